@@ -1,0 +1,192 @@
+//! The one error type of the libraries: what was wrong, where, and what to do.
+
+use std::path::PathBuf;
+
+/// Result of this crate's functions.
+pub type Result<T, E = Error> = std::result::Result<T, E>;
+
+/// What can go wrong, in words a user can act on.
+///
+/// The message is one line. [`Error::is_usage`] tells a call that was wrong
+/// (exit status 2) from work that failed (exit status 1).
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// A name that no registered item has.
+    #[error("unknown {kind} `{name}`{}", suggestion(.near))]
+    UnknownName {
+        /// What kind of thing was looked for, such as `task`.
+        kind: &'static str,
+        /// The name asked for.
+        name: String,
+        /// Names that come close, nearest first; all names where none does.
+        near: Vec<String>,
+    },
+    /// A scene that cannot be read or that an engine refuses.
+    #[error("scene {scene}: {message}")]
+    Scene {
+        /// Name or path of the scene.
+        scene: String,
+        /// What is wrong and where in it.
+        message: String,
+    },
+    /// A parameter target or its values that make no sense in this scene.
+    #[error("parameter `{parameter}`: {message}")]
+    Parameter {
+        /// Name or target of the parameter.
+        parameter: String,
+        /// What is wrong.
+        message: String,
+    },
+    /// A configuration value out of its domain.
+    #[error("config {key}: {message}")]
+    Config {
+        /// The key, dotted.
+        key: String,
+        /// What is wrong and what is allowed.
+        message: String,
+    },
+    /// A log that cannot be used.
+    #[error("log {}: {message}", .path.display())]
+    Log {
+        /// File of the log.
+        path: PathBuf,
+        /// What is wrong, with row and column where known.
+        message: String,
+    },
+    /// An engine or library that is not there.
+    #[error("{what} is not available: {message}")]
+    Missing {
+        /// What is missing.
+        what: String,
+        /// Why, and how to get it.
+        message: String,
+    },
+    /// An engine cannot do what was asked.
+    #[error("backend `{backend}` cannot {what}")]
+    Incapable {
+        /// The engine.
+        backend: String,
+        /// What it cannot do.
+        what: String,
+    },
+    /// A file could not be read or written.
+    #[error("{}: {message}", .path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// What happened.
+        message: String,
+    },
+    /// Work that had begun failed.
+    #[error("{0}")]
+    Failed(String),
+    /// A caller of the library handed arrays or indices that do not fit.
+    #[error("{0}")]
+    Shape(String),
+    /// The user interrupted the work.
+    #[error("interrupted")]
+    Interrupted,
+}
+
+impl Error {
+    /// True where the call was wrong rather than the work.
+    #[must_use]
+    pub fn is_usage(&self) -> bool {
+        !matches!(self, Self::Failed(_) | Self::Shape(_) | Self::Interrupted)
+    }
+
+    /// An error of kind [`Error::UnknownName`] with the names that come close.
+    #[must_use]
+    pub fn unknown<'a>(
+        kind: &'static str,
+        name: &str,
+        known: impl IntoIterator<Item = &'a str>,
+    ) -> Self {
+        Self::UnknownName {
+            kind,
+            name: name.to_owned(),
+            near: near_names(name, known),
+        }
+    }
+}
+
+fn suggestion(near: &[String]) -> String {
+    match near {
+        [] => String::new(),
+        [one] => format!("; did you mean `{one}`?"),
+        many => format!(
+            "; known: {}",
+            many.iter()
+                .map(|n| format!("`{n}`"))
+                .collect::<Vec<_>>()
+                .join(", ")
+        ),
+    }
+}
+
+/// Names within a third of their length in edits of `name` or containing it,
+/// nearest first; all of `known` where none is near.
+fn near_names<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Vec<String> {
+    let known: Vec<&str> = known.into_iter().collect();
+    let mut near: Vec<(usize, &str)> = known
+        .iter()
+        .filter_map(|&k| {
+            let distance = edit_distance(name, k);
+            let close = distance <= k.len().max(name.len()) / 3;
+            let part = name.len() >= 2 && (k.contains(name) || name.contains(k));
+            (close || part).then_some((distance, k))
+        })
+        .collect();
+    near.sort();
+    if near.is_empty() {
+        return known.iter().map(|&k| k.to_owned()).collect();
+    }
+    near.into_iter().map(|(_, k)| k.to_owned()).collect()
+}
+
+/// Levenshtein distance in characters.
+fn edit_distance(a: &str, b: &str) -> usize {
+    let b: Vec<char> = b.chars().collect();
+    let mut row: Vec<usize> = (0..=b.len()).collect();
+    for (i, ca) in a.chars().enumerate() {
+        let mut diagonal = row[0];
+        row[0] = i + 1;
+        for (j, &cb) in b.iter().enumerate() {
+            let substituted = diagonal + usize::from(ca != cb);
+            diagonal = row[j + 1];
+            row[j + 1] = substituted.min(row[j] + 1).min(diagonal + 1);
+        }
+    }
+    row[b.len()]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_typo_names_its_neighbour() {
+        let error = Error::unknown("task", "rod-balancin", ["rod-balancing", "shuffleboard"]);
+        assert_eq!(
+            error.to_string(),
+            "unknown task `rod-balancin`; did you mean `rod-balancing`?"
+        );
+        assert!(error.is_usage());
+    }
+
+    #[test]
+    fn a_wild_guess_lists_everything() {
+        let error = Error::unknown("backend", "zzz", ["mujoco", "rapier"]);
+        assert_eq!(
+            error.to_string(),
+            "unknown backend `zzz`; known: `mujoco`, `rapier`"
+        );
+    }
+
+    #[test]
+    fn edit_distance_counts_edits() {
+        assert_eq!(edit_distance("kitten", "sitting"), 3);
+        assert_eq!(edit_distance("", "abc"), 3);
+        assert_eq!(edit_distance("reps", "reps"), 0);
+    }
+}
