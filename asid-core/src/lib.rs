@@ -2,8 +2,18 @@
 //!
 //! This crate knows no engine and no network.
 
+pub mod backend;
 pub mod environment;
 pub mod error;
+pub mod layout;
+pub mod mass;
+pub mod registry;
+pub mod scene;
+pub mod simulator;
 
+pub use backend::{Backend, Capabilities, Model};
 pub use environment::{BatchEnvironment, Transition};
 pub use error::{Error, Result};
+pub use layout::{Layout, Recording, Target};
+pub use scene::Scene;
+pub use simulator::{BatchConfig, Control, Rollout, Simulator, Snapshot, Status};

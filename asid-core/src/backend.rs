@@ -1,0 +1,86 @@
+//! An engine: compiles a scene, says what it can do, makes batches.
+
+use std::sync::Arc;
+
+use crate::error::Result;
+use crate::layout::{Layout, Target};
+use crate::scene::Scene;
+use crate::simulator::{BatchConfig, Simulator};
+
+bitflags::bitflags! {
+    /// What an engine can do. Tests and algorithms branch on these bits and
+    /// never on an engine's name.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub struct Capabilities: u64 {
+        /// Hinge, slide and ball joints in a tree.
+        const ARTICULATION = 1 << 0;
+        /// Free bodies with contact between primitive shapes.
+        const CONTACT = 1 << 1;
+        /// Dry friction of joints.
+        const JOINT_FRICTION = 1 << 2;
+        /// Torsional friction of contacts.
+        const TORSIONAL_FRICTION = 1 << 3;
+        /// Rolling friction of contacts.
+        const ROLLING_FRICTION = 1 << 4;
+        /// Softness of contacts can be set.
+        const CONTACT_STIFFNESS = 1 << 5;
+        /// Position and velocity servos, and torque drives.
+        const ACTUATORS = 1 << 6;
+        /// A saved state continues to the bit.
+        const EXACT_SNAPSHOT = 1 << 7;
+        /// Wrenches on bodies during a rollout.
+        const EXTERNAL_FORCES = 1 << 8;
+        /// Parameters may change during a rollout.
+        const PARAMETER_CHANGES = 1 << 9;
+        /// Hooks before each physics step.
+        const STEP_HOOKS = 1 << 10;
+        /// Normal forces between two bodies can be recorded.
+        const CONTACT_FORCES = 1 << 11;
+        /// Computes in double precision.
+        const DOUBLE_PRECISION = 1 << 12;
+        /// Springs, dampers and rotor inertia of joints.
+        const JOINT_IMPEDANCE = 1 << 13;
+        /// Equality constraints (weld, connect).
+        const EQUALITY = 1 << 14;
+        /// Triangle meshes.
+        const MESHES = 1 << 15;
+    }
+}
+
+/// An engine that loads scenes.
+pub trait Backend: Send + Sync {
+    /// Name on the command line, such as `mujoco`.
+    fn name(&self) -> &str;
+
+    /// Version of the engine.
+    fn version(&self) -> String;
+
+    /// What it can do.
+    fn capabilities(&self) -> Capabilities;
+
+    /// Compiles a scene.
+    ///
+    /// # Errors
+    /// [`crate::Error::Scene`] where the engine refuses it or would ignore a
+    /// part that changes the physics.
+    fn load(&self, scene: &Scene) -> Result<Arc<dyn Model>>;
+}
+
+/// A scene compiled by an engine; batches are made of it.
+pub trait Model: Send + Sync {
+    /// Names and places.
+    fn layout(&self) -> &Layout;
+
+    /// Value of a target in the scene as it is.
+    ///
+    /// # Errors
+    /// [`crate::Error::Parameter`] where the scene has no such target or the
+    /// engine cannot change it.
+    fn nominal(&self, target: &Target) -> Result<f64>;
+
+    /// Makes a batch, every simulation reset and with nominal parameters.
+    ///
+    /// # Errors
+    /// As [`Model::nominal`], for every target of the configuration.
+    fn simulator(&self, config: &BatchConfig) -> Result<Box<dyn Simulator>>;
+}

@@ -1,0 +1,257 @@
+//! A scene: one MJCF document that every backend loads.
+//!
+//! MJCF is the common language of the engines, so the scene *is* the document
+//! and nothing more. Includes are spliced in when it is read, by text and not
+//! by an engine, so that every engine sees the same bytes and `asid export`
+//! writes exactly what was simulated.
+
+use std::path::{Path, PathBuf};
+
+use crate::error::{Error, Result};
+
+/// Deepest chain of `<include>` that is followed.
+const MAX_INCLUDE_DEPTH: usize = 8;
+
+/// One MJCF document with its includes spliced in.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scene {
+    name: String,
+    xml: String,
+    directory: Option<PathBuf>,
+}
+
+impl Scene {
+    /// Reads a document and its includes from files.
+    ///
+    /// # Errors
+    /// When a file is missing, is not well-formed XML, or is not MJCF; the
+    /// message names file, line and column.
+    pub fn from_file(path: &Path) -> Result<Self> {
+        let xml = read(path)?;
+        let directory = path.parent().map(Path::to_path_buf).unwrap_or_default();
+        let name = path.display().to_string();
+        let from = directory.clone();
+        let xml = splice(&name, &xml, 0, &|file| read(&from.join(file)))?;
+        Self::checked(name, xml, Some(directory))
+    }
+
+    /// A document held in memory; `includes` are pairs of file name, as written
+    /// in the document, and text.
+    ///
+    /// # Errors
+    /// As [`Scene::from_file`].
+    pub fn from_xml(name: &str, xml: &str, includes: &[(&str, &str)]) -> Result<Self> {
+        let xml = splice(name, xml, 0, &|file| {
+            includes
+                .iter()
+                .find(|(n, _)| *n == file)
+                .map(|(_, text)| (*text).to_owned())
+                .ok_or_else(|| Error::Scene {
+                    scene: name.to_owned(),
+                    message: format!("included file `{file}` is not there"),
+                })
+        })?;
+        Self::checked(name.to_owned(), xml, None)
+    }
+
+    fn checked(name: String, xml: String, directory: Option<PathBuf>) -> Result<Self> {
+        let document = parse(&name, &xml)?;
+        let root = document.root_element().tag_name().name().to_owned();
+        if root != "mujoco" {
+            return Err(Error::Scene {
+                scene: name,
+                message: format!("the root element is <{root}>, but MJCF begins with <mujoco>"),
+            });
+        }
+        Ok(Self {
+            name,
+            xml,
+            directory,
+        })
+    }
+
+    /// Path or name it was read by.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// The whole document, includes spliced in.
+    #[must_use]
+    pub fn xml(&self) -> &str {
+        &self.xml
+    }
+
+    /// Folder that relative asset paths start from; `None` for a scene from memory.
+    #[must_use]
+    pub fn directory(&self) -> Option<&Path> {
+        self.directory.as_deref()
+    }
+
+    /// The parsed document, with defaults resolved, for what is read from a
+    /// scene without an engine (kinematics, mass properties, names).
+    ///
+    /// # Errors
+    /// When the document is not valid MJCF.
+    pub fn description(&self) -> Result<mjcf_rs::Model> {
+        let base = self.directory.clone().unwrap_or_default();
+        mjcf_rs::Model::from_str(&self.xml, &base).map_err(|e| Error::Scene {
+            scene: self.name.clone(),
+            message: one_line(&e.to_string()),
+        })
+    }
+
+    /// The same scene with another physics time step, seconds.
+    ///
+    /// # Errors
+    /// When `timestep` is not a positive number.
+    pub fn with_timestep(&self, timestep: f64) -> Result<Self> {
+        if !(timestep.is_finite() && timestep > 0.0) {
+            return Err(Error::Config {
+                key: "timestep".into(),
+                message: format!("must be a positive number of seconds, not {timestep}"),
+            });
+        }
+        let document = parse(&self.name, &self.xml)?;
+        let value = format!("{timestep:?}");
+        // The last value of a repeated section wins, so an option element at
+        // the end settles it whatever the document said before.
+        let end = document.root_element().range().end;
+        let close = self.xml[..end].rfind("</").ok_or_else(|| Error::Scene {
+            scene: self.name.clone(),
+            message: "the document is empty".into(),
+        })?;
+        let mut xml = self.xml.clone();
+        xml.insert_str(close, &format!("<option timestep=\"{value}\"/>\n"));
+        Ok(Self {
+            xml,
+            ..self.clone()
+        })
+    }
+}
+
+fn read(path: &Path) -> Result<String> {
+    std::fs::read_to_string(path).map_err(|e| Error::Scene {
+        scene: path.display().to_string(),
+        message: match e.kind() {
+            std::io::ErrorKind::NotFound => "no such file".into(),
+            std::io::ErrorKind::InvalidData => "is not UTF-8 text".into(),
+            _ => e.to_string(),
+        },
+    })
+}
+
+fn parse<'a>(name: &str, xml: &'a str) -> Result<roxmltree::Document<'a>> {
+    roxmltree::Document::parse(xml).map_err(|e| Error::Scene {
+        scene: name.to_owned(),
+        message: format!("is not well-formed XML: {}", one_line(&e.to_string())),
+    })
+}
+
+/// Replaces every `<include file="…"/>` by the children of that file's root.
+fn splice(
+    name: &str,
+    xml: &str,
+    depth: usize,
+    load: &dyn Fn(&str) -> Result<String>,
+) -> Result<String> {
+    if depth > MAX_INCLUDE_DEPTH {
+        return Err(Error::Scene {
+            scene: name.to_owned(),
+            message: format!(
+                "includes are nested deeper than {MAX_INCLUDE_DEPTH}: is there a cycle?"
+            ),
+        });
+    }
+    let document = parse(name, xml)?;
+    let mut out = String::with_capacity(xml.len());
+    let mut copied = 0;
+    for node in document.descendants().filter(|n| n.has_tag_name("include")) {
+        let file = node.attribute("file").ok_or_else(|| Error::Scene {
+            scene: name.to_owned(),
+            message: format!(
+                "line {}: <include> has no `file`",
+                document.text_pos_at(node.range().start).row
+            ),
+        })?;
+        let text = splice(file, &load(file)?, depth + 1, load)?;
+        let included = parse(file, &text)?;
+        let root = included.root_element();
+        out.push_str(&xml[copied..node.range().start]);
+        if let (Some(first), Some(last)) = (root.first_child(), root.last_child()) {
+            out.push_str(&text[first.range().start..last.range().end]);
+        }
+        copied = node.range().end;
+    }
+    out.push_str(&xml[copied..]);
+    Ok(out)
+}
+
+/// Error texts of parsers folded to one line.
+pub(crate) fn one_line(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn includes_are_spliced_in_place() {
+        let scene = Scene::from_xml(
+            "outer",
+            r#"<mujoco><include file="inner.xml"/><worldbody/></mujoco>"#,
+            &[(
+                "inner.xml",
+                r#"<mujocoinclude><option timestep="0.01"/></mujocoinclude>"#,
+            )],
+        )
+        .unwrap();
+        assert_eq!(
+            scene.xml(),
+            r#"<mujoco><option timestep="0.01"/><worldbody/></mujoco>"#
+        );
+    }
+
+    #[test]
+    fn an_include_cycle_is_an_error() {
+        let error = Scene::from_xml(
+            "a.xml",
+            r#"<mujoco><include file="a.xml"/></mujoco>"#,
+            &[("a.xml", r#"<mujoco><include file="a.xml"/></mujoco>"#)],
+        )
+        .unwrap_err();
+        assert!(error.to_string().contains("cycle"), "{error}");
+    }
+
+    #[test]
+    fn malformed_xml_names_the_place() {
+        let error = Scene::from_xml("bad.xml", "<mujoco><body></mujoco>", &[]).unwrap_err();
+        let text = error.to_string();
+        assert!(
+            text.starts_with("scene bad.xml: is not well-formed XML"),
+            "{text}"
+        );
+        assert!(text.contains("1:"), "{text}");
+    }
+
+    #[test]
+    fn another_root_is_refused() {
+        let error = Scene::from_xml("robot.urdf", "<robot/>", &[]).unwrap_err();
+        assert!(error.to_string().contains("<robot>"), "{error}");
+    }
+
+    #[test]
+    fn the_last_timestep_wins() {
+        let scene = Scene::from_xml(
+            "s",
+            r#"<mujoco><option timestep="0.01"/><worldbody/></mujoco>"#,
+            &[],
+        )
+        .unwrap()
+        .with_timestep(0.001)
+        .unwrap();
+        let model = scene.description().unwrap();
+        assert!((model.option.timestep - 0.001).abs() < 1e-12);
+    }
+}

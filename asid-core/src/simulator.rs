@@ -1,0 +1,347 @@
+//! A batch of simulations of one scene.
+//!
+//! Everything is a call on the whole batch with caller-owned, row-major arrays
+//! of `f64`, one row a simulation: that is what makes an engine behind it fast
+//! (one call, all cores, no allocation), what makes it a C table (an engine
+//! plugin is such a table), and what makes results independent of the number
+//! of threads. The price is that a single simulation is a batch of one.
+//!
+//! A *frame* is the interval at which commands change and readings are
+//! recorded; it takes one or more physics steps (`substeps`).
+
+use std::any::Any;
+use std::sync::Arc;
+
+use crate::error::Result;
+use crate::layout::{Layout, Recording, Target};
+
+/// State of one simulation.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub enum Status {
+    /// It runs.
+    #[default]
+    Running,
+    /// Its state left the finite or plausible range. It stands still, records
+    /// NaN, and takes no part until it is reset, loaded or copied into.
+    Diverged {
+        /// Simulated time at which it was seen, s.
+        time: f64,
+        /// What the engine said.
+        message: String,
+    },
+}
+
+impl Status {
+    /// True where it runs.
+    #[must_use]
+    pub fn is_running(&self) -> bool {
+        matches!(self, Self::Running)
+    }
+}
+
+/// How a batch is made.
+#[derive(Clone, Debug, Default)]
+pub struct BatchConfig {
+    /// Number of simulations.
+    pub size: usize,
+    /// Threads; 0 for one a core. Results do not depend on it.
+    pub threads: usize,
+    /// What [`Simulator::set_parameters`] sets, one column each.
+    pub targets: Vec<Target>,
+}
+
+/// States of some simulations, opaque and exact: restored, a simulation goes on
+/// to the bit. Valid in every batch made of the same compiled scene.
+#[derive(Clone)]
+pub struct Snapshot {
+    data: Arc<dyn Any + Send + Sync>,
+    rows: usize,
+}
+
+impl std::fmt::Debug for Snapshot {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "Snapshot({} rows)", self.rows)
+    }
+}
+
+impl Snapshot {
+    /// Wraps an engine's own data for `rows` simulations.
+    pub fn new<T: Any + Send + Sync>(data: T, rows: usize) -> Self {
+        Self {
+            data: Arc::new(data),
+            rows,
+        }
+    }
+
+    /// Number of states in it.
+    #[must_use]
+    pub fn rows(&self) -> usize {
+        self.rows
+    }
+
+    /// The engine's own data, where it is of type `T`.
+    #[must_use]
+    pub fn data<T: Any>(&self) -> Option<&T> {
+        self.data.downcast_ref()
+    }
+}
+
+/// Commands of a rollout.
+#[derive(Clone, Copy, Debug)]
+pub enum Control<'a> {
+    /// One trajectory for all, `frames x nu`.
+    Shared(&'a [f64]),
+    /// One trajectory a simulation, `sims x frames x nu`.
+    PerSimulation(&'a [f64]),
+}
+
+/// A wrench on one body, constant over each frame: force (N) and torque (N m)
+/// in the world frame, at the body's centre of mass.
+#[derive(Clone, Copy, Debug)]
+pub struct ExternalForce<'a> {
+    /// Index in [`Layout::bodies`].
+    pub body: usize,
+    /// `sims x frames x 6`: force, then torque.
+    pub wrench: &'a [f64],
+}
+
+/// A parameter that takes another value from some frame on.
+#[derive(Clone, Copy, Debug)]
+pub struct ParameterChange<'a> {
+    /// First frame with the new value.
+    pub frame: usize,
+    /// Column in [`BatchConfig::targets`].
+    pub column: usize,
+    /// New values, one a simulation of the rollout.
+    pub values: &'a [f64],
+}
+
+/// What a [`StepHook`] sees of a simulation before a physics step, and may change.
+#[derive(Debug)]
+pub struct StepView<'a> {
+    /// Simulated time since the last reset or load, s.
+    pub time: f64,
+    /// Positions, `nq`.
+    pub qpos: &'a [f64],
+    /// Velocities, `nv`.
+    pub qvel: &'a [f64],
+    /// Command of this step, `nu`; it may be changed, for this step only.
+    pub ctrl: &'a mut [f64],
+    /// Generalised force to add in this step, `nv`; zero on entry.
+    pub force: &'a mut [f64],
+}
+
+/// Physics that an engine does not have, called before each physics step of
+/// each simulation, from several threads at once.
+///
+/// It is the door for effects whose force depends on the state. It costs a call
+/// a step; a rollout without a hook pays nothing.
+pub trait StepHook: Sync {
+    /// Called before a physics step; `row` is the row of the rollout (not the
+    /// simulation's number), `step` the physics step since its start.
+    fn before_step(&self, row: usize, step: usize, view: &mut StepView<'_>);
+}
+
+/// One rollout of some simulations of a batch.
+#[derive(Clone, Copy)]
+pub struct Rollout<'a> {
+    /// Which simulations, strictly increasing.
+    pub sims: &'a [usize],
+    /// Number of frames.
+    pub frames: usize,
+    /// Physics steps a frame.
+    pub substeps: usize,
+    /// Commands.
+    pub control: Control<'a>,
+    /// External forces, at most one entry a body.
+    pub forces: &'a [ExternalForce<'a>],
+    /// Parameter changes, by frame.
+    pub changes: &'a [ParameterChange<'a>],
+    /// Physics the engine lacks.
+    pub hook: Option<&'a dyn StepHook>,
+    /// What is recorded at the end of each frame: the state then, before any
+    /// later command acts.
+    pub record: &'a Recording,
+}
+
+impl<'a> Rollout<'a> {
+    /// A plain rollout: commands in, readings out.
+    #[must_use]
+    pub fn new(
+        sims: &'a [usize],
+        frames: usize,
+        substeps: usize,
+        control: Control<'a>,
+        record: &'a Recording,
+    ) -> Self {
+        Self {
+            sims,
+            frames,
+            substeps,
+            control,
+            forces: &[],
+            changes: &[],
+            hook: None,
+            record,
+        }
+    }
+
+    /// Checks every array's length against the batch, for engines to call first.
+    ///
+    /// # Errors
+    /// [`crate::Error::Shape`], naming the array.
+    pub fn check(
+        &self,
+        layout: &Layout,
+        batch_size: usize,
+        columns: usize,
+        out: &[f64],
+    ) -> Result<()> {
+        let n = self.sims.len();
+        check_sims(self.sims, batch_size)?;
+        let control = n_checked(match self.control {
+            Control::Shared(c) => (c.len(), self.frames * layout.nu()),
+            Control::PerSimulation(c) => (c.len(), n * self.frames * layout.nu()),
+        });
+        expect(control, "control")?;
+        if let Control::Shared(c) | Control::PerSimulation(c) = self.control
+            && c.iter().any(|x| !x.is_finite())
+        {
+            return Err(shape("control holds a value that is not finite".into()));
+        }
+        for force in self.forces {
+            if force.body == 0 || force.body >= layout.bodies.len() {
+                return Err(shape(format!(
+                    "external force on body {} of {}",
+                    force.body,
+                    layout.bodies.len()
+                )));
+            }
+            expect(
+                n_checked((force.wrench.len(), n * self.frames * 6)),
+                "external force",
+            )?;
+            if force.wrench.iter().any(|x| !x.is_finite()) {
+                return Err(shape(
+                    "external force holds a value that is not finite".into(),
+                ));
+            }
+        }
+        for change in self.changes {
+            if change.column >= columns || change.frame >= self.frames {
+                return Err(shape(format!(
+                    "parameter change of column {} at frame {}: there are {columns} columns and {} frames",
+                    change.column, change.frame, self.frames
+                )));
+            }
+            expect(n_checked((change.values.len(), n)), "parameter change")?;
+        }
+        expect(
+            n_checked((out.len(), n * self.frames * self.record.width())),
+            "output",
+        )
+    }
+}
+
+fn shape(message: String) -> crate::Error {
+    crate::Error::Shape(message)
+}
+
+fn n_checked((have, want): (usize, usize)) -> Option<(usize, usize)> {
+    (have != want).then_some((have, want))
+}
+
+fn expect(mismatch: Option<(usize, usize)>, what: &str) -> Result<()> {
+    match mismatch {
+        None => Ok(()),
+        Some((have, want)) => Err(shape(format!(
+            "{what} has {have} values where {want} are needed"
+        ))),
+    }
+}
+
+/// Checks that `sims` are strictly increasing and within the batch.
+///
+/// # Errors
+/// [`crate::Error::Shape`] otherwise.
+pub fn check_sims(sims: &[usize], batch_size: usize) -> Result<()> {
+    if sims.windows(2).any(|w| w[0] >= w[1]) || sims.last().is_some_and(|&s| s >= batch_size) {
+        return Err(shape(format!(
+            "simulations must be strictly increasing and below {batch_size}"
+        )));
+    }
+    Ok(())
+}
+
+/// A batch of `n` simulations of one scene, with their own states and parameters.
+///
+/// All methods take the simulations they act on as strictly increasing indices
+/// and check the lengths of arrays. Errors are about the call; what happens to
+/// one simulation is in [`Simulator::status`] and never disturbs the others.
+pub trait Simulator: Send {
+    /// Names and places.
+    fn layout(&self) -> &Layout;
+
+    /// Number of simulations, `n`.
+    fn batch_size(&self) -> usize;
+
+    /// Sets the parameters of some simulations: `sims x columns`, in the order of
+    /// [`BatchConfig::targets`]. States stay as they are.
+    ///
+    /// # Errors
+    /// When a length does not fit or a value is not finite or not physical
+    /// (a negative mass or friction).
+    fn set_parameters(&mut self, sims: &[usize], values: &[f64]) -> Result<()>;
+
+    /// Puts simulations into the scene's first keyframe, or its default state
+    /// where it has none, at time zero with no memory of before.
+    ///
+    /// # Errors
+    /// When `sims` do not fit.
+    fn reset(&mut self, sims: &[usize]) -> Result<()>;
+
+    /// Sets positions (`sims x nq`) and velocities (`sims x nv`); quaternions
+    /// are normalised. Contacts are found anew; time and parameters stay.
+    ///
+    /// # Errors
+    /// When a length does not fit or a value is not finite.
+    fn set_state(&mut self, sims: &[usize], qpos: &[f64], qvel: &[f64]) -> Result<()>;
+
+    /// Runs a rollout and writes `sims x frames x record.width()` readings.
+    /// Rows of a simulation that has diverged are NaN from that frame on.
+    ///
+    /// # Errors
+    /// When an array does not fit.
+    fn rollout(&mut self, rollout: &Rollout<'_>, out: &mut [f64]) -> Result<()>;
+
+    /// Reads the present state without stepping: `sims x record.width()`.
+    ///
+    /// # Errors
+    /// When an array does not fit.
+    fn read(&mut self, sims: &[usize], record: &Recording, out: &mut [f64]) -> Result<()>;
+
+    /// Saves the states of some simulations, one row each. Parameters are not part of a state.
+    ///
+    /// # Errors
+    /// When `sims` do not fit.
+    fn save(&mut self, sims: &[usize]) -> Result<Snapshot>;
+
+    /// Restores states: simulation `sims[i]` takes row `rows[i]`, and keeps its parameters.
+    ///
+    /// # Errors
+    /// When the snapshot is of another scene or an index does not fit.
+    fn load(&mut self, snapshot: &Snapshot, rows: &[usize], sims: &[usize]) -> Result<()>;
+
+    /// Copies states within the batch: `to[i]` takes the state of `from[i]` and keeps
+    /// its own parameters. `to` must not contain an index that is in `from`.
+    ///
+    /// # Errors
+    /// When an index does not fit.
+    fn copy_state(&mut self, from: &[usize], to: &[usize]) -> Result<()>;
+
+    /// Status of each simulation, `n`.
+    fn status(&self) -> &[Status];
+
+    /// Physics steps taken by all simulations of the batch since it was made.
+    fn steps_taken(&self) -> u64;
+}
