@@ -1,2 +1,83 @@
-//! Developer entry.
-fn main() {}
+//! Developer entry of the repository: `cargo xtask <subcommand>`.
+//!
+//! One file a subcommand. This crate links no native library, because it is
+//! what fetches them.
+
+// A developer tool talks to the terminal.
+#![allow(clippy::print_stdout, clippy::print_stderr)]
+
+mod library;
+mod lint;
+mod setup;
+mod stage;
+mod test;
+mod wheel;
+
+use std::process::ExitCode;
+
+use anyhow::{Result, bail};
+
+const HELP: &str = "\
+Usage: cargo xtask <subcommand>
+
+  setup [--only mujoco|torch]  fetches the native libraries into .native/ (quick when all is there)
+  lint                         formatting, clippy and rustdoc over the workspace, all features
+  test                         setup, lint and every test: what CI runs
+
+A library that you have already wins: set MUJOCO_DYNAMIC_LINK_DIR to the folder of libmujoco.so,
+LIBTORCH to the folder that holds lib/ and include/, or LIBTORCH_USE_PYTORCH=1.
+Without a network: PIP_NO_INDEX=1 PIP_FIND_LINKS=<folder of wheels> cargo xtask setup";
+
+fn main() -> ExitCode {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    match run(&arguments) {
+        Ok(true) => ExitCode::SUCCESS,
+        Ok(false) => ExitCode::FAILURE,
+        Err(error) => {
+            eprintln!("xtask: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// Runs one subcommand; false where it ran and found something wrong.
+fn run(arguments: &[String]) -> Result<bool> {
+    let Some((subcommand, rest)) = arguments.split_first() else {
+        bail!("no subcommand\n{HELP}");
+    };
+    match subcommand.as_str() {
+        "setup" => setup::run(&setup::selection(rest)?).map(|()| true),
+        "lint" => without_arguments(rest).and_then(|()| lint::run()),
+        "test" => without_arguments(rest).and_then(|()| test::run()),
+        "help" | "--help" | "-h" => {
+            println!("{HELP}");
+            Ok(true)
+        }
+        other => bail!("unknown subcommand `{other}`; known: setup, lint, test, help"),
+    }
+}
+
+fn without_arguments(rest: &[String]) -> Result<()> {
+    match rest.first() {
+        Some(argument) => bail!("unexpected argument `{argument}`; this subcommand takes none"),
+        None => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn error_of(arguments: &[&str]) -> String {
+        let arguments: Vec<String> = arguments.iter().map(|a| (*a).to_owned()).collect();
+        run(&arguments).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn wrong_calls_say_what_is_known() {
+        assert!(error_of(&[]).starts_with("no subcommand"));
+        assert!(error_of(&["tset"]).contains("known: setup, lint, test"));
+        assert!(error_of(&["test", "--fast"]).contains("`--fast`"));
+        assert!(error_of(&["setup", "--only", "bullet"]).contains("known: mujoco, torch"));
+    }
+}

@@ -1,0 +1,21 @@
+//! Lets this crate's tests and examples find libtorch: an rpath to `$LIBTORCH/lib`.
+//!
+//! Where LIBTORCH is not set (`LIBTORCH_USE_PYTORCH=1`, or a system-wide
+//! libtorch) nothing is added and the loader's own search path holds.
+
+// A build script speaks to cargo through its standard output.
+#![allow(clippy::print_stdout)]
+
+use std::env;
+use std::path::PathBuf;
+
+fn main() {
+    println!("cargo:rerun-if-changed=build.rs");
+    println!("cargo:rerun-if-env-changed=LIBTORCH");
+    let Some(value) = env::var_os("LIBTORCH") else {
+        return;
+    };
+    if let Ok(folder) = PathBuf::from(value).join("lib").canonicalize() {
+        println!("cargo:rustc-link-arg=-Wl,-rpath,{}", folder.display());
+    }
+}

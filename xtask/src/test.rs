@@ -1,0 +1,16 @@
+//! `cargo xtask test`: set-up, lints and every test, with one summary. CI runs this.
+
+use anyhow::Result;
+
+use crate::lint::stages_of_lint;
+use crate::stage::{ALL_FEATURES, Stages};
+use crate::{library, setup};
+
+/// Runs everything; without the native libraries nothing else can be built.
+pub fn run() -> Result<bool> {
+    let mut stages = Stages::default();
+    stages.run("setup", || setup::run(&library::ALL).map(|()| true))?;
+    stages_of_lint(&mut stages)?;
+    stages.cargo("tests", &["test", "--workspace", ALL_FEATURES], &[])?;
+    Ok(stages.finish())
+}
