@@ -5,10 +5,14 @@
 pub mod backend;
 pub mod environment;
 pub mod error;
+pub mod kinematics;
 pub mod layout;
 pub mod mass;
+pub mod parameter;
 pub mod registry;
+pub mod rng;
 pub mod scene;
+pub mod signal;
 pub mod simulator;
 
 pub use backend::{Backend, Capabilities, Model};
