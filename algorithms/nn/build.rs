@@ -7,15 +7,15 @@
 #![allow(clippy::print_stdout)]
 
 use std::env;
-use std::path::PathBuf;
+use std::path::{Path, absolute};
 
 fn main() {
     println!("cargo:rerun-if-changed=build.rs");
     println!("cargo:rerun-if-env-changed=LIBTORCH");
-    let Some(value) = env::var_os("LIBTORCH") else {
+    let Some(value) = env::var_os("LIBTORCH").filter(|v| !v.is_empty()) else {
         return;
     };
-    if let Ok(folder) = PathBuf::from(value).join("lib").canonicalize() {
+    if let Ok(folder) = absolute(Path::new(&value).join("lib")) {
         println!("cargo:rustc-link-arg=-Wl,-rpath,{}", folder.display());
     }
 }

@@ -1,0 +1,307 @@
+//! Proximal policy optimisation with a clipped objective (Schulman et al. 2017,
+//! "Proximal policy optimization algorithms", algorithm 1), from top to bottom.
+//!
+//! ```text
+//! repeat
+//!     act for n_steps in the batch of environments      (rollout.rs)
+//!     advantages by generalised advantage estimation    (gae.rs)
+//!     for each epoch and minibatch
+//!         ascend the clipped surrogate objective        (surrogate.rs)
+//!         and descend the squared error of the critic
+//! ```
+//!
+//! A time limit is not a failure: a truncated episode is worth what the critic
+//! says of the state it reached. Rewards have a constant scale.
+
+use std::ops::ControlFlow;
+
+use asid_core::{BatchEnvironment, Error, Result};
+use rand::SeedableRng;
+use rand::seq::SliceRandom;
+use rand_chacha::ChaCha8Rng;
+use serde::{Deserialize, Serialize};
+use tch::nn::{Adam, Optimizer, OptimizerConfig};
+use tch::{Kind, Tensor};
+
+use crate::actor_critic::{ActorCritic, to_vec};
+use crate::config::PpoConfig;
+use crate::evaluation::{Evaluation, evaluate, mean_and_std};
+use crate::gae::{Outcome, advantages};
+use crate::normaliser::Normaliser;
+use crate::policy::Policy;
+use crate::rollout::{Collector, Rollout};
+use crate::surrogate::{Shift, clipped_surrogate_loss, shift};
+
+/// One point of the learning curve: what one update did.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PpoProgress {
+    /// Environment steps so far, over the whole batch.
+    pub env_steps: usize,
+    /// Environment steps to train for.
+    pub total_steps: usize,
+    /// Mean undiscounted, unscaled return of the episodes that ended in this
+    /// rollout; none where no episode ended.
+    pub mean_return: Option<f64>,
+    /// Standard deviation of those returns.
+    pub return_std: Option<f64>,
+    /// Mean standard deviation of the entries of an action.
+    pub action_std: f64,
+    /// KL(old, new) over this rollout's samples after the update.
+    pub approx_kl: f64,
+    /// Share of this rollout's samples outside the clipping interval after the update.
+    pub clip_fraction: f64,
+    /// Entropy of an action, in nats.
+    pub entropy: f64,
+    /// Share of the variance of the critic's targets that it explained before
+    /// the update; none where the targets do not vary.
+    pub explained_variance: Option<f64>,
+}
+
+/// What [`train`] returns.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Trained {
+    /// The policy, with the normaliser of its observations.
+    pub policy: Policy,
+    /// One point an update.
+    pub curve: Vec<PpoProgress>,
+    /// Returns without action noise, after training; none where the settings ask for no episode.
+    pub evaluation: Option<Evaluation>,
+}
+
+/// Trains a policy on `environment`.
+///
+/// `on_progress` sees every point of the curve; [`ControlFlow::Break`] ends the
+/// training there, and what has been learnt so far is evaluated and returned.
+/// On the CPU, equal seeds (and equal environments) give equal results: libtorch
+/// is set to one thread, for the process.
+///
+/// # Errors
+/// [`Error::Config`] for settings out of their domain, [`Error::Missing`] for a
+/// device that is not there, those of the environment, and [`Error::Failed`]
+/// where an observation, a reward or the policy stops being finite.
+pub fn train(
+    environment: &mut dyn BatchEnvironment,
+    config: &PpoConfig,
+    seed: u64,
+    on_progress: &mut dyn FnMut(&PpoProgress) -> ControlFlow<()>,
+) -> Result<Trained> {
+    let learnt = learn(environment, config, seed, on_progress)?;
+    let policy = learnt.networks.policy(&learnt.normaliser);
+    let evaluation = match config.evaluation_episodes {
+        0 => None,
+        episodes => Some(evaluate(environment, &policy, episodes)?),
+    };
+    Ok(Trained {
+        policy,
+        curve: learnt.curve,
+        evaluation,
+    })
+}
+
+/// Networks and curve, before they become a [`Trained`].
+pub(crate) struct Learnt {
+    pub networks: ActorCritic,
+    pub normaliser: Normaliser,
+    pub curve: Vec<PpoProgress>,
+}
+
+/// The outer loop: rollout, update, report.
+pub(crate) fn learn(
+    environment: &mut dyn BatchEnvironment,
+    config: &PpoConfig,
+    seed: u64,
+    on_progress: &mut dyn FnMut(&PpoProgress) -> ControlFlow<()>,
+) -> Result<Learnt> {
+    config.validate()?;
+    let device = config.device()?;
+    tch::set_num_threads(1);
+    let [mut weights, actions, mut order] = streams(seed);
+    let (observations, outputs) = (environment.observation_len(), environment.action_len());
+    let normalise = config.normalise_observation;
+    let mut collector = Collector::new(environment, normalise, config.reward_scale, actions)?;
+    let networks = ActorCritic::new(observations, outputs, config, device, &mut weights);
+    let mut optimiser = Adam::default()
+        .eps(1e-5)
+        .build(&networks.store, config.learning_rate)
+        .map_err(|e| Error::Failed(format!("libtorch: {e}")))?;
+    let steps = config.n_steps.div_ceil(collector.batch_size());
+    let mut curve = Vec::new();
+    while collector.env_steps < config.total_steps {
+        if config.anneal_learning_rate {
+            let left = 1.0 - collector.env_steps as f64 / config.total_steps as f64;
+            optimiser.set_lr(config.learning_rate * left);
+        }
+        let rollout = collector.collect(&networks, steps)?;
+        let samples = Samples::new(&rollout, &networks, collector.batch_size(), config);
+        let shift = update(&mut optimiser, &networks, &samples, config, &mut order);
+        let progress = progress(&collector, &rollout, &samples, &networks, shift, config);
+        if !(progress.approx_kl.is_finite() && progress.entropy.is_finite()) {
+            return Err(Error::Failed(format!(
+                "PPO diverged after {} environment steps: lower ppo.learning_rate or ppo.reward_scale",
+                collector.env_steps
+            )));
+        }
+        let flow = on_progress(&progress);
+        curve.push(progress);
+        if flow.is_break() {
+            break;
+        }
+    }
+    let normaliser = collector.normaliser;
+    Ok(Learnt {
+        networks,
+        normaliser,
+        curve,
+    })
+}
+
+/// Independent generators of one seed: weights, action noise, order of samples.
+fn streams(seed: u64) -> [ChaCha8Rng; 3] {
+    [0, 1, 2].map(|stream| {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        rng.set_stream(stream);
+        rng
+    })
+}
+
+/// One rollout as the update takes it, one row a sample.
+struct Samples {
+    observation: Tensor,
+    action: Tensor,
+    old_log_prob: Tensor,
+    advantage: Tensor,
+    /// What the critic should say: advantage plus its old value.
+    target: Tensor,
+    explained_variance: Option<f64>,
+}
+
+impl Samples {
+    /// Values, advantages and old densities of a rollout, each in one pass.
+    fn new(rollout: &Rollout, networks: &ActorCritic, n: usize, config: &PpoConfig) -> Self {
+        tch::no_grad(|| {
+            let observation = networks.observations(&rollout.observation);
+            let action = networks.actions(&rollout.action);
+            let reached = networks.observations(&rollout.next_observation);
+            let value: Vec<f64> = to_vec(&networks.value(&observation));
+            let outcome = Outcome {
+                reward: &rollout.reward,
+                value: &value,
+                next_value: &to_vec::<f64>(&networks.value(&reached)),
+                terminated: &rollout.terminated,
+                truncated: &rollout.truncated,
+            };
+            let advantage = advantages(outcome, n, config.gamma, config.lambda);
+            let target: Vec<f64> = advantage.iter().zip(&value).map(|(a, v)| a + v).collect();
+            let column = |values: &[f64]| {
+                let single: Vec<f32> = values.iter().map(|&v| v as f32).collect();
+                networks.tensor(&single, 1).squeeze_dim(1)
+            };
+            let (error, spread) = (mean_and_std(&advantage).1, mean_and_std(&target).1);
+            Self {
+                old_log_prob: networks.log_prob(&observation, &action),
+                advantage: column(&advantage),
+                target: column(&target),
+                observation,
+                action,
+                explained_variance: (spread > 0.0).then(|| 1.0 - (error / spread).powi(2)),
+            }
+        })
+    }
+
+    fn len(&self) -> i64 {
+        self.advantage.size()[0]
+    }
+
+    /// The same samples with `f` applied to each column.
+    fn map(&self, f: impl Fn(&Tensor) -> Tensor) -> Self {
+        Self {
+            observation: f(&self.observation),
+            action: f(&self.action),
+            old_log_prob: f(&self.old_log_prob),
+            advantage: f(&self.advantage),
+            target: f(&self.target),
+            explained_variance: self.explained_variance,
+        }
+    }
+}
+
+/// Epochs of minibatches over the samples; returns how far the policy moved.
+fn update(
+    optimiser: &mut Optimizer,
+    networks: &ActorCritic,
+    samples: &Samples,
+    config: &PpoConfig,
+    rng: &mut ChaCha8Rng,
+) -> Shift {
+    let len = samples.len();
+    let moved = || {
+        tch::no_grad(|| {
+            let log_prob = networks.log_prob(&samples.observation, &samples.action);
+            shift(&log_prob, &samples.old_log_prob, config.clip)
+        })
+    };
+    let mut order: Vec<i64> = (0..len).collect();
+    for _ in 0..config.epochs {
+        order.shuffle(rng);
+        let index = Tensor::from_slice(&order).to_device(networks.store.device());
+        let shuffled = samples.map(|column| column.index_select(0, &index));
+        for start in (0..len).step_by(config.minibatch) {
+            let rows = (len - start).min(config.minibatch as i64);
+            let part = shuffled.map(|column| column.narrow(0, start, rows));
+            let loss = loss(networks, &part, config);
+            optimiser.backward_step_clip_norm(&loss, config.max_gradient_norm);
+        }
+        if let Some(target_kl) = config.target_kl {
+            let shift = moved();
+            if shift.approx_kl > 1.5 * target_kl {
+                return shift;
+            }
+        }
+    }
+    moved()
+}
+
+/// Equation 9 of the paper, with its sign turned.
+fn loss(networks: &ActorCritic, part: &Samples, config: &PpoConfig) -> Tensor {
+    let log_prob = networks.log_prob(&part.observation, &part.action);
+    let advantage = if config.normalise_advantage && part.len() > 1 {
+        let centred: Tensor = &part.advantage - part.advantage.mean(None::<Kind>);
+        centred / (part.advantage.std(true) + 1e-8)
+    } else {
+        part.advantage.shallow_clone()
+    };
+    let policy_loss =
+        clipped_surrogate_loss(&log_prob, &part.old_log_prob, &advantage, config.clip);
+    let value_loss = (networks.value(&part.observation) - &part.target)
+        .square()
+        .mean(None::<Kind>);
+    let mut loss = policy_loss + config.value_coefficient * value_loss;
+    if config.entropy_coefficient > 0.0 {
+        loss -= config.entropy_coefficient * networks.entropy();
+    }
+    loss
+}
+
+/// The point of the curve after an update.
+fn progress(
+    collector: &Collector<'_>,
+    rollout: &Rollout,
+    samples: &Samples,
+    networks: &ActorCritic,
+    shift: Shift,
+    config: &PpoConfig,
+) -> PpoProgress {
+    let returns = &rollout.episode_returns;
+    let moments = (!returns.is_empty()).then(|| mean_and_std(returns));
+    PpoProgress {
+        env_steps: collector.env_steps,
+        total_steps: config.total_steps,
+        mean_return: moments.map(|(mean, _)| mean),
+        return_std: moments.map(|(_, std)| std),
+        action_std: mean_and_std(&networks.action_std()).0,
+        approx_kl: shift.approx_kl,
+        clip_fraction: shift.clip_fraction,
+        entropy: tch::no_grad(|| networks.entropy().double_value(&[])),
+        explained_variance: samples.explained_variance,
+    }
+}
