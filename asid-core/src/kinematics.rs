@@ -75,14 +75,20 @@ impl Chain {
                 [joint] => joint,
                 _ => {
                     let body = b.name.clone().unwrap_or_default();
-                    return Err(fail(format!("body `{body}` has several joints; a chain takes one a body")));
+                    return Err(fail(format!(
+                        "body `{body}` has several joints; a chain takes one a body"
+                    )));
                 }
             };
             let name = joint.name.clone().unwrap_or_default();
             let hinge = match joint.type_ {
                 JointType::Hinge => true,
                 JointType::Slide => false,
-                _ => return Err(fail(format!("joint `{name}` is neither a hinge nor a slide"))),
+                _ => {
+                    return Err(fail(format!(
+                        "joint `{name}` is neither a hinge nor a slide"
+                    )));
+                }
             };
             links.push(Link {
                 previous_from_body: pending,
@@ -94,6 +100,11 @@ impl Chain {
             });
             names.push(name);
             pending = Isometry3::identity();
+        }
+        if links.len() > MAX_LINKS {
+            return Err(fail(format!(
+                "the chain to site `{site}` has more than {MAX_LINKS} joints"
+            )));
         }
         let last_from_site = pending * isometry(&model.bodies[body].body.sites[index].pose);
         Ok(Self {
@@ -146,10 +157,7 @@ impl Chain {
             );
             world *= if link.hinge {
                 let turn = UnitQuaternion::from_axis_angle(&link.axis, moved);
-                Isometry3::from_parts(
-                    Translation3::from(link.anchor - turn * link.anchor),
-                    turn,
-                )
+                Isometry3::from_parts(Translation3::from(link.anchor - turn * link.anchor), turn)
             } else {
                 Isometry3::from_parts(
                     Translation3::from(link.axis.into_inner() * moved),

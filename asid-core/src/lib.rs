@@ -3,21 +3,45 @@
 //! This crate knows no engine and no network.
 
 pub mod backend;
+pub mod cartesian;
 pub mod environment;
+pub mod episode;
 pub mod error;
+pub mod explore;
+pub mod identify;
+pub mod information;
 pub mod kinematics;
 pub mod layout;
 pub mod mass;
 pub mod parameter;
+pub mod posterior;
+pub mod problem;
+pub mod progress;
+pub mod real_world;
 pub mod registry;
+pub mod replay;
 pub mod rng;
 pub mod scene;
 pub mod signal;
 pub mod simulator;
+pub mod solve;
+pub mod task;
 
 pub use backend::{Backend, Capabilities, Model};
 pub use environment::{BatchEnvironment, Transition};
+pub use episode::Episode;
 pub use error::{Error, Result};
+pub use explore::{Explorer, Policy};
+pub use identify::Identifier;
+pub use information::{Information, Objective};
 pub use layout::{Layout, Recording, Target};
+pub use parameter::Parameter;
+pub use posterior::Posterior;
+pub use problem::Problem;
+pub use progress::Progress;
+pub use real_world::{RealWorld, SimulatedWorld};
+pub use rng::Streams;
 pub use scene::Scene;
 pub use simulator::{BatchConfig, Control, Rollout, Simulator, Snapshot, Status};
+pub use solve::{TaskPolicy, TaskSolver};
+pub use task::Task;

@@ -65,7 +65,9 @@ impl Parameter {
             ));
         }
         if self.scale == Scale::Log && low <= 0.0 {
-            return fail(format!("range [{low}, {high}] must be positive on a log scale"));
+            return fail(format!(
+                "range [{low}, {high}] must be positive on a log scale"
+            ));
         }
         if self.targets.is_empty() {
             return fail("has no target".into());
@@ -160,7 +162,10 @@ mod tests {
             let mean = z.iter().sum::<f64>() / n as f64;
             let var = z.iter().map(|z| (z - mean).powi(2)).sum::<f64>() / n as f64;
             // Standard errors: 1/sqrt(n) = 0.007 for the mean, about 0.006 for the variance.
-            assert!(mean.abs() < 0.03 && (var - 1.0).abs() < 0.03, "{mean} {var}");
+            assert!(
+                mean.abs() < 0.03 && (var - 1.0).abs() < 0.03,
+                "{mean} {var}"
+            );
         }
     }
 
@@ -178,8 +183,16 @@ mod tests {
 
     #[test]
     fn ranges_upside_down_or_not_finite_are_refused() {
-        for range in [[1.0, 0.5], [1.0, 1.0], [f64::NAN, 1.0], [0.0, f64::INFINITY]] {
-            assert!(parameter(range, Scale::Linear).check().is_err(), "{range:?}");
+        for range in [
+            [1.0, 0.5],
+            [1.0, 1.0],
+            [f64::NAN, 1.0],
+            [0.0, f64::INFINITY],
+        ] {
+            assert!(
+                parameter(range, Scale::Linear).check().is_err(),
+                "{range:?}"
+            );
         }
         assert!(parameter([0.0, 1.0], Scale::Log).check().is_err());
         assert!(parameter([0.1, 1.0], Scale::Log).check().is_ok());

@@ -68,7 +68,12 @@ mod tests {
     fn streams_differ_by_name_index_and_seed_and_repeat() {
         let first = |s: u64, n: &str, i: u64| Streams::new(s).indexed(n, i).random::<u64>();
         assert_eq!(first(0, "a", 0), first(0, "a", 0));
-        let all = [first(0, "a", 0), first(0, "a", 1), first(0, "b", 0), first(1, "a", 0)];
+        let all = [
+            first(0, "a", 0),
+            first(0, "a", 1),
+            first(0, "b", 0),
+            first(1, "a", 0),
+        ];
         for i in 0..all.len() {
             for j in 0..i {
                 assert_ne!(all[i], all[j]);

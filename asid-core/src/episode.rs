@@ -1,0 +1,396 @@
+//! Logs of episodes: one CSV file each.
+//!
+//! A row holds the time (s), the command of each actuator from that time on
+//! (`ctrl.<actuator>`), and each sensor's reading of the state at that time,
+//! before the row's command acts (`<sensor>`, or `<sensor>.0`, `<sensor>.1`…).
+//! An empty cell is a missing reading and is NaN here.
+
+use std::path::Path;
+
+use crate::error::{Error, Result};
+use crate::layout::Layout;
+
+/// A sensor's columns.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ChannelColumns {
+    /// Name of the sensor.
+    pub name: String,
+    /// Number of columns.
+    pub len: usize,
+}
+
+/// One episode: commands and readings over time.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Episode {
+    /// Times, s, strictly increasing; `rows`.
+    pub time: Vec<f64>,
+    /// Names of the actuators.
+    pub actuators: Vec<String>,
+    /// Commands, `rows x actuators`.
+    pub ctrl: Vec<f64>,
+    /// Sensors, in the order of a reading's row.
+    pub channels: Vec<ChannelColumns>,
+    /// Readings, `rows x width`; NaN where missing.
+    pub readings: Vec<f64>,
+}
+
+impl Episode {
+    /// Number of rows.
+    #[must_use]
+    pub fn rows(&self) -> usize {
+        self.time.len()
+    }
+
+    /// Entries of a reading's row.
+    #[must_use]
+    pub fn width(&self) -> usize {
+        self.channels.iter().map(|c| c.len).sum()
+    }
+
+    /// Reading's row `i`.
+    #[must_use]
+    pub fn reading(&self, i: usize) -> &[f64] {
+        let w = self.width();
+        &self.readings[i * w..(i + 1) * w]
+    }
+
+    /// The latest reading while an episode is being recorded.
+    pub(crate) fn reading_tail(&self, width: usize) -> &[f64] {
+        &self.readings[self.readings.len() - width..]
+    }
+
+    /// Where a channel lies in a reading's row.
+    #[must_use]
+    pub fn channel(&self, name: &str) -> Option<std::ops::Range<usize>> {
+        let mut start = 0;
+        for c in &self.channels {
+            if c.name == name {
+                return Some(start..start + c.len);
+            }
+            start += c.len;
+        }
+        None
+    }
+
+    /// Readings of the channels `names` only, `rows x their width`, NaN where a
+    /// channel is not in the log.
+    #[must_use]
+    pub fn select(&self, layout: &Layout, names: &[String]) -> Vec<f64> {
+        let picks: Vec<(Option<std::ops::Range<usize>>, usize)> = names
+            .iter()
+            .map(|n| {
+                let len = layout.sensor(n).map_or(1, |s| s.len);
+                (self.channel(n), len)
+            })
+            .collect();
+        let mut out = Vec::new();
+        for i in 0..self.rows() {
+            let row = self.reading(i);
+            for (range, len) in &picks {
+                match range {
+                    Some(r) => out.extend_from_slice(&row[r.clone()]),
+                    None => out.extend(std::iter::repeat_n(f64::NAN, *len)),
+                }
+            }
+        }
+        out
+    }
+
+    /// Writes the log.
+    ///
+    /// # Errors
+    /// When the file cannot be written.
+    pub fn write_csv(&self, path: &Path) -> Result<()> {
+        let mut text = String::from("time");
+        for a in &self.actuators {
+            text += &format!(",ctrl.{a}");
+        }
+        for c in &self.channels {
+            if c.len == 1 {
+                text += &format!(",{}", c.name);
+            } else {
+                for i in 0..c.len {
+                    text += &format!(",{}.{i}", c.name);
+                }
+            }
+        }
+        text.push('\n');
+        let (nu, width) = (self.actuators.len(), self.width());
+        for i in 0..self.rows() {
+            text += &cell(self.time[i]);
+            for x in self.ctrl[i * nu..(i + 1) * nu]
+                .iter()
+                .chain(&self.readings[i * width..(i + 1) * width])
+            {
+                text.push(',');
+                if x.is_finite() {
+                    text += &cell(*x);
+                }
+            }
+            text.push('\n');
+        }
+        std::fs::write(path, text).map_err(|e| Error::File {
+            path: path.to_owned(),
+            message: e.to_string(),
+        })
+    }
+
+    /// Reads a log of a scene with this layout. Columns may come in any order and
+    /// sensors may be missing; columns `qpos.*` and `qvel.*` are passed over.
+    ///
+    /// # Errors
+    /// When the file cannot be read or a row or column is wrong; the message names both.
+    pub fn read_csv(path: &Path, layout: &Layout) -> Result<Self> {
+        let fail = |message: String| Error::Log {
+            path: path.to_owned(),
+            message,
+        };
+        let mut reader = csv::ReaderBuilder::new()
+            .trim(csv::Trim::All)
+            .from_path(path)
+            .map_err(|e| fail(crate::scene::one_line(&e.to_string())))?;
+        let header: Vec<String> = reader
+            .headers()
+            .map_err(|e| fail(crate::scene::one_line(&e.to_string())))?
+            .iter()
+            .map(str::to_owned)
+            .collect();
+        let column = |name: &str| header.iter().position(|h| h == name);
+        let time_column = column("time").ok_or_else(|| fail("has no column `time`".into()))?;
+        let mut ctrl_columns = Vec::with_capacity(layout.nu());
+        for a in &layout.actuators {
+            let name = format!("ctrl.{}", a.name);
+            ctrl_columns.push(column(&name).ok_or_else(|| {
+                fail(format!(
+                    "has no column `{name}`, the command of an actuator"
+                ))
+            })?);
+        }
+        let mut channels = Vec::new();
+        let mut reading_columns = Vec::new();
+        for s in &layout.sensors {
+            let names: Vec<String> = if s.len == 1 {
+                vec![s.name.clone()]
+            } else {
+                (0..s.len).map(|i| format!("{}.{i}", s.name)).collect()
+            };
+            let found: Vec<usize> = names.iter().filter_map(|n| column(n)).collect();
+            if found.is_empty() {
+                continue;
+            }
+            if found.len() < names.len() {
+                let missing = names.iter().find(|n| column(n).is_none());
+                return Err(fail(format!(
+                    "sensor `{}` has {} entries but column `{}` is missing",
+                    s.name,
+                    s.len,
+                    missing.map_or("", String::as_str)
+                )));
+            }
+            channels.push(ChannelColumns {
+                name: s.name.clone(),
+                len: s.len,
+            });
+            reading_columns.extend(found);
+        }
+        for (i, name) in header.iter().enumerate() {
+            let known = i == time_column
+                || ctrl_columns.contains(&i)
+                || reading_columns.contains(&i)
+                || name.starts_with("qpos.")
+                || name.starts_with("qvel.");
+            if !known {
+                let known = layout.sensors.iter().map(|s| &*s.name);
+                return Err(fail(format!(
+                    "column `{name}` is no sensor or actuator of the scene; {}",
+                    Error::unknown("sensor", name, known)
+                )));
+            }
+        }
+        if channels.is_empty() {
+            return Err(fail("has no column of a sensor of the scene".into()));
+        }
+        let mut episode = Self {
+            actuators: layout.actuators.iter().map(|a| a.name.clone()).collect(),
+            channels,
+            ..Self::default()
+        };
+        for (i, record) in reader.records().enumerate() {
+            let row = i + 2;
+            let record = record.map_err(|e| {
+                fail(format!(
+                    "row {row}: {}",
+                    crate::scene::one_line(&e.to_string())
+                ))
+            })?;
+            let number = |c: usize| -> Result<f64> {
+                let text = record.get(c).unwrap_or("");
+                if text.is_empty() {
+                    return Ok(f64::NAN);
+                }
+                match text.parse::<f64>() {
+                    Ok(x) if x.is_finite() => Ok(x),
+                    _ => Err(fail(format!(
+                        "row {row}, column `{}`: `{text}` is not a finite number",
+                        header[c]
+                    ))),
+                }
+            };
+            let time = number(time_column)?;
+            if time.is_nan() {
+                return Err(fail(format!("row {row}: the time is missing")));
+            }
+            if let Some(&last) = episode.time.last()
+                && time <= last
+            {
+                return Err(fail(format!(
+                    "row {row}: time {time} does not come after {last}"
+                )));
+            }
+            episode.time.push(time);
+            for &c in &ctrl_columns {
+                let x = number(c)?;
+                if x.is_nan() {
+                    return Err(fail(format!(
+                        "row {row}, column `{}`: a command is missing",
+                        header[c]
+                    )));
+                }
+                episode.ctrl.push(x);
+            }
+            for &c in &reading_columns {
+                episode.readings.push(number(c)?);
+            }
+        }
+        if episode.rows() < 2 {
+            return Err(fail(format!(
+                "has {} rows of data; at least 2 are needed",
+                episode.rows()
+            )));
+        }
+        if episode.readings.iter().all(|x| x.is_nan()) {
+            return Err(fail("every reading is missing".into()));
+        }
+        Ok(episode)
+    }
+}
+
+/// The shortest text that reads back as the same number.
+fn cell(x: f64) -> String {
+    if x != 0.0 && (x.abs() < 1e-4 || x.abs() >= 1e15) {
+        format!("{x:e}")
+    } else {
+        format!("{x}")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::layout::{Actuator, Sensor};
+
+    fn layout() -> Layout {
+        Layout {
+            timestep: 0.01,
+            nq: 0,
+            nv: 0,
+            bodies: vec!["world".into()],
+            geoms: vec![],
+            joints: vec![],
+            actuators: vec![Actuator {
+                name: "servo".into(),
+                ctrl_range: None,
+            }],
+            sensors: vec![
+                Sensor {
+                    name: "angle".into(),
+                    kind: "jointpos".into(),
+                    address: 0,
+                    len: 1,
+                },
+                Sensor {
+                    name: "tip".into(),
+                    kind: "framepos".into(),
+                    address: 1,
+                    len: 3,
+                },
+            ],
+            keyframes: vec![],
+        }
+    }
+
+    fn read(text: &str) -> Result<Episode> {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("log.csv");
+        std::fs::write(&path, text).unwrap();
+        Episode::read_csv(&path, &layout())
+    }
+
+    #[test]
+    fn logs_round_trip_to_the_bit() {
+        let episode = Episode {
+            time: vec![0.0, 0.1, 0.2],
+            actuators: vec!["servo".into()],
+            ctrl: vec![1.0 / 3.0, -2e-7, 1e20],
+            channels: vec![
+                ChannelColumns {
+                    name: "angle".into(),
+                    len: 1,
+                },
+                ChannelColumns {
+                    name: "tip".into(),
+                    len: 3,
+                },
+            ],
+            readings: vec![
+                0.1,
+                1.0,
+                f64::NAN,
+                3.0,
+                0.2,
+                1.5,
+                2.0,
+                3.5,
+                -0.3,
+                1.0,
+                2.0,
+                std::f64::consts::PI,
+            ],
+        };
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("log.csv");
+        episode.write_csv(&path).unwrap();
+        let back = Episode::read_csv(&path, &layout()).unwrap();
+        assert_eq!(back.time, episode.time);
+        assert_eq!(back.ctrl, episode.ctrl);
+        for (a, b) in back.readings.iter().zip(&episode.readings) {
+            assert!(a == b || (a.is_nan() && b.is_nan()));
+        }
+    }
+
+    #[test]
+    fn bad_logs_name_row_and_column() {
+        let cases = [
+            ("t,ctrl.servo,angle\n0,1,2\n", "no column `time`"),
+            ("time,angle\n0,1\n", "`ctrl.servo`"),
+            ("time,ctrl.servo,angel\n0,1,2\n1,1,2\n", "`angel`"),
+            ("time,ctrl.servo,tip.0,tip.1\n0,1,2,3\n", "`tip.2`"),
+            ("time,ctrl.servo,angle\n0,1,2\n0,1,2\n", "row 3: time 0"),
+            (
+                "time,ctrl.servo,angle\n0,1,2\n1,1,abc\n",
+                "row 3, column `angle`: `abc`",
+            ),
+            (
+                "time,ctrl.servo,angle\n0,1,2\n1,,2\n",
+                "row 3, column `ctrl.servo`",
+            ),
+            ("time,ctrl.servo,angle\n0,1,2\n", "1 rows"),
+            ("time,ctrl.servo,angle\n0,1,\n1,1,\n", "every reading"),
+            ("time,ctrl.servo,angle\n0,1,2\n1,1\n", "row 3"),
+        ];
+        for (text, expected) in cases {
+            let error = read(text).unwrap_err().to_string();
+            assert!(error.contains(expected), "{error}");
+        }
+    }
+}

@@ -1,0 +1,57 @@
+//! Exploration: from a task and a prior to a policy.
+
+use crate::error::Result;
+use crate::problem::Problem;
+
+/// An exploration policy, played once in the real world.
+pub trait Policy: Send {
+    /// A new episode begins.
+    fn reset(&mut self);
+
+    /// The action of control step `step`, in the task's units, for a reading's row
+    /// (tracked signals with their noise, then proprioception).
+    ///
+    /// # Errors
+    /// When planning fails.
+    fn act(&mut self, step: usize, reading: &[f64], action: &mut [f64]) -> Result<()>;
+
+    /// The policy as JSON, for the robot's side.
+    fn export(&self) -> serde_json::Value;
+}
+
+/// One point of a learning curve.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CurvePoint {
+    /// Iterations or environment steps.
+    pub x: f64,
+    /// Mean return.
+    pub mean: f64,
+    /// Standard deviation of the return.
+    pub std: f64,
+}
+
+/// A policy and how it came about.
+pub struct Explored<'a> {
+    /// The policy.
+    pub policy: Box<dyn Policy + 'a>,
+    /// Return over the search; a planner that plans when the episode begins adds to it then.
+    pub curve: Vec<CurvePoint>,
+    /// What `x` counts.
+    pub curve_label: &'static str,
+    /// Name of the objective; empty where there is none.
+    pub objective: String,
+}
+
+/// Turns a task and a prior into an exploration policy.
+pub trait Explorer: Send + Sync {
+    /// Makes a policy; the prior is that of the problem's parameters. `start` is the
+    /// start pose the policy will meet, where it is known beforehand.
+    ///
+    /// # Errors
+    /// When the engine fails or the user interrupts.
+    fn explore<'a>(
+        &'a self,
+        problem: &'a Problem<'a>,
+        start: Option<&[f64]>,
+    ) -> Result<Explored<'a>>;
+}

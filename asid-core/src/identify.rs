@@ -1,0 +1,38 @@
+//! Identification: from real episodes and a simulator to a posterior.
+
+use crate::episode::Episode;
+use crate::error::Result;
+use crate::posterior::Posterior;
+use crate::problem::Problem;
+
+/// The population of a search after one iteration, for pictures.
+#[derive(Clone, Debug, PartialEq)]
+pub struct IterationSummary {
+    /// Quantiles 2.5, 25, 50, 75 and 97.5 % of each parameter, in its unit.
+    pub quantiles: Vec<[f64; 5]>,
+    /// Best negative log-likelihood so far, up to a constant.
+    pub best_loss: f64,
+}
+
+/// What identification found.
+#[derive(Clone, Debug)]
+pub struct Identified {
+    /// The posterior.
+    pub posterior: Posterior,
+    /// Start pose of each episode at the best fit, in the task's coordinates.
+    pub starts: Vec<Vec<f64>>,
+    /// How the search narrowed down.
+    pub iterations: Vec<IterationSummary>,
+    /// Root mean square of the whitened residual at the best fit: 1 where the
+    /// simulator explains the readings as well as their noise allows.
+    pub residual: f64,
+}
+
+/// Turns real episodes into a posterior over the problem's parameters.
+pub trait Identifier: Send + Sync {
+    /// Fits the simulator to the episodes.
+    ///
+    /// # Errors
+    /// When the engine fails, every simulation diverges, or the user interrupts.
+    fn identify(&self, problem: &Problem<'_>, episodes: &[Episode]) -> Result<Identified>;
+}

@@ -1,0 +1,23 @@
+//! How long work tells that it goes on, and learns that it should stop.
+
+/// Where progress is told to. Libraries never print.
+pub trait Progress: Sync {
+    /// A stage begins; `total` units of work are expected.
+    fn begin(&self, stage: &str, total: u64);
+    /// Some units are done.
+    fn advance(&self, units: u64);
+    /// The present figure of merit, in words.
+    fn note(&self, _text: &str) {}
+    /// The stage is over.
+    fn end(&self);
+}
+
+/// Progress that nobody looks at.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Silent;
+
+impl Progress for Silent {
+    fn begin(&self, _stage: &str, _total: u64) {}
+    fn advance(&self, _units: u64) {}
+    fn end(&self) {}
+}

@@ -1,0 +1,239 @@
+//! The real world: what answers with one episode, and lets a task be tried once.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use rand_distr::{Distribution, StandardNormal};
+
+use crate::backend::Model;
+use crate::episode::{ChannelColumns, Episode};
+use crate::error::Result;
+use crate::explore::Policy;
+use crate::parameter::Parameter;
+use crate::problem::{Batch, Problem, substeps};
+use crate::progress::Silent;
+use crate::rng::{Rng, Streams};
+use crate::signal::SignalSet;
+use crate::simulator::{Control, Rollout};
+use crate::solve::TaskPolicy;
+use crate::task::{Outcome, Task};
+
+/// An episode as it was, and what only a simulated world can tell of it.
+#[derive(Clone, Debug)]
+pub struct RealEpisode {
+    /// The log.
+    pub episode: Episode,
+    /// Share of control steps at whose frames the machine touched the object.
+    pub contact_fraction: f64,
+    /// True start pose, where it is known.
+    pub true_start: Option<Vec<f64>>,
+}
+
+/// One attempt at the task.
+#[derive(Clone, Debug)]
+pub struct Attempt {
+    /// What came of it.
+    pub outcome: Outcome,
+    /// The action.
+    pub action: Vec<f64>,
+    /// Readings of the task's channels, `frames x width`.
+    pub readings: Vec<f64>,
+}
+
+/// What can be explored once and tried once.
+pub trait RealWorld {
+    /// Plays a policy for one episode.
+    ///
+    /// # Errors
+    /// When the policy or the world fails.
+    fn explore(&mut self, policy: &mut dyn Policy) -> Result<RealEpisode>;
+
+    /// Tries the task once.
+    ///
+    /// # Errors
+    /// When the policy or the world fails.
+    fn attempt(&mut self, policy: &mut dyn TaskPolicy) -> Result<Attempt>;
+}
+
+/// A simulator with a hidden truth, its own start poses and noisy trackers.
+pub struct SimulatedWorld<'a> {
+    task: &'a dyn Task,
+    batch: Batch,
+    signals: SignalSet,
+    truth: Vec<f64>,
+    streams: Streams,
+}
+
+impl<'a> SimulatedWorld<'a> {
+    /// A world of `model` whose `parameters` have the values `truth`; `streams`
+    /// draws start poses and noise.
+    ///
+    /// # Errors
+    /// When the model is not one of the task's scene.
+    pub fn new(
+        task: &'a dyn Task,
+        model: &dyn Model,
+        parameters: &[Parameter],
+        truth: &[f64],
+        streams: Streams,
+    ) -> Result<Self> {
+        let steps = AtomicU64::new(0);
+        let problem = Problem {
+            task,
+            model,
+            parameters,
+            threads: 1,
+            streams,
+            progress: &Silent,
+            physics_steps: &steps,
+            env_steps: &steps,
+        };
+        let batch = problem.batch(1)?;
+        let signals = SignalSet::new(model.layout(), &task.exploration().signals)?;
+        Ok(Self {
+            task,
+            batch,
+            signals,
+            truth: truth.to_vec(),
+            streams,
+        })
+    }
+
+    /// The start pose that the world will begin its exploration episode with.
+    #[must_use]
+    pub fn exploration_start(&self) -> Vec<f64> {
+        draw(
+            &self.task.exploration().start,
+            &mut self.streams.stream("exploration start"),
+        )
+    }
+
+    /// Adds the physics steps taken in this world to `counter`.
+    pub fn count_physics(&self, counter: &AtomicU64) {
+        counter.fetch_add(self.batch.simulator.steps_taken(), Ordering::Relaxed);
+    }
+
+    fn begin(&mut self, start: &[f64]) -> Result<()> {
+        self.batch.set_parameters(&[0], &self.truth)?;
+        self.batch.place(self.task, &[0], start)
+    }
+}
+
+fn draw(coordinates: &[crate::task::Coordinate], rng: &mut Rng) -> Vec<f64> {
+    use rand::Rng as _;
+    coordinates.iter().map(|c| c.at(rng.random())).collect()
+}
+
+impl RealWorld for SimulatedWorld<'_> {
+    fn explore(&mut self, policy: &mut dyn Policy) -> Result<RealEpisode> {
+        let protocol = self.task.exploration();
+        let start = self.exploration_start();
+        self.begin(&start)?;
+        let layout = self.batch.simulator.layout().clone();
+        let mut noise = self.streams.stream("exploration noise");
+        let names = protocol.channels();
+        let width = layout.recording(&names)?.width();
+        let contact = format!("contact.{}/{}", protocol.contact[0], protocol.contact[1]);
+        let mut all = names.clone();
+        all.push(contact);
+        let recording = layout.recording(&all)?;
+        let substeps = substeps(&layout, protocol.frame_period)?;
+        let (frames, nu) = (protocol.frames_per_step, layout.nu());
+        let mut commander = self.task.commander()?;
+        commander.reset();
+        policy.reset();
+
+        let mut episode = Episode {
+            actuators: layout.actuators.iter().map(|a| a.name.clone()).collect(),
+            channels: names
+                .iter()
+                .map(|n| {
+                    Ok(ChannelColumns {
+                        name: n.clone(),
+                        len: layout.sensor(n)?.len,
+                    })
+                })
+                .collect::<Result<_>>()?,
+            ..Episode::default()
+        };
+        let mut row = vec![0.0; width + 1];
+        self.batch.simulator.read(&[0], &recording, &mut row)?;
+        let tracked = self.signals.width();
+        let mut observe = |row: &[f64]| {
+            let mut seen = row[..width].to_vec();
+            self.signals
+                .add_noise(&mut seen[..tracked], || StandardNormal.sample(&mut noise));
+            seen
+        };
+        episode.readings.extend(observe(&row));
+        let mut action = vec![0.0; protocol.action.len()];
+        let mut ctrl = vec![0.0; frames * nu];
+        let mut out = vec![0.0; frames * (width + 1)];
+        let mut touched = 0;
+        for step in 0..protocol.horizon {
+            let latest = episode.reading_tail(width).to_vec();
+            policy.act(step, &latest, &mut action)?;
+            for (a, c) in action.iter_mut().zip(&protocol.action) {
+                *a = a.clamp(c.range[0], c.range[1]);
+            }
+            commander.commands(&action, &mut ctrl);
+            let rollout = Rollout::new(&[0], frames, substeps, Control::Shared(&ctrl), &recording);
+            self.batch.simulator.rollout(&rollout, &mut out)?;
+            episode.ctrl.extend_from_slice(&ctrl);
+            for frame in out.chunks_exact(width + 1) {
+                episode.readings.extend(observe(frame));
+            }
+            touched += usize::from(out.chunks_exact(width + 1).any(|r| r[width] > 0.0));
+        }
+        let last = episode.ctrl[episode.ctrl.len() - nu..].to_vec();
+        episode.ctrl.extend(last);
+        episode.time = (0..=protocol.frames())
+            .map(|k| (k as f64 * protocol.frame_period * 1e9).round() / 1e9)
+            .collect();
+        Ok(RealEpisode {
+            episode,
+            contact_fraction: touched as f64 / protocol.horizon as f64,
+            true_start: Some(start),
+        })
+    }
+
+    fn attempt(&mut self, policy: &mut dyn TaskPolicy) -> Result<Attempt> {
+        let protocol = self.task.downstream();
+        let mut rng = self.streams.stream("task start");
+        let start = draw(&protocol.start, &mut rng);
+        self.begin(&start)?;
+        let layout = self.batch.simulator.layout().clone();
+        let tracked: Vec<String> = self
+            .task
+            .exploration()
+            .signals
+            .iter()
+            .map(|s| s.sensor.clone())
+            .collect();
+        let mut seen = vec![0.0; self.signals.width()];
+        self.batch
+            .simulator
+            .read(&[0], &layout.recording(&tracked)?, &mut seen)?;
+        self.signals
+            .add_noise(&mut seen, || StandardNormal.sample(&mut rng));
+        let believed = self.task.locate(&seen);
+        let mut action = vec![0.0; protocol.action.len()];
+        policy.act(&believed, &mut action)?;
+        let ctrl = self.task.attempt(&believed, &action)?;
+        let recording = layout.recording(&protocol.channels)?;
+        let substeps = substeps(&layout, protocol.frame_period)?;
+        let mut readings = vec![0.0; protocol.frames * recording.width()];
+        let rollout = Rollout::new(
+            &[0],
+            protocol.frames,
+            substeps,
+            Control::Shared(&ctrl),
+            &recording,
+        );
+        self.batch.simulator.rollout(&rollout, &mut readings)?;
+        Ok(Attempt {
+            outcome: self.task.outcome(&readings),
+            action,
+            readings,
+        })
+    }
+}

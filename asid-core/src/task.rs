@@ -1,0 +1,212 @@
+//! A task: a scene with unknowns, how to explore it, and what to achieve in it.
+//!
+//! A task describes; it runs nothing. Explorers, identifiers and solvers see the
+//! same description, whatever the task, and the arrays they pass around are laid
+//! out by it.
+
+use crate::backend::Capabilities;
+use crate::error::Result;
+use crate::layout::Layout;
+use crate::parameter::Parameter;
+use crate::scene::Scene;
+use crate::signal::Signal;
+
+/// A number with a name, a unit and a range: an entry of an action or of a start pose.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Coordinate {
+    /// Name, such as `x`.
+    pub name: String,
+    /// SI unit.
+    pub unit: String,
+    /// Smallest and largest value.
+    pub range: [f64; 2],
+}
+
+impl Coordinate {
+    /// A coordinate of this name, unit and range.
+    #[must_use]
+    pub fn new(name: &str, unit: &str, range: [f64; 2]) -> Self {
+        Self {
+            name: name.into(),
+            unit: unit.into(),
+            range,
+        }
+    }
+
+    /// Value at a fraction of the range.
+    #[must_use]
+    pub fn at(&self, fraction: f64) -> f64 {
+        self.range[0] + fraction * (self.range[1] - self.range[0])
+    }
+
+    /// Middle of the range.
+    #[must_use]
+    pub fn center(&self) -> f64 {
+        self.at(0.5)
+    }
+
+    /// Standard deviation of a uniform draw from the range.
+    #[must_use]
+    pub fn std(&self) -> f64 {
+        (self.range[1] - self.range[0]) / 12_f64.sqrt()
+    }
+}
+
+/// A named set of true values, such as `left`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Condition {
+    /// Name in tables.
+    pub name: String,
+    /// Values by parameter name.
+    pub truth: Vec<(String, f64)>,
+}
+
+/// How the unknowns are explored.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ExplorationProtocol {
+    /// Control steps of an episode.
+    pub horizon: usize,
+    /// Frames (rows of commands and readings) of a control step.
+    pub frames_per_step: usize,
+    /// Length of a frame, s; a multiple of the physics time step.
+    pub frame_period: f64,
+    /// Entries of an action.
+    pub action: Vec<Coordinate>,
+    /// Start pose of the object, drawn uniformly.
+    pub start: Vec<Coordinate>,
+    /// What a tracker reads of the object: the likelihood's data.
+    pub signals: Vec<Signal>,
+    /// Sensors of the machine itself, for policies and logs.
+    pub proprioception: Vec<String>,
+    /// Bodies whose contact counts as interaction.
+    pub contact: [String; 2],
+}
+
+impl ExplorationProtocol {
+    /// Frames of an episode.
+    #[must_use]
+    pub fn frames(&self) -> usize {
+        self.horizon * self.frames_per_step
+    }
+
+    /// Names of all sensors of a reading's row: tracked signals, then proprioception.
+    #[must_use]
+    pub fn channels(&self) -> Vec<String> {
+        let tracked = self.signals.iter().map(|s| s.sensor.clone());
+        tracked.chain(self.proprioception.iter().cloned()).collect()
+    }
+}
+
+/// What is to be achieved, and how it is measured.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DownstreamProtocol {
+    /// Name of the metric, such as `tilt_deg`.
+    pub metric: String,
+    /// Unit of the metric, as shown to people.
+    pub unit: String,
+    /// Frames of an attempt.
+    pub frames: usize,
+    /// Length of a frame, s.
+    pub frame_period: f64,
+    /// Entries of a task action.
+    pub action: Vec<Coordinate>,
+    /// Start pose of the object, drawn uniformly.
+    pub start: Vec<Coordinate>,
+    /// Channels that the metric is computed from.
+    pub channels: Vec<String>,
+    /// Phases of an attempt: name, start and end in s, for plots.
+    pub phases: Vec<(String, f64, f64)>,
+}
+
+/// What came of an attempt.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Outcome {
+    /// The metric.
+    pub value: f64,
+    /// The task's own success rule.
+    pub success: bool,
+    /// What a solver minimises: the metric, with penalties that lead towards success.
+    pub cost: f64,
+}
+
+/// A shape seen from above or from the side, for pictures; m.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Outline {
+    /// What it is.
+    pub label: String,
+    /// Corners, in order.
+    pub corners: Vec<[f64; 2]>,
+}
+
+/// What a picture of the scene from above shows.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct TopView {
+    /// The object in its own frame.
+    pub object: Outline,
+    /// Things that stand still, in the world frame.
+    pub fixtures: Vec<Outline>,
+    /// Corners of the picture: low then high.
+    pub bounds: [[f64; 2]; 2],
+}
+
+/// Turns exploration actions into commands of the actuators, feed-forward.
+pub trait Commander: Send {
+    /// Back to the start of an episode.
+    fn reset(&mut self);
+    /// Commands of the next control step: `frames_per_step x nu`.
+    fn commands(&mut self, action: &[f64], ctrl: &mut [f64]);
+}
+
+/// A task as the framework sees it.
+pub trait Task: Send + Sync {
+    /// Name on the command line.
+    fn name(&self) -> &str;
+    /// One line for `asid list`.
+    fn about(&self) -> &str;
+    /// The scene.
+    fn scene(&self) -> &Scene;
+    /// What an engine must be able to do.
+    fn requires(&self) -> Capabilities;
+    /// The unknowns that are identified by default.
+    fn parameters(&self) -> Vec<Parameter>;
+    /// Further unknowns that can be switched on by name.
+    fn optional_parameters(&self) -> Vec<Parameter> {
+        Vec::new()
+    }
+    /// Named true values for tables.
+    fn conditions(&self) -> Vec<Condition>;
+    /// How it is explored.
+    fn exploration(&self) -> &ExplorationProtocol;
+    /// What is to be achieved.
+    fn downstream(&self) -> &DownstreamProtocol;
+    /// Writes a start pose into positions (`nq`, the first keyframe on entry).
+    ///
+    /// # Errors
+    /// When the layout is not that of the task's scene.
+    fn place(&self, layout: &Layout, start: &[f64], qpos: &mut [f64]) -> Result<()>;
+    /// The start pose that a reading of the tracked signals shows.
+    fn locate(&self, signals: &[f64]) -> Vec<f64>;
+    /// A fresh commander of exploration.
+    ///
+    /// # Errors
+    /// When the scene lacks what the commander needs.
+    fn commander(&self) -> Result<Box<dyn Commander>>;
+    /// Commands of an attempt, `frames x nu`, for a task action and the start pose believed in.
+    ///
+    /// # Errors
+    /// When the scene lacks what the primitive needs.
+    fn attempt(&self, start: &[f64], action: &[f64]) -> Result<Vec<f64>>;
+    /// The metric over an attempt, one value a frame, from `frames x width` readings.
+    fn metric(&self, readings: &[f64]) -> Vec<f64>;
+    /// What came of an attempt.
+    fn outcome(&self, readings: &[f64]) -> Outcome;
+    /// What a picture from above shows.
+    fn top_view(&self) -> TopView {
+        TopView::default()
+    }
+    /// What a picture from the side shows at the end of an attempt: shapes in the
+    /// world, from one row of readings.
+    fn side_view(&self, _readings: &[f64]) -> Vec<Outline> {
+        Vec::new()
+    }
+}
