@@ -6,8 +6,9 @@ use asid_core::{BatchEnvironment, Error, Result, Transition};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use crate::PpoConfig;
+use crate::policy::Layer;
 use crate::ppo::{PpoProgress, learn, train};
+use crate::{Normaliser, Policy, PpoConfig, evaluate};
 
 fn carry_on(_: &PpoProgress) -> ControlFlow<()> {
     ControlFlow::Continue(())
@@ -138,7 +139,7 @@ fn a_one_step_environment_is_solved() {
     let evaluation = trained.evaluation.unwrap();
     assert!(evaluation.mean > -0.01, "{}", evaluation.mean);
     let last = trained.curve.last().unwrap();
-    assert!(last.action_std < 0.7, "the policy gets surer: {last:?}");
+    assert!(last.action_std < 0.5, "the policy gets surer: {last:?}");
 }
 
 /// Ten steps to a goal that is up to four steps away. From a distance `d` the best
@@ -158,7 +159,7 @@ fn a_longer_episode_with_a_time_limit_is_solved() {
     assert!(evaluation.mean > -0.275, "{}", evaluation.mean);
     assert_eq!(evaluation.returns.len(), 64);
     let explained = trained.curve.last().unwrap().explained_variance;
-    assert!(explained.unwrap() > 0.3, "the critic learns: {explained:?}");
+    assert!(explained.unwrap() > 0.7, "the critic learns: {explained:?}");
 }
 
 /// With rewards of 1 and gamma = 1/2 a state is worth 1 / (1 - gamma) = 2 if time
@@ -232,6 +233,28 @@ fn progress_is_seen_and_can_end_the_training() {
     assert!(trained.evaluation.is_none());
     // 16 steps of 8 environments with episodes of 5: three ended in each.
     assert!(seen[0].mean_return.is_some());
+}
+
+/// Ten episodes of eight environments are two of each. A policy that stands
+/// still returns minus the sum of the distances of its goal.
+#[test]
+fn an_evaluation_counts_as_many_episodes_of_each_environment() {
+    let layers = vec![Layer {
+        weight: vec![0.0; 2],
+        bias: vec![0.0],
+    }];
+    let still = Policy::new(Normaliser::identity(2), layers, vec![0.0]);
+    let mut environment = Line::new(8, 5);
+    let evaluation = evaluate(&mut environment, &still, 10).unwrap();
+    assert_eq!(evaluation.returns.len(), 16);
+    assert_eq!(evaluation.env_steps, 8 * 10);
+    // The goals are up to 0.4 away, for five steps.
+    assert!(evaluation.returns.iter().all(|r| (-2.0..=0.0).contains(r)));
+    assert!(evaluation.std > 0.0);
+
+    let misfit = Policy::new(Normaliser::identity(3), vec![], vec![0.0]);
+    let error = evaluate(&mut environment, &misfit, 10).unwrap_err();
+    assert!(matches!(error, Error::Shape(_)), "{error}");
 }
 
 #[test]

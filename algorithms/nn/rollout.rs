@@ -131,16 +131,21 @@ impl<'a> Collector<'a> {
             let message = format!("environment changed the size of a transition of {n} rows");
             return Err(Error::Shape(message));
         }
-        let numbers = t
-            .observation
-            .iter()
-            .chain(&t.final_observation)
-            .chain(&t.reward);
-        if numbers.clone().any(|x| !x.is_finite()) {
-            return Err(Error::Failed(format!(
-                "environment gave an observation or reward that is not finite at step {}",
-                self.env_steps / n
-            )));
+        for i in 0..n {
+            let row = i * len..(i + 1) * len;
+            // The state that a terminated episode reached is never valued: it may be anything.
+            let reached = if t.terminated[i] {
+                &[]
+            } else {
+                &t.final_observation[row.clone()]
+            };
+            let mut numbers = t.observation[row].iter().chain(reached);
+            if !t.reward[i].is_finite() || numbers.any(|x| !x.is_finite()) {
+                return Err(Error::Failed(format!(
+                    "environment {i} of {n} gave an observation or reward that is not finite at step {}",
+                    self.env_steps / n
+                )));
+            }
         }
         Ok(())
     }

@@ -176,9 +176,11 @@ fn pip_failure(said: &str) -> String {
         "name resolution",
         "ProxyError",
         "SSLError",
+        // Not one file of the project was seen: no index, or an empty folder.
+        "(from versions: none)",
     ];
     if network.iter().any(|sign| said.contains(sign)) {
-        return "pip cannot reach its package index: check the network or set PIP_INDEX_URL, or \
+        return "pip finds no package index that has it: check the network or set PIP_INDEX_URL, or \
                 put the wheels in a folder and set PIP_NO_INDEX=1 PIP_FIND_LINKS=<folder>"
             .to_owned();
     }
@@ -285,6 +287,8 @@ mod tests {
             message,
             "pip download failed: No matching distribution found"
         );
+        let message = pip_failure("ERROR: Could not find x (from versions: none)\n");
+        assert!(message.contains("PIP_INDEX_URL"), "{message}");
         let message = pip_failure("... NewConnectionError('...'): failed\nERROR: No matching\n");
         assert!(message.contains("PIP_NO_INDEX"), "{message}");
         assert!(!pip_failure("").contains('\n'));
