@@ -83,7 +83,9 @@ fn is_complete(library: &Library, place: &Path) -> bool {
 /// Fetches, checks and extracts the wheels beside `place`, then moves the result there.
 fn install(library: &Library, place: &Path) -> Result<()> {
     let parent = place.parent().context("a path without a parent")?;
-    let partial = parent.join(format!(".{}.partial-{}", library.folder, process::id()));
+    let prefix = format!(".{}.partial-", library.folder);
+    remove_abandoned(parent, &prefix);
+    let partial = parent.join(format!("{prefix}{}", process::id()));
     let downloads = partial.join("downloads");
     let tree = partial.join("tree");
     let work = || -> Result<()> {
@@ -105,6 +107,20 @@ fn install(library: &Library, place: &Path) -> Result<()> {
     // Nothing half done stays behind, whatever happened.
     let _ = fs::remove_dir_all(&partial);
     outcome
+}
+
+/// Removes what set-ups that were interrupted left: folders named after a process that is gone.
+fn remove_abandoned(parent: &Path, prefix: &str) {
+    let Ok(entries) = fs::read_dir(parent) else {
+        return;
+    };
+    for entry in entries.flatten() {
+        let name = entry.file_name();
+        let owner = name.to_str().and_then(|n| n.strip_prefix(prefix));
+        if owner.is_some_and(|pid| !Path::new("/proc").join(pid).exists()) {
+            let _ = fs::remove_dir_all(entry.path());
+        }
+    }
 }
 
 /// Adds links, small files and the stamp to an extracted tree.
@@ -198,6 +214,20 @@ mod tests {
         replace(&tree, &place).unwrap();
         assert!(place.join("fresh").exists() && !place.join("stale").exists());
         assert!(!tree.exists());
+    }
+
+    #[test]
+    fn only_what_a_dead_process_left_is_removed() {
+        let folder = tempfile::tempdir().unwrap();
+        let alive = folder.path().join(format!(".x.partial-{}", process::id()));
+        // Above the largest process id that Linux gives.
+        let dead = folder.path().join(".x.partial-99999999");
+        let other = folder.path().join("libtorch");
+        for path in [&alive, &dead, &other] {
+            fs::create_dir(path).unwrap();
+        }
+        remove_abandoned(folder.path(), ".x.partial-");
+        assert!(alive.exists() && other.exists() && !dead.exists());
     }
 
     #[test]
