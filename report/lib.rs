@@ -1,1 +1,18 @@
-//! (module docs)
+//! HTML reports with inline SVG plots: one file that opens offline.
+//!
+//! Three layers, each usable on its own:
+//!
+//! - [`plot`] draws charts and plan views as SVG. All colours are CSS
+//!   variables, so that one drawing serves a light and a dark page.
+//! - [`page`] is the shell: header, tiles, sections, figures, tables.
+//! - [`run`] holds what the report of a run shows, as plain data that is
+//!   stored as `trace.json` in the run's folder, and writes it as a page.
+//!
+//! Nothing here fails on strange numbers: a point that is not finite is not
+//! drawn, and in a table it reads `n/a`.
+
+pub mod markup;
+pub mod number;
+pub mod page;
+pub mod plot;
+pub mod run;

@@ -1,0 +1,38 @@
+//! A plot with the title above it and the sentence below that helps to read it.
+
+use crate::markup::escape;
+use crate::plot::{NARROW, Plot, WIDE};
+
+/// A figure: title, plot, caption.
+pub struct Figure {
+    title: String,
+    caption: String,
+    plot: Box<dyn Plot + Send + Sync>,
+}
+
+impl std::fmt::Debug for Figure {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Figure").field("title", &self.title).field("caption", &self.caption).finish_non_exhaustive()
+    }
+}
+
+impl Figure {
+    /// A figure; `title` says what one sees, `caption` how to read it.
+    pub fn new(title: impl Into<String>, plot: impl Plot + Send + Sync + 'static, caption: impl Into<String>) -> Self {
+        Self { title: title.into(), caption: caption.into(), plot: Box::new(plot) }
+    }
+
+    /// The figure; one with a row to itself carries a second layout for wide screens.
+    pub(super) fn html(&self, id: &str, alone: bool) -> String {
+        let narrow = self.plot.svg(id, NARROW);
+        let drawing = if alone {
+            let wide = self.plot.svg(&format!("{id}w"), WIDE);
+            format!("<div class=\"on-narrow\">{narrow}</div><div class=\"on-wide\">{wide}</div>")
+        } else {
+            narrow
+        };
+        let class = if alone { "alone" } else { "" };
+        let caption = if self.caption.is_empty() { String::new() } else { format!("<figcaption>{}</figcaption>", escape(&self.caption)) };
+        format!("<figure class=\"{class}\"><h3>{}</h3>{drawing}{caption}</figure>\n", escape(&self.title))
+    }
+}

@@ -1,0 +1,114 @@
+//! Tables that scroll inside their own frame where the screen is narrow.
+
+use super::Tone;
+use crate::markup::escape;
+
+/// A column's head, and whether it holds numbers (set flush right).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Column {
+    title: String,
+    number: bool,
+}
+
+impl Column {
+    /// A column of text.
+    #[must_use]
+    pub fn text(title: &str) -> Self {
+        Self { title: title.to_owned(), number: false }
+    }
+
+    /// A column of numbers.
+    #[must_use]
+    pub fn number(title: &str) -> Self {
+        Self { title: title.to_owned(), number: true }
+    }
+}
+
+/// A cell: formatted text, and how it is meant.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Cell {
+    text: String,
+    tone: Tone,
+}
+
+impl Cell {
+    /// A cell with a tone.
+    #[must_use]
+    pub fn toned(text: impl Into<String>, tone: Tone) -> Self {
+        Self { text: text.into(), tone }
+    }
+}
+
+impl<T: Into<String>> From<T> for Cell {
+    fn from(text: T) -> Self {
+        Self::toned(text, Tone::Plain)
+    }
+}
+
+/// A table. Rows shorter than the head are filled up with empty cells, longer ones cut.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Table {
+    columns: Vec<Column>,
+    rows: Vec<Vec<Cell>>,
+    total: bool,
+    caption: String,
+}
+
+impl Table {
+    /// A table without rows.
+    #[must_use]
+    pub fn new(columns: Vec<Column>) -> Self {
+        Self { columns, rows: Vec::new(), total: false, caption: String::new() }
+    }
+
+    /// Adds a row.
+    #[must_use]
+    pub fn row(mut self, cells: Vec<Cell>) -> Self {
+        self.rows.push(cells);
+        self
+    }
+
+    /// Sets the last row apart as the sum of the others.
+    #[must_use]
+    pub fn total(mut self) -> Self {
+        self.total = true;
+        self
+    }
+
+    /// Sets the sentence above the table.
+    #[must_use]
+    pub fn caption(mut self, caption: impl Into<String>) -> Self {
+        self.caption = caption.into();
+        self
+    }
+
+    pub(super) fn html(&self) -> String {
+        let class = |column: &Column, tone: Tone| match (column.number, tone.class()) {
+            (true, "") => " class=\"n\"".to_owned(),
+            (true, tone) => format!(" class=\"n {tone}\""),
+            (false, "") => String::new(),
+            (false, tone) => format!(" class=\"{tone}\""),
+        };
+        let head: String = self
+            .columns
+            .iter()
+            .map(|c| format!("<th scope=\"col\"{}>{}</th>", class(c, Tone::Plain), escape(&c.title)))
+            .collect();
+        let mut body = String::new();
+        for (i, row) in self.rows.iter().enumerate() {
+            let last = self.total && i + 1 == self.rows.len();
+            body.push_str(if last { "<tr class=\"total\">" } else { "<tr>" });
+            for (j, column) in self.columns.iter().enumerate() {
+                let empty = Cell::default();
+                let cell = row.get(j).unwrap_or(&empty);
+                let (open, close) = if j == 0 { ("<th scope=\"row\"", "</th>") } else { ("<td", "</td>") };
+                body.push_str(&format!("{open}{}>{}{close}", class(column, cell.tone), escape(&cell.text)));
+            }
+            body.push_str("</tr>");
+        }
+        let caption = if self.caption.is_empty() { String::new() } else { format!("<caption>{}</caption>", escape(&self.caption)) };
+        format!(
+            "<div class=\"table\" tabindex=\"0\" role=\"region\" aria-label=\"table\"><table>{caption}<thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>\n"
+        )
+    }
+}

@@ -1,0 +1,323 @@
+//! A plan view: shapes and paths in a plane, both axes to the same scale.
+
+use super::chart::path;
+use super::frame::{Axis, Frame, Request};
+use super::header::{Entry, Key};
+use super::layer::Extent;
+use super::{Colour, Dash, NARROW, Plot, coordinate, root};
+use crate::markup::escape;
+
+/// A shape in the plane, in data units.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Outline {
+    points: Vec<[f64; 2]>,
+    circle: Option<f64>,
+    closed: bool,
+    dots: bool,
+    colour: Colour,
+    dash: Dash,
+    fill: f64,
+    stroke: f64,
+    context: bool,
+    label: Option<(String, bool)>,
+}
+
+impl Outline {
+    fn new(points: Vec<[f64; 2]>) -> Self {
+        Self {
+            points,
+            circle: None,
+            closed: true,
+            dots: false,
+            colour: Colour::Ink,
+            dash: Dash::Solid,
+            fill: 0.1,
+            stroke: 1.0,
+            context: false,
+            label: None,
+        }
+    }
+
+    /// A closed polygon.
+    #[must_use]
+    pub fn polygon(points: Vec<[f64; 2]>) -> Self {
+        Self::new(points)
+    }
+
+    /// A circle.
+    #[must_use]
+    pub fn circle(centre: [f64; 2], radius: f64) -> Self {
+        Self { circle: Some(radius.abs()), ..Self::new(vec![centre]) }
+    }
+
+    /// An open path.
+    #[must_use]
+    pub fn path(points: Vec<[f64; 2]>) -> Self {
+        Self { closed: false, fill: 0.0, ..Self::new(points) }
+    }
+
+    /// Dots that grow from faint to strong along the sequence: time.
+    #[must_use]
+    pub fn trail(points: Vec<[f64; 2]>) -> Self {
+        Self { closed: false, dots: true, ..Self::new(points) }
+    }
+
+    /// Sets the colour.
+    #[must_use]
+    pub fn colour(mut self, colour: Colour) -> Self {
+        self.colour = colour;
+        self
+    }
+
+    /// Sets the opacities of filling and outline, 0 to 1.
+    #[must_use]
+    pub fn strength(mut self, fill: f64, stroke: f64) -> Self {
+        (self.fill, self.stroke) = (fill.clamp(0.0, 1.0), stroke.clamp(0.0, 1.0));
+        self
+    }
+
+    /// Draws the outline in dashes.
+    #[must_use]
+    pub fn dashed(mut self) -> Self {
+        self.dash = Dash::Dashed;
+        self
+    }
+
+    /// Sets the text of the legend.
+    #[must_use]
+    pub fn label(mut self, label: impl Into<String>) -> Self {
+        self.label = Some((label.into(), false));
+        self
+    }
+
+    /// Names a whole series of ghosts in the legend, from faint to strong.
+    #[must_use]
+    pub fn series_label(mut self, label: impl Into<String>) -> Self {
+        self.label = Some((label.into(), true));
+        self
+    }
+
+    /// Draws the shape where it is in view, but lets it not widen the view.
+    #[must_use]
+    pub fn context(mut self) -> Self {
+        self.context = true;
+        self
+    }
+
+    fn extend(&self, extent: &mut Extent) {
+        let r = self.circle.unwrap_or(0.0);
+        for [x, y] in &self.points {
+            extent.include(x - r, y - r);
+            extent.include(x + r, y + r);
+        }
+    }
+}
+
+/// A plan view of [`Outline`]s, drawn in the order given.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    title: String,
+    description: String,
+    x: Axis,
+    y: Axis,
+    outlines: Vec<Outline>,
+    floor: Option<f64>,
+}
+
+impl Plan {
+    /// An empty plan over axes of the same unit.
+    #[must_use]
+    pub fn new(title: &str, x: Axis, y: Axis) -> Self {
+        Self { title: title.to_owned(), description: String::new(), x, y, outlines: Vec::new(), floor: None }
+    }
+
+    /// Adds a shape over those there are.
+    #[must_use]
+    pub fn outline(mut self, outline: Outline) -> Self {
+        self.outlines.push(outline);
+        self
+    }
+
+    /// Sets the description read to those who cannot see the plan.
+    #[must_use]
+    pub fn description(mut self, description: impl Into<String>) -> Self {
+        self.description = description.into();
+        self
+    }
+
+    /// Keeps the view from reaching below `y`: the floor of a side view.
+    #[must_use]
+    pub fn floor(mut self, y: f64) -> Self {
+        self.floor = Some(y);
+        self
+    }
+
+    /// The part of the plane to show, or `None` where there is nothing.
+    fn view(&self) -> Option<Extent> {
+        let mut extent = Extent::default();
+        self.outlines.iter().filter(|o| !o.context).for_each(|o| o.extend(&mut extent));
+        if !extent.x[0].is_finite() {
+            self.outlines.iter().for_each(|o| o.extend(&mut extent));
+        }
+        if !extent.x[0].is_finite() {
+            return None;
+        }
+        let size = (extent.x[1] - extent.x[0]).max(extent.y[1] - extent.y[0]);
+        let pad = if size > 0.0 { 0.07 * size } else { 0.1 };
+        extent.x = [extent.x[0] - pad, extent.x[1] + pad];
+        extent.y = [extent.y[0] - pad, extent.y[1] + pad];
+        if let Some(floor) = self.floor.filter(|&f| f < extent.y[1]) {
+            extent.y[0] = extent.y[0].max(floor);
+        }
+        Some(extent)
+    }
+
+    fn entries(&self) -> Vec<Entry> {
+        let entry = |o: &Outline| {
+            let (text, series) = o.label.clone()?;
+            let key = match (series || o.dots, o.closed) {
+                (true, _) => Key::Fade,
+                (false, true) if o.dash == Dash::Solid => Key::Fill(o.fill),
+                _ => Key::Line(o.dash),
+            };
+            Some(Entry { key, colour: o.colour, text })
+        };
+        self.outlines.iter().filter_map(entry).collect()
+    }
+}
+
+impl Plot for Plan {
+    fn svg(&self, id: &str, width: f64) -> String {
+        let view = self.view();
+        let entries = if view.is_some() { self.entries() } else { Vec::new() };
+        let mut extent = view.unwrap_or(Extent { x: [0.0, 1.0], y: [0.0, 1.0] });
+
+        // The box's height follows from equal scales. Where that would be too
+        // flat or too tall, the shorter side shows more of the plane.
+        let limits = if width > NARROW * 1.5 { [0.28, 0.55] } else { [0.38, 0.95] };
+        let mut plot_height = limits[1] * width;
+        // The tick labels' width depends on the height, and the height on it: twice settles it.
+        for _ in 0..2 {
+            let [left, right] = Frame::margins((&self.y, extent.y), plot_height);
+            let across = width - left - right;
+            let (w, h) = (extent.x[1] - extent.x[0], extent.y[1] - extent.y[0]);
+            plot_height = (across * h / w).clamp(limits[0] * width, limits[1] * width);
+            let unit = (w / across).max(h / plot_height);
+            widen(&mut extent.x, unit * across, None);
+            widen(&mut extent.y, unit * plot_height, self.floor);
+        }
+
+        let request = Request {
+            id,
+            width,
+            x: (&self.x, extent.x),
+            y: (&self.y, extent.y),
+            entries,
+            above: Vec::new(),
+        };
+        let frame = Frame::new(request, plot_height);
+        let mut body = format!("{}{}", frame.clip, frame.svg);
+        if view.is_some() {
+            let shapes: String = self.outlines.iter().map(|o| draw(o, &frame)).collect();
+            body.push_str(&format!("<g clip-path=\"url(#{}-clip)\">{shapes}</g>", escape(id)));
+        } else {
+            let [left, top, right, bottom] = frame.area;
+            body.push_str(&format!(
+                "<text class=\"empty\" text-anchor=\"middle\" x=\"{}\" y=\"{}\">no data</text>",
+                coordinate(0.5 * (left + right)),
+                coordinate(0.5 * (top + bottom))
+            ));
+        }
+        root(id, [frame.width, frame.height], &self.title, &self.description, &body)
+    }
+}
+
+/// Grows `interval` about its middle, or up from a floor it stands on, to `size`.
+fn widen(interval: &mut [f64; 2], size: f64, floor: Option<f64>) {
+    let missing = size - (interval[1] - interval[0]);
+    if missing <= 0.0 {
+        return;
+    }
+    let below = if floor.is_some_and(|f| interval[0] <= f) { 0.0 } else { 0.5 * missing };
+    *interval = [interval[0] - below, interval[1] + missing - below];
+}
+
+fn draw(outline: &Outline, frame: &Frame) -> String {
+    let class = outline.colour.class();
+    let at = |p: &[f64; 2]| [frame.x.map(p[0]), frame.y.map(p[1])];
+    let style = format!(
+        "class=\"shape {class}\" fill-opacity=\"{}\" stroke-opacity=\"{}\"{}",
+        coordinate(outline.fill),
+        coordinate(outline.stroke),
+        outline.dash.attribute()
+    );
+    let points: Vec<[f64; 2]> = outline.points.iter().map(at).collect();
+    if let Some(radius) = outline.circle {
+        let Some([cx, cy]) = points.first().filter(|p| p.iter().all(|c| c.is_finite()) && radius.is_finite()) else {
+            return String::new();
+        };
+        let r = (frame.x.map(outline.points[0][0] + radius) - cx).abs();
+        return format!("<circle {style} cx=\"{}\" cy=\"{}\" r=\"{}\"/>", coordinate(*cx), coordinate(*cy), coordinate(r));
+    }
+    if outline.dots {
+        let last = points.len().saturating_sub(1).max(1) as f64;
+        return points
+            .iter()
+            .enumerate()
+            .filter(|(_, p)| p.iter().all(|c| c.is_finite()))
+            .map(|(i, [cx, cy])| {
+                format!(
+                    "<circle class=\"fill {class}\" fill-opacity=\"{}\" cx=\"{}\" cy=\"{}\" r=\"3\"/>",
+                    coordinate(0.25 + 0.75 * i as f64 / last),
+                    coordinate(*cx),
+                    coordinate(*cy)
+                )
+            })
+            .collect();
+    }
+    let d = path(&points);
+    if d.is_empty() {
+        return String::new();
+    }
+    let close = if outline.closed { "Z" } else { "" };
+    format!("<path {style} d=\"{d}{close}\"/>")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn attribute(document: &roxmltree::Document<'_>, tag: &str, name: &str) -> f64 {
+        let node = document.descendants().filter(|n| n.has_tag_name(tag)).find_map(|n| n.attribute(name));
+        node.unwrap().parse().unwrap()
+    }
+
+    #[test]
+    fn a_metre_is_as_long_upwards_as_it_is_sideways() {
+        for corner in [[4.0, 1.0], [1.0, 4.0], [0.2, 0.3]] {
+            let [x, y] = corner;
+            let plan = Plan::new("p", Axis::new("x", "m"), Axis::new("y", "m"))
+                .outline(Outline::polygon(vec![[0.0, 0.0], [x, 0.0], [x, y], [0.0, y]]));
+            let svg = plan.svg("p", NARROW);
+            let document = roxmltree::Document::parse(&svg).unwrap();
+            let d = document.descendants().find(|n| n.attribute("class").is_some_and(|c| c.starts_with("shape"))).unwrap();
+            let numbers: Vec<f64> = d.attribute("d").unwrap().split(['M', 'L', 'Z', ' ']).filter_map(|t| t.parse().ok()).collect();
+            let (across, up) = (numbers[2] - numbers[0], numbers[3] - numbers[5]);
+            // Coordinates are rounded to a hundredth.
+            assert!((across / x - up / y).abs() < 0.02 / x.min(y), "{numbers:?}");
+        }
+    }
+
+    #[test]
+    fn nothing_to_show_says_so_and_odd_points_are_skipped() {
+        let plan = Plan::new("p", Axis::new("x", "m"), Axis::new("y", "m"));
+        assert!(plan.svg("p", NARROW).contains("no data"));
+        let odd = plan
+            .outline(Outline::polygon(vec![[f64::NAN, 0.0], [0.0, 1.0], [1.0, f64::INFINITY]]))
+            .outline(Outline::circle([f64::NAN, 0.0], 1.0))
+            .outline(Outline::trail(vec![[0.0, 0.0], [f64::NAN, 1.0]]));
+        let svg = odd.svg("p", NARROW);
+        let document = roxmltree::Document::parse(&svg).unwrap();
+        assert!(!svg.contains("NaN") && attribute(&document, "circle", "r") > 0.0);
+    }
+}

@@ -1,0 +1,119 @@
+//! The report of a run: what happened, as data and as a page.
+//!
+//! [`RunReport`] holds everything that the page shows. It is stored as
+//! `trace.json` beside `result.json`, so that the page can be written again
+//! from files alone. All quantities are in SI units, seconds and radians unless
+//! a `unit` field says otherwise; a `unit` is for display (`m`, `rad`, `deg`).
+//!
+//! Whatever a run does not have stays empty (`None`, an empty `Vec`): its part
+//! of the page is left out, with a remark where a reader would look for it.
+//!
+//! ```
+//! use asid_report::run::RunReport;
+//! let report = RunReport { task: "rod-balancing".into(), backend: "rapier".into(), ..RunReport::default() };
+//! assert!(report.html().contains("rod-balancing"));
+//! ```
+
+mod closing;
+mod downstream;
+mod episode;
+mod exploration;
+mod head;
+mod nullable;
+mod posterior;
+mod signals;
+mod trace;
+
+pub use trace::{
+    Downstream, Episode, ExpectedStd, Exploration, FileEntry, LearningCurve, NamedText, NamedValue, Narrowing,
+    ObjectTrack, ParameterReport, Path, Phase, Prior, RealWorld, Replay, RunReport, SCHEMA, Search, Shape, ShapeKind,
+    SideView, Signal, StageCost, Trial,
+};
+
+use std::path::Path as FilePath;
+
+use asid_core::error::{Error, Result};
+
+use crate::page::Page;
+
+/// Name of the file that holds a [`RunReport`] in a run's folder.
+pub const TRACE_FILE: &str = "trace.json";
+/// Name of the page in a run's folder.
+pub const REPORT_FILE: &str = "report.html";
+
+impl RunReport {
+    /// The report as one self-contained HTML page.
+    #[must_use]
+    pub fn html(&self) -> String {
+        let mut page: Page = head::page(self);
+        for section in [
+            episode::section(self),
+            signals::section(self),
+            exploration::section(self),
+            posterior::section(self),
+            downstream::section(self),
+            closing::parameters(self),
+            closing::costs(self),
+            closing::repeat(self),
+        ]
+        .into_iter()
+        .flatten()
+        {
+            page = page.section(section);
+        }
+        page.html()
+    }
+
+    /// The content of `trace.json`. A number that is not finite is written as `null` and read back as NaN.
+    ///
+    /// # Errors
+    /// [`Error::Failed`] where serialisation fails, which no content of these types makes it do.
+    pub fn to_json(&self) -> Result<String> {
+        serde_json::to_string(self).map_err(|e| Error::Failed(format!("{TRACE_FILE}: {e}")))
+    }
+
+    /// Reads the content of a `trace.json`.
+    ///
+    /// # Errors
+    /// [`Error::Failed`] where the text is no such file, or one of a newer version.
+    pub fn from_json(text: &str) -> Result<Self> {
+        let report: Self = serde_json::from_str(text).map_err(|e| Error::Failed(format!("{TRACE_FILE} is not a run's trace: {e}")))?;
+        if report.schema > SCHEMA {
+            return Err(Error::Failed(format!(
+                "{TRACE_FILE} has schema {}, this program reads up to {SCHEMA}: use a newer one",
+                report.schema
+            )));
+        }
+        Ok(report)
+    }
+
+    /// Writes `trace.json` and `report.html` into `folder`, replacing those there are.
+    ///
+    /// # Errors
+    /// [`Error::File`] where a file cannot be written.
+    pub fn write(&self, folder: &FilePath) -> Result<()> {
+        write(&folder.join(TRACE_FILE), &self.to_json()?)?;
+        write(&folder.join(REPORT_FILE), &self.html())
+    }
+
+    /// Reads the `trace.json` of a finished run's folder.
+    ///
+    /// # Errors
+    /// [`Error::File`] where it cannot be read or is not a trace.
+    pub fn read(folder: &FilePath) -> Result<Self> {
+        let path = folder.join(TRACE_FILE);
+        let text = std::fs::read_to_string(&path).map_err(|e| Error::File {
+            path: path.clone(),
+            message: format!("{e}; a report needs the folder of a finished run"),
+        })?;
+        Self::from_json(&text).map_err(|e| Error::File { path, message: e.to_string() })
+    }
+}
+
+/// Writes a file whole or not at all: beside its place first, then moved there.
+fn write(path: &FilePath, text: &str) -> Result<()> {
+    let failed = |e: std::io::Error| Error::File { path: path.to_path_buf(), message: e.to_string() };
+    let partial = path.with_extension("partial");
+    std::fs::write(&partial, text).map_err(failed)?;
+    std::fs::rename(&partial, path).map_err(failed)
+}

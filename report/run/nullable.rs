@@ -1,0 +1,42 @@
+//! Reading numbers that may not have been finite: JSON has only `null` for them.
+
+use serde::{Deserialize, Deserializer};
+
+/// A number, `null` read as NaN.
+#[derive(Clone, Copy)]
+struct Number(f64);
+
+impl<'de> Deserialize<'de> for Number {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        Ok(Self(Option::<f64>::deserialize(deserializer)?.unwrap_or(f64::NAN)))
+    }
+}
+
+/// One number.
+pub(super) fn scalar<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+    Number::deserialize(deserializer).map(|n| n.0)
+}
+
+/// A list of numbers.
+pub(super) fn list<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<f64>, D::Error> {
+    Ok(Vec::<Number>::deserialize(deserializer)?.into_iter().map(|n| n.0).collect())
+}
+
+/// A fixed number of numbers.
+pub(super) fn array<'de, D: Deserializer<'de>, const N: usize>(deserializer: D) -> Result<[f64; N], D::Error> {
+    let numbers = list(deserializer)?;
+    let found = numbers.len();
+    numbers.try_into().map_err(|_| serde::de::Error::invalid_length(found, &format!("{N} numbers").as_str()))
+}
+
+/// A list of rows of `N` numbers.
+pub(super) fn rows<'de, D: Deserializer<'de>, const N: usize>(deserializer: D) -> Result<Vec<[f64; N]>, D::Error> {
+    Vec::<Vec<Number>>::deserialize(deserializer)?
+        .into_iter()
+        .map(|row| {
+            let found = row.len();
+            let numbers: Vec<f64> = row.into_iter().map(|n| n.0).collect();
+            numbers.try_into().map_err(|_| serde::de::Error::invalid_length(found, &format!("{N} numbers").as_str()))
+        })
+        .collect()
+}

@@ -1,0 +1,223 @@
+//! How the posterior narrowed, and what it is in the end.
+
+use super::head::{covered, interval};
+use super::trace::{ParameterReport, Prior, RunReport};
+use crate::number::{decimals, quantity, to_precision_of};
+use crate::page::{Figure, Section};
+use crate::plot::{Axis, Chart, Colour, Layer, Spacing, Weighted, grid};
+
+/// Share of the prior's range below which the density is drawn in close-up.
+const CLOSE_UP: f64 = 0.5;
+
+pub(super) fn section(report: &RunReport) -> Option<Section> {
+    if report.identifier.is_empty() && report.parameters.iter().all(|p| p.samples.is_empty() && p.narrowing.is_empty()) {
+        return None;
+    }
+    let mut figures = Vec::new();
+    let mut notes = Vec::new();
+    for p in &report.parameters {
+        if p.narrowing.is_empty() {
+            notes.push(format!("No narrowing of {}: the identifier does not iterate.", p.name));
+        } else {
+            figures.push(narrowing(p));
+        }
+        match density(p) {
+            Some(figure) => figures.push(figure),
+            None => notes.push(format!("No posterior of {}: the run has neither samples nor a standard deviation.", p.name)),
+        }
+    }
+    let mut section = Section::new("Identification")
+        .lead("What is believed of each unknown, from the prior through the identifier's iterations to the final posterior.")
+        .figures(figures);
+    if report.parameters.is_empty() {
+        section = section.note("The task has no unknown parameters.");
+    }
+    Some(notes.into_iter().fold(section, Section::note))
+}
+
+fn spacing(p: &ParameterReport) -> Spacing {
+    if p.log_scale { Spacing::Log } else { Spacing::Linear }
+}
+
+fn narrowing(p: &ParameterReport) -> Figure {
+    let band = |low: usize, high: usize| {
+        p.narrowing.iter().map(|n| [f64::from(n.iteration), n.quantiles[low], n.quantiles[high]]).collect::<Vec<_>>()
+    };
+    let median = p.narrowing.iter().map(|n| [f64::from(n.iteration), n.quantiles[2]]).collect();
+    let title = format!("{} narrows over the iterations", p.name);
+    let mut chart = Chart::new(&title, Axis::new("iteration", ""), Axis::new(&p.name, &p.unit).spacing(spacing(p)))
+        .layer(Layer::band(band(0, 4)).colour(Colour::Blue).opacity(0.16).label("95 %"))
+        .layer(Layer::band(band(1, 3)).colour(Colour::Blue).opacity(0.3).label("50 %"))
+        .layer(Layer::line(median).colour(Colour::Blue).label("median"));
+    if let Some(truth) = p.truth {
+        chart = chart.layer(Layer::horizontal(truth).colour(Colour::Ink).dashed().label("truth"));
+    }
+    let width = |q: &[f64; 5]| q[4] - q[0];
+    let caption = match (p.narrowing.first(), p.narrowing.last()) {
+        (Some(first), Some(last)) => {
+            let scale = width(&last.quantiles);
+            format!(
+                "The central 95 % go from {} wide to {} wide.",
+                quantity(&to_precision_of(width(&first.quantiles), scale), &p.unit),
+                quantity(&to_precision_of(scale, scale), &p.unit)
+            )
+        }
+        _ => String::new(),
+    };
+    Figure::new(title, chart.description(caption.clone()), caption)
+}
+
+fn density(p: &ParameterReport) -> Option<Figure> {
+    let title = format!("Posterior of {}", p.name);
+    if let Some(Prior::Binary { probability }) = p.prior {
+        return Some(Figure::new(title, binary(p, probability)?, "Probability before and after."));
+    }
+    let range = range(p);
+    let weighted = Weighted::new(&p.samples, &p.weights);
+    let domain = domain(p, weighted.as_ref(), range)?;
+    let points: Vec<[f64; 2]> = match &weighted {
+        Some(weighted) => weighted.density(range.unwrap_or([0.0, 0.0])).points(domain, 240),
+        None => grid(domain, 240).map(|x| [x, gaussian(x, p.estimate, p.std)]).collect(),
+    };
+
+    let mut chart = Chart::new(&title, Axis::new(&p.name, &p.unit).domain(domain), Axis::new("density", "").zero().bare());
+    let [low, high] = p.interval95;
+    if low.is_finite() && high.is_finite() {
+        let inside = points.iter().copied().filter(|q| (low..=high).contains(&q[0])).collect();
+        chart = chart.layer(Layer::area(inside).colour(Colour::Blue).opacity(0.22).label("95 % interval"));
+    }
+    if let Some(prior) = &p.prior {
+        let prior_points = grid(domain, 240).map(|x| [x, prior_density(prior, x)]).collect();
+        chart = chart.layer(Layer::line(prior_points).colour(Colour::Muted).dashed().label("prior"));
+    }
+    chart = chart.layer(Layer::line(points).colour(Colour::Blue).label("posterior"));
+    if p.estimate.is_finite() {
+        chart = chart.layer(Layer::vertical(p.estimate).colour(Colour::Blue).label(format!("estimate {}", to_precision_of(p.estimate, p.std))));
+    }
+    if let Some(truth) = p.truth {
+        chart = chart.layer(Layer::vertical(truth).colour(Colour::Ink).dashed().label(format!("truth {}", to_precision_of(truth, p.std))));
+    }
+    let caption = caption(p, domain, range);
+    Some(Figure::new(title, chart.description(caption.clone()), caption))
+}
+
+fn caption(p: &ParameterReport, domain: [f64; 2], range: Option<[f64; 2]>) -> String {
+    let mut text = match interval(p) {
+        Some(interval) => format!("95 % interval {}", quantity(&interval, &p.unit)),
+        None => "The final posterior".to_owned(),
+    };
+    match covered(p) {
+        Some(true) => text.push_str(", which holds the truth"),
+        Some(false) => text.push_str(", which misses the truth"),
+        None => {}
+    }
+    if let Some([low, high]) = range {
+        if high - low > 1.01 * (domain[1] - domain[0]) {
+            let times = (high - low) / (domain[1] - domain[0]);
+            text.push_str(&format!("; a close-up, the prior's range is {} times as wide", decimals(times, usize::from(times < 10.0))));
+        }
+    }
+    text.push('.');
+    text
+}
+
+/// The range of the prior.
+fn range(p: &ParameterReport) -> Option<[f64; 2]> {
+    let range = match p.prior? {
+        Prior::Uniform { low, high } | Prior::LogUniform { low, high } | Prior::Normal { low, high, .. } => [low, high],
+        Prior::Binary { .. } => [0.0, 1.0],
+    };
+    (range[0].is_finite() && range[1].is_finite() && range[0] < range[1]).then_some(range)
+}
+
+/// What the density is drawn over: the prior's range, or a close-up where the posterior fills little of it.
+fn domain(p: &ParameterReport, weighted: Option<&Weighted>, range: Option<[f64; 2]>) -> Option<[f64; 2]> {
+    let (centre, std) = match weighted {
+        Some(weighted) => (weighted.mean(), weighted.std()),
+        None => (p.estimate, p.std),
+    };
+    if !centre.is_finite() || !std.is_finite() {
+        return None;
+    }
+    let least = range.map_or(1e-3 * centre.abs().max(1e-6), |r| 1e-3 * (r[1] - r[0]));
+    let reach = (4.5 * std).max(least);
+    let mut close = [centre - reach, centre + reach];
+    for x in p.truth.into_iter().chain(p.interval95).filter(|x| x.is_finite()) {
+        close = [close[0].min(x - 0.15 * reach), close[1].max(x + 0.15 * reach)];
+    }
+    Some(match range {
+        None => close,
+        Some(range) if close[1] - close[0] > CLOSE_UP * (range[1] - range[0]) => [range[0].min(close[0].max(range[0])), range[1]],
+        Some(range) => {
+            // A truth out of the prior's range stays in view.
+            let truth = p.truth.filter(|t| t.is_finite()).unwrap_or(centre);
+            [close[0].max(range[0].min(truth)), close[1].min(range[1].max(truth))]
+        }
+    })
+}
+
+fn prior_density(prior: &Prior, x: f64) -> f64 {
+    match *prior {
+        Prior::Uniform { low, high } if (low..=high).contains(&x) => 1.0 / (high - low),
+        Prior::LogUniform { low, high } if low > 0.0 && (low..=high).contains(&x) => 1.0 / (x * (high / low).ln()),
+        // The mass beyond the cut is not given back: the line is a guide, not a measure.
+        Prior::Normal { mean, std, low, high } if (low..=high).contains(&x) => gaussian(x, mean, std),
+        _ => 0.0,
+    }
+}
+
+fn gaussian(x: f64, mean: f64, std: f64) -> f64 {
+    (-0.5 * ((x - mean) / std).powi(2)).exp() / (std * (2.0 * std::f64::consts::PI).sqrt())
+}
+
+/// Two pairs of bars for a parameter that is either 0 or 1.
+fn binary(p: &ParameterReport, prior: f64) -> Option<Chart> {
+    let after = match Weighted::new(&p.samples, &p.weights) {
+        Some(weighted) => weighted.mean(),
+        None => p.estimate,
+    };
+    if !after.is_finite() {
+        return None;
+    }
+    let pair = |one: f64, x: f64| vec![[x, x + 0.3, 1.0 - one], [1.0 + x, 1.3 + x, one]];
+    let mut chart = Chart::new(&format!("Posterior of {}", p.name), Axis::new(&p.name, &p.unit).domain([-0.5, 1.5]), Axis::new("probability", "").domain([0.0, 1.0]))
+        .description(format!("Probability of 1: {} before, {} after.", decimals(prior, 2), decimals(after, 2)))
+        .layer(Layer::bars(pair(prior, -0.3)).colour(Colour::Muted).opacity(0.35).label("prior"))
+        .layer(Layer::bars(pair(after, 0.0)).colour(Colour::Blue).label("posterior"));
+    if let Some(truth) = p.truth {
+        chart = chart.layer(Layer::vertical(truth).colour(Colour::Ink).dashed().label("truth"));
+    }
+    Some(chart)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_close_up_is_taken_only_of_a_narrow_posterior_and_holds_the_truth() {
+        let mut p = ParameterReport {
+            estimate: 0.06,
+            std: 0.002,
+            truth: Some(0.075),
+            prior: Some(Prior::Uniform { low: -0.1, high: 0.1 }),
+            ..ParameterReport::default()
+        };
+        let close = domain(&p, None, range(&p)).unwrap();
+        assert!(close[0] > 0.04 && close[1] > 0.075 && close[1] < 0.1, "{close:?}");
+        p.std = 0.05;
+        assert_eq!(domain(&p, None, range(&p)).unwrap(), [-0.1, 0.1]);
+        p.std = f64::NAN;
+        assert!(domain(&p, None, range(&p)).is_none());
+    }
+
+    #[test]
+    fn priors_have_mass_one() {
+        for prior in [Prior::Uniform { low: -0.1, high: 0.3 }, Prior::LogUniform { low: 0.01, high: 0.3 }] {
+            let points: Vec<f64> = grid([-0.2, 0.4], 60_001).map(|x| prior_density(&prior, x)).collect();
+            let mass: f64 = points.iter().sum::<f64>() * 0.6 / 60_000.0;
+            // The jumps at the ends cost up to half a grid step's mass each.
+            assert!((mass - 1.0).abs() < 1e-3, "{prior:?}: {mass}");
+        }
+    }
+}
