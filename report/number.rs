@@ -23,6 +23,17 @@ pub fn significant(value: f64, digits: usize) -> String {
     }
 }
 
+/// Like [`significant`], without zeros at the end of the decimals: for round numbers such as limits and ranges.
+#[must_use]
+pub fn round(value: f64, digits: usize) -> String {
+    let text = significant(value, digits);
+    if text.contains('.') && !text.contains('×') {
+        text.trim_end_matches('0').trim_end_matches('.').to_owned()
+    } else {
+        text
+    }
+}
+
 /// `value` with a fixed number of decimals and a real minus sign; never a negative zero.
 #[must_use]
 pub fn decimals(value: f64, decimals: usize) -> String {
@@ -156,6 +167,7 @@ mod tests {
         assert_eq!(significant(3.2e-7, 2), "3.2×10⁻⁷");
         assert_eq!(significant(f64::NAN, 3), NOT_A_NUMBER);
         assert_eq!(decimals(-0.0001, 2), "0.00");
+        assert_eq!((round(5.0, 3), round(-0.1, 3), round(100.0, 2)), ("5".to_owned(), "−0.1".to_owned(), "100".to_owned()));
     }
 
     #[test]

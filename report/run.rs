@@ -26,11 +26,11 @@ mod trace;
 
 pub use trace::{
     Downstream, Episode, ExpectedStd, Exploration, FileEntry, LearningCurve, NamedText, NamedValue, Narrowing,
-    ObjectTrack, ParameterReport, Path, Phase, Prior, RealWorld, Replay, RunReport, SCHEMA, Search, Shape, ShapeKind,
+    ObjectTrack, ParameterReport, Phase, PlanarPath, Prior, RealWorld, Replay, RunReport, SCHEMA, Search, Shape, ShapeKind,
     SideView, Signal, StageCost, Trial,
 };
 
-use std::path::Path as FilePath;
+use std::path::Path;
 
 use asid_core::error::{Error, Result};
 
@@ -77,21 +77,24 @@ impl RunReport {
     /// # Errors
     /// [`Error::Failed`] where the text is no such file, or one of a newer version.
     pub fn from_json(text: &str) -> Result<Self> {
-        let report: Self = serde_json::from_str(text).map_err(|e| Error::Failed(format!("{TRACE_FILE} is not a run's trace: {e}")))?;
-        if report.schema > SCHEMA {
-            return Err(Error::Failed(format!(
-                "{TRACE_FILE} has schema {}, this program reads up to {SCHEMA}: use a newer one",
-                report.schema
-            )));
+        // The version first: of a newer layout nothing else need be readable.
+        #[derive(serde::Deserialize)]
+        struct Version {
+            schema: u32,
         }
-        Ok(report)
+        let failed = |e: serde_json::Error| Error::Failed(format!("{TRACE_FILE} is not a run's trace: {e}"));
+        let Version { schema } = serde_json::from_str(text).map_err(failed)?;
+        if schema > SCHEMA {
+            return Err(Error::Failed(format!("{TRACE_FILE} has schema {schema}, this program reads up to {SCHEMA}: use a newer one")));
+        }
+        serde_json::from_str(text).map_err(failed)
     }
 
     /// Writes `trace.json` and `report.html` into `folder`, replacing those there are.
     ///
     /// # Errors
     /// [`Error::File`] where a file cannot be written.
-    pub fn write(&self, folder: &FilePath) -> Result<()> {
+    pub fn write(&self, folder: &Path) -> Result<()> {
         write(&folder.join(TRACE_FILE), &self.to_json()?)?;
         write(&folder.join(REPORT_FILE), &self.html())
     }
@@ -100,7 +103,7 @@ impl RunReport {
     ///
     /// # Errors
     /// [`Error::File`] where it cannot be read or is not a trace.
-    pub fn read(folder: &FilePath) -> Result<Self> {
+    pub fn read(folder: &Path) -> Result<Self> {
         let path = folder.join(TRACE_FILE);
         let text = std::fs::read_to_string(&path).map_err(|e| Error::File {
             path: path.clone(),
@@ -111,7 +114,7 @@ impl RunReport {
 }
 
 /// Writes a file whole or not at all: beside its place first, then moved there.
-fn write(path: &FilePath, text: &str) -> Result<()> {
+fn write(path: &Path, text: &str) -> Result<()> {
     let failed = |e: std::io::Error| Error::File { path: path.to_path_buf(), message: e.to_string() };
     let partial = path.with_extension("partial");
     std::fs::write(&partial, text).map_err(failed)?;

@@ -3,24 +3,41 @@
 use super::Tone;
 use crate::markup::escape;
 
-/// A column's head, and whether it holds numbers (set flush right).
+/// What a column holds, which decides how it is set.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kind {
+    /// A word or two, never broken.
+    Text,
+    /// Numbers, flush right.
+    Number,
+    /// Sentences, broken where they need to be.
+    Prose,
+}
+
+/// A column's head and what it holds.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Column {
     title: String,
-    number: bool,
+    kind: Kind,
 }
 
 impl Column {
     /// A column of text.
     #[must_use]
     pub fn text(title: &str) -> Self {
-        Self { title: title.to_owned(), number: false }
+        Self { title: title.to_owned(), kind: Kind::Text }
     }
 
     /// A column of numbers.
     #[must_use]
     pub fn number(title: &str) -> Self {
-        Self { title: title.to_owned(), number: true }
+        Self { title: title.to_owned(), kind: Kind::Number }
+    }
+
+    /// A column of sentences.
+    #[must_use]
+    pub fn prose(title: &str) -> Self {
+        Self { title: title.to_owned(), kind: Kind::Prose }
     }
 }
 
@@ -83,11 +100,16 @@ impl Table {
     }
 
     pub(super) fn html(&self) -> String {
-        let class = |column: &Column, tone: Tone| match (column.number, tone.class()) {
-            (true, "") => " class=\"n\"".to_owned(),
-            (true, tone) => format!(" class=\"n {tone}\""),
-            (false, "") => String::new(),
-            (false, tone) => format!(" class=\"{tone}\""),
+        let class = |column: &Column, tone: Tone| {
+            let kind = match column.kind {
+                Kind::Text => "",
+                Kind::Number => "n",
+                Kind::Prose => "p",
+            };
+            match format!("{kind} {}", tone.class()).trim() {
+                "" => String::new(),
+                classes => format!(" class=\"{classes}\""),
+            }
         };
         let head: String = self
             .columns

@@ -88,6 +88,8 @@ pub(crate) struct Request<'a> {
     pub(crate) entries: Vec<Entry>,
     /// Labels above the plot, `x` in data units.
     pub(crate) above: Vec<Above>,
+    /// Draw grid lines up from the x axis as well.
+    pub(crate) map_grid: bool,
 }
 
 impl Frame {
@@ -100,7 +102,7 @@ impl Frame {
 
     /// Lays out a frame whose box is `plot_height` high.
     pub(crate) fn new(request: Request<'_>, plot_height: f64) -> Self {
-        let Request { id, width, x, y, entries, mut above } = request;
+        let Request { id, width, x, y, entries, mut above, map_grid } = request;
         let [margin_left, margin_right] = Self::margins(y, plot_height);
         let (left, right) = (margin_left, width - margin_right);
         let x_scale = Scale::new(x.1, [left, right], x.0.spacing);
@@ -128,6 +130,9 @@ impl Frame {
         }
         for (value, label) in x_marks.values.iter().zip(&x_marks.labels) {
             let at = x_scale.map(*value);
+            if map_grid {
+                svg.push_str(&format!("<path class=\"grid\" d=\"M{} {}V{}\"/>", coordinate(at), coordinate(top), coordinate(bottom)));
+            }
             svg.push_str(&format!("<path class=\"axis\" d=\"M{} {}v4\"/>", coordinate(at), coordinate(bottom)));
             // Labels at the ends move inwards rather than out of the drawing.
             let half = 0.5 * text_width(label, FONT_SIZE);

@@ -7,7 +7,7 @@
 use super::{Colour, Dash, FONT_SIZE, coordinate};
 use crate::markup::{escape, fit, text_width};
 
-const ROW: f64 = 18.0;
+const ROW: f64 = 19.0;
 const KEY_WIDTH: f64 = 20.0;
 const KEY_GAP: f64 = 6.0;
 const ITEM_GAP: f64 = 16.0;
@@ -79,13 +79,16 @@ pub(crate) fn layout(width: f64, y_label: &str, entries: &[Entry], above: &[Abov
         x += needed + ITEM_GAP;
         at_row_start = false;
     }
-    let mut height = if y_label.is_empty() && entries.is_empty() { 4.0 } else { baseline + 9.0 };
+    let mut height = if y_label.is_empty() && entries.is_empty() { 4.0 } else { baseline + 13.0 };
 
     // Marker labels, left to right; lane 0 is next to the plot.
     let placed = lanes(width, above);
+    if !placed.is_empty() {
+        height -= 4.0;
+    }
     let count = placed.iter().map(|p| p.lane + 1).max().unwrap_or(0);
     for label in &placed {
-        let y = height + ROW * (count - label.lane) as f64 - 6.0;
+        let y = height + ROW * (count - label.lane) as f64 - 5.0;
         svg.push_str(&format!(
             "<text class=\"mark-label {}\" x=\"{}\" y=\"{}\">{}</text>",
             label.colour.class(),

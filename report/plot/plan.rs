@@ -214,6 +214,7 @@ impl Plot for Plan {
             y: (&self.y, extent.y),
             entries,
             above: Vec::new(),
+            map_grid: true,
         };
         let frame = Frame::new(request, plot_height);
         let mut body = format!("{}{}", frame.clip, frame.svg);

@@ -109,7 +109,7 @@ fn linear_ticks([low, high]: [f64; 2], most: usize) -> Ticks {
     // Long labels share a power of ten, in steps of a thousand as units do.
     let largest = low.abs().max(high.abs());
     let digits_of_largest = largest.log10().floor() as i32;
-    let exponent = if digits_of_largest >= 5 || digits_of_largest < -3 || magnitude < -4 {
+    let exponent = if !(-3..5).contains(&digits_of_largest) || magnitude < -4 {
         digits_of_largest.div_euclid(3) * 3
     } else {
         0

@@ -2,7 +2,7 @@
 
 use super::head::{covered, interval};
 use super::trace::{Prior, RunReport};
-use crate::number::{decimals, duration, grouped, quantity, significant, to_precision_of, unit_symbol, with_uncertainty};
+use crate::number::{decimals, duration, grouped, quantity, round, to_precision_of, unit_symbol, with_uncertainty};
 use crate::page::{Cell, Column, Section, Table, Tone};
 
 pub(super) fn parameters(report: &RunReport) -> Option<Section> {
@@ -47,7 +47,7 @@ pub(super) fn parameters(report: &RunReport) -> Option<Section> {
 }
 
 fn prior(prior: &Prior) -> String {
-    let n = |x: f64| significant(x, 3);
+    let n = |x: f64| round(x, 3);
     match *prior {
         Prior::Uniform { low, high } => format!("uniform, {} to {}", n(low), n(high)),
         Prior::LogUniform { low, high } => format!("log-uniform, {} to {}", n(low), n(high)),
@@ -97,7 +97,7 @@ pub(super) fn repeat(report: &RunReport) -> Option<Section> {
     }
     section = section.facts(report.versions.iter().map(|v| (v.name.clone(), v.value.clone())).collect());
     if !report.files.is_empty() {
-        let mut table = Table::new(vec![Column::text("file"), Column::text("holds")]);
+        let mut table = Table::new(vec![Column::text("file"), Column::prose("holds")]);
         for file in &report.files {
             table = table.row(vec![file.name.clone().into(), file.what.clone().into()]);
         }

@@ -4,7 +4,7 @@ use super::episode::outline_of;
 use super::head::{metric_name, metric_value};
 use super::trace::{Downstream, RunReport, Search, SideView};
 use crate::markup::capitalise;
-use crate::number::{grouped, quantity, significant, to_precision_of};
+use crate::number::{grouped, quantity, round, significant, to_precision_of};
 use crate::page::{Figure, Section};
 use crate::plot::{Axis, Chart, Colour, Layer, Plan, Weighted};
 
@@ -48,7 +48,7 @@ fn over_time(d: &Downstream) -> Figure {
     });
     let mut chart = Chart::new(&title, Axis::new("time", "s"), Axis::new(name, &d.unit).zero()).layers(spans);
     if let Some(limit) = d.threshold.filter(|l| l.is_finite()) {
-        let label = format!("limit {}", quantity(&significant(limit, 2), &d.unit));
+        let label = format!("limit {}", quantity(&round(limit, 3), &d.unit));
         chart = chart.layer(Layer::horizontal(limit).colour(Colour::Vermillion).dashed().label(label));
     }
     chart = chart.layer(Layer::line(points.clone()).colour(Colour::Blue).label(name));

@@ -39,7 +39,7 @@ fn lead(exploration: &Exploration) -> String {
         (objective, form) => format!("Fisher information of the real episode, {form} form; the objective is {objective}."),
     };
     if let Some(share) = exploration.contact_fraction.filter(|c| c.is_finite()) {
-        text.push_str(&format!(" The robot touched the object in {} % of the control steps.", decimals(100.0 * share, 0)));
+        text.push_str(&format!(" The robot touched the object in {} of the control steps.", quantity(&decimals(100.0 * share, 0), "%")));
     }
     text
 }

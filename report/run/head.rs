@@ -25,7 +25,7 @@ pub(super) fn page(report: &RunReport) -> Page {
     for note in &report.notes {
         page = page.fact("note", note.clone());
     }
-    tiles(report).into_iter().fold(page, Page::tile).footer(footer(report))
+    tiles(report).into_iter().fold(page, Page::tile)
 }
 
 fn real_world(report: &RunReport) -> Option<String> {
@@ -156,9 +156,4 @@ fn tiles(report: &RunReport) -> Vec<Tile> {
 fn standard_deviation(p: &ParameterReport) -> String {
     let (_, std) = with_uncertainty(p.estimate, p.std);
     if std.is_empty() { String::new() } else { format!("± {}", quantity(&std, &p.unit)) }
-}
-
-fn footer(report: &RunReport) -> String {
-    let versions: Vec<String> = report.versions.iter().map(|v| format!("{} {}", v.name, v.value)).collect();
-    if versions.is_empty() { String::new() } else { format!("Made by {}.", versions.join(", ")) }
 }

@@ -111,11 +111,9 @@ fn caption(p: &ParameterReport, domain: [f64; 2], range: Option<[f64; 2]>) -> St
         Some(false) => text.push_str(", which misses the truth"),
         None => {}
     }
-    if let Some([low, high]) = range {
-        if high - low > 1.01 * (domain[1] - domain[0]) {
-            let times = (high - low) / (domain[1] - domain[0]);
-            text.push_str(&format!("; a close-up, the prior's range is {} times as wide", decimals(times, usize::from(times < 10.0))));
-        }
+    let times = range.map_or(1.0, |r| (r[1] - r[0]) / (domain[1] - domain[0]));
+    if times > 1.01 {
+        text.push_str(&format!("; a close-up, the prior's range is {} times as wide", decimals(times, usize::from(times < 10.0))));
     }
     text.push('.');
     text

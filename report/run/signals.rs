@@ -16,7 +16,7 @@ pub(super) fn section(report: &RunReport) -> Option<Section> {
 }
 
 fn figure(signal: &Signal) -> Figure {
-    let title = if signal.name.is_empty() { "A signal".to_owned() } else { signal.name.clone() };
+    let title = format!("{}, real and replayed", if signal.name.is_empty() { "A signal" } else { &signal.name });
     Figure::new(title, chart(signal), caption(signal))
 }
 
@@ -55,15 +55,16 @@ fn caption(signal: &Signal) -> String {
         Some(noise) => decimals(rms / noise, 1),
         None => quantity(&significant(rms, 2), &signal.unit),
     };
+    let times = if noise.is_some() { " times the noise" } else { "" };
     let mut text = match (rms(&signal.before), rms(&signal.after)) {
-        (Some(before), Some(after)) => format!("Root mean square residual {} before, {} after", show(before), show(after)),
-        (Some(one), None) | (None, Some(one)) => format!("Root mean square residual {}", show(one)),
+        (Some(before), Some(after)) => format!("Off by {}{times} before, by {} after (root mean square", show(before), show(after)),
+        (Some(one), None) | (None, Some(one)) => format!("Off by {}{times} (root mean square", show(one)),
         (None, None) => return "Readings of the real episode.".to_owned(),
     };
     if let Some(noise) = noise {
-        text.push_str(&format!(" times the noise of {}; strokes are two standard deviations", quantity(&significant(noise, 2), &signal.unit)));
+        text.push_str(&format!("; the noise is {}, strokes are ± two of it", quantity(&significant(noise, 2), &signal.unit)));
     }
-    text.push('.');
+    text.push_str(").");
     text
 }
 

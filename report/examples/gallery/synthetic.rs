@@ -1,9 +1,4 @@
-//! Writes a run report of made-up but realistic data, to look at the layout.
-//!
-//! `cargo run -p asid-report --example gallery -- FOLDER [--bare]` writes
-//! `trace.json` and `report.html` there; `--bare` leaves out all that is optional.
-
-use std::path::PathBuf;
+//! Runs that never happened, with the shapes and sizes of those that do.
 
 use asid_report::run::*;
 
@@ -12,22 +7,13 @@ const TRUTH: f64 = 0.06;
 const ESTIMATE: f64 = 0.0612;
 const STD: f64 = 0.0021;
 
-fn main() -> Result<(), asid_core::error::Error> {
-    let mut folder = PathBuf::from("gallery");
-    let mut bare = false;
-    for argument in std::env::args().skip(1) {
-        if argument == "--bare" { bare = true } else { folder = argument.into() }
-    }
-    std::fs::create_dir_all(&folder).map_err(|e| asid_core::error::Error::Failed(e.to_string()))?;
-    let report = if bare { bare_run() } else { full_run() };
-    report.write(&folder)
-}
-
-fn bare_run() -> RunReport {
+/// A run that kept nothing that is optional.
+pub fn bare_run() -> RunReport {
     RunReport { task: "rod-balancing".into(), backend: "rapier".into(), explorer: "random".into(), ..RunReport::default() }
 }
 
-fn full_run() -> RunReport {
+/// Rod balancing with everything there is to show.
+pub fn full_run() -> RunReport {
     let mut noise = Noise(7);
     RunReport {
         task: "rod-balancing".into(),
@@ -73,6 +59,72 @@ fn full_run() -> RunReport {
     }
 }
 
+/// Several unknowns of every kind, two action dimensions, long and hostile names, numbers that are none.
+pub fn crowded_run() -> RunReport {
+    let mut noise = Noise(11);
+    let mut report = full_run();
+    report.task = "sphere-patches <&\"'>".into();
+    report.explorer = "fisher-ppo".into();
+    report.notes = vec!["2 of 512 simulations diverged and were left out.".into()];
+    let logarithmic = (1..=3).map(|i| {
+        let centre = [2e-5f64, 1.7e-4, 8e-4][i - 1];
+        let draw = |z: f64, spread: f64| (centre * (spread * z).exp()).clamp(1e-5, 1e-3);
+        ParameterReport {
+            name: format!("rolling_friction_{i}"),
+            unit: "m".into(),
+            target: format!("geom/patch_{i}/friction/2"),
+            log_scale: true,
+            truth: Some(centre * 1.05),
+            estimate: centre,
+            std: 0.12 * centre,
+            interval95: [draw(-1.96, 0.12), draw(1.96, 0.12)],
+            prior: Some(Prior::LogUniform { low: 1e-5, high: 1e-3 }),
+            narrowing: (0..5)
+                .map(|k| Narrowing { iteration: k, quantiles: [-1.96, -0.67, 0.0, 0.67, 1.96].map(|z| draw(z, 1.3 / f64::from(1 + k * k))) })
+                .collect(),
+            samples: (0..300).map(|_| draw(noise.normal(), 0.12)).collect(),
+            ..ParameterReport::default()
+        }
+    });
+    report.parameters = logarithmic.collect();
+    report.parameters.push(ParameterReport {
+        name: "articulated".into(),
+        truth: Some(1.0),
+        estimate: 0.97,
+        prior: Some(Prior::Binary { probability: 0.5 }),
+        ..ParameterReport::default()
+    });
+    report.learning = Some(LearningCurve {
+        x_label: "environment steps".into(),
+        y_label: "return".into(),
+        x: (0..200).map(|i| 5_000.0 * f64::from(i)).collect(),
+        mean: (0..200).map(|i| if i == 60 { f64::NAN } else { 40.0 * f64::from(i).sqrt() + 12.0 * noise.normal() }).collect(),
+        std: vec![45.0; 200],
+        best: vec![],
+    });
+    if let Some(downstream) = &mut report.downstream {
+        downstream.value = 0.31;
+        downstream.success = false;
+        downstream.metric = "goal_distance_m".into();
+        downstream.label = String::new();
+        downstream.unit = "m".into();
+        downstream.threshold = Some(0.05);
+        downstream.phases = (0..12u8)
+            .map(|i| Phase { name: format!("phase number {i}"), start: 0.2 * f64::from(i), end: 0.2 * f64::from(i + 1) })
+            .collect();
+        if let Some(search) = &mut downstream.search {
+            search.chosen.push(NamedValue { name: "speed".into(), value: 0.42, unit: "m/s".into() });
+            search.cost_unit = "m".into();
+            for trial in &mut search.trials {
+                trial.action.push(0.42 + 0.1 * noise.normal());
+            }
+            search.trials[3].cost = f64::INFINITY;
+        }
+    }
+    report.exploration = None;
+    report
+}
+
 fn parameter(noise: &mut Noise) -> ParameterReport {
     let narrowing = (0..=8).map(|iteration| {
         let spread = 0.055 * 0.55f64.powi(iteration) + STD;
@@ -112,7 +164,7 @@ fn episode() -> Episode {
             time: steps().collect(),
             poses: steps().map(|t| pose(t, TRUTH)).collect(),
         }],
-        end_effector: Some(Path {
+        end_effector: Some(PlanarPath {
             time: steps().collect(),
             position: steps().map(|t| [0.44 + 0.09 * t + 0.02 * (2.0 * t).sin(), 0.16 - 0.1 * t + 0.03 * (2.6 * t).cos()]).collect(),
         }),

@@ -1,0 +1,123 @@
+//! The real episode: what was seen of it, and its replays.
+
+use serde::{Deserialize, Serialize};
+
+use super::super::nullable;
+
+/// The real episode in the horizontal plane of the world, in m.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Episode {
+    /// Objects that move.
+    pub objects: Vec<ObjectTrack>,
+    /// The end effector's path.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub end_effector: Option<PlanarPath>,
+    /// The workspace as `[x_low, x_high, y_low, y_high]`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub workspace: Option<[f64; 4]>,
+    /// What stands still: table, walls, goal, ledge.
+    pub shapes: Vec<Shape>,
+}
+
+/// An object that moves in the plane.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct ObjectTrack {
+    /// Name, such as `rod`.
+    pub name: String,
+    /// Its outline in its own frame, a polygon in m.
+    #[serde(deserialize_with = "nullable::rows")]
+    pub outline: Vec<[f64; 2]>,
+    /// Times of the poses in s.
+    #[serde(deserialize_with = "nullable::list")]
+    pub time: Vec<f64>,
+    /// Pose at each time: x and y in m, yaw in rad.
+    #[serde(deserialize_with = "nullable::rows")]
+    pub poses: Vec<[f64; 3]>,
+}
+
+/// A path in the plane.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct PlanarPath {
+    /// Times in s; a dot is drawn at each, so control steps serve better than physics steps.
+    #[serde(deserialize_with = "nullable::list")]
+    pub time: Vec<f64>,
+    /// Position at each time in m.
+    #[serde(deserialize_with = "nullable::rows")]
+    pub position: Vec<[f64; 2]>,
+}
+
+/// What a shape is, which decides its colour.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ShapeKind {
+    /// Table, wall, ledge: it only stands there.
+    #[default]
+    Fixed,
+    /// Where something should go.
+    Goal,
+    /// The object of the task.
+    Object,
+    /// A part of the object to be told apart, such as its movable mass.
+    Part,
+    /// The robot.
+    Robot,
+}
+
+/// A polygon, or a circle where it has a radius.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Shape {
+    /// Text for the legend; may be empty.
+    pub label: String,
+    /// What it is.
+    pub kind: ShapeKind,
+    /// Corners of the polygon in m, or the circle's centre.
+    #[serde(deserialize_with = "nullable::rows")]
+    pub points: Vec<[f64; 2]>,
+    /// Radius of the circle in m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub radius: Option<f64>,
+}
+
+/// A tracked signal of the real episode.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Signal {
+    /// Name as in the log, such as `rod_pos.0`.
+    pub name: String,
+    /// Unit of the values.
+    pub unit: String,
+    /// Standard deviation of a reading's noise, where it is known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub noise_std: Option<f64>,
+    /// Times of the readings in s.
+    #[serde(deserialize_with = "nullable::list")]
+    pub time: Vec<f64>,
+    /// Readings; NaN where one is missing.
+    #[serde(deserialize_with = "nullable::list")]
+    pub readings: Vec<f64>,
+    /// The same commands replayed with the prior's mean.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub before: Option<Replay>,
+    /// The same commands replayed with the estimate.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub after: Option<Replay>,
+}
+
+/// A replayed trajectory of a signal.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Replay {
+    /// Times in s, increasing; need not be those of the readings.
+    #[serde(deserialize_with = "nullable::list")]
+    pub time: Vec<f64>,
+    /// Value at each time.
+    #[serde(deserialize_with = "nullable::list")]
+    pub value: Vec<f64>,
+    /// `[low, high]` of 95 % of the posterior's replays at each time; may be empty.
+    #[serde(deserialize_with = "nullable::rows")]
+    pub band95: Vec<[f64; 2]>,
+}
