@@ -1,0 +1,577 @@
+//! The only place that talks to MuJoCo's C interface by pointers.
+//!
+//! `mujoco-rs` has no batch calls, so the `mjb_*` functions of `mjbatch.h` are
+//! declared here by hand beside its types. [`Batch`] owns an `mjBatch`; a
+//! function given to [`Batch::apply`] sees one simulation at a time as a
+//! [`Sim`]. Everything above this module is safe code.
+//!
+//! Two properties of the C side shape it. A fatal error inside a batch call
+//! unwinds by `longjmp` to the batch, over the frames of the function that was
+//! running: that function must own nothing that needs dropping while it is
+//! inside a [`Sim`] method. A fatal error anywhere else ends the process, so
+//! arguments are checked in Rust before they get here.
+
+use std::any::Any;
+use std::ffi::{CStr, c_char, c_int, c_void};
+use std::marker::PhantomData;
+use std::ops::Range;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+use std::ptr::NonNull;
+use std::sync::{Mutex, Once, PoisonError};
+
+use mujoco_rs::mujoco_c::{
+    mj_contactForce, mj_forward, mj_step, mj_step1, mj_step2, mjData, mjLogMessage, mjModel,
+    mjWarningStat, mjtDisableBit, mju_setLogHandler,
+};
+use mujoco_rs::wrappers::mj_model::MjModel;
+
+/// `mjBatch` of `mjbatch.h`, opaque.
+#[repr(C)]
+struct RawBatch {
+    _opaque: [u8; 0],
+}
+
+/// `mjBatchConfig`.
+#[repr(C)]
+struct BatchConfig {
+    nthread: c_int,
+    persistent: bool,
+}
+
+type BatchFunction = unsafe extern "C" fn(*const mjModel, *mut mjData, c_int, *mut c_void);
+
+unsafe extern "C" {
+    fn mjb_makeBatch(
+        m: *const mjModel,
+        nsim: c_int,
+        config: *const BatchConfig,
+        error: *mut c_char,
+        error_sz: c_int,
+    ) -> *mut RawBatch;
+    fn mjb_deleteBatch(b: *mut RawBatch);
+    fn mjb_nstate(b: *const RawBatch) -> c_int;
+    fn mjb_state(b: *mut RawBatch) -> *mut f64;
+    fn mjb_stateComponent(b: *mut RawBatch, component: c_int, size: *mut c_int) -> *mut f64;
+    fn mjb_warning(b: *mut RawBatch) -> *mut mjWarningStat;
+    fn mjb_reset(
+        b: *mut RawBatch,
+        ids: *const c_int,
+        nid: c_int,
+        key: *const c_int,
+        stage: c_int,
+    ) -> c_int;
+    fn mjb_status(b: *const RawBatch) -> *const c_int;
+    fn mjb_error(b: *const RawBatch, sim: c_int) -> *const c_char;
+    fn mjb_expand(
+        b: *mut RawBatch,
+        name: *const c_char,
+        size: *mut c_int,
+        elemsize: *mut c_int,
+    ) -> *mut c_void;
+    fn mjb_setConst(b: *mut RawBatch, ids: *const c_int, nid: c_int) -> c_int;
+    fn mjb_apply(
+        b: *mut RawBatch,
+        ids: *const c_int,
+        nid: c_int,
+        func: BatchFunction,
+        arg: *mut c_void,
+        save: c_int,
+    ) -> c_int;
+}
+
+/// Entries of `mjData.warning` (`mjtWarning`).
+const WARNINGS: usize = 7;
+/// First of the warnings about bad numbers: `qpos`, `qvel`, `qacc`, `ctrl`.
+const WARN_BADQPOS: usize = 3;
+/// `mjMAXVAL`: a larger magnitude counts as bad.
+const MAX_VALUE: f64 = 1e10;
+
+/// True where MuJoCo's own check calls a number bad: not finite, or above 1e10.
+#[must_use]
+pub fn is_bad(x: f64) -> bool {
+    // A comparison with NaN is false.
+    !(x.abs() <= MAX_VALUE)
+}
+
+/// Routes MuJoCo's messages away from the console and from `MUJOCO_LOG.TXT` in
+/// the working directory. Warnings are dropped: what they say is in the
+/// counters of each simulation. A fatal error outside a batch aborts with its
+/// text, as the C library allows no return from one.
+pub fn silence_log() {
+    static ONCE: Once = Once::new();
+    unsafe extern "C" fn handler(message: *const mjLogMessage) {
+        // SAFETY: MuJoCo passes a message that lives for this call.
+        let Some(message) = (unsafe { message.as_ref() }) else {
+            return;
+        };
+        assert!(
+            message.level() != mujoco_rs::mujoco_c::mjtLogLevel::mjLOG_ERROR,
+            "MuJoCo stopped: {}",
+            message.subject()
+        );
+    }
+    ONCE.call_once(|| {
+        // SAFETY: the handler is a plain function that lives as long as the program.
+        unsafe { mju_setLogHandler(Some(handler)) };
+    });
+}
+
+/// Turns off the silent restart of a simulation whose state went bad.
+pub fn disable_autoreset(model: &mut MjModel) {
+    // SAFETY: a flag of the options; no size or index table is touched.
+    let raw = unsafe { model.ffi_mut() };
+    raw.opt.disableflags |= mjtDisableBit::mjDSBL_AUTORESET as c_int;
+}
+
+/// A model field with values of its own in each simulation; see [`Batch::expand`].
+#[derive(Clone, Copy, Debug)]
+pub struct Expanded(usize);
+
+/// An owned `mjBatch`: state rows, model fields and threads of many simulations.
+pub struct Batch {
+    raw: NonNull<RawBatch>,
+    size: usize,
+    nstate: usize,
+    /// Storage of the expanded fields: first entry, entries a simulation.
+    fields: Vec<(NonNull<f64>, usize)>,
+}
+
+// SAFETY: an mjBatch is bound to no thread: every call sets up the calling
+// thread anew, and `&mut self` keeps calls apart.
+unsafe impl Send for Batch {}
+
+impl Batch {
+    /// Makes a batch of a copy of `model`.
+    ///
+    /// # Errors
+    /// MuJoCo's message where it refuses.
+    pub fn new(model: &MjModel, size: usize, threads: usize) -> Result<Self, String> {
+        let nsim = c_int::try_from(size).map_err(|_| "too many simulations".to_owned())?;
+        let config = BatchConfig {
+            nthread: c_int::try_from(threads).unwrap_or(c_int::MAX).max(1),
+            persistent: false,
+        };
+        let mut error = [0 as c_char; 512];
+        // SAFETY: the model outlives the call, which copies it; `config` and
+        // `error` are valid for it, and `nsim` is checked to be in range.
+        let raw = unsafe {
+            mjb_makeBatch(
+                model.ffi(),
+                nsim,
+                &raw const config,
+                error.as_mut_ptr(),
+                error.len() as c_int,
+            )
+        };
+        let Some(raw) = NonNull::new(raw) else {
+            // SAFETY: MuJoCo ends the text with NUL within the buffer.
+            let text = unsafe { CStr::from_ptr(error.as_ptr()) };
+            return Err(text.to_string_lossy().into_owned());
+        };
+        // SAFETY: `raw` is a live batch.
+        let nstate = unsafe { mjb_nstate(raw.as_ptr()) } as usize;
+        Ok(Self {
+            raw,
+            size,
+            nstate,
+            fields: Vec::new(),
+        })
+    }
+
+    /// Length of a state row (`mjSTATE_INTEGRATION`).
+    #[must_use]
+    pub fn nstate(&self) -> usize {
+        self.nstate
+    }
+
+    /// Where a state component (one `mjtState` bit) lies in a state row.
+    pub fn component(&mut self, bit: u32) -> Range<usize> {
+        let mut len: c_int = 0;
+        // SAFETY: a live batch; the address lies within its first state row.
+        let start = unsafe {
+            let base = mjb_state(self.raw.as_ptr());
+            let at = mjb_stateComponent(self.raw.as_ptr(), bit as c_int, &raw mut len);
+            if at.is_null() {
+                0
+            } else {
+                at.offset_from(base) as usize
+            }
+        };
+        start..start + len as usize
+    }
+
+    /// State row of a simulation.
+    pub fn state(&mut self, sim: usize) -> &mut [f64] {
+        assert!(sim < self.size, "simulation {sim} of {}", self.size);
+        // SAFETY: rows are `nstate` apart, `sim` is in range, and `&mut self`
+        // keeps the row to this borrow.
+        unsafe {
+            let row = mjb_state(self.raw.as_ptr()).add(sim * self.nstate);
+            std::slice::from_raw_parts_mut(row, self.nstate)
+        }
+    }
+
+    /// Forgets the warnings of a simulation.
+    pub fn clear_warnings(&mut self, sim: usize) {
+        assert!(sim < self.size, "simulation {sim} of {}", self.size);
+        // SAFETY: `size x WARNINGS` plain counters; `sim` is in range.
+        let counters = unsafe {
+            let row = mjb_warning(self.raw.as_ptr()).add(sim * WARNINGS);
+            std::slice::from_raw_parts_mut(row, WARNINGS)
+        };
+        for counter in counters {
+            counter.number = 0;
+            counter.lastinfo = 0;
+        }
+    }
+
+    /// Resets simulations, to keyframe 0 where `keyframe` is set, else to the
+    /// model's defaults. `ids` are strictly increasing and in range.
+    pub fn reset(&mut self, ids: &[c_int], keyframe: bool) {
+        self.check(ids);
+        let keys = vec![0; if keyframe { ids.len() } else { 0 }];
+        let key = if keyframe {
+            keys.as_ptr()
+        } else {
+            std::ptr::null()
+        };
+        // SAFETY: `ids` are checked; one key a simulation, or none; stage 0
+        // computes nothing. The caller asks for keyframe 0 only where there is one.
+        unsafe { mjb_reset(self.raw.as_ptr(), ids.as_ptr(), ids.len() as c_int, key, 0) };
+    }
+
+    /// Gives a model field of doubles a value in each simulation, starting from the model's.
+    ///
+    /// # Errors
+    /// When there is no such field.
+    pub fn expand(&mut self, field: &CStr) -> Result<Expanded, String> {
+        let (mut len, mut element): (c_int, c_int) = (0, 0);
+        // SAFETY: a live batch and a NUL-terminated name.
+        let storage = unsafe {
+            mjb_expand(
+                self.raw.as_ptr(),
+                field.as_ptr(),
+                &raw mut len,
+                &raw mut element,
+            )
+        };
+        let storage = NonNull::new(storage.cast::<f64>())
+            .filter(|_| element as usize == size_of::<f64>())
+            .ok_or_else(|| format!("the engine has no field {}", field.to_string_lossy()))?;
+        self.fields.push((storage, len as usize));
+        Ok(Expanded(self.fields.len() - 1))
+    }
+
+    /// Values of an expanded field in a simulation.
+    pub fn field(&mut self, field: Expanded, sim: usize) -> &mut [f64] {
+        assert!(sim < self.size, "simulation {sim} of {}", self.size);
+        let (storage, len) = self.fields[field.0];
+        // SAFETY: the storage is `size x len` doubles that the batch keeps until
+        // it is deleted; `sim` is in range and `&mut self` keeps others away.
+        unsafe { std::slice::from_raw_parts_mut(storage.as_ptr().add(sim * len), len) }
+    }
+
+    /// Recomputes the constants that follow from changed model fields.
+    ///
+    /// # Errors
+    /// MuJoCo's message of the first simulation it refuses, whose constants stay as they were.
+    pub fn set_const(&mut self, ids: &[c_int]) -> Result<(), String> {
+        if ids.is_empty() {
+            return Ok(());
+        }
+        self.check(ids);
+        // SAFETY: `ids` are checked.
+        let failed = unsafe { mjb_setConst(self.raw.as_ptr(), ids.as_ptr(), ids.len() as c_int) };
+        match ids.iter().find_map(|&i| self.failure(i as usize)) {
+            Some(message) if failed > 0 => Err(message),
+            _ => Ok(()),
+        }
+    }
+
+    /// Message of the error that a simulation raised in its last call, if it did.
+    #[must_use]
+    pub fn failure(&self, sim: usize) -> Option<String> {
+        assert!(sim < self.size, "simulation {sim} of {}", self.size);
+        // SAFETY: `size` status values; the message is a NUL-terminated text that
+        // lives until the next call on the batch, and is copied here.
+        unsafe {
+            let status = *mjb_status(self.raw.as_ptr()).add(sim);
+            (status != 0).then(|| {
+                CStr::from_ptr(mjb_error(self.raw.as_ptr(), sim as c_int))
+                    .to_string_lossy()
+                    .into_owned()
+            })
+        }
+    }
+
+    /// Runs `function` on each simulation with its job (`jobs[i]` goes with
+    /// `ids[i]`), on all threads; `save` keeps the state it leaves. Returns how
+    /// many raised an error in MuJoCo; those keep the state from before.
+    ///
+    /// `function` must own nothing that needs dropping while it calls a method
+    /// of [`Sim`]. A panic in it is raised again here.
+    pub fn apply<J, F>(&mut self, ids: &[c_int], jobs: &mut [J], function: &F, save: bool) -> usize
+    where
+        J: Send,
+        F: Fn(&mut J, &mut Sim<'_>) + Sync,
+    {
+        assert_eq!(ids.len(), jobs.len(), "one job a simulation");
+        if ids.is_empty() {
+            return 0;
+        }
+        self.check(ids);
+        let call = Call {
+            function,
+            ids,
+            jobs: jobs.as_mut_ptr(),
+            panic: Mutex::new(None),
+        };
+        // SAFETY: `ids` are checked; `call` outlives the call, which joins all
+        // threads before it returns; `F` is `Sync` and `J` is `Send`, so threads
+        // may share the one and take one each of the other.
+        let failed = unsafe {
+            mjb_apply(
+                self.raw.as_ptr(),
+                ids.as_ptr(),
+                ids.len() as c_int,
+                run::<J, F>,
+                (&raw const call).cast_mut().cast(),
+                c_int::from(save),
+            )
+        };
+        if let Some(payload) = call
+            .panic
+            .into_inner()
+            .unwrap_or_else(PoisonError::into_inner)
+        {
+            resume_unwind(payload);
+        }
+        failed as usize
+    }
+
+    /// MuJoCo ends the process over bad ids, so they are checked first.
+    fn check(&self, ids: &[c_int]) {
+        assert!(
+            ids.windows(2).all(|w| w[0] < w[1])
+                && ids.first().is_none_or(|&i| i >= 0)
+                && ids.last().is_none_or(|&i| (i as usize) < self.size),
+            "simulations must be strictly increasing and below {}",
+            self.size
+        );
+    }
+}
+
+impl Drop for Batch {
+    fn drop(&mut self) {
+        // SAFETY: made by mjb_makeBatch and deleted only here.
+        unsafe { mjb_deleteBatch(self.raw.as_ptr()) };
+    }
+}
+
+/// What [`run`] gets: the function, its jobs, and where a panic of it waits.
+struct Call<'a, J, F> {
+    function: &'a F,
+    ids: &'a [c_int],
+    jobs: *mut J,
+    panic: Mutex<Option<Box<dyn Any + Send>>>,
+}
+
+/// The C function behind [`Batch::apply`].
+unsafe extern "C" fn run<J, F>(m: *const mjModel, d: *mut mjData, sim: c_int, arg: *mut c_void)
+where
+    F: Fn(&mut J, &mut Sim<'_>) + Sync,
+{
+    // SAFETY: `arg` is the `Call` of [`Batch::apply`], which outlives this call.
+    let call = unsafe { &*arg.cast_const().cast::<Call<'_, J, F>>() };
+    let Ok(row) = call.ids.binary_search(&sim) else {
+        return;
+    };
+    // SAFETY: there are as many jobs as ids, and each simulation runs once a
+    // call, so nobody else has this one.
+    let job = unsafe { &mut *call.jobs.add(row) };
+    let mut view = Sim {
+        m,
+        d,
+        borrow: PhantomData,
+    };
+    let outcome = catch_unwind(AssertUnwindSafe(|| (call.function)(job, &mut view)));
+    if let Err(payload) = outcome {
+        *call.panic.lock().unwrap_or_else(PoisonError::into_inner) = Some(payload);
+    }
+}
+
+/// One simulation's model and data during [`Batch::apply`].
+///
+/// The pointers stay pointers, as MuJoCo writes through its own copies of them;
+/// slices are made for the length of a borrow.
+pub struct Sim<'a> {
+    m: *const mjModel,
+    d: *mut mjData,
+    borrow: PhantomData<&'a mut mjData>,
+}
+
+/// Accessors of arrays of `mjData`: `name`, length in `mjModel`, documentation.
+macro_rules! arrays {
+    ($($name:ident, $len:ident $(* $factor:literal)?, $doc:literal;)*) => {$(
+        #[doc = $doc]
+        #[must_use]
+        pub fn $name(&self) -> &[f64] {
+            // SAFETY: `m` and `d` are live and belong together; the array holds
+            // that many doubles, and `&self` keeps writers away.
+            unsafe { slice((*self.d).$name, (*self.m).$len as usize $(* $factor)?) }
+        }
+    )*};
+}
+
+impl Sim<'_> {
+    arrays! {
+        qpos, nq, "Positions, `nq`.";
+        qvel, nv, "Velocities, `nv`.";
+        sensordata, nsensordata, "Readings of the stages computed last.";
+    }
+
+    /// Simulated time, s.
+    #[must_use]
+    pub fn time(&self) -> f64 {
+        // SAFETY: `d` is live.
+        unsafe { (*self.d).time }
+    }
+
+    /// Command, generalised force and the read-only state, for a hook:
+    /// `(qpos, qvel, ctrl, qfrc_applied)`.
+    pub fn hook_view(&mut self) -> (&[f64], &[f64], &mut [f64], &mut [f64]) {
+        // SAFETY: four disjoint arrays of `d`, borrowed from `self` together.
+        unsafe {
+            let (m, d) = (&*self.m, self.d);
+            (
+                slice((*d).qpos, m.nq as usize),
+                slice((*d).qvel, m.nv as usize),
+                slice_mut((*d).ctrl, m.nu as usize),
+                slice_mut((*d).qfrc_applied, m.nv as usize),
+            )
+        }
+    }
+
+    /// Commands, `nu`.
+    pub fn ctrl(&mut self) -> &mut [f64] {
+        // SAFETY: `nu` doubles, borrowed from `self`.
+        unsafe { slice_mut((*self.d).ctrl, (*self.m).nu as usize) }
+    }
+
+    /// Applied wrenches, `nbody x 6`: force, then torque.
+    pub fn wrenches(&mut self) -> &mut [f64] {
+        // SAFETY: `6 nbody` doubles, borrowed from `self`.
+        unsafe { slice_mut((*self.d).xfrc_applied, (*self.m).nbody as usize * 6) }
+    }
+
+    /// One physics step.
+    pub fn step(&mut self) {
+        // SAFETY: `m` and `d` are live and belong together.
+        unsafe { mj_step(self.m, self.d) };
+    }
+
+    /// The half of a step that needs no command: positions, velocities and their sensors.
+    pub fn step1(&mut self) {
+        // SAFETY: `m` and `d` are live and belong together.
+        unsafe { mj_step1(self.m, self.d) };
+    }
+
+    /// The other half, after [`Sim::step1`] or [`Sim::forward`] on the present state.
+    pub fn step2(&mut self) {
+        // SAFETY: `m` and `d` are live and belong together.
+        unsafe { mj_step2(self.m, self.d) };
+    }
+
+    /// Everything that follows from the present state and command.
+    pub fn forward(&mut self) {
+        // SAFETY: `m` and `d` are live and belong together.
+        unsafe { mj_forward(self.m, self.d) };
+    }
+
+    /// What MuJoCo warned about since the last reset that makes the state worthless.
+    #[must_use]
+    pub fn bad_number(&self) -> Option<BadNumber> {
+        // SAFETY: `d` is live; an array of plain counters is read.
+        let warnings = unsafe { &(&(*self.d).warning)[WARN_BADQPOS..] };
+        let kinds = [
+            BadNumber::Position,
+            BadNumber::Velocity,
+            BadNumber::Acceleration,
+            BadNumber::Command,
+        ];
+        let seen = warnings.iter().position(|w| w.number > 0);
+        if let Some(first) = seen {
+            return kinds.get(first).copied();
+        }
+        if self.qpos().iter().any(|&x| is_bad(x)) {
+            return Some(BadNumber::Position);
+        }
+        self.qvel()
+            .iter()
+            .any(|&x| is_bad(x))
+            .then_some(BadNumber::Velocity)
+    }
+
+    /// Sum of the normal forces between the geoms of two bodies, N, as of the
+    /// last [`Sim::forward`].
+    #[must_use]
+    pub fn contact_force(&self, bodies: [usize; 2]) -> f64 {
+        let mut sum = 0.0;
+        // SAFETY: `ncon` contacts in the array; geom indices are checked to be of
+        // geoms (a flex has -1) before they index `geom_bodyid`.
+        unsafe {
+            let (m, d) = (&*self.m, self.d);
+            for i in 0..(*d).ncon {
+                let contact = &*(*d).contact.add(i as usize);
+                let [a, b] = contact.geom;
+                if a < 0 || b < 0 {
+                    continue;
+                }
+                let pair = [a, b].map(|g| *m.geom_bodyid.add(g as usize) as usize);
+                if pair == bodies || pair == [bodies[1], bodies[0]] {
+                    let mut force = [0.0; 6];
+                    mj_contactForce(self.m, d, i, &raw mut force);
+                    sum += force[0];
+                }
+            }
+        }
+        sum
+    }
+}
+
+/// Which number of a state went bad.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum BadNumber {
+    /// A position.
+    Position,
+    /// A velocity.
+    Velocity,
+    /// An acceleration.
+    Acceleration,
+    /// A command or a force that was applied.
+    Command,
+}
+
+/// A slice of an array of MuJoCo, which is null where it is empty.
+///
+/// # Safety
+/// `ptr` holds `len` doubles that nobody writes for `'a`, or is null or `len` 0.
+unsafe fn slice<'a>(ptr: *const f64, len: usize) -> &'a [f64] {
+    if ptr.is_null() || len == 0 {
+        return &[];
+    }
+    // SAFETY: as promised by the caller.
+    unsafe { std::slice::from_raw_parts(ptr, len) }
+}
+
+/// As [`slice`], to write.
+///
+/// # Safety
+/// `ptr` holds `len` doubles that only the result touches for `'a`, or is null or `len` 0.
+unsafe fn slice_mut<'a>(ptr: *mut f64, len: usize) -> &'a mut [f64] {
+    if ptr.is_null() || len == 0 {
+        return &mut [];
+    }
+    // SAFETY: as promised by the caller.
+    unsafe { std::slice::from_raw_parts_mut(ptr, len) }
+}

@@ -1,0 +1,152 @@
+//! Mass properties of a body that parameters change.
+//!
+//! A compiled model keeps mass, centre and principal inertia of each body and
+//! forgets the geoms they came from. Where a parameter moves or weighs a geom,
+//! its body is rebuilt from its geoms as the document describes them, with the
+//! formulas that all engines share.
+
+use asid_core::mass::{GeomMass, MassProperties};
+use asid_core::{Result, Scene};
+use mujoco_rs::wrappers::mj_model::MjModel;
+use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
+
+/// Relative difference below which geoms are taken to explain a body's mass
+/// properties: far above the rounding of two ways of summing them, far below
+/// any difference that means something.
+const AGREEMENT: f64 = 1e-6;
+
+/// Mass properties as a compiled model holds them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BodyInertia {
+    /// Mass, kg.
+    pub mass: f64,
+    /// Centre of mass in the body's frame, m.
+    pub ipos: [f64; 3],
+    /// `body_from_principal`, w x y z.
+    pub iquat: [f64; 4],
+    /// Principal moments, kg m².
+    pub inertia: [f64; 3],
+}
+
+impl BodyInertia {
+    /// Those of a body of a compiled model.
+    #[must_use]
+    pub fn of(model: &MjModel, body: usize) -> Self {
+        Self {
+            mass: model.body_mass()[body],
+            ipos: model.body_ipos()[body],
+            iquat: model.body_iquat()[body],
+            inertia: model.body_inertia()[body],
+        }
+    }
+
+    /// Those of a union of geoms.
+    #[must_use]
+    pub fn of_geoms(geoms: &[GeomMass]) -> Self {
+        let all = MassProperties::of_geoms(geoms);
+        let (moments, rotation) = all.principal();
+        Self {
+            mass: all.mass,
+            ipos: all.center.into(),
+            iquat: [rotation.w, rotation.i, rotation.j, rotation.k],
+            inertia: moments.into(),
+        }
+    }
+
+    /// True where a body with these properties can exist: positive mass and
+    /// moments, none larger than the sum of the other two.
+    #[must_use]
+    pub fn is_physical(&self) -> bool {
+        let [a, b, c] = self.inertia;
+        let slack = 1e-9 * (a + b + c);
+        self.mass > 0.0
+            && a > 0.0
+            && b > 0.0
+            && c > 0.0
+            && a <= b + c + slack
+            && b <= a + c + slack
+            && c <= a + b + slack
+    }
+
+    /// Inertia along the body's axes.
+    fn tensor(&self) -> Matrix3<f64> {
+        let [w, x, y, z] = self.iquat;
+        let rotation = UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z))
+            .to_rotation_matrix()
+            .into_inner();
+        rotation * Matrix3::from_diagonal(&Vector3::from(self.inertia)) * rotation.transpose()
+    }
+
+    /// True where both describe the same body, whatever the order of the
+    /// principal axes.
+    fn agrees(&self, other: &Self) -> bool {
+        let scale = self.tensor().norm() / self.mass.max(f64::MIN_POSITIVE);
+        let offset = (Vector3::from(self.ipos) - Vector3::from(other.ipos)).norm();
+        (self.mass - other.mass).abs() <= AGREEMENT * self.mass
+            && offset <= AGREEMENT * scale.sqrt()
+            && (self.tensor() - other.tensor()).norm() <= AGREEMENT * self.tensor().norm()
+    }
+}
+
+/// The geoms of a body, with their names as in the layout.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BodyGeoms {
+    /// Indices of the geoms in the model.
+    pub geoms: Vec<usize>,
+    /// Their mass properties, in the same order.
+    pub masses: Vec<GeomMass>,
+}
+
+/// Where a body's mass properties come from.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Origin {
+    /// From its geoms, which explain them.
+    Geoms(BodyGeoms),
+    /// From an `<inertial>` element: geoms may move without changing them.
+    Inertial,
+    /// From something else, such as a mesh; the text says what is known.
+    Other(String),
+}
+
+/// Finds where the mass properties of `body` come from, by comparing what the
+/// engine compiled with what the document's geoms add up to.
+///
+/// # Errors
+/// When the document cannot be read.
+pub fn origin(scene: &Scene, model: &MjModel, body: usize, name: &str) -> Result<Origin> {
+    if body == 0 {
+        return Ok(Origin::Inertial);
+    }
+    let document = scene.description()?;
+    let same_count = document.bodies.len() == model.nbody() as usize;
+    let entry = document
+        .bodies
+        .iter()
+        .find(|b| b.body.name.as_deref() == Some(name))
+        .or_else(|| document.bodies.get(body).filter(|_| same_count));
+    let Some(entry) = entry else {
+        return Ok(Origin::Other(format!(
+            "body `{name}` is not found in the document"
+        )));
+    };
+    let compiled = BodyInertia::of(model, body);
+    let first = model.body_geomadr()[body];
+    let count = model.body_geomnum()[body] as usize;
+    let masses: Option<Vec<GeomMass>> = entry.body.geoms.iter().map(GeomMass::of).collect();
+    if let Some(masses) = masses.filter(|m| m.len() == count && count > 0)
+        && compiled.agrees(&BodyInertia::of_geoms(&masses))
+    {
+        let first = first as usize;
+        return Ok(Origin::Geoms(BodyGeoms {
+            geoms: (first..first + count).collect(),
+            masses,
+        }));
+    }
+    Ok(if entry.body.inertial.is_some() {
+        Origin::Inertial
+    } else {
+        Origin::Other(format!(
+            "the mass of body `{name}` is not that of its geoms as primitives"
+        ))
+    })
+}
