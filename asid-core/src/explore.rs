@@ -15,6 +15,11 @@ pub trait Policy: Send {
     /// When planning fails.
     fn act(&mut self, step: usize, reading: &[f64], action: &mut [f64]) -> Result<()>;
 
+    /// Return over the search, for a policy that searched when its episode began.
+    fn take_curve(&mut self) -> Vec<CurvePoint> {
+        Vec::new()
+    }
+
     /// The policy as JSON, for the robot's side.
     fn export(&self) -> serde_json::Value;
 }

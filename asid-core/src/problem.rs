@@ -2,7 +2,7 @@
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use crate::backend::Model;
+use crate::backend::{Capabilities, Model};
 use crate::error::{Error, Result};
 use crate::layout::Layout;
 use crate::parameter::Parameter;
@@ -17,6 +17,8 @@ pub struct Problem<'a> {
     pub task: &'a dyn Task,
     /// The scene compiled by the engine that the method may use.
     pub model: &'a dyn Model,
+    /// What that engine can do.
+    pub capabilities: Capabilities,
     /// The unknowns.
     pub parameters: &'a [Parameter],
     /// Threads; 0 for one a core.
@@ -26,9 +28,9 @@ pub struct Problem<'a> {
     /// Where progress is told to.
     pub progress: &'a dyn Progress,
     /// Physics steps taken so far.
-    pub physics_steps: &'a AtomicU64,
+    pub physics_counter: &'a AtomicU64,
     /// Control steps of exploration episodes simulated so far.
-    pub env_steps: &'a AtomicU64,
+    pub env_counter: &'a AtomicU64,
 }
 
 impl Problem<'_> {
@@ -57,8 +59,14 @@ impl Problem<'_> {
 
     /// Counts the physics steps that `batch` took.
     pub fn count_physics(&self, batch: &Batch, before: u64) {
-        self.physics_steps
+        self.physics_counter
             .fetch_add(batch.simulator.steps_taken() - before, Ordering::Relaxed);
+    }
+
+    /// Physics steps counted so far.
+    #[must_use]
+    pub fn physics_steps(&self) -> u64 {
+        self.physics_counter.load(Ordering::Relaxed)
     }
 
     /// Physics steps of one frame.

@@ -22,6 +22,8 @@ use crate::task::{Outcome, Task};
 pub struct RealEpisode {
     /// The log.
     pub episode: Episode,
+    /// Actions of the policy, `horizon x action`, in the task's units.
+    pub actions: Vec<f64>,
     /// Share of control steps at whose frames the machine touched the object.
     pub contact_fraction: f64,
     /// True start pose, where it is known.
@@ -35,6 +37,8 @@ pub struct Attempt {
     pub outcome: Outcome,
     /// The action.
     pub action: Vec<f64>,
+    /// Start pose that the machine believed in.
+    pub believed_start: Vec<f64>,
     /// Readings of the task's channels, `frames x width`.
     pub readings: Vec<f64>,
 }
@@ -80,12 +84,13 @@ impl<'a> SimulatedWorld<'a> {
         let problem = Problem {
             task,
             model,
+            capabilities: crate::Capabilities::empty(),
             parameters,
             threads: 1,
             streams,
             progress: &Silent,
-            physics_steps: &steps,
-            env_steps: &steps,
+            physics_counter: &steps,
+            env_counter: &steps,
         };
         let batch = problem.batch(1)?;
         let signals = SignalSet::new(model.layout(), &task.exploration().signals)?;
@@ -169,12 +174,14 @@ impl RealWorld for SimulatedWorld<'_> {
         let mut ctrl = vec![0.0; frames * nu];
         let mut out = vec![0.0; frames * (width + 1)];
         let mut touched = 0;
+        let mut actions = Vec::new();
         for step in 0..protocol.horizon {
             let latest = episode.reading_tail(width).to_vec();
             policy.act(step, &latest, &mut action)?;
             for (a, c) in action.iter_mut().zip(&protocol.action) {
                 *a = a.clamp(c.range[0], c.range[1]);
             }
+            actions.extend_from_slice(&action);
             commander.commands(&action, &mut ctrl);
             let rollout = Rollout::new(&[0], frames, substeps, Control::Shared(&ctrl), &recording);
             self.batch.simulator.rollout(&rollout, &mut out)?;
@@ -191,6 +198,7 @@ impl RealWorld for SimulatedWorld<'_> {
             .collect();
         Ok(RealEpisode {
             episode,
+            actions,
             contact_fraction: touched as f64 / protocol.horizon as f64,
             true_start: Some(start),
         })
@@ -233,6 +241,7 @@ impl RealWorld for SimulatedWorld<'_> {
         Ok(Attempt {
             outcome: self.task.outcome(&readings),
             action,
+            believed_start: believed,
             readings,
         })
     }

@@ -1,0 +1,179 @@
+//! Fisher exploration as a batch of environments, for learners.
+//!
+//! An observation is the noisy reading, the share of the episode that is over
+//! and, for each unknown, the log of the information gathered so far: with it the
+//! return of the telescoping objectives is a function of the observation.
+
+use asid_core::environment::{BatchEnvironment, Transition};
+use asid_core::fisher::{FisherBatch, FisherSettings};
+use asid_core::rng::Rng;
+use asid_core::{Problem, Result};
+use rand::Rng as _;
+use rand_distr::{Distribution, StandardNormal};
+
+/// Noise of each entry of a policy's observation (published ASID code).
+pub const OBSERVATION_NOISE: f64 = 0.01;
+
+/// A batch of Fisher exploration episodes that step together.
+pub struct FisherEnvironment<'a> {
+    problem: &'a Problem<'a>,
+    batch: FisherBatch<'a>,
+    rng: Rng,
+    step: usize,
+    readings: Vec<f64>,
+}
+
+impl<'a> FisherEnvironment<'a> {
+    /// `episodes` environments; unknowns and start poses are drawn anew for each episode.
+    ///
+    /// # Errors
+    /// As [`FisherBatch::new`].
+    pub fn new(
+        problem: &'a Problem<'a>,
+        settings: &FisherSettings,
+        episodes: usize,
+    ) -> Result<Self> {
+        let batch = FisherBatch::new(problem, settings, episodes)?;
+        Ok(Self {
+            readings: vec![0.0; episodes * batch.width()],
+            rng: problem.streams.stream("fisher environment"),
+            batch,
+            problem,
+            step: 0,
+        })
+    }
+
+    /// Starts one episode in each environment at given unknowns and start poses.
+    ///
+    /// # Errors
+    /// When the engine fails.
+    pub fn begin_at(
+        &mut self,
+        theta: &[f64],
+        starts: &[f64],
+        observation: &mut [f64],
+    ) -> Result<()> {
+        self.step = 0;
+        let mut readings = std::mem::take(&mut self.readings);
+        let begun = self.batch.begin(theta, starts, &mut readings);
+        self.readings = readings;
+        begun?;
+        self.observe(observation);
+        Ok(())
+    }
+
+    /// The episodes' information.
+    #[must_use]
+    pub fn batch(&self) -> &FisherBatch<'a> {
+        &self.batch
+    }
+
+    /// Entries of an observation for a reading's row of `width` entries and `d` unknowns.
+    #[must_use]
+    pub fn observation_len_for(width: usize, d: usize) -> usize {
+        width + 1 + d
+    }
+
+    /// Writes an observation from its parts.
+    pub fn write_observation(
+        reading: &[f64],
+        fraction: f64,
+        expected_std: &[f64],
+        out: &mut [f64],
+    ) {
+        let width = reading.len();
+        out[..width].copy_from_slice(reading);
+        out[width] = fraction;
+        for (o, s) in out[width + 1..].iter_mut().zip(expected_std) {
+            *o = -s.max(1e-6).ln();
+        }
+    }
+
+    fn observe(&mut self, observation: &mut [f64]) {
+        let width = self.batch.width();
+        let len = self.observation_len();
+        let fraction = self.step as f64 / self.problem.task.exploration().horizon as f64;
+        for e in 0..self.batch.episodes() {
+            let mut reading = self.readings[e * width..(e + 1) * width].to_vec();
+            for x in &mut reading {
+                let noise: f64 = StandardNormal.sample(&mut self.rng);
+                *x = if x.is_finite() {
+                    *x + OBSERVATION_NOISE * noise
+                } else {
+                    0.0
+                };
+            }
+            let std = self.batch.information()[e].expected_std();
+            Self::write_observation(
+                &reading,
+                fraction,
+                &std,
+                &mut observation[e * len..(e + 1) * len],
+            );
+        }
+    }
+}
+
+impl BatchEnvironment for FisherEnvironment<'_> {
+    fn batch_size(&self) -> usize {
+        self.batch.episodes()
+    }
+
+    fn observation_len(&self) -> usize {
+        Self::observation_len_for(self.batch.width(), self.problem.parameters.len())
+    }
+
+    fn action_len(&self) -> usize {
+        self.problem.task.exploration().action.len()
+    }
+
+    fn reset(&mut self, observation: &mut [f64]) -> Result<()> {
+        let n = self.batch.episodes();
+        let protocol = self.problem.task.exploration();
+        let mut theta = Vec::new();
+        let mut starts = Vec::new();
+        for _ in 0..n {
+            for p in self.problem.parameters {
+                theta.push(p.sample(&mut self.rng));
+            }
+            for c in &protocol.start {
+                starts.push(c.at(self.rng.random()));
+            }
+        }
+        self.begin_at(&theta, &starts, observation)
+    }
+
+    fn step(&mut self, actions: &[f64], transition: &mut Transition) -> Result<()> {
+        let protocol = self.problem.task.exploration();
+        let a = protocol.action.len();
+        let scaled: Vec<f64> = actions
+            .iter()
+            .enumerate()
+            .map(|(i, u)| protocol.action[i % a].at((u.clamp(-1.0, 1.0) + 1.0) / 2.0))
+            .collect();
+        let mut readings = std::mem::take(&mut self.readings);
+        let stepped = self
+            .batch
+            .step(&scaled, &mut readings, &mut transition.reward);
+        self.readings = readings;
+        stepped?;
+        self.step += 1;
+        let over = self.step == protocol.horizon;
+        let mut observation = std::mem::take(&mut transition.final_observation);
+        self.observe(&mut observation);
+        transition.final_observation = observation;
+        // The horizon is part of the task and the time is observed: its end is an end, not a cut.
+        transition.terminated.fill(over);
+        transition.truncated.fill(false);
+        if over {
+            let mut first = std::mem::take(&mut transition.observation);
+            self.reset(&mut first)?;
+            transition.observation = first;
+        } else {
+            transition
+                .observation
+                .copy_from_slice(&transition.final_observation);
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,7 @@
+//! Exploration: policies that make an episode tell the most about the unknowns.
+
+pub mod environment;
+pub mod fisher_cem;
+pub mod random;
+
+pub use environment::FisherEnvironment;

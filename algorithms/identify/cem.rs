@@ -1,0 +1,104 @@
+//! Identification by the cross-entropy method.
+
+use asid_core::identify::{Identified, Identifier};
+use asid_core::registry::{self, IdentifierEntry};
+use asid_core::{Episode, Error, Problem, Result};
+use serde::{Deserialize, Serialize};
+
+use super::Likelihood;
+use super::sampling::{self, Samples, SamplingSettings};
+use crate::optimise::{Cem, CemSettings};
+
+/// Settings of identification by CEM.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct CemIdentifier {
+    /// Refits of the search.
+    pub iterations: usize,
+    /// Simulations a refit.
+    pub population: usize,
+    /// Search distribution.
+    pub cem: CemSettings,
+    /// Posterior after the search.
+    pub sampling: SamplingSettings,
+}
+
+impl Default for CemIdentifier {
+    fn default() -> Self {
+        Self {
+            iterations: 5,
+            population: 64,
+            cem: CemSettings {
+                elite_fraction: 0.15,
+                ..CemSettings::default()
+            },
+            sampling: SamplingSettings::default(),
+        }
+    }
+}
+
+inventory::submit! {
+    IdentifierEntry {
+        name: "cem",
+        about: "cross-entropy method, then importance sampling of the likelihood",
+        defaults: registry::defaults::<CemIdentifier>,
+        make: |s| {
+            let identifier: CemIdentifier = registry::settings("identifier", s)?;
+            check(identifier.iterations, identifier.population)?;
+            Ok(Box::new(identifier))
+        },
+    }
+}
+
+/// Checks that there is something to search with.
+pub(super) fn check(iterations: usize, population: usize) -> Result<()> {
+    if iterations == 0 || population < 4 {
+        return Err(Error::Config {
+            key: "identifier".into(),
+            message: format!(
+                "needs at least 1 iteration of at least 4 simulations, not {iterations} of {population}"
+            ),
+        });
+    }
+    Ok(())
+}
+
+impl Identifier for CemIdentifier {
+    fn identify(&self, problem: &Problem<'_>, episodes: &[Episode]) -> Result<Identified> {
+        let mut likelihood =
+            Likelihood::new(problem, episodes, self.population.max(self.sampling.draws))?;
+        let (low, high) = likelihood.bounds();
+        let n = likelihood.dimension();
+        let mut cem = Cem::new(self.cem.clone(), &vec![0.0; n], &vec![1.0; n], &low, &high);
+        let mut rng = problem.streams.stream("identify");
+        let mut samples = Samples::default();
+        let mut iterations = Vec::new();
+        let total = self.iterations + self.sampling.rounds;
+        problem.progress.begin("identify", total as u64);
+        for _ in 0..self.iterations {
+            let proposal = cem.distribution();
+            let points = cem.ask(self.population, &mut rng);
+            let losses = likelihood.losses(&points)?;
+            cem.tell(&points, &losses);
+            let best = losses.iter().copied().fold(f64::INFINITY, f64::min);
+            iterations.push(sampling::summary(
+                &likelihood,
+                &points,
+                &vec![1.0; points.len()],
+                best,
+            ));
+            samples.add(proposal, points, &losses);
+            problem.progress.advance(1);
+        }
+        let found = sampling::posterior(
+            problem,
+            &mut likelihood,
+            &self.sampling,
+            samples,
+            iterations,
+            &mut rng,
+        );
+        problem.progress.end();
+        found
+    }
+}

@@ -1,0 +1,233 @@
+//! The likelihood of real episodes under a simulator.
+//!
+//! A point of the search space is `[z, s_1, s_2, …]`: the unknowns in prior-scaled
+//! coordinates, then the start pose of each episode as an offset from what its
+//! first reading shows, in standard deviations of that reading. The episode's
+//! commands are replayed from there, and the loss is half the sum of squared
+//! whitened residuals over all readings that are present.
+
+use asid_core::problem::Batch;
+use asid_core::replay::Replay;
+use asid_core::signal::SignalSet;
+use asid_core::{Episode, Error, Parameter, Problem, Result};
+use rand_distr::{Distribution, StandardNormal};
+
+/// How far a start pose may lie from its first reading, in standard deviations of that reading.
+const START_BOUND: f64 = 6.0;
+
+/// Draws that measure how the tracker's noise spreads the located start pose.
+const LOCATE_DRAWS: usize = 256;
+
+struct Observed {
+    replay: Replay,
+    readings: Vec<f64>,
+    /// Start pose located by the first complete reading, and its deviation.
+    start: Vec<f64>,
+    start_std: Vec<f64>,
+}
+
+/// Likelihood of some episodes, for a whole population of points at once.
+pub struct Likelihood<'a> {
+    problem: &'a Problem<'a>,
+    batch: Batch,
+    size: usize,
+    signals: SignalSet,
+    episodes: Vec<Observed>,
+    predicted: Vec<f64>,
+    present: usize,
+}
+
+impl<'a> Likelihood<'a> {
+    /// Prepares the likelihood for populations of up to `size` points.
+    ///
+    /// # Errors
+    /// When an episode has no complete reading of the tracked signals, or the engine
+    /// cannot set an unknown.
+    pub fn new(problem: &'a Problem<'a>, episodes: &[Episode], size: usize) -> Result<Self> {
+        let protocol = problem.task.exploration();
+        let layout = problem.model.layout();
+        let signals = SignalSet::new(layout, &protocol.signals)?;
+        let names: Vec<String> = protocol.signals.iter().map(|s| s.sensor.clone()).collect();
+        let width = signals.width();
+        let mut observed = Vec::with_capacity(episodes.len());
+        let mut present = 0;
+        let mut whitened = vec![0.0; signals.whitened_len()];
+        for episode in episodes {
+            let readings = episode.select(layout, &names);
+            let first = readings
+                .chunks_exact(width)
+                .find(|r| r.iter().all(|x| x.is_finite()))
+                .ok_or_else(|| {
+                    Error::Failed(format!(
+                        "no row of the log has a reading of all of {}",
+                        names.join(", ")
+                    ))
+                })?;
+            let start = problem.task.locate(first);
+            let mut rng = problem.streams.stream("locate");
+            let mut squares = vec![0.0; start.len()];
+            for _ in 0..LOCATE_DRAWS {
+                let mut noisy = first.to_vec();
+                signals.add_noise(&mut noisy, || StandardNormal.sample(&mut rng));
+                for (q, (a, b)) in squares
+                    .iter_mut()
+                    .zip(problem.task.locate(&noisy).iter().zip(&start))
+                {
+                    // Angles may jump by a turn; a jump is no spread.
+                    let d = a - b;
+                    let turn = std::f64::consts::PI;
+                    let d = if d.abs() > turn {
+                        d - d.signum() * 2.0 * turn
+                    } else {
+                        d
+                    };
+                    *q += d * d;
+                }
+            }
+            for row in readings.chunks_exact(width) {
+                signals.difference(row, row, &mut whitened);
+                present += whitened.iter().filter(|x| x.is_finite()).count();
+            }
+            observed.push(Observed {
+                replay: Replay::new(layout, episode, &names)?,
+                readings,
+                start,
+                start_std: squares
+                    .iter()
+                    .map(|q| (q / LOCATE_DRAWS as f64).sqrt().max(1e-9))
+                    .collect(),
+            });
+        }
+        Ok(Self {
+            batch: problem.batch(size)?,
+            size,
+            signals,
+            episodes: observed,
+            predicted: Vec::new(),
+            present,
+            problem,
+        })
+    }
+
+    /// Largest population.
+    #[must_use]
+    pub fn size(&self) -> usize {
+        self.size
+    }
+
+    /// Entries of a point.
+    #[must_use]
+    pub fn dimension(&self) -> usize {
+        self.problem.parameters.len() + self.episodes.iter().map(|e| e.start.len()).sum::<usize>()
+    }
+
+    /// Smallest and largest value of each entry.
+    #[must_use]
+    pub fn bounds(&self) -> (Vec<f64>, Vec<f64>) {
+        let d = self.problem.parameters.len();
+        let high: Vec<f64> = (0..self.dimension())
+            .map(|i| {
+                if i < d {
+                    Parameter::scaled_bound()
+                } else {
+                    START_BOUND
+                }
+            })
+            .collect();
+        (high.iter().map(|x| -x).collect(), high)
+    }
+
+    /// Number of readings' entries that are present.
+    #[must_use]
+    pub fn present(&self) -> usize {
+        self.present
+    }
+
+    /// The unknowns at a point, in their units.
+    #[must_use]
+    pub fn parameters(&self, point: &[f64]) -> Vec<f64> {
+        self.problem
+            .parameters
+            .iter()
+            .zip(point)
+            .map(|(p, z)| p.from_scaled(*z))
+            .collect()
+    }
+
+    /// The start pose of episode `k` at a point, in the task's coordinates.
+    #[must_use]
+    pub fn start(&self, point: &[f64], k: usize) -> Vec<f64> {
+        let before: usize = self.episodes[..k].iter().map(|e| e.start.len()).sum();
+        let from = self.problem.parameters.len() + before;
+        let e = &self.episodes[k];
+        e.start
+            .iter()
+            .zip(&e.start_std)
+            .zip(&point[from..])
+            .map(|((x, s), offset)| x + s * offset)
+            .collect()
+    }
+
+    /// Loss of each point: half the sum of squared whitened residuals; infinite
+    /// where a simulation diverged.
+    ///
+    /// # Errors
+    /// When the engine fails.
+    pub fn losses(&mut self, points: &[Vec<f64>]) -> Result<Vec<f64>> {
+        let mut losses = vec![0.0; points.len()];
+        let mut whitened = vec![0.0; self.signals.whitened_len()];
+        for first in (0..points.len()).step_by(self.size) {
+            let chunk = &points[first..(first + self.size).min(points.len())];
+            for k in 0..self.episodes.len() {
+                self.predict(chunk, k)?;
+                let observed = &self.episodes[k];
+                let (rows, width) = (observed.replay.rows(), observed.replay.width());
+                for (i, loss) in losses[first..first + chunk.len()].iter_mut().enumerate() {
+                    let predicted = &self.predicted[i * rows * width..(i + 1) * rows * width];
+                    if predicted.iter().any(|x| !x.is_finite()) {
+                        *loss = f64::INFINITY;
+                        continue;
+                    }
+                    for (p, o) in predicted
+                        .chunks_exact(width)
+                        .zip(observed.readings.chunks_exact(width))
+                    {
+                        self.signals.difference(p, o, &mut whitened);
+                        *loss += 0.5
+                            * whitened
+                                .iter()
+                                .filter(|x| x.is_finite())
+                                .map(|x| x * x)
+                                .sum::<f64>();
+                    }
+                }
+            }
+        }
+        Ok(losses)
+    }
+
+    /// Predicted readings of episode `k` at one point, `rows x width`.
+    ///
+    /// # Errors
+    /// When the engine fails.
+    pub fn prediction(&mut self, point: &[f64], k: usize) -> Result<Vec<f64>> {
+        self.predict(&[point.to_vec()], k)?;
+        let replay = &self.episodes[k].replay;
+        Ok(self.predicted[..replay.rows() * replay.width()].to_vec())
+    }
+
+    fn predict(&mut self, points: &[Vec<f64>], k: usize) -> Result<()> {
+        let sims: Vec<usize> = (0..points.len()).collect();
+        let theta: Vec<f64> = points.iter().flat_map(|p| self.parameters(p)).collect();
+        let starts: Vec<f64> = points.iter().flat_map(|p| self.start(p, k)).collect();
+        self.batch.set_parameters(&sims, &theta)?;
+        self.batch.place(self.problem.task, &sims, &starts)?;
+        let replay = &mut self.episodes[k].replay;
+        self.predicted
+            .resize(points.len() * replay.rows() * replay.width(), 0.0);
+        let before = self.batch.simulator.steps_taken();
+        replay.run(&mut *self.batch.simulator, &sims, &mut self.predicted)?;
+        self.problem.count_physics(&self.batch, before);
+        Ok(())
+    }
+}

@@ -1,0 +1,14 @@
+//! Identification: fit the simulator to real episodes and say how sure that is.
+//!
+//! A search (CEM or REPS) finds where the likelihood is, with the start pose of
+//! each episode co-estimated; then importance sampling turns what was simulated
+//! into a posterior. The interval comes from the likelihood, never from the
+//! spread of an elite, which measures only how far a search has converged.
+
+pub mod cem;
+pub mod likelihood;
+pub mod reps;
+pub mod sampling;
+
+pub use likelihood::Likelihood;
+pub use sampling::{Samples, SamplingSettings};

@@ -1,0 +1,172 @@
+//! Relative entropy policy search (Peters, Mülling and Altün 2010), episodic form:
+//! reweight the draws by `exp(J / eta)`, with the temperature `eta` that bounds
+//! the step by `eps` in relative entropy, and refit.
+//!
+//! With `J` a log-likelihood, `eta` is a temperature in the statistical sense too;
+//! it is then kept at 1 or above, where the draws of one step are weighted by the
+//! likelihood itself.
+
+use asid_core::rng::Rng;
+use serde::{Deserialize, Serialize};
+
+use super::Gaussian;
+
+/// How far one refit may go.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct RepsSettings {
+    /// Bound on the relative entropy of a step.
+    pub epsilon: f64,
+    /// Smallest temperature; 1 for a log-likelihood, 0 for a plain search.
+    pub min_eta: f64,
+}
+
+impl Default for RepsSettings {
+    fn default() -> Self {
+        Self {
+            epsilon: 0.5,
+            min_eta: 0.0,
+        }
+    }
+}
+
+/// The dual `eta * eps + eta * log mean exp((J - max J) / eta) + max J`.
+#[must_use]
+pub fn dual(eta: f64, epsilon: f64, rewards: &[f64]) -> f64 {
+    let max = rewards.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let mean = rewards.iter().map(|j| ((j - max) / eta).exp()).sum::<f64>() / rewards.len() as f64;
+    eta * epsilon + eta * mean.ln() + max
+}
+
+/// The temperature that minimises the dual, by golden-section search on its logarithm.
+#[must_use]
+pub fn temperature(epsilon: f64, rewards: &[f64]) -> f64 {
+    let max = rewards.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let min = rewards.iter().copied().fold(f64::INFINITY, f64::min);
+    let spread = (max - min).max(1e-12);
+    let ratio = (5_f64.sqrt() - 1.0) / 2.0;
+    let (mut a, mut b) = ((spread * 1e-6).ln(), (spread * 1e3).ln());
+    let f = |x: f64| dual(x.exp(), epsilon, rewards);
+    let (mut c, mut d) = (b - ratio * (b - a), a + ratio * (b - a));
+    let (mut fc, mut fd) = (f(c), f(d));
+    for _ in 0..100 {
+        if fc < fd {
+            (b, d, fd) = (d, c, fc);
+            c = b - ratio * (b - a);
+            fc = f(c);
+        } else {
+            (a, c, fc) = (c, d, fd);
+            d = a + ratio * (b - a);
+            fd = f(d);
+        }
+    }
+    ((a + b) / 2.0).exp()
+}
+
+/// A search by relative entropy policy search with full covariance.
+#[derive(Clone, Debug)]
+pub struct Reps {
+    settings: RepsSettings,
+    distribution: Gaussian,
+    min_std: Vec<f64>,
+    low: Vec<f64>,
+    high: Vec<f64>,
+}
+
+impl Reps {
+    /// Starts from `mean` and `std`, inside the box `[low, high]`.
+    #[must_use]
+    pub fn new(
+        settings: RepsSettings,
+        mean: &[f64],
+        std: &[f64],
+        low: &[f64],
+        high: &[f64],
+    ) -> Self {
+        Self {
+            settings,
+            distribution: Gaussian::diagonal(mean, std, low, high),
+            min_std: std.iter().map(|s| s * 1e-3).collect(),
+            low: low.to_vec(),
+            high: high.to_vec(),
+        }
+    }
+
+    /// The present distribution.
+    #[must_use]
+    pub fn distribution(&self) -> &Gaussian {
+        &self.distribution
+    }
+
+    /// Draws `n` candidates.
+    pub fn ask(&self, n: usize, rng: &mut Rng) -> Vec<Vec<f64>> {
+        (0..n).map(|_| self.distribution.sample(rng)).collect()
+    }
+
+    /// Reweights and refits; returns the temperature. Rewards that are not finite weigh nothing.
+    pub fn tell(&mut self, candidates: &[Vec<f64>], rewards: &[f64]) -> f64 {
+        let usable: Vec<usize> = (0..rewards.len())
+            .filter(|&i| rewards[i].is_finite())
+            .collect();
+        if usable.len() < 2 {
+            return f64::INFINITY;
+        }
+        let rewards: Vec<f64> = usable.iter().map(|&i| rewards[i]).collect();
+        let samples: Vec<Vec<f64>> = usable.iter().map(|&i| candidates[i].clone()).collect();
+        let eta = temperature(self.settings.epsilon, &rewards).max(self.settings.min_eta);
+        let max = rewards.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let weights: Vec<f64> = rewards.iter().map(|j| ((j - max) / eta).exp()).collect();
+        self.distribution = Gaussian::fit(&samples, &weights, &self.min_std, &self.low, &self.high);
+        eta
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use asid_core::Streams;
+
+    #[test]
+    fn the_temperature_bounds_the_relative_entropy() {
+        let rewards: Vec<f64> = (0..200).map(|i| -0.01 * f64::from(i * i)).collect();
+        let eta = temperature(0.5, &rewards);
+        let max = 0.0;
+        let w: Vec<f64> = rewards.iter().map(|j| ((j - max) / eta).exp()).collect();
+        let total: f64 = w.iter().sum();
+        // KL of the reweighted from the uniform draws: sum p log(p n).
+        let kl: f64 = w
+            .iter()
+            .map(|w| w / total)
+            .filter(|p| *p > 0.0)
+            .map(|p| p * (p * 200.0).ln())
+            .sum();
+        assert!((kl - 0.5).abs() < 1e-3, "{kl}");
+    }
+
+    #[test]
+    fn the_dual_by_hand() {
+        // Rewards 0 and -ln 3, eta 1: mean exp = (1 + 1/3)/2 = 2/3.
+        let value = dual(1.0, 0.5, &[0.0, -(3.0_f64.ln())]);
+        assert!((value - (0.5 + (2.0_f64 / 3.0).ln())).abs() < 1e-12);
+    }
+
+    #[test]
+    fn it_settles_on_the_peak_of_a_likelihood() {
+        let settings = RepsSettings {
+            epsilon: 0.5,
+            min_eta: 1.0,
+        };
+        let mut reps = Reps::new(settings, &[0.0], &[2.0], &[-5.0], &[5.0]);
+        let mut rng = Streams::new(0).stream("reps");
+        for _ in 0..15 {
+            let candidates = reps.ask(400, &mut rng);
+            let rewards: Vec<f64> = candidates
+                .iter()
+                .map(|c| -0.5 * ((c[0] - 0.5) / 0.1).powi(2))
+                .collect();
+            reps.tell(&candidates, &rewards);
+        }
+        assert!((reps.distribution().mean()[0] - 0.5).abs() < 0.02);
+        assert!(reps.distribution().std()[0] < 0.1);
+    }
+}

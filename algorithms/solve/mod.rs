@@ -1,0 +1,3 @@
+//! Solving a task for a belief over its unknowns.
+
+pub mod cem;
