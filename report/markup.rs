@@ -65,11 +65,20 @@ pub fn fit(text: &str, size: f64, width: f64) -> String {
     kept
 }
 
-/// `text` with its first letter in upper case.
+/// `text` with its first letter in upper case, unless it begins with an identifier such as `rod_yaw`.
 #[must_use]
 pub fn capitalise(text: &str) -> String {
+    if text
+        .split_whitespace()
+        .next()
+        .is_some_and(|word| word.contains(['_', '.']))
+    {
+        return text.to_owned();
+    }
     let mut letters = text.chars();
-    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
+    letters.next().map_or_else(String::new, |first| {
+        first.to_uppercase().chain(letters).collect()
+    })
 }
 
 #[cfg(test)]
@@ -78,7 +87,10 @@ mod tests {
 
     #[test]
     fn special_characters_are_escaped_and_control_characters_dropped() {
-        assert_eq!(escape("a<b & \"c\" > 'd'\u{0}\u{7}"), "a&lt;b &amp; &quot;c&quot; &gt; &#39;d&#39;");
+        assert_eq!(
+            escape("a<b & \"c\" > 'd'\u{0}\u{7}"),
+            "a&lt;b &amp; &quot;c&quot; &gt; &#39;d&#39;"
+        );
     }
 
     #[test]

@@ -47,27 +47,91 @@ pub fn decimals(value: f64, decimals: usize) -> String {
     }
 }
 
-/// Value and uncertainty to the same decimal, the uncertainty with two significant digits: `("0.0612", "0.0021")`.
+/// How finely a quantity is told, so that estimate, truth and interval compare at a glance.
 ///
-/// Without a usable uncertainty the value has four significant digits and the second text is empty.
-#[must_use]
-pub fn with_uncertainty(value: f64, uncertainty: f64) -> (String, String) {
-    if !(uncertainty.is_finite() && uncertainty > 0.0 && value.is_finite()) {
-        return (significant(value, 4), String::new());
-    }
-    let scientific = format!("{uncertainty:.1e}");
-    let (_, exponent) = split_exponent(&scientific);
-    if !(-6..4).contains(&exponent) {
-        return (significant(value, 4), significant(uncertainty, 2));
-    }
-    let places = decimals_for(2, exponent);
-    (decimals(value, places), decimals(uncertainty, places))
+/// ```
+/// use asid_report::number::Precision;
+/// let precision = Precision::of(0.061_23, 0.002_1);
+/// assert_eq!(precision.show(0.061_23), "0.0612");
+/// assert_eq!(precision.with_uncertainty(0.061_23, 0.002_1), "0.0612 ± 0.0021");
+/// assert_eq!(Precision::of(2e-5, 2.4e-6).with_uncertainty(2e-5, 2.4e-6), "(20.0 ± 2.4)×10⁻⁶");
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Precision {
+    /// Decimals after division by `10^exponent`; four significant digits where there is no uncertainty.
+    places: Option<usize>,
+    /// A multiple of three, 0 for numbers of a handy size.
+    exponent: i32,
 }
 
-/// `value` to the same decimal as an uncertainty would be given with, so that numbers compare at a glance.
-#[must_use]
-pub fn to_precision_of(value: f64, uncertainty: f64) -> String {
-    with_uncertainty(value, uncertainty).0
+impl Precision {
+    /// Enough for two significant digits of `uncertainty`, which may be NaN where none is known.
+    #[must_use]
+    pub fn of(value: f64, uncertainty: f64) -> Self {
+        if !(uncertainty.is_finite() && uncertainty > 0.0 && value.is_finite()) {
+            return Self {
+                places: None,
+                exponent: 0,
+            };
+        }
+        let last = split_exponent(&format!("{uncertainty:.1e}")).1;
+        let size = value.abs().max(uncertainty).log10().floor() as i32;
+        let exponent = if (-3..6).contains(&size) {
+            0
+        } else {
+            size.div_euclid(3) * 3
+        };
+        Self {
+            places: Some(decimals_for(2, last - exponent).min(12)),
+            exponent,
+        }
+    }
+
+    /// `value` with its power of ten.
+    #[must_use]
+    pub fn show(self, value: f64) -> String {
+        self.powered(&self.scaled(value), value.is_finite())
+    }
+
+    /// `low to high`.
+    #[must_use]
+    pub fn interval(self, [low, high]: [f64; 2]) -> String {
+        let text = format!("{} to {}", self.scaled(low), self.scaled(high));
+        if self.exponent == 0 {
+            text
+        } else {
+            self.powered(&format!("({text})"), true)
+        }
+    }
+
+    /// `value ± uncertainty`; only the value where there is no uncertainty.
+    #[must_use]
+    pub fn with_uncertainty(self, value: f64, uncertainty: f64) -> String {
+        if self.places.is_none() {
+            return self.show(value);
+        }
+        let text = format!("{} ± {}", self.scaled(value), self.scaled(uncertainty));
+        if self.exponent == 0 {
+            text
+        } else {
+            self.powered(&format!("({text})"), true)
+        }
+    }
+
+    fn scaled(self, value: f64) -> String {
+        match self.places {
+            Some(places) => decimals(value / 10f64.powi(self.exponent), places),
+            None => round(value, 4),
+        }
+    }
+
+    fn powered(self, text: &str, finite: bool) -> String {
+        if self.exponent == 0 || !finite {
+            text.to_owned()
+        } else {
+            format!("{text}×10{}", superscript(self.exponent))
+        }
+    }
 }
 
 /// A whole number in groups of three, set apart by a narrow no-break space.
@@ -112,13 +176,20 @@ pub fn duration(seconds: f64) -> String {
         return NOT_A_NUMBER.to_owned();
     }
     if seconds < 100.0 {
-        let places = if seconds < 1.0 { 2 } else { usize::from(seconds < 10.0) };
+        let places = if seconds < 1.0 {
+            2
+        } else {
+            usize::from(seconds < 10.0)
+        };
         return format!("{seconds:.places$}\u{a0}s");
     }
     let whole = seconds.round();
     let minutes = (whole / 60.0).floor();
     if minutes < 100.0 {
-        format!("{minutes:.0}\u{a0}min {:02.0}\u{a0}s", whole - 60.0 * minutes)
+        format!(
+            "{minutes:.0}\u{a0}min {:02.0}\u{a0}s",
+            whole - 60.0 * minutes
+        )
     } else {
         format!("{:.1}\u{a0}h", seconds / 3600.0)
     }
@@ -167,14 +238,25 @@ mod tests {
         assert_eq!(significant(3.2e-7, 2), "3.2×10⁻⁷");
         assert_eq!(significant(f64::NAN, 3), NOT_A_NUMBER);
         assert_eq!(decimals(-0.0001, 2), "0.00");
-        assert_eq!((round(5.0, 3), round(-0.1, 3), round(100.0, 2)), ("5".to_owned(), "−0.1".to_owned(), "100".to_owned()));
+        assert_eq!(
+            (round(5.0, 3), round(-0.1, 3), round(100.0, 2)),
+            ("5".to_owned(), "−0.1".to_owned(), "100".to_owned())
+        );
     }
 
     #[test]
     fn value_and_uncertainty_share_their_last_decimal() {
-        assert_eq!(with_uncertainty(0.061_23, 0.002_1), ("0.0612".to_owned(), "0.0021".to_owned()));
-        assert_eq!(with_uncertainty(12.34, 0.999), ("12.3".to_owned(), "1.0".to_owned()));
-        assert_eq!(with_uncertainty(0.5, f64::NAN), ("0.5000".to_owned(), String::new()));
+        let show = |value: f64, std: f64| Precision::of(value, std).with_uncertainty(value, std);
+        assert_eq!(show(0.061_23, 0.002_1), "0.0612 ± 0.0021");
+        assert_eq!(show(12.34, 0.999), "12.3 ± 1.0");
+        assert_eq!(show(0.5, f64::NAN), "0.5");
+        assert_eq!(show(0.0, 0.002_1), "0.0000 ± 0.0021");
+        assert_eq!(show(f64::NAN, 1.0), NOT_A_NUMBER);
+        assert_eq!(show(3.0e-5, 1.0), "0.0 ± 1.0");
+        assert_eq!(
+            Precision::of(2e-5, 2.4e-6).interval([1.58e-5, 2.53e-5]),
+            "(15.8 to 25.3)×10⁻⁶"
+        );
     }
 
     #[test]

@@ -65,7 +65,11 @@ impl Tile {
     /// A tile that shows `value` (formatted, with its unit) under `label`.
     #[must_use]
     pub fn new(label: &str, value: &str) -> Self {
-        Self { label: label.to_owned(), value: value.to_owned(), ..Self::default() }
+        Self {
+            label: label.to_owned(),
+            value: value.to_owned(),
+            ..Self::default()
+        }
     }
 
     /// Adds a line of small print.
@@ -83,7 +87,11 @@ impl Tile {
     }
 
     fn html(&self) -> String {
-        let note = if self.note.is_empty() { String::new() } else { format!("<dd class=\"small\">{}</dd>", escape(&self.note)) };
+        let note = if self.note.is_empty() {
+            String::new()
+        } else {
+            format!("<dd class=\"small\">{}</dd>", escape(&self.note))
+        };
         format!(
             "<div class=\"tile {}\"><dt>{}</dt><dd class=\"value\">{}</dd>{note}</div>",
             self.tone.class(),
@@ -116,7 +124,11 @@ impl Section {
     /// An empty section.
     #[must_use]
     pub fn new(title: &str) -> Self {
-        Self { title: title.to_owned(), lead: String::new(), blocks: Vec::new() }
+        Self {
+            title: title.to_owned(),
+            lead: String::new(),
+            blocks: Vec::new(),
+        }
     }
 
     /// Sets the sentence or two that introduce the section.
@@ -174,8 +186,16 @@ impl Section {
 
     fn html(&self, number: usize) -> String {
         let mut figures = 0;
-        let blocks: String = self.blocks.iter().map(|block| block.html(number, &mut figures)).collect();
-        let lead = if self.lead.is_empty() { String::new() } else { format!("<p>{}</p>", escape(&self.lead)) };
+        let blocks: String = self
+            .blocks
+            .iter()
+            .map(|block| block.html(number, &mut figures))
+            .collect();
+        let lead = if self.lead.is_empty() {
+            String::new()
+        } else {
+            format!("<p>{}</p>", escape(&self.lead))
+        };
         format!(
             "<section aria-labelledby=\"s{number}\"><div class=\"margin\"><h2 id=\"s{number}\">{}</h2>{lead}</div>\
              <div class=\"body\">{blocks}</div></section>\n",
@@ -192,7 +212,9 @@ impl Block {
                 let odd = list.len() % 2 == 1;
                 let mut out = String::from("<div class=\"figures\">");
                 for (i, figure) in list.iter().enumerate() {
-                    out.push_str(&figure.html(&format!("p{section}-{figures}"), odd && i + 1 == list.len()));
+                    out.push_str(
+                        &figure.html(&format!("p{section}-{figures}"), odd && i + 1 == list.len()),
+                    );
                     *figures += 1;
                 }
                 out.push_str("</div>");
@@ -201,11 +223,18 @@ impl Block {
             Self::Table(table) => table.html(),
             Self::Note(text) => format!("<p class=\"note\">{}</p>", escape(text)),
             Self::Command(text) => {
-                format!("<div class=\"command\"><pre tabindex=\"0\"><code>{}</code></pre></div>", escape(text))
+                format!(
+                    "<div class=\"command\"><pre tabindex=\"0\"><code>{}</code></pre></div>",
+                    escape(text)
+                )
             }
             Self::Facts(facts) => {
-                let rows: String =
-                    facts.iter().map(|(k, v)| format!("<div><dt>{}</dt><dd>{}</dd></div>", escape(k), escape(v))).collect();
+                let rows: String = facts
+                    .iter()
+                    .map(|(k, v)| {
+                        format!("<div><dt>{}</dt><dd>{}</dd></div>", escape(k), escape(v))
+                    })
+                    .collect();
                 format!("<dl class=\"facts\">{rows}</dl>")
             }
             Self::Heading(text) => format!("<h3 class=\"heading\">{}</h3>", escape(text)),
@@ -295,14 +324,27 @@ impl Page {
     #[must_use]
     pub fn html(&self) -> String {
         let some = |tag: &str, class: &str, text: &str| {
-            if text.is_empty() { String::new() } else { format!("<{tag} class=\"{class}\">{}</{tag}>", escape(text)) }
+            if text.is_empty() {
+                String::new()
+            } else {
+                format!("<{tag} class=\"{class}\">{}</{tag}>", escape(text))
+            }
         };
         let badge = self.badge.as_ref().map_or(String::new(), |(text, tone)| {
-            format!(" <span class=\"badge {}\">{}</span>", tone.class(), escape(text))
+            format!(
+                " <span class=\"badge {}\">{}</span>",
+                tone.class(),
+                escape(text)
+            )
         });
         let facts = Block::Facts(self.facts.clone()).html(0, &mut 0);
         let tiles: String = self.tiles.iter().map(Tile::html).collect();
-        let sections: String = self.sections.iter().enumerate().map(|(i, s)| s.html(i + 1)).collect();
+        let sections: String = self
+            .sections
+            .iter()
+            .enumerate()
+            .map(|(i, s)| s.html(i + 1))
+            .collect();
         format!(
             "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\" />\n\
              <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\" />\n\
@@ -313,7 +355,11 @@ impl Page {
             kicker = some("p", "kicker", &self.kicker),
             lead = some("p", "lead", &self.lead),
             facts = if self.facts.is_empty() { "" } else { &facts },
-            tiles = if tiles.is_empty() { String::new() } else { format!("<dl class=\"tiles\">{tiles}</dl>\n") },
+            tiles = if tiles.is_empty() {
+                String::new()
+            } else {
+                format!("<dl class=\"tiles\">{tiles}</dl>\n")
+            },
             footer = some("footer", "", &self.footer),
         )
     }

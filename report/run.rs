@@ -25,9 +25,9 @@ mod signals;
 mod trace;
 
 pub use trace::{
-    Downstream, Episode, ExpectedStd, Exploration, FileEntry, LearningCurve, NamedText, NamedValue, Narrowing,
-    ObjectTrack, ParameterReport, Phase, PlanarPath, Prior, RealWorld, Replay, RunReport, SCHEMA, Search, Shape, ShapeKind,
-    SideView, Signal, StageCost, Trial,
+    Downstream, Episode, ExpectedStd, Exploration, FileEntry, LearningCurve, NamedText, NamedValue,
+    Narrowing, ObjectTrack, ParameterReport, Phase, PlanarPath, Prior, RealWorld, Replay,
+    RunReport, SCHEMA, Search, Shape, ShapeKind, SideView, Signal, StageCost, Trial,
 };
 
 use std::path::Path;
@@ -82,10 +82,13 @@ impl RunReport {
         struct Version {
             schema: u32,
         }
-        let failed = |e: serde_json::Error| Error::Failed(format!("{TRACE_FILE} is not a run's trace: {e}"));
+        let failed =
+            |e: serde_json::Error| Error::Failed(format!("{TRACE_FILE} is not a run's trace: {e}"));
         let Version { schema } = serde_json::from_str(text).map_err(failed)?;
         if schema > SCHEMA {
-            return Err(Error::Failed(format!("{TRACE_FILE} has schema {schema}, this program reads up to {SCHEMA}: use a newer one")));
+            return Err(Error::Failed(format!(
+                "{TRACE_FILE} has schema {schema}, this program reads up to {SCHEMA}: use a newer one"
+            )));
         }
         serde_json::from_str(text).map_err(failed)
     }
@@ -109,13 +112,19 @@ impl RunReport {
             path: path.clone(),
             message: format!("{e}; a report needs the folder of a finished run"),
         })?;
-        Self::from_json(&text).map_err(|e| Error::File { path, message: e.to_string() })
+        Self::from_json(&text).map_err(|e| Error::File {
+            path,
+            message: e.to_string(),
+        })
     }
 }
 
 /// Writes a file whole or not at all: beside its place first, then moved there.
 fn write(path: &Path, text: &str) -> Result<()> {
-    let failed = |e: std::io::Error| Error::File { path: path.to_path_buf(), message: e.to_string() };
+    let failed = |e: std::io::Error| Error::File {
+        path: path.to_path_buf(),
+        message: e.to_string(),
+    };
     let partial = path.with_extension("partial");
     std::fs::write(&partial, text).map_err(failed)?;
     std::fs::rename(&partial, path).map_err(failed)

@@ -12,14 +12,25 @@ pub struct Figure {
 
 impl std::fmt::Debug for Figure {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Figure").field("title", &self.title).field("caption", &self.caption).finish_non_exhaustive()
+        f.debug_struct("Figure")
+            .field("title", &self.title)
+            .field("caption", &self.caption)
+            .finish_non_exhaustive()
     }
 }
 
 impl Figure {
     /// A figure; `title` says what one sees, `caption` how to read it.
-    pub fn new(title: impl Into<String>, plot: impl Plot + Send + Sync + 'static, caption: impl Into<String>) -> Self {
-        Self { title: title.into(), caption: caption.into(), plot: Box::new(plot) }
+    pub fn new(
+        title: impl Into<String>,
+        plot: impl Plot + Send + Sync + 'static,
+        caption: impl Into<String>,
+    ) -> Self {
+        Self {
+            title: title.into(),
+            caption: caption.into(),
+            plot: Box::new(plot),
+        }
     }
 
     /// The figure; one with a row to itself carries a second layout for wide screens.
@@ -32,7 +43,14 @@ impl Figure {
             narrow
         };
         let class = if alone { "alone" } else { "" };
-        let caption = if self.caption.is_empty() { String::new() } else { format!("<figcaption>{}</figcaption>", escape(&self.caption)) };
-        format!("<figure class=\"{class}\"><h3>{}</h3>{drawing}{caption}</figure>\n", escape(&self.title))
+        let caption = if self.caption.is_empty() {
+            String::new()
+        } else {
+            format!("<figcaption>{}</figcaption>", escape(&self.caption))
+        };
+        format!(
+            "<figure class=\"{class}\"><h3>{}</h3>{drawing}{caption}</figure>\n",
+            escape(&self.title)
+        )
     }
 }

@@ -25,19 +25,28 @@ impl Column {
     /// A column of text.
     #[must_use]
     pub fn text(title: &str) -> Self {
-        Self { title: title.to_owned(), kind: Kind::Text }
+        Self {
+            title: title.to_owned(),
+            kind: Kind::Text,
+        }
     }
 
     /// A column of numbers.
     #[must_use]
     pub fn number(title: &str) -> Self {
-        Self { title: title.to_owned(), kind: Kind::Number }
+        Self {
+            title: title.to_owned(),
+            kind: Kind::Number,
+        }
     }
 
     /// A column of sentences.
     #[must_use]
     pub fn prose(title: &str) -> Self {
-        Self { title: title.to_owned(), kind: Kind::Prose }
+        Self {
+            title: title.to_owned(),
+            kind: Kind::Prose,
+        }
     }
 }
 
@@ -52,7 +61,10 @@ impl Cell {
     /// A cell with a tone.
     #[must_use]
     pub fn toned(text: impl Into<String>, tone: Tone) -> Self {
-        Self { text: text.into(), tone }
+        Self {
+            text: text.into(),
+            tone,
+        }
     }
 }
 
@@ -75,7 +87,12 @@ impl Table {
     /// A table without rows.
     #[must_use]
     pub fn new(columns: Vec<Column>) -> Self {
-        Self { columns, rows: Vec::new(), total: false, caption: String::new() }
+        Self {
+            columns,
+            rows: Vec::new(),
+            total: false,
+            caption: String::new(),
+        }
     }
 
     /// Adds a row.
@@ -114,7 +131,13 @@ impl Table {
         let head: String = self
             .columns
             .iter()
-            .map(|c| format!("<th scope=\"col\"{}>{}</th>", class(c, Tone::Plain), escape(&c.title)))
+            .map(|c| {
+                format!(
+                    "<th scope=\"col\"{}>{}</th>",
+                    class(c, Tone::Plain),
+                    escape(&c.title)
+                )
+            })
             .collect();
         let mut body = String::new();
         for (i, row) in self.rows.iter().enumerate() {
@@ -123,12 +146,24 @@ impl Table {
             for (j, column) in self.columns.iter().enumerate() {
                 let empty = Cell::default();
                 let cell = row.get(j).unwrap_or(&empty);
-                let (open, close) = if j == 0 { ("<th scope=\"row\"", "</th>") } else { ("<td", "</td>") };
-                body.push_str(&format!("{open}{}>{}{close}", class(column, cell.tone), escape(&cell.text)));
+                let (open, close) = if j == 0 {
+                    ("<th scope=\"row\"", "</th>")
+                } else {
+                    ("<td", "</td>")
+                };
+                body.push_str(&format!(
+                    "{open}{}>{}{close}",
+                    class(column, cell.tone),
+                    escape(&cell.text)
+                ));
             }
             body.push_str("</tr>");
         }
-        let caption = if self.caption.is_empty() { String::new() } else { format!("<caption>{}</caption>", escape(&self.caption)) };
+        let caption = if self.caption.is_empty() {
+            String::new()
+        } else {
+            format!("<caption>{}</caption>", escape(&self.caption))
+        };
         format!(
             "<div class=\"table\" tabindex=\"0\" role=\"region\" aria-label=\"table\"><table>{caption}<thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>\n"
         )

@@ -32,7 +32,14 @@ impl Chart {
     /// An empty chart whose title says what one sees.
     #[must_use]
     pub fn new(title: &str, x: Axis, y: Axis) -> Self {
-        Self { title: title.to_owned(), description: String::new(), x, y, height: 190.0, layers: Vec::new() }
+        Self {
+            title: title.to_owned(),
+            description: String::new(),
+            x,
+            y,
+            height: 190.0,
+            layers: Vec::new(),
+        }
     }
 
     /// Adds a layer over those there are.
@@ -72,9 +79,15 @@ impl Chart {
             y.into_iter().for_each(|y| extent.include_y(y));
         }
         let has_data = self.layers.iter().any(|l| {
-            !matches!(l.mark, Mark::Vertical(_) | Mark::Horizontal(_) | Mark::Span(..)) && l.extent()[0][0].is_finite()
+            !matches!(
+                l.mark,
+                Mark::Vertical(_) | Mark::Horizontal(_) | Mark::Span(..)
+            ) && l.extent()[0][0].is_finite()
         });
-        let points = self.layers.iter().any(|l| matches!(l.mark, Mark::Dots(..) | Mark::Whiskers(_)));
+        let points = self
+            .layers
+            .iter()
+            .any(|l| matches!(l.mark, Mark::Dots(..) | Mark::Whiskers(_)));
         let x = domain(&self.x, extent.x, if points { 0.02 } else { 0.0 });
         let y = domain(&self.y, extent.y, 0.06);
         has_data.then_some([x, y])
@@ -91,7 +104,11 @@ impl Chart {
                 Mark::Dots(..) => Key::Dot(layer.opacity),
             };
             if let Some(text) = layer.label.as_ref().filter(|t| !t.is_empty()) {
-                entries.push(Entry { key, colour: layer.colour, text: text.clone() });
+                entries.push(Entry {
+                    key,
+                    colour: layer.colour,
+                    text: text.clone(),
+                });
             }
         }
         entries
@@ -102,12 +119,18 @@ impl Chart {
         self.layers
             .iter()
             .filter_map(|layer| match &layer.mark {
-                Mark::Vertical(x) => {
-                    layer.label.as_ref().map(|text| Above { x: *x, text: text.clone(), colour: layer.colour })
-                }
+                Mark::Vertical(x) => layer.label.as_ref().map(|text| Above {
+                    x: *x,
+                    text: text.clone(),
+                    colour: layer.colour,
+                }),
                 Mark::Span(x0, x1, name) if x0.is_finite() && x1.is_finite() => {
                     let middle = 0.5 * (x0.max(x_low) + x1.min(x_high));
-                    Some(Above { x: middle, text: name.clone(), colour: layer.colour })
+                    Some(Above {
+                        x: middle,
+                        text: name.clone(),
+                        colour: layer.colour,
+                    })
                 }
                 _ => None,
             })
@@ -120,10 +143,30 @@ impl Plot for Chart {
     fn svg(&self, id: &str, width: f64) -> String {
         let domains = self.domains();
         let [x, y] = domains.unwrap_or([[0.0, 1.0], [0.0, 1.0]]);
-        let above = if domains.is_some() { self.above(x) } else { Vec::new() };
-        let entries = if domains.is_some() { self.entries() } else { Vec::new() };
-        let request = Request { id, width, x: (&self.x, x), y: (&self.y, y), entries, above, map_grid: false };
-        let height = if width > NARROW * 1.5 { self.height * 1.15 } else { self.height };
+        let above = if domains.is_some() {
+            self.above(x)
+        } else {
+            Vec::new()
+        };
+        let entries = if domains.is_some() {
+            self.entries()
+        } else {
+            Vec::new()
+        };
+        let request = Request {
+            id,
+            width,
+            x: (&self.x, x),
+            y: (&self.y, y),
+            entries,
+            above,
+            map_grid: false,
+        };
+        let height = if width > NARROW * 1.5 {
+            self.height * 1.15
+        } else {
+            self.height
+        };
         let frame = Frame::new(request, height);
 
         let mut body = frame.clip.clone();
@@ -136,13 +179,27 @@ impl Plot for Chart {
                 coordinate(0.5 * (top + bottom))
             ));
         } else {
-            let clipped = |inner: &str| format!("<g clip-path=\"url(#{}-clip)\">{inner}</g>", escape(id));
-            let (spans, marks): (Vec<_>, Vec<_>) = self.layers.iter().partition(|l| matches!(l.mark, Mark::Span(..)));
-            body.push_str(&clipped(&spans.iter().map(|l| draw(l, &frame)).collect::<String>()));
+            let clipped =
+                |inner: &str| format!("<g clip-path=\"url(#{}-clip)\">{inner}</g>", escape(id));
+            let (spans, marks): (Vec<_>, Vec<_>) = self
+                .layers
+                .iter()
+                .partition(|l| matches!(l.mark, Mark::Span(..)));
+            body.push_str(&clipped(
+                &spans.iter().map(|l| draw(l, &frame)).collect::<String>(),
+            ));
             body.push_str(&frame.svg);
-            body.push_str(&clipped(&marks.iter().map(|l| draw(l, &frame)).collect::<String>()));
+            body.push_str(&clipped(
+                &marks.iter().map(|l| draw(l, &frame)).collect::<String>(),
+            ));
         }
-        root(id, [frame.width, frame.height], &self.title, &self.description, &body)
+        root(
+            id,
+            [frame.width, frame.height],
+            &self.title,
+            &self.description,
+            &body,
+        )
     }
 }
 
@@ -163,7 +220,18 @@ fn domain(axis: &Axis, data: [f64; 2], pad: f64) -> [f64; 2] {
     }
     let room = pad * (high - low);
     // Data that stand on zero keep standing on the axis.
-    [if axis.zero && low == 0.0 { 0.0 } else { low - room }, if axis.zero && high == 0.0 { 0.0 } else { high + room }]
+    [
+        if axis.zero && low == 0.0 {
+            0.0
+        } else {
+            low - room
+        },
+        if axis.zero && high == 0.0 {
+            0.0
+        } else {
+            high + room
+        },
+    ]
 }
 
 fn draw(layer: &Layer, frame: &Frame) -> String {
@@ -177,9 +245,14 @@ fn draw(layer: &Layer, frame: &Frame) -> String {
         if path.is_empty() {
             return String::new();
         }
-        format!("<path class=\"line {class}\" d=\"{path}\" stroke-opacity=\"{opacity}\"{}/>", layer.dash.attribute())
+        format!(
+            "<path class=\"line {class}\" d=\"{path}\" stroke-opacity=\"{opacity}\"{}/>",
+            layer.dash.attribute()
+        )
     };
-    let fill = |path: &str| format!("<path class=\"fill {class}\" d=\"{path}\" fill-opacity=\"{opacity}\"/>");
+    let fill = |path: &str| {
+        format!("<path class=\"fill {class}\" d=\"{path}\" fill-opacity=\"{opacity}\"/>")
+    };
     match &layer.mark {
         Mark::Line(points) => stroke(&path(&thin(points.iter().map(at).collect()))),
         Mark::Steps(points) => {
@@ -193,7 +266,9 @@ fn draw(layer: &Layer, frame: &Frame) -> String {
             stroke(&path(&corners))
         }
         Mark::Band(points) => {
-            let edges = points.iter().map(|p| [x.map(p[0]), y.map(p[1]), y.map(p[2])]);
+            let edges = points
+                .iter()
+                .map(|p| [x.map(p[0]), y.map(p[1]), y.map(p[2])]);
             fill(&ribbon(&edges.collect::<Vec<_>>()))
         }
         Mark::Area(points) => {
@@ -205,7 +280,14 @@ fn draw(layer: &Layer, frame: &Frame) -> String {
                 .iter()
                 .map(at)
                 .filter(|p| p.iter().all(|c| c.is_finite()))
-                .map(|[cx, cy]| format!("<circle cx=\"{}\" cy=\"{}\" r=\"{}\"/>", coordinate(cx), coordinate(cy), coordinate(*radius)))
+                .map(|[cx, cy]| {
+                    format!(
+                        "<circle cx=\"{}\" cy=\"{}\" r=\"{}\"/>",
+                        coordinate(cx),
+                        coordinate(cy),
+                        coordinate(*radius)
+                    )
+                })
                 .collect();
             format!("<g class=\"fill {class}\" fill-opacity=\"{opacity}\">{dots}</g>")
         }
@@ -214,7 +296,14 @@ fn draw(layer: &Layer, frame: &Frame) -> String {
                 .iter()
                 .map(|p| [x.map(p[0]), y.map(p[1]), y.map(p[2])])
                 .filter(|p| p.iter().all(|c| c.is_finite()))
-                .map(|p| format!("M{} {}V{}", coordinate(p[0]), coordinate(p[1]), coordinate(p[2])))
+                .map(|p| {
+                    format!(
+                        "M{} {}V{}",
+                        coordinate(p[0]),
+                        coordinate(p[1]),
+                        coordinate(p[2])
+                    )
+                })
                 .collect();
             stroke(&strokes)
         }
@@ -237,16 +326,29 @@ fn draw(layer: &Layer, frame: &Frame) -> String {
                 .collect();
             fill(&rectangles)
         }
-        Mark::Vertical(value) if x.map(*value).is_finite() => {
-            stroke(&format!("M{} {}V{}", coordinate(x.map(*value)), coordinate(top), coordinate(bottom)))
-        }
-        Mark::Horizontal(value) if y.map(*value).is_finite() => {
-            stroke(&format!("M{} {}H{}", coordinate(left), coordinate(y.map(*value)), coordinate(right)))
-        }
+        Mark::Vertical(value) if x.map(*value).is_finite() => stroke(&format!(
+            "M{} {}V{}",
+            coordinate(x.map(*value)),
+            coordinate(top),
+            coordinate(bottom)
+        )),
+        Mark::Horizontal(value) if y.map(*value).is_finite() => stroke(&format!(
+            "M{} {}H{}",
+            coordinate(left),
+            coordinate(y.map(*value)),
+            coordinate(right)
+        )),
         Mark::Span(x0, x1, _) if x0.is_finite() && x1.is_finite() => {
             let (a, b) = (x.map_clamped(x0.min(*x1)), x.map_clamped(x0.max(*x1)));
             // A hair's breadth between neighbours shows where one ends.
-            fill(&format!("M{} {}V{}H{}V{}Z", coordinate(a + 0.5), coordinate(bottom), coordinate(top), coordinate(b - 0.5), coordinate(bottom)))
+            fill(&format!(
+                "M{} {}V{}H{}V{}Z",
+                coordinate(a + 0.5),
+                coordinate(bottom),
+                coordinate(top),
+                coordinate(b - 0.5),
+                coordinate(bottom)
+            ))
         }
         Mark::Vertical(_) | Mark::Horizontal(_) | Mark::Span(..) => String::new(),
     }
@@ -258,7 +360,12 @@ pub(super) fn path(points: &[[f64; 2]]) -> String {
     let mut pen_down = false;
     for [x, y] in points {
         if x.is_finite() && y.is_finite() {
-            d.push_str(&format!("{}{} {}", if pen_down { 'L' } else { 'M' }, coordinate(*x), coordinate(*y)));
+            d.push_str(&format!(
+                "{}{} {}",
+                if pen_down { 'L' } else { 'M' },
+                coordinate(*x),
+                coordinate(*y)
+            ));
             pen_down = true;
         } else {
             pen_down = false;
@@ -289,7 +396,13 @@ fn thin(points: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
     let mut kept = Vec::with_capacity(MOST_POINTS);
     for part in points.chunks(stretch) {
         let by = |better: fn(f64, f64) -> bool| {
-            (1..part.len()).fold(0, |best, i| if better(part[i][1], part[best][1]) { i } else { best })
+            (1..part.len()).fold(0, |best, i| {
+                if better(part[i][1], part[best][1]) {
+                    i
+                } else {
+                    best
+                }
+            })
         };
         let mut indices = [0, by(|a, b| a < b), by(|a, b| a > b), part.len() - 1];
         indices.sort_unstable();
@@ -310,28 +423,62 @@ mod tests {
     use crate::plot::{NARROW, Scale};
 
     fn chart() -> Chart {
-        Chart::new("t <&>", Axis::new("x & y", "m"), Axis::new("y", "").domain([0.0, 2.0]))
+        Chart::new(
+            "t <&>",
+            Axis::new("x & y", "m"),
+            Axis::new("y", "").domain([0.0, 2.0]),
+        )
     }
 
     #[test]
     fn a_marker_line_stands_where_the_scale_says() {
-        let svg = chart().layer(Layer::line(vec![[0.0, 0.0], [0.1, 2.0]])).layer(Layer::vertical(0.06).label("truth")).svg("a", NARROW);
+        let svg = chart()
+            .layer(Layer::line(vec![[0.0, 0.0], [0.1, 2.0]]))
+            .layer(Layer::vertical(0.06).label("truth"))
+            .svg("a", NARROW);
         let document = roxmltree::Document::parse(&svg).unwrap();
-        let clip = document.descendants().find(|n| n.has_tag_name("rect")).unwrap();
+        let clip = document
+            .descendants()
+            .find(|n| n.has_tag_name("rect"))
+            .unwrap();
         let number = |name: &str| clip.attribute(name).unwrap().parse::<f64>().unwrap();
-        let scale = Scale::new([0.0, 0.1], [number("x"), number("x") + number("width")], Spacing::Linear);
-        let d = document.descendants().find_map(|n| n.attribute("d").filter(|d| d.contains('V'))).unwrap();
+        let scale = Scale::new(
+            [0.0, 0.1],
+            [number("x"), number("x") + number("width")],
+            Spacing::Linear,
+        );
+        let d = document
+            .descendants()
+            .find_map(|n| n.attribute("d").filter(|d| d.contains('V')))
+            .unwrap();
         let drawn: f64 = d[1..].split(' ').next().unwrap().parse().unwrap();
         // Coordinates are rounded to a hundredth, those of the box as well.
-        assert!((drawn - scale.map(0.06)).abs() < 0.02, "{drawn} is not {}", scale.map(0.06));
+        assert!(
+            (drawn - scale.map(0.06)).abs() < 0.02,
+            "{drawn} is not {}",
+            scale.map(0.06)
+        );
     }
 
     #[test]
     fn what_is_not_finite_is_skipped() {
         let nan = f64::NAN;
         let svg = chart()
-            .layer(Layer::line(vec![[0.0, 1.0], [1.0, nan], [f64::INFINITY, 1.0], [3.0, 1.0], [4.0, 1.5]]).label("a"))
-            .layer(Layer::band(vec![[0.0, 0.0, nan], [1.0, 0.0, 1.0], [2.0, 0.5, 1.0]]))
+            .layer(
+                Layer::line(vec![
+                    [0.0, 1.0],
+                    [1.0, nan],
+                    [f64::INFINITY, 1.0],
+                    [3.0, 1.0],
+                    [4.0, 1.5],
+                ])
+                .label("a"),
+            )
+            .layer(Layer::band(vec![
+                [0.0, 0.0, nan],
+                [1.0, 0.0, 1.0],
+                [2.0, 0.5, 1.0],
+            ]))
             .layer(Layer::dots(vec![[nan, nan], [1.0, 1.0]]))
             .layer(Layer::bars(vec![[0.0, 1.0, nan], [1.0, 2.0, 1.0]]))
             .layer(Layer::whiskers(vec![[0.0, nan, 1.0]]))
@@ -341,13 +488,20 @@ mod tests {
             .svg("a", NARROW);
         assert!(roxmltree::Document::parse(&svg).is_ok());
         assert!(!svg.contains("NaN") && !svg.contains("inf"), "{svg}");
-        assert!(!svg.contains("no span") && !svg.contains("nowhere"), "{svg}");
+        assert!(
+            !svg.contains("no span") && !svg.contains("nowhere"),
+            "{svg}"
+        );
         assert_eq!(svg.matches("<circle").count(), 1, "{svg}");
     }
 
     #[test]
     fn no_data_says_so() {
-        for layers in [vec![], vec![Layer::line(vec![])], vec![Layer::dots(vec![[f64::NAN, 0.0]]), Layer::vertical(1.0)]] {
+        for layers in [
+            vec![],
+            vec![Layer::line(vec![])],
+            vec![Layer::dots(vec![[f64::NAN, 0.0]]), Layer::vertical(1.0)],
+        ] {
             let svg = chart().layers(layers).svg("a", NARROW);
             assert!(roxmltree::Document::parse(&svg).is_ok() && svg.contains("no data"));
         }
@@ -359,6 +513,10 @@ mod tests {
         points[5_003][1] = 7.0;
         points[7_001][1] = -3.0;
         let kept = thin(points);
-        assert!(kept.len() <= MOST_POINTS + 4 && kept.contains(&[5_003.0, 7.0]) && kept.contains(&[7_001.0, -3.0]));
+        assert!(
+            kept.len() <= MOST_POINTS + 4
+                && kept.contains(&[5_003.0, 7.0])
+                && kept.contains(&[7_001.0, -3.0])
+        );
     }
 }

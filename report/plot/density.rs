@@ -11,7 +11,13 @@ impl Weighted {
     /// Equal weights where `weights` is empty; `None` where nothing usable is left.
     #[must_use]
     pub fn new(samples: &[f64], weights: &[f64]) -> Option<Self> {
-        let weight = |i: usize| if weights.is_empty() { 1.0 } else { weights.get(i).copied().unwrap_or(0.0) };
+        let weight = |i: usize| {
+            if weights.is_empty() {
+                1.0
+            } else {
+                weights.get(i).copied().unwrap_or(0.0)
+            }
+        };
         let mut sorted: Vec<(f64, f64)> = samples
             .iter()
             .enumerate()
@@ -50,7 +56,12 @@ impl Weighted {
     #[must_use]
     pub fn std(&self) -> f64 {
         let mean = self.mean();
-        self.sorted.iter().map(|(v, w)| w * (v - mean).powi(2)).sum::<f64>().max(0.0).sqrt()
+        self.sorted
+            .iter()
+            .map(|(v, w)| w * (v - mean).powi(2))
+            .sum::<f64>()
+            .max(0.0)
+            .sqrt()
     }
 
     /// Kernel density with Silverman's bandwidth (1986, eq. 3.31) at the effective number of samples.
@@ -62,10 +73,23 @@ impl Weighted {
         let effective = 1.0 / self.sorted.iter().map(|s| s.1 * s.1).sum::<f64>();
         let quartiles = (self.quantile(0.75) - self.quantile(0.25)) / 1.34;
         let std = self.std();
-        let spread = if quartiles > 0.0 { std.min(quartiles) } else { std };
-        let smallest = 1e-4 * if bounds[1] > bounds[0] { bounds[1] - bounds[0] } else { self.mean().abs().max(1e-9) };
+        let spread = if quartiles > 0.0 {
+            std.min(quartiles)
+        } else {
+            std
+        };
+        let smallest = 1e-4
+            * if bounds[1] > bounds[0] {
+                bounds[1] - bounds[0]
+            } else {
+                self.mean().abs().max(1e-9)
+            };
         let bandwidth = (0.9 * spread * effective.powf(-0.2)).max(smallest);
-        Density { samples: self.sorted.clone(), bandwidth, bounds }
+        Density {
+            samples: self.sorted.clone(),
+            bandwidth,
+            bounds,
+        }
     }
 }
 
@@ -116,10 +140,15 @@ mod tests {
 
     #[test]
     fn a_density_has_mass_one_even_at_a_bound() {
-        let samples: Vec<f64> = (0..200).map(|i| 0.1 * (f64::from(i) / 200.0).powi(3)).collect();
+        let samples: Vec<f64> = (0..200)
+            .map(|i| 0.1 * (f64::from(i) / 200.0).powi(3))
+            .collect();
         let density = Weighted::new(&samples, &[]).unwrap().density([0.0, 0.1]);
         let points = density.points([0.0, 0.1], 4001);
-        let mass: f64 = points.windows(2).map(|p| 0.5 * (p[0][1] + p[1][1]) * (p[1][0] - p[0][0])).sum();
+        let mass: f64 = points
+            .windows(2)
+            .map(|p| 0.5 * (p[0][1] + p[1][1]) * (p[1][0] - p[0][0]))
+            .sum();
         // Trapezoidal error at this step is far below a part in a thousand.
         assert!((mass - 1.0).abs() < 1e-3, "{mass}");
     }
@@ -135,7 +164,9 @@ mod tests {
 
     #[test]
     fn equal_samples_give_a_finite_peak() {
-        let density = Weighted::new(&[0.05; 10], &[]).unwrap().density([-0.1, 0.1]);
+        let density = Weighted::new(&[0.05; 10], &[])
+            .unwrap()
+            .density([-0.1, 0.1]);
         assert!(density.at(0.05).is_finite() && density.at(0.05) > density.at(0.06));
     }
 }

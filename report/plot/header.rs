@@ -54,12 +54,17 @@ pub(crate) fn layout(width: f64, y_label: &str, entries: &[Entry], above: &[Abov
     let mut baseline = FONT_SIZE;
     let mut x = 0.0;
     if !y_label.is_empty() {
-        svg.push_str(&format!("<text class=\"axis-label\" x=\"0\" y=\"{}\">{}</text>", coordinate(baseline), escape(&y_label)));
+        svg.push_str(&format!(
+            "<text class=\"axis-label\" x=\"0\" y=\"{}\">{}</text>",
+            coordinate(baseline),
+            escape(&y_label)
+        ));
         x = text_width(&y_label, FONT_SIZE) + 1.4 * ITEM_GAP;
     }
     let mut at_row_start = x == 0.0;
     // A legend that would break over rows anyway starts on a row of its own.
-    let total: f64 = entries.iter().map(|e| item_width(&e.text)).sum::<f64>() + ITEM_GAP * entries.len().saturating_sub(1) as f64;
+    let total: f64 = entries.iter().map(|e| item_width(&e.text)).sum::<f64>()
+        + ITEM_GAP * entries.len().saturating_sub(1) as f64;
     if !entries.is_empty() && !at_row_start && x + total > width {
         (x, baseline, at_row_start) = (0.0, baseline + ROW, true);
     }
@@ -79,7 +84,11 @@ pub(crate) fn layout(width: f64, y_label: &str, entries: &[Entry], above: &[Abov
         x += needed + ITEM_GAP;
         at_row_start = false;
     }
-    let mut height = if y_label.is_empty() && entries.is_empty() { 4.0 } else { baseline + 13.0 };
+    let mut height = if y_label.is_empty() && entries.is_empty() {
+        4.0
+    } else {
+        baseline + 13.0
+    };
 
     // Marker labels, left to right; lane 0 is next to the plot.
     let placed = lanes(width, above);
@@ -116,7 +125,10 @@ struct Placed {
 }
 
 fn lanes(width: f64, above: &[Above]) -> Vec<Placed> {
-    let mut order: Vec<&Above> = above.iter().filter(|a| a.x.is_finite() && !a.text.is_empty()).collect();
+    let mut order: Vec<&Above> = above
+        .iter()
+        .filter(|a| a.x.is_finite() && !a.text.is_empty())
+        .collect();
     order.sort_by(|a, b| a.x.total_cmp(&b.x));
     let mut placed: Vec<Placed> = Vec::with_capacity(order.len());
     for label in order {
@@ -126,9 +138,20 @@ fn lanes(width: f64, above: &[Above]) -> Vec<Placed> {
         let right = left + wide;
         // The lowest lane in which nothing is met.
         let lane = (0..)
-            .find(|&lane| placed.iter().filter(|p| p.lane == lane).all(|p| left > p.right + LABEL_GAP || right < p.left - LABEL_GAP))
+            .find(|&lane| {
+                placed
+                    .iter()
+                    .filter(|p| p.lane == lane)
+                    .all(|p| left > p.right + LABEL_GAP || right < p.left - LABEL_GAP)
+            })
             .unwrap_or(placed.len());
-        placed.push(Placed { text, colour: label.colour, left, right, lane });
+        placed.push(Placed {
+            text,
+            colour: label.colour,
+            left,
+            right,
+            lane,
+        });
     }
     placed
 }
@@ -171,14 +194,21 @@ mod tests {
     fn marker_labels_never_touch_and_stay_inside() {
         let above: Vec<Above> = [10.0, 12.0, 14.0, 200.0, 399.0, f64::NAN]
             .iter()
-            .map(|&x| Above { x, text: "truth 0.0600".to_owned(), colour: Colour::Ink })
+            .map(|&x| Above {
+                x,
+                text: "truth 0.0600".to_owned(),
+                colour: Colour::Ink,
+            })
             .collect();
         let placed = lanes(400.0, &above);
         assert_eq!(placed.len(), 5);
         for (i, a) in placed.iter().enumerate() {
             assert!(a.left >= 0.0 && a.right <= 400.0);
             for b in &placed[i + 1..] {
-                assert!(a.lane != b.lane || a.right < b.left || b.right < a.left, "{a:?} meets {b:?}");
+                assert!(
+                    a.lane != b.lane || a.right < b.left || b.right < a.left,
+                    "{a:?} meets {b:?}"
+                );
             }
         }
     }
@@ -186,7 +216,11 @@ mod tests {
     #[test]
     fn a_long_legend_flows_into_rows() {
         let entries: Vec<Entry> = (0..6)
-            .map(|i| Entry { key: Key::Dot(1.0), colour: Colour::Blue, text: format!("a rather long entry {i}") })
+            .map(|i| Entry {
+                key: Key::Dot(1.0),
+                colour: Colour::Blue,
+                text: format!("a rather long entry {i}"),
+            })
             .collect();
         let one = layout(420.0, "tilt (°)", &entries[..1], &[]);
         let all = layout(420.0, "tilt (°)", &entries, &[]);

@@ -66,7 +66,13 @@ pub struct Layer {
 
 impl Layer {
     fn new(mark: Mark) -> Self {
-        Self { mark, colour: Colour::Ink, label: None, dash: Dash::Solid, opacity: 1.0 }
+        Self {
+            mark,
+            colour: Colour::Ink,
+            label: None,
+            dash: Dash::Solid,
+            opacity: 1.0,
+        }
     }
 
     /// Connected points `[x, y]`.
@@ -114,7 +120,13 @@ impl Layer {
     /// A histogram: counts `y[i]` between `edges[i]` and `edges[i + 1]`.
     #[must_use]
     pub fn histogram(edges: &[f64], y: &[f64]) -> Self {
-        Self::bars(edges.windows(2).zip(y).map(|(e, &y)| [e[0], e[1], y]).collect())
+        Self::bars(
+            edges
+                .windows(2)
+                .zip(y)
+                .map(|(e, &y)| [e[0], e[1], y])
+                .collect(),
+        )
     }
 
     /// A vertical line at `x`; its label stands above the plot.
@@ -132,7 +144,9 @@ impl Layer {
     /// A shaded stretch of the x axis, its name above the plot.
     #[must_use]
     pub fn span(x0: f64, x1: f64, name: &str) -> Self {
-        Self::new(Mark::Span(x0, x1, name.to_owned())).colour(Colour::Muted).opacity(0.12)
+        Self::new(Mark::Span(x0, x1, name.to_owned()))
+            .colour(Colour::Muted)
+            .opacity(0.12)
     }
 
     /// Sets the colour.
@@ -216,7 +230,10 @@ pub(crate) struct Extent {
 impl Default for Extent {
     fn default() -> Self {
         let nothing = [f64::INFINITY, f64::NEG_INFINITY];
-        Self { x: nothing, y: nothing }
+        Self {
+            x: nothing,
+            y: nothing,
+        }
     }
 }
 

@@ -47,19 +47,30 @@ impl Outline {
     /// A circle.
     #[must_use]
     pub fn circle(centre: [f64; 2], radius: f64) -> Self {
-        Self { circle: Some(radius.abs()), ..Self::new(vec![centre]) }
+        Self {
+            circle: Some(radius.abs()),
+            ..Self::new(vec![centre])
+        }
     }
 
     /// An open path.
     #[must_use]
     pub fn path(points: Vec<[f64; 2]>) -> Self {
-        Self { closed: false, fill: 0.0, ..Self::new(points) }
+        Self {
+            closed: false,
+            fill: 0.0,
+            ..Self::new(points)
+        }
     }
 
     /// Dots that grow from faint to strong along the sequence: time.
     #[must_use]
     pub fn trail(points: Vec<[f64; 2]>) -> Self {
-        Self { closed: false, dots: true, ..Self::new(points) }
+        Self {
+            closed: false,
+            dots: true,
+            ..Self::new(points)
+        }
     }
 
     /// Sets the colour.
@@ -128,7 +139,14 @@ impl Plan {
     /// An empty plan over axes of the same unit.
     #[must_use]
     pub fn new(title: &str, x: Axis, y: Axis) -> Self {
-        Self { title: title.to_owned(), description: String::new(), x, y, outlines: Vec::new(), floor: None }
+        Self {
+            title: title.to_owned(),
+            description: String::new(),
+            x,
+            y,
+            outlines: Vec::new(),
+            floor: None,
+        }
     }
 
     /// Adds a shape over those there are.
@@ -155,7 +173,10 @@ impl Plan {
     /// The part of the plane to show, or `None` where there is nothing.
     fn view(&self) -> Option<Extent> {
         let mut extent = Extent::default();
-        self.outlines.iter().filter(|o| !o.context).for_each(|o| o.extend(&mut extent));
+        self.outlines
+            .iter()
+            .filter(|o| !o.context)
+            .for_each(|o| o.extend(&mut extent));
         if !extent.x[0].is_finite() {
             self.outlines.iter().for_each(|o| o.extend(&mut extent));
         }
@@ -180,7 +201,11 @@ impl Plan {
                 (false, true) if o.dash == Dash::Solid => Key::Fill(o.fill),
                 _ => Key::Line(o.dash),
             };
-            Some(Entry { key, colour: o.colour, text })
+            Some(Entry {
+                key,
+                colour: o.colour,
+                text,
+            })
         };
         self.outlines.iter().filter_map(entry).collect()
     }
@@ -189,12 +214,23 @@ impl Plan {
 impl Plot for Plan {
     fn svg(&self, id: &str, width: f64) -> String {
         let view = self.view();
-        let entries = if view.is_some() { self.entries() } else { Vec::new() };
-        let mut extent = view.unwrap_or(Extent { x: [0.0, 1.0], y: [0.0, 1.0] });
+        let entries = if view.is_some() {
+            self.entries()
+        } else {
+            Vec::new()
+        };
+        let mut extent = view.unwrap_or(Extent {
+            x: [0.0, 1.0],
+            y: [0.0, 1.0],
+        });
 
         // The box's height follows from equal scales. Where that would be too
         // flat or too tall, the shorter side shows more of the plane.
-        let limits = if width > NARROW * 1.5 { [0.28, 0.55] } else { [0.38, 0.95] };
+        let limits = if width > NARROW * 1.5 {
+            [0.28, 0.55]
+        } else {
+            [0.38, 0.95]
+        };
         let mut plot_height = limits[1] * width;
         // The tick labels' width depends on the height, and the height on it: twice settles it.
         for _ in 0..2 {
@@ -220,7 +256,10 @@ impl Plot for Plan {
         let mut body = format!("{}{}", frame.clip, frame.svg);
         if view.is_some() {
             let shapes: String = self.outlines.iter().map(|o| draw(o, &frame)).collect();
-            body.push_str(&format!("<g clip-path=\"url(#{}-clip)\">{shapes}</g>", escape(id)));
+            body.push_str(&format!(
+                "<g clip-path=\"url(#{}-clip)\">{shapes}</g>",
+                escape(id)
+            ));
         } else {
             let [left, top, right, bottom] = frame.area;
             body.push_str(&format!(
@@ -229,7 +268,13 @@ impl Plot for Plan {
                 coordinate(0.5 * (top + bottom))
             ));
         }
-        root(id, [frame.width, frame.height], &self.title, &self.description, &body)
+        root(
+            id,
+            [frame.width, frame.height],
+            &self.title,
+            &self.description,
+            &body,
+        )
     }
 }
 
@@ -239,7 +284,11 @@ fn widen(interval: &mut [f64; 2], size: f64, floor: Option<f64>) {
     if missing <= 0.0 {
         return;
     }
-    let below = if floor.is_some_and(|f| interval[0] <= f) { 0.0 } else { 0.5 * missing };
+    let below = if floor.is_some_and(|f| interval[0] <= f) {
+        0.0
+    } else {
+        0.5 * missing
+    };
     *interval = [interval[0] - below, interval[1] + missing - below];
 }
 
@@ -254,11 +303,19 @@ fn draw(outline: &Outline, frame: &Frame) -> String {
     );
     let points: Vec<[f64; 2]> = outline.points.iter().map(at).collect();
     if let Some(radius) = outline.circle {
-        let Some([cx, cy]) = points.first().filter(|p| p.iter().all(|c| c.is_finite()) && radius.is_finite()) else {
+        let Some([cx, cy]) = points
+            .first()
+            .filter(|p| p.iter().all(|c| c.is_finite()) && radius.is_finite())
+        else {
             return String::new();
         };
         let r = (frame.x.map(outline.points[0][0] + radius) - cx).abs();
-        return format!("<circle {style} cx=\"{}\" cy=\"{}\" r=\"{}\"/>", coordinate(*cx), coordinate(*cy), coordinate(r));
+        return format!(
+            "<circle {style} cx=\"{}\" cy=\"{}\" r=\"{}\"/>",
+            coordinate(*cx),
+            coordinate(*cy),
+            coordinate(r)
+        );
     }
     if outline.dots {
         let last = points.len().saturating_sub(1).max(1) as f64;
@@ -289,7 +346,10 @@ mod tests {
     use super::*;
 
     fn attribute(document: &roxmltree::Document<'_>, tag: &str, name: &str) -> f64 {
-        let node = document.descendants().filter(|n| n.has_tag_name(tag)).find_map(|n| n.attribute(name));
+        let node = document
+            .descendants()
+            .filter(|n| n.has_tag_name(tag))
+            .find_map(|n| n.attribute(name));
         node.unwrap().parse().unwrap()
     }
 
@@ -297,12 +357,21 @@ mod tests {
     fn a_metre_is_as_long_upwards_as_it_is_sideways() {
         for corner in [[4.0, 1.0], [1.0, 4.0], [0.2, 0.3]] {
             let [x, y] = corner;
-            let plan = Plan::new("p", Axis::new("x", "m"), Axis::new("y", "m"))
-                .outline(Outline::polygon(vec![[0.0, 0.0], [x, 0.0], [x, y], [0.0, y]]));
+            let plan = Plan::new("p", Axis::new("x", "m"), Axis::new("y", "m")).outline(
+                Outline::polygon(vec![[0.0, 0.0], [x, 0.0], [x, y], [0.0, y]]),
+            );
             let svg = plan.svg("p", NARROW);
             let document = roxmltree::Document::parse(&svg).unwrap();
-            let d = document.descendants().find(|n| n.attribute("class").is_some_and(|c| c.starts_with("shape"))).unwrap();
-            let numbers: Vec<f64> = d.attribute("d").unwrap().split(['M', 'L', 'Z', ' ']).filter_map(|t| t.parse().ok()).collect();
+            let d = document
+                .descendants()
+                .find(|n| n.attribute("class").is_some_and(|c| c.starts_with("shape")))
+                .unwrap();
+            let numbers: Vec<f64> = d
+                .attribute("d")
+                .unwrap()
+                .split(['M', 'L', 'Z', ' '])
+                .filter_map(|t| t.parse().ok())
+                .collect();
             let (across, up) = (numbers[2] - numbers[0], numbers[3] - numbers[5]);
             // Coordinates are rounded to a hundredth.
             assert!((across / x - up / y).abs() < 0.02 / x.min(y), "{numbers:?}");
@@ -314,7 +383,11 @@ mod tests {
         let plan = Plan::new("p", Axis::new("x", "m"), Axis::new("y", "m"));
         assert!(plan.svg("p", NARROW).contains("no data"));
         let odd = plan
-            .outline(Outline::polygon(vec![[f64::NAN, 0.0], [0.0, 1.0], [1.0, f64::INFINITY]]))
+            .outline(Outline::polygon(vec![
+                [f64::NAN, 0.0],
+                [0.0, 1.0],
+                [1.0, f64::INFINITY],
+            ]))
             .outline(Outline::circle([f64::NAN, 0.0], 1.0))
             .outline(Outline::trail(vec![[0.0, 0.0], [f64::NAN, 1.0]]));
         let svg = odd.svg("p", NARROW);

@@ -48,7 +48,11 @@ impl Scale {
             let pad = if low == 0.0 { 1.0 } else { 0.1 * low.abs() };
             [low, high] = [low - pad, high + pad];
         }
-        Self { domain: [low, high], range, spacing }
+        Self {
+            domain: [low, high],
+            range,
+            spacing,
+        }
     }
 
     /// The domain in data units, increasing.
@@ -81,8 +85,23 @@ impl Scale {
         if self.spacing == Spacing::Log {
             let values = log_ticks(self.domain, most.max(2));
             if values.len() >= 2 {
-                let labels = values.iter().map(|&v| log_label(v)).collect();
-                return Ticks { values, labels, exponent: 0 };
+                // One style for all: plain numbers where all are short.
+                let plain = values.iter().all(|v| (0.999e-3..1.001e4).contains(v));
+                let labels = values
+                    .iter()
+                    .map(|&v| {
+                        if plain {
+                            number::round(v, 1)
+                        } else {
+                            log_label(v)
+                        }
+                    })
+                    .collect();
+                return Ticks {
+                    values,
+                    labels,
+                    exponent: 0,
+                };
             }
         }
         linear_ticks(self.domain, most.max(2))
@@ -115,8 +134,15 @@ fn linear_ticks([low, high]: [f64; 2], most: usize) -> Ticks {
         0
     };
     let places = usize::try_from(exponent - magnitude).unwrap_or(0).min(12);
-    let labels = values.iter().map(|v| number::decimals(v / 10f64.powi(exponent), places)).collect();
-    Ticks { values, labels, exponent }
+    let labels = values
+        .iter()
+        .map(|v| number::decimals(v / 10f64.powi(exponent), places))
+        .collect();
+    Ticks {
+        values,
+        labels,
+        exponent,
+    }
 }
 
 /// Ticks on decades, with their double and fivefold where there are few decades.
@@ -140,12 +166,13 @@ fn log_ticks([low, high]: [f64; 2], most: usize) -> Vec<f64> {
 
 fn log_label(value: f64) -> String {
     let exponent = (value.log10() + 1e-9).floor() as i32;
-    if (-3..4).contains(&exponent) {
-        return number::significant(value, 1);
-    }
     let mantissa = (value / 10f64.powi(exponent)).round();
     let power = format!("10{}", number::superscript(exponent));
-    if mantissa == 1.0 { power } else { format!("{mantissa:.0}×{power}") }
+    if mantissa == 1.0 {
+        power
+    } else {
+        format!("{mantissa:.0}×{power}")
+    }
 }
 
 #[cfg(test)]
@@ -154,20 +181,38 @@ mod tests {
 
     #[test]
     fn ticks_are_round_inside_evenly_spaced_and_few() {
-        for domain in [[0.0, 1.0], [-0.1, 0.1], [3.2e-9, 7.7e-9], [-1e7, 2.5e8], [99.9, 100.3], [0.0, 20.0]] {
+        for domain in [
+            [0.0, 1.0],
+            [-0.1, 0.1],
+            [3.2e-9, 7.7e-9],
+            [-1e7, 2.5e8],
+            [99.9, 100.3],
+            [0.0, 20.0],
+        ] {
             for most in 2..9 {
                 let ticks = Scale::new(domain, [0.0, 1.0], Spacing::Linear).ticks(most);
                 assert!(ticks.values.len() <= most, "{domain:?} {most}: {ticks:?}");
                 assert_eq!(ticks.values.len(), ticks.labels.len());
                 let slack = 1e-9 * (domain[1] - domain[0]);
-                assert!(ticks.values.iter().all(|&v| v >= domain[0] - slack && v <= domain[1] + slack));
+                assert!(
+                    ticks
+                        .values
+                        .iter()
+                        .all(|&v| v >= domain[0] - slack && v <= domain[1] + slack)
+                );
                 for pair in ticks.values.windows(3) {
                     assert!(((pair[2] - pair[1]) - (pair[1] - pair[0])).abs() < slack);
                 }
                 // Each label reads as another number than its neighbour.
-                assert!(ticks.labels.windows(2).all(|pair| pair[0] != pair[1]), "{ticks:?}");
+                assert!(
+                    ticks.labels.windows(2).all(|pair| pair[0] != pair[1]),
+                    "{ticks:?}"
+                );
                 // From three on, the 1-2-5 series always finds at least two.
-                assert!(most < 4 || ticks.values.len() >= 2, "{domain:?} {most}: {ticks:?}");
+                assert!(
+                    most < 4 || ticks.values.len() >= 2,
+                    "{domain:?} {most}: {ticks:?}"
+                );
             }
         }
     }
@@ -177,7 +222,10 @@ mod tests {
         let ticks = Scale::new([-0.1, 0.1], [0.0, 1.0], Spacing::Linear).ticks(5);
         assert_eq!(ticks.labels, ["−0.10", "−0.05", "0.00", "0.05", "0.10"]);
         let small = Scale::new([0.0, 4e-6], [0.0, 1.0], Spacing::Linear).ticks(5);
-        assert_eq!((small.exponent, small.labels.last().unwrap().as_str()), (-6, "4"));
+        assert_eq!(
+            (small.exponent, small.labels.last().unwrap().as_str()),
+            (-6, "4")
+        );
     }
 
     #[test]
@@ -192,7 +240,13 @@ mod tests {
 
     #[test]
     fn a_domain_without_extent_or_sense_still_maps() {
-        for domain in [[0.0, 0.0], [3.0, 3.0], [f64::NAN, 1.0], [2.0, 1.0], [f64::NEG_INFINITY, f64::INFINITY]] {
+        for domain in [
+            [0.0, 0.0],
+            [3.0, 3.0],
+            [f64::NAN, 1.0],
+            [2.0, 1.0],
+            [f64::NEG_INFINITY, f64::INFINITY],
+        ] {
             let scale = Scale::new(domain, [0.0, 10.0], Spacing::Log);
             assert!(scale.domain()[0] < scale.domain()[1]);
             assert!(scale.map(scale.domain()[1]).is_finite());

@@ -4,7 +4,7 @@ use super::episode::outline_of;
 use super::head::{metric_name, metric_value};
 use super::trace::{Downstream, RunReport, Search, SideView};
 use crate::markup::capitalise;
-use crate::number::{grouped, quantity, round, significant, to_precision_of};
+use crate::number::{Precision, grouped, quantity, round, significant};
 use crate::page::{Figure, Section};
 use crate::plot::{Axis, Chart, Colour, Layer, Plan, Weighted};
 
@@ -20,7 +20,12 @@ pub(super) fn section(report: &RunReport) -> Option<Section> {
     } else {
         figures.push(over_time(downstream));
     }
-    figures.extend(downstream.side_view.as_ref().map(|view| side(view, downstream)));
+    figures.extend(
+        downstream
+            .side_view
+            .as_ref()
+            .map(|view| side(view, downstream)),
+    );
     match &downstream.search {
         Some(search) => figures.extend((0..search.chosen.len()).map(|i| tried(search, i))),
         None => section = section.note("No search to show: the solver kept no trials."),
@@ -29,42 +34,97 @@ pub(super) fn section(report: &RunReport) -> Option<Section> {
 }
 
 fn lead(d: &Downstream) -> String {
-    let rule = if d.rule.is_empty() { String::new() } else { format!(" Success means {}.", d.rule) };
+    let rule = if d.rule.is_empty() {
+        String::new()
+    } else {
+        format!(" Success means {}.", d.rule)
+    };
     format!(
         "Done once in the real world with what was learnt: {} is {}, {}.{rule}",
         metric_name(d),
         metric_value(d),
-        if d.success { "a success" } else { "not a success" }
+        if d.success {
+            "a success"
+        } else {
+            "not a success"
+        }
     )
 }
 
 fn over_time(d: &Downstream) -> Figure {
     let name = metric_name(d);
-    let points: Vec<[f64; 2]> = d.time.iter().zip(&d.metric_over_time).map(|(&t, &v)| [t, v]).collect();
+    let points: Vec<[f64; 2]> = d
+        .time
+        .iter()
+        .zip(&d.metric_over_time)
+        .map(|(&t, &v)| [t, v])
+        .collect();
     let title = format!("{name} over the task");
     let spans = d.phases.iter().enumerate().map(|(i, phase)| {
         // Neighbours differ in shade.
-        Layer::span(phase.start, phase.end, &phase.name).opacity(if i % 2 == 0 { 0.07 } else { 0.15 })
+        Layer::span(phase.start, phase.end, &phase.name).opacity(if i % 2 == 0 {
+            0.07
+        } else {
+            0.15
+        })
     });
-    let mut chart = Chart::new(&title, Axis::new("time", "s"), Axis::new(name, &d.unit).zero()).layers(spans);
+    let mut chart = Chart::new(
+        &title,
+        Axis::new("time", "s"),
+        Axis::new(&name, &d.unit).zero(),
+    )
+    .layers(spans);
     if let Some(limit) = d.threshold.filter(|l| l.is_finite()) {
         let label = format!("limit {}", quantity(&round(limit, 3), &d.unit));
-        chart = chart.layer(Layer::horizontal(limit).colour(Colour::Vermillion).dashed().label(label));
+        chart = chart.layer(
+            Layer::horizontal(limit)
+                .colour(Colour::Vermillion)
+                .dashed()
+                .label(label),
+        );
     }
     chart = chart.layer(Layer::line(points.clone()).colour(Colour::Blue).label(name));
-    let peak = points.iter().map(|p| p[1]).filter(|v| v.is_finite()).fold(f64::NAN, f64::max);
-    let phases = if d.phases.is_empty() { "" } else { "; shades are the phases of the motion" };
-    let caption = format!("At most {}, {} at the end{phases}.", quantity(&significant(peak, 2), &d.unit), metric_value(d));
-    Figure::new(capitalise(&title), chart.description(caption.clone()), caption)
+    let peak = points
+        .iter()
+        .map(|p| p[1])
+        .filter(|v| v.is_finite())
+        .fold(f64::NAN, f64::max);
+    let phases = if d.phases.is_empty() {
+        ""
+    } else {
+        "; shades are the phases of the motion"
+    };
+    let caption = format!(
+        "At most {}, {} at the end{phases}.",
+        quantity(&significant(peak, 2), &d.unit),
+        metric_value(d)
+    );
+    Figure::new(
+        capitalise(&title),
+        chart.description(caption.clone()),
+        caption,
+    )
 }
 
 /// Cost of the actions tried against one dimension of the action.
 fn tried(search: &Search, dimension: usize) -> Figure {
     let chosen = &search.chosen[dimension];
-    let cost = if search.cost_label.is_empty() { "cost" } else { &search.cost_label };
-    let title = format!("{} of the actions tried, by {}", capitalise(cost), chosen.name);
+    let cost = if search.cost_label.is_empty() {
+        "cost"
+    } else {
+        &search.cost_label
+    };
+    let title = format!(
+        "{} of the actions tried, by {}",
+        capitalise(cost),
+        chosen.name
+    );
     let iterations = search.trials.iter().map(|t| t.iteration).max().unwrap_or(0);
-    let mut chart = Chart::new(&title, Axis::new(&chosen.name, &chosen.unit), Axis::new(cost, &search.cost_unit));
+    let mut chart = Chart::new(
+        &title,
+        Axis::new(&chosen.name, &chosen.unit),
+        Axis::new(cost, &search.cost_unit),
+    );
     let mut labelled = false;
     for iteration in 0..=iterations {
         let dots: Vec<[f64; 2]> = search
@@ -77,17 +137,31 @@ fn tried(search: &Search, dimension: usize) -> Figure {
             continue;
         }
         let share = f64::from(iteration) / f64::from(iterations.max(1));
-        let mut layer = Layer::dots(dots).colour(Colour::Blue).radius(2.2).opacity(0.2 + 0.6 * share);
+        let mut layer = Layer::dots(dots)
+            .colour(Colour::Blue)
+            .radius(2.2)
+            .opacity(0.2 + 0.6 * share);
         if iteration == iterations && !labelled {
-            let text = if iterations > 0 { "tried (late is stronger)" } else { "tried" };
+            let text = if iterations > 0 {
+                "tried (late is stronger)"
+            } else {
+                "tried"
+            };
             layer = layer.label(text);
             labelled = true;
         }
         chart = chart.layer(layer);
     }
     let resolution = spread(search, dimension);
-    let value = resolution.map_or_else(|| significant(chosen.value, 3), |r| to_precision_of(chosen.value, r));
-    chart = chart.layer(Layer::vertical(chosen.value).colour(Colour::Ink).label(format!("chosen {value}")));
+    let value = resolution.map_or_else(
+        || significant(chosen.value, 3),
+        |r| Precision::of(chosen.value, r).show(chosen.value),
+    );
+    chart = chart.layer(
+        Layer::vertical(chosen.value)
+            .colour(Colour::Ink)
+            .label(format!("chosen {value}")),
+    );
     let caption = format!(
         "{} actions in {} iterations of the solver, in the simulator; chosen: {} = {}.",
         grouped(search.trials.len() as u64),
@@ -100,20 +174,36 @@ fn tried(search: &Search, dimension: usize) -> Figure {
 
 /// A tenth of the spread of the actions tried: how finely the chosen one needs to be told.
 fn spread(search: &Search, dimension: usize) -> Option<f64> {
-    let values: Vec<f64> = search.trials.iter().filter_map(|t| t.action.get(dimension).copied()).collect();
+    let values: Vec<f64> = search
+        .trials
+        .iter()
+        .filter_map(|t| t.action.get(dimension).copied())
+        .collect();
     Some(0.1 * Weighted::new(&values, &[])?.std()).filter(|s| *s > 0.0)
 }
 
 fn side(view: &SideView, d: &Downstream) -> Figure {
-    let label = if view.x_label.is_empty() { "along" } else { &view.x_label };
-    let mut plan = Plan::new("The end of the task seen from the side", Axis::new(label, "m"), Axis::new("height", "m"))
-        .description(format!("{} is {}.", metric_name(d), metric_value(d)));
+    let label = if view.x_label.is_empty() {
+        "along"
+    } else {
+        &view.x_label
+    };
+    let mut plan = Plan::new(
+        "The end of the task seen from the side",
+        Axis::new(label, "m"),
+        Axis::new("height", "m"),
+    )
+    .description(format!("{} is {}.", metric_name(d), metric_value(d)));
     if let Some(floor) = view.floor.filter(|f| f.is_finite()) {
         plan = plan.floor(floor);
     }
     for shape in &view.shapes {
         plan = plan.outline(outline_of(shape));
     }
-    let caption = format!("The final scene in the real world, both axes to the same scale; {} {}.", metric_name(d), metric_value(d));
+    let caption = format!(
+        "The final scene in the real world, both axes to the same scale; {} {}.",
+        metric_name(d),
+        metric_value(d)
+    );
     Figure::new("The end, seen from the side", plan, caption)
 }

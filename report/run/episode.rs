@@ -12,14 +12,28 @@ const GHOSTS: usize = 5;
 pub(super) fn section(report: &RunReport) -> Option<Section> {
     let section = Section::new("The real episode");
     let Some(episode) = &report.episode else {
-        return Some(section.note("No view from above: the run has no real episode with tracked objects."));
+        return Some(
+            section.note("No view from above: the run has no real episode with tracked objects."),
+        );
     };
-    let names: Vec<&str> = episode.objects.iter().map(|o| o.name.as_str()).filter(|n| !n.is_empty()).collect();
-    let what = if names.is_empty() { "the objects".to_owned() } else { format!("the {}", names.join(" and the ")) };
+    let names: Vec<&str> = episode
+        .objects
+        .iter()
+        .map(|o| o.name.as_str())
+        .filter(|n| !n.is_empty())
+        .collect();
+    let what = if names.is_empty() {
+        "the objects".to_owned()
+    } else {
+        format!("the {}", names.join(" and the "))
+    };
     let lead = format!(
         "Seen from above: the one episode that all conclusions rest on. {} moved {}.",
         capitalise(&what),
-        episode.objects.first().map_or_else(|| "nothing".to_owned(), displacement)
+        episode
+            .objects
+            .first()
+            .map_or_else(|| "nothing".to_owned(), displacement)
     );
     let figure = Figure::new(
         format!("Path of the end effector and of {what}"),
@@ -34,7 +48,14 @@ fn plan(episode: &Episode) -> Plan {
         .description("Outlines of the objects from start to end, the path of the end effector, and what stands around them.");
     if let Some([x0, x1, y0, y1]) = episode.workspace {
         let corners = vec![[x0, y0], [x1, y0], [x1, y1], [x0, y1]];
-        plan = plan.outline(Outline::polygon(corners).colour(Colour::Muted).strength(0.0, 0.6).dashed().context().label("workspace"));
+        plan = plan.outline(
+            Outline::polygon(corners)
+                .colour(Colour::Muted)
+                .strength(0.0, 0.6)
+                .dashed()
+                .context()
+                .label("workspace"),
+        );
     }
     for shape in &episode.shapes {
         let goal = shape.kind == ShapeKind::Goal;
@@ -49,8 +70,16 @@ fn plan(episode: &Episode) -> Plan {
     }
     if let Some(path) = &episode.end_effector {
         plan = plan
-            .outline(Outline::path(path.position.clone()).colour(Colour::Vermillion).strength(0.0, 0.35))
-            .outline(Outline::trail(path.position.clone()).colour(Colour::Vermillion).label(span("end effector", &path.time)));
+            .outline(
+                Outline::path(path.position.clone())
+                    .colour(Colour::Vermillion)
+                    .strength(0.0, 0.35),
+            )
+            .outline(
+                Outline::trail(path.position.clone())
+                    .colour(Colour::Vermillion)
+                    .label(span("end effector", &path.time)),
+            );
     }
     plan
 }
@@ -68,23 +97,42 @@ pub(super) fn outline_of(shape: &Shape) -> Outline {
         ShapeKind::Part => outline.colour(Colour::Ink).strength(0.55, 0.9),
         ShapeKind::Robot => outline.colour(Colour::Vermillion).strength(0.2, 0.9),
     };
-    if shape.label.is_empty() { outline } else { outline.label(shape.label.clone()) }
+    if shape.label.is_empty() {
+        outline
+    } else {
+        outline.label(shape.label.clone())
+    }
 }
 
 /// Outlines of an object at evenly spread times, faint to strong.
 fn ghosts(track: &ObjectTrack, colour: Colour) -> Vec<Outline> {
-    let poses: Vec<&[f64; 3]> = track.poses.iter().filter(|p| p.iter().all(|c| c.is_finite())).collect();
+    let poses: Vec<&[f64; 3]> = track
+        .poses
+        .iter()
+        .filter(|p| p.iter().all(|c| c.is_finite()))
+        .collect();
     if poses.is_empty() || track.outline.is_empty() {
         return Vec::new();
     }
     let count = (GHOSTS + 2).min(poses.len());
     (0..count)
         .map(|i| {
-            let share = if count == 1 { 1.0 } else { i as f64 / (count - 1) as f64 };
+            let share = if count == 1 {
+                1.0
+            } else {
+                i as f64 / (count - 1) as f64
+            };
             let pose = poses[(share * (poses.len() - 1) as f64).round() as usize];
             let outline = Outline::polygon(placed(&track.outline, *pose)).colour(colour);
             if i + 1 == count {
-                outline.strength(0.2, 1.0).series_label(span(if track.name.is_empty() { "object" } else { &track.name }, &track.time))
+                outline.strength(0.2, 1.0).series_label(span(
+                    if track.name.is_empty() {
+                        "object"
+                    } else {
+                        &track.name
+                    },
+                    &track.time,
+                ))
             } else {
                 outline.strength(0.03, 0.25 + 0.4 * share)
             }
@@ -95,14 +143,21 @@ fn ghosts(track: &ObjectTrack, colour: Colour) -> Vec<Outline> {
 /// `outline` moved from its own frame to `world_from_object = [x, y, yaw]`.
 fn placed(outline: &[[f64; 2]], [x, y, yaw]: [f64; 3]) -> Vec<[f64; 2]> {
     let (sin, cos) = yaw.sin_cos();
-    outline.iter().map(|p| [x + cos * p[0] - sin * p[1], y + sin * p[0] + cos * p[1]]).collect()
+    outline
+        .iter()
+        .map(|p| [x + cos * p[0] - sin * p[1], y + sin * p[0] + cos * p[1]])
+        .collect()
 }
 
 /// `name, 0 to 2.0 s`.
 fn span(name: &str, time: &[f64]) -> String {
     match (time.first(), time.last()) {
         (Some(first), Some(last)) if first.is_finite() && last.is_finite() => {
-            format!("{name}, {} to {} s", decimals(*first, 1), decimals(*last, 1))
+            format!(
+                "{name}, {} to {} s",
+                decimals(*first, 1),
+                decimals(*last, 1)
+            )
         }
         _ => name.to_owned(),
     }
@@ -110,7 +165,10 @@ fn span(name: &str, time: &[f64]) -> String {
 
 /// `by 0.12 m and turned by 34°`.
 fn displacement(track: &ObjectTrack) -> String {
-    let mut poses = track.poses.iter().filter(|p| p.iter().all(|c| c.is_finite()));
+    let mut poses = track
+        .poses
+        .iter()
+        .filter(|p| p.iter().all(|c| c.is_finite()));
     match (poses.next(), poses.next_back()) {
         (Some(a), Some(b)) => format!(
             "by {} m and turned by {}°",

@@ -1,23 +1,42 @@
 //! The top of the page: what ran, the answer, the key figures.
 
 use super::trace::{Downstream, ParameterReport, RunReport};
-use crate::number::{decimals, duration, grouped, quantity, significant, to_precision_of, with_uncertainty};
+use crate::number::{Precision, decimals, duration, grouped, quantity, significant};
 use crate::page::{Page, Tile, Tone};
 
 pub(super) fn page(report: &RunReport) -> Page {
-    let title = if report.condition.is_empty() { report.task.clone() } else { format!("{}, {}", report.task, report.condition) };
+    let title = if report.condition.is_empty() {
+        report.task.clone()
+    } else {
+        format!("{}, {}", report.task, report.condition)
+    };
     let mut page = Page::new(&title).kicker("ASID run").lead(answer(report));
     if let Some(downstream) = &report.downstream {
-        let (word, tone) = if downstream.success { ("success", Tone::Good) } else { ("no success", Tone::Bad) };
+        let (word, tone) = if downstream.success {
+            ("success", Tone::Good)
+        } else {
+            ("no success", Tone::Bad)
+        };
         page = page.badge(word, tone);
     }
 
-    let stages: Vec<&str> =
-        [&report.explorer, &report.identifier, &report.solver].into_iter().map(String::as_str).filter(|s| !s.is_empty()).collect();
+    let stages: Vec<&str> = [&report.explorer, &report.identifier, &report.solver]
+        .into_iter()
+        .map(String::as_str)
+        .filter(|s| !s.is_empty())
+        .collect();
     if !stages.is_empty() {
         page = page.fact("explorer → identifier → solver", stages.join(" → "));
     }
-    let seed = format!("{}, seed {}", if report.backend.is_empty() { "unknown" } else { &report.backend }, report.seed);
+    let seed = format!(
+        "{}, seed {}",
+        if report.backend.is_empty() {
+            "unknown"
+        } else {
+            &report.backend
+        },
+        report.seed
+    );
     page = page.fact("simulator", seed);
     if let Some(world) = real_world(report) {
         page = page.fact("real world", world);
@@ -54,30 +73,48 @@ fn answer(report: &RunReport) -> String {
     if !report.answer.is_empty() {
         return report.answer.clone();
     }
-    let mut parts: Vec<String> =
-        report.parameters.iter().filter(|p| p.estimate.is_finite()).map(|p| {
-            let truth = p.truth.map_or(String::new(), |t| format!(" (truth {})", to_precision_of(t, p.std)));
+    let mut parts: Vec<String> = report
+        .parameters
+        .iter()
+        .filter(|p| p.estimate.is_finite())
+        .map(|p| {
+            let truth = p.truth.map_or(String::new(), |t| {
+                format!(" (truth {})", precision(p).show(t))
+            });
             format!("{} is {}{truth}", p.name, estimate(p))
-        }).collect();
+        })
+        .collect();
     if let Some(d) = &report.downstream {
         let verdict = if d.success { "success" } else { "no success" };
-        parts.push(format!("{} in the real world is {}: {verdict}", metric_name(d), metric_value(d)));
+        parts.push(format!(
+            "{} in the real world is {}: {verdict}",
+            metric_name(d),
+            metric_value(d)
+        ));
     }
-    if parts.is_empty() { String::new() } else { format!("{}.", parts.join("; ")) }
+    if parts.is_empty() {
+        String::new()
+    } else {
+        format!("{}.", parts.join("; "))
+    }
+}
+
+/// How finely all numbers of a parameter are told.
+pub(super) fn precision(p: &ParameterReport) -> Precision {
+    Precision::of(p.estimate, p.std)
 }
 
 /// `0.0612 ± 0.0021 m`.
-pub(super) fn estimate(p: &ParameterReport) -> String {
-    let (value, std) = with_uncertainty(p.estimate, p.std);
-    let number = if std.is_empty() { value } else { format!("{value} ± {std}") };
-    quantity(&number, &p.unit)
+fn estimate(p: &ParameterReport) -> String {
+    quantity(&precision(p).with_uncertainty(p.estimate, p.std), &p.unit)
 }
 
 /// `0.0571 to 0.0653`, without the unit.
 pub(super) fn interval(p: &ParameterReport) -> Option<String> {
-    let [low, high] = p.interval95;
-    (low.is_finite() && high.is_finite())
-        .then(|| format!("{} to {}", to_precision_of(low, p.std), to_precision_of(high, p.std)))
+    p.interval95
+        .iter()
+        .all(|x| x.is_finite())
+        .then(|| precision(p).interval(p.interval95))
 }
 
 /// Whether the truth is known and lies in the 95 % interval.
@@ -87,11 +124,19 @@ pub(super) fn covered(p: &ParameterReport) -> Option<bool> {
     Some((low..=high).contains(&truth))
 }
 
-pub(super) fn metric_name(d: &Downstream) -> &str {
-    match (d.label.as_str(), d.metric.as_str()) {
-        ("", "") => "the metric",
-        ("", metric) => metric,
-        (label, _) => label,
+/// What the metric is called in a sentence: its label, or its name without the unit and underscores.
+pub(super) fn metric_name(d: &Downstream) -> String {
+    if !d.label.is_empty() {
+        return d.label.clone();
+    }
+    let bare = d
+        .metric
+        .strip_suffix(&format!("_{}", d.unit))
+        .unwrap_or(&d.metric);
+    if bare.is_empty() {
+        "the metric".to_owned()
+    } else {
+        bare.replace('_', " ")
     }
 }
 
@@ -117,43 +162,79 @@ fn tiles(report: &RunReport) -> Vec<Tile> {
             None => "",
         };
         if single {
-            tiles.push(Tile::new(&p.name, &quantity(&to_precision_of(p.estimate, p.std), &p.unit)).note(standard_deviation(p)));
+            tiles.push(
+                Tile::new(&p.name, &quantity(&precision(p).show(p.estimate), &p.unit))
+                    .note(standard_deviation(p)),
+            );
             if let Some(truth) = p.truth {
-                tiles.push(Tile::new("truth", &quantity(&to_precision_of(truth, p.std), &p.unit)).note("hidden from the method"));
+                tiles.push(
+                    Tile::new("truth", &quantity(&precision(p).show(truth), &p.unit))
+                        .note("hidden from the method"),
+                );
                 let error = p.estimate - truth;
                 let note = if p.std > 0.0 && error.is_finite() {
                     format!("{} standard deviations", decimals((error / p.std).abs(), 1))
                 } else {
                     String::new()
                 };
-                tiles.push(Tile::new("error", &quantity(&to_precision_of(error, p.std), &p.unit)).note(note));
+                tiles.push(
+                    Tile::new("error", &quantity(&precision(p).show(error), &p.unit)).note(note),
+                );
             }
             if let Some(interval) = interval(p) {
-                let note = [p.unit.as_str(), coverage].iter().filter(|t| !t.is_empty()).copied().collect::<Vec<_>>().join(", ");
+                let note = [p.unit.as_str(), coverage]
+                    .iter()
+                    .filter(|t| !t.is_empty())
+                    .copied()
+                    .collect::<Vec<_>>()
+                    .join(", ");
                 tiles.push(Tile::new("95 % interval", &interval).note(note));
             }
         } else {
-            let truth = p.truth.map_or(String::new(), |t| format!("truth {}", to_precision_of(t, p.std)));
-            let note = [standard_deviation(p), truth, coverage.to_owned()].into_iter().filter(|t| !t.is_empty()).collect::<Vec<_>>();
-            tiles.push(Tile::new(&p.name, &quantity(&to_precision_of(p.estimate, p.std), &p.unit)).note(note.join(", ")));
+            let truth = p
+                .truth
+                .map_or(String::new(), |t| format!("truth {}", precision(p).show(t)));
+            let note = [standard_deviation(p), truth, coverage.to_owned()]
+                .into_iter()
+                .filter(|t| !t.is_empty())
+                .collect::<Vec<_>>();
+            tiles.push(
+                Tile::new(&p.name, &quantity(&precision(p).show(p.estimate), &p.unit))
+                    .note(note.join(", ")),
+            );
         }
     }
     if let Some(d) = &report.downstream {
         let tone = if d.success { Tone::Good } else { Tone::Bad };
-        tiles.push(Tile::new(metric_name(d), &metric_value(d)).note(d.rule.clone()).tone(tone));
-        tiles.push(Tile::new("outcome", if d.success { "success" } else { "no success" }).note("one try, zero-shot").tone(tone));
+        tiles.push(
+            Tile::new(&metric_name(d), &metric_value(d))
+                .note(d.rule.clone())
+                .tone(tone),
+        );
+        tiles.push(
+            Tile::new("outcome", if d.success { "success" } else { "no success" })
+                .note("one try, zero-shot")
+                .tone(tone),
+        );
     }
     if report.wall_s.is_finite() {
         tiles.push(Tile::new("wall time", &duration(report.wall_s)).note("whole run"));
     }
     if report.physics_steps > 0 {
-        let note = if report.env_steps > 0 { format!("{} control steps", grouped(report.env_steps)) } else { String::new() };
+        let note = if report.env_steps > 0 {
+            format!("{} control steps", grouped(report.env_steps))
+        } else {
+            String::new()
+        };
         tiles.push(Tile::new("physics steps", &grouped(report.physics_steps)).note(note));
     }
     tiles
 }
 
 fn standard_deviation(p: &ParameterReport) -> String {
-    let (_, std) = with_uncertainty(p.estimate, p.std);
-    if std.is_empty() { String::new() } else { format!("± {}", quantity(&std, &p.unit)) }
+    if p.std.is_finite() && p.std > 0.0 {
+        format!("± {}", quantity(&precision(p).show(p.std), &p.unit))
+    } else {
+        String::new()
+    }
 }

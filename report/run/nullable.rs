@@ -8,7 +8,9 @@ struct Number(f64);
 
 impl<'de> Deserialize<'de> for Number {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        Ok(Self(Option::<f64>::deserialize(deserializer)?.unwrap_or(f64::NAN)))
+        Ok(Self(
+            Option::<f64>::deserialize(deserializer)?.unwrap_or(f64::NAN),
+        ))
     }
 }
 
@@ -19,24 +21,35 @@ pub(super) fn scalar<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, 
 
 /// A list of numbers.
 pub(super) fn list<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<f64>, D::Error> {
-    Ok(Vec::<Number>::deserialize(deserializer)?.into_iter().map(|n| n.0).collect())
+    Ok(Vec::<Number>::deserialize(deserializer)?
+        .into_iter()
+        .map(|n| n.0)
+        .collect())
 }
 
 /// A fixed number of numbers.
-pub(super) fn array<'de, D: Deserializer<'de>, const N: usize>(deserializer: D) -> Result<[f64; N], D::Error> {
+pub(super) fn array<'de, D: Deserializer<'de>, const N: usize>(
+    deserializer: D,
+) -> Result<[f64; N], D::Error> {
     let numbers = list(deserializer)?;
     let found = numbers.len();
-    numbers.try_into().map_err(|_| serde::de::Error::invalid_length(found, &format!("{N} numbers").as_str()))
+    numbers
+        .try_into()
+        .map_err(|_| serde::de::Error::invalid_length(found, &format!("{N} numbers").as_str()))
 }
 
 /// A list of rows of `N` numbers.
-pub(super) fn rows<'de, D: Deserializer<'de>, const N: usize>(deserializer: D) -> Result<Vec<[f64; N]>, D::Error> {
+pub(super) fn rows<'de, D: Deserializer<'de>, const N: usize>(
+    deserializer: D,
+) -> Result<Vec<[f64; N]>, D::Error> {
     Vec::<Vec<Number>>::deserialize(deserializer)?
         .into_iter()
         .map(|row| {
             let found = row.len();
             let numbers: Vec<f64> = row.into_iter().map(|n| n.0).collect();
-            numbers.try_into().map_err(|_| serde::de::Error::invalid_length(found, &format!("{N} numbers").as_str()))
+            numbers.try_into().map_err(|_| {
+                serde::de::Error::invalid_length(found, &format!("{N} numbers").as_str())
+            })
         })
         .collect()
 }

@@ -4,7 +4,9 @@ mod episode;
 mod stages;
 
 pub use episode::{Episode, ObjectTrack, PlanarPath, Replay, Shape, ShapeKind, Signal};
-pub use stages::{Downstream, ExpectedStd, Exploration, LearningCurve, Phase, Search, SideView, Trial};
+pub use stages::{
+    Downstream, ExpectedStd, Exploration, LearningCurve, Phase, Search, SideView, Trial,
+};
 
 use serde::{Deserialize, Serialize};
 

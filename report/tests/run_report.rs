@@ -1,5 +1,7 @@
 //! The page of a run: whole, well-formed and legible, whatever the run kept.
 
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
 #[path = "../examples/gallery/synthetic.rs"]
 mod synthetic;
 
@@ -16,7 +18,12 @@ fn xml(html: &str) -> &str {
 }
 
 fn runs() -> [RunReport; 4] {
-    [synthetic::full_run(), synthetic::bare_run(), synthetic::crowded_run(), RunReport::default()]
+    [
+        synthetic::full_run(),
+        synthetic::bare_run(),
+        synthetic::crowded_run(),
+        RunReport::default(),
+    ]
 }
 
 #[test]
@@ -29,13 +36,20 @@ fn every_page_is_well_formed_with_unique_identifiers_and_finite_coordinates() {
             assert!(seen.insert(id), "{id} twice in {}", run.task);
         }
         // Whatever an attribute refers to is there.
-        for labels in document.descendants().filter_map(|n| n.attribute("aria-labelledby")) {
+        for labels in document
+            .descendants()
+            .filter_map(|n| n.attribute("aria-labelledby"))
+        {
             assert!(labels.split(' ').all(|id| seen.contains(id)), "{labels}");
         }
         for svg in document.descendants().filter(|n| n.has_tag_name("svg")) {
             for attribute in svg.descendants().flat_map(|n| n.attributes()) {
                 let value = attribute.value();
-                assert!(!value.contains("NaN") && !value.contains("inf"), "{}={value}", attribute.name());
+                assert!(
+                    !value.contains("NaN") && !value.contains("inf"),
+                    "{}={value}",
+                    attribute.name()
+                );
             }
         }
     }
@@ -57,10 +71,22 @@ fn texts_of_a_plot_do_not_overlap_and_stay_inside() {
         let html = run.html();
         let document = Document::parse(xml(&html)).unwrap();
         for svg in document.descendants().filter(|n| n.has_tag_name("svg")) {
-            let size: Vec<f64> = svg.attribute("viewBox").unwrap().split(' ').map(|t| t.parse().unwrap()).collect();
-            let boxes: Vec<([f64; 4], &str)> = svg.descendants().filter(|n| n.has_tag_name("text")).map(text_box).collect();
+            let size: Vec<f64> = svg
+                .attribute("viewBox")
+                .unwrap()
+                .split(' ')
+                .map(|t| t.parse().unwrap())
+                .collect();
+            let boxes: Vec<([f64; 4], &str)> = svg
+                .descendants()
+                .filter(|n| n.has_tag_name("text"))
+                .map(text_box)
+                .collect();
             for (i, (a, a_text)) in boxes.iter().enumerate() {
-                assert!(a[0] > -0.5 && a[2] < size[2] + 0.5 && a[3] < size[3] + 0.5, "{a_text} leaves {size:?}: {a:?}");
+                assert!(
+                    a[0] > -0.5 && a[2] < size[2] + 0.5 && a[3] < size[3] + 0.5,
+                    "{a_text} leaves {size:?}: {a:?}"
+                );
                 for (b, b_text) in &boxes[i + 1..] {
                     let apart = a[2] <= b[0] || b[2] <= a[0] || a[3] <= b[1] || b[3] <= a[1];
                     assert!(apart, "{a_text} {a:?} meets {b_text} {b:?} in {}", run.task);
@@ -80,7 +106,15 @@ fn text_box<'a>(node: Node<'a, '_>) -> ([f64; 4], &'a str) {
         Some("end") => number("x") - width,
         _ => number("x"),
     };
-    ([left, number("y") - 0.75 * FONT_SIZE, left + width, number("y")], text)
+    (
+        [
+            left,
+            number("y") - 0.75 * FONT_SIZE,
+            left + width,
+            number("y"),
+        ],
+        text,
+    )
 }
 
 #[test]
@@ -108,14 +142,28 @@ fn a_stored_trace_gives_the_same_page() {
         assert_eq!(read.html(), run.html(), "{}", run.task);
     }
     // NaN is null in JSON and comes back as NaN.
-    assert!(RunReport::from_json("{\"schema\":1,\"wall_s\":null}").unwrap().wall_s.is_nan());
+    assert!(
+        RunReport::from_json("{\"schema\":1,\"wall_s\":null}")
+            .unwrap()
+            .wall_s
+            .is_nan()
+    );
 }
 
 #[test]
 fn a_trace_that_is_none_gives_one_clear_line() {
-    for text in ["", "[]", "{\"schema\":99}", "{}", "{\"schema\":1,\"parameters\":[{\"interval95\":[1]}]}"] {
+    for text in [
+        "",
+        "[]",
+        "{\"schema\":99}",
+        "{}",
+        "{\"schema\":1,\"parameters\":[{\"interval95\":[1]}]}",
+    ] {
         let message = RunReport::from_json(text).unwrap_err().to_string();
-        assert!(message.contains("trace.json") && !message.contains('\n'), "{message}");
+        assert!(
+            message.contains("trace.json") && !message.contains('\n'),
+            "{message}"
+        );
     }
 }
 

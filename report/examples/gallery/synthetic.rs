@@ -9,7 +9,12 @@ const STD: f64 = 0.0021;
 
 /// A run that kept nothing that is optional.
 pub fn bare_run() -> RunReport {
-    RunReport { task: "rod-balancing".into(), backend: "rapier".into(), explorer: "random".into(), ..RunReport::default() }
+    RunReport {
+        task: "rod-balancing".into(),
+        backend: "rapier".into(),
+        explorer: "random".into(),
+        ..RunReport::default()
+    }
 }
 
 /// Rod balancing with everything there is to show.
@@ -78,9 +83,16 @@ pub fn crowded_run() -> RunReport {
             estimate: centre,
             std: 0.12 * centre,
             interval95: [draw(-1.96, 0.12), draw(1.96, 0.12)],
-            prior: Some(Prior::LogUniform { low: 1e-5, high: 1e-3 }),
+            prior: Some(Prior::LogUniform {
+                low: 1e-5,
+                high: 1e-3,
+            }),
             narrowing: (0..5)
-                .map(|k| Narrowing { iteration: k, quantiles: [-1.96, -0.67, 0.0, 0.67, 1.96].map(|z| draw(z, 1.3 / f64::from(1 + k * k))) })
+                .map(|k| Narrowing {
+                    iteration: k,
+                    quantiles: [-1.96, -0.67, 0.0, 0.67, 1.96]
+                        .map(|z| draw(z, 1.3 / f64::from(1 + k * k))),
+                })
                 .collect(),
             samples: (0..300).map(|_| draw(noise.normal(), 0.12)).collect(),
             ..ParameterReport::default()
@@ -98,7 +110,15 @@ pub fn crowded_run() -> RunReport {
         x_label: "environment steps".into(),
         y_label: "return".into(),
         x: (0..200).map(|i| 5_000.0 * f64::from(i)).collect(),
-        mean: (0..200).map(|i| if i == 60 { f64::NAN } else { 40.0 * f64::from(i).sqrt() + 12.0 * noise.normal() }).collect(),
+        mean: (0..200)
+            .map(|i| {
+                if i == 60 {
+                    f64::NAN
+                } else {
+                    40.0 * f64::from(i).sqrt() + 12.0 * noise.normal()
+                }
+            })
+            .collect(),
         std: vec![45.0; 200],
         best: vec![],
     });
@@ -110,10 +130,18 @@ pub fn crowded_run() -> RunReport {
         downstream.unit = "m".into();
         downstream.threshold = Some(0.05);
         downstream.phases = (0..12u8)
-            .map(|i| Phase { name: format!("phase number {i}"), start: 0.2 * f64::from(i), end: 0.2 * f64::from(i + 1) })
+            .map(|i| Phase {
+                name: format!("phase number {i}"),
+                start: 0.2 * f64::from(i),
+                end: 0.2 * f64::from(i + 1),
+            })
             .collect();
         if let Some(search) = &mut downstream.search {
-            search.chosen.push(NamedValue { name: "speed".into(), value: 0.42, unit: "m/s".into() });
+            search.chosen.push(NamedValue {
+                name: "speed".into(),
+                value: 0.42,
+                unit: "m/s".into(),
+            });
             search.cost_unit = "m".into();
             for trial in &mut search.trials {
                 trial.action.push(0.42 + 0.1 * noise.normal());
@@ -129,8 +157,15 @@ fn parameter(noise: &mut Noise) -> ParameterReport {
     let narrowing = (0..=8).map(|iteration| {
         let spread = 0.055 * 0.55f64.powi(iteration) + STD;
         let centre = ESTIMATE * (1.0 - 0.5f64.powi(iteration));
-        let z = if iteration == 0 { [-1.7, -0.9, 0.0, 0.9, 1.7] } else { [-1.96, -0.674, 0.0, 0.674, 1.96] };
-        Narrowing { iteration: iteration as u32, quantiles: z.map(|z| (centre + z * spread).clamp(-0.1, 0.1)) }
+        let z = if iteration == 0 {
+            [-1.7, -0.9, 0.0, 0.9, 1.7]
+        } else {
+            [-1.96, -0.674, 0.0, 0.674, 1.96]
+        };
+        Narrowing {
+            iteration: iteration as u32,
+            quantiles: z.map(|z| (centre + z * spread).clamp(-0.1, 0.1)),
+        }
     });
     ParameterReport {
         name: "mass_offset".into(),
@@ -140,7 +175,10 @@ fn parameter(noise: &mut Noise) -> ParameterReport {
         estimate: ESTIMATE,
         std: STD,
         interval95: [ESTIMATE - 1.96 * STD, ESTIMATE + 1.96 * STD],
-        prior: Some(Prior::Uniform { low: -0.1, high: 0.1 }),
+        prior: Some(Prior::Uniform {
+            low: -0.1,
+            high: 0.1,
+        }),
         narrowing: narrowing.collect(),
         samples: (0..400).map(|_| ESTIMATE + STD * noise.normal()).collect(),
         ..ParameterReport::default()
@@ -151,7 +189,11 @@ fn parameter(noise: &mut Noise) -> ParameterReport {
 fn pose(t: f64, offset: f64) -> [f64; 3] {
     let push = ((t - 0.45) / 1.3).clamp(0.0, 1.0);
     let smooth = push * push * (3.0 - 2.0 * push);
-    [0.55 + 0.09 * smooth, 0.05 - 0.05 * smooth - 0.4 * offset * smooth, 1.35 - 11.0 * offset * smooth - 0.1 * smooth]
+    [
+        0.55 + 0.09 * smooth,
+        0.05 - 0.05 * smooth - 0.4 * offset * smooth,
+        1.35 - 11.0 * offset * smooth - 0.1 * smooth,
+    ]
 }
 
 fn episode() -> Episode {
@@ -166,7 +208,14 @@ fn episode() -> Episode {
         }],
         end_effector: Some(PlanarPath {
             time: steps().collect(),
-            position: steps().map(|t| [0.44 + 0.09 * t + 0.02 * (2.0 * t).sin(), 0.16 - 0.1 * t + 0.03 * (2.6 * t).cos()]).collect(),
+            position: steps()
+                .map(|t| {
+                    [
+                        0.44 + 0.09 * t + 0.02 * (2.0 * t).sin(),
+                        0.16 - 0.1 * t + 0.03 * (2.6 * t).cos(),
+                    ]
+                })
+                .collect(),
         }),
         workspace: Some([0.12, 1.0, -1.0, 1.0]),
         shapes: vec![Shape {
@@ -180,34 +229,50 @@ fn episode() -> Episode {
 
 fn signals(noise: &mut Noise) -> Vec<Signal> {
     let fine: Vec<f64> = (0..=200).map(|i| 0.01 * f64::from(i)).collect();
-    [("rod_pos.0", "m", 0.002), ("rod_pos.1", "m", 0.002), ("rod_yaw", "rad", 0.01)]
-        .iter()
-        .enumerate()
-        .map(|(k, (name, unit, std))| {
-            let time: Vec<f64> = (0..=20).map(|i| 0.1 * f64::from(i)).collect();
-            let replay = |offset: f64, width: f64| Replay {
-                time: fine.clone(),
-                value: fine.iter().map(|&t| pose(t, offset)[k]).collect(),
-                band95: fine.iter().map(|&t| [pose(t, offset - width)[k], pose(t, offset + width)[k]]).collect(),
-            };
-            let mut readings: Vec<f64> = time.iter().map(|&t| pose(t, TRUTH)[k] + std * noise.normal()).collect();
-            readings[13] = f64::NAN;
-            Signal {
-                name: (*name).into(),
-                unit: (*unit).into(),
-                noise_std: Some(*std),
-                time,
-                readings,
-                before: Some(Replay { band95: vec![], ..replay(0.0, 0.0) }),
-                after: Some(replay(ESTIMATE, 2.0 * STD)),
-            }
-        })
-        .collect()
+    [
+        ("rod_pos.0", "m", 0.002),
+        ("rod_pos.1", "m", 0.002),
+        ("rod_yaw", "rad", 0.01),
+    ]
+    .iter()
+    .enumerate()
+    .map(|(k, (name, unit, std))| {
+        let time: Vec<f64> = (0..=20).map(|i| 0.1 * f64::from(i)).collect();
+        let replay = |offset: f64, width: f64| Replay {
+            time: fine.clone(),
+            value: fine.iter().map(|&t| pose(t, offset)[k]).collect(),
+            band95: fine
+                .iter()
+                .map(|&t| [pose(t, offset - width)[k], pose(t, offset + width)[k]])
+                .collect(),
+        };
+        let mut readings: Vec<f64> = time
+            .iter()
+            .map(|&t| pose(t, TRUTH)[k] + std * noise.normal())
+            .collect();
+        readings[13] = f64::NAN;
+        Signal {
+            name: (*name).into(),
+            unit: (*unit).into(),
+            noise_std: Some(*std),
+            time,
+            readings,
+            before: Some(Replay {
+                band95: vec![],
+                ..replay(0.0, 0.0)
+            }),
+            after: Some(replay(ESTIMATE, 2.0 * STD)),
+        }
+    })
+    .collect()
 }
 
 fn exploration() -> Exploration {
     let time: Vec<f64> = (1..=20).map(|i| 0.1 * f64::from(i)).collect();
-    let gained: Vec<f64> = time.iter().map(|t| 0.9 * (-((t - 1.0) / 0.33).powi(2)).exp() + if *t > 0.4 { 0.03 } else { 0.0 }).collect();
+    let gained: Vec<f64> = time
+        .iter()
+        .map(|t| 0.9 * (-((t - 1.0) / 0.33).powi(2)).exp() + if *t > 0.4 { 0.03 } else { 0.0 })
+        .collect();
     let mut sum = 0.0;
     let value = gained.iter().map(|g| {
         sum += g;
@@ -220,7 +285,12 @@ fn exploration() -> Exploration {
         time,
         gained,
         gained_unit: "nat".into(),
-        expected_std: vec![ExpectedStd { parameter: "mass_offset".into(), unit: "m".into(), prior: Some(0.0577), value }],
+        expected_std: vec![ExpectedStd {
+            parameter: "mass_offset".into(),
+            unit: "m".into(),
+            prior: Some(0.0577),
+            value,
+        }],
         contact_fraction: Some(0.65),
     }
 }
@@ -233,7 +303,10 @@ fn learning() -> LearningCurve {
         y_label: "return".into(),
         mean: x.iter().map(|&i| rise(i)).collect(),
         std: x.iter().map(|&i| 0.3 + 1.6 * (-0.25 * i).exp()).collect(),
-        best: x.iter().map(|&i| rise(i) + 0.5 + 1.9 * (-0.25 * i).exp()).collect(),
+        best: x
+            .iter()
+            .map(|&i| rise(i) + 0.5 + 1.9 * (-0.25 * i).exp())
+            .collect(),
         x,
     }
 }
@@ -246,18 +319,42 @@ fn downstream(noise: &mut Noise) -> Downstream {
         t if t < 5.2 => 2.2 * (-(t - 3.6) * 0.8).exp() + 0.15 * (15.0 * t).sin(),
         t => 0.3 + 1.4 * (-(t - 5.2) * 4.0).exp() * (22.0 * (t - 5.2)).cos().abs(),
     };
-    let phases = [("above", 0.0, 1.3), ("grasp", 1.3, 2.1), ("lift", 2.1, 3.6), ("place", 3.6, 5.2), ("release", 5.2, 5.6), ("rise", 5.6, 7.2)];
+    let phases = [
+        ("above", 0.0, 1.3),
+        ("grasp", 1.3, 2.1),
+        ("lift", 2.1, 3.6),
+        ("place", 3.6, 5.2),
+        ("release", 5.2, 5.6),
+        ("rise", 5.6, 7.2),
+    ];
     let mut trials = Vec::new();
     for iteration in 0..6 {
-        let (centre, spread) = (ESTIMATE * (1.0 - 0.4f64.powi(iteration)), 0.05 * 0.5f64.powi(iteration));
+        let (centre, spread) = (
+            ESTIMATE * (1.0 - 0.4f64.powi(iteration)),
+            0.05 * 0.5f64.powi(iteration),
+        );
         for _ in 0..40 {
             let action = centre + spread * noise.normal();
-            let cost = if (action - TRUTH).abs() > 0.045 { 18.0 + noise.normal() } else { 230.0 * (action - TRUTH).abs() + 0.3 * noise.normal().abs() };
-            trials.push(Trial { iteration: iteration as u32, action: vec![action], cost });
+            let cost = if (action - TRUTH).abs() > 0.045 {
+                18.0 + noise.normal()
+            } else {
+                230.0 * (action - TRUTH).abs() + 0.3 * noise.normal().abs()
+            };
+            trials.push(Trial {
+                iteration: iteration as u32,
+                action: vec![action],
+                cost,
+            });
         }
     }
-    let rectangle = |x0: f64, x1: f64, y0: f64, y1: f64| vec![[x0, y0], [x1, y0], [x1, y1], [x0, y1]];
-    let shape = |label: &str, kind: ShapeKind, points: Vec<[f64; 2]>| Shape { label: label.into(), kind, points, radius: None };
+    let rectangle =
+        |x0: f64, x1: f64, y0: f64, y1: f64| vec![[x0, y0], [x1, y0], [x1, y1], [x0, y1]];
+    let shape = |label: &str, kind: ShapeKind, points: Vec<[f64; 2]>| Shape {
+        label: label.into(),
+        kind,
+        points,
+        radius: None,
+    };
     Downstream {
         metric: "tilt_deg".into(),
         label: "tilt".into(),
@@ -268,9 +365,19 @@ fn downstream(noise: &mut Noise) -> Downstream {
         threshold: Some(5.0),
         metric_over_time: time.iter().map(|&t| tilt(t).max(0.0)).collect(),
         time,
-        phases: phases.map(|(name, start, end)| Phase { name: name.into(), start, end }).to_vec(),
+        phases: phases
+            .map(|(name, start, end)| Phase {
+                name: name.into(),
+                start,
+                end,
+            })
+            .to_vec(),
         search: Some(Search {
-            chosen: vec![NamedValue { name: "pick_offset".into(), value: 0.0607, unit: "m".into() }],
+            chosen: vec![NamedValue {
+                name: "pick_offset".into(),
+                value: 0.0607,
+                unit: "m".into(),
+            }],
             cost_label: "expected tilt".into(),
             cost_unit: "deg".into(),
             trials,
@@ -281,7 +388,11 @@ fn downstream(noise: &mut Noise) -> Downstream {
             shapes: vec![
                 shape("ledge", ShapeKind::Fixed, rectangle(-0.02, 0.02, 0.0, 0.15)),
                 shape("rod", ShapeKind::Object, rectangle(-0.21, 0.09, 0.15, 0.19)),
-                shape("its mass", ShapeKind::Part, rectangle(-0.02, 0.02, 0.155, 0.185)),
+                shape(
+                    "its mass",
+                    ShapeKind::Part,
+                    rectangle(-0.02, 0.02, 0.155, 0.185),
+                ),
             ],
         }),
     }
@@ -292,7 +403,10 @@ struct Noise(u64);
 
 impl Noise {
     fn uniform(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
         (self.0 >> 11) as f64 / (1u64 << 53) as f64
     }
 

@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{NamedValue, Shape};
 use super::super::nullable;
+use super::{NamedValue, Shape};
 
 /// What the exploration was for and what the real episode gathered.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
