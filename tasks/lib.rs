@@ -1,1 +1,4 @@
-//! (module docs)
+//! The tasks of the ASID paper, one folder each: the code and its `scene.xml` side by side.
+
+pub mod panda;
+pub mod rod_balancing;

@@ -185,7 +185,7 @@ impl Chain {
 }
 
 /// Longest chain.
-const MAX_LINKS: usize = 32;
+pub const MAX_LINKS: usize = 32;
 
 #[cfg(test)]
 mod tests {
