@@ -1,0 +1,229 @@
+//! What this backend cannot simulate, found in the document before the loader sees it.
+//!
+//! Loaders skip what they do not know. A part of a scene that changes the
+//! physics must not be skipped in silence, so it is looked for by name here and
+//! refused with one line. Settings of another engine's solver (`solref`,
+//! `solimp`, `impratio`, integrators) are not physics of the scene and pass.
+
+use asid_core::{Error, Result, Scene};
+use mjcf_rs::Model;
+use mjcf_rs::body::{GeomType, JointType};
+use mjcf_rs::equality::Equality;
+use mjcf_rs::extras::ActuatorKind;
+use roxmltree::Node;
+
+/// Elements that change the physics and that this backend lacks.
+const ELEMENTS: [&str; 14] = [
+    "tendon", "flex", "flexcomp", "composite", "plugin", "extension", "muscle", "adhesion",
+    "cylinder", "damper", "intvelocity", "dcmotor", "general", "replicate",
+];
+
+/// Attributes that change the physics and that this backend or its loader lacks.
+const ATTRIBUTES: [(&str, &str); 17] = [
+    ("position", "dampratio"),
+    ("position", "timeconst"),
+    ("position", "inheritrange"),
+    ("position", "delay"),
+    ("velocity", "delay"),
+    ("motor", "delay"),
+    ("motor", "dyntype"),
+    ("joint", "actuatorfrcrange"),
+    ("joint", "actuatorgravcomp"),
+    ("joint", "springdamper"),
+    ("geom", "fluidshape"),
+    ("geom", "gap"),
+    ("geom", "shellinertia"),
+    ("compiler", "settotalmass"),
+    ("compiler", "balanceinertia"),
+    ("compiler", "inertiagrouprange"),
+    ("compiler", "alignfree"),
+];
+
+fn refuse(scene: &Scene, message: String) -> Error {
+    Error::Scene {
+        scene: scene.name().to_owned(),
+        message: format!("backend `rapier` {message}"),
+    }
+}
+
+/// Refuses a document with parts that this backend would leave out.
+///
+/// # Errors
+/// [`Error::Scene`], naming the first such part and its line.
+pub fn check(scene: &Scene, model: &Model) -> Result<()> {
+    check_document(scene)?;
+    check_bodies(scene, model)?;
+    check_actuators(scene, model)?;
+    for equality in &model.equality {
+        if let Equality::Tendon(_) = equality {
+            return Err(refuse(scene, "has no tendons (<equality><tendon>)".into()));
+        }
+        if let Equality::Joint(joint) = equality
+            && (joint.joint2.is_none() || joint.polycoef[2..].iter().any(|&c| c != 0.0))
+        {
+            return Err(refuse(
+                scene,
+                "couples joints only linearly and in pairs (<equality><joint>)".into(),
+            ));
+        }
+    }
+    Ok(())
+}
+
+fn check_document(scene: &Scene) -> Result<()> {
+    let document = roxmltree::Document::parse(scene.xml())
+        .map_err(|e| refuse(scene, format!("cannot read it: {e}")))?;
+    let place = |node: &Node<'_, '_>| {
+        let name = node.attribute("name").map(|n| format!(" `{n}`"));
+        let line = document.text_pos_at(node.range().start).row;
+        format!(
+            "<{}>{} on line {line}",
+            node.tag_name().name(),
+            name.unwrap_or_default()
+        )
+    };
+    for node in document.descendants().filter(Node::is_element) {
+        let tag = node.tag_name().name();
+        let in_actuators = node.parent().is_some_and(|p| p.has_tag_name("actuator"));
+        // Mesh wrappers and defaults may share a name with an actuator.
+        let ambiguous = ["cylinder", "plugin", "damper", "general", "muscle"].contains(&tag);
+        let in_defaults = node.ancestors().any(|a| a.has_tag_name("default"));
+        if ELEMENTS.contains(&tag) && !in_defaults && (!ambiguous || in_actuators) {
+            return Err(refuse(scene, format!("cannot simulate {}", place(&node))));
+        }
+        for (element, attribute) in ATTRIBUTES {
+            if tag == element
+                && let Some(value) = node.attribute(attribute)
+                && !["0", "false", "none", "-1"].contains(&value)
+            {
+                return Err(refuse(
+                    scene,
+                    format!("cannot honour `{attribute}` of {}", place(&node)),
+                ));
+            }
+        }
+        let fluid = ["wind", "density", "viscosity"];
+        if tag == "option"
+            && let Some(attribute) = fluid.iter().find(|a| {
+                node.attribute(**a).is_some_and(|v| {
+                    v.split_whitespace().any(|x| x.parse::<f64>().is_ok_and(|x| x != 0.0))
+                })
+            })
+        {
+            return Err(refuse(
+                scene,
+                format!("has no fluid: `{attribute}` of {}", place(&node)),
+            ));
+        }
+        if tag == "flag" {
+            for attribute in node.attributes() {
+                let solver = ["warmstart", "filterparent", "refsafe", "energy", "midphase",
+                    "nativeccd", "island", "multiccd", "eulerdamp", "autoreset", "sensor",
+                    "invdiscrete", "fwdinv", "sleep"];
+                let disables = attribute.value() == "disable" || attribute.name() == "override";
+                if disables && (attribute.name() == "filterparent" || !solver.contains(&attribute.name())) {
+                    return Err(refuse(
+                        scene,
+                        format!("cannot honour `{}` of {}", attribute.name(), place(&node)),
+                    ));
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+fn check_bodies(scene: &Scene, model: &Model) -> Result<()> {
+    for entry in &model.bodies {
+        let body = &entry.body;
+        let name = body.name.as_deref().unwrap_or("without a name");
+        if body.mocap {
+            return Err(refuse(scene, format!("cannot move mocap body `{name}`")));
+        }
+        for joint in &body.joints {
+            let joint_name = joint.name.as_deref().unwrap_or("without a name");
+            let limited = joint
+                .limited
+                .resolve(model.compiler.autolimits, joint.range.is_some());
+            let passive = joint.damping != 0.0
+                || joint.armature != 0.0
+                || joint.frictionloss != 0.0
+                || joint.stiffness != 0.0;
+            match joint.type_ {
+                JointType::Free if body.joints.len() > 1 => {
+                    return Err(refuse(
+                        scene,
+                        format!("allows no other joint beside free joint `{joint_name}`"),
+                    ));
+                }
+                JointType::Free if passive => {
+                    return Err(refuse(
+                        scene,
+                        format!("cannot damp, spring or weigh down free joint `{joint_name}`"),
+                    ));
+                }
+                JointType::Ball if limited || joint.stiffness != 0.0 => {
+                    return Err(refuse(
+                        scene,
+                        format!("cannot limit or spring ball joint `{joint_name}`"),
+                    ));
+                }
+                _ => {}
+            }
+        }
+        for geom in &body.geoms {
+            let collides = geom.contype != 0 || geom.conaffinity != 0;
+            let primitive = !matches!(
+                geom.type_,
+                GeomType::Mesh | GeomType::Hfield | GeomType::Sdf | GeomType::Ellipsoid
+            );
+            if collides && !primitive {
+                return Err(refuse(
+                    scene,
+                    format!(
+                        "has no contact for geom `{}` ({:?}): use boxes, spheres, capsules, cylinders and planes",
+                        geom.name.as_deref().unwrap_or("without a name"),
+                        geom.type_
+                    ),
+                ));
+            }
+        }
+    }
+    Ok(())
+}
+
+fn check_actuators(scene: &Scene, model: &Model) -> Result<()> {
+    for (i, actuator) in model.actuators.iter().enumerate() {
+        let name = actuator.name.clone().unwrap_or(format!("actuator{i}"));
+        let known = matches!(
+            actuator.kind,
+            ActuatorKind::Motor | ActuatorKind::Position | ActuatorKind::Velocity
+        );
+        if !known {
+            return Err(refuse(
+                scene,
+                format!("drives only <motor>, <position> and <velocity>, not actuator `{name}`"),
+            ));
+        }
+        let Some(joint) = actuator.joint.as_deref() else {
+            return Err(refuse(
+                scene,
+                format!("drives joints only: actuator `{name}` names none"),
+            ));
+        };
+        let Some((body, index)) = model.joint_by_name(joint) else {
+            return Err(refuse(
+                scene,
+                format!("cannot find joint `{joint}` of actuator `{name}`"),
+            ));
+        };
+        let kind = model.bodies[body].body.joints[index].type_;
+        if !matches!(kind, JointType::Hinge | JointType::Slide) {
+            return Err(refuse(
+                scene,
+                format!("drives only hinges and slides, not joint `{joint}` of actuator `{name}`"),
+            ));
+        }
+    }
+    Ok(())
+}

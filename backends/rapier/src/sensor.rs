@@ -1,0 +1,219 @@
+//! Sensors, read from the state with MuJoCo's meaning.
+//!
+//! `objtype="body"` is the frame of the body's inertia, with its origin in the
+//! centre of mass, and `xbody` the frame of the body itself, as in MuJoCo.
+
+use asid_core::layout::{JointKind, Layout};
+use asid_core::{Error, Result};
+use mjcf_rs::Model;
+use nalgebra::{UnitQuaternion, Vector3};
+
+use crate::compiled::{Compiled, Frame};
+use crate::convert;
+use crate::state::State;
+
+/// What is read of a frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Reading {
+    /// Position in the world, m.
+    Position,
+    /// Orientation w x y z.
+    Orientation,
+    /// One of its axes.
+    Axis(usize),
+    /// Velocity in the world frame, m/s.
+    Velocity,
+    /// Angular velocity in the world frame, rad/s.
+    Rate,
+    /// Velocity in its own frame, m/s.
+    OwnVelocity,
+    /// Angular velocity in its own frame, rad/s.
+    OwnRate,
+}
+
+/// A sensor's place in the scene.
+#[derive(Clone, Debug)]
+pub enum SensorSlot {
+    /// Of a place fixed in a body.
+    Frame(Reading, Frame),
+    /// Of a geom, which a parameter may move.
+    Geom(Reading, usize),
+    /// Of a body's centre of mass and principal axes.
+    Inertia(Reading, usize),
+    /// Coordinate of a joint.
+    JointPosition(usize),
+    /// Velocity of a joint.
+    JointVelocity(usize),
+    /// Simulated time, s.
+    Clock,
+    /// One that this engine cannot read, with the reason.
+    Unread(String),
+}
+
+impl SensorSlot {
+    /// The sensors of a parsed scene, in its order.
+    pub fn of_scene(model: &Model, layout: &Layout) -> Vec<Self> {
+        model
+            .sensors
+            .iter()
+            .map(|sensor| Self::of(sensor, model, layout))
+            .collect()
+    }
+
+    fn of(sensor: &mjcf_rs::extras::Sensor, model: &Model, layout: &Layout) -> Self {
+        let object = sensor.objname.as_deref().unwrap_or_default();
+        let kind = sensor.kind.as_str();
+        if sensor.refname.is_some() {
+            return Self::Unread("relative to another frame".into());
+        }
+        if sensor.cutoff.is_some_and(|c| c > 0.0) {
+            return Self::Unread("with a cutoff".into());
+        }
+        let joint = || layout.joints.iter().position(|j| j.name == object);
+        let reading = match kind {
+            "clock" => return Self::Clock,
+            "jointpos" | "ballquat" => {
+                return joint().map_or_else(|| missing("joint", object), Self::JointPosition);
+            }
+            "jointvel" | "ballangvel" => {
+                return joint().map_or_else(|| missing("joint", object), Self::JointVelocity);
+            }
+            "framepos" => Reading::Position,
+            "framequat" => Reading::Orientation,
+            "framexaxis" => Reading::Axis(0),
+            "frameyaxis" => Reading::Axis(1),
+            "framezaxis" => Reading::Axis(2),
+            "framelinvel" => Reading::Velocity,
+            "frameangvel" => Reading::Rate,
+            "velocimeter" => Reading::OwnVelocity,
+            "gyro" => Reading::OwnRate,
+            _ => return Self::Unread("of this kind".into()),
+        };
+        let body = || layout.bodies.iter().position(|b| b == object);
+        match sensor.objtype.as_deref().unwrap_or_default() {
+            "body" => body().map_or_else(
+                || missing("body", object),
+                |b| Self::Inertia(reading, b),
+            ),
+            "xbody" => body().map_or_else(
+                || missing("body", object),
+                |body| {
+                    Self::Frame(
+                        reading,
+                        Frame {
+                            body,
+                            position: Vector3::zeros(),
+                            rotation: UnitQuaternion::identity(),
+                        },
+                    )
+                },
+            ),
+            "site" => model.site_by_name(object).map_or_else(
+                || missing("site", object),
+                |(body, i)| {
+                    let (position, rotation) = convert::parts(&model.bodies[body].body.sites[i].pose);
+                    Self::Frame(
+                        reading,
+                        Frame {
+                            body,
+                            position,
+                            rotation,
+                        },
+                    )
+                },
+            ),
+            "geom" => layout
+                .geoms
+                .iter()
+                .position(|g| g == object)
+                .map_or_else(|| missing("geom", object), |g| Self::Geom(reading, g)),
+            other => Self::Unread(format!("on objects of type `{other}`")),
+        }
+    }
+
+    /// Refuses a sensor that this engine cannot read.
+    ///
+    /// # Errors
+    /// [`Error::Incapable`], naming the sensor.
+    pub fn check(&self, name: &str, kind: &str) -> Result<()> {
+        match self {
+            Self::Unread(why) => Err(Error::Incapable {
+                backend: "rapier".into(),
+                what: format!("read sensor `{name}` (<{kind}>): it reads none {why}"),
+            }),
+            _ => Ok(()),
+        }
+    }
+
+    /// Reads it into `out`, as long as the sensor is.
+    pub fn read(&self, state: &State, compiled: &Compiled, out: &mut [f64]) {
+        match self {
+            Self::Frame(reading, frame) => {
+                let motion = state.motion(compiled, frame.body);
+                let at = motion.position + motion.rotation * frame.position;
+                let rotation = motion.rotation * frame.rotation;
+                read_frame(*reading, &at, &rotation, motion.velocity_at(&at), motion.angular, out);
+            }
+            Self::Geom(reading, geom) => {
+                let frame = &compiled.geom_frames[*geom];
+                let motion = state.motion(compiled, frame.body);
+                let at = motion.position + motion.rotation * state.structure.geoms[*geom].position;
+                let rotation = motion.rotation * frame.rotation;
+                read_frame(*reading, &at, &rotation, motion.velocity_at(&at), motion.angular, out);
+            }
+            Self::Inertia(reading, body) => {
+                let motion = state.motion(compiled, *body);
+                let axes = compiled.masses.inertia(*body, &state.structure).axes;
+                let rotation = motion.rotation * axes;
+                let at = motion.center;
+                read_frame(*reading, &at, &rotation, motion.linear, motion.angular, out);
+            }
+            Self::JointPosition(joint) | Self::JointVelocity(joint) => {
+                let slot = &compiled.joints[*joint];
+                let velocity = matches!(self, Self::JointVelocity(_));
+                if slot.kind == JointKind::Ball {
+                    let (q, rate) = state.ball(slot);
+                    if velocity {
+                        out.copy_from_slice(rate.as_slice());
+                    } else {
+                        out.copy_from_slice(&[q.w, q.i, q.j, q.k]);
+                    }
+                } else {
+                    let (q, v) = state.scalar(slot);
+                    out[0] = if velocity { v } else { q };
+                }
+            }
+            Self::Clock => out[0] = state.time,
+            Self::Unread(_) => out.fill(f64::NAN),
+        }
+    }
+}
+
+fn missing(kind: &str, name: &str) -> SensorSlot {
+    SensorSlot::Unread(format!("of a {kind} that is not there (`{name}`)"))
+}
+
+fn read_frame(
+    reading: Reading,
+    position: &Vector3<f64>,
+    rotation: &UnitQuaternion<f64>,
+    velocity: Vector3<f64>,
+    rate: Vector3<f64>,
+    out: &mut [f64],
+) {
+    let vector = match reading {
+        Reading::Orientation => {
+            out.copy_from_slice(&[rotation.w, rotation.i, rotation.j, rotation.k]);
+            return;
+        }
+        Reading::Position => *position,
+        Reading::Axis(0) => rotation * Vector3::x(),
+        Reading::Axis(1) => rotation * Vector3::y(),
+        Reading::Axis(_) => rotation * Vector3::z(),
+        Reading::Velocity => velocity,
+        Reading::Rate => rate,
+        Reading::OwnVelocity => rotation.inverse() * velocity,
+        Reading::OwnRate => rotation.inverse() * rate,
+    };
+    out.copy_from_slice(vector.as_slice());
+}

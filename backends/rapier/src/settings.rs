@@ -1,0 +1,51 @@
+//! Settings of rapier's solver for physics that is measured, not played.
+//!
+//! rapier's own defaults are for games. What is set here was chosen by the
+//! tests of this crate: friction within 3 % of Coulomb's law, no creep, a grip
+//! that holds, at the highest speed that still does it.
+
+use rapier3d::dynamics::{FrictionModel, IntegrationParameters, SpringCoefficients};
+
+/// Substeps of one physics step: rapier integrates each and solves its
+/// constraints once in it.
+const SUBSTEPS: usize = 4;
+
+/// Natural frequency of a contact, Hz. It is both the stiffness of a grip and
+/// the rate at which penetration is pushed out; a tenth of the substeps' rate
+/// at a step of 2 ms.
+const CONTACT_FREQUENCY: f32 = 200.0;
+
+/// Damping ratio of a contact: heavily overdamped, so that nothing bounces.
+const CONTACT_DAMPING: f32 = 5.0;
+
+/// Distance at which contacts are prepared, m: over what 2 m/s covers in a step of 2 ms.
+const PREDICTION: f32 = 0.005;
+
+/// Fastest recovery from penetration, m/s; slow, so that an overlapping start
+/// does not explode.
+const RECOVERY_SPEED: f32 = 0.5;
+
+/// Speed beyond which a simulation counts as diverged, m/s. rapier clamps
+/// velocities to it silently.
+pub const MAX_SPEED: f32 = 400.0;
+
+/// Solver settings for a physics step of `dt` seconds.
+pub fn integration_parameters(dt: f64) -> IntegrationParameters {
+    let softness = SpringCoefficients::new(CONTACT_FREQUENCY, CONTACT_DAMPING);
+    IntegrationParameters {
+        dt: dt as f32,
+        min_ccd_dt: dt as f32,
+        contact_softness: softness,
+        static_contact_softness: softness,
+        num_solver_iterations: SUBSTEPS,
+        normalized_allowed_linear_error: 1e-4,
+        normalized_max_corrective_velocity: RECOVERY_SPEED,
+        normalized_prediction_distance: PREDICTION,
+        normalized_max_linear_velocity: MAX_SPEED,
+        max_ccd_substeps: 0,
+        contact_clustering: false,
+        contact_recycling: false,
+        friction_model: FrictionModel::Coulomb,
+        ..IntegrationParameters::default()
+    }
+}

@@ -1,0 +1,45 @@
+//! Everything that a simulation's future depends on, parameters apart.
+//!
+//! A state is a set of rapier's own collections. Cloning them is what saving
+//! means, and it is exact: warm-starting impulses, contact graphs and the
+//! broad phase come along. rapier's pipeline is scratch memory and stays behind.
+
+use asid_core::Status;
+use rapier3d::dynamics::{
+    CCDSolver, ImpulseJointSet, IslandManager, MultibodyJointSet, RigidBodySet, SoftBodySet,
+};
+use rapier3d::geometry::{BroadPhaseBvh, ColliderSet, NarrowPhase};
+
+use crate::contact::Resistance;
+use crate::structure::Structure;
+
+/// State of one simulation.
+#[derive(Clone)]
+pub struct State {
+    /// Rigid bodies.
+    pub bodies: RigidBodySet,
+    /// Shapes on them.
+    pub colliders: ColliderSet,
+    /// Groups of touching bodies.
+    pub islands: IslandManager,
+    /// Pairs of near shapes.
+    pub broad_phase: BroadPhaseBvh,
+    /// Contacts with their impulses.
+    pub narrow_phase: NarrowPhase,
+    /// Equality constraints.
+    pub impulse_joints: ImpulseJointSet,
+    /// Articulated trees.
+    pub multibodies: MultibodyJointSet,
+    /// None of these are ever made; the pipeline asks for the collection.
+    pub soft_bodies: SoftBodySet,
+    /// Continuous collision detection, which is off.
+    pub ccd: CCDSolver,
+    /// Rolling and torsional resistance that contacts remember.
+    pub resistance: Resistance,
+    /// Mass properties and places that the collections were built with.
+    pub structure: Structure,
+    /// Time since the last reset or load, s.
+    pub time: f64,
+    /// Whether it runs.
+    pub status: Status,
+}

@@ -1,0 +1,187 @@
+//! Parameters that are built into the bodies: masses and places of geoms, and
+//! the mass properties of bodies that follow from them.
+//!
+//! These live inside rapier's collections, hence inside a state, although
+//! parameters are not part of a state. So a state remembers which values it was
+//! built with, and a simulation that takes the state over rebuilds only what
+//! differs from its own; where nothing differs not a bit is touched.
+
+use asid_core::mass::{GeomMass, MassProperties};
+use mjcf_rs::Model;
+use mjcf_rs::body::{Body, InertiaSpec};
+use mjcf_rs::compiler::{Compiler, InertiaFromGeom};
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+
+use crate::convert;
+
+/// Values of the structural parameters, of every geom and body.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Structure {
+    /// Place in its body (m) and mass (kg) of each geom.
+    pub geoms: Vec<GeomValues>,
+    /// What parameters set on each body directly.
+    pub bodies: Vec<BodyValues>,
+}
+
+/// Structural values of one geom.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GeomValues {
+    /// Place in its body, m.
+    pub position: Vector3<f64>,
+    /// Mass, kg; zero for a geom that has none.
+    pub mass: f64,
+}
+
+/// Structural values set on one body; `None` follows from the document.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct BodyValues {
+    /// Mass, kg; the inertia is scaled with it.
+    pub mass: Option<f64>,
+    /// Centre of mass, m.
+    pub center: [Option<f64>; 3],
+    /// Principal moments, kg m².
+    pub inertia: [Option<f64>; 3],
+}
+
+/// How the mass of each body comes about.
+#[derive(Clone, Debug)]
+pub struct MassModel {
+    /// Per body: the `<inertial>` element, where it counts.
+    inertials: Vec<Option<Inertia>>,
+    /// Per body: indices of its geoms.
+    geoms_of: Vec<std::ops::Range<usize>>,
+    /// Per geom: mass properties as in the document; `None` for a plane or a mesh.
+    geoms: Vec<Option<GeomMass>>,
+    bound_mass: f64,
+    bound_inertia: f64,
+}
+
+/// Mass properties with their principal axes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Inertia {
+    /// Mass, kg.
+    pub mass: f64,
+    /// Centre of mass in the body's frame, m.
+    pub center: Vector3<f64>,
+    /// Principal moments, kg m².
+    pub moments: Vector3<f64>,
+    /// `body_from_principal`.
+    pub axes: UnitQuaternion<f64>,
+}
+
+impl MassModel {
+    /// Reads how masses come about, and the values as they are.
+    pub fn new(model: &Model) -> (Self, Structure) {
+        let mut mass_model = Self {
+            inertials: Vec::new(),
+            geoms_of: Vec::new(),
+            geoms: Vec::new(),
+            bound_mass: model.compiler.bound_mass,
+            bound_inertia: model.compiler.bound_inertia,
+        };
+        let mut structure = Structure {
+            geoms: Vec::new(),
+            bodies: vec![BodyValues::default(); model.bodies.len()],
+        };
+        for entry in &model.bodies {
+            let first = mass_model.geoms.len();
+            for geom in &entry.body.geoms {
+                let mut geom = geom.clone();
+                geom.density = geom.density.or(Some(model.compiler.inertia_density));
+                let mass = GeomMass::of(&geom);
+                let position = mass
+                    .as_ref()
+                    .map_or_else(|| convert::parts(&geom.pose).0, |m| m.position);
+                structure.geoms.push(GeomValues {
+                    position,
+                    mass: mass.as_ref().map_or(0.0, |m| m.mass),
+                });
+                mass_model.geoms.push(mass);
+            }
+            mass_model.geoms_of.push(first..mass_model.geoms.len());
+            mass_model
+                .inertials
+                .push(inertial(&entry.body, &model.compiler));
+        }
+        (mass_model, structure)
+    }
+
+    /// True where a body's mass comes from its geoms.
+    pub fn follows_geoms(&self, body: usize) -> bool {
+        self.inertials[body].is_none()
+    }
+
+    /// Indices of a body's geoms.
+    pub fn geoms_of(&self, body: usize) -> std::ops::Range<usize> {
+        self.geoms_of[body].clone()
+    }
+
+    /// True where a geom is a primitive, whose mass can be changed.
+    pub fn is_primitive(&self, geom: usize) -> bool {
+        self.geoms[geom].is_some()
+    }
+
+    /// Mass properties of a body.
+    pub fn inertia(&self, body: usize, structure: &Structure) -> Inertia {
+        let mut inertia = self.inertials[body].unwrap_or_else(|| {
+            let geoms: Vec<GeomMass> = self.geoms_of[body]
+                .clone()
+                .filter_map(|g| {
+                    let mut mass = self.geoms[g].clone()?;
+                    mass.mass = structure.geoms[g].mass;
+                    mass.position = structure.geoms[g].position;
+                    Some(mass)
+                })
+                .collect();
+            let all = MassProperties::of_geoms(&geoms);
+            let (moments, axes) = all.principal();
+            Inertia {
+                mass: all.mass,
+                center: all.center,
+                moments,
+                axes,
+            }
+        });
+        inertia.mass = inertia.mass.max(self.bound_mass);
+        inertia.moments = inertia.moments.map(|m| m.max(self.bound_inertia));
+        let values = &structure.bodies[body];
+        if let Some(mass) = values.mass {
+            if inertia.mass > 0.0 {
+                inertia.moments *= mass / inertia.mass;
+            }
+            inertia.mass = mass;
+        }
+        for axis in 0..3 {
+            inertia.center[axis] = values.center[axis].unwrap_or(inertia.center[axis]);
+            inertia.moments[axis] = values.inertia[axis].unwrap_or(inertia.moments[axis]);
+        }
+        inertia
+    }
+}
+
+/// The `<inertial>` of a body, where the compiler's settings let it count.
+fn inertial(body: &Body, compiler: &Compiler) -> Option<Inertia> {
+    let given = body.inertial.as_ref()?;
+    if compiler.inertia_from_geom == InertiaFromGeom::True && !body.geoms.is_empty() {
+        return None;
+    }
+    let (center, frame) = convert::parts(&given.pose);
+    let (moments, axes) = match given.inertia {
+        InertiaSpec::Diagonal(d) => (Vector3::from(d), frame),
+        InertiaSpec::Full([xx, yy, zz, xy, xz, yz]) => {
+            let full = MassProperties {
+                mass: given.mass,
+                center,
+                inertia: Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz),
+            };
+            let (moments, axes) = full.principal();
+            (moments, frame * axes)
+        }
+    };
+    Some(Inertia {
+        mass: given.mass,
+        center,
+        moments,
+        axes,
+    })
+}

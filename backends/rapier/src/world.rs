@@ -1,0 +1,334 @@
+//! One simulation: a state, its parameters, and rapier's pipeline to step it.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use asid_core::layout::{Channel, JointKind};
+use asid_core::simulator::StepHook;
+use asid_core::{Recording, Status};
+use nalgebra::Vector3;
+use rapier3d::dynamics::RigidBodyHandle;
+use rapier3d::math::Vector;
+use rapier3d::pipeline::PhysicsPipeline;
+
+use crate::compiled::Compiled;
+use crate::contact::{self, Hooks, Touching};
+use crate::parameter::Tables;
+use crate::settings::MAX_SPEED;
+use crate::state::State;
+use crate::convert;
+
+/// Position beyond which a simulation counts as diverged, m.
+const MAX_POSITION: f32 = 1e4;
+
+/// Angular or joint velocity beyond which a simulation counts as diverged, rad/s.
+const MAX_RATE: f32 = 1e4;
+
+/// One simulation of a batch.
+pub struct World {
+    /// State.
+    pub state: State,
+    /// Parameters.
+    pub tables: Tables,
+    /// Steps taken since it was made.
+    pub steps: u64,
+    pipeline: PhysicsPipeline,
+    /// Bodies with a force on them in this step.
+    pushed: Vec<RigidBodyHandle>,
+    torques: Vec<(usize, Vector)>,
+    qpos: Vec<f64>,
+    qvel: Vec<f64>,
+    ctrl: Vec<f64>,
+    force: Vec<f64>,
+}
+
+/// What acts on one physics step.
+pub struct StepInput<'a> {
+    /// Command, `nu`.
+    pub ctrl: &'a [f64],
+    /// Bodies of the layout with force (N) and torque (N m) on them.
+    pub wrenches: &'a [(usize, &'a [f64])],
+    /// Physics the engine lacks.
+    pub hook: Option<&'a dyn StepHook>,
+    /// Row of the rollout, for the hook.
+    pub row: usize,
+    /// Physics step since the start of the rollout, for the hook.
+    pub step: usize,
+}
+
+impl World {
+    /// A simulation in the scene's start state with nominal parameters.
+    pub fn new(compiled: &Compiled) -> Self {
+        let mut world = Self {
+            state: compiled.pristine.clone(),
+            tables: compiled.nominal.clone(),
+            steps: 0,
+            pipeline: PhysicsPipeline::new(),
+            pushed: Vec::new(),
+            torques: Vec::new(),
+            qpos: vec![0.0; compiled.layout.nq],
+            qvel: vec![0.0; compiled.layout.nv],
+            ctrl: vec![0.0; compiled.layout.nu()],
+            force: vec![0.0; compiled.layout.nv],
+        };
+        world.reset(compiled);
+        world
+    }
+
+    /// Puts it into the scene's start state, at time zero.
+    pub fn reset(&mut self, compiled: &Compiled) {
+        self.place(compiled, &compiled.start.0, &compiled.start.1, 0.0);
+    }
+
+    /// Puts it into a state without a history.
+    pub fn place(&mut self, compiled: &Compiled, qpos: &[f64], qvel: &[f64], time: f64) {
+        self.adopt(compiled, &compiled.pristine);
+        self.state.set_coordinates(compiled, qpos, qvel);
+        self.state.time = time;
+    }
+
+    /// Takes over a state and gives it this simulation's parameters.
+    pub fn adopt(&mut self, compiled: &Compiled, state: &State) {
+        self.state.clone_from(state);
+        self.state.rebuild(compiled, &self.tables);
+        // The pipeline remembers which impulse joints it selected last.
+        if !self.state.impulse_joints.is_empty() {
+            self.pipeline = PhysicsPipeline::new();
+        }
+    }
+
+    /// Takes one physics step. What goes wrong in it ends in the status.
+    pub fn step(&mut self, compiled: &Compiled, input: &StepInput<'_>) {
+        if !self.state.status.is_running() {
+            return;
+        }
+        let outcome = catch_unwind(AssertUnwindSafe(|| self.try_step(compiled, input)));
+        self.steps += 1;
+        let message = match outcome {
+            Ok(()) => self.complaint(compiled),
+            Err(panic) => Some(
+                panic
+                    .downcast_ref::<String>()
+                    .cloned()
+                    .or_else(|| panic.downcast_ref::<&str>().map(|s| (*s).to_owned()))
+                    .unwrap_or_else(|| "rapier failed".into()),
+            ),
+        };
+        self.state.time += compiled.layout.timestep;
+        if let Some(message) = message {
+            self.pipeline = PhysicsPipeline::new();
+            self.state.status = Status::Diverged {
+                time: self.state.time,
+                message,
+            };
+        }
+    }
+
+    fn try_step(&mut self, compiled: &Compiled, input: &StepInput<'_>) {
+        self.ctrl.copy_from_slice(input.ctrl);
+        let mut hooked: &[f64] = &[];
+        if let Some(hook) = input.hook {
+            self.state
+                .coordinates(compiled, &mut self.qpos, &mut self.qvel);
+            self.force.fill(0.0);
+            hook.before_step(
+                input.row,
+                input.step,
+                &mut asid_core::simulator::StepView {
+                    time: self.state.time,
+                    qpos: &self.qpos,
+                    qvel: &self.qvel,
+                    ctrl: &mut self.ctrl,
+                    force: &mut self.force,
+                },
+            );
+            hooked = &self.force;
+        }
+        self.state
+            .drive(compiled, &self.tables, &self.ctrl, hooked);
+        if input.hook.is_some() {
+            self.push_generalised(compiled);
+        }
+        for (body, wrench) in input.wrenches {
+            let force = Vector3::from_column_slice(&wrench[..3]);
+            let torque = Vector3::from_column_slice(&wrench[3..6]);
+            self.push(compiled, *body, &force, &torque);
+        }
+        self.resist(compiled);
+
+        let State {
+            bodies,
+            colliders,
+            islands,
+            broad_phase,
+            narrow_phase,
+            impulse_joints,
+            multibodies,
+            soft_bodies,
+            ccd,
+            ..
+        } = &mut self.state;
+        let hooks = Hooks {
+            table: &compiled.pairs,
+            friction: &self.tables.friction,
+        };
+        let g = self.tables.gravity;
+        self.pipeline.step(
+            Vector::new(g[0] as f32, g[1] as f32, g[2] as f32),
+            &compiled.integration,
+            islands,
+            broad_phase,
+            narrow_phase,
+            bodies,
+            colliders,
+            impulse_joints,
+            multibodies,
+            soft_bodies,
+            ccd,
+            &hooks,
+            &(),
+        );
+        for handle in self.pushed.drain(..) {
+            if let Some(body) = bodies.get_mut(handle) {
+                body.reset_forces(false);
+                body.reset_torques(false);
+            }
+        }
+    }
+
+    /// Adds a force (N) and a torque (N m) at a body's centre of mass for this step.
+    fn push(&mut self, compiled: &Compiled, body: usize, force: &Vector3<f64>, torque: &Vector3<f64>) {
+        let Some(handle) = compiled.bodies[body] else {
+            return;
+        };
+        if let Some(rigid) = self.state.bodies.get_mut(handle)
+            && rigid.is_dynamic()
+        {
+            rigid.add_force(convert::to_vector(force), false);
+            rigid.add_torque(convert::to_vector(torque), false);
+            self.pushed.push(handle);
+        }
+    }
+
+    /// Adds the generalised forces of free and ball joints; those of hinges and
+    /// slides go through their drives.
+    fn push_generalised(&mut self, compiled: &Compiled) {
+        for joint in &compiled.joints {
+            let f = &self.force[joint.qvel..joint.qvel + joint.kind.qvel_len()];
+            if f.iter().all(|&x| x == 0.0) {
+                continue;
+            }
+            let motion = self.state.motion(compiled, joint.body);
+            match joint.kind {
+                JointKind::Free => {
+                    let force = Vector3::new(f[0], f[1], f[2]);
+                    let torque = motion.rotation * Vector3::new(f[3], f[4], f[5]);
+                    let moved = torque + (motion.position - motion.center).cross(&force);
+                    self.push(compiled, joint.body, &force, &moved);
+                }
+                JointKind::Ball => {
+                    let torque = motion.rotation * Vector3::new(f[0], f[1], f[2]);
+                    self.push(compiled, joint.body, &Vector3::zeros(), &torque);
+                    self.push(compiled, joint.parent, &Vector3::zeros(), &-torque);
+                }
+                JointKind::Hinge | JointKind::Slide => {}
+            }
+        }
+    }
+
+    /// Adds the rolling and torsional resistance of contacts.
+    fn resist(&mut self, compiled: &Compiled) {
+        let mut torques = std::mem::take(&mut self.torques);
+        torques.clear();
+        let mut resistance = std::mem::take(&mut self.state.resistance);
+        let state = &self.state;
+        resistance.torques(
+            &compiled.pairs,
+            &self.tables.friction,
+            &Touching {
+                narrow_phase: &state.narrow_phase,
+                colliders: &state.colliders,
+                body_of: &compiled.body_of_geom,
+                body: &|i| state.body(compiled, i),
+            },
+            compiled.layout.timestep as f32,
+            &mut torques,
+        );
+        self.state.resistance = resistance;
+        for (body, torque) in &torques {
+            self.push(compiled, *body, &Vector3::zeros(), &convert::vector(*torque));
+        }
+        self.torques = torques;
+    }
+
+    /// Why the state is out of the plausible range, if it is.
+    fn complaint(&self, compiled: &Compiled) -> Option<String> {
+        let quarantine = self.pipeline.quarantine();
+        if !quarantine.is_empty() {
+            return Some("a body's position is not finite".into());
+        }
+        for (_, multibody) in self.multibodies() {
+            let fast = multibody
+                .generalized_velocity()
+                .iter()
+                .any(|v| !v.is_finite() || v.abs() > MAX_RATE);
+            if fast {
+                return Some(format!("a joint moves faster than {MAX_RATE} rad/s"));
+            }
+        }
+        for (index, handle) in compiled.bodies.iter().enumerate() {
+            let Some(body) = handle.and_then(|h| self.state.bodies.get(h)) else {
+                continue;
+            };
+            let name = &compiled.layout.bodies[index];
+            let position = body.translation();
+            if !position.is_finite() || position.abs().max_element() > MAX_POSITION {
+                return Some(format!("body `{name}` is farther than {MAX_POSITION} m"));
+            }
+            let (linear, angular) = (body.linvel(), body.angvel());
+            if !linear.is_finite() || linear.length() > 0.99 * MAX_SPEED {
+                return Some(format!("body `{name}` moves faster than {MAX_SPEED} m/s"));
+            }
+            if !angular.is_finite() || angular.length() > MAX_RATE {
+                return Some(format!("body `{name}` turns faster than {MAX_RATE} rad/s"));
+            }
+        }
+        None
+    }
+
+    fn multibodies(&self) -> impl Iterator<Item = ((), &rapier3d::dynamics::Multibody)> {
+        self.state.multibodies.multibodies().map(|m| ((), m))
+    }
+
+    /// Reads channels into a row; NaN where the simulation has diverged.
+    pub fn read(&mut self, compiled: &Compiled, record: &Recording, row: &mut [f64]) {
+        if !self.state.status.is_running() {
+            row.fill(f64::NAN);
+            return;
+        }
+        let coordinates = record
+            .channels()
+            .iter()
+            .any(|c| matches!(c, Channel::Position { .. } | Channel::Velocity { .. }));
+        if coordinates {
+            self.state
+                .coordinates(compiled, &mut self.qpos, &mut self.qvel);
+        }
+        for (i, channel) in record.channels().iter().enumerate() {
+            let out = &mut row[record.range(i)];
+            match *channel {
+                Channel::Sensor { index } => compiled.sensors[index].read(&self.state, compiled, out),
+                Channel::Position { start, len } => out.copy_from_slice(&self.qpos[start..start + len]),
+                Channel::Velocity { start, len } => out.copy_from_slice(&self.qvel[start..start + len]),
+                Channel::ContactForce { bodies } => {
+                    out[0] = contact::normal_force(
+                        &self.state.narrow_phase,
+                        &self.state.colliders,
+                        &compiled.body_of_geom,
+                        bodies,
+                        compiled.layout.timestep,
+                    );
+                }
+            }
+        }
+    }
+}
