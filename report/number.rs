@@ -53,8 +53,8 @@ pub fn decimals(value: f64, decimals: usize) -> String {
 /// use asid_report::number::Precision;
 /// let precision = Precision::of(0.061_23, 0.002_1);
 /// assert_eq!(precision.show(0.061_23), "0.0612");
-/// assert_eq!(precision.with_uncertainty(0.061_23, 0.002_1), "0.0612 ± 0.0021");
-/// assert_eq!(Precision::of(2e-5, 2.4e-6).with_uncertainty(2e-5, 2.4e-6), "(20.0 ± 2.4)×10⁻⁶");
+/// assert_eq!(precision.with_uncertainty(0.061_23, 0.002_1), "0.0612\u{a0}±\u{a0}0.0021");
+/// assert_eq!(Precision::of(2e-5, 2.4e-6).with_uncertainty(2e-5, 2.4e-6), "(20.0\u{a0}±\u{a0}2.4)×10⁻⁶");
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Precision {
@@ -110,7 +110,11 @@ impl Precision {
         if self.places.is_none() {
             return self.show(value);
         }
-        let text = format!("{} ± {}", self.scaled(value), self.scaled(uncertainty));
+        let text = format!(
+            "{}\u{a0}±\u{a0}{}",
+            self.scaled(value),
+            self.scaled(uncertainty)
+        );
         if self.exponent == 0 {
             text
         } else {
@@ -247,12 +251,12 @@ mod tests {
     #[test]
     fn value_and_uncertainty_share_their_last_decimal() {
         let show = |value: f64, std: f64| Precision::of(value, std).with_uncertainty(value, std);
-        assert_eq!(show(0.061_23, 0.002_1), "0.0612 ± 0.0021");
-        assert_eq!(show(12.34, 0.999), "12.3 ± 1.0");
+        assert_eq!(show(0.061_23, 0.002_1), "0.0612\u{a0}±\u{a0}0.0021");
+        assert_eq!(show(12.34, 0.999), "12.3\u{a0}±\u{a0}1.0");
         assert_eq!(show(0.5, f64::NAN), "0.5");
-        assert_eq!(show(0.0, 0.002_1), "0.0000 ± 0.0021");
+        assert_eq!(show(0.0, 0.002_1), "0.0000\u{a0}±\u{a0}0.0021");
         assert_eq!(show(f64::NAN, 1.0), NOT_A_NUMBER);
-        assert_eq!(show(3.0e-5, 1.0), "0.0 ± 1.0");
+        assert_eq!(show(3.0e-5, 1.0), "0.0\u{a0}±\u{a0}1.0");
         assert_eq!(
             Precision::of(2e-5, 2.4e-6).interval([1.58e-5, 2.53e-5]),
             "(15.8 to 25.3)×10⁻⁶"

@@ -20,6 +20,8 @@ mod density;
 mod frame;
 mod header;
 mod layer;
+mod marks;
+mod outline;
 mod plan;
 mod scale;
 
@@ -28,7 +30,8 @@ pub(crate) use density::grid;
 pub use density::{Density, Weighted};
 pub use frame::Axis;
 pub use layer::{Dash, Layer};
-pub use plan::{Outline, Plan};
+pub use outline::Outline;
+pub use plan::Plan;
 pub use scale::{Scale, Spacing, Ticks};
 
 /// Width of a plot that stands beside another one, in SVG units.

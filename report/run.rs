@@ -18,6 +18,7 @@ mod closing;
 mod downstream;
 mod episode;
 mod exploration;
+mod final_density;
 mod head;
 mod nullable;
 mod posterior;

@@ -3,12 +3,10 @@
 use super::frame::{Axis, Frame, Request};
 use super::header::{Above, Entry, Key};
 use super::layer::{Extent, Layer, Mark};
+use super::marks::draw;
 use super::scale::Spacing;
 use super::{Dash, NARROW, Plot, coordinate, root};
 use crate::markup::escape;
-
-/// Points a line is thinned to; a plot has fewer pixels than this.
-const MOST_POINTS: usize = 900;
 
 /// A chart of [`Layer`]s.
 ///
@@ -234,189 +232,6 @@ fn domain(axis: &Axis, data: [f64; 2], pad: f64) -> [f64; 2] {
     ]
 }
 
-fn draw(layer: &Layer, frame: &Frame) -> String {
-    let class = layer.colour.class();
-    let (x, y) = (&frame.x, &frame.y);
-    let [left, top, right, bottom] = frame.area;
-    let zero = y.map_clamped(0.0);
-    let opacity = coordinate(layer.opacity);
-    let at = |p: &[f64; 2]| [x.map(p[0]), y.map(p[1])];
-    let stroke = |path: &str| {
-        if path.is_empty() {
-            return String::new();
-        }
-        format!(
-            "<path class=\"line {class}\" d=\"{path}\" stroke-opacity=\"{opacity}\"{}/>",
-            layer.dash.attribute()
-        )
-    };
-    let fill = |path: &str| {
-        format!("<path class=\"fill {class}\" d=\"{path}\" fill-opacity=\"{opacity}\"/>")
-    };
-    match &layer.mark {
-        Mark::Line(points) => stroke(&path(&thin(points.iter().map(at).collect()))),
-        Mark::Steps(points) => {
-            let mut corners: Vec<[f64; 2]> = Vec::with_capacity(2 * points.len());
-            for p in points.iter().map(at) {
-                if let Some(&[_, before]) = corners.last() {
-                    corners.push([p[0], before]);
-                }
-                corners.push(p);
-            }
-            stroke(&path(&corners))
-        }
-        Mark::Band(points) => {
-            let edges = points
-                .iter()
-                .map(|p| [x.map(p[0]), y.map(p[1]), y.map(p[2])]);
-            fill(&ribbon(&edges.collect::<Vec<_>>()))
-        }
-        Mark::Area(points) => {
-            let edges = points.iter().map(|p| [x.map(p[0]), zero, y.map(p[1])]);
-            fill(&ribbon(&edges.collect::<Vec<_>>()))
-        }
-        Mark::Dots(points, radius) => {
-            let dots: String = points
-                .iter()
-                .map(at)
-                .filter(|p| p.iter().all(|c| c.is_finite()))
-                .map(|[cx, cy]| {
-                    format!(
-                        "<circle cx=\"{}\" cy=\"{}\" r=\"{}\"/>",
-                        coordinate(cx),
-                        coordinate(cy),
-                        coordinate(*radius)
-                    )
-                })
-                .collect();
-            format!("<g class=\"fill {class}\" fill-opacity=\"{opacity}\">{dots}</g>")
-        }
-        Mark::Whiskers(points) => {
-            let strokes: String = points
-                .iter()
-                .map(|p| [x.map(p[0]), y.map(p[1]), y.map(p[2])])
-                .filter(|p| p.iter().all(|c| c.is_finite()))
-                .map(|p| {
-                    format!(
-                        "M{} {}V{}",
-                        coordinate(p[0]),
-                        coordinate(p[1]),
-                        coordinate(p[2])
-                    )
-                })
-                .collect();
-            stroke(&strokes)
-        }
-        Mark::Bars(bars) => {
-            let rectangles: String = bars
-                .iter()
-                .map(|b| [x.map(b[0]), x.map(b[1]), y.map(b[2])])
-                .filter(|b| b.iter().all(|c| c.is_finite()))
-                .map(|[x0, x1, y1]| {
-                    let gap = if (x1 - x0).abs() > 4.0 { 0.6 } else { 0.0 };
-                    format!(
-                        "M{} {}V{}H{}V{}Z",
-                        coordinate(x0 + gap),
-                        coordinate(zero),
-                        coordinate(y1),
-                        coordinate(x1 - gap),
-                        coordinate(zero)
-                    )
-                })
-                .collect();
-            fill(&rectangles)
-        }
-        Mark::Vertical(value) if x.map(*value).is_finite() => stroke(&format!(
-            "M{} {}V{}",
-            coordinate(x.map(*value)),
-            coordinate(top),
-            coordinate(bottom)
-        )),
-        Mark::Horizontal(value) if y.map(*value).is_finite() => stroke(&format!(
-            "M{} {}H{}",
-            coordinate(left),
-            coordinate(y.map(*value)),
-            coordinate(right)
-        )),
-        Mark::Span(x0, x1, _) if x0.is_finite() && x1.is_finite() => {
-            let (a, b) = (x.map_clamped(x0.min(*x1)), x.map_clamped(x0.max(*x1)));
-            // A hair's breadth between neighbours shows where one ends.
-            fill(&format!(
-                "M{} {}V{}H{}V{}Z",
-                coordinate(a + 0.5),
-                coordinate(bottom),
-                coordinate(top),
-                coordinate(b - 0.5),
-                coordinate(bottom)
-            ))
-        }
-        Mark::Vertical(_) | Mark::Horizontal(_) | Mark::Span(..) => String::new(),
-    }
-}
-
-/// An SVG path through `points`, interrupted where one is not finite.
-pub(super) fn path(points: &[[f64; 2]]) -> String {
-    let mut d = String::new();
-    let mut pen_down = false;
-    for [x, y] in points {
-        if x.is_finite() && y.is_finite() {
-            d.push_str(&format!(
-                "{}{} {}",
-                if pen_down { 'L' } else { 'M' },
-                coordinate(*x),
-                coordinate(*y)
-            ));
-            pen_down = true;
-        } else {
-            pen_down = false;
-        }
-    }
-    d
-}
-
-/// Closed shapes between `[x, y0]` and `[x, y1]`, one a stretch of finite points.
-fn ribbon(edges: &[[f64; 3]]) -> String {
-    edges
-        .split(|e| e.iter().any(|c| !c.is_finite()))
-        .filter(|stretch| stretch.len() > 1)
-        .map(|stretch| {
-            let there = stretch.iter().map(|e| [e[0], e[2]]);
-            let back = stretch.iter().rev().map(|e| [e[0], e[1]]);
-            format!("{}Z", path(&there.chain(back).collect::<Vec<_>>()))
-        })
-        .collect()
-}
-
-/// Keeps first, lowest, highest and last of each stretch of a long line, which draws the same at this size.
-fn thin(points: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
-    if points.len() <= MOST_POINTS {
-        return points;
-    }
-    let stretch = points.len().div_ceil(MOST_POINTS / 4);
-    let mut kept = Vec::with_capacity(MOST_POINTS);
-    for part in points.chunks(stretch) {
-        let by = |better: fn(f64, f64) -> bool| {
-            (1..part.len()).fold(0, |best, i| {
-                if better(part[i][1], part[best][1]) {
-                    i
-                } else {
-                    best
-                }
-            })
-        };
-        let mut indices = [0, by(|a, b| a < b), by(|a, b| a > b), part.len() - 1];
-        indices.sort_unstable();
-        let mut last = usize::MAX;
-        for i in indices {
-            if i != last {
-                kept.push(part[i]);
-                last = i;
-            }
-        }
-    }
-    kept
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -505,18 +320,5 @@ mod tests {
             let svg = chart().layers(layers).svg("a", NARROW);
             assert!(roxmltree::Document::parse(&svg).is_ok() && svg.contains("no data"));
         }
-    }
-
-    #[test]
-    fn thinning_keeps_the_extremes() {
-        let mut points: Vec<[f64; 2]> = (0..10_000).map(|i| [f64::from(i), 0.0]).collect();
-        points[5_003][1] = 7.0;
-        points[7_001][1] = -3.0;
-        let kept = thin(points);
-        assert!(
-            kept.len() <= MOST_POINTS + 4
-                && kept.contains(&[5_003.0, 7.0])
-                && kept.contains(&[7_001.0, -3.0])
-        );
     }
 }
