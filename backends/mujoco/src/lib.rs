@@ -22,6 +22,7 @@ mod parameter;
 mod rollout;
 mod simulator;
 mod state;
+mod target;
 
 use std::sync::Arc;
 

@@ -10,8 +10,9 @@ use mujoco_rs::wrappers::mj_model::MjModel;
 
 use crate::ffi;
 use crate::layout::layout;
-use crate::parameter::{Column, Plan};
+use crate::parameter::Plan;
 use crate::simulator::MujocoSimulator;
+use crate::target::Column;
 
 /// What all batches of one compiled scene share.
 pub struct Compiled {

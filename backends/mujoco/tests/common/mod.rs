@@ -1,5 +1,5 @@
 //! Scenes and short calls that the tests share.
-#![allow(dead_code)]
+#![allow(dead_code, clippy::unwrap_used)]
 
 use std::sync::Arc;
 
@@ -25,7 +25,7 @@ pub const ARM: &str = r#"
     </body>
     <body name="ball" pos="1 0 0.1">
       <freejoint name="ball"/>
-      <geom name="ball" type="sphere" size="0.1" mass="0.5" condim="6"/>
+      <geom name="ball" type="sphere" size="0.1" mass="0.5" condim="6" friction="0.3 0.005 0.0001"/>
     </body>
   </worldbody>
   <actuator>
@@ -41,7 +41,7 @@ pub const ARM: &str = r#"
     <actuatorfrc name="torque" actuator="elbow"/>
   </sensor>
   <keyframe>
-    <key name="start" qpos="0.2 -0.3 1 0 0.15 1 0 0 0" qvel="0 0 0.5 0.2 0 0 1 0" ctrl="0.1 0"/>
+    <key name="start" qpos="0.2 -0.3 1 0 0.15 1 0 0 0" qvel="0 0 0.5 0.2 0 0 1 3" ctrl="0.1 0"/>
   </keyframe>
 </mujoco>"#;
 

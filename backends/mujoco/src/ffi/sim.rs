@@ -1,0 +1,207 @@
+//! One simulation's model and data, seen from inside a batch call.
+
+use std::marker::PhantomData;
+
+use mujoco_rs::mujoco_c::{
+    mj_contactForce, mj_forward, mj_step, mj_step1, mj_step2, mjData, mjModel,
+};
+
+/// First of the warnings about bad numbers: `qpos`, `qvel`, `qacc`, `ctrl`.
+const WARN_BADQPOS: usize = 3;
+/// `mjMAXVAL`: a larger magnitude counts as bad.
+const MAX_VALUE: f64 = 1e10;
+
+/// True where MuJoCo's own check calls a number bad: not finite, or above 1e10.
+#[must_use]
+pub fn is_bad(x: f64) -> bool {
+    // A comparison with NaN is false.
+    !(x.abs() <= MAX_VALUE)
+}
+
+/// One simulation's model and data during [`Batch::apply`](super::Batch::apply).
+///
+/// The pointers stay pointers, as MuJoCo writes through its own copies of them;
+/// slices are made for the length of a borrow.
+pub struct Sim<'a> {
+    m: *const mjModel,
+    d: *mut mjData,
+    borrow: PhantomData<&'a mut mjData>,
+}
+
+/// Accessors of arrays of `mjData`: `name`, length in `mjModel`, documentation.
+macro_rules! arrays {
+    ($($name:ident, $len:ident $(* $factor:literal)?, $doc:literal;)*) => {$(
+        #[doc = $doc]
+        #[must_use]
+        pub fn $name(&self) -> &[f64] {
+            // SAFETY: `m` and `d` are live and belong together; the array holds
+            // that many doubles, and `&self` keeps writers away.
+            unsafe { slice((*self.d).$name, (*self.m).$len as usize $(* $factor)?) }
+        }
+    )*};
+}
+
+impl Sim<'_> {
+    /// A view of one simulation.
+    ///
+    /// # Safety
+    /// `m` and `d` are live, belong together, and are nobody else's while the view lives.
+    pub(super) unsafe fn new(m: *const mjModel, d: *mut mjData) -> Self {
+        Self {
+            m,
+            d,
+            borrow: PhantomData,
+        }
+    }
+
+    arrays! {
+        qpos, nq, "Positions, `nq`.";
+        qvel, nv, "Velocities, `nv`.";
+        sensordata, nsensordata, "Readings of the stages computed last.";
+    }
+
+    /// Simulated time, s.
+    #[must_use]
+    pub fn time(&self) -> f64 {
+        // SAFETY: `d` is live.
+        unsafe { (*self.d).time }
+    }
+
+    /// Command, generalised force and the read-only state, for a hook:
+    /// `(qpos, qvel, ctrl, qfrc_applied)`.
+    pub fn hook_view(&mut self) -> (&[f64], &[f64], &mut [f64], &mut [f64]) {
+        // SAFETY: four disjoint arrays of `d`, borrowed from `self` together.
+        unsafe {
+            let (m, d) = (&*self.m, self.d);
+            (
+                slice((*d).qpos, m.nq as usize),
+                slice((*d).qvel, m.nv as usize),
+                slice_mut((*d).ctrl, m.nu as usize),
+                slice_mut((*d).qfrc_applied, m.nv as usize),
+            )
+        }
+    }
+
+    /// Commands, `nu`.
+    pub fn ctrl(&mut self) -> &mut [f64] {
+        // SAFETY: `nu` doubles, borrowed from `self`.
+        unsafe { slice_mut((*self.d).ctrl, (*self.m).nu as usize) }
+    }
+
+    /// Applied wrenches, `nbody x 6`: force, then torque.
+    pub fn wrenches(&mut self) -> &mut [f64] {
+        // SAFETY: `6 nbody` doubles, borrowed from `self`.
+        unsafe { slice_mut((*self.d).xfrc_applied, (*self.m).nbody as usize * 6) }
+    }
+
+    /// One physics step.
+    pub fn step(&mut self) {
+        // SAFETY: `m` and `d` are live and belong together.
+        unsafe { mj_step(self.m, self.d) };
+    }
+
+    /// The half of a step that needs no command: positions, velocities and their sensors.
+    pub fn step1(&mut self) {
+        // SAFETY: `m` and `d` are live and belong together.
+        unsafe { mj_step1(self.m, self.d) };
+    }
+
+    /// The other half, after [`Sim::step1`] or [`Sim::forward`] on the present state.
+    pub fn step2(&mut self) {
+        // SAFETY: `m` and `d` are live and belong together.
+        unsafe { mj_step2(self.m, self.d) };
+    }
+
+    /// Everything that follows from the present state and command.
+    pub fn forward(&mut self) {
+        // SAFETY: `m` and `d` are live and belong together.
+        unsafe { mj_forward(self.m, self.d) };
+    }
+
+    /// What MuJoCo warned about since the last reset that makes the state worthless.
+    #[must_use]
+    pub fn bad_number(&self) -> Option<BadNumber> {
+        // SAFETY: `d` is live; an array of plain counters is read.
+        let warnings = unsafe { &(&(*self.d).warning)[WARN_BADQPOS..] };
+        let kinds = [
+            BadNumber::Position,
+            BadNumber::Velocity,
+            BadNumber::Acceleration,
+            BadNumber::Command,
+        ];
+        let seen = warnings.iter().position(|w| w.number > 0);
+        if let Some(first) = seen {
+            return kinds.get(first).copied();
+        }
+        if self.qpos().iter().any(|&x| is_bad(x)) {
+            return Some(BadNumber::Position);
+        }
+        self.qvel()
+            .iter()
+            .any(|&x| is_bad(x))
+            .then_some(BadNumber::Velocity)
+    }
+
+    /// Sum of the normal forces between the geoms of two bodies, N, as of the
+    /// last [`Sim::forward`].
+    #[must_use]
+    pub fn contact_force(&self, bodies: [usize; 2]) -> f64 {
+        let mut sum = 0.0;
+        // SAFETY: `ncon` contacts in the array; geom indices are checked to be of
+        // geoms (a flex has -1) before they index `geom_bodyid`.
+        unsafe {
+            let (m, d) = (&*self.m, self.d);
+            for i in 0..(*d).ncon {
+                let contact = &*(*d).contact.add(i as usize);
+                let [a, b] = contact.geom;
+                if a < 0 || b < 0 {
+                    continue;
+                }
+                let pair = [a, b].map(|g| *m.geom_bodyid.add(g as usize) as usize);
+                if pair == bodies || pair == [bodies[1], bodies[0]] {
+                    let mut force = [0.0; 6];
+                    mj_contactForce(self.m, d, i, &raw mut force);
+                    sum += force[0];
+                }
+            }
+        }
+        sum
+    }
+}
+
+/// Which number of a state went bad.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum BadNumber {
+    /// A position.
+    Position,
+    /// A velocity.
+    Velocity,
+    /// An acceleration.
+    Acceleration,
+    /// A command or a force that was applied.
+    Command,
+}
+
+/// A slice of an array of MuJoCo, which is null where it is empty.
+///
+/// # Safety
+/// `ptr` holds `len` doubles that nobody writes for `'a`, or is null or `len` 0.
+unsafe fn slice<'a>(ptr: *const f64, len: usize) -> &'a [f64] {
+    if ptr.is_null() || len == 0 {
+        return &[];
+    }
+    // SAFETY: as promised by the caller.
+    unsafe { std::slice::from_raw_parts(ptr, len) }
+}
+
+/// As [`slice`], to write.
+///
+/// # Safety
+/// `ptr` holds `len` doubles that only the result touches for `'a`, or is null or `len` 0.
+unsafe fn slice_mut<'a>(ptr: *mut f64, len: usize) -> &'a mut [f64] {
+    if ptr.is_null() || len == 0 {
+        return &mut [];
+    }
+    // SAFETY: as promised by the caller.
+    unsafe { std::slice::from_raw_parts_mut(ptr, len) }
+}
