@@ -113,6 +113,24 @@ impl Outline {
         self
     }
 
+    /// Whether any of the shape's line lies in `view`.
+    pub(super) fn is_in(&self, view: &Extent) -> bool {
+        let inside = |x: f64, y: f64| {
+            (view.x[0]..=view.x[1]).contains(&x) && (view.y[0]..=view.y[1]).contains(&y)
+        };
+        let samples = || (0..=64).map(|i| f64::from(i) / 64.0);
+        if let (Some(r), Some([x, y])) = (self.circle, self.points.first()) {
+            return samples().any(|share| {
+                let (sin, cos) = (std::f64::consts::TAU * share).sin_cos();
+                inside(x + r * cos, y + r * sin)
+            });
+        }
+        let next = self.points.iter().cycle().skip(1);
+        self.points.iter().zip(next).any(|(a, b)| {
+            samples().any(|s| inside(a[0] + s * (b[0] - a[0]), a[1] + s * (b[1] - a[1])))
+        })
+    }
+
     /// Grows `extent` to hold the shape.
     pub(super) fn extend(&self, extent: &mut Extent) {
         let r = self.circle.unwrap_or(0.0);
@@ -158,7 +176,7 @@ pub(super) fn draw(outline: &Outline, frame: &Frame) -> String {
             .map(|(i, [cx, cy])| {
                 format!(
                     "<circle class=\"fill {class}\" fill-opacity=\"{}\" cx=\"{}\" cy=\"{}\" r=\"3\"/>",
-                    coordinate(0.25 + 0.75 * i as f64 / last),
+                    coordinate(0.35 + 0.65 * i as f64 / last),
                     coordinate(*cx),
                     coordinate(*cy)
                 )

@@ -76,7 +76,8 @@ impl Plan {
         Some(extent)
     }
 
-    fn entries(&self) -> Vec<Entry> {
+    /// Legend of what is in view.
+    fn entries(&self, view: &Extent) -> Vec<Entry> {
         let entry = |o: &Outline| {
             let (text, series) = o.label.clone()?;
             let key = match (series || o.dots, o.closed) {
@@ -90,18 +91,17 @@ impl Plan {
                 text,
             })
         };
-        self.outlines.iter().filter_map(entry).collect()
+        self.outlines
+            .iter()
+            .filter(|o| o.is_in(view))
+            .filter_map(entry)
+            .collect()
     }
 }
 
 impl Plot for Plan {
     fn svg(&self, id: &str, width: f64) -> String {
         let view = self.view();
-        let entries = if view.is_some() {
-            self.entries()
-        } else {
-            Vec::new()
-        };
         let mut extent = view.unwrap_or(Extent {
             x: [0.0, 1.0],
             y: [0.0, 1.0],
@@ -126,6 +126,11 @@ impl Plot for Plan {
             widen(&mut extent.y, unit * plot_height, self.floor);
         }
 
+        let entries = if view.is_some() {
+            self.entries(&extent)
+        } else {
+            Vec::new()
+        };
         let request = Request {
             id,
             width,
@@ -210,6 +215,25 @@ mod tests {
             // Coordinates are rounded to a hundredth.
             assert!((across / x - up / y).abs() < 0.02 / x.min(y), "{numbers:?}");
         }
+    }
+
+    #[test]
+    fn the_legend_leaves_out_what_is_out_of_view() {
+        let square = |size: f64| {
+            Outline::polygon(vec![
+                [-size, -size],
+                [size, -size],
+                [size, size],
+                [-size, size],
+            ])
+        };
+        let plan = |size: f64| {
+            Plan::new("p", Axis::new("x", "m"), Axis::new("y", "m"))
+                .outline(square(size).context().label("workspace"))
+                .outline(square(1.0).label("rod"))
+        };
+        assert!(plan(1.1).svg("p", NARROW).contains("workspace"));
+        assert!(!plan(50.0).svg("p", NARROW).contains("workspace"));
     }
 
     #[test]

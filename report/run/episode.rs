@@ -35,10 +35,16 @@ pub(super) fn section(report: &RunReport) -> Option<Section> {
             .first()
             .map_or_else(|| "nothing".to_owned(), displacement)
     );
+    let dots = if episode.end_effector.is_some() {
+        "; each dot is one control step"
+    } else {
+        ""
+    };
+    let caption = format!("Faint is early, strong is late. Both axes have the same scale{dots}.");
     let figure = Figure::new(
         format!("Path of the end effector and of {what}"),
         plan(episode),
-        "Faint is early, strong is late. Both axes have the same scale; each dot is one control step.",
+        caption,
     );
     Some(section.lead(lead).figures(vec![figure]))
 }
