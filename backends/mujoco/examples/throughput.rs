@@ -1,7 +1,8 @@
 //! Physics steps per second of a batch against a bare loop over `mj_step`.
 //!
-//! `cargo run --release -p asid-mujoco --example throughput [SCENE.xml]`; it
-//! needs `MUJOCO_DYNAMIC_LINK_DIR`. Both sides step the same scene from the same
+//! `cargo run --release -p asid-mujoco --example throughput [SCENE.xml [TARGET]]`
+//! needs `MUJOCO_DYNAMIC_LINK_DIR`. With a target, simulations differ in that
+//! parameter, and the time to set it is printed as well. Both sides step the same scene from the same
 //! state under the same commands, one thread against one and two against two,
 //! in turns; the best of several rounds counts, as other load only slows down.
 
@@ -10,26 +11,26 @@
 use std::path::Path;
 use std::time::Instant;
 
-use asid_core::layout::Layout;
+use asid_core::layout::{Layout, Target};
 use asid_core::{Backend, BatchConfig, Control, Rollout, Scene};
 use asid_mujoco::MujocoBackend;
 use mujoco_rs::wrappers::mj_model::MjModel;
 
 /// A seven-joint arm of capsules with position servos, holding a rod over a ledge.
 const ARM: &str = include_str!("arm.xml");
-const SUBSTEPS: usize = 20;
-const FRAMES: usize = 25;
+/// Steps of one simulation in a round.
+const STEPS: usize = 500;
 const ROUNDS: usize = 5;
 
 /// Servo targets that wander around the keyframe's.
-fn commands(layout: &Layout) -> Vec<f64> {
+fn commands(layout: &Layout, frames: usize) -> Vec<f64> {
     let base = layout
         .keyframes
         .first()
         .map_or_else(|| vec![0.0; layout.nu()], |k| k.ctrl.clone());
-    (0..FRAMES)
+    (0..frames)
         .flat_map(|frame| {
-            let wave = (frame as f64 * 0.3).sin() * 0.1;
+            let wave = (frame as f64 * 7.0 / frames as f64).sin() * 0.1;
             base.iter()
                 .enumerate()
                 .map(move |(i, u)| u + wave * (1.0 - 0.2 * i as f64))
@@ -52,7 +53,7 @@ fn bare(model: &MjModel, commands: &[f64], simulations: usize, threads: usize) -
                     }
                     for command in commands.chunks_exact(nu) {
                         data.ctrl_mut().copy_from_slice(command);
-                        for _ in 0..SUBSTEPS {
+                        for _ in 0..STEPS * nu / commands.len() {
                             data.step();
                         }
                     }
@@ -60,7 +61,7 @@ fn bare(model: &MjModel, commands: &[f64], simulations: usize, threads: usize) -
             });
         }
     });
-    (simulations * FRAMES * SUBSTEPS) as f64 / start.elapsed().as_secs_f64()
+    (simulations * STEPS) as f64 / start.elapsed().as_secs_f64()
 }
 
 fn main() -> asid_core::Result<()> {
@@ -71,7 +72,10 @@ fn main() -> asid_core::Result<()> {
     let model = MujocoBackend::new()?.load(&scene)?;
     let layout = model.layout();
     let raw = MjModel::from_xml_string(scene.xml()).unwrap();
-    let commands = commands(layout);
+    let targets: Vec<Target> = match std::env::args().nth(2) {
+        Some(target) => vec![target.parse()?],
+        None => Vec::new(),
+    };
     let joints: Vec<String> = layout
         .joints
         .iter()
@@ -79,37 +83,56 @@ fn main() -> asid_core::Result<()> {
         .collect();
     let sensors: Vec<String> = layout.sensors.iter().map(|s| s.name.clone()).collect();
     println!(
-        "{}: nq {}, nu {}, {} sensors; {FRAMES} frames of {SUBSTEPS} steps",
+        "{}: nq {}, nu {}, {} sensors",
         scene.name(),
         layout.nq,
         layout.nu(),
         sensors.len()
     );
-    for (what, names) in [("qpos", &joints), ("sensors", &sensors)] {
+    for (what, names, substeps) in [
+        ("qpos", &joints, 20),
+        ("sensors", &sensors, 20),
+        ("sensors", &sensors, 1),
+    ] {
         let record = layout.recording(names)?;
-        for size in [64, 256] {
-            for threads in [1, 2] {
-                let mut simulator = model.simulator(&BatchConfig {
-                    size,
-                    threads,
-                    targets: Vec::new(),
-                })?;
-                let sims: Vec<usize> = (0..size).collect();
-                let mut out = vec![0.0; size * FRAMES * record.width()];
-                let (mut best, mut best_bare) = (0.0_f64, 0.0_f64);
-                for _ in 0..ROUNDS {
-                    best_bare = best_bare.max(bare(&raw, &commands, size, threads));
-                    simulator.reset(&sims)?;
-                    let control = Control::Shared(&commands);
-                    let rollout = Rollout::new(&sims, FRAMES, SUBSTEPS, control, &record);
+        let frames = STEPS / substeps;
+        let commands = commands(layout, frames);
+        for (size, threads) in [(64, 1), (64, 2), (256, 1), (256, 2)] {
+            let mut simulator = model.simulator(&BatchConfig {
+                size,
+                threads,
+                targets: targets.clone(),
+            })?;
+            let sims: Vec<usize> = (0..size).collect();
+            let mut out = vec![0.0; size * frames * record.width()];
+            let (mut best, mut best_bare) = (0.0_f64, 0.0_f64);
+            let mut setting = f64::INFINITY;
+            for round in 0..ROUNDS {
+                best_bare = best_bare.max(bare(&raw, &commands, size, threads));
+                simulator.reset(&sims)?;
+                if let Some(target) = targets.first() {
+                    let nominal = model.nominal(target)?;
+                    let values: Vec<f64> = (0..size)
+                        .map(|i| nominal + 1e-4 * (i + round) as f64 / size as f64)
+                        .collect();
                     let start = Instant::now();
-                    simulator.rollout(&rollout, &mut out)?;
-                    let steps = (size * FRAMES * SUBSTEPS) as f64;
-                    best = best.max(steps / start.elapsed().as_secs_f64());
+                    simulator.set_parameters(&sims, &values)?;
+                    setting = setting.min(start.elapsed().as_secs_f64());
                 }
+                let control = Control::Shared(&commands);
+                let rollout = Rollout::new(&sims, frames, substeps, control, &record);
+                let start = Instant::now();
+                simulator.rollout(&rollout, &mut out)?;
+                best = best.max((size * STEPS) as f64 / start.elapsed().as_secs_f64());
+            }
+            println!(
+                "record {what:7} every {substeps:2} steps, batch {size:3}, threads {threads}: {best:8.0} steps/s, bare {best_bare:8.0}, ratio {:.3}",
+                best / best_bare
+            );
+            if !targets.is_empty() {
                 println!(
-                    "record {what:7} batch {size:3} threads {threads}: {best:8.0} steps/s, bare {best_bare:8.0}, ratio {:.3}",
-                    best / best_bare
+                    "    parameters set in {:.1} µs a simulation",
+                    1e6 * setting / size as f64
                 );
             }
         }

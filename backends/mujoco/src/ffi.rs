@@ -192,13 +192,21 @@ impl Batch {
 
     /// State row of a simulation.
     pub fn state(&mut self, sim: usize) -> &mut [f64] {
-        assert!(sim < self.size, "simulation {sim} of {}", self.size);
-        // SAFETY: rows are `nstate` apart, `sim` is in range, and `&mut self`
-        // keeps the row to this borrow.
-        unsafe {
-            let row = mjb_state(self.raw.as_ptr()).add(sim * self.nstate);
-            std::slice::from_raw_parts_mut(row, self.nstate)
-        }
+        let width = self.nstate;
+        &mut self.states()[sim * width..(sim + 1) * width]
+    }
+
+    /// Copies a state row.
+    pub fn copy_state(&mut self, from: usize, to: usize) {
+        let width = self.nstate;
+        self.states()
+            .copy_within(from * width..(from + 1) * width, to * width);
+    }
+
+    fn states(&mut self) -> &mut [f64] {
+        // SAFETY: `size x nstate` doubles that the batch keeps, and `&mut self`
+        // keeps others away.
+        unsafe { sim::slice_mut(mjb_state(self.raw.as_ptr()), self.size * self.nstate) }
     }
 
     /// Forgets the warnings of a simulation.

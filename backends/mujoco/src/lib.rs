@@ -14,6 +14,7 @@
 //!   reported as diverged and stands still.
 //! - Nothing is written to the console or to `MUJOCO_LOG.TXT`.
 
+mod contact;
 mod ffi;
 mod inertia;
 mod layout;

@@ -177,12 +177,6 @@ impl MujocoSimulator {
         let runs = |s: &usize| self.status[*s].is_running();
         sims.iter().copied().filter(runs).collect()
     }
-
-    fn put_state(&mut self, sim: usize, row: &[f64], status: Status) {
-        self.batch.state(sim).copy_from_slice(row);
-        self.batch.clear_warnings(sim);
-        self.status[sim] = status;
-    }
 }
 
 fn describe(bad: BadNumber) -> &'static str {
@@ -420,7 +414,9 @@ impl Simulator for MujocoSimulator {
         let width = self.batch.nstate();
         for (&row, &sim) in rows.iter().zip(sims) {
             let state = &saved.rows[row * width..(row + 1) * width];
-            self.put_state(sim, state, saved.status[row].clone());
+            self.batch.state(sim).copy_from_slice(state);
+            self.batch.clear_warnings(sim);
+            self.status[sim] = saved.status[row].clone();
         }
         Ok(())
     }
@@ -432,15 +428,15 @@ impl Simulator for MujocoSimulator {
         if let Some(sim) = from.iter().find(|&&s| s >= size) {
             return Err(Error::Shape(format!("simulation {sim} of {size}")));
         }
-        if let Some(sim) = to.iter().find(|s| from.contains(s)) {
+        if let Some(sim) = from.iter().find(|s| to.binary_search(s).is_ok()) {
             return Err(Error::Shape(format!(
                 "simulation {sim} is copied from and to"
             )));
         }
         for (&source, &sim) in from.iter().zip(to) {
-            let state = self.batch.state(source).to_vec();
-            let status = self.status[source].clone();
-            self.put_state(sim, &state, status);
+            self.batch.copy_state(source, sim);
+            self.batch.clear_warnings(sim);
+            self.status[sim] = self.status[source].clone();
         }
         Ok(())
     }

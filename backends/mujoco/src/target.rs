@@ -11,6 +11,7 @@ use asid_core::{Error, Result};
 use mujoco_rs::mujoco_c::{mjtBias, mjtGain};
 use mujoco_rs::wrappers::mj_model::{MjModel, MjtGeomBase};
 
+use crate::contact::overruled;
 use crate::inertia::{BodyGeoms, BodyInertia, Origin, origin};
 use crate::model::Compiled;
 
@@ -220,6 +221,12 @@ impl Resolver<'_> {
         match self.target.attribute.as_str() {
             "friction" => {
                 let i = self.index(3)?;
+                if let Some(why) = overruled(model, &self.compiled.layout, geom) {
+                    return Err(parameter(
+                        self.target,
+                        &format!("it would have no effect: {why}"),
+                    ));
+                }
                 let nominal = model.geom_friction()[geom][i];
                 let entry = (Field::GeomFriction, 3 * geom + i, 1.0);
                 Ok(self.column(nominal, Domain::NonNegative, vec![entry]))

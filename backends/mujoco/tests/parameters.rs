@@ -1,5 +1,7 @@
 //! Parameters: each target acts, and mass properties follow as if compiled.
 
+#![allow(clippy::unwrap_used)]
+
 mod common;
 
 use asid_core::simulator::{ExternalForce, ParameterChange};
@@ -271,6 +273,36 @@ fn bad_targets_say_what_is_wrong() {
         };
         assert!(error.to_string().contains(part), "{error}");
     }
+}
+
+#[test]
+fn friction_without_effect_is_refused() {
+    let target = "geom/ball/friction/0".parse().unwrap();
+    let nominal = |xml: &str| load(xml).nominal(&target).map_err(|e| e.to_string());
+    assert_eq!(nominal(ARM), Ok(0.3));
+    // The floor and the arm rule the ball.
+    let above = ARM.replace("<geom name=", "<geom priority=\"2\" name=");
+    let above = above.replace("<geom priority=\"2\" name=\"ball\"", "<geom name=\"ball\"");
+    let error = nominal(&above).unwrap_err();
+    assert!(error.contains("higher priority"), "{error}");
+    // With the floor alone above it, the arm still meets its friction.
+    let floor = ARM.replace(
+        "<geom name=\"floor\"",
+        "<geom priority=\"1\" name=\"floor\"",
+    );
+    assert_eq!(nominal(&floor), Ok(0.3));
+    // A pair, and contact bits that leave nothing else.
+    let pair = floor
+        .replace(
+            "<keyframe>",
+            "<contact><pair geom1=\"ball\" geom2=\"floor\" friction=\"0.5 0.5 0.1 0.1 0.1\"/></contact><keyframe>",
+        )
+        .replace("<geom name=\"ball\"", "<geom contype=\"0\" conaffinity=\"0\" name=\"ball\"");
+    let error = nominal(&pair).unwrap_err();
+    assert!(
+        error.contains("<pair>") && error.contains("`floor`"),
+        "{error}"
+    );
 }
 
 #[test]

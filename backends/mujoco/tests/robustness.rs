@@ -1,5 +1,7 @@
 //! What goes wrong stays where it is, and is said.
 
+#![allow(clippy::unwrap_used)]
+
 mod common;
 
 use asid_core::simulator::{ExternalForce, StepHook, StepView};
@@ -210,6 +212,30 @@ fn bad_documents_are_one_line() {
         );
     }
     assert!(!std::path::Path::new("MUJOCO_LOG.TXT").exists());
+}
+
+#[test]
+fn assets_are_found_beside_the_document() {
+    let folder = std::env::temp_dir().join(format!("asid-mujoco-{}", std::process::id()));
+    std::fs::create_dir_all(folder.join("assets")).unwrap();
+    let mesh = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
+    std::fs::write(folder.join("assets/tetra.obj"), mesh).unwrap();
+    let path = folder.join("scene.xml");
+    std::fs::write(
+        &path,
+        r#"<mujoco><compiler meshdir="assets"/><asset><mesh name="tetra" file="tetra.obj"/></asset>
+        <worldbody><body name="b"><freejoint/><geom name="g" type="mesh" mesh="tetra" density="600"/></body></worldbody></mujoco>"#,
+    )
+    .unwrap();
+    let scene = asid_core::Scene::from_file(&path).unwrap();
+    let backend = asid_mujoco::MujocoBackend::new().unwrap();
+    let model = asid_core::Backend::load(&backend, &scene).unwrap();
+    // A corner of the unit cube: a sixth of a cubic metre.
+    let mass = model.nominal(&"body/b/mass".parse().unwrap()).unwrap();
+    assert!((mass - 100.0).abs() < 1e-9, "{mass}");
+    let error = model.nominal(&"geom/g/mass".parse().unwrap()).unwrap_err();
+    assert!(error.to_string().contains("primitives"), "{error}");
+    std::fs::remove_dir_all(&folder).unwrap();
 }
 
 #[test]

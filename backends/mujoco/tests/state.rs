@@ -1,5 +1,7 @@
 //! States: exact snapshots, copies, resets, and readings that are not late.
 
+#![allow(clippy::unwrap_used)]
+
 mod common;
 
 use asid_core::{Control, Rollout};
@@ -28,11 +30,36 @@ fn a_snapshot_goes_on_to_the_bit() {
 fn reading_along_the_way_does_not_change_the_motion() {
     // A reading takes the first half of the next step early; the motion must
     // be the one of an unobserved run, to the bit, and one call must equal many.
-    let model = load(ARM);
+    for xml in [
+        ARM.to_owned(),
+        delayed(),
+        ARM.replace("impratio", "integrator=\"RK4\" impratio"),
+    ] {
+        reading_is_passive(&xml);
+    }
+}
+
+/// [`ARM`] with delayed drives and sensors, whose buffers are part of the state.
+fn delayed() -> String {
+    ARM.replace(
+        "<motor name=\"elbow\"",
+        "<motor name=\"elbow\" delay=\"0.013\" nsample=\"10\"",
+    )
+    .replace(
+        "<jointpos name=\"angle\"",
+        "<jointpos name=\"angle\" delay=\"0.011\" nsample=\"10\"",
+    )
+    .replace(
+        "<framelinacc name",
+        "<framelinacc delay=\"0.004\" nsample=\"4\" name",
+    )
+}
+
+fn reading_is_passive(xml: &str) {
+    let model = load(xml);
     let state = recording(&model, &["qpos.shoulder", "qpos.elbow", "qpos.ball"]);
     let mut plain = batch(&model, 1, 1, &[]);
     roll(&mut plain, 50, 4, &waves(50), &state);
-    let end = plain.save(&[0]).unwrap();
     for channels in [&CHANNELS[..1], &CHANNELS[2..4], &CHANNELS[..]] {
         let record = recording(&model, channels);
         let mut watched = batch(&model, 1, 1, &[]);
@@ -49,7 +76,23 @@ fn reading_along_the_way_does_not_change_the_motion() {
         }
         assert_eq!(bits(&whole), bits(&pieces), "{channels:?}");
     }
-    plain.load(&end, &[0], &[0]).unwrap();
+}
+
+#[test]
+fn a_delayed_drive_acts_late() {
+    // With a delay of 13 ms the elbow stays on its free path for 6 steps of 2 ms.
+    let record = recording(&load(ARM), &["qvel.elbow"]);
+    let run = |xml: &str, torque: f64| {
+        let mut simulator = batch(&load(xml), 1, 1, &[]);
+        let command = [0.1, 0.0].repeat(10);
+        roll(&mut simulator, 10, 1, &command, &record);
+        roll(&mut simulator, 10, 1, &[0.1, torque].repeat(10), &record)
+    };
+    let (free, driven) = (run(&delayed(), 0.0), run(&delayed(), 0.4));
+    let first = free.iter().zip(&driven).position(|(a, b)| a != b);
+    assert_eq!(first, Some(7), "{free:?} {driven:?}");
+    let prompt = (run(ARM, 0.0), run(ARM, 0.4));
+    assert!(prompt.0[0] != prompt.1[0]);
 }
 
 #[test]

@@ -14,8 +14,7 @@ const MAX_VALUE: f64 = 1e10;
 /// True where MuJoCo's own check calls a number bad: not finite, or above 1e10.
 #[must_use]
 pub fn is_bad(x: f64) -> bool {
-    // A comparison with NaN is false.
-    !(x.abs() <= MAX_VALUE)
+    x.is_nan() || x.abs() > MAX_VALUE
 }
 
 /// One simulation's model and data during [`Batch::apply`](super::Batch::apply).
@@ -198,7 +197,7 @@ unsafe fn slice<'a>(ptr: *const f64, len: usize) -> &'a [f64] {
 ///
 /// # Safety
 /// `ptr` holds `len` doubles that only the result touches for `'a`, or is null or `len` 0.
-unsafe fn slice_mut<'a>(ptr: *mut f64, len: usize) -> &'a mut [f64] {
+pub(super) unsafe fn slice_mut<'a>(ptr: *mut f64, len: usize) -> &'a mut [f64] {
     if ptr.is_null() || len == 0 {
         return &mut [];
     }
