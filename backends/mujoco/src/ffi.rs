@@ -286,7 +286,7 @@ impl Batch {
         }
     }
 
-    /// Message of the error that a simulation raised in its last call, if it did.
+    /// The error that a simulation raised in its last call, if it did, in one line.
     #[must_use]
     pub fn failure(&self, sim: usize) -> Option<String> {
         assert!(sim < self.size, "simulation {sim} of {}", self.size);
@@ -295,9 +295,8 @@ impl Batch {
         unsafe {
             let status = *mjb_status(self.raw.as_ptr()).add(sim);
             (status != 0).then(|| {
-                CStr::from_ptr(mjb_error(self.raw.as_ptr(), sim as c_int))
-                    .to_string_lossy()
-                    .into_owned()
+                let text = CStr::from_ptr(mjb_error(self.raw.as_ptr(), sim as c_int));
+                one_line(&text.to_string_lossy())
             })
         }
     }
@@ -364,6 +363,12 @@ impl Drop for Batch {
         // SAFETY: made by mjb_makeBatch and deleted only here.
         unsafe { mjb_deleteBatch(self.raw.as_ptr()) };
     }
+}
+
+/// MuJoCo's texts folded to one line.
+#[must_use]
+pub fn one_line(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
 /// What [`run`] gets: the function, its jobs, and where a panic of it waits.

@@ -110,10 +110,6 @@ fn forbid_simple(body: &mut MjsBody) {
 fn refused(scene: &Scene, message: &(impl ToString + ?Sized)) -> Error {
     Error::Scene {
         scene: scene.name().to_owned(),
-        message: message
-            .to_string()
-            .split_whitespace()
-            .collect::<Vec<_>>()
-            .join(" "),
+        message: ffi::one_line(&message.to_string()),
     }
 }

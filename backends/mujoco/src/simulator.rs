@@ -285,10 +285,12 @@ impl Simulator for MujocoSimulator {
         }
         let segments = segments(rollout);
         // All values are checked before the first step.
-        let mut values = self.present(rollout.sims);
-        for segment in segments.iter().filter(|_| !rollout.changes.is_empty()) {
-            self.changed(rollout, segment.start, &mut values);
-            self.check_values(&values)?;
+        if !rollout.changes.is_empty() {
+            let mut values = self.present(rollout.sims);
+            for segment in &segments {
+                self.changed(rollout, segment.start, &mut values);
+                self.check_values(&values)?;
+            }
         }
         let nu = layout.nu();
         let width = rollout.record.width();
@@ -313,9 +315,9 @@ impl Simulator for MujocoSimulator {
                 stopped: None,
             });
         }
-        let mut values = self.present(rollout.sims);
         for range in segments {
             if !rollout.changes.is_empty() {
+                let mut values = self.present(rollout.sims);
                 self.changed(rollout, range.start, &mut values);
                 self.write_parameters(rollout.sims, &values)?;
             }

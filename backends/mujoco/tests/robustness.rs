@@ -82,6 +82,42 @@ fn an_absurd_velocity_diverges_instead_of_restarting() {
     assert!(!simulator.status()[0].is_running());
 }
 
+#[test]
+fn an_error_inside_the_engine_stops_its_simulation_alone() {
+    // Memory for the solver's stack that suffices in the air and not in contact.
+    let starved = |bytes: usize| {
+        let xml = ARM.replace(
+            "<worldbody>",
+            &format!("<size memory=\"{bytes}\"/><worldbody>"),
+        );
+        load(&xml)
+    };
+    let flying = [0.2, -0.3, 1.0, 0.0, 3.0, 1.0, 0.0, 0.0, 0.0];
+    let resting = [0.2, -0.3, 1.0, 0.0, 0.099, 1.0, 0.0, 0.0, 0.0];
+    let mut seen = false;
+    for bytes in (12_000..60_000).step_by(1000) {
+        let model = starved(bytes);
+        let record = recording(&model, &["angle", "ball_pos"]);
+        let mut simulator = batch(&model, 2, 2, &[]);
+        let state = [flying, resting].concat();
+        simulator.set_state(&[0, 1], &state, &[0.0; 16]).unwrap();
+        let out = roll(&mut simulator, 3, 2, &waves(3), &record);
+        if simulator.status()[0].is_running()
+            && let Status::Diverged { time, message } = &simulator.status()[1]
+        {
+            assert!(
+                message.contains("out of memory") && !message.contains('\n'),
+                "{message}"
+            );
+            assert!((0.0..0.013).contains(time), "{time}");
+            assert!(out[..12].iter().all(|x| x.is_finite()));
+            assert!(out[23].is_nan());
+            seen = true;
+        }
+    }
+    assert!(seen, "no size starved one and not the other");
+}
+
 /// A spring to the origin along x, and the command of the elbow halved.
 struct Spring;
 
