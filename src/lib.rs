@@ -1,1 +1,20 @@
-//! Facade.
+//! Active exploration for system identification, and diagnosis of the
+//! sim-to-real gap.
+//!
+//! This crate gathers the others for authors of plugins, and holds the `asid`
+//! command line: a program that links a plugin and calls [`cli::main`] has the
+//! whole of it.
+
+pub use asid_algorithms as algorithms;
+pub use asid_core as core;
+pub use asid_report as report;
+pub use asid_tasks as tasks;
+
+#[cfg(feature = "mujoco")]
+pub use asid_mujoco as mujoco;
+#[cfg(feature = "torch")]
+pub use asid_nn as nn;
+#[cfg(feature = "rapier")]
+pub use asid_rapier as rapier;
+
+pub mod cli;

@@ -1,2 +1,7 @@
-//! Binary.
-fn main() {}
+//! The `asid` command line.
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    asid::cli::main()
+}

@@ -44,10 +44,9 @@ impl<'a> Likelihood<'a> {
     /// When an episode has no complete reading of the tracked signals, or the engine
     /// cannot set an unknown.
     pub fn new(problem: &'a Problem<'a>, episodes: &[Episode], size: usize) -> Result<Self> {
-        let protocol = problem.task.exploration();
         let layout = problem.model.layout();
-        let signals = SignalSet::new(layout, &protocol.signals)?;
-        let names: Vec<String> = protocol.signals.iter().map(|s| s.sensor.clone()).collect();
+        let signals = SignalSet::new(layout, problem.signals)?;
+        let names: Vec<String> = problem.signals.iter().map(|s| s.sensor.clone()).collect();
         let width = signals.width();
         let mut observed = Vec::with_capacity(episodes.len());
         let mut present = 0;

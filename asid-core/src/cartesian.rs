@@ -37,7 +37,7 @@ impl Default for CartesianSettings {
             damping: 0.02,
             gain: 10.0,
             posture_gain: 1.0,
-            max_acceleration: 10.0,
+            max_acceleration: 5.0,
             max_joint_speed: 2.175,
         }
     }
@@ -50,6 +50,7 @@ pub struct CartesianController {
     settings: CartesianSettings,
     home: Vec<f64>,
     lead: Vec<f64>,
+    ranges: Vec<Option<[f64; 2]>>,
     rotation: UnitQuaternion<f64>,
     start: Vector3<f64>,
     q: Vec<f64>,
@@ -78,8 +79,10 @@ impl CartesianController {
             )));
         }
         let pose = chain.forward(home, None);
+        let (lead, ranges) = servos(scene, &chain)?.into_iter().unzip();
         Ok(Self {
-            lead: servo_lead(scene, &chain)?,
+            lead,
+            ranges,
             rotation: pose.rotation,
             start: pose.translation.vector,
             position: pose.translation.vector,
@@ -178,13 +181,20 @@ impl CartesianController {
             let really = (self.q[k] - before[k]) / dt;
             ctrl[k] = before[k] + really * (dt / 2.0 + self.lead[k]);
         }
-        self.chain.clamp(&mut ctrl[..n]);
-        self.position = next;
+        for (c, range) in ctrl.iter_mut().zip(&self.ranges) {
+            if let Some([low, high]) = range {
+                *c = c.clamp(*low, *high);
+            }
+        }
+        // Where the joints are too slow the reference waits for them.
+        self.position += (next - self.position) * scale;
+        self.velocity *= scale;
     }
 }
 
-/// Seconds by which each joint of the chain trails its servo's command.
-fn servo_lead(scene: &Scene, chain: &Chain) -> Result<Vec<f64>> {
+/// For each joint of the chain: seconds by which it trails its servo's command,
+/// and the range of that command.
+fn servos(scene: &Scene, chain: &Chain) -> Result<Vec<(f64, Option<[f64; 2]>)>> {
     let model = scene.description()?;
     chain
         .joints()
@@ -194,7 +204,7 @@ fn servo_lead(scene: &Scene, chain: &Chain) -> Result<Vec<f64>> {
                 .actuators
                 .iter()
                 .find(|a| a.joint.as_deref() == Some(name) && a.kp.is_some_and(|kp| kp > 0.0));
-            let Some((kp, kv)) = servo.and_then(|a| Some((a.kp?, a.kv.unwrap_or(0.0)))) else {
+            let Some((servo, kp)) = servo.and_then(|a| Some((a, a.kp?))) else {
                 return Err(Error::Scene {
                     scene: scene.name().to_owned(),
                     message: format!("joint `{name}` has no position servo with a gain kp"),
@@ -203,7 +213,8 @@ fn servo_lead(scene: &Scene, chain: &Chain) -> Result<Vec<f64>> {
             let damping = model
                 .joint_by_name(name)
                 .map_or(0.0, |(body, i)| model.bodies[body].body.joints[i].damping);
-            Ok((kv + damping) / kp)
+            let lead = (servo.kv.unwrap_or(0.0) + damping) / kp;
+            Ok((lead, servo.ctrl_range))
         })
         .collect()
 }
@@ -276,11 +287,11 @@ mod tests {
         let mut controller = arm();
         let mut ctrl = [0.0; 7];
         let mut last = Vector3::zeros();
-        for _ in 0..5 {
+        for _ in 0..6 {
             let from = controller.position();
             controller.steer(Vector3::new(0.5, 0.0, 0.0), |x| x, 0.02, &mut ctrl);
             let velocity = (controller.position() - from) / 0.02;
-            assert!((velocity - last).norm() <= 10.0 * 0.02 + 1e-9);
+            assert!((velocity - last).norm() <= 5.0 * 0.02 + 1e-9);
             last = velocity;
         }
         assert!((last.x - 0.5).abs() < 1e-9);

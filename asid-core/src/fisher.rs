@@ -150,7 +150,7 @@ impl<'a> FisherBatch<'a> {
         let batch = problem.batch(episodes * copies)?;
         let layout = problem.model.layout();
         let recording = layout.recording(&protocol.channels())?;
-        let signals = SignalSet::new(layout, &protocol.signals)?;
+        let signals = SignalSet::new(layout, problem.signals)?;
         let rows = signals.whitened_len();
         let from: Vec<usize> = (0..episodes)
             .flat_map(|e| std::iter::repeat_n(e * copies, copies - 1))

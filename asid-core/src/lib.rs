@@ -24,6 +24,7 @@ pub mod registry;
 pub mod replay;
 pub mod rng;
 pub mod scene;
+pub mod sensitivity;
 pub mod signal;
 pub mod simulator;
 pub mod solve;

@@ -8,6 +8,7 @@ use crate::layout::Layout;
 use crate::parameter::Parameter;
 use crate::progress::Progress;
 use crate::rng::Streams;
+use crate::signal::Signal;
 use crate::simulator::{BatchConfig, Simulator};
 use crate::task::Task;
 
@@ -21,6 +22,8 @@ pub struct Problem<'a> {
     pub capabilities: Capabilities,
     /// The unknowns.
     pub parameters: &'a [Parameter],
+    /// What is tracked, with the noise that is assumed.
+    pub signals: &'a [Signal],
     /// Threads; 0 for one a core.
     pub threads: usize,
     /// Streams of chance.

@@ -12,7 +12,7 @@ use crate::parameter::Parameter;
 use crate::problem::{Batch, Problem, substeps};
 use crate::progress::Silent;
 use crate::rng::{Rng, Streams};
-use crate::signal::SignalSet;
+use crate::signal::{Signal, SignalSet};
 use crate::simulator::{Control, Rollout};
 use crate::solve::TaskPolicy;
 use crate::task::{Outcome, Task};
@@ -68,8 +68,8 @@ pub struct SimulatedWorld<'a> {
 }
 
 impl<'a> SimulatedWorld<'a> {
-    /// A world of `model` whose `parameters` have the values `truth`; `streams`
-    /// draws start poses and noise.
+    /// A world of `model` whose `parameters` have the values `truth` and whose trackers
+    /// have the noise of `signals`; `streams` draws start poses and noise.
     ///
     /// # Errors
     /// When the model is not one of the task's scene.
@@ -78,6 +78,7 @@ impl<'a> SimulatedWorld<'a> {
         model: &dyn Model,
         parameters: &[Parameter],
         truth: &[f64],
+        signals: &[Signal],
         streams: Streams,
     ) -> Result<Self> {
         let steps = AtomicU64::new(0);
@@ -86,6 +87,7 @@ impl<'a> SimulatedWorld<'a> {
             model,
             capabilities: crate::Capabilities::empty(),
             parameters,
+            signals,
             threads: 1,
             streams,
             progress: &Silent,
@@ -93,7 +95,7 @@ impl<'a> SimulatedWorld<'a> {
             env_counter: &steps,
         };
         let batch = problem.batch(1)?;
-        let signals = SignalSet::new(model.layout(), &task.exploration().signals)?;
+        let signals = SignalSet::new(model.layout(), signals)?;
         Ok(Self {
             task,
             batch,

@@ -104,6 +104,10 @@ pub struct DownstreamProtocol {
     pub metric: String,
     /// Unit of the metric, as shown to people.
     pub unit: String,
+    /// The rule of success, in words.
+    pub rule: String,
+    /// The metric's limit in the rule, where it has one.
+    pub threshold: Option<f64>,
     /// Frames of an attempt.
     pub frames: usize,
     /// Length of a frame, s.

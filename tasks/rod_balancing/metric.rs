@@ -7,13 +7,13 @@ use nalgebra::Vector3;
 use super::{LEDGE, LEDGE_HALF, ROD_HALF, rectangle};
 
 /// Largest tilt of a success, degrees.
-const MAX_TILT: f64 = 5.0;
+pub const MAX_TILT: f64 = 5.0;
 
 /// Added to the cost where the rod has left the ledge, degrees (the published code's reward is -10 then).
 const DROP_COST: f64 = 10.0;
 
 /// How far the rod's middle may be from its rest height on the ledge, m.
-const HEIGHT_TOLERANCE: f64 = 0.01;
+const HEIGHT_TOLERANCE: f64 = 0.005;
 
 /// Tilt of the rod's long axis against the horizontal, degrees, from a row of
 /// position and orientation.

@@ -104,7 +104,9 @@ impl RodBalancing {
         };
         let downstream = DownstreamProtocol {
             metric: "tilt_deg".into(),
-            unit: "°".into(),
+            unit: "deg".into(),
+            rule: "tilt below 5° and still on the ledge".into(),
+            threshold: Some(metric::MAX_TILT),
             frames: placing::frames(),
             frame_period: placing::FRAME_PERIOD,
             action: vec![Coordinate::new("pick", "m", [-0.1, 0.1])],

@@ -1,0 +1,78 @@
+//! Does a parameter act at all?
+//!
+//! A target may exist and still change nothing: a friction that another geom's
+//! priority overrides, a mass of a body that never moves. Everything that can move
+//! is thrown about at both ends of the range, and the readings must differ.
+
+use rand::Rng as _;
+
+use crate::error::{Error, Result};
+use crate::problem::{Problem, home};
+use crate::simulator::{Control, Rollout};
+
+/// Throws that are compared.
+const THROWS: usize = 4;
+/// Frames of a throw.
+const FRAMES: usize = 30;
+/// Largest speed of a throw, m/s or rad/s.
+const SPEED: f64 = 1.0;
+
+/// Checks that every unknown of the problem changes what the sensors read.
+///
+/// # Errors
+/// [`Error::Parameter`] naming the first that does not.
+pub fn check_parameters(problem: &Problem<'_>) -> Result<()> {
+    let protocol = problem.task.exploration();
+    let layout = problem.model.layout();
+    let recording = layout.recording(&protocol.channels())?;
+    let substeps = problem.substeps(protocol.frame_period)?;
+    let d = problem.parameters.len();
+    let mut rng = problem.streams.stream("sensitivity");
+    let center: Vec<f64> = problem.parameters.iter().map(|p| p.center()).collect();
+    let n = 2 * d * THROWS;
+    let mut batch = problem.batch(n)?;
+    let sims: Vec<usize> = (0..n).collect();
+    let mut theta = Vec::with_capacity(n * d);
+    for (i, p) in problem.parameters.iter().enumerate() {
+        for u in [0.05, 0.95] {
+            for _ in 0..THROWS {
+                let mut row = center.clone();
+                row[i] = p.from_unit(u);
+                theta.extend(row);
+            }
+        }
+    }
+    let (qpos, qvel) = home(layout);
+    let throws: Vec<f64> = (0..THROWS * qvel.len())
+        .map(|_| rng.random_range(-SPEED..SPEED))
+        .collect();
+    batch.set_parameters(&sims, &theta)?;
+    batch.simulator.reset(&sims)?;
+    batch
+        .simulator
+        .set_state(&sims, &qpos.repeat(n), &throws.repeat(2 * d))?;
+    let still = layout.keyframes.first().map_or_else(|| vec![0.0; layout.nu()], |k| k.ctrl.clone());
+    let control = still.repeat(FRAMES);
+    let row = FRAMES * recording.width();
+    let mut out = vec![0.0; n * row];
+    let before = batch.simulator.steps_taken();
+    let rollout = Rollout::new(&sims, FRAMES, substeps, Control::Shared(&control), &recording);
+    batch.simulator.rollout(&rollout, &mut out)?;
+    problem.count_physics(&batch, before);
+    for (p, both) in problem.parameters.iter().zip(out.chunks_exact(2 * THROWS * row)) {
+        let (low, high) = both.split_at(THROWS * row);
+        if low == high {
+            let targets: Vec<String> = p.targets.iter().map(ToString::to_string).collect();
+            return Err(Error::Parameter {
+                parameter: p.name.clone(),
+                message: format!(
+                    "changes nothing in this scene: no reading differs between {} and {} for target {}",
+                    p.from_unit(0.05),
+                    p.from_unit(0.95),
+                    targets.join(", ")
+                ),
+            });
+        }
+    }
+    Ok(())
+}

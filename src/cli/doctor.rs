@@ -1,0 +1,72 @@
+//! `asid doctor`: native libraries looked for, found, missing, and how to get them.
+
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+use anyhow::Result;
+
+/// Arguments of `doctor`.
+#[derive(clap::Args)]
+pub struct Arguments {}
+
+struct Library {
+    name: &'static str,
+    what_for: &'static str,
+    built_in: bool,
+    variable: &'static str,
+    folder: &'static str,
+    file: &'static str,
+}
+
+const LIBRARIES: [Library; 2] = [
+    Library {
+        name: "MuJoCo 3.17.0",
+        what_for: "backend `mujoco`",
+        built_in: cfg!(feature = "mujoco"),
+        variable: "MUJOCO_DYNAMIC_LINK_DIR",
+        folder: ".native/mujoco",
+        file: "libmujoco.so",
+    },
+    Library {
+        name: "libtorch 2.13.0",
+        what_for: "explorer `fisher-ppo`",
+        built_in: cfg!(feature = "torch"),
+        variable: "LIBTORCH",
+        folder: ".native/libtorch",
+        file: "lib/libtorch_cpu.so",
+    },
+];
+
+/// Prints what was looked for and found.
+pub fn doctor(_arguments: &Arguments) -> Result<()> {
+    let mut out = std::io::stdout().lock();
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    writeln!(out, "asid {} ({}), {cores} cores", env!("CARGO_PKG_VERSION"), env!("ASID_GIT"))?;
+    for entry in asid_core::registry::all::<asid_core::registry::BackendEntry>() {
+        match (entry.make)() {
+            Ok(backend) => writeln!(out, "ok       backend `{}`, version {}", entry.name, backend.version())?,
+            Err(e) => writeln!(out, "missing  backend `{}`: {e}", entry.name)?,
+        }
+    }
+    for library in &LIBRARIES {
+        let mut places: Vec<PathBuf> = Vec::new();
+        if let Some(folder) = std::env::var_os(library.variable) {
+            places.push(Path::new(&folder).join(library.file));
+        }
+        places.push(Path::new(library.folder).join(library.file));
+        let found = places.iter().find(|p| p.exists());
+        let built = if library.built_in { "built in" } else { "not in this build" };
+        match found {
+            Some(path) => writeln!(out, "ok       {} for {}: {} ({built})", library.name, library.what_for, path.display())?,
+            None => writeln!(
+                out,
+                "missing  {} for {} ({built}): looked for {}; get it with `cargo xtask setup`, or set {}",
+                library.name,
+                library.what_for,
+                places.iter().map(|p| p.display().to_string()).collect::<Vec<_>>().join(" and "),
+                library.variable
+            )?,
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,33 @@
+//! `asid export`: a task's scene as one MJCF document.
+
+use std::path::PathBuf;
+
+use anyhow::Result;
+use asid_core::Error;
+use asid_core::registry::{TaskEntry, find};
+
+/// Arguments of `export`.
+#[derive(clap::Args)]
+pub struct Arguments {
+    /// The task
+    task: String,
+    /// File to write; it must not exist
+    #[arg(long, value_name = "FILE.xml")]
+    out: PathBuf,
+}
+
+/// Writes the scene.
+pub fn export(arguments: &Arguments) -> Result<()> {
+    use std::io::Write as _;
+    let task = (find::<TaskEntry>(&arguments.task)?.make)()?;
+    let failed = |e: std::io::Error| Error::File {
+        path: arguments.out.clone(),
+        message: match e.kind() {
+            std::io::ErrorKind::AlreadyExists => "exists already; choose another name".into(),
+            _ => format!("cannot be written: {e}"),
+        },
+    };
+    let mut file = std::fs::File::create_new(&arguments.out).map_err(failed)?;
+    file.write_all(task.scene().xml().as_bytes()).map_err(failed)?;
+    Ok(())
+}

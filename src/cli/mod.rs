@@ -1,0 +1,77 @@
+//! The command line, one file a subcommand.
+
+mod compare;
+mod config;
+mod doctor;
+mod explore;
+mod export;
+mod failure;
+mod identify;
+mod list;
+mod options;
+mod output;
+mod progress;
+mod report;
+mod result;
+mod run;
+mod session;
+mod solve;
+mod trace;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+/// Active exploration for system identification: explore, identify, solve.
+#[derive(Parser)]
+#[command(name = "asid", version, about, arg_required_else_help = true)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Backends, tasks, explorers, identifiers, solvers and effects
+    List(list::Arguments),
+    /// Native libraries: looked for, found, missing, and how to get them
+    Doctor(doctor::Arguments),
+    /// Explore, identify, solve and try the task once in the real world
+    Run(run::Arguments),
+    /// The exploration policy and its commands, for a robot
+    Explore(explore::Arguments),
+    /// The posterior from logs of the real machine
+    Identify(identify::Arguments),
+    /// The task action for a posterior
+    Solve(solve::Arguments),
+    /// Methods head to head, over seeds and conditions
+    Compare(compare::Arguments),
+    /// A task's scene as MJCF
+    Export(export::Arguments),
+    /// (Re)writes the report of a finished run
+    Report(report::Arguments),
+}
+
+/// Runs the command line of this process.
+#[must_use]
+pub fn main() -> ExitCode {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => return failure::usage(&error),
+    };
+    let done = match cli.command {
+        Command::List(arguments) => list::list(&arguments),
+        Command::Doctor(arguments) => doctor::doctor(&arguments),
+        Command::Run(arguments) => run::run(&arguments),
+        Command::Explore(arguments) => explore::explore(&arguments),
+        Command::Identify(arguments) => identify::identify(&arguments),
+        Command::Solve(arguments) => solve::solve(&arguments),
+        Command::Compare(arguments) => compare::compare(&arguments),
+        Command::Export(arguments) => export::export(&arguments),
+        Command::Report(arguments) => report::report(&arguments),
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => failure::report(&error),
+    }
+}

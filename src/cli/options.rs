@@ -1,0 +1,60 @@
+//! Options that several subcommands share.
+
+use std::path::PathBuf;
+
+/// Options of every subcommand that works.
+#[derive(clap::Args, Clone, Debug, Default)]
+pub struct Common {
+    /// Engine of the simulator: see `asid list`
+    #[arg(long, value_name = "NAME")]
+    pub backend: Option<String>,
+    /// Seed of all chance
+    #[arg(long, value_name = "N")]
+    pub seed: Option<u64>,
+    /// Threads; results do not depend on it [default: one a core]
+    #[arg(long, value_name = "N")]
+    pub threads: Option<usize>,
+    /// Settings from a file, such as a run's config.toml
+    #[arg(long, value_name = "FILE.toml")]
+    pub config: Option<PathBuf>,
+    /// One setting, such as explorer.iterations=10 (repeatable)
+    #[arg(long, value_name = "KEY=VALUE")]
+    pub set: Vec<String>,
+    /// Folder for the results [default: the next free one below runs/]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// No progress on standard error
+    #[arg(long)]
+    pub quiet: bool,
+    /// The result, and nothing else, on standard output
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Names of the algorithms.
+#[derive(clap::Args, Clone, Debug, Default)]
+pub struct Algorithms {
+    /// How to explore
+    #[arg(long, value_name = "NAME")]
+    pub explorer: Option<String>,
+    /// How to identify
+    #[arg(long, value_name = "NAME")]
+    pub identifier: Option<String>,
+    /// How to solve
+    #[arg(long, value_name = "NAME")]
+    pub solver: Option<String>,
+}
+
+/// The simulated real world.
+#[derive(clap::Args, Clone, Debug, Default)]
+pub struct Real {
+    /// A hidden true value, such as mass_offset=0.06 [default: drawn from the prior by the seed]
+    #[arg(long, value_name = "NAME=VALUE")]
+    pub truth: Vec<String>,
+    /// Engine of the real world [default: the simulator's]
+    #[arg(long, value_name = "NAME")]
+    pub real_backend: Option<String>,
+    /// Model of the real world, MJCF [default: the task's scene]
+    #[arg(long, value_name = "FILE.xml")]
+    pub real_model: Option<PathBuf>,
+}

@@ -1,0 +1,132 @@
+//! `result.json`.
+
+use asid_core::pipeline::RunOutcome;
+use asid_core::posterior::Marginal;
+use serde::Serialize;
+
+use super::session::Session;
+
+/// Layout version.
+const SCHEMA: u32 = 1;
+
+/// An unknown: truth where it is known, estimate and interval.
+#[derive(Serialize)]
+pub struct ParameterResult {
+    name: String,
+    unit: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub truth: Option<f64>,
+    pub estimate: f64,
+    pub std: f64,
+    pub interval95: [f64; 2],
+}
+
+impl ParameterResult {
+    pub fn new(marginal: &Marginal, truth: Option<f64>) -> Self {
+        Self {
+            name: marginal.name.clone(),
+            unit: marginal.unit.clone(),
+            truth,
+            estimate: marginal.estimate,
+            std: marginal.std,
+            interval95: marginal.interval95,
+        }
+    }
+}
+
+#[derive(Serialize)]
+struct ExplorationResult {
+    objective: String,
+    expected_std: Vec<f64>,
+    a_optimality: f64,
+    log_det: f64,
+    trace: f64,
+    contact_fraction: f64,
+}
+
+#[derive(Serialize)]
+struct DownstreamResult {
+    metric: String,
+    value: f64,
+    success: bool,
+}
+
+#[derive(Serialize)]
+pub struct CostResult {
+    pub wall_s: f64,
+    pub physics_steps: u64,
+    pub env_steps: u64,
+}
+
+/// What made a result.
+#[derive(Serialize)]
+pub struct Versions {
+    asid: &'static str,
+    engine: String,
+    git: &'static str,
+}
+
+impl Versions {
+    pub fn of(session: &Session) -> Self {
+        Self {
+            asid: env!("CARGO_PKG_VERSION"),
+            engine: session.engine.clone(),
+            git: env!("ASID_GIT"),
+        }
+    }
+}
+
+/// `result.json` of `run`.
+#[derive(Serialize)]
+pub struct RunResult {
+    schema: u32,
+    task: String,
+    backend: String,
+    explorer: String,
+    identifier: String,
+    solver: String,
+    seed: u64,
+    parameters: Vec<ParameterResult>,
+    exploration: ExplorationResult,
+    downstream: DownstreamResult,
+    cost: CostResult,
+    versions: Versions,
+}
+
+impl RunResult {
+    pub fn new(session: &Session, truth: &[f64], outcome: &RunOutcome, wall_s: f64) -> Self {
+        let config = &session.config;
+        let information = &outcome.information;
+        Self {
+            schema: SCHEMA,
+            task: config.task.clone(),
+            backend: config.backend.clone(),
+            explorer: config.explorer.name.clone(),
+            identifier: config.identifier.name.clone(),
+            solver: config.solver.name.clone(),
+            seed: config.seed,
+            parameters: outcome
+                .belief
+                .marginals
+                .iter()
+                .zip(truth)
+                .map(|(m, &t)| ParameterResult::new(m, Some(t)))
+                .collect(),
+            exploration: ExplorationResult {
+                objective: outcome.objective.clone(),
+                expected_std: information.expected_std.last().cloned().unwrap_or_default(),
+                a_optimality: information.a_optimality,
+                log_det: information.log_det,
+                trace: information.trace,
+                contact_fraction: outcome.real.as_ref().map_or(0.0, |r| r.contact_fraction),
+            },
+            downstream: DownstreamResult {
+                metric: session.task.downstream().metric.clone(),
+                value: outcome.attempt.outcome.value,
+                success: outcome.attempt.outcome.success,
+            },
+            cost: session.cost(wall_s),
+            versions: Versions::of(session),
+        }
+    }
+}

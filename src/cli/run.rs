@@ -1,0 +1,108 @@
+//! `asid run`: explore, identify, solve, and one zero-shot attempt in the real world.
+
+use std::io::Write as _;
+use std::time::Instant;
+
+use anyhow::Result;
+use asid_core::pipeline::{self, Method, RunOutcome};
+use asid_core::registry::{ExplorerEntry, IdentifierEntry, SolverEntry, find};
+
+use super::options::{Algorithms, Common, Real};
+use super::output::{OutFolder, write_json, write_text};
+use super::result::RunResult;
+use super::session::Session;
+use super::trace;
+
+/// Arguments of `run`.
+#[derive(clap::Args)]
+pub struct Arguments {
+    /// The task: see `asid list`
+    task: String,
+    #[command(flatten)]
+    common: Common,
+    #[command(flatten)]
+    algorithms: Algorithms,
+    #[command(flatten)]
+    real: Real,
+}
+
+/// Runs the pipeline and writes its folder.
+pub fn run(arguments: &Arguments) -> Result<()> {
+    let clock = Instant::now();
+    let session = Session::open(&arguments.task, &arguments.common, &arguments.algorithms, &arguments.real)?;
+    let out = OutFolder::claim(arguments.common.out.as_deref(), &arguments.task)?;
+    let truth = session.truth();
+    let outcome = pipeline(&session, &truth)?;
+    let wall_s = clock.elapsed().as_secs_f64();
+    let result = RunResult::new(&session, &truth, &outcome, wall_s);
+    let report = trace::run_report(&session, &truth, &outcome, wall_s, command_line())?;
+    out.write(|folder| {
+        write_json(&folder.join("result.json"), &result)?;
+        write_text(&folder.join("config.toml"), &toml::to_string_pretty(&session.config)?)?;
+        write_json(&folder.join("posterior.json"), &outcome.belief)?;
+        if let Some(real) = &outcome.real {
+            real.episode.write_csv(&folder.join("real.csv"))?;
+            write_json(&folder.join("policy.json"), &outcome.policy)?;
+        }
+        report.write(folder)?;
+        Ok(())
+    })?;
+    let mut stdout = std::io::stdout().lock();
+    if arguments.common.json {
+        writeln!(stdout, "{}", serde_json::to_string_pretty(&result)?)?;
+        return Ok(());
+    }
+    for (m, t) in outcome.belief.marginals.iter().zip(&truth) {
+        writeln!(
+            stdout,
+            "{}: {:.4} ± {:.4} {} (95 %: {:.4} to {:.4}), truth {t:.4}",
+            m.name, m.estimate, m.std, m.unit, m.interval95[0], m.interval95[1]
+        )?;
+    }
+    let protocol = session.task.downstream();
+    let attempt = &outcome.attempt.outcome;
+    writeln!(
+        stdout,
+        "{}: {:.2}, {}",
+        protocol.metric,
+        attempt.value,
+        if attempt.success { "success" } else { "failure" }
+    )?;
+    let cost = session.cost(wall_s);
+    writeln!(
+        stdout,
+        "{:.1} s, {:.2} million physics steps on {}",
+        wall_s,
+        cost.physics_steps as f64 / 1e6,
+        session.engine
+    )?;
+    writeln!(stdout, "report: {}", out.path().join("report.html").display())?;
+    Ok(())
+}
+
+/// The pipeline with the session's algorithms.
+pub fn pipeline(session: &Session, truth: &[f64]) -> Result<RunOutcome> {
+    let config = &session.config;
+    let explorer = (find::<ExplorerEntry>(&config.explorer.name)?.make)(&config.explorer.settings)?;
+    let identifier = (find::<IdentifierEntry>(&config.identifier.name)?.make)(&config.identifier.settings)?;
+    let solver = (find::<SolverEntry>(&config.solver.name)?.make)(&config.solver.settings)?;
+    let method = Method {
+        explorer: Some(&*explorer),
+        identifier: Some(&*identifier),
+        solver: &*solver,
+    };
+    let problem = session.problem();
+    let mut world = session.world(truth)?;
+    Ok(pipeline::run(&problem, method, &mut world)?)
+}
+
+/// The command line of this process, quoted where it must be.
+pub fn command_line() -> String {
+    std::iter::once("asid".to_owned())
+        .chain(std::env::args().skip(1).map(|a| {
+            let plain = |c: char| c.is_ascii_alphanumeric() || "-_=./,:@+".contains(c);
+            if !a.is_empty() && a.chars().all(plain) { a } else { format!("'{}'", a.replace('\'', r"'\''")) }
+        }))
+        .collect::<Vec<_>>()
+        .join(" ")
+}

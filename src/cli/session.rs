@@ -1,0 +1,156 @@
+//! A task on an engine with resolved settings: what every working subcommand opens.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use anyhow::Result;
+use asid_core::registry::{self, BackendEntry, Entry, TaskEntry};
+use asid_core::signal::Signal;
+use asid_core::{Backend, Capabilities, Error, Model, Parameter, Problem, Scene, SimulatedWorld, Streams, Task};
+
+use super::config::Config;
+use super::options::{Algorithms, Common, Real};
+use super::progress::Bars;
+use super::result::CostResult;
+
+/// An open task.
+pub struct Session {
+    pub task: Box<dyn Task>,
+    pub config: Config,
+    pub parameters: Vec<Parameter>,
+    pub signals: Vec<Signal>,
+    pub model: Arc<dyn Model>,
+    pub engine: String,
+    capabilities: Capabilities,
+    threads: usize,
+    progress: Bars,
+    physics_steps: AtomicU64,
+    env_steps: AtomicU64,
+}
+
+impl Session {
+    /// Finds the task and the engine, resolves the settings, loads the scene and
+    /// checks that every unknown acts.
+    pub fn open(task: &str, common: &Common, algorithms: &Algorithms, real: &Real) -> Result<Self> {
+        let task = (registry::find::<TaskEntry>(task)?.make)()?;
+        let (config, parameters) = Config::resolve(&*task, common, algorithms, real)?;
+        let backend = backend(&config.backend)?;
+        require(&*backend, task.requires())?;
+        let model = backend.load(task.scene())?;
+        for target in parameters.iter().flat_map(|p| &p.targets) {
+            model.nominal(target)?;
+        }
+        let signals = config
+            .noise
+            .iter()
+            .map(|(sensor, &noise)| Signal {
+                sensor: sensor.clone(),
+                noise,
+            })
+            .collect::<Vec<_>>();
+        let signals = task
+            .exploration()
+            .signals
+            .iter()
+            .filter_map(|s| signals.iter().find(|n| n.sensor == s.sensor).cloned())
+            .collect();
+        let session = Self {
+            task,
+            parameters,
+            signals,
+            model,
+            engine: format!("{} {}", backend.name(), backend.version()),
+            capabilities: backend.capabilities(),
+            threads: common.threads.unwrap_or(0),
+            progress: Bars::new(common.quiet),
+            physics_steps: AtomicU64::new(0),
+            env_steps: AtomicU64::new(0),
+            config,
+        };
+        asid_core::sensitivity::check_parameters(&session.problem())?;
+        Ok(session)
+    }
+
+    /// The problem as algorithms see it.
+    pub fn problem(&self) -> Problem<'_> {
+        Problem {
+            task: &*self.task,
+            model: &*self.model,
+            capabilities: self.capabilities,
+            parameters: &self.parameters,
+            signals: &self.signals,
+            threads: self.threads,
+            streams: Streams::new(self.config.seed),
+            progress: &self.progress,
+            physics_counter: &self.physics_steps,
+            env_counter: &self.env_steps,
+        }
+    }
+
+    /// The hidden truth: as given, and drawn from the prior by the seed otherwise.
+    pub fn truth(&self) -> Vec<f64> {
+        let mut rng = Streams::new(self.config.seed).stream("truth");
+        self.parameters
+            .iter()
+            .map(|p| {
+                let drawn = p.sample(&mut rng);
+                self.config.real.truth.get(&p.name).copied().unwrap_or(drawn)
+            })
+            .collect()
+    }
+
+    /// The simulated real world with this truth.
+    pub fn world(&self, truth: &[f64]) -> Result<SimulatedWorld<'_>> {
+        let real = &self.config.real;
+        let model = match &real.model {
+            None if real.backend == self.config.backend => Arc::clone(&self.model),
+            None => load(&real.backend, &*self.task, self.task.scene())?,
+            Some(path) => load(&real.backend, &*self.task, &Scene::from_file(path)?)?,
+        };
+        let streams = Streams::new(self.config.seed).child("real world");
+        Ok(SimulatedWorld::new(
+            &*self.task,
+            &*model,
+            &self.parameters,
+            truth,
+            &self.signals,
+            streams,
+        )?)
+    }
+
+    /// Cost so far.
+    pub fn cost(&self, wall_s: f64) -> CostResult {
+        CostResult {
+            wall_s,
+            physics_steps: self.physics_steps.load(Ordering::Relaxed),
+            env_steps: self.env_steps.load(Ordering::Relaxed),
+        }
+    }
+}
+
+fn load(backend_name: &str, task: &dyn Task, scene: &Scene) -> Result<Arc<dyn Model>> {
+    let backend = backend(backend_name)?;
+    require(&*backend, task.requires())?;
+    Ok(backend.load(scene)?)
+}
+
+/// The engine of this name; one that was left out of the build says how to get it.
+pub fn backend(name: &str) -> Result<Box<dyn Backend>> {
+    match registry::find::<BackendEntry>(name) {
+        Ok(entry) => Ok((entry.make)()?),
+        Err(unknown) => Err(super::list::missing(BackendEntry::KIND, name).unwrap_or(unknown).into()),
+    }
+}
+
+fn require(backend: &dyn Backend, needed: Capabilities) -> Result<()> {
+    let lacking = needed - backend.capabilities();
+    if lacking.is_empty() {
+        return Ok(());
+    }
+    let names: Vec<String> = lacking.iter_names().map(|(n, _)| n.to_lowercase().replace('_', " ")).collect();
+    Err(Error::Incapable {
+        backend: backend.name().to_owned(),
+        what: format!("do what this task needs: {}", names.join(", ")),
+    }
+    .into())
+}
