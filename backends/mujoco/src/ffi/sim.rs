@@ -193,7 +193,7 @@ unsafe fn slice<'a>(ptr: *const f64, len: usize) -> &'a [f64] {
     unsafe { std::slice::from_raw_parts(ptr, len) }
 }
 
-/// As [`slice`], to write.
+/// As `slice` above, to write.
 ///
 /// # Safety
 /// `ptr` holds `len` doubles that only the result touches for `'a`, or is null or `len` 0.
