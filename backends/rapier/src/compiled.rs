@@ -12,13 +12,13 @@ use mjcf_rs::extras::ActuatorKind;
 use nalgebra::{UnitQuaternion, Vector3};
 use rapier3d::dynamics::{
     CCDSolver, ImpulseJointSet, IntegrationParameters, IslandManager, MassProperties,
-    MultibodyJointHandle, MultibodyJointSet, RigidBody, RigidBodyHandle, RigidBodySet, SoftBodySet,
+    MultibodyJointHandle, MultibodyJointSet, RigidBody, RigidBodyBuilder, RigidBodyHandle, RigidBodySet, SoftBodySet,
 };
 use rapier3d::geometry::{
     BroadPhaseBvh, ColliderHandle, ColliderSet, Group, InteractionGroups, InteractionTestMode,
     NarrowPhase,
 };
-use rapier3d_mjcf::{MjcfLoaderOptions, MjcfMultibodyOptions, MjcfRobot};
+use rapier3d_mjcf::{MjcfBody, MjcfLoaderOptions, MjcfMultibodyOptions, MjcfRobot};
 
 use crate::contact::{PairTable, Resistance};
 use crate::parameter::Tables;
@@ -86,6 +86,12 @@ pub struct Compiled {
     pub pristine: State,
     /// Rigid body of each body; `None` for a world that nothing refers to.
     pub bodies: Vec<Option<RigidBodyHandle>>,
+    /// Whether each body is a moving link of an articulated tree.
+    pub links: Vec<bool>,
+    /// Whether each body is in an articulated tree at all, be it as its fixed root.
+    pub trees: Vec<bool>,
+    /// The moving links with shapes that can touch something.
+    pub touching_links: Vec<usize>,
     /// Body of each geom.
     pub body_of_geom: Vec<usize>,
     /// Frame of each geom.
@@ -148,10 +154,11 @@ impl Compiled {
             disable_joint_motors: true,
             ..MjcfLoaderOptions::default()
         };
-        let robot = catch_unwind(AssertUnwindSafe(|| {
+        let mut robot = catch_unwind(AssertUnwindSafe(|| {
             MjcfRobot::from_model(&model, options, base)
         }))
             .map_err(|_| fail("rapier's loader failed on it".into()))?;
+        give_roots(&mut robot);
         let geom_index = robot.geom_name_to_collider.clone();
         let joint_index = robot.joint_name_to_idx.clone();
         let body_of_rapier: Vec<(usize, bool)> = robot
@@ -233,6 +240,9 @@ impl Compiled {
             pairs,
             masses,
             pristine: state,
+            links: vec![false; bodies.len()],
+            trees: vec![false; bodies.len()],
+            touching_links: Vec::new(),
             bodies,
             body_of_geom,
             geom_frames,
@@ -263,7 +273,6 @@ impl Compiled {
             }
         }
         for (_, body) in bodies.iter_mut() {
-            body.enable_gyroscopic_forces(true);
             let activation = body.activation_mut();
             activation.normalized_linear_threshold = -1.0;
             activation.angular_threshold = -1.0;
@@ -285,6 +294,16 @@ impl Compiled {
                 set_inertia(body, colliders, &inertia);
             }
         }
+        for (body, handle) in self.bodies.iter().enumerate() {
+            let Some(handle) = *handle else { continue };
+            let moves = bodies.get(handle).is_some_and(RigidBody::is_dynamic);
+            self.trees[body] = multibodies.rigid_body_link(handle).is_some();
+            self.links[body] = moves && self.trees[body];
+            let geoms = self.masses.geoms_of(body);
+            if self.links[body] && self.colliders[geoms].iter().any(Option::is_some) {
+                self.touching_links.push(body);
+            }
+        }
         // Fixed roots lose their six degrees of freedom here, once.
         for joint in &self.joints {
             if let Some((multibody, _)) = joint.handle.and_then(|h| multibodies.get_mut(h)) {
@@ -303,6 +322,10 @@ pub fn set_inertia(body: &mut RigidBody, colliders: &ColliderSet, inertia: &Iner
         convert::to_vector(&inertia.moments),
         convert::to_rotation(&inertia.axes),
     );
+    // A body with equal moments has no gyroscopic torque, only rapier's rounding of it.
+    let [a, b, c] = inertia.moments.into();
+    let spread = (a - b).abs().max((b - c).abs());
+    body.enable_gyroscopic_forces(spread > 1e-6 * inertia.moments.amax());
     body.set_additional_mass_properties(properties, false);
     body.recompute_mass_properties_from_colliders(colliders);
 }
@@ -328,6 +351,38 @@ fn groups(model: &Model) -> Vec<InteractionGroups> {
             InteractionGroups::new(member, filter, InteractionTestMode::Or)
         })
         .collect()
+}
+
+/// Roots each tree that stands on the world in a fixed body of its own. On the
+/// world's body all trees would be one, with one large mass matrix, and what lies
+/// on the floor would be solved as if it touched a link. Trees stay together
+/// where an equality couples joints, which must then be in one tree.
+fn give_roots(robot: &mut MjcfRobot) {
+    let together = !robot.joint_couplings.is_empty();
+    let mut root = None;
+    for joint in 0..robot.joints.len() {
+        if robot.joints[joint].link1 != 0 {
+            continue;
+        }
+        let at = match root {
+            Some(at) if together => at,
+            _ => {
+                robot.bodies.push(MjcfBody {
+                    name: None,
+                    is_intermediate: true,
+                    mjcf_body_id: 0,
+                    body: RigidBodyBuilder::fixed().build(),
+                    colliders: Vec::new(),
+                    gravcomp: 0.0,
+                    mass: 0.0,
+                    visual_meshes: Vec::new(),
+                });
+                robot.bodies.len() - 1
+            }
+        };
+        root = Some(at);
+        robot.joints[joint].link1 = at;
+    }
 }
 
 /// Frame of every geom in its body, `fromto` resolved.

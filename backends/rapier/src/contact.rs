@@ -18,6 +18,11 @@ use rapier3d::math::Vector;
 use rapier3d::utils::AngularInertiaOps;
 use rapier3d::pipeline::{ContactModificationContext, PairFilterContext, PhysicsHooks};
 
+use crate::slip::Sides;
+
+/// Bit of a contact's index by which rapier marks it as new.
+const NEW_CONTACT: u32 = 1 << 31;
+
 /// Part of a relative rotation that one step takes out.
 const STOPPING: f32 = 0.7;
 
@@ -153,6 +158,12 @@ pub struct Hooks<'a> {
     pub table: &'a PairTable,
     /// Friction of each geom of this simulation.
     pub friction: &'a [Friction],
+    /// Body of each geom.
+    pub body_of: &'a [usize],
+    /// Whether each body is a moving link of an articulated tree.
+    pub links: &'a [bool],
+    /// Whether each body is in an articulated tree at all.
+    pub trees: &'a [bool],
 }
 
 impl PhysicsHooks for Hooks<'_> {
@@ -169,8 +180,19 @@ impl PhysicsHooks for Hooks<'_> {
         let a = context.colliders[context.collider1].user_data as usize;
         let b = context.colliders[context.collider2].user_data as usize;
         let (friction, condim) = self.table.friction(self.friction, a, b);
+        let sides = [context.rigid_body1, context.rigid_body2];
+        let (first, second) = (self.body_of[a], self.body_of[b]);
+        let links = [self.links[first], self.links[second]];
+        let apart = self.trees[first] || self.trees[second];
+        let bodies = context.bodies;
         if let Some(rigid) = context.rigid_mut() {
             *rigid.friction = if condim == 1 { 0.0 } else { friction[0] };
+            let sides = Sides::new(bodies, sides, links, apart, *rigid.normal);
+            for contact in rigid.solver_contacts.iter_mut() {
+                let point = (contact.contact_id[0] & !NEW_CONTACT) as usize;
+                let impulse = rigid.manifold.points.get(point).map_or(0.0, |p| p.data.impulse);
+                sides.align(contact, impulse * *rigid.friction);
+            }
         }
     }
 }

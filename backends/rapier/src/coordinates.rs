@@ -82,6 +82,18 @@ impl State {
         }
     }
 
+    /// Gives the bodies of links that can touch something their present velocity:
+    /// rapier leaves there what they had one substep earlier, and contacts see it.
+    pub fn refresh_link_velocities(&mut self, compiled: &Compiled) {
+        for &body in &compiled.touching_links {
+            let motion = self.motion(compiled, body);
+            if let Some(rigid) = compiled.bodies[body].and_then(|h| self.bodies.get_mut(h)) {
+                rigid.set_linvel(convert::to_vector(&motion.linear), false);
+                rigid.set_angvel(convert::to_vector(&motion.angular), false);
+            }
+        }
+    }
+
     /// Reads `qpos` (`nq`) and `qvel` (`nv`).
     pub fn coordinates(&self, compiled: &Compiled, qpos: &mut [f64], qvel: &mut [f64]) {
         for joint in &compiled.joints {

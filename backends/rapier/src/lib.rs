@@ -14,6 +14,7 @@ mod parameter;
 mod refusal;
 mod sensor;
 mod settings;
+mod slip;
 mod state;
 mod structure;
 mod world;

@@ -6,13 +6,14 @@
 
 use rapier3d::dynamics::{FrictionModel, IntegrationParameters, SpringCoefficients};
 
-/// Substeps of one physics step: rapier integrates each and solves its
-/// constraints once in it.
-const SUBSTEPS: usize = 4;
+/// Longest substep, s. rapier integrates each substep and solves its constraints
+/// once in it. A pushed rod ends within 0.3 mm of where it does with a quarter
+/// of this, at three times the speed.
+const SUBSTEP: f64 = 1e-3;
 
-/// Natural frequency of a contact, Hz. It is both the stiffness of a grip and
-/// the rate at which penetration is pushed out; a tenth of the substeps' rate
-/// at a step of 2 ms.
+/// Natural frequency of a contact, Hz: the stiffness of a grip, and the rate at
+/// which penetration is pushed out. A thing at rest sinks in by g over its
+/// angular square, 6 µm.
 const CONTACT_FREQUENCY: f32 = 200.0;
 
 /// Damping ratio of a contact: heavily overdamped, so that nothing bounces.
@@ -37,7 +38,7 @@ pub fn integration_parameters(dt: f64) -> IntegrationParameters {
         min_ccd_dt: dt as f32,
         contact_softness: softness,
         static_contact_softness: softness,
-        num_solver_iterations: SUBSTEPS,
+        num_solver_iterations: ((dt / SUBSTEP - 1e-6).ceil() as usize).max(2),
         normalized_allowed_linear_error: 1e-4,
         normalized_max_corrective_velocity: RECOVERY_SPEED,
         normalized_prediction_distance: PREDICTION,

@@ -143,6 +143,7 @@ impl World {
             );
             hooked = &self.force;
         }
+        self.state.refresh_link_velocities(compiled);
         self.state
             .drive(compiled, &self.tables, &self.ctrl, hooked);
         if input.hook.is_some() {
@@ -170,6 +171,9 @@ impl World {
         let hooks = Hooks {
             table: &compiled.pairs,
             friction: &self.tables.friction,
+            body_of: &compiled.body_of_geom,
+            links: &compiled.links,
+            trees: &compiled.trees,
         };
         let g = self.tables.gravity;
         self.pipeline.step(
