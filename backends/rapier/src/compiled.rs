@@ -92,6 +92,8 @@ pub struct Compiled {
     pub trees: Vec<bool>,
     /// The moving links with shapes that can touch something.
     pub touching_links: Vec<usize>,
+    /// Free bodies that carry joints: roots of trees that float.
+    pub floating: Vec<usize>,
     /// Body of each geom.
     pub body_of_geom: Vec<usize>,
     /// Frame of each geom.
@@ -160,6 +162,7 @@ impl Compiled {
             .map_err(|_| fail("rapier's loader failed on it".into()))?;
         give_roots(&mut robot);
         let geom_index = robot.geom_name_to_collider.clone();
+        let couplings = robot.joint_couplings.clone();
         let joint_index = robot.joint_name_to_idx.clone();
         let body_of_rapier: Vec<(usize, bool)> = robot
             .bodies
@@ -189,6 +192,17 @@ impl Compiled {
             &mut state.impulse_joints,
             MjcfMultibodyOptions::SKIP_JOINT_MOTORS | MjcfMultibodyOptions::SKIP_JOINT_SPRINGS,
         );
+        for coupling in &couplings {
+            let tree = |joint: usize| {
+                let child = handles.joints.get(joint).map(|j| j.link2)?;
+                state.multibodies.rigid_body_link(child).map(|l| l.multibody)
+            };
+            if tree(coupling.joint1) != tree(coupling.joint2) {
+                return Err(fail(
+                    "backend `rapier` couples only joints of one tree (<equality><joint>)".into(),
+                ));
+            }
+        }
         let mut bodies = vec![None; layout.bodies.len()];
         for (place, handle) in body_of_rapier.iter().zip(&handles.bodies) {
             if let (&(body, false), Some(handle)) = (place, handle) {
@@ -243,6 +257,7 @@ impl Compiled {
             links: vec![false; bodies.len()],
             trees: vec![false; bodies.len()],
             touching_links: Vec::new(),
+            floating: Vec::new(),
             bodies,
             body_of_geom,
             geom_frames,
@@ -299,6 +314,10 @@ impl Compiled {
             let moves = bodies.get(handle).is_some_and(RigidBody::is_dynamic);
             self.trees[body] = multibodies.rigid_body_link(handle).is_some();
             self.links[body] = moves && self.trees[body];
+            let free = |j: &JointSlot| j.body == body && j.kind == JointKind::Free;
+            if self.trees[body] && self.joints.iter().any(free) {
+                self.floating.push(body);
+            }
             let geoms = self.masses.geoms_of(body);
             if self.links[body] && self.colliders[geoms].iter().any(Option::is_some) {
                 self.touching_links.push(body);

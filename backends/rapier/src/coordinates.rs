@@ -94,6 +94,34 @@ impl State {
         }
     }
 
+    /// Orientation of the root of a tree that floats.
+    pub fn root_rotation(&self, compiled: &Compiled, body: usize) -> Rotation {
+        self.body(compiled, body)
+            .map_or(Rotation::IDENTITY, |b| b.position().rotation)
+    }
+
+    /// Puts the root of a tree that floats where it belongs after a step in which
+    /// it turned from `before`. rapier moves a root's origin with the velocity of
+    /// its centre of mass, as if the centre were at the origin.
+    pub fn correct_root(&mut self, compiled: &Compiled, body: usize, before: Rotation) {
+        let Some(handle) = compiled.bodies[body] else {
+            return;
+        };
+        let Some(rigid) = self.bodies.get_mut(handle) else {
+            return;
+        };
+        let center = rigid.mass_properties().local_mprops.local_com;
+        let mut pose = *rigid.position();
+        pose.translation += before * center - pose.rotation * center;
+        rigid.set_position(pose, false);
+        if let Some(link) = self.multibodies.rigid_body_link(handle).copied()
+            && let Some(multibody) = self.multibodies.get_multibody_mut(link.multibody)
+        {
+            multibody.forward_kinematics(&self.bodies, true);
+            multibody.update_rigid_bodies(&mut self.bodies, true);
+        }
+    }
+
     /// Reads `qpos` (`nq`) and `qvel` (`nv`).
     pub fn coordinates(&self, compiled: &Compiled, qpos: &mut [f64], qvel: &mut [f64]) {
         for joint in &compiled.joints {

@@ -7,7 +7,7 @@ use asid_core::simulator::StepHook;
 use asid_core::{Recording, Status};
 use nalgebra::Vector3;
 use rapier3d::dynamics::RigidBodyHandle;
-use rapier3d::math::Vector;
+use rapier3d::math::{Rotation, Vector};
 use rapier3d::pipeline::PhysicsPipeline;
 
 use crate::compiled::Compiled;
@@ -35,6 +35,8 @@ pub struct World {
     /// Bodies with a force on them in this step.
     pushed: Vec<RigidBodyHandle>,
     torques: Vec<(usize, Vector)>,
+    /// Orientations of floating roots before the step.
+    rotations: Vec<Rotation>,
     qpos: Vec<f64>,
     qvel: Vec<f64>,
     ctrl: Vec<f64>,
@@ -65,6 +67,7 @@ impl World {
             pipeline: PhysicsPipeline::new(),
             pushed: Vec::new(),
             torques: Vec::new(),
+            rotations: Vec::new(),
             qpos: vec![0.0; compiled.layout.nq],
             qvel: vec![0.0; compiled.layout.nv],
             ctrl: vec![0.0; compiled.layout.nu()],
@@ -156,6 +159,10 @@ impl World {
         }
         self.resist(compiled);
 
+        self.rotations.clear();
+        for &body in &compiled.floating {
+            self.rotations.push(self.state.root_rotation(compiled, body));
+        }
         let State {
             bodies,
             colliders,
@@ -196,6 +203,9 @@ impl World {
                 body.reset_forces(false);
                 body.reset_torques(false);
             }
+        }
+        for (&body, &before) in compiled.floating.iter().zip(&self.rotations) {
+            self.state.correct_root(compiled, body, before);
         }
     }
 
@@ -270,7 +280,7 @@ impl World {
         if !quarantine.is_empty() {
             return Some("a body's position is not finite".into());
         }
-        for (_, multibody) in self.multibodies() {
+        for multibody in self.state.multibodies.multibodies() {
             let fast = multibody
                 .generalized_velocity()
                 .iter()
@@ -297,10 +307,6 @@ impl World {
             }
         }
         None
-    }
-
-    fn multibodies(&self) -> impl Iterator<Item = ((), &rapier3d::dynamics::Multibody)> {
-        self.state.multibodies.multibodies().map(|m| ((), m))
     }
 
     /// Reads channels into a row; NaN where the simulation has diverged.

@@ -193,3 +193,27 @@ fn a_ball_joint_turns_like_a_free_top() {
     assert!((end[4] - 0.4).abs() < 1e-3 && (end[6] + 0.6).abs() < 1e-3, "{end:?}");
     assert_eq!(end[..7], end[7..]);
 }
+
+#[test]
+fn a_floating_tree_keeps_its_momentum() {
+    // A base whose centre of mass is not its origin, and a link on it, set spinning.
+    let inside = r#"<option gravity="0 0 0"/><worldbody><body name="base"><freejoint name="base"/>
+        <geom type="box" size=".1 .1 .02" pos=".1 0 0" mass="1"/>
+        <body name="lid" pos="0.2 0 0"><joint name="lid" axis="0 0 1"/>
+          <geom type="box" size=".1 .02 .02" pos=".1 0 0" mass="0.5"/></body></body></worldbody>
+      <sensor><framepos name="a" objtype="body" objname="base"/><framepos name="b" objtype="body" objname="lid"/></sensor>"#;
+    let mut bench = Bench::new(inside, &["a", "b"]);
+    let mut qpos = vec![0.0; 8];
+    qpos[3] = 1.0;
+    bench.place(&qpos, &[0.2, 0.0, 0.0, 0.0, 0.0, 2.0, -1.0]);
+    let center = |r: &[f64]| -> Vec<f64> { (0..3).map(|i| (r[i] + 0.5 * r[3 + i]) / 1.5).collect() };
+    let start = center(&bench.read());
+    let rows = bench.run(1000, &[]);
+    let (half, end) = (center(&rows[499]), center(&rows[999]));
+    for i in 0..3 {
+        let bend = end[i] - 2.0 * half[i] + start[i];
+        // The path of the common centre is straight within 1 % of its length of 1 m.
+        assert!(bend.abs() < 0.01, "entry {i} bends by {bend} m");
+    }
+    assert!((end[0] - start[0]).hypot(end[1] - start[1]) > 0.5);
+}

@@ -1,0 +1,137 @@
+//! Scenes: layouts, sensors, and parts that are refused rather than left out.
+
+#![allow(clippy::unwrap_used)]
+
+mod support;
+
+use asid_core::layout::JointKind;
+use asid_core::{Backend, Scene};
+use asid_rapier::Rapier;
+use support::{Bench, scene};
+
+#[test]
+fn the_layout_is_in_document_order() {
+    let inside = r#"<worldbody>
+        <geom type="plane" size="1 1 1"/>
+        <body name="a" pos="0 0 1"><freejoint name="fly"/><geom name="ga" type="sphere" size=".1"/>
+          <body><joint type="ball"/><geom type="sphere" size=".1" pos="0 0 .3"/></body></body>
+        <body name="b" pos="2 0 1"><joint name="turn" ref="0.3"/><joint name="slide" type="slide"/><geom type="sphere" size=".1"/></body>
+      </worldbody>
+      <actuator><motor joint="turn"/><velocity name="drive" joint="slide" kv="2" ctrlrange="-1 1"/></actuator>
+      <sensor><jointpos name="angle" joint="turn"/><framequat objtype="xbody" objname="a"/></sensor>
+      <keyframe><key name="far" qpos="0 0 2 1 0 0 0 1 0 0 0 0.4 0.1"/></keyframe>"#;
+    let model = Rapier.load(&scene(inside)).unwrap();
+    let layout = model.layout();
+    assert_eq!(layout.bodies, ["world", "a", "body2", "b"]);
+    assert_eq!(layout.geoms, ["geom0", "ga", "geom2", "geom3"]);
+    let joints: Vec<_> = layout
+        .joints
+        .iter()
+        .map(|j| (j.name.as_str(), j.kind, j.qpos, j.qvel))
+        .collect();
+    assert_eq!(
+        joints,
+        [
+            ("fly", JointKind::Free, 0, 0),
+            ("joint1", JointKind::Ball, 7, 6),
+            ("turn", JointKind::Hinge, 11, 9),
+            ("slide", JointKind::Slide, 12, 10),
+        ]
+    );
+    assert_eq!((layout.nq, layout.nv), (13, 11));
+    assert_eq!(layout.actuators[0].name, "actuator0");
+    assert_eq!(layout.actuators[1].ctrl_range, Some([-1.0, 1.0]));
+    assert_eq!((layout.sensors[1].address, layout.sensors[1].len), (1, 4));
+    // A batch starts in the first keyframe.
+    let mut bench = Bench::new(inside, &["qpos.fly", "angle", "qpos.slide"]);
+    let start = bench.read();
+    for (read, set) in start.iter().zip([0., 0., 2., 1., 0., 0., 0., 0.4, 0.1]) {
+        assert!((read - set).abs() < 1e-6, "{start:?}");
+    }
+}
+
+#[test]
+fn sensors_read_frames_where_they_are() {
+    let inside = r#"<option gravity="0 0 0"/><worldbody>
+        <body name="b" pos="0 0 1"><joint name="j" axis="0 0 1"/>
+          <geom name="g" type="box" size=".1 .1 .1" pos="0.5 0 0" euler="0 0 0.1" mass="1"/>
+          <site name="s" pos="1 0 0" quat="0 1 0 0"/></body></worldbody>
+      <sensor>
+        <framepos name="site" objtype="site" objname="s"/><framelinvel name="site_v" objtype="site" objname="s"/>
+        <framepos name="geom" objtype="geom" objname="g"/><framepos name="inertia" objtype="body" objname="b"/>
+        <framelinvel name="inertia_v" objtype="body" objname="b"/><frameangvel name="w" objtype="xbody" objname="b"/>
+        <framepos name="frame" objtype="xbody" objname="b"/><framezaxis name="z" objtype="site" objname="s"/>
+        <jointvel name="jv" joint="j"/><gyro name="gyro" site="s"/><velocimeter name="v" site="s"/>
+        <clock name="clock"/><torque name="torque" site="s"/>
+      </sensor>"#;
+    let names = ["site", "site_v", "geom", "inertia", "inertia_v", "w", "frame", "z", "jv", "gyro", "v", "clock"];
+    let mut bench = Bench::new(inside, &names);
+    bench.place(&[std::f64::consts::FRAC_PI_2], &[2.0]);
+    let expected = [
+        0., 1., 1., -2., 0., 0., 0., 0.5, 1., 0., 0.5, 1., -1., 0., 0., 0., 0., 2., 0., 0., 1., 0., 0., -1., 2.,
+        0., 0., -2., 0., -2., 0., 0.,
+    ];
+    let read = bench.read();
+    for (i, (a, b)) in read.iter().zip(expected).enumerate() {
+        assert!((a - b).abs() < 1e-6, "entry {i}: {a} against {b}");
+    }
+    // After steps the velocity is that of the present, not of a substep before.
+    let row = bench.run(10, &[]).pop().unwrap();
+    assert!((row[3].hypot(row[4]) - 2.0).abs() < 1e-4 && (row[31] - 0.02).abs() < 1e-9);
+    // What it cannot read is refused when it is asked for.
+    let record = bench.simulator.layout().recording(&["torque"]).unwrap();
+    let error = bench.simulator.read(&[0], &record, &mut [0.0; 3]).unwrap_err();
+    assert!(error.to_string().contains("read sensor `torque`"), "{error}");
+}
+
+#[test]
+fn equalities_hold() {
+    let inside = r#"<worldbody>
+        <body pos="0 0 1"><joint name="l" type="slide" axis="1 0 0"/><geom type="sphere" size=".05" mass="1"/></body>
+        <body pos="0 1 1"><joint name="r" type="slide" axis="1 0 0"/><geom type="sphere" size=".05" mass="1"/></body>
+        <body name="hung" pos="1 0 1"><freejoint name="hung"/><geom type="box" size=".1 .1 .1" mass="1"/></body>
+      </worldbody>
+      <equality><joint joint1="l" joint2="r" polycoef="0 -2 0 0 0"/><connect body1="hung" anchor="0 0 0.5"/></equality>
+      <actuator><motor joint="l"/></actuator>"#;
+    let rows = Bench::new(inside, &["qpos.l", "qpos.r", "qpos.hung"]).run(500, &[1.0]);
+    let end = &rows[499];
+    // One newton moves 1 + 4 kg.
+    assert!((end[0] - 0.1).abs() < 2e-3, "{}", end[0]);
+    assert!((end[1] + 2.0 * end[0]).abs() < 2e-3, "{end:?}");
+    assert!((end[4] - 1.0).abs() < 2e-3, "{end:?}");
+}
+
+#[test]
+fn what_it_cannot_simulate_is_refused_by_name() {
+    let joint = r#"<body name="b"><joint name="j"/><geom type="sphere" size="1"/></body>"#;
+    let cases = [
+        (format!("<worldbody>{joint}</worldbody><actuator><general name=\"g\" joint=\"j\"/></actuator>"), "<general> `g` on line"),
+        (format!("<worldbody>{joint}</worldbody><actuator><position name=\"p\" joint=\"j\" kp=\"1\" dampratio=\"1\"/></actuator>"), "`dampratio` of <position> `p`"),
+        (format!("<worldbody>{joint}</worldbody><tendon><fixed name=\"t\"><joint joint=\"j\" coef=\"1\"/></fixed></tendon>"), "<tendon>"),
+        (format!("<worldbody>{joint}</worldbody><actuator><motor name=\"m\" joint=\"k\"/></actuator>"), "joint `k` of actuator `m`"),
+        ("<worldbody><body><freejoint/><geom name=\"e\" type=\"ellipsoid\" size=\"1 2 3\"/></body></worldbody>".into(), "geom `e`"),
+        ("<worldbody><body><joint name=\"ball\" type=\"ball\" stiffness=\"1\"/><geom size=\"1\"/></body></worldbody>".into(), "ball joint `ball`"),
+        ("<worldbody><body name=\"none\"><freejoint/></body></worldbody>".into(), "`none` moves but has no mass"),
+        ("<option viscosity=\"0.1\"/><worldbody/>".into(), "`viscosity` of <option>"),
+        ("<option><flag gravity=\"disable\"/></option><worldbody/>".into(), "`gravity` of <flag>"),
+        ("<worldbody/><keyframe><key name=\"k\" qpos=\"1\"/></keyframe>".into(), "keyframe `k`"),
+        ("<worldbody/><contact><exclude body1=\"x\" body2=\"y\"/></contact>".into(), "names body `x`"),
+    ];
+    for (inside, says) in cases {
+        let Err(error) = Rapier.load(&scene(&inside)) else {
+            panic!("`{says}` was let in");
+        };
+        let text = error.to_string();
+        assert!(text.contains(says) && !text.contains('\n'), "{text}");
+    }
+    // Settings of another engine's solver are not physics of the scene.
+    let inside = r#"<option integrator="implicitfast" cone="elliptic" impratio="10"/>
+      <worldbody><body><freejoint/><geom size=".1" solref="0.01 1" solimp="0.9 0.95 0.001"/></body></worldbody>"#;
+    assert!(Rapier.load(&scene(inside)).is_ok());
+}
+
+#[test]
+fn an_empty_scene_runs() {
+    let scene = Scene::from_xml("empty", "<mujoco/>", &[]).unwrap();
+    assert_eq!(Bench::with(&scene, &[], 1, 1, &[]).run(3, &[]).len(), 0);
+}
