@@ -65,6 +65,7 @@ pub struct SimulatedWorld<'a> {
     signals: SignalSet,
     truth: Vec<f64>,
     streams: Streams,
+    start: Option<Vec<f64>>,
 }
 
 impl<'a> SimulatedWorld<'a> {
@@ -102,16 +103,26 @@ impl<'a> SimulatedWorld<'a> {
             signals,
             truth: truth.to_vec(),
             streams,
+            start: None,
         })
+    }
+
+    /// The same world, whose exploration episode begins with this start pose.
+    #[must_use]
+    pub fn with_exploration_start(mut self, start: Vec<f64>) -> Self {
+        self.start = Some(start);
+        self
     }
 
     /// The start pose that the world will begin its exploration episode with.
     #[must_use]
     pub fn exploration_start(&self) -> Vec<f64> {
-        draw(
-            &self.task.exploration().start,
-            &mut self.streams.stream("exploration start"),
-        )
+        self.start.clone().unwrap_or_else(|| {
+            draw(
+                &self.task.exploration().start,
+                &mut self.streams.stream("exploration start"),
+            )
+        })
     }
 
     /// Adds the physics steps taken in this world to `counter`.

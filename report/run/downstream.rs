@@ -9,11 +9,15 @@ use crate::page::{Figure, Section};
 use crate::plot::{Axis, Chart, Colour, Layer, Plan, Weighted};
 
 pub(super) fn section(report: &RunReport) -> Option<Section> {
-    let section = Section::new("The task, zero-shot");
+    let predicted = report.predicted();
+    let section = Section::new(if predicted { "The task, as predicted" } else { "The task, zero-shot" });
     let Some(downstream) = &report.downstream else {
+        if !report.stage.is_empty() {
+            return None;
+        }
         return Some(section.note("No downstream part: the run ended before the task was tried."));
     };
-    let mut section = section.lead(lead(downstream));
+    let mut section = section.lead(lead(downstream, predicted));
     let mut figures = Vec::new();
     if downstream.time.is_empty() {
         section = section.note("No metric over time was kept.");
@@ -24,7 +28,7 @@ pub(super) fn section(report: &RunReport) -> Option<Section> {
         downstream
             .side_view
             .as_ref()
-            .map(|view| side(view, downstream)),
+            .map(|view| side(view, downstream, predicted)),
     );
     match &downstream.search {
         Some(search) => figures.extend((0..search.chosen.len()).map(|i| tried(search, i))),
@@ -33,14 +37,19 @@ pub(super) fn section(report: &RunReport) -> Option<Section> {
     Some(section.figures(figures))
 }
 
-fn lead(d: &Downstream) -> String {
+fn lead(d: &Downstream, predicted: bool) -> String {
     let rule = if d.rule.is_empty() {
         String::new()
     } else {
         format!(" Success means {}.", d.rule)
     };
+    let where_done = if predicted {
+        "Done once in the simulator at the estimate"
+    } else {
+        "Done once in the real world with what was learnt"
+    };
     format!(
-        "Done once in the real world with what was learnt: {} is {}, {}.{rule}",
+        "{where_done}: {} is {}, {}.{rule}",
         metric_name(d),
         metric_value(d),
         if d.success {
@@ -182,7 +191,8 @@ fn spread(search: &Search, dimension: usize) -> Option<f64> {
     Some(0.1 * Weighted::new(&values, &[])?.std()).filter(|s| *s > 0.0)
 }
 
-fn side(view: &SideView, d: &Downstream) -> Figure {
+fn side(view: &SideView, d: &Downstream, predicted: bool) -> Figure {
+    let world = if predicted { "simulator" } else { "real world" };
     let label = if view.x_label.is_empty() {
         "along"
     } else {
@@ -201,7 +211,7 @@ fn side(view: &SideView, d: &Downstream) -> Figure {
         plan = plan.outline(outline_of(shape));
     }
     let caption = format!(
-        "The final scene in the real world, both axes to the same scale; {} {}.",
+        "The final scene in the {world}, both axes to the same scale; {} {}.",
         metric_name(d),
         metric_value(d)
     );

@@ -10,8 +10,22 @@ use crate::plot::{Axis, Colour, Outline, Plan};
 const GHOSTS: usize = 5;
 
 pub(super) fn section(report: &RunReport) -> Option<Section> {
-    let section = Section::new("The real episode");
+    let (title, which) = if report.predicted() {
+        (
+            "The predicted episode",
+            "the episode that the simulator expects",
+        )
+    } else {
+        (
+            "The real episode",
+            "the one episode that all conclusions rest on",
+        )
+    };
+    let section = Section::new(title);
     let Some(episode) = &report.episode else {
+        if !report.stage.is_empty() {
+            return None;
+        }
         return Some(
             section.note("No view from above: the run has no real episode with tracked objects."),
         );
@@ -28,7 +42,7 @@ pub(super) fn section(report: &RunReport) -> Option<Section> {
         format!("the {}", names.join(" and the "))
     };
     let lead = format!(
-        "Seen from above: the one episode that all conclusions rest on. {} moved {}.",
+        "Seen from above: {which}. {} moved {}.",
         capitalise(&what),
         episode
             .objects
@@ -43,14 +57,14 @@ pub(super) fn section(report: &RunReport) -> Option<Section> {
     let caption = format!("Faint is early, strong is late. Both axes have the same scale{dots}.");
     let figure = Figure::new(
         format!("Path of the end effector and of {what}"),
-        plan(episode),
+        plan(episode, title),
         caption,
     );
     Some(section.lead(lead).figures(vec![figure]))
 }
 
-fn plan(episode: &Episode) -> Plan {
-    let mut plan = Plan::new("The real episode seen from above", Axis::new("x", "m"), Axis::new("y", "m"))
+fn plan(episode: &Episode, title: &str) -> Plan {
+    let mut plan = Plan::new(&format!("{title} seen from above"), Axis::new("x", "m"), Axis::new("y", "m"))
         .description("Outlines of the objects from start to end, the path of the end effector, and what stands around them.");
     if let Some([x0, x1, y0, y1]) = episode.workspace {
         let corners = vec![[x0, y0], [x1, y0], [x1, y1], [x0, y1]];

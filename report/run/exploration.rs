@@ -13,7 +13,8 @@ pub(super) fn section(report: &RunReport) -> Option<Section> {
     let mut figures = Vec::new();
     match &report.exploration {
         Some(exploration) => {
-            section = section.lead(lead(exploration));
+            let episode = if report.predicted() { "predicted" } else { "real" };
+            section = section.lead(lead(exploration, episode));
             if !exploration.gained.is_empty() {
                 figures.push(gained(exploration));
             }
@@ -49,14 +50,14 @@ fn name(report: &RunReport) -> &str {
     }
 }
 
-fn lead(exploration: &Exploration) -> String {
+fn lead(exploration: &Exploration, episode: &str) -> String {
     let mut text = match (exploration.objective.as_str(), exploration.form.as_str()) {
-        ("", _) => "Fisher information of the real episode.".to_owned(),
+        ("", _) => format!("Fisher information of the {episode} episode."),
         (objective, "") => {
-            format!("Fisher information of the real episode; the objective is {objective}.")
+            format!("Fisher information of the {episode} episode; the objective is {objective}.")
         }
         (objective, form) => format!(
-            "Fisher information of the real episode, {form} form; the objective is {objective}."
+            "Fisher information of the {episode} episode, {form} form; the objective is {objective}."
         ),
     };
     if let Some(share) = exploration.contact_fraction.filter(|c| c.is_finite()) {

@@ -10,14 +10,21 @@ pub(super) fn page(report: &RunReport) -> Page {
     } else {
         format!("{}, {}", report.task, report.condition)
     };
-    let mut page = Page::new(&title).kicker("ASID run").lead(answer(report));
+    let stage = if report.stage.is_empty() { "run" } else { &report.stage };
+    let mut page = Page::new(&title)
+        .kicker(&format!("ASID {stage}"))
+        .lead(answer(report));
     if let Some(downstream) = &report.downstream {
         let (word, tone) = if downstream.success {
             ("success", Tone::Good)
         } else {
             ("no success", Tone::Bad)
         };
-        page = page.badge(word, tone);
+        page = if report.predicted() {
+            page.badge(&format!("{word} expected"), tone)
+        } else {
+            page.badge(word, tone)
+        };
     }
 
     let stages: Vec<&str> = [&report.explorer, &report.identifier, &report.solver]
@@ -26,7 +33,11 @@ pub(super) fn page(report: &RunReport) -> Page {
         .filter(|s| !s.is_empty())
         .collect();
     if !stages.is_empty() {
-        page = page.fact("explorer → identifier → solver", stages.join(" → "));
+        page = if report.stage.is_empty() {
+            page.fact("explorer → identifier → solver", stages.join(" → "))
+        } else {
+            page.fact("algorithm", stages.join(", "))
+        };
     }
     let seed = format!(
         "{}, seed {}",
@@ -86,8 +97,9 @@ fn answer(report: &RunReport) -> String {
         .collect();
     if let Some(d) = &report.downstream {
         let verdict = if d.success { "success" } else { "no success" };
+        let world = if report.predicted() { "simulator" } else { "real world" };
         parts.push(format!(
-            "{} in the real world is {}: {verdict}",
+            "{} in the {world} is {}: {verdict}",
             metric_name(d),
             metric_value(d)
         ));
@@ -213,7 +225,11 @@ fn tiles(report: &RunReport) -> Vec<Tile> {
         );
         tiles.push(
             Tile::new("outcome", if d.success { "success" } else { "no success" })
-                .note("one try, zero-shot")
+                .note(if report.predicted() {
+                    "in the simulator, at the estimate"
+                } else {
+                    "one try, zero-shot"
+                })
                 .tone(tone),
         );
     }

@@ -19,7 +19,7 @@ pub(super) fn section(report: &RunReport) -> Option<Section> {
     let mut notes = Vec::new();
     for p in &report.parameters {
         if p.narrowing.is_empty() {
-            if !matches!(p.prior, Some(Prior::Binary { .. })) {
+            if !matches!(p.prior, Some(Prior::Binary { .. })) && !report.identifier.is_empty() {
                 notes.push(format!(
                     "No narrowing of {}: the identifier does not iterate.",
                     p.name

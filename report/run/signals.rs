@@ -7,6 +7,9 @@ use crate::plot::{Axis, Chart, Colour, Layer};
 
 pub(super) fn section(report: &RunReport) -> Option<Section> {
     let section = Section::new("Real against replayed");
+    if report.signals.is_empty() && !report.stage.is_empty() {
+        return None;
+    }
     if report.signals.is_empty() {
         return Some(section.note("No replay: the run kept no readings to compare with."));
     }

@@ -21,6 +21,9 @@ pub const SCHEMA: u32 = 1;
 pub struct RunReport {
     /// Layout version, [`SCHEMA`].
     pub schema: u32,
+    /// Stage that was run alone: `explore`, `identify` or `solve`; empty for a whole run.
+    /// What `explore` and `solve` show is predicted by the simulator.
+    pub stage: String,
     /// Name of the task.
     pub task: String,
     /// Condition of the task, such as `left`; empty where it has none.
@@ -78,6 +81,7 @@ impl Default for RunReport {
     fn default() -> Self {
         Self {
             schema: SCHEMA,
+            stage: String::new(),
             task: String::new(),
             condition: String::new(),
             backend: String::new(),

@@ -7,10 +7,50 @@ use std::path::{Path, PathBuf};
 use anyhow::Result;
 use asid_core::parameter::{Parameter, Scale};
 use asid_core::registry::{self, AlgorithmEntry, Entry, Settings};
+use asid_core::task::Coordinate;
 use asid_core::{Error, Target, Task};
 use serde::{Deserialize, Serialize};
 
 use super::options::{Algorithms, Common, Real};
+
+/// What settings are resolved for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Stage {
+    /// The whole pipeline, or many of them.
+    Run,
+    /// Exploration alone.
+    Explore,
+    /// Identification alone.
+    Identify,
+    /// Solving alone.
+    Solve,
+}
+
+impl Stage {
+    /// Name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Run => "run",
+            Self::Explore => "explore",
+            Self::Identify => "identify",
+            Self::Solve => "solve",
+        }
+    }
+
+    /// Coordinates of the start pose that the stage is told.
+    pub fn start(self, task: &dyn Task) -> &[Coordinate] {
+        match self {
+            Self::Run | Self::Identify => &[],
+            Self::Explore => &task.exploration().start,
+            Self::Solve => &task.downstream().start,
+        }
+    }
+
+    fn is_run(&self) -> bool {
+        *self == Self::Run
+    }
+}
 
 /// An algorithm by name, with its settings.
 #[derive(Clone, Debug, Serialize)]
@@ -38,15 +78,21 @@ pub struct RealConfig {
 /// Everything that decides the result of a command.
 #[derive(Clone, Debug, Serialize)]
 pub struct Config {
+    /// What it was resolved for.
+    #[serde(skip_serializing_if = "Stage::is_run")]
+    pub command: Stage,
     /// The task's name.
     pub task: String,
     /// Engine of the simulator.
     pub backend: String,
     /// Seed.
     pub seed: u64,
-    /// Start pose of exploration by coordinate, where it is known (`explore`).
+    /// Start pose of the object by coordinate, for a stage that is told it.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub start: BTreeMap<String, f64>,
+    /// Coordinates of the start pose that were not given and took the middle of their range.
+    #[serde(skip)]
+    pub assumed: Vec<String>,
     /// Explorer.
     pub explorer: Component,
     /// Identifier.
@@ -117,8 +163,9 @@ fn wrong(key: &str, message: impl Into<String>) -> anyhow::Error {
 }
 
 impl Config {
-    /// Resolves the settings of a task, and the unknowns they make.
+    /// Resolves the settings of a task for a stage, and the unknowns they make.
     pub fn resolve(
+        stage: Stage,
         task: &dyn Task,
         common: &Common,
         algorithms: &Algorithms,
@@ -128,6 +175,10 @@ impl Config {
             Some(path) => read_table(path)?,
             None => toml::Table::new(),
         };
+        // A start pose in the settings of one stage means nothing to another.
+        if text(&table, "command")?.is_some_and(|c| c != stage.name()) {
+            table.remove("start");
+        }
         for assignment in &common.set {
             set(&mut table, assignment)?;
         }
@@ -175,7 +226,9 @@ impl Config {
             (Some(path), _) => Some(path.clone()),
             (None, path) => path.map(PathBuf::from),
         };
+        let (start, assumed) = start(stage, task, &section(&table, "start")?)?;
         let config = Self {
+            command: stage,
             task: task.name().to_owned(),
             seed: match (common.seed, table.get("seed")) {
                 (Some(seed), _) => seed,
@@ -185,7 +238,8 @@ impl Config {
                     .and_then(|s| u64::try_from(s).ok())
                     .ok_or_else(|| wrong("seed", format!("{value} is not a whole number from 0 up")))?,
             },
-            start: numbers("start", &section(&table, "start")?)?,
+            start,
+            assumed,
             explorer: component::<dyn asid_core::Explorer>(&table, "explorer", algorithms.explorer.as_deref(), ASID.explorer)?,
             identifier: component::<dyn asid_core::Identifier>(
                 &table,
@@ -207,12 +261,6 @@ impl Config {
             backend,
             parameter,
         };
-        for name in config.start.keys() {
-            let known: Vec<&str> = task.exploration().start.iter().map(|c| &*c.name).collect();
-            if !known.contains(&name.as_str()) {
-                return Err(Error::unknown("start coordinate", name, known).into());
-            }
-        }
         Ok((config, parameters))
     }
 }
@@ -460,4 +508,39 @@ fn noise(task: &dyn Task, table: &toml::Table) -> Result<BTreeMap<String, f64>> 
         }
     }
     Ok(all)
+}
+
+/// The start pose of a stage that is told it, and the names of the coordinates that
+/// were not given and took the middle of their range.
+fn start(stage: Stage, task: &dyn Task, table: &toml::Table) -> Result<(BTreeMap<String, f64>, Vec<String>)> {
+    let given = numbers("start", table)?;
+    let coordinates = stage.start(task);
+    for (name, &value) in &given {
+        if coordinates.is_empty() {
+            return Err(wrong(
+                &format!("start.{name}"),
+                format!("`{}` takes no start pose; `explore` and `solve` do", stage.name()),
+            ));
+        }
+        let Some(c) = coordinates.iter().find(|c| &c.name == name) else {
+            let known = coordinates.iter().map(|c| &*c.name);
+            return Err(Error::unknown("start coordinate", name, known).into());
+        };
+        // A tracker may show an object a little outside; further off it is another unit or frame.
+        let [low, high] = c.range;
+        let slack = high - low;
+        if !(low - slack..=high + slack).contains(&value) {
+            return Err(wrong(
+                &format!("start.{name}"),
+                format!("{value} {} is far outside the task's range, {low} to {high}", c.unit),
+            ));
+        }
+    }
+    let missing = coordinates.iter().filter(|c| !given.contains_key(&c.name));
+    let assumed = missing.map(|c| c.name.clone()).collect();
+    let all = coordinates
+        .iter()
+        .map(|c| (c.name.clone(), given.get(&c.name).copied().unwrap_or(c.center())))
+        .collect();
+    Ok((all, assumed))
 }

@@ -1,6 +1,155 @@
-//! placeholder
-/// Arguments.
+//! `asid explore`: the exploration policy and its commands, for a real machine.
+//!
+//! The policy is played once in the simulator at the middle of the prior. An
+//! open-loop policy can be played from `commands.csv` as it stands; one that reacts
+//! to its readings is in `policy.json`, and the commands are what it would do there.
+
+use std::collections::BTreeMap;
+use std::time::Instant;
+
+use anyhow::Result;
+use asid_core::fisher::FisherSettings;
+use asid_core::pipeline::episode_information;
+use asid_core::real_world::RealEpisode;
+use asid_core::registry::{ExplorerEntry, find};
+use asid_core::signal::Signal;
+use asid_core::{Episode, Parameter, RealWorld as _, SimulatedWorld};
+use serde::Serialize;
+
+use super::config::Stage;
+use super::options::{Algorithms, Common, Real};
+use super::output::{OutFolder, write_json};
+use super::result::{CostResult, ExplorationResult, SCHEMA, Versions};
+use super::session::Session;
+use super::{stage, trace};
+
+/// Arguments of `explore`.
 #[derive(clap::Args)]
-pub struct Arguments {}
-/// Placeholder.
-pub fn explore(_a: &Arguments) -> anyhow::Result<()> { Ok(()) }
+#[command(after_help = "\
+The start pose of the object is given by --set start.NAME=VALUE, such as --set start.x=0.55; \
+what is not given takes the middle of its range.
+
+The folder holds commands.csv (time in s and the command of each actuator), predicted.csv (the log \
+that the simulator expects), policy.json, result.json, config.toml, report.html and trace.json.")]
+pub struct Arguments {
+    /// The task: see `asid list`
+    task: String,
+    /// How to explore: see `asid list`
+    #[arg(long, value_name = "NAME")]
+    explorer: Option<String>,
+    #[command(flatten)]
+    common: Common,
+}
+
+/// `result.json` of `explore`.
+#[derive(Serialize)]
+struct ExploreResult {
+    schema: u32,
+    task: String,
+    backend: String,
+    explorer: String,
+    seed: u64,
+    start: BTreeMap<String, f64>,
+    exploration: ExplorationResult,
+    cost: CostResult,
+    versions: Versions,
+}
+
+/// Explores in the simulator and writes what a machine needs to do the same.
+pub fn explore(arguments: &Arguments) -> Result<()> {
+    let clock = Instant::now();
+    let common = &arguments.common;
+    let algorithms = Algorithms {
+        explorer: arguments.explorer.clone(),
+        ..Algorithms::default()
+    };
+    let session = Session::open_stage(Stage::Explore, &arguments.task, common, &algorithms, &Real::default())?;
+    let out = OutFolder::claim(common.out.as_deref(), &format!("{}-explore", arguments.task))?;
+    stage::check_start(&session);
+    let config = &session.config;
+    let start = session.start();
+    let problem = session.problem();
+    let center: Vec<f64> = session.parameters.iter().map(Parameter::center).collect();
+
+    let explorer = (find::<ExplorerEntry>(&config.explorer.name)?.make)(&config.explorer.settings)?;
+    let mut explored = explorer.explore(&problem, Some(&start))?;
+    let played = nominal_world(&session, &center)?
+        .with_exploration_start(start.clone())
+        .explore(&mut *explored.policy)?;
+    let searched = explored.policy.take_curve();
+    let curve = if searched.is_empty() { explored.curve } else { searched };
+    let policy = explored.policy.export();
+    let information = episode_information(&problem, &FisherSettings::default(), &center, &start, &played.actions)?;
+
+    let wall_s = clock.elapsed().as_secs_f64();
+    let result = ExploreResult {
+        schema: SCHEMA,
+        task: config.task.clone(),
+        backend: config.backend.clone(),
+        explorer: config.explorer.name.clone(),
+        seed: config.seed,
+        start: config.start.clone(),
+        exploration: ExplorationResult::new(&explored.objective, &information, played.contact_fraction),
+        cost: session.cost(wall_s),
+        versions: Versions::of(&session),
+    };
+    let expected: Vec<String> = session
+        .parameters
+        .iter()
+        .zip(information.expected_std.last().into_iter().flatten())
+        .map(|(p, std)| format!("{} ± {std:.4} {}", p.name, p.unit))
+        .collect();
+    let lines = [
+        format!("start: {}", stage::start_line(&session)),
+        format!("expected after the episode: {}", expected.join(", ")),
+    ];
+    let mut report = stage::report(
+        &session,
+        wall_s,
+        &[
+            ("commands.csv", "the commands to play: time in s, one column an actuator"),
+            ("predicted.csv", "log of the episode that the simulator expects, without noise"),
+            ("policy.json", "the exploration policy"),
+        ],
+    );
+    report.explorer.clone_from(&config.explorer.name);
+    report.answer = format!("From {}, the episode is expected to tell {}.", lines[0], expected.join(", "));
+    report.episode = Some(trace::episode(&session, &played.episode));
+    report.exploration =
+        trace::exploration(&session, &explored.objective, &information, Some(played.contact_fraction));
+    report.learning = trace::learning(&curve, explored.curve_label);
+    stage::finish(&session, common, &out, &result, &report, &lines, |folder| {
+        write_json(&folder.join("policy.json"), &policy)?;
+        commands_of(&played).write_csv(&folder.join("commands.csv"))?;
+        played.episode.write_csv(&folder.join("predicted.csv"))?;
+        Ok(())
+    })
+}
+
+/// The simulator at these values, whose trackers are perfect.
+fn nominal_world<'a>(session: &'a Session, theta: &[f64]) -> Result<SimulatedWorld<'a>> {
+    let signals: Vec<Signal> = session
+        .signals
+        .iter()
+        .map(|s| Signal {
+            sensor: s.sensor.clone(),
+            noise: 0.0,
+        })
+        .collect();
+    Ok(SimulatedWorld::new(
+        &*session.task,
+        &*session.model,
+        &session.parameters,
+        theta,
+        &signals,
+        session.problem().streams.child("nominal world"),
+    )?)
+}
+
+fn commands_of(played: &RealEpisode) -> Episode {
+    Episode {
+        channels: Vec::new(),
+        readings: Vec::new(),
+        ..played.episode.clone()
+    }
+}

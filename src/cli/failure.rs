@@ -1,29 +1,108 @@
 //! How an error reaches the user: one line on standard error, and the exit status.
 
 use std::io::Write as _;
+use std::panic::AssertUnwindSafe;
 use std::process::ExitCode;
+use std::sync::Mutex;
 
 /// Exit status of work that failed.
 const FAILED: u8 = 1;
 /// Exit status of a call that was wrong.
 const WRONG_CALL: u8 = 2;
 
+/// What the latest panic said, and where.
+static PANIC: Mutex<Option<String>> = Mutex::new(None);
+
 /// A problem with the command line itself; help and version are no problem.
 pub fn usage(error: &clap::Error) -> ExitCode {
-    use clap::error::ErrorKind::{DisplayHelp, DisplayVersion};
-    let _ = error.print();
+    use clap::error::ErrorKind::{DisplayHelp, DisplayHelpOnMissingArgumentOrSubcommand, DisplayVersion};
     match error.kind() {
-        DisplayHelp | DisplayVersion => ExitCode::SUCCESS,
-        _ => ExitCode::from(WRONG_CALL),
+        DisplayHelp | DisplayVersion => {
+            let _ = error.print();
+            ExitCode::SUCCESS
+        }
+        DisplayHelpOnMissingArgumentOrSubcommand => {
+            let _ = error.print();
+            ExitCode::from(WRONG_CALL)
+        }
+        _ => {
+            tell(&usage_line(&error.to_string()));
+            ExitCode::from(WRONG_CALL)
+        }
     }
+}
+
+/// The message of the parser without its heading and its reminder of the usage.
+fn usage_line(text: &str) -> String {
+    let text = text.strip_prefix("error: ").unwrap_or(text);
+    let end = ["\n\nUsage:", "\n\nFor more information"]
+        .iter()
+        .filter_map(|mark| text.find(mark))
+        .min()
+        .unwrap_or(text.len());
+    let paragraphs: Vec<String> = text[..end].split("\n\n").map(one_line).filter(|p| !p.is_empty()).collect();
+    format!("{}; see --help", paragraphs.join("; "))
 }
 
 /// Writes the error and tells whether the call or the work was wrong.
 pub fn report(error: &anyhow::Error) -> ExitCode {
-    let line = format!("{error:#}").split_whitespace().collect::<Vec<_>>().join(" ");
-    let _ = writeln!(std::io::stderr(), "asid: {line}");
+    // Whoever reads standard output has seen enough, as `head` has.
+    let closed = |e: &std::io::Error| e.kind() == std::io::ErrorKind::BrokenPipe;
+    if error.downcast_ref::<std::io::Error>().is_some_and(closed) {
+        return ExitCode::SUCCESS;
+    }
+    tell(&one_line(&format!("{error:#}")));
     match error.downcast_ref::<asid_core::Error>() {
         Some(e) if e.is_usage() => ExitCode::from(WRONG_CALL),
         _ => ExitCode::from(FAILED),
+    }
+}
+
+/// A remark that stops nothing.
+pub fn warn(text: &str) {
+    tell(&format!("warning: {}", one_line(text)));
+}
+
+/// Runs `work`; a panic in it, which is a defect of this program, ends as one line.
+///
+/// Engines catch panics of their own and report them as a simulation's status, so
+/// nothing is written until one gets here. `RUST_BACKTRACE` brings the usual text back.
+pub fn guard(work: impl FnOnce() -> ExitCode) -> ExitCode {
+    if std::env::var_os("RUST_BACKTRACE").is_none() {
+        std::panic::set_hook(Box::new(|info| {
+            let text = info.payload_as_str().unwrap_or("panic");
+            let place = info.location().map(|l| format!(" ({}:{})", l.file(), l.line())).unwrap_or_default();
+            if let Ok(mut latest) = PANIC.lock() {
+                *latest = Some(format!("{text}{place}"));
+            }
+        }));
+    }
+    std::panic::catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|_| {
+        let said = PANIC.lock().ok().and_then(|mut latest| latest.take()).unwrap_or_default();
+        tell(&one_line(&format!("internal error: {said}; please report it with the command line")));
+        ExitCode::from(FAILED)
+    })
+}
+
+fn one_line(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+fn tell(line: &str) {
+    let _ = writeln!(std::io::stderr(), "asid: {line}");
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_parsers_message_becomes_one_line() {
+        let text = "error: unexpected argument '--sed' found\n\n  tip: a similar argument exists: '--seed'\n\n\
+                    Usage: asid run <TASK>\n\nFor more information, try '--help'.\n";
+        assert_eq!(
+            usage_line(text),
+            "unexpected argument '--sed' found; tip: a similar argument exists: '--seed'; see --help"
+        );
     }
 }

@@ -1,6 +1,200 @@
-//! placeholder
-/// Arguments.
+//! `asid identify`: the posterior over the unknowns from logs of the real machine.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use anyhow::Result;
+use asid_core::identify::Identified;
+use asid_core::registry::{IdentifierEntry, find};
+use asid_core::{Episode, Error, Parameter};
+use asid_report::run::{RealWorld, RunReport};
+use serde::Serialize;
+
+use super::config::Stage;
+use super::options::{Algorithms, Common, Real};
+use super::output::{OutFolder, write_json};
+use super::result::{CostResult, ParameterResult, SCHEMA, Versions};
+use super::session::Session;
+use super::{failure, stage, trace};
+
+/// A residual above this many standard deviations of the noise is more than chance and
+/// a noise that was guessed a little low.
+const UNEXPLAINED: f64 = 1.5;
+
+/// Episodes this many times longer than the task's are taken for times in another unit.
+const LONGEST: f64 = 100.0;
+
+/// Arguments of `identify`.
 #[derive(clap::Args)]
-pub struct Arguments {}
-/// Placeholder.
-pub fn identify(_a: &Arguments) -> anyhow::Result<()> { Ok(()) }
+#[command(after_help = "\
+A log is a CSV file: `time` in seconds, strictly increasing, at any rate; `ctrl.ACTUATOR`, the command \
+from that time on; and columns named after the scene's sensors, vectors as NAME.0, NAME.1 and so on \
+(quaternions w x y z). An empty cell is a missing reading. The machine begins where the scene's first \
+keyframe has it; where the object begins is estimated.
+
+The folder holds posterior.json (for `asid solve`), result.json, config.toml, a copy of the logs, \
+report.html and trace.json.")]
+pub struct Arguments {
+    /// The task: see `asid list`
+    task: String,
+    /// Log of a real episode, CSV; several are fitted together
+    #[arg(long, value_name = "FILE", required = true, num_args = 1..)]
+    log: Vec<PathBuf>,
+    /// How to identify: see `asid list`
+    #[arg(long, value_name = "NAME")]
+    identifier: Option<String>,
+    #[command(flatten)]
+    common: Common,
+}
+
+/// `result.json` of `identify`.
+#[derive(Serialize)]
+struct IdentifyResult {
+    schema: u32,
+    task: String,
+    backend: String,
+    identifier: String,
+    seed: u64,
+    parameters: Vec<ParameterResult>,
+    /// Root mean square of the residuals at the best fit, in standard deviations of the noise.
+    residual: f64,
+    /// Start pose of each episode at the best fit.
+    starts: Vec<BTreeMap<String, f64>>,
+    logs: Vec<String>,
+    cost: CostResult,
+    versions: Versions,
+}
+
+/// Identifies from logs.
+pub fn identify(arguments: &Arguments) -> Result<()> {
+    let clock = Instant::now();
+    let common = &arguments.common;
+    let algorithms = Algorithms {
+        identifier: arguments.identifier.clone(),
+        ..Algorithms::default()
+    };
+    let session = Session::open_stage(Stage::Identify, &arguments.task, common, &algorithms, &Real::default())?;
+    let episodes: Vec<Episode> = arguments.log.iter().map(|path| read(&session, path)).collect::<Result<_>>()?;
+    let out = OutFolder::claim(common.out.as_deref(), &format!("{}-identify", arguments.task))?;
+    let config = &session.config;
+    let identifier = (find::<IdentifierEntry>(&config.identifier.name)?.make)(&config.identifier.settings)?;
+    let found = identifier.identify(&session.problem(), &episodes)?;
+
+    let wall_s = clock.elapsed().as_secs_f64();
+    let coordinates = &session.task.exploration().start;
+    let result = IdentifyResult {
+        schema: SCHEMA,
+        task: config.task.clone(),
+        backend: config.backend.clone(),
+        identifier: config.identifier.name.clone(),
+        seed: config.seed,
+        parameters: found.posterior.marginals.iter().map(|m| ParameterResult::new(m, None)).collect(),
+        residual: found.residual,
+        starts: found.starts.iter().map(|s| stage::pose(coordinates, s)).collect(),
+        logs: arguments.log.iter().map(|p| p.display().to_string()).collect(),
+        cost: session.cost(wall_s),
+        versions: Versions::of(&session),
+    };
+    let mut lines: Vec<String> = found
+        .posterior
+        .marginals
+        .iter()
+        .map(|m| {
+            let [low, high] = m.interval95;
+            format!("{}: {:.4} ± {:.4} {} (95 %: {low:.4} to {high:.4})", m.name, m.estimate, m.std, m.unit)
+        })
+        .collect();
+    lines.push(format!("residual: {:.2} times the sensors' noise", found.residual));
+    let names = copies(arguments.log.len());
+    let report = report(&session, &episodes, &found, &names, wall_s)?;
+    stage::finish(&session, common, &out, &result, &report, &lines, |folder| {
+        write_json(&folder.join("posterior.json"), &found.posterior)?;
+        for (path, name) in arguments.log.iter().zip(&names) {
+            std::fs::copy(path, folder.join(name)).map_err(|e| Error::File {
+                path: path.clone(),
+                message: e.to_string(),
+            })?;
+        }
+        Ok(())
+    })?;
+    if found.residual > UNEXPLAINED {
+        failure::warn(&unexplained(found.residual));
+    }
+    Ok(())
+}
+
+/// Names of the logs' copies in the folder.
+fn copies(n: usize) -> Vec<String> {
+    match n {
+        1 => vec!["real.csv".into()],
+        n => (1..=n).map(|i| format!("real-{i}.csv")).collect(),
+    }
+}
+
+fn unexplained(residual: f64) -> String {
+    format!(
+        "the simulator does not explain the logs: at the best fit the readings are off by {residual:.1} times \
+         their noise, and the intervals are widened for it; check the noise, the start of the machine and \
+         whether something else differs from the scene"
+    )
+}
+
+/// Reads a log and checks that it can be identified from.
+fn read(session: &Session, path: &Path) -> Result<Episode> {
+    let layout = session.model.layout();
+    let episode = Episode::read_csv(path, layout)?;
+    let fail = |message: String| Error::Log {
+        path: path.to_owned(),
+        message,
+    };
+    let names: Vec<String> = session.signals.iter().map(|s| s.sensor.clone()).collect();
+    if let Some(name) = names.iter().find(|n| episode.channel(n).is_none()) {
+        return Err(fail(format!("has no columns of `{name}`, which the task tracks")).into());
+    }
+    let readings = episode.select(layout, &names);
+    let width = readings.len() / episode.rows();
+    if !readings.chunks_exact(width).any(|row| row.iter().all(|x| x.is_finite())) {
+        return Err(fail(format!("no row has a reading of all of {}", names.join(", "))).into());
+    }
+    let protocol = session.task.exploration();
+    let usual = protocol.frames() as f64 * protocol.frame_period;
+    let lasts = episode.time[episode.rows() - 1] - episode.time[0];
+    if lasts > LONGEST * usual {
+        return Err(fail(format!(
+            "lasts {lasts} s, where the task's episode lasts {usual} s; is the time in seconds?"
+        ))
+        .into());
+    }
+    Ok(episode)
+}
+
+fn report(
+    session: &Session,
+    episodes: &[Episode],
+    found: &Identified,
+    names: &[String],
+    wall_s: f64,
+) -> Result<RunReport> {
+    let mut files = vec![("posterior.json", "the posterior, for `asid solve`")];
+    files.extend(names.iter().map(|n| (n.as_str(), "log of a real episode")));
+    let mut report = stage::report(session, wall_s, &files);
+    let center: Vec<f64> = session.parameters.iter().map(Parameter::center).collect();
+    let before = trace::replay(session, &episodes[0], &center, &found.starts[0])?;
+    let after = trace::replay(session, &episodes[0], &found.posterior.mean(), &found.starts[0])?;
+    report.identifier.clone_from(&session.config.identifier.name);
+    report.real_world = RealWorld {
+        engine: "logs".into(),
+        ..RealWorld::default()
+    };
+    report.parameters = trace::parameters(session, None, &found.posterior, Some(&found.iterations));
+    report.episode = Some(trace::episode(session, &episodes[0]));
+    report.signals = trace::tracked(session, &episodes[0], Some((&before, &after)));
+    if episodes.len() > 1 {
+        report.notes.push(format!("{} episodes were fitted together; the first is shown", episodes.len()));
+    }
+    if found.residual > UNEXPLAINED {
+        report.notes.push(unexplained(found.residual));
+    }
+    Ok(report)
+}

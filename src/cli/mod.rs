@@ -16,6 +16,7 @@ mod result;
 mod run;
 mod session;
 mod solve;
+mod stage;
 mod trace;
 
 use std::process::ExitCode;
@@ -55,6 +56,10 @@ enum Command {
 /// Runs the command line of this process.
 #[must_use]
 pub fn main() -> ExitCode {
+    failure::guard(dispatch)
+}
+
+fn dispatch() -> ExitCode {
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         Err(error) => return failure::usage(&error),

@@ -2,6 +2,16 @@
 
 use std::path::PathBuf;
 
+/// Most threads that may be asked for.
+const MAX_THREADS: usize = 1024;
+
+fn threads(text: &str) -> Result<usize, String> {
+    text.parse()
+        .ok()
+        .filter(|n| (1..=MAX_THREADS).contains(n))
+        .ok_or_else(|| format!("not a whole number from 1 to {MAX_THREADS}"))
+}
+
 /// Options of every subcommand that works.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub struct Common {
@@ -9,10 +19,10 @@ pub struct Common {
     #[arg(long, value_name = "NAME")]
     pub backend: Option<String>,
     /// Seed of all chance
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
     pub seed: Option<u64>,
     /// Threads; results do not depend on it [default: one a core]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = threads)]
     pub threads: Option<usize>,
     /// Settings from a file, such as a run's config.toml
     #[arg(long, value_name = "FILE.toml")]

@@ -1,13 +1,13 @@
 //! `result.json`.
 
-use asid_core::pipeline::RunOutcome;
+use asid_core::pipeline::{EpisodeInformation, RunOutcome};
 use asid_core::posterior::Marginal;
 use serde::Serialize;
 
 use super::session::Session;
 
 /// Layout version.
-const SCHEMA: u32 = 1;
+pub const SCHEMA: u32 = 1;
 
 /// An unknown: truth where it is known, estimate and interval.
 #[derive(Serialize)]
@@ -34,14 +34,28 @@ impl ParameterResult {
     }
 }
 
+/// What the exploration tells about the unknowns.
 #[derive(Serialize)]
-struct ExplorationResult {
+pub struct ExplorationResult {
     objective: String,
     expected_std: Vec<f64>,
     a_optimality: f64,
     log_det: f64,
     trace: f64,
     contact_fraction: f64,
+}
+
+impl ExplorationResult {
+    pub fn new(objective: &str, information: &EpisodeInformation, contact_fraction: f64) -> Self {
+        Self {
+            objective: objective.to_owned(),
+            expected_std: information.expected_std.last().cloned().unwrap_or_default(),
+            a_optimality: information.a_optimality,
+            log_det: information.log_det,
+            trace: information.trace,
+            contact_fraction,
+        }
+    }
 }
 
 #[derive(Serialize)]
@@ -96,7 +110,6 @@ pub struct RunResult {
 impl RunResult {
     pub fn new(session: &Session, truth: &[f64], outcome: &RunOutcome, wall_s: f64) -> Self {
         let config = &session.config;
-        let information = &outcome.information;
         Self {
             schema: SCHEMA,
             task: config.task.clone(),
@@ -112,14 +125,11 @@ impl RunResult {
                 .zip(truth)
                 .map(|(m, &t)| ParameterResult::new(m, Some(t)))
                 .collect(),
-            exploration: ExplorationResult {
-                objective: outcome.objective.clone(),
-                expected_std: information.expected_std.last().cloned().unwrap_or_default(),
-                a_optimality: information.a_optimality,
-                log_det: information.log_det,
-                trace: information.trace,
-                contact_fraction: outcome.real.as_ref().map_or(0.0, |r| r.contact_fraction),
-            },
+            exploration: ExplorationResult::new(
+                &outcome.objective,
+                &outcome.information,
+                outcome.real.as_ref().map_or(0.0, |r| r.contact_fraction),
+            ),
             downstream: DownstreamResult {
                 metric: session.task.downstream().metric.clone(),
                 value: outcome.attempt.outcome.value,

@@ -8,7 +8,7 @@ use asid_core::registry::{self, BackendEntry, Entry, TaskEntry};
 use asid_core::signal::Signal;
 use asid_core::{Backend, Capabilities, Error, Model, Parameter, Problem, Scene, SimulatedWorld, Streams, Task};
 
-use super::config::Config;
+use super::config::{Config, Stage};
 use super::options::{Algorithms, Common, Real};
 use super::progress::Bars;
 use super::result::CostResult;
@@ -29,11 +29,22 @@ pub struct Session {
 }
 
 impl Session {
+    /// Opens a task for the whole pipeline; see [`Session::open_stage`].
+    pub fn open(task: &str, common: &Common, algorithms: &Algorithms, real: &Real) -> Result<Self> {
+        Self::open_stage(Stage::Run, task, common, algorithms, real)
+    }
+
     /// Finds the task and the engine, resolves the settings, loads the scene and
     /// checks that every unknown acts.
-    pub fn open(task: &str, common: &Common, algorithms: &Algorithms, real: &Real) -> Result<Self> {
+    pub fn open_stage(
+        stage: Stage,
+        task: &str,
+        common: &Common,
+        algorithms: &Algorithms,
+        real: &Real,
+    ) -> Result<Self> {
         let task = (registry::find::<TaskEntry>(task)?.make)()?;
-        let (config, parameters) = Config::resolve(&*task, common, algorithms, real)?;
+        let (config, parameters) = Config::resolve(stage, &*task, common, algorithms, real)?;
         let backend = backend(&config.backend)?;
         require(&*backend, task.requires())?;
         let model = backend.load(task.scene())?;
@@ -85,6 +96,12 @@ impl Session {
             physics_counter: &self.physics_steps,
             env_counter: &self.env_steps,
         }
+    }
+
+    /// The start pose of a stage that is told it, in the order of its coordinates.
+    pub fn start(&self) -> Vec<f64> {
+        let coordinates = self.config.command.start(&*self.task).iter();
+        coordinates.filter_map(|c| self.config.start.get(&c.name).copied()).collect()
     }
 
     /// The hidden truth: as given, and drawn from the prior by the seed otherwise.

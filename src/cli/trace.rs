@@ -2,9 +2,12 @@
 
 use anyhow::Result;
 use asid_core::parameter::Scale;
-use asid_core::pipeline::RunOutcome;
+use asid_core::explore::CurvePoint;
+use asid_core::pipeline::{EpisodeInformation, RunOutcome};
+use asid_core::real_world::Attempt;
 use asid_core::replay::Replay as Replayed;
 use asid_core::signal::yaw;
+use asid_core::solve::Trial;
 use asid_core::task::Outline;
 use asid_report::run as r;
 
@@ -45,16 +48,14 @@ pub fn run_report(
         parameters: parameters(session, Some(truth), &outcome.belief, outcome.identified.as_ref().map(|f| &*f.iterations)),
         episode: outcome.real.as_ref().map(|real| episode(session, &real.episode)),
         signals: signals(session, outcome)?,
-        exploration: exploration(session, outcome),
-        learning: (!outcome.curve.is_empty()).then(|| r::LearningCurve {
-            x_label: outcome.curve_label.to_owned(),
-            y_label: "return".into(),
-            x: outcome.curve.iter().map(|p| p.x).collect(),
-            mean: outcome.curve.iter().map(|p| p.mean).collect(),
-            std: outcome.curve.iter().map(|p| p.std).collect(),
-            best: Vec::new(),
-        }),
-        downstream: Some(downstream(session, outcome)),
+        exploration: exploration(
+            session,
+            &outcome.objective,
+            &outcome.information,
+            outcome.real.as_ref().map(|r| r.contact_fraction),
+        ),
+        learning: learning(&outcome.curve, outcome.curve_label),
+        downstream: Some(downstream(session, &outcome.attempt, &outcome.trials)),
         costs: outcome
             .costs
             .iter()
@@ -67,31 +68,54 @@ pub fn run_report(
         wall_s,
         physics_steps: cost.physics_steps,
         env_steps: cost.env_steps,
-        versions: [
-            ("asid", env!("CARGO_PKG_VERSION").to_owned()),
-            ("engine", session.engine.clone()),
-            ("git", env!("ASID_GIT").to_owned()),
-        ]
-        .map(|(name, value)| r::NamedText {
-            name: name.into(),
-            value,
-        })
-        .into(),
+        versions: versions(session),
         command,
-        files: [
+        files: files(&[
             ("result.json", "the figures"),
             ("config.toml", "all settings; `--config` with it repeats the run"),
             ("real.csv", "log of the real episode"),
             ("policy.json", "the exploration policy"),
             ("posterior.json", "the posterior, for `asid solve`"),
             ("trace.json", "the data of this report"),
-        ]
-        .map(|(name, what)| r::FileEntry {
-            name: name.into(),
-            what: what.into(),
-        })
-        .into(),
+        ]),
         ..r::RunReport::default()
+    })
+}
+
+/// What made the result.
+pub fn versions(session: &Session) -> Vec<r::NamedText> {
+    [
+        ("asid", env!("CARGO_PKG_VERSION").to_owned()),
+        ("engine", session.engine.clone()),
+        ("git", env!("ASID_GIT").to_owned()),
+    ]
+    .map(|(name, value)| r::NamedText {
+        name: name.into(),
+        value,
+    })
+    .into()
+}
+
+/// Files of the folder: name and what it holds.
+pub fn files(entries: &[(&str, &str)]) -> Vec<r::FileEntry> {
+    entries
+        .iter()
+        .map(|(name, what)| r::FileEntry {
+            name: (*name).to_owned(),
+            what: (*what).to_owned(),
+        })
+        .collect()
+}
+
+/// Return over the search for a policy; `None` where it did not search.
+pub fn learning(curve: &[CurvePoint], label: &str) -> Option<r::LearningCurve> {
+    (!curve.is_empty()).then(|| r::LearningCurve {
+        x_label: label.to_owned(),
+        y_label: "return".into(),
+        x: curve.iter().map(|p| p.x).collect(),
+        mean: curve.iter().map(|p| p.mean).collect(),
+        std: curve.iter().map(|p| p.std).collect(),
+        best: Vec::new(),
     })
 }
 
@@ -289,13 +313,18 @@ pub fn replay(session: &Session, log: &asid_core::Episode, theta: &[f64], start:
     Ok(out)
 }
 
-fn exploration(session: &Session, outcome: &RunOutcome) -> Option<r::Exploration> {
-    let information = &outcome.information;
+/// What an episode tells about the unknowns, step by step.
+pub fn exploration(
+    session: &Session,
+    objective: &str,
+    information: &EpisodeInformation,
+    contact_fraction: Option<f64>,
+) -> Option<r::Exploration> {
     let (prior, rest) = information.expected_std.split_first()?;
     let protocol = session.task.exploration();
     let step = protocol.frames_per_step as f64 * protocol.frame_period;
     Some(r::Exploration {
-        objective: outcome.objective.clone(),
+        objective: objective.to_owned(),
         form: "trajectory".into(),
         time: (1..=rest.len()).map(|k| k as f64 * step).collect(),
         gained: information.reward.clone(),
@@ -311,13 +340,13 @@ fn exploration(session: &Session, outcome: &RunOutcome) -> Option<r::Exploration
                 value: rest.iter().map(|s| s[i]).collect(),
             })
             .collect(),
-        contact_fraction: outcome.real.as_ref().map(|r| r.contact_fraction),
+        contact_fraction,
     })
 }
 
-fn downstream(session: &Session, outcome: &RunOutcome) -> r::Downstream {
+/// An attempt at the task and how its action was found.
+pub fn downstream(session: &Session, attempt: &Attempt, trials: &[Trial]) -> r::Downstream {
     let protocol = session.task.downstream();
-    let attempt = &outcome.attempt;
     let series = session.task.metric(&attempt.readings);
     let label = protocol.metric.split('_').next().unwrap_or_default().to_owned();
     let width = attempt.readings.len() / protocol.frames;
@@ -355,8 +384,7 @@ fn downstream(session: &Session, outcome: &RunOutcome) -> r::Downstream {
                 .collect(),
             cost_label: format!("expected {label}, with penalties"),
             cost_unit: protocol.unit.clone(),
-            trials: outcome
-                .trials
+            trials: trials
                 .iter()
                 .map(|t| r::Trial {
                     iteration: t.iteration as u32,
