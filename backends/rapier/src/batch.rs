@@ -7,7 +7,9 @@ use std::sync::Arc;
 
 use asid_core::layout::{Channel, Layout};
 use asid_core::simulator::{ParameterChange, check_sims};
-use asid_core::{BatchConfig, Control, Error, Recording, Result, Rollout, Simulator, Snapshot, Status, Target};
+use asid_core::{
+    BatchConfig, Control, Error, Recording, Result, Rollout, Simulator, Snapshot, Status, Target,
+};
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
@@ -37,7 +39,9 @@ fn shape(message: String) -> Error {
 
 fn expect(have: usize, want: usize, what: &str) -> Result<()> {
     if have != want {
-        return Err(shape(format!("{what} has {have} values where {want} are needed")));
+        return Err(shape(format!(
+            "{what} has {have} values where {want} are needed"
+        )));
     }
     Ok(())
 }
@@ -76,8 +80,8 @@ impl Batch {
     }
 
     /// Runs `work` for each of some simulations with its row, in parallel.
-    fn for_each<'a, T: Send>(
-        &'a mut self,
+    fn for_each<T: Send>(
+        &mut self,
         sims: &[usize],
         rows: Vec<T>,
         work: impl Fn(&Compiled, usize, &mut World, T) + Sync,
@@ -183,7 +187,12 @@ impl Simulator for Batch {
     }
 
     fn rollout(&mut self, rollout: &Rollout<'_>, out: &mut [f64]) -> Result<()> {
-        rollout.check(&self.compiled.layout, self.worlds.len(), self.columns.len(), out)?;
+        rollout.check(
+            &self.compiled.layout,
+            self.worlds.len(),
+            self.columns.len(),
+            out,
+        )?;
         self.check_recording(rollout.record)?;
         self.check_changes(rollout.changes)?;
         let (frames, width) = (rollout.frames, rollout.record.width());
@@ -228,7 +237,11 @@ impl Simulator for Batch {
                     };
                     world.step(compiled, &input);
                 }
-                world.read(compiled, rollout.record, &mut out[frame * width..(frame + 1) * width]);
+                world.read(
+                    compiled,
+                    rollout.record,
+                    &mut out[frame * width..(frame + 1) * width],
+                );
             }
         };
         self.for_each(rollout.sims, rows, run);
@@ -264,7 +277,10 @@ impl Simulator for Batch {
             .filter(|s| Arc::ptr_eq(&s.compiled, &self.compiled))
             .ok_or_else(|| shape("the snapshot is of another scene or engine".into()))?;
         if let Some(row) = rows.iter().find(|&&r| r >= saved.states.len()) {
-            return Err(shape(format!("row {row} of a snapshot of {}", saved.states.len())));
+            return Err(shape(format!(
+                "row {row} of a snapshot of {}",
+                saved.states.len()
+            )));
         }
         self.for_each(sims, rows.to_vec(), |compiled, _, world, row| {
             world.adopt(compiled, &saved.states[row]);
@@ -275,7 +291,10 @@ impl Simulator for Batch {
     fn copy_state(&mut self, from: &[usize], to: &[usize]) -> Result<()> {
         check_sims(to, self.worlds.len())?;
         expect(from.len(), to.len(), "from")?;
-        if let Some(i) = from.iter().find(|&&f| f >= self.worlds.len() || to.contains(&f)) {
+        if let Some(i) = from
+            .iter()
+            .find(|&&f| f >= self.worlds.len() || to.contains(&f))
+        {
             return Err(shape(format!("simulation {i} cannot be copied from")));
         }
         for (&source, &target) in from.iter().zip(to) {

@@ -12,7 +12,8 @@ use mjcf_rs::extras::ActuatorKind;
 use nalgebra::{UnitQuaternion, Vector3};
 use rapier3d::dynamics::{
     CCDSolver, ImpulseJointSet, IntegrationParameters, IslandManager, MassProperties,
-    MultibodyJointHandle, MultibodyJointSet, RigidBody, RigidBodyBuilder, RigidBodyHandle, RigidBodySet, SoftBodySet,
+    MultibodyJointHandle, MultibodyJointSet, RigidBody, RigidBodyBuilder, RigidBodyHandle,
+    RigidBodySet, SoftBodySet,
 };
 use rapier3d::geometry::{
     BroadPhaseBvh, ColliderHandle, ColliderSet, Group, InteractionGroups, InteractionTestMode,
@@ -134,8 +135,11 @@ impl Compiled {
             .enumerate()
             .flat_map(|(i, b)| std::iter::repeat_n(i, b.body.geoms.len()))
             .collect();
-        let pairs = PairTable::new(&model, &body_of_geom)
-            .map_err(|what| fail(format!("a contact element names {what}, which is not there")))?;
+        let pairs = PairTable::new(&model, &body_of_geom).map_err(|what| {
+            fail(format!(
+                "a contact element names {what}, which is not there"
+            ))
+        })?;
         let (masses, structure) = MassModel::new(&model);
         let geom_frames = geom_frames(&model);
         let sensors = SensorSlot::of_scene(&model, &layout);
@@ -159,7 +163,7 @@ impl Compiled {
         let mut robot = catch_unwind(AssertUnwindSafe(|| {
             MjcfRobot::from_model(&model, options, base)
         }))
-            .map_err(|_| fail("rapier's loader failed on it".into()))?;
+        .map_err(|_| fail("rapier's loader failed on it".into()))?;
         give_roots(&mut robot);
         let geom_index = robot.geom_name_to_collider.clone();
         let couplings = robot.joint_couplings.clone();
@@ -195,7 +199,10 @@ impl Compiled {
         for coupling in &couplings {
             let tree = |joint: usize| {
                 let child = handles.joints.get(joint).map(|j| j.link2)?;
-                state.multibodies.rigid_body_link(child).map(|l| l.multibody)
+                state
+                    .multibodies
+                    .rigid_body_link(child)
+                    .map(|l| l.multibody)
             };
             if tree(coupling.joint1) != tree(coupling.joint2) {
                 return Err(fail(
@@ -447,16 +454,14 @@ fn actuators(model: &Model, layout: &Layout) -> Result<Vec<ActuatorSlot>> {
 
 fn check_equalities(model: &Model) -> std::result::Result<(), String> {
     let body = |name: &str| {
-        model
-            .body_id_by_name(name)
-            .map(|_| ())
-            .ok_or(format!("an equality names body `{name}`, which is not there"))
+        model.body_id_by_name(name).map(|_| ()).ok_or(format!(
+            "an equality names body `{name}`, which is not there"
+        ))
     };
     let joint = |name: &str| {
-        model
-            .joint_by_name(name)
-            .map(|_| ())
-            .ok_or(format!("an equality names joint `{name}`, which is not there"))
+        model.joint_by_name(name).map(|_| ()).ok_or(format!(
+            "an equality names joint `{name}`, which is not there"
+        ))
     };
     for equality in &model.equality {
         match equality {

@@ -15,8 +15,8 @@ use mjcf_rs::Model;
 use rapier3d::dynamics::RigidBody;
 use rapier3d::geometry::{ColliderSet, NarrowPhase, SolverFlags};
 use rapier3d::math::Vector;
-use rapier3d::utils::AngularInertiaOps;
 use rapier3d::pipeline::{ContactModificationContext, PairFilterContext, PhysicsHooks};
+use rapier3d::utils::AngularInertiaOps;
 
 use crate::slip::Sides;
 
@@ -190,7 +190,11 @@ impl PhysicsHooks for Hooks<'_> {
             let sides = Sides::new(bodies, sides, links, apart, *rigid.normal);
             for contact in rigid.solver_contacts.iter_mut() {
                 let point = (contact.contact_id[0] & !NEW_CONTACT) as usize;
-                let impulse = rigid.manifold.points.get(point).map_or(0.0, |p| p.data.impulse);
+                let impulse = rigid
+                    .manifold
+                    .points
+                    .get(point)
+                    .map_or(0.0, |p| p.data.impulse);
                 sides.align(contact, impulse * *rigid.friction);
             }
         }
@@ -313,9 +317,13 @@ impl Resistance {
             for (rate, held, coefficient) in parts {
                 let bound = coefficient * load;
                 let direction = rate.normalize_or_zero();
-                let inverse = inverse_inertia(first, direction)
-                    + inverse_inertia(second, direction);
-                let stop = if inverse > 0.0 { rate / (inverse * dt) } else { Vector::ZERO };
+                let inverse =
+                    inverse_inertia(first, direction) + inverse_inertia(second, direction);
+                let stop = if inverse > 0.0 {
+                    rate / (inverse * dt)
+                } else {
+                    Vector::ZERO
+                };
                 let wanted = held - stop * STOPPING;
                 let torque = wanted.clamp_length_max(bound);
                 let sliding = torque != wanted;

@@ -60,8 +60,10 @@ impl State {
         let position = convert::vector(pose.translation);
         let local = rigid.mass_properties().local_mprops.local_com;
         let center = position + rotation * convert::vector(local);
-        let (mut linear, mut angular) =
-            (convert::vector(rigid.linvel()), convert::vector(rigid.angvel()));
+        let (mut linear, mut angular) = (
+            convert::vector(rigid.linvel()),
+            convert::vector(rigid.angvel()),
+        );
         // What rapier keeps for a link is that of an earlier substep.
         if let Some(link) = self.multibodies.rigid_body_link(handle)
             && let Some(multibody) = self.multibodies.get_multibody(link.multibody)

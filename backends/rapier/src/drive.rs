@@ -94,8 +94,10 @@ impl State {
                 continue;
             }
             let (q, v) = self.scalar(joint);
-            for (slot, (values, &ctrl)) in
-                compiled.actuators.iter().zip(tables.actuators.iter().zip(ctrl))
+            for (slot, (values, &ctrl)) in compiled
+                .actuators
+                .iter()
+                .zip(tables.actuators.iter().zip(ctrl))
             {
                 if slot.joint != index {
                     continue;
@@ -151,7 +153,10 @@ impl State {
                 (linear.stiffness, rest - joint.reference)
             } else {
                 let force = linear.at(q + joint.reference, 0.0);
-                (if force == 0.0 { 0.0 } else { CARRIER }, q + force / CARRIER)
+                (
+                    if force == 0.0 { 0.0 } else { CARRIER },
+                    q + force / CARRIER,
+                )
             };
             link.joint.set_spring(axis, stiffness as f32, rest as f32);
         }

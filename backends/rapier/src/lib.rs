@@ -1,7 +1,71 @@
 //! rapier as a backend of ASID: pure Rust, no native library.
 //!
-//! A scene goes through `rapier3d-mjcf` into rapier's multibodies, and a batch
-//! is a pool of such worlds.
+//! A scene goes through `rapier3d-mjcf` into rapier's multibodies (articulated
+//! trees in reduced coordinates) and plain rigid bodies; a batch is a set of such
+//! worlds, each stepped by one thread at a time. What the loader leaves at a
+//! game's defaults or does not know is done here: mass properties, joint forces,
+//! drives, sensors, contact rules, friction.
+//!
+//! # What it computes
+//!
+//! - Time is divided into substeps of at most 1 ms (at least two a step),
+//!   integrated semi-implicitly; each solves its constraints once, warm-started.
+//! - Springs, dampers and servos are implicit and solved together with the mass
+//!   matrix (module `drive`), so gains may be stiff. `frictionloss` is a bounded
+//!   constraint of each degree of freedom. Armature is added to the mass matrix.
+//! - Friction of contacts is Coulomb's, point by point, with MuJoCo's rules for
+//!   pairs (`condim`, `priority`, larger coefficient, `<pair>`, `<exclude>`). rapier
+//!   turns the friction of a sliding point away from its slip; module `slip`
+//!   turns it back.
+//! - Torsional and rolling friction are torques from the normal force of the step
+//!   before (module `contact`).
+//! - A state is a copy of rapier's collections and continues to the bit. Setting
+//!   a state starts from the world as built, so it has no memory.
+//!
+//! # How well
+//!
+//! | what | error against theory |
+//! |---|---|
+//! | distance that a box or a rod slides, any direction, friction 0.1 to 0.5 | 0.1 to 0.5 % |
+//! | incline: holds at 0.97 of the angle of friction, creep in 2 s | below 0.1 mm |
+//! | distance that a ball rolls out, `a = 5/7 mu_r g / R` | 0.2 % |
+//! | spin-down of a ball, `mu_t N / I` | 0.1 % |
+//! | normal force of a box at rest | 0.01 % |
+//! | sinking in of a body under its own weight | 6 µm |
+//! | energy of a pendulum of 0.5 rad in 10 s | below 2 % of the swing |
+//! | servo at half of critical damping, step response | 0.6 % of the step (backward Euler) |
+//! | slip of a 0.2 kg rod in a grip of 50 N, carried 0.6 m | 0.7 mm |
+//!
+//! # Where it differs from MuJoCo
+//!
+//! - Single precision: a derivative by differences needs steps of about a
+//!   hundredth of a parameter's range.
+//! - Contacts are equally stiff everywhere (200 Hz, overdamped): `solref` and
+//!   `solimp` are not read, and restitution is zero. Contacts do not lift a sliding
+//!   body as MuJoCo's convex cone does, so trajectories depend on parameters more
+//!   smoothly.
+//! - Bounds of sliding, spinning and rolling friction are independent; a contact
+//!   that slides resists spinning no less. A sphere touches in one point.
+//! - In contacts with a moving link the direction of friction is corrected with
+//!   the inertia of the free body alone; contacts that stick are not corrected.
+//!   A contact with a tree solves its two directions apart.
+//! - How a face shares its load between its corners is left open by statics and
+//!   comes out otherwise: the moment of a spinning rod's ends is 3 % lower.
+//! - `margin` and `gap` are not read; joint limits are hard.
+//! - Joints of one tree only are coupled by `<equality><joint>`, and linearly.
+//! - The saturation of a servo is judged by the force that it would reach at the
+//!   end of the step where MuJoCo takes that of the start.
+//! - Not simulated, and refused: `<general>` and other actuators with states,
+//!   tendons, flexes, meshes, height fields and ellipsoids in contact, fluids,
+//!   damped free joints, springs and limits of ball joints. Sensors other than
+//!   positions, orientations and velocities of frames and joints are refused when
+//!   they are asked for.
+//!
+//! # Speed
+//!
+//! A Panda with a rod in contact takes 33 to 35 thousand steps a second on one
+//! core at a step of 2 ms; most of it is the mass matrix of the arm. Saving or
+//! loading that state takes 10 µs, a third of a step.
 
 mod batch;
 mod compiled;

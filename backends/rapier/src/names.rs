@@ -15,13 +15,24 @@ pub fn layout(scene: &Scene, model: &Model) -> Result<Layout> {
     let mut joints = Vec::new();
     let (mut nq, mut nv) = (0, 0);
     for (i, entry) in model.bodies.iter().enumerate() {
-        let fallback = if i == 0 { "world".into() } else { format!("body{i}") };
-        let name = if i == 0 { None } else { entry.body.name.clone() };
+        let fallback = if i == 0 {
+            "world".into()
+        } else {
+            format!("body{i}")
+        };
+        let name = if i == 0 {
+            None
+        } else {
+            entry.body.name.clone()
+        };
         let body = name.unwrap_or(fallback);
         for joint in &entry.body.joints {
             let kind = joint_kind(joint.type_);
             joints.push(Joint {
-                name: joint.name.clone().unwrap_or(format!("joint{}", joints.len())),
+                name: joint
+                    .name
+                    .clone()
+                    .unwrap_or(format!("joint{}", joints.len())),
                 kind,
                 body: body.clone(),
                 qpos: nq,

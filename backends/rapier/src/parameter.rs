@@ -128,10 +128,12 @@ fn find<'a>(
     kind: &'static str,
     names: impl Iterator<Item = &'a str> + Clone,
 ) -> Result<usize> {
-    names
-        .clone()
-        .position(|n| n == target.name)
-        .ok_or_else(|| bad(target, Error::unknown(kind, &target.name, names).to_string()))
+    names.clone().position(|n| n == target.name).ok_or_else(|| {
+        bad(
+            target,
+            Error::unknown(kind, &target.name, names).to_string(),
+        )
+    })
 }
 
 impl Knob {
@@ -171,7 +173,9 @@ impl Knob {
                     "solref" | "solimp" => {
                         return Err(Error::Incapable {
                             backend: "rapier".into(),
-                            what: format!("set `{target}`: its contacts are equally stiff everywhere"),
+                            what: format!(
+                                "set `{target}`: its contacts are equally stiff everywhere"
+                            ),
                         });
                     }
                     _ => return Err(unknown(target, "friction, pos, mass")),
@@ -204,7 +208,12 @@ impl Knob {
                     }
                     "stiffness" => Self::Stiffness(joint),
                     "armature" => Self::Armature(joint),
-                    _ => return Err(unknown(target, "damping, frictionloss, stiffness, armature")),
+                    _ => {
+                        return Err(unknown(
+                            target,
+                            "damping, frictionloss, stiffness, armature",
+                        ));
+                    }
                 }
             }
             "actuator" => {
@@ -314,7 +323,10 @@ impl Knob {
 fn unknown(target: &Target, known: &str) -> Error {
     bad(
         target,
-        format!("`{}` of a {} is not a parameter; known: {known}", target.attribute, target.element),
+        format!(
+            "`{}` of a {} is not a parameter; known: {known}",
+            target.attribute, target.element
+        ),
     )
 }
 

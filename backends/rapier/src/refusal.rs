@@ -14,8 +14,20 @@ use roxmltree::Node;
 
 /// Elements that change the physics and that this backend lacks.
 const ELEMENTS: [&str; 14] = [
-    "tendon", "flex", "flexcomp", "composite", "plugin", "extension", "muscle", "adhesion",
-    "cylinder", "damper", "intvelocity", "dcmotor", "general", "replicate",
+    "tendon",
+    "flex",
+    "flexcomp",
+    "composite",
+    "plugin",
+    "extension",
+    "muscle",
+    "adhesion",
+    "cylinder",
+    "damper",
+    "intvelocity",
+    "dcmotor",
+    "general",
+    "replicate",
 ];
 
 /// Attributes that change the physics and that this backend or its loader lacks.
@@ -106,7 +118,8 @@ fn check_document(scene: &Scene) -> Result<()> {
         if tag == "option"
             && let Some(attribute) = fluid.iter().find(|a| {
                 node.attribute(**a).is_some_and(|v| {
-                    v.split_whitespace().any(|x| x.parse::<f64>().is_ok_and(|x| x != 0.0))
+                    v.split_whitespace()
+                        .any(|x| x.parse::<f64>().is_ok_and(|x| x != 0.0))
                 })
             })
         {
@@ -117,11 +130,26 @@ fn check_document(scene: &Scene) -> Result<()> {
         }
         if tag == "flag" {
             for attribute in node.attributes() {
-                let solver = ["warmstart", "filterparent", "refsafe", "energy", "midphase",
-                    "nativeccd", "island", "multiccd", "eulerdamp", "autoreset", "sensor",
-                    "invdiscrete", "fwdinv", "sleep"];
+                let solver = [
+                    "warmstart",
+                    "filterparent",
+                    "refsafe",
+                    "energy",
+                    "midphase",
+                    "nativeccd",
+                    "island",
+                    "multiccd",
+                    "eulerdamp",
+                    "autoreset",
+                    "sensor",
+                    "invdiscrete",
+                    "fwdinv",
+                    "sleep",
+                ];
                 let disables = attribute.value() == "disable" || attribute.name() == "override";
-                if disables && (attribute.name() == "filterparent" || !solver.contains(&attribute.name())) {
+                if disables
+                    && (attribute.name() == "filterparent" || !solver.contains(&attribute.name()))
+                {
                     return Err(refuse(
                         scene,
                         format!("cannot honour `{}` of {}", attribute.name(), place(&node)),

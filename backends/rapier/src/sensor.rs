@@ -91,10 +91,7 @@ impl SensorSlot {
         };
         let body = || layout.bodies.iter().position(|b| b == object);
         match sensor.objtype.as_deref().unwrap_or_default() {
-            "body" => body().map_or_else(
-                || missing("body", object),
-                |b| Self::Inertia(reading, b),
-            ),
+            "body" => body().map_or_else(|| missing("body", object), |b| Self::Inertia(reading, b)),
             "xbody" => body().map_or_else(
                 || missing("body", object),
                 |body| {
@@ -111,7 +108,8 @@ impl SensorSlot {
             "site" => model.site_by_name(object).map_or_else(
                 || missing("site", object),
                 |(body, i)| {
-                    let (position, rotation) = convert::parts(&model.bodies[body].body.sites[i].pose);
+                    let (position, rotation) =
+                        convert::parts(&model.bodies[body].body.sites[i].pose);
                     Self::Frame(
                         reading,
                         Frame {
@@ -152,14 +150,28 @@ impl SensorSlot {
                 let motion = state.motion(compiled, frame.body);
                 let at = motion.position + motion.rotation * frame.position;
                 let rotation = motion.rotation * frame.rotation;
-                read_frame(*reading, &at, &rotation, motion.velocity_at(&at), motion.angular, out);
+                read_frame(
+                    *reading,
+                    &at,
+                    &rotation,
+                    motion.velocity_at(&at),
+                    motion.angular,
+                    out,
+                );
             }
             Self::Geom(reading, geom) => {
                 let frame = &compiled.geom_frames[*geom];
                 let motion = state.motion(compiled, frame.body);
                 let at = motion.position + motion.rotation * state.structure.geoms[*geom].position;
                 let rotation = motion.rotation * frame.rotation;
-                read_frame(*reading, &at, &rotation, motion.velocity_at(&at), motion.angular, out);
+                read_frame(
+                    *reading,
+                    &at,
+                    &rotation,
+                    motion.velocity_at(&at),
+                    motion.angular,
+                    out,
+                );
             }
             Self::Inertia(reading, body) => {
                 let motion = state.motion(compiled, *body);

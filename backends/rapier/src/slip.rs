@@ -80,7 +80,11 @@ impl<'a> Sides<'a> {
         if largest <= 0.0 {
             return;
         }
-        let share = if self.links[0] || self.links[1] { sliding(v, k, limit) } else { 1.0 };
+        let share = if self.links[0] || self.links[1] {
+            sliding(v, k, limit)
+        } else {
+            1.0
+        };
         let scaled = [
             share * ((k[0][0] * v[0] + cross * v[1]) / largest - v[0]),
             share * ((cross * v[0] + k[1][1] * v[1]) / largest - v[1]),

@@ -12,10 +12,10 @@ use rapier3d::pipeline::PhysicsPipeline;
 
 use crate::compiled::Compiled;
 use crate::contact::{self, Hooks, Touching};
+use crate::convert;
 use crate::parameter::Tables;
 use crate::settings::MAX_SPEED;
 use crate::state::State;
-use crate::convert;
 
 /// Position beyond which a simulation counts as diverged, m.
 const MAX_POSITION: f32 = 1e4;
@@ -147,8 +147,7 @@ impl World {
             hooked = &self.force;
         }
         self.state.refresh_link_velocities(compiled);
-        self.state
-            .drive(compiled, &self.tables, &self.ctrl, hooked);
+        self.state.drive(compiled, &self.tables, &self.ctrl, hooked);
         if input.hook.is_some() {
             self.push_generalised(compiled);
         }
@@ -161,7 +160,8 @@ impl World {
 
         self.rotations.clear();
         for &body in &compiled.floating {
-            self.rotations.push(self.state.root_rotation(compiled, body));
+            self.rotations
+                .push(self.state.root_rotation(compiled, body));
         }
         let State {
             bodies,
@@ -210,7 +210,13 @@ impl World {
     }
 
     /// Adds a force (N) and a torque (N m) at a body's centre of mass for this step.
-    fn push(&mut self, compiled: &Compiled, body: usize, force: &Vector3<f64>, torque: &Vector3<f64>) {
+    fn push(
+        &mut self,
+        compiled: &Compiled,
+        body: usize,
+        force: &Vector3<f64>,
+        torque: &Vector3<f64>,
+    ) {
         let Some(handle) = compiled.bodies[body] else {
             return;
         };
@@ -269,7 +275,12 @@ impl World {
         );
         self.state.resistance = resistance;
         for (body, torque) in &torques {
-            self.push(compiled, *body, &Vector3::zeros(), &convert::vector(*torque));
+            self.push(
+                compiled,
+                *body,
+                &Vector3::zeros(),
+                &convert::vector(*torque),
+            );
         }
         self.torques = torques;
     }
@@ -326,9 +337,15 @@ impl World {
         for (i, channel) in record.channels().iter().enumerate() {
             let out = &mut row[record.range(i)];
             match *channel {
-                Channel::Sensor { index } => compiled.sensors[index].read(&self.state, compiled, out),
-                Channel::Position { start, len } => out.copy_from_slice(&self.qpos[start..start + len]),
-                Channel::Velocity { start, len } => out.copy_from_slice(&self.qvel[start..start + len]),
+                Channel::Sensor { index } => {
+                    compiled.sensors[index].read(&self.state, compiled, out)
+                }
+                Channel::Position { start, len } => {
+                    out.copy_from_slice(&self.qpos[start..start + len])
+                }
+                Channel::Velocity { start, len } => {
+                    out.copy_from_slice(&self.qvel[start..start + len])
+                }
                 Channel::ContactForce { bodies } => {
                     out[0] = contact::normal_force(
                         &self.state.narrow_phase,

@@ -32,8 +32,16 @@ fn on_incline(friction: f64, angle: f64) -> Bench {
 fn a_box_on_an_incline_slips_only_beyond_the_angle_of_friction() {
     let limit = 0.3f64.atan();
     let stays = on_incline(0.3, 0.97 * limit).run(1000, &[]);
-    assert!(stays[999][0].abs() < 1e-4, "crept {} m in 2 s", stays[999][0]);
-    assert!(stays[999][7].abs() < 1e-5, "creeps at {} m/s", stays[999][7]);
+    assert!(
+        stays[999][0].abs() < 1e-4,
+        "crept {} m in 2 s",
+        stays[999][0]
+    );
+    assert!(
+        stays[999][7].abs() < 1e-5,
+        "creeps at {} m/s",
+        stays[999][7]
+    );
     let angle = 1.05 * limit;
     let slips = on_incline(0.3, angle).run(1000, &[]);
     let acceleration = slips[999][7] - slips[499][7];
@@ -50,7 +58,11 @@ fn the_normal_force_carries_the_weight() {
     let force = rows[499][13];
     assert!((force - 0.5 * G).abs() < 1e-3, "{force} N");
     // It sinks in by g over the squared angular frequency of contacts.
-    assert!((rows[499][2] - 0.05).abs() < 5e-5, "rests at {} m", rows[499][2]);
+    assert!(
+        (rows[499][2] - 0.05).abs() < 5e-5,
+        "rests at {} m",
+        rows[499][2]
+    );
 }
 
 #[test]
@@ -89,10 +101,21 @@ fn friction_is_the_same_in_every_direction_along_a_rod() {
         bench.place(&[0., 0., 0.02, cos, 0., 0., sin], &[1., 0., 0., 0., 0., 0.]);
         let end = &bench.run(1500, &[])[1499];
         let expected = 1.0 / (2.0 * 0.2 * G);
-        assert!((end[0] / expected - 1.0).abs() < 0.01, "yaw {yaw}: {} m", end[0]);
+        assert!(
+            (end[0] / expected - 1.0).abs() < 0.01,
+            "yaw {yaw}: {} m",
+            end[0]
+        );
         // Sideways drift and turning are what friction in the wrong direction gives.
-        assert!(end[1].abs() < 0.005 * expected, "yaw {yaw}: drifts {} m", end[1]);
-        assert!((2.0 * end[6].atan2(end[3]) - yaw).abs() < 1e-3, "yaw {yaw}: turns");
+        assert!(
+            end[1].abs() < 0.005 * expected,
+            "yaw {yaw}: drifts {} m",
+            end[1]
+        );
+        assert!(
+            (2.0 * end[6].atan2(end[3]) - yaw).abs() < 1e-3,
+            "yaw {yaw}: turns"
+        );
     }
 }
 
@@ -108,7 +131,10 @@ fn a_spinning_rod_slows_by_the_moment_of_its_ends() {
     let slowing = (rows[24][12] - rows[124][12]) / 0.2;
     // Statics leave open how a box shares its load between its inner and outer
     // corners: within 5 %, where all on the inner ones would be 24 % less.
-    assert!((slowing / expected - 1.0).abs() < 0.05, "{slowing} rad/s², not {expected}");
+    assert!(
+        (slowing / expected - 1.0).abs() < 0.05,
+        "{slowing} rad/s², not {expected}"
+    );
 }
 
 /// A ball of 0.3 kg and radius 0.05 m that resists rolling and spinning.
@@ -137,7 +163,11 @@ fn a_rolling_ball_stops_where_rolling_friction_says() {
         let expected = 0.25 / (2.0 * 5.0 / 7.0 * rolling / 0.05 * G);
         let error = rows[3999][0] / expected - 1.0;
         assert!(error.abs() < 0.01, "rolling friction {rolling}: {error}");
-        assert!(rows[3999][7].abs() < 1e-6, "still rolls at {} m/s", rows[3999][7]);
+        assert!(
+            rows[3999][7].abs() < 1e-6,
+            "still rolls at {} m/s",
+            rows[3999][7]
+        );
     }
 }
 
@@ -162,7 +192,10 @@ fn a_ball_on_a_slope_rolls_only_beyond_rolling_friction() {
     let rows = bench.run(1000, &[]);
     let expected = 5.0 / 7.0 * (rolls - 0.002 / 0.05 * G);
     let acceleration = rows[999][7] - rows[499][7];
-    assert!((acceleration / expected - 1.0).abs() < 0.02, "{acceleration} against {expected}");
+    assert!(
+        (acceleration / expected - 1.0).abs() < 0.02,
+        "{acceleration} against {expected}"
+    );
 }
 
 #[test]
@@ -173,8 +206,15 @@ fn a_spinning_ball_slows_by_torsional_friction() {
         let rows = bench.run(500, &[]);
         let expected = 0.01 * G / (0.4 * 0.05 * 0.05);
         let slowing = (rows[9][12] - rows[59][12]) / 0.1;
-        assert!((slowing / expected - 1.0).abs() < 0.005, "{slowing} against {expected}");
-        assert!(rows[499][12].abs() < 1e-4, "still spins at {} rad/s", rows[499][12]);
+        assert!(
+            (slowing / expected - 1.0).abs() < 0.005,
+            "{slowing} against {expected}"
+        );
+        assert!(
+            rows[499][12].abs() < 1e-4,
+            "still spins at {} rad/s",
+            rows[499][12]
+        );
     }
 }
 
@@ -192,7 +232,10 @@ fn a_stack_of_boxes_stands() {
     let mut bench = Bench::new(&inside, &["qpos.b3", "qvel.b3"]);
     let rows = bench.run(1500, &[]);
     let top = &rows[1499];
-    assert!((top[2] - 0.35).abs() < 1e-3 && top[0].hypot(top[1]) < 1e-3, "{top:?}");
+    assert!(
+        (top[2] - 0.35).abs() < 1e-3 && top[0].hypot(top[1]) < 1e-3,
+        "{top:?}"
+    );
     assert!(top[7..].iter().all(|v| v.abs() < 1e-3), "{top:?}");
 }
 
@@ -215,7 +258,13 @@ fn contact_rules_are_mujocos() {
       <contact><exclude body1="world" body2="excluded"/></contact>"#;
     let mut bench = Bench::new(
         inside,
-        &["qpos.falls", "qpos.stands", "qpos.excluded", "qpos.arm", "contact.post/arm"],
+        &[
+            "qpos.falls",
+            "qpos.stands",
+            "qpos.excluded",
+            "qpos.arm",
+            "contact.post/arm",
+        ],
     );
     let layout = bench.simulator.layout().clone();
     let mut qpos = bench_qpos(&mut bench);
@@ -225,7 +274,11 @@ fn contact_rules_are_mujocos() {
     bench.place(&qpos, &qvel);
     let rows = bench.run(500, &[]);
     let end = &rows[499];
-    assert!(bench.simulator.status()[0].is_running(), "{:?}", bench.simulator.status());
+    assert!(
+        bench.simulator.status()[0].is_running(),
+        "{:?}",
+        bench.simulator.status()
+    );
     assert!(end[2] < -4.0, "bits that do not match met");
     // The floor's priority makes its 0.2 count and not the larger 1.
     let slid = end[7] - 1.0;

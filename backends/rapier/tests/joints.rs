@@ -21,7 +21,11 @@ fn a_body_falls_freely_and_keeps_its_spin() {
     // of mass flies straight and is 0.05 m along the body's x axis.
     let (sin, cos) = (-3.0f64).sin_cos();
     let height = 5.0 - 0.5 * G - 0.5 * G * 0.001;
-    assert!((end[2] - height).abs() < 1e-4, "z {} against {height}", end[2]);
+    assert!(
+        (end[2] - height).abs() < 1e-4,
+        "z {} against {height}",
+        end[2]
+    );
     assert!((end[0] + 0.05 * cos - 1.05).abs() < 1e-4, "x {}", end[0]);
     assert!((end[1] + 0.05 * sin).abs() < 1e-3, "y {}", end[1]);
     assert!((end[12] + 3.0).abs() < 1e-4, "spin {}", end[12]);
@@ -36,7 +40,11 @@ fn unit_torque_gives_the_expected_acceleration() {
     let inertia = 2.0 * 0.25 + 2.0 * (0.04 + 0.04) / 12.0 + 0.1;
     let mut bench = Bench::new(inside, &["qvel.j"]);
     let rows = bench.run(100, &[0.5]);
-    assert!((rows[99][0] - 0.2 / inertia).abs() < 1e-4 * 0.2 / inertia, "{}", rows[99][0]);
+    assert!(
+        (rows[99][0] - 0.2 / inertia).abs() < 1e-4 * 0.2 / inertia,
+        "{}",
+        rows[99][0]
+    );
     // A slide: one newton on two kilograms.
     let inside = r#"<option gravity="0 0 0"/><worldbody><body><joint name="j" type="slide" axis="0 1 0"/>
       <geom type="sphere" size=".1" mass="2"/></body></worldbody><actuator><motor joint="j"/></actuator>"#;
@@ -56,13 +64,25 @@ fn a_pendulum_keeps_its_energy_and_period() {
     let energy = |r: &Vec<f64>| 0.5 * inertia * r[1] * r[1] - 0.5 * G * r[0].cos();
     let depth = 0.5 * G * (1.0 - 0.5f64.cos());
     let drift = (energy(&rows[4999]) - energy(&rows[0])) / depth;
-    assert!(drift.abs() < 0.02, "energy drifts by {drift} of the swing in 10 s");
-    let mut crossings = rows.windows(2).enumerate().filter(|(_, w)| w[0][0] > 0.0 && w[1][0] <= 0.0);
-    let (first, last) = (crossings.next().unwrap().0, crossings.last().unwrap().0);
+    assert!(
+        drift.abs() < 0.02,
+        "energy drifts by {drift} of the swing in 10 s"
+    );
+    let mut crossings = rows
+        .windows(2)
+        .enumerate()
+        .filter(|(_, w)| w[0][0] > 0.0 && w[1][0] <= 0.0);
+    let (first, last) = (
+        crossings.next().unwrap().0,
+        crossings.next_back().unwrap().0,
+    );
     let period = (last - first) as f64 * 0.002 / 6.0;
     // Series of the exact period for an amplitude of 0.5 rad.
     let expected = std::f64::consts::TAU * (inertia / (0.5 * G)).sqrt() * (1.0 + 0.25 / 16.0);
-    assert!((period / expected - 1.0).abs() < 0.005, "{period} against {expected}");
+    assert!(
+        (period / expected - 1.0).abs() < 0.005,
+        "{period} against {expected}"
+    );
 }
 
 /// A servo on a hinge of inertia 0.1 kg m² without gravity.
@@ -89,7 +109,11 @@ fn a_servo_answers_a_step_like_its_differential_equation() {
         let (sin, cos) = (damped * t).sin_cos();
         let expected = 1.0 - (-zeta * omega * t).exp() * (cos + zeta * omega / damped * sin);
         // Backward Euler in substeps h = 1 ms is off by about omega h / 2.
-        assert!((row[0] - expected).abs() < 0.006, "t {t}: {} against {expected}", row[0]);
+        assert!(
+            (row[0] - expected).abs() < 0.006,
+            "t {t}: {} against {expected}",
+            row[0]
+        );
     }
 }
 
@@ -115,7 +139,11 @@ fn a_limited_servo_pushes_with_its_limit() {
     // Then it follows 1 - q, with a command that is clamped to 1 as well, and
     // never changes its force by more than its limits in one step.
     assert!((rows[5999][0] - 1.0).abs() < 1e-3, "{} rad", rows[5999][0]);
-    assert!(rows[1000..].iter().all(|r| (r[1] - (1.0 - r[0])).abs() < 0.01));
+    assert!(
+        rows[1000..]
+            .iter()
+            .all(|r| (r[1] - (1.0 - r[0])).abs() < 0.01)
+    );
 }
 
 #[test]
@@ -190,7 +218,10 @@ fn a_ball_joint_turns_like_a_free_top() {
         .map(|(a, b)| a * b)
         .sum();
     assert!(1.0 - dot.abs() < 1e-5, "{end:?} against {expected:?}");
-    assert!((end[4] - 0.4).abs() < 1e-3 && (end[6] + 0.6).abs() < 1e-3, "{end:?}");
+    assert!(
+        (end[4] - 0.4).abs() < 1e-3 && (end[6] + 0.6).abs() < 1e-3,
+        "{end:?}"
+    );
     assert_eq!(end[..7], end[7..]);
 }
 
@@ -206,7 +237,8 @@ fn a_floating_tree_keeps_its_momentum() {
     let mut qpos = vec![0.0; 8];
     qpos[3] = 1.0;
     bench.place(&qpos, &[0.2, 0.0, 0.0, 0.0, 0.0, 2.0, -1.0]);
-    let center = |r: &[f64]| -> Vec<f64> { (0..3).map(|i| (r[i] + 0.5 * r[3 + i]) / 1.5).collect() };
+    let center =
+        |r: &[f64]| -> Vec<f64> { (0..3).map(|i| (r[i] + 0.5 * r[3 + i]) / 1.5).collect() };
     let start = center(&bench.read());
     let rows = bench.run(1000, &[]);
     let (half, end) = (center(&rows[499]), center(&rows[999]));

@@ -68,7 +68,10 @@ fn every_parameter_acts() {
         let model = Rapier.load(&scene(SCENE)).unwrap();
         let parsed: Target = target.parse().unwrap();
         let now = model.nominal(&parsed).unwrap();
-        nominal.simulator.set_parameters(&[0, 1], &[now, value]).unwrap();
+        nominal
+            .simulator
+            .set_parameters(&[0, 1], &[now, value])
+            .unwrap();
         let layout = nominal.simulator.layout().clone();
         let mut qvel = vec![0.0; 2 * layout.nv];
         for sim in 0..2 {
@@ -76,7 +79,9 @@ fn every_parameter_acts() {
             v[..6].copy_from_slice(&[0.5, 0., 0., 0., 0., 5.]);
             v[6..12].copy_from_slice(&[0.5, 0., 0., 0., 10., 5.]);
         }
-        let one = [0., 0., 0.05, 1., 0., 0., 0., 1., 0., 0.05, 1., 0., 0., 0., 0.];
+        let one = [
+            0., 0., 0.05, 1., 0., 0., 0., 1., 0., 0.05, 1., 0., 0., 0., 0.,
+        ];
         let qpos = [one, one].concat();
         nominal.simulator.set_state(&[0, 1], &qpos, &qvel).unwrap();
         let rows = nominal.run(200, &[0.2]);
@@ -88,7 +93,11 @@ fn every_parameter_acts() {
         assert!(gap > 1e-4, "{target} changes `{channel}` by {gap}");
         // Setting the nominal value changes nothing, to the bit.
         let untouched = value_after(target, None, channel, 200);
-        assert_eq!(untouched, value_after(target, Some(now), channel, 200), "{target}");
+        assert_eq!(
+            untouched,
+            value_after(target, Some(now), channel, 200),
+            "{target}"
+        );
         assert_eq!(untouched, rows[199][0], "{target}");
     }
 }
@@ -102,7 +111,13 @@ fn a_mass_off_the_middle_loads_that_side() {
       <body name="beam" pos="0 0 0.12"><freejoint name="beam"/><geom type="box" size=".15 .02 .02" mass="0.1"/>
         <geom name="weight" type="sphere" size=".01" mass="0.4" contype="0" conaffinity="0"/></body></worldbody>"#;
     let channels = ["contact.left/beam", "contact.right/beam"];
-    let mut bench = Bench::with(&scene(inside), &channels, 1, 1, &["geom/weight/pos/0", "geom/weight/mass"]);
+    let mut bench = Bench::with(
+        &scene(inside),
+        &channels,
+        1,
+        1,
+        &["geom/weight/pos/0", "geom/weight/mass"],
+    );
     bench.simulator.set_parameters(&[0], &[0.05, 0.6]).unwrap();
     let end = bench.run(500, &[]).pop().unwrap();
     // Feet bear somewhere over their 0.02 m width: moments are known to that.
@@ -167,7 +182,10 @@ fn targets_that_make_no_sense_are_refused() {
         ("option/wind/0", "no such parameter"),
     ] {
         let error = refused(target);
-        assert!(matches!(error, Error::Parameter { .. }), "{target}: {error}");
+        assert!(
+            matches!(error, Error::Parameter { .. }),
+            "{target}: {error}"
+        );
         assert!(error.to_string().contains(says), "{target}: {error}");
     }
     for target in ["geom/crate/solref/0", "joint/crate/damping"] {

@@ -64,12 +64,25 @@ fn sensors_read_frames_where_they_are() {
         <jointvel name="jv" joint="j"/><gyro name="gyro" site="s"/><velocimeter name="v" site="s"/>
         <clock name="clock"/><torque name="torque" site="s"/>
       </sensor>"#;
-    let names = ["site", "site_v", "geom", "inertia", "inertia_v", "w", "frame", "z", "jv", "gyro", "v", "clock"];
+    let names = [
+        "site",
+        "site_v",
+        "geom",
+        "inertia",
+        "inertia_v",
+        "w",
+        "frame",
+        "z",
+        "jv",
+        "gyro",
+        "v",
+        "clock",
+    ];
     let mut bench = Bench::new(inside, &names);
     bench.place(&[std::f64::consts::FRAC_PI_2], &[2.0]);
     let expected = [
-        0., 1., 1., -2., 0., 0., 0., 0.5, 1., 0., 0.5, 1., -1., 0., 0., 0., 0., 2., 0., 0., 1., 0., 0., -1., 2.,
-        0., 0., -2., 0., -2., 0., 0.,
+        0., 1., 1., -2., 0., 0., 0., 0.5, 1., 0., 0.5, 1., -1., 0., 0., 0., 0., 2., 0., 0., 1., 0.,
+        0., -1., 2., 0., 0., -2., 0., -2., 0., 0.,
     ];
     let read = bench.read();
     for (i, (a, b)) in read.iter().zip(expected).enumerate() {
@@ -80,8 +93,14 @@ fn sensors_read_frames_where_they_are() {
     assert!((row[3].hypot(row[4]) - 2.0).abs() < 1e-4 && (row[31] - 0.02).abs() < 1e-9);
     // What it cannot read is refused when it is asked for.
     let record = bench.simulator.layout().recording(&["torque"]).unwrap();
-    let error = bench.simulator.read(&[0], &record, &mut [0.0; 3]).unwrap_err();
-    assert!(error.to_string().contains("read sensor `torque`"), "{error}");
+    let error = bench
+        .simulator
+        .read(&[0], &record, &mut [0.0; 3])
+        .unwrap_err();
+    assert!(
+        error.to_string().contains("read sensor `torque`"),
+        "{error}"
+    );
 }
 
 #[test]

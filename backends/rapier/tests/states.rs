@@ -27,7 +27,14 @@ const BUSY: &str = r#"<option timestep="0.002"/>
   <actuator><position joint="reach" kp="400" kv="40" forcerange="-20 20"/><position joint="yaw" kp="100" kv="10"/></actuator>"#;
 
 const CHANNELS: [&str; 8] = [
-    "qpos.yaw", "qpos.reach", "qpos.crate", "qvel.crate", "qpos.ball", "qvel.ball", "qpos.rider", "contact.finger/crate",
+    "qpos.yaw",
+    "qpos.reach",
+    "qpos.crate",
+    "qvel.crate",
+    "qpos.ball",
+    "qvel.ball",
+    "qpos.rider",
+    "contact.finger/crate",
 ];
 
 const PUSH: [f64; 2] = [0.2, 0.1];
@@ -43,7 +50,10 @@ fn bits(rows: &[Vec<f64>]) -> Vec<u64> {
 #[test]
 fn the_scene_is_busy() {
     let rows = busy(1, 1, &[]).run(400, &PUSH);
-    assert!(rows.iter().any(|r| *r.last().unwrap() > 0.5), "the finger touches nothing");
+    assert!(
+        rows.iter().any(|r| *r.last().unwrap() > 0.5),
+        "the finger touches nothing"
+    );
     assert!(rows[399][2] > 0.02, "the crate stays");
     assert!(rows[399][15] > 0.14, "the ball stays");
 }
@@ -58,11 +68,18 @@ fn a_loaded_state_goes_on_to_the_bit() {
     assert_eq!(bits(&on[..200]), bits(&on[200..400]));
     // Into a simulation with another past, and back into the same one.
     bench.simulator.reset(&[1]).unwrap();
-    bench.simulator.load(&saved, &[0, 0, 0], &[0, 1, 2]).unwrap();
+    bench
+        .simulator
+        .load(&saved, &[0, 0, 0], &[0, 1, 2])
+        .unwrap();
     assert_eq!(bench.read(), before);
     let again = bench.run(200, &PUSH);
     for sim in 0..3 {
-        assert_eq!(bits(&on[..200]), bits(&again[sim * 200..][..200]), "simulation {sim}");
+        assert_eq!(
+            bits(&on[..200]),
+            bits(&again[sim * 200..][..200]),
+            "simulation {sim}"
+        );
     }
 }
 
@@ -70,7 +87,10 @@ fn a_loaded_state_goes_on_to_the_bit() {
 fn a_copied_state_goes_on_to_the_bit() {
     let mut bench = busy(2, 1, &[]);
     bench.run(100, &PUSH);
-    bench.simulator.set_state(&[1], &[0.1; 30], &[0.0; 26]).unwrap();
+    bench
+        .simulator
+        .set_state(&[1], &[0.1; 30], &[0.0; 26])
+        .unwrap();
     bench.run(5, &PUSH);
     bench.simulator.copy_state(&[0], &[1]).unwrap();
     let rows = bench.run(200, &PUSH);
@@ -79,7 +99,11 @@ fn a_copied_state_goes_on_to_the_bit() {
 
 #[test]
 fn a_loaded_state_takes_its_own_parameters() {
-    let targets = ["geom/crate/mass", "geom/ball/friction/0", "joint/reach/damping"];
+    let targets = [
+        "geom/crate/mass",
+        "geom/ball/friction/0",
+        "joint/reach/damping",
+    ];
     let mut bench = busy(2, 1, &targets);
     let own = [0.4, 1.0, 0.0, 0.8, 0.1, 5.0];
     bench.simulator.set_parameters(&[0, 1], &own).unwrap();
@@ -89,7 +113,10 @@ fn a_loaded_state_takes_its_own_parameters() {
     let apart = bench.run(200, &PUSH);
     assert_ne!(bits(&apart[..200]), bits(&apart[200..]));
     // The same as parameters set after loading.
-    bench.simulator.set_parameters(&[0, 1], &[0.4, 1.0, 0.0, 0.4, 1.0, 0.0]).unwrap();
+    bench
+        .simulator
+        .set_parameters(&[0, 1], &[0.4, 1.0, 0.0, 0.4, 1.0, 0.0])
+        .unwrap();
     bench.simulator.load(&saved, &[0, 0], &[0, 1]).unwrap();
     bench.simulator.set_parameters(&[0, 1], &own).unwrap();
     assert_eq!(bits(&bench.run(200, &PUSH)), bits(&apart));
@@ -101,7 +128,11 @@ fn a_set_state_has_no_memory() {
     let layout = bench.simulator.layout().clone();
     let start = busy(1, 1, &[]).simulator.layout().clone();
     assert_eq!(layout, start);
-    let joints: Vec<String> = layout.joints.iter().map(|j| format!("qpos.{}", j.name)).collect();
+    let joints: Vec<String> = layout
+        .joints
+        .iter()
+        .map(|j| format!("qpos.{}", j.name))
+        .collect();
     let record = layout.recording(&joints).unwrap();
     let mut qpos = vec![0.0; record.width()];
     bench.simulator.read(&[0], &record, &mut qpos).unwrap();
@@ -110,7 +141,10 @@ fn a_set_state_has_no_memory() {
     bench.run(130, &PUSH);
     bench.simulator.reset(&[1]).unwrap();
     let both = [qpos.clone(), qpos].concat();
-    bench.simulator.set_state(&[0, 1], &both, &[qvel.clone(), qvel].concat()).unwrap();
+    bench
+        .simulator
+        .set_state(&[0, 1], &both, &[qvel.clone(), qvel].concat())
+        .unwrap();
     let rows = bench.run(200, &PUSH);
     assert_eq!(bits(&rows[..200]), bits(&rows[200..]));
 }
@@ -161,7 +195,13 @@ fn a_simulation_that_diverges_stops_alone() {
     let layout = bench.simulator.layout().clone();
     let record = layout.recording(&CHANNELS).unwrap();
     let wrench: Vec<f64> = (0..3 * 50)
-        .flat_map(|i| if i / 50 == 1 { [1e30, 0., 0., 0., 1e30, 0.] } else { [0.0; 6] })
+        .flat_map(|i| {
+            if i / 50 == 1 {
+                [1e30, 0., 0., 0., 1e30, 0.]
+            } else {
+                [0.0; 6]
+            }
+        })
         .collect();
     let forces = [ExternalForce {
         body: layout.body("crate").unwrap(),
@@ -174,7 +214,11 @@ fn a_simulation_that_diverges_stops_alone() {
     bench.simulator.rollout(&rollout, &mut out).unwrap();
     let status = bench.simulator.status();
     assert!(status[0].is_running() && status[2].is_running());
-    assert!(matches!(status[1], Status::Diverged { .. }), "{:?}", status[1]);
+    assert!(
+        matches!(status[1], Status::Diverged { .. }),
+        "{:?}",
+        status[1]
+    );
     let rows: Vec<_> = out.chunks(50 * record.width()).collect();
     // Finite, then not a number to the end.
     let first = rows[1].iter().position(|x| x.is_nan()).unwrap();
@@ -216,11 +260,20 @@ fn hooks_and_external_forces_push_alike() {
     let inertia = 0.4 * 0.02 / 12.0;
     // One second of a constant force and torque; the changed command acts as well.
     assert!((out[693] - 2.0).abs() < 1e-3, "{}", out[693]);
-    assert!((out[698] / (0.001 / inertia) - 1.0).abs() < 1e-3, "{}", out[698]);
+    assert!(
+        (out[698] / (0.001 / inertia) - 1.0).abs() < 1e-3,
+        "{}",
+        out[698]
+    );
     assert!((out[699] + 0.1).abs() < 1e-3, "{}", out[699]);
 
     bench.simulator.reset(&[0]).unwrap();
-    let wrench: Vec<f64> = [0.8, 0., 0., 0., 0., 0.001].iter().copied().cycle().take(600).collect();
+    let wrench: Vec<f64> = [0.8, 0., 0., 0., 0., 0.001]
+        .iter()
+        .copied()
+        .cycle()
+        .take(600)
+        .collect();
     let forces = [ExternalForce {
         body: layout.body("crate").unwrap(),
         wrench: &wrench,
@@ -229,7 +282,12 @@ fn hooks_and_external_forces_push_alike() {
     let mut rollout = Rollout::new(&[0], 100, 5, Control::Shared(&[0.0; 100]), &record);
     rollout.forces = &forces;
     bench.simulator.rollout(&rollout, &mut pushed).unwrap();
-    for (i, (a, b)) in out.iter().zip(&pushed).enumerate().filter(|(i, _)| i % 7 != 6) {
+    for (i, (a, b)) in out
+        .iter()
+        .zip(&pushed)
+        .enumerate()
+        .filter(|(i, _)| i % 7 != 6)
+    {
         assert!((a - b).abs() < 1e-4, "entry {i}: {a} against {b}");
     }
     assert_eq!(bench.simulator.steps_taken(), 1000);

@@ -22,7 +22,13 @@ impl Bench {
         Self::with(&scene(inside), channels, 1, 1, &[])
     }
 
-    pub fn with(scene: &Scene, channels: &[&str], size: usize, threads: usize, targets: &[&str]) -> Self {
+    pub fn with(
+        scene: &Scene,
+        channels: &[&str],
+        size: usize,
+        threads: usize,
+        targets: &[&str],
+    ) -> Self {
         let model = Rapier.load(scene).unwrap();
         let targets: Vec<Target> = targets.iter().map(|t| t.parse().unwrap()).collect();
         let config = BatchConfig {
@@ -43,13 +49,20 @@ impl Bench {
     /// Runs all simulations under one constant command and gives every frame's
     /// row, simulation after simulation.
     pub fn run(&mut self, frames: usize, ctrl: &[f64]) -> Vec<Vec<f64>> {
-        let controls: Vec<f64> = ctrl.iter().copied().cycle().take(frames * ctrl.len()).collect();
+        let controls: Vec<f64> = ctrl
+            .iter()
+            .copied()
+            .cycle()
+            .take(frames * ctrl.len())
+            .collect();
         let record = self.simulator.layout().recording(&self.channels).unwrap();
         let sims = self.all();
         let mut out = vec![0.0; sims.len() * frames * record.width()];
         let rollout = Rollout::new(&sims, frames, 1, Control::Shared(&controls), &record);
         self.simulator.rollout(&rollout, &mut out).unwrap();
-        out.chunks(record.width().max(1)).map(<[f64]>::to_vec).collect()
+        out.chunks(record.width().max(1))
+            .map(<[f64]>::to_vec)
+            .collect()
     }
 
     pub fn read(&mut self) -> Vec<f64> {
