@@ -4,29 +4,24 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
 use asid_core::layout::{JointKind, Layout};
-use asid_core::mass::GeomMass;
 use asid_core::{Error, Result, Scene, Status};
-use mjcf_rs::Model;
-use mjcf_rs::equality::Equality;
 use mjcf_rs::extras::ActuatorKind;
 use nalgebra::{UnitQuaternion, Vector3};
 use rapier3d::dynamics::{
     CCDSolver, ImpulseJointSet, IntegrationParameters, IslandManager, MassProperties,
-    MultibodyJointHandle, MultibodyJointSet, RigidBody, RigidBodyBuilder, RigidBodyHandle,
-    RigidBodySet, SoftBodySet,
+    MultibodyJointHandle, MultibodyJointSet, RigidBody, RigidBodyHandle, RigidBodySet, SoftBodySet,
 };
 use rapier3d::geometry::{
-    BroadPhaseBvh, ColliderHandle, ColliderSet, Group, InteractionGroups, InteractionTestMode,
-    NarrowPhase,
+    BroadPhaseBvh, ColliderHandle, ColliderSet, InteractionGroups, NarrowPhase,
 };
-use rapier3d_mjcf::{MjcfBody, MjcfLoaderOptions, MjcfMultibodyOptions, MjcfRobot};
+use rapier3d_mjcf::{MjcfLoaderOptions, MjcfMultibodyOptions, MjcfRobot};
 
 use crate::contact::{PairTable, Resistance};
 use crate::parameter::Tables;
 use crate::sensor::SensorSlot;
 use crate::state::State;
 use crate::structure::{Inertia, MassModel};
-use crate::{convert, names, refusal, settings};
+use crate::{convert, document, names, refusal, settings};
 
 /// A joint's place in rapier.
 #[derive(Clone, Debug)]
@@ -141,18 +136,18 @@ impl Compiled {
             ))
         })?;
         let (masses, structure) = MassModel::new(&model);
-        let geom_frames = geom_frames(&model);
+        let geom_frames = document::geom_frames(&model);
         let sensors = SensorSlot::of_scene(&model, &layout);
-        let actuators = actuators(&model, &layout)?;
+        let actuators = document::actuators(&model, &layout)?;
         let nominal = Tables::new(&model, structure.clone());
         let start = match layout.keyframes.first() {
             Some(key) => (key.qpos.clone(), key.qvel.clone()),
             None => (names::default_qpos(&model, &layout), vec![0.0; layout.nv]),
         };
 
-        check_equalities(&model).map_err(fail)?;
-        let groups = groups(&model);
-        let places = rename(&mut model);
+        document::check_equalities(&model).map_err(fail)?;
+        let groups = document::groups(&model);
+        let places = document::rename(&mut model);
         let base = scene.directory().unwrap_or(Path::new(""));
         let options = MjcfLoaderOptions {
             skip_plane_geoms: false,
@@ -164,7 +159,7 @@ impl Compiled {
             MjcfRobot::from_model(&model, options, base)
         }))
         .map_err(|_| fail("rapier's loader failed on it".into()))?;
-        give_roots(&mut robot);
+        document::give_roots(&mut robot);
         let geom_index = robot.geom_name_to_collider.clone();
         let couplings = robot.joint_couplings.clone();
         let joint_index = robot.joint_name_to_idx.clone();
@@ -354,188 +349,4 @@ pub fn set_inertia(body: &mut RigidBody, colliders: &ColliderSet, inertia: &Iner
     body.enable_gyroscopic_forces(spread > 1e-6 * inertia.moments.amax());
     body.set_additional_mass_properties(properties, false);
     body.recompute_mass_properties_from_colliders(colliders);
-}
-
-/// Contact bits of each geom; geoms of an explicit pair pass them all, and the
-/// table of pairs decides.
-fn groups(model: &Model) -> Vec<InteractionGroups> {
-    let paired: Vec<&str> = model
-        .contact
-        .pairs
-        .iter()
-        .flat_map(|p| [p.geom1.as_str(), p.geom2.as_str()])
-        .collect();
-    let geoms = model.bodies.iter().flat_map(|b| &b.body.geoms);
-    geoms
-        .map(|geom| {
-            let named = geom.name.as_deref();
-            let (member, filter) = if named.is_some_and(|n| paired.contains(&n)) {
-                (Group::ALL, Group::ALL)
-            } else {
-                (Group::from(geom.contype), Group::from(geom.conaffinity))
-            };
-            InteractionGroups::new(member, filter, InteractionTestMode::Or)
-        })
-        .collect()
-}
-
-/// Roots each tree that stands on the world in a fixed body of its own. On the
-/// world's body all trees would be one, with one large mass matrix, and what lies
-/// on the floor would be solved as if it touched a link. Trees stay together
-/// where an equality couples joints, which must then be in one tree.
-fn give_roots(robot: &mut MjcfRobot) {
-    let together = !robot.joint_couplings.is_empty();
-    let mut root = None;
-    for joint in 0..robot.joints.len() {
-        if robot.joints[joint].link1 != 0 {
-            continue;
-        }
-        let at = match root {
-            Some(at) if together => at,
-            _ => {
-                robot.bodies.push(MjcfBody {
-                    name: None,
-                    is_intermediate: true,
-                    mjcf_body_id: 0,
-                    body: RigidBodyBuilder::fixed().build(),
-                    colliders: Vec::new(),
-                    gravcomp: 0.0,
-                    mass: 0.0,
-                    visual_meshes: Vec::new(),
-                });
-                robot.bodies.len() - 1
-            }
-        };
-        root = Some(at);
-        robot.joints[joint].link1 = at;
-    }
-}
-
-/// Frame of every geom in its body, `fromto` resolved.
-fn geom_frames(model: &Model) -> Vec<Frame> {
-    let mut frames = Vec::new();
-    for (body, entry) in model.bodies.iter().enumerate() {
-        for geom in &entry.body.geoms {
-            let (position, rotation) = match GeomMass::of(geom) {
-                Some(mass) => (mass.position, mass.rotation),
-                None => convert::parts(&geom.pose),
-            };
-            frames.push(Frame {
-                body,
-                position,
-                rotation,
-            });
-        }
-    }
-    frames
-}
-
-fn actuators(model: &Model, layout: &Layout) -> Result<Vec<ActuatorSlot>> {
-    let mut slots = Vec::with_capacity(model.actuators.len());
-    for (actuator, place) in model.actuators.iter().zip(&layout.actuators) {
-        let name = actuator.joint.as_deref().unwrap_or_default();
-        layout.joint(name)?;
-        let limited = actuator
-            .force_limited
-            .resolve(model.compiler.autolimits, actuator.force_range.is_some());
-        slots.push(ActuatorSlot {
-            kind: actuator.kind,
-            joint: layout
-                .joints
-                .iter()
-                .position(|j| j.name == name)
-                .unwrap_or_default(),
-            ctrl_range: place.ctrl_range,
-            force_range: actuator.force_range.filter(|_| limited),
-        });
-    }
-    Ok(slots)
-}
-
-fn check_equalities(model: &Model) -> std::result::Result<(), String> {
-    let body = |name: &str| {
-        model.body_id_by_name(name).map(|_| ()).ok_or(format!(
-            "an equality names body `{name}`, which is not there"
-        ))
-    };
-    let joint = |name: &str| {
-        model.joint_by_name(name).map(|_| ()).ok_or(format!(
-            "an equality names joint `{name}`, which is not there"
-        ))
-    };
-    for equality in &model.equality {
-        match equality {
-            Equality::Connect(c) => {
-                body(&c.body1)?;
-                c.body2.as_deref().map_or(Ok(()), body)?;
-            }
-            Equality::Weld(w) => {
-                body(&w.body1)?;
-                w.body2.as_deref().map_or(Ok(()), body)?;
-            }
-            Equality::Joint(j) => {
-                joint(&j.joint1)?;
-                j.joint2.as_deref().map_or(Ok(()), joint)?;
-            }
-            Equality::Tendon(_) => {}
-        }
-    }
-    Ok(())
-}
-
-/// Names that the loader sees. The loader finds things by name and skips what
-/// has none, so every geom and joint gets a name of its own.
-struct Places;
-
-impl Places {
-    fn geom(&self, index: usize) -> String {
-        format!("\u{1}geom{index}")
-    }
-
-    fn joint(&self, index: usize) -> String {
-        format!("\u{1}joint{index}")
-    }
-}
-
-/// Gives every geom and joint its name for the loader, and takes away what this
-/// backend does itself: actuators, sensors, keyframes, contact filters, and
-/// springs, damping and friction of joints.
-fn rename(model: &mut Model) -> Places {
-    let places = Places;
-    let (mut geom_count, mut joint_count) = (0, 0);
-    let mut new_names = Vec::new();
-    for entry in &mut model.bodies {
-        for geom in &mut entry.body.geoms {
-            geom.name = Some(places.geom(geom_count));
-            geom_count += 1;
-        }
-        for joint in &mut entry.body.joints {
-            let name = places.joint(joint_count);
-            joint_count += 1;
-            if let Some(old) = joint.name.replace(name.clone()) {
-                new_names.push((old, name));
-            }
-            joint.damping = 0.0;
-            joint.stiffness = 0.0;
-            joint.frictionloss = 0.0;
-            joint.armature = 0.0;
-        }
-    }
-    let renamed = |old: &str| {
-        new_names
-            .iter()
-            .find(|(name, _)| name == old)
-            .map_or_else(|| old.to_owned(), |(_, new)| new.clone())
-    };
-    for equality in &mut model.equality {
-        if let Equality::Joint(joint) = equality {
-            joint.joint1 = renamed(&joint.joint1);
-            joint.joint2 = joint.joint2.as_deref().map(renamed);
-        }
-    }
-    model.actuators.clear();
-    model.sensors.clear();
-    model.keyframes.clear();
-    model.contact = mjcf_rs::contact::Contact::default();
-    places
 }

@@ -106,11 +106,8 @@ impl PairTable {
             let (i, j) = (index(&pair.geom1)?, index(&pair.geom2)?);
             for at in [i * n + j, j * n + i] {
                 pairs[at].meets = true;
-                pairs[at].condim = pair.condim.unwrap_or(3);
+                pairs[at].condim = pair.condim.unwrap_or(pairs[at].condim);
                 pairs[at].own = pair.friction.map(|f| f.map(|x| x as f32));
-                if pairs[at].own.is_none() {
-                    pairs[at].own = Some([1.0, 0.005, 0.0001]);
-                }
             }
         }
         let resists = pairs.iter().any(|p| p.meets && p.condim >= 4);
@@ -250,6 +247,8 @@ struct Held {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Resistance {
     held: Vec<Held>,
+    /// Those of the step before; kept for its memory.
+    before: Vec<Held>,
 }
 
 impl Resistance {
@@ -279,7 +278,8 @@ impl Resistance {
                 inverse.transform_vector(axis).dot(axis)
             })
         };
-        let before = std::mem::take(&mut self.held);
+        std::mem::swap(&mut self.held, &mut self.before);
+        self.held.clear();
         for pair in narrow_phase.contact_pairs() {
             let a = colliders[pair.collider1].user_data as usize;
             let b = colliders[pair.collider2].user_data as usize;
@@ -300,7 +300,8 @@ impl Resistance {
             let (first, second) = (body_of[a], body_of[b]);
             let relative = angular_velocity(second) - angular_velocity(first);
             let key = (a as u32, b as u32);
-            let held = before
+            let held = self
+                .before
                 .iter()
                 .find(|h| h.pair == key)
                 .map_or(Vector::ZERO, |h| h.torque);

@@ -72,6 +72,7 @@ mod compiled;
 mod contact;
 mod convert;
 mod coordinates;
+mod document;
 mod drive;
 mod names;
 mod parameter;

@@ -302,3 +302,37 @@ fn bench_qpos(bench: &mut Bench) -> Vec<f64> {
     bench.simulator.read(&[0], &record, &mut qpos).unwrap();
     qpos
 }
+
+#[test]
+fn a_moving_link_carries_what_lies_on_it_by_coulombs_law() {
+    // A plate on a slide, accelerated by a force; a rod lies on it at 45 degrees.
+    let inside = r#"<worldbody>
+        <body name="plate" pos="0 0 -0.05"><joint name="plate" type="slide" axis="1 0 0"/>
+          <geom type="box" size="1 1 .05" mass="100" friction="0.2 0 0"/></body>
+        <body name="rod" pos="0 0 0.02"><freejoint name="rod"/>
+          <geom type="box" size="0.02 0.03 0.02" pos="0 -.12 0" mass="0.1" friction="0.01 0 0"/>
+          <geom type="box" size="0.02 0.03 0.02" pos="0 .12 0" mass="0.1" friction="0.01 0 0"/></body>
+      </worldbody><actuator><motor joint="plate"/></actuator>"#;
+    let (sin, cos) = (0.3927f64).sin_cos();
+    for acceleration in [1.5, 4.0] {
+        let mut bench = Bench::new(
+            inside,
+            &["qvel.plate", "qvel.rod", "qpos.rod", "qpos.plate"],
+        );
+        bench.place(&[0., 0., 0., 0.02, cos, 0., 0., sin], &[0.0; 7]);
+        let rows = bench.run(200, &[100.2 * acceleration]);
+        let gain = (rows[199][1] - rows[99][1]) / 0.2;
+        if acceleration < 0.2 * G {
+            let slip = (rows[199][7] - rows[199][14]).abs();
+            assert!(slip < 1e-3, "slips {slip} m while it should stick");
+        } else {
+            assert!((gain / (0.2 * G) - 1.0).abs() < 0.03, "{gain} m/s²");
+        }
+        // It is not dragged sideways, and hardly turned.
+        assert!(
+            rows[199][8].abs() < 3e-3,
+            "drifts {} m sideways",
+            rows[199][8]
+        );
+    }
+}

@@ -5,6 +5,7 @@
 mod support;
 
 use asid_core::layout::JointKind;
+use asid_core::registry::BackendEntry;
 use asid_core::{Backend, Scene};
 use asid_rapier::Rapier;
 use support::{Bench, scene};
@@ -153,4 +154,10 @@ fn what_it_cannot_simulate_is_refused_by_name() {
 fn an_empty_scene_runs() {
     let scene = Scene::from_xml("empty", "<mujoco/>", &[]).unwrap();
     assert_eq!(Bench::with(&scene, &[], 1, 1, &[]).run(3, &[]).len(), 0);
+}
+
+#[test]
+fn the_registry_finds_it() {
+    let entry = asid_core::registry::find::<BackendEntry>("rapier").unwrap();
+    assert_eq!((entry.make)().unwrap().name(), Rapier.name());
 }
