@@ -16,7 +16,8 @@ use rapier3d::geometry::{
 };
 use rapier3d_mjcf::{MjcfLoaderOptions, MjcfMultibodyOptions, MjcfRobot};
 
-use crate::contact::{PairTable, Resistance};
+use crate::contact::Resistance;
+use crate::pairs::PairTable;
 use crate::parameter::Tables;
 use crate::sensor::SensorSlot;
 use crate::state::State;

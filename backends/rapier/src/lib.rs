@@ -14,7 +14,7 @@
 //!   matrix (module `drive`), so gains may be stiff. `frictionloss` is a bounded
 //!   constraint of each degree of freedom. Armature is added to the mass matrix.
 //! - Friction of contacts is Coulomb's, point by point, with MuJoCo's rules for
-//!   pairs (`condim`, `priority`, larger coefficient, `<pair>`, `<exclude>`). rapier
+//!   pairs (module `pairs`). rapier
 //!   turns the friction of a sliding point away from its slip; module `slip`
 //!   turns it back.
 //! - Torsional and rolling friction are torques from the normal force of the step
@@ -75,6 +75,7 @@ mod coordinates;
 mod document;
 mod drive;
 mod names;
+mod pairs;
 mod parameter;
 mod refusal;
 mod sensor;

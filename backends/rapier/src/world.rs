@@ -11,8 +11,9 @@ use rapier3d::math::{Rotation, Vector};
 use rapier3d::pipeline::PhysicsPipeline;
 
 use crate::compiled::Compiled;
-use crate::contact::{self, Hooks, Touching};
+use crate::contact::{self, Touching};
 use crate::convert;
+use crate::pairs::Hooks;
 use crate::parameter::Tables;
 use crate::settings::MAX_SPEED;
 use crate::state::State;

@@ -313,7 +313,7 @@ fn a_moving_link_carries_what_lies_on_it_by_coulombs_law() {
           <geom type="box" size="0.02 0.03 0.02" pos="0 -.12 0" mass="0.1" friction="0.01 0 0"/>
           <geom type="box" size="0.02 0.03 0.02" pos="0 .12 0" mass="0.1" friction="0.01 0 0"/></body>
       </worldbody><actuator><motor joint="plate"/></actuator>"#;
-    let (sin, cos) = (0.3927f64).sin_cos();
+    let (sin, cos) = std::f64::consts::FRAC_PI_8.sin_cos();
     for acceleration in [1.5, 4.0] {
         let mut bench = Bench::new(
             inside,
