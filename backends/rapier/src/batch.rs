@@ -62,7 +62,7 @@ impl Batch {
         };
         let pool = if threads.min(config.size) > 1 {
             let pool = rayon::ThreadPoolBuilder::new()
-                .num_threads(threads)
+                .num_threads(threads.min(config.size))
                 .thread_name(|i| format!("rapier-{i}"))
                 .build()
                 .map_err(|e| Error::Failed(format!("cannot start {threads} threads: {e}")))?;
@@ -293,7 +293,7 @@ impl Simulator for Batch {
         expect(from.len(), to.len(), "from")?;
         if let Some(i) = from
             .iter()
-            .find(|&&f| f >= self.worlds.len() || to.contains(&f))
+            .find(|&&f| f >= self.worlds.len() || to.binary_search(&f).is_ok())
         {
             return Err(shape(format!("simulation {i} cannot be copied from")));
         }

@@ -65,7 +65,7 @@ fn a_pendulum_keeps_its_energy_and_period() {
     let depth = 0.5 * G * (1.0 - 0.5f64.cos());
     let drift = (energy(&rows[4999]) - energy(&rows[0])) / depth;
     assert!(
-        drift.abs() < 0.02,
+        drift.abs() < 0.005,
         "energy drifts by {drift} of the swing in 10 s"
     );
     let mut crossings = rows
@@ -110,7 +110,7 @@ fn a_servo_answers_a_step_like_its_differential_equation() {
         let expected = 1.0 - (-zeta * omega * t).exp() * (cos + zeta * omega / damped * sin);
         // Backward Euler in substeps h = 1 ms is off by about omega h / 2.
         assert!(
-            (row[0] - expected).abs() < 0.006,
+            (row[0] - expected).abs() < 0.005,
             "t {t}: {} against {expected}",
             row[0]
         );
