@@ -30,8 +30,8 @@ const SCENE: &str = r#"<option timestep="0.002"/>
     <position joint="left" kp="2500" kv="60"/><position joint="right" kp="2500" kv="60"/>
   </actuator>"#;
 
-/// Joints of the fingers are positive when they are open, and closed at zero; the
-/// rod's half width of 0.02 m stops them 0.02 m before the command.
+/// Command of an open finger, m. Closed is zero; the rod's half width of 0.02 m
+/// keeps a finger that far from it.
 const OPEN: f64 = 0.045;
 
 /// Moves linearly from one command to the next and gives the last row.
