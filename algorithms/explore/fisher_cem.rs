@@ -11,7 +11,7 @@ use asid_core::registry::{self, ExplorerEntry};
 use asid_core::{Error, Posterior, Problem, Result};
 use serde::{Deserialize, Serialize};
 
-use crate::optimise::{Cem, CemSettings};
+use crate::optimise::{Cem, CemSettings, require};
 
 /// Settings of the planner.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -78,6 +78,8 @@ impl FisherCem {
                 });
             }
         }
+        require(self.std > 0.0, "explorer.std", self.std, "above 0")?;
+        self.cem.check("explorer.cem")?;
         self.fisher.check()
     }
 

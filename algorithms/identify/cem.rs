@@ -45,6 +45,8 @@ inventory::submit! {
         make: |s| {
             let identifier: CemIdentifier = registry::settings("identifier", s)?;
             check(identifier.iterations, identifier.population)?;
+            identifier.cem.check("identifier.cem")?;
+            identifier.sampling.check()?;
             Ok(Box::new(identifier))
         },
     }

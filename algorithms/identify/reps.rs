@@ -45,6 +45,8 @@ inventory::submit! {
         make: |s| {
             let identifier: RepsIdentifier = registry::settings("identifier", s)?;
             super::cem::check(identifier.iterations, identifier.population)?;
+            identifier.reps.check("identifier.reps")?;
+            identifier.sampling.check()?;
             Ok(Box::new(identifier))
         },
     }

@@ -19,7 +19,7 @@ use asid_core::{Error, Posterior, Problem, Result};
 use serde::{Deserialize, Serialize};
 
 use super::Likelihood;
-use crate::optimise::Gaussian;
+use crate::optimise::{Gaussian, require};
 
 /// How the posterior is sampled after the search.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -43,6 +43,19 @@ impl Default for SamplingSettings {
             widen: 1.3,
             min_effective: 25.0,
         }
+    }
+}
+
+impl SamplingSettings {
+    /// Checks the settings.
+    ///
+    /// # Errors
+    /// When one is out of its domain.
+    pub fn check(&self) -> Result<()> {
+        let Self { draws, widen, min_effective, .. } = *self;
+        require(draws > 0, "identifier.sampling.draws", draws as f64, "at least 1")?;
+        require(widen > 0.0, "identifier.sampling.widen", widen, "above 0")?;
+        require(min_effective >= 1.0, "identifier.sampling.min_effective", min_effective, "at least 1")
     }
 }
 

@@ -1,10 +1,11 @@
 //! The cross-entropy method (Rubinstein 1999): refit a normal distribution to
 //! the best of its own draws.
 
+use asid_core::Result;
 use asid_core::rng::Rng;
 use serde::{Deserialize, Serialize};
 
-use super::Gaussian;
+use super::{Gaussian, require};
 
 /// How the distribution follows its elite.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -25,6 +26,20 @@ impl Default for CemSettings {
             smoothing: 0.1,
             min_std_fraction: 1e-3,
         }
+    }
+}
+
+impl CemSettings {
+    /// Checks the settings; `key` is where they stand in a configuration.
+    ///
+    /// # Errors
+    /// When one is out of its domain.
+    pub fn check(&self, key: &str) -> Result<()> {
+        let Self { elite_fraction: elite, smoothing, min_std_fraction: least } = *self;
+        let key = |name: &str| format!("{key}.{name}");
+        require(elite > 0.0 && elite <= 1.0, &key("elite_fraction"), elite, "above 0 and at most 1")?;
+        require((0.0..1.0).contains(&smoothing), &key("smoothing"), smoothing, "from 0 to below 1")?;
+        require((0.0..=1.0).contains(&least), &key("min_std_fraction"), least, "from 0 to 1")
     }
 }
 

@@ -6,10 +6,11 @@
 //! it is then kept at 1 or above, where the draws of one step are weighted by the
 //! likelihood itself.
 
+use asid_core::Result;
 use asid_core::rng::Rng;
 use serde::{Deserialize, Serialize};
 
-use super::Gaussian;
+use super::{Gaussian, require};
 
 /// How far one refit may go.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -27,6 +28,18 @@ impl Default for RepsSettings {
             epsilon: 0.5,
             min_eta: 0.0,
         }
+    }
+}
+
+impl RepsSettings {
+    /// Checks the settings; `key` is where they stand in a configuration.
+    ///
+    /// # Errors
+    /// When one is out of its domain.
+    pub fn check(&self, key: &str) -> Result<()> {
+        let Self { epsilon, min_eta } = *self;
+        require(epsilon > 0.0, &format!("{key}.epsilon"), epsilon, "above 0")?;
+        require(min_eta >= 0.0, &format!("{key}.min_eta"), min_eta, "0 or above")
     }
 }
 

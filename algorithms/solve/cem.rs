@@ -56,6 +56,7 @@ inventory::submit! {
                     });
                 }
             }
+            solver.cem.check("solver.cem")?;
             Ok(Box::new(solver))
         },
     }

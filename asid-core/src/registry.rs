@@ -116,18 +116,28 @@ pub fn find<E: Entry>(name: &str) -> Result<&'static E> {
 /// # Errors
 /// [`Error::Config`] naming `section` and the key.
 pub fn settings<S: serde::de::DeserializeOwned>(section: &str, table: &Settings) -> Result<S> {
-    for (key, value) in table {
-        if value.as_float().is_some_and(|x| !x.is_finite()) {
-            return Err(Error::Config {
-                key: format!("{section}.{key}"),
-                message: format!("{value} is not a finite number"),
-            });
-        }
-    }
+    check_finite(section, table)?;
     S::deserialize(toml::Value::Table(table.clone())).map_err(|e| Error::Config {
         key: section.to_owned(),
         message: crate::scene::one_line(e.message()),
     })
+}
+
+fn check_finite(section: &str, table: &Settings) -> Result<()> {
+    for (key, value) in table {
+        let key = format!("{section}.{key}");
+        match value {
+            toml::Value::Table(inner) => check_finite(&key, inner)?,
+            toml::Value::Float(x) if !x.is_finite() => {
+                return Err(Error::Config {
+                    key,
+                    message: format!("{value} is not a finite number"),
+                });
+            }
+            _ => {}
+        }
+    }
+    Ok(())
 }
 
 /// The default settings of an algorithm as a table.

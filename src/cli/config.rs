@@ -371,22 +371,45 @@ where
     if named.is_some_and(|n| n != name) {
         given.clear();
     }
-    let entry = registry::find::<AlgorithmEntry<T>>(&name)?;
+    let entry = registry::find::<AlgorithmEntry<T>>(&name)
+        .map_err(|unknown| super::list::missing(AlgorithmEntry::<T>::KIND, &name).unwrap_or(unknown))?;
     let mut settings = (entry.defaults)();
-    merge(&mut settings, given);
+    merge(key, &mut settings, given)?;
     (entry.make)(&settings)?;
     Ok(Component { name, settings })
 }
 
-fn merge(into: &mut toml::Table, from: toml::Table) {
+/// Settings over their defaults, which say what kind of value each one is.
+fn merge(section: &str, into: &mut toml::Table, from: toml::Table) -> Result<()> {
+    use toml::Value::{Boolean, Float, Integer, String, Table};
     for (key, value) in from {
-        match (into.get_mut(&key), value) {
-            (Some(toml::Value::Table(a)), toml::Value::Table(b)) => merge(a, b),
-            (_, value) => {
-                into.insert(key, value);
+        let full = format!("{section}.{key}");
+        let value = match (into.get_mut(&key), value) {
+            (Some(Table(a)), Table(b)) => {
+                merge(&full, a, b)?;
+                continue;
             }
-        }
+            (Some(Float(_)), Integer(i)) => Float(i as f64),
+            (Some(Float(_)), Float(x)) => Float(x),
+            (Some(Float(_)), other) => return Err(wrong(&full, format!("{other} is not a number"))),
+            (Some(Integer(_)), Integer(i)) if i >= 0 => Integer(i),
+            (Some(Integer(_)), other) => {
+                return Err(wrong(&full, format!("{other} is not a whole number from 0 up")));
+            }
+            (Some(Boolean(_)), other) if !other.is_bool() => {
+                return Err(wrong(&full, format!("{other} is neither true nor false")));
+            }
+            (Some(String(_)), other) if !other.is_str() => {
+                return Err(wrong(&full, format!("{other} is not a text in quotes")));
+            }
+            (Some(Table(_)), other) => {
+                return Err(wrong(&full, format!("{other} is not a section of settings")));
+            }
+            (_, other) => other,
+        };
+        into.insert(key, value);
     }
+    Ok(())
 }
 
 /// The task's unknowns with what the configuration says of them.

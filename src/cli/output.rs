@@ -1,8 +1,11 @@
 //! The folder of a result: written whole or not at all.
 //!
-//! Nothing is written before the work is done. Then the files go into a folder
-//! beside the wanted one, which takes its name when all are there.
+//! Nothing is written before the work is done. Then the files go into a folder of
+//! their own, which takes its final name when all are there. A folder that exists
+//! already (it may be the root of a volume, which nothing can be renamed onto) gets
+//! the files one by one, `result.json` last.
 
+use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
@@ -11,9 +14,14 @@ use asid_core::Error;
 /// Where results go when `--out` is not given.
 const RUNS: &str = "runs";
 
+/// The file that says that a folder holds a result.
+const RESULT: &str = "result.json";
+
 /// A place for a result that was free and writable when it was claimed.
 pub struct OutFolder {
-    path: PathBuf,
+    path: RefCell<PathBuf>,
+    /// Start of the name where the next free one is taken.
+    stem: Option<String>,
 }
 
 fn file(path: &Path, message: impl Into<String>) -> anyhow::Error {
@@ -24,68 +32,107 @@ fn file(path: &Path, message: impl Into<String>) -> anyhow::Error {
     .into()
 }
 
+/// A failure to write after the work: the call was not wrong.
+fn failed(path: &Path, error: &std::io::Error) -> anyhow::Error {
+    Error::Failed(format!("{}: cannot be written: {error}", path.display())).into()
+}
+
+fn next_free(stem: &str) -> PathBuf {
+    (1..)
+        .map(|n| Path::new(RUNS).join(format!("{stem}-{n}")))
+        .find(|p| !p.exists())
+        .unwrap_or_default()
+}
+
 impl OutFolder {
     /// Checks that a result can be written to `out`, or to the next free folder
     /// `runs/<stem>-<n>` where none is given.
     pub fn claim(out: Option<&Path>, stem: &str) -> Result<Self> {
-        let path = match out {
-            Some(path) => path.to_owned(),
-            None => (1..)
-                .map(|n| Path::new(RUNS).join(format!("{stem}-{n}")))
-                .find(|p| !p.exists())
-                .unwrap_or_default(),
+        let (path, stem) = match out {
+            Some(path) => (path.to_owned(), None),
+            None => (next_free(stem), Some(stem.to_owned())),
         };
-        if path.is_file() {
-            return Err(file(&path, "is a file; --out needs a folder"));
+        if path.as_os_str().is_empty() {
+            return Err(file(Path::new("--out"), "names no folder"));
         }
         if path.is_dir() {
             let mut entries = std::fs::read_dir(&path).map_err(|e| file(&path, e.to_string()))?;
             if entries.next().is_some() {
-                let what = if path.join("result.json").exists() { "already holds another run" } else { "is not empty" };
+                let what = if path.join(RESULT).exists() { "already holds another run" } else { "is not empty" };
                 return Err(file(&path, format!("{what}; choose another --out")));
             }
+        } else if path.exists() || path.file_name().is_none() {
+            return Err(file(&path, "is no folder; --out needs one, new or empty"));
         }
-        let folder = Self { path };
         // The nearest folder that exists must take new entries.
-        let base = folder
-            .path
+        let base = path
             .ancestors()
-            .skip(1)
             .map(|p| if p.as_os_str().is_empty() { Path::new(".") } else { p })
             .find(|p| p.exists())
             .unwrap_or(Path::new("."));
         let probe = base.join(format!(".asid-{}", std::process::id()));
-        std::fs::create_dir(&probe).map_err(|e| file(&folder.path, format!("cannot be written: {e}")))?;
+        std::fs::create_dir(&probe).map_err(|e| file(&path, format!("cannot be written: {e}")))?;
         std::fs::remove_dir(&probe).map_err(|e| file(&probe, e.to_string()))?;
-        Ok(folder)
+        Ok(Self {
+            path: RefCell::new(path),
+            stem,
+        })
     }
 
     /// Writes the result: `fill` gets a fresh folder; it takes its name when all went well.
     pub fn write(&self, fill: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
-        let parent = self.path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        std::fs::create_dir_all(parent).map_err(|e| file(parent, e.to_string()))?;
-        let name = self.path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-        let staging = parent.join(format!(".{name}.{}", std::process::id()));
-        std::fs::create_dir(&staging).map_err(|e| file(&staging, e.to_string()))?;
-        let filled = fill(&staging).and_then(|()| {
-            // A rename onto an empty folder replaces it, onto anything else it fails.
-            std::fs::rename(&staging, &self.path).map_err(|e| file(&self.path, e.to_string()))
-        });
-        if filled.is_err() {
+        let path = self.path();
+        let exists = path.is_dir() && self.stem.is_none();
+        let beside = if exists { Some(&*path) } else { path.parent() };
+        let beside = beside.filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        std::fs::create_dir_all(beside).map_err(|e| failed(beside, &e))?;
+        let staging = beside.join(format!(".asid-{}", std::process::id()));
+        std::fs::create_dir(&staging).map_err(|e| failed(&staging, &e))?;
+        let done = fill(&staging).and_then(|()| if exists { move_into(&staging, &path) } else { self.name(&staging) });
+        if done.is_err() {
             let _ = std::fs::remove_dir_all(&staging);
         }
-        filled
+        done
     }
 
-    /// Where it will be.
-    pub fn path(&self) -> &Path {
-        &self.path
+    /// Gives the filled folder its name: the wanted one, or the next that is still free.
+    fn name(&self, staging: &Path) -> Result<()> {
+        loop {
+            // A rename onto an empty folder replaces it, onto anything else it fails.
+            let renamed = std::fs::rename(staging, self.path());
+            match (renamed, &self.stem) {
+                (Ok(()), _) => return Ok(()),
+                (Err(_), Some(stem)) if self.path().exists() => {
+                    self.path.replace(next_free(stem));
+                }
+                (Err(e), _) => return Err(failed(&self.path(), &e)),
+            }
+        }
     }
+
+    /// Where it will be; where it is, once written.
+    pub fn path(&self) -> PathBuf {
+        self.path.borrow().clone()
+    }
+}
+
+/// Moves the files of one folder into another, the result last.
+fn move_into(from: &Path, to: &Path) -> Result<()> {
+    let entries = std::fs::read_dir(from).map_err(|e| failed(to, &e))?;
+    let mut names: Vec<_> = entries.filter_map(|e| Some(e.ok()?.file_name())).collect();
+    names.sort_by_key(|n| n == RESULT);
+    if let Some(taken) = names.iter().map(|n| to.join(n)).find(|p| p.exists()) {
+        return Err(Error::Failed(format!("{} exists by now; choose another --out", taken.display())).into());
+    }
+    for name in names {
+        std::fs::rename(from.join(&name), to.join(&name)).map_err(|e| failed(&to.join(&name), &e))?;
+    }
+    std::fs::remove_dir(from).map_err(|e| failed(from, &e))
 }
 
 /// Writes a text file.
 pub fn write_text(path: &Path, text: &str) -> Result<()> {
-    std::fs::write(path, text).map_err(|e| file(path, e.to_string()))
+    std::fs::write(path, text).map_err(|e| failed(path, &e))
 }
 
 /// Writes a value as indented JSON.

@@ -124,6 +124,12 @@ impl Session {
             None => load(&real.backend, &*self.task, self.task.scene())?,
             Some(path) => load(&real.backend, &*self.task, &Scene::from_file(path)?)?,
         };
+        if let Some(path) = &real.model {
+            self.check_real(&*model).map_err(|e| Error::Scene {
+                scene: path.display().to_string(),
+                message: format!("cannot stand for the task's real world: {e}"),
+            })?;
+        }
         let streams = Streams::new(self.config.seed).child("real world");
         Ok(SimulatedWorld::new(
             &*self.task,
@@ -133,6 +139,37 @@ impl Session {
             &self.signals,
             streams,
         )?)
+    }
+
+    /// Checks that a model has what the task's protocols need.
+    fn check_real(&self, model: &dyn Model) -> asid_core::Result<()> {
+        let (ours, theirs) = (self.model.layout(), model.layout());
+        let (exploration, downstream) = (self.task.exploration(), self.task.downstream());
+        if ours.actuators.len() != theirs.actuators.len() {
+            return Err(Error::Shape(format!(
+                "it has {} actuators, the task commands {}",
+                theirs.actuators.len(),
+                ours.actuators.len()
+            )));
+        }
+        for (i, actuator) in ours.actuators.iter().enumerate() {
+            if theirs.actuator(&actuator.name)? != i {
+                return Err(Error::Shape(format!("actuator `{}` has another place in the order", actuator.name)));
+            }
+        }
+        theirs.recording(&exploration.channels())?;
+        theirs.recording(&downstream.channels)?;
+        theirs.body(&exploration.contact[0])?;
+        theirs.body(&exploration.contact[1])?;
+        for target in self.parameters.iter().flat_map(|p| &p.targets) {
+            model.nominal(target)?;
+        }
+        for frame_period in [exploration.frame_period, downstream.frame_period] {
+            asid_core::problem::substeps(theirs, frame_period)?;
+        }
+        let (mut qpos, _) = asid_core::problem::home(theirs);
+        let middle: Vec<f64> = exploration.start.iter().map(asid_core::task::Coordinate::center).collect();
+        self.task.place(theirs, &middle, &mut qpos)
     }
 
     /// Cost so far.
