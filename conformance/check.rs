@@ -1,0 +1,194 @@
+//! What a check is, what running it gives, and the printed table.
+
+use std::fmt::Write as _;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use asid_core::{Backend, Capabilities, Result};
+use serde::{Deserialize, Serialize};
+
+use crate::deviations;
+
+/// Largest figure that passes, for engines of double and of single precision.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tolerance {
+    double: f64,
+    single: f64,
+}
+
+impl Tolerance {
+    /// The same for both, where the arithmetic does not matter.
+    #[must_use]
+    pub const fn same(value: f64) -> Self {
+        Self {
+            double: value,
+            single: value,
+        }
+    }
+
+    /// Where rounding is what is left.
+    #[must_use]
+    pub const fn by_precision(double: f64, single: f64) -> Self {
+        Self { double, single }
+    }
+
+    /// The one that holds for an engine.
+    #[must_use]
+    pub fn of(self, capabilities: Capabilities) -> f64 {
+        if capabilities.contains(Capabilities::DOUBLE_PRECISION) {
+            self.double
+        } else {
+            self.single
+        }
+    }
+}
+
+/// One question to an engine, with a number for an answer.
+#[derive(Clone, Copy, Debug)]
+pub struct Check {
+    /// Name, `family/what`.
+    pub name: &'static str,
+    /// What an engine must claim for the question to make sense.
+    pub needs: Capabilities,
+    /// Unit of the figure; empty for a ratio or a count.
+    pub unit: &'static str,
+    /// Largest magnitude of the figure that passes.
+    pub tolerance: Tolerance,
+    /// Where the tolerance comes from.
+    pub reason: &'static str,
+    /// Measures the figure: a deviation, zero at best.
+    pub measure: fn(&dyn Backend) -> Result<f64>,
+}
+
+impl Check {
+    /// Asks a backend. An error or a panic of the engine is a failed row, not an end.
+    #[must_use]
+    pub fn run(&self, backend: &dyn Backend) -> Row {
+        let capabilities = backend.capabilities();
+        let tolerance = self.tolerance.of(capabilities);
+        let mut row = Row {
+            engine: backend.name().to_owned(),
+            check: self.name.to_owned(),
+            value: None,
+            tolerance,
+            unit: self.unit.to_owned(),
+            outcome: Outcome::NotClaimed,
+            reason: self.reason.to_owned(),
+            note: String::new(),
+        };
+        let lacking = self.needs - capabilities;
+        if !lacking.is_empty() {
+            let names: Vec<&str> = lacking.iter_names().map(|(name, _)| name).collect();
+            row.note = format!("does not claim {}", names.join(", "));
+            return row;
+        }
+        row.outcome = Outcome::Fail;
+        match catch_unwind(AssertUnwindSafe(|| (self.measure)(backend))) {
+            Ok(Ok(value)) if value.abs() <= tolerance => {
+                row.value = Some(value);
+                row.outcome = Outcome::Pass;
+            }
+            Ok(Ok(value)) if value.is_finite() => row.value = Some(value),
+            Ok(Ok(value)) => row.note = format!("the figure is {value}"),
+            Ok(Err(error)) => row.note = error.to_string(),
+            Err(panic) => {
+                let text = panic
+                    .downcast_ref::<String>()
+                    .map(String::as_str)
+                    .or_else(|| panic.downcast_ref::<&str>().copied())
+                    .unwrap_or("without a message");
+                row.note = format!("panicked: {text}");
+            }
+        }
+        if row.outcome == Outcome::Fail
+            && let Some(known) = deviations::find(&row.engine, self.name)
+        {
+            row.note = known.reason.clone();
+            if row.value.is_some_and(|value| value.abs() <= known.allowed) {
+                row.outcome = Outcome::KnownDeviation;
+            }
+        }
+        row
+    }
+}
+
+/// What became of a check.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Outcome {
+    /// Within the tolerance.
+    Pass,
+    /// Beyond it, or an error where there should be none.
+    Fail,
+    /// The engine does not claim what the check needs.
+    NotClaimed,
+    /// Beyond the tolerance, and within what the table of deviations allows.
+    KnownDeviation,
+}
+
+impl Outcome {
+    /// As it is written in tables.
+    #[must_use]
+    pub fn label(self) -> &'static str {
+        match self {
+            Self::Pass => "pass",
+            Self::Fail => "FAIL",
+            Self::NotClaimed => "not-claimed",
+            Self::KnownDeviation => "known-deviation",
+        }
+    }
+}
+
+/// Answer of one engine to one check.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Row {
+    /// Name of the backend.
+    pub engine: String,
+    /// Name of the check.
+    pub check: String,
+    /// The figure; `None` where there is none.
+    pub value: Option<f64>,
+    /// Largest magnitude that passes.
+    pub tolerance: f64,
+    /// Unit of both.
+    pub unit: String,
+    /// What became of it.
+    pub outcome: Outcome,
+    /// Where the tolerance comes from.
+    pub reason: String,
+    /// Why there is no figure, what is not claimed, or why a deviation is known.
+    pub note: String,
+}
+
+impl Row {
+    /// True where the engine does not do what it claims.
+    #[must_use]
+    pub fn is_failure(&self) -> bool {
+        self.outcome == Outcome::Fail
+    }
+}
+
+/// Rows as a table in plain text, one line each.
+#[must_use]
+pub fn table(rows: &[Row]) -> String {
+    let check = rows.iter().map(|r| r.check.len()).max().unwrap_or(0).max(5);
+    let engine = rows.iter().map(|r| r.engine.len()).max().unwrap_or(0).max(6);
+    let mut text = format!(
+        "{:engine$}  {:check$}  {:>10}  {:>9}  {:6}  {:15}  reason\n",
+        "engine", "check", "figure", "tolerance", "unit", "outcome"
+    );
+    for row in rows {
+        let value = row.value.map_or_else(|| "-".to_owned(), |v| format!("{v:.2e}"));
+        let reason = if row.note.is_empty() { &row.reason } else { &row.note };
+        // Writing into a String cannot fail.
+        let _ = writeln!(
+            text,
+            "{:engine$}  {:check$}  {value:>10}  {:>9.1e}  {:6}  {:15}  {reason}",
+            row.engine,
+            row.check,
+            row.tolerance,
+            row.unit,
+            row.outcome.label(),
+        );
+    }
+    text
+}

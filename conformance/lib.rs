@@ -1,0 +1,67 @@
+//! Is an engine right? Checks of a backend against theory, and against the
+//! contract of [`asid_core::simulator`].
+//!
+//! A [`Check`] is a value: its name, the capability bits it needs, a function
+//! from a backend to one figure, the tolerance of that figure and the reason
+//! for the tolerance. A figure is a *deviation*: from a closed-form solution, or
+//! a count of broken promises, so that zero is perfect for every check. Running
+//! a check gives a [`Row`], and rows are all there is to read: what an engine
+//! does not claim is a row too, and so is what it is known to get wrong.
+//!
+//! Two rules keep the suite honest. A check looks at capability bits and never
+//! at an engine's name; what one engine is known to miss stands in the table
+//! `deviations.toml`, with the figure that is allowed and the reason. And a
+//! tolerance follows from the time step, the arithmetic or the softness that
+//! the scene asks for, not from what some engine happens to give.
+//!
+//! ```no_run
+//! # fn main() -> asid_core::Result<()> {
+//! let entry = asid_core::registry::find::<asid_core::registry::BackendEntry>("mujoco")?;
+//! let backend = (entry.make)()?;
+//! let rows = asid_conformance::run(&*backend);
+//! assert!(rows.iter().all(|row| !row.is_failure()), "{}", asid_conformance::table(&rows));
+//! # Ok(())
+//! # }
+//! ```
+
+mod actuators;
+mod check;
+mod contact;
+mod deviations;
+mod dynamics;
+mod faults;
+mod forces;
+mod frames;
+mod friction;
+mod joints;
+mod parameters;
+mod rig;
+mod state;
+
+pub use check::{Check, Outcome, Row, Tolerance, table};
+
+use asid_core::Backend;
+
+/// Every check, family after family.
+pub fn checks() -> impl Iterator<Item = &'static Check> {
+    [
+        dynamics::CHECKS,
+        joints::CHECKS,
+        contact::CHECKS,
+        friction::CHECKS,
+        actuators::CHECKS,
+        frames::CHECKS,
+        parameters::CHECKS,
+        forces::CHECKS,
+        state::CHECKS,
+        faults::CHECKS,
+    ]
+    .into_iter()
+    .flatten()
+}
+
+/// Runs every check on a backend.
+#[must_use]
+pub fn run(backend: &dyn Backend) -> Vec<Row> {
+    checks().map(|check| check.run(backend)).collect()
+}

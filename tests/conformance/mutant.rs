@@ -1,0 +1,356 @@
+//! An engine with one fault: another engine behind a wrapper that spoils what
+//! passes through it.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use asid::core::layout::Channel;
+use asid::core::simulator::ExternalForce;
+use asid::core::{
+    Backend, BatchConfig, Capabilities, Control, Layout, Model, Recording, Result, Rollout, Scene,
+    Simulator, Snapshot, Status, Target,
+};
+
+/// What is wrong with an engine.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fault {
+    /// Nothing.
+    None,
+    /// Sliding friction of every geom is half of what the scene says.
+    FrictionHalved,
+    /// Joints are not damped.
+    DampingIgnored,
+    /// Limits of commands and forces do not act.
+    LimitsIgnored,
+    /// The last of several actuators does nothing.
+    TorqueIgnored,
+    /// Quaternions are read as x y z w.
+    QuaternionSwapped,
+    /// Sensors show the frame before.
+    StaleSensor,
+    /// Readings carry the noise of one random state that all batches share.
+    SharedNoise,
+    /// The result depends on the number of threads.
+    ThreadDependent,
+    /// A restored state has no velocity.
+    ForgetsVelocity,
+    /// A simulation's parameters are set for all.
+    SharedParameters,
+    /// Parameters do not change during a rollout.
+    ChangesIgnored,
+    /// Torques of external wrenches are lost.
+    WrenchTorqueLost,
+    /// External forces act with the opposite sign.
+    ForceReversed,
+    /// Simulations that are not asked for move as well.
+    OthersMove,
+    /// A diverged simulation says that it runs.
+    DivergenceHidden,
+    /// Commands that are not finite are taken for zero.
+    NanAccepted,
+}
+
+impl Fault {
+    /// Every fault.
+    pub const ALL: [Self; 16] = [
+        Self::FrictionHalved,
+        Self::DampingIgnored,
+        Self::LimitsIgnored,
+        Self::TorqueIgnored,
+        Self::QuaternionSwapped,
+        Self::StaleSensor,
+        Self::SharedNoise,
+        Self::ThreadDependent,
+        Self::ForgetsVelocity,
+        Self::SharedParameters,
+        Self::ChangesIgnored,
+        Self::WrenchTorqueLost,
+        Self::ForceReversed,
+        Self::OthersMove,
+        Self::DivergenceHidden,
+        Self::NanAccepted,
+    ];
+}
+
+/// The shared random state of [`Fault::SharedNoise`].
+static NOISE: AtomicU64 = AtomicU64::new(1);
+
+/// An engine with a fault.
+pub struct Mutant<'a> {
+    inner: &'a dyn Backend,
+    fault: Fault,
+}
+
+impl<'a> Mutant<'a> {
+    /// Spoils an engine.
+    pub fn new(inner: &'a dyn Backend, fault: Fault) -> Self {
+        Self { inner, fault }
+    }
+}
+
+impl Backend for Mutant<'_> {
+    fn name(&self) -> &str {
+        "mutant"
+    }
+
+    fn version(&self) -> String {
+        self.inner.version()
+    }
+
+    fn capabilities(&self) -> Capabilities {
+        self.inner.capabilities()
+    }
+
+    fn load(&self, scene: &Scene) -> Result<Arc<dyn Model>> {
+        let xml = match self.fault {
+            Fault::FrictionHalved => rewritten(scene.xml(), "friction", |value| {
+                let mut numbers = value.split(' ');
+                let first: f64 = numbers.next().unwrap().parse().unwrap();
+                let rest: Vec<&str> = numbers.collect();
+                format!("{} {}", first / 2.0, rest.join(" "))
+            }),
+            Fault::DampingIgnored => rewritten(scene.xml(), "damping", |_| "0".into()),
+            Fault::LimitsIgnored => {
+                let xml = rewritten(scene.xml(), "ctrlrange", |_| "-1e6 1e6".into());
+                rewritten(&xml, "forcerange", |_| "-1e6 1e6".into())
+            }
+            _ => scene.xml().to_owned(),
+        };
+        Ok(Arc::new(MutantModel {
+            inner: self.inner.load(&Scene::from_xml(scene.name(), &xml, &[])?)?,
+            fault: self.fault,
+        }))
+    }
+}
+
+/// A document with every value of an attribute replaced.
+fn rewritten(xml: &str, attribute: &str, change: impl Fn(&str) -> String) -> String {
+    let mark = format!(" {attribute}=\"");
+    let mut parts = xml.split(&mark);
+    let mut out = parts.next().unwrap_or_default().to_owned();
+    for part in parts {
+        let (value, rest) = part.split_once('"').unwrap();
+        out += &format!("{mark}{}\"{rest}", change(value));
+    }
+    out
+}
+
+struct MutantModel {
+    inner: Arc<dyn Model>,
+    fault: Fault,
+}
+
+impl Model for MutantModel {
+    fn layout(&self) -> &Layout {
+        self.inner.layout()
+    }
+
+    fn nominal(&self, target: &Target) -> Result<f64> {
+        self.inner.nominal(target)
+    }
+
+    fn simulator(&self, config: &BatchConfig) -> Result<Box<dyn Simulator>> {
+        Ok(Box::new(MutantSimulator {
+            inner: self.inner.simulator(config)?,
+            fault: self.fault,
+            threads: config.threads,
+            running: vec![Status::Running; config.size],
+        }))
+    }
+}
+
+struct MutantSimulator {
+    inner: Box<dyn Simulator>,
+    fault: Fault,
+    threads: usize,
+    running: Vec<Status>,
+}
+
+impl MutantSimulator {
+    /// Spoils rows of readings, `frames` a simulation.
+    fn spoil(&self, record: &Recording, frames: usize, out: &mut [f64]) {
+        let width = record.width();
+        if width == 0 || frames == 0 {
+            return;
+        }
+        let layout = self.inner.layout();
+        match self.fault {
+            Fault::SharedNoise => {
+                for value in out {
+                    let noise = NOISE.fetch_add(1, Ordering::Relaxed).wrapping_mul(0x9e37_79b9);
+                    *value *= 1.0 + 1e-14 * (noise % 1000) as f64;
+                }
+            }
+            Fault::ThreadDependent if self.threads > 1 => {
+                for value in out {
+                    *value *= 1.0 + f64::EPSILON;
+                }
+            }
+            Fault::QuaternionSwapped => {
+                for row in out.chunks_mut(width) {
+                    for (i, channel) in record.channels().iter().enumerate() {
+                        let at = record.range(i).start;
+                        match channel {
+                            Channel::Sensor { index }
+                                if layout.sensors[*index].kind == "framequat" =>
+                            {
+                                row[at..at + 4].rotate_left(1);
+                            }
+                            Channel::Position { len: 7, .. } => {
+                                row[at + 3..at + 7].rotate_left(1);
+                            }
+                            _ => {}
+                        }
+                    }
+                }
+            }
+            Fault::StaleSensor => {
+                for rows in out.chunks_mut(width * frames) {
+                    for (i, channel) in record.channels().iter().enumerate() {
+                        if matches!(channel, Channel::Sensor { .. }) {
+                            for frame in (1..frames).rev() {
+                                let range = record.range(i);
+                                let before = (frame - 1) * width + range.start
+                                    ..(frame - 1) * width + range.end;
+                                rows.copy_within(before, frame * width + range.start);
+                            }
+                        }
+                    }
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// Commands with the last of several actuators at zero, or without NaN.
+    fn commands(&self, values: &[f64]) -> Vec<f64> {
+        let nu = self.inner.layout().nu().max(1);
+        let mut values = values.to_vec();
+        if self.fault == Fault::TorqueIgnored && nu > 1 {
+            values.iter_mut().skip(nu - 1).step_by(nu).for_each(|c| *c = 0.0);
+        }
+        if self.fault == Fault::NanAccepted {
+            values.iter_mut().filter(|c| !c.is_finite()).for_each(|c| *c = 0.0);
+        }
+        values
+    }
+
+    fn wrench(&self, wrench: &[f64]) -> Vec<f64> {
+        let factors = match self.fault {
+            Fault::WrenchTorqueLost => [1.0, 0.0],
+            Fault::ForceReversed => [-1.0, 1.0],
+            _ => [1.0, 1.0],
+        };
+        let factor = |i: usize| factors[i % 6 / 3];
+        wrench.iter().enumerate().map(|(i, w)| w * factor(i)).collect()
+    }
+}
+
+impl Simulator for MutantSimulator {
+    fn layout(&self) -> &Layout {
+        self.inner.layout()
+    }
+
+    fn batch_size(&self) -> usize {
+        self.inner.batch_size()
+    }
+
+    fn set_parameters(&mut self, sims: &[usize], values: &[f64]) -> Result<()> {
+        self.inner.set_parameters(sims, values)?;
+        if self.fault == Fault::SharedParameters && !sims.is_empty() {
+            let columns = values.len() / sims.len();
+            let all: Vec<usize> = (0..self.batch_size()).collect();
+            let last = &values[values.len() - columns..];
+            self.inner.set_parameters(&all, &last.repeat(all.len()))?;
+        }
+        Ok(())
+    }
+
+    fn reset(&mut self, sims: &[usize]) -> Result<()> {
+        self.inner.reset(sims)
+    }
+
+    fn set_state(&mut self, sims: &[usize], qpos: &[f64], qvel: &[f64]) -> Result<()> {
+        self.inner.set_state(sims, qpos, qvel)
+    }
+
+    fn rollout(&mut self, rollout: &Rollout<'_>, out: &mut [f64]) -> Result<()> {
+        let (Control::Shared(values) | Control::PerSimulation(values)) = rollout.control;
+        let values = self.commands(values);
+        let control = match rollout.control {
+            Control::Shared(_) => Control::Shared(&values),
+            Control::PerSimulation(_) => Control::PerSimulation(&values),
+        };
+        let wrenches: Vec<Vec<f64>> =
+            rollout.forces.iter().map(|f| self.wrench(f.wrench)).collect();
+        let forces: Vec<ExternalForce<'_>> = rollout
+            .forces
+            .iter()
+            .zip(&wrenches)
+            .map(|(force, wrench)| ExternalForce {
+                body: force.body,
+                wrench,
+            })
+            .collect();
+        let spoilt = Rollout {
+            control,
+            forces: &forces,
+            changes: match self.fault {
+                Fault::ChangesIgnored => &[],
+                _ => rollout.changes,
+            },
+            ..*rollout
+        };
+        self.inner.rollout(&spoilt, out)?;
+        if self.fault == Fault::OthersMove {
+            let others: Vec<usize> =
+                (0..self.batch_size()).filter(|s| !rollout.sims.contains(s)).collect();
+            let nothing = Recording::default();
+            let still = vec![0.0; self.layout().nu()];
+            let control = Control::Shared(&still);
+            let more = Rollout::new(&others, 1, 1, control, &nothing);
+            self.inner.rollout(&more, &mut [])?;
+        }
+        self.spoil(rollout.record, rollout.frames, out);
+        Ok(())
+    }
+
+    fn read(&mut self, sims: &[usize], record: &Recording, out: &mut [f64]) -> Result<()> {
+        self.inner.read(sims, record, out)?;
+        self.spoil(record, 1, out);
+        Ok(())
+    }
+
+    fn save(&mut self, sims: &[usize]) -> Result<Snapshot> {
+        self.inner.save(sims)
+    }
+
+    fn load(&mut self, snapshot: &Snapshot, rows: &[usize], sims: &[usize]) -> Result<()> {
+        self.inner.load(snapshot, rows, sims)?;
+        if self.fault == Fault::ForgetsVelocity {
+            let layout = self.inner.layout();
+            let names: Vec<String> =
+                layout.joints.iter().map(|j| format!("qpos.{}", j.name)).collect();
+            let (record, nv) = (layout.recording(&names)?, layout.nv);
+            let mut qpos = vec![0.0; sims.len() * record.width()];
+            self.inner.read(sims, &record, &mut qpos)?;
+            self.inner.set_state(sims, &qpos, &vec![0.0; sims.len() * nv])?;
+        }
+        Ok(())
+    }
+
+    fn copy_state(&mut self, from: &[usize], to: &[usize]) -> Result<()> {
+        self.inner.copy_state(from, to)
+    }
+
+    fn status(&self) -> &[Status] {
+        match self.fault {
+            Fault::DivergenceHidden => &self.running,
+            _ => self.inner.status(),
+        }
+    }
+
+    fn steps_taken(&self) -> u64 {
+        self.inner.steps_taken()
+    }
+}
