@@ -40,7 +40,7 @@ impl Default for CemIdentifier {
 inventory::submit! {
     IdentifierEntry {
         name: "cem",
-        about: "cross-entropy method, then importance sampling of the likelihood",
+        about: "cross-entropy method, then the posterior by emulation of the likelihood",
         defaults: registry::defaults::<CemIdentifier>,
         make: |s| {
             let identifier: CemIdentifier = registry::settings("identifier", s)?;
@@ -78,18 +78,11 @@ impl Identifier for CemIdentifier {
         let total = self.iterations + self.sampling.rounds;
         problem.progress.begin("identify", total as u64);
         for _ in 0..self.iterations {
-            let proposal = cem.distribution();
             let points = cem.ask(self.population, &mut rng);
-            let losses = likelihood.losses(&points)?;
+            let residuals = likelihood.residuals(&points)?;
+            let losses = samples.add(&points, residuals);
             cem.tell(&points, &losses);
-            let best = losses.iter().copied().fold(f64::INFINITY, f64::min);
-            iterations.push(sampling::summary(
-                &likelihood,
-                &points,
-                &vec![1.0; points.len()],
-                best,
-            ));
-            samples.add(proposal, points, &losses);
+            iterations.push(sampling::summary(&likelihood, &points, samples.best_loss()));
             problem.progress.advance(1);
         }
         let found = sampling::posterior(

@@ -3,8 +3,8 @@
 //! A point of the search space is `[z, s_1, s_2, …]`: the unknowns in prior-scaled
 //! coordinates, then the start pose of each episode as an offset from what its
 //! first reading shows, in standard deviations of that reading. The episode's
-//! commands are replayed from there, and the loss is half the sum of squared
-//! whitened residuals over all readings that are present.
+//! commands are replayed from there; what differs from the readings, divided by
+//! their noise, is the whitened residual.
 
 use asid_core::problem::Batch;
 use asid_core::replay::Replay;
@@ -167,42 +167,36 @@ impl<'a> Likelihood<'a> {
             .collect()
     }
 
-    /// Loss of each point: half the sum of squared whitened residuals; infinite
-    /// where a simulation diverged.
+    /// Whitened residuals (predicted minus observed) of all episodes at each point, one
+    /// entry a reading, zero where it is missing; `None` where a simulation diverged.
     ///
     /// # Errors
     /// When the engine fails.
-    pub fn losses(&mut self, points: &[Vec<f64>]) -> Result<Vec<f64>> {
-        let mut losses = vec![0.0; points.len()];
-        let mut whitened = vec![0.0; self.signals.whitened_len()];
+    pub fn residuals(&mut self, points: &[Vec<f64>]) -> Result<Vec<Option<Vec<f64>>>> {
+        let len = self.signals.whitened_len();
+        let mut all: Vec<Option<Vec<f64>>> = vec![Some(Vec::new()); points.len()];
+        let mut whitened = vec![0.0; len];
         for first in (0..points.len()).step_by(self.size) {
             let chunk = &points[first..(first + self.size).min(points.len())];
             for k in 0..self.episodes.len() {
                 self.predict(chunk, k)?;
                 let observed = &self.episodes[k];
                 let (rows, width) = (observed.replay.rows(), observed.replay.width());
-                for (i, loss) in losses[first..first + chunk.len()].iter_mut().enumerate() {
+                for (i, out) in all[first..first + chunk.len()].iter_mut().enumerate() {
                     let predicted = &self.predicted[i * rows * width..(i + 1) * rows * width];
                     if predicted.iter().any(|x| !x.is_finite()) {
-                        *loss = f64::INFINITY;
-                        continue;
+                        *out = None;
                     }
-                    for (p, o) in predicted
-                        .chunks_exact(width)
-                        .zip(observed.readings.chunks_exact(width))
-                    {
+                    let Some(out) = out else { continue };
+                    out.reserve(rows * len);
+                    for (p, o) in predicted.chunks_exact(width).zip(observed.readings.chunks_exact(width)) {
                         self.signals.difference(p, o, &mut whitened);
-                        *loss += 0.5
-                            * whitened
-                                .iter()
-                                .filter(|x| x.is_finite())
-                                .map(|x| x * x)
-                                .sum::<f64>();
+                        out.extend(whitened.iter().map(|x| if x.is_finite() { *x } else { 0.0 }));
                     }
                 }
             }
         }
-        Ok(losses)
+        Ok(all)
     }
 
     /// Predicted readings of episode `k` at one point, `rows x width`.

@@ -1,11 +1,12 @@
 //! Identification: fit the simulator to real episodes and say how sure that is.
 //!
 //! A search (CEM or REPS) finds where the likelihood is, with the start pose of
-//! each episode co-estimated; then importance sampling turns what was simulated
-//! into a posterior. The interval comes from the likelihood, never from the
-//! spread of an elite, which measures only how far a search has converged.
+//! each episode co-estimated; then draws around its end, and a smooth model of what
+//! they predict, give a posterior. The interval comes from the likelihood, never from
+//! the spread of an elite, which measures only how far a search has converged.
 
 pub mod cem;
+pub mod emulator;
 pub mod likelihood;
 pub mod reps;
 pub mod sampling;

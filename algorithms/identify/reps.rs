@@ -40,7 +40,7 @@ impl Default for RepsIdentifier {
 inventory::submit! {
     IdentifierEntry {
         name: "reps",
-        about: "relative entropy policy search, then importance sampling of the likelihood",
+        about: "relative entropy policy search, then the posterior by emulation of the likelihood",
         defaults: registry::defaults::<RepsIdentifier>,
         make: |s| {
             let identifier: RepsIdentifier = registry::settings("identifier", s)?;
@@ -66,19 +66,12 @@ impl Identifier for RepsIdentifier {
             .progress
             .begin("identify", (self.iterations + self.sampling.rounds) as u64);
         for _ in 0..self.iterations {
-            let proposal = reps.distribution().clone();
             let points = reps.ask(self.population, &mut rng);
-            let losses = likelihood.losses(&points)?;
+            let residuals = likelihood.residuals(&points)?;
+            let losses = samples.add(&points, residuals);
             let rewards: Vec<f64> = losses.iter().map(|l| -l).collect();
             reps.tell(&points, &rewards);
-            let best = losses.iter().copied().fold(f64::INFINITY, f64::min);
-            iterations.push(sampling::summary(
-                &likelihood,
-                &points,
-                &vec![1.0; points.len()],
-                best,
-            ));
-            samples.add(proposal, points, &losses);
+            iterations.push(sampling::summary(&likelihood, &points, samples.best_loss()));
             problem.progress.advance(1);
         }
         let found = sampling::posterior(

@@ -1,16 +1,10 @@
-//! From a search's samples to a posterior: adaptive multiple importance sampling.
+//! From a search to a posterior.
 //!
-//! Every point that was simulated counts. With proposals `q_1 … q_T` and `n_t`
-//! draws from each, a point `x` weighs `L(x) / sum_t n_t q_t(x)` (the deterministic
-//! mixture of Owen and Zhou 2000; adapted over rounds as by Cornuet et al. 2012).
-//! A few rounds of draws around the weighted samples follow the search, because a
-//! search may end narrower than the posterior.
-//!
-//! The likelihood is tempered, `L^beta`, for two reasons, and both only widen the
-//! interval: where the best fit leaves residuals larger than the sensors' noise
-//! (`beta = 1 / reduced chi^2`), and where contact makes the likelihood so ragged
-//! that a handful of points would carry all the weight (`beta` falls until the
-//! effective number of samples is reached).
+//! A search (CEM, REPS) says where the likelihood is; how wide it is there is
+//! another question, and the spread of an elite does not answer it. So rounds of
+//! draws over a region around the search's end follow. Each round fits an
+//! [`Emulator`] to all points inside the region, and the emulator's posterior makes
+//! the next region: narrower where the data tell more, wider where it was too narrow.
 
 use asid_core::identify::{Identified, IterationSummary};
 use asid_core::posterior::weighted_quantile;
@@ -19,20 +13,21 @@ use asid_core::{Error, Posterior, Problem, Result};
 use serde::{Deserialize, Serialize};
 
 use super::Likelihood;
+use super::emulator::{Emulator, REACH, features_len};
 use crate::optimise::{Gaussian, require};
 
 /// How the posterior is sampled after the search.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SamplingSettings {
-    /// Rounds of draws around the weighted samples.
+    /// Rounds of draws.
     pub rounds: usize,
-    /// Draws a round.
+    /// Draws a round; at least three for each feature of the emulator are taken.
     pub draws: usize,
-    /// Factor on the deviations of a round's proposal.
+    /// Deviations of the next region in units of the posterior's.
     pub widen: f64,
-    /// Smallest effective number of samples.
-    pub min_effective: f64,
+    /// Samples of the posterior that are kept.
+    pub samples: usize,
 }
 
 impl Default for SamplingSettings {
@@ -40,119 +35,88 @@ impl Default for SamplingSettings {
         Self {
             rounds: 4,
             draws: 64,
-            widen: 1.3,
-            min_effective: 25.0,
+            widen: 2.0,
+            samples: 1000,
         }
     }
 }
 
 impl SamplingSettings {
-    /// Checks the settings.
+    /// Checks that there is something to draw.
     ///
     /// # Errors
-    /// When one is out of its domain.
+    /// [`Error::Config`] naming the setting.
     pub fn check(&self) -> Result<()> {
-        let Self { draws, widen, min_effective, .. } = *self;
+        let Self {
+            draws,
+            widen,
+            samples,
+            ..
+        } = *self;
         require(draws > 0, "identifier.sampling.draws", draws as f64, "at least 1")?;
-        require(widen > 0.0, "identifier.sampling.widen", widen, "above 0")?;
-        require(min_effective >= 1.0, "identifier.sampling.min_effective", min_effective, "at least 1")
+        require(samples > 1, "identifier.sampling.samples", samples as f64, "at least 2")?;
+        require(widen > 0.0, "identifier.sampling.widen", widen, "above 0")
+    }
+
+    /// Draws a round for a search space of `n` entries.
+    #[must_use]
+    pub fn draws_for(&self, n: usize) -> usize {
+        self.draws.max(3 * features_len(n))
     }
 }
 
-/// Everything that was simulated, and what it was drawn from.
+/// Everything that was simulated.
 #[derive(Default)]
 pub struct Samples {
     points: Vec<Vec<f64>>,
+    residuals: Vec<Vec<f64>>,
     losses: Vec<f64>,
-    proposals: Vec<(Gaussian, usize)>,
 }
 
 impl Samples {
-    /// Adds draws from one proposal.
-    pub fn add(&mut self, proposal: Gaussian, points: Vec<Vec<f64>>, losses: &[f64]) {
-        self.proposals.push((proposal, points.len()));
-        self.points.extend(points);
-        self.losses.extend_from_slice(losses);
+    /// Adds points with their residuals, and returns the loss of each: half the sum of
+    /// squares, infinite where the simulation diverged.
+    pub fn add(&mut self, points: &[Vec<f64>], residuals: Vec<Option<Vec<f64>>>) -> Vec<f64> {
+        let mut losses = Vec::with_capacity(points.len());
+        for (point, residual) in points.iter().zip(residuals) {
+            let Some(residual) = residual else {
+                losses.push(f64::INFINITY);
+                continue;
+            };
+            let loss = 0.5 * residual.iter().map(|x| x * x).sum::<f64>();
+            losses.push(loss);
+            self.points.push(point.clone());
+            self.residuals.push(residual);
+            self.losses.push(loss);
+        }
+        losses
     }
 
-    /// The point with the smallest loss.
+    /// The smallest loss so far.
     #[must_use]
-    pub fn best(&self) -> Option<(&[f64], f64)> {
-        (0..self.losses.len())
-            .filter(|&i| self.losses[i].is_finite())
-            .min_by(|&i, &j| self.losses[i].total_cmp(&self.losses[j]))
-            .map(|i| (&*self.points[i], self.losses[i]))
+    pub fn best_loss(&self) -> f64 {
+        self.losses.iter().copied().fold(f64::INFINITY, f64::min)
     }
 
-    /// Log of the mixture density at every point.
-    fn log_mixture(&self) -> Vec<f64> {
-        self.points
-            .iter()
-            .map(|x| {
-                let terms: Vec<f64> = self
-                    .proposals
-                    .iter()
-                    .map(|(q, n)| (*n as f64).ln() + q.log_density(x))
-                    .collect();
-                let max = terms.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-                max + terms.iter().map(|t| (t - max).exp()).sum::<f64>().ln()
-            })
-            .collect()
-    }
-
-    /// Normalised weights under the likelihood to the power `beta`.
-    fn weights(&self, log_mixture: &[f64], beta: f64) -> Vec<f64> {
-        let logs: Vec<f64> = self
-            .losses
-            .iter()
-            .zip(log_mixture)
-            .map(|(l, q)| {
-                if l.is_finite() {
-                    -beta * l - q
-                } else {
-                    f64::NEG_INFINITY
-                }
-            })
+    /// Where the likelihood is: a fit to the `count` best points, weighted by rank, so that
+    /// it is not carried by the luck of one.
+    fn elite(&self, count: usize, low: &[f64], high: &[f64]) -> Gaussian {
+        let mut order: Vec<usize> = (0..self.losses.len()).collect();
+        order.sort_by(|&i, &j| self.losses[i].total_cmp(&self.losses[j]));
+        order.truncate(count);
+        let weights: Vec<f64> = (0..order.len())
+            .map(|rank| ((count as f64 + 0.5) / (rank as f64 + 1.0)).ln())
             .collect();
-        let max = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        let weights: Vec<f64> = logs.iter().map(|l| (l - max).exp()).collect();
-        let total: f64 = weights.iter().sum();
-        weights.iter().map(|w| w / total).collect()
-    }
-
-    /// Weights with the largest `beta` not above `highest` that reach the effective number.
-    fn tempered(&self, highest: f64, min_effective: f64) -> (Vec<f64>, f64) {
-        let log_mixture = self.log_mixture();
-        let effective = |w: &[f64]| 1.0 / w.iter().map(|w| w * w).sum::<f64>();
-        let weights = self.weights(&log_mixture, highest);
-        let target = min_effective.min(self.points.len() as f64 / 2.0);
-        if effective(&weights) >= target {
-            return (weights, highest);
-        }
-        let (mut low, mut high) = (highest * 1e-6, highest);
-        for _ in 0..40 {
-            let middle = (low * high).sqrt();
-            if effective(&self.weights(&log_mixture, middle)) >= target {
-                low = middle;
-            } else {
-                high = middle;
-            }
-        }
-        (self.weights(&log_mixture, low), low)
+        let points: Vec<Vec<f64>> = order.iter().map(|&i| self.points[i].clone()).collect();
+        Gaussian::fit(&points, &weights, &vec![1e-2; low.len()], low, high)
     }
 }
 
-/// Quantiles of the unknowns over weighted points, for pictures.
+/// Quantiles of the unknowns over points, for pictures.
 #[must_use]
-pub fn summary(
-    likelihood: &Likelihood<'_>,
-    points: &[Vec<f64>],
-    weights: &[f64],
-    best_loss: f64,
-) -> IterationSummary {
+pub fn summary(likelihood: &Likelihood<'_>, points: &[Vec<f64>], best_loss: f64) -> IterationSummary {
     let values: Vec<Vec<f64>> = points.iter().map(|p| likelihood.parameters(p)).collect();
-    let total: f64 = weights.iter().sum();
-    let weights: Vec<f64> = weights.iter().map(|w| w / total).collect();
+    let weights = vec![1.0 / values.len().max(1) as f64; values.len()];
     let d = values.first().map_or(0, Vec::len);
     IterationSummary {
         quantiles: (0..d)
@@ -165,10 +129,10 @@ pub fn summary(
     }
 }
 
-/// Rounds of importance sampling after a search, and the posterior.
+/// Rounds of draws after a search, and the posterior.
 ///
 /// # Errors
-/// When the engine fails or every simulation diverged.
+/// When the engine fails or nearly every simulation diverged.
 pub fn posterior(
     problem: &Problem<'_>,
     likelihood: &mut Likelihood<'_>,
@@ -179,113 +143,40 @@ pub fn posterior(
 ) -> Result<Identified> {
     let (low, high) = likelihood.bounds();
     let n = likelihood.dimension();
-    let diverged = || Error::Failed("every simulation of the episode diverged".into());
-    // Entries of the reading minus entries of the point: what a perfect fit leaves.
-    let freedom = (likelihood.present() as f64 - n as f64).max(1.0);
-    let mismatch = |loss: f64| (2.0 * loss / freedom).max(1.0);
-    for _ in 0..settings.rounds {
-        let (_, best) = samples.best().ok_or_else(diverged)?;
-        let (weights, _) = samples.tempered(
-            1.0 / mismatch(best),
-            settings.min_effective.max(4.0 * n as f64),
-        );
-        let proposal = Gaussian::fit(&samples.points, &weights, &vec![1e-4; n], &low, &high)
+    let d = problem.parameters.len();
+    let too_few = || Error::Failed("nearly every simulation of the episode diverged".into());
+    if samples.points.len() < 2 {
+        return Err(too_few());
+    }
+    let draws = settings.draws_for(n);
+    let mut region = samples.elite(2 * n + 4, &low, &high).widened(settings.widen);
+    let mut found: Option<(Emulator, Vec<Vec<f64>>)> = None;
+    for _ in 0..settings.rounds.max(1) {
+        let points: Vec<Vec<f64>> = (0..draws).map(|_| region.sample(rng)).collect();
+        let residuals = likelihood.residuals(&points)?;
+        samples.add(&points, residuals);
+        let near: Vec<usize> = (0..samples.points.len())
+            .filter(|&i| region.standardise(&samples.points[i]).iter().all(|u| u.abs() <= REACH))
+            .collect();
+        let points: Vec<&[f64]> = near.iter().map(|&i| &*samples.points[i]).collect();
+        let residuals: Vec<&[f64]> = near.iter().map(|&i| &*samples.residuals[i]).collect();
+        let emulator = Emulator::fit(&region, &points, &residuals, d, likelihood.present()).ok_or_else(too_few)?;
+        let drawn = emulator.sample(&low, &high, settings.samples.max(2), rng);
+        iterations.push(summary(likelihood, &drawn, samples.best_loss()));
+        region = Gaussian::fit(&drawn, &vec![1.0; drawn.len()], &vec![1e-3; n], &low, &high)
             .widened(settings.widen);
-        let points: Vec<Vec<f64>> = (0..settings.draws).map(|_| proposal.sample(rng)).collect();
-        let losses = likelihood.losses(&points)?;
-        samples.add(proposal, points, &losses);
+        found = Some((emulator, drawn));
         problem.progress.advance(1);
-        let best = samples.best().ok_or_else(diverged)?.1;
-        iterations.push(summary(
-            likelihood,
-            &samples.points,
-            &weights_padded(&weights, samples.points.len()),
-            best,
-        ));
     }
-    let (best_point, best_loss) = samples
-        .best()
-        .map(|(x, l)| (x.to_vec(), l))
-        .ok_or_else(diverged)?;
-    let (weights, _) = samples.tempered(1.0 / mismatch(best_loss), settings.min_effective);
-    iterations.push(summary(likelihood, &samples.points, &weights, best_loss));
-    let values: Vec<Vec<f64>> = samples
-        .points
-        .iter()
-        .map(|p| likelihood.parameters(p))
-        .collect();
-    let (values, weights): (Vec<_>, Vec<_>) = values
-        .into_iter()
-        .zip(weights)
-        .filter(|(_, w)| *w > 1e-9)
-        .unzip();
-    let episodes = (n - problem.parameters.len()) / problem.task.exploration().start.len().max(1);
+    let (emulator, drawn) = found.ok_or_else(too_few)?;
+    let best = emulator.best();
+    let values: Vec<Vec<f64>> = drawn.iter().map(|p| likelihood.parameters(p)).collect();
+    let episodes = (n - d) / problem.task.exploration().start.len().max(1);
     Ok(Identified {
-        posterior: Posterior::from_samples(problem.parameters, values, &weights),
-        starts: (0..episodes)
-            .map(|k| likelihood.start(&best_point, k))
-            .collect(),
+        posterior: Posterior::from_samples(problem.parameters, values, &vec![1.0; drawn.len()]),
+        starts: (0..episodes).map(|k| likelihood.start(&best, k)).collect(),
         iterations,
-        residual: (2.0 * best_loss / likelihood.present().max(1) as f64).sqrt(),
+        residual: emulator.residual,
+        roughness: emulator.roughness,
     })
-}
-
-/// Weights of the points before the last round, with zeros for that round.
-fn weights_padded(weights: &[f64], len: usize) -> Vec<f64> {
-    let mut padded = weights.to_vec();
-    padded.resize(len, 0.0);
-    padded
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use asid_core::Streams;
-
-    fn drawn(stds: &[f64], target_mean: f64, target_std: f64) -> Samples {
-        let mut rng = Streams::new(5).stream("s");
-        let mut samples = Samples::default();
-        for &std in stds {
-            let q = Gaussian::diagonal(&[0.1], &[std], &[-50.0], &[50.0]);
-            let points: Vec<Vec<f64>> = (0..2000).map(|_| q.sample(&mut rng)).collect();
-            let losses: Vec<f64> = points
-                .iter()
-                .map(|p| 0.5 * ((p[0] - target_mean) / target_std).powi(2))
-                .collect();
-            samples.add(q, points, &losses);
-        }
-        samples
-    }
-
-    #[test]
-    fn a_mixture_of_wide_and_narrow_proposals_gives_the_known_posterior() {
-        let samples = drawn(&[3.0, 1.0, 0.1], 0.4, 0.5);
-        let weights = samples.weights(&samples.log_mixture(), 1.0);
-        let mean: f64 = samples
-            .points
-            .iter()
-            .zip(&weights)
-            .map(|(p, w)| p[0] * w)
-            .sum();
-        let var: f64 = samples
-            .points
-            .iter()
-            .zip(&weights)
-            .map(|(p, w)| w * (p[0] - mean).powi(2))
-            .sum();
-        // About 2500 effective samples: errors of 0.5 / sqrt(2500) = 0.01.
-        assert!((mean - 0.4).abs() < 0.03, "{mean}");
-        assert!((var.sqrt() - 0.5).abs() < 0.03, "{}", var.sqrt());
-    }
-
-    #[test]
-    fn tempering_reaches_the_effective_number() {
-        let samples = drawn(&[3.0], 0.4, 1e-4);
-        let (weights, beta) = samples.tempered(1.0, 25.0);
-        let effective = 1.0 / weights.iter().map(|w| w * w).sum::<f64>();
-        assert!(
-            beta < 1.0 && effective >= 25.0 && effective < 30.0,
-            "{beta} {effective}"
-        );
-    }
 }

@@ -111,6 +111,21 @@ impl Gaussian {
         (0..self.mean.len()).map(|i| l.row(i).norm()).collect()
     }
 
+    /// Coordinates in which the distribution is a standard normal one.
+    #[must_use]
+    pub fn standardise(&self, x: &[f64]) -> Vec<f64> {
+        let d = DVector::from_column_slice(x) - &self.mean;
+        let l = self.factor.l();
+        l.solve_lower_triangular(&d).unwrap_or(d).as_slice().to_vec()
+    }
+
+    /// The point at these standardised coordinates.
+    #[must_use]
+    pub fn unstandardise(&self, u: &[f64]) -> Vec<f64> {
+        let x = &self.mean + self.factor.l() * DVector::from_column_slice(u);
+        x.as_slice().to_vec()
+    }
+
     /// A draw inside the box.
     pub fn sample(&self, rng: &mut Rng) -> Vec<f64> {
         let n = self.mean.len();

@@ -26,6 +26,9 @@ pub struct Identified {
     /// Root mean square of the whitened residual at the best fit: 1 where the
     /// simulator explains the readings as well as their noise allows.
     pub residual: f64,
+    /// How much nearby simulations differ by the luck of contact, root mean square in
+    /// units of the readings' noise; 0 where it was not measured.
+    pub roughness: f64,
 }
 
 /// Turns real episodes into a posterior over the problem's parameters.
