@@ -125,11 +125,13 @@ fn stiff_response(backend: &dyn Backend) -> Result<f64> {
     // Roots of 0.1 s^2 + 400 s + 4000, far apart.
     let root = (400f64 * 400.0 - 4.0 * 0.1 * 4000.0).sqrt();
     let (slow, fast) = ((400.0 - root) / 0.2, (400.0 + root) / 0.2);
-    Ok(largest(stiff(backend)?.iter().enumerate().map(|(i, row)| {
-        let t = (i + 1) as f64 * STEP;
-        let left = (fast * (-slow * t).exp() - slow * (-fast * t).exp()) / (fast - slow);
-        row[0] / 0.3 - 1.0 + left
-    })))
+    Ok(largest(stiff(backend)?.iter().enumerate().map(
+        |(i, row)| {
+            let t = (i + 1) as f64 * STEP;
+            let left = (fast * (-slow * t).exp() - slow * (-fast * t).exp()) / (fast - slow);
+            row[0] / 0.3 - 1.0 + left
+        },
+    )))
 }
 
 fn stiff_rest(backend: &dyn Backend) -> Result<f64> {
@@ -152,7 +154,10 @@ fn force_limit(backend: &dyn Backend) -> Result<f64> {
         backend,
         r#"<position joint="j" kp="1000" kv="10" forcerange="-0.2 0.2"/>"#,
     )?;
-    Ok(relative(last(&rig.run(100, &[1.0])?)?[1], 2.0 * 100.0 * STEP))
+    Ok(relative(
+        last(&rig.run(100, &[1.0])?)?[1],
+        2.0 * 100.0 * STEP,
+    ))
 }
 
 fn command_limit(backend: &dyn Backend) -> Result<f64> {
@@ -204,6 +209,9 @@ fn own_joint(backend: &dyn Backend) -> Result<f64> {
     let rows = rig.run(50, &[1.0, 2.0, 3.0])?;
     let end = last(&rows)?;
     Ok(largest(
-        [2.0, 3.0, 1.0].iter().zip(end).map(|(&t, &v)| relative(v, t)),
+        [2.0, 3.0, 1.0]
+            .iter()
+            .zip(end)
+            .map(|(&t, &v)| relative(v, t)),
     ))
 }

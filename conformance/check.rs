@@ -171,14 +171,25 @@ impl Row {
 #[must_use]
 pub fn table(rows: &[Row]) -> String {
     let check = rows.iter().map(|r| r.check.len()).max().unwrap_or(0).max(5);
-    let engine = rows.iter().map(|r| r.engine.len()).max().unwrap_or(0).max(6);
+    let engine = rows
+        .iter()
+        .map(|r| r.engine.len())
+        .max()
+        .unwrap_or(0)
+        .max(6);
     let mut text = format!(
         "{:engine$}  {:check$}  {:>10}  {:>9}  {:6}  {:15}  reason\n",
         "engine", "check", "figure", "tolerance", "unit", "outcome"
     );
     for row in rows {
-        let value = row.value.map_or_else(|| "-".to_owned(), |v| format!("{v:.2e}"));
-        let reason = if row.note.is_empty() { &row.reason } else { &row.note };
+        let value = row
+            .value
+            .map_or_else(|| "-".to_owned(), |v| format!("{v:.2e}"));
+        let reason = if row.note.is_empty() {
+            &row.reason
+        } else {
+            &row.note
+        };
         // Writing into a String cannot fail.
         let _ = writeln!(
             text,

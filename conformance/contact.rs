@@ -19,6 +19,14 @@ pub const CHECKS: &[Check] = &[
         measure: rest_heights,
     },
     Check {
+        name: "contact/rest-height-of-a-mesh",
+        needs: CONTACT.union(Capabilities::MESHES),
+        unit: "m",
+        tolerance: Tolerance::same(5e-4),
+        reason: "as contact/rest-height-of-shapes",
+        measure: mesh_height,
+    },
+    Check {
         name: "contact/rest-is-still",
         needs: CONTACT,
         unit: "m/s",
@@ -144,6 +152,21 @@ fn rest_heights(backend: &dyn Backend) -> Result<f64> {
     Ok(largest(heights))
 }
 
+fn mesh_height(backend: &dyn Backend) -> Result<f64> {
+    let corner = |i: usize| {
+        let sign = |bit: usize| if i >> bit & 1 == 0 { "-.05" } else { ".05" };
+        format!("{} {} {} ", sign(0), sign(1), sign(2))
+    };
+    let corners: String = (0..8).map(corner).collect();
+    let inside = format!(
+        r#"<asset><mesh name="cube" vertex="{corners}"/></asset>
+        <worldbody><geom type="plane" size="5 5 .1"/><body pos="0 0 .05"><freejoint name="b"/>
+          <geom type="mesh" mesh="cube" mass="0.7"/></body></worldbody>"#
+    );
+    let mut rig = Rig::new(backend, &inside, &["qpos.b"])?;
+    Ok(last(&rig.run(500, &[])?)?[2] - 0.05)
+}
+
 fn rest_is_still(backend: &dyn Backend) -> Result<f64> {
     Ok(largest(resting(backend, 0.0, &["qvel.b"])?))
 }
@@ -187,9 +210,9 @@ fn stack_stands(backend: &dyn Backend) -> Result<f64> {
 fn stack_forces(backend: &dyn Backend) -> Result<f64> {
     let channels = ["contact.world/b0", "contact.b0/b1", "contact.b1/b2"];
     let forces = stack(backend, &channels)?;
-    Ok(largest((0..3).map(|i| {
-        relative(forces[i], (3 - i) as f64 * 0.3 * G)
-    })))
+    Ok(largest(
+        (0..3).map(|i| relative(forces[i], (3 - i) as f64 * 0.3 * G)),
+    ))
 }
 
 fn tips_over(backend: &dyn Backend) -> Result<f64> {
@@ -230,9 +253,9 @@ fn collision_momentum(backend: &dyn Backend) -> Result<f64> {
         return Ok(f64::NAN);
     }
     let momentum = |v: &[f64], i: usize| 0.4 * v[i] + v[6 + i];
-    Ok(largest(
-        (0..3).map(|i| (momentum(&after, i) - momentum(&before, i)) / (0.4 * 1.5)),
-    ))
+    Ok(largest((0..3).map(|i| {
+        (momentum(&after, i) - momentum(&before, i)) / (0.4 * 1.5)
+    })))
 }
 
 fn collision_energy(backend: &dyn Backend) -> Result<f64> {

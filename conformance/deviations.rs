@@ -35,7 +35,9 @@ static TABLE: LazyLock<Vec<Deviation>> = LazyLock::new(|| {
 
 /// The known deviation of an engine in a check.
 pub fn find(engine: &str, check: &str) -> Option<&'static Deviation> {
-    TABLE.iter().find(|d| d.engine == engine && d.check == check)
+    TABLE
+        .iter()
+        .find(|d| d.engine == engine && d.check == check)
 }
 
 #[cfg(test)]

@@ -138,9 +138,8 @@ fn tumbling_momentum(backend: &dyn Backend) -> Result<f64> {
     let before = inertia.component_mul(&rate);
     let rows = rig.run(500, &[])?;
     let end = last(&rows)?;
-    let attitude = UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(
-        end[3], end[4], end[5], end[6],
-    ));
+    let attitude =
+        UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(end[3], end[4], end[5], end[6]));
     let after = attitude * inertia.component_mul(&Vector3::new(end[10], end[11], end[12]));
     Ok((after - before).norm() / before.norm())
 }
@@ -178,9 +177,7 @@ fn pendulum(backend: &dyn Backend) -> Result<Vec<Vec<f64>>> {
 
 fn pendulum_energy(backend: &dyn Backend) -> Result<f64> {
     let swing = 0.5 * G * (1.0 - 1f64.cos());
-    let energy = |r: &Vec<f64>| {
-        0.5 * PENDULUM_INERTIA * r[1] * r[1] + 0.5 * G * (1.0 - r[0].cos())
-    };
+    let energy = |r: &Vec<f64>| 0.5 * PENDULUM_INERTIA * r[1] * r[1] + 0.5 * G * (1.0 - r[0].cos());
     Ok(largest(
         pendulum(backend)?.iter().map(|r| energy(r) / swing - 1.0),
     ))
@@ -231,9 +228,9 @@ fn coupled_links(backend: &dyn Backend) -> Result<f64> {
     let cross = m * l * c * bend.cos();
     let near = 0.01 + 1.0 * 0.2 * 0.2 + m * l * l + far + 2.0 * cross;
     let mass = Matrix2::new(near, far + cross, far + cross, far);
-    let theory = mass
-        .try_inverse()
-        .map_or(Vector2::zeros(), |inverse| inverse * Vector2::new(0.7, -0.4) * STEP);
+    let theory = mass.try_inverse().map_or(Vector2::zeros(), |inverse| {
+        inverse * Vector2::new(0.7, -0.4) * STEP
+    });
     let found = Vector2::new(rows[0][0], rows[0][1]);
     Ok((found - theory).norm() / theory.norm())
 }

@@ -107,6 +107,14 @@ pub const CHECKS: &[Check] = &[
         reason: "the default softness (20 ms, d = 0.9) yields (1 - d) g / (d k) = 0.4 mm: twice that",
         measure: weld_holds,
     },
+    Check {
+        name: "joints/coupling-shares-torque",
+        needs: DRIVEN.union(Capabilities::EQUALITY),
+        unit: "",
+        tolerance: Tolerance::same(0.01),
+        reason: "both wheels turn as one inertia of I (1 + 2^2); the coupling gives way by (1 - d) a / (d k) = 0.1 mrad of 1 rad, and takes 20 ms to do so",
+        measure: coupling,
+    },
 ];
 
 /// A wheel of 0.1 kg m² on a hinge without gravity, driven by a motor.
@@ -185,7 +193,11 @@ fn dry_friction_breakaway(backend: &dyn Backend) -> Result<f64> {
 }
 
 fn dry_friction_slows(backend: &dyn Backend) -> Result<f64> {
-    let mut rig = wheel(backend, &format!(r#"frictionloss="0.3" {HARD}"#), &["qvel.j"])?;
+    let mut rig = wheel(
+        backend,
+        &format!(r#"frictionloss="0.3" {HARD}"#),
+        &["qvel.j"],
+    )?;
     rig.place(&[0.0], &[4.0])?;
     Ok(relative(last(&rig.run(500, &[0.0])?)?[0], 4.0 - 3.0))
 }
@@ -219,4 +231,25 @@ fn weld_holds(backend: &dyn Backend) -> Result<f64> {
     let rows = rig.run(500, &[])?;
     let end = last(&rows)?;
     Ok(largest([end[0] - 0.1, end[1], end[2] - 1.0]))
+}
+
+/// Two wheels of 0.1 kg m², the second coupled to turn twice as far as the first.
+fn coupling(backend: &dyn Backend) -> Result<f64> {
+    let wheel = |name: &str| {
+        format!(
+            r#"<body><joint name="{name}" axis="0 0 1"/>
+            <inertial pos="0 0 0" mass="1" diaginertia="0.1 0.1 0.1"/></body>"#
+        )
+    };
+    let inside = format!(
+        r#"<option gravity="0 0 0"/><worldbody>{}{}</worldbody>
+        <actuator><motor joint="a"/></actuator>
+        <equality><joint joint1="b" joint2="a" polycoef="0 2 0 0 0"/></equality>"#,
+        wheel("a"),
+        wheel("b")
+    );
+    let mut rig = Rig::new(backend, &inside, &["qpos.a", "qpos.b"])?;
+    let rows = rig.run(500, &[1.0])?;
+    let end = last(&rows)?;
+    Ok(largest([relative(end[0], 1.0), relative(end[1], 2.0)]))
 }

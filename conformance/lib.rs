@@ -25,15 +25,20 @@
 //! ```
 
 mod actuators;
+mod arrays;
 mod check;
 mod contact;
+mod contact_parameters;
 mod deviations;
+mod divergence;
 mod dynamics;
 mod faults;
 mod forces;
 mod frames;
 mod friction;
 mod joints;
+mod mechanism_parameters;
+mod pair;
 mod parameters;
 mod rig;
 mod state;
@@ -50,10 +55,14 @@ pub fn checks() -> impl Iterator<Item = &'static Check> {
         contact::CHECKS,
         friction::CHECKS,
         actuators::CHECKS,
+        arrays::CHECKS,
         frames::CHECKS,
+        contact_parameters::CHECKS,
+        mechanism_parameters::CHECKS,
         parameters::CHECKS,
         forces::CHECKS,
         state::CHECKS,
+        divergence::CHECKS,
         faults::CHECKS,
     ]
     .into_iter()

@@ -69,7 +69,14 @@ pub const PILE: &str = r#"
   <actuator><position name="servo" joint="turn" kp="20" kv="2" ctrlrange="-2 2"/></actuator>"#;
 
 const CHANNELS: [&str; 8] = [
-    "qpos.turn", "qvel.turn", "qpos.a", "qvel.a", "qpos.b", "qvel.b", "qpos.c", "qvel.c",
+    "qpos.turn",
+    "qvel.turn",
+    "qpos.a",
+    "qvel.a",
+    "qpos.b",
+    "qvel.b",
+    "qpos.c",
+    "qvel.c",
 ];
 
 /// A batch of piles; the simulations differ from the first command on.
@@ -155,7 +162,15 @@ fn set_state(backend: &dyn Backend) -> Result<f64> {
     let mut qpos = vec![0.0; nq];
     for (i, joint) in ["a", "b", "c"].iter().enumerate() {
         let at = rig.simulator.layout().joint(joint)?.qpos;
-        let place = [0.1 * i as f64, 0.02, 0.05 + 0.08 * i as f64, 1.0, 0.0, 0.1, 0.0];
+        let place = [
+            0.1 * i as f64,
+            0.02,
+            0.05 + 0.08 * i as f64,
+            1.0,
+            0.0,
+            0.1,
+            0.0,
+        ];
         qpos[at..at + 7].copy_from_slice(&place);
     }
     let qvel: Vec<f64> = (0..nv).map(|i| 0.1 * (i as f64).sin()).collect();

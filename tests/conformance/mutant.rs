@@ -117,7 +117,9 @@ impl Backend for Mutant<'_> {
             _ => scene.xml().to_owned(),
         };
         Ok(Arc::new(MutantModel {
-            inner: self.inner.load(&Scene::from_xml(scene.name(), &xml, &[])?)?,
+            inner: self
+                .inner
+                .load(&Scene::from_xml(scene.name(), &xml, &[])?)?,
             fault: self.fault,
         }))
     }
@@ -177,7 +179,9 @@ impl MutantSimulator {
         match self.fault {
             Fault::SharedNoise => {
                 for value in out {
-                    let noise = NOISE.fetch_add(1, Ordering::Relaxed).wrapping_mul(0x9e37_79b9);
+                    let noise = NOISE
+                        .fetch_add(1, Ordering::Relaxed)
+                        .wrapping_mul(0x9e37_79b9);
                     *value *= 1.0 + 1e-14 * (noise % 1000) as f64;
                 }
             }
@@ -227,10 +231,17 @@ impl MutantSimulator {
         let nu = self.inner.layout().nu().max(1);
         let mut values = values.to_vec();
         if self.fault == Fault::TorqueIgnored && nu > 1 {
-            values.iter_mut().skip(nu - 1).step_by(nu).for_each(|c| *c = 0.0);
+            values
+                .iter_mut()
+                .skip(nu - 1)
+                .step_by(nu)
+                .for_each(|c| *c = 0.0);
         }
         if self.fault == Fault::NanAccepted {
-            values.iter_mut().filter(|c| !c.is_finite()).for_each(|c| *c = 0.0);
+            values
+                .iter_mut()
+                .filter(|c| !c.is_finite())
+                .for_each(|c| *c = 0.0);
         }
         values
     }
@@ -242,7 +253,11 @@ impl MutantSimulator {
             _ => [1.0, 1.0],
         };
         let factor = |i: usize| factors[i % 6 / 3];
-        wrench.iter().enumerate().map(|(i, w)| w * factor(i)).collect()
+        wrench
+            .iter()
+            .enumerate()
+            .map(|(i, w)| w * factor(i))
+            .collect()
     }
 }
 
@@ -281,8 +296,11 @@ impl Simulator for MutantSimulator {
             Control::Shared(_) => Control::Shared(&values),
             Control::PerSimulation(_) => Control::PerSimulation(&values),
         };
-        let wrenches: Vec<Vec<f64>> =
-            rollout.forces.iter().map(|f| self.wrench(f.wrench)).collect();
+        let wrenches: Vec<Vec<f64>> = rollout
+            .forces
+            .iter()
+            .map(|f| self.wrench(f.wrench))
+            .collect();
         let forces: Vec<ExternalForce<'_>> = rollout
             .forces
             .iter()
@@ -303,8 +321,9 @@ impl Simulator for MutantSimulator {
         };
         self.inner.rollout(&spoilt, out)?;
         if self.fault == Fault::OthersMove {
-            let others: Vec<usize> =
-                (0..self.batch_size()).filter(|s| !rollout.sims.contains(s)).collect();
+            let others: Vec<usize> = (0..self.batch_size())
+                .filter(|s| !rollout.sims.contains(s))
+                .collect();
             let nothing = Recording::default();
             let still = vec![0.0; self.layout().nu()];
             let control = Control::Shared(&still);
@@ -329,12 +348,16 @@ impl Simulator for MutantSimulator {
         self.inner.load(snapshot, rows, sims)?;
         if self.fault == Fault::ForgetsVelocity {
             let layout = self.inner.layout();
-            let names: Vec<String> =
-                layout.joints.iter().map(|j| format!("qpos.{}", j.name)).collect();
+            let names: Vec<String> = layout
+                .joints
+                .iter()
+                .map(|j| format!("qpos.{}", j.name))
+                .collect();
             let (record, nv) = (layout.recording(&names)?, layout.nv);
             let mut qpos = vec![0.0; sims.len() * record.width()];
             self.inner.read(sims, &record, &mut qpos)?;
-            self.inner.set_state(sims, &qpos, &vec![0.0; sims.len() * nv])?;
+            self.inner
+                .set_state(sims, &qpos, &vec![0.0; sims.len() * nv])?;
         }
         Ok(())
     }

@@ -1,0 +1,260 @@
+//! Parameters of masses, joints and actuators, each by the amount that physics says.
+
+use asid_core::{Backend, Capabilities, Result};
+
+use crate::check::{Check, Tolerance};
+use crate::pair::{both, ends, pair};
+use crate::rig::{G, STEP, largest};
+
+const DRIVEN: Capabilities = Capabilities::ARTICULATION.union(Capabilities::ACTUATORS);
+const IMPEDANCE: Capabilities = DRIVEN.union(Capabilities::JOINT_IMPEDANCE);
+const ROUNDING: Tolerance = Tolerance::by_precision(1e-9, 1e-4);
+const EXACT: &str = "from rest or under constant force the first steps are exact: rounding";
+
+/// The checks of this family.
+pub const CHECKS: &[Check] = &[
+    Check {
+        name: "parameters/geom-position",
+        needs: DRIVEN,
+        unit: "",
+        tolerance: ROUNDING,
+        reason: EXACT,
+        measure: geom_position,
+    },
+    Check {
+        name: "parameters/geom-mass",
+        needs: DRIVEN,
+        unit: "",
+        tolerance: ROUNDING,
+        reason: EXACT,
+        measure: geom_mass,
+    },
+    Check {
+        name: "parameters/body-mass",
+        needs: DRIVEN,
+        unit: "",
+        tolerance: ROUNDING,
+        reason: EXACT,
+        measure: body_mass,
+    },
+    Check {
+        name: "parameters/body-centre-of-mass",
+        needs: DRIVEN,
+        unit: "",
+        tolerance: ROUNDING,
+        reason: EXACT,
+        measure: body_centre,
+    },
+    Check {
+        name: "parameters/body-inertia",
+        needs: DRIVEN,
+        unit: "",
+        tolerance: ROUNDING,
+        reason: EXACT,
+        measure: body_inertia,
+    },
+    Check {
+        name: "parameters/joint-armature",
+        needs: IMPEDANCE,
+        unit: "",
+        tolerance: ROUNDING,
+        reason: EXACT,
+        measure: joint_armature,
+    },
+    Check {
+        name: "parameters/joint-damping",
+        needs: IMPEDANCE,
+        unit: "",
+        tolerance: Tolerance::by_precision(1e-6, 1e-4),
+        reason: "terminal speed is torque over damping: exp(-20), and rounding",
+        measure: joint_damping,
+    },
+    Check {
+        name: "parameters/joint-friction",
+        needs: DRIVEN.union(Capabilities::JOINT_FRICTION),
+        unit: "",
+        tolerance: Tolerance::same(0.005),
+        reason: "torque less friction, constant; one step in 200 may pass at breakaway",
+        measure: joint_friction,
+    },
+    Check {
+        name: "parameters/joint-stiffness",
+        needs: IMPEDANCE,
+        unit: "",
+        tolerance: Tolerance::by_precision(1e-6, 1e-4),
+        reason: "at rest the angle is torque over stiffness: exp(-20), and rounding",
+        measure: joint_stiffness,
+    },
+    Check {
+        name: "parameters/servo-gain",
+        needs: DRIVEN,
+        unit: "",
+        tolerance: Tolerance::by_precision(1e-6, 1e-4),
+        reason: "at rest kp times the error is the load: exp(-20), and rounding",
+        measure: servo_gain,
+    },
+    Check {
+        name: "parameters/velocity-gain",
+        needs: IMPEDANCE,
+        unit: "",
+        tolerance: Tolerance::by_precision(1e-6, 1e-4),
+        reason: "at rest kv (c - v) = damping v: exp(-20), and rounding",
+        measure: velocity_gain,
+    },
+    Check {
+        name: "parameters/gear",
+        needs: DRIVEN,
+        unit: "",
+        tolerance: ROUNDING,
+        reason: EXACT,
+        measure: gear,
+    },
+];
+
+/// A hinge about y under gravity with two small balls, let go with the arm level.
+fn arm(backend: &dyn Backend, parameter: (&str, f64)) -> Result<[f64; 2]> {
+    let inside = r#"<worldbody><body name="arm"><joint name="j" axis="0 1 0"/>
+      <geom name="near" type="sphere" size=".05" pos=".2 0 0" mass="1"/>
+      <geom name="far" type="sphere" size=".02" pos=".5 0 0" mass=".4"/></body></worldbody>"#;
+    let mut rig = pair(backend, inside, &["qvel.j"], &[parameter])?;
+    let rows = rig.run(1, &[])?;
+    Ok([rows[0][0] / STEP, rows[1][0] / STEP])
+}
+
+/// Acceleration of that arm with its far ball of mass `m` at `r`.
+fn arm_theory(m: f64, r: f64) -> f64 {
+    let near = 0.04 + 0.4 * 0.05 * 0.05;
+    G * (0.2 + m * r) / (near + m * (r * r + 0.4 * 0.02 * 0.02))
+}
+
+fn geom_position(backend: &dyn Backend) -> Result<f64> {
+    let found = arm(backend, ("geom/far/pos/0", 0.3))?;
+    Ok(both(found, [arm_theory(0.4, 0.5), arm_theory(0.4, 0.3)]))
+}
+
+fn geom_mass(backend: &dyn Backend) -> Result<f64> {
+    let found = arm(backend, ("geom/far/mass", 0.9))?;
+    Ok(both(found, [arm_theory(0.4, 0.5), arm_theory(0.9, 0.5)]))
+}
+
+fn body_mass(backend: &dyn Backend) -> Result<f64> {
+    // Along a slide, and about a hinge, where the inertia grows with the mass.
+    let inside = r#"<option gravity="0 0 0"/><worldbody>
+      <body name="cart" pos="0 2 0"><joint name="s" type="slide" axis="1 0 0"/><geom type="box" size=".1 .1 .1" mass="2"/></body>
+      <body name="door"><joint name="h" axis="0 0 1"/><geom type="box" size=".2 .05 .1" pos=".2 0 0" mass="1"/></body></worldbody>
+      <actuator><motor joint="s"/><motor joint="h"/></actuator>"#;
+    let parameters = [("body/cart/mass", 4.0), ("body/door/mass", 3.0)];
+    let mut rig = pair(backend, inside, &["qvel.s", "qvel.h"], &parameters)?;
+    let [nominal, changed] = ends(&rig.run(20, &[1.0, 1.0])?)?;
+    let inertia = 0.04 + (0.4 * 0.4 + 0.1 * 0.1) / 12.0;
+    let time = 20.0 * STEP;
+    Ok(largest([
+        both([nominal[0], changed[0]], [0.5 * time, 0.25 * time]),
+        both(
+            [nominal[1], changed[1]],
+            [1.0, 3.0].map(|m| time / (m * inertia)),
+        ),
+    ]))
+}
+
+/// A wheel on a hinge, with a centre of mass, a motor, and what acts on its joint.
+fn wheel(
+    backend: &dyn Backend,
+    joint: &str,
+    actuator: &str,
+    parameter: (&str, f64),
+    frames: usize,
+    ctrl: f64,
+) -> Result<[Vec<f64>; 2]> {
+    let inside = format!(
+        r#"<option gravity="0 0 0" integrator="implicitfast"/><worldbody><body name="wheel">
+        <joint name="j" axis="0 0 1" {joint}/>
+        <inertial pos=".1 0 0" mass="2" diaginertia=".08 .08 .08"/></body></worldbody>
+        <actuator>{actuator}</actuator>"#
+    );
+    let mut rig = pair(backend, &inside, &["qpos.j", "qvel.j"], &[parameter])?;
+    ends(&rig.run(frames, &[ctrl])?)
+}
+
+/// The wheel's inertia about its hinge, kg m².
+const INERTIA: f64 = 0.08 + 2.0 * 0.01;
+const MOTOR: &str = r#"<motor name="m" joint="j"/>"#;
+
+/// Rates after 20 steps under a unit torque, against those of two inertias.
+fn inertia_is(backend: &dyn Backend, parameter: (&str, f64), inertia: f64) -> Result<f64> {
+    let rows = wheel(backend, "", MOTOR, parameter, 20, 1.0)?;
+    let time = 20.0 * STEP;
+    Ok(both(rows.map(|r| r[1]), [time / INERTIA, time / inertia]))
+}
+
+fn body_centre(backend: &dyn Backend) -> Result<f64> {
+    inertia_is(backend, ("body/wheel/ipos/0", 0.3), 0.08 + 2.0 * 0.09)
+}
+
+fn body_inertia(backend: &dyn Backend) -> Result<f64> {
+    inertia_is(backend, ("body/wheel/inertia/2", 0.12), 0.12 + 0.02)
+}
+
+fn joint_armature(backend: &dyn Backend) -> Result<f64> {
+    inertia_is(backend, ("joint/j/armature", 0.05), INERTIA + 0.05)
+}
+
+fn joint_damping(backend: &dyn Backend) -> Result<f64> {
+    let joint = r#"damping="1""#;
+    let rows = wheel(backend, joint, MOTOR, ("joint/j/damping", 2.5), 1000, 0.5)?;
+    Ok(both(rows.map(|r| r[1]), [0.5, 0.2]))
+}
+
+fn joint_friction(backend: &dyn Backend) -> Result<f64> {
+    let joint = r#"frictionloss="0.2" solreffriction="0.02 1" solimpfriction="0.999 0.999 0.001""#;
+    let rows = wheel(
+        backend,
+        joint,
+        MOTOR,
+        ("joint/j/frictionloss", 0.6),
+        200,
+        1.0,
+    )?;
+    let time = 200.0 * STEP;
+    Ok(both(
+        rows.map(|r| r[1]),
+        [0.8, 0.4].map(|torque| torque / INERTIA * time),
+    ))
+}
+
+fn joint_stiffness(backend: &dyn Backend) -> Result<f64> {
+    let joint = r#"stiffness="2" damping="0.9""#;
+    let rows = wheel(backend, joint, MOTOR, ("joint/j/stiffness", 5.0), 6000, 0.5)?;
+    Ok(both(rows.map(|r| r[0]), [0.25, 0.1]))
+}
+
+fn servo_gain(backend: &dyn Backend) -> Result<f64> {
+    // A spring of stiffness 2 pulls against the servo.
+    let joint = r#"stiffness="2" damping="0.9""#;
+    let servo = r#"<position name="p" joint="j" kp="8"/>"#;
+    let rows = wheel(backend, joint, servo, ("actuator/p/kp", 18.0), 3000, 0.5)?;
+    Ok(both(rows.map(|r| r[0]), [0.4, 0.45]))
+}
+
+fn velocity_gain(backend: &dyn Backend) -> Result<f64> {
+    let servo = r#"<velocity name="v" joint="j" kv="1"/>"#;
+    let rows = wheel(
+        backend,
+        r#"damping="1""#,
+        servo,
+        ("actuator/v/kv", 4.0),
+        1500,
+        0.5,
+    )?;
+    Ok(both(rows.map(|r| r[1]), [0.25, 0.4]))
+}
+
+fn gear(backend: &dyn Backend) -> Result<f64> {
+    let motor = r#"<motor name="m" joint="j" gear="2"/>"#;
+    let rows = wheel(backend, "", motor, ("actuator/m/gear", -0.5), 20, 1.0)?;
+    let time = 20.0 * STEP;
+    Ok(both(
+        rows.map(|r| r[1]),
+        [2.0, -0.5].map(|g| g / INERTIA * time),
+    ))
+}
