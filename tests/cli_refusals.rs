@@ -1,0 +1,245 @@
+//! Bad input: one clear line on standard error, exit status 2, nothing on the disk.
+
+mod cli_support;
+
+use cli_support::{Workplace, tiny};
+
+/// Runs a command that must be refused with a line that holds all of `expected`.
+fn refused(place: &Workplace, arguments: &[&str], expected: &[&str]) {
+    let before = place.names();
+    let output = place.run(arguments);
+    let line = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(2), "{arguments:?}: {line}");
+    assert_eq!(line.lines().count(), 1, "{arguments:?}: {line}");
+    assert!(output.stdout.is_empty(), "{arguments:?}");
+    for text in expected {
+        assert!(line.contains(text), "{arguments:?}: `{text}` is not in: {line}");
+    }
+    assert_eq!(place.names(), before, "{arguments:?} left something");
+}
+
+/// A refused run with these options.
+fn refused_run(place: &Workplace, options: &[&str], expected: &[&str]) {
+    // Were it not refused it would soon be over.
+    let mut arguments = tiny(&["run", "rod-balancing"]);
+    if !options.contains(&"--out") {
+        arguments.extend(["--out", "out"]);
+    }
+    arguments.extend(options);
+    refused(place, &arguments, expected);
+}
+
+#[test]
+fn unknown_names_list_the_near_ones() {
+    let place = Workplace::new();
+    refused(&place, &["run", "rod-balancin"], &["task", "`rod-balancing`"]);
+    refused(&place, &["rum", "rod-balancing"], &["'rum'", "'run'"]);
+    for (option, name, near) in [
+        ("--backend", "rapeer", "`rapier`"),
+        ("--real-backend", "rapeer", "`rapier`"),
+        ("--explorer", "fishercem", "`fisher-cem`"),
+        ("--identifier", "rep", "`reps`"),
+        ("--solver", "xyz", "`cem`"),
+        ("--truth", "mass_ofset=0.1", "`mass_offset`"),
+        ("--sed", "1", "'--seed'"),
+    ] {
+        refused_run(&place, &[option, name], &[near]);
+    }
+    for (setting, near) in [
+        ("explorr.std=1", "`explorer`"),
+        ("explorer.iteration=1", "`iterations`"),
+        ("explorer.fisher.objective=best", "`a-optimal`"),
+        ("noise.rodpos=1", "`rod_pos`"),
+        ("parameter.mass_ofset.range=[0,1]", "`mass_offset`"),
+        ("real.bakend=rapier", "`backend`"),
+    ] {
+        refused_run(&place, &["--set", setting], &[near]);
+    }
+}
+
+#[test]
+fn settings_that_make_no_sense_are_named() {
+    let place = Workplace::new();
+    refused_run(&place, &["--set", "explorer.iterations"], &["KEY=VALUE"]);
+    refused_run(&place, &["--truth", "mass_offset"], &["NAME=VALUE"]);
+    refused_run(&place, &["--truth", "mass_offset=nan"], &["finite"]);
+    refused_run(&place, &["--seed", "-1"], &["'-1'", "--seed"]);
+    refused_run(&place, &["--threads", "abc"], &["'abc'", "--threads"]);
+    for (key, values) in [
+        ("explorer.std", ["nan", "inf", "abc", "-1"]),
+        ("explorer.iterations", ["0", "-3", "1.5", "abc"]),
+        ("explorer.cem.elite_fraction", ["nan", "7", "0", "abc"]),
+        ("identifier.sampling.widen", ["nan", "-inf", "0", "true"]),
+        ("identifier.sampling.draws", ["0", "-1", "nan", "abc"]),
+        ("identifier.reps.epsilon", ["0", "-1", "nan", "abc"]),
+        ("solver.population", ["0", "-1", "nan", "abc"]),
+        ("solver.cem.smoothing", ["nan", "1", "-1", "abc"]),
+        ("noise.rod_pos", ["nan", "0", "-1", "abc"]),
+        ("seed", ["-1", "nan", "1.5", "abc"]),
+    ] {
+        for value in values {
+            refused_run(&place, &["--set", &format!("{key}={value}")], &[key]);
+        }
+    }
+}
+
+#[test]
+fn unknowns_that_cannot_be_identified_are_refused() {
+    let place = Workplace::new();
+    for (setting, expected) in [
+        ("range=[0.1,-0.1]", "upside down"),
+        ("range=[nan,0.1]", "finite"),
+        ("range=[0.1,0.1]", "empty"),
+        ("range=5", "parameter.mass_offset"),
+        ("scale=log", "positive"),
+        ("enabled=false", "switched off"),
+        ("target=rubbish", "element/name/attribute"),
+        ("target=geom/nothing/pos/1", "unknown geom `nothing`"),
+        ("target=geom/rod_mass/pos/9", "index 9"),
+        ("target=geom/rod_mass/colour", "`colour`"),
+        // A geom that is there and touches nothing.
+        ("target=geom/link1_shape/friction/0", "geom/link1_shape/friction/0"),
+    ] {
+        refused_run(&place, &["--set", &format!("parameter.mass_offset.{setting}")], &[expected]);
+    }
+}
+
+#[test]
+fn files_of_settings_are_read_with_care() {
+    let place = Workplace::new();
+    refused_run(&place, &["--config", "none.toml"], &["none.toml"]);
+    refused_run(&place, &["--config", "."], &["directory"]);
+    place.write("bad.toml", "seed = 1\nbackend == \"rapier\"\n");
+    refused_run(&place, &["--config", "bad.toml"], &["bad.toml", "line 2"]);
+    place.write("other.toml", "task = \"shuffleboard\"\n");
+    refused_run(&place, &["--config", "other.toml"], &["shuffleboard"]);
+    place.write("nan.toml", "[explorer]\nstd = nan\n");
+    refused_run(&place, &["--config", "nan.toml"], &["explorer.std", "finite"]);
+}
+
+#[test]
+fn a_folder_that_cannot_take_a_result_is_refused_before_work() {
+    let place = Workplace::new();
+    place.write("file", "");
+    refused_run(&place, &["--out", "file"], &["file"]);
+    refused_run(&place, &["--out", "file/below"], &["file/below"]);
+    refused_run(&place, &["--out", "."], &["not empty"]);
+    std::fs::create_dir(place.path("old")).unwrap();
+    place.write("old/result.json", "{}");
+    refused_run(&place, &["--out", "old"], &["another run"]);
+    assert_eq!(place.read("old/result.json"), "{}");
+    // A kernel's file system takes no folders, whoever asks.
+    if std::path::Path::new("/proc/self").exists() {
+        refused_run(&place, &["--out", "/proc/asid"], &["cannot be written"]);
+    }
+    place.write("scene.xml", "mine");
+    refused(&place, &["export", "rod-balancing", "--out", "scene.xml"], &["exists already"]);
+    assert_eq!(place.read("scene.xml"), "mine");
+    refused(&place, &["report", "old"], &["finished run"]);
+    refused(&place, &["report", "nowhere"], &["nowhere"]);
+}
+
+#[test]
+fn models_of_the_real_world_must_fit_the_task() {
+    let place = Workplace::new();
+    refused_run(&place, &["--real-model", "none.xml"], &["none.xml", "no such file"]);
+    for (name, text, expected) in [
+        ("torn.xml", "<mujoco><worldbody>", "well-formed"),
+        ("robot.xml", "<robot name=\"r\"/>", "<mujoco>"),
+        ("ball.xml", "<mujoco><worldbody><body name=\"rod\"><freejoint/><geom size=\"0.1\"/></body></worldbody></mujoco>", "actuators"),
+    ] {
+        place.write(name, text);
+        refused_run(&place, &["--real-model", name], &[name, expected]);
+    }
+    assert!(place.run(&["export", "rod-balancing", "--out", "scene.xml"]).status.success());
+    let renamed = place.read("scene.xml").replace("rod_free", "rod_loose");
+    place.write("renamed.xml", &renamed);
+    refused_run(&place, &["--real-model", "renamed.xml"], &["renamed.xml", "`rod_free`", "`rod_loose`"]);
+}
+
+#[test]
+fn bad_logs_name_row_and_column() {
+    let place = Workplace::new();
+    let identify = |text: &str, expected: &[&str]| {
+        place.write("log.csv", text);
+        refused(&place, &tiny(&["identify", "rod-balancing", "--log", "log.csv", "--out", "out"]), expected);
+    };
+    refused(&place, &["identify", "rod-balancing"], &["--log"]);
+    refused(&place, &["identify", "rod-balancing", "--log", "none.csv"], &["none.csv"]);
+    let actuators: Vec<String> = (1..=7)
+        .map(|i| format!("joint{i}"))
+        .chain(["finger_left".into(), "finger_right".into()])
+        .map(|name| format!("ctrl.{name}"))
+        .collect();
+    let sensors = "rod_pos.0,rod_pos.1,rod_pos.2,rod_quat.0,rod_quat.1,rod_quat.2,rod_quat.3";
+    let header = format!("time,{},{sensors}", actuators.join(","));
+    let row = |time: &str, x: &str| format!("{time},0,0,0,0,0,0,0,0,0,{x},0,0.02,1,0,0,0");
+    identify("", &["log.csv"]);
+    identify("time,angle\n0,1\n", &["`ctrl.joint1`"]);
+    identify(&format!("time,{}\n0,0,0,0,0,0,0,0,0,0\n", actuators.join(",")), &["no column of a sensor"]);
+    identify(&format!("{header},rod_spin\n{},1\n", row("0", "0.5")), &["`rod_spin`"]);
+    identify(&format!("{header}\n{}\n", row("0", "0.5")), &["1 rows"]);
+    identify(&format!("{header}\n{}\n{}\n", row("0", "0.5"), row("0.02", "abc")), &["row 3", "`rod_pos.0`", "`abc`"]);
+    identify(&format!("{header}\n{}\n{}\n", row("0.1", "0.5"), row("0.1", "0.5")), &["row 3", "time"]);
+    identify(&format!("{header}\n{}\n{}\n", row("0", "0.5"), row("1e6", "0.5")), &["seconds"]);
+    identify(&format!("{header}\n{}\n{}\n", row("0", ""), row("0.1", "")), &["no row", "rod_pos"]);
+    let position_only = header.replace(",rod_quat.0,rod_quat.1,rod_quat.2,rod_quat.3", "");
+    let short = |time: &str| row(time, "0.5").trim_end_matches(",1,0,0,0").to_owned();
+    identify(&format!("{position_only}\n{}\n{}\n", short("0"), short("0.1")), &["`rod_quat`"]);
+}
+
+#[test]
+fn posteriors_must_be_of_the_task() {
+    let place = Workplace::new();
+    let solve = |expected: &[&str]| {
+        refused(&place, &tiny(&["solve", "rod-balancing", "--posterior", "p", "--out", "out"]), expected);
+    };
+    refused(&place, &["solve", "rod-balancing"], &["--posterior"]);
+    solve(&["p/posterior.json"]);
+    std::fs::create_dir(place.path("p")).unwrap();
+    solve(&["p/posterior.json"]);
+    place.write("p/posterior.json", "{");
+    solve(&["not a posterior"]);
+    let posterior = |name: &str, sample: &str, weight: &str| {
+        format!(
+            "{{\"marginals\":[{{\"name\":\"{name}\",\"unit\":\"m\",\"estimate\":0,\"std\":0.01,\"interval95\":[-0.02,0.02]}}],\
+             \"samples\":[{sample}],\"weights\":[{weight}]}}"
+        )
+    };
+    place.write("p/posterior.json", &posterior("friction", "[0.3]", "1"));
+    solve(&["friction", "mass_offset", "p/config.toml"]);
+    place.write("p/posterior.json", &posterior("mass_offset", "[0.3, 1]", "1"));
+    solve(&["sample 0"]);
+    place.write("p/posterior.json", &posterior("mass_offset", "[0.3]", "-1"));
+    solve(&["weights"]);
+    place.write("p/posterior.json", &posterior("mass_offset", "[0.01]", "1"));
+    place.write("p/result.json", "{\"task\":\"shuffleboard\"}");
+    solve(&["shuffleboard", "rod-balancing"]);
+}
+
+#[test]
+fn start_poses_belong_to_the_stages_that_are_told_them() {
+    let place = Workplace::new();
+    let explore = |setting: &str, expected: &[&str]| {
+        refused(&place, &tiny(&["explore", "rod-balancing", "--out", "out", "--set", setting]), expected);
+    };
+    explore("start.z=1", &["`z`", "`x`"]);
+    explore("start.x=nan", &["start.x", "finite"]);
+    explore("start.x=abc", &["start.x", "finite"]);
+    explore("start.x=55", &["start.x", "range"]);
+    refused_run(&place, &["--set", "start.x=0.5"], &["no start pose"]);
+}
+
+#[cfg(not(feature = "mujoco"))]
+#[test]
+fn an_engine_left_out_says_how_to_get_it() {
+    let place = Workplace::new();
+    refused_run(&place, &["--backend", "mujoco"], &["mujoco", "cargo xtask setup", "--features mujoco"]);
+}
+
+#[cfg(not(feature = "torch"))]
+#[test]
+fn an_explorer_left_out_says_how_to_get_it() {
+    let place = Workplace::new();
+    refused_run(&place, &["--explorer", "fisher-ppo"], &["fisher-ppo", "cargo xtask setup", "--features torch"]);
+}
