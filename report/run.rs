@@ -43,6 +43,11 @@ pub const TRACE_FILE: &str = "trace.json";
 pub const REPORT_FILE: &str = "report.html";
 
 impl RunReport {
+    /// Whether the simulator predicted what is shown: nothing was done in the real world yet.
+    fn predicted(&self) -> bool {
+        matches!(self.stage.as_str(), "explore" | "solve")
+    }
+
     /// The report as one self-contained HTML page.
     #[must_use]
     pub fn html(&self) -> String {
