@@ -3,6 +3,8 @@
 //!
 //! `cargo test --features mujoco --test conformance -- --nocapture` prints the table.
 
+#![allow(clippy::unwrap_used, clippy::print_stdout)]
+
 #[path = "conformance/mutant.rs"]
 mod mutant;
 
