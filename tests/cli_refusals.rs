@@ -1,5 +1,7 @@
 //! Bad input: one clear line on standard error, exit status 2, nothing on the disk.
 
+#![allow(clippy::unwrap_used)]
+
 mod cli_support;
 
 use cli_support::{Workplace, tiny};

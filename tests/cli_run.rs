@@ -1,5 +1,7 @@
 //! What the commands leave behind when all goes well.
 
+#![allow(clippy::unwrap_used)]
+
 mod cli_support;
 
 use cli_support::{Workplace, names, tiny};
@@ -95,12 +97,19 @@ fn a_run_leaves_the_contracts_folder_and_its_config_repeats_it_at_any_thread_cou
     assert_eq!(place.read("a/config.toml"), place.read("b/config.toml"));
     assert_eq!(log, place.read("b/real.csv"));
 
+    // The stage alone, on the run's own log, finds what the run found.
+    done(&place, &["identify", "rod-balancing", "--config", "a/config.toml", "--log", "a/real.csv", "--out", "c"]);
+    let alone = json(&place.read("c/result.json"));
+    for key in ["estimate", "std", "interval95"] {
+        assert_eq!(alone["parameters"][0][key], parameter[key]);
+    }
+
     // The report is written again from the folder alone.
     let page = place.read("b/report.html");
     std::fs::remove_file(place.path("b/report.html")).unwrap();
     done(&place, &["report", "b"]);
     assert_eq!(page, place.read("b/report.html"));
-    assert_eq!(place.names(), ["a", "b"]);
+    assert_eq!(place.names(), ["a", "b", "c"]);
 }
 
 #[test]

@@ -113,7 +113,11 @@ pub fn explore(arguments: &Arguments) -> Result<()> {
         ],
     );
     report.explorer.clone_from(&config.explorer.name);
-    report.answer = format!("From {}, the episode is expected to tell {}.", lines[0], expected.join(", "));
+    report.answer = format!(
+        "From {}, the episode is expected to tell {}.",
+        stage::start_line(&session),
+        expected.join(", ")
+    );
     report.episode = Some(trace::episode(&session, &played.episode));
     report.exploration =
         trace::exploration(&session, &explored.objective, &information, Some(played.contact_fraction));

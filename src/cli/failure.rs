@@ -105,4 +105,12 @@ mod tests {
             "unexpected argument '--sed' found; tip: a similar argument exists: '--seed'; see --help"
         );
     }
+
+    #[test]
+    fn a_panic_ends_as_a_failure_of_the_work() {
+        let before = std::panic::take_hook();
+        let status = guard(|| panic!("a defect"));
+        std::panic::set_hook(before);
+        assert_eq!(format!("{status:?}"), format!("{:?}", ExitCode::from(FAILED)));
+    }
 }

@@ -92,7 +92,8 @@ impl OutFolder {
         if done.is_err() {
             let _ = std::fs::remove_dir_all(&staging);
         }
-        done
+        // Whatever went wrong, the work had been done: the call was not at fault.
+        done.map_err(|e| Error::Failed(format!("{e:#}")).into())
     }
 
     /// Gives the filled folder its name: the wanted one, or the next that is still free.

@@ -217,7 +217,7 @@ fn check(posterior: &Posterior) -> Result<(), String> {
         return Err(format!("sample {i} is not {d} finite numbers"));
     }
     let total: f64 = weights.iter().sum();
-    if weights.iter().any(|w| !(*w >= 0.0)) || (total - 1.0).abs() > 1e-6 {
+    if weights.iter().any(|w| w.is_nan() || *w < 0.0) || (total - 1.0).abs() > 1e-6 {
         return Err(format!("the weights are not positive numbers that sum to 1, but to {total}"));
     }
     Ok(())

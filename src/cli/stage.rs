@@ -95,7 +95,7 @@ pub fn report(session: &Session, wall_s: f64, files: &[(&str, &str)]) -> RunRepo
     let cost = session.cost(wall_s);
     let all = [
         ("result.json", "the figures"),
-        ("config.toml", "all settings; `--config` with it repeats the stage"),
+        ("config.toml", "all settings, for `--config`"),
     ];
     let all: Vec<(&str, &str)> =
         all.iter().chain(files).copied().chain([("trace.json", "the data of this report")]).collect();
