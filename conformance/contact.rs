@@ -59,6 +59,16 @@ pub const CHECKS: &[Check] = &[
         measure: weight_on_slope,
     },
     Check {
+        name: "contact/force-passes-through",
+        needs: FORCES
+            .union(Capabilities::ARTICULATION)
+            .union(Capabilities::ACTUATORS),
+        unit: "",
+        tolerance: Tolerance::same(1e-3),
+        reason: "a finger pushes a box against a wall by 5 N, and both contacts carry it: what an iterative solver leaves over",
+        measure: force_passes,
+    },
+    Check {
         name: "contact/stack-of-three-stands",
         needs: CONTACT,
         unit: "m",
@@ -184,6 +194,21 @@ fn weight(backend: &dyn Backend) -> Result<f64> {
 fn weight_on_slope(backend: &dyn Backend) -> Result<f64> {
     let end = resting(backend, 0.3, &["contact.b/world"])?;
     Ok(relative(end[0], 0.5 * G * 0.3f64.cos()))
+}
+
+fn force_passes(backend: &dyn Backend) -> Result<f64> {
+    let inside = r#"<option gravity="0 0 0"/><worldbody>
+        <geom type="box" size=".02 .2 .2" pos=".12 0 0"/>
+        <body name="box"><freejoint name="box"/><geom type="box" size=".1 .05 .05" mass="0.5"/></body>
+        <body name="finger" pos="-.11 0 0"><joint name="s" type="slide" axis="1 0 0"/>
+          <geom type="box" size=".01 .03 .03" mass="0.1"/></body></worldbody>
+      <actuator><motor joint="s"/></actuator>"#;
+    let channels = ["contact.finger/box", "contact.box/world"];
+    let mut rig = Rig::new(backend, inside, &channels)?;
+    let rows = rig.run(500, &[5.0])?;
+    Ok(largest(
+        last(&rows)?.iter().map(|force| relative(*force, 5.0)),
+    ))
 }
 
 /// Three boxes of 0.3 kg, one on the other, after two seconds.

@@ -68,6 +68,14 @@ pub const CHECKS: &[Check] = &[
         measure: unit_torque,
     },
     Check {
+        name: "dynamics/inertia-of-shapes",
+        needs: TREE.union(Capabilities::ACTUATORS),
+        unit: "",
+        tolerance: Tolerance::by_precision(1e-9, 1e-4),
+        reason: "mass and inertia of turned shapes by density, from textbook formulas: rounding",
+        measure: inertia_of_shapes,
+    },
+    Check {
         name: "dynamics/unit-force-on-a-slide",
         needs: TREE.union(Capabilities::ACTUATORS),
         unit: "",
@@ -201,6 +209,44 @@ fn unit_torque(backend: &dyn Backend) -> Result<f64> {
     let mut rig = Rig::new(backend, inside, &["qvel.j"])?;
     let inertia = 2.0 * 0.25 + 2.0 * (0.2 * 0.2 + 0.3 * 0.3) / 12.0;
     Ok(relative(last(&rig.run(50, &[1.0])?)?[0], 0.1 / inertia))
+}
+
+/// Shapes of 800 kg/m³ half a metre from a hinge about z, their axis along x.
+fn inertia_of_shapes(backend: &dyn Backend) -> Result<f64> {
+    let pi = std::f64::consts::PI;
+    let density = 800.0;
+    let sphere = density * 4.0 / 3.0 * pi * 0.1f64.powi(3);
+    let cuboid = density * 8.0 * 0.1 * 0.15 * 0.2;
+    let (r, h) = (0.05f64, 0.3);
+    let cylinder = density * pi * r * r * h;
+    let caps = density * 4.0 / 3.0 * pi * r.powi(3);
+    let across = cylinder * (3.0 * r * r + h * h) / 12.0;
+    // Two half balls whose centres lie 3/8 r beyond the ends of the cylinder.
+    let half_balls = caps * (0.4 * r * r + 0.25 * h * h + 0.375 * r * h);
+    let shapes = [
+        ("sphere", ".1", sphere, 0.4 * sphere * 0.01),
+        // Turned to x, its z side lies along x and its x side along -z.
+        (
+            "box",
+            ".1 .15 .2",
+            cuboid,
+            cuboid * (0.4 * 0.4 + 0.3 * 0.3) / 12.0,
+        ),
+        ("cylinder", ".05 .15", cylinder, across),
+        ("capsule", ".05 .15", cylinder + caps, across + half_balls),
+    ];
+    let mut errors = Vec::new();
+    for (shape, size, mass, inertia) in shapes {
+        let inside = format!(
+            r#"<option gravity="0 0 0"/><worldbody><body><joint name="j" axis="0 0 1"/>
+            <geom type="{shape}" size="{size}" pos=".5 0 0" zaxis="1 0 0" density="{density}"/></body></worldbody>
+            <actuator><motor joint="j"/></actuator>"#
+        );
+        let mut rig = Rig::new(backend, &inside, &["qvel.j"])?;
+        let rows = rig.run(50, &[1.0])?;
+        errors.push(relative(last(&rows)?[0], 0.1 / (inertia + 0.25 * mass)));
+    }
+    Ok(largest(errors))
 }
 
 fn unit_force(backend: &dyn Backend) -> Result<f64> {

@@ -30,6 +30,14 @@ pub const CHECKS: &[Check] = &[
         measure: site_orientation,
     },
     Check {
+        name: "frames/orientations-of-a-document",
+        needs: TREE,
+        unit: "",
+        tolerance: EXACT,
+        reason: "one rotation written as quat, axisangle, euler, xyaxes and zaxis: rounding",
+        measure: orientations,
+    },
+    Check {
         name: "frames/site-velocity",
         needs: TREE,
         unit: "m/s",
@@ -151,4 +159,56 @@ fn body_frames(backend: &dyn Backend) -> Result<f64> {
     let read = floating(backend, qpos, [0.0; 6])?.read()?.swap_remove(0);
     let theory = [1.0, 1.8, 3.0, 1.0, 2.0, 3.0];
     Ok(largest((0..6).map(|i| read[3 + i] - theory[i])))
+}
+
+/// Sites of one body whose orientation is written in each of MJCF's ways.
+fn orientations(backend: &dyn Backend) -> Result<f64> {
+    let turn = UnitQuaternion::from_scaled_axis(Vector3::x() * 0.6)
+        * UnitQuaternion::from_scaled_axis(Vector3::y() * -0.4)
+        * UnitQuaternion::from_scaled_axis(Vector3::z() * 1.1);
+    let written = |v: Vector3<f64>| format!("{:?} {:?} {:?}", v.x, v.y, v.z);
+    let axis = turn.axis().map_or(Vector3::zeros(), |a| a.into_inner());
+    // The least rotation that carries z to where this one carries it.
+    let least =
+        UnitQuaternion::rotation_between(&Vector3::z(), &(turn * Vector3::z())).unwrap_or_default();
+    let ways = [
+        (
+            format!(
+                r#"quat="{:?} {:?} {:?} {:?}""#,
+                turn.w, turn.i, turn.j, turn.k
+            ),
+            turn,
+        ),
+        (
+            format!(r#"axisangle="{} {:?}""#, written(axis), turn.angle()),
+            turn,
+        ),
+        // By default the angles turn about the turned axes, x first.
+        (r#"euler="0.6 -0.4 1.1""#.to_owned(), turn),
+        (
+            format!(
+                r#"xyaxes="{} {}""#,
+                written(turn * Vector3::x() * 2.0),
+                written(turn * Vector3::new(0.3, 0.5, 0.0))
+            ),
+            turn,
+        ),
+        (
+            format!(r#"zaxis="{}""#, written(turn * Vector3::z() * 3.0)),
+            least,
+        ),
+    ];
+    let mut errors = Vec::new();
+    for (way, theory) in ways {
+        let inside = format!(
+            r#"<worldbody><body><joint name="j"/><geom type="sphere" size=".1"/>
+            <site name="s" {way}/></body></worldbody>
+            <sensor><framequat name="q" objtype="site" objname="s"/></sensor>"#
+        );
+        let q = Rig::new(backend, &inside, &["q"])?.read()?.swap_remove(0);
+        let sign = if q[0] * theory.w < 0.0 { -1.0 } else { 1.0 };
+        let theory = [theory.w, theory.i, theory.j, theory.k];
+        errors.extend((0..4).map(|i| sign * q[i] - theory[i]));
+    }
+    Ok(largest(errors))
 }

@@ -3,7 +3,7 @@
 use asid_core::{Backend, Capabilities, Result};
 
 use crate::check::{Check, Tolerance};
-use crate::rig::{G, Rig, STEP, largest, last, relative};
+use crate::rig::{G, Rig, STEP, broken, largest, last, relative};
 
 const CONTACT: Capabilities = Capabilities::CONTACT;
 const ROLLING: Capabilities = CONTACT.union(Capabilities::ROLLING_FRICTION);
@@ -50,6 +50,16 @@ pub const CHECKS: &[Check] = &[
         tolerance: Tolerance::same(0.01),
         reason: "Coulomb's cone is round: as stopping-distance, and no drift sideways",
         measure: every_direction,
+    },
+    Check {
+        name: "friction/grip-holds-up-to-its-bound",
+        needs: CONTACT
+            .union(Capabilities::ARTICULATION)
+            .union(Capabilities::ACTUATORS),
+        unit: "",
+        tolerance: Tolerance::same(0.0),
+        reason: "two fingers carry 2 mu F: nine tenths of that stay, eleven tenths fall: wrong of two",
+        measure: grip,
     },
     Check {
         name: "friction/sliding-ball-ends-rolling",
@@ -178,6 +188,34 @@ fn every_direction(backend: &dyn Backend) -> Result<f64> {
         errors.extend([relative(along, theory), aside / theory]);
     }
     Ok(largest(errors))
+}
+
+/// Two fingers press a box of 0.5 kg from both sides and let it go or not.
+fn grip(backend: &dyn Backend) -> Result<f64> {
+    let finger = |name: &str, side: f64| {
+        format!(
+            r#"<body pos="{} 0 0"><joint name="{name}" type="slide" axis="{} 0 0"/>
+            <geom type="box" size=".01 .05 .05" mass="0.1" friction="0.4"/></body>"#,
+            -0.06 * side,
+            side
+        )
+    };
+    let inside = format!(
+        r#"<option {ROUND}/><worldbody>{}{}
+        <body><freejoint name="box"/><geom type="box" size=".05 .03 .03" mass="0.5" friction="0.4"/></body></worldbody>
+        <actuator><motor joint="l"/><motor joint="r"/></actuator>"#,
+        finger("l", 1.0),
+        finger("r", -1.0)
+    );
+    let mut held = [false; 2];
+    for (held, share) in held.iter_mut().zip([0.9, 1.1]) {
+        let mut rig = Rig::new(backend, &inside, &["qpos.box"])?;
+        let force = 0.5 * G / (2.0 * 0.4 * share);
+        let rows = rig.run(250, &[force, force])?;
+        // Eleven tenths fall by (1 - 1 / 1.1) g t^2 / 2 = 0.1 m in half a second.
+        *held = last(&rows)?[2] > -0.01;
+    }
+    Ok(broken([held[0], !held[1]]))
 }
 
 const RADIUS: f64 = 0.05;

@@ -20,6 +20,14 @@ pub const CHECKS: &[Check] = &[
         measure: armature,
     },
     Check {
+        name: "joints/defaults-are-inherited",
+        needs: IMPEDANCE.union(DRIVEN),
+        unit: "",
+        tolerance: Tolerance::by_precision(1e-9, 1e-4),
+        reason: "armature from the default class, a class below it, childclass and the joint itself: constant acceleration, rounding",
+        measure: defaults,
+    },
+    Check {
         name: "joints/damping-decay",
         needs: IMPEDANCE,
         unit: "",
@@ -130,6 +138,32 @@ fn wheel(backend: &dyn Backend, joint: &str, channels: &[&str]) -> Result<Rig> {
 fn armature(backend: &dyn Backend) -> Result<f64> {
     let mut rig = wheel(backend, r#"armature="0.15""#, &["qvel.j"])?;
     Ok(relative(last(&rig.run(50, &[1.0])?)?[0], 0.1 / 0.25))
+}
+
+/// Wheels of 0.1 kg m² whose armature comes from four places of a document.
+fn defaults(backend: &dyn Backend) -> Result<f64> {
+    let wheel = |body: &str, joint: &str| {
+        format!(
+            r#"<body {body}><joint {joint} axis="0 0 1"/>
+            <inertial pos="0 0 0" mass="1" diaginertia="0.1 0.1 0.1"/></body>"#
+        )
+    };
+    let inside = format!(
+        r#"<option gravity="0 0 0"/>
+        <default><joint armature="0.1"/><motor gear="2"/>
+          <default class="heavy"><joint armature="0.3"/></default></default>
+        <worldbody>{}{}{}{}</worldbody>
+        <actuator><motor joint="a"/><motor joint="b"/><motor joint="c"/><motor joint="d" gear="1"/></actuator>"#,
+        wheel("", r#"name="a""#),
+        wheel("", r#"name="b" class="heavy""#),
+        wheel(r#"childclass="heavy""#, r#"name="c""#),
+        wheel(r#"childclass="heavy""#, r#"name="d" armature="0.4""#)
+    );
+    let mut rig = Rig::new(backend, &inside, &["qvel.a", "qvel.b", "qvel.c", "qvel.d"])?;
+    let rows = rig.run(50, &[1.0; 4])?;
+    let theory = [2.0 / 0.2, 2.0 / 0.4, 2.0 / 0.4, 1.0 / 0.5];
+    let end = last(&rows)?;
+    Ok(largest((0..4).map(|i| relative(end[i], 0.1 * theory[i]))))
 }
 
 fn damping_decay(backend: &dyn Backend) -> Result<f64> {
