@@ -78,7 +78,7 @@ pub fn guard(work: impl FnOnce() -> ExitCode) -> ExitCode {
         }));
     }
     std::panic::catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|_| {
-        let said = PANIC.lock().ok().and_then(|mut latest| latest.take()).unwrap_or_default();
+        let said = PANIC.lock().ok().and_then(|mut latest| latest.take()).unwrap_or_else(|| "see above".into());
         tell(&one_line(&format!("internal error: {said}; please report it with the command line")));
         ExitCode::from(FAILED)
     })
