@@ -189,9 +189,16 @@ impl<'a> Likelihood<'a> {
                     }
                     let Some(out) = out else { continue };
                     out.reserve(rows * len);
-                    for (p, o) in predicted.chunks_exact(width).zip(observed.readings.chunks_exact(width)) {
+                    for (p, o) in predicted
+                        .chunks_exact(width)
+                        .zip(observed.readings.chunks_exact(width))
+                    {
                         self.signals.difference(p, o, &mut whitened);
-                        out.extend(whitened.iter().map(|x| if x.is_finite() { *x } else { 0.0 }));
+                        out.extend(
+                            whitened
+                                .iter()
+                                .map(|x| if x.is_finite() { *x } else { 0.0 }),
+                        );
                     }
                 }
             }

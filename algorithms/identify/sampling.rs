@@ -53,8 +53,18 @@ impl SamplingSettings {
             samples,
             ..
         } = *self;
-        require(draws > 0, "identifier.sampling.draws", draws as f64, "at least 1")?;
-        require(samples > 1, "identifier.sampling.samples", samples as f64, "at least 2")?;
+        require(
+            draws > 0,
+            "identifier.sampling.draws",
+            draws as f64,
+            "at least 1",
+        )?;
+        require(
+            samples > 1,
+            "identifier.sampling.samples",
+            samples as f64,
+            "at least 2",
+        )?;
         require(widen > 0.0, "identifier.sampling.widen", widen, "above 0")
     }
 
@@ -114,7 +124,11 @@ impl Samples {
 
 /// Quantiles of the unknowns over points, for pictures.
 #[must_use]
-pub fn summary(likelihood: &Likelihood<'_>, points: &[Vec<f64>], best_loss: f64) -> IterationSummary {
+pub fn summary(
+    likelihood: &Likelihood<'_>,
+    points: &[Vec<f64>],
+    best_loss: f64,
+) -> IterationSummary {
     let values: Vec<Vec<f64>> = points.iter().map(|p| likelihood.parameters(p)).collect();
     let weights = vec![1.0 / values.len().max(1) as f64; values.len()];
     let d = values.first().map_or(0, Vec::len);
@@ -149,18 +163,26 @@ pub fn posterior(
         return Err(too_few());
     }
     let draws = settings.draws_for(n);
-    let mut region = samples.elite(2 * n + 4, &low, &high).widened(settings.widen);
+    let mut region = samples
+        .elite(2 * n + 4, &low, &high)
+        .widened(settings.widen);
     let mut found: Option<(Emulator, Vec<Vec<f64>>)> = None;
     for _ in 0..settings.rounds.max(1) {
         let points: Vec<Vec<f64>> = (0..draws).map(|_| region.sample(rng)).collect();
         let residuals = likelihood.residuals(&points)?;
         samples.add(&points, residuals);
         let near: Vec<usize> = (0..samples.points.len())
-            .filter(|&i| region.standardise(&samples.points[i]).iter().all(|u| u.abs() <= REACH))
+            .filter(|&i| {
+                region
+                    .standardise(&samples.points[i])
+                    .iter()
+                    .all(|u| u.abs() <= REACH)
+            })
             .collect();
         let points: Vec<&[f64]> = near.iter().map(|&i| &*samples.points[i]).collect();
         let residuals: Vec<&[f64]> = near.iter().map(|&i| &*samples.residuals[i]).collect();
-        let emulator = Emulator::fit(&region, &points, &residuals, d, likelihood.present()).ok_or_else(too_few)?;
+        let emulator = Emulator::fit(&region, &points, &residuals, d, likelihood.present())
+            .ok_or_else(too_few)?;
         let drawn = emulator.sample(&low, &high, settings.samples.max(2), rng);
         iterations.push(summary(likelihood, &drawn, samples.best_loss()));
         region = Gaussian::fit(&drawn, &vec![1.0; drawn.len()], &vec![1e-3; n], &low, &high)

@@ -35,11 +35,30 @@ impl CemSettings {
     /// # Errors
     /// When one is out of its domain.
     pub fn check(&self, key: &str) -> Result<()> {
-        let Self { elite_fraction: elite, smoothing, min_std_fraction: least } = *self;
+        let Self {
+            elite_fraction: elite,
+            smoothing,
+            min_std_fraction: least,
+        } = *self;
         let key = |name: &str| format!("{key}.{name}");
-        require(elite > 0.0 && elite <= 1.0, &key("elite_fraction"), elite, "above 0 and at most 1")?;
-        require((0.0..1.0).contains(&smoothing), &key("smoothing"), smoothing, "from 0 to below 1")?;
-        require((0.0..=1.0).contains(&least), &key("min_std_fraction"), least, "from 0 to 1")
+        require(
+            elite > 0.0 && elite <= 1.0,
+            &key("elite_fraction"),
+            elite,
+            "above 0 and at most 1",
+        )?;
+        require(
+            (0.0..1.0).contains(&smoothing),
+            &key("smoothing"),
+            smoothing,
+            "from 0 to below 1",
+        )?;
+        require(
+            (0.0..=1.0).contains(&least),
+            &key("min_std_fraction"),
+            least,
+            "from 0 to 1",
+        )
     }
 }
 

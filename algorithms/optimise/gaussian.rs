@@ -116,7 +116,10 @@ impl Gaussian {
     pub fn standardise(&self, x: &[f64]) -> Vec<f64> {
         let d = DVector::from_column_slice(x) - &self.mean;
         let l = self.factor.l();
-        l.solve_lower_triangular(&d).unwrap_or(d).as_slice().to_vec()
+        l.solve_lower_triangular(&d)
+            .unwrap_or(d)
+            .as_slice()
+            .to_vec()
     }
 
     /// The point at these standardised coordinates.

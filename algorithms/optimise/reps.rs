@@ -39,7 +39,12 @@ impl RepsSettings {
     pub fn check(&self, key: &str) -> Result<()> {
         let Self { epsilon, min_eta } = *self;
         require(epsilon > 0.0, &format!("{key}.epsilon"), epsilon, "above 0")?;
-        require(min_eta >= 0.0, &format!("{key}.min_eta"), min_eta, "0 or above")
+        require(
+            min_eta >= 0.0,
+            &format!("{key}.min_eta"),
+            min_eta,
+            "0 or above",
+        )
     }
 }
 

@@ -9,12 +9,14 @@
 //! is `d s_h / d theta` under the same actions, which counts what a tracked
 //! trajectory reveals when it is replayed as a whole. Start-pose entries make sense in
 //! the trajectory form only.
+//!
+//! The noise `S` is that of the trackers, plus, where [`FisherSettings::roughness`] says
+//! so, the square of what each reading deviates from a straight line over the copies.
 
 use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
-use crate::backend::Capabilities;
 use crate::error::{Error, Result};
 use crate::information::{Information, Objective};
 use crate::layout::Recording;
@@ -67,9 +69,12 @@ pub struct FisherSettings {
     pub form: Form,
     /// Estimate the start pose along (trajectory form only).
     pub nuisance: bool,
-    /// Half the difference between the copies, in prior standard deviations;
-    /// 0 takes 0.1 in double precision and 0.3 in single.
+    /// Half the difference between the copies, in prior standard deviations.
     pub delta: f64,
+    /// Count what the copies deviate from a straight line as noise. With contact the
+    /// trajectory is rough: a difference divided by a small step is then mostly luck, and
+    /// an explorer that is paid for it seeks chaos.
+    pub roughness: bool,
 }
 
 impl Default for FisherSettings {
@@ -78,7 +83,8 @@ impl Default for FisherSettings {
             objective: Objective::AOptimal,
             form: Form::Trajectory,
             nuisance: true,
-            delta: 0.0,
+            delta: 0.3,
+            roughness: true,
         }
     }
 }
@@ -89,11 +95,11 @@ impl FisherSettings {
     /// # Errors
     /// When `delta` is negative.
     pub fn check(&self) -> Result<()> {
-        if !(self.delta.is_finite() && (0.0..=1.0).contains(&self.delta)) {
+        if !(self.delta.is_finite() && self.delta > 0.0 && self.delta <= 1.0) {
             return Err(Error::Config {
                 key: "explorer.delta".into(),
                 message: format!(
-                    "must be between 0 and 1 prior standard deviations, not {}",
+                    "must be above 0 and at most 1 prior standard deviation, not {}",
                     self.delta
                 ),
             });
@@ -109,7 +115,6 @@ const START_DELTA: f64 = 0.02;
 pub struct FisherBatch<'a> {
     problem: &'a Problem<'a>,
     settings: FisherSettings,
-    delta: f64,
     batch: Batch,
     episodes: usize,
     entries: usize,
@@ -126,6 +131,8 @@ pub struct FisherBatch<'a> {
     readings: Vec<f64>,
     jacobian: Vec<f64>,
     difference: Vec<f64>,
+    below: Vec<f64>,
+    noise: Vec<f64>,
     copies: (Vec<usize>, Vec<usize>),
     alive: Vec<bool>,
 }
@@ -157,13 +164,7 @@ impl<'a> FisherBatch<'a> {
             .collect();
         let to: Vec<usize> = (0..episodes * copies).filter(|s| s % copies != 0).collect();
         let n = episodes * copies;
-        let double = batch_is_double(problem);
         Ok(Self {
-            delta: match settings.delta {
-                0.0 if double => 0.1,
-                0.0 => 0.3,
-                delta => delta,
-            },
             settings: settings.clone(),
             episodes,
             entries,
@@ -179,6 +180,8 @@ impl<'a> FisherBatch<'a> {
             readings: vec![0.0; n * protocol.frames_per_step * recording.width()],
             jacobian: vec![0.0; entries * rows],
             difference: vec![0.0; rows],
+            below: vec![0.0; rows],
+            noise: vec![1.0; rows],
             copies: (from, to),
             alive: vec![true; episodes],
             recording,
@@ -229,7 +232,7 @@ impl<'a> FisherBatch<'a> {
                     if let Some(parameter) = self.problem.parameters.get(entry) {
                         let bound = Parameter::scaled_bound();
                         let z = parameter.to_scaled(t[entry]);
-                        let moved = (z + sign * self.delta).clamp(-bound, bound);
+                        let moved = (z + sign * self.settings.delta).clamp(-bound, bound);
                         t[entry] = parameter.from_scaled(moved);
                         taken += sign * moved;
                     } else {
@@ -350,6 +353,7 @@ impl<'a> FisherBatch<'a> {
         let rows = self.signals.whitened_len();
         let row =
             |copy: usize| &readings[((e * copies + copy) * frames + frame) * width..][..width];
+        self.noise.fill(1.0);
         for entry in 0..self.entries {
             let (up, down) = (row(1 + 2 * entry), row(2 + 2 * entry));
             self.signals.difference(up, down, &mut self.difference);
@@ -357,13 +361,22 @@ impl<'a> FisherBatch<'a> {
             for k in 0..rows {
                 self.jacobian[entry * rows + k] = self.difference[k] / step;
             }
+            if self.settings.roughness {
+                // up + down - 2 middle: nothing on a straight line, luck and curvature otherwise.
+                self.signals.difference(up, row(0), &mut self.difference);
+                self.signals.difference(row(0), down, &mut self.below);
+                for (noise, (a, b)) in self
+                    .noise
+                    .iter_mut()
+                    .zip(self.difference.iter().zip(&self.below))
+                {
+                    *noise += (0.5 * (a - b)).powi(2);
+                }
+            }
+        }
+        for (i, j) in self.jacobian.iter_mut().enumerate() {
+            *j /= self.noise[i % rows].sqrt();
         }
         self.information[e].add(&self.jacobian, rows);
     }
-}
-
-fn batch_is_double(problem: &Problem<'_>) -> bool {
-    problem
-        .capabilities
-        .contains(Capabilities::DOUBLE_PRECISION)
 }

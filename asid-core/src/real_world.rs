@@ -150,9 +150,13 @@ impl RealWorld for SimulatedWorld<'_> {
         let mut noise = self.streams.stream("exploration noise");
         let names = protocol.channels();
         let width = layout.recording(&names)?.width();
-        let contact = format!("contact.{}/{}", protocol.contact[0], protocol.contact[1]);
         let mut all = names.clone();
-        all.push(contact);
+        all.extend(
+            protocol
+                .contact
+                .iter()
+                .map(|[a, b]| format!("contact.{a}/{b}")),
+        );
         let recording = layout.recording(&all)?;
         let substeps = substeps(&layout, protocol.frame_period)?;
         let (frames, nu) = (protocol.frames_per_step, layout.nu());
@@ -173,7 +177,8 @@ impl RealWorld for SimulatedWorld<'_> {
                 .collect::<Result<_>>()?,
             ..Episode::default()
         };
-        let mut row = vec![0.0; width + 1];
+        let all_width = recording.width();
+        let mut row = vec![0.0; all_width];
         self.batch.simulator.read(&[0], &recording, &mut row)?;
         let tracked = self.signals.width();
         let mut observe = |row: &[f64]| {
@@ -185,7 +190,7 @@ impl RealWorld for SimulatedWorld<'_> {
         episode.readings.extend(observe(&row));
         let mut action = vec![0.0; protocol.action.len()];
         let mut ctrl = vec![0.0; frames * nu];
-        let mut out = vec![0.0; frames * (width + 1)];
+        let mut out = vec![0.0; frames * all_width];
         let mut touched = 0;
         let mut actions = Vec::new();
         for step in 0..protocol.horizon {
@@ -199,10 +204,13 @@ impl RealWorld for SimulatedWorld<'_> {
             let rollout = Rollout::new(&[0], frames, substeps, Control::Shared(&ctrl), &recording);
             self.batch.simulator.rollout(&rollout, &mut out)?;
             episode.ctrl.extend_from_slice(&ctrl);
-            for frame in out.chunks_exact(width + 1) {
+            for frame in out.chunks_exact(all_width) {
                 episode.readings.extend(observe(frame));
             }
-            touched += usize::from(out.chunks_exact(width + 1).any(|r| r[width] > 0.0));
+            touched += usize::from(
+                out.chunks_exact(all_width)
+                    .any(|r| r[width..].iter().any(|force| *force > 0.0)),
+            );
         }
         let last = episode.ctrl[episode.ctrl.len() - nu..].to_vec();
         episode.ctrl.extend(last);

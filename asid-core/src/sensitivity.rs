@@ -51,15 +51,28 @@ pub fn check_parameters(problem: &Problem<'_>) -> Result<()> {
     batch
         .simulator
         .set_state(&sims, &qpos.repeat(n), &throws.repeat(2 * d))?;
-    let still = layout.keyframes.first().map_or_else(|| vec![0.0; layout.nu()], |k| k.ctrl.clone());
+    let still = layout
+        .keyframes
+        .first()
+        .map_or_else(|| vec![0.0; layout.nu()], |k| k.ctrl.clone());
     let control = still.repeat(FRAMES);
     let row = FRAMES * recording.width();
     let mut out = vec![0.0; n * row];
     let before = batch.simulator.steps_taken();
-    let rollout = Rollout::new(&sims, FRAMES, substeps, Control::Shared(&control), &recording);
+    let rollout = Rollout::new(
+        &sims,
+        FRAMES,
+        substeps,
+        Control::Shared(&control),
+        &recording,
+    );
     batch.simulator.rollout(&rollout, &mut out)?;
     problem.count_physics(&batch, before);
-    for (p, both) in problem.parameters.iter().zip(out.chunks_exact(2 * THROWS * row)) {
+    for (p, both) in problem
+        .parameters
+        .iter()
+        .zip(out.chunks_exact(2 * THROWS * row))
+    {
         let (low, high) = both.split_at(THROWS * row);
         if low == high {
             let targets: Vec<String> = p.targets.iter().map(ToString::to_string).collect();

@@ -78,8 +78,8 @@ pub struct ExplorationProtocol {
     pub signals: Vec<Signal>,
     /// Sensors of the machine itself, for policies and logs.
     pub proprioception: Vec<String>,
-    /// Bodies whose contact counts as interaction.
-    pub contact: [String; 2],
+    /// Pairs of bodies whose contact counts as interaction.
+    pub contact: Vec<[String; 2]>,
 }
 
 impl ExplorationProtocol {

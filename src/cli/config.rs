@@ -133,7 +133,17 @@ pub struct ParameterConfig {
 
 /// Keys at the top of a configuration.
 const KEYS: [&str; 12] = [
-    "schema", "command", "task", "backend", "seed", "start", "explorer", "identifier", "solver", "real", "noise",
+    "schema",
+    "command",
+    "task",
+    "backend",
+    "seed",
+    "start",
+    "explorer",
+    "identifier",
+    "solver",
+    "real",
+    "noise",
     "parameter",
 ];
 
@@ -192,7 +202,10 @@ impl Config {
         {
             return Err(wrong(
                 "task",
-                format!("the configuration is for `{name}`, the command for `{}`", task.name()),
+                format!(
+                    "the configuration is for `{name}`, the command for `{}`",
+                    task.name()
+                ),
             ));
         }
         let backend = match (&common.backend, text(&table, "backend")?) {
@@ -202,7 +215,8 @@ impl Config {
         };
         let real_table = section(&table, "real")?;
         check_keys("real", &real_table, &["backend", "model", "truth"])?;
-        let mut truth: BTreeMap<String, f64> = numbers("real.truth", &section(&real_table, "truth")?)?;
+        let mut truth: BTreeMap<String, f64> =
+            numbers("real.truth", &section(&real_table, "truth")?)?;
         for given in &real.truth {
             let (name, value) = given
                 .split_once('=')
@@ -212,7 +226,12 @@ impl Config {
                 .parse()
                 .ok()
                 .filter(|x: &f64| x.is_finite())
-                .ok_or_else(|| wrong(&format!("--truth {name}"), format!("`{value}` is not a finite number")))?;
+                .ok_or_else(|| {
+                    wrong(
+                        &format!("--truth {name}"),
+                        format!("`{value}` is not a finite number"),
+                    )
+                })?;
             truth.insert(name.trim().to_owned(), value);
         }
         let (parameter, parameters) = unknowns(task, &section(&table, "parameter")?)?;
@@ -236,18 +255,30 @@ impl Config {
                 (None, Some(value)) => value
                     .as_integer()
                     .and_then(|s| u64::try_from(s).ok())
-                    .ok_or_else(|| wrong("seed", format!("{value} is not a whole number from 0 up")))?,
+                    .ok_or_else(|| {
+                        wrong("seed", format!("{value} is not a whole number from 0 up"))
+                    })?,
             },
             start,
             assumed,
-            explorer: component::<dyn asid_core::Explorer>(&table, "explorer", algorithms.explorer.as_deref(), ASID.explorer)?,
+            explorer: component::<dyn asid_core::Explorer>(
+                &table,
+                "explorer",
+                algorithms.explorer.as_deref(),
+                ASID.explorer,
+            )?,
             identifier: component::<dyn asid_core::Identifier>(
                 &table,
                 "identifier",
                 algorithms.identifier.as_deref(),
                 ASID.identifier,
             )?,
-            solver: component::<dyn asid_core::TaskSolver>(&table, "solver", algorithms.solver.as_deref(), ASID.solver)?,
+            solver: component::<dyn asid_core::TaskSolver>(
+                &table,
+                "solver",
+                algorithms.solver.as_deref(),
+                ASID.solver,
+            )?,
             real: RealConfig {
                 backend: match (&real.real_backend, text(&real_table, "backend")?) {
                     (Some(name), _) => name.clone(),
@@ -270,7 +301,9 @@ impl Config {
 fn default_backend() -> String {
     let all = registry::all::<registry::BackendEntry>();
     let rapier = all.iter().find(|e| e.name == "rapier");
-    rapier.or(all.first()).map_or_else(String::new, |e| e.name.to_owned())
+    rapier
+        .or(all.first())
+        .map_or_else(String::new, |e| e.name.to_owned())
 }
 
 fn read_table(path: &Path) -> Result<toml::Table> {
@@ -280,7 +313,9 @@ fn read_table(path: &Path) -> Result<toml::Table> {
     };
     let text = std::fs::read_to_string(path).map_err(|e| file(e.to_string()))?;
     Ok(text.parse().map_err(|e: toml::de::Error| {
-        let line = e.span().map_or(0, |s| text[..s.start.min(text.len())].lines().count().max(1));
+        let line = e.span().map_or(0, |s| {
+            text[..s.start.min(text.len())].lines().count().max(1)
+        });
         file(format!("line {line}: {}", e.message()))
     })?)
 }
@@ -303,7 +338,12 @@ fn set(table: &mut toml::Table, assignment: &str) -> Result<()> {
             .entry(part)
             .or_insert_with(|| toml::Value::Table(toml::Table::new()))
             .as_table_mut()
-            .ok_or_else(|| wrong(key, format!("`{part}` is a value and has no settings below it")))?;
+            .ok_or_else(|| {
+                wrong(
+                    key,
+                    format!("`{part}` is a value and has no settings below it"),
+                )
+            })?;
     }
     at.insert(last.to_owned(), value);
     Ok(())
@@ -347,7 +387,12 @@ fn numbers(name: &str, table: &toml::Table) -> Result<BTreeMap<String, f64>> {
                 .or_else(|| value.as_integer().map(|i| i as f64))
                 .filter(|x| x.is_finite())
                 .map(|x| (key.clone(), x))
-                .ok_or_else(|| wrong(&format!("{name}.{key}"), format!("{value} is not a finite number")))
+                .ok_or_else(|| {
+                    wrong(
+                        &format!("{name}.{key}"),
+                        format!("{value} is not a finite number"),
+                    )
+                })
         })
         .collect()
 }
@@ -367,12 +412,16 @@ where
     let mut given = section(table, key)?;
     let named = text(&given, "name")?;
     given.remove("name");
-    let name = option.map(str::to_owned).or_else(|| named.clone()).unwrap_or_else(|| default.to_owned());
+    let name = option
+        .map(str::to_owned)
+        .or_else(|| named.clone())
+        .unwrap_or_else(|| default.to_owned());
     if named.is_some_and(|n| n != name) {
         given.clear();
     }
-    let entry = registry::find::<AlgorithmEntry<T>>(&name)
-        .map_err(|unknown| super::list::missing(AlgorithmEntry::<T>::KIND, &name).unwrap_or(unknown))?;
+    let entry = registry::find::<AlgorithmEntry<T>>(&name).map_err(|unknown| {
+        super::list::missing(AlgorithmEntry::<T>::KIND, &name).unwrap_or(unknown)
+    })?;
     let mut settings = (entry.defaults)();
     merge(key, &mut settings, given)?;
     (entry.make)(&settings)?;
@@ -391,10 +440,15 @@ fn merge(section: &str, into: &mut toml::Table, from: toml::Table) -> Result<()>
             }
             (Some(Float(_)), Integer(i)) => Float(i as f64),
             (Some(Float(_)), Float(x)) => Float(x),
-            (Some(Float(_)), other) => return Err(wrong(&full, format!("{other} is not a number"))),
+            (Some(Float(_)), other) => {
+                return Err(wrong(&full, format!("{other} is not a number")));
+            }
             (Some(Integer(_)), Integer(i)) if i >= 0 => Integer(i),
             (Some(Integer(_)), other) => {
-                return Err(wrong(&full, format!("{other} is not a whole number from 0 up")));
+                return Err(wrong(
+                    &full,
+                    format!("{other} is not a whole number from 0 up"),
+                ));
             }
             (Some(Boolean(_)), other) if !other.is_bool() => {
                 return Err(wrong(&full, format!("{other} is neither true nor false")));
@@ -403,7 +457,10 @@ fn merge(section: &str, into: &mut toml::Table, from: toml::Table) -> Result<()>
                 return Err(wrong(&full, format!("{other} is not a text in quotes")));
             }
             (Some(Table(_)), other) => {
-                return Err(wrong(&full, format!("{other} is not a section of settings")));
+                return Err(wrong(
+                    &full,
+                    format!("{other} is not a section of settings"),
+                ));
             }
             (_, other) => other,
         };
@@ -523,7 +580,10 @@ fn noise(task: &dyn Task, table: &toml::Table) -> Result<BTreeMap<String, f64>> 
         .collect();
     for (name, value) in numbers("noise", table)? {
         if value <= 0.0 {
-            return Err(wrong(&format!("noise.{name}"), format!("must be positive, not {value}")));
+            return Err(wrong(
+                &format!("noise.{name}"),
+                format!("must be positive, not {value}"),
+            ));
         }
         if all.insert(name.clone(), value).is_none() {
             let known = task.exploration().signals.iter().map(|s| &*s.sensor);
@@ -535,14 +595,21 @@ fn noise(task: &dyn Task, table: &toml::Table) -> Result<BTreeMap<String, f64>> 
 
 /// The start pose of a stage that is told it, and the names of the coordinates that
 /// were not given and took the middle of their range.
-fn start(stage: Stage, task: &dyn Task, table: &toml::Table) -> Result<(BTreeMap<String, f64>, Vec<String>)> {
+fn start(
+    stage: Stage,
+    task: &dyn Task,
+    table: &toml::Table,
+) -> Result<(BTreeMap<String, f64>, Vec<String>)> {
     let given = numbers("start", table)?;
     let coordinates = stage.start(task);
     for (name, &value) in &given {
         if coordinates.is_empty() {
             return Err(wrong(
                 &format!("start.{name}"),
-                format!("`{}` takes no start pose; `explore` and `solve` do", stage.name()),
+                format!(
+                    "`{}` takes no start pose; `explore` and `solve` do",
+                    stage.name()
+                ),
             ));
         }
         let Some(c) = coordinates.iter().find(|c| &c.name == name) else {
@@ -555,7 +622,10 @@ fn start(stage: Stage, task: &dyn Task, table: &toml::Table) -> Result<(BTreeMap
         if !(low - slack..=high + slack).contains(&value) {
             return Err(wrong(
                 &format!("start.{name}"),
-                format!("{value} {} is far outside the task's range, {low} to {high}", c.unit),
+                format!(
+                    "{value} {} is far outside the task's range, {low} to {high}",
+                    c.unit
+                ),
             ));
         }
     }
@@ -563,7 +633,12 @@ fn start(stage: Stage, task: &dyn Task, table: &toml::Table) -> Result<(BTreeMap
     let assumed = missing.map(|c| c.name.clone()).collect();
     let all = coordinates
         .iter()
-        .map(|c| (c.name.clone(), given.get(&c.name).copied().unwrap_or(c.center())))
+        .map(|c| {
+            (
+                c.name.clone(),
+                given.get(&c.name).copied().unwrap_or(c.center()),
+            )
+        })
         .collect();
     Ok((all, assumed))
 }

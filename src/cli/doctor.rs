@@ -41,10 +41,20 @@ const LIBRARIES: [Library; 2] = [
 pub fn doctor(_arguments: &Arguments) -> Result<()> {
     let mut out = std::io::stdout().lock();
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
-    writeln!(out, "asid {} ({}), {cores} cores", env!("CARGO_PKG_VERSION"), env!("ASID_GIT"))?;
+    writeln!(
+        out,
+        "asid {} ({}), {cores} cores",
+        env!("CARGO_PKG_VERSION"),
+        env!("ASID_GIT")
+    )?;
     for entry in asid_core::registry::all::<asid_core::registry::BackendEntry>() {
         match (entry.make)() {
-            Ok(backend) => writeln!(out, "ok       backend `{}`, version {}", entry.name, backend.version())?,
+            Ok(backend) => writeln!(
+                out,
+                "ok       backend `{}`, version {}",
+                entry.name,
+                backend.version()
+            )?,
             Err(e) => writeln!(out, "missing  backend `{}`: {e}", entry.name)?,
         }
     }
@@ -55,15 +65,29 @@ pub fn doctor(_arguments: &Arguments) -> Result<()> {
         }
         places.push(Path::new(library.folder).join(library.file));
         let found = places.iter().find(|p| p.exists());
-        let built = if library.built_in { "built in" } else { "not in this build" };
+        let built = if library.built_in {
+            "built in"
+        } else {
+            "not in this build"
+        };
         match found {
-            Some(path) => writeln!(out, "ok       {} for {}: {} ({built})", library.name, library.what_for, path.display())?,
+            Some(path) => writeln!(
+                out,
+                "ok       {} for {}: {} ({built})",
+                library.name,
+                library.what_for,
+                path.display()
+            )?,
             None => writeln!(
                 out,
                 "missing  {} for {} ({built}): looked for {}; get it with `cargo xtask setup`, or set {}",
                 library.name,
                 library.what_for,
-                places.iter().map(|p| p.display().to_string()).collect::<Vec<_>>().join(" and "),
+                places
+                    .iter()
+                    .map(|p| p.display().to_string())
+                    .collect::<Vec<_>>()
+                    .join(" and "),
                 library.variable
             )?,
         }

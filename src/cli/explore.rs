@@ -63,8 +63,17 @@ pub fn explore(arguments: &Arguments) -> Result<()> {
         explorer: arguments.explorer.clone(),
         ..Algorithms::default()
     };
-    let session = Session::open_stage(Stage::Explore, &arguments.task, common, &algorithms, &Real::default())?;
-    let out = OutFolder::claim(common.out.as_deref(), &format!("{}-explore", arguments.task))?;
+    let session = Session::open_stage(
+        Stage::Explore,
+        &arguments.task,
+        common,
+        &algorithms,
+        &Real::default(),
+    )?;
+    let out = OutFolder::claim(
+        common.out.as_deref(),
+        &format!("{}-explore", arguments.task),
+    )?;
     stage::check_start(&session);
     let config = &session.config;
     let start = session.start();
@@ -77,9 +86,19 @@ pub fn explore(arguments: &Arguments) -> Result<()> {
         .with_exploration_start(start.clone())
         .explore(&mut *explored.policy)?;
     let searched = explored.policy.take_curve();
-    let curve = if searched.is_empty() { explored.curve } else { searched };
+    let curve = if searched.is_empty() {
+        explored.curve
+    } else {
+        searched
+    };
     let policy = explored.policy.export();
-    let information = episode_information(&problem, &FisherSettings::default(), &center, &start, &played.actions)?;
+    let information = episode_information(
+        &problem,
+        &FisherSettings::default(),
+        &center,
+        &start,
+        &played.actions,
+    )?;
 
     let wall_s = clock.elapsed().as_secs_f64();
     let result = ExploreResult {
@@ -89,7 +108,11 @@ pub fn explore(arguments: &Arguments) -> Result<()> {
         explorer: config.explorer.name.clone(),
         seed: config.seed,
         start: config.start.clone(),
-        exploration: ExplorationResult::new(&explored.objective, &information, played.contact_fraction),
+        exploration: ExplorationResult::new(
+            &explored.objective,
+            &information,
+            played.contact_fraction,
+        ),
         cost: session.cost(wall_s),
         versions: Versions::of(&session),
     };
@@ -107,8 +130,14 @@ pub fn explore(arguments: &Arguments) -> Result<()> {
         &session,
         wall_s,
         &[
-            ("commands.csv", "the commands to play: time in s, one column an actuator"),
-            ("predicted.csv", "log of the episode that the simulator expects, without noise"),
+            (
+                "commands.csv",
+                "the commands to play: time in s, one column an actuator",
+            ),
+            (
+                "predicted.csv",
+                "log of the episode that the simulator expects, without noise",
+            ),
             ("policy.json", "the exploration policy"),
         ],
     );
@@ -119,8 +148,12 @@ pub fn explore(arguments: &Arguments) -> Result<()> {
         expected.join(", ")
     );
     report.episode = Some(trace::episode(&session, &played.episode));
-    report.exploration =
-        trace::exploration(&session, &explored.objective, &information, Some(played.contact_fraction));
+    report.exploration = trace::exploration(
+        &session,
+        &explored.objective,
+        &information,
+        Some(played.contact_fraction),
+    );
     report.learning = trace::learning(&curve, explored.curve_label);
     stage::finish(&session, common, &out, &result, &report, &lines, |folder| {
         write_json(&folder.join("policy.json"), &policy)?;

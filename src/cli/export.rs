@@ -28,6 +28,7 @@ pub fn export(arguments: &Arguments) -> Result<()> {
         },
     };
     let mut file = std::fs::File::create_new(&arguments.out).map_err(failed)?;
-    file.write_all(task.scene().xml().as_bytes()).map_err(failed)?;
+    file.write_all(task.scene().xml().as_bytes())
+        .map_err(failed)?;
     Ok(())
 }

@@ -15,7 +15,9 @@ static PANIC: Mutex<Option<String>> = Mutex::new(None);
 
 /// A problem with the command line itself; help and version are no problem.
 pub fn usage(error: &clap::Error) -> ExitCode {
-    use clap::error::ErrorKind::{DisplayHelp, DisplayHelpOnMissingArgumentOrSubcommand, DisplayVersion};
+    use clap::error::ErrorKind::{
+        DisplayHelp, DisplayHelpOnMissingArgumentOrSubcommand, DisplayVersion,
+    };
     match error.kind() {
         DisplayHelp | DisplayVersion => {
             let _ = error.print();
@@ -40,7 +42,11 @@ fn usage_line(text: &str) -> String {
         .filter_map(|mark| text.find(mark))
         .min()
         .unwrap_or(text.len());
-    let paragraphs: Vec<String> = text[..end].split("\n\n").map(one_line).filter(|p| !p.is_empty()).collect();
+    let paragraphs: Vec<String> = text[..end]
+        .split("\n\n")
+        .map(one_line)
+        .filter(|p| !p.is_empty())
+        .collect();
     format!("{}; see --help", paragraphs.join("; "))
 }
 
@@ -71,15 +77,24 @@ pub fn guard(work: impl FnOnce() -> ExitCode) -> ExitCode {
     if std::env::var_os("RUST_BACKTRACE").is_none() {
         std::panic::set_hook(Box::new(|info| {
             let text = info.payload_as_str().unwrap_or("panic");
-            let place = info.location().map(|l| format!(" ({}:{})", l.file(), l.line())).unwrap_or_default();
+            let place = info
+                .location()
+                .map(|l| format!(" ({}:{})", l.file(), l.line()))
+                .unwrap_or_default();
             if let Ok(mut latest) = PANIC.lock() {
                 *latest = Some(format!("{text}{place}"));
             }
         }));
     }
     std::panic::catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|_| {
-        let said = PANIC.lock().ok().and_then(|mut latest| latest.take()).unwrap_or_else(|| "see above".into());
-        tell(&one_line(&format!("internal error: {said}; please report it with the command line")));
+        let said = PANIC
+            .lock()
+            .ok()
+            .and_then(|mut latest| latest.take())
+            .unwrap_or_else(|| "see above".into());
+        tell(&one_line(&format!(
+            "internal error: {said}; please report it with the command line"
+        )));
         ExitCode::from(FAILED)
     })
 }
@@ -111,6 +126,9 @@ mod tests {
         let before = std::panic::take_hook();
         let status = guard(|| panic!("a defect"));
         std::panic::set_hook(before);
-        assert_eq!(format!("{status:?}"), format!("{:?}", ExitCode::from(FAILED)));
+        assert_eq!(
+            format!("{status:?}"),
+            format!("{:?}", ExitCode::from(FAILED))
+        );
     }
 }

@@ -74,11 +74,25 @@ pub fn identify(arguments: &Arguments) -> Result<()> {
         identifier: arguments.identifier.clone(),
         ..Algorithms::default()
     };
-    let session = Session::open_stage(Stage::Identify, &arguments.task, common, &algorithms, &Real::default())?;
-    let episodes: Vec<Episode> = arguments.log.iter().map(|path| read(&session, path)).collect::<Result<_>>()?;
-    let out = OutFolder::claim(common.out.as_deref(), &format!("{}-identify", arguments.task))?;
+    let session = Session::open_stage(
+        Stage::Identify,
+        &arguments.task,
+        common,
+        &algorithms,
+        &Real::default(),
+    )?;
+    let episodes: Vec<Episode> = arguments
+        .log
+        .iter()
+        .map(|path| read(&session, path))
+        .collect::<Result<_>>()?;
+    let out = OutFolder::claim(
+        common.out.as_deref(),
+        &format!("{}-identify", arguments.task),
+    )?;
     let config = &session.config;
-    let identifier = (find::<IdentifierEntry>(&config.identifier.name)?.make)(&config.identifier.settings)?;
+    let identifier =
+        (find::<IdentifierEntry>(&config.identifier.name)?.make)(&config.identifier.settings)?;
     let found = identifier.identify(&session.problem(), &episodes)?;
 
     let wall_s = clock.elapsed().as_secs_f64();
@@ -89,10 +103,23 @@ pub fn identify(arguments: &Arguments) -> Result<()> {
         backend: config.backend.clone(),
         identifier: config.identifier.name.clone(),
         seed: config.seed,
-        parameters: found.posterior.marginals.iter().map(|m| ParameterResult::new(m, None)).collect(),
+        parameters: found
+            .posterior
+            .marginals
+            .iter()
+            .map(|m| ParameterResult::new(m, None))
+            .collect(),
         residual: found.residual,
-        starts: found.starts.iter().map(|s| stage::pose(coordinates, s)).collect(),
-        logs: arguments.log.iter().map(|p| p.display().to_string()).collect(),
+        starts: found
+            .starts
+            .iter()
+            .map(|s| stage::pose(coordinates, s))
+            .collect(),
+        logs: arguments
+            .log
+            .iter()
+            .map(|p| p.display().to_string())
+            .collect(),
         cost: session.cost(wall_s),
         versions: Versions::of(&session),
     };
@@ -102,10 +129,16 @@ pub fn identify(arguments: &Arguments) -> Result<()> {
         .iter()
         .map(|m| {
             let [low, high] = m.interval95;
-            format!("{}: {:.4} ± {:.4} {} (95 %: {low:.4} to {high:.4})", m.name, m.estimate, m.std, m.unit)
+            format!(
+                "{}: {:.4} ± {:.4} {} (95 %: {low:.4} to {high:.4})",
+                m.name, m.estimate, m.std, m.unit
+            )
         })
         .collect();
-    lines.push(format!("residual: {:.2} times the sensors' noise", found.residual));
+    lines.push(format!(
+        "residual: {:.2} times the sensors' noise",
+        found.residual
+    ));
     let names = copies(arguments.log.len());
     let report = report(&session, &episodes, &found, &names, wall_s)?;
     stage::finish(&session, common, &out, &result, &report, &lines, |folder| {
@@ -154,8 +187,15 @@ fn read(session: &Session, path: &Path) -> Result<Episode> {
     }
     let readings = episode.select(layout, &names);
     let width = readings.len() / episode.rows();
-    if !readings.chunks_exact(width).any(|row| row.iter().all(|x| x.is_finite())) {
-        return Err(fail(format!("no row has a reading of all of {}", names.join(", "))).into());
+    if !readings
+        .chunks_exact(width)
+        .any(|row| row.iter().all(|x| x.is_finite()))
+    {
+        return Err(fail(format!(
+            "no row has a reading of all of {}",
+            names.join(", ")
+        ))
+        .into());
     }
     let protocol = session.task.exploration();
     let usual = protocol.frames() as f64 * protocol.frame_period;
@@ -181,8 +221,15 @@ fn report(
     let mut report = stage::report(session, wall_s, &files);
     let center: Vec<f64> = session.parameters.iter().map(Parameter::center).collect();
     let before = trace::replay(session, &episodes[0], &center, &found.starts[0])?;
-    let after = trace::replay(session, &episodes[0], &found.posterior.mean(), &found.starts[0])?;
-    report.identifier.clone_from(&session.config.identifier.name);
+    let after = trace::replay(
+        session,
+        &episodes[0],
+        &found.posterior.mean(),
+        &found.starts[0],
+    )?;
+    report
+        .identifier
+        .clone_from(&session.config.identifier.name);
     report.real_world = RealWorld {
         engine: "logs".into(),
         ..RealWorld::default()
@@ -191,7 +238,10 @@ fn report(
     report.episode = Some(trace::episode(session, &episodes[0]));
     report.signals = trace::tracked(session, &episodes[0], Some((&before, &after)));
     if episodes.len() > 1 {
-        report.notes.push(format!("{} episodes were fitted together; the first is shown", episodes.len()));
+        report.notes.push(format!(
+            "{} episodes were fitted together; the first is shown",
+            episodes.len()
+        ));
     }
     if found.residual > UNEXPLAINED {
         report.notes.push(unexplained(found.residual));

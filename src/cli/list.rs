@@ -26,14 +26,21 @@ const OPTIONAL: [(&str, &str, &str); 3] = [
 
 /// Says how to get something that this build lacks.
 pub fn missing(kind: &str, name: &str) -> Option<Error> {
-    OPTIONAL.iter().find(|(k, n, _)| *k == kind && *n == name).map(|(_, _, feature)| Error::Missing {
-        what: format!("{kind} `{name}`"),
-        message: reason(feature),
-    })
+    OPTIONAL
+        .iter()
+        .find(|(k, n, _)| *k == kind && *n == name)
+        .map(|(_, _, feature)| Error::Missing {
+            what: format!("{kind} `{name}`"),
+            message: reason(feature),
+        })
 }
 
 fn reason(feature: &str) -> String {
-    let setup = if feature == "rapier" { "" } else { "`cargo xtask setup`, then " };
+    let setup = if feature == "rapier" {
+        ""
+    } else {
+        "`cargo xtask setup`, then "
+    };
     format!("this build is without it; {setup}build with `--features {feature}`")
 }
 

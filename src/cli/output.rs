@@ -58,7 +58,11 @@ impl OutFolder {
         if path.is_dir() {
             let mut entries = std::fs::read_dir(&path).map_err(|e| file(&path, e.to_string()))?;
             if entries.next().is_some() {
-                let what = if path.join(RESULT).exists() { "already holds another run" } else { "is not empty" };
+                let what = if path.join(RESULT).exists() {
+                    "already holds another run"
+                } else {
+                    "is not empty"
+                };
                 return Err(file(&path, format!("{what}; choose another --out")));
             }
         } else if path.exists() || path.file_name().is_none() {
@@ -67,7 +71,13 @@ impl OutFolder {
         // The nearest folder that exists must take new entries.
         let base = path
             .ancestors()
-            .map(|p| if p.as_os_str().is_empty() { Path::new(".") } else { p })
+            .map(|p| {
+                if p.as_os_str().is_empty() {
+                    Path::new(".")
+                } else {
+                    p
+                }
+            })
             .find(|p| p.exists())
             .unwrap_or(Path::new("."));
         let probe = base.join(format!(".asid-{}", std::process::id()));
@@ -84,11 +94,19 @@ impl OutFolder {
         let path = self.path();
         let exists = path.is_dir() && self.stem.is_none();
         let beside = if exists { Some(&*path) } else { path.parent() };
-        let beside = beside.filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let beside = beside
+            .filter(|p| !p.as_os_str().is_empty())
+            .unwrap_or(Path::new("."));
         std::fs::create_dir_all(beside).map_err(|e| failed(beside, &e))?;
         let staging = beside.join(format!(".asid-{}", std::process::id()));
         std::fs::create_dir(&staging).map_err(|e| failed(&staging, &e))?;
-        let done = fill(&staging).and_then(|()| if exists { move_into(&staging, &path) } else { self.name(&staging) });
+        let done = fill(&staging).and_then(|()| {
+            if exists {
+                move_into(&staging, &path)
+            } else {
+                self.name(&staging)
+            }
+        });
         if done.is_err() {
             let _ = std::fs::remove_dir_all(&staging);
         }
@@ -123,10 +141,15 @@ fn move_into(from: &Path, to: &Path) -> Result<()> {
     let mut names: Vec<_> = entries.filter_map(|e| Some(e.ok()?.file_name())).collect();
     names.sort_by_key(|n| n == RESULT);
     if let Some(taken) = names.iter().map(|n| to.join(n)).find(|p| p.exists()) {
-        return Err(Error::Failed(format!("{} exists by now; choose another --out", taken.display())).into());
+        return Err(Error::Failed(format!(
+            "{} exists by now; choose another --out",
+            taken.display()
+        ))
+        .into());
     }
     for name in names {
-        std::fs::rename(from.join(&name), to.join(&name)).map_err(|e| failed(&to.join(&name), &e))?;
+        std::fs::rename(from.join(&name), to.join(&name))
+            .map_err(|e| failed(&to.join(&name), &e))?;
     }
     std::fs::remove_dir(from).map_err(|e| failed(from, &e))
 }

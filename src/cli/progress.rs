@@ -34,7 +34,9 @@ impl Progress for Bars {
             return;
         }
         let bar = ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::stderr());
-        if let Ok(style) = ProgressStyle::with_template("{msg:24} {bar:30} {pos}/{len}  {elapsed} gone, {eta} left") {
+        if let Ok(style) = ProgressStyle::with_template(
+            "{msg:24} {bar:30} {pos}/{len}  {elapsed} gone, {eta} left",
+        ) {
             bar.set_style(style);
         }
         bar.set_message(stage.to_owned());

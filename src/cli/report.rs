@@ -20,7 +20,8 @@ pub fn report(arguments: &Arguments) -> Result<()> {
         path: path.clone(),
         message,
     };
-    let text = std::fs::read_to_string(&path).map_err(|e| fail(format!("{e}; is this the folder of a finished run?")))?;
+    let text = std::fs::read_to_string(&path)
+        .map_err(|e| fail(format!("{e}; is this the folder of a finished run?")))?;
     let report: RunReport = serde_json::from_str(&text).map_err(|e| fail(e.to_string()))?;
     let html = arguments.dir.join("report.html");
     let staging = arguments.dir.join(".report.html");

@@ -29,7 +29,12 @@ pub struct Arguments {
 /// Runs the pipeline and writes its folder.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let clock = Instant::now();
-    let session = Session::open(&arguments.task, &arguments.common, &arguments.algorithms, &arguments.real)?;
+    let session = Session::open(
+        &arguments.task,
+        &arguments.common,
+        &arguments.algorithms,
+        &arguments.real,
+    )?;
     let out = OutFolder::claim(arguments.common.out.as_deref(), &arguments.task)?;
     let truth = session.truth();
     let outcome = pipeline(&session, &truth)?;
@@ -38,7 +43,10 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let report = trace::run_report(&session, &truth, &outcome, wall_s, command_line())?;
     out.write(|folder| {
         write_json(&folder.join("result.json"), &result)?;
-        write_text(&folder.join("config.toml"), &toml::to_string_pretty(&session.config)?)?;
+        write_text(
+            &folder.join("config.toml"),
+            &toml::to_string_pretty(&session.config)?,
+        )?;
         write_json(&folder.join("posterior.json"), &outcome.belief)?;
         if let Some(real) = &outcome.real {
             real.episode.write_csv(&folder.join("real.csv"))?;
@@ -66,7 +74,11 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         "{}: {:.2}, {}",
         protocol.metric,
         attempt.value,
-        if attempt.success { "success" } else { "failure" }
+        if attempt.success {
+            "success"
+        } else {
+            "failure"
+        }
     )?;
     let cost = session.cost(wall_s);
     writeln!(
@@ -76,7 +88,11 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         cost.physics_steps as f64 / 1e6,
         session.engine
     )?;
-    writeln!(stdout, "report: {}", out.path().join("report.html").display())?;
+    writeln!(
+        stdout,
+        "report: {}",
+        out.path().join("report.html").display()
+    )?;
     Ok(())
 }
 
@@ -84,7 +100,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 pub fn pipeline(session: &Session, truth: &[f64]) -> Result<RunOutcome> {
     let config = &session.config;
     let explorer = (find::<ExplorerEntry>(&config.explorer.name)?.make)(&config.explorer.settings)?;
-    let identifier = (find::<IdentifierEntry>(&config.identifier.name)?.make)(&config.identifier.settings)?;
+    let identifier =
+        (find::<IdentifierEntry>(&config.identifier.name)?.make)(&config.identifier.settings)?;
     let solver = (find::<SolverEntry>(&config.solver.name)?.make)(&config.solver.settings)?;
     let method = Method {
         explorer: Some(&*explorer),
@@ -101,7 +118,11 @@ pub fn command_line() -> String {
     std::iter::once("asid".to_owned())
         .chain(std::env::args().skip(1).map(|a| {
             let plain = |c: char| c.is_ascii_alphanumeric() || "-_=./,:@+".contains(c);
-            if !a.is_empty() && a.chars().all(plain) { a } else { format!("'{}'", a.replace('\'', r"'\''")) }
+            if !a.is_empty() && a.chars().all(plain) {
+                a
+            } else {
+                format!("'{}'", a.replace('\'', r"'\''"))
+            }
         }))
         .collect::<Vec<_>>()
         .join(" ")

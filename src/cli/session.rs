@@ -6,7 +6,9 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use anyhow::Result;
 use asid_core::registry::{self, BackendEntry, Entry, TaskEntry};
 use asid_core::signal::Signal;
-use asid_core::{Backend, Capabilities, Error, Model, Parameter, Problem, Scene, SimulatedWorld, Streams, Task};
+use asid_core::{
+    Backend, Capabilities, Error, Model, Parameter, Problem, Scene, SimulatedWorld, Streams, Task,
+};
 
 use super::config::{Config, Stage};
 use super::options::{Algorithms, Common, Real};
@@ -101,7 +103,9 @@ impl Session {
     /// The start pose of a stage that is told it, in the order of its coordinates.
     pub fn start(&self) -> Vec<f64> {
         let coordinates = self.config.command.start(&*self.task).iter();
-        coordinates.filter_map(|c| self.config.start.get(&c.name).copied()).collect()
+        coordinates
+            .filter_map(|c| self.config.start.get(&c.name).copied())
+            .collect()
     }
 
     /// The hidden truth: as given, and drawn from the prior by the seed otherwise.
@@ -111,7 +115,12 @@ impl Session {
             .iter()
             .map(|p| {
                 let drawn = p.sample(&mut rng);
-                self.config.real.truth.get(&p.name).copied().unwrap_or(drawn)
+                self.config
+                    .real
+                    .truth
+                    .get(&p.name)
+                    .copied()
+                    .unwrap_or(drawn)
             })
             .collect()
     }
@@ -154,13 +163,17 @@ impl Session {
         }
         for (i, actuator) in ours.actuators.iter().enumerate() {
             if theirs.actuator(&actuator.name)? != i {
-                return Err(Error::Shape(format!("actuator `{}` has another place in the order", actuator.name)));
+                return Err(Error::Shape(format!(
+                    "actuator `{}` has another place in the order",
+                    actuator.name
+                )));
             }
         }
         theirs.recording(&exploration.channels())?;
         theirs.recording(&downstream.channels)?;
-        theirs.body(&exploration.contact[0])?;
-        theirs.body(&exploration.contact[1])?;
+        for body in exploration.contact.iter().flatten() {
+            theirs.body(body)?;
+        }
         for target in self.parameters.iter().flat_map(|p| &p.targets) {
             model.nominal(target)?;
         }
@@ -168,7 +181,11 @@ impl Session {
             asid_core::problem::substeps(theirs, frame_period)?;
         }
         let (mut qpos, _) = asid_core::problem::home(theirs);
-        let middle: Vec<f64> = exploration.start.iter().map(asid_core::task::Coordinate::center).collect();
+        let middle: Vec<f64> = exploration
+            .start
+            .iter()
+            .map(asid_core::task::Coordinate::center)
+            .collect();
         self.task.place(theirs, &middle, &mut qpos)
     }
 
@@ -192,7 +209,9 @@ fn load(backend_name: &str, task: &dyn Task, scene: &Scene) -> Result<Arc<dyn Mo
 pub fn backend(name: &str) -> Result<Box<dyn Backend>> {
     match registry::find::<BackendEntry>(name) {
         Ok(entry) => Ok((entry.make)()?),
-        Err(unknown) => Err(super::list::missing(BackendEntry::KIND, name).unwrap_or(unknown).into()),
+        Err(unknown) => Err(super::list::missing(BackendEntry::KIND, name)
+            .unwrap_or(unknown)
+            .into()),
     }
 }
 
@@ -201,7 +220,10 @@ fn require(backend: &dyn Backend, needed: Capabilities) -> Result<()> {
     if lacking.is_empty() {
         return Ok(());
     }
-    let names: Vec<String> = lacking.iter_names().map(|(n, _)| n.to_lowercase().replace('_', " ")).collect();
+    let names: Vec<String> = lacking
+        .iter_names()
+        .map(|(n, _)| n.to_lowercase().replace('_', " "))
+        .collect();
     Err(Error::Incapable {
         backend: backend.name().to_owned(),
         what: format!("do what this task needs: {}", names.join(", ")),

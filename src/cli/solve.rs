@@ -92,7 +92,13 @@ pub fn solve(arguments: &Arguments) -> Result<()> {
         solver: arguments.solver.clone(),
         ..Algorithms::default()
     };
-    let session = Session::open_stage(Stage::Solve, &arguments.task, common, &algorithms, &Real::default())?;
+    let session = Session::open_stage(
+        Stage::Solve,
+        &arguments.task,
+        common,
+        &algorithms,
+        &Real::default(),
+    )?;
     let belief = belief(&session, &arguments.posterior)?;
     let out = OutFolder::claim(common.out.as_deref(), &format!("{}-solve", arguments.task))?;
     stage::check_start(&session);
@@ -115,8 +121,11 @@ pub fn solve(arguments: &Arguments) -> Result<()> {
         expected_cost: expected.cost,
         start: config.start.clone(),
     };
-    let chosen: Vec<String> =
-        record.action.iter().map(|a| format!("{} {:.4} {}", a.name, a.value, a.unit)).collect();
+    let chosen: Vec<String> = record
+        .action
+        .iter()
+        .map(|a| format!("{} {:.4} {}", a.name, a.value, a.unit))
+        .collect();
     let lines = [
         format!("start: {}", stage::start_line(&session)),
         format!(
@@ -133,7 +142,10 @@ pub fn solve(arguments: &Arguments) -> Result<()> {
         wall_s,
         &[
             ("action.json", "the action"),
-            ("commands.csv", "the commands to play: time in s, one column an actuator"),
+            (
+                "commands.csv",
+                "the commands to play: time in s, one column an actuator",
+            ),
         ],
     );
     report.solver.clone_from(&config.solver.name);
@@ -150,7 +162,11 @@ pub fn solve(arguments: &Arguments) -> Result<()> {
         solver: config.solver.name.clone(),
         seed: config.seed,
         posterior: arguments.posterior.display().to_string(),
-        parameters: belief.marginals.iter().map(|m| ParameterResult::new(m, None)).collect(),
+        parameters: belief
+            .marginals
+            .iter()
+            .map(|m| ParameterResult::new(m, None))
+            .collect(),
         start: config.start.clone(),
         action: stage::named(&protocol.action, &action),
         expected,
@@ -159,7 +175,8 @@ pub fn solve(arguments: &Arguments) -> Result<()> {
     };
     stage::finish(&session, common, &out, &result, &report, &lines, |folder| {
         write_json(&folder.join("action.json"), &record)?;
-        stage::commands(&session, ctrl, protocol.frame_period).write_csv(&folder.join("commands.csv"))?;
+        stage::commands(&session, ctrl, protocol.frame_period)
+            .write_csv(&folder.join("commands.csv"))?;
         Ok(())
     })
 }
@@ -168,21 +185,32 @@ pub fn solve(arguments: &Arguments) -> Result<()> {
 fn belief(session: &Session, from: &Path) -> Result<Posterior> {
     if from == Path::new(PRIOR) {
         let mut rng = session.problem().streams.stream("prior belief");
-        return Ok(Posterior::prior(&session.parameters, PRIOR_SAMPLES, &mut rng));
+        return Ok(Posterior::prior(
+            &session.parameters,
+            PRIOR_SAMPLES,
+            &mut rng,
+        ));
     }
     let path = from.join("posterior.json");
     let fail = |message: String| Error::File {
         path: path.clone(),
         message,
     };
-    let text = std::fs::read_to_string(&path)
-        .map_err(|e| fail(format!("{e}; --posterior takes a folder of `asid identify` or `asid run`, or `prior`")))?;
+    let text = std::fs::read_to_string(&path).map_err(|e| {
+        fail(format!(
+            "{e}; --posterior takes a folder of `asid identify` or `asid run`, or `prior`"
+        ))
+    })?;
     let posterior: Posterior =
         serde_json::from_str(&text).map_err(|e| fail(format!("is not a posterior: {e}")))?;
     if let Some(task) = task_of(from)
         && task != session.config.task
     {
-        return Err(fail(format!("is of the task `{task}`, not of `{}`", session.config.task)).into());
+        return Err(fail(format!(
+            "is of the task `{task}`, not of `{}`",
+            session.config.task
+        ))
+        .into());
     }
     let theirs: Vec<&str> = posterior.marginals.iter().map(|m| &*m.name).collect();
     let ours: Vec<&str> = session.parameters.iter().map(|p| &*p.name).collect();
@@ -210,15 +238,24 @@ fn task_of(folder: &Path) -> Option<String> {
 fn check(posterior: &Posterior) -> Result<(), String> {
     let (samples, weights) = (&posterior.samples, &posterior.weights);
     if samples.is_empty() || samples.len() != weights.len() {
-        return Err(format!("has {} samples and {} weights", samples.len(), weights.len()));
+        return Err(format!(
+            "has {} samples and {} weights",
+            samples.len(),
+            weights.len()
+        ));
     }
     let d = posterior.marginals.len();
-    if let Some(i) = samples.iter().position(|s| s.len() != d || s.iter().any(|x| !x.is_finite())) {
+    if let Some(i) = samples
+        .iter()
+        .position(|s| s.len() != d || s.iter().any(|x| !x.is_finite()))
+    {
         return Err(format!("sample {i} is not {d} finite numbers"));
     }
     let total: f64 = weights.iter().sum();
     if weights.iter().any(|w| w.is_nan() || *w < 0.0) || (total - 1.0).abs() > 1e-6 {
-        return Err(format!("the weights are not positive numbers that sum to 1, but to {total}"));
+        return Err(format!(
+            "the weights are not positive numbers that sum to 1, but to {total}"
+        ));
     }
     Ok(())
 }
@@ -245,13 +282,22 @@ fn try_out(
     batch.place(&*session.task, &sims, &start.repeat(n))?;
     let mut readings = vec![0.0; n * protocol.frames * recording.width()];
     let substeps = problem.substeps(protocol.frame_period)?;
-    let rollout = Rollout::new(&sims, protocol.frames, substeps, Control::Shared(ctrl), &recording);
+    let rollout = Rollout::new(
+        &sims,
+        protocol.frames,
+        substeps,
+        Control::Shared(ctrl),
+        &recording,
+    );
     let before = batch.simulator.steps_taken();
     batch.simulator.rollout(&rollout, &mut readings)?;
     problem.count_physics(&batch, before);
 
     let (mean, samples) = readings.split_at(readings.len() / n);
-    let outcomes: Vec<_> = samples.chunks_exact(mean.len()).map(|r| session.task.outcome(r)).collect();
+    let outcomes: Vec<_> = samples
+        .chunks_exact(mean.len())
+        .map(|r| session.task.outcome(r))
+        .collect();
     let share = 1.0 / TRIES as f64;
     Ok((
         Expected {

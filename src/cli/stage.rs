@@ -42,7 +42,11 @@ pub fn named(coordinates: &[Coordinate], values: &[f64]) -> Vec<Named> {
 
 /// Values by the names of their coordinates.
 pub fn pose(coordinates: &[Coordinate], values: &[f64]) -> BTreeMap<String, f64> {
-    coordinates.iter().map(|c| c.name.clone()).zip(values.iter().copied()).collect()
+    coordinates
+        .iter()
+        .map(|c| c.name.clone())
+        .zip(values.iter().copied())
+        .collect()
 }
 
 /// `x 0.5500 m, y 0.0000 m (middle of its range)`.
@@ -54,7 +58,16 @@ pub fn start_line(session: &Session) -> String {
         .zip(session.start())
         .map(|(c, value)| {
             let assumed = config.assumed.contains(&c.name);
-            format!("{} {value:.4} {}{}", c.name, c.unit, if assumed { " (middle of its range)" } else { "" })
+            format!(
+                "{} {value:.4} {}{}",
+                c.name,
+                c.unit,
+                if assumed {
+                    " (middle of its range)"
+                } else {
+                    ""
+                }
+            )
         })
         .collect();
     entries.join(", ")
@@ -75,7 +88,13 @@ pub fn check_start(session: &Session) {
 
 /// Commands alone as a log: rows every `period` seconds from 0, the last one held.
 pub fn commands(session: &Session, mut ctrl: Vec<f64>, period: f64) -> Episode {
-    let actuators: Vec<String> = session.model.layout().actuators.iter().map(|a| a.name.clone()).collect();
+    let actuators: Vec<String> = session
+        .model
+        .layout()
+        .actuators
+        .iter()
+        .map(|a| a.name.clone())
+        .collect();
     let nu = actuators.len();
     let last = ctrl[ctrl.len() - nu..].to_vec();
     ctrl.extend(last);
@@ -97,8 +116,12 @@ pub fn report(session: &Session, wall_s: f64, files: &[(&str, &str)]) -> RunRepo
         ("result.json", "the figures"),
         ("config.toml", "all settings, for `--config`"),
     ];
-    let all: Vec<(&str, &str)> =
-        all.iter().chain(files).copied().chain([("trace.json", "the data of this report")]).collect();
+    let all: Vec<(&str, &str)> = all
+        .iter()
+        .chain(files)
+        .copied()
+        .chain([("trace.json", "the data of this report")])
+        .collect();
     RunReport {
         stage: config.command.name().to_owned(),
         task: config.task.clone(),
@@ -127,7 +150,10 @@ pub fn finish(
 ) -> Result<()> {
     out.write(|folder| {
         write_json(&folder.join("result.json"), result)?;
-        write_text(&folder.join("config.toml"), &toml::to_string_pretty(&session.config)?)?;
+        write_text(
+            &folder.join("config.toml"),
+            &toml::to_string_pretty(&session.config)?,
+        )?;
         fill(folder)?;
         report.write(folder)?;
         Ok(())

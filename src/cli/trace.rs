@@ -1,8 +1,8 @@
 //! Fills the data that a run's report is made of.
 
 use anyhow::Result;
-use asid_core::parameter::Scale;
 use asid_core::explore::CurvePoint;
+use asid_core::parameter::Scale;
 use asid_core::pipeline::{EpisodeInformation, RunOutcome};
 use asid_core::real_world::Attempt;
 use asid_core::replay::Replay as Replayed;
@@ -36,7 +36,12 @@ pub fn run_report(
         seed: config.seed,
         real_world: r::RealWorld {
             engine: config.real.backend.clone(),
-            model: config.real.model.as_ref().map(|p| p.display().to_string()).unwrap_or_default(),
+            model: config
+                .real
+                .model
+                .as_ref()
+                .map(|p| p.display().to_string())
+                .unwrap_or_default(),
             effects: Vec::new(),
             noise: session
                 .signals
@@ -45,8 +50,16 @@ pub fn run_report(
                 .collect::<Vec<_>>()
                 .join(", "),
         },
-        parameters: parameters(session, Some(truth), &outcome.belief, outcome.identified.as_ref().map(|f| &*f.iterations)),
-        episode: outcome.real.as_ref().map(|real| episode(session, &real.episode)),
+        parameters: parameters(
+            session,
+            Some(truth),
+            &outcome.belief,
+            outcome.identified.as_ref().map(|f| &*f.iterations),
+        ),
+        episode: outcome
+            .real
+            .as_ref()
+            .map(|real| episode(session, &real.episode)),
         signals: signals(session, outcome)?,
         exploration: exploration(
             session,
@@ -72,7 +85,10 @@ pub fn run_report(
         command,
         files: files(&[
             ("result.json", "the figures"),
-            ("config.toml", "all settings; `--config` with it repeats the run"),
+            (
+                "config.toml",
+                "all settings; `--config` with it repeats the run",
+            ),
             ("real.csv", "log of the real episode"),
             ("policy.json", "the exploration policy"),
             ("posterior.json", "the posterior, for `asid solve`"),
@@ -127,9 +143,12 @@ fn condition(session: &Session, truth: &[f64]) -> String {
         .conditions()
         .into_iter()
         .find(|c| {
-            c.truth
-                .iter()
-                .all(|(n, v)| names.iter().position(|k| k == n).is_some_and(|i| truth[i] == *v))
+            c.truth.iter().all(|(n, v)| {
+                names
+                    .iter()
+                    .position(|k| k == n)
+                    .is_some_and(|i| truth[i] == *v)
+            })
         })
         .map(|c| c.name)
         .unwrap_or_default()
@@ -151,11 +170,19 @@ pub fn parameters(
         .map(|(i, (p, m))| {
             let [low, high] = p.range;
             let prior_quantiles = [0.025, 0.25, 0.5, 0.75, 0.975].map(|u| p.from_unit(u));
-            let after = iterations.unwrap_or_default().iter().map(|s| s.quantiles[i]);
+            let after = iterations
+                .unwrap_or_default()
+                .iter()
+                .map(|s| s.quantiles[i]);
             r::ParameterReport {
                 name: p.name.clone(),
                 unit: p.unit.clone(),
-                target: p.targets.iter().map(ToString::to_string).collect::<Vec<_>>().join(", "),
+                target: p
+                    .targets
+                    .iter()
+                    .map(ToString::to_string)
+                    .collect::<Vec<_>>()
+                    .join(", "),
                 log_scale: p.scale == Scale::Log,
                 truth: truth.map(|t| t[i]),
                 estimate: m.estimate,
@@ -194,12 +221,19 @@ pub fn episode(session: &Session, log: &asid_core::Episode) -> r::Episode {
     let view = session.task.top_view();
     let protocol = session.task.exploration();
     let position = session.signals.first().and_then(|s| log.channel(&s.sensor));
-    let orientation = session.signals.iter().filter_map(|s| log.channel(&s.sensor)).find(|c| c.len() == 4);
+    let orientation = session
+        .signals
+        .iter()
+        .filter_map(|s| log.channel(&s.sensor))
+        .find(|c| c.len() == 4);
     let poses = |row: &[f64]| {
         let (p, q) = (position.clone()?, orientation.clone()?);
         Some([row[p.start], row[p.start + 1], yaw(&row[q])])
     };
-    let effector = protocol.proprioception.first().and_then(|name| log.channel(name));
+    let effector = protocol
+        .proprioception
+        .first()
+        .and_then(|name| log.channel(name));
     let every = protocol.frames_per_step.max(1);
     r::Episode {
         objects: vec![r::ObjectTrack {
@@ -220,8 +254,17 @@ pub fn episode(session: &Session, log: &asid_core::Episode) -> r::Episode {
                 })
                 .collect(),
         }),
-        workspace: Some([view.bounds[0][0], view.bounds[1][0], view.bounds[0][1], view.bounds[1][1]]),
-        shapes: view.fixtures.iter().map(|f| shape(f, r::ShapeKind::Fixed)).collect(),
+        workspace: Some([
+            view.bounds[0][0],
+            view.bounds[1][0],
+            view.bounds[0][1],
+            view.bounds[1][1],
+        ]),
+        shapes: view
+            .fixtures
+            .iter()
+            .map(|f| shape(f, r::ShapeKind::Fixed))
+            .collect(),
     }
 }
 
@@ -230,14 +273,27 @@ fn signals(session: &Session, outcome: &RunOutcome) -> Result<Vec<r::Signal>> {
     let (Some(real), Some(found)) = (&outcome.real, &outcome.identified) else {
         return Ok(Vec::new());
     };
-    let center: Vec<f64> = session.parameters.iter().map(asid_core::Parameter::center).collect();
+    let center: Vec<f64> = session
+        .parameters
+        .iter()
+        .map(asid_core::Parameter::center)
+        .collect();
     let before = replay(session, &real.episode, &center, &found.starts[0])?;
-    let after = replay(session, &real.episode, &outcome.belief.mean(), &found.starts[0])?;
+    let after = replay(
+        session,
+        &real.episode,
+        &outcome.belief.mean(),
+        &found.starts[0],
+    )?;
     Ok(tracked(session, &real.episode, Some((&before, &after))))
 }
 
 /// Readings of the tracked signals, an orientation as its heading, with replays.
-pub fn tracked(session: &Session, log: &asid_core::Episode, replays: Option<(&[f64], &[f64])>) -> Vec<r::Signal> {
+pub fn tracked(
+    session: &Session,
+    log: &asid_core::Episode,
+    replays: Option<(&[f64], &[f64])>,
+) -> Vec<r::Signal> {
     let width: usize = session
         .signals
         .iter()
@@ -251,16 +307,31 @@ pub fn tracked(session: &Session, log: &asid_core::Episode, replays: Option<(&[f
             continue;
         };
         let range = log.channel(&signal.sensor);
-        let entries: Vec<usize> = if sensor.len == 4 { vec![0] } else { (0..sensor.len).collect() };
+        let entries: Vec<usize> = if sensor.len == 4 {
+            vec![0]
+        } else {
+            (0..sensor.len).collect()
+        };
         for i in entries {
             let value = |row: &[f64], from: usize| {
-                if sensor.len == 4 { yaw(&row[from..from + 4]) } else { row[from + i] }
+                if sensor.len == 4 {
+                    yaw(&row[from..from + 4])
+                } else {
+                    row[from + i]
+                }
             };
             let series = |data: &[f64]| {
-                unwrapped(data.chunks_exact(width).map(|row| value(row, at)).collect(), sensor.len == 4)
+                unwrapped(
+                    data.chunks_exact(width).map(|row| value(row, at)).collect(),
+                    sensor.len == 4,
+                )
             };
             let readings: Vec<f64> = (0..log.rows())
-                .map(|k| range.as_ref().map_or(f64::NAN, |r| value(log.reading(k), r.start)))
+                .map(|k| {
+                    range
+                        .as_ref()
+                        .map_or(f64::NAN, |r| value(log.reading(k), r.start))
+                })
                 .collect();
             let replay = |data: &[f64]| r::Replay {
                 time: log.time.clone(),
@@ -273,7 +344,11 @@ pub fn tracked(session: &Session, log: &asid_core::Episode, replays: Option<(&[f
                     1 => signal.sensor.clone(),
                     _ => format!("{}.{i}", signal.sensor),
                 },
-                unit: if sensor.len == 4 { "rad".into() } else { sensor.unit().into() },
+                unit: if sensor.len == 4 {
+                    "rad".into()
+                } else {
+                    sensor.unit().into()
+                },
                 noise_std: Some(signal.noise),
                 time: log.time.clone(),
                 readings: unwrapped(readings, sensor.len == 4),
@@ -301,7 +376,12 @@ fn unwrapped(mut values: Vec<f64>, angle: bool) -> Vec<f64> {
 }
 
 /// Predicted tracked readings of a log at these values.
-pub fn replay(session: &Session, log: &asid_core::Episode, theta: &[f64], start: &[f64]) -> Result<Vec<f64>> {
+pub fn replay(
+    session: &Session,
+    log: &asid_core::Episode,
+    theta: &[f64],
+    start: &[f64],
+) -> Result<Vec<f64>> {
     let problem = session.problem();
     let names: Vec<String> = session.signals.iter().map(|s| s.sensor.clone()).collect();
     let mut replay = Replayed::new(session.model.layout(), log, &names)?;
@@ -348,7 +428,12 @@ pub fn exploration(
 pub fn downstream(session: &Session, attempt: &Attempt, trials: &[Trial]) -> r::Downstream {
     let protocol = session.task.downstream();
     let series = session.task.metric(&attempt.readings);
-    let label = protocol.metric.split('_').next().unwrap_or_default().to_owned();
+    let label = protocol
+        .metric
+        .split('_')
+        .next()
+        .unwrap_or_default()
+        .to_owned();
     let width = attempt.readings.len() / protocol.frames;
     let last = &attempt.readings[attempt.readings.len() - width..];
     let view = session.task.side_view(last);
@@ -360,7 +445,9 @@ pub fn downstream(session: &Session, attempt: &Attempt, trials: &[Trial]) -> r::
         success: attempt.outcome.success,
         rule: protocol.rule.clone(),
         threshold: protocol.threshold,
-        time: (1..=series.len()).map(|k| k as f64 * protocol.frame_period).collect(),
+        time: (1..=series.len())
+            .map(|k| k as f64 * protocol.frame_period)
+            .collect(),
         metric_over_time: series,
         phases: protocol
             .phases
@@ -400,7 +487,11 @@ pub fn downstream(session: &Session, attempt: &Attempt, trials: &[Trial]) -> r::
                 .iter()
                 .enumerate()
                 .map(|(i, o)| {
-                    let kind = if i + 1 == view.len() { r::ShapeKind::Object } else { r::ShapeKind::Fixed };
+                    let kind = if i + 1 == view.len() {
+                        r::ShapeKind::Object
+                    } else {
+                        r::ShapeKind::Fixed
+                    };
                     shape(o, kind)
                 })
                 .collect(),

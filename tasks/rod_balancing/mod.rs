@@ -100,7 +100,9 @@ impl RodBalancing {
                 },
             ],
             proprioception: panda::proprioception(),
-            contact: ["finger_left".into(), "rod".into()],
+            contact: ["finger_left", "finger_right"]
+                .map(|f| [f.into(), "rod".into()])
+                .into(),
         };
         let downstream = DownstreamProtocol {
             metric: "tilt_deg".into(),

@@ -14,7 +14,7 @@ pub const FRAME_PERIOD: f64 = 0.02;
 const FRAMES: usize = 5;
 
 /// Longest way of a control step, m (0.75 m/s).
-const MAX_STEP: f64 = 0.075;
+const MAX_STEP: f64 = 0.04;
 
 /// Where the hand may go: x, y, and distance from the arm's base, m.
 const WORKSPACE_X: [f64; 2] = [0.30, 0.70];

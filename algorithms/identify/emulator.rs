@@ -1,0 +1,346 @@
+//! A smooth local model of a rough simulator, and the posterior under it.
+//!
+//! With contact, the trajectory is not a smooth function of the unknowns: a
+//! contact made a step earlier sends it a few millimetres elsewhere. Two nearby
+//! points then differ by many times the sensors' noise, and the likelihood of
+//! single simulations says more about their luck than about the unknowns. The real
+//! machine has luck of its own.
+//!
+//! So the residuals `e(x)` of points spread over a region are regressed on
+//! quadratic features, `e(x) = A phi(x) + epsilon`. The regression averages the
+//! luck away, and its residuals measure it: an observation differs from `A phi`
+//! by the sensors' noise (whitened: `1`) and one more draw of `epsilon`, with
+//! variance `s_k^2` at reading `k` and correlated along the episode. With weights
+//! `W = 1 / (1 + s^2)` the loss is `phi^T A^T W A phi / 2`. Its width ignores the
+//! correlation; the sandwich formula (White 1982)
+//!
+//! `H^-1 B^T W (1 + R) W B H^-1`, `H = B^T W B`, `B = de/dx`, `R = cov(epsilon)`
+//!
+//! does not, and the loss is multiplied by the ratio of the two (a temperature).
+//! Nothing here selects points by how well they fit, which would bias it.
+
+use asid_core::rng::Rng;
+use nalgebra::{DMatrix, DVector};
+
+use crate::optimise::Gaussian;
+
+/// Ridge on the regression, relative to the number of points.
+const RIDGE: f64 = 1e-6;
+
+/// The posterior is looked for within this many deviations of the region's middle.
+pub const REACH: f64 = 3.0;
+
+/// A quadratic model of the residuals over a region.
+pub struct Emulator {
+    region: Gaussian,
+    /// `A^T W A`, features x features.
+    gram: DMatrix<f64>,
+    /// Factor on the loss.
+    temperature: f64,
+    /// Root mean square of the emulated whitened residual at its best point.
+    pub residual: f64,
+    /// Root mean square of the roughness, in units of the sensors' noise.
+    pub roughness: f64,
+}
+
+/// Number of features of `n` entries.
+#[must_use]
+pub fn features_len(n: usize) -> usize {
+    1 + n + n * (n + 1) / 2
+}
+
+/// `1, u, u u^T` (upper triangle).
+fn features(u: &[f64]) -> Vec<f64> {
+    let mut phi = Vec::with_capacity(features_len(u.len()));
+    phi.push(1.0);
+    phi.extend_from_slice(u);
+    for i in 0..u.len() {
+        for j in i..u.len() {
+            phi.push(u[i] * u[j]);
+        }
+    }
+    phi
+}
+
+/// `d phi / d u_k`.
+fn feature_slope(u: &[f64], k: usize) -> Vec<f64> {
+    let mut slope = vec![0.0; features_len(u.len())];
+    slope[1 + k] = 1.0;
+    let mut at = 1 + u.len();
+    for i in 0..u.len() {
+        for j in i..u.len() {
+            slope[at] = f64::from(u8::from(i == k)) * u[j] + f64::from(u8::from(j == k)) * u[i];
+            at += 1;
+        }
+    }
+    slope
+}
+
+impl Emulator {
+    /// Fits residuals of points in a region; `sought` is how many leading entries are
+    /// unknowns (the others are start poses). `readings` is how many residual entries
+    /// are present. `None` where there are too few points.
+    #[must_use]
+    pub fn fit(
+        region: &Gaussian,
+        points: &[&[f64]],
+        residuals: &[&[f64]],
+        sought: usize,
+        readings: usize,
+    ) -> Option<Self> {
+        let n = region.mean().len();
+        let f = features_len(n);
+        let count = points.len();
+        if count < f + n {
+            return None;
+        }
+        let m = residuals[0].len();
+        let whitened: Vec<Vec<f64>> = points.iter().map(|x| region.standardise(x)).collect();
+        let phi = DMatrix::from_fn(count, f, {
+            let rows: Vec<Vec<f64>> = whitened.iter().map(|u| features(u)).collect();
+            move |i, j| rows[i][j]
+        });
+        let e = DMatrix::from_fn(count, m, |i, k| residuals[i][k]);
+        let normal = phi.transpose() * &phi + DMatrix::identity(f, f) * (RIDGE * count as f64);
+        let a = normal.cholesky()?.solve(&(phi.transpose() * &e));
+        let epsilon = &e - &phi * &a;
+        let freedom = (count - f) as f64;
+        let spread: DVector<f64> =
+            DVector::from_fn(m, |k, _| epsilon.column(k).norm_squared() / freedom);
+        let weights = spread.map(|s| 1.0 / (1.0 + s));
+        let weighted = DMatrix::from_fn(f, m, |i, k| a[(i, k)] * weights[k]);
+        let gram = &weighted * a.transpose();
+        let mut emulator = Self {
+            region: region.clone(),
+            gram,
+            temperature: 1.0,
+            residual: 0.0,
+            roughness: (spread.sum() / readings.max(1) as f64).sqrt(),
+        };
+        let best = emulator.minimum(n);
+        let best_features = DVector::from_vec(features(&best));
+        // Residual at the best point, in units of what noise and roughness explain.
+        let at_best = a.transpose() * &best_features;
+        let raw = at_best.norm_squared() / readings.max(1) as f64;
+        emulator.residual = raw.sqrt();
+        let mismatch = 2.0 * emulator.loss_at(&best) / (readings as f64 - n as f64).max(1.0);
+        // Slopes of the residuals at the best point, and the two covariances.
+        let b = DMatrix::from_fn(m, n, {
+            let slopes: Vec<DVector<f64>> = (0..n)
+                .map(|k| a.transpose() * DVector::from_vec(feature_slope(&best, k)))
+                .collect();
+            move |i, k| slopes[k][i]
+        });
+        let bw = DMatrix::from_fn(n, m, |k, i| b[(i, k)] * weights[i]);
+        // Standardised coordinates: what the data do not see keeps the region's width.
+        let h = &bw * &b + DMatrix::identity(n, n) * 1e-9;
+        let projected = &bw * epsilon.transpose();
+        let middle = &bw * bw.transpose() + &projected * projected.transpose() / freedom;
+        let inverse = h.cholesky()?.inverse();
+        let sandwich = &inverse * middle * &inverse;
+        let inflation = (0..sought)
+            .map(|i| sandwich[(i, i)] / inverse[(i, i)])
+            .fold(1.0, f64::max);
+        emulator.temperature = 1.0 / (inflation * mismatch.max(1.0));
+        Some(emulator)
+    }
+
+    fn loss_at(&self, u: &[f64]) -> f64 {
+        let phi = DVector::from_vec(features(u));
+        0.5 * phi.dot(&(&self.gram * &phi))
+    }
+
+    /// Tempered loss at a point of the search space.
+    #[must_use]
+    pub fn loss(&self, x: &[f64]) -> f64 {
+        self.temperature * self.loss_at(&self.region.standardise(x))
+    }
+
+    /// The best point in standardised coordinates, within reach: damped Newton steps.
+    fn minimum(&self, n: usize) -> Vec<f64> {
+        let mut u = vec![0.0; n];
+        let mut loss = self.loss_at(&u);
+        let mut damping = 1e-3
+            * (0..n)
+                .map(|i| self.gram[(1 + i, 1 + i)])
+                .fold(1.0, f64::max);
+        for _ in 0..60 {
+            let phi = DVector::from_vec(features(&u));
+            let slopes: Vec<DVector<f64>> = (0..n)
+                .map(|k| DVector::from_vec(feature_slope(&u, k)))
+                .collect();
+            let g_phi = &self.gram * &phi;
+            let gradient = DVector::from_fn(n, |k, _| slopes[k].dot(&g_phi));
+            let hessian = DMatrix::from_fn(n, n, |i, j| slopes[i].dot(&(&self.gram * &slopes[j])));
+            let Some(factor) = (hessian + DMatrix::identity(n, n) * damping).cholesky() else {
+                break;
+            };
+            let step = factor.solve(&gradient);
+            let next: Vec<f64> = (0..n)
+                .map(|i| (u[i] - step[i]).clamp(-REACH, REACH))
+                .collect();
+            let next_loss = self.loss_at(&next);
+            if next_loss < loss {
+                (u, loss) = (next, next_loss);
+                damping *= 0.3;
+            } else {
+                damping *= 5.0;
+            }
+        }
+        u
+    }
+
+    /// The best point of the search space.
+    #[must_use]
+    pub fn best(&self) -> Vec<f64> {
+        self.region
+            .unstandardise(&self.minimum(self.region.mean().len()))
+    }
+
+    /// `count` equally weighted points of the posterior, by a Metropolis walk inside the
+    /// box and within reach of the region's middle.
+    pub fn sample(&self, low: &[f64], high: &[f64], count: usize, rng: &mut Rng) -> Vec<Vec<f64>> {
+        use rand::Rng as _;
+        use rand_distr::{Distribution, StandardNormal};
+        let n = self.region.mean().len();
+        let inside = |u: &[f64]| {
+            let x = self.region.unstandardise(u);
+            u.iter().all(|v| v.abs() <= REACH)
+                && x.iter()
+                    .zip(low)
+                    .zip(high)
+                    .all(|((x, l), h)| x >= l && x <= h)
+        };
+        let mut u = self.minimum(n);
+        if !inside(&u) {
+            let x: Vec<f64> = self
+                .region
+                .unstandardise(&u)
+                .iter()
+                .zip(low)
+                .zip(high)
+                .map(|((x, l), h)| x.clamp(*l, *h))
+                .collect();
+            u = self.region.standardise(&x);
+        }
+        // Steps shaped by the curvature at the best point, scaled for the walk's acceptance.
+        let slopes: Vec<DVector<f64>> = (0..n)
+            .map(|k| DVector::from_vec(feature_slope(&u, k)))
+            .collect();
+        let curvature = DMatrix::from_fn(n, n, |i, j| {
+            self.temperature * slopes[i].dot(&(&self.gram * &slopes[j]))
+        }) + DMatrix::identity(n, n) * REACH.powi(-2);
+        let Some(factor) = curvature
+            .cholesky()
+            .map(|c| c.inverse())
+            .and_then(|c| c.cholesky())
+        else {
+            return vec![self.region.unstandardise(&u); count];
+        };
+        let shape = factor.l() * (2.4 / (n as f64).sqrt());
+        let mut loss = self.temperature * self.loss_at(&u);
+        let (warm_up, thin) = (2000, 10);
+        let mut out = Vec::with_capacity(count);
+        for i in 0..warm_up + count * thin {
+            let z = DVector::from_fn(n, |_, _| StandardNormal.sample(rng));
+            let step = &shape * z;
+            let next: Vec<f64> = (0..n).map(|k| u[k] + step[k]).collect();
+            let chance: f64 = rng.random();
+            if inside(&next) {
+                let next_loss = self.temperature * self.loss_at(&next);
+                if chance.ln() < loss - next_loss {
+                    (u, loss) = (next, next_loss);
+                }
+            }
+            if i >= warm_up && (i - warm_up) % thin == 0 {
+                out.push(self.region.unstandardise(&u));
+            }
+        }
+        out
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use asid_core::Streams;
+    use rand_distr::{Distribution, StandardNormal};
+
+    /// A linear simulator with `m` readings, roughness of size `rough` that lasts `run`
+    /// readings, and a draw of noise.
+    fn fitted(seed: u64, rough: f64, run: usize) -> (f64, f64) {
+        let mut rng = Streams::new(seed).stream("e");
+        let m = 200;
+        let slope = 0.5;
+        let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
+        let mut luck = |rough: f64| -> Vec<f64> {
+            let blocks: Vec<f64> = (0..m / run).map(|_| rough * normal()).collect();
+            (0..m).map(|k| blocks[k / run]).collect()
+        };
+        let real = luck(rough);
+        let noise = luck(0.0);
+        let region = Gaussian::diagonal(&[0.2], &[1.0], &[-9.0], &[9.0]);
+        let mut draws = Streams::new(seed).stream("d");
+        let points: Vec<Vec<f64>> = (0..64).map(|_| region.sample(&mut draws)).collect();
+        let mut sensor = Streams::new(seed).stream("n");
+        let observed: Vec<f64> = (0..m)
+            .map(|k| {
+                let n: f64 = StandardNormal.sample(&mut sensor);
+                real[k] + noise[k] + n
+            })
+            .collect();
+        let residuals: Vec<Vec<f64>> = points
+            .iter()
+            .map(|x| {
+                let l = luck(rough);
+                (0..m).map(|k| slope * x[0] + l[k] - observed[k]).collect()
+            })
+            .collect();
+        let p: Vec<&[f64]> = points.iter().map(Vec::as_slice).collect();
+        let r: Vec<&[f64]> = residuals.iter().map(Vec::as_slice).collect();
+        let emulator = Emulator::fit(&region, &p, &r, 1, m).unwrap();
+        let mut walk = Streams::new(seed).stream("w");
+        let samples = emulator.sample(&[-9.0], &[9.0], 1000, &mut walk);
+        let mean = samples.iter().map(|s| s[0]).sum::<f64>() / 1000.0;
+        let var = samples.iter().map(|s| (s[0] - mean).powi(2)).sum::<f64>() / 1000.0;
+        (mean, var.sqrt())
+    }
+
+    #[test]
+    fn without_roughness_it_is_linear_regression() {
+        // Truth 0, 200 readings of slope 0.5 and noise 1: deviation 1 / (0.5 sqrt 200) = 0.141.
+        let (mean, std) = fitted(1, 0.0, 1);
+        assert!(mean.abs() < 4.0 * 0.141, "{mean}");
+        assert!((std / 0.141 - 1.0).abs() < 0.15, "{std}");
+    }
+
+    #[test]
+    fn intervals_hold_under_correlated_roughness() {
+        // Luck of 3 noise deviations that lasts 20 readings: ten independent pieces, so the
+        // deviation of the estimate is 3 / (0.5 sqrt 10) = 1.9. Were every reading taken for
+        // independent, it would seem to be 0.45.
+        let runs: Vec<(f64, f64)> = (0..60).map(|s| fitted(s, 3.0, 20)).collect();
+        let covered = runs.iter().filter(|(m, s)| m.abs() < 1.96 * s).count();
+        // A binomial of 60 at 0.95 is at least 51 with probability 0.998. The box of three region
+        // deviations cuts the widest posteriors.
+        assert!(covered >= 50, "{covered} of 60");
+    }
+
+    #[test]
+    fn slopes_are_derivatives_of_features() {
+        let u = [0.3, -0.7, 1.1];
+        let h = 1e-6;
+        for k in 0..3 {
+            let (mut up, mut down) = (u, u);
+            up[k] += h;
+            down[k] -= h;
+            for ((a, b), s) in features(&up)
+                .iter()
+                .zip(features(&down))
+                .zip(feature_slope(&u, k))
+            {
+                assert!(((a - b) / (2.0 * h) - s).abs() < 1e-8);
+            }
+        }
+    }
+}
