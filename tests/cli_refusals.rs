@@ -15,7 +15,10 @@ fn refused(place: &Workplace, arguments: &[&str], expected: &[&str]) {
     assert_eq!(line.lines().count(), 1, "{arguments:?}: {line}");
     assert!(output.stdout.is_empty(), "{arguments:?}");
     for text in expected {
-        assert!(line.contains(text), "{arguments:?}: `{text}` is not in: {line}");
+        assert!(
+            line.contains(text),
+            "{arguments:?}: `{text}` is not in: {line}"
+        );
     }
     assert_eq!(place.names(), before, "{arguments:?} left something");
 }
@@ -34,7 +37,11 @@ fn refused_run(place: &Workplace, options: &[&str], expected: &[&str]) {
 #[test]
 fn unknown_names_list_the_near_ones() {
     let place = Workplace::new();
-    refused(&place, &["run", "rod-balancin"], &["task", "`rod-balancing`"]);
+    refused(
+        &place,
+        &["run", "rod-balancin"],
+        &["task", "`rod-balancing`"],
+    );
     refused(&place, &["rum", "rod-balancing"], &["'rum'", "'run'"]);
     for (option, name, near) in [
         ("--backend", "rapeer", "`rapier`"),
@@ -100,9 +107,16 @@ fn unknowns_that_cannot_be_identified_are_refused() {
         ("target=geom/rod_mass/pos/9", "index 9"),
         ("target=geom/rod_mass/colour", "`colour`"),
         // A geom that is there and touches nothing.
-        ("target=geom/link1_shape/friction/0", "geom/link1_shape/friction/0"),
+        (
+            "target=geom/link1_shape/friction/0",
+            "geom/link1_shape/friction/0",
+        ),
     ] {
-        refused_run(&place, &["--set", &format!("parameter.mass_offset.{setting}")], &[expected]);
+        refused_run(
+            &place,
+            &["--set", &format!("parameter.mass_offset.{setting}")],
+            &[expected],
+        );
     }
 }
 
@@ -116,7 +130,11 @@ fn files_of_settings_are_read_with_care() {
     place.write("other.toml", "task = \"shuffleboard\"\n");
     refused_run(&place, &["--config", "other.toml"], &["shuffleboard"]);
     place.write("nan.toml", "[explorer]\nstd = nan\n");
-    refused_run(&place, &["--config", "nan.toml"], &["explorer.std", "finite"]);
+    refused_run(
+        &place,
+        &["--config", "nan.toml"],
+        &["explorer.std", "finite"],
+    );
 }
 
 #[test]
@@ -135,7 +153,11 @@ fn a_folder_that_cannot_take_a_result_is_refused_before_work() {
         refused_run(&place, &["--out", "/proc/asid"], &["cannot be written"]);
     }
     place.write("scene.xml", "mine");
-    refused(&place, &["export", "rod-balancing", "--out", "scene.xml"], &["exists already"]);
+    refused(
+        &place,
+        &["export", "rod-balancing", "--out", "scene.xml"],
+        &["exists already"],
+    );
     assert_eq!(place.read("scene.xml"), "mine");
     refused(&place, &["report", "old"], &["finished run"]);
     refused(&place, &["report", "nowhere"], &["nowhere"]);
@@ -144,19 +166,36 @@ fn a_folder_that_cannot_take_a_result_is_refused_before_work() {
 #[test]
 fn models_of_the_real_world_must_fit_the_task() {
     let place = Workplace::new();
-    refused_run(&place, &["--real-model", "none.xml"], &["none.xml", "no such file"]);
+    refused_run(
+        &place,
+        &["--real-model", "none.xml"],
+        &["none.xml", "no such file"],
+    );
     for (name, text, expected) in [
         ("torn.xml", "<mujoco><worldbody>", "well-formed"),
         ("robot.xml", "<robot name=\"r\"/>", "<mujoco>"),
-        ("ball.xml", "<mujoco><worldbody><body name=\"rod\"><freejoint/><geom size=\"0.1\"/></body></worldbody></mujoco>", "actuators"),
+        (
+            "ball.xml",
+            "<mujoco><worldbody><body name=\"rod\"><freejoint/><geom size=\"0.1\"/></body></worldbody></mujoco>",
+            "actuators",
+        ),
     ] {
         place.write(name, text);
         refused_run(&place, &["--real-model", name], &[name, expected]);
     }
-    assert!(place.run(&["export", "rod-balancing", "--out", "scene.xml"]).status.success());
+    assert!(
+        place
+            .run(&["export", "rod-balancing", "--out", "scene.xml"])
+            .status
+            .success()
+    );
     let renamed = place.read("scene.xml").replace("rod_free", "rod_loose");
     place.write("renamed.xml", &renamed);
-    refused_run(&place, &["--real-model", "renamed.xml"], &["renamed.xml", "`rod_free`", "`rod_loose`"]);
+    refused_run(
+        &place,
+        &["--real-model", "renamed.xml"],
+        &["renamed.xml", "`rod_free`", "`rod_loose`"],
+    );
 }
 
 #[test]
@@ -164,10 +203,25 @@ fn bad_logs_name_row_and_column() {
     let place = Workplace::new();
     let identify = |text: &str, expected: &[&str]| {
         place.write("log.csv", text);
-        refused(&place, &tiny(&["identify", "rod-balancing", "--log", "log.csv", "--out", "out"]), expected);
+        refused(
+            &place,
+            &tiny(&[
+                "identify",
+                "rod-balancing",
+                "--log",
+                "log.csv",
+                "--out",
+                "out",
+            ]),
+            expected,
+        );
     };
     refused(&place, &["identify", "rod-balancing"], &["--log"]);
-    refused(&place, &["identify", "rod-balancing", "--log", "none.csv"], &["none.csv"]);
+    refused(
+        &place,
+        &["identify", "rod-balancing", "--log", "none.csv"],
+        &["none.csv"],
+    );
     let actuators: Vec<String> = (1..=7)
         .map(|i| format!("joint{i}"))
         .chain(["finger_left".into(), "finger_right".into()])
@@ -178,23 +232,48 @@ fn bad_logs_name_row_and_column() {
     let row = |time: &str, x: &str| format!("{time},0,0,0,0,0,0,0,0,0,{x},0,0.02,1,0,0,0");
     identify("", &["log.csv"]);
     identify("time,angle\n0,1\n", &["`ctrl.joint1`"]);
-    identify(&format!("time,{}\n0,0,0,0,0,0,0,0,0,0\n", actuators.join(",")), &["no column of a sensor"]);
-    identify(&format!("{header},rod_spin\n{},1\n", row("0", "0.5")), &["`rod_spin`"]);
+    identify(
+        &format!("time,{}\n0,0,0,0,0,0,0,0,0,0\n", actuators.join(",")),
+        &["no column of a sensor"],
+    );
+    identify(
+        &format!("{header},rod_spin\n{},1\n", row("0", "0.5")),
+        &["`rod_spin`"],
+    );
     identify(&format!("{header}\n{}\n", row("0", "0.5")), &["1 rows"]);
-    identify(&format!("{header}\n{}\n{}\n", row("0", "0.5"), row("0.02", "abc")), &["row 3", "`rod_pos.0`", "`abc`"]);
-    identify(&format!("{header}\n{}\n{}\n", row("0.1", "0.5"), row("0.1", "0.5")), &["row 3", "time"]);
-    identify(&format!("{header}\n{}\n{}\n", row("0", "0.5"), row("1e6", "0.5")), &["seconds"]);
-    identify(&format!("{header}\n{}\n{}\n", row("0", ""), row("0.1", "")), &["no row", "rod_pos"]);
+    identify(
+        &format!("{header}\n{}\n{}\n", row("0", "0.5"), row("0.02", "abc")),
+        &["row 3", "`rod_pos.0`", "`abc`"],
+    );
+    identify(
+        &format!("{header}\n{}\n{}\n", row("0.1", "0.5"), row("0.1", "0.5")),
+        &["row 3", "time"],
+    );
+    identify(
+        &format!("{header}\n{}\n{}\n", row("0", "0.5"), row("1e6", "0.5")),
+        &["seconds"],
+    );
+    identify(
+        &format!("{header}\n{}\n{}\n", row("0", ""), row("0.1", "")),
+        &["no row", "rod_pos"],
+    );
     let position_only = header.replace(",rod_quat.0,rod_quat.1,rod_quat.2,rod_quat.3", "");
     let short = |time: &str| row(time, "0.5").trim_end_matches(",1,0,0,0").to_owned();
-    identify(&format!("{position_only}\n{}\n{}\n", short("0"), short("0.1")), &["`rod_quat`"]);
+    identify(
+        &format!("{position_only}\n{}\n{}\n", short("0"), short("0.1")),
+        &["`rod_quat`"],
+    );
 }
 
 #[test]
 fn posteriors_must_be_of_the_task() {
     let place = Workplace::new();
     let solve = |expected: &[&str]| {
-        refused(&place, &tiny(&["solve", "rod-balancing", "--posterior", "p", "--out", "out"]), expected);
+        refused(
+            &place,
+            &tiny(&["solve", "rod-balancing", "--posterior", "p", "--out", "out"]),
+            expected,
+        );
     };
     refused(&place, &["solve", "rod-balancing"], &["--posterior"]);
     solve(&["p/posterior.json"]);
@@ -210,7 +289,10 @@ fn posteriors_must_be_of_the_task() {
     };
     place.write("p/posterior.json", &posterior("friction", "[0.3]", "1"));
     solve(&["friction", "mass_offset", "p/config.toml"]);
-    place.write("p/posterior.json", &posterior("mass_offset", "[0.3, 1]", "1"));
+    place.write(
+        "p/posterior.json",
+        &posterior("mass_offset", "[0.3, 1]", "1"),
+    );
     solve(&["sample 0"]);
     place.write("p/posterior.json", &posterior("mass_offset", "[0.3]", "-1"));
     solve(&["weights"]);
@@ -223,7 +305,11 @@ fn posteriors_must_be_of_the_task() {
 fn start_poses_belong_to_the_stages_that_are_told_them() {
     let place = Workplace::new();
     let explore = |setting: &str, expected: &[&str]| {
-        refused(&place, &tiny(&["explore", "rod-balancing", "--out", "out", "--set", setting]), expected);
+        refused(
+            &place,
+            &tiny(&["explore", "rod-balancing", "--out", "out", "--set", setting]),
+            expected,
+        );
     };
     explore("start.z=1", &["`z`", "`x`"]);
     explore("start.x=nan", &["start.x", "finite"]);
@@ -236,12 +322,20 @@ fn start_poses_belong_to_the_stages_that_are_told_them() {
 #[test]
 fn an_engine_left_out_says_how_to_get_it() {
     let place = Workplace::new();
-    refused_run(&place, &["--backend", "mujoco"], &["mujoco", "cargo xtask setup", "--features mujoco"]);
+    refused_run(
+        &place,
+        &["--backend", "mujoco"],
+        &["mujoco", "cargo xtask setup", "--features mujoco"],
+    );
 }
 
 #[cfg(not(feature = "torch"))]
 #[test]
 fn an_explorer_left_out_says_how_to_get_it() {
     let place = Workplace::new();
-    refused_run(&place, &["--explorer", "fisher-ppo"], &["fisher-ppo", "cargo xtask setup", "--features torch"]);
+    refused_run(
+        &place,
+        &["--explorer", "fisher-ppo"],
+        &["fisher-ppo", "cargo xtask setup", "--features torch"],
+    );
 }

@@ -34,7 +34,10 @@ fn is_finite(value: &Value) -> bool {
 
 /// The page is well-formed, and nothing in it is fetched from elsewhere.
 fn check_page(html: &str) {
-    let body = html.trim_start().strip_prefix("<!DOCTYPE html>").or(html.trim_start().strip_prefix("<!doctype html>"));
+    let body = html
+        .trim_start()
+        .strip_prefix("<!DOCTYPE html>")
+        .or(html.trim_start().strip_prefix("<!doctype html>"));
     let document = roxmltree::Document::parse(body.unwrap_or(html)).unwrap();
     for node in document.descendants() {
         for attribute in node.attributes() {
@@ -49,10 +52,24 @@ fn check_page(html: &str) {
 #[test]
 fn a_run_leaves_the_contracts_folder_and_its_config_repeats_it_at_any_thread_count() {
     let place = Workplace::new();
-    let arguments = tiny(&["run", "rod-balancing", "--out", "a", "--json", "--threads", "1", "--truth", "mass_offset=0.05"]);
+    let arguments = tiny(&[
+        "run",
+        "rod-balancing",
+        "--out",
+        "a",
+        "--json",
+        "--threads",
+        "1",
+        "--truth",
+        "mass_offset=0.05",
+    ]);
     let (out, _) = done(&place, &arguments);
     let result = place.read("a/result.json");
-    assert_eq!(json(&out), json(&result), "--json prints the result and nothing else");
+    assert_eq!(
+        json(&out),
+        json(&result),
+        "--json prints the result and nothing else"
+    );
 
     let value = json(&result);
     assert_eq!(value["schema"], 1);
@@ -65,18 +82,29 @@ fn a_run_leaves_the_contracts_folder_and_its_config_repeats_it_at_any_thread_cou
         assert_eq!(value[key], expected);
     }
     let parameter = &value["parameters"][0];
-    assert_eq!((&parameter["name"], &parameter["unit"]), (&"mass_offset".into(), &"m".into()));
+    assert_eq!(
+        (&parameter["name"], &parameter["unit"]),
+        (&"mass_offset".into(), &"m".into())
+    );
     assert_eq!(parameter["truth"], 0.05);
     assert!(is_finite(&parameter["estimate"]) && is_finite(&parameter["std"]));
-    assert!(parameter["interval95"][0].as_f64().unwrap() <= parameter["interval95"][1].as_f64().unwrap());
+    assert!(
+        parameter["interval95"][0].as_f64().unwrap()
+            <= parameter["interval95"][1].as_f64().unwrap()
+    );
     let exploration = &value["exploration"];
     assert!(exploration["objective"].is_string() && is_finite(&exploration["expected_std"][0]));
     for key in ["a_optimality", "log_det", "trace", "contact_fraction"] {
         assert!(is_finite(&exploration[key]), "{key}");
     }
     assert_eq!(value["downstream"]["metric"], "tilt_deg");
-    assert!(is_finite(&value["downstream"]["value"]) && value["downstream"]["success"].is_boolean());
-    assert!(value["cost"]["physics_steps"].as_u64().unwrap() > 0 && value["cost"]["env_steps"].as_u64().unwrap() > 0);
+    assert!(
+        is_finite(&value["downstream"]["value"]) && value["downstream"]["success"].is_boolean()
+    );
+    assert!(
+        value["cost"]["physics_steps"].as_u64().unwrap() > 0
+            && value["cost"]["env_steps"].as_u64().unwrap() > 0
+    );
     for key in ["asid", "engine", "git"] {
         assert!(value["versions"][key].is_string());
     }
@@ -91,14 +119,41 @@ fn a_run_leaves_the_contracts_folder_and_its_config_repeats_it_at_any_thread_cou
     assert_eq!(log.lines().count(), 1 + 101);
     check_page(&place.read("a/report.html"));
 
-    let (out, _) = done(&place, &["run", "rod-balancing", "--config", "a/config.toml", "--threads", "2", "--out", "b"]);
-    assert!(out.contains("mass_offset") && out.contains("tilt_deg") && out.contains("b/report.html"), "{out}");
+    let (out, _) = done(
+        &place,
+        &[
+            "run",
+            "rod-balancing",
+            "--config",
+            "a/config.toml",
+            "--threads",
+            "2",
+            "--out",
+            "b",
+        ],
+    );
+    assert!(
+        out.contains("mass_offset") && out.contains("tilt_deg") && out.contains("b/report.html"),
+        "{out}"
+    );
     assert_eq!(timeless(&result), timeless(&place.read("b/result.json")));
     assert_eq!(place.read("a/config.toml"), place.read("b/config.toml"));
     assert_eq!(log, place.read("b/real.csv"));
 
     // The stage alone, on the run's own log, finds what the run found.
-    done(&place, &["identify", "rod-balancing", "--config", "a/config.toml", "--log", "a/real.csv", "--out", "c"]);
+    done(
+        &place,
+        &[
+            "identify",
+            "rod-balancing",
+            "--config",
+            "a/config.toml",
+            "--log",
+            "a/real.csv",
+            "--out",
+            "c",
+        ],
+    );
     let alone = json(&place.read("c/result.json"));
     for key in ["estimate", "std", "interval95"] {
         assert_eq!(alone["parameters"][0][key], parameter[key]);
@@ -115,18 +170,46 @@ fn a_run_leaves_the_contracts_folder_and_its_config_repeats_it_at_any_thread_cou
 #[test]
 fn the_stages_lead_from_one_to_the_next() {
     let place = Workplace::new();
-    let (out, _) = done(&place, &tiny(&["explore", "rod-balancing", "--set", "start.x=0.53", "--out", "explored"]));
-    assert!(out.contains("x 0.5300 m") && out.contains("y 0.0000 m (middle of its range)"), "{out}");
+    let (out, _) = done(
+        &place,
+        &tiny(&[
+            "explore",
+            "rod-balancing",
+            "--set",
+            "start.x=0.53",
+            "--out",
+            "explored",
+        ]),
+    );
+    assert!(
+        out.contains("x 0.5300 m") && out.contains("y 0.0000 m (middle of its range)"),
+        "{out}"
+    );
     assert_eq!(
         names(&place.path("explored")),
-        ["commands.csv", "config.toml", "policy.json", "predicted.csv", "report.html", "result.json", "trace.json"]
+        [
+            "commands.csv",
+            "config.toml",
+            "policy.json",
+            "predicted.csv",
+            "report.html",
+            "result.json",
+            "trace.json"
+        ]
     );
     let result = json(&place.read("explored/result.json"));
     assert_eq!(result["start"]["x"], 0.53);
     assert!(is_finite(&result["exploration"]["expected_std"][0]));
     let predicted = place.read("explored/predicted.csv");
-    for (command, row) in place.read("explored/commands.csv").lines().zip(predicted.lines()) {
-        assert!(row.starts_with(command), "the prediction was made with the commands");
+    for (command, row) in place
+        .read("explored/commands.csv")
+        .lines()
+        .zip(predicted.lines())
+    {
+        assert!(
+            row.starts_with(command),
+            "the prediction was made with the commands"
+        );
     }
     assert_eq!(json(&place.read("explored/policy.json"))["start"][0], 0.53);
     check_page(&place.read("explored/report.html"));
@@ -134,12 +217,28 @@ fn the_stages_lead_from_one_to_the_next() {
     // The settings of one stage serve the next; its start pose does not.
     let (out, err) = done(
         &place,
-        &["identify", "rod-balancing", "--config", "explored/config.toml", "--log", "explored/predicted.csv", "--out", "found"],
+        &[
+            "identify",
+            "rod-balancing",
+            "--config",
+            "explored/config.toml",
+            "--log",
+            "explored/predicted.csv",
+            "--out",
+            "found",
+        ],
     );
     assert!(out.contains("mass_offset") && err.is_empty(), "{out}{err}");
     assert_eq!(
         names(&place.path("found")),
-        ["config.toml", "posterior.json", "real.csv", "report.html", "result.json", "trace.json"]
+        [
+            "config.toml",
+            "posterior.json",
+            "real.csv",
+            "report.html",
+            "result.json",
+            "trace.json"
+        ]
     );
     let result = json(&place.read("found/result.json"));
     // Readings without noise are explained to within it, whatever the search found.
@@ -151,19 +250,39 @@ fn the_stages_lead_from_one_to_the_next() {
 
     let (out, _) = done(
         &place,
-        &["solve", "rod-balancing", "--config", "found/config.toml", "--posterior", "found", "--out", "solved", "--json"],
+        &[
+            "solve",
+            "rod-balancing",
+            "--config",
+            "found/config.toml",
+            "--posterior",
+            "found",
+            "--out",
+            "solved",
+            "--json",
+        ],
     );
     assert_eq!(json(&out), json(&place.read("solved/result.json")));
     assert_eq!(
         names(&place.path("solved")),
-        ["action.json", "commands.csv", "config.toml", "report.html", "result.json", "trace.json"]
+        [
+            "action.json",
+            "commands.csv",
+            "config.toml",
+            "report.html",
+            "result.json",
+            "trace.json"
+        ]
     );
     let action = json(&place.read("solved/action.json"));
     assert_eq!(action["action"][0]["name"], "pick");
     assert!(is_finite(&action["action"][0]["value"]) && is_finite(&action["expected_cost"]));
     assert_eq!(action["start"]["y"], -0.2);
     let commands = place.read("solved/commands.csv");
-    assert!(commands.starts_with("time,ctrl.joint1,") && commands.contains("\n0.02,"), "{commands}");
+    assert!(
+        commands.starts_with("time,ctrl.joint1,") && commands.contains("\n0.02,"),
+        "{commands}"
+    );
     check_page(&place.read("solved/report.html"));
 }
 
@@ -175,28 +294,57 @@ fn altered(log: &str, change: impl Fn(usize, &str, &str) -> String) -> String {
     let columns: Vec<&str> = header.split(',').collect();
     let rows = lines.enumerate().map(|(i, line)| {
         let cells = columns.iter().zip(line.split(','));
-        cells.map(|(column, cell)| change(i, column, cell)).collect::<Vec<_>>().join(",")
+        cells
+            .map(|(column, cell)| change(i, column, cell))
+            .collect::<Vec<_>>()
+            .join(",")
     });
-    std::iter::once(header.to_owned()).chain(rows).collect::<Vec<_>>().join("\n") + "\n"
+    std::iter::once(header.to_owned())
+        .chain(rows)
+        .collect::<Vec<_>>()
+        .join("\n")
+        + "\n"
 }
 
 #[test]
 fn logs_of_real_machines_are_taken_as_they_come() {
     let place = Workplace::new();
-    done(&place, &["explore", "rod-balancing", "--explorer", "random", "--out", "explored"]);
+    done(
+        &place,
+        &[
+            "explore",
+            "rod-balancing",
+            "--explorer",
+            "random",
+            "--out",
+            "explored",
+        ],
+    );
     let clean = place.read("explored/predicted.csv");
     let identify = |log: String, name: &str| {
         place.write("log.csv", &log);
-        let (_, err) = done(&place, &tiny(&["identify", "rod-balancing", "--log", "log.csv", "--out", name]));
+        let (_, err) = done(
+            &place,
+            &tiny(&[
+                "identify",
+                "rod-balancing",
+                "--log",
+                "log.csv",
+                "--out",
+                name,
+            ]),
+        );
         (json(&place.read(&format!("{name}/result.json"))), err)
     };
     let number = |cell: &str| cell.parse::<f64>().unwrap();
     let (reference, _) = identify(clean.clone(), "reference");
 
     // A quaternion and its negative are the same orientation.
-    let flipped = altered(&clean, |i, column, cell| match column.starts_with("rod_quat") && i % 2 == 1 {
-        true => (-number(cell)).to_string(),
-        false => cell.to_owned(),
+    let flipped = altered(&clean, |i, column, cell| {
+        match column.starts_with("rod_quat") && i % 2 == 1 {
+            true => (-number(cell)).to_string(),
+            false => cell.to_owned(),
+        }
     });
     let (result, _) = identify(flipped, "flipped");
     let estimate = |r: &Value| r["parameters"][0]["estimate"].as_f64().unwrap();
@@ -209,7 +357,10 @@ fn logs_of_real_machines_are_taken_as_they_come() {
         _ => cell.to_owned(),
     });
     let (result, err) = identify(ragged, "ragged");
-    assert!(result["residual"].as_f64().unwrap() < 1.5 && err.is_empty(), "{result} {err}");
+    assert!(
+        result["residual"].as_f64().unwrap() < 1.5 && err.is_empty(),
+        "{result} {err}"
+    );
 
     // The rod drifts as no simulated one can.
     let drifting = altered(&clean, |i, column, cell| match column {
@@ -226,14 +377,36 @@ fn logs_of_real_machines_are_taken_as_they_come() {
 fn without_out_the_next_free_folder_is_taken() {
     let place = Workplace::new();
     for _ in 0..2 {
-        done(&place, &tiny(&["solve", "rod-balancing", "--posterior", "prior"]));
+        done(
+            &place,
+            &tiny(&["solve", "rod-balancing", "--posterior", "prior"]),
+        );
     }
-    assert_eq!(names(&place.path("runs")), ["rod-balancing-solve-1", "rod-balancing-solve-2"]);
+    assert_eq!(
+        names(&place.path("runs")),
+        ["rod-balancing-solve-1", "rod-balancing-solve-2"]
+    );
     // An empty folder that is there is filled.
     std::fs::create_dir(place.path("empty")).unwrap();
-    done(&place, &tiny(&["solve", "rod-balancing", "--posterior", "prior", "--out", "empty"]));
+    done(
+        &place,
+        &tiny(&[
+            "solve",
+            "rod-balancing",
+            "--posterior",
+            "prior",
+            "--out",
+            "empty",
+        ]),
+    );
     assert!(names(&place.path("empty")).contains(&"result.json".to_owned()));
-    assert_eq!(names(&place.path("empty")).iter().filter(|n| n.starts_with('.')).count(), 0);
+    assert_eq!(
+        names(&place.path("empty"))
+            .iter()
+            .filter(|n| n.starts_with('.'))
+            .count(),
+        0
+    );
 }
 
 #[cfg(unix)]
@@ -248,7 +421,10 @@ fn an_interrupted_run_leaves_nothing() {
         .unwrap();
     std::thread::sleep(std::time::Duration::from_secs(1));
     assert!(child.try_wait().unwrap().is_none(), "the run is under way");
-    let kill = std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    let kill = std::process::Command::new("kill")
+        .args(["-INT", &child.id().to_string()])
+        .status()
+        .unwrap();
     assert!(kill.success());
     assert!(!child.wait().unwrap().success());
     assert!(place.names().is_empty(), "{:?}", place.names());
@@ -258,7 +434,15 @@ fn an_interrupted_run_leaves_nothing() {
 fn lists_and_help_say_what_there_is() {
     let place = Workplace::new();
     let (out, _) = done(&place, &["list"]);
-    for name in ["rapier", "mujoco", "rod-balancing", "fisher-cem", "fisher-ppo", "random", "reps"] {
+    for name in [
+        "rapier",
+        "mujoco",
+        "rod-balancing",
+        "fisher-cem",
+        "fisher-ppo",
+        "random",
+        "reps",
+    ] {
         assert!(out.contains(name), "{name} in {out}");
     }
     assert!(json(&done(&place, &["list", "--json"]).0).is_array());

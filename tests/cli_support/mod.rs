@@ -49,7 +49,10 @@ impl Workplace {
     /// The command, to be run in this folder.
     pub fn asid(&self, arguments: &[&str]) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_asid"));
-        command.current_dir(self.folder.path()).env_remove("RUST_BACKTRACE").args(arguments);
+        command
+            .current_dir(self.folder.path())
+            .env_remove("RUST_BACKTRACE")
+            .args(arguments);
         command
     }
 
@@ -61,7 +64,9 @@ impl Workplace {
 /// Names in a folder, sorted, hidden ones too.
 pub fn names(folder: &Path) -> Vec<String> {
     let entries = std::fs::read_dir(folder).unwrap();
-    let mut names: Vec<String> = entries.map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+    let mut names: Vec<String> = entries
+        .map(|e| e.unwrap().file_name().into_string().unwrap())
+        .collect();
     names.sort();
     names
 }

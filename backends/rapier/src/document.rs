@@ -198,6 +198,11 @@ pub fn rename(model: &mut Model) -> Places {
         if let Equality::Joint(joint) = equality {
             joint.joint1 = renamed(&joint.joint1);
             joint.joint2 = joint.joint2.as_deref().map(renamed);
+            // The loader takes the second joint for the function of the first;
+            // in MJCF the first is the function of the second.
+            if let Some(second) = joint.joint2.as_mut() {
+                std::mem::swap(&mut joint.joint1, second);
+            }
         }
     }
     model.actuators.clear();

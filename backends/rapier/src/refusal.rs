@@ -5,6 +5,8 @@
 //! refused with one line. Settings of another engine's solver (`solref`,
 //! `solimp`, `impratio`, integrators) are not physics of the scene and pass.
 
+use std::collections::HashSet;
+
 use asid_core::{Error, Result, Scene};
 use mjcf_rs::Model;
 use mjcf_rs::body::{GeomType, JointType};
@@ -82,6 +84,20 @@ pub fn check(scene: &Scene, model: &Model) -> Result<()> {
     Ok(())
 }
 
+/// What a name must be unique among; `None` where names are not looked up.
+fn named_kind(node: &Node<'_, '_>) -> Option<&'static str> {
+    let within = |tag: &str| node.ancestors().skip(1).any(|a| a.has_tag_name(tag));
+    match node.tag_name().name() {
+        "body" if within("worldbody") => Some("body"),
+        "geom" if within("worldbody") => Some("geom"),
+        "site" if within("worldbody") => Some("site"),
+        "joint" | "freejoint" if within("worldbody") => Some("joint"),
+        _ if within("actuator") => Some("actuator"),
+        _ if within("sensor") => Some("sensor"),
+        _ => None,
+    }
+}
+
 fn check_document(scene: &Scene) -> Result<()> {
     let document = roxmltree::Document::parse(scene.xml())
         .map_err(|e| refuse(scene, format!("cannot read it: {e}")))?;
@@ -94,8 +110,17 @@ fn check_document(scene: &Scene) -> Result<()> {
             name.unwrap_or_default()
         )
     };
+    let mut names = HashSet::new();
     for node in document.descendants().filter(Node::is_element) {
         let tag = node.tag_name().name();
+        if let (Some(kind), Some(name)) = (named_kind(&node), node.attribute("name"))
+            && !names.insert((kind, name))
+        {
+            return Err(refuse(
+                scene,
+                format!("finds the name of {} a second time", place(&node)),
+            ));
+        }
         let in_actuators = node.parent().is_some_and(|p| p.has_tag_name("actuator"));
         // Mesh wrappers and defaults may share a name with an actuator.
         let ambiguous = ["cylinder", "plugin", "damper", "general", "muscle"].contains(&tag);

@@ -24,6 +24,10 @@ const MAX_POSITION: f32 = 1e4;
 /// Angular or joint velocity beyond which a simulation counts as diverged, rad/s.
 const MAX_RATE: f32 = 1e4;
 
+/// Largest force (N) or torque (N m) on a body. What it does to a velocity can
+/// still be squared in single precision; beyond that rapier takes it for nothing.
+const MAX_FORCE: f64 = 1e15;
+
 /// One simulation of a batch.
 pub struct World {
     /// State.
@@ -36,6 +40,8 @@ pub struct World {
     /// Bodies with a force on them in this step.
     pushed: Vec<RigidBodyHandle>,
     torques: Vec<(usize, Vector)>,
+    /// Body with a force beyond [`MAX_FORCE`] on it in this step.
+    excess: Option<usize>,
     /// Orientations of floating roots before the step.
     rotations: Vec<Rotation>,
     qpos: Vec<f64>,
@@ -68,6 +74,7 @@ impl World {
             pipeline: PhysicsPipeline::new(),
             pushed: Vec::new(),
             torques: Vec::new(),
+            excess: None,
             rotations: Vec::new(),
             qpos: vec![0.0; compiled.layout.nq],
             qvel: vec![0.0; compiled.layout.nv],
@@ -108,7 +115,14 @@ impl World {
         let outcome = catch_unwind(AssertUnwindSafe(|| self.try_step(compiled, input)));
         self.steps += 1;
         let message = match outcome {
-            Ok(()) => self.complaint(compiled),
+            Ok(()) => self
+                .excess
+                .take()
+                .map(|body| {
+                    let name = &compiled.layout.bodies[body];
+                    format!("a force on body `{name}` is beyond {MAX_FORCE} N")
+                })
+                .or_else(|| self.complaint(compiled)),
             Err(panic) => Some(
                 panic
                     .downcast_ref::<String>()
@@ -221,6 +235,10 @@ impl World {
         let Some(handle) = compiled.bodies[body] else {
             return;
         };
+        if force.amax().max(torque.amax()) > MAX_FORCE {
+            self.excess = Some(body);
+            return;
+        }
         if let Some(rigid) = self.state.bodies.get_mut(handle)
             && rigid.is_dynamic()
         {

@@ -115,9 +115,9 @@ fn equalities_hold() {
       <actuator><motor joint="l"/></actuator>"#;
     let rows = Bench::new(inside, &["qpos.l", "qpos.r", "qpos.hung"]).run(500, &[1.0]);
     let end = &rows[499];
-    // One newton moves 1 + 4 kg.
-    assert!((end[0] - 0.1).abs() < 2e-3, "{}", end[0]);
-    assert!((end[1] + 2.0 * end[0]).abs() < 2e-3, "{end:?}");
+    // The first joint is -2 times the second: one newton moves 1 + 1/4 kg.
+    assert!((end[0] - 0.4).abs() < 2e-3, "{}", end[0]);
+    assert!((end[0] + 2.0 * end[1]).abs() < 2e-3, "{end:?}");
     assert!((end[4] - 1.0).abs() < 2e-3, "{end:?}");
 }
 
