@@ -3,11 +3,13 @@
 //!
 //! It plans when the episode begins, for the start pose that the first reading
 //! shows. Every candidate is simulated at several values of the unknowns, drawn
-//! from the prior, and judged by its mean return.
+//! from the prior, and judged by its mean return. Draws differ from iteration to
+//! iteration, so the best of each meet once more at common ones.
 
 use asid_core::explore::{CurvePoint, Explored, Explorer, Policy};
 use asid_core::fisher::{FisherBatch, FisherSettings};
 use asid_core::registry::{self, ExplorerEntry};
+use asid_core::rng::Rng;
 use asid_core::{Error, Posterior, Problem, Result};
 use serde::{Deserialize, Serialize};
 
@@ -36,16 +38,19 @@ pub struct FisherCem {
 impl Default for FisherCem {
     fn default() -> Self {
         Self {
-            iterations: 6,
-            population: 24,
+            iterations: 5,
+            population: 32,
             prior_samples: 2,
-            hold: 2,
+            hold: 5,
             std: 0.7,
             cem: CemSettings {
                 elite_fraction: 0.2,
                 ..CemSettings::default()
             },
-            fisher: FisherSettings::default(),
+            fisher: FisherSettings {
+                nuisance: false,
+                ..FisherSettings::default()
+            },
         }
     }
 }
@@ -94,79 +99,126 @@ impl FisherCem {
         start: &[f64],
     ) -> Result<(Vec<f64>, Vec<CurvePoint>)> {
         let protocol = problem.task.exploration();
-        let (a, horizon) = (protocol.action.len(), protocol.horizon);
-        let knots = horizon.div_ceil(self.hold);
-        let n = knots * a;
-        let (low, high) = (vec![-1.0; n], vec![1.0; n]);
+        let n = protocol.horizon.div_ceil(self.hold) * protocol.action.len();
         let mut cem = Cem::new(
             self.cem.clone(),
             &vec![0.0; n],
             &vec![self.std; n],
-            &low,
-            &high,
+            &vec![-1.0; n],
+            &vec![1.0; n],
         );
         let mut rng = problem.streams.stream("fisher-cem");
-        let samples = self.prior_samples;
-        let mut batch = FisherBatch::new(problem, &self.fisher, self.population * samples)?;
-        let (e, width) = (batch.episodes(), batch.width());
-        let starts = start.repeat(e);
-        let mut readings = vec![0.0; e * width];
-        let mut reward = vec![0.0; e];
-        let mut actions = vec![0.0; e * a];
+        let mut trials = Trials::new(self, problem, start)?;
         let mut curve = Vec::new();
-        problem
-            .progress
-            .begin("explore: planning", (self.iterations * horizon) as u64);
+        // The best of every iteration, for a fair comparison in the end.
+        let mut finalists: Vec<Vec<f64>> = Vec::new();
+        let kept = (self.population / (FINAL * self.iterations)).max(1);
+        problem.progress.begin(
+            "explore: planning",
+            ((self.iterations + 1) * protocol.horizon) as u64,
+        );
         for iteration in 0..self.iterations {
             let candidates = cem.ask(self.population, &mut rng);
-            let prior = Posterior::prior(problem.parameters, samples, &mut rng);
-            let theta: Vec<f64> = (0..self.population)
-                .flat_map(|_| prior.samples.iter().flatten().copied())
-                .collect();
-            batch.begin(&theta, &starts, &mut readings)?;
-            let mut returns = vec![0.0; e];
-            for h in 0..horizon {
-                for (i, row) in actions.chunks_exact_mut(a).enumerate() {
-                    let knot = &candidates[i / samples][h / self.hold * a..][..a];
-                    for ((x, u), c) in row.iter_mut().zip(knot).zip(&protocol.action) {
-                        *x = c.at((u + 1.0) / 2.0);
-                    }
-                }
-                batch.step(&actions, &mut readings, &mut reward)?;
-                for (sum, r) in returns.iter_mut().zip(&reward) {
-                    *sum += r;
-                }
-                problem.progress.advance(1);
-            }
-            let mean_returns: Vec<f64> = returns
-                .chunks_exact(samples)
-                .map(|c| c.iter().sum::<f64>() / samples as f64)
-                .collect();
-            let costs: Vec<f64> = mean_returns.iter().map(|r| -r).collect();
+            let returns = trials.returns(&candidates, self.prior_samples, &mut rng)?;
+            let costs: Vec<f64> = returns.iter().map(|r| -r).collect();
             cem.tell(&candidates, &costs);
-            let mean = mean_returns.iter().sum::<f64>() / mean_returns.len() as f64;
-            let variance = mean_returns.iter().map(|r| (r - mean).powi(2)).sum::<f64>()
-                / mean_returns.len() as f64;
+            let mut order: Vec<usize> = (0..returns.len()).collect();
+            order.sort_by(|&i, &j| returns[j].total_cmp(&returns[i]));
+            finalists.extend(order.iter().take(kept).map(|&i| candidates[i].clone()));
+            let mean = returns.iter().sum::<f64>() / returns.len() as f64;
+            let variance =
+                returns.iter().map(|r| (r - mean).powi(2)).sum::<f64>() / returns.len() as f64;
             curve.push(CurvePoint {
                 x: (iteration + 1) as f64,
                 mean,
                 std: variance.sqrt(),
             });
         }
+        finalists.push(cem.mean().to_vec());
+        finalists.truncate(self.population);
+        let samples = self.population * self.prior_samples / finalists.len();
+        let returns = trials.returns(&finalists, samples.max(1), &mut rng)?;
         problem.progress.end();
-        let (best, _) = cem
-            .best()
+        let best = (0..returns.len())
+            .filter(|&i| returns[i].is_finite())
+            .max_by(|&i, &j| returns[i].total_cmp(&returns[j]))
             .ok_or_else(|| Error::Failed("every exploration episode diverged".into()))?;
-        let plan = (0..horizon)
+        Ok((trials.actions(&finalists[best]), curve))
+    }
+}
+
+/// In the final each plan is tried at about this many times the search's prior samples.
+const FINAL: usize = 4;
+
+/// Episodes of candidate plans in the simulator.
+struct Trials<'a> {
+    explorer: &'a FisherCem,
+    problem: &'a Problem<'a>,
+    start: &'a [f64],
+    batch: FisherBatch<'a>,
+}
+
+impl<'a> Trials<'a> {
+    fn new(explorer: &'a FisherCem, problem: &'a Problem<'a>, start: &'a [f64]) -> Result<Self> {
+        let episodes = explorer.population * explorer.prior_samples;
+        Ok(Self {
+            batch: FisherBatch::new(problem, &explorer.fisher, episodes)?,
+            explorer,
+            problem,
+            start,
+        })
+    }
+
+    /// Actions of all control steps of a candidate, in the task's units.
+    fn actions(&self, candidate: &[f64]) -> Vec<f64> {
+        let protocol = self.problem.task.exploration();
+        let a = protocol.action.len();
+        (0..protocol.horizon)
             .flat_map(|h| {
-                best[h / self.hold * a..][..a]
+                candidate[h / self.explorer.hold * a..][..a]
                     .iter()
                     .zip(&protocol.action)
                     .map(|(u, c)| c.at((u + 1.0) / 2.0))
-                    .collect::<Vec<_>>()
             })
+            .collect()
+    }
+
+    /// Mean return of each candidate over `samples` draws of the unknowns, the same for all.
+    fn returns(
+        &mut self,
+        candidates: &[Vec<f64>],
+        samples: usize,
+        rng: &mut Rng,
+    ) -> Result<Vec<f64>> {
+        let protocol = self.problem.task.exploration();
+        let (a, e) = (protocol.action.len(), self.batch.episodes());
+        let plans: Vec<Vec<f64>> = candidates.iter().map(|c| self.actions(c)).collect();
+        let prior = Posterior::prior(self.problem.parameters, samples, rng);
+        // Episodes beyond the last candidate repeat it, and do not count.
+        let of = |i: usize| (i / samples).min(candidates.len() - 1);
+        let theta: Vec<f64> = (0..e)
+            .flat_map(|i| prior.samples[i % samples].iter().copied())
             .collect();
-        Ok((plan, curve))
+        let mut readings = vec![0.0; e * self.batch.width()];
+        let mut reward = vec![0.0; e];
+        let mut actions = vec![0.0; e * a];
+        self.batch
+            .begin(&theta, &self.start.repeat(e), &mut readings)?;
+        let mut returns = vec![0.0; e];
+        for h in 0..protocol.horizon {
+            for (i, row) in actions.chunks_exact_mut(a).enumerate() {
+                row.copy_from_slice(&plans[of(i)][h * a..(h + 1) * a]);
+            }
+            self.batch.step(&actions, &mut readings, &mut reward)?;
+            for (sum, r) in returns.iter_mut().zip(&reward) {
+                *sum += r;
+            }
+            self.problem.progress.advance(1);
+        }
+        Ok(returns[..candidates.len() * samples]
+            .chunks_exact(samples)
+            .map(|c| c.iter().sum::<f64>() / samples as f64)
+            .collect())
     }
 }
 
