@@ -3,9 +3,10 @@
 use std::sync::Arc;
 
 use crate::error::Result;
-use crate::layout::{Layout, Target};
+use crate::layout::Layout;
 use crate::scene::Scene;
 use crate::simulator::{BatchConfig, Simulator};
+use crate::target::Target;
 
 bitflags::bitflags! {
     /// What an engine can do. Tests and algorithms branch on these bits and

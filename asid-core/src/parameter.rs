@@ -8,8 +8,8 @@ use rand::Rng as _;
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
-use crate::layout::Target;
 use crate::rng::Rng;
+use crate::target::Target;
 
 /// Scale on which a parameter is uniform a priori and on which steps are taken.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]

@@ -13,7 +13,8 @@ use std::any::Any;
 use std::sync::Arc;
 
 use crate::error::Result;
-use crate::layout::{Layout, Recording, Target};
+use crate::layout::{Layout, Recording};
+use crate::target::Target;
 
 /// State of one simulation.
 #[derive(Clone, Debug, Default, PartialEq)]

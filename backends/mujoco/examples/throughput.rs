@@ -11,7 +11,7 @@
 use std::path::Path;
 use std::time::Instant;
 
-use asid_core::layout::{Layout, Target};
+use asid_core::{Layout, Target};
 use asid_core::{Backend, BatchConfig, Control, Rollout, Scene};
 use asid_mujoco::MujocoBackend;
 use mujoco_rs::wrappers::mj_model::MjModel;

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use asid_core::layout::{Layout, Target};
+use asid_core::{Layout, Target};
 use asid_core::{BatchConfig, Error, Model, Result, Scene, Simulator};
 use mujoco_rs::mujoco_c::mjtEnableBit;
 use mujoco_rs::wrappers::mj_editing::{MjSpec, MjsBody};

@@ -1,6 +1,6 @@
 //! The parameters of a batch: values in, model fields of a simulation out.
 
-use asid_core::layout::Target;
+use asid_core::Target;
 use asid_core::{Error, Result};
 
 use crate::ffi::{Batch, Expanded};

@@ -6,7 +6,7 @@
 
 use std::ffi::CStr;
 
-use asid_core::layout::Target;
+use asid_core::Target;
 use asid_core::{Error, Result};
 use mujoco_rs::mujoco_c::{mjtBias, mjtGain};
 use mujoco_rs::wrappers::mj_model::{MjModel, MjtGeomBase};

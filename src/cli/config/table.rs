@@ -1,0 +1,106 @@
+//! Reading settings out of TOML, with errors that name the key.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use anyhow::Result;
+use asid_core::Error;
+
+pub fn wrong(key: &str, message: impl Into<String>) -> anyhow::Error {
+    Error::Config {
+        key: key.to_owned(),
+        message: message.into(),
+    }
+    .into()
+}
+
+pub fn read_table(path: &Path) -> Result<toml::Table> {
+    let file = |message: String| Error::File {
+        path: path.to_owned(),
+        message,
+    };
+    let text = std::fs::read_to_string(path).map_err(|e| file(e.to_string()))?;
+    Ok(text.parse().map_err(|e: toml::de::Error| {
+        let line = e.span().map_or(0, |s| {
+            text[..s.start.min(text.len())].lines().count().max(1)
+        });
+        file(format!("line {line}: {}", e.message()))
+    })?)
+}
+
+/// Applies `key.key=value`; a value that is no TOML is taken as text.
+pub fn set(table: &mut toml::Table, assignment: &str) -> Result<()> {
+    let (key, value) = assignment
+        .split_once('=')
+        .ok_or_else(|| wrong("--set", format!("`{assignment}` is not KEY=VALUE")))?;
+    let value = format!("x = {value}")
+        .parse::<toml::Table>()
+        .ok()
+        .and_then(|mut t| t.remove("x"))
+        .unwrap_or_else(|| toml::Value::String(value.trim().to_owned()));
+    let mut parts: Vec<&str> = key.trim().split('.').collect();
+    let last = parts.pop().unwrap_or_default();
+    let mut at = table;
+    for part in parts {
+        at = at
+            .entry(part)
+            .or_insert_with(|| toml::Value::Table(toml::Table::new()))
+            .as_table_mut()
+            .ok_or_else(|| {
+                wrong(
+                    key,
+                    format!("`{part}` is a value and has no settings below it"),
+                )
+            })?;
+    }
+    at.insert(last.to_owned(), value);
+    Ok(())
+}
+
+pub fn text(table: &toml::Table, key: &str) -> Result<Option<String>> {
+    table
+        .get(key)
+        .map(|v| {
+            v.as_str()
+                .map(str::to_owned)
+                .ok_or_else(|| wrong(key, format!("{v} is not a text in quotes")))
+        })
+        .transpose()
+}
+
+pub fn section(table: &toml::Table, key: &str) -> Result<toml::Table> {
+    match table.get(key) {
+        None => Ok(toml::Table::new()),
+        Some(toml::Value::Table(t)) => Ok(t.clone()),
+        Some(other) => Err(wrong(key, format!("{other} is not a section of settings"))),
+    }
+}
+
+pub fn check_keys(name: &str, table: &toml::Table, known: &[&'static str]) -> Result<()> {
+    for key in table.keys() {
+        if !known.contains(&key.as_str()) {
+            let unknown = Error::unknown("setting", key, known.iter().copied());
+            return Err(wrong(name, unknown.to_string()));
+        }
+    }
+    Ok(())
+}
+
+pub fn numbers(name: &str, table: &toml::Table) -> Result<BTreeMap<String, f64>> {
+    table
+        .iter()
+        .map(|(key, value)| {
+            value
+                .as_float()
+                .or_else(|| value.as_integer().map(|i| i as f64))
+                .filter(|x| x.is_finite())
+                .map(|x| (key.clone(), x))
+                .ok_or_else(|| {
+                    wrong(
+                        &format!("{name}.{key}"),
+                        format!("{value} is not a finite number"),
+                    )
+                })
+        })
+        .collect()
+}

@@ -1,0 +1,196 @@
+//! The real episode in the report: its picture from above and its signals with their replays.
+
+use anyhow::Result;
+use asid_core::pipeline::RunOutcome;
+use asid_core::replay::Replay as Replayed;
+use asid_core::signal::yaw;
+use asid_core::task::Outline;
+use asid_report::run as r;
+
+use super::super::session::Session;
+
+pub fn shape(outline: &Outline, kind: r::ShapeKind) -> r::Shape {
+    r::Shape {
+        label: outline.label.clone(),
+        kind,
+        points: outline.corners.clone(),
+        radius: None,
+    }
+}
+
+/// The real episode from above.
+pub fn episode(session: &Session, log: &asid_core::Episode) -> r::Episode {
+    let view = session.task.top_view();
+    let protocol = session.task.exploration();
+    let position = session.signals.first().and_then(|s| log.channel(&s.sensor));
+    let orientation = session
+        .signals
+        .iter()
+        .filter_map(|s| log.channel(&s.sensor))
+        .find(|c| c.len() == 4);
+    let poses = |row: &[f64]| {
+        let (p, q) = (position.clone()?, orientation.clone()?);
+        Some([row[p.start], row[p.start + 1], yaw(&row[q])])
+    };
+    let effector = protocol
+        .proprioception
+        .first()
+        .and_then(|name| log.channel(name));
+    let every = protocol.frames_per_step.max(1);
+    r::Episode {
+        objects: vec![r::ObjectTrack {
+            name: view.object.label.clone(),
+            outline: view.object.corners.clone(),
+            time: log.time.clone(),
+            poses: (0..log.rows())
+                .map(|i| poses(log.reading(i)).unwrap_or([f64::NAN; 3]))
+                .collect(),
+        }],
+        end_effector: effector.map(|range| r::PlanarPath {
+            time: log.time.iter().step_by(every).copied().collect(),
+            position: (0..log.rows())
+                .step_by(every)
+                .map(|i| {
+                    let row = &log.reading(i)[range.clone()];
+                    [row[0], row[1]]
+                })
+                .collect(),
+        }),
+        workspace: Some([
+            view.bounds[0][0],
+            view.bounds[1][0],
+            view.bounds[0][1],
+            view.bounds[1][1],
+        ]),
+        shapes: view
+            .fixtures
+            .iter()
+            .map(|f| shape(f, r::ShapeKind::Fixed))
+            .collect(),
+    }
+}
+
+/// Real readings against replays at the prior's centre and at the estimate.
+pub fn signals(session: &Session, outcome: &RunOutcome) -> Result<Vec<r::Signal>> {
+    let (Some(real), Some(found)) = (&outcome.real, &outcome.identified) else {
+        return Ok(Vec::new());
+    };
+    let center: Vec<f64> = session
+        .parameters
+        .iter()
+        .map(asid_core::Parameter::center)
+        .collect();
+    let before = replay(session, &real.episode, &center, &found.starts[0])?;
+    let after = replay(
+        session,
+        &real.episode,
+        &outcome.belief.mean(),
+        &found.starts[0],
+    )?;
+    Ok(tracked(session, &real.episode, Some((&before, &after))))
+}
+
+/// Readings of the tracked signals, an orientation as its heading, with replays.
+pub fn tracked(
+    session: &Session,
+    log: &asid_core::Episode,
+    replays: Option<(&[f64], &[f64])>,
+) -> Vec<r::Signal> {
+    let width: usize = session
+        .signals
+        .iter()
+        .filter_map(|s| session.model.layout().sensor(&s.sensor).ok())
+        .map(|s| s.len)
+        .sum();
+    let mut out = Vec::new();
+    let mut at = 0;
+    for signal in &session.signals {
+        let Ok(sensor) = session.model.layout().sensor(&signal.sensor) else {
+            continue;
+        };
+        let range = log.channel(&signal.sensor);
+        let entries: Vec<usize> = if sensor.len == 4 {
+            vec![0]
+        } else {
+            (0..sensor.len).collect()
+        };
+        for i in entries {
+            let value = |row: &[f64], from: usize| {
+                if sensor.len == 4 {
+                    yaw(&row[from..from + 4])
+                } else {
+                    row[from + i]
+                }
+            };
+            let series = |data: &[f64]| {
+                unwrapped(
+                    data.chunks_exact(width).map(|row| value(row, at)).collect(),
+                    sensor.len == 4,
+                )
+            };
+            let readings: Vec<f64> = (0..log.rows())
+                .map(|k| {
+                    range
+                        .as_ref()
+                        .map_or(f64::NAN, |r| value(log.reading(k), r.start))
+                })
+                .collect();
+            let replay = |data: &[f64]| r::Replay {
+                time: log.time.clone(),
+                value: series(data),
+                band95: Vec::new(),
+            };
+            out.push(r::Signal {
+                name: match sensor.len {
+                    4 => format!("{} (heading)", signal.sensor),
+                    1 => signal.sensor.clone(),
+                    _ => format!("{}.{i}", signal.sensor),
+                },
+                unit: if sensor.len == 4 {
+                    "rad".into()
+                } else {
+                    sensor.unit().into()
+                },
+                noise_std: Some(signal.noise),
+                time: log.time.clone(),
+                readings: unwrapped(readings, sensor.len == 4),
+                before: replays.map(|(b, _)| replay(b)),
+                after: replays.map(|(_, a)| replay(a)),
+            });
+        }
+        at += sensor.len;
+    }
+    out
+}
+
+/// Angles without jumps of a turn.
+pub fn unwrapped(mut values: Vec<f64>, angle: bool) -> Vec<f64> {
+    if angle {
+        let turn = 2.0 * std::f64::consts::PI;
+        for i in 1..values.len() {
+            let jump = ((values[i] - values[i - 1]) / turn).round();
+            if jump.is_finite() {
+                values[i] -= jump * turn;
+            }
+        }
+    }
+    values
+}
+
+/// Predicted tracked readings of a log at these values.
+pub fn replay(
+    session: &Session,
+    log: &asid_core::Episode,
+    theta: &[f64],
+    start: &[f64],
+) -> Result<Vec<f64>> {
+    let problem = session.problem();
+    let names: Vec<String> = session.signals.iter().map(|s| s.sensor.clone()).collect();
+    let mut replay = Replayed::new(session.model.layout(), log, &names)?;
+    let mut batch = problem.batch(1)?;
+    batch.set_parameters(&[0], theta)?;
+    batch.place(&*session.task, &[0], start)?;
+    let mut out = vec![0.0; replay.rows() * replay.width()];
+    replay.run(&mut *batch.simulator, &[0], &mut out)?;
+    Ok(out)
+}
