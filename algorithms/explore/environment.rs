@@ -1,8 +1,8 @@
 //! Fisher exploration as a batch of environments, for learners.
 //!
-//! An observation is the noisy reading, the share of the episode that is over
-//! and, for each unknown, the log of the information gathered so far: with it the
-//! return of the telescoping objectives is a function of the observation.
+//! An observation comes of a noisy reading; with the share of the episode that is
+//! over and the information gathered so far in it (see [`Observer`]), the return of
+//! the telescoping objectives is a function of the observation.
 
 use asid_core::environment::{BatchEnvironment, Transition};
 use asid_core::fisher::{FisherBatch, FisherSettings};
@@ -11,13 +11,16 @@ use asid_core::{Problem, Result};
 use rand::Rng as _;
 use rand_distr::{Distribution, StandardNormal};
 
-/// Noise of each entry of a policy's observation (published ASID code).
+use super::observation::Observer;
+
+/// Noise of each entry of a reading that a policy sees in training (published ASID code).
 pub const OBSERVATION_NOISE: f64 = 0.01;
 
 /// A batch of Fisher exploration episodes that step together.
 pub struct FisherEnvironment<'a> {
     problem: &'a Problem<'a>,
     batch: FisherBatch<'a>,
+    observer: Observer,
     rng: Rng,
     step: usize,
     readings: Vec<f64>,
@@ -37,6 +40,7 @@ impl<'a> FisherEnvironment<'a> {
         Ok(Self {
             readings: vec![0.0; episodes * batch.width()],
             rng: problem.streams.stream("fisher environment"),
+            observer: Observer::new(problem)?,
             batch,
             problem,
             step: 0,
@@ -68,48 +72,25 @@ impl<'a> FisherEnvironment<'a> {
         &self.batch
     }
 
-    /// Entries of an observation for a reading's row of `width` entries and `d` unknowns.
+    /// What the environments' observations are made of.
     #[must_use]
-    pub fn observation_len_for(width: usize, d: usize) -> usize {
-        width + 1 + d
-    }
-
-    /// Writes an observation from its parts.
-    pub fn write_observation(
-        reading: &[f64],
-        fraction: f64,
-        expected_std: &[f64],
-        out: &mut [f64],
-    ) {
-        let width = reading.len();
-        out[..width].copy_from_slice(reading);
-        out[width] = fraction;
-        for (o, s) in out[width + 1..].iter_mut().zip(expected_std) {
-            *o = -s.max(1e-6).ln();
-        }
+    pub fn observer(&self) -> &Observer {
+        &self.observer
     }
 
     fn observe(&mut self, observation: &mut [f64]) {
         let width = self.batch.width();
-        let len = self.observation_len();
-        let fraction = self.step as f64 / self.problem.task.exploration().horizon as f64;
-        for e in 0..self.batch.episodes() {
-            let mut reading = self.readings[e * width..(e + 1) * width].to_vec();
-            for x in &mut reading {
+        let share = self.step as f64 / self.problem.task.exploration().horizon as f64;
+        let mut noisy = vec![0.0; width];
+        let rows = observation.chunks_exact_mut(self.observer.observation_len());
+        for (e, row) in rows.enumerate() {
+            let reading = &self.readings[e * width..(e + 1) * width];
+            for (x, r) in noisy.iter_mut().zip(reading) {
                 let noise: f64 = StandardNormal.sample(&mut self.rng);
-                *x = if x.is_finite() {
-                    *x + OBSERVATION_NOISE * noise
-                } else {
-                    0.0
-                };
+                *x = r + OBSERVATION_NOISE * noise;
             }
             let std = self.batch.information()[e].expected_std();
-            Self::write_observation(
-                &reading,
-                fraction,
-                &std,
-                &mut observation[e * len..(e + 1) * len],
-            );
+            self.observer.observe(&noisy, share, &std, row);
         }
     }
 }
@@ -120,7 +101,7 @@ impl BatchEnvironment for FisherEnvironment<'_> {
     }
 
     fn observation_len(&self) -> usize {
-        Self::observation_len_for(self.batch.width(), self.problem.parameters.len())
+        self.observer.observation_len()
     }
 
     fn action_len(&self) -> usize {

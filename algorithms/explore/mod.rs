@@ -2,6 +2,8 @@
 
 pub mod environment;
 pub mod fisher_cem;
+pub mod observation;
 pub mod random;
 
 pub use environment::FisherEnvironment;
+pub use observation::Observer;

@@ -12,6 +12,7 @@
 mod actor_critic;
 pub mod config;
 pub mod evaluation;
+pub mod fisher_ppo;
 pub mod gae;
 #[cfg(test)]
 mod learning_tests;
@@ -24,6 +25,7 @@ pub mod surrogate;
 
 pub use config::PpoConfig;
 pub use evaluation::{Evaluation, evaluate};
+pub use fisher_ppo::FisherPpo;
 pub use normaliser::Normaliser;
 pub use policy::Policy;
 pub use ppo::{PpoProgress, Trained, train};

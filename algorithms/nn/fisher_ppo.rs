@@ -1,0 +1,222 @@
+//! The Fisher objective with PPO: a policy that reacts to what it sees.
+//!
+//! It is trained once, over start poses and unknowns drawn anew for every episode
+//! (domain randomisation), and then plays any episode without a search. In the real
+//! world the information gathered so far, part of its observation, is that of a
+//! simulation at the middle of the prior which starts where the first reading shows
+//! the object and takes the same actions.
+
+use std::ops::ControlFlow;
+
+use asid_algorithms::explore::{FisherEnvironment, Observer};
+use asid_core::explore::{CurvePoint, Explored, Explorer};
+use asid_core::fisher::{FisherBatch, FisherSettings};
+use asid_core::information::Objective;
+use asid_core::registry::{self, ExplorerEntry};
+use asid_core::{Error, Problem, Result};
+use rand::Rng as _;
+use serde::{Deserialize, Serialize};
+
+use crate::config::PpoConfig;
+use crate::policy::Policy;
+use crate::ppo::{PpoProgress, train};
+
+/// Settings of the explorer.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct FisherPpo {
+    /// Episodes that are simulated at once.
+    pub environments: usize,
+    /// The learner. Discount 1 and a constant scale of rewards keep the return equal
+    /// to the information gained.
+    pub ppo: PpoConfig,
+    /// What is rewarded.
+    pub fisher: FisherSettings,
+}
+
+impl Default for FisherPpo {
+    fn default() -> Self {
+        Self {
+            environments: 128,
+            ppo: PpoConfig {
+                total_steps: 150_000,
+                n_steps: 2560,
+                minibatch: 256,
+                learning_rate: 1e-3,
+                anneal_learning_rate: true,
+                gamma: 1.0,
+                evaluation_episodes: 0,
+                ..PpoConfig::default()
+            },
+            fisher: FisherSettings {
+                objective: Objective::DOptimal,
+                nuisance: false,
+                ..FisherSettings::default()
+            },
+        }
+    }
+}
+
+inventory::submit! {
+    ExplorerEntry {
+        name: "fisher-ppo",
+        about: "Fisher information, a policy trained by proximal policy optimisation",
+        defaults: registry::defaults::<FisherPpo>,
+        make: |s| {
+            let explorer: FisherPpo = registry::settings("explorer", s)?;
+            explorer.check()?;
+            Ok(Box::new(explorer))
+        },
+    }
+}
+
+impl FisherPpo {
+    fn check(&self) -> Result<()> {
+        if self.environments == 0 {
+            return Err(Error::Config {
+                key: "explorer.environments".into(),
+                message: "must be at least 1".into(),
+            });
+        }
+        self.ppo.validate()?;
+        self.fisher.check()
+    }
+
+    /// Trains a policy; its learning curve is counted in environment steps.
+    ///
+    /// # Errors
+    /// When the engine fails or the learner diverges.
+    pub fn train(&self, problem: &Problem<'_>) -> Result<(Policy, Vec<CurvePoint>)> {
+        let mut environment = FisherEnvironment::new(problem, &self.fisher, self.environments)?;
+        let seed = problem.streams.stream("fisher-ppo").random();
+        let mut curve = Vec::new();
+        let mut told = 0;
+        let total = self.ppo.total_steps as u64;
+        problem.progress.begin("explore: training", total);
+        let trained = train(&mut environment, &self.ppo, seed, &mut |p: &PpoProgress| {
+            problem.progress.advance((p.env_steps - told) as u64);
+            told = p.env_steps;
+            if let (Some(mean), Some(std)) = (p.mean_return, p.return_std) {
+                problem.progress.note(&format!("return {mean:.2} ± {std:.2}"));
+                curve.push(CurvePoint {
+                    x: p.env_steps as f64,
+                    mean,
+                    std,
+                });
+            }
+            ControlFlow::Continue(())
+        });
+        problem.progress.end();
+        Ok((trained?.policy, curve))
+    }
+}
+
+impl Explorer for FisherPpo {
+    fn explore<'a>(
+        &'a self,
+        problem: &'a Problem<'a>,
+        _start: Option<&[f64]>,
+    ) -> Result<Explored<'a>> {
+        let (policy, curve) = self.train(problem)?;
+        Ok(Explored {
+            policy: Box::new(TrainedPolicy::new(problem, &self.fisher, policy)?),
+            curve,
+            curve_label: "environment steps",
+            objective: format!(
+                "{} ({} form{})",
+                self.fisher.objective.name(),
+                self.fisher.form.name(),
+                if self.fisher.nuisance {
+                    ", start pose co-estimated"
+                } else {
+                    ""
+                }
+            ),
+        })
+    }
+}
+
+/// A trained network in the real world.
+pub struct TrainedPolicy<'a> {
+    problem: &'a Problem<'a>,
+    network: Policy,
+    observer: Observer,
+    /// The episode as it would be in the middle of the prior.
+    shadow: FisherBatch<'a>,
+    shadow_reading: Vec<f64>,
+    observation: Vec<f64>,
+}
+
+impl<'a> TrainedPolicy<'a> {
+    /// A network that was trained with these settings, or reloaded from an export.
+    ///
+    /// # Errors
+    /// When the network is not one of this problem, or as [`FisherBatch::new`].
+    pub fn new(
+        problem: &'a Problem<'a>,
+        settings: &FisherSettings,
+        network: Policy,
+    ) -> Result<Self> {
+        let observer = Observer::new(problem)?;
+        let shadow = FisherBatch::new(problem, settings, 1)?;
+        let actions = problem.task.exploration().action.len();
+        let (inputs, outputs) = (observer.observation_len(), actions);
+        if network.observation_len() != inputs || network.action_len() != outputs {
+            return Err(Error::Shape(format!(
+                "the network takes {} entries and gives {}, the task `{}` has observations of {inputs} and actions of {outputs}",
+                network.observation_len(),
+                network.action_len(),
+                problem.task.name(),
+            )));
+        }
+        Ok(Self {
+            shadow_reading: vec![0.0; shadow.width()],
+            observation: vec![0.0; inputs],
+            problem,
+            network,
+            observer,
+            shadow,
+        })
+    }
+}
+
+impl asid_core::explore::Policy for TrainedPolicy<'_> {
+    fn reset(&mut self) {}
+
+    fn act(&mut self, step: usize, reading: &[f64], action: &mut [f64]) -> Result<()> {
+        let protocol = self.problem.task.exploration();
+        if step == 0 {
+            let middle: Vec<f64> = self.problem.parameters.iter().map(|p| p.center()).collect();
+            let start = self.problem.task.locate(reading);
+            self.shadow.begin(&middle, &start, &mut self.shadow_reading)?;
+        }
+        let share = step as f64 / protocol.horizon as f64;
+        let std = self.shadow.information()[0].expected_std();
+        self.observer.observe(reading, share, &std, &mut self.observation);
+        self.network.act(&self.observation, action)?;
+        for (a, c) in action.iter_mut().zip(&protocol.action) {
+            *a = c.at((*a + 1.0) / 2.0);
+        }
+        self.shadow.step(action, &mut self.shadow_reading, &mut [0.0])
+    }
+
+    /// `{"kind": "network", "observation": [{"name", "len"}], "action": [{"name", "unit",
+    /// "range"}], "network": …}`. The network is what [`Policy`] reads and writes: a
+    /// normaliser `(x - mean) / sqrt(variance)`, clipped at plus and minus 10, then layers
+    /// `y = x W + b` (`weight` is inputs x outputs, row by row) with tanh between them.
+    /// The output, clipped to -1 to 1, spans each action's range.
+    fn export(&self) -> serde_json::Value {
+        let observation: Vec<_> = self.observer.entries().iter().map(|e| {
+            serde_json::json!({"name": e.name, "len": e.len})
+        }).collect();
+        let action: Vec<_> = self.problem.task.exploration().action.iter().map(|c| {
+            serde_json::json!({"name": c.name, "unit": c.unit, "range": c.range})
+        }).collect();
+        serde_json::json!({
+            "kind": "network",
+            "observation": observation,
+            "action": action,
+            "network": self.network,
+        })
+    }
+}
