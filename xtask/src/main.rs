@@ -6,6 +6,7 @@
 // A developer tool talks to the terminal.
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
+mod bench;
 mod library;
 mod lint;
 mod setup;
@@ -23,6 +24,8 @@ Usage: cargo xtask <subcommand>
   setup [--only mujoco|torch]  fetches the native libraries into .native/ (quick when all is there)
   lint                         formatting, clippy and rustdoc over the workspace, all features
   test                         setup, lint and every test: what CI runs
+  bench [--quick] [--out FILE.json] [--markdown FILE.md]
+                               speed beside the engines' own loops, a table and a JSON file
 
 A library that you have already wins: set MUJOCO_DYNAMIC_LINK_DIR to the folder of libmujoco.so,
 LIBTORCH to the folder that holds lib/ and include/, or LIBTORCH_USE_PYTORCH=1.
@@ -49,11 +52,12 @@ fn run(arguments: &[String]) -> Result<bool> {
         "setup" => setup::run(&setup::selection(rest)?).map(|()| true),
         "lint" => without_arguments(rest).and_then(|()| lint::run()),
         "test" => without_arguments(rest).and_then(|()| test::run()),
+        "bench" => bench::run(rest),
         "help" | "--help" | "-h" => {
             println!("{HELP}");
             Ok(true)
         }
-        other => bail!("unknown subcommand `{other}`; known: setup, lint, test, help"),
+        other => bail!("unknown subcommand `{other}`; known: setup, lint, test, bench, help"),
     }
 }
 

@@ -67,6 +67,8 @@
 //! core at a step of 2 ms, a gripped or pushed rod some 28; most of it is the mass
 //! matrix of the arm. Saving or loading that state takes 8 µs, a quarter of a step.
 
+#[doc(hidden)]
+pub mod bare;
 mod batch;
 mod compiled;
 mod contact;

@@ -1,0 +1,161 @@
+//! Environment steps a second of Fisher exploration with one unknown, and how
+//! much of its CPU time the engine's own stepping takes.
+//!
+//! The share is CPU time of the bare loop by that of the Fisher rollout, over the
+//! same number of physics steps with the same parameters, starts and commands.
+//! In the one-step form the copies take the episode's state every control step,
+//! which the bare loop does not do: its states drift a little from theirs.
+
+use std::sync::atomic::AtomicU64;
+
+use anyhow::Result;
+use asid_core::fisher::{FisherBatch, FisherSettings, Form};
+use asid_core::progress::Silent;
+use asid_core::{Backend, Model, Parameter, Problem, Streams, Task};
+use serde::Serialize;
+
+use crate::bare::bare;
+use crate::clock::{Cost, timed};
+use crate::workload::{Episodes, Workload};
+
+/// Episodes of a batch.
+const EPISODES: usize = 64;
+
+/// One engine, form and number of threads.
+#[derive(Clone, Debug, Serialize)]
+pub struct FisherRow {
+    engine: String,
+    form: &'static str,
+    episodes: usize,
+    threads: usize,
+    rounds: usize,
+    /// Control steps of all episodes a second, best of the rounds.
+    env_steps_per_s: f64,
+    /// Physics steps of all copies a second.
+    physics_steps_per_s: f64,
+    /// Share of the CPU time that the engine's own stepping takes, on one thread.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    engine_cpu_share: Option<f64>,
+}
+
+/// All rows of one engine.
+///
+/// # Errors
+/// When the engine fails.
+pub fn rows(
+    backend: &dyn Backend,
+    task: &dyn Task,
+    model: &dyn Model,
+    threads: &[usize],
+    rounds: usize,
+) -> Result<Vec<FisherRow>> {
+    let mut out = Vec::new();
+    for form in [Form::OneStep, Form::Trajectory] {
+        for &threads in threads {
+            let name = backend.name();
+            eprintln!("fisher: {name}, {}, threads {threads}", form.name());
+            out.push(row(backend, task, model, form, threads, rounds)?);
+        }
+    }
+    Ok(out)
+}
+
+fn row(
+    backend: &dyn Backend,
+    task: &dyn Task,
+    model: &dyn Model,
+    form: Form,
+    threads: usize,
+    rounds: usize,
+) -> Result<FisherRow> {
+    let parameters = task.parameters();
+    let signals = &task.exploration().signals;
+    let (physics, environment) = (AtomicU64::new(0), AtomicU64::new(0));
+    let problem = Problem {
+        task,
+        model,
+        capabilities: backend.capabilities(),
+        parameters: &parameters,
+        signals,
+        threads,
+        streams: Streams::new(1),
+        progress: &Silent,
+        physics_counter: &physics,
+        env_counter: &environment,
+    };
+    let settings = FisherSettings {
+        form,
+        nuisance: false,
+        ..FisherSettings::default()
+    };
+    let mut batch = FisherBatch::new(&problem, &settings, EPISODES)?;
+    let episodes = Episodes::random(task, &parameters, EPISODES, 2);
+    let (theta, copies) = copies(&parameters, &settings, &episodes.theta);
+    let work = Workload::new(task, model.layout(), &parameters, &episodes, &theta, copies)?;
+    let mut loops = bare(backend.name(), task.scene(), &work)?;
+    let mut readings = vec![0.0; EPISODES * batch.width()];
+    let mut reward = vec![0.0; EPISODES];
+    let (mut best, mut engine) = (Cost::ENDLESS, Cost::ENDLESS);
+    for _ in 0..rounds {
+        if threads == 1 {
+            loops.rewind()?;
+            engine = engine.least(timed(|| loops.run(1)).1);
+        }
+        let (done, cost) = timed(|| {
+            batch.begin(&episodes.theta, &episodes.starts, &mut readings)?;
+            for actions in &episodes.actions {
+                batch.step(actions, &mut readings, &mut reward)?;
+            }
+            Ok::<_, asid_core::Error>(())
+        });
+        done?;
+        best = best.least(cost);
+    }
+    Ok(FisherRow {
+        engine: backend.name().to_owned(),
+        form: form.name(),
+        episodes: EPISODES,
+        threads,
+        rounds,
+        env_steps_per_s: (EPISODES * episodes.horizon) as f64 / best.wall_s,
+        physics_steps_per_s: work.steps() as f64 / best.wall_s,
+        engine_cpu_share: (threads == 1).then(|| engine.cpu_s / best.cpu_s),
+    })
+}
+
+/// Unknowns of every simulation of a Fisher batch: each episode, then a copy up
+/// and one down for each unknown. Also the number of simulations an episode.
+fn copies(parameters: &[Parameter], settings: &FisherSettings, theta: &[f64]) -> (Vec<f64>, usize) {
+    let d = parameters.len();
+    let bound = Parameter::scaled_bound();
+    let mut out = Vec::new();
+    for own in theta.chunks_exact(d) {
+        out.extend_from_slice(own);
+        for (i, parameter) in parameters.iter().enumerate() {
+            for sign in [1.0, -1.0] {
+                let mut copy = own.to_vec();
+                let z = parameter.to_scaled(own[i]) + sign * settings.delta;
+                copy[i] = parameter.from_scaled(z.clamp(-bound, bound));
+                out.extend(copy);
+            }
+        }
+    }
+    (out, 1 + 2 * d)
+}
+
+/// The rows as a table.
+pub fn table(rows: &[FisherRow]) -> Vec<Vec<String>> {
+    rows.iter()
+        .map(|r| {
+            vec![
+                r.engine.clone(),
+                r.form.to_owned(),
+                r.threads.to_string(),
+                format!("{:.0}", r.env_steps_per_s),
+                format!("{:.0}", r.physics_steps_per_s),
+                r.engine_cpu_share
+                    .map_or_else(String::new, |s| format!("{:.0} %", 100.0 * s)),
+            ]
+        })
+        .collect()
+}

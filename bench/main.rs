@@ -1,0 +1,237 @@
+//! How fast ASID is beside its engines: a table, and a JSON file with the circumstances.
+//!
+//! `cargo xtask bench` builds and calls it. Speeds depend on the machine, so
+//! nothing here passes or fails; each row that has something to be compared with
+//! is measured together with it, in turns, and the best of some rounds counts,
+//! because other load only slows down.
+
+// A measuring tool talks to the terminal.
+#![allow(clippy::print_stdout, clippy::print_stderr)]
+
+// Engines and tasks that are linked in register themselves.
+#[cfg(feature = "mujoco")]
+use asid_mujoco as _;
+use asid_tasks as _;
+
+mod bare;
+mod clock;
+mod fisher;
+mod machine;
+#[cfg(feature = "mujoco")]
+mod mujoco;
+mod page;
+mod physics;
+mod program;
+mod workload;
+
+use std::path::PathBuf;
+
+use anyhow::{Context, Result};
+use asid_core::registry::{BackendEntry, TaskEntry, all, find};
+use clap::{Parser, ValueEnum};
+use serde::Serialize;
+
+use crate::machine::Circumstances;
+
+/// Layout version of the JSON file.
+const SCHEMA: u32 = 1;
+
+/// The task whose scene and pipeline are measured.
+const TASK: &str = "rod-balancing";
+
+/// A part of the measurement.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Part {
+    /// Physics steps of batches beside the bare loop
+    Physics,
+    /// Environment steps of Fisher exploration
+    Fisher,
+    /// A whole run, and identification alone
+    Program,
+    /// Start-up
+    Start,
+}
+
+/// Measures the speed of ASID beside that of its engines.
+#[derive(Parser)]
+#[command(name = "cargo xtask bench")]
+struct Arguments {
+    /// One short round of everything, and no whole runs
+    #[arg(long)]
+    quick: bool,
+    /// Only these parts
+    #[arg(long, value_enum, value_delimiter = ',')]
+    only: Vec<Part>,
+    /// Only this engine
+    #[arg(long, value_name = "NAME")]
+    engine: Option<String>,
+    /// Where to write the JSON file [default: bench.json in the target folder]
+    #[arg(long, value_name = "FILE.json")]
+    out: Option<PathBuf>,
+    /// A page whose tables between the two `bench` markers are rewritten
+    #[arg(long, value_name = "FILE.md")]
+    markdown: Option<PathBuf>,
+}
+
+impl Arguments {
+    fn wants(&self, part: Part) -> bool {
+        let whole = part != Part::Program || !self.quick;
+        self.only.contains(&part) || (self.only.is_empty() && whole)
+    }
+
+    fn out(&self) -> Result<PathBuf> {
+        if let Some(out) = &self.out {
+            return Ok(out.clone());
+        }
+        let own = std::env::current_exe().context("cannot tell where this program lies")?;
+        let target = own.ancestors().nth(2).context("no target folder")?;
+        Ok(target.join("bench.json"))
+    }
+}
+
+/// Everything measured.
+#[derive(Serialize)]
+struct Results {
+    schema: u32,
+    task: &'static str,
+    circumstances: Circumstances,
+    physics: Vec<physics::PhysicsRow>,
+    fisher: Vec<fisher::FisherRow>,
+    program: Vec<program::RunRow>,
+    start: Vec<program::StartRow>,
+}
+
+impl Results {
+    fn markdown(&self) -> String {
+        let threads = "threads";
+        let mut out = format!(
+            "`{}`, {}\n\n",
+            self.circumstances.command,
+            self.circumstances.sentence()
+        );
+        out += &page::table(
+            "Physics steps",
+            &[
+                "engine",
+                "batch",
+                threads,
+                "steps/s",
+                "bare loop",
+                "ratio",
+                "ratio of CPU time",
+            ],
+            &physics::table(&self.physics),
+        );
+        out += &page::table(
+            "Fisher exploration, one unknown",
+            &[
+                "engine",
+                "form",
+                threads,
+                "environment steps/s",
+                "physics steps/s",
+                "CPU time in the engine",
+            ],
+            &fisher::table(&self.fisher),
+        );
+        out += &page::table(
+            "Whole runs, default settings",
+            &["engine", "command", "s", "million physics steps"],
+            &program::table_of_runs(&self.program),
+        );
+        out += &page::table(
+            "Start-up",
+            &["command", "least, ms", "median, ms"],
+            &program::table_of_starts(&self.start),
+        );
+        out
+    }
+}
+
+fn main() -> Result<()> {
+    let arguments = Arguments::parse();
+    let page = arguments
+        .markdown
+        .as_deref()
+        .map(page::Page::read)
+        .transpose()?;
+    let out = arguments.out()?;
+    let engines: Vec<String> = match &arguments.engine {
+        Some(name) => vec![find::<BackendEntry>(name)?.name.to_owned()],
+        None => all::<BackendEntry>()
+            .iter()
+            .map(|e| e.name.to_owned())
+            .collect(),
+    };
+    let results = measure(&arguments, &engines)?;
+    let text = results.markdown();
+    print!("{text}");
+    let json = serde_json::to_string_pretty(&results)? + "\n";
+    std::fs::write(&out, json).with_context(|| format!("cannot write {}", out.display()))?;
+    if let (Some(page), Some(path)) = (page, &arguments.markdown) {
+        page.write(path, &text)?;
+    }
+    println!("{}", out.display());
+    Ok(())
+}
+
+fn measure(arguments: &Arguments, engines: &[String]) -> Result<Results> {
+    let task = (find::<TaskEntry>(TASK)?.make)()?;
+    let effort = if arguments.quick {
+        physics::Effort {
+            rounds: 1,
+            frames: 30,
+        }
+    } else {
+        physics::Effort {
+            rounds: 3,
+            frames: usize::MAX,
+        }
+    };
+    let cores = machine::cores();
+    let threads: &[usize] = if cores > 1 { &[1, cores] } else { &[1] };
+    let mut versions = Vec::new();
+    for name in engines {
+        let backend = (find::<BackendEntry>(name)?.make)()?;
+        versions.push((name.clone(), backend.version()));
+    }
+    let mut results = Results {
+        schema: SCHEMA,
+        task: TASK,
+        circumstances: Circumstances::now(command(), &versions),
+        physics: Vec::new(),
+        fisher: Vec::new(),
+        program: Vec::new(),
+        start: Vec::new(),
+    };
+    for name in engines {
+        let backend = (find::<BackendEntry>(name)?.make)()?;
+        let model = backend.load(task.scene())?;
+        if arguments.wants(Part::Physics) {
+            let rows = physics::rows(name, &*task, &*model, threads, effort)?;
+            results.physics.extend(rows);
+        }
+        if arguments.wants(Part::Fisher) {
+            let rows = fisher::rows(&*backend, &*task, &*model, threads, effort.rounds)?;
+            results.fisher.extend(rows);
+        }
+        if arguments.wants(Part::Program) {
+            let rows = program::runs(&program::find()?, TASK, name)?;
+            results.program.extend(rows);
+        }
+    }
+    if arguments.wants(Part::Start) {
+        results.start = program::starts(&program::find()?)?;
+    }
+    Ok(results)
+}
+
+/// The command line as it is typed.
+fn command() -> String {
+    let arguments = std::env::args().skip(1);
+    let words: Vec<String> = ["cargo".into(), "xtask".into(), "bench".into()]
+        .into_iter()
+        .chain(arguments)
+        .collect();
+    words.join(" ")
+}

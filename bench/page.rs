@@ -1,0 +1,125 @@
+//! Tables, and the page that holds them between two markers.
+
+use std::fs;
+use std::path::Path;
+
+use anyhow::{Context, Result, bail};
+
+const BEGIN: &str = "<!-- bench: begin -->";
+const END: &str = "<!-- bench: end -->";
+
+/// A titled table in Markdown, its columns aligned for reading as text.
+pub fn table(title: &str, header: &[&str], rows: &[Vec<String>]) -> String {
+    if rows.is_empty() {
+        return String::new();
+    }
+    let widths: Vec<usize> = (0..header.len())
+        .map(|c| {
+            let cells = rows.iter().map(|r| r[c].chars().count());
+            cells.chain([header[c].chars().count()]).max().unwrap_or(0)
+        })
+        .collect();
+    // Numbers are flush right, words left.
+    let right: Vec<bool> = (0..header.len())
+        .map(|c| {
+            rows.iter()
+                .all(|r| r[c].is_empty() || r[c].starts_with(|x: char| x.is_ascii_digit()))
+        })
+        .collect();
+    let line = |cells: Vec<&str>| {
+        let cells: Vec<String> = cells
+            .iter()
+            .enumerate()
+            .map(|(c, text)| {
+                let pad = " ".repeat(widths[c] - text.chars().count());
+                if right[c] {
+                    format!("{pad}{text}")
+                } else {
+                    format!("{text}{pad}")
+                }
+            })
+            .collect();
+        format!("| {} |\n", cells.join(" | "))
+    };
+    let rules: Vec<String> = (0..header.len())
+        .map(|c| {
+            if right[c] {
+                "-".repeat(widths[c] - 1) + ":"
+            } else {
+                "-".repeat(widths[c])
+            }
+        })
+        .collect();
+    let mut out = format!("### {title}\n\n");
+    out += &line(header.to_vec());
+    out += &line(rules.iter().map(String::as_str).collect());
+    for row in rows {
+        out += &line(row.iter().map(String::as_str).collect());
+    }
+    out + "\n"
+}
+
+/// A page whose text between the markers can be replaced.
+pub struct Page {
+    before: String,
+    after: String,
+}
+
+impl Page {
+    /// Reads a page.
+    ///
+    /// # Errors
+    /// When it cannot be read or lacks a marker.
+    pub fn read(path: &Path) -> Result<Self> {
+        let text =
+            fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+        let Some((before, (_, after))) = text
+            .split_once(BEGIN)
+            .and_then(|(b, rest)| Some((b, rest.split_once(END)?)))
+        else {
+            bail!("{} has no lines `{BEGIN}` and `{END}`", path.display());
+        };
+        Ok(Self {
+            before: before.to_owned(),
+            after: after.to_owned(),
+        })
+    }
+
+    /// Writes it with `text` between the markers.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub fn write(&self, path: &Path, text: &str) -> Result<()> {
+        let whole = format!(
+            "{}{BEGIN}\n{}\n{END}{}",
+            self.before,
+            text.trim_end(),
+            self.after
+        );
+        fs::write(path, whole).with_context(|| format!("cannot write {}", path.display()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_the_text_between_the_markers_changes() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("page.md");
+        fs::write(&path, format!("above\n{BEGIN}\nold\n{END}\nbelow\n")).unwrap();
+        Page::read(&path).unwrap().write(&path, "new\n").unwrap();
+        let text = fs::read_to_string(&path).unwrap();
+        assert_eq!(text, format!("above\n{BEGIN}\nnew\n{END}\nbelow\n"));
+        fs::write(&path, "no markers").unwrap();
+        assert!(Page::read(&path).is_err());
+    }
+
+    #[test]
+    fn columns_of_numbers_are_flush_right() {
+        let rows = [vec!["a".into(), "7".into()], vec!["bc".into(), "10".into()]];
+        let text = table("T", &["x", "n"], &rows);
+        assert!(text.contains("| a  |  7 |\n| bc | 10 |\n"), "{text}");
+    }
+}
