@@ -88,11 +88,11 @@ pub fn run_report(
             ("result.json", "the figures"),
             (
                 "config.toml",
-                "all settings; `--config` with it repeats the run",
+                "all settings; given to --config, it repeats the run",
             ),
             ("real.csv", "log of the real episode"),
             ("policy.json", "the exploration policy"),
-            ("posterior.json", "the posterior, for `asid solve`"),
+            ("posterior.json", "the posterior, for asid solve"),
             ("trace.json", "the data of this report"),
         ]),
         ..r::RunReport::default()

@@ -98,7 +98,7 @@ use crate::compiled::Compiled;
 use crate::parameter::Knob;
 
 /// Version of the rapier that this crate is built against.
-const VERSION: &str = "rapier3d 0.36";
+const VERSION: &str = "0.36";
 
 /// The engine.
 #[derive(Clone, Copy, Debug, Default)]
