@@ -9,7 +9,7 @@
 
 use std::sync::Arc;
 
-use asid_core::layout::{Layout, Target};
+use asid_core::{Layout, Target};
 use asid_core::{Error, Result, Scene};
 use rapier3d::math::Vector;
 use rapier3d::pipeline::PhysicsPipeline;
