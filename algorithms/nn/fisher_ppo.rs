@@ -97,7 +97,9 @@ impl FisherPpo {
             problem.progress.advance((p.env_steps - told) as u64);
             told = p.env_steps;
             if let (Some(mean), Some(std)) = (p.mean_return, p.return_std) {
-                problem.progress.note(&format!("return {mean:.2} ± {std:.2}"));
+                problem
+                    .progress
+                    .note(&format!("return {mean:.2} ± {std:.2}"));
                 curve.push(CurvePoint {
                     x: p.env_steps as f64,
                     mean,
@@ -188,16 +190,19 @@ impl asid_core::explore::Policy for TrainedPolicy<'_> {
         if step == 0 {
             let middle: Vec<f64> = self.problem.parameters.iter().map(|p| p.center()).collect();
             let start = self.problem.task.locate(reading);
-            self.shadow.begin(&middle, &start, &mut self.shadow_reading)?;
+            self.shadow
+                .begin(&middle, &start, &mut self.shadow_reading)?;
         }
         let share = step as f64 / protocol.horizon as f64;
         let std = self.shadow.information()[0].expected_std();
-        self.observer.observe(reading, share, &std, &mut self.observation);
+        self.observer
+            .observe(reading, share, &std, &mut self.observation);
         self.network.act(&self.observation, action)?;
         for (a, c) in action.iter_mut().zip(&protocol.action) {
             *a = c.at((*a + 1.0) / 2.0);
         }
-        self.shadow.step(action, &mut self.shadow_reading, &mut [0.0])
+        self.shadow
+            .step(action, &mut self.shadow_reading, &mut [0.0])
     }
 
     /// `{"kind": "network", "observation": [{"name", "len"}], "action": [{"name", "unit",
@@ -206,17 +211,173 @@ impl asid_core::explore::Policy for TrainedPolicy<'_> {
     /// `y = x W + b` (`weight` is inputs x outputs, row by row) with tanh between them.
     /// The output, clipped to -1 to 1, spans each action's range.
     fn export(&self) -> serde_json::Value {
-        let observation: Vec<_> = self.observer.entries().iter().map(|e| {
-            serde_json::json!({"name": e.name, "len": e.len})
-        }).collect();
-        let action: Vec<_> = self.problem.task.exploration().action.iter().map(|c| {
-            serde_json::json!({"name": c.name, "unit": c.unit, "range": c.range})
-        }).collect();
+        let observation: Vec<_> = self
+            .observer
+            .entries()
+            .iter()
+            .map(|e| serde_json::json!({"name": e.name, "len": e.len}))
+            .collect();
+        let action: Vec<_> = self
+            .problem
+            .task
+            .exploration()
+            .action
+            .iter()
+            .map(|c| serde_json::json!({"name": c.name, "unit": c.unit, "range": c.range}))
+            .collect();
         serde_json::json!({
             "kind": "network",
             "observation": observation,
             "action": action,
             "network": self.network,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::AtomicU64;
+
+    // Linked for the entries that they register.
+    use asid_rapier as _;
+    use asid_tasks as _;
+
+    use asid_core::explore::Policy as _;
+    use asid_core::progress::Silent;
+    use asid_core::registry::{BackendEntry, TaskEntry, find};
+    use asid_core::{Capabilities, RealWorld as _, SimulatedWorld, Streams};
+
+    use super::*;
+
+    /// Runs `check` on rod balancing in the engine that needs no native library.
+    fn with_problem(check: impl FnOnce(&Problem<'_>)) {
+        let task = (find::<TaskEntry>("rod-balancing").unwrap().make)().unwrap();
+        let backend = (find::<BackendEntry>("rapier").unwrap().make)().unwrap();
+        let model = backend.load(task.scene()).unwrap();
+        let parameters = task.parameters();
+        let counter = AtomicU64::new(0);
+        check(&Problem {
+            task: &*task,
+            model: &*model,
+            capabilities: Capabilities::empty(),
+            parameters: &parameters,
+            signals: &task.exploration().signals,
+            threads: 0,
+            streams: Streams::new(3),
+            progress: &Silent,
+            physics_counter: &counter,
+            env_counter: &counter,
+        });
+    }
+
+    /// Two updates of two episodes.
+    fn tiny() -> FisherPpo {
+        let mut explorer = FisherPpo {
+            environments: 2,
+            ..FisherPpo::default()
+        };
+        explorer.ppo.n_steps = 40;
+        explorer.ppo.total_steps = 80;
+        explorer.ppo.minibatch = 16;
+        explorer
+    }
+
+    #[test]
+    fn the_same_seed_gives_the_same_policy_and_an_episode_can_be_played() {
+        with_problem(|problem| {
+            let explorer = tiny();
+            let (network, curve) = explorer.train(problem).unwrap();
+            assert_eq!(network, explorer.train(problem).unwrap().0);
+            let steps: Vec<f64> = curve.iter().map(|p| p.x).collect();
+            assert_eq!(steps, [40.0, 80.0]);
+            assert!(curve.iter().all(|p| p.mean.is_finite() && p.std >= 0.0));
+
+            let mut explored = explorer.explore(problem, None).unwrap();
+            assert_eq!(explored.curve, curve);
+            let signals = problem.signals;
+            let mut world = SimulatedWorld::new(
+                problem.task,
+                problem.model,
+                problem.parameters,
+                &[0.05],
+                signals,
+                Streams::new(1),
+            )
+            .unwrap();
+            let first = world.explore(&mut *explored.policy).unwrap();
+            // A policy can be played again: the second episode is the first.
+            let second = world.explore(&mut *explored.policy).unwrap();
+            assert_eq!(first.actions, second.actions);
+            assert_eq!(first.actions.len(), 20 * 2);
+        });
+    }
+
+    /// The information gathered so far is an entry of the observation: with other
+    /// readings equal, a policy that looks at nothing else acts by it.
+    #[test]
+    fn a_policy_acts_by_the_information_gathered() {
+        with_problem(|problem| {
+            let inputs = Observer::new(problem).unwrap().observation_len();
+            let mut weight = vec![0.0; inputs * 2];
+            weight[(inputs - 1) * 2] = 0.1;
+            let network = Policy::linear(inputs, weight, vec![0.0; 2]);
+            let settings = FisherSettings::default();
+            let mut policy = TrainedPolicy::new(problem, &settings, network).unwrap();
+            let reading = {
+                let mut batch = FisherBatch::new(problem, &settings, 1).unwrap();
+                let mut first = vec![0.0; batch.width()];
+                batch.begin(&[0.0], &[0.55, 0.0, 0.5], &mut first).unwrap();
+                first
+            };
+            let mut actions = Vec::new();
+            for step in 0..20 {
+                let mut action = [0.0; 2];
+                let told = policy.shadow.information()[0].expected_std();
+                policy.act(step, &reading, &mut action).unwrap();
+                assert!(action.iter().all(|a| a.is_finite()));
+                if step > 0 {
+                    // Weight 0.1 on -log std; the action's range is plus and minus 0.1 m.
+                    let expected = (-0.1 * told[0].ln()).clamp(-1.0, 1.0) * 0.1;
+                    assert!((action[0] - expected).abs() < 1e-7, "{action:?} {told:?}");
+                }
+                actions.push(action);
+            }
+            assert!(actions[0][0].abs() < 0.02, "the prior alone: {actions:?}");
+        });
+    }
+
+    #[test]
+    fn an_export_can_be_reloaded_and_a_network_of_another_task_is_refused() {
+        with_problem(|problem| {
+            let explorer = tiny();
+            let (network, _) = explorer.train(problem).unwrap();
+            let policy = TrainedPolicy::new(problem, &explorer.fisher, network.clone()).unwrap();
+            let export = policy.export();
+            let reloaded = Policy::from_json(&export["network"]).unwrap();
+            assert_eq!(reloaded, network);
+            let entries = export["observation"].as_array().unwrap();
+            let len: u64 = entries.iter().map(|e| e["len"].as_u64().unwrap()).sum();
+            assert_eq!(len as usize, network.observation_len());
+            assert_eq!(export["action"][0]["range"][1], 0.1);
+
+            let other = Policy::linear(3, vec![0.0; 6], vec![0.0; 2]);
+            let refused = TrainedPolicy::new(problem, &explorer.fisher, other);
+            assert!(
+                refused
+                    .err()
+                    .unwrap()
+                    .to_string()
+                    .contains("takes 3 entries")
+            );
+        });
+    }
+
+    #[test]
+    fn wrong_settings_are_named() {
+        let make = find::<ExplorerEntry>("fisher-ppo").unwrap().make;
+        let message = |text: &str| make(&text.parse().unwrap()).err().unwrap().to_string();
+        assert!(message("environments = 0").contains("explorer.environments"));
+        assert!(message("[ppo]\nclip = 0.0").contains("ppo.clip"));
+        assert!(message("[fisher]\ndelta = -1.0").contains("delta"));
     }
 }

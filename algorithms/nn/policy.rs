@@ -48,6 +48,30 @@ impl Policy {
         }
     }
 
+    /// One layer without normaliser: `y = x W + b`.
+    #[cfg(test)]
+    pub(crate) fn linear(inputs: usize, weight: Vec<f32>, bias: Vec<f32>) -> Self {
+        let log_std = vec![0.0; bias.len()];
+        let layers = vec![Layer { weight, bias }];
+        Self::new(Normaliser::identity(inputs), layers, log_std)
+    }
+
+    /// Reads a policy out of JSON, such as the `network` of an exported explorer.
+    ///
+    /// # Errors
+    /// [`Error::Config`] where it is no sound policy.
+    pub fn from_json(value: &serde_json::Value) -> Result<Self> {
+        let wrong = |message: String| Error::Config {
+            key: "network".to_owned(),
+            message,
+        };
+        let policy = Self::deserialize(value).map_err(|e| wrong(e.to_string()))?;
+        match policy.fault() {
+            None => Ok(policy),
+            Some(fault) => Err(wrong(format!("not a usable policy: {fault}"))),
+        }
+    }
+
     /// Entries of one observation.
     #[must_use]
     pub fn observation_len(&self) -> usize {

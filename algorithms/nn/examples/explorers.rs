@@ -11,10 +11,11 @@
 //! episode tells is computed at the truth and the true start, with the settings that
 //! the reports use, whatever the explorer was paid for. An explorer's settings follow
 //! its name: `fisher-ppo/ppo.total_steps=50000/fisher.objective=a-optimal`; `seed` is
-//! that of its own chance. Ratios are to the first explorer of the line.
+//! that of its own chance. Ratios are to the first explorer of the line. Standard error
+//! gets the return over training and the value of every episode.
 
 // A table on standard output is what this program is for.
-#![allow(clippy::print_stdout)]
+#![allow(clippy::print_stdout, clippy::print_stderr)]
 
 use std::error::Error;
 use std::sync::atomic::AtomicU64;
@@ -22,9 +23,10 @@ use std::time::Instant;
 
 use asid::core::fisher::FisherSettings;
 use asid::core::pipeline::episode_information;
-use asid::core::progress::Silent;
 use asid::core::registry::{BackendEntry, ExplorerEntry, Settings, TaskEntry, find};
-use asid::core::{Model, Parameter, Problem, RealWorld as _, SimulatedWorld, Streams, Task};
+use asid::core::{
+    Model, Parameter, Problem, Progress, RealWorld as _, SimulatedWorld, Streams, Task,
+};
 use rand::Rng as _;
 
 /// Seed of the episodes, whatever the explorers' own.
@@ -68,6 +70,18 @@ fn main() -> Outcome<()> {
     Ok(())
 }
 
+/// Progress as lines on standard error.
+struct Notes;
+
+impl Progress for Notes {
+    fn begin(&self, _stage: &str, _total: u64) {}
+    fn advance(&self, _units: u64) {}
+    fn note(&self, text: &str) {
+        eprintln!("{text}");
+    }
+    fn end(&self) {}
+}
+
 /// What all explorers are measured on.
 struct Bench<'a> {
     task: &'a dyn Task,
@@ -99,7 +113,7 @@ impl Bench<'_> {
             signals: &self.task.exploration().signals,
             threads: 0,
             streams: Streams::new(seed),
-            progress: &Silent,
+            progress: &Notes,
             physics_counter: &self.counter,
             env_counter: &self.counter,
         }
@@ -151,6 +165,10 @@ impl Bench<'_> {
                 &real.actions,
             )?;
             stds.extend(told.expected_std.last().and_then(|s| s.first()));
+            eprintln!(
+                "episode {episode}: start {start:.3?}, truth {truth:.4?}, std {:.5?}",
+                told.expected_std.last()
+            );
             contact += real.contact_fraction / self.episodes as f64;
         }
         Ok(Row {
