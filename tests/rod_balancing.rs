@@ -9,7 +9,7 @@ use asid::core::pipeline::episode_information;
 use asid::core::progress::Silent;
 use asid::core::registry::{BackendEntry, ExplorerEntry, IdentifierEntry, TaskEntry, all, find};
 use asid::core::{
-    Backend, Control, Model, Parameter, Policy, Problem, RealWorld, Rollout, SimulatedWorld, Streams, Task,
+    Backend, Control, Parameter, Policy, Problem, RealWorld, Rollout, SimulatedWorld, Streams,
 };
 
 /// Calls `check` with a problem for each engine.
@@ -46,14 +46,27 @@ fn attempts(problem: &Problem<'_>, cases: &[(f64, f64)]) -> Vec<asid::core::task
     let mut batch = problem.batch(cases.len()).unwrap();
     let offsets: Vec<f64> = cases.iter().map(|c| c.0).collect();
     batch.set_parameters(&sims, &offsets).unwrap();
-    batch.place(problem.task, &sims, &start.repeat(cases.len())).unwrap();
-    let control: Vec<f64> = cases.iter().flat_map(|c| problem.task.attempt(&start, &[c.1]).unwrap()).collect();
+    batch
+        .place(problem.task, &sims, &start.repeat(cases.len()))
+        .unwrap();
+    let control: Vec<f64> = cases
+        .iter()
+        .flat_map(|c| problem.task.attempt(&start, &[c.1]).unwrap())
+        .collect();
     let recording = layout.recording(&protocol.channels).unwrap();
     let mut out = vec![0.0; cases.len() * protocol.frames * recording.width()];
     let substeps = problem.substeps(protocol.frame_period).unwrap();
-    let rollout = Rollout::new(&sims, protocol.frames, substeps, Control::PerSimulation(&control), &recording);
+    let rollout = Rollout::new(
+        &sims,
+        protocol.frames,
+        substeps,
+        Control::PerSimulation(&control),
+        &recording,
+    );
     batch.simulator.rollout(&rollout, &mut out).unwrap();
-    out.chunks_exact(protocol.frames * recording.width()).map(|r| problem.task.outcome(r)).collect()
+    out.chunks_exact(protocol.frames * recording.width())
+        .map(|r| problem.task.outcome(r))
+        .collect()
 }
 
 #[test]
@@ -66,11 +79,20 @@ fn a_rod_laid_down_at_its_centre_of_mass_stays_and_35_mm_off_it_falls() {
             let outcomes = attempts(problem, &cases);
             for (i, outcome) in outcomes.iter().enumerate() {
                 let near = (1..=3).contains(&i);
-                assert_eq!(outcome.success, near, "{engine}, offset {offset}, case {i}: {outcome:?}");
+                assert_eq!(
+                    outcome.success, near,
+                    "{engine}, offset {offset}, case {i}: {outcome:?}"
+                );
                 if near {
-                    assert!(outcome.value < 1.0, "{engine}, offset {offset}: {outcome:?}");
+                    assert!(
+                        outcome.value < 1.0,
+                        "{engine}, offset {offset}: {outcome:?}"
+                    );
                 } else {
-                    assert!(outcome.value > 20.0, "{engine}, offset {offset}: {outcome:?}");
+                    assert!(
+                        outcome.value > 20.0,
+                        "{engine}, offset {offset}: {outcome:?}"
+                    );
                 }
             }
         }
@@ -120,18 +142,36 @@ fn one_push_identifies_the_offset_and_the_interval_holds_it() {
     on_every_engine(3, |engine, problem| {
         let truth = [0.05];
         let streams = Streams::new(3);
-        let mut world = SimulatedWorld::new(problem.task, problem.model, problem.parameters, &truth, problem.signals, streams)
-            .unwrap()
-            .with_exploration_start(vec![0.55, 0.0, 0.2])
-            .unwrap();
+        let mut world = SimulatedWorld::new(
+            problem.task,
+            problem.model,
+            problem.parameters,
+            &truth,
+            problem.signals,
+            streams,
+        )
+        .unwrap()
+        .with_exploration_start(vec![0.55, 0.0, 0.2]);
         let real = world.explore(&mut Push).unwrap();
         let entry = find::<IdentifierEntry>("reps").unwrap();
         let identifier = (entry.make)(&(entry.defaults)()).unwrap();
-        let found = identifier.identify(problem, std::slice::from_ref(&real.episode)).unwrap();
+        let found = identifier
+            .identify(problem, std::slice::from_ref(&real.episode))
+            .unwrap();
         let marginal = &found.posterior.marginals[0];
-        assert!((found.residual - 1.0).abs() < 0.25, "{engine}: residual {}", found.residual);
-        assert!((marginal.estimate - truth[0]).abs() < 4.0 * marginal.std.max(1e-3), "{engine}: {marginal:?}");
-        assert!((marginal.estimate - truth[0]).abs() < 0.02, "{engine}: {marginal:?}");
+        assert!(
+            (found.residual - 1.0).abs() < 0.25,
+            "{engine}: residual {}",
+            found.residual
+        );
+        assert!(
+            (marginal.estimate - truth[0]).abs() < 4.0 * marginal.std.max(1e-3),
+            "{engine}: {marginal:?}"
+        );
+        assert!(
+            (marginal.estimate - truth[0]).abs() < 0.02,
+            "{engine}: {marginal:?}"
+        );
         assert!(marginal.std < 0.02, "{engine}: {marginal:?}");
         // The start pose is found better than the first reading shows it (2 mm).
         let error = (found.starts[0][0] - 0.55).hypot(found.starts[0][1]);
@@ -143,13 +183,19 @@ fn one_push_identifies_the_offset_and_the_interval_holds_it() {
 fn the_likelihood_of_the_truth_is_what_the_noise_makes_it() {
     on_every_engine(5, |engine, problem| {
         let truth = [-0.03];
-        let mut world =
-            SimulatedWorld::new(problem.task, problem.model, problem.parameters, &truth, problem.signals, Streams::new(5))
-                .unwrap()
-                .with_exploration_start(vec![0.55, 0.0, 0.2])
-                .unwrap();
+        let mut world = SimulatedWorld::new(
+            problem.task,
+            problem.model,
+            problem.parameters,
+            &truth,
+            problem.signals,
+            Streams::new(5),
+        )
+        .unwrap()
+        .with_exploration_start(vec![0.55, 0.0, 0.2]);
         let real = world.explore(&mut Push).unwrap();
-        let mut likelihood = Likelihood::new(problem, std::slice::from_ref(&real.episode), 1).unwrap();
+        let mut likelihood =
+            Likelihood::new(problem, std::slice::from_ref(&real.episode), 1).unwrap();
         // The point of the truth: the start pose as an offset from what the first reading shows.
         let n = likelihood.dimension();
         let zero = vec![0.0; n];
@@ -180,14 +226,25 @@ fn the_planner_touches_the_rod_wherever_it_lies() {
         let start = [0.58, -0.15, 1.3];
         let mut explored = explorer.explore(problem, Some(&start)).unwrap();
         let truth = [0.02];
-        let mut world =
-            SimulatedWorld::new(problem.task, problem.model, problem.parameters, &truth, problem.signals, Streams::new(0))
-                .unwrap()
-                .with_exploration_start(start.to_vec())
-                .unwrap();
+        let mut world = SimulatedWorld::new(
+            problem.task,
+            problem.model,
+            problem.parameters,
+            &truth,
+            problem.signals,
+            Streams::new(0),
+        )
+        .unwrap()
+        .with_exploration_start(start.to_vec());
         let real = world.explore(&mut *explored.policy).unwrap();
-        let told =
-            episode_information(problem, &FisherSettings::default(), &truth, &start, &real.actions).unwrap();
+        let told = episode_information(
+            problem,
+            &FisherSettings::default(),
+            &truth,
+            &start,
+            &real.actions,
+        )
+        .unwrap();
         // Without a touch the prior's deviation of 58 mm stays.
         let std = told.expected_std.last().unwrap()[0];
         assert!(std < 0.03, "{engine}: {std}");

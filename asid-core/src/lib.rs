@@ -1,9 +1,19 @@
-//! Traits and data types of ASID.
+//! Traits and data types of ASID. This crate knows no engine and no network.
 //!
-//! This crate knows no engine and no network.
+//! - What is simulated: a [`Scene`] (one MJCF document), compiled by a [`Backend`]
+//!   into a [`Model`], of which batches are made: [`Simulator`]. Everything is a
+//!   whole-batch call on row-major arrays, which is fast, independent of the number of
+//!   threads, and expressible as a C table.
+//! - What is done: a [`Task`] with [`Parameter`]s; an [`Explorer`] makes a [`Policy`],
+//!   a [`RealWorld`] plays it, an [`Identifier`] fits a [`Posterior`] to the
+//!   [`Episode`], a [`TaskSolver`] makes a [`TaskPolicy`]; [`pipeline`] joins them.
+//! - What is computed: [`information`] and [`fisher`] (what an episode tells), [`signal`]
+//!   (how readings are compared), [`replay`] (a log in a simulator).
+//! - How parts are found: [`registry`].
 
 pub mod backend;
 pub mod cartesian;
+pub mod effect;
 pub mod environment;
 pub mod episode;
 pub mod error;
@@ -32,6 +42,7 @@ pub mod target;
 pub mod task;
 
 pub use backend::{Backend, Capabilities, Model};
+pub use effect::{Effect, EffectSpec};
 pub use environment::{BatchEnvironment, Transition};
 pub use episode::Episode;
 pub use error::{Error, Result};

@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use rand_distr::{Distribution, StandardNormal};
 
 use crate::backend::Model;
+use crate::effect::Effects;
 use crate::episode::{ChannelColumns, Episode};
 use crate::error::Result;
 use crate::explore::Policy;
@@ -66,6 +67,7 @@ pub struct SimulatedWorld<'a> {
     truth: Vec<f64>,
     streams: Streams,
     start: Option<Vec<f64>>,
+    effects: Effects,
 }
 
 impl<'a> SimulatedWorld<'a> {
@@ -104,6 +106,7 @@ impl<'a> SimulatedWorld<'a> {
             truth: truth.to_vec(),
             streams,
             start: None,
+            effects: Effects(Vec::new()),
         })
     }
 
@@ -111,6 +114,13 @@ impl<'a> SimulatedWorld<'a> {
     #[must_use]
     pub fn with_exploration_start(mut self, start: Vec<f64>) -> Self {
         self.start = Some(start);
+        self
+    }
+
+    /// The same world with effects that the method's simulator lacks.
+    #[must_use]
+    pub fn with_effects(mut self, effects: Effects) -> Self {
+        self.effects = effects;
         self
     }
 
@@ -201,7 +211,9 @@ impl RealWorld for SimulatedWorld<'_> {
             }
             actions.extend_from_slice(&action);
             commander.commands(&action, &mut ctrl);
-            let rollout = Rollout::new(&[0], frames, substeps, Control::Shared(&ctrl), &recording);
+            let mut rollout =
+                Rollout::new(&[0], frames, substeps, Control::Shared(&ctrl), &recording);
+            rollout.hook = self.effects.hook();
             self.batch.simulator.rollout(&rollout, &mut out)?;
             episode.ctrl.extend_from_slice(&ctrl);
             for frame in out.chunks_exact(all_width) {
@@ -251,13 +263,14 @@ impl RealWorld for SimulatedWorld<'_> {
         let recording = layout.recording(&protocol.channels)?;
         let substeps = substeps(&layout, protocol.frame_period)?;
         let mut readings = vec![0.0; protocol.frames * recording.width()];
-        let rollout = Rollout::new(
+        let mut rollout = Rollout::new(
             &[0],
             protocol.frames,
             substeps,
             Control::Shared(&ctrl),
             &recording,
         );
+        rollout.hook = self.effects.hook();
         self.batch.simulator.rollout(&rollout, &mut readings)?;
         Ok(Attempt {
             outcome: self.task.outcome(&readings),

@@ -5,6 +5,7 @@
 //! sorted by name, so that nothing depends on the order of linking.
 
 use crate::backend::Backend;
+use crate::effect::Effect;
 use crate::error::{Error, Result};
 use crate::explore::Explorer;
 use crate::identify::Identifier;
@@ -31,6 +32,16 @@ pub struct TaskEntry {
     pub make: fn() -> Result<Box<dyn Task>>,
 }
 
+/// An effect that is linked in.
+pub struct EffectEntry {
+    /// Name on the command line.
+    pub name: &'static str,
+    /// One line for `asid list`.
+    pub about: &'static str,
+    /// Makes it.
+    pub make: fn() -> Box<dyn Effect>,
+}
+
 /// Settings of an algorithm, as in a configuration file.
 pub type Settings = toml::Table;
 
@@ -55,6 +66,7 @@ pub type SolverEntry = AlgorithmEntry<dyn TaskSolver>;
 
 inventory::collect!(BackendEntry);
 inventory::collect!(TaskEntry);
+inventory::collect!(EffectEntry);
 inventory::collect!(ExplorerEntry);
 inventory::collect!(IdentifierEntry);
 inventory::collect!(SolverEntry);
@@ -85,6 +97,7 @@ macro_rules! entry {
 
 entry!(BackendEntry, "backend");
 entry!(TaskEntry, "task");
+entry!(EffectEntry, "effect");
 entry!(ExplorerEntry, "explorer");
 entry!(IdentifierEntry, "identifier");
 entry!(SolverEntry, "solver");

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use asid_core::task::Coordinate;
-use asid_core::{Error, Parameter, Task, registry};
+use asid_core::{EffectSpec, Error, Parameter, Task, registry};
 use serde::Serialize;
 
 use super::options::{Algorithms, Common, Real};
@@ -65,6 +65,9 @@ pub struct RealConfig {
     /// Model file; empty for the task's scene.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub model: Option<PathBuf>,
+    /// Effects that the simulator lacks, as `name@site:parameter=value`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub effects: Vec<String>,
     /// True values that were given; the others are drawn from the prior.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub truth: BTreeMap<String, f64>,
@@ -177,7 +180,11 @@ impl Config {
             (None, None) => default_backend(),
         };
         let real_table = section(&table, "real")?;
-        check_keys("real", &real_table, &["backend", "model", "truth"])?;
+        check_keys(
+            "real",
+            &real_table,
+            &["backend", "model", "truth", "effects"],
+        )?;
         let mut truth: BTreeMap<String, f64> =
             numbers("real.truth", &section(&real_table, "truth")?)?;
         for given in &real.truth {
@@ -249,6 +256,7 @@ impl Config {
                     (None, None) => backend.clone(),
                 },
                 model,
+                effects: effects(&real_table, real)?,
                 truth,
             },
             noise: noise(task, &section(&table, "noise")?)?,
@@ -257,6 +265,22 @@ impl Config {
         };
         Ok((config, parameters))
     }
+}
+
+/// Effects of the configuration, then those of the command line, each checked for its form.
+fn effects(table: &toml::Table, real: &Real) -> Result<Vec<String>> {
+    let listed = match table.get("effects") {
+        None => Vec::new(),
+        Some(value) => value
+            .as_array()
+            .and_then(|a| a.iter().map(|v| v.as_str().map(str::to_owned)).collect())
+            .ok_or_else(|| wrong("real.effects", format!("{value} is not a list of texts")))?,
+    };
+    listed
+        .iter()
+        .chain(&real.real_effect)
+        .map(|text| Ok(text.parse::<EffectSpec>()?.to_string()))
+        .collect()
 }
 
 /// The engine that is used where none is named: the first that is built in, MuJoCo last,

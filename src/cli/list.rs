@@ -5,7 +5,7 @@ use std::io::Write as _;
 use anyhow::Result;
 use asid_core::Error;
 use asid_core::registry::{
-    BackendEntry, Entry, ExplorerEntry, IdentifierEntry, SolverEntry, TaskEntry, all,
+    BackendEntry, EffectEntry, Entry, ExplorerEntry, IdentifierEntry, SolverEntry, TaskEntry, all,
 };
 use serde::Serialize;
 
@@ -95,6 +95,7 @@ pub fn list(arguments: &Arguments) -> Result<()> {
     all.extend(rows::<ExplorerEntry>());
     all.extend(rows::<IdentifierEntry>());
     all.extend(rows::<SolverEntry>());
+    all.extend(rows::<EffectEntry>());
     let mut out = std::io::stdout().lock();
     if arguments.json {
         writeln!(out, "{}", serde_json::to_string_pretty(&all)?)?;

@@ -67,4 +67,8 @@ pub struct Real {
     /// Model of the real world, MJCF [default: the task's scene]
     #[arg(long, value_name = "FILE.xml")]
     pub real_model: Option<PathBuf>,
+    /// An effect of the real world that the simulator lacks, such as
+    /// viscous-friction@joint1:damping=2 (repeatable)
+    #[arg(long, value_name = "NAME@SITE:PARAMETER=VALUE")]
+    pub real_effect: Vec<String>,
 }

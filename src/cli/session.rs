@@ -4,6 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use anyhow::Result;
+use asid_core::effect::{EffectSpec, Effects};
 use asid_core::registry::{self, BackendEntry, Entry, TaskEntry};
 use asid_core::signal::Signal;
 use asid_core::{
@@ -139,15 +140,24 @@ impl Session {
                 message: format!("cannot stand for the task's real world: {e}"),
             })?;
         }
+        let effects = real
+            .effects
+            .iter()
+            .map(|text| text.parse::<EffectSpec>()?.attach(model.layout()))
+            .collect::<asid_core::Result<Vec<_>>>()?;
+        if !effects.is_empty() {
+            require(&*backend(&real.backend)?, Capabilities::STEP_HOOKS)?;
+        }
         let streams = Streams::new(self.config.seed).child("real world");
-        Ok(SimulatedWorld::new(
+        let world = SimulatedWorld::new(
             &*self.task,
             &*model,
             &self.parameters,
             truth,
             &self.signals,
             streams,
-        )?)
+        )?;
+        Ok(world.with_effects(Effects(effects)))
     }
 
     /// Checks that a model has what the task's protocols need.

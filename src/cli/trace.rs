@@ -43,7 +43,7 @@ pub fn run_report(
                 .as_ref()
                 .map(|p| p.display().to_string())
                 .unwrap_or_default(),
-            effects: Vec::new(),
+            effects: config.real.effects.clone(),
             noise: session
                 .signals
                 .iter()
