@@ -21,6 +21,9 @@ use crate::workload::{Episodes, Workload};
 /// Episodes of a batch.
 const EPISODES: usize = 64;
 
+/// Both forms of the derivative.
+const FORMS: [Form; 2] = [Form::OneStep, Form::Trajectory];
+
 /// One engine, form and number of threads.
 #[derive(Clone, Debug, Serialize)]
 pub struct FisherRow {
@@ -49,83 +52,79 @@ pub fn rows(
     threads: &[usize],
     rounds: usize,
 ) -> Result<Vec<FisherRow>> {
-    let mut out = Vec::new();
-    for form in [Form::OneStep, Form::Trajectory] {
-        for &threads in threads {
-            let name = backend.name();
-            eprintln!("fisher: {name}, {}, threads {threads}", form.name());
-            out.push(row(backend, task, model, form, threads, rounds)?);
-        }
-    }
-    Ok(out)
-}
-
-fn row(
-    backend: &dyn Backend,
-    task: &dyn Task,
-    model: &dyn Model,
-    form: Form,
-    threads: usize,
-    rounds: usize,
-) -> Result<FisherRow> {
     let parameters = task.parameters();
-    let signals = &task.exploration().signals;
+    let episodes = Episodes::random(task, &parameters, EPISODES, 2);
     let (physics, environment) = (AtomicU64::new(0), AtomicU64::new(0));
-    let problem = Problem {
+    let problem = |threads| Problem {
         task,
         model,
         capabilities: backend.capabilities(),
         parameters: &parameters,
-        signals,
+        signals: &task.exploration().signals,
         threads,
         streams: Streams::new(1),
         progress: &Silent,
         physics_counter: &physics,
         env_counter: &environment,
     };
-    let settings = FisherSettings {
+    let settings = FORMS.map(|form| FisherSettings {
         form,
         nuisance: false,
         ..FisherSettings::default()
-    };
-    let mut batch = FisherBatch::new(&problem, &settings, EPISODES)?;
-    let episodes = Episodes::random(task, &parameters, EPISODES, 2);
-    let (theta, copies) = copies(&parameters, &settings, &episodes.theta);
+    });
+    // Both forms have the same simulations.
+    let (theta, copies) = copies(&parameters, settings[0].delta, &episodes.theta);
     let work = Workload::new(task, model.layout(), &parameters, &episodes, &theta, copies)?;
     let mut loops = bare(backend.name(), task.scene(), &work)?;
-    let mut readings = vec![0.0; EPISODES * batch.width()];
-    let mut reward = vec![0.0; EPISODES];
-    let (mut best, mut engine) = (Cost::ENDLESS, Cost::ENDLESS);
-    for _ in 0..rounds {
-        if threads == 1 {
-            loops.rewind()?;
-            engine = engine.least(timed(|| loops.run(1)).1);
+    let mut out = Vec::new();
+    for &threads in threads {
+        eprintln!("fisher: {}, threads {threads}", backend.name());
+        let problem = problem(threads);
+        let mut engine = Cost::ENDLESS;
+        let mut best = FORMS.map(|_| Cost::ENDLESS);
+        let mut batches = Vec::with_capacity(FORMS.len());
+        for settings in &settings {
+            batches.push(FisherBatch::new(&problem, settings, EPISODES)?);
         }
-        let (done, cost) = timed(|| {
-            batch.begin(&episodes.theta, &episodes.starts, &mut readings)?;
-            for actions in &episodes.actions {
-                batch.step(actions, &mut readings, &mut reward)?;
+        for _ in 0..rounds {
+            if threads == 1 {
+                loops.rewind()?;
+                engine = engine.least(timed(|| loops.run(1)).1);
             }
-            Ok::<_, asid_core::Error>(())
-        });
-        done?;
-        best = best.least(cost);
+            for (batch, best) in batches.iter_mut().zip(&mut best) {
+                let (done, cost) = timed(|| explore(batch, &episodes));
+                done?;
+                *best = best.least(cost);
+            }
+        }
+        out.extend(FORMS.iter().zip(best).map(|(form, best)| FisherRow {
+            engine: backend.name().to_owned(),
+            form: form.name(),
+            episodes: EPISODES,
+            threads,
+            rounds,
+            env_steps_per_s: (EPISODES * episodes.horizon) as f64 / best.wall_s,
+            physics_steps_per_s: work.steps() as f64 / best.wall_s,
+            engine_cpu_share: (threads == 1).then(|| engine.cpu_s / best.cpu_s),
+        }));
     }
-    Ok(FisherRow {
-        engine: backend.name().to_owned(),
-        form: form.name(),
-        episodes: EPISODES,
-        threads,
-        rounds,
-        env_steps_per_s: (EPISODES * episodes.horizon) as f64 / best.wall_s,
-        physics_steps_per_s: work.steps() as f64 / best.wall_s,
-        engine_cpu_share: (threads == 1).then(|| engine.cpu_s / best.cpu_s),
-    })
+    Ok(out)
+}
+
+/// Runs the episodes of a batch from their start to their end.
+fn explore(batch: &mut FisherBatch<'_>, episodes: &Episodes) -> Result<()> {
+    let mut readings = vec![0.0; batch.episodes() * batch.width()];
+    let mut reward = vec![0.0; batch.episodes()];
+    batch.begin(&episodes.theta, &episodes.starts, &mut readings)?;
+    for actions in &episodes.actions {
+        batch.step(actions, &mut readings, &mut reward)?;
+    }
+    Ok(())
 }
 
 /// Unknowns of every simulation of a Fisher batch: each episode, then a copy up
 /// and one down for each unknown. Also the number of simulations an episode.
-fn copies(parameters: &[Parameter], settings: &FisherSettings, theta: &[f64]) -> (Vec<f64>, usize) {
+fn copies(parameters: &[Parameter], delta: f64, theta: &[f64]) -> (Vec<f64>, usize) {
     let d = parameters.len();
     let bound = Parameter::scaled_bound();
     let mut out = Vec::new();
@@ -134,7 +133,7 @@ fn copies(parameters: &[Parameter], settings: &FisherSettings, theta: &[f64]) ->
         for (i, parameter) in parameters.iter().enumerate() {
             for sign in [1.0, -1.0] {
                 let mut copy = own.to_vec();
-                let z = parameter.to_scaled(own[i]) + sign * settings.delta;
+                let z = parameter.to_scaled(own[i]) + sign * delta;
                 copy[i] = parameter.from_scaled(z.clamp(-bound, bound));
                 out.extend(copy);
             }

@@ -76,4 +76,9 @@ impl Bare for Mujoco<'_> {
             }
         });
     }
+
+    #[cfg(test)]
+    fn qpos(&self, i: usize) -> Vec<f64> {
+        self.data[i].qpos().to_vec()
+    }
 }
