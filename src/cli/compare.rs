@@ -1,7 +1,7 @@
 //! `asid compare`: methods head to head, over conditions and seeds.
 
-use std::fmt::Write as _;
 use std::io::Write as _;
+use std::path::PathBuf;
 use std::time::Instant;
 
 use anyhow::Result;
@@ -9,16 +9,17 @@ use asid_core::Error;
 use asid_core::pipeline::{self, Method};
 use asid_core::registry::{ExplorerEntry, IdentifierEntry, SolverEntry, TaskEntry, find};
 use asid_core::task::Condition;
-use serde::Serialize;
 
 use super::config::ASID;
 use super::options::{Algorithms, Common, Real};
 use super::output::{OutFolder, write_json, write_text};
 use super::result::Versions;
 use super::session::Session;
-use statistics::{bootstrap, interquartile_mean, median};
+use table::{CompareResult, Run, RunParameter};
 
+mod page;
 mod statistics;
+mod table;
 
 /// Arguments of `compare`.
 #[derive(clap::Args)]
@@ -34,6 +35,9 @@ pub struct Arguments {
     /// Runs of each method and condition
     #[arg(long, value_name = "N", default_value_t = 10)]
     seeds: u64,
+    /// Puts finished comparisons together instead, such as those of several machines
+    #[arg(long, value_name = "DIR", num_args = 1..)]
+    merge: Vec<PathBuf>,
     #[command(flatten)]
     common: Common,
     #[command(flatten)]
@@ -65,64 +69,11 @@ const METHODS: [MethodEntry; 3] = [
     },
 ];
 
-/// How well one unknown was identified over the runs of a row.
-#[derive(Serialize)]
-struct Identification {
-    name: String,
-    unit: String,
-    median_abs_error: f64,
-    coverage95: f64,
-    median_width95: f64,
-    median_expected_std: f64,
-}
-
-/// One row of the table.
-#[derive(Serialize)]
-struct Row {
-    task: String,
-    condition: String,
-    method: String,
-    backend: String,
-    metric: String,
-    n: usize,
-    mean: f64,
-    std: f64,
-    iqm: f64,
-    interval95: [f64; 2],
-    success_rate: f64,
-    values: Vec<f64>,
-    paper: Option<f64>,
-    identification: Vec<Identification>,
-}
-
-/// One run, for those who want to look closer.
-#[derive(Serialize)]
-struct Run {
-    task: String,
-    condition: String,
-    method: String,
-    seed: u64,
-    truth: Vec<f64>,
-    estimate: Vec<f64>,
-    std: Vec<f64>,
-    interval95: Vec<[f64; 2]>,
-    expected_std: Vec<f64>,
-    residual: f64,
-    contact_fraction: f64,
-    value: f64,
-    success: bool,
-    wall_s: f64,
-}
-
-#[derive(Serialize)]
-struct CompareResult {
-    schema: u32,
-    rows: Vec<Row>,
-    versions: Versions,
-}
-
 /// Runs the comparison and writes its folder.
 pub fn compare(arguments: &Arguments) -> Result<()> {
+    if !arguments.merge.is_empty() {
+        return merge(arguments);
+    }
     let tasks: Vec<String> = if arguments.tasks.is_empty() {
         asid_core::registry::all::<TaskEntry>()
             .iter()
@@ -147,23 +98,21 @@ pub fn compare(arguments: &Arguments) -> Result<()> {
         }
     }
     let out = OutFolder::claim(arguments.common.out.as_deref(), "compare")?;
-    let mut rows = Vec::new();
     let mut runs = Vec::new();
-    let mut versions = None;
-    let mut config = None;
+    let mut made_by = None;
     let total = plan.len() as u64 * methods.len() as u64 * arguments.seeds;
     let clock = Instant::now();
     for (task, condition) in &plan {
         for method in &methods {
-            let mut of_row = Vec::new();
             for k in 0..arguments.seeds {
                 let session = open(arguments, task, condition, method, k)?;
-                let run = one(&session, condition, method)?;
-                of_row.push(run);
-                versions.get_or_insert_with(|| Versions::of(&session));
-                config.get_or_insert_with(|| toml::to_string_pretty(&session.config));
-                let done = (runs.len() + of_row.len()) as u64;
+                runs.push(one(&session, condition, method)?);
+                if made_by.is_none() {
+                    let config = toml::to_string_pretty(&session.config)?;
+                    made_by = Some((serde_json::to_value(Versions::of(&session))?, config));
+                }
                 if !arguments.common.quiet {
+                    let done = runs.len() as u64;
                     let left = clock.elapsed().as_secs_f64() / done as f64 * (total - done) as f64;
                     let _ = write!(
                         std::io::stderr(),
@@ -173,37 +122,96 @@ pub fn compare(arguments: &Arguments) -> Result<()> {
                     );
                 }
             }
-            rows.push(row(arguments, task, condition, method, &of_row)?);
-            runs.extend(of_row);
         }
     }
     if !arguments.common.quiet {
         let _ = writeln!(std::io::stderr());
     }
-    let (Some(versions), Some(config)) = (versions, config) else {
+    let Some((versions, config)) = made_by else {
         return Err(Error::Failed("there is nothing to compare".into()).into());
     };
+    write(arguments, &out, runs, versions, &config)
+}
+
+/// Puts the runs of finished comparisons together.
+fn merge(arguments: &Arguments) -> Result<()> {
+    let out = OutFolder::claim(arguments.common.out.as_deref(), "compare")?;
+    let mut runs: Vec<Run> = Vec::new();
+    let mut made_by = None;
+    for folder in &arguments.merge {
+        let read = |name: &str| {
+            let path = folder.join(name);
+            std::fs::read_to_string(&path).map_err(|e| Error::File {
+                path,
+                message: format!("{e}; is this the folder of a finished comparison?"),
+            })
+        };
+        let wrong = |name: &str, e: serde_json::Error| Error::File {
+            path: folder.join(name),
+            message: e.to_string(),
+        };
+        let more: Vec<Run> =
+            serde_json::from_str(&read("runs.json")?).map_err(|e| wrong("runs.json", e))?;
+        let result: serde_json::Value =
+            serde_json::from_str(&read("result.json")?).map_err(|e| wrong("result.json", e))?;
+        for run in more {
+            if runs.iter().any(|r| r.same_as(&run)) {
+                return Err(Error::File {
+                    path: folder.join("runs.json"),
+                    message: format!(
+                        "{} {} {} on {}, seed {}, is in more than one folder",
+                        run.task, run.condition, run.method, run.backend, run.seed
+                    ),
+                }
+                .into());
+            }
+            runs.push(run);
+        }
+        if made_by.is_none() {
+            made_by = Some((result["versions"].clone(), read("config.toml")?));
+        }
+    }
+    let (versions, config) = made_by.unwrap_or_default();
+    write(arguments, &out, runs, versions, &config)
+}
+
+/// Writes the folder and prints the table.
+fn write(
+    arguments: &Arguments,
+    out: &OutFolder,
+    runs: Vec<Run>,
+    versions: serde_json::Value,
+    config: &str,
+) -> Result<()> {
     let result = CompareResult {
         schema: 1,
-        rows,
+        rows: table::rows(&runs),
         versions,
     };
-    let config = config?;
-    let table = table(&result.rows);
+    let markdown = table::markdown(&result.rows);
+    let command = super::run::command_line();
     out.write(|folder| {
         write_json(&folder.join("result.json"), &result)?;
         write_json(&folder.join("runs.json"), &runs)?;
-        write_text(&folder.join("config.toml"), &config)?;
+        write_text(&folder.join("config.toml"), config)?;
         write_text(
             &folder.join("table.md"),
-            &format!("{table}\n`{}`\n", super::run::command_line()),
+            &format!("{markdown}\n`{command}`\n"),
+        )?;
+        write_text(
+            &folder.join("report.html"),
+            &page::html(&result, &runs, &command),
         )
     })?;
     let mut stdout = std::io::stdout().lock();
     if arguments.common.json {
         writeln!(stdout, "{}", serde_json::to_string_pretty(&result)?)?;
     } else {
-        writeln!(stdout, "{table}\nresults: {}", out.path().display())?;
+        writeln!(
+            stdout,
+            "{markdown}\nreport: {}",
+            out.path().join("report.html").display()
+        )?;
     }
     Ok(())
 }
@@ -264,6 +272,7 @@ fn open(
     Session::open(task, &common, &algorithms, &real)
 }
 
+/// One run of a method under a condition.
 fn one(session: &Session, condition: &Condition, method: &MethodEntry) -> Result<Run> {
     let clock = Instant::now();
     let config = &session.config;
@@ -280,116 +289,33 @@ fn one(session: &Session, condition: &Condition, method: &MethodEntry) -> Result
         solver: &*solver,
     };
     let outcome = pipeline::run(&problem, chosen, &mut world)?;
+    let expected = outcome.information.expected_std.last();
     Ok(Run {
         task: config.task.clone(),
         condition: condition.name.clone(),
         method: method.name.to_owned(),
+        backend: config.backend.clone(),
         seed: config.seed,
-        estimate: outcome.belief.mean(),
-        std: outcome.belief.marginals.iter().map(|m| m.std).collect(),
-        interval95: outcome
+        parameters: outcome
             .belief
             .marginals
             .iter()
-            .map(|m| m.interval95)
+            .enumerate()
+            .map(|(i, m)| RunParameter {
+                name: m.name.clone(),
+                unit: m.unit.clone(),
+                truth: truth[i],
+                estimate: m.estimate,
+                std: m.std,
+                interval95: m.interval95,
+                expected_std: expected.map(|e| e[i]),
+            })
             .collect(),
-        expected_std: outcome
-            .information
-            .expected_std
-            .last()
-            .cloned()
-            .unwrap_or_default(),
-        residual: outcome.identified.as_ref().map_or(f64::NAN, |f| f.residual),
-        contact_fraction: outcome.real.as_ref().map_or(0.0, |r| r.contact_fraction),
+        residual: outcome.identified.as_ref().map(|f| f.residual),
+        contact_fraction: outcome.real.as_ref().map(|r| r.contact_fraction),
+        metric: session.task.downstream().metric.clone(),
         value: outcome.attempt.outcome.value,
         success: outcome.attempt.outcome.success,
         wall_s: clock.elapsed().as_secs_f64(),
-        truth,
     })
-}
-
-fn row(
-    arguments: &Arguments,
-    task: &str,
-    condition: &Condition,
-    method: &MethodEntry,
-    runs: &[Run],
-) -> Result<Row> {
-    let session = open(arguments, task, condition, method, 0)?;
-    let values: Vec<f64> = runs.iter().map(|r| r.value).collect();
-    let n = values.len() as f64;
-    let mean = values.iter().sum::<f64>() / n;
-    let variance = values.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0);
-    let identification = session
-        .parameters
-        .iter()
-        .enumerate()
-        .filter(|_| method.identifies)
-        .map(|(i, p)| Identification {
-            name: p.name.clone(),
-            unit: p.unit.clone(),
-            median_abs_error: median(runs.iter().map(|r| (r.estimate[i] - r.truth[i]).abs())),
-            coverage95: runs
-                .iter()
-                .filter(|r| r.interval95[i][0] <= r.truth[i] && r.truth[i] <= r.interval95[i][1])
-                .count() as f64
-                / n,
-            median_width95: median(runs.iter().map(|r| r.interval95[i][1] - r.interval95[i][0])),
-            median_expected_std: median(runs.iter().filter_map(|r| r.expected_std.get(i).copied())),
-        })
-        .collect();
-    Ok(Row {
-        task: task.to_owned(),
-        condition: condition.name.clone(),
-        method: method.name.to_owned(),
-        backend: session.config.backend.clone(),
-        metric: session.task.downstream().metric.clone(),
-        n: values.len(),
-        mean,
-        std: variance.sqrt(),
-        iqm: interquartile_mean(&values),
-        interval95: bootstrap(&values),
-        success_rate: runs.iter().filter(|r| r.success).count() as f64 / n,
-        values,
-        paper: None,
-        identification,
-    })
-}
-
-/// The table as Markdown.
-fn table(rows: &[Row]) -> String {
-    let mut text = String::from(
-        "| task | condition | method | n | metric | mean (95 %) | success | median error | coverage | width | expected std |\n|---|---|---|---|---|---|---|---|---|---|---|\n",
-    );
-    for r in rows {
-        let _ = write!(
-            text,
-            "| {} | {} | {} | {} | {} | {:.2} ({:.2} to {:.2}) | {:.0} % |",
-            r.task,
-            r.condition,
-            r.method,
-            r.n,
-            r.metric,
-            r.mean,
-            r.interval95[0],
-            r.interval95[1],
-            100.0 * r.success_rate
-        );
-        let list = |f: &dyn Fn(&Identification) -> String| {
-            r.identification
-                .iter()
-                .map(f)
-                .collect::<Vec<_>>()
-                .join(", ")
-        };
-        let _ = writeln!(
-            text,
-            " {} | {} | {} | {} |",
-            list(&|i| format!("{:.4} {}", i.median_abs_error, i.unit)),
-            list(&|i| format!("{:.0} %", 100.0 * i.coverage95)),
-            list(&|i| format!("{:.4} {}", i.median_width95, i.unit)),
-            list(&|i| format!("{:.4} {}", i.median_expected_std, i.unit)),
-        );
-    }
-    text
 }
