@@ -24,7 +24,8 @@ mod physics;
 mod program;
 mod workload;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
 
 use anyhow::{Context, Result};
 use asid_core::registry::{BackendEntry, TaskEntry, all, find};
@@ -148,14 +149,30 @@ impl Results {
     }
 }
 
-fn main() -> Result<()> {
-    let arguments = Arguments::parse();
+fn main() -> ExitCode {
+    match run(&Arguments::parse()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("bench: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// Measures and writes. A folder that cannot be written to is found out before.
+fn run(arguments: &Arguments) -> Result<()> {
     let page = arguments
         .markdown
         .as_deref()
         .map(page::Page::read)
         .transpose()?;
     let out = arguments.out()?;
+    let folder = match out.parent() {
+        Some(folder) if folder != Path::new("") => folder,
+        _ => Path::new("."),
+    };
+    tempfile::tempfile_in(folder)
+        .with_context(|| format!("cannot write into {}", folder.display()))?;
     let engines: Vec<String> = match &arguments.engine {
         Some(name) => vec![find::<BackendEntry>(name)?.name.to_owned()],
         None => all::<BackendEntry>()
@@ -163,7 +180,7 @@ fn main() -> Result<()> {
             .map(|e| e.name.to_owned())
             .collect(),
     };
-    let results = measure(&arguments, &engines)?;
+    let results = measure(arguments, &engines)?;
     let text = results.markdown();
     print!("{text}");
     let json = serde_json::to_string_pretty(&results)? + "\n";
