@@ -10,7 +10,11 @@ use crate::plot::{Axis, Chart, Colour, Layer, Plan, Weighted};
 
 pub(super) fn section(report: &RunReport) -> Option<Section> {
     let predicted = report.predicted();
-    let section = Section::new(if predicted { "The task, as predicted" } else { "The task, zero-shot" });
+    let section = Section::new(if predicted {
+        "The task, as predicted"
+    } else {
+        "The task, zero-shot"
+    });
     let Some(downstream) = &report.downstream else {
         if !report.stage.is_empty() {
             return None;

@@ -13,7 +13,11 @@ pub(super) fn section(report: &RunReport) -> Option<Section> {
     let mut figures = Vec::new();
     match &report.exploration {
         Some(exploration) => {
-            let episode = if report.predicted() { "predicted" } else { "real" };
+            let episode = if report.predicted() {
+                "predicted"
+            } else {
+                "real"
+            };
             section = section.lead(lead(exploration, episode));
             if !exploration.gained.is_empty() {
                 figures.push(gained(exploration));

@@ -10,7 +10,11 @@ pub(super) fn page(report: &RunReport) -> Page {
     } else {
         format!("{}, {}", report.task, report.condition)
     };
-    let stage = if report.stage.is_empty() { "run" } else { &report.stage };
+    let stage = if report.stage.is_empty() {
+        "run"
+    } else {
+        &report.stage
+    };
     let mut page = Page::new(&title)
         .kicker(&format!("ASID {stage}"))
         .lead(answer(report));
@@ -97,7 +101,11 @@ fn answer(report: &RunReport) -> String {
         .collect();
     if let Some(d) = &report.downstream {
         let verdict = if d.success { "success" } else { "no success" };
-        let world = if report.predicted() { "simulator" } else { "real world" };
+        let world = if report.predicted() {
+            "simulator"
+        } else {
+            "real world"
+        };
         parts.push(format!(
             "{} in the {world} is {}: {verdict}",
             metric_name(d),

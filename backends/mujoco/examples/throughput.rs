@@ -11,8 +11,8 @@
 use std::path::Path;
 use std::time::Instant;
 
-use asid_core::{Layout, Target};
 use asid_core::{Backend, BatchConfig, Control, Rollout, Scene};
+use asid_core::{Layout, Target};
 use asid_mujoco::MujocoBackend;
 use mujoco_rs::wrappers::mj_model::MjModel;
 

@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use asid_core::{Layout, Target};
 use asid_core::{BatchConfig, Error, Model, Result, Scene, Simulator};
+use asid_core::{Layout, Target};
 use mujoco_rs::mujoco_c::mjtEnableBit;
 use mujoco_rs::wrappers::mj_editing::{MjSpec, MjsBody};
 use mujoco_rs::wrappers::mj_model::MjModel;

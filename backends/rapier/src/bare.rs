@@ -9,8 +9,8 @@
 
 use std::sync::Arc;
 
-use asid_core::{Layout, Target};
 use asid_core::{Error, Result, Scene};
+use asid_core::{Layout, Target};
 use rapier3d::math::Vector;
 use rapier3d::pipeline::PhysicsPipeline;
 
