@@ -1,26 +1,25 @@
 //! Fisher exploration as a batch of environments, for learners.
 //!
-//! An observation comes of a noisy reading; with the share of the episode that is
+//! An observation comes of a reading with the trackers' noise, as in the real world; with the share of the episode that is
 //! over and the information gathered so far in it (see [`Observer`]), the return of
 //! the telescoping objectives is a function of the observation.
 
 use asid_core::environment::{BatchEnvironment, Transition};
 use asid_core::fisher::{FisherBatch, FisherSettings};
 use asid_core::rng::Rng;
+use asid_core::signal::SignalSet;
 use asid_core::{Problem, Result};
 use rand::Rng as _;
 use rand_distr::{Distribution, StandardNormal};
 
 use super::observation::Observer;
 
-/// Noise of each entry of a reading that a policy sees in training (published ASID code).
-pub const OBSERVATION_NOISE: f64 = 0.01;
-
 /// A batch of Fisher exploration episodes that step together.
 pub struct FisherEnvironment<'a> {
     problem: &'a Problem<'a>,
     batch: FisherBatch<'a>,
     observer: Observer,
+    signals: SignalSet,
     rng: Rng,
     step: usize,
     readings: Vec<f64>,
@@ -41,6 +40,7 @@ impl<'a> FisherEnvironment<'a> {
             readings: vec![0.0; episodes * batch.width()],
             rng: problem.streams.stream("fisher environment"),
             observer: Observer::new(problem)?,
+            signals: SignalSet::new(problem.model.layout(), problem.signals)?,
             batch,
             problem,
             step: 0,
@@ -82,13 +82,12 @@ impl<'a> FisherEnvironment<'a> {
         let width = self.batch.width();
         let share = self.step as f64 / self.problem.task.exploration().horizon as f64;
         let mut noisy = vec![0.0; width];
+        let tracked = self.signals.width();
         let rows = observation.chunks_exact_mut(self.observer.observation_len());
         for (e, row) in rows.enumerate() {
-            let reading = &self.readings[e * width..(e + 1) * width];
-            for (x, r) in noisy.iter_mut().zip(reading) {
-                let noise: f64 = StandardNormal.sample(&mut self.rng);
-                *x = r + OBSERVATION_NOISE * noise;
-            }
+            noisy.copy_from_slice(&self.readings[e * width..(e + 1) * width]);
+            self.signals
+                .add_noise(&mut noisy[..tracked], || StandardNormal.sample(&mut self.rng));
             let std = self.batch.information()[e].expected_std();
             self.observer.observe(&noisy, share, &std, row);
         }

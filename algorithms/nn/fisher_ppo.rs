@@ -40,10 +40,9 @@ impl Default for FisherPpo {
     fn default() -> Self {
         Self {
             environments: 64,
-            // One episode of each environment an update. On rod balancing this learns from
-            // about half the steps that twice the batch needs.
+            // One episode of each environment an update.
             ppo: PpoConfig {
-                total_steps: 100_000,
+                total_steps: 200_000,
                 n_steps: 1280,
                 minibatch: 128,
                 learning_rate: 1e-3,
