@@ -1,5 +1,7 @@
 //! Effects against theory on every engine that is built in, and off at their null value to the bit.
 
+#![allow(clippy::unwrap_used)]
+
 use asid::core::effect::EffectSpec;
 use asid::core::registry::{BackendEntry, EffectEntry, all};
 use asid::core::{BatchConfig, Capabilities, Control, Rollout, Scene};

@@ -1,6 +1,8 @@
 //! The rod task's physics on every engine that is built in: what identification and
 //! the task rely on, without any learning.
 
+#![allow(clippy::unwrap_used)]
+
 use std::sync::atomic::AtomicU64;
 
 use asid::algorithms::identify::Likelihood;

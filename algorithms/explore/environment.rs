@@ -86,8 +86,9 @@ impl<'a> FisherEnvironment<'a> {
         let rows = observation.chunks_exact_mut(self.observer.observation_len());
         for (e, row) in rows.enumerate() {
             noisy.copy_from_slice(&self.readings[e * width..(e + 1) * width]);
-            self.signals
-                .add_noise(&mut noisy[..tracked], || StandardNormal.sample(&mut self.rng));
+            self.signals.add_noise(&mut noisy[..tracked], || {
+                StandardNormal.sample(&mut self.rng)
+            });
             let std = self.batch.information()[e].expected_std();
             self.observer.observe(&noisy, share, &std, row);
         }
