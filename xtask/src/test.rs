@@ -11,6 +11,10 @@ pub fn run() -> Result<bool> {
     let mut stages = Stages::default();
     stages.run("setup", || setup::run(&library::ALL).map(|()| true))?;
     stages_of_lint(&mut stages)?;
-    stages.cargo("tests", &["test", "--workspace", ALL_FEATURES], &[])?;
+    stages.cargo(
+        "tests",
+        &["test", "--workspace", "--no-fail-fast", ALL_FEATURES],
+        &[],
+    )?;
     Ok(stages.finish())
 }
