@@ -1,5 +1,7 @@
 //! Comparisons of methods through the real binary.
 
+#![allow(clippy::unwrap_used)]
+
 #[allow(dead_code)]
 mod cli_support;
 
