@@ -119,6 +119,21 @@ fn readings_before_contact_do_not_tell_the_mass_offset() {
     });
 }
 
+/// The real world of a problem with this truth and start pose.
+fn world<'a>(problem: &Problem<'a>, truth: &[f64], start: Vec<f64>) -> SimulatedWorld<'a> {
+    let Problem {
+        task,
+        model,
+        parameters,
+        signals,
+        streams,
+        ..
+    } = *problem;
+    SimulatedWorld::new(task, model, parameters, truth, signals, streams)
+        .unwrap()
+        .with_exploration_start(start)
+}
+
 /// A plan that pushes one end of a rod that lies across.
 struct Push;
 
@@ -143,17 +158,7 @@ impl Policy for Push {
 fn one_push_identifies_the_offset_and_the_interval_holds_it() {
     on_every_engine(3, |engine, problem| {
         let truth = [0.05];
-        let streams = Streams::new(3);
-        let mut world = SimulatedWorld::new(
-            problem.task,
-            problem.model,
-            problem.parameters,
-            &truth,
-            problem.signals,
-            streams,
-        )
-        .unwrap()
-        .with_exploration_start(vec![0.55, 0.0, 0.2]);
+        let mut world = world(problem, &truth, vec![0.55, 0.0, 0.2]);
         let real = world.explore(&mut Push).unwrap();
         let entry = find::<IdentifierEntry>("reps").unwrap();
         let identifier = (entry.make)(&(entry.defaults)()).unwrap();
@@ -185,16 +190,7 @@ fn one_push_identifies_the_offset_and_the_interval_holds_it() {
 fn the_likelihood_of_the_truth_is_what_the_noise_makes_it() {
     on_every_engine(5, |engine, problem| {
         let truth = [-0.03];
-        let mut world = SimulatedWorld::new(
-            problem.task,
-            problem.model,
-            problem.parameters,
-            &truth,
-            problem.signals,
-            Streams::new(5),
-        )
-        .unwrap()
-        .with_exploration_start(vec![0.55, 0.0, 0.2]);
+        let mut world = world(problem, &truth, vec![0.55, 0.0, 0.2]);
         let real = world.explore(&mut Push).unwrap();
         let mut likelihood =
             Likelihood::new(problem, std::slice::from_ref(&real.episode), 1).unwrap();
@@ -228,16 +224,7 @@ fn the_planner_touches_the_rod_wherever_it_lies() {
         let start = [0.58, -0.15, 1.3];
         let mut explored = explorer.explore(problem, Some(&start)).unwrap();
         let truth = [0.02];
-        let mut world = SimulatedWorld::new(
-            problem.task,
-            problem.model,
-            problem.parameters,
-            &truth,
-            problem.signals,
-            Streams::new(0),
-        )
-        .unwrap()
-        .with_exploration_start(start.to_vec());
+        let mut world = world(problem, &truth, start.to_vec());
         let real = world.explore(&mut *explored.policy).unwrap();
         let told = episode_information(
             problem,

@@ -10,6 +10,7 @@ pub mod emulator;
 pub mod likelihood;
 pub mod reps;
 pub mod sampling;
+pub mod search;
 
 pub use likelihood::Likelihood;
 pub use sampling::{Samples, SamplingSettings};

@@ -5,8 +5,8 @@ use asid_core::registry::{self, IdentifierEntry};
 use asid_core::{Episode, Problem, Result};
 use serde::{Deserialize, Serialize};
 
-use super::Likelihood;
-use super::sampling::{self, Samples, SamplingSettings};
+use super::sampling::SamplingSettings;
+use super::search::{self, Budget};
 use crate::optimise::{Reps, RepsSettings};
 
 /// Settings of identification by REPS.
@@ -44,7 +44,7 @@ inventory::submit! {
         defaults: registry::defaults::<RepsIdentifier>,
         make: |s| {
             let identifier: RepsIdentifier = registry::settings("identifier", s)?;
-            super::cem::check(identifier.iterations, identifier.population)?;
+            identifier.budget().check()?;
             identifier.reps.check("identifier.reps")?;
             identifier.sampling.check()?;
             Ok(Box::new(identifier))
@@ -52,37 +52,24 @@ inventory::submit! {
     }
 }
 
+impl RepsIdentifier {
+    fn budget(&self) -> Budget {
+        Budget {
+            iterations: self.iterations,
+            population: self.population,
+        }
+    }
+}
+
 impl Identifier for RepsIdentifier {
     fn identify(&self, problem: &Problem<'_>, episodes: &[Episode]) -> Result<Identified> {
-        let mut likelihood =
-            Likelihood::new(problem, episodes, self.population.max(self.sampling.draws))?;
-        let (low, high) = likelihood.bounds();
-        let n = likelihood.dimension();
-        let mut reps = Reps::new(self.reps.clone(), &vec![0.0; n], &vec![1.0; n], &low, &high);
-        let mut rng = problem.streams.stream("identify");
-        let mut samples = Samples::default();
-        let mut iterations = Vec::new();
-        problem
-            .progress
-            .begin("identify", (self.iterations + self.sampling.rounds) as u64);
-        for _ in 0..self.iterations {
-            let points = reps.ask(self.population, &mut rng);
-            let residuals = likelihood.residuals(&points)?;
-            let losses = samples.add(&points, residuals);
-            let rewards: Vec<f64> = losses.iter().map(|l| -l).collect();
-            reps.tell(&points, &rewards);
-            iterations.push(sampling::summary(&likelihood, &points, samples.best_loss()));
-            problem.progress.advance(1);
-        }
-        let found = sampling::posterior(
+        let settings = self.reps.clone();
+        search::identify(
             problem,
-            &mut likelihood,
+            episodes,
+            self.budget(),
             &self.sampling,
-            samples,
-            iterations,
-            &mut rng,
-        );
-        problem.progress.end();
-        found
+            |mean, std, low, high| Reps::new(settings, mean, std, low, high),
+        )
     }
 }

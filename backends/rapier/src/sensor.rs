@@ -10,6 +10,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 
 use crate::compiled::{Compiled, Frame};
 use crate::convert;
+use crate::coordinates::Motion;
 use crate::state::State;
 
 /// What is read of a frame.
@@ -148,30 +149,13 @@ impl SensorSlot {
         match self {
             Self::Frame(reading, frame) => {
                 let motion = state.motion(compiled, frame.body);
-                let at = motion.position + motion.rotation * frame.position;
-                let rotation = motion.rotation * frame.rotation;
-                read_frame(
-                    *reading,
-                    &at,
-                    &rotation,
-                    motion.velocity_at(&at),
-                    motion.angular,
-                    out,
-                );
+                read_at(*reading, &motion, &frame.position, &frame.rotation, out);
             }
             Self::Geom(reading, geom) => {
                 let frame = &compiled.geom_frames[*geom];
                 let motion = state.motion(compiled, frame.body);
-                let at = motion.position + motion.rotation * state.structure.geoms[*geom].position;
-                let rotation = motion.rotation * frame.rotation;
-                read_frame(
-                    *reading,
-                    &at,
-                    &rotation,
-                    motion.velocity_at(&at),
-                    motion.angular,
-                    out,
-                );
+                let position = state.structure.geoms[*geom].position;
+                read_at(*reading, &motion, &position, &frame.rotation, out);
             }
             Self::Inertia(reading, body) => {
                 let motion = state.motion(compiled, *body);
@@ -203,6 +187,26 @@ impl SensorSlot {
 
 fn missing(kind: &str, name: &str) -> SensorSlot {
     SensorSlot::Unread(format!("of a {kind} that is not there (`{name}`)"))
+}
+
+/// Reads a frame that is fixed to a moving body: `position` and `rotation` are in the body's frame.
+fn read_at(
+    reading: Reading,
+    motion: &Motion,
+    position: &Vector3<f64>,
+    rotation: &UnitQuaternion<f64>,
+    out: &mut [f64],
+) {
+    let at = motion.position + motion.rotation * position;
+    let rotation = motion.rotation * rotation;
+    read_frame(
+        reading,
+        &at,
+        &rotation,
+        motion.velocity_at(&at),
+        motion.angular,
+        out,
+    );
 }
 
 fn read_frame(
