@@ -15,7 +15,7 @@ bitflags::bitflags! {
     pub struct Capabilities: u64 {
         /// Hinge, slide and ball joints in a tree.
         const ARTICULATION = 1 << 0;
-        /// Free bodies with contact between primitive shapes.
+        /// Contact between primitive shapes.
         const CONTACT = 1 << 1;
         /// Dry friction of joints.
         const JOINT_FRICTION = 1 << 2;
@@ -45,6 +45,12 @@ bitflags::bitflags! {
         const EQUALITY = 1 << 14;
         /// Triangle meshes.
         const MESHES = 1 << 15;
+        /// Free joints.
+        const FREE_BODIES = 1 << 16;
+        /// Ranges of joints.
+        const JOINT_LIMITS = 1 << 17;
+        /// Masses, centres of mass and inertia can be parameters.
+        const MASS_PARAMETERS = 1 << 18;
     }
 }
 
