@@ -53,6 +53,14 @@ pub enum Error {
         /// What is wrong, with row and column where known.
         message: String,
     },
+    /// A plugin that cannot be used.
+    #[error("plugin {}: {message}", .path.display())]
+    Plugin {
+        /// File of the plugin.
+        path: PathBuf,
+        /// What is wrong with it, and what to do.
+        message: String,
+    },
     /// An engine or library that is not there.
     #[error("{what} is not available: {message}")]
     Missing {
