@@ -13,6 +13,7 @@
 
 pub mod backend;
 pub mod cartesian;
+pub mod document;
 pub mod effect;
 pub mod environment;
 pub mod episode;

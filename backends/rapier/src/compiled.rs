@@ -22,7 +22,7 @@ use crate::parameter::Tables;
 use crate::sensor::SensorSlot;
 use crate::state::State;
 use crate::structure::{Inertia, MassModel};
-use crate::{convert, document, names, refusal, settings};
+use crate::{convert, document, refusal, settings};
 
 /// A joint's place in rapier.
 #[derive(Clone, Debug)]
@@ -120,7 +120,7 @@ impl Compiled {
     pub fn new(scene: &Scene) -> Result<Self> {
         let mut model = scene.description()?;
         refusal::check(scene, &model)?;
-        let layout = names::layout(scene, &model)?;
+        let layout = asid_core::document::layout(scene, &model)?;
         let fail = |message: String| Error::Scene {
             scene: scene.name().to_owned(),
             message,
@@ -143,7 +143,10 @@ impl Compiled {
         let nominal = Tables::new(&model, structure.clone());
         let start = match layout.keyframes.first() {
             Some(key) => (key.qpos.clone(), key.qvel.clone()),
-            None => (names::default_qpos(&model, &layout), vec![0.0; layout.nv]),
+            None => (
+                asid_core::document::default_qpos(&model, &layout),
+                vec![0.0; layout.nv],
+            ),
         };
 
         document::check_equalities(&model).map_err(fail)?;

@@ -76,7 +76,6 @@ mod convert;
 mod coordinates;
 mod document;
 mod drive;
-mod names;
 mod pairs;
 mod parameter;
 mod refusal;

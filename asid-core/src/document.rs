@@ -1,9 +1,12 @@
-//! The layout of a scene, as MuJoCo orders it, read from the parsed document.
+//! The layout of a scene, as MuJoCo orders it, read from the parsed document: for
+//! engines that have no compiler of their own.
 
-use asid_core::layout::{Actuator, Joint, JointKind, Keyframe, Layout, Sensor, sensor_len};
-use asid_core::{Error, Result, Scene};
 use mjcf_rs::Model;
 use mjcf_rs::body::JointType;
+
+use crate::error::{Error, Result};
+use crate::layout::{Actuator, Joint, JointKind, Keyframe, Layout, Sensor, sensor_len};
+use crate::scene::Scene;
 
 /// Names and places of a parsed scene.
 ///
@@ -109,6 +112,7 @@ pub fn layout(scene: &Scene, model: &Model) -> Result<Layout> {
 }
 
 /// Kind of a joint of the document.
+#[must_use]
 pub fn joint_kind(kind: JointType) -> JointKind {
     match kind {
         JointType::Free => JointKind::Free,
@@ -120,6 +124,7 @@ pub fn joint_kind(kind: JointType) -> JointKind {
 
 /// MuJoCo's `qpos0`, length `nq`: free bodies where the document has them, balls
 /// unturned, hinges and slides at their `ref`.
+#[must_use]
 pub fn default_qpos(model: &Model, layout: &Layout) -> Vec<f64> {
     let mut qpos = vec![0.0; layout.nq];
     let mut next = layout.joints.iter();
