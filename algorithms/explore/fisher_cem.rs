@@ -8,7 +8,7 @@
 
 use asid_core::explore::{CurvePoint, Explored, Explorer, Policy};
 use asid_core::fisher::{FisherBatch, FisherSettings};
-use asid_core::registry::{self, ExplorerEntry};
+use asid_core::registry;
 use asid_core::rng::Rng;
 use asid_core::{Error, Posterior, Problem, Result};
 use serde::{Deserialize, Serialize};
@@ -55,18 +55,16 @@ impl Default for FisherCem {
     }
 }
 
-inventory::submit! {
-    ExplorerEntry {
-        name: "fisher-cem",
-        about: "Fisher information, open-loop plans by the cross-entropy method",
-        defaults: registry::defaults::<FisherCem>,
-        make: |s| {
-            let explorer: FisherCem = registry::settings("explorer", s)?;
-            explorer.check()?;
-            Ok(Box::new(explorer))
-        },
-    }
-}
+asid_core::register!(ExplorerEntry {
+    name: "fisher-cem",
+    about: "Fisher information, open-loop plans by the cross-entropy method",
+    defaults: registry::defaults::<FisherCem>,
+    make: |s| {
+        let explorer: FisherCem = registry::settings("explorer", s)?;
+        explorer.check()?;
+        Ok(Box::new(explorer))
+    },
+});
 
 impl FisherCem {
     fn check(&self) -> Result<()> {

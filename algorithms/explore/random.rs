@@ -1,7 +1,7 @@
 //! Random actions: the explorer that knows nothing.
 
 use asid_core::explore::{Explored, Explorer, Policy};
-use asid_core::registry::{self, ExplorerEntry};
+use asid_core::registry;
 use asid_core::rng::Rng;
 use asid_core::task::Coordinate;
 use asid_core::{Problem, Result};
@@ -13,14 +13,14 @@ use serde::{Deserialize, Serialize};
 #[serde(default, deny_unknown_fields)]
 pub struct RandomExplorer {}
 
-inventory::submit! {
-    ExplorerEntry {
-        name: "random",
-        about: "independent uniform actions",
-        defaults: registry::defaults::<RandomExplorer>,
-        make: |s| Ok(Box::new(registry::settings::<RandomExplorer>("explorer", s)?)),
-    }
-}
+asid_core::register!(ExplorerEntry {
+    name: "random",
+    about: "independent uniform actions",
+    defaults: registry::defaults::<RandomExplorer>,
+    make: |s| Ok(Box::new(registry::settings::<RandomExplorer>(
+        "explorer", s
+    )?)),
+});
 
 struct RandomPolicy {
     action: Vec<Coordinate>,

@@ -1,7 +1,7 @@
 //! Identification by the cross-entropy method.
 
 use asid_core::identify::{Identified, Identifier};
-use asid_core::registry::{self, IdentifierEntry};
+use asid_core::registry;
 use asid_core::{Episode, Problem, Result};
 use serde::{Deserialize, Serialize};
 
@@ -37,20 +37,18 @@ impl Default for CemIdentifier {
     }
 }
 
-inventory::submit! {
-    IdentifierEntry {
-        name: "cem",
-        about: "cross-entropy method, then the posterior by emulation of the likelihood",
-        defaults: registry::defaults::<CemIdentifier>,
-        make: |s| {
-            let identifier: CemIdentifier = registry::settings("identifier", s)?;
-            identifier.budget().check()?;
-            identifier.cem.check("identifier.cem")?;
-            identifier.sampling.check()?;
-            Ok(Box::new(identifier))
-        },
-    }
-}
+asid_core::register!(IdentifierEntry {
+    name: "cem",
+    about: "cross-entropy method, then the posterior by emulation of the likelihood",
+    defaults: registry::defaults::<CemIdentifier>,
+    make: |s| {
+        let identifier: CemIdentifier = registry::settings("identifier", s)?;
+        identifier.budget().check()?;
+        identifier.cem.check("identifier.cem")?;
+        identifier.sampling.check()?;
+        Ok(Box::new(identifier))
+    },
+});
 
 impl CemIdentifier {
     fn budget(&self) -> Budget {

@@ -1,7 +1,7 @@
 //! Identification by relative entropy policy search over the simulator's parameters.
 
 use asid_core::identify::{Identified, Identifier};
-use asid_core::registry::{self, IdentifierEntry};
+use asid_core::registry;
 use asid_core::{Episode, Problem, Result};
 use serde::{Deserialize, Serialize};
 
@@ -37,20 +37,18 @@ impl Default for RepsIdentifier {
     }
 }
 
-inventory::submit! {
-    IdentifierEntry {
-        name: "reps",
-        about: "relative entropy policy search, then the posterior by emulation of the likelihood",
-        defaults: registry::defaults::<RepsIdentifier>,
-        make: |s| {
-            let identifier: RepsIdentifier = registry::settings("identifier", s)?;
-            identifier.budget().check()?;
-            identifier.reps.check("identifier.reps")?;
-            identifier.sampling.check()?;
-            Ok(Box::new(identifier))
-        },
-    }
-}
+asid_core::register!(IdentifierEntry {
+    name: "reps",
+    about: "relative entropy policy search, then the posterior by emulation of the likelihood",
+    defaults: registry::defaults::<RepsIdentifier>,
+    make: |s| {
+        let identifier: RepsIdentifier = registry::settings("identifier", s)?;
+        identifier.budget().check()?;
+        identifier.reps.check("identifier.reps")?;
+        identifier.sampling.check()?;
+        Ok(Box::new(identifier))
+    },
+});
 
 impl RepsIdentifier {
     fn budget(&self) -> Budget {

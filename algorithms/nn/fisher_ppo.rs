@@ -12,7 +12,7 @@ use asid_algorithms::explore::{FisherEnvironment, Observer};
 use asid_core::explore::{CurvePoint, Explored, Explorer};
 use asid_core::fisher::{FisherBatch, FisherSettings};
 use asid_core::information::Objective;
-use asid_core::registry::{self, ExplorerEntry};
+use asid_core::registry;
 use asid_core::{Error, Problem, Result};
 use rand::Rng as _;
 use serde::{Deserialize, Serialize};
@@ -61,18 +61,16 @@ impl Default for FisherPpo {
     }
 }
 
-inventory::submit! {
-    ExplorerEntry {
-        name: "fisher-ppo",
-        about: "Fisher information, a policy trained by proximal policy optimisation",
-        defaults: registry::defaults::<FisherPpo>,
-        make: |s| {
-            let explorer: FisherPpo = registry::settings("explorer", s)?;
-            explorer.check()?;
-            Ok(Box::new(explorer))
-        },
-    }
-}
+asid_core::register!(ExplorerEntry {
+    name: "fisher-ppo",
+    about: "Fisher information, a policy trained by proximal policy optimisation",
+    defaults: registry::defaults::<FisherPpo>,
+    make: |s| {
+        let explorer: FisherPpo = registry::settings("explorer", s)?;
+        explorer.check()?;
+        Ok(Box::new(explorer))
+    },
+});
 
 impl FisherPpo {
     fn check(&self) -> Result<()> {

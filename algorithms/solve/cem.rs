@@ -2,7 +2,7 @@
 //! samples of the belief. With the prior as the belief this is domain randomisation.
 
 use asid_core::problem::Batch;
-use asid_core::registry::{self, SolverEntry};
+use asid_core::registry;
 use asid_core::rng::Rng;
 use asid_core::signal::SignalSet;
 use asid_core::solve::{Solved, TaskPolicy, TaskSolver, Trial};
@@ -41,30 +41,28 @@ impl Default for CemSolver {
     }
 }
 
-inventory::submit! {
-    SolverEntry {
-        name: "cem",
-        about: "cross-entropy method over the task's action",
-        defaults: registry::defaults::<CemSolver>,
-        make: |s| {
-            let solver: CemSolver = registry::settings("solver", s)?;
-            for (key, value) in [
-                ("iterations", solver.iterations),
-                ("population", solver.population),
-                ("belief_samples", solver.belief_samples),
-            ] {
-                if value == 0 {
-                    return Err(Error::Config {
-                        key: format!("solver.{key}"),
-                        message: "must be at least 1".into(),
-                    });
-                }
+asid_core::register!(SolverEntry {
+    name: "cem",
+    about: "cross-entropy method over the task's action",
+    defaults: registry::defaults::<CemSolver>,
+    make: |s| {
+        let solver: CemSolver = registry::settings("solver", s)?;
+        for (key, value) in [
+            ("iterations", solver.iterations),
+            ("population", solver.population),
+            ("belief_samples", solver.belief_samples),
+        ] {
+            if value == 0 {
+                return Err(Error::Config {
+                    key: format!("solver.{key}"),
+                    message: "must be at least 1".into(),
+                });
             }
-            solver.cem.check("solver.cem")?;
-            Ok(Box::new(solver))
-        },
-    }
-}
+        }
+        solver.cem.check("solver.cem")?;
+        Ok(Box::new(solver))
+    },
+});
 
 struct FixedAction(Vec<f64>);
 

@@ -62,3 +62,6 @@ pub use simulator::{BatchConfig, Control, Rollout, Simulator, Snapshot, Status};
 pub use solve::{TaskPolicy, TaskSolver};
 pub use target::Target;
 pub use task::Task;
+
+#[doc(hidden)]
+pub use inventory as __inventory;

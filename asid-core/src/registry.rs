@@ -1,8 +1,10 @@
-//! Finds backends, tasks, explorers, identifiers and solvers by name.
+//! Finds backends, tasks, explorers, identifiers, solvers and effects by name.
 //!
-//! What is linked in registers itself through [`inventory`]: one
-//! `inventory::submit!` in the author's crate, no list to edit. Lists come out
-//! sorted by name, so that nothing depends on the order of linking.
+//! What is linked in registers itself: one [`register!`](crate::register) in the
+//! author's crate, no list to edit. What is loaded at run time is [`add`]ed. Lists
+//! come out sorted by name, so that nothing depends on the order of linking.
+
+use std::sync::{PoisonError, RwLock};
 
 use crate::backend::Backend;
 use crate::effect::Effect;
@@ -12,77 +14,96 @@ use crate::identify::Identifier;
 use crate::solve::TaskSolver;
 use crate::task::Task;
 
-/// A backend that is linked in.
+mod origin;
+mod register;
+
+pub use origin::{Origin, Package};
+
+/// A backend.
 pub struct BackendEntry {
     /// Name on the command line.
     pub name: &'static str,
     /// One line for `asid list`.
     pub about: &'static str,
     /// Makes it; an error says why it is missing on this machine.
-    pub make: fn() -> Result<Box<dyn Backend>>,
+    pub make: Maker<dyn Backend>,
+    /// Where it comes from.
+    pub origin: Origin,
 }
 
-/// A task that is linked in.
+/// A task.
 pub struct TaskEntry {
     /// Name on the command line.
     pub name: &'static str,
     /// One line for `asid list`.
     pub about: &'static str,
     /// Makes it.
-    pub make: fn() -> Result<Box<dyn Task>>,
+    pub make: Maker<dyn Task>,
+    /// Where it comes from.
+    pub origin: Origin,
 }
 
-/// An effect that is linked in.
+/// An effect.
 pub struct EffectEntry {
     /// Name on the command line.
     pub name: &'static str,
     /// One line for `asid list`.
     pub about: &'static str,
     /// Makes it.
-    pub make: fn() -> Box<dyn Effect>,
+    pub make: &'static (dyn Fn() -> Box<dyn Effect> + Sync),
+    /// Where it comes from.
+    pub origin: Origin,
 }
+
+/// Makes a thing that implements `T`; a closure, for what is loaded at run time.
+pub type Maker<T> = &'static (dyn Fn() -> Result<Box<T>> + Sync);
 
 /// Settings of an algorithm, as in a configuration file.
 pub type Settings = toml::Table;
 
-/// An algorithm that is linked in; `T` is the trait it implements.
+/// An algorithm; `T` is the trait it implements.
 pub struct AlgorithmEntry<T: ?Sized + 'static> {
     /// Name on the command line.
     pub name: &'static str,
     /// One line for `asid list`.
     pub about: &'static str,
     /// All its settings with their defaults.
-    pub defaults: fn() -> Settings,
+    pub defaults: &'static (dyn Fn() -> Settings + Sync),
     /// Makes it; settings that are left out take their defaults.
-    pub make: fn(&Settings) -> Result<Box<T>>,
+    pub make: &'static (dyn Fn(&Settings) -> Result<Box<T>> + Sync),
+    /// Where it comes from.
+    pub origin: Origin,
 }
 
-/// An explorer that is linked in.
+/// An explorer.
 pub type ExplorerEntry = AlgorithmEntry<dyn Explorer>;
-/// An identifier that is linked in.
+/// An identifier.
 pub type IdentifierEntry = AlgorithmEntry<dyn Identifier>;
-/// A solver that is linked in.
+/// A solver.
 pub type SolverEntry = AlgorithmEntry<dyn TaskSolver>;
 
-inventory::collect!(BackendEntry);
-inventory::collect!(TaskEntry);
-inventory::collect!(EffectEntry);
-inventory::collect!(ExplorerEntry);
-inventory::collect!(IdentifierEntry);
-inventory::collect!(SolverEntry);
-
-/// Something with a name that registers itself.
-pub trait Entry: inventory::Collect + 'static {
+/// Something with a name that can be registered.
+pub trait Entry: inventory::Collect + Sync + Sized + 'static {
     /// What kind of thing it is, in error messages.
     const KIND: &'static str;
     /// Name on the command line.
     fn name(&self) -> &'static str;
     /// One line for `asid list`.
     fn about(&self) -> &'static str;
+    /// Where it comes from.
+    fn origin(&self) -> Origin;
+    /// The same under another name.
+    #[must_use]
+    fn renamed(self, name: &'static str) -> Self;
+    /// Entries that were added at run time.
+    #[doc(hidden)]
+    fn added() -> &'static RwLock<Vec<&'static Self>>;
 }
 
 macro_rules! entry {
     ($type:ty, $kind:literal) => {
+        inventory::collect!($type);
+
         impl Entry for $type {
             const KIND: &'static str = $kind;
             fn name(&self) -> &'static str {
@@ -90,6 +111,16 @@ macro_rules! entry {
             }
             fn about(&self) -> &'static str {
                 self.about
+            }
+            fn origin(&self) -> Origin {
+                self.origin
+            }
+            fn renamed(self, name: &'static str) -> Self {
+                Self { name, ..self }
+            }
+            fn added() -> &'static RwLock<Vec<&'static Self>> {
+                static ADDED: RwLock<Vec<&'static $type>> = RwLock::new(Vec::new());
+                &ADDED
             }
         }
     };
@@ -106,8 +137,49 @@ entry!(SolverEntry, "solver");
 #[must_use]
 pub fn all<E: Entry>() -> Vec<&'static E> {
     let mut entries: Vec<&E> = inventory::iter::<E>().collect();
+    let added = E::added().read().unwrap_or_else(PoisonError::into_inner);
+    entries.extend(added.iter().copied());
     entries.sort_by_key(|e| e.name());
     entries
+}
+
+/// Adds an entry for the rest of the process, and returns the name that it got: its own,
+/// or where that is taken `NAME@plugin`, `NAME@plugin2`, …, so that what is linked in
+/// and what is loaded can be used side by side.
+///
+/// # Errors
+/// [`Error::Config`] where the name is not made of letters, digits, `-`, `_` and `.`.
+pub fn add<E: Entry>(entry: E) -> Result<&'static str> {
+    let own = entry.name();
+    let plain = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
+    if own.is_empty() || !own.chars().all(plain) {
+        return Err(Error::Config {
+            key: format!("{} name", E::KIND),
+            message: format!("`{own}` is not made of letters, digits, `-`, `_` and `.`"),
+        });
+    }
+    let mut added = E::added().write().unwrap_or_else(PoisonError::into_inner);
+    let taken = |name: &str| {
+        inventory::iter::<E>().any(|e| e.name() == name) || added.iter().any(|e| e.name() == name)
+    };
+    let name = free_name(own, taken);
+    let name: &'static str = if name == own {
+        own
+    } else {
+        Box::leak(name.into_boxed_str())
+    };
+    added.push(Box::leak(Box::new(entry.renamed(name))));
+    Ok(name)
+}
+
+/// `name`, or its first variant that is not taken.
+fn free_name(name: &str, taken: impl Fn(&str) -> bool) -> String {
+    let variants =
+        std::iter::once(format!("{name}@plugin")).chain((2..).map(|n| format!("{name}@plugin{n}")));
+    std::iter::once(name.to_owned())
+        .chain(variants)
+        .find(|n| !taken(n))
+        .unwrap_or_default()
 }
 
 /// The entry of this name.
@@ -157,4 +229,40 @@ fn check_finite(section: &str, table: &Settings) -> Result<()> {
 #[must_use]
 pub fn defaults<S: Default + serde::Serialize>() -> Settings {
     toml::Table::try_from(S::default()).unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn engine(name: &'static str) -> BackendEntry {
+        BackendEntry {
+            name,
+            about: "",
+            make: &|| Err(Error::Failed("not made".into())),
+            origin: Origin::Loaded(std::path::Path::new("libengine.so")),
+        }
+    }
+
+    #[test]
+    fn a_name_that_is_taken_gets_a_suffix_and_the_list_stays_sorted() {
+        let names: Vec<_> = (0..3)
+            .map(|_| add(engine("test-engine")).unwrap())
+            .collect();
+        assert_eq!(
+            names,
+            ["test-engine", "test-engine@plugin", "test-engine@plugin2"]
+        );
+        add(engine("a-test-engine")).unwrap();
+        let all: Vec<_> = all::<BackendEntry>().iter().map(|e| e.name).collect();
+        assert!(all.is_sorted(), "{all:?}");
+        assert!(find::<BackendEntry>("test-engine@plugin2").is_ok());
+    }
+
+    #[test]
+    fn a_name_that_no_command_line_could_hold_is_refused() {
+        for name in ["", "my engine", "a@b", "a:b", "a\nb"] {
+            assert!(add(engine(name)).is_err(), "{name:?}");
+        }
+    }
 }

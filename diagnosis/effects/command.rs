@@ -1,29 +1,34 @@
 //! Effects on the way from the command to the drive.
 
 use asid_core::effect::{Acts, Effect, EffectParameter};
-use asid_core::registry::EffectEntry;
 use asid_core::simulator::{StepHook, StepView};
 use asid_core::{Layout, Result};
 
-inventory::submit! {
-    EffectEntry {
-        name: "actuator-gain",
-        about: "the command is scaled",
-        make: || Box::new(Affine {
-            parameters: &[EffectParameter { name: "gain", unit: "", range: [0.5, 1.5], null: 1.0 }],
-        }),
-    }
-}
+asid_core::register!(EffectEntry {
+    name: "actuator-gain",
+    about: "the command is scaled",
+    make: || Box::new(Affine {
+        parameters: &[EffectParameter {
+            name: "gain",
+            unit: "",
+            range: [0.5, 1.5],
+            null: 1.0
+        }],
+    }),
+});
 
-inventory::submit! {
-    EffectEntry {
-        name: "actuator-bias",
-        about: "the command is shifted",
-        make: || Box::new(Affine {
-            parameters: &[EffectParameter { name: "bias", unit: "", range: [-0.1, 0.1], null: 0.0 }],
-        }),
-    }
-}
+asid_core::register!(EffectEntry {
+    name: "actuator-bias",
+    about: "the command is shifted",
+    make: || Box::new(Affine {
+        parameters: &[EffectParameter {
+            name: "bias",
+            unit: "",
+            range: [-0.1, 0.1],
+            null: 0.0
+        }],
+    }),
+});
 
 /// `gain * command + bias`, with one of the two as its parameter.
 struct Affine {

@@ -2,17 +2,14 @@
 
 use asid_core::effect::{Acts, Effect, EffectParameter};
 use asid_core::layout::JointKind;
-use asid_core::registry::EffectEntry;
 use asid_core::simulator::{StepHook, StepView};
 use asid_core::{Layout, Result};
 
-inventory::submit! {
-    EffectEntry {
-        name: "viscous-friction",
-        about: "force against the speed of a joint",
-        make: || Box::new(ViscousFriction),
-    }
-}
+asid_core::register!(EffectEntry {
+    name: "viscous-friction",
+    about: "force against the speed of a joint",
+    make: || Box::new(ViscousFriction),
+});
 
 /// Force `-damping * speed` on a hinge or slide.
 ///

@@ -16,7 +16,6 @@ mod pushing;
 
 use asid_core::kinematics::Chain;
 use asid_core::parameter::{Parameter, Scale};
-use asid_core::registry::TaskEntry;
 use asid_core::signal::{Signal, yaw};
 use asid_core::task::{
     Commander, Condition, Coordinate, DownstreamProtocol, ExplorationProtocol, Outcome, Outline,
@@ -46,13 +45,11 @@ pub struct RodBalancing {
     downstream: DownstreamProtocol,
 }
 
-inventory::submit! {
-    TaskEntry {
-        name: "rod-balancing",
-        about: "find a rod's centre of mass by pushing it, then balance it on a ledge",
-        make: || Ok(Box::new(RodBalancing::new()?)),
-    }
-}
+asid_core::register!(TaskEntry {
+    name: "rod-balancing",
+    about: "find a rod's centre of mass by pushing it, then balance it on a ledge",
+    make: || Ok(Box::new(RodBalancing::new()?)),
+});
 
 impl RodBalancing {
     /// The task with its published ranges.

@@ -27,19 +27,16 @@ mod target;
 
 use std::sync::Arc;
 
-use asid_core::registry::BackendEntry;
 use asid_core::{Backend, Capabilities, Error, Model, Result, Scene};
 
 /// Version of MuJoCo that the bindings are made for.
 const VERSION: &str = "3.17.0";
 
-inventory::submit! {
-    BackendEntry {
-        name: "mujoco",
-        about: "MuJoCo 3.17, double precision, the reference engine",
-        make: || MujocoBackend::new().map(|b| Box::new(b) as Box<dyn Backend>),
-    }
-}
+asid_core::register!(BackendEntry {
+    name: "mujoco",
+    about: "MuJoCo 3.17, double precision, the reference engine",
+    make: || MujocoBackend::new().map(|b| Box::new(b) as Box<dyn Backend>),
+});
 
 /// The engine.
 #[derive(Debug)]

@@ -89,7 +89,6 @@ mod world;
 use std::sync::Arc;
 
 use asid_core::backend::{Backend, Capabilities, Model};
-use asid_core::registry::BackendEntry;
 use asid_core::{BatchConfig, Layout, Result, Scene, Simulator, Target};
 
 use crate::batch::Batch;
@@ -140,10 +139,8 @@ impl Model for RapierModel {
     }
 }
 
-inventory::submit! {
-    BackendEntry {
-        name: "rapier",
-        about: "rapier 0.36: pure Rust, single precision, always there",
-        make: || Ok(Box::new(Rapier)),
-    }
-}
+asid_core::register!(BackendEntry {
+    name: "rapier",
+    about: "rapier 0.36: pure Rust, single precision, always there",
+    make: || Ok(Box::new(Rapier)),
+});

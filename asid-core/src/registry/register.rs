@@ -1,0 +1,56 @@
+//! The one statement by which a part registers itself.
+
+/// Registers a part under a name, with the package that the statement stands in.
+///
+/// The entry is one of [`BackendEntry`](crate::registry::BackendEntry),
+/// [`TaskEntry`](crate::registry::TaskEntry),
+/// [`EffectEntry`](crate::registry::EffectEntry), and for algorithms, which have settings,
+/// [`ExplorerEntry`](crate::registry::ExplorerEntry),
+/// [`IdentifierEntry`](crate::registry::IdentifierEntry) and
+/// [`SolverEntry`](crate::registry::SolverEntry).
+///
+/// ```
+/// use asid_core::{Explorer, Problem, Result, explore::Explored, registry};
+///
+/// /// Stands still.
+/// #[derive(Default, serde::Serialize, serde::Deserialize)]
+/// #[serde(default, deny_unknown_fields)]
+/// struct Still {}
+///
+/// asid_core::register!(ExplorerEntry {
+///     name: "still",
+///     about: "stands still",
+///     defaults: registry::defaults::<Still>,
+///     make: |settings| Ok(Box::new(registry::settings::<Still>("explorer", settings)?)),
+/// });
+///
+/// impl Explorer for Still {
+///     fn explore<'a>(&'a self, _: &'a Problem<'a>, _: Option<&[f64]>) -> Result<Explored<'a>> {
+///         Err(asid_core::Error::Failed("there is nothing to explore".into()))
+///     }
+/// }
+///
+/// assert!(registry::find::<registry::ExplorerEntry>("still").is_ok());
+/// ```
+#[macro_export]
+macro_rules! register {
+    ($entry:ident {
+        name: $name:expr,
+        about: $about:expr,
+        $(defaults: $defaults:expr,)?
+        make: $make:expr $(,)?
+    }) => {
+        $crate::__inventory::submit! {
+            $crate::registry::$entry {
+                name: $name,
+                about: $about,
+                $(defaults: &$defaults,)?
+                make: &$make,
+                origin: $crate::registry::Origin::Linked($crate::registry::Package {
+                    name: env!("CARGO_PKG_NAME"),
+                    version: env!("CARGO_PKG_VERSION"),
+                }),
+            }
+        }
+    };
+}
