@@ -474,21 +474,22 @@ typedef struct asid_backend {
                     double *out, asid_error *error);
 
   /* Saves the states of some simulations, without their parameters: `count` rows,
-   * usable in every batch of the same model. Threads: one a batch. */
+   * usable in every batch of the same model. This and the next two may be NULL
+   * where ASID_EXACT_SNAPSHOT is not claimed. Threads: one a batch. */
   asid_code (*save)(asid_batch *batch, const uint64_t *sims, uint64_t count,
                     asid_snapshot **snapshot, asid_error *error);
 
-  /* Restores states: sims[i] takes row rows[i] and runs again. Threads: one a
-   * batch; the snapshot may be read by several batches at once. */
+  /* Restores states: sims[i] takes row rows[i], its status included, and keeps its
+   * parameters. Threads: one a batch; several batches may read a snapshot at once. */
   asid_code (*restore)(asid_batch *batch, const asid_snapshot *snapshot, const uint64_t *rows,
                        const uint64_t *sims, uint64_t count, asid_error *error);
 
   /* Frees a snapshot. Threads: any, when it is not in use. */
   void (*destroy_snapshot)(asid_snapshot *snapshot);
 
-  /* Copies states within a batch: to[i] takes the state of from[i], keeps its
-   * parameters and runs again. No index of `to` is in `from`. May be NULL: the
-   * host then saves and restores. Threads: one a batch. */
+  /* Copies states within a batch: to[i] takes state and status of from[i], and
+   * keeps its parameters. `to` is strictly increasing and shares no index with
+   * `from`. May be NULL: the host then saves and restores. Threads: one a batch. */
   asid_code (*copy_state)(asid_batch *batch, const uint64_t *from, const uint64_t *to,
                           uint64_t count, asid_error *error);
 

@@ -1,7 +1,46 @@
-//! The C ABI of engines.
+//! The C ABI of engines: shared libraries that are loaded at run time.
 //!
-//! An engine plugin is a shared library with one exported function, which gives a
-//! table of functions ([`table`]; the header `include/asid_backend.h` is what its
-//! author sees).
+//! An engine plugin exports one function, which gives a table of functions. Its
+//! author sees the header `include/asid_backend.h` and nothing else; [`table`] is
+//! the same in Rust. From here two roads lead away:
+//!
+//! - **in**: [`library::open`] opens a library, [`engine`](engine()) checks its table, and
+//!   [`Engine::backend`] makes it a backend like the built-in ones. The adapter checks
+//!   all that a caller could get wrong before the engine is called, keeps models
+//!   alive as long as batches and snapshots of them, and words what the engine says.
+//! - **out**: [`export_backend!`] makes a Rust engine such a library; panics and
+//!   handles that are no longer valid end at the table.
+//!
+//! All `unsafe` code of the project that is not an engine's own is in this crate.
 
+mod adapter;
+mod engine;
+pub mod export;
+mod failure;
+mod hook;
+mod layout;
+pub mod library;
+mod simulator;
+mod slices;
 pub mod table;
+mod text;
+pub mod world;
+
+pub use asid_core as core;
+pub use engine::{Engine, engine};
+
+use std::path::Path;
+
+use asid_core::{Error, Result};
+
+/// Opens a library and loads its engine.
+///
+/// # Errors
+/// [`Error::Plugin`] where the file is no library, exports no engine, or exports
+/// one that this host cannot use.
+pub fn open_engine(path: &Path) -> Result<Engine> {
+    engine(library::open(path)?, path)?.ok_or_else(|| Error::Plugin {
+        path: path.to_path_buf(),
+        message: format!("exports no engine (no symbol `{}`)", table::ENTRY),
+    })
+}
