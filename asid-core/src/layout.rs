@@ -315,6 +315,42 @@ pub struct Recording {
 }
 
 impl Recording {
+    /// A recording of channels given by index.
+    ///
+    /// # Errors
+    /// [`Error::Shape`] where one lies outside the layout.
+    pub fn of(layout: &Layout, channels: &[Channel]) -> Result<Self> {
+        let mut offsets = vec![0];
+        let mut width = 0;
+        for channel in channels {
+            let within = |start: usize, len: usize, all: usize| {
+                start.checked_add(len).is_some_and(|end| end <= all)
+            };
+            let (fits, len) = match *channel {
+                Channel::Sensor { index } => (
+                    index < layout.sensors.len(),
+                    layout.sensors.get(index).map_or(0, |s| s.len),
+                ),
+                Channel::Position { start, len } => (within(start, len, layout.nq), len),
+                Channel::Velocity { start, len } => (within(start, len, layout.nv), len),
+                Channel::ContactForce { bodies } => {
+                    (bodies.iter().all(|&b| b < layout.bodies.len()), 1)
+                }
+            };
+            if !fits {
+                return Err(Error::Shape(format!(
+                    "channel {channel:?} lies outside the scene"
+                )));
+            }
+            width += len;
+            offsets.push(width);
+        }
+        Ok(Self {
+            channels: channels.to_vec(),
+            offsets,
+        })
+    }
+
     /// The channels in order.
     #[must_use]
     pub fn channels(&self) -> &[Channel] {

@@ -70,6 +70,12 @@ impl Scene {
         })
     }
 
+    /// The same scene with another folder for relative asset paths.
+    #[must_use]
+    pub fn in_directory(self, directory: Option<PathBuf>) -> Self {
+        Self { directory, ..self }
+    }
+
     /// Path or name it was read by.
     #[must_use]
     pub fn name(&self) -> &str {
