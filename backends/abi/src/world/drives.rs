@@ -98,7 +98,8 @@ pub fn sensors(
                 .find_map(|kind| Some((*kind, node.attribute(*kind)?)));
             own.or_else(|| Some((node.attribute("objtype")?, node.attribute("objname")?)))
         });
-        let named = named.or_else(|| Some((sensor.objtype.as_deref()?, sensor.objname.as_deref()?)));
+        let named =
+            named.or_else(|| Some((sensor.objtype.as_deref()?, sensor.objname.as_deref()?)));
         let (kind, name) = named.unwrap_or_default();
         let place_of = |name: &str| match kind {
             "site" => sites(model)
@@ -107,7 +108,10 @@ pub fn sensors(
             "xbody" => object(layout, "body", name),
             _ => object(layout, kind, name),
         };
-        let known = matches!(kind, "joint" | "body" | "xbody" | "geom" | "site" | "actuator");
+        let known = matches!(
+            kind,
+            "joint" | "body" | "xbody" | "geom" | "site" | "actuator"
+        );
         let index = match place_of(name) {
             None if known => {
                 return Err(format!(

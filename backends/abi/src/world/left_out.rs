@@ -90,7 +90,7 @@ fn known(tag: &str) -> Option<&'static [&'static str]> {
             "saveinertial",
         ],
         "option" => &["timestep", "gravity"],
-        "worldbody" | "frame" | "default" | "camera" | "light" => &[],
+        "worldbody" | "frame" | "default" => &[],
         "body" => &["sleep"],
         "inertial" => &["mass", "diaginertia", "fullinertia"],
         "freejoint" => &[],
@@ -233,16 +233,19 @@ fn visit(node: Node<'_, '_>, section: &str, found: &mut Vec<String>) {
         (_, "joint" | "freejoint" | "inertial") if parent == Some("frame") => {
             found.push(format!("frame/{tag}"));
         }
-        ("default", _) if known(tag).is_none() => {
-            // A class for something else matters where that is used, and is said there.
+        ("default", "general" | "intvelocity" | "damper") => {
+            let known = known("motor").unwrap_or_default();
+            attributes(node, &format!("default/{tag}"), known, found);
         }
+        // A class for something else matters where that is used, and is said there.
+        ("default", _) if known(tag).is_none() => return,
+        (_, "camera" | "light") => return,
         (_, _) => match known(tag) {
             Some(known) if section != "contact" && section != "equality" && section != "tendon" => {
                 let default = if section == "default" { "default/" } else { "" };
                 attributes(node, &format!("{default}{tag}"), known, found);
             }
-            _ if tag == section && node.children().any(|n| n.is_element()) => {}
-            _ if tag == section => found.push(tag.to_owned()),
+            _ if tag == section => {}
             _ => {
                 found.push(format!("{}/{tag}", parent.unwrap_or(section)));
                 return;

@@ -114,7 +114,11 @@ fn shape(geom: &Geom, model: &Model) -> Result<(), String> {
         return Err(format!("has a mass or density of {mass}"));
     }
     if let Some(mesh) = &geom.mesh
-        && !model.assets.meshes.iter().any(|m| m.name.as_ref() == Some(mesh))
+        && !model
+            .assets
+            .meshes
+            .iter()
+            .any(|m| m.name.as_ref() == Some(mesh))
     {
         return Err(format!("names mesh `{mesh}`, which is not there"));
     }
