@@ -92,9 +92,6 @@ pub trait Entry: inventory::Collect + Sync + Sized + 'static {
     fn about(&self) -> &'static str;
     /// Where it comes from.
     fn origin(&self) -> Origin;
-    /// The same under another name.
-    #[must_use]
-    fn renamed(self, name: &'static str) -> Self;
     /// Entries that were added at run time.
     #[doc(hidden)]
     fn added() -> &'static RwLock<Vec<&'static Self>>;
@@ -114,9 +111,6 @@ macro_rules! entry {
             }
             fn origin(&self) -> Origin {
                 self.origin
-            }
-            fn renamed(self, name: &'static str) -> Self {
-                Self { name, ..self }
             }
             fn added() -> &'static RwLock<Vec<&'static Self>> {
                 static ADDED: RwLock<Vec<&'static $type>> = RwLock::new(Vec::new());
@@ -143,14 +137,14 @@ pub fn all<E: Entry>() -> Vec<&'static E> {
     entries
 }
 
-/// Adds an entry for the rest of the process, and returns the name that it got: its own,
-/// or where that is taken `NAME@plugin`, `NAME@plugin2`, …, so that what is linked in
-/// and what is loaded can be used side by side.
+/// Adds an entry for the rest of the process, and returns the name that it got.
+///
+/// That is `own`, or where that is taken `OWN@plugin`, `OWN@plugin2`, …, so that what is
+/// linked in and what is loaded can be used side by side. `build` is given the name.
 ///
 /// # Errors
-/// [`Error::Config`] where the name is not made of letters, digits, `-`, `_` and `.`.
-pub fn add<E: Entry>(entry: E) -> Result<&'static str> {
-    let own = entry.name();
+/// [`Error::Config`] where `own` is not made of letters, digits, `-`, `_` and `.`.
+pub fn add<E: Entry>(own: &str, build: impl FnOnce(&'static str) -> E) -> Result<&'static str> {
     let plain = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
     if own.is_empty() || !own.chars().all(plain) {
         return Err(Error::Config {
@@ -162,13 +156,8 @@ pub fn add<E: Entry>(entry: E) -> Result<&'static str> {
     let taken = |name: &str| {
         inventory::iter::<E>().any(|e| e.name() == name) || added.iter().any(|e| e.name() == name)
     };
-    let name = free_name(own, taken);
-    let name: &'static str = if name == own {
-        own
-    } else {
-        Box::leak(name.into_boxed_str())
-    };
-    added.push(Box::leak(Box::new(entry.renamed(name))));
+    let name: &'static str = Box::leak(free_name(own, taken).into_boxed_str());
+    added.push(Box::leak(Box::new(build(name))));
     Ok(name)
 }
 
@@ -235,25 +224,23 @@ pub fn defaults<S: Default + serde::Serialize>() -> Settings {
 mod tests {
     use super::*;
 
-    fn engine(name: &'static str) -> BackendEntry {
-        BackendEntry {
+    fn add_engine(name: &str) -> Result<&'static str> {
+        add(name, |name| BackendEntry {
             name,
             about: "",
             make: &|| Err(Error::Failed("not made".into())),
             origin: Origin::Loaded(std::path::Path::new("libengine.so")),
-        }
+        })
     }
 
     #[test]
     fn a_name_that_is_taken_gets_a_suffix_and_the_list_stays_sorted() {
-        let names: Vec<_> = (0..3)
-            .map(|_| add(engine("test-engine")).unwrap())
-            .collect();
+        let names: Vec<_> = (0..3).map(|_| add_engine("test-engine").unwrap()).collect();
         assert_eq!(
             names,
             ["test-engine", "test-engine@plugin", "test-engine@plugin2"]
         );
-        add(engine("a-test-engine")).unwrap();
+        add_engine("a-test-engine").unwrap();
         let all: Vec<_> = all::<BackendEntry>().iter().map(|e| e.name).collect();
         assert!(all.is_sorted(), "{all:?}");
         assert!(find::<BackendEntry>("test-engine@plugin2").is_ok());
@@ -262,7 +249,7 @@ mod tests {
     #[test]
     fn a_name_that_no_command_line_could_hold_is_refused() {
         for name in ["", "my engine", "a@b", "a:b", "a\nb"] {
-            assert!(add(engine(name)).is_err(), "{name:?}");
+            assert!(add_engine(name).is_err(), "{name:?}");
         }
     }
 }
