@@ -9,7 +9,7 @@
 //!   [`Episode`], a [`TaskSolver`] makes a [`TaskPolicy`]; [`pipeline`] joins them.
 //! - What is computed: [`information`] and [`fisher`] (what an episode tells), [`signal`]
 //!   (how readings are compared), [`replay`] (a log in a simulator).
-//! - How parts are found: [`registry`].
+//! - How parts are found: [`registry`], and [`plugin`] for those loaded at run time.
 
 pub mod backend;
 pub mod cartesian;
@@ -27,6 +27,7 @@ pub mod layout;
 pub mod mass;
 pub mod parameter;
 pub mod pipeline;
+pub mod plugin;
 pub mod posterior;
 pub mod problem;
 pub mod progress;
@@ -41,6 +42,10 @@ pub mod simulator;
 pub mod solve;
 pub mod target;
 pub mod task;
+
+// What public items speak of, so that an author need not match versions.
+pub use mjcf_rs;
+pub use nalgebra;
 
 pub use backend::{Backend, Capabilities, Model};
 pub use effect::{Effect, EffectSpec};

@@ -1,0 +1,168 @@
+//! Explorers, identifiers, solvers, effects, and what they make.
+
+use crate::effect::{Acts, Effect, EffectParameter};
+use crate::episode::Episode;
+use crate::error::Result;
+use crate::explore::{CurvePoint, Explored, Explorer, Policy};
+use crate::identify::{Identified, Identifier};
+use crate::layout::Layout;
+use crate::posterior::Posterior;
+use crate::problem::Problem;
+use crate::simulator::StepHook;
+use crate::solve::{Solved, TaskPolicy, TaskSolver};
+
+use super::super::border::Border;
+use super::Across;
+use crate::backend::Model;
+use crate::progress::Progress;
+use crate::task::Task;
+
+/// What a problem refers to, wrapped for the side that is handed it.
+struct Handed<'a> {
+    task: Across<&'a dyn Task>,
+    model: Across<&'a dyn Model>,
+    progress: Across<&'a dyn Progress>,
+}
+
+impl<'a> Handed<'a> {
+    fn new(problem: &Problem<'a>, border: Border) -> Self {
+        Self {
+            task: Across::new(problem.task, border),
+            model: Across::new(problem.model, border),
+            progress: Across::new(problem.progress, border),
+        }
+    }
+
+    fn problem<'b>(&'b self, problem: &'b Problem<'a>) -> Problem<'b> {
+        Problem {
+            task: &self.task,
+            model: &self.model,
+            progress: &self.progress,
+            capabilities: problem.capabilities,
+            parameters: problem.parameters,
+            signals: problem.signals,
+            threads: problem.threads,
+            streams: problem.streams,
+            physics_counter: problem.physics_counter,
+            env_counter: problem.env_counter,
+        }
+    }
+
+    /// The problem for an object that keeps it. The few words that it takes are never
+    /// freed: they must outlive what the other side makes of them.
+    fn kept(problem: &'a Problem<'a>, border: Border) -> &'a Problem<'a> {
+        let handed: &'a Self = Box::leak(Box::new(Self::new(problem, border)));
+        Box::leak(Box::new(handed.problem(problem)))
+    }
+}
+
+impl Explorer for Across<Box<dyn Explorer>> {
+    fn explore<'a>(
+        &'a self,
+        problem: &'a Problem<'a>,
+        start: Option<&[f64]>,
+    ) -> Result<Explored<'a>> {
+        let problem = Handed::kept(problem, self.border.back());
+        let explored = self.border.try_run(|| self.inner.explore(problem, start))?;
+        Ok(Explored {
+            policy: Box::new(Across::new(explored.policy, self.border)),
+            ..explored
+        })
+    }
+}
+
+impl Policy for Across<Box<dyn Policy + '_>> {
+    fn reset(&mut self) {
+        self.run_mut(|policy| policy.reset());
+    }
+
+    fn act(&mut self, step: usize, reading: &[f64], action: &mut [f64]) -> Result<()> {
+        self.try_run_mut(|policy| policy.act(step, reading, action))?;
+        self.border
+            .finite(reading, action, "an action of the policy")
+    }
+
+    fn take_curve(&mut self) -> Vec<CurvePoint> {
+        self.run_mut(|policy| policy.take_curve())
+    }
+
+    fn export(&self) -> serde_json::Value {
+        self.run(|policy| policy.export())
+    }
+}
+
+impl Identifier for Across<Box<dyn Identifier>> {
+    fn identify(&self, problem: &Problem<'_>, episodes: &[Episode]) -> Result<Identified> {
+        let handed = Handed::new(problem, self.border.back());
+        let problem = handed.problem(problem);
+        let found = self.try_run(|identifier| identifier.identify(&problem, episodes))?;
+        let marginals = &found.posterior.marginals;
+        let values: Vec<f64> = marginals
+            .iter()
+            .flat_map(|m| [m.estimate, m.std, m.interval95[0], m.interval95[1]])
+            .collect();
+        self.border.finite(&[], &values, "the posterior")?;
+        Ok(found)
+    }
+}
+
+impl TaskSolver for Across<Box<dyn TaskSolver>> {
+    fn solve<'a>(&'a self, problem: &'a Problem<'a>, belief: &Posterior) -> Result<Solved<'a>> {
+        let problem = Handed::kept(problem, self.border.back());
+        let solved = self.border.try_run(|| self.inner.solve(problem, belief))?;
+        Ok(Solved {
+            policy: Box::new(Across::new(solved.policy, self.border)),
+            ..solved
+        })
+    }
+}
+
+impl TaskPolicy for Across<Box<dyn TaskPolicy + '_>> {
+    fn act(&mut self, start: &[f64], action: &mut [f64]) -> Result<()> {
+        self.try_run_mut(|policy| policy.act(start, action))?;
+        self.border
+            .finite(start, action, "an action of the task policy")
+    }
+}
+
+impl Effect for Across<Box<dyn Effect>> {
+    fn acts(&self) -> Acts {
+        self.run(|effect| effect.acts())
+    }
+
+    fn parameters(&self) -> &'static [EffectParameter] {
+        self.run(|effect| effect.parameters())
+    }
+
+    fn sites(&self, layout: &Layout) -> Vec<String> {
+        self.run(|effect| effect.sites(layout))
+    }
+
+    fn attach(
+        &self,
+        layout: &Layout,
+        site: &str,
+        values: &[f64],
+    ) -> Result<Box<dyn StepHook + Send>> {
+        let hook = self.try_run(|effect| effect.attach(layout, site, values))?;
+        Ok(Box::new(Across::new(hook, self.border)))
+    }
+}
+
+impl Progress for Across<&dyn Progress> {
+    fn begin(&self, stage: &str, total: u64) {
+        self.run(|progress| progress.begin(stage, total));
+    }
+
+    fn advance(&self, units: u64) {
+        self.run(|progress| progress.advance(units));
+    }
+
+    fn note(&self, text: &str) {
+        self.run(|progress| progress.note(text));
+    }
+
+    fn end(&self) {
+        self.run(|progress| progress.end());
+    }
+}

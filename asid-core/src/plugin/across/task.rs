@@ -1,0 +1,118 @@
+//! Tasks and what they make.
+
+use std::ops::Deref;
+
+use super::Across;
+use crate::backend::Capabilities;
+use crate::error::Result;
+use crate::layout::Layout;
+use crate::parameter::Parameter;
+use crate::scene::Scene;
+use crate::task::{
+    Commander, Condition, DownstreamProtocol, ExplorationProtocol, Outcome, Outline, Task, TopView,
+};
+
+impl<T> Task for Across<T>
+where
+    T: Deref + Send + Sync,
+    T::Target: Task,
+{
+    fn name(&self) -> &str {
+        self.name.unwrap_or_else(|| self.run(|task| task.name()))
+    }
+
+    fn about(&self) -> &str {
+        self.run(|task| task.about())
+    }
+
+    fn scene(&self) -> &Scene {
+        self.run(|task| task.scene())
+    }
+
+    fn requires(&self) -> Capabilities {
+        self.run(|task| task.requires())
+    }
+
+    fn parameters(&self) -> Vec<Parameter> {
+        self.run(|task| task.parameters())
+    }
+
+    fn optional_parameters(&self) -> Vec<Parameter> {
+        self.run(|task| task.optional_parameters())
+    }
+
+    fn conditions(&self) -> Vec<Condition> {
+        self.run(|task| task.conditions())
+    }
+
+    fn exploration(&self) -> &ExplorationProtocol {
+        self.run(|task| task.exploration())
+    }
+
+    fn downstream(&self) -> &DownstreamProtocol {
+        self.run(|task| task.downstream())
+    }
+
+    fn place(&self, layout: &Layout, start: &[f64], qpos: &mut [f64]) -> Result<()> {
+        self.try_run(|task| task.place(layout, start, qpos))?;
+        self.border
+            .finite(start, qpos, "a position of the task's start")
+    }
+
+    fn locate(&self, signals: &[f64]) -> Vec<f64> {
+        let start = self.run(|task| task.locate(signals));
+        self.border
+            .check_finite(signals, &start, "the task's reading of the start");
+        start
+    }
+
+    fn commander(&self) -> Result<Box<dyn Commander>> {
+        let commander = self.try_run(|task| task.commander())?;
+        Ok(Box::new(Across::new(commander, self.border)))
+    }
+
+    fn attempt(&self, start: &[f64], action: &[f64]) -> Result<Vec<f64>> {
+        let commands = self.try_run(|task| task.attempt(start, action))?;
+        let given = [start, action].concat();
+        self.border
+            .finite(&given, &commands, "a command of the task's attempt")?;
+        Ok(commands)
+    }
+
+    fn metric(&self, readings: &[f64]) -> Vec<f64> {
+        let values = self.run(|task| task.metric(readings));
+        self.border
+            .check_finite(readings, &values, "the task's metric");
+        values
+    }
+
+    fn outcome(&self, readings: &[f64]) -> Outcome {
+        let outcome = self.run(|task| task.outcome(readings));
+        self.border.check_finite(
+            readings,
+            &[outcome.value, outcome.cost],
+            "the task's outcome, metric and cost,",
+        );
+        outcome
+    }
+
+    fn top_view(&self) -> TopView {
+        self.run(|task| task.top_view())
+    }
+
+    fn side_view(&self, readings: &[f64]) -> Vec<Outline> {
+        self.run(|task| task.side_view(readings))
+    }
+}
+
+impl Commander for Across<Box<dyn Commander>> {
+    fn reset(&mut self) {
+        self.run_mut(|commander| commander.reset());
+    }
+
+    fn commands(&mut self, action: &[f64], ctrl: &mut [f64]) {
+        self.run_mut(|commander| commander.commands(action, ctrl));
+        self.border
+            .check_finite(action, ctrl, "a command of the task's exploration");
+    }
+}
