@@ -144,9 +144,7 @@ impl LoadedModel {
                 size: size_of::<table::Scene>() as u64,
                 name: name.as_ptr(),
                 xml: xml.as_ptr(),
-                directory: directory
-                    .as_ref()
-                    .map_or(std::ptr::null(), |d| d.as_ptr()),
+                directory: directory.as_ref().map_or(std::ptr::null(), |d| d.as_ptr()),
                 world: Some(world),
             },
             scene,

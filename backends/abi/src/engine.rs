@@ -185,7 +185,10 @@ fn missing_function(t: &table::Backend) -> Option<&'static str> {
         ("read", t.read.is_some()),
         ("save", !snapshots || t.save.is_some()),
         ("restore", !snapshots || t.restore.is_some()),
-        ("destroy_snapshot", !snapshots || t.destroy_snapshot.is_some()),
+        (
+            "destroy_snapshot",
+            !snapshots || t.destroy_snapshot.is_some(),
+        ),
         ("status", t.status.is_some()),
         ("diverged_count", t.diverged_count.is_some()),
         ("steps_taken", t.steps_taken.is_some()),

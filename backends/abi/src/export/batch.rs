@@ -50,8 +50,12 @@ pub unsafe extern "C" fn set_parameters(
         let held = Held::new(batch)?;
         let n = numbers(count, held.entry().columns)?;
         // SAFETY: the host passes `count` indices and that many rows.
-        let (sims, values) =
-            unsafe { (indices(sims, count)?, slices::read(values, n, "parameters")?) };
+        let (sims, values) = unsafe {
+            (
+                indices(sims, count)?,
+                slices::read(values, n, "parameters")?,
+            )
+        };
         held.run(|s| s.set_parameters(sims, values))
     };
     // SAFETY: the host's error structure.
@@ -179,16 +183,10 @@ pub unsafe extern "C" fn rollout(
             let rows = numbers(r.count, frames)?;
             let nu = layout.nu();
             let control = match r.shared_control {
-                0 => Control::PerSimulation(slices::read(
-                    r.control,
-                    numbers(rows, nu)?,
-                    "control",
-                )?),
-                _ => Control::Shared(slices::read(
-                    r.control,
-                    numbers(r.frames, nu)?,
-                    "control",
-                )?),
+                0 => {
+                    Control::PerSimulation(slices::read(r.control, numbers(rows, nu)?, "control")?)
+                }
+                _ => Control::Shared(slices::read(r.control, numbers(r.frames, nu)?, "control")?),
             };
             let forces = slices::read(r.forces, r.force_count, "the forces")?
                 .iter()
@@ -348,7 +346,10 @@ pub unsafe extern "C" fn status(
             .unwrap_or_default();
         for (i, place) in out.iter_mut().enumerate() {
             write_status(
-                first.checked_add(i).and_then(|n| known.get(n)).unwrap_or(&lost),
+                first
+                    .checked_add(i)
+                    .and_then(|n| known.get(n))
+                    .unwrap_or(&lost),
                 place,
             );
         }
@@ -371,9 +372,8 @@ fn write_status(status: &Status, place: &mut table::Status) {
 
 /// `diverged_count`.
 pub unsafe extern "C" fn diverged_count(batch: *const table::Batch) -> u64 {
-    let count = |held: Held| {
-        held.run(|s| Ok(s.status().iter().filter(|s| !s.is_running()).count() as u64))
-    };
+    let count =
+        |held: Held| held.run(|s| Ok(s.status().iter().filter(|s| !s.is_running()).count() as u64));
     Held::new(batch).and_then(count).unwrap_or(1)
 }
 

@@ -113,12 +113,16 @@ impl Held {
                     return Err(Error::Failed("another thread uses this batch".into()));
                 }
                 Err(TryLockError::Poisoned(_)) => {
-                    return Err(Error::Failed("the batch panicked in an earlier call".into()));
+                    return Err(Error::Failed(
+                        "the batch panicked in an earlier call".into(),
+                    ));
                 }
             };
         match guard.as_mut() {
             Some(simulator) => body(&mut **simulator),
-            None => Err(Error::Failed("the batch panicked in an earlier call".into())),
+            None => Err(Error::Failed(
+                "the batch panicked in an earlier call".into(),
+            )),
         }
     }
 }

@@ -1,0 +1,254 @@
+//! A loaded scene: what the engine keeps of a document.
+
+use std::sync::Arc;
+
+use asid_core::layout::JointKind;
+use asid_core::mass::{GeomMass, MassProperties};
+use asid_core::mjcf_rs::body::InertiaSpec;
+use asid_core::nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
+use asid_core::{
+    BatchConfig, Error, Layout, Model, Result, Scene, Simulator, Target, document, mjcf_rs,
+};
+
+use crate::flight::Body;
+use crate::simulator::FlightSimulator;
+
+/// What all batches of a scene share.
+pub struct Compiled {
+    /// Names and places.
+    pub layout: Layout,
+    /// Bodies on free joints, in the order of their joints.
+    pub bodies: Vec<Body>,
+    /// Index of each in [`Layout::bodies`].
+    pub places: Vec<usize>,
+    /// Frame that each sensor looks at.
+    pub frames: Vec<Frame>,
+    /// Gravity, m/s².
+    pub gravity: Vector3<f64>,
+    /// Positions of a reset.
+    pub start: Vec<f64>,
+}
+
+/// A frame on a flying body.
+#[derive(Clone, Copy, Debug)]
+pub struct Frame {
+    /// Which of [`Compiled::bodies`].
+    pub body: usize,
+    /// Its origin in the body's frame, m.
+    pub position: Vector3<f64>,
+    /// `body_from_frame`.
+    pub rotation: UnitQuaternion<f64>,
+}
+
+/// What a parameter changes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Column {
+    /// A component of gravity.
+    Gravity(usize),
+    /// Mass of one of [`Compiled::bodies`]; its inertia goes with it.
+    Mass(usize),
+}
+
+/// A loaded scene.
+pub struct FlightModel {
+    compiled: Arc<Compiled>,
+}
+
+impl FlightModel {
+    /// Loads a scene.
+    ///
+    /// # Errors
+    /// [`Error::Scene`] for everything that this engine would have to ignore:
+    /// other joints than free ones, shapes that could meet, drives, equalities.
+    pub fn load(scene: &Scene) -> Result<Self> {
+        let refuse = |message: String| Error::Scene {
+            scene: scene.name().to_owned(),
+            message,
+        };
+        let document = scene.description()?;
+        let layout = document::layout(scene, &document)?;
+        if let Some(joint) = layout.joints.iter().find(|j| j.kind != JointKind::Free) {
+            return Err(refuse(format!(
+                "joint `{}` is not free; this engine flies free bodies only",
+                joint.name
+            )));
+        }
+        for (what, n) in [
+            ("drives", document.actuators.len()),
+            ("equalities", document.equality.len()),
+            ("tendons", document.tendons.len()),
+        ] {
+            if n > 0 {
+                return Err(refuse(format!("this engine has no {what}")));
+            }
+        }
+        let meets = |g: &mjcf_rs::body::Geom| g.contype != 0 || g.conaffinity != 0;
+        let with_geoms = document.bodies.iter();
+        if with_geoms
+            .filter(|b| b.body.geoms.iter().any(meets))
+            .count()
+            > 1
+        {
+            return Err(refuse(
+                "this engine has no contact; give geoms contype=\"0\" conaffinity=\"0\"".into(),
+            ));
+        }
+        let mut bodies = Vec::new();
+        let mut places = Vec::new();
+        for (i, entry) in document.bodies.iter().enumerate().skip(1) {
+            if entry.body.joints.is_empty() {
+                continue;
+            }
+            let mass = mass_of(&entry.body);
+            let inverse = mass.inertia.try_inverse().filter(|_| mass.mass > 0.0);
+            bodies.push(Body {
+                mass: mass.mass,
+                center: mass.center,
+                inertia: mass.inertia,
+                inverse: inverse.ok_or_else(|| {
+                    refuse(format!("body `{}` flies without a mass", layout.bodies[i]))
+                })?,
+            });
+            places.push(i);
+        }
+        let frames = frames(&document, &layout, &places, &bodies).map_err(refuse)?;
+        let [x, y, z] = document.option.gravity;
+        let start = match layout.keyframes.first() {
+            Some(key) => key.qpos.clone(),
+            None => document::default_qpos(&document, &layout),
+        };
+        Ok(Self {
+            compiled: Arc::new(Compiled {
+                gravity: Vector3::new(x, y, z),
+                bodies,
+                places,
+                frames,
+                start,
+                layout,
+            }),
+        })
+    }
+}
+
+/// Mass properties: as the document states them, or of the geoms.
+fn mass_of(body: &mjcf_rs::body::Body) -> MassProperties {
+    let Some(inertial) = &body.inertial else {
+        let geoms: Vec<GeomMass> = body.geoms.iter().filter_map(GeomMass::of).collect();
+        return MassProperties::of_geoms(&geoms);
+    };
+    let (center, rotation) = pose(&inertial.pose);
+    let own = match inertial.inertia {
+        InertiaSpec::Diagonal(d) => Matrix3::from_diagonal(&Vector3::from(d)),
+        InertiaSpec::Full([xx, yy, zz, xy, xz, yz]) => {
+            Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz)
+        }
+    };
+    let turn = rotation.to_rotation_matrix().into_inner();
+    MassProperties {
+        mass: inertial.mass,
+        center,
+        inertia: turn * own * turn.transpose(),
+    }
+}
+
+fn pose(pose: &mjcf_rs::Pose) -> (Vector3<f64>, UnitQuaternion<f64>) {
+    let (p, q) = (pose.translation, pose.rotation);
+    (
+        Vector3::new(p.x, p.y, p.z),
+        UnitQuaternion::from_quaternion(Quaternion::new(q.w, q.x, q.y, q.z)),
+    )
+}
+
+/// The frame of every sensor; an error names the first sensor that is not one of a frame.
+fn frames(
+    document: &mjcf_rs::Model,
+    layout: &Layout,
+    places: &[usize],
+    bodies: &[Body],
+) -> std::result::Result<Vec<Frame>, String> {
+    const KINDS: [&str; 4] = ["framepos", "framequat", "framelinvel", "frameangvel"];
+    let mut frames = Vec::new();
+    for (sensor, place) in document.sensors.iter().zip(&layout.sensors) {
+        let name = sensor.objname.as_deref().unwrap_or_default();
+        let refuse = |why: &str| format!("sensor `{}` ({}): {why}", place.name, place.kind);
+        if !KINDS.contains(&sensor.kind.as_str()) || sensor.refname.is_some() {
+            return Err(refuse("this engine has only frame sensors, in the world"));
+        }
+        let flying = |body: usize| {
+            let found = places.iter().position(|&p| p == body);
+            found.ok_or_else(|| refuse("its body does not fly"))
+        };
+        let by_name = |body: &String| body == name;
+        frames.push(match sensor.objtype.as_deref() {
+            Some(kind @ ("body" | "xbody")) => {
+                let at = layout.bodies.iter().position(by_name);
+                let body = flying(at.ok_or_else(|| refuse("there is no such body"))?)?;
+                let own = Vector3::zeros();
+                Frame {
+                    body,
+                    position: if kind == "body" {
+                        bodies[body].center
+                    } else {
+                        own
+                    },
+                    rotation: UnitQuaternion::identity(),
+                }
+            }
+            Some("site") => {
+                let found = document.site_by_name(name);
+                let (at, site) = found.ok_or_else(|| refuse("there is no such site"))?;
+                let (position, rotation) = pose(&document.bodies[at].body.sites[site].pose);
+                Frame {
+                    body: flying(at)?,
+                    position,
+                    rotation,
+                }
+            }
+            _ => return Err(refuse("this engine looks at bodies and sites")),
+        });
+    }
+    Ok(frames)
+}
+
+impl Compiled {
+    /// What a target changes, and its value in the scene.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for a target that this engine does not know.
+    pub fn resolve(&self, target: &Target) -> Result<(Column, f64)> {
+        let parts = (
+            target.element.as_str(),
+            target.attribute.as_str(),
+            target.index,
+        );
+        let flying = || {
+            let at = self.layout.body(&target.name).ok()?;
+            self.places.iter().position(|&p| p == at)
+        };
+        match (parts, flying()) {
+            (("option", "gravity", i @ 0..3), _) => Ok((Column::Gravity(i), self.gravity[i])),
+            (("body", "mass", 0), Some(body)) => Ok((Column::Mass(body), self.bodies[body].mass)),
+            _ => Err(Error::Parameter {
+                parameter: target.to_string(),
+                message: "this engine changes option/gravity/{0,1,2} and body/NAME/mass".into(),
+            }),
+        }
+    }
+}
+
+impl Model for FlightModel {
+    fn layout(&self) -> &Layout {
+        &self.compiled.layout
+    }
+
+    fn nominal(&self, target: &Target) -> Result<f64> {
+        Ok(self.compiled.resolve(target)?.1)
+    }
+
+    fn simulator(&self, config: &BatchConfig) -> Result<Box<dyn Simulator>> {
+        Ok(Box::new(FlightSimulator::new(
+            self.compiled.clone(),
+            config,
+        )?))
+    }
+}
