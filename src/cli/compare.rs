@@ -39,7 +39,7 @@ pub struct Arguments {
     #[arg(long, value_name = "DIR", num_args = 1..)]
     merge: Vec<PathBuf>,
     #[command(flatten)]
-    common: Common,
+    pub common: Common,
     #[command(flatten)]
     algorithms: Algorithms,
 }

@@ -2,7 +2,7 @@
 //! `--set`, then the options, resolved into one record that repeats the run.
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use asid_core::task::Coordinate;
@@ -10,6 +10,7 @@ use asid_core::{EffectSpec, Error, Parameter, Task, registry};
 use serde::Serialize;
 
 use super::options::{Algorithms, Common, Real};
+use super::plugins::{file_of, used};
 use component::{Component, component};
 use table::{check_keys, numbers, read_table, section, set, text, wrong};
 use unknowns::{ParameterConfig, noise, unknowns};
@@ -85,6 +86,9 @@ pub struct Config {
     pub backend: String,
     /// Seed.
     pub seed: u64,
+    /// Files of the plugins that it needs.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub plugins: Vec<PathBuf>,
     /// Start pose of the object by coordinate, for a stage that is told it.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub start: BTreeMap<String, f64>,
@@ -106,12 +110,13 @@ pub struct Config {
 }
 
 /// Keys at the top of a configuration.
-const KEYS: [&str; 12] = [
+const KEYS: [&str; 13] = [
     "schema",
     "command",
     "task",
     "backend",
     "seed",
+    "plugins",
     "start",
     "explorer",
     "identifier",
@@ -156,6 +161,9 @@ impl Config {
             table.remove("start");
         }
         for assignment in &common.set {
+            if assignment.trim_start().starts_with("plugins") {
+                return Err(wrong("plugins", "is given by --plugin FILE, not by --set"));
+            }
             set(&mut table, assignment)?;
         }
         for key in table.keys() {
@@ -216,7 +224,7 @@ impl Config {
             (None, path) => path.map(PathBuf::from),
         };
         let (start, assumed) = start(stage, task, &section(&table, "start")?)?;
-        let config = Self {
+        let mut config = Self {
             command: stage,
             task: task.name().to_owned(),
             seed: match (common.seed, table.get("seed")) {
@@ -229,6 +237,7 @@ impl Config {
                         wrong("seed", format!("{value} is not a whole number from 0 up"))
                     })?,
             },
+            plugins: Vec::new(),
             start,
             assumed,
             explorer: component::<dyn asid_core::Explorer>(
@@ -263,7 +272,38 @@ impl Config {
             backend,
             parameter,
         };
+        config.plugins = config.used_plugins();
         Ok((config, parameters))
+    }
+
+    /// Files of plugins that were named, or that the settings name parts of.
+    fn used_plugins(&self) -> Vec<PathBuf> {
+        use registry::{
+            BackendEntry, EffectEntry, ExplorerEntry, IdentifierEntry, SolverEntry, TaskEntry,
+        };
+        let mut files = vec![
+            file_of::<TaskEntry>(&self.task),
+            file_of::<BackendEntry>(&self.backend),
+            file_of::<BackendEntry>(&self.real.backend),
+            file_of::<ExplorerEntry>(&self.explorer.name),
+            file_of::<IdentifierEntry>(&self.identifier.name),
+            file_of::<SolverEntry>(&self.solver.name),
+        ];
+        let effects = self.real.effects.iter();
+        let specs = effects.filter_map(|text| text.parse::<EffectSpec>().ok());
+        files.extend(specs.map(|spec| file_of::<EffectEntry>(&spec.name)));
+        used(&files)
+    }
+}
+
+/// Plugins that a configuration file names.
+pub fn plugins(path: &Path) -> Result<Vec<PathBuf>> {
+    match read_table(path)?.get("plugins") {
+        None => Ok(Vec::new()),
+        Some(value) => value
+            .as_array()
+            .and_then(|a| a.iter().map(|v| v.as_str().map(PathBuf::from)).collect())
+            .ok_or_else(|| wrong("plugins", format!("{value} is not a list of files"))),
     }
 }
 

@@ -4,6 +4,9 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
+use asid_loader::search;
+
+use super::plugins::Refused;
 
 /// Arguments of `doctor`.
 #[derive(clap::Args)]
@@ -38,7 +41,7 @@ const LIBRARIES: [Library; 2] = [
 ];
 
 /// Prints what was looked for and found.
-pub fn doctor(_arguments: &Arguments) -> Result<()> {
+pub fn doctor(_arguments: &Arguments, refused: &[Refused]) -> Result<()> {
     let mut out = std::io::stdout().lock();
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     writeln!(
@@ -91,6 +94,26 @@ pub fn doctor(_arguments: &Arguments) -> Result<()> {
                 library.variable
             )?,
         }
+    }
+    for place in search::places() {
+        let (path, from) = (place.path.display(), place.from);
+        let files = search::files(&place).map_or(0, |files| files.len());
+        match place.path.exists() {
+            true => writeln!(out, "ok       plugins of {path} ({from}): {files} found")?,
+            false => writeln!(out, "absent   plugins of {path} ({from}): no such folder")?,
+        }
+    }
+    for plugin in asid_loader::loaded() {
+        let names: Vec<String> = plugin
+            .parts
+            .iter()
+            .map(|p| format!("{} `{}`", p.kind, p.name))
+            .collect();
+        let file = plugin.file.display();
+        writeln!(out, "ok       plugin {file}: {}", names.join(", "))?;
+    }
+    for plugin in refused {
+        writeln!(out, "refused  {}", plugin.why)?;
     }
     Ok(())
 }

@@ -38,7 +38,7 @@ pub struct Arguments {
     #[arg(long, value_name = "NAME")]
     explorer: Option<String>,
     #[command(flatten)]
-    common: Common,
+    pub common: Common,
 }
 
 /// `result.json` of `explore`.

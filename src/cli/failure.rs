@@ -69,7 +69,7 @@ pub fn warn(text: &str) {
     tell(&format!("warning: {}", one_line(text)));
 }
 
-/// Runs `work`; a panic in it, which is a defect of this program, ends as one line.
+/// Runs `work`; a panic in it, which is a defect of this program or of a plugin, ends as one line.
 ///
 /// Engines catch panics of their own and report them as a simulation's status, so
 /// nothing is written until one gets here. `RUST_BACKTRACE` brings the usual text back.
@@ -86,7 +86,13 @@ pub fn guard(work: impl FnOnce() -> ExitCode) -> ExitCode {
             }
         }));
     }
-    std::panic::catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|_| {
+    std::panic::catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|payload| {
+        if let Some(text) = payload.downcast_ref::<String>()
+            && asid_core::plugin::blames_a_plugin(text)
+        {
+            tell(&one_line(text));
+            return ExitCode::from(FAILED);
+        }
         let said = PANIC
             .lock()
             .ok()

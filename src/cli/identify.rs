@@ -45,7 +45,7 @@ pub struct Arguments {
     #[arg(long, value_name = "NAME")]
     identifier: Option<String>,
     #[command(flatten)]
-    common: Common,
+    pub common: Common,
 }
 
 /// `result.json` of `identify`.

@@ -5,9 +5,12 @@ use std::io::Write as _;
 use anyhow::Result;
 use asid_core::Error;
 use asid_core::registry::{
-    BackendEntry, EffectEntry, Entry, ExplorerEntry, IdentifierEntry, SolverEntry, TaskEntry, all,
+    BackendEntry, EffectEntry, Entry, ExplorerEntry, IdentifierEntry, Origin, SolverEntry,
+    TaskEntry, all,
 };
 use serde::Serialize;
+
+use super::plugins::Refused;
 
 /// Arguments of `list`.
 #[derive(clap::Args)]
@@ -22,6 +25,16 @@ const OPTIONAL: [(&str, &str, &str); 3] = [
     ("backend", "mujoco", "mujoco"),
     ("backend", "rapier", "rapier"),
     ("explorer", "fisher-ppo", "torch"),
+];
+
+/// Packages whose parts count as built in.
+const OWN: [&str; 6] = [
+    "asid-algorithms",
+    "asid-diagnosis",
+    "asid-mujoco",
+    "asid-nn",
+    "asid-rapier",
+    "asid-tasks",
 ];
 
 /// Says how to get something that this build lacks.
@@ -50,8 +63,26 @@ struct Row {
     name: String,
     about: String,
     available: bool,
+    /// `built in`, the package that is linked in, or the plugin's file.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    origin: Option<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
     why: Option<String>,
+}
+
+fn origin(origin: Origin) -> String {
+    match origin {
+        Origin::Linked(package) if OWN.contains(&package.name) => "built in".into(),
+        other => other.to_string(),
+    }
+}
+
+/// One line on an entry; where its own name was taken it says so.
+fn about<E: Entry>(entry: &E) -> String {
+    match entry.name().split_once("@plugin") {
+        Some((own, _)) => format!("{} (its name `{own}` is taken)", entry.about()),
+        None => entry.about().to_owned(),
+    }
 }
 
 fn rows<E: Entry>() -> Vec<Row> {
@@ -60,8 +91,9 @@ fn rows<E: Entry>() -> Vec<Row> {
         .map(|e| Row {
             kind: E::KIND,
             name: e.name().to_owned(),
-            about: e.about().to_owned(),
+            about: about(*e),
             available: true,
+            origin: Some(origin(e.origin())),
             why: None,
         })
         .collect();
@@ -72,6 +104,7 @@ fn rows<E: Entry>() -> Vec<Row> {
                 name: name.to_owned(),
                 about: String::new(),
                 available: false,
+                origin: None,
                 why: Some(reason(feature)),
             });
         }
@@ -81,7 +114,7 @@ fn rows<E: Entry>() -> Vec<Row> {
 }
 
 /// Prints the list.
-pub fn list(arguments: &Arguments) -> Result<()> {
+pub fn list(arguments: &Arguments, refused: &[Refused]) -> Result<()> {
     let mut all: Vec<Row> = rows::<BackendEntry>();
     for row in &mut all {
         if let Ok(entry) = asid_core::registry::find::<BackendEntry>(&row.name) {
@@ -96,14 +129,27 @@ pub fn list(arguments: &Arguments) -> Result<()> {
     all.extend(rows::<IdentifierEntry>());
     all.extend(rows::<SolverEntry>());
     all.extend(rows::<EffectEntry>());
+    all.extend(refused.iter().map(|r| Row {
+        kind: "plugin",
+        name: r.path.display().to_string(),
+        about: String::new(),
+        available: false,
+        origin: None,
+        why: Some(format!("refused: {}", r.why)),
+    }));
     let mut out = std::io::stdout().lock();
     if arguments.json {
         writeln!(out, "{}", serde_json::to_string_pretty(&all)?)?;
         return Ok(());
     }
     for row in all {
-        let text = row.why.map_or(row.about, |why| format!("missing: {why}"));
-        writeln!(out, "{:<11} {:<14} {text}", row.kind, row.name)?;
+        let text = match (row.why, row.origin) {
+            (Some(why), _) if row.kind == "plugin" => why,
+            (Some(why), Some(origin)) => format!("missing: {why} [{origin}]"),
+            (Some(why), None) => format!("missing: {why}"),
+            (None, origin) => format!("{} [{}]", row.about, origin.unwrap_or_default()),
+        };
+        writeln!(out, "{:<11} {:<16} {text}", row.kind, row.name)?;
     }
     Ok(())
 }

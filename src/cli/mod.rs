@@ -10,6 +10,7 @@ mod identify;
 mod list;
 mod options;
 mod output;
+mod plugins;
 mod progress;
 mod report;
 mod result;
@@ -19,14 +20,19 @@ mod solve;
 mod stage;
 mod trace;
 
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+use anyhow::Result;
 use clap::{Parser, Subcommand};
 
 /// Active exploration for system identification: explore, identify, solve.
 #[derive(Parser)]
 #[command(name = "asid", version, about, arg_required_else_help = true)]
 struct Cli {
+    /// A plugin to load: a shared library (repeatable); see `asid list` for what it brings
+    #[arg(long, global = true, value_name = "FILE")]
+    plugin: Vec<PathBuf>,
     #[command(subcommand)]
     command: Command,
 }
@@ -53,6 +59,21 @@ enum Command {
     Report(report::Arguments),
 }
 
+impl Command {
+    /// The configuration that it is given.
+    fn config(&self) -> Option<&Path> {
+        let common = match self {
+            Self::Run(a) => &a.common,
+            Self::Explore(a) => &a.common,
+            Self::Identify(a) => &a.common,
+            Self::Solve(a) => &a.common,
+            Self::Compare(a) => &a.common,
+            Self::List(_) | Self::Doctor(_) | Self::Export(_) | Self::Report(_) => return None,
+        };
+        common.config.as_deref()
+    }
+}
+
 /// Runs the command line of this process.
 #[must_use]
 pub fn main() -> ExitCode {
@@ -64,19 +85,29 @@ fn dispatch() -> ExitCode {
         Ok(cli) => cli,
         Err(error) => return failure::usage(&error),
     };
-    let done = match cli.command {
-        Command::List(arguments) => list::list(&arguments),
-        Command::Doctor(arguments) => doctor::doctor(&arguments),
-        Command::Run(arguments) => run::run(&arguments),
-        Command::Explore(arguments) => explore::explore(&arguments),
-        Command::Identify(arguments) => identify::identify(&arguments),
-        Command::Solve(arguments) => solve::solve(&arguments),
-        Command::Compare(arguments) => compare::compare(&arguments),
-        Command::Export(arguments) => export::export(&arguments),
-        Command::Report(arguments) => report::report(&arguments),
-    };
-    match done {
+    match run_command(&cli) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => failure::report(&error),
+    }
+}
+
+fn run_command(cli: &Cli) -> Result<()> {
+    let mut named = cli.plugin.clone();
+    named.extend(plugins::of_config(cli.command.config())?);
+    let refused = plugins::load(&named)?;
+    match &cli.command {
+        Command::List(_) | Command::Doctor(_) => {}
+        _ => refused.iter().for_each(|r| failure::warn(&r.why)),
+    }
+    match &cli.command {
+        Command::List(arguments) => list::list(arguments, &refused),
+        Command::Doctor(arguments) => doctor::doctor(arguments, &refused),
+        Command::Run(arguments) => run::run(arguments),
+        Command::Explore(arguments) => explore::explore(arguments),
+        Command::Identify(arguments) => identify::identify(arguments),
+        Command::Solve(arguments) => solve::solve(arguments),
+        Command::Compare(arguments) => compare::compare(arguments),
+        Command::Export(arguments) => export::export(arguments),
+        Command::Report(arguments) => report::report(arguments),
     }
 }

@@ -19,7 +19,7 @@ pub struct Arguments {
     /// The task: see `asid list`
     task: String,
     #[command(flatten)]
-    common: Common,
+    pub common: Common,
     #[command(flatten)]
     algorithms: Algorithms,
     #[command(flatten)]

@@ -45,7 +45,7 @@ pub struct Arguments {
     #[arg(long, value_name = "NAME")]
     solver: Option<String>,
     #[command(flatten)]
-    common: Common,
+    pub common: Common,
 }
 
 /// What the chosen action does in the simulator, over the belief.

@@ -1,0 +1,103 @@
+//! A magnetic catch: a magnet that draws a joint to one place, as that of a cupboard's door
+//! or a laptop's lid.
+//!
+//! It is a well of potential energy `U(q) = -depth exp(-(q - place)^2 / (2 width^2))`, so
+//! the force on the joint is
+//!
+//! `F(q) = -depth (q - place) / width^2 exp(-(q - place)^2 / (2 width^2))`,
+//!
+//! largest at one width from the place, where it is `0.61 depth / width`. It takes no energy
+//! from the motion. The force is explicit in time: accurate while the joint takes several
+//! steps to cross a width.
+
+use asid_core::effect::{Acts, Effect, EffectParameter};
+use asid_core::layout::JointKind;
+use asid_core::simulator::{StepHook, StepView};
+use asid_core::{Error, Layout, Result};
+
+asid_core::register!(EffectEntry {
+    name: "magnetic-catch",
+    about: "a magnet draws a joint to one place",
+    make: || Box::new(MagneticCatch),
+});
+
+asid_core::export_plugin!();
+
+/// The effect.
+struct MagneticCatch;
+
+impl Effect for MagneticCatch {
+    fn acts(&self) -> Acts {
+        Acts::Force
+    }
+
+    fn parameters(&self) -> &'static [EffectParameter] {
+        &[
+            EffectParameter {
+                name: "depth",
+                unit: "J",
+                range: [0.0, 1.0],
+                null: 0.0,
+            },
+            EffectParameter {
+                name: "place",
+                unit: "rad or m",
+                range: [-1.0, 1.0],
+                null: 0.0,
+            },
+            EffectParameter {
+                name: "width",
+                unit: "rad or m",
+                range: [0.01, 0.5],
+                null: 0.1,
+            },
+        ]
+    }
+
+    fn sites(&self, layout: &Layout) -> Vec<String> {
+        let simple = |kind| matches!(kind, JointKind::Hinge | JointKind::Slide);
+        let joints = layout.joints.iter().filter(|j| simple(j.kind));
+        joints.map(|j| j.name.clone()).collect()
+    }
+
+    fn attach(
+        &self,
+        layout: &Layout,
+        site: &str,
+        values: &[f64],
+    ) -> Result<Box<dyn StepHook + Send>> {
+        let [depth, place, width] = values else {
+            return Err(Error::Shape("magnetic-catch has three values".into()));
+        };
+        if *width <= 0.0 {
+            return Err(Error::Config {
+                key: "magnetic-catch width".into(),
+                message: format!("{width} is not above 0"),
+            });
+        }
+        let joint = layout.joint(site)?;
+        Ok(Box::new(Catch {
+            qpos: joint.qpos,
+            dof: joint.qvel,
+            depth: *depth,
+            place: *place,
+            width: *width,
+        }))
+    }
+}
+
+/// The magnet of one joint.
+struct Catch {
+    qpos: usize,
+    dof: usize,
+    depth: f64,
+    place: f64,
+    width: f64,
+}
+
+impl StepHook for Catch {
+    fn before_step(&self, _row: usize, _step: usize, view: &mut StepView<'_>) {
+        let x = (view.qpos[self.qpos] - self.place) / self.width;
+        view.force[self.dof] -= self.depth / self.width * x * (-0.5 * x * x).exp();
+    }
+}

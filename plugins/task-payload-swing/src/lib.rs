@@ -1,0 +1,191 @@
+//! Payload swing: an arm with an unknown payload is to swing up to a set angle in one go.
+//!
+//! The unknowns are the payload's mass and the damping of the bearing. Exploration moves
+//! the arm by torques for two seconds, weak ones: only in time with its own period do they
+//! move it enough to tell the mass. The task is one pulse of the motor, half a second
+//! long, after which the arm swings on by itself; its torque must fit the payload.
+
+use asid_core::parameter::{Parameter, Scale};
+use asid_core::signal::Signal;
+use asid_core::task::{
+    Commander, Condition, Coordinate, DownstreamProtocol, ExplorationProtocol, Outcome, Task,
+};
+use asid_core::{Capabilities, Layout, Result, Scene};
+
+/// Name on the command line.
+const NAME: &str = "payload-swing";
+/// One line for `asid list`.
+const ABOUT: &str = "weigh a payload by swinging it, then swing it to a set angle";
+
+/// Angle that the swing is to reach, rad.
+const GOAL: f64 = 0.6;
+/// Largest distance of the peak from [`GOAL`] that is a success, rad.
+const THRESHOLD: f64 = 0.05;
+/// Length of a frame, s.
+const FRAME_PERIOD: f64 = 0.02;
+/// Frames of the pulse, and of the whole attempt.
+const FRAMES: [usize; 2] = [25, 75];
+
+asid_core::register!(TaskEntry {
+    name: NAME,
+    about: ABOUT,
+    make: || Ok(Box::new(PayloadSwing::new()?)),
+});
+
+asid_core::export_plugin!();
+
+/// The task.
+pub struct PayloadSwing {
+    scene: Scene,
+    exploration: ExplorationProtocol,
+    downstream: DownstreamProtocol,
+}
+
+impl PayloadSwing {
+    /// The task with its ranges.
+    ///
+    /// # Errors
+    /// When the scene that is built in cannot be read.
+    pub fn new() -> Result<Self> {
+        let angle = Signal {
+            sensor: "angle".into(),
+            noise: 0.01,
+        };
+        let exploration = ExplorationProtocol {
+            horizon: 20,
+            frames_per_step: 5,
+            frame_period: FRAME_PERIOD,
+            action: vec![Coordinate::new("torque", "N m", [-0.5, 0.5])],
+            start: vec![Coordinate::new("angle", "rad", [-0.1, 0.1])],
+            signals: vec![angle],
+            proprioception: vec!["speed".into()],
+            contact: Vec::new(),
+        };
+        let downstream = DownstreamProtocol {
+            metric: "peak_error_rad".into(),
+            unit: "rad".into(),
+            rule: "the swing's peak within 0.05 rad of 0.6 rad".into(),
+            threshold: Some(THRESHOLD),
+            frames: FRAMES[1],
+            frame_period: FRAME_PERIOD,
+            action: vec![Coordinate::new("torque", "N m", [0.0, 3.0])],
+            start: vec![Coordinate::new("angle", "rad", [-0.02, 0.02])],
+            channels: vec!["angle".into()],
+            phases: vec![("pulse".into(), 0.0, FRAMES[0] as f64 * FRAME_PERIOD)],
+        };
+        Ok(Self {
+            scene: Scene::from_xml(NAME, include_str!("scene.xml"), &[])?,
+            exploration,
+            downstream,
+        })
+    }
+}
+
+impl Task for PayloadSwing {
+    fn name(&self) -> &str {
+        NAME
+    }
+
+    fn about(&self) -> &str {
+        ABOUT
+    }
+
+    fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    fn requires(&self) -> Capabilities {
+        Capabilities::ARTICULATION
+            | Capabilities::ACTUATORS
+            | Capabilities::JOINT_IMPEDANCE
+            | Capabilities::MASS_PARAMETERS
+    }
+
+    fn parameters(&self) -> Vec<Parameter> {
+        let unknown = |name: &str, target: &str, range, scale, unit: &str| Parameter {
+            name: name.into(),
+            targets: target.parse().into_iter().collect(),
+            range,
+            scale,
+            unit: unit.into(),
+        };
+        vec![
+            unknown("mass", "geom/payload/mass", [0.2, 1.0], Scale::Linear, "kg"),
+            unknown(
+                "damping",
+                "joint/shoulder/damping",
+                [0.01, 0.1],
+                Scale::Log,
+                "N m s/rad",
+            ),
+        ]
+    }
+
+    fn conditions(&self) -> Vec<Condition> {
+        [("light", 0.3, 0.02), ("heavy", 0.9, 0.05)]
+            .map(|(name, mass, damping)| Condition {
+                name: name.into(),
+                truth: vec![("mass".into(), mass), ("damping".into(), damping)],
+            })
+            .into()
+    }
+
+    fn exploration(&self) -> &ExplorationProtocol {
+        &self.exploration
+    }
+
+    fn downstream(&self) -> &DownstreamProtocol {
+        &self.downstream
+    }
+
+    fn place(&self, layout: &Layout, start: &[f64], qpos: &mut [f64]) -> Result<()> {
+        qpos[layout.joint("shoulder")?.qpos] = start[0];
+        Ok(())
+    }
+
+    fn locate(&self, signals: &[f64]) -> Vec<f64> {
+        vec![signals[0]]
+    }
+
+    fn commander(&self) -> Result<Box<dyn Commander>> {
+        Ok(Box::new(Torque))
+    }
+
+    fn attempt(&self, _start: &[f64], action: &[f64]) -> Result<Vec<f64>> {
+        let pulse = |frame| if frame < FRAMES[0] { action[0] } else { 0.0 };
+        Ok((0..FRAMES[1]).map(pulse).collect())
+    }
+
+    fn metric(&self, readings: &[f64]) -> Vec<f64> {
+        let mut peak = f64::NEG_INFINITY;
+        readings
+            .iter()
+            .map(|angle| {
+                peak = angle.max(peak);
+                (peak - GOAL).abs()
+            })
+            .collect()
+    }
+
+    fn outcome(&self, readings: &[f64]) -> Outcome {
+        // `max` would pass over the NaN of a simulation that diverged.
+        let highest = |a: f64, &b: &f64| if a > b { a } else { b };
+        let error = (readings.iter().fold(f64::NEG_INFINITY, highest) - GOAL).abs();
+        Outcome {
+            value: error,
+            success: error <= THRESHOLD,
+            cost: error,
+        }
+    }
+}
+
+/// The action is the torque, held over the control step.
+struct Torque;
+
+impl Commander for Torque {
+    fn reset(&mut self) {}
+
+    fn commands(&mut self, action: &[f64], ctrl: &mut [f64]) {
+        ctrl.fill(action[0]);
+    }
+}
