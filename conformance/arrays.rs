@@ -1,34 +1,33 @@
 //! Names and places in arrays: the layout, keyframes, quaternions, free joints, rows.
 
-use asid_core::layout::JointKind;
 use asid_core::{Backend, Capabilities, Result};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 use crate::check::{Check, Tolerance};
-use crate::rig::{Rig, STEP, broken, largest, last, relative};
+use crate::faults::ANY;
+use crate::rig::{Rig, STEP, largest, last, relative};
 
-const FREE: Capabilities = Capabilities::CONTACT;
+const FREE: Capabilities = Capabilities::FREE_BODIES;
 const TREE: Capabilities = Capabilities::ARTICULATION;
-const BOTH: Capabilities = FREE.union(TREE);
 const EXACT: Tolerance = Tolerance::by_precision(1e-12, 2e-6);
 
 /// The checks of this family.
 pub const CHECKS: &[Check] = &[
     Check {
         name: "arrays/layout",
-        needs: BOTH.union(Capabilities::ACTUATORS),
+        needs: ANY,
         unit: "",
         tolerance: Tolerance::same(0.0),
         reason: "names and places follow from the document alone: wrong of nine",
-        measure: layout,
+        measure: crate::layout::layout,
     },
     Check {
         name: "arrays/reset-is-the-first-keyframe",
-        needs: BOTH.union(Capabilities::ACTUATORS),
+        needs: ANY,
         unit: "",
         tolerance: EXACT,
         reason: "positions and velocities of the first <key>: rounding",
-        measure: keyframe,
+        measure: crate::layout::keyframe,
     },
     Check {
         name: "arrays/quaternion-order",
@@ -79,91 +78,6 @@ pub const CHECKS: &[Check] = &[
         measure: substeps,
     },
 ];
-
-const SCENE: &str = r#"
-  <worldbody>
-    <geom name="floor" type="plane" size="5 5 .1"/>
-    <body name="arm" pos="0 0 3"><joint name="swing" axis="0 1 0"/>
-      <geom type="sphere" size=".05" mass="1"/>
-      <body name="hand" pos=".3 0 0"><joint name="reach" type="slide" axis="1 0 0"/>
-        <geom name="finger" type="sphere" size=".05" mass="1"/></body>
-      <body pos="0 .3 0"><joint name="wrist" type="ball"/><geom type="sphere" size=".05" mass="1"/></body>
-    </body>
-    <body name="box" pos="2 0 1"><freejoint name="box"/><geom type="box" size=".1 .1 .1" mass="1"/></body>
-  </worldbody>
-  <actuator><motor name="push" joint="reach" ctrlrange="-2 3"/><motor name="turn" joint="swing"/></actuator>
-  <sensor><jointpos name="angle" joint="swing"/><framepos name="place" objtype="body" objname="box"/>
-    <framequat name="attitude" objtype="body" objname="box"/><jointvel name="speed" joint="reach"/></sensor>
-  <keyframe><key name="up" qpos="0.5 0.1 0.6 0.8 0 0 2 0 1 0 1 0 0" qvel="1 2 3 4 5 6 7 8 9 10 11"/></keyframe>"#;
-
-fn layout(backend: &dyn Backend) -> Result<f64> {
-    let rig = Rig::new(backend, SCENE, &[])?;
-    let layout = rig.simulator.layout();
-    let joints = [
-        ("swing", JointKind::Hinge, 0, 0),
-        ("reach", JointKind::Slide, 1, 1),
-        ("wrist", JointKind::Ball, 2, 2),
-        ("box", JointKind::Free, 6, 5),
-    ];
-    let sensors = [
-        ("angle", "jointpos", 0, 1),
-        ("place", "framepos", 1, 3),
-        ("attitude", "framequat", 4, 4),
-        ("speed", "jointvel", 8, 1),
-    ];
-    Ok(broken([
-        layout.timestep == STEP,
-        layout.nq == 13 && layout.nv == 11 && layout.nu() == 2,
-        layout.bodies.len() == 5
-            && [0, 1, 2, 4].map(|i| layout.bodies[i].as_str()) == ["world", "arm", "hand", "box"],
-        layout.geoms.len() == 5
-            && [0, 2].map(|i| layout.geoms[i].as_str()) == ["floor", "finger"]
-            && layout.geoms[1] == "geom1",
-        layout.joints.len() == joints.len()
-            && (layout.joints.iter().zip(joints)).all(|(j, (name, kind, qpos, qvel))| {
-                j.name == name && j.kind == kind && j.qpos == qpos && j.qvel == qvel
-            }),
-        layout
-            .joints
-            .iter()
-            .any(|j| j.name == "reach" && j.body == "hand"),
-        layout.actuators.len() == 2
-            && layout.actuators[0].name == "push"
-            && layout.actuators[0].ctrl_range == Some([-2.0, 3.0])
-            && layout.actuators[1].name == "turn"
-            && layout.actuators[1].ctrl_range.is_none(),
-        layout.sensors.len() == sensors.len()
-            && (layout.sensors.iter().zip(sensors)).all(|(s, (name, kind, address, len))| {
-                s.name == name && s.kind == kind && s.address == address && s.len == len
-            }),
-        layout.keyframes.len() == 1 && layout.keyframes[0].name == "up",
-    ]))
-}
-
-fn keyframe(backend: &dyn Backend) -> Result<f64> {
-    let channels = [
-        "qpos.swing",
-        "qpos.reach",
-        "qpos.wrist",
-        "qpos.box",
-        "qvel.swing",
-        "qvel.reach",
-        "qvel.wrist",
-        "qvel.box",
-    ];
-    let mut rig = Rig::new(backend, SCENE, &channels)?;
-    let key = [
-        0.5, 0.1, 0.6, 0.8, 0.0, 0.0, 2.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 1.0, 2.0, 3.0, 4.0, 5.0,
-        6.0, 7.0, 8.0, 9.0, 10.0, 11.0,
-    ];
-    let found = rig.read()?;
-    Ok(largest(
-        found[0]
-            .iter()
-            .zip(key)
-            .map(|(a, b)| (a - b) / b.abs().max(1.0)),
-    ))
-}
 
 /// A weightless free body with a site a metre along its x axis, and its centre
 /// of mass 0.2 m up its z axis.

@@ -5,7 +5,7 @@ use asid_core::{Backend, Capabilities, Result};
 use crate::check::{Check, Tolerance};
 use crate::rig::{G, Rig, STEP, broken, largest, last, relative};
 
-const CONTACT: Capabilities = Capabilities::CONTACT;
+const CONTACT: Capabilities = Capabilities::CONTACT.union(Capabilities::FREE_BODIES);
 const FORCES: Capabilities = CONTACT.union(Capabilities::CONTACT_FORCES);
 
 /// The checks of this family.

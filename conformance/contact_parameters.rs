@@ -6,7 +6,7 @@ use crate::check::{Check, Tolerance};
 use crate::pair::{both, ends, pair};
 use crate::rig::{G, Rows, STEP, largest, last, relative};
 
-const CONTACT: Capabilities = Capabilities::CONTACT;
+const CONTACT: Capabilities = Capabilities::CONTACT.union(Capabilities::FREE_BODIES);
 
 /// The checks of this family.
 pub const CHECKS: &[Check] = &[
@@ -44,7 +44,7 @@ pub const CHECKS: &[Check] = &[
     },
     Check {
         name: "parameters/geom-position-moves-its-contact",
-        needs: CONTACT,
+        needs: CONTACT.union(Capabilities::MASS_PARAMETERS),
         unit: "m",
         tolerance: Tolerance::same(5e-4),
         reason: "a ball set 30 mm lower in its body holds that 30 mm higher: softness as contact/rest-height-of-shapes",
@@ -57,14 +57,14 @@ const RADIUS: f64 = 0.05;
 /// A ball on a plane, settled and then sent off; the friction of the plane counts.
 fn ball(
     backend: &dyn Backend,
-    condim: u32,
+    (condim, friction): (u32, &str),
     parameter: (&str, f64),
     qvel: [f64; 6],
     frames: usize,
 ) -> Result<Rows> {
     let inside = format!(
         r#"<option cone="elliptic" impratio="100"/><worldbody>
-        <geom name="floor" type="plane" size="5 5 .1" condim="{condim}" friction="1 0.01 0.002"/>
+        <geom name="floor" type="plane" size="5 5 .1" condim="{condim}" friction="{friction}"/>
         <body name="b" pos="0 0 {RADIUS}"><freejoint name="b"/>
           <geom name="ball" type="sphere" size="{RADIUS}" mass="0.3" friction="0.01 0 0"/></body></worldbody>"#
     );
@@ -92,7 +92,7 @@ fn sliding_friction(backend: &dyn Backend) -> Result<f64> {
 fn torsional_friction(backend: &dyn Backend) -> Result<f64> {
     let spin = [0.0, 0.0, 0.0, 0.0, 0.0, 60.0];
     let parameter = ("geom/floor/friction/1", 0.005);
-    let rows = ball(backend, 4, parameter, spin, 700)?;
+    let rows = ball(backend, (4, "1 0.01 0"), parameter, spin, 700)?;
     let turned = |rows: &[Vec<f64>]| rows.iter().map(|row| row[12] * STEP).sum::<f64>();
     let slowing = |friction: f64| friction * G / (0.4 * RADIUS * RADIUS);
     let theory = [0.01, 0.005].map(|friction| 60.0 * 60.0 / (2.0 * slowing(friction)));
@@ -102,7 +102,7 @@ fn torsional_friction(backend: &dyn Backend) -> Result<f64> {
 fn rolling_friction(backend: &dyn Backend) -> Result<f64> {
     let roll = [0.5, 0.0, 0.0, 0.0, 10.0, 0.0];
     let parameter = ("geom/floor/friction/2", 0.004);
-    let rows = ends(&ball(backend, 6, parameter, roll, 1250)?)?;
+    let rows = ends(&ball(backend, (6, "1 0 0.002"), parameter, roll, 1250)?)?;
     let theory = [0.002, 0.004].map(|f| 0.25 / (2.0 * 5.0 / 7.0 * f * G / RADIUS));
     Ok(both(rows.map(|row| row[0]), theory))
 }

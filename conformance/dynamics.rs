@@ -6,7 +6,7 @@ use nalgebra::{Matrix2, UnitQuaternion, Vector2, Vector3};
 use crate::check::{Check, Tolerance};
 use crate::rig::{G, Rig, STEP, largest, last, period, relative};
 
-const FREE: Capabilities = Capabilities::CONTACT;
+const FREE: Capabilities = Capabilities::FREE_BODIES;
 const TREE: Capabilities = Capabilities::ARTICULATION;
 
 /// The checks of this family.
@@ -111,7 +111,7 @@ pub const CHECKS: &[Check] = &[
 
 fn falling(backend: &dyn Backend) -> Result<Vec<f64>> {
     let inside = r#"<worldbody><body name="b" pos="0 0 10"><freejoint name="b"/>
-      <geom type="sphere" size=".1" mass="1"/></body></worldbody>"#;
+      <geom type="sphere" size=".1" mass="1" contype="0" conaffinity="0"/></body></worldbody>"#;
     let mut rig = Rig::new(backend, inside, &["qpos.b", "qvel.b"])?;
     rig.place(
         &[0.0, 0.0, 10.0, 1.0, 0.0, 0.0, 0.0],
@@ -177,7 +177,7 @@ const PENDULUM_INERTIA: f64 = 0.25 + 0.4 * 0.02 * 0.02;
 /// A bob of 1 kg on half a metre, let go at 1 rad: 10 s of angle and rate.
 fn pendulum(backend: &dyn Backend) -> Result<Vec<Vec<f64>>> {
     let inside = r#"<worldbody><body pos="0 0 1"><joint name="j" axis="0 1 0"/>
-      <geom type="sphere" size=".02" pos="0 0 -0.5" mass="1"/></body></worldbody>"#;
+      <geom type="sphere" size=".02" pos="0 0 -0.5" mass="1" contype="0" conaffinity="0"/></body></worldbody>"#;
     let mut rig = Rig::new(backend, inside, &["qpos.j", "qvel.j"])?;
     rig.place(&[1.0], &[0.0])?;
     rig.run(5000, &[])
@@ -204,7 +204,7 @@ fn pendulum_period(backend: &dyn Backend) -> Result<f64> {
 
 fn unit_torque(backend: &dyn Backend) -> Result<f64> {
     let inside = r#"<option gravity="0 0 0"/><worldbody><body><joint name="j" axis="0 0 1"/>
-      <geom type="box" size=".1 .15 .2" pos="0.5 0 0" mass="2"/></body></worldbody>
+      <geom type="box" size=".1 .15 .2" pos="0.5 0 0" mass="2" contype="0" conaffinity="0"/></body></worldbody>
       <actuator><motor joint="j"/></actuator>"#;
     let mut rig = Rig::new(backend, inside, &["qvel.j"])?;
     let inertia = 2.0 * 0.25 + 2.0 * (0.2 * 0.2 + 0.3 * 0.3) / 12.0;
@@ -239,7 +239,8 @@ fn inertia_of_shapes(backend: &dyn Backend) -> Result<f64> {
     for (shape, size, mass, inertia) in shapes {
         let inside = format!(
             r#"<option gravity="0 0 0"/><worldbody><body><joint name="j" axis="0 0 1"/>
-            <geom type="{shape}" size="{size}" pos=".5 0 0" zaxis="1 0 0" density="{density}"/></body></worldbody>
+            <geom type="{shape}" size="{size}" pos=".5 0 0" zaxis="1 0 0" density="{density}"
+              contype="0" conaffinity="0"/></body></worldbody>
             <actuator><motor joint="j"/></actuator>"#
         );
         let mut rig = Rig::new(backend, &inside, &["qvel.j"])?;
@@ -252,7 +253,7 @@ fn inertia_of_shapes(backend: &dyn Backend) -> Result<f64> {
 fn unit_force(backend: &dyn Backend) -> Result<f64> {
     let inside = r#"<option gravity="0 0 0"/><worldbody><body>
       <joint name="j" type="slide" axis="0.6 0 0.8"/>
-      <geom type="sphere" size=".1" mass="2"/></body></worldbody>
+      <geom type="sphere" size=".1" mass="2" contype="0" conaffinity="0"/></body></worldbody>
       <actuator><motor joint="j"/></actuator>"#;
     let mut rig = Rig::new(backend, inside, &["qvel.j"])?;
     Ok(relative(last(&rig.run(50, &[1.0])?)?[0], 0.05))

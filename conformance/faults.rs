@@ -7,13 +7,11 @@ use asid_core::simulator::{ExternalForce, ParameterChange};
 use asid_core::{Backend, Capabilities, Control, Error, Result, Rollout, Scene};
 
 use crate::check::{Check, Tolerance};
-use crate::rig::{Rig, Size, broken, differing_bits};
-use crate::state::PILE;
+use crate::rig::{Rig, broken, differing_bits};
+use crate::subject::{batch, stirred, subject};
 
-/// Contacts, joints and drives.
-pub const MOVING: Capabilities = Capabilities::CONTACT
-    .union(Capabilities::ARTICULATION)
-    .union(Capabilities::ACTUATORS);
+/// What every engine has to do.
+pub const ANY: Capabilities = Capabilities::empty();
 
 /// A check that counts broken promises.
 pub const fn check(
@@ -36,70 +34,62 @@ pub const fn check(
 pub const CHECKS: &[Check] = &[
     check(
         "faults/values-that-are-not-finite",
-        MOVING,
+        ANY,
         "an error each: accepted of six",
         not_finite,
     ),
     check(
         "faults/wrong-lengths",
-        MOVING,
-        "an error each: accepted of seven",
+        ANY,
+        "an error each: accepted of nine",
         wrong_lengths,
     ),
     check(
         "faults/wrong-indices",
-        MOVING,
+        ANY,
         "an error each: accepted of ten",
         wrong_indices,
     ),
     check(
+        "faults/simulations-out-of-order",
+        ANY,
+        "unsorted, repeated or beyond the batch is an error in every call that takes simulations: accepted of 18",
+        out_of_order,
+    ),
+    check(
         "faults/forces-out-of-place",
-        MOVING.union(Capabilities::EXTERNAL_FORCES),
-        "an error each: accepted of three",
+        Capabilities::EXTERNAL_FORCES,
+        "an error each: accepted of four",
         wrong_forces,
     ),
     check(
-        "faults/foreign-snapshots",
-        MOVING,
-        "an error each: accepted of two",
-        foreign_snapshots,
+        "faults/changes-out-of-place",
+        Capabilities::PARAMETER_CHANGES,
+        "an error each: accepted of four",
+        wrong_changes,
     ),
     check(
         "faults/a-bad-call-changes-nothing",
-        MOVING,
+        ANY,
         "to the bit: readings that differ after calls that failed",
         bad_call_changes_nothing,
     ),
     check(
         "faults/nothing-to-do",
-        MOVING,
-        "no simulations and no frames are no errors; no substeps or an empty batch may be, but no more than that: refused of two",
+        ANY,
+        "no simulations, no frames and no channels are no errors and change nothing; no substeps or an empty batch may be, but no more than that: broken of ten",
         nothing_to_do,
     ),
     check(
         "faults/scenes-that-make-no-sense",
-        Capabilities::ARTICULATION,
+        ANY,
         "an error each: accepted of five",
         bad_scenes,
     ),
 ];
 
-const THREE: Size<'static> = Size {
-    sims: 3,
-    threads: 2,
-    targets: &["joint/turn/damping", "option/gravity/2"],
-};
-
-/// What is recorded of a pile.
-pub const CHANNELS: [&str; 4] = ["qpos.turn", "qvel.turn", "qpos.a", "qpos.c"];
-
-/// Three piles on two threads.
-pub fn pile(backend: &dyn Backend) -> Result<Rig> {
-    Rig::with(backend, PILE, &CHANNELS, THREE)
-}
-
 fn not_finite(backend: &dyn Backend) -> Result<f64> {
-    let mut rig = Rig::with(backend, PILE, &CHANNELS, Size { sims: 1, ..THREE })?;
+    let mut rig = batch(backend, 1, 1)?;
     let (nq, nv) = (rig.simulator.layout().nq, rig.simulator.layout().nv);
     let (qpos, qvel) = (vec![0.1; nq], vec![0.0; nv]);
     let spoilt = |values: &[f64], with: f64| {
@@ -107,19 +97,24 @@ fn not_finite(backend: &dyn Backend) -> Result<f64> {
         values[0] = with;
         values
     };
+    let mut commanded = |value: f64| {
+        let ctrl = rig.command(value);
+        ctrl.is_empty() || rig.run(3, &ctrl).is_err()
+    };
     Ok(broken([
-        rig.run(3, &[f64::NAN]).is_err(),
-        rig.run(3, &[f64::INFINITY]).is_err(),
+        commanded(f64::NAN),
+        commanded(f64::INFINITY),
         rig.place(&spoilt(&qpos, f64::NAN), &qvel).is_err(),
         rig.place(&qpos, &spoilt(&qvel, f64::INFINITY)).is_err(),
-        rig.set(&[f64::NAN, -9.81]).is_err(),
-        rig.set(&[0.1, f64::NEG_INFINITY]).is_err(),
+        rig.set(&[f64::NAN, 0.0]).is_err(),
+        rig.set(&[-9.81, f64::NEG_INFINITY]).is_err(),
     ]))
 }
 
 fn wrong_lengths(backend: &dyn Backend) -> Result<f64> {
-    let mut rig = pile(backend)?;
-    let (nq, nv) = (rig.simulator.layout().nq, rig.simulator.layout().nv);
+    let mut rig = batch(backend, 3, 2)?;
+    let layout = rig.simulator.layout();
+    let (nq, nv, nu) = (layout.nq, layout.nv, layout.nu());
     let width = rig.record.width();
     let mut out = vec![0.0; width * 6];
     let simulator = &mut rig.simulator;
@@ -127,120 +122,174 @@ fn wrong_lengths(backend: &dyn Backend) -> Result<f64> {
         let rollout = Rollout::new(&[0, 1, 2], 2, 1, control, &rig.record);
         simulator.rollout(&rollout, out).is_err()
     };
-    let control = [0.0; 2];
+    let control = vec![0.0; 6 * nu + 1];
     let rollouts = [
-        roll(Control::Shared(&[0.0]), &mut out),
+        roll(Control::Shared(&control[..2 * nu + 1]), &mut out),
         roll(Control::PerSimulation(&control), &mut out),
-        roll(Control::Shared(&control), &mut out[..width]),
+        roll(Control::Shared(&control[..2 * nu]), &mut out[..width]),
     ];
     Ok(broken([
         rollouts[0],
         rollouts[1],
         rollouts[2],
-        rig.simulator.read(&[0], &rig.record, &mut out).is_err(),
-        rig.simulator
-            .set_state(&[0], &vec![0.0; nq - 1], &vec![0.0; nv])
-            .is_err(),
-        rig.simulator
-            .set_state(&[0], &vec![0.0; nq], &vec![0.0; nv + 1])
-            .is_err(),
-        rig.simulator
-            .set_parameters(&[0, 1], &[0.1, -9.81])
-            .is_err(),
+        simulator.read(&[0], &rig.record, &mut out).is_err(),
+        (simulator.set_state(&[0], &vec![0.0; nq - 1], &vec![0.0; nv])).is_err(),
+        (simulator.set_state(&[0], &vec![0.0; nq], &vec![0.0; nv + 1])).is_err(),
+        simulator.set_parameters(&[0, 1], &[-9.81, 0.0]).is_err(),
+        simulator.set_parameters(&[0], &[-9.81]).is_err(),
+        simulator.set_parameters(&[0], &[-9.81, 0.0, 0.0]).is_err(),
     ]))
 }
 
 fn wrong_indices(backend: &dyn Backend) -> Result<f64> {
-    let mut rig = pile(backend)?;
+    let mut rig = batch(backend, 3, 2)?;
     let snapshot = rig.simulator.save(&[0, 1])?;
     let simulator = &mut rig.simulator;
-    let mut out = vec![0.0; rig.record.width() * 2];
-    let mut kept = [false; 3];
-    for (kept, sims) in kept.iter_mut().zip([[1, 0], [1, 1], [1, 3]]) {
-        let control = Control::Shared(&[0.0]);
-        let rollout = Rollout::new(&sims, 1, 1, control, &rig.record);
-        *kept = simulator.rollout(&rollout, &mut out).is_err();
-    }
     Ok(broken([
-        kept[0],
-        kept[1],
-        kept[2],
         simulator.reset(&[3]).is_err(),
-        simulator.reset(&[2, 1]).is_err(),
         simulator.save(&[usize::MAX]).is_err(),
         simulator.load(&snapshot, &[2], &[0]).is_err(),
+        simulator.load(&snapshot, &[usize::MAX], &[0]).is_err(),
         simulator.load(&snapshot, &[0, 1], &[0]).is_err(),
+        simulator.load(&snapshot, &[0], &[0, 1]).is_err(),
         simulator.copy_state(&[3], &[0]).is_err(),
         simulator.copy_state(&[0], &[0]).is_err(),
+        simulator.copy_state(&[0, 1], &[1, 2]).is_err(),
+        simulator.copy_state(&[0, 0], &[1]).is_err(),
     ]))
 }
 
+fn out_of_order(backend: &dyn Backend) -> Result<f64> {
+    let mut rig = batch(backend, 3, 2)?;
+    let layout = rig.simulator.layout();
+    let (nq, nv, nu) = (layout.nq, layout.nv, layout.nu());
+    let snapshot = rig.simulator.save(&[0, 1])?;
+    let simulator = &mut rig.simulator;
+    let mut out = vec![0.0; rig.record.width() * 2];
+    let mut accepted = 0.0;
+    for sims in [[1, 0], [1, 1], [1, 3]] {
+        let control = vec![0.0; nu];
+        let rollout = Rollout::new(&sims, 1, 1, Control::Shared(&control), &rig.record);
+        accepted += broken([
+            simulator.rollout(&rollout, &mut out).is_err(),
+            simulator.reset(&sims).is_err(),
+            (simulator.set_state(&sims, &vec![0.5; 2 * nq], &vec![0.0; 2 * nv])).is_err(),
+            (simulator.set_parameters(&sims, &[-9.81, 0.0, -9.81, 0.0])).is_err(),
+            simulator.save(&sims).is_err(),
+            simulator.load(&snapshot, &[0, 1], &sims).is_err(),
+        ]);
+    }
+    Ok(accepted)
+}
+
 fn wrong_forces(backend: &dyn Backend) -> Result<f64> {
-    let mut rig = pile(backend)?;
+    let mut rig = batch(backend, 3, 2)?;
+    let ctrl = rig.command(0.0);
     let mut push = |body: usize, wrench: &[f64]| {
-        rig.run_with(1, 1, &[0.0], |extras| {
+        rig.run_with(1, 1, &ctrl, |extras| {
             extras.forces.push(ExternalForce { body, wrench });
         })
         .is_err()
     };
+    let mut spoilt = [0.0; 18];
+    spoilt[7] = f64::NAN;
     Ok(broken([
         push(0, &[0.0; 18]),
         push(99, &[0.0; 18]),
         push(1, &[0.0; 6]),
+        push(1, &spoilt),
     ]))
 }
 
-fn foreign_snapshots(backend: &dyn Backend) -> Result<f64> {
-    let mut rig = pile(backend)?;
-    let other =
-        r#"<worldbody><body><joint name="j"/><geom type="sphere" size=".1"/></body></worldbody>"#;
-    let mut other = Rig::new(backend, other, &[])?;
-    let foreign = other.simulator.save(&[0])?;
-    let alien = asid_core::Snapshot::new("of no engine", 1);
+fn wrong_changes(backend: &dyn Backend) -> Result<f64> {
+    let mut rig = batch(backend, 3, 2)?;
+    let ctrl = rig.command(0.0);
+    let mut change = |frame: usize, column: usize, values: &[f64]| {
+        rig.run_with(2, 1, &ctrl.repeat(1), |extras| {
+            extras.changes.push(ParameterChange {
+                frame,
+                column,
+                values,
+            });
+        })
+        .is_err()
+    };
     Ok(broken([
-        rig.simulator.load(&foreign, &[0], &[0]).is_err(),
-        rig.simulator.load(&alien, &[0], &[0]).is_err(),
+        change(2, 0, &[-9.0; 3]),
+        change(0, 2, &[-9.0; 3]),
+        change(0, 0, &[-9.0; 2]),
+        change(0, 0, &[-9.0, f64::NAN, -9.0]),
     ]))
 }
 
 fn bad_call_changes_nothing(backend: &dyn Backend) -> Result<f64> {
-    let mut rig = pile(backend)?;
-    rig.run(20, &[0.5])?;
+    let mut rig = stirred(backend, 3, 2)?;
+    let (ctrl, half) = (rig.command(f64::NAN), rig.command(0.5));
+    rig.run(20, &half)?;
     let before = rig.read()?;
-    let refused = rig.run(5, &[f64::NAN]).is_err()
-        && rig.set(&[0.1, -5.0, 0.1, f64::NAN, 0.1, -5.0]).is_err()
+    let (nq, nv) = (rig.simulator.layout().nq, rig.simulator.layout().nv);
+    let mut qvel = vec![0.0; 3 * nv];
+    qvel[3 * nv - 1] = f64::NAN;
+    let mut refused = (ctrl.is_empty() || rig.run(5, &ctrl).is_err())
+        && rig.set(&[-5.0, 0.1, -5.0, 0.1, -5.0, f64::NAN]).is_err()
         && rig.simulator.reset(&[0, 7]).is_err()
-        && rig
-            .run_with(3, 1, &[0.0], |extras| {
+        && (rig
+            .simulator
+            .set_state(&[0, 1, 2], &vec![0.5; 3 * nq], &qvel))
+        .is_err();
+    if (backend.capabilities()).contains(Capabilities::PARAMETER_CHANGES) {
+        refused &= rig
+            .run_with(3, 1, &half, |extras| {
                 extras.changes.push(ParameterChange {
                     frame: 0,
-                    column: 1,
+                    column: 0,
                     values: &[-1.0, f64::NAN, -1.0],
                 });
             })
             .is_err();
+    }
     if !refused {
         return Err(Error::Failed("a bad call was accepted".into()));
     }
     let unmoved = differing_bits(&before, &rig.read()?);
     // Neither states nor parameters: it goes on like one that never heard of them.
-    let mut other = pile(backend)?;
-    other.run(20, &[0.5])?;
-    Ok(unmoved + differing_bits(&rig.run(20, &[0.5])?, &other.run(20, &[0.5])?))
+    let mut other = stirred(backend, 3, 2)?;
+    other.run(20, &half)?;
+    Ok(unmoved + differing_bits(&rig.run(20, &half)?, &other.run(20, &half)?))
 }
 
 fn nothing_to_do(backend: &dyn Backend) -> Result<f64> {
-    let mut rig = pile(backend)?;
-    let no_sims = rig.run_with(2, 1, &[0.0], |extras| extras.sims.clear());
-    let no_frames = rig.run(0, &[0.0]);
+    let mut rig = stirred(backend, 3, 2)?;
+    let ctrl = rig.command(0.0);
+    let before = rig.read()?;
+    let no_sims = rig.run_with(2, 1, &ctrl, |extras| extras.sims.clear());
+    let no_frames = rig.run(0, &ctrl);
+    let record = std::mem::take(&mut rig.record);
+    let no_channels = rig.run(0, &ctrl).is_ok() && rig.read().is_ok();
+    rig.record = record;
+    let simulator = &mut rig.simulator;
+    let empty = simulator.save(&[]);
+    let calls = [
+        no_sims.is_ok(),
+        no_frames.is_ok(),
+        no_channels,
+        simulator.reset(&[]).is_ok(),
+        simulator.set_state(&[], &[], &[]).is_ok(),
+        simulator.set_parameters(&[], &[]).is_ok(),
+        simulator.copy_state(&[], &[]).is_ok(),
+        empty.is_ok_and(|s| s.rows() == 0 && simulator.load(&s, &[], &[]).is_ok()),
+        simulator.read(&[], &rig.record, &mut []).is_ok(),
+        differing_bits(&before, &rig.read()?) == 0.0,
+    ];
     // Whether these two are errors is the engine's choice.
-    let _ = rig.run_with(2, 0, &[0.0], |_| {});
-    let _ = Rig::with(backend, PILE, &CHANNELS, Size { sims: 0, ..THREE })
-        .and_then(|mut rig| rig.run(2, &[0.0]));
-    Ok(broken([no_sims.is_ok(), no_frames.is_ok()]))
+    let _ = rig.run_with(2, 0, &ctrl, |_| {});
+    let _ = batch(backend, 0, 2).and_then(|mut rig| rig.run(2, &ctrl));
+    Ok(broken(calls))
 }
 
 fn bad_scenes(backend: &dyn Backend) -> Result<f64> {
+    // What is good about them is known to load.
+    Rig::new(backend, &subject(backend).inside, &[])?;
     let refused = |inside: &str| {
         Scene::from_xml("bad", &format!("<mujoco>{inside}</mujoco>"), &[])
             .and_then(|scene| backend.load(&scene))

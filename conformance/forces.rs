@@ -1,15 +1,13 @@
-//! External wrenches and hooks.
+//! External wrenches.
 
-use asid_core::simulator::{ExternalForce, StepHook, StepView};
+use asid_core::simulator::ExternalForce;
 use asid_core::{Backend, Capabilities, Result};
 
 use crate::check::{Check, Tolerance};
-use crate::rig::{G, Rig, STEP, largest, last, relative};
+use crate::rig::{Rig, STEP, largest, last, relative};
+use crate::subject::falling;
 
-const PUSHED: Capabilities = Capabilities::CONTACT.union(Capabilities::EXTERNAL_FORCES);
-const HOOKED: Capabilities = Capabilities::ARTICULATION
-    .union(Capabilities::ACTUATORS)
-    .union(Capabilities::STEP_HOOKS);
+const PUSHED: Capabilities = Capabilities::FREE_BODIES.union(Capabilities::EXTERNAL_FORCES);
 const ROUNDING: Tolerance = Tolerance::by_precision(1e-9, 1e-4);
 
 /// The checks of this family.
@@ -48,7 +46,7 @@ pub const CHECKS: &[Check] = &[
     },
     Check {
         name: "forces/wrench-on-a-link",
-        needs: PUSHED.union(Capabilities::ARTICULATION),
+        needs: Capabilities::ARTICULATION.union(Capabilities::EXTERNAL_FORCES),
         unit: "",
         tolerance: ROUNDING,
         reason: "one step from rest: lever times force and torque over inertia: rounding",
@@ -56,35 +54,11 @@ pub const CHECKS: &[Check] = &[
     },
     Check {
         name: "forces/wrench-only-in-its-frames",
-        needs: PUSHED,
+        needs: Capabilities::EXTERNAL_FORCES,
         unit: "m/s",
         tolerance: ROUNDING,
         reason: "speed grows in the frame with the force, and neither before, after, nor in the next rollout: rounding",
         measure: only_in_its_frames,
-    },
-    Check {
-        name: "forces/hook-adds-force",
-        needs: HOOKED,
-        unit: "",
-        tolerance: ROUNDING,
-        reason: "a generalised force of 0.5 N m beside a motor of 1 N m: rounding",
-        measure: hook_adds,
-    },
-    Check {
-        name: "forces/hook-changes-a-command",
-        needs: HOOKED,
-        unit: "",
-        tolerance: ROUNDING,
-        reason: "a command set in every second step acts in those only: rounding",
-        measure: hook_commands,
-    },
-    Check {
-        name: "forces/hook-sees-the-state",
-        needs: HOOKED,
-        unit: "",
-        tolerance: Tolerance::same(1.1e-3),
-        reason: "damping by hook from the velocity it is shown: first order, rate dt / 2 after one time constant",
-        measure: hook_sees,
     },
 ];
 
@@ -152,73 +126,23 @@ fn wrench_on_link(backend: &dyn Backend) -> Result<f64> {
 }
 
 fn only_in_its_frames(backend: &dyn Backend) -> Result<f64> {
-    let on = [2.0, 0.0, 0.0, 0.0, 0.0, 0.0];
-    let (mut rig, rows) = pushed(backend, &[[0.0; 6], on, [0.0; 6]])?;
+    let falling = falling(backend);
+    let inside = format!(r#"<option gravity="0 0 0"/>{}"#, falling.inside);
+    let mut rig = Rig::new(backend, &inside, falling.velocity)?;
+    let body = rig.simulator.layout().body(falling.body)?;
+    let wrench = [[0.0; 6], [2.0, 0.0, 0.0, 0.0, 0.0, 0.0], [0.0; 6]].concat();
+    let rows = rig.run_with(3, 1, &[], |extras| {
+        extras.forces.push(ExternalForce {
+            body,
+            wrench: &wrench,
+        });
+    })?;
     let after = rig.run(1, &[])?[0][0];
+    let speed = 2.0 * STEP;
     Ok(largest([
         rows[0][0],
-        rows[1][0] - STEP,
-        rows[2][0] - STEP,
-        after - STEP,
+        rows[1][0] - speed,
+        rows[2][0] - speed,
+        after - speed,
     ]))
-}
-
-struct Adds;
-
-impl StepHook for Adds {
-    fn before_step(&self, _: usize, _: usize, view: &mut StepView<'_>) {
-        view.force[0] += 0.5;
-    }
-}
-
-struct Alternates;
-
-impl StepHook for Alternates {
-    fn before_step(&self, _: usize, step: usize, view: &mut StepView<'_>) {
-        if step.is_multiple_of(2) {
-            view.ctrl[0] = 3.0;
-        }
-    }
-}
-
-struct Damps;
-
-impl StepHook for Damps {
-    fn before_step(&self, _: usize, _: usize, view: &mut StepView<'_>) {
-        view.force[0] -= 0.1 * view.qvel[0];
-    }
-}
-
-/// A wheel of 0.1 kg m² under a motor and a hook: its rate after `frames` of two steps.
-fn hooked(
-    backend: &dyn Backend,
-    hook: &dyn StepHook,
-    start: f64,
-    command: f64,
-    frames: usize,
-) -> Result<f64> {
-    let inside = format!(
-        r#"<option gravity="0 0 -{G}"/><worldbody><body><joint name="j" axis="0 0 1"/>
-        <inertial pos="0 0 0" mass="1" diaginertia="0.1 0.1 0.1"/></body></worldbody>
-        <actuator><motor joint="j"/></actuator>"#
-    );
-    let mut rig = Rig::new(backend, &inside, &["qvel.j"])?;
-    rig.place(&[0.0], &[start])?;
-    let rows = rig.run_with(frames, 2, &[command], |extras| extras.hook = Some(hook))?;
-    Ok(last(&rows)?[0])
-}
-
-fn hook_adds(backend: &dyn Backend) -> Result<f64> {
-    let rate = hooked(backend, &Adds, 0.0, 1.0, 25)?;
-    Ok(relative(rate, 1.5 / 0.1 * 50.0 * STEP))
-}
-
-fn hook_commands(backend: &dyn Backend) -> Result<f64> {
-    let rate = hooked(backend, &Alternates, 0.0, 1.0, 25)?;
-    Ok(relative(rate, 2.0 / 0.1 * 50.0 * STEP))
-}
-
-fn hook_sees(backend: &dyn Backend) -> Result<f64> {
-    let rate = hooked(backend, &Damps, 2.0, 0.0, 250)?;
-    Ok(relative(rate, 2.0 * (-1f64).exp()))
 }

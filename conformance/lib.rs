@@ -36,12 +36,15 @@ mod faults;
 mod forces;
 mod frames;
 mod friction;
+mod hooks;
 mod joints;
+mod layout;
 mod mechanism_parameters;
 mod pair;
 mod parameters;
 mod rig;
 mod state;
+mod subject;
 
 pub use check::{Check, Outcome, Row, Tolerance, table};
 
@@ -61,6 +64,7 @@ pub fn checks() -> impl Iterator<Item = &'static Check> {
         mechanism_parameters::CHECKS,
         parameters::CHECKS,
         forces::CHECKS,
+        hooks::CHECKS,
         state::CHECKS,
         divergence::CHECKS,
         faults::CHECKS,

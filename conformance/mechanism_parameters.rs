@@ -8,6 +8,7 @@ use crate::rig::{G, STEP, largest};
 
 const DRIVEN: Capabilities = Capabilities::ARTICULATION.union(Capabilities::ACTUATORS);
 const IMPEDANCE: Capabilities = DRIVEN.union(Capabilities::JOINT_IMPEDANCE);
+const MASS: Capabilities = Capabilities::MASS_PARAMETERS;
 const ROUNDING: Tolerance = Tolerance::by_precision(1e-9, 1e-4);
 const EXACT: &str = "from rest or under constant force the first steps are exact: rounding";
 
@@ -15,7 +16,7 @@ const EXACT: &str = "from rest or under constant force the first steps are exact
 pub const CHECKS: &[Check] = &[
     Check {
         name: "parameters/geom-position",
-        needs: DRIVEN,
+        needs: Capabilities::ARTICULATION.union(MASS),
         unit: "",
         tolerance: ROUNDING,
         reason: EXACT,
@@ -23,7 +24,7 @@ pub const CHECKS: &[Check] = &[
     },
     Check {
         name: "parameters/geom-mass",
-        needs: DRIVEN,
+        needs: Capabilities::ARTICULATION.union(MASS),
         unit: "",
         tolerance: ROUNDING,
         reason: EXACT,
@@ -31,7 +32,7 @@ pub const CHECKS: &[Check] = &[
     },
     Check {
         name: "parameters/body-mass",
-        needs: DRIVEN,
+        needs: DRIVEN.union(MASS),
         unit: "",
         tolerance: ROUNDING,
         reason: EXACT,
@@ -39,7 +40,7 @@ pub const CHECKS: &[Check] = &[
     },
     Check {
         name: "parameters/body-centre-of-mass",
-        needs: DRIVEN,
+        needs: DRIVEN.union(MASS),
         unit: "",
         tolerance: ROUNDING,
         reason: EXACT,
@@ -47,7 +48,7 @@ pub const CHECKS: &[Check] = &[
     },
     Check {
         name: "parameters/body-inertia",
-        needs: DRIVEN,
+        needs: DRIVEN.union(MASS),
         unit: "",
         tolerance: ROUNDING,
         reason: EXACT,
@@ -87,7 +88,7 @@ pub const CHECKS: &[Check] = &[
     },
     Check {
         name: "parameters/servo-gain",
-        needs: DRIVEN,
+        needs: IMPEDANCE,
         unit: "",
         tolerance: Tolerance::by_precision(1e-6, 1e-4),
         reason: "at rest kp times the error is the load: exp(-20), and rounding",
@@ -114,8 +115,8 @@ pub const CHECKS: &[Check] = &[
 /// A hinge about y under gravity with two small balls, let go with the arm level.
 fn arm(backend: &dyn Backend, parameter: (&str, f64)) -> Result<[f64; 2]> {
     let inside = r#"<worldbody><body name="arm"><joint name="j" axis="0 1 0"/>
-      <geom name="near" type="sphere" size=".05" pos=".2 0 0" mass="1"/>
-      <geom name="far" type="sphere" size=".02" pos=".5 0 0" mass=".4"/></body></worldbody>"#;
+      <geom name="near" type="sphere" size=".05" pos=".2 0 0" mass="1" contype="0" conaffinity="0"/>
+      <geom name="far" type="sphere" size=".02" pos=".5 0 0" mass=".4" contype="0" conaffinity="0"/></body></worldbody>"#;
     let mut rig = pair(backend, inside, &["qvel.j"], &[parameter])?;
     let rows = rig.run(1, &[])?;
     Ok([rows[0][0] / STEP, rows[1][0] / STEP])
@@ -140,8 +141,10 @@ fn geom_mass(backend: &dyn Backend) -> Result<f64> {
 fn body_mass(backend: &dyn Backend) -> Result<f64> {
     // Along a slide, and about a hinge, where the inertia grows with the mass.
     let inside = r#"<option gravity="0 0 0"/><worldbody>
-      <body name="cart" pos="0 2 0"><joint name="s" type="slide" axis="1 0 0"/><geom type="box" size=".1 .1 .1" mass="2"/></body>
-      <body name="door"><joint name="h" axis="0 0 1"/><geom type="box" size=".2 .05 .1" pos=".2 0 0" mass="1"/></body></worldbody>
+      <body name="cart" pos="0 2 0"><joint name="s" type="slide" axis="1 0 0"/>
+        <geom type="box" size=".1 .1 .1" mass="2" contype="0" conaffinity="0"/></body>
+      <body name="door"><joint name="h" axis="0 0 1"/>
+        <geom type="box" size=".2 .05 .1" pos=".2 0 0" mass="1" contype="0" conaffinity="0"/></body></worldbody>
       <actuator><motor joint="s"/><motor joint="h"/></actuator>"#;
     let parameters = [("body/cart/mass", 4.0), ("body/door/mass", 3.0)];
     let mut rig = pair(backend, inside, &["qvel.s", "qvel.h"], &parameters)?;

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use asid_core::simulator::{ExternalForce, ParameterChange, StepHook};
 use asid_core::{
-    Backend, BatchConfig, Control, Error, Model, Recording, Result, Rollout, Scene, Simulator,
-    Target,
+    Backend, BatchConfig, Control, Error, Layout, Model, Recording, Result, Rollout, Scene,
+    Simulator, Target,
 };
 
 /// Standard gravity as the scenes have it, m/s².
@@ -95,6 +95,28 @@ impl Rig {
             simulator,
             record,
         })
+    }
+
+    /// Another batch of the same compiled scene, without parameters.
+    ///
+    /// # Errors
+    /// As [`Model::simulator`].
+    pub fn another(&self, sims: usize, threads: usize) -> Result<Self> {
+        let simulator = self.model.simulator(&BatchConfig {
+            size: sims,
+            threads,
+            targets: Vec::new(),
+        })?;
+        Ok(Self {
+            model: Arc::clone(&self.model),
+            simulator,
+            record: self.record.clone(),
+        })
+    }
+
+    /// The same command for every actuator.
+    pub fn command(&self, value: f64) -> Vec<f64> {
+        vec![value; self.simulator.layout().nu()]
     }
 
     /// Every simulation's number.
@@ -189,6 +211,15 @@ pub struct Extras<'a> {
     pub changes: Vec<ParameterChange<'a>>,
     /// Hook.
     pub hook: Option<&'a dyn StepHook>,
+}
+
+/// Names of the channels of a whole state: `qpos` of each joint, then `qvel` of each.
+pub fn state_channels(layout: &Layout) -> Vec<String> {
+    let of = |kind: &'static str| {
+        let joints = layout.joints.iter();
+        joints.map(move |joint| format!("{kind}.{}", joint.name))
+    };
+    of("qpos").chain(of("qvel")).collect()
 }
 
 /// The last row.

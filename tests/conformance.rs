@@ -7,11 +7,14 @@
 
 #[path = "conformance/mutant.rs"]
 mod mutant;
+#[path = "conformance/narrow.rs"]
+mod narrow;
 
 use asid::core::registry::{self, BackendEntry};
-use asid::core::{Backend, Error};
+use asid::core::{Backend, Capabilities, Error};
 use asid_conformance::{Outcome, Row, checks, run, table};
 use mutant::{Fault, Mutant};
+use narrow::Narrow;
 
 fn engines() -> Vec<Box<dyn Backend>> {
     let engines: Vec<_> = registry::all::<BackendEntry>()
@@ -36,6 +39,44 @@ fn every_engine_conforms() {
         let rows = run(&*engine);
         println!("{}", table(&rows));
         failures.extend(rows.into_iter().filter(Row::is_failure));
+    }
+    assert!(failures.is_empty(), "\n{}", table(&failures));
+}
+
+/// What small engines claim: mechanisms, driven mechanisms, free bodies.
+const SMALL: [Capabilities; 3] = [
+    Capabilities::ARTICULATION.union(Capabilities::EXACT_SNAPSHOT),
+    Capabilities::ARTICULATION
+        .union(Capabilities::ACTUATORS)
+        .union(Capabilities::JOINT_IMPEDANCE)
+        .union(Capabilities::EXACT_SNAPSHOT)
+        .union(Capabilities::EXTERNAL_FORCES)
+        .union(Capabilities::STEP_HOOKS),
+    Capabilities::FREE_BODIES.union(Capabilities::EXACT_SNAPSHOT),
+];
+
+#[test]
+fn no_check_needs_more_than_it_names() {
+    // An engine that refuses whatever it does not claim passes what is left.
+    let engine = engines().swap_remove(0);
+    let all = engine.capabilities();
+    let mut failures = Vec::new();
+    let without = all.iter().map(|bit| all - bit);
+    for bits in without.chain(SMALL) {
+        // Precision is not for the taking: tolerances follow from it.
+        let bits = bits | Capabilities::DOUBLE_PRECISION;
+        let rows = run(&Narrow::new(&*engine, bits));
+        let passes = rows.iter().filter(|r| r.outcome == Outcome::Pass).count();
+        println!(
+            "{passes:3} of {} checks without {:?}",
+            rows.len(),
+            all - bits
+        );
+        assert!(passes > 30, "only {passes} checks with {bits:?}");
+        failures.extend(rows.into_iter().filter(Row::is_failure).map(|mut row| {
+            row.engine = format!("without {:?}", all - bits);
+            row
+        }));
     }
     assert!(failures.is_empty(), "\n{}", table(&failures));
 }
