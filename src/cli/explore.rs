@@ -147,7 +147,7 @@ pub fn explore(arguments: &Arguments) -> Result<()> {
         stage::start_line(&session),
         expected.join(", ")
     );
-    report.episode = Some(trace::episode(&session, &played.episode));
+    report.episode = trace::episode(&session, &played.episode);
     report.exploration = trace::exploration(
         &session,
         &explored.objective,

@@ -235,7 +235,7 @@ fn report(
         ..RealWorld::default()
     };
     report.parameters = trace::parameters(session, None, &found.posterior, Some(&found.iterations));
-    report.episode = Some(trace::episode(session, &episodes[0]));
+    report.episode = trace::episode(session, &episodes[0]);
     report.signals = trace::tracked(session, &episodes[0], Some((&before, &after)));
     if episodes.len() > 1 {
         report.notes.push(format!(

@@ -60,7 +60,7 @@ pub fn run_report(
         episode: outcome
             .real
             .as_ref()
-            .map(|real| episode(session, &real.episode)),
+            .and_then(|real| episode(session, &real.episode)),
         signals: signals(session, outcome)?,
         exploration: exploration(
             session,

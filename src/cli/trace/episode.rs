@@ -18,33 +18,33 @@ pub fn shape(outline: &Outline, kind: r::ShapeKind) -> r::Shape {
     }
 }
 
-/// The real episode from above.
-pub fn episode(session: &Session, log: &asid_core::Episode) -> r::Episode {
+/// The real episode from above; none where no pose of an object is tracked.
+pub fn episode(session: &Session, log: &asid_core::Episode) -> Option<r::Episode> {
     let view = session.task.top_view();
     let protocol = session.task.exploration();
     let position = session.signals.first().and_then(|s| log.channel(&s.sensor));
+    let position = position.filter(|p| p.len() >= 2)?;
     let orientation = session
         .signals
         .iter()
         .filter_map(|s| log.channel(&s.sensor))
-        .find(|c| c.len() == 4);
-    let poses = |row: &[f64]| {
-        let (p, q) = (position.clone()?, orientation.clone()?);
-        Some([row[p.start], row[p.start + 1], yaw(&row[q])])
+        .find(|c| c.len() == 4)?;
+    let pose = |row: &[f64]| {
+        let [x, y] = [row[position.start], row[position.start + 1]];
+        [x, y, yaw(&row[orientation.clone()])]
     };
     let effector = protocol
         .proprioception
         .first()
-        .and_then(|name| log.channel(name));
+        .and_then(|name| log.channel(name))
+        .filter(|range| range.len() >= 2);
     let every = protocol.frames_per_step.max(1);
-    r::Episode {
+    Some(r::Episode {
         objects: vec![r::ObjectTrack {
             name: view.object.label.clone(),
             outline: view.object.corners.clone(),
             time: log.time.clone(),
-            poses: (0..log.rows())
-                .map(|i| poses(log.reading(i)).unwrap_or([f64::NAN; 3]))
-                .collect(),
+            poses: (0..log.rows()).map(|i| pose(log.reading(i))).collect(),
         }],
         end_effector: effector.map(|range| r::PlanarPath {
             time: log.time.iter().step_by(every).copied().collect(),
@@ -67,7 +67,7 @@ pub fn episode(session: &Session, log: &asid_core::Episode) -> r::Episode {
             .iter()
             .map(|f| shape(f, r::ShapeKind::Fixed))
             .collect(),
-    }
+    })
 }
 
 /// Real readings against replays at the prior's centre and at the estimate.
