@@ -22,8 +22,8 @@ use asid_core::{Error, Result};
 pub struct Loaded {
     /// Its file, without links in its path.
     pub file: &'static Path,
-    /// Its Cargo package, where it brings parts in Rust.
-    pub package: Option<Package>,
+    /// Its Cargo packages, where it brings parts in Rust.
+    pub packages: Vec<Package>,
     /// What it brought.
     pub parts: Vec<Part>,
 }
@@ -70,31 +70,32 @@ fn register(path: &Path, file: PathBuf) -> Result<Loaded> {
     let library = library::open(path)?;
     let file: &'static Path = Box::leak(file.into_boxed_path());
     let engine = asid_abi::engine(library, path)?;
-    let declaration = declaration(library);
-    if engine.is_none() && declaration.is_none() {
+    let parts = match declaration(library) {
+        // SAFETY: the address is that of the library's constant of this name, and the
+        // library is never closed.
+        Some(address) => unsafe { plugin::accept(address, file) }?,
+        None => None,
+    };
+    if engine.is_none() && parts.is_none() {
         return Err(Error::Plugin {
             path: path.to_owned(),
             message: format!(
-                "is a library but no plugin: it exports neither `{}` (an engine) nor `{}` (parts in Rust)",
-                asid_abi::table::ENTRY,
-                plugin::SYMBOL
+                "is a library but no plugin: it exports neither an engine (`{}`) nor parts in Rust (`asid_core::export_plugin!()`)",
+                asid_abi::table::ENTRY
             ),
         });
     }
     let mut loaded = Loaded {
         file,
-        package: None,
+        packages: Vec::new(),
         parts: Vec::new(),
     };
-    if let Some(address) = declaration {
-        // SAFETY: the address is that of the library's constant of this name, and the
-        // library is never closed.
-        let registered = unsafe { plugin::accept(address, file) }?;
-        loaded.package = Some(registered.package);
-        let parts = registered.entries.into_iter();
+    if let Some(registered) = parts {
+        loaded.packages = registered.packages;
+        let entries = registered.entries.into_iter();
         loaded
             .parts
-            .extend(parts.map(|(kind, own_name, name)| Part {
+            .extend(entries.map(|(kind, own_name, name)| Part {
                 kind,
                 own_name,
                 name,

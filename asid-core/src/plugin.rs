@@ -29,5 +29,5 @@ mod fingerprint;
 mod panics;
 
 pub use border::blames_a_plugin;
-pub use declaration::{Declaration, SYMBOL};
+pub use declaration::{Declaration, Exported, SYMBOL};
 pub use entries::{Registered, accept};

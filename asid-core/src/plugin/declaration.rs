@@ -1,12 +1,14 @@
-//! What a plugin exports: one constant, which says what it is before anything is called.
+//! What a plugin exports: one constant, which says what it is before anything of it is used.
 
 use std::ffi::{CStr, c_char};
+use std::mem::offset_of;
 use std::path::Path;
 
 use super::entries::Entries;
 use super::fingerprint::{self, PROBES, Probe};
 use super::panics::{self, Panics};
 use crate::error::{Error, Result};
+use crate::registry::Package;
 
 /// Name of the exported constant.
 pub const SYMBOL: &str = "asid_rust_plugin";
@@ -14,60 +16,63 @@ pub const SYMBOL: &str = "asid_rust_plugin";
 /// How the constant begins.
 const MAGIC: [u8; 8] = *b"ASIDRUST";
 
-/// A plugin's statement of what it is; [`export_plugin!`](crate::export_plugin) makes it.
+/// What a shared library of Rust is built by and from, and what it hands over.
 ///
-/// The first three fields have the same place in every version, and are all that is read
+/// The first four fields have the same place in every version, and are all that is read
 /// before the fingerprints were compared.
 #[repr(C)]
 pub struct Declaration {
     magic: [u8; 8],
     size: usize,
     fingerprint: *const c_char,
+    exported: extern "C" fn() -> usize,
     probes: *const Probe,
     probe_count: usize,
-    package: &'static str,
-    version: &'static str,
-    packages: &'static [&'static str],
     panics: Panics,
-    entries: fn(&[&str]) -> Entries,
+    entries: fn() -> Entries,
 }
 
 // SAFETY: the pointers are to constants of the library, which is never closed.
 unsafe impl Sync for Declaration {}
 
-impl Declaration {
-    /// That of a package, handing over what it and other `packages` register.
-    #[doc(hidden)]
-    #[must_use]
-    pub const fn new(
-        package: &'static str,
-        version: &'static str,
-        packages: &'static [&'static str],
-    ) -> Self {
-        Self {
-            magic: MAGIC,
-            size: size_of::<Self>(),
-            fingerprint: fingerprint::TEXT.as_ptr().cast(),
-            probes: PROBES.as_ptr(),
-            probe_count: PROBES.len(),
-            package,
-            version,
-            packages,
-            panics: panics::OWN,
-            entries: Entries::of,
-        }
-    }
+/// The constant. It is in every shared library that holds this crate, once, however many
+/// packages with parts are linked into it.
+#[unsafe(no_mangle)]
+#[allow(non_upper_case_globals)]
+pub static asid_rust_plugin: Declaration = Declaration {
+    magic: MAGIC,
+    size: size_of::<Declaration>(),
+    fingerprint: fingerprint::TEXT.as_ptr().cast(),
+    exported,
+    probes: PROBES.as_ptr(),
+    probe_count: PROBES.len(),
+    panics: panics::OWN,
+    entries: Entries::exported,
+};
 
-    /// Reads the constant of a library, after checking that it can be read.
+/// A package that hands its parts over where it is in a shared library.
+#[doc(hidden)]
+pub struct Exported(pub Package);
+
+inventory::collect!(Exported);
+
+/// Number of packages that hand over parts.
+extern "C" fn exported() -> usize {
+    inventory::iter::<Exported>().count()
+}
+
+impl Declaration {
+    /// Reads the constant of a library, after checking that it can be read; `None` where
+    /// no package in the library hands anything over, as in an engine that is written in Rust.
     ///
     /// # Errors
     /// [`Error::Plugin`] saying what differs from this program, and what to do.
     ///
     /// # Safety
     /// `address` is that of the constant [`SYMBOL`] of a library that stays open: at least
-    /// three words, of which the second tells how many bytes there are, and the third is null
-    /// or points to a text ended by a zero.
-    pub(super) unsafe fn read(address: *const Self, path: &Path) -> Result<&'static Self> {
+    /// four words, of which the second tells how many bytes there are, the third is null
+    /// or points to a text ended by a zero, and the fourth is a function.
+    pub(super) unsafe fn read(address: *const Self, path: &Path) -> Result<Option<&'static Self>> {
         let refuse = |message: String| Error::Plugin {
             path: path.to_owned(),
             message,
@@ -75,7 +80,7 @@ impl Declaration {
         if address.is_null() || !address.is_aligned() {
             return Err(refuse(format!("its `{SYMBOL}` is at no valid address")));
         }
-        // SAFETY: three words are there; `addr_of!` makes no reference to the rest.
+        // SAFETY: these words are there; `addr_of!` makes no reference to the rest.
         let (magic, size, text) = unsafe {
             (
                 (&raw const (*address).magic).read(),
@@ -84,15 +89,18 @@ impl Declaration {
             )
         };
         if magic != MAGIC {
-            return Err(refuse(format!(
-                "its `{SYMBOL}` is not made by `asid_core::export_plugin!`"
-            )));
+            return Err(refuse(format!("its `{SYMBOL}` is not that of asid-core")));
         }
         let needed = size_of::<Self>();
-        if size < std::mem::offset_of!(Self, probes) || text.is_null() {
+        if size < offset_of!(Self, probes) || text.is_null() {
             return Err(refuse(format!(
                 "its `{SYMBOL}` is cut off: {size} bytes where {needed} are needed; rebuild the plugin"
             )));
+        }
+        // SAFETY: it is there, and a function of the C ABI in every version.
+        let exported = unsafe { (&raw const (*address).exported).read() };
+        if exported() == 0 {
+            return Ok(None);
         }
         // SAFETY: it is a text ended by a zero.
         let theirs = unsafe { CStr::from_ptr(text) }.to_string_lossy();
@@ -112,12 +120,7 @@ impl Declaration {
             return Err(refuse(difference));
         }
         // SAFETY: as above, and the library is never closed.
-        Ok(unsafe { &*address })
-    }
-
-    /// Name and version of the plugin's package.
-    pub(super) fn package(&self) -> (&'static str, &'static str) {
-        (self.package, self.version)
+        Ok(Some(unsafe { &*address }))
     }
 
     /// Panics of the plugin's copy of the standard library.
@@ -127,31 +130,26 @@ impl Declaration {
 
     /// What it registers, its panics being caught by the caller.
     pub(super) fn entries(&self) -> Entries {
-        (self.entries)(self.packages)
+        (self.entries)()
     }
 }
 
-/// Makes a shared library of the crate a plugin, which `asid --plugin FILE` loads.
+/// Hands over what the package registers, where it is in a shared library that
+/// `asid --plugin FILE` loads.
 ///
-/// It is written once, in a crate of the type `cdylib`, and hands over what the crate's
-/// own package registers; further packages that are linked in are named:
-/// `export_plugin!("my-tasks", "my-effects")`.
-///
-/// A program can have the exported constant once: where a program links two such crates,
-/// put the line behind a feature of each.
+/// It is written once in a crate. The library is one of the type `cdylib`: of the crate
+/// itself, or of another that links it. In a program it does nothing.
 #[macro_export]
 macro_rules! export_plugin {
-    ($($package:literal),* $(,)?) => {
+    () => {
         #[cfg(panic = "abort")]
         compile_error!("a plugin needs `panic = \"unwind\"` in its profile: its panics are caught");
 
-        /// What `asid --plugin` looks for.
-        #[allow(unsafe_code, non_upper_case_globals, missing_docs)]
-        #[unsafe(no_mangle)]
-        pub static asid_rust_plugin: $crate::plugin::Declaration = $crate::plugin::Declaration::new(
-            env!("CARGO_PKG_NAME"),
-            env!("CARGO_PKG_VERSION"),
-            &[env!("CARGO_PKG_NAME"), $($package),*],
-        );
+        $crate::__inventory::submit! {
+            $crate::plugin::Exported($crate::registry::Package {
+                name: env!("CARGO_PKG_NAME"),
+                version: env!("CARGO_PKG_VERSION"),
+            })
+        }
     };
 }

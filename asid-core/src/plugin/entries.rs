@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::across::Across;
 use super::border::{Border, Loaded};
-use super::declaration::Declaration;
+use super::declaration::{Declaration, Exported};
 use crate::backend::Backend;
 use crate::error::{Error, Result};
 use crate::explore::Explorer;
@@ -18,6 +18,7 @@ use crate::task::Task;
 
 /// Entries of a plugin's own registry.
 pub struct Entries {
+    packages: Vec<Package>,
     backends: Vec<&'static BackendEntry>,
     tasks: Vec<&'static TaskEntry>,
     explorers: Vec<&'static ExplorerEntry>,
@@ -27,13 +28,16 @@ pub struct Entries {
 }
 
 impl Entries {
-    /// Those that some packages register, in the copy of the crate that this code is in.
-    pub fn of(packages: &[&str]) -> Self {
-        fn of<E: Entry>(packages: &[&str]) -> Vec<&'static E> {
-            let ours =
-                |e: &&E| matches!(e.origin(), Origin::Linked(p) if packages.contains(&p.name));
+    /// What the packages that are exported register, in the copy of the crate that this
+    /// code is in.
+    pub fn exported() -> Self {
+        fn of<E: Entry>(packages: &[Package]) -> Vec<&'static E> {
+            let ours = |e: &&E| matches!(e.origin(), Origin::Linked(p) if packages.contains(&p));
             registry::all::<E>().into_iter().filter(ours).collect()
         }
+        let mut packages: Vec<Package> = inventory::iter::<Exported>().map(|e| e.0).collect();
+        packages.sort_by_key(|p| p.name);
+        let packages = &packages;
         Self {
             backends: of(packages),
             tasks: of(packages),
@@ -41,6 +45,7 @@ impl Entries {
             identifiers: of(packages),
             solvers: of(packages),
             effects: of(packages),
+            packages: packages.clone(),
         }
     }
 }
@@ -48,13 +53,13 @@ impl Entries {
 /// What a plugin brought.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Registered {
-    /// Its package.
-    pub package: Package,
+    /// Its packages.
+    pub packages: Vec<Package>,
     /// Kind, own name, and the name that it got here.
     pub entries: Vec<(&'static str, &'static str, &'static str)>,
 }
 
-/// Checks a plugin and registers what it hands over.
+/// Checks a plugin and registers what it hands over; `None` where that is nothing.
 ///
 /// # Errors
 /// [`Error::Plugin`] where it was not built as this program was, hands over nothing, or
@@ -63,16 +68,21 @@ pub struct Registered {
 /// # Safety
 /// `address` is that of the constant [`SYMBOL`](super::SYMBOL) of the library `path`,
 /// which is never closed.
-pub unsafe fn accept(address: *const Declaration, path: &'static Path) -> Result<Registered> {
+pub unsafe fn accept(
+    address: *const Declaration,
+    path: &'static Path,
+) -> Result<Option<Registered>> {
     // SAFETY: as this function's.
-    let declaration = unsafe { Declaration::read(address, path) }?;
+    let Some(declaration) = unsafe { Declaration::read(address, path) }? else {
+        return Ok(None);
+    };
     let plugin: &'static Loaded = Box::leak(Box::new(Loaded {
         path,
         panics: declaration.panics(),
     }));
     (plugin.panics.silence)();
     let border = Border::Inward(plugin);
-    let entries = border.try_run(|| Ok(declaration.entries()))?;
+    let handed = border.try_run(|| Ok(declaration.entries()))?;
     let adder = Adder {
         border,
         origin: Origin::Loaded(path),
@@ -81,18 +91,17 @@ pub unsafe fn accept(address: *const Declaration, path: &'static Path) -> Result
         path: path.to_owned(),
         message: e.to_string(),
     };
-    let entries = adder.all(&entries).map_err(named)?;
+    let entries = adder.all(&handed).map_err(named)?;
     if entries.is_empty() {
         return Err(Error::Plugin {
             path: path.to_owned(),
             message: "registers nothing: `asid_core::register!` is missing in its package".into(),
         });
     }
-    let (name, version) = declaration.package();
-    Ok(Registered {
-        package: Package { name, version },
+    Ok(Some(Registered {
+        packages: handed.packages,
         entries,
-    })
+    }))
 }
 
 /// Adds entries of a plugin to the registry of this program.
