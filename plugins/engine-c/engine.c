@@ -125,6 +125,7 @@ static void destroy_model(asid_model *m) { free(m); }
 
 /* The parameter that a target means: here a component of gravity. */
 static asid_code find_column(const asid_target *t, size_t *column, asid_error *error) {
+  snprintf(error->subject, sizeof error->subject, "%s/%s/%s", t->element, t->name, t->attribute);
   if (strcmp(t->element, "option") != 0 || strcmp(t->attribute, "gravity") != 0 || t->index > 2)
     return fail(error, ASID_PARAMETER, "this engine can change option/gravity/{0,1,2} only", "");
   *column = (size_t)t->index;

@@ -159,9 +159,9 @@ static asid_code set_state(asid_batch *b, const uint64_t *sims, uint64_t count, 
 static asid_code can_record(const asid_batch *b, const asid_channel *channels, uint64_t count, asid_error *error) {
   for (size_t i = 0; i < count; i++) {
     if (channels[i].kind == ASID_CHANNEL_CONTACT)
-      return refuse(error, ASID_INCAPABLE, "", "record contact forces: it has no contact");
+      return refuse(error, ASID_INCAPABLE, "mechanism", "record contact forces: it has no contact");
     if (channels[i].kind == ASID_CHANNEL_SENSOR && b->m->sensors[channels[i].a].reading == READ_NOTHING)
-      return refuse(error, ASID_INCAPABLE, "", "read sensor number %d of this scene", (int)channels[i].a);
+      return refuse(error, ASID_INCAPABLE, "mechanism", "read sensor number %d of this scene", (int)channels[i].a);
   }
   return ASID_OK;
 }

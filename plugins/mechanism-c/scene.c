@@ -53,25 +53,25 @@ static int could_touch(const asid_world *world, const asid_geom *a, const asid_g
 static asid_code check(const asid_world *world, asid_error *error) {
   for (uint64_t i = 0; i < world->nleft_out; i++)
     if (!harmless(world->left_out[i]))
-      return refuse(error, ASID_SCENE, "", "has no `%s`", world->left_out[i]);
+      return refuse(error, ASID_SCENE, "", "this engine lacks `%s`", world->left_out[i]);
   for (uint64_t i = 0; i < world->njoint; i++) {
     const asid_joint *j = &world->joints[i];
     int turns = j->kind == ASID_HINGE || j->kind == ASID_SLIDE;
-    if (j->limited) return refuse(error, ASID_SCENE, "", "has no limits of joints: joint `%s`", j->name);
-    if (j->frictionloss != 0) return refuse(error, ASID_SCENE, "", "has no dry friction: joint `%s`", j->name);
+    if (j->limited) return refuse(error, ASID_SCENE, "", "this engine has no limits of joints: joint `%s`", j->name);
+    if (j->frictionloss != 0) return refuse(error, ASID_SCENE, "", "this engine has no dry friction: joint `%s`", j->name);
     if (j->stiffness != 0 && !turns)
-      return refuse(error, ASID_SCENE, "", "has springs on hinges and slides only: joint `%s`", j->name);
+      return refuse(error, ASID_SCENE, "", "this engine has springs on hinges and slides only: joint `%s`", j->name);
   }
   for (uint64_t i = 0; i < world->nactuator; i++) {
     const asid_actuator *a = &world->actuators[i];
     if (a->kind == ASID_OTHER || a->joint == ASID_NONE || world->joints[a->joint].kind < ASID_HINGE)
-      return refuse(error, ASID_SCENE, "", "drives hinges and slides by motor, position and velocity: not <%s> `%s`",
+      return refuse(error, ASID_SCENE, "", "this engine drives hinges and slides by motor, position and velocity: not <%s> `%s`",
                     a->kind_name, a->name);
   }
   for (uint64_t i = 0; i < world->ngeom; i++)
     for (uint64_t k = 0; k < i; k++)
       if (could_touch(world, &world->geoms[k], &world->geoms[i]))
-        return refuse(error, ASID_SCENE, "", "has no contact: geoms `%s` and `%s` could touch (contype and conaffinity)",
+        return refuse(error, ASID_SCENE, "", "this engine has no contact: geoms `%s` and `%s` could touch (contype and conaffinity)",
                       world->geoms[k].name, world->geoms[i].name);
   return ASID_OK;
 }

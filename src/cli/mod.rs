@@ -8,6 +8,7 @@ mod export;
 mod failure;
 mod identify;
 mod list;
+mod new;
 mod options;
 mod output;
 mod plugins;
@@ -20,6 +21,7 @@ mod solve;
 mod stage;
 mod trace;
 
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -55,6 +57,8 @@ enum Command {
     Compare(compare::Arguments),
     /// A task's scene as MJCF
     Export(export::Arguments),
+    /// A folder that a plugin starts from
+    New(new::Arguments),
     /// (Re)writes the report of a finished run
     Report(report::Arguments),
 }
@@ -68,7 +72,9 @@ impl Command {
             Self::Identify(a) => &a.common,
             Self::Solve(a) => &a.common,
             Self::Compare(a) => &a.common,
-            Self::List(_) | Self::Doctor(_) | Self::Export(_) | Self::Report(_) => return None,
+            Self::List(_) | Self::Doctor(_) | Self::Export(_) | Self::New(_) | Self::Report(_) => {
+                return None;
+            }
         };
         common.config.as_deref()
     }
@@ -81,18 +87,41 @@ pub fn main() -> ExitCode {
 }
 
 fn dispatch() -> ExitCode {
-    let cli = match Cli::try_parse() {
+    let mut arguments: Vec<OsString> = std::env::args_os().collect();
+    let mut named = leading_plugins(&mut arguments);
+    let cli = match Cli::try_parse_from(arguments) {
         Ok(cli) => cli,
         Err(error) => return failure::usage(&error),
     };
-    match run_command(&cli) {
+    named.extend_from_slice(&cli.plugin);
+    match run_command(&cli, named) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => failure::report(&error),
     }
 }
 
-fn run_command(cli: &Cli) -> Result<()> {
-    let mut named = cli.plugin.clone();
+/// Takes the plugins that stand before the subcommand out of the arguments: an option of
+/// the subcommand would hide them.
+fn leading_plugins(arguments: &mut Vec<OsString>) -> Vec<PathBuf> {
+    let mut named = Vec::new();
+    while let Some(first) = arguments.get(1).and_then(|a| a.to_str()) {
+        let taken = match (first, first.strip_prefix("--plugin="), arguments.get(2)) {
+            (_, Some(file), _) => {
+                named.push(PathBuf::from(file));
+                1
+            }
+            ("--plugin", _, Some(file)) => {
+                named.push(PathBuf::from(file));
+                2
+            }
+            _ => break,
+        };
+        arguments.drain(1..=taken);
+    }
+    named
+}
+
+fn run_command(cli: &Cli, mut named: Vec<PathBuf>) -> Result<()> {
     named.extend(plugins::of_config(cli.command.config())?);
     let refused = plugins::load(&named)?;
     match &cli.command {
@@ -108,6 +137,35 @@ fn run_command(cli: &Cli) -> Result<()> {
         Command::Solve(arguments) => solve::solve(arguments),
         Command::Compare(arguments) => compare::compare(arguments),
         Command::Export(arguments) => export::export(arguments),
+        Command::New(arguments) => new::new(arguments),
         Command::Report(arguments) => report::report(arguments),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn plugins_before_the_subcommand_are_taken_out() {
+        let mut arguments: Vec<OsString> = [
+            "asid",
+            "--plugin",
+            "a.so",
+            "--plugin=b.so",
+            "list",
+            "--plugin",
+            "c.so",
+        ]
+        .map(OsString::from)
+        .into();
+        assert_eq!(
+            leading_plugins(&mut arguments),
+            [PathBuf::from("a.so"), PathBuf::from("b.so")]
+        );
+        assert_eq!(arguments, ["asid", "list", "--plugin", "c.so"]);
+        let mut alone: Vec<OsString> = ["asid", "--plugin"].map(OsString::from).into();
+        assert!(leading_plugins(&mut alone).is_empty());
+        assert_eq!(alone.len(), 2);
     }
 }

@@ -1,0 +1,166 @@
+//! `asid new`: a folder that a plugin starts from, with all that it needs to be built.
+
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+use anyhow::Result;
+use asid_core::Error;
+use clap::builder::{PossibleValue, PossibleValuesParser};
+
+/// Arguments of `new`.
+#[derive(clap::Args)]
+pub struct Arguments {
+    /// What to start
+    #[arg(value_parser = PossibleValuesParser::new(KINDS.iter().map(Kind::value)))]
+    kind: String,
+    /// Folder to write; it must be empty or not exist. Its name becomes the plugin's
+    dir: PathBuf,
+}
+
+/// Something that can be started.
+struct Kind {
+    name: &'static str,
+    about: &'static str,
+    /// Text in the files that holds the plugin's name, and how a new name is written in
+    /// its place, as `{}`.
+    rename: (&'static str, &'static str),
+    /// Names and contents.
+    files: &'static [(&'static str, &'static str)],
+}
+
+/// The interface of engines.
+const HEADER: (&str, &str) = (
+    "asid_backend.h",
+    include_str!("../../backends/abi/include/asid_backend.h"),
+);
+
+/// How to write an engine.
+const ENGINE_GUIDE: (&str, &str) = ("GUIDE.md", include_str!("../../docs/add-a-backend.md"));
+
+/// All that there is to start from: the examples themselves, which tests build and run.
+const KINDS: &[Kind] = &[
+    Kind {
+        name: "engine-c",
+        about: "a physics engine in one C file: rigid bodies in free flight",
+        rename: ("\"flight\"", "\"{}\""),
+        files: &[
+            HEADER,
+            ("engine.c", include_str!("../../plugins/engine-c/engine.c")),
+            (
+                "README.md",
+                include_str!("../../plugins/engine-c/README.md"),
+            ),
+            ENGINE_GUIDE,
+        ],
+    },
+    Kind {
+        name: "mechanism-c",
+        about: "a larger engine in C: trees of joints, drives and sensors, without contact",
+        rename: ("\"mechanism\"", "\"{}\""),
+        files: &[
+            HEADER,
+            (
+                "engine.c",
+                include_str!("../../plugins/mechanism-c/engine.c"),
+            ),
+            ("scene.c", include_str!("../../plugins/mechanism-c/scene.c")),
+            (
+                "dynamics.c",
+                include_str!("../../plugins/mechanism-c/dynamics.c"),
+            ),
+            (
+                "mechanism.h",
+                include_str!("../../plugins/mechanism-c/mechanism.h"),
+            ),
+            (
+                "README.md",
+                include_str!("../../plugins/mechanism-c/README.md"),
+            ),
+            ENGINE_GUIDE,
+        ],
+    },
+];
+
+impl Kind {
+    fn value(&self) -> PossibleValue {
+        PossibleValue::new(self.name).help(self.about)
+    }
+
+    /// A file's text for a plugin of this name.
+    fn text(&self, text: &str, name: &str) -> String {
+        let (from, to) = self.rename;
+        text.replace(from, &to.replace("{}", name))
+    }
+}
+
+/// Writes the folder.
+pub fn new(arguments: &Arguments) -> Result<()> {
+    let kind = KINDS.iter().find(|k| k.name == arguments.kind);
+    let kind =
+        kind.ok_or_else(|| Error::unknown("kind", &arguments.kind, KINDS.iter().map(|k| k.name)))?;
+    let dir = &arguments.dir;
+    let name = plugin_name(dir)?;
+    prepare(dir)?;
+    for (file, text) in kind.files {
+        let path = dir.join(file);
+        let folder = path.parent().unwrap_or(dir);
+        // Nothing is there, but something may have come meanwhile.
+        let written = std::fs::create_dir_all(folder)
+            .and_then(|()| std::fs::File::create_new(&path))
+            .and_then(|mut f| f.write_all(kind.text(text, &name).as_bytes()));
+        written.map_err(|e| failed(&path, &e))?;
+    }
+    let names: Vec<&str> = kind.files.iter().map(|(file, _)| *file).collect();
+    let mut out = std::io::stdout().lock();
+    writeln!(out, "{}: {}", dir.display(), names.join(", "))?;
+    writeln!(out, "README.md says how to build it and what to change")?;
+    Ok(())
+}
+
+/// The plugin's name: that of its folder.
+fn plugin_name(dir: &Path) -> Result<String> {
+    let refuse = |message: &str| Error::File {
+        path: dir.to_path_buf(),
+        message: message.to_owned(),
+    };
+    // `.` has a name too, where it is.
+    let full = dir.canonicalize().unwrap_or_else(|_| dir.to_path_buf());
+    let name = full
+        .file_name()
+        .and_then(|n| n.to_str())
+        .unwrap_or_default();
+    let fits = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-';
+    if name.is_empty() || !name.chars().all(fits) || !name.starts_with(char::is_alphabetic) {
+        let message = "its name becomes the plugin's: use a-z, 0-9 and -, a letter first";
+        return Err(refuse(message).into());
+    }
+    Ok(name.to_owned())
+}
+
+/// Makes the folder, or sees that it is empty.
+fn prepare(dir: &Path) -> Result<()> {
+    let refuse = |message: &str| Error::File {
+        path: dir.to_path_buf(),
+        message: message.to_owned(),
+    };
+    match std::fs::read_dir(dir) {
+        Ok(mut entries) if entries.next().is_some() => {
+            Err(refuse("holds something already; choose another folder").into())
+        }
+        Ok(_) => Ok(()),
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => {
+            Ok(std::fs::create_dir_all(dir).map_err(|e| failed(dir, &e))?)
+        }
+        Err(e) if e.kind() == std::io::ErrorKind::NotADirectory => {
+            Err(refuse("is there already and is no folder; choose another name").into())
+        }
+        Err(e) => Err(failed(dir, &e).into()),
+    }
+}
+
+fn failed(path: &Path, error: &std::io::Error) -> Error {
+    Error::File {
+        path: path.to_path_buf(),
+        message: format!("cannot be written: {error}"),
+    }
+}
