@@ -144,10 +144,10 @@ fn prepare(dir: &Path) -> Result<()> {
         message: message.to_owned(),
     };
     match std::fs::read_dir(dir) {
-        Ok(mut entries) if entries.next().is_some() => {
-            Err(refuse("holds something already; choose another folder").into())
-        }
-        Ok(_) => Ok(()),
+        Ok(mut entries) => match entries.next() {
+            None => Ok(()),
+            Some(_) => Err(refuse("holds something already; choose another folder").into()),
+        },
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => {
             Ok(std::fs::create_dir_all(dir).map_err(|e| failed(dir, &e))?)
         }
