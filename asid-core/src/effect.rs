@@ -9,7 +9,7 @@ use std::str::FromStr;
 
 use crate::error::{Error, Result};
 use crate::layout::Layout;
-use crate::registry::{EffectEntry, find};
+use crate::registry::{EffectEntry, all, find};
 use crate::simulator::{StepHook, StepView};
 
 /// Where an effect acts.
@@ -81,7 +81,7 @@ impl FromStr for EffectSpec {
             ),
         };
         let (head, tail) = text.split_once(':').unwrap_or((text, ""));
-        let (name, site) = head.split_once('@').unwrap_or((head, ""));
+        let (name, site) = name_and_site(head);
         if name.trim().is_empty() {
             return Err(wrong("the name is missing".into()));
         }
@@ -106,6 +106,19 @@ impl FromStr for EffectSpec {
             site: site.trim().to_owned(),
             values,
         })
+    }
+}
+
+/// Splits `NAME@SITE`. A loaded effect whose own name was taken has an `@` in its name.
+fn name_and_site(head: &str) -> (&str, &str) {
+    let longest = all::<EffectEntry>()
+        .iter()
+        .filter(|e| head == e.name || head.starts_with(&format!("{}@", e.name)))
+        .map(|e| e.name.len())
+        .max();
+    match longest {
+        Some(length) => (&head[..length], head[length..].trim_start_matches('@')),
+        None => head.split_once('@').unwrap_or((head, "")),
     }
 }
 

@@ -1,0 +1,287 @@
+//! A plugin for tests, of which every part fails in its own way.
+//!
+//! The tasks are `payload-swing` with one method that fails.
+
+use asid_core::effect::{Acts, Effect, EffectParameter};
+use asid_core::explore::{Explored, Explorer, Policy};
+use asid_core::identify::{Identified, Identifier};
+use asid_core::registry::Settings;
+use asid_core::simulator::{StepHook, StepView};
+use asid_core::solve::{Solved, TaskSolver};
+use asid_core::task::{
+    Commander, Condition, DownstreamProtocol, ExplorationProtocol, Outcome, Task,
+};
+use asid_core::{
+    Capabilities, Episode, Error, Layout, Parameter, Posterior, Problem, Result, Scene,
+};
+use payload_swing::PayloadSwing;
+
+asid_core::export_plugin!();
+
+/// What fails.
+#[derive(Clone, Copy, PartialEq)]
+enum Fault {
+    OutcomePanics,
+    OutcomeIsNan,
+    MetricIsNan,
+    AttemptPanics,
+    AttemptFails,
+    CommandsPanic,
+}
+
+/// `payload-swing` with a fault.
+struct Faulty {
+    inner: PayloadSwing,
+    fault: Fault,
+}
+
+macro_rules! faulty_tasks {
+    ($($name:literal: $fault:ident),* $(,)?) => {$(
+        asid_core::register!(TaskEntry {
+            name: $name,
+            about: "fails",
+            make: || Ok(Box::new(Faulty {
+                inner: PayloadSwing::new()?,
+                fault: Fault::$fault,
+            })),
+        });
+    )*};
+}
+
+faulty_tasks! {
+    "outcome-panics": OutcomePanics,
+    "outcome-is-nan": OutcomeIsNan,
+    "metric-is-nan": MetricIsNan,
+    "attempt-panics": AttemptPanics,
+    "attempt-fails": AttemptFails,
+    "commands-panic": CommandsPanic,
+}
+
+asid_core::register!(TaskEntry {
+    name: "make-panics",
+    about: "fails",
+    make: || panic!("the task cannot be made"),
+});
+
+impl Task for Faulty {
+    fn name(&self) -> &str {
+        "faulty"
+    }
+
+    fn about(&self) -> &str {
+        "fails"
+    }
+
+    fn scene(&self) -> &Scene {
+        self.inner.scene()
+    }
+
+    fn requires(&self) -> Capabilities {
+        self.inner.requires()
+    }
+
+    fn parameters(&self) -> Vec<Parameter> {
+        self.inner.parameters()
+    }
+
+    fn conditions(&self) -> Vec<Condition> {
+        self.inner.conditions()
+    }
+
+    fn exploration(&self) -> &ExplorationProtocol {
+        self.inner.exploration()
+    }
+
+    fn downstream(&self) -> &DownstreamProtocol {
+        self.inner.downstream()
+    }
+
+    fn place(&self, layout: &Layout, start: &[f64], qpos: &mut [f64]) -> Result<()> {
+        self.inner.place(layout, start, qpos)
+    }
+
+    fn locate(&self, signals: &[f64]) -> Vec<f64> {
+        self.inner.locate(signals)
+    }
+
+    fn commander(&self) -> Result<Box<dyn Commander>> {
+        match self.fault {
+            Fault::CommandsPanic => Ok(Box::new(Panicking)),
+            _ => self.inner.commander(),
+        }
+    }
+
+    fn attempt(&self, start: &[f64], action: &[f64]) -> Result<Vec<f64>> {
+        match self.fault {
+            Fault::AttemptPanics => panic!("no torque for the attempt"),
+            Fault::AttemptFails => Err(Error::Failed("the motor is too weak".into())),
+            _ => self.inner.attempt(start, action),
+        }
+    }
+
+    fn metric(&self, readings: &[f64]) -> Vec<f64> {
+        match self.fault {
+            Fault::MetricIsNan => vec![f64::NAN; readings.len()],
+            _ => self.inner.metric(readings),
+        }
+    }
+
+    fn outcome(&self, readings: &[f64]) -> Outcome {
+        let outcome = self.inner.outcome(readings);
+        match self.fault {
+            Fault::OutcomePanics => panic!("the outcome of\nseveral lines"),
+            Fault::OutcomeIsNan => Outcome {
+                value: f64::NAN,
+                ..outcome
+            },
+            _ => outcome,
+        }
+    }
+}
+
+/// A commander that panics.
+struct Panicking;
+
+impl Commander for Panicking {
+    fn reset(&mut self) {}
+
+    fn commands(&mut self, _action: &[f64], _ctrl: &mut [f64]) {
+        panic!("no commands today");
+    }
+}
+
+/// An explorer that fails in one way.
+struct FaultyExplorer(fn(&Problem<'_>));
+
+macro_rules! faulty_explorers {
+    ($($name:literal: $fault:expr),* $(,)?) => {$(
+        asid_core::register!(ExplorerEntry {
+            name: $name,
+            about: "fails",
+            defaults: Settings::new,
+            make: |_| Ok(Box::new(FaultyExplorer($fault))),
+        });
+    )*};
+}
+
+faulty_explorers! {
+    "explore-panics": |_| panic!("nothing to explore"),
+    "explore-panics-in-a-thread": |_| {
+        let thread = std::thread::spawn(|| -> () { panic!("nothing in the thread") });
+        let joined: std::thread::Result<()> = thread.join();
+        if let Err(payload) = joined {
+            std::panic::resume_unwind(payload);
+        }
+    },
+    // A reading without values: an index beyond the end, on the side of the task.
+    "explore-makes-the-task-panic": |problem| drop(problem.task.locate(&[])),
+    "act-panics": |_| {},
+}
+
+impl Explorer for FaultyExplorer {
+    fn explore<'a>(
+        &'a self,
+        problem: &'a Problem<'a>,
+        _start: Option<&[f64]>,
+    ) -> Result<Explored<'a>> {
+        (self.0)(problem);
+        Ok(Explored {
+            policy: Box::new(PanickingPolicy),
+            curve: Vec::new(),
+            curve_label: "",
+            objective: String::new(),
+        })
+    }
+}
+
+/// A policy that panics, when it is used and once more when it is dropped.
+struct PanickingPolicy;
+
+impl Policy for PanickingPolicy {
+    fn reset(&mut self) {}
+
+    fn act(&mut self, _step: usize, _reading: &[f64], _action: &mut [f64]) -> Result<()> {
+        panic!("no action comes to mind");
+    }
+
+    fn export(&self) -> serde_json::Value {
+        serde_json::Value::Null
+    }
+}
+
+impl Drop for PanickingPolicy {
+    fn drop(&mut self) {
+        panic!("cannot be dropped");
+    }
+}
+
+/// An identifier and a solver that panic.
+struct PanickingAlgorithm;
+
+asid_core::register!(IdentifierEntry {
+    name: "identify-panics",
+    about: "fails",
+    defaults: Settings::new,
+    make: |_| Ok(Box::new(PanickingAlgorithm)),
+});
+
+asid_core::register!(SolverEntry {
+    name: "solve-panics",
+    about: "fails",
+    defaults: Settings::new,
+    make: |_| Ok(Box::new(PanickingAlgorithm)),
+});
+
+impl Identifier for PanickingAlgorithm {
+    fn identify(&self, _problem: &Problem<'_>, _episodes: &[Episode]) -> Result<Identified> {
+        panic!("no posterior");
+    }
+}
+
+impl TaskSolver for PanickingAlgorithm {
+    fn solve<'a>(&'a self, _problem: &'a Problem<'a>, _belief: &Posterior) -> Result<Solved<'a>> {
+        panic!("no solution");
+    }
+}
+
+/// An effect whose force fails.
+struct FaultyEffect(fn() -> f64);
+
+asid_core::register!(EffectEntry {
+    name: "force-panics",
+    about: "fails",
+    make: || Box::new(FaultyEffect(|| panic!("no force"))),
+});
+
+asid_core::register!(EffectEntry {
+    name: "force-is-nan",
+    about: "fails",
+    make: || Box::new(FaultyEffect(|| f64::NAN)),
+});
+
+impl Effect for FaultyEffect {
+    fn acts(&self) -> Acts {
+        Acts::Force
+    }
+
+    fn parameters(&self) -> &'static [EffectParameter] {
+        &[]
+    }
+
+    fn sites(&self, _layout: &Layout) -> Vec<String> {
+        Vec::new()
+    }
+
+    fn attach(&self, _: &Layout, _: &str, _: &[f64]) -> Result<Box<dyn StepHook + Send>> {
+        Ok(Box::new(FaultyHook(self.0)))
+    }
+}
+
+/// The force of [`FaultyEffect`].
+struct FaultyHook(fn() -> f64);
+
+impl StepHook for FaultyHook {
+    fn before_step(&self, _row: usize, _step: usize, view: &mut StepView<'_>) {
+        view.force.fill((self.0)());
+    }
+}
