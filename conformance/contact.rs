@@ -3,7 +3,7 @@
 use asid_core::{Backend, Capabilities, Result};
 
 use crate::check::{Check, Tolerance};
-use crate::rig::{G, Rig, STEP, broken, largest, last, relative};
+use crate::rig::{G, Rig, broken, largest, last, relative};
 
 const CONTACT: Capabilities = Capabilities::CONTACT.union(Capabilities::FREE_BODIES);
 const FORCES: Capabilities = CONTACT.union(Capabilities::CONTACT_FORCES);
@@ -115,14 +115,6 @@ pub const CHECKS: &[Check] = &[
         tolerance: Tolerance::same(0.05),
         reason: "a spring gives back what it takes; contact begins within a step: 2 w dt of the energy at w = 50 /s",
         measure: bounces,
-    },
-    Check {
-        name: "contact/who-meets-whom",
-        needs: CONTACT,
-        unit: "",
-        tolerance: Tolerance::same(0.0),
-        reason: "contype and conaffinity of either side suffice, <exclude> counts: wrong of three",
-        measure: who_meets,
     },
 ];
 
@@ -307,31 +299,4 @@ fn bounces(backend: &dyn Backend) -> Result<f64> {
         .unwrap_or(heights.len());
     let highest = heights[first..].iter().copied().fold(f64::NAN, f64::max);
     Ok(relative(highest, 0.2))
-}
-
-fn who_meets(backend: &dyn Backend) -> Result<f64> {
-    let inside = r#"<worldbody>
-        <geom type="plane" size="5 5 .1" contype="1" conaffinity="0"/>
-        <body name="falls" pos="0 0 0.05"><freejoint name="falls"/>
-          <geom type="box" size=".05 .05 .05" mass="1" contype="2" conaffinity="4"/></body>
-        <body name="stands" pos="1 0 0.05"><freejoint name="stands"/>
-          <geom type="box" size=".05 .05 .05" mass="1" contype="0" conaffinity="1"/></body>
-        <body name="excluded" pos="2 0 0.05"><freejoint name="excluded"/>
-          <geom type="box" size=".05 .05 .05" mass="1" contype="0" conaffinity="1"/></body>
-      </worldbody><contact><exclude body1="world" body2="excluded"/></contact>"#;
-    let mut rig = Rig::new(
-        backend,
-        inside,
-        &["qpos.falls", "qpos.stands", "qpos.excluded"],
-    )?;
-    let rows = rig.run(250, &[])?;
-    let end = last(&rows)?;
-    // What meets nothing has fallen freely for half a second.
-    let fallen = 0.05 - 0.5 * G * 0.25;
-    let near = |z: f64, height: f64| (z - height).abs() < 2.0 * G * STEP;
-    Ok(broken([
-        near(end[2], fallen),
-        near(end[9], 0.05),
-        near(end[16], fallen),
-    ]))
 }

@@ -38,6 +38,14 @@ pub const CHECKS: &[Check] = &[
         measure: orientations,
     },
     Check {
+        name: "frames/degrees-of-a-document",
+        needs: TREE,
+        unit: "",
+        tolerance: EXACT,
+        reason: "axisangle, euler and ref are degrees where a document says nothing else, keyframes and readings radians, lengths metres: rounding",
+        measure: degrees,
+    },
+    Check {
         name: "frames/site-velocity",
         needs: TREE,
         unit: "m/s",
@@ -211,4 +219,26 @@ fn orientations(backend: &dyn Backend) -> Result<f64> {
         errors.extend((0..4).map(|i| sign * q[i] - theory[i]));
     }
     Ok(largest(errors))
+}
+
+/// A document in degrees, as documents are where they say nothing else.
+fn degrees(backend: &dyn Backend) -> Result<f64> {
+    let xml = r#"<mujoco><worldbody>
+      <body euler="0 0 30"><joint name="h" axis="0 0 1" ref="45"/><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>
+        <body axisangle="1 0 0 60"><joint name="s" type="slide" axis="1 0 0" ref="0.2"/>
+          <inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/><site name="tip" pos="0 1 0"/></body></body></worldbody>
+      <sensor><jointpos name="ph" joint="h"/><jointpos name="ps" joint="s"/>
+        <framepos name="p" objtype="site" objname="tip"/></sensor>
+      <keyframe><key qpos="1 0.5"/></keyframe></mujoco>"#;
+    let scene = asid_core::Scene::from_xml("conformance", xml, &[])?;
+    let mut rig = Rig::of(backend.load(&scene)?, &["ph", "ps", "p"], crate::rig::ONE)?;
+    let found = rig.read()?.swap_remove(0);
+    let about = |axis: Vector3<f64>, degrees: f64| {
+        UnitQuaternion::from_scaled_axis(axis * degrees.to_radians())
+    };
+    let first = about(Vector3::z(), 30.0 - 45.0) * UnitQuaternion::from_scaled_axis(Vector3::z());
+    let second = first * about(Vector3::x(), 60.0);
+    let tip = second * Vector3::new(0.3, 1.0, 0.0);
+    let theory = [1.0, 0.5, tip.x, tip.y, tip.z];
+    Ok(largest((0..5).map(|i| found[i] - theory[i])))
 }

@@ -27,11 +27,14 @@
 mod actuators;
 mod arrays;
 mod check;
+mod claims;
 mod contact;
 mod contact_parameters;
+mod contact_rules;
 mod deviations;
 mod divergence;
 mod dynamics;
+mod equalities;
 mod faults;
 mod forces;
 mod frames;
@@ -39,6 +42,7 @@ mod friction;
 mod hooks;
 mod joints;
 mod layout;
+mod lifetime;
 mod mechanism_parameters;
 mod pair;
 mod parameters;
@@ -55,7 +59,9 @@ pub fn checks() -> impl Iterator<Item = &'static Check> {
     [
         dynamics::CHECKS,
         joints::CHECKS,
+        equalities::CHECKS,
         contact::CHECKS,
+        contact_rules::CHECKS,
         friction::CHECKS,
         actuators::CHECKS,
         arrays::CHECKS,
@@ -66,8 +72,10 @@ pub fn checks() -> impl Iterator<Item = &'static Check> {
         forces::CHECKS,
         hooks::CHECKS,
         state::CHECKS,
+        lifetime::CHECKS,
         divergence::CHECKS,
         faults::CHECKS,
+        claims::CHECKS,
     ]
     .into_iter()
     .flatten()

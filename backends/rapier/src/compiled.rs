@@ -125,6 +125,8 @@ impl Compiled {
             scene: scene.name().to_owned(),
             message,
         };
+        document::correct(scene, &mut model)
+            .map_err(|what| fail(format!("backend `rapier` {what}")))?;
         let body_of_geom: Vec<usize> = model
             .bodies
             .iter()

@@ -1,9 +1,9 @@
 //! What of the document is prepared for rapier's loader, and what the loader must
 //! not see because this crate does it itself.
 
-use asid_core::Result;
 use asid_core::layout::Layout;
 use asid_core::mass::GeomMass;
+use asid_core::{Result, Scene};
 use mjcf_rs::Model;
 use mjcf_rs::equality::Equality;
 use rapier3d::dynamics::RigidBodyBuilder;
@@ -113,6 +113,50 @@ pub fn actuators(model: &Model, layout: &Layout) -> Result<Vec<ActuatorSlot>> {
     Ok(slots)
 }
 
+/// Puts right what the parser takes for something else: the friction of a `<pair>` has
+/// two sliding and two rolling entries, and an equality may name the world.
+///
+/// # Errors
+/// A pair whose friction differs by direction, or is left to a default class.
+pub fn correct(scene: &Scene, model: &mut Model) -> std::result::Result<(), String> {
+    for equality in &mut model.equality {
+        let second = match equality {
+            Equality::Connect(c) => &mut c.body2,
+            Equality::Weld(w) => &mut w.body2,
+            Equality::Joint(_) | Equality::Tendon(_) => continue,
+        };
+        if second.as_deref() == Some("world") {
+            *second = None;
+        }
+    }
+    let document = roxmltree::Document::parse(scene.xml()).map_err(|e| e.to_string())?;
+    let nodes = document.descendants().filter(|n| n.has_tag_name("pair"));
+    let (elements, defaults): (Vec<_>, Vec<_>) =
+        nodes.partition(|n| n.parent().is_some_and(|p| p.has_tag_name("contact")));
+    if defaults.iter().any(|n| n.has_attribute("friction")) {
+        return Err("takes the friction of a <pair> from itself, not from a default".into());
+    }
+    for (node, pair) in elements.iter().zip(&mut model.contact.pairs) {
+        let Some(text) = node.attribute("friction") else {
+            continue;
+        };
+        let values: Vec<f64> = text
+            .split_whitespace()
+            .filter_map(|v| v.parse().ok())
+            .collect();
+        let entry = |i: usize, otherwise: f64| values.get(i).copied().unwrap_or(otherwise);
+        let rolling = entry(3, 1e-4);
+        if entry(0, 1.0) != entry(1, 1.0) || rolling != entry(4, rolling) {
+            return Err(format!(
+                "has the same friction in both directions, unlike <pair> `{}` `{}`",
+                pair.geom1, pair.geom2
+            ));
+        }
+        pair.friction = Some([entry(0, 1.0), entry(2, 0.005), rolling]);
+    }
+    Ok(())
+}
+
 /// Checks that equalities name bodies and joints that are there.
 ///
 /// # Errors
@@ -169,10 +213,17 @@ impl Places {
 /// springs, damping and friction of joints.
 pub fn rename(model: &mut Model) -> Places {
     let places = Places;
+    let paired: Vec<String> = (model.contact.pairs.iter())
+        .flat_map(|p| [p.geom1.clone(), p.geom2.clone()])
+        .collect();
     let (mut geom_count, mut joint_count) = (0, 0);
     let mut new_names = Vec::new();
     for entry in &mut model.bodies {
         for geom in &mut entry.body.geoms {
+            // What touches by an explicit pair alone has a shape all the same.
+            if geom.name.as_ref().is_some_and(|n| paired.contains(n)) && geom.conaffinity == 0 {
+                geom.contype = geom.contype.max(1);
+            }
             geom.name = Some(places.geom(geom_count));
             geom_count += 1;
         }

@@ -225,7 +225,9 @@ fn check_bodies(scene: &Scene, model: &Model) -> Result<()> {
             }
         }
         for geom in &body.geoms {
-            let collides = geom.contype != 0 || geom.conaffinity != 0;
+            let paired = (model.contact.pairs.iter())
+                .any(|p| [Some(&p.geom1), Some(&p.geom2)].contains(&geom.name.as_ref()));
+            let collides = paired || geom.contype != 0 || geom.conaffinity != 0;
             let primitive = !matches!(
                 geom.type_,
                 GeomType::Mesh | GeomType::Hfield | GeomType::Sdf | GeomType::Ellipsoid
