@@ -7,14 +7,15 @@ use rand_distr::{Distribution, StandardNormal};
 use crate::backend::Model;
 use crate::effect::Effects;
 use crate::episode::{ChannelColumns, Episode};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::explore::Policy;
 use crate::parameter::Parameter;
+use crate::plugin::blames_a_plugin;
 use crate::problem::{Batch, Problem, substeps};
 use crate::progress::Silent;
 use crate::rng::{Rng, Streams};
 use crate::signal::{Signal, SignalSet};
-use crate::simulator::{Control, Rollout};
+use crate::simulator::{Control, Rollout, Status};
 use crate::solve::TaskPolicy;
 use crate::task::{Outcome, Task};
 
@@ -144,6 +145,16 @@ impl<'a> SimulatedWorld<'a> {
         self.batch.set_parameters(&[0], &self.truth)?;
         self.batch.place(self.task, &[0], start)
     }
+
+    /// Whether the simulation goes on; one that a plugin's effect ended does not count.
+    fn check(&self) -> Result<()> {
+        match &self.batch.simulator.status()[0] {
+            Status::Diverged { message, .. } if blames_a_plugin(message) => {
+                Err(Error::Failed(message.clone()))
+            }
+            _ => Ok(()),
+        }
+    }
 }
 
 fn draw(coordinates: &[crate::task::Coordinate], rng: &mut Rng) -> Vec<f64> {
@@ -215,6 +226,7 @@ impl RealWorld for SimulatedWorld<'_> {
                 Rollout::new(&[0], frames, substeps, Control::Shared(&ctrl), &recording);
             rollout.hook = self.effects.hook();
             self.batch.simulator.rollout(&rollout, &mut out)?;
+            self.check()?;
             episode.ctrl.extend_from_slice(&ctrl);
             for frame in out.chunks_exact(all_width) {
                 episode.readings.extend(observe(frame));
@@ -272,6 +284,7 @@ impl RealWorld for SimulatedWorld<'_> {
         );
         rollout.hook = self.effects.hook();
         self.batch.simulator.rollout(&rollout, &mut readings)?;
+        self.check()?;
         Ok(Attempt {
             outcome: self.task.outcome(&readings),
             action,
