@@ -55,8 +55,8 @@ static asid_code fail(asid_error *error, asid_code code, const char *why, const 
 
 /* Refuses what this engine would otherwise ignore in silence. */
 static asid_code check(const asid_world *w, asid_error *error) {
-  for (size_t i = 0; i < w->nleft_out; i++)
-    if (strncmp(w->left_out[i], "option ", 7) != 0) /* how other engines compute */
+  for (size_t i = 0; i < w->nleft_out; i++) /* how other engines integrate is no physics */
+    if (strcmp(w->left_out[i], "option integrator") != 0 && strcmp(w->left_out[i], "option cone") != 0)
       return fail(error, ASID_SCENE, "this engine lacks", w->left_out[i]);
   if (w->nbody > MOST || w->nsensor > MOST) return fail(error, ASID_SCENE, "the scene is too large", "");
   if (w->nactuator > 0) return fail(error, ASID_SCENE, "this engine has no actuators", w->actuators[0].name);

@@ -1,0 +1,248 @@
+//! Engines in C: the examples are built by the system's compiler and conform, the guide
+//! leads to a green table, and its code is that of the examples.
+
+#![cfg(unix)]
+#![allow(clippy::unwrap_used)]
+
+#[allow(dead_code)]
+mod cli_support;
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use asid::core::{Backend, Capabilities};
+use asid_conformance::{Outcome, Row, table};
+use cli_support::{Workplace, names};
+
+/// What the examples promise to compile under without a warning.
+const STRICT: [&str; 6] = [
+    "-std=c99",
+    "-Wall",
+    "-Wextra",
+    "-pedantic",
+    "-Werror",
+    "-O2",
+];
+
+/// The C compiler: `$CC`, or `cc`.
+fn compiler() -> String {
+    std::env::var("CC").unwrap_or_else(|_| "cc".into())
+}
+
+fn repository(path: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join(path)
+}
+
+fn read(path: &str) -> String {
+    std::fs::read_to_string(repository(path)).unwrap()
+}
+
+/// Compiles sources of a folder of the repository into a library.
+fn build(folder: &str, sources: &[&str], library: &Path) {
+    let sources = sources.iter().map(|s| repository(folder).join(s));
+    let output = Command::new(compiler())
+        .args(STRICT)
+        .args(["-shared", "-fPIC", "-I"])
+        .arg(repository("backends/abi/include"))
+        .args(sources)
+        .arg("-o")
+        .arg(library)
+        .arg("-lm")
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success() && said.is_empty(), "{said}");
+}
+
+fn engine(library: &Path) -> Box<dyn Backend> {
+    let engine = asid_abi::open_engine(library).unwrap();
+    engine.backend(engine.name())
+}
+
+/// Runs all checks; gives how many passed.
+fn conforms(backend: &dyn Backend) -> usize {
+    let rows = asid_conformance::run(backend);
+    let failures: Vec<Row> = rows.iter().filter(|r| r.is_failure()).cloned().collect();
+    assert!(failures.is_empty(), "\n{}", table(&failures));
+    let known = |r: &&Row| r.outcome == Outcome::KnownDeviation;
+    assert_eq!(rows.iter().filter(known).count(), 0, "an example deviates");
+    rows.iter().filter(|r| r.outcome == Outcome::Pass).count()
+}
+
+#[test]
+fn the_engine_in_one_file_conforms() {
+    let place = Workplace::new();
+    let library = place.path("libflight.so");
+    build("plugins/engine-c", &["engine.c"], &library);
+    let engine = engine(&library);
+    assert_eq!(engine.name(), "flight");
+    assert!(engine.capabilities().contains(Capabilities::FREE_BODIES));
+    assert!(conforms(&*engine) > 60);
+}
+
+#[test]
+fn the_engine_of_mechanisms_conforms() {
+    let place = Workplace::new();
+    let library = place.path("libmechanism.so");
+    let sources = ["engine.c", "scene.c", "dynamics.c"];
+    build("plugins/mechanism-c", &sources, &library);
+    let engine = engine(&library);
+    let claimed = Capabilities::ARTICULATION | Capabilities::ACTUATORS;
+    assert!(engine.capabilities().contains(claimed));
+    assert!(conforms(&*engine) > 110);
+}
+
+#[test]
+fn what_an_engine_lacks_is_one_line() {
+    let place = Workplace::new();
+    let library = place.path("libmechanism.so");
+    let sources = ["engine.c", "scene.c", "dynamics.c"];
+    build("plugins/mechanism-c", &sources, &library);
+    let engine = engine(&library);
+    let body = |joint: &str| {
+        format!(
+            r#"<worldbody><body name="b"><joint name="j" {joint}/>
+            <geom name="g" size="1" contype="0" conaffinity="0"/></body></worldbody>"#
+        )
+    };
+    let two = r#"<worldbody><body><joint/><geom name="g" size="1"/></body>
+        <body><joint/><geom name="h" size="1"/></body></worldbody>"#;
+    for (inside, expected) in [
+        (body(r#"range="0 1""#), "no limits of joints: joint `j`"),
+        (body(r#"frictionloss="1""#), "no dry friction: joint `j`"),
+        (
+            body(r#"springdamper="1 1""#),
+            "lacks `joint/j springdamper`",
+        ),
+        (
+            body("") + r#"<option wind="1 0 0"/>"#,
+            "lacks `option wind`",
+        ),
+        (
+            body("") + r#"<actuator><damper joint="j"/></actuator>"#,
+            "<damper> `actuator0`",
+        ),
+        (two.into(), "geoms `g` and `h` could touch"),
+    ] {
+        let xml = format!("<mujoco>{inside}</mujoco>");
+        let scene = asid::core::Scene::from_xml("it", &xml, &[]).unwrap();
+        let error = engine.load(&scene).err().unwrap().to_string();
+        assert!(error.starts_with("scene it: this engine "), "{error}");
+        assert!(error.contains(expected), "{expected}: {error}");
+        assert_eq!(error.lines().count(), 1, "{error}");
+    }
+}
+
+/// Code blocks of a language in the guide.
+fn blocks(language: &str) -> Vec<String> {
+    let guide = read("docs/add-a-backend.md");
+    let mut found = Vec::new();
+    for part in guide.split("\n```").skip(1).step_by(2) {
+        if let Some(code) = part.strip_prefix(&format!("{language}\n")) {
+            found.push(code.to_owned());
+        }
+    }
+    found
+}
+
+#[test]
+fn the_guide_leads_to_a_green_table() {
+    let commands = &blocks("sh")[0];
+    assert!(commands.contains("asid conformance"), "{commands}");
+    let commands = commands.replace("\ncc ", &format!("\n{} ", compiler()));
+    let place = Workplace::new();
+    let bin = Path::new(env!("CARGO_BIN_EXE_asid")).parent().unwrap();
+    let mut path = bin.as_os_str().to_owned();
+    path.push(":");
+    path.push(std::env::var_os("PATH").unwrap());
+    let output = Command::new("sh")
+        .args(["-e", "-c", &commands])
+        .current_dir(place.path(""))
+        .env("PATH", path)
+        .env_remove("ASID_PLUGIN_PATH")
+        .output()
+        .unwrap();
+    let text = String::from_utf8(output.stdout).unwrap();
+    let errors = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.success(), "{text}\n{errors}");
+    let listed = text.lines().find(|l| l.contains("rigid bodies in free"));
+    assert!(listed.is_some_and(|l| l.contains("my-engine")), "{text}");
+    let row = |l: &&str| l.contains("dynamics/free-tumbling-momentum");
+    let row = text.lines().filter(|l| l.contains("my-engine")).find(row);
+    assert!(row.is_some_and(|l| l.contains("pass")), "{text}");
+    assert!(!text.contains("FAIL"), "{text}");
+}
+
+#[test]
+fn code_of_the_guide_is_that_of_the_examples() {
+    let engine = read("plugins/engine-c/engine.c");
+    let (quoted, new): (Vec<_>, Vec<_>) = blocks("c").into_iter().partition(|b| engine.contains(b));
+    assert!(quoted.len() > 10, "{new:?}");
+    // What is not quoted must compile beside the rest.
+    let place = Workplace::new();
+    place.write("guide.c", &(engine + &new.join("\n")));
+    let output = Command::new(compiler())
+        .args(STRICT)
+        .args(["-Wno-unused-function", "-fsyntax-only", "-I"])
+        .arg(repository("backends/abi/include"))
+        .arg(place.path("guide.c"))
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success() && said.is_empty(), "{said}");
+    // Rust code is built and run where it stands.
+    let sources = [
+        "plugins/engine-rust/src/lib.rs",
+        "plugins/own-binary/src/main.rs",
+        "backends/rapier/src/lib.rs",
+    ]
+    .map(read);
+    for block in blocks("rust") {
+        let stands = sources.iter().any(|s| s.contains(&block));
+        assert!(stands, "in no example:\n{block}");
+    }
+}
+
+#[test]
+fn new_writes_what_can_be_built_and_nothing_over_anything() {
+    let place = Workplace::new();
+    for kind in ["engine-c", "mechanism-c"] {
+        let dir = format!("deep/{kind}-of-mine");
+        let output = place.run(&["new", kind, &dir]);
+        assert!(output.status.success(), "{output:?}");
+        // The compile line of its README, as it is written.
+        let readme = place.read(&format!("{dir}/README.md"));
+        let line = readme.lines().find(|l| l.starts_with("cc ")).unwrap();
+        let line = line.replacen("cc", &compiler(), 1);
+        let status = Command::new("sh")
+            .args(["-c", &line])
+            .current_dir(place.path(&dir))
+            .status()
+            .unwrap();
+        assert!(status.success(), "{line}");
+        let engine = asid_abi::open_engine(&place.path(&dir).join("libmy.so")).unwrap();
+        assert_eq!(engine.name(), format!("{kind}-of-mine"));
+
+        let before = names(&place.path(&dir));
+        let again = place.run(&["new", kind, &dir]);
+        assert_eq!(again.status.code(), Some(2));
+        let said = String::from_utf8(again.stderr).unwrap();
+        assert!(said.contains("holds something already"), "{said}");
+        assert_eq!(names(&place.path(&dir)), before);
+    }
+    place.write("file", "");
+    for (arguments, expected) in [
+        (["new", "engine-c", "file"], "no folder"),
+        (["new", "engine-c", "My_Engine"], "a-z, 0-9 and -"),
+        (["new", "engine-d", "x"], "engine-c"),
+    ] {
+        let output = place.run(&arguments);
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(2), "{said}");
+        assert!(
+            said.contains(expected) && said.lines().count() == 1,
+            "{said}"
+        );
+    }
+    assert_eq!(place.names(), ["deep", "file"]);
+}
