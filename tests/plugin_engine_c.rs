@@ -6,6 +6,7 @@
 
 #[allow(dead_code)]
 mod cli_support;
+mod plugin_support;
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -13,6 +14,7 @@ use std::process::Command;
 use asid::core::{Backend, Capabilities};
 use asid_conformance::{Outcome, Row, table};
 use cli_support::{Workplace, names};
+use serde_json::Value;
 
 /// What the examples promise to compile under without a warning.
 const STRICT: [&str; 6] = [
@@ -131,6 +133,32 @@ fn what_an_engine_lacks_is_one_line() {
         assert!(error.contains(expected), "{expected}: {error}");
         assert_eq!(error.lines().count(), 1, "{error}");
     }
+}
+
+#[test]
+fn a_task_runs_on_an_engine_in_c_as_on_another() {
+    let place = Workplace::new();
+    let library = place.path("libmechanism.so");
+    let sources = ["engine.c", "scene.c", "dynamics.c"];
+    build("plugins/mechanism-c", &sources, &library);
+    let task = plugin_support::build(&["payload-swing"]).swap_remove(0);
+    let mut arguments = vec!["run", "payload-swing", "--seed", "1", "--quiet"];
+    arguments.extend(["--out", "out", "--backend", "mechanism"]);
+    // The truth is a world of another engine, so both must be right.
+    arguments.extend(["--real-backend", "rapier"]);
+    for plugin in [&task, &library] {
+        arguments.extend(["--plugin", plugin.to_str().unwrap()]);
+    }
+    let output = place.run(&arguments);
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{said}");
+    let result: Value = serde_json::from_str(&place.read("out/result.json")).unwrap();
+    assert_eq!(result["versions"]["engine"], "mechanism 1.0");
+    let mass = &result["parameters"][0];
+    let error = mass["estimate"].as_f64().unwrap() - mass["truth"].as_f64().unwrap();
+    // 0.01 rad of noise leave 1.2 g of deviation; three times that.
+    assert!(error.abs() < 3.6e-3, "{mass}");
+    assert_eq!(result["downstream"]["success"], true, "{result}");
 }
 
 /// Code blocks of a language in the guide.
