@@ -20,6 +20,7 @@
 //! ```
 
 mod figure;
+mod gauge;
 mod section;
 mod table;
 mod tile;
@@ -27,6 +28,7 @@ mod tile;
 use section::Block;
 
 pub use figure::Figure;
+pub use gauge::Gauge;
 pub use section::Section;
 pub use table::{Cell, Column, Table};
 pub use tile::Tile;
@@ -44,6 +46,8 @@ pub enum Tone {
     Plain,
     /// As one hopes.
     Good,
+    /// Short of it, as is known and accepted.
+    Fair,
     /// Not as one hopes.
     Bad,
 }
@@ -53,6 +57,7 @@ impl Tone {
         match self {
             Self::Plain => "",
             Self::Good => "good",
+            Self::Fair => "fair",
             Self::Bad => "bad",
         }
     }

@@ -1,6 +1,6 @@
 //! Tables that scroll inside their own frame where the screen is narrow.
 
-use super::Tone;
+use super::{Gauge, Tone};
 use crate::markup::escape;
 
 /// What a column holds, which decides how it is set.
@@ -55,6 +55,9 @@ impl Column {
 pub struct Cell {
     text: String,
     tone: Tone,
+    gauge: Option<Gauge>,
+    note: String,
+    hint: String,
 }
 
 impl Cell {
@@ -64,6 +67,46 @@ impl Cell {
         Self {
             text: text.into(),
             tone,
+            ..Self::default()
+        }
+    }
+
+    /// Adds a gauge under the text.
+    #[must_use]
+    pub fn gauge(mut self, gauge: Gauge) -> Self {
+        self.gauge = Some(gauge);
+        self
+    }
+
+    /// Adds a sentence of small print under the text.
+    #[must_use]
+    pub fn note(mut self, note: impl Into<String>) -> Self {
+        self.note = note.into();
+        self
+    }
+
+    /// Adds what is shown while the pointer rests on the cell.
+    #[must_use]
+    pub fn hint(mut self, hint: impl Into<String>) -> Self {
+        self.hint = hint.into();
+        self
+    }
+
+    /// What stands in the cell.
+    fn html(&self) -> String {
+        let gauge = self.gauge.as_ref().map_or_else(String::new, Gauge::html);
+        let note = match &*self.note {
+            "" => String::new(),
+            note => format!("<small>{}</small>", escape(note)),
+        };
+        format!("{}{gauge}{note}", escape(&self.text))
+    }
+
+    /// The attribute with what is shown on hover.
+    fn title(&self) -> String {
+        match &*self.hint {
+            "" => String::new(),
+            hint => format!(" title=\"{}\"", escape(hint)),
         }
     }
 }
@@ -152,9 +195,10 @@ impl Table {
                     ("<td", "</td>")
                 };
                 body.push_str(&format!(
-                    "{open}{}>{}{close}",
+                    "{open}{}{}>{}{close}",
                     class(column, cell.tone),
-                    escape(&cell.text)
+                    cell.title(),
+                    cell.html()
                 ));
             }
             body.push_str("</tr>");
