@@ -21,6 +21,7 @@ mod machine;
 mod mujoco;
 mod page;
 mod physics;
+mod plugin;
 mod program;
 mod workload;
 
@@ -45,6 +46,8 @@ const TASK: &str = "rod-balancing";
 enum Part {
     /// Physics steps of batches beside the bare loop
     Physics,
+    /// Engines loaded as plugins beside themselves linked in
+    Plugin,
     /// Environment steps of Fisher exploration
     Fisher,
     /// A whole run, and identification alone
@@ -97,6 +100,7 @@ struct Results {
     task: &'static str,
     circumstances: Circumstances,
     physics: Vec<physics::PhysicsRow>,
+    plugin: Vec<plugin::PluginRow>,
     fisher: Vec<fisher::FisherRow>,
     program: Vec<program::RunRow>,
     start: Vec<program::StartRow>,
@@ -122,6 +126,19 @@ impl Results {
                 "ratio of CPU time",
             ],
             &physics::table(&self.physics),
+        );
+        out += &page::table(
+            "An engine loaded as a plugin, by the same engine linked in: a batch of 64",
+            &[
+                "engine",
+                "a call each",
+                threads,
+                "steps/s linked",
+                "time",
+                "CPU time",
+                "median time of a round",
+            ],
+            &plugin::table(&self.plugin),
         );
         out += &page::table(
             "Fisher exploration, one unknown",
@@ -217,6 +234,7 @@ fn measure(arguments: &Arguments, engines: &[String]) -> Result<Results> {
         task: TASK,
         circumstances: Circumstances::now(command(), &versions),
         physics: Vec::new(),
+        plugin: Vec::new(),
         fisher: Vec::new(),
         program: Vec::new(),
         start: Vec::new(),
@@ -227,6 +245,11 @@ fn measure(arguments: &Arguments, engines: &[String]) -> Result<Results> {
         if arguments.wants(Part::Physics) {
             let rows = physics::rows(name, &*task, &*model, threads, effort)?;
             results.physics.extend(rows);
+        }
+        if arguments.wants(Part::Plugin) {
+            let library = plugin::library(name)?;
+            let rows = plugin::rows(name, &*task, &*model, &library, threads, effort.rounds)?;
+            results.plugin.extend(rows);
         }
         if arguments.wants(Part::Fisher) {
             let rows = fisher::rows(&*backend, &*task, &*model, threads, effort.rounds)?;

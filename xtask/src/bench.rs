@@ -18,6 +18,8 @@ pub fn run(arguments: &[String]) -> Result<bool> {
         "--release",
         "--package=asid",
         "--package=asid-bench",
+        "--package=asid-mujoco-plugin",
+        "--package=asid-rapier-plugin",
         "--features=asid/mujoco,asid-bench/mujoco",
     ];
     if !Stages::default().cargo("build", &build, &[])? {

@@ -9,6 +9,7 @@
 mod bench;
 mod library;
 mod lint;
+mod miri;
 mod setup;
 mod stage;
 mod test;
@@ -24,6 +25,7 @@ Usage: cargo xtask <subcommand>
   setup [--only mujoco|torch]  fetches the native libraries into .native/ (quick when all is there)
   lint                         formatting, clippy and rustdoc over the workspace, all features
   test                         setup, lint and every test: what CI runs
+  miri                         the engine ABI's unsafe code under Miri, where a toolchain has it
   bench [--quick] [--out FILE.json] [--markdown FILE.md]
                                speed beside the engines' own loops, a table and a JSON file
 
@@ -52,12 +54,13 @@ fn run(arguments: &[String]) -> Result<bool> {
         "setup" => setup::run(&setup::selection(rest)?).map(|()| true),
         "lint" => without_arguments(rest).and_then(|()| lint::run()),
         "test" => without_arguments(rest).and_then(|()| test::run()),
+        "miri" => without_arguments(rest).and_then(|()| miri::run()),
         "bench" => bench::run(rest),
         "help" | "--help" | "-h" => {
             println!("{HELP}");
             Ok(true)
         }
-        other => bail!("unknown subcommand `{other}`; known: setup, lint, test, bench, help"),
+        other => bail!("unknown subcommand `{other}`; known: setup, lint, test, miri, bench, help"),
     }
 }
 

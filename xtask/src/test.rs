@@ -1,10 +1,10 @@
-//! `cargo xtask test`: set-up, lints and every test, with one summary. CI runs this.
+//! `cargo xtask test`: set-up, lints, every test, and Miri, with one summary. CI runs this.
 
 use anyhow::Result;
 
 use crate::lint::stages_of_lint;
 use crate::stage::{ALL_FEATURES, Stages};
-use crate::{library, setup};
+use crate::{library, miri, setup};
 
 /// Runs everything; without the native libraries nothing else can be built.
 pub fn run() -> Result<bool> {
@@ -16,5 +16,6 @@ pub fn run() -> Result<bool> {
         &["test", "--workspace", "--no-fail-fast", ALL_FEATURES],
         &[],
     )?;
+    miri::stage(&mut stages)?;
     Ok(stages.finish())
 }

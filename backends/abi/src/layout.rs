@@ -150,12 +150,11 @@ impl LayoutTable {
     /// Writes a layout.
     #[must_use]
     pub fn new(layout: &Layout) -> Self {
-        let mut names = Vec::new();
+        let mut names: Vec<CString> = Vec::new();
         let mut name = |text: &str| {
-            let text = text::owned(text);
-            let pointer = text.as_ptr();
-            names.push(text);
-            pointer
+            // The address is taken where the string stays: moving a box ends what was borrowed of it.
+            names.push(text::owned(text));
+            names.last().map_or(std::ptr::null(), |n| n.as_ptr())
         };
         let bodies: Vec<_> = layout.bodies.iter().map(|n| name(n)).collect();
         let geoms: Vec<_> = layout.geoms.iter().map(|n| name(n)).collect();

@@ -40,7 +40,7 @@ pub fn actuators(
         };
         let joint = match actuator.joint.as_deref() {
             None => table::NONE,
-            Some(name) => object(layout, "joint", name).ok_or_else(|| {
+            Some(name) => stated(model, layout, "joint", name).ok_or_else(|| {
                 format!(
                     "actuator `{}` drives joint `{name}`, which is not there",
                     place.name
@@ -76,6 +76,22 @@ pub fn actuators(
     Ok(drives)
 }
 
+/// Place of an element that the document itself names: what has no name there cannot be
+/// meant there, whatever it is called afterwards.
+fn stated(model: &Model, layout: &Layout, kind: &str, name: &str) -> Option<u64> {
+    let named = match kind {
+        "body" => name == "world" || model.body_id_by_name(name).is_some(),
+        "geom" => model.geom_by_name(name).is_some(),
+        "joint" => model.joint_by_name(name).is_some(),
+        "actuator" => model
+            .actuators
+            .iter()
+            .any(|a| a.name.as_deref() == Some(name)),
+        _ => false,
+    };
+    object(layout, kind, name).filter(|_| named)
+}
+
 /// Attributes by which a sensor names its object, each for its own kind.
 const OBJECTS: [&str; 6] = ["joint", "body", "geom", "site", "actuator", "tendon"];
 
@@ -105,8 +121,8 @@ pub fn sensors(
             "site" => sites(model)
                 .position(|(_, site)| site.name.as_deref() == Some(name))
                 .map(|i| i as u64),
-            "xbody" => object(layout, "body", name),
-            _ => object(layout, kind, name),
+            "xbody" => stated(model, layout, "body", name),
+            _ => stated(model, layout, kind, name),
         };
         let known = matches!(
             kind,

@@ -44,12 +44,12 @@ const MACHINE: &str = r#"
     <body name="arm" pos="0 0 1" euler="0 0 90">
       <joint name="swing" axis="0 3 4" range="-90 45" ref="30" springref="10"/>
       <geom name="beam" type="capsule" fromto="0 0 0 0.4 0 0" size="0.05" mass="2"/>
-      <body childclass="stiff"><joint type="slide"/><joint type="ball" pos="0 0 .1" range="0 60"/>
+      <body childclass="stiff"><joint name="reach" type="slide"/><joint type="ball" pos="0 0 .1" range="0 60"/>
         <geom type="box" size=".1 .2 .3"/><site pos="0 0 .5"/></body></body>
     <body name="lump"><freejoint/><inertial pos="1 0 0" quat="0 1 1 0" mass="3" diaginertia="1 2 2.5"/></body>
   </worldbody>
   <actuator><motor name="pull" joint="swing" gear="3" ctrlrange="-1 2"/>
-    <position joint="joint1" kp="20" kv="2" forcerange="-5 5"/><velocity joint="joint1"/>
+    <position joint="reach" kp="20" kv="2" forcerange="-5 5"/><velocity joint="reach"/>
     <general joint="swing" gainprm="3"/></actuator>
   <sensor><jointpos name="angle" joint="swing"/><framepos objtype="site" objname="corner"/>
     <framequat objtype="xbody" objname="lump"/><actuatorfrc name="force" actuator="pull"/></sensor>
@@ -92,7 +92,7 @@ fn joints_are_in_radians_with_defaults_resolved() {
     let table = world.table();
     let joints = list(table.joints, table.njoint);
     let names: Vec<_> = joints.iter().map(|j| text(j.name)).collect();
-    assert_eq!(names, ["swing", "joint1", "joint2", "joint3"]);
+    assert_eq!(names, ["swing", "reach", "joint2", "joint3"]);
     let kinds: Vec<_> = joints.iter().map(|j| j.kind).collect();
     assert_eq!(
         kinds,
@@ -292,6 +292,10 @@ fn nonsense_is_refused_with_its_name() {
         (
             body("<joint/><geom size='1'/>") + "<actuator><motor joint='x'/></actuator>",
             "actuator `actuator0` drives joint `x`",
+        ),
+        (
+            body("<joint/><geom size='1'/>") + "<actuator><motor joint='joint0'/></actuator>",
+            "drives joint `joint0`, which is not there",
         ),
         (
             body("") + "<sensor><framepos name='s' objtype='site' objname='x'/></sensor>",
