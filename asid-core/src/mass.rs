@@ -44,7 +44,8 @@ impl GeomMass {
         let mut pose = geom.pose;
         if let Some([x1, y1, z1, x2, y2, z2]) = geom.fromto {
             let (a, b) = (Vector3::new(x1, y1, z1), Vector3::new(x2, y2, z2));
-            let along = b - a;
+            // z points from the second end to the first, as MuJoCo has it.
+            let along = a - b;
             let turn =
                 UnitQuaternion::rotation_between(&Vector3::z(), &along).unwrap_or_else(|| {
                     UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI)
@@ -193,6 +194,24 @@ mod tests {
         ];
         let all = MassProperties::of_geoms(&geoms);
         assert!((all.center.y - 0.06).abs() < 1e-12);
+    }
+
+    #[test]
+    fn z_points_from_the_second_end_to_the_first() {
+        for (ends, z) in [
+            ([0.0, 0.0, 0.0, 0.3, 0.0, 0.4], [-0.6, 0.0, -0.8]),
+            ([0.0, 0.0, 1.0, 0.0, 0.0, 2.0], [0.0, 0.0, -1.0]),
+            ([0.0, 0.0, 2.0, 0.0, 0.0, 1.0], [0.0, 0.0, 1.0]),
+        ] {
+            let geom = Geom {
+                type_: GeomType::Capsule,
+                size: [0.1, 0.0, 0.0],
+                fromto: Some(ends),
+                ..Geom::default()
+            };
+            let found = GeomMass::of(&geom).unwrap().rotation * Vector3::z();
+            assert!((found - Vector3::from(z)).norm() < 1e-12, "{found}");
+        }
     }
 
     #[test]

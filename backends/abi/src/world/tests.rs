@@ -134,9 +134,9 @@ fn geoms_and_sites_lie_where_the_document_says() {
     assert_eq!(geoms[0].mass, 0.0);
     near(geoms[1].pos, [0.2, 0.0, 0.0]);
     near(geoms[1].size, [0.05, 0.2, 0.0]);
-    // The capsule's z points along the beam's x.
+    // The capsule's z points from the beam's second end to its first, against x.
     let half = 0.5_f64.sqrt();
-    near(geoms[1].quat, [half, 0.0, half, 0.0]);
+    near(geoms[1].quat, [half, 0.0, -half, 0.0]);
     let sites = list(table.sites, table.nsite);
     let named: Vec<_> = sites.iter().map(|s| (text(s.name), s.body)).collect();
     assert_eq!(named, [("corner".into(), 0), ("site1".into(), 2)]);
