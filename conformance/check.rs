@@ -60,6 +60,12 @@ pub struct Check {
 }
 
 impl Check {
+    /// The family that it belongs to: the first part of its name.
+    #[must_use]
+    pub fn family(&self) -> &'static str {
+        self.name.split('/').next().unwrap_or_default()
+    }
+
     /// Asks a backend. An error or a panic of the engine is a failed row, not an end.
     #[must_use]
     pub fn run(&self, backend: &dyn Backend) -> Row {
@@ -79,6 +85,10 @@ impl Check {
         if !lacking.is_empty() {
             let names: Vec<&str> = lacking.iter_names().map(|(name, _)| name).collect();
             row.note = format!("does not claim {}", names.join(", "));
+            return row;
+        }
+        if !capabilities.intersects(crate::MOVES) {
+            row.note = "claims neither ARTICULATION nor FREE_BODIES: nothing moves".into();
             return row;
         }
         row.outcome = Outcome::Fail;
@@ -138,6 +148,12 @@ impl Outcome {
     }
 }
 
+impl std::fmt::Display for Outcome {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.pad(self.label())
+    }
+}
+
 /// Answer of one engine to one check.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Row {
@@ -160,6 +176,24 @@ pub struct Row {
 }
 
 impl Row {
+    /// The figure as a part of its tolerance, 1 at the limit; a count where nothing is
+    /// tolerated. `None` where there is no figure.
+    #[must_use]
+    pub fn share(&self) -> Option<f64> {
+        let value = self.value?.abs();
+        if self.tolerance > 0.0 {
+            Some(value / self.tolerance)
+        } else {
+            Some(value)
+        }
+    }
+
+    /// The family of its check.
+    #[must_use]
+    pub fn family(&self) -> &str {
+        self.check.split('/').next().unwrap_or_default()
+    }
+
     /// True where the engine does not do what it claims.
     #[must_use]
     pub fn is_failure(&self) -> bool {

@@ -14,6 +14,26 @@
 //! tolerance follows from the time step, the arithmetic or the softness that
 //! the scene asks for, not from what some engine happens to give.
 //!
+//! # What a capability asks for
+//!
+//! A check needs exactly the capabilities that it names, and its scene has nothing
+//! that needs another: an engine that refuses whatever it does not claim passes
+//! all that is left. Beside the bits' own meaning (see [`Capabilities`]):
+//!
+//! | claimed | sensors and parts of a document that its checks use |
+//! |---|---|
+//! | anything | `<key>`, `<inertial>`, geoms with `contype="0" conaffinity="0"` and their mass and inertia; the `option/gravity` parameters; `qpos.` and `qvel.` channels |
+//! | `ARTICULATION` | hinges, slides and balls with `ref`; sensors `jointpos`, `jointvel`, and of sites `framepos`, `framequat`, `framelinvel`, `frameangvel` |
+//! | `FREE_BODIES` | `<freejoint>`; sensors `framepos` and `framequat` of bodies (`body` and `xbody`) and `framepos` of sites, `framelinvel` of bodies |
+//! | `ACTUATORS` | `motor`, `position` and `velocity` on hinges, with `gear`, `ctrlrange`, `forcerange`; parameters `kp`, `kv`, `gear`. Stiff servos ask for `integrator="implicitfast"` |
+//! | `JOINT_IMPEDANCE` | `damping`, `stiffness` with `springref`, `armature`, and these as parameters |
+//! | `JOINT_FRICTION`, `JOINT_LIMITS` | `frictionloss`, also as a parameter; `range` |
+//! | `CONTACT` | planes, spheres, boxes, cylinders, capsules; `contype`, `conaffinity`, `priority`, `<exclude>`, `<pair>`; sliding friction, also as a parameter |
+//! | `MASS_PARAMETERS` | `geom/…/pos`, `geom/…/mass`, `body/…/mass`, `ipos`, `inertia` |
+//!
+//! Snapshots, determinism, hostile calls, divergence and the rules of parameters are
+//! asked of every engine, in a scene made of what it claims.
+//!
 //! ```no_run
 //! # fn main() -> asid_core::Result<()> {
 //! let entry = asid_core::registry::find::<asid_core::registry::BackendEntry>("mujoco")?;
@@ -52,7 +72,10 @@ mod subject;
 
 pub use check::{Check, Outcome, Row, Tolerance, table};
 
-use asid_core::Backend;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use asid_core::{Backend, Capabilities};
 
 /// Every check, family after family.
 pub fn checks() -> impl Iterator<Item = &'static Check> {
@@ -81,8 +104,116 @@ pub fn checks() -> impl Iterator<Item = &'static Check> {
     .flatten()
 }
 
+/// What the checks of a family are about, in the order of families: its name, which is
+/// the first part of its checks' names, and a sentence.
+pub const FAMILIES: &[(&str, &str)] = &[
+    (
+        "dynamics",
+        "Free motion and trees of joints against closed-form solutions.",
+    ),
+    (
+        "joints",
+        "Springs, dampers, dry friction, rotor inertia, limits and equalities of joints.",
+    ),
+    (
+        "contact",
+        "Contact along the normal: rest, weight, stacks, edges, collisions, and who meets whom.",
+    ),
+    (
+        "friction",
+        "Friction of contacts: sliding, rolling, spinning, and whose friction counts.",
+    ),
+    ("actuators", "Motors and servos, their gains and limits."),
+    (
+        "arrays",
+        "Names and places in arrays: the layout, keyframes, quaternions, free joints, rows.",
+    ),
+    (
+        "frames",
+        "Frames and units of sensors against forward kinematics by hand.",
+    ),
+    (
+        "parameters",
+        "Each parameter by the amount that physics says, and the rules of parameters.",
+    ),
+    ("forces", "External wrenches."),
+    (
+        "effects",
+        "The hook before each step, and what effects do there.",
+    ),
+    (
+        "state",
+        "Snapshots, determinism, batches and threads, to the bit.",
+    ),
+    (
+        "divergence",
+        "Simulations that leave the plausible range: reported, alone, and able to recover.",
+    ),
+    (
+        "faults",
+        "Calls that make no sense: an error each, and none changes anything.",
+    ),
+    (
+        "claims",
+        "What an engine does not claim, it refuses or does; it leaves nothing out silently.",
+    ),
+];
+
 /// Runs every check on a backend.
 #[must_use]
 pub fn run(backend: &dyn Backend) -> Vec<Row> {
-    checks().map(|check| check.run(backend)).collect()
+    let all: Vec<&Check> = checks().collect();
+    run_checks(backend, &all, 1, &|_| {})
+}
+
+/// Runs some checks on a backend, several at a time; `done` hears of each row as it comes.
+/// Rows are in the order of the checks, and do not depend on `threads`.
+pub fn run_checks(
+    backend: &dyn Backend,
+    checks: &[&Check],
+    threads: usize,
+    done: &(dyn Fn(&Row) + Sync),
+) -> Vec<Row> {
+    let next = AtomicUsize::new(0);
+    let rows: Vec<Mutex<Option<Row>>> = checks.iter().map(|_| Mutex::new(None)).collect();
+    let work = || {
+        while let Some((check, place)) = {
+            let i = next.fetch_add(1, Ordering::Relaxed);
+            checks.get(i).zip(rows.get(i))
+        } {
+            let row = check.run(backend);
+            done(&row);
+            if let Ok(mut place) = place.lock() {
+                *place = Some(row);
+            }
+        }
+    };
+    std::thread::scope(|scope| {
+        for _ in 1..threads.min(checks.len()) {
+            scope.spawn(work);
+        }
+        work();
+    });
+    rows.into_iter()
+        .filter_map(|row| row.into_inner().ok().flatten())
+        .collect()
+}
+
+/// What an engine must be able to do for anything to be asked of it: something moves.
+pub(crate) const MOVES: Capabilities = Capabilities::ARTICULATION.union(Capabilities::FREE_BODIES);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_check_has_a_family_a_reason_and_a_name_of_its_own() {
+        let mut names = std::collections::HashSet::new();
+        for check in checks() {
+            assert!(names.insert(check.name), "{} is there twice", check.name);
+            assert!(check.reason.len() > 10, "{} has no reason", check.name);
+            let known = FAMILIES.iter().any(|(family, _)| *family == check.family());
+            assert!(known, "{} is of no family", check.name);
+        }
+    }
 }

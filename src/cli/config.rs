@@ -307,6 +307,24 @@ pub fn plugins(path: &Path) -> Result<Vec<PathBuf>> {
     }
 }
 
+/// The settings of a file that may have these keys and no others.
+pub fn read(path: &Path, known: &[&'static str]) -> Result<toml::Table> {
+    let table = read_table(path)?;
+    check_keys(&path.display().to_string(), &table, known)?;
+    Ok(table)
+}
+
+/// A list of texts; none where the key is not there.
+pub fn texts(table: &toml::Table, key: &str) -> Result<Vec<String>> {
+    match table.get(key) {
+        None => Ok(Vec::new()),
+        Some(value) => value
+            .as_array()
+            .and_then(|a| a.iter().map(|v| v.as_str().map(str::to_owned)).collect())
+            .ok_or_else(|| wrong(key, format!("{value} is not a list of texts"))),
+    }
+}
+
 /// Effects of the configuration, then those of the command line, each checked for its form.
 fn effects(table: &toml::Table, real: &Real) -> Result<Vec<String>> {
     let listed = match table.get("effects") {

@@ -2,6 +2,7 @@
 
 mod compare;
 mod config;
+mod conformance;
 mod doctor;
 mod explore;
 mod export;
@@ -55,6 +56,8 @@ enum Command {
     Solve(solve::Arguments),
     /// Methods head to head, over seeds and conditions
     Compare(compare::Arguments),
+    /// Every check against every engine: theory, and the contract of a backend
+    Conformance(conformance::Arguments),
     /// A task's scene as MJCF
     Export(export::Arguments),
     /// A folder that a plugin starts from
@@ -72,6 +75,7 @@ impl Command {
             Self::Identify(a) => &a.common,
             Self::Solve(a) => &a.common,
             Self::Compare(a) => &a.common,
+            Self::Conformance(a) => return a.config.as_deref(),
             Self::List(_) | Self::Doctor(_) | Self::Export(_) | Self::New(_) | Self::Report(_) => {
                 return None;
             }
@@ -136,6 +140,7 @@ fn run_command(cli: &Cli, mut named: Vec<PathBuf>) -> Result<()> {
         Command::Identify(arguments) => identify::identify(arguments),
         Command::Solve(arguments) => solve::solve(arguments),
         Command::Compare(arguments) => compare::compare(arguments),
+        Command::Conformance(arguments) => conformance::conformance(arguments),
         Command::Export(arguments) => export::export(arguments),
         Command::New(arguments) => new::new(arguments),
         Command::Report(arguments) => report::report(arguments),

@@ -5,7 +5,8 @@ use std::path::PathBuf;
 /// Most threads that may be asked for.
 const MAX_THREADS: usize = 1024;
 
-fn threads(text: &str) -> Result<usize, String> {
+/// A number of threads.
+pub fn threads(text: &str) -> Result<usize, String> {
     text.parse()
         .ok()
         .filter(|n| (1..=MAX_THREADS).contains(n))

@@ -1,0 +1,324 @@
+//! `asid conformance`: every check against every engine, as a table.
+
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+use anyhow::Result;
+use asid_conformance::{Check, Outcome, Row, checks, run_checks, table};
+use asid_core::registry::{self, BackendEntry, Origin};
+use asid_core::{Backend, Error, Progress as _};
+use serde::Serialize;
+
+use super::config;
+use super::output::{OutFolder, write_json, write_text};
+use super::progress::Bars;
+use super::{failure, plugins, session};
+
+mod page;
+
+/// Arguments of `conformance`.
+#[derive(clap::Args)]
+pub struct Arguments {
+    /// An engine (repeatable) [default: those of the plugins that are named, else all]
+    #[arg(long, value_name = "NAME")]
+    backend: Vec<String>,
+    /// Only checks whose name holds this text, such as friction/ (repeatable) [default: all]
+    #[arg(long, value_name = "TEXT")]
+    check: Vec<String>,
+    /// Checks at a time; figures do not depend on it [default: one a core]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = super::options::threads)]
+    threads: Option<usize>,
+    /// Engines and checks from a file, such as the config.toml of another call
+    #[arg(long, value_name = "FILE.toml")]
+    pub config: Option<PathBuf>,
+    /// Folder for the results and their report [default: none is written]
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// No progress on standard error
+    #[arg(long)]
+    quiet: bool,
+    /// The rows, and nothing else, on standard output
+    #[arg(long)]
+    json: bool,
+}
+
+/// An engine that is asked.
+struct Asked {
+    entry: &'static BackendEntry,
+    backend: Box<dyn Backend>,
+}
+
+/// What is said of an engine beside its rows.
+#[derive(Serialize)]
+struct Engine {
+    name: String,
+    version: String,
+    origin: String,
+    claims: Vec<&'static str>,
+    lacks: Vec<&'static str>,
+    #[serde(flatten)]
+    count: Count,
+}
+
+/// Rows of an engine by outcome.
+#[derive(Clone, Copy, Default, Serialize)]
+#[serde(rename_all = "kebab-case")]
+struct Count {
+    pass: usize,
+    fail: usize,
+    known_deviation: usize,
+    not_claimed: usize,
+}
+
+impl Count {
+    fn of<'a>(rows: impl Iterator<Item = &'a Row>) -> Self {
+        let mut count = Self::default();
+        for row in rows {
+            *match row.outcome {
+                Outcome::Pass => &mut count.pass,
+                Outcome::Fail => &mut count.fail,
+                Outcome::KnownDeviation => &mut count.known_deviation,
+                Outcome::NotClaimed => &mut count.not_claimed,
+            } += 1;
+        }
+        count
+    }
+}
+
+/// `result.json`.
+#[derive(Serialize)]
+struct ConformanceResult {
+    schema: u32,
+    rows: Vec<Row>,
+    engines: Vec<Engine>,
+    versions: Versions,
+}
+
+#[derive(Serialize)]
+struct Versions {
+    asid: &'static str,
+    git: &'static str,
+}
+
+/// `config.toml`.
+#[derive(Serialize)]
+struct Resolved {
+    backend: Vec<String>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    check: Vec<String>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    plugins: Vec<PathBuf>,
+}
+
+/// Runs the checks, prints the table and writes the folder.
+pub fn conformance(arguments: &Arguments) -> Result<()> {
+    let (backends, patterns) = wanted(arguments)?;
+    let engines = asked(&backends)?;
+    let chosen = chosen(&patterns)?;
+    let out = (arguments.out.as_deref())
+        .map(|out| OutFolder::claim(Some(out), "conformance"))
+        .transpose()?;
+    let threads = arguments
+        .threads
+        .unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from));
+
+    let bars = Bars::new(arguments.quiet);
+    bars.begin("conformance", (engines.len() * chosen.len()) as u64);
+    let mut rows = Vec::new();
+    let mut said = Vec::new();
+    for asked in &engines {
+        bars.note(asked.entry.name);
+        let mut own = run_checks(&*asked.backend, &chosen, threads, &|_| bars.advance(1));
+        // An engine that is there twice has two names, of which it knows one.
+        own.iter_mut()
+            .for_each(|row| row.engine = asked.entry.name.to_owned());
+        said.push(Engine {
+            name: asked.entry.name.to_owned(),
+            version: asked.backend.version(),
+            origin: asked.entry.origin.to_string(),
+            claims: bits(asked.backend.capabilities()),
+            lacks: bits(!asked.backend.capabilities()),
+            count: Count::of(own.iter()),
+        });
+        rows.extend(own);
+    }
+    bars.end();
+
+    let result = ConformanceResult {
+        schema: 1,
+        rows,
+        engines: said,
+        versions: Versions {
+            asid: env!("CARGO_PKG_VERSION"),
+            git: env!("ASID_GIT"),
+        },
+    };
+    if let Some(out) = &out {
+        write(out, &result, &engines, patterns)?;
+    }
+    print(arguments, &result, out.map(|out| out.path()).as_deref())?;
+    verdict(&result)
+}
+
+/// Names of capabilities, in the order of their bits.
+fn bits(capabilities: asid_core::Capabilities) -> Vec<&'static str> {
+    capabilities.iter_names().map(|(name, _)| name).collect()
+}
+
+/// Engines and parts of checks' names, from the options, else from the configuration.
+fn wanted(arguments: &Arguments) -> Result<(Vec<String>, Vec<String>)> {
+    let table = match &arguments.config {
+        Some(path) => config::read(path, &["backend", "check", "plugins"])?,
+        None => toml::Table::new(),
+    };
+    let or_configured = |given: &Vec<String>, key: &str| {
+        if given.is_empty() {
+            config::texts(&table, key)
+        } else {
+            Ok(given.clone())
+        }
+    };
+    Ok((
+        or_configured(&arguments.backend, "backend")?,
+        or_configured(&arguments.check, "check")?,
+    ))
+}
+
+/// The engines to ask: those that are named, else those of plugins that are, else all
+/// that work on this machine.
+fn asked(names: &[String]) -> Result<Vec<Asked>> {
+    if !names.is_empty() {
+        return names
+            .iter()
+            .map(|name| {
+                let backend = session::backend(name)?;
+                let entry = registry::find::<BackendEntry>(name)?;
+                Ok(Asked { entry, backend })
+            })
+            .collect();
+    }
+    let given = plugins::used(&[]);
+    let loaded = |entry: &BackendEntry| match entry.origin {
+        Origin::Loaded(file) => given.iter().any(|g| g == file),
+        Origin::Linked(_) => false,
+    };
+    let mut entries = registry::all::<BackendEntry>();
+    if !given.is_empty() {
+        entries.retain(|entry| loaded(entry));
+        if entries.is_empty() {
+            return Err(Error::Config {
+                key: "--plugin".into(),
+                message: "brings no engine; name engines with --backend".into(),
+            }
+            .into());
+        }
+    }
+    let mut engines = Vec::new();
+    for entry in entries {
+        match (entry.make)() {
+            Ok(backend) => engines.push(Asked { entry, backend }),
+            Err(error) => failure::warn(&format!("engine `{}` is left out: {error}", entry.name)),
+        }
+    }
+    if engines.is_empty() {
+        return Err(
+            Error::Failed("no engine works on this machine; see `asid doctor`".into()).into(),
+        );
+    }
+    Ok(engines)
+}
+
+/// The checks whose names hold one of some texts, all where there is none.
+fn chosen(patterns: &[String]) -> Result<Vec<&'static Check>> {
+    let all: Vec<&Check> = checks().collect();
+    if let Some(text) = (patterns.iter()).find(|p| !all.iter().any(|c| c.name.contains(&***p))) {
+        return Err(Error::unknown("check", text, all.iter().map(|c| c.name)).into());
+    }
+    let holds = |check: &&Check| patterns.iter().any(|p| check.name.contains(p.as_str()));
+    Ok(all
+        .into_iter()
+        .filter(|check| patterns.is_empty() || holds(check))
+        .collect())
+}
+
+fn write(
+    out: &OutFolder,
+    result: &ConformanceResult,
+    engines: &[Asked],
+    check: Vec<String>,
+) -> Result<()> {
+    let resolved = Resolved {
+        backend: engines.iter().map(|e| e.entry.name.to_owned()).collect(),
+        check,
+        plugins: plugins::used(
+            &(engines.iter())
+                .map(|e| plugins::file_of::<BackendEntry>(e.entry.name))
+                .collect::<Vec<_>>(),
+        ),
+    };
+    out.write(|folder| {
+        write_json(&folder.join("result.json"), result)?;
+        write_text(
+            &folder.join("config.toml"),
+            &toml::to_string_pretty(&resolved)?,
+        )?;
+        write_text(
+            &folder.join("report.html"),
+            &page::html(result, &super::run::command_line()),
+        )
+    })
+}
+
+fn print(arguments: &Arguments, result: &ConformanceResult, out: Option<&Path>) -> Result<()> {
+    let mut stdout = std::io::stdout().lock();
+    if arguments.json {
+        writeln!(stdout, "{}", serde_json::to_string_pretty(result)?)?;
+        return Ok(());
+    }
+    writeln!(stdout, "{}", table(&result.rows))?;
+    for engine in &result.engines {
+        writeln!(stdout, "{}", sentence(engine))?;
+    }
+    if let Some(out) = out {
+        writeln!(stdout, "report: {}", out.join("report.html").display())?;
+    }
+    Ok(())
+}
+
+/// An engine's rows in numbers.
+fn sentence(engine: &Engine) -> String {
+    let count = engine.count;
+    format!(
+        "{}: {} pass, {} fail, {} known deviations, {} not claimed",
+        engine.name, count.pass, count.fail, count.known_deviation, count.not_claimed
+    )
+}
+
+/// An error where a row fails.
+fn verdict(result: &ConformanceResult) -> Result<()> {
+    let failed: Vec<String> = result
+        .rows
+        .iter()
+        .filter(|row| row.is_failure())
+        .map(|row| format!("{} on {}", row.check, row.engine))
+        .collect();
+    if failed.is_empty() {
+        return Ok(());
+    }
+    let shown = failed
+        .iter()
+        .take(5)
+        .cloned()
+        .collect::<Vec<_>>()
+        .join(", ");
+    let more = match failed.len().saturating_sub(5) {
+        0 => String::new(),
+        more => format!(" and {more} more"),
+    };
+    let word = if failed.len() == 1 {
+        "check fails"
+    } else {
+        "checks fail"
+    };
+    Err(Error::Failed(format!("{} {word}: {shown}{more}", failed.len())).into())
+}

@@ -1,0 +1,302 @@
+//! The HTML page of a conformance table.
+
+use asid_conformance::{FAMILIES, Outcome, Row, checks};
+use asid_report::number::{quantity, significant};
+use asid_report::page::{Cell, Column, Gauge, Page, Section, Table, Tone};
+
+use super::{ConformanceResult, Count, Engine};
+
+/// The page: each engine in a sentence, what is wrong, then family after family.
+pub fn html(result: &ConformanceResult, command: &str) -> String {
+    let total = Count::of(result.rows.iter());
+    let (badge, tone) = match (total.fail, total.known_deviation) {
+        (0, 0) => ("none fails".to_owned(), Tone::Good),
+        (0, _) => ("none fails beyond what is known".to_owned(), Tone::Good),
+        (n, _) => (format!("{n} fail"), Tone::Bad),
+    };
+    let asked = result.rows.len() / result.engines.len().max(1);
+    let mut page = Page::new("Are the engines right?")
+        .kicker("ASID conformance")
+        .badge(&badge, tone)
+        .lead(format!(
+            "{asked} checks of {}, against closed-form theory and against the contract of a backend.",
+            joined(result.engines.iter().map(|e| e.name.as_str()))
+        ));
+    for engine in &result.engines {
+        page = page.fact(
+            &format!("{} {}", engine.name, engine.version),
+            verdict(engine),
+        );
+    }
+    for section in [
+        listed(result, Outcome::Fail, "What fails", "Not within tolerance, or an error where there should be none."),
+        listed(
+            result,
+            Outcome::KnownDeviation,
+            "Known deviations",
+            "Beyond the tolerance and within what the table of deviations accepts, with the reason that is inherent in the engine.",
+        ),
+    ]
+    .into_iter()
+    .flatten()
+    {
+        page = page.section(section);
+    }
+    let mut first = true;
+    for (family, about) in FAMILIES {
+        if let Some(table) = family_table(result, family, first) {
+            page = page.section(Section::new(&title(family)).lead(*about).table(table));
+            first = false;
+        }
+    }
+    if result.engines.iter().any(|e| e.count.not_claimed > 0) {
+        page = page.section(not_claimed(result));
+    }
+    let origins = (result.engines.iter())
+        .map(|e| {
+            (
+                e.name.clone(),
+                format!("version {}, {}", e.version, e.origin),
+            )
+        })
+        .collect();
+    page.section(
+        Section::new("Engines")
+            .lead("Where each comes from.")
+            .facts(origins),
+    )
+    .section(Section::new("Repeat it").command(command))
+    .footer(format!(
+        "asid {} ({})",
+        result.versions.asid, result.versions.git
+    ))
+    .html()
+}
+
+/// Names in a row: `a`, `a and b`, `a, b and c`.
+fn joined<'a>(names: impl Iterator<Item = &'a str>) -> String {
+    let names: Vec<&str> = names.collect();
+    match &names[..] {
+        [] => "no engine".into(),
+        [one] => (*one).into(),
+        [most @ .., last] => format!("{} and {last}", most.join(", ")),
+    }
+}
+
+/// An engine in one sentence.
+fn verdict(engine: &Engine) -> String {
+    let count = engine.count;
+    let asked = count.pass + count.fail + count.known_deviation;
+    let mut parts = vec![match count.fail {
+        0 if count.known_deviation == 0 => {
+            format!("passes all {asked} checks of what it claims")
+        }
+        0 => format!("passes {} of {asked} checks of what it claims", count.pass),
+        n => format!("fails {n} of {asked} checks of what it claims"),
+    }];
+    if count.known_deviation > 0 {
+        parts.push(format!("{} known deviations", count.known_deviation));
+    }
+    if count.not_claimed > 0 {
+        let plural = if count.not_claimed == 1 { "is" } else { "are" };
+        parts.push(format!(
+            "{} {plural} not asked, as it does not claim what they need",
+            count.not_claimed
+        ));
+    }
+    parts.join("; ") + "."
+}
+
+fn title(family: &str) -> String {
+    let mut letters = family.chars();
+    letters.next().map_or_else(String::new, |first| {
+        first.to_uppercase().chain(letters).collect()
+    })
+}
+
+/// A figure with its unit; a dash where there is none.
+fn figure(row: &Row) -> String {
+    row.value.map_or_else(
+        || "–".to_owned(),
+        |value| quantity(&significant(value, 2), &row.unit),
+    )
+}
+
+fn limit(row: &Row) -> String {
+    quantity(&significant(row.tolerance, 2), &row.unit)
+}
+
+fn tone(outcome: Outcome) -> Tone {
+    match outcome {
+        Outcome::Pass => Tone::Good,
+        Outcome::KnownDeviation => Tone::Fair,
+        Outcome::Fail => Tone::Bad,
+        Outcome::NotClaimed => Tone::Plain,
+    }
+}
+
+/// What a row is told as when the pointer rests on it.
+fn hint(row: &Row) -> String {
+    let share = match row.share() {
+        Some(share) if row.tolerance > 0.0 => {
+            format!(
+                ", {} of the tolerance {}",
+                significant(share, 2),
+                limit(row)
+            )
+        }
+        _ => String::new(),
+    };
+    let note = if row.note.is_empty() {
+        String::new()
+    } else {
+        format!(": {}", row.note)
+    };
+    format!(
+        "{} on {}: {}{share}{note}",
+        row.check, row.engine, row.outcome
+    )
+}
+
+/// One engine's cell of a check.
+fn cell(row: Option<&Row>) -> Cell {
+    let Some(row) = row else {
+        return Cell::from("");
+    };
+    let tone = tone(row.outcome);
+    let cell = match row.outcome {
+        Outcome::NotClaimed => Cell::from("").note("not claimed"),
+        Outcome::Pass => Cell::from(figure(row)),
+        Outcome::Fail if row.value.is_none() => Cell::toned("error", tone),
+        _ => Cell::toned(figure(row), tone),
+    };
+    let cell = match row.share() {
+        // Where nothing is tolerated, a count has no place on the scale.
+        Some(share) if row.tolerance > 0.0 || share == 0.0 => cell.gauge(Gauge::new(share, tone)),
+        Some(_) => cell.gauge(Gauge::new(f64::INFINITY, tone)),
+        None => cell,
+    };
+    cell.hint(hint(row))
+}
+
+/// The checks of a family: a row a check, a column an engine.
+fn family_table(result: &ConformanceResult, family: &str, explain: bool) -> Option<Table> {
+    let of = |check: &str, engine: &str| {
+        let mut rows = result.rows.iter();
+        rows.find(|row| row.check == check && row.engine == engine)
+    };
+    let mut columns = vec![Column::prose("check, and where its tolerance comes from")];
+    columns.push(Column::number("tolerance"));
+    columns.extend(result.engines.iter().map(|e| Column::number(&e.name)));
+    let mut table = Table::new(columns);
+    let mut any = false;
+    for check in checks().filter(|check| check.family() == family) {
+        let cells: Vec<Option<&Row>> = (result.engines.iter())
+            .map(|engine| of(check.name, &engine.name))
+            .collect();
+        let Some(some) = cells.iter().flatten().next() else {
+            continue;
+        };
+        any = true;
+        let name = check
+            .name
+            .split_once('/')
+            .map_or(check.name, |(_, name)| name);
+        // Engines of different precision have different tolerances.
+        let mut limits: Vec<String> = cells.iter().flatten().map(|row| limit(row)).collect();
+        limits.dedup();
+        let mut tolerance = Cell::from(limits.first().cloned().unwrap_or_default());
+        if limits.len() > 1 {
+            tolerance = tolerance.note(limits[1..].join(", "));
+        }
+        let mut row = vec![
+            Cell::from(name.replace('-', " "))
+                .note(&*some.reason)
+                .hint(check.name),
+            tolerance,
+        ];
+        row.extend(cells.into_iter().map(cell));
+        table = table.row(row);
+    }
+    if explain {
+        table = table.caption(
+            "A figure is a deviation, zero at best. Its bar is on a logarithmic scale that ends at ten times the tolerance, \
+             with a tick at the tolerance; a ring is less than a millionth of it. A second tolerance is that of single precision.",
+        );
+    }
+    any.then_some(table)
+}
+
+/// The rows of one outcome, with what is known about each.
+fn listed(
+    result: &ConformanceResult,
+    outcome: Outcome,
+    title: &str,
+    lead: &str,
+) -> Option<Section> {
+    let rows: Vec<&Row> = (result.rows.iter())
+        .filter(|row| row.outcome == outcome)
+        .collect();
+    if rows.is_empty() {
+        return None;
+    }
+    let mut table = Table::new(vec![
+        Column::text("check"),
+        Column::text("engine"),
+        Column::number("figure"),
+        Column::number("tolerance"),
+        Column::prose("what is said"),
+    ]);
+    for row in rows {
+        let said = if row.note.is_empty() {
+            &row.reason
+        } else {
+            &row.note
+        };
+        table = table.row(vec![
+            Cell::from(row.check.clone()),
+            Cell::from(row.engine.clone()),
+            cell(Some(row)),
+            Cell::from(limit(row)),
+            Cell::from(said.clone()),
+        ]);
+    }
+    Some(Section::new(title).lead(lead).table(table))
+}
+
+/// What each engine does not claim, and what is not asked of it for that.
+fn not_claimed(result: &ConformanceResult) -> Section {
+    let mut table = Table::new(vec![
+        Column::text("engine"),
+        Column::prose("does not claim"),
+        Column::prose("so these are not asked"),
+    ]);
+    for engine in result.engines.iter().filter(|e| e.count.not_claimed > 0) {
+        let lacks = |name: &&str| name.to_lowercase().replace('_', " ");
+        let names: Vec<String> = engine.lacks.iter().map(lacks).collect();
+        let mut families: Vec<(&str, usize)> = Vec::new();
+        for row in result.rows.iter() {
+            if row.engine != engine.name || row.outcome != Outcome::NotClaimed {
+                continue;
+            }
+            match families
+                .iter_mut()
+                .find(|(family, _)| *family == row.family())
+            {
+                Some((_, count)) => *count += 1,
+                None => families.push((row.family(), 1)),
+            }
+        }
+        let counts: Vec<String> = (families.iter())
+            .map(|(family, count)| format!("{count} of {family}"))
+            .collect();
+        table = table.row(vec![
+            Cell::from(engine.name.clone()),
+            Cell::from(names.join(", ")),
+            Cell::from(counts.join(", ")),
+        ]);
+    }
+    Section::new("Not claimed")
+        .lead("An engine is asked for what it claims, and for refusing the rest.")
+        .table(table)
+}
