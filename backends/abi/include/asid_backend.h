@@ -243,7 +243,7 @@ typedef struct asid_world {
   const asid_sensor *sensors;
   uint64_t nkeyframe;
   const asid_keyframe *keyframes;
-  /* What the document holds and this structure does not, such as `equality` or
+  /* What the document holds and this structure does not, such as `equality/weld` or
    * `geom/arm solref`, one text each. An engine that builds its world from this
    * structure must refuse what it would otherwise silently leave out. */
   uint64_t nleft_out;
