@@ -15,13 +15,8 @@ use cli_support::Workplace;
 use serde_json::Value;
 
 /// The libraries of the task, the explorer and the effect.
-static LIBRARIES: LazyLock<Vec<PathBuf>> = LazyLock::new(|| {
-    plugin_support::build(&[
-        "payload-swing",
-        "explorer-multisine",
-        "effect-magnetic-catch",
-    ])
-});
+static LIBRARIES: LazyLock<Vec<PathBuf>> =
+    LazyLock::new(|| plugin_support::build(&["payload-swing", "multisine", "magnetic-catch"]));
 
 fn text(path: &Path) -> &str {
     path.to_str().unwrap()
@@ -108,11 +103,7 @@ fn loaded_explorer_and_effect_work_with_a_loaded_task() {
     ];
     done(place.run(&[&arguments[..], &all()].concat()));
     let config = place.read("a/config.toml");
-    for part in [
-        "libpayload_swing",
-        "libexplorer_multisine",
-        "libeffect_magnetic_catch",
-    ] {
+    for part in ["libpayload_swing", "libmultisine", "libmagnetic_catch"] {
         assert!(config.contains(part), "{config}");
     }
     let policy: Value = serde_json::from_str(&place.read("a/policy.json")).unwrap();

@@ -24,6 +24,8 @@ struct Kind {
     /// Text in the files that holds the plugin's name, and how a new name is written in
     /// its place, as `{}`.
     rename: (&'static str, &'static str),
+    /// A Cargo package: crates of this repository are named by their folders.
+    cargo: bool,
     /// Names and contents.
     files: &'static [(&'static str, &'static str)],
 }
@@ -37,12 +39,19 @@ const HEADER: (&str, &str) = (
 /// How to write an engine.
 const ENGINE_GUIDE: (&str, &str) = ("GUIDE.md", include_str!("../../docs/add-a-backend.md"));
 
+/// The versions of dependencies that this program was built with: a plugin in Rust needs the same.
+const CARGO_LOCK: (&str, &str) = ("Cargo.lock", include_str!("../../Cargo.lock"));
+
+/// The sources that this program was built from.
+const SOURCES: &str = env!("CARGO_MANIFEST_DIR");
+
 /// All that there is to start from: the examples themselves, which tests build and run.
 const KINDS: &[Kind] = &[
     Kind {
         name: "engine-c",
         about: "a physics engine in one C file: rigid bodies in free flight",
         rename: ("\"flight\"", "\"{}\""),
+        cargo: false,
         files: &[
             HEADER,
             ("engine.c", include_str!("../../plugins/engine-c/engine.c")),
@@ -57,6 +66,7 @@ const KINDS: &[Kind] = &[
         name: "mechanism-c",
         about: "a larger engine in C: trees of joints, drives and sensors, without contact",
         rename: ("\"mechanism\"", "\"{}\""),
+        cargo: false,
         files: &[
             HEADER,
             (
@@ -79,6 +89,84 @@ const KINDS: &[Kind] = &[
             ENGINE_GUIDE,
         ],
     },
+    Kind {
+        name: "task",
+        about: "a task in Rust: a payload is weighed by swinging it, then swung to an angle",
+        rename: ("payload-swing", "{}"),
+        cargo: true,
+        files: &[
+            (
+                "Cargo.toml",
+                include_str!("../../plugins/task-payload-swing/Cargo.toml"),
+            ),
+            CARGO_LOCK,
+            (
+                "src/lib.rs",
+                include_str!("../../plugins/task-payload-swing/src/lib.rs"),
+            ),
+            (
+                "src/scene.xml",
+                include_str!("../../plugins/task-payload-swing/src/scene.xml"),
+            ),
+            (
+                "tests/needs_the_unknowns.rs",
+                include_str!("../../plugins/task-payload-swing/tests/needs_the_unknowns.rs"),
+            ),
+            (
+                "README.md",
+                include_str!("../../plugins/task-payload-swing/README.md"),
+            ),
+            ("GUIDE.md", include_str!("../../docs/add-a-task.md")),
+        ],
+    },
+    Kind {
+        name: "explorer",
+        about: "an explorer in Rust: sums of sines with random phases",
+        rename: ("multisine", "{}"),
+        cargo: true,
+        files: &[
+            (
+                "Cargo.toml",
+                include_str!("../../plugins/explorer-multisine/Cargo.toml"),
+            ),
+            CARGO_LOCK,
+            (
+                "src/lib.rs",
+                include_str!("../../plugins/explorer-multisine/src/lib.rs"),
+            ),
+            (
+                "README.md",
+                include_str!("../../plugins/explorer-multisine/README.md"),
+            ),
+            ("GUIDE.md", include_str!("../../docs/add-an-algorithm.md")),
+        ],
+    },
+    Kind {
+        name: "effect",
+        about: "an effect in Rust: a magnet draws a joint to one place",
+        rename: ("magnetic-catch", "{}"),
+        cargo: true,
+        files: &[
+            (
+                "Cargo.toml",
+                include_str!("../../plugins/effect-magnetic-catch/Cargo.toml"),
+            ),
+            CARGO_LOCK,
+            (
+                "src/lib.rs",
+                include_str!("../../plugins/effect-magnetic-catch/src/lib.rs"),
+            ),
+            (
+                "tests/theory.rs",
+                include_str!("../../plugins/effect-magnetic-catch/tests/theory.rs"),
+            ),
+            (
+                "README.md",
+                include_str!("../../plugins/effect-magnetic-catch/README.md"),
+            ),
+            ("GUIDE.md", include_str!("../../docs/add-an-effect.md")),
+        ],
+    },
 ];
 
 impl Kind {
@@ -89,7 +177,12 @@ impl Kind {
     /// A file's text for a plugin of this name.
     fn text(&self, text: &str, name: &str) -> String {
         let (from, to) = self.rename;
-        text.replace(from, &to.replace("{}", name))
+        let text = text.replace(from, &to.replace("{}", name));
+        if !self.cargo {
+            return text;
+        }
+        text.replace(&from.replace('-', "_"), &name.replace('-', "_"))
+            .replace("\"../../", &format!("\"{SOURCES}/"))
     }
 }
 

@@ -5,7 +5,7 @@
 use asid_core::{Backend as _, BatchConfig, Control, EffectSpec, Rollout, Scene};
 
 // The crate registers the effect by being linked in.
-use effect_magnetic_catch as _;
+use magnetic_catch as _;
 
 /// A rotor of 0.5 kg m² that nothing else acts on.
 const ROTOR: &str = r#"<mujoco><compiler angle="radian"/><option timestep="0.002" gravity="0 0 0"/>

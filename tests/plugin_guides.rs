@@ -1,0 +1,115 @@
+//! The guides to tasks, algorithms and effects: their commands are run outside of the
+//! repository, and their code is that of the examples.
+
+#![cfg(unix)]
+#![allow(clippy::unwrap_used)]
+
+#[allow(dead_code)]
+mod cli_support;
+
+use std::path::Path;
+use std::process::Command;
+
+use cli_support::{TINY, Workplace};
+
+const GUIDES: [&str; 3] = [
+    "docs/add-a-task.md",
+    "docs/add-an-algorithm.md",
+    "docs/add-an-effect.md",
+];
+
+fn read(path: &str) -> String {
+    std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(path)).unwrap()
+}
+
+/// Blocks of code in a language, each with the line before it.
+fn blocks(text: &str, language: &str) -> Vec<(String, String)> {
+    let mut blocks = Vec::new();
+    let mut lines = text.lines();
+    let mut before = "";
+    while let Some(line) = lines.next() {
+        if line == format!("```{language}") {
+            let block: Vec<&str> = lines.by_ref().take_while(|l| *l != "```").collect();
+            blocks.push((before.to_owned(), block.join("\n")));
+        }
+        before = line;
+    }
+    blocks
+}
+
+#[test]
+fn code_in_the_guides_is_that_of_the_examples() {
+    for guide in GUIDES {
+        let found = blocks(&read(guide), "rust");
+        assert!(!found.is_empty(), "{guide}");
+        for (before, block) in found {
+            let file = before
+                .strip_prefix("<!-- ")
+                .and_then(|b| b.strip_suffix(" -->"));
+            let file = file.unwrap_or_else(|| panic!("{guide}: no file before\n{block}"));
+            assert!(
+                read(file).contains(&block),
+                "{guide}: not in {file}:\n{block}"
+            );
+        }
+    }
+}
+
+/// Follows a guide's first commands in an empty folder; work is cut short where `settings` allow.
+fn follow(guide: &str, settings: &[&str]) {
+    let place = Workplace::new();
+    let program = Path::new(env!("CARGO_BIN_EXE_asid"));
+    let short: String = settings.iter().map(|s| format!(" --set {s}")).collect();
+    let (_, commands) = blocks(&read(guide), "sh").remove(0);
+    let script: String = commands
+        .lines()
+        .map(|line| match line.starts_with("asid run") {
+            true => format!("{line} --quiet --out result{short}\n"),
+            false => format!("{line}\n"),
+        })
+        .collect();
+    // What is built of the dependencies is kept for the next time.
+    let kept = program.parent().unwrap().parent().unwrap().join("guides");
+    let script = script.replace("target/release", &format!("{}/release", kept.display()));
+    let path = format!(
+        "{}:{}:{}",
+        program.parent().unwrap().display(),
+        Path::new(env!("CARGO")).parent().unwrap().display(),
+        std::env::var("PATH").unwrap_or_default()
+    );
+    let output = Command::new("sh")
+        .args(["-e", "-c", &script])
+        .current_dir(place.path(""))
+        .env("PATH", path)
+        .env("CARGO_TARGET_DIR", &kept)
+        .env("CARGO_PROFILE_RELEASE_OPT_LEVEL", "1")
+        .env_remove("RUST_BACKTRACE")
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{guide}:\n{script}\n{said}");
+    let name = commands.split_whitespace().nth(3).unwrap();
+    let listed = String::from_utf8_lossy(&output.stdout);
+    assert!(listed.contains(&format!(" {name} ")), "{listed}");
+    assert!(
+        place
+            .read(&format!("{name}/result/result.json"))
+            .contains("parameters")
+    );
+}
+
+#[test]
+fn the_guide_to_tasks_leads_to_a_run() {
+    follow(GUIDES[0], &TINY);
+}
+
+#[test]
+fn the_guide_to_algorithms_leads_to_a_run() {
+    // The new explorer has other settings.
+    follow(GUIDES[1], &TINY[3..]);
+}
+
+#[test]
+fn the_guide_to_effects_leads_to_a_run() {
+    follow(GUIDES[2], &TINY);
+}
