@@ -133,6 +133,8 @@ typedef struct asid_body {
   double mass;        /* kg                                                    */
   double com[3];      /* centre of mass in the body's frame, m                 */
   double inertia[6];  /* about the centre, along the body's axes: xx yy zz xy xz yz, kg m2 */
+  double moments[3];  /* the same as principal moments, kg m2                  */
+  double iquat[4];    /* body_from_principal                                   */
   int32_t inertial;   /* 1: stated by the document; 0: the sum of its geoms    */
   int32_t padding;
 } asid_body;

@@ -155,7 +155,11 @@ impl LoadedSimulator {
         if code == table::PANIC {
             self.poison = Some(text::from_buffer(&error.message));
         }
-        decode(code, &error, name, "", path)
+        let subject = match code {
+            table::INCAPABLE => self.engine_name(),
+            _ => String::new(),
+        };
+        decode(code, &error, name, &subject, path)
     }
 
     /// Asks for the statuses of all simulations where some have diverged, or had.

@@ -158,7 +158,7 @@ c_structs! {
     /// A body of a document.
     Body = "asid_body" {
         name: *const c_char, parent: u64, pos: [f64; 3], quat: [f64; 4], mass: f64,
-        com: [f64; 3], inertia: [f64; 6], inertial: i32, padding: i32,
+        com: [f64; 3], inertia: [f64; 6], moments: [f64; 3], iquat: [f64; 4], inertial: i32, padding: i32,
     }
     /// A joint of a document.
     Joint = "asid_joint" {

@@ -83,6 +83,10 @@ fn bodies_have_parents_poses_and_masses() {
     // Half a turn about x + y exchanges x and y and turns z over.
     assert_eq!((bodies[2].inertial, bodies[3].inertial), (0, 1));
     near(bodies[3].inertia, [2.0, 1.0, 2.5, 0.0, 0.0, 0.0]);
+    // The principal axes of a document stay in its order.
+    near(bodies[3].moments, [1.0, 2.0, 2.5]);
+    let half = 0.5_f64.sqrt();
+    near(bodies[3].iquat, [0.0, half, half, 0.0]);
     near(bodies[3].com, [1.0, 0.0, 0.0]);
 }
 

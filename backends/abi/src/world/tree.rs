@@ -41,6 +41,7 @@ pub fn bodies(model: &Model, layout: &Layout, texts: &mut Texts) -> Vec<table::B
                 _ => bounded(mass, &model.compiler),
             };
             let m = mass.inertia;
+            let (moments, axes) = principal(body, stated.is_some(), &mass);
             table::Body {
                 name: texts.add(name),
                 parent: entry.parent.map_or(table::NONE, |p| p as u64),
@@ -56,6 +57,8 @@ pub fn bodies(model: &Model, layout: &Layout, texts: &mut Texts) -> Vec<table::B
                     m[(0, 2)],
                     m[(1, 2)],
                 ],
+                moments: moments.into(),
+                iquat: [axes.w, axes.i, axes.j, axes.k],
                 inertial: i32::from(stated.is_some()),
                 padding: 0,
             }
@@ -83,6 +86,22 @@ fn stated(body: &Body, compiler: &Compiler) -> Option<MassProperties> {
         center: center.into(),
         inertia: turn * own * turn.transpose(),
     })
+}
+
+/// Principal moments and their axes: in the document's own order where it states them.
+fn principal(
+    body: &Body,
+    stated: bool,
+    mass: &MassProperties,
+) -> (Vector3<f64>, UnitQuaternion<f64>) {
+    if let (true, Some(given)) = (stated, &body.inertial)
+        && let InertiaSpec::Diagonal(moments) = given.inertia
+    {
+        let (_, [w, x, y, z]) = parts(&given.pose);
+        let axes = UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z));
+        return (Vector3::from(moments), axes);
+    }
+    mass.principal()
 }
 
 /// Lower limits that the compiler puts on masses and principal moments.
