@@ -82,7 +82,7 @@ fn follow(guide: &str, settings: &[&str]) {
         .current_dir(place.path(""))
         .env("PATH", path)
         .env("CARGO_TARGET_DIR", &kept)
-        .env("CARGO_PROFILE_RELEASE_OPT_LEVEL", "1")
+        .env("CARGO_PROFILE_RELEASE_OPT_LEVEL", "0")
         .env_remove("RUST_BACKTRACE")
         .output()
         .unwrap();

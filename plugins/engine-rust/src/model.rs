@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use asid_core::layout::JointKind;
 use asid_core::mass::{GeomMass, MassProperties};
-use asid_core::mjcf_rs::body::InertiaSpec;
+use asid_core::mjcf_rs::body::{GeomType, InertiaSpec};
 use asid_core::nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 use asid_core::{
     BatchConfig, Error, Layout, Model, Result, Scene, Simulator, Target, document, mjcf_rs,
@@ -81,6 +81,12 @@ impl FlightModel {
             if n > 0 {
                 return Err(refuse(format!("this engine has no {what}")));
             }
+        }
+        let mut geoms = document.bodies.iter().flat_map(|b| &b.body.geoms);
+        if geoms.any(|g| matches!(g.type_, GeomType::Mesh | GeomType::Hfield)) {
+            return Err(refuse(
+                "this engine has no meshes and no height fields".into(),
+            ));
         }
         let meets = |g: &mjcf_rs::body::Geom| g.contype != 0 || g.conaffinity != 0;
         let with_geoms = document.bodies.iter();

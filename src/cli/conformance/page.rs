@@ -28,6 +28,7 @@ pub fn html(result: &ConformanceResult, command: &str) -> String {
             verdict(engine),
         );
     }
+    page = page.section(overview(result));
     for section in [
         listed(result, Outcome::Fail, "What fails", "Not within tolerance, or an error where there should be none."),
         listed(
@@ -42,11 +43,11 @@ pub fn html(result: &ConformanceResult, command: &str) -> String {
     {
         page = page.section(section);
     }
-    let mut first = true;
+    let mut explain = true;
     for (family, about) in FAMILIES {
-        if let Some(table) = family_table(result, family, first) {
+        if let Some(table) = family_table(result, family, explain) {
             page = page.section(Section::new(&title(family)).lead(*about).table(table));
-            first = false;
+            explain = false;
         }
     }
     if result.engines.iter().any(|e| e.count.not_claimed > 0) {
@@ -89,10 +90,10 @@ fn verdict(engine: &Engine) -> String {
     let asked = count.pass + count.fail + count.known_deviation;
     let mut parts = vec![match count.fail {
         0 if count.known_deviation == 0 => {
-            format!("passes all {asked} checks of what it claims")
+            format!("Passes all {asked} checks of what it claims")
         }
-        0 => format!("passes {} of {asked} checks of what it claims", count.pass),
-        n => format!("fails {n} of {asked} checks of what it claims"),
+        0 => format!("Passes {} of {asked} checks of what it claims", count.pass),
+        n => format!("Fails {n} of {asked} checks of what it claims"),
     }];
     if count.known_deviation > 0 {
         parts.push(format!("{} known deviations", count.known_deviation));
@@ -114,12 +115,10 @@ fn title(family: &str) -> String {
     })
 }
 
-/// A figure with its unit; a dash where there is none.
+/// A figure; its unit stands with the tolerance.
 fn figure(row: &Row) -> String {
-    row.value.map_or_else(
-        || "–".to_owned(),
-        |value| quantity(&significant(value, 2), &row.unit),
-    )
+    row.value
+        .map_or_else(|| "–".to_owned(), |value| significant(value, 2))
 }
 
 fn limit(row: &Row) -> String {
@@ -179,6 +178,43 @@ fn cell(row: Option<&Row>) -> Cell {
     cell.hint(hint(row))
 }
 
+/// How many checks of each family each engine passes.
+fn overview(result: &ConformanceResult) -> Section {
+    let mut columns = vec![Column::text("family")];
+    columns.extend(result.engines.iter().map(|e| Column::text(&e.name)));
+    let mut table = Table::new(columns);
+    for (family, _) in FAMILIES {
+        let cells: Vec<Cell> = (result.engines.iter())
+            .map(|engine| {
+                let rows = result.rows.iter();
+                tally(Count::of(rows.filter(|row| {
+                    row.family() == *family && row.engine == engine.name
+                })))
+            })
+            .collect();
+        let asked = result.rows.iter().any(|row| row.family() == *family);
+        if asked {
+            let mut row = vec![Cell::from(title(family))];
+            row.extend(cells);
+            table = table.row(row);
+        }
+    }
+    Section::new("At a glance")
+        .lead("Checks passed, of those that an engine's claims ask for.")
+        .table(table)
+}
+
+fn tally(count: Count) -> Cell {
+    let asked = count.pass + count.fail + count.known_deviation;
+    let text = format!("{} of {asked}", count.pass);
+    match (asked, count.fail, count.known_deviation) {
+        (0, _, _) => Cell::from("").note("not claimed"),
+        (_, 0, 0) => Cell::toned(text, Tone::Good),
+        (_, 0, known) => Cell::toned(text, Tone::Fair).note(format!("{known} known deviations")),
+        (_, fail, _) => Cell::toned(text, Tone::Bad).note(format!("{fail} fail")),
+    }
+}
+
 /// The checks of a family: a row a check, a column an engine.
 fn family_table(result: &ConformanceResult, family: &str, explain: bool) -> Option<Table> {
     let of = |check: &str, engine: &str| {
@@ -204,10 +240,12 @@ fn family_table(result: &ConformanceResult, family: &str, explain: bool) -> Opti
             .map_or(check.name, |(_, name)| name);
         // Engines of different precision have different tolerances.
         let mut limits: Vec<String> = cells.iter().flatten().map(|row| limit(row)).collect();
+        let first = limits.first().cloned();
+        limits.retain(|limit| Some(limit) != first.as_ref());
         limits.dedup();
-        let mut tolerance = Cell::from(limits.first().cloned().unwrap_or_default());
-        if limits.len() > 1 {
-            tolerance = tolerance.note(limits[1..].join(", "));
+        let mut tolerance = Cell::from(first.unwrap_or_default());
+        if !limits.is_empty() {
+            tolerance = tolerance.note(limits.join(", "));
         }
         let mut row = vec![
             Cell::from(name.replace('-', " "))
