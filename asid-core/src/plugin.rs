@@ -3,11 +3,11 @@
 //! Such a library holds its own copy of this crate and of the standard library, and
 //! hands over trait objects as they are. That is sound only where both sides were
 //! built alike, so the library says what it was built by and from, and nothing of it
-//! is called before that was compared: the [`fingerprint`].
+//! is called before that was compared: the fingerprint.
 //!
 //! Two copies of the standard library cannot catch each other's panics: one that
 //! reached a `catch_unwind` of the other side would end the process. Every object
-//! that crosses is therefore wrapped ([`across`]): a call is made inside the
+//! that crosses is therefore wrapped (module `across`): a call is made inside the
 //! `catch_unwind` of the side that the object belongs to, and what was caught is
 //! raised anew on the side that called. A panic of a plugin becomes an error that
 //! names its file, or where a method returns no error a panic with that text.

@@ -145,13 +145,7 @@ pub fn all<E: Entry>() -> Vec<&'static E> {
 /// # Errors
 /// [`Error::Config`] where `own` is not made of letters, digits, `-`, `_` and `.`.
 pub fn add<E: Entry>(own: &str, build: impl FnOnce(&'static str) -> E) -> Result<&'static str> {
-    let plain = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
-    if own.is_empty() || !own.chars().all(plain) {
-        return Err(Error::Config {
-            key: format!("{} name", E::KIND),
-            message: format!("`{own}` is not made of letters, digits, `-`, `_` and `.`"),
-        });
-    }
+    check_name::<E>(own)?;
     let mut added = E::added().write().unwrap_or_else(PoisonError::into_inner);
     let taken = |name: &str| {
         inventory::iter::<E>().any(|e| e.name() == name) || added.iter().any(|e| e.name() == name)
@@ -159,6 +153,18 @@ pub fn add<E: Entry>(own: &str, build: impl FnOnce(&'static str) -> E) -> Result
     let name: &'static str = Box::leak(free_name(own, taken).into_boxed_str());
     added.push(Box::leak(Box::new(build(name))));
     Ok(name)
+}
+
+/// Whether a name can be added.
+pub(crate) fn check_name<E: Entry>(own: &str) -> Result<()> {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
+    if !own.is_empty() && own.chars().all(plain) {
+        return Ok(());
+    }
+    Err(Error::Config {
+        key: format!("{} name", E::KIND),
+        message: format!("`{own}` is not made of letters, digits, `-`, `_` and `.`"),
+    })
 }
 
 /// `name`, or its first variant that is not taken.

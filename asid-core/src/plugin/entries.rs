@@ -48,6 +48,20 @@ impl Entries {
             packages: packages.clone(),
         }
     }
+
+    /// Whether all names can be used, before the first one is.
+    fn check_names(&self) -> Result<()> {
+        fn check<E: Entry>(entries: &[&'static E]) -> Result<()> {
+            let mut names = entries.iter().map(|e| e.name());
+            names.try_for_each(registry::check_name::<E>)
+        }
+        check(&self.backends)?;
+        check(&self.tasks)?;
+        check(&self.explorers)?;
+        check(&self.identifiers)?;
+        check(&self.solvers)?;
+        check(&self.effects)
+    }
 }
 
 /// What a plugin brought.
@@ -91,6 +105,7 @@ pub unsafe fn accept(
         path: path.to_owned(),
         message: e.to_string(),
     };
+    handed.check_names().map_err(&named)?;
     let entries = adder.all(&handed).map_err(named)?;
     if entries.is_empty() {
         return Err(Error::Plugin {
