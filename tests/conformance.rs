@@ -5,6 +5,8 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
+#[path = "conformance/fault.rs"]
+mod fault;
 #[path = "conformance/mutant.rs"]
 mod mutant;
 #[path = "conformance/narrow.rs"]
@@ -12,8 +14,9 @@ mod narrow;
 
 use asid::core::registry::{self, BackendEntry};
 use asid::core::{Backend, Capabilities, Error};
-use asid_conformance::{Outcome, Row, checks, run, table};
-use mutant::{Fault, Mutant};
+use asid_conformance::{Check, Outcome, Row, checks, run_checks, table};
+use fault::Fault;
+use mutant::Mutant;
 use narrow::Narrow;
 
 fn engines() -> Vec<Box<dyn Backend>> {
@@ -32,11 +35,17 @@ fn engines() -> Vec<Box<dyn Backend>> {
     engines
 }
 
+/// All rows of an engine, two checks at a time.
+fn rows(engine: &dyn Backend) -> Vec<Row> {
+    let all: Vec<&Check> = checks().collect();
+    run_checks(engine, &all, 2, &|_| {})
+}
+
 #[test]
 fn every_engine_conforms() {
     let mut failures = Vec::new();
     for engine in engines() {
-        let rows = run(&*engine);
+        let rows = rows(&*engine);
         println!("{}", table(&rows));
         failures.extend(rows.into_iter().filter(Row::is_failure));
     }
@@ -65,7 +74,7 @@ fn no_check_needs_more_than_it_names() {
     for bits in without.chain(SMALL) {
         // Precision is not for the taking: tolerances follow from it.
         let bits = bits | Capabilities::DOUBLE_PRECISION;
-        let rows = run(&Narrow::new(&*engine, bits));
+        let rows = rows(&Narrow::new(&*engine, bits));
         let passes = rows.iter().filter(|r| r.outcome == Outcome::Pass).count();
         println!(
             "{passes:3} of {} checks without {:?}",
@@ -81,37 +90,57 @@ fn no_check_needs_more_than_it_names() {
     assert!(failures.is_empty(), "\n{}", table(&failures));
 }
 
+/// Faults that no check sees in an engine that is sound otherwise.
+fn missed(engine: &dyn Backend, faults: impl Iterator<Item = Fault>) -> Vec<Fault> {
+    let sound: Vec<&Check> = (checks().zip(rows(engine)))
+        .filter(|(_, row)| row.outcome == Outcome::Pass)
+        .map(|(check, _)| check)
+        .collect();
+    let caught = |fault| {
+        let rows = run_checks(&Mutant::new(engine, fault), &sound, 2, &|_| {});
+        let failed = rows.into_iter().filter(Row::is_failure);
+        failed.map(|row| row.check).collect::<Vec<_>>()
+    };
+    // The wrapper itself changes nothing.
+    assert_eq!(caught(Fault::None), Vec::<String>::new());
+    faults
+        .filter(|fault| {
+            let caught = caught(*fault);
+            println!("{fault:?}: {}", caught.join(", "));
+            caught.is_empty()
+        })
+        .collect()
+}
+
 #[test]
 fn every_fault_is_caught() {
     // Which engine is spoilt does not matter; one that is right is enough.
     let engine = engines().swap_remove(0);
-    let sound: Vec<bool> = checks()
-        .map(|check| check.run(&*engine).outcome == Outcome::Pass)
-        .collect();
-    let mutant = |fault| Mutant::new(&*engine, fault);
-    let mut missed = Vec::new();
-    for fault in Fault::ALL {
-        let caught: Vec<&str> = checks()
-            .zip(&sound)
-            .filter(|(check, sound)| **sound && check.run(&mutant(fault)).is_failure())
-            .map(|(check, _)| check.name)
-            .collect();
-        println!("{fault:?}: {}", caught.join(", "));
-        if caught.is_empty() {
-            missed.push(fault);
-        }
-    }
+    let missed = missed(&*engine, Fault::ALL.into_iter());
     assert!(missed.is_empty(), "no check sees {missed:?}");
-    // The wrapper itself changes nothing.
-    for (check, sound) in checks().zip(&sound) {
-        let row = check.run(&mutant(Fault::None));
-        assert_eq!(row.outcome == Outcome::Pass, *sound, "{row:?}");
-    }
 }
 
 #[test]
-fn rows_survive_json() {
+fn faults_of_a_mechanism_are_caught() {
     let engine = engines().swap_remove(0);
+    let bits = Capabilities::all()
+        - Capabilities::CONTACT
+        - Capabilities::FREE_BODIES
+        - Capabilities::EQUALITY
+        - Capabilities::MESHES
+        - Capabilities::CONTACT_FORCES;
+    let faults = Fault::ALL.into_iter().filter(|f| f.of_a_mechanism());
+    let missed = missed(&Narrow::new(&*engine, bits), faults);
+    assert!(missed.is_empty(), "no check sees {missed:?}");
+}
+
+#[test]
+fn rows_survive_json_and_threads() {
+    let engine = engines().swap_remove(0);
+    // As many at a time as there may be: the rows are the same, in the same order.
+    let all: Vec<&Check> = checks().take(20).collect();
+    let one = run_checks(&*engine, &all, 1, &|_| {});
+    assert_eq!(one, run_checks(&*engine, &all, 8, &|_| {}));
     let rows: Vec<Row> = checks().take(3).map(|check| check.run(&*engine)).collect();
     let text = serde_json::to_string(&rows).unwrap();
     assert!(text.contains(r#""outcome":"pass""#), "{text}");

@@ -1,76 +1,17 @@
 //! An engine with one fault: another engine behind a wrapper that spoils what
 //! passes through it.
 
-use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex};
 
 use asid::core::layout::Channel;
-use asid::core::simulator::ExternalForce;
+use asid::core::simulator::{ExternalForce, StepHook};
 use asid::core::{
     Backend, BatchConfig, Capabilities, Control, Layout, Model, Recording, Result, Rollout, Scene,
     Simulator, Snapshot, Status, Target,
 };
 
-/// What is wrong with an engine.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Fault {
-    /// Nothing.
-    None,
-    /// Sliding friction of every geom is half of what the scene says.
-    FrictionHalved,
-    /// Joints are not damped.
-    DampingIgnored,
-    /// Limits of commands and forces do not act.
-    LimitsIgnored,
-    /// The last of several actuators does nothing.
-    TorqueIgnored,
-    /// Quaternions are read as x y z w.
-    QuaternionSwapped,
-    /// Sensors show the frame before.
-    StaleSensor,
-    /// Readings carry the noise of one random state that all batches share.
-    SharedNoise,
-    /// The result depends on the number of threads.
-    ThreadDependent,
-    /// A restored state has no velocity.
-    ForgetsVelocity,
-    /// A simulation's parameters are set for all.
-    SharedParameters,
-    /// Parameters do not change during a rollout.
-    ChangesIgnored,
-    /// Torques of external wrenches are lost.
-    WrenchTorqueLost,
-    /// External forces act with the opposite sign.
-    ForceReversed,
-    /// Simulations that are not asked for move as well.
-    OthersMove,
-    /// A diverged simulation says that it runs.
-    DivergenceHidden,
-    /// Commands that are not finite are taken for zero.
-    NanAccepted,
-}
-
-impl Fault {
-    /// Every fault.
-    pub const ALL: [Self; 16] = [
-        Self::FrictionHalved,
-        Self::DampingIgnored,
-        Self::LimitsIgnored,
-        Self::TorqueIgnored,
-        Self::QuaternionSwapped,
-        Self::StaleSensor,
-        Self::SharedNoise,
-        Self::ThreadDependent,
-        Self::ForgetsVelocity,
-        Self::SharedParameters,
-        Self::ChangesIgnored,
-        Self::WrenchTorqueLost,
-        Self::ForceReversed,
-        Self::OthersMove,
-        Self::DivergenceHidden,
-        Self::NanAccepted,
-    ];
-}
+use crate::fault::{Fault, SpoiltHook};
 
 /// The shared random state of [`Fault::SharedNoise`].
 static NOISE: AtomicU64 = AtomicU64::new(1);
@@ -98,7 +39,10 @@ impl Backend for Mutant<'_> {
     }
 
     fn capabilities(&self) -> Capabilities {
-        self.inner.capabilities()
+        match self.fault {
+            Fault::RangesLeftOut => self.inner.capabilities() - Capabilities::JOINT_LIMITS,
+            _ => self.inner.capabilities(),
+        }
     }
 
     fn load(&self, scene: &Scene) -> Result<Arc<dyn Model>> {
@@ -109,6 +53,21 @@ impl Backend for Mutant<'_> {
                 let rest: Vec<&str> = numbers.collect();
                 format!("{} {}", first / 2.0, rest.join(" "))
             }),
+            Fault::PriorityIgnored => rewritten(scene.xml(), "priority", |_| "0".into()),
+            Fault::PairsIgnored => match scene.xml().split_once("<pair") {
+                Some((before, pair)) => {
+                    let after = pair.split_once("/>").unwrap().1;
+                    format!("{before}{after}")
+                }
+                None => scene.xml().to_owned(),
+            },
+            // Far enough that nothing gets there.
+            Fault::RangesLeftOut => rewritten(scene.xml(), "range", |_| "-1e5 1e5".into()),
+            Fault::DegreesIgnored => {
+                scene
+                    .xml()
+                    .replacen("<mujoco>", "<mujoco><compiler angle=\"radian\"/>", 1)
+            }
             Fault::DampingIgnored => rewritten(scene.xml(), "damping", |_| "0".into()),
             Fault::LimitsIgnored => {
                 let xml = rewritten(scene.xml(), "ctrlrange", |_| "-1e6 1e6".into());
@@ -190,6 +149,17 @@ impl MutantSimulator {
                     *value *= 1.0 + f64::EPSILON;
                 }
             }
+            Fault::DegreesRead => {
+                for row in out.chunks_mut(width) {
+                    for (i, channel) in record.channels().iter().enumerate() {
+                        if let Channel::Sensor { index } = channel
+                            && layout.sensors[*index].kind == "jointpos"
+                        {
+                            row[record.range(i).start] *= 180.0 / std::f64::consts::PI;
+                        }
+                    }
+                }
+            }
             Fault::QuaternionSwapped => {
                 for row in out.chunks_mut(width) {
                     for (i, channel) in record.channels().iter().enumerate() {
@@ -246,6 +216,27 @@ impl MutantSimulator {
         values
     }
 
+    /// Simulations as they are taken.
+    fn order(&self, sims: &[usize]) -> Vec<usize> {
+        let mut sims = sims.to_vec();
+        if self.fault == Fault::OrderIgnored {
+            sims.sort_unstable();
+        }
+        sims
+    }
+
+    /// Positions of some simulations.
+    fn positions(&mut self, sims: &[usize]) -> Result<Vec<f64>> {
+        let layout = self.inner.layout();
+        let names: Vec<String> = (layout.joints.iter())
+            .map(|j| format!("qpos.{}", j.name))
+            .collect();
+        let record = layout.recording(&names)?;
+        let mut qpos = vec![0.0; sims.len() * record.width()];
+        self.inner.read(sims, &record, &mut qpos)?;
+        Ok(qpos)
+    }
+
     fn wrench(&self, wrench: &[f64]) -> Vec<f64> {
         let factors = match self.fault {
             Fault::WrenchTorqueLost => [1.0, 0.0],
@@ -282,7 +273,14 @@ impl Simulator for MutantSimulator {
     }
 
     fn reset(&mut self, sims: &[usize]) -> Result<()> {
-        self.inner.reset(sims)
+        self.inner.reset(&self.order(sims))?;
+        if self.fault == Fault::ResetRemembers && !sims.is_empty() {
+            let nv = self.layout().nv;
+            let qpos = self.positions(sims)?;
+            let qvel = vec![1e-9; sims.len() * nv];
+            self.inner.set_state(sims, &qpos, &qvel)?;
+        }
+        Ok(())
     }
 
     fn set_state(&mut self, sims: &[usize], qpos: &[f64], qvel: &[f64]) -> Result<()> {
@@ -310,7 +308,17 @@ impl Simulator for MutantSimulator {
                 wrench,
             })
             .collect();
+        let hook = rollout.hook.map(|inner| SpoiltHook {
+            inner,
+            fault: self.fault,
+            sims: rollout.sims,
+            timestep: self.layout().timestep,
+            before: Mutex::default(),
+        });
+        let sims = self.order(rollout.sims);
         let spoilt = Rollout {
+            sims: &sims,
+            hook: hook.as_ref().map(|hook| hook as &dyn StepHook),
             control,
             forces: &forces,
             changes: match self.fault {
@@ -331,6 +339,14 @@ impl Simulator for MutantSimulator {
             self.inner.rollout(&more, &mut [])?;
         }
         self.spoil(rollout.record, rollout.frames, out);
+        let rows = rollout.frames * rollout.record.width();
+        match self.fault {
+            Fault::HookDisturbs if rollout.hook.is_some() => {
+                out.iter_mut().for_each(|x| *x *= 1.0 + f64::EPSILON);
+            }
+            Fault::LargeBatchCut if rollout.sims.len() > 1024 => out[1024 * rows..].fill(0.0),
+            _ => {}
+        }
         Ok(())
     }
 
@@ -345,17 +361,13 @@ impl Simulator for MutantSimulator {
     }
 
     fn load(&mut self, snapshot: &Snapshot, rows: &[usize], sims: &[usize]) -> Result<()> {
-        self.inner.load(snapshot, rows, sims)?;
+        match self.inner.load(snapshot, rows, sims) {
+            Err(_) if self.fault == Fault::AnySnapshot => return Ok(()),
+            done => done?,
+        }
         if self.fault == Fault::ForgetsVelocity {
-            let layout = self.inner.layout();
-            let names: Vec<String> = layout
-                .joints
-                .iter()
-                .map(|j| format!("qpos.{}", j.name))
-                .collect();
-            let (record, nv) = (layout.recording(&names)?, layout.nv);
-            let mut qpos = vec![0.0; sims.len() * record.width()];
-            self.inner.read(sims, &record, &mut qpos)?;
+            let nv = self.layout().nv;
+            let qpos = self.positions(sims)?;
             self.inner
                 .set_state(sims, &qpos, &vec![0.0; sims.len() * nv])?;
         }
