@@ -109,16 +109,21 @@ impl Check {
                 row.note = format!("panicked: {text}");
             }
         }
-        if row.outcome == Outcome::Fail
-            && let Some(known) = deviations::find(&row.engine, self.name)
-        {
-            row.note = known.reason.clone();
-            if row.value.is_some_and(|value| value.abs() <= known.allowed) {
-                row.outcome = Outcome::KnownDeviation;
-            }
-        }
-        row
+        excused(row, deviations::find(backend.name(), self.name))
     }
+}
+
+/// A row that fails, as what is known of the engine has it.
+fn excused(mut row: Row, known: Option<&deviations::Deviation>) -> Row {
+    if row.outcome == Outcome::Fail
+        && let Some(known) = known
+    {
+        row.note = known.reason.clone();
+        if row.value.is_some_and(|value| value.abs() <= known.allowed) {
+            row.outcome = Outcome::KnownDeviation;
+        }
+    }
+    row
 }
 
 /// What became of a check.
@@ -236,4 +241,47 @@ pub fn table(rows: &[Row]) -> String {
         );
     }
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn row(value: Option<f64>, outcome: Outcome) -> Row {
+        Row {
+            engine: "engine".into(),
+            check: "family/check".into(),
+            value,
+            tolerance: 0.1,
+            unit: "m".into(),
+            outcome,
+            reason: "of the tolerance".into(),
+            note: String::new(),
+        }
+    }
+
+    #[test]
+    fn a_known_deviation_excuses_what_it_allows_and_no_more() {
+        let known = deviations::Deviation {
+            engine: "engine".into(),
+            check: "family/check".into(),
+            allowed: 0.3,
+            reason: "of the deviation".into(),
+        };
+        let after = |value, outcome| excused(row(value, outcome), Some(&known)).outcome;
+        assert_eq!(after(Some(-0.2), Outcome::Fail), Outcome::KnownDeviation);
+        assert_eq!(after(Some(0.4), Outcome::Fail), Outcome::Fail);
+        assert_eq!(after(None, Outcome::Fail), Outcome::Fail);
+        assert_eq!(after(Some(0.05), Outcome::Pass), Outcome::Pass);
+        assert_eq!(
+            excused(row(Some(0.2), Outcome::Fail), None).outcome,
+            Outcome::Fail
+        );
+    }
+
+    #[test]
+    fn a_share_is_of_the_tolerance() {
+        assert_eq!(row(Some(-0.05), Outcome::Pass).share(), Some(0.5));
+        assert_eq!(row(None, Outcome::Fail).share(), None);
+    }
 }
