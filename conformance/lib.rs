@@ -54,6 +54,7 @@ mod contact_rules;
 mod deviations;
 mod divergence;
 mod dynamics;
+mod effects;
 mod equalities;
 mod faults;
 mod forces;
@@ -93,6 +94,7 @@ pub fn checks() -> impl Iterator<Item = &'static Check> {
         mechanism_parameters::CHECKS,
         parameters::CHECKS,
         forces::CHECKS,
+        effects::CHECKS,
         hooks::CHECKS,
         state::CHECKS,
         lifetime::CHECKS,

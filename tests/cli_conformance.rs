@@ -81,7 +81,7 @@ fn the_folder_repeats_the_call_and_reads_offline() {
     assert!(document.descendants().any(|n| n.has_tag_name("svg")));
     let fetches = |node: &roxmltree::Node<'_, '_>| {
         let refers = |name: &&str| node.attribute(*name).is_some_and(|v| v.contains("://"));
-        ["src", "href"].iter().any(|name| refers(&name))
+        ["src", "href"].iter().any(refers)
     };
     assert!(!document.descendants().any(|node| fetches(&node)));
 }
@@ -117,7 +117,7 @@ fn a_wrong_plugin_fails_alone() {
     assert_eq!(source.matches(right).count(), 1, "the example has changed");
     place.write(
         "engine.c",
-        &source.replace(right, &"0.9 * gravity[i] + wrench[i]"),
+        &source.replace(right, "0.9 * gravity[i] + wrench[i]"),
     );
     let compiler = std::env::var("CC").unwrap_or_else(|_| "cc".into());
     let built = std::process::Command::new(compiler)

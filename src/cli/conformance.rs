@@ -14,6 +14,7 @@ use super::output::{OutFolder, write_json, write_text};
 use super::progress::Bars;
 use super::{failure, plugins, session};
 
+mod cell;
 mod page;
 
 /// Arguments of `conformance`.

@@ -1,9 +1,9 @@
 //! The HTML page of a conformance table.
 
 use asid_conformance::{FAMILIES, Outcome, Row, checks};
-use asid_report::number::{quantity, significant};
-use asid_report::page::{Cell, Column, Gauge, Page, Section, Table, Tone};
+use asid_report::page::{Cell, Column, Page, Section, Table, Tone};
 
+use super::cell::{cell, limit};
 use super::{ConformanceResult, Count, Engine};
 
 /// The page: each engine in a sentence, what is wrong, then family after family.
@@ -113,69 +113,6 @@ fn title(family: &str) -> String {
     letters.next().map_or_else(String::new, |first| {
         first.to_uppercase().chain(letters).collect()
     })
-}
-
-/// A figure; its unit stands with the tolerance.
-fn figure(row: &Row) -> String {
-    row.value
-        .map_or_else(|| "–".to_owned(), |value| significant(value, 2))
-}
-
-fn limit(row: &Row) -> String {
-    quantity(&significant(row.tolerance, 2), &row.unit)
-}
-
-fn tone(outcome: Outcome) -> Tone {
-    match outcome {
-        Outcome::Pass => Tone::Good,
-        Outcome::KnownDeviation => Tone::Fair,
-        Outcome::Fail => Tone::Bad,
-        Outcome::NotClaimed => Tone::Plain,
-    }
-}
-
-/// What a row is told as when the pointer rests on it.
-fn hint(row: &Row) -> String {
-    let share = match row.share() {
-        Some(share) if row.tolerance > 0.0 => {
-            format!(
-                ", {} of the tolerance {}",
-                significant(share, 2),
-                limit(row)
-            )
-        }
-        _ => String::new(),
-    };
-    let note = if row.note.is_empty() {
-        String::new()
-    } else {
-        format!(": {}", row.note)
-    };
-    format!(
-        "{} on {}: {}{share}{note}",
-        row.check, row.engine, row.outcome
-    )
-}
-
-/// One engine's cell of a check.
-fn cell(row: Option<&Row>) -> Cell {
-    let Some(row) = row else {
-        return Cell::from("");
-    };
-    let tone = tone(row.outcome);
-    let cell = match row.outcome {
-        Outcome::NotClaimed => Cell::from("").note("not claimed"),
-        Outcome::Pass => Cell::from(figure(row)),
-        Outcome::Fail if row.value.is_none() => Cell::toned("error", tone),
-        _ => Cell::toned(figure(row), tone),
-    };
-    let cell = match row.share() {
-        // Where nothing is tolerated, a count has no place on the scale.
-        Some(share) if row.tolerance > 0.0 || share == 0.0 => cell.gauge(Gauge::new(share, tone)),
-        Some(_) => cell.gauge(Gauge::new(f64::INFINITY, tone)),
-        None => cell,
-    };
-    cell.hint(hint(row))
 }
 
 /// How many checks of each family each engine passes.
