@@ -8,7 +8,8 @@
 mod cli_support;
 mod plugin_support;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::process::Command;
 
 use cli_support::Workplace;
 use serde_json::Value;
@@ -71,6 +72,68 @@ fn loaded_and_linked_engines_give_identical_figures() {
     assert!(linked.len() > 100, "{} rows", linked.len());
     assert_eq!(linked, loaded);
     assert!(linked.iter().all(|(_, _, outcome)| outcome != "fail"));
+}
+
+/// Builds the engine of the ABI's own tests with one fault.
+fn faulty(place: &Workplace, fault: &str) -> PathBuf {
+    let here = Path::new(env!("CARGO_MANIFEST_DIR")).join("backends/abi");
+    let library = place.path("libfaulty.so");
+    let built = Command::new(std::env::var("CC").unwrap_or_else(|_| "cc".into()))
+        .args(["-std=c99", "-shared", "-fPIC", "-I"])
+        .arg(here.join("include"))
+        .arg(format!("-D{fault}"))
+        .arg(here.join("tests/wrong.c"))
+        .arg("-o")
+        .arg(&library)
+        .status()
+        .unwrap();
+    assert!(built.success());
+    library
+}
+
+/// Runs a call that must fail with a status, and returns its one line.
+fn one_line(place: &Workplace, arguments: &[&str], status: i32) -> String {
+    let output = place.run(arguments);
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(status), "{said}");
+    assert_eq!(said.lines().count(), 1, "{said}");
+    said
+}
+
+#[test]
+fn a_plugin_that_crashes_has_a_last_word() {
+    let place = Workplace::new();
+    let library = faulty(&place, "ROLLOUT_CRASHES");
+    let file = library.to_str().unwrap();
+    let call = [
+        "conformance",
+        "--quiet",
+        "--check",
+        "dynamics/pendulum-energy",
+        "--plugin",
+    ];
+    assert_eq!(
+        one_line(&place, &[&call[..], &[file]].concat(), 1),
+        format!("asid: plugin {file}: rollout: crashed, and this program with it\n")
+    );
+}
+
+#[test]
+fn a_library_that_is_cut_short_has_a_last_word() {
+    let place = Workplace::new();
+    let library = faulty(&place, "NO_FAULT");
+    let whole = std::fs::read(&library).unwrap();
+    std::fs::write(&library, &whole[..9000.min(whole.len() / 2)]).unwrap();
+    let file = library.to_str().unwrap();
+    // The system's loader refuses such a file, or dies of it.
+    let output = place.run(&["list", "--plugin", file]);
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert!(matches!(output.status.code(), Some(1 | 2)), "{said}");
+    assert!(
+        said.starts_with(&format!("asid: plugin {file}: ")),
+        "{said}"
+    );
+    assert_eq!(said.lines().count(), 1, "{said}");
 }
 
 #[test]

@@ -108,9 +108,11 @@ unsafe impl Sync for ModelHandle {}
 impl Drop for ModelHandle {
     fn drop(&mut self) {
         if let Some(destroy) = self.engine.table.destroy_model {
-            // SAFETY: made by `load`, and destroyed here only; batches and
-            // snapshots hold this handle, so none is left.
-            unsafe { destroy(self.pointer.as_ptr()) }
+            self.engine.action("destroy_model").run(|| {
+                // SAFETY: made by `load`, and destroyed here only; batches and
+                // snapshots hold this handle, so none is left.
+                unsafe { destroy(self.pointer.as_ptr()) }
+            });
         }
     }
 }
@@ -153,8 +155,10 @@ impl LoadedModel {
         let load = function(engine.table.load, "load", &engine)?;
         let mut pointer = std::ptr::null_mut();
         let mut error = table::Error::empty();
-        // SAFETY: all that is pointed to lives until the call returns.
-        let code = unsafe { load((&raw const host).cast(), &mut pointer, &mut error) };
+        let code = engine.action("load").run(|| {
+            // SAFETY: all that is pointed to lives until the call returns.
+            unsafe { load((&raw const host).cast(), &mut pointer, &mut error) }
+        });
         decode(code, &error, "load", scene.name(), &engine.path)?;
         let pointer = NonNull::new(pointer)
             .ok_or_else(|| broken(&engine.path, "load", "says that all is well and gives NULL"))?;
@@ -189,8 +193,10 @@ impl ModelHandle {
         let Some(get) = self.engine.table.layout else {
             return Ok(None);
         };
-        // SAFETY: the model lives.
-        let layout = unsafe { get(self.pointer()) };
+        let layout = self.engine.action("layout").run(|| {
+            // SAFETY: the model lives.
+            unsafe { get(self.pointer()) }
+        });
         if layout.is_null() {
             return Ok(None);
         }
@@ -212,15 +218,11 @@ impl Model for LoadedModel {
         let named = NamedTarget::new(target, &self.handle);
         let mut value = f64::NAN;
         let mut error = table::Error::empty();
-        // SAFETY: all that is pointed to lives until the call returns.
-        let code = unsafe {
-            nominal(
-                self.handle.pointer(),
-                &named.table(),
-                &mut value,
-                &mut error,
-            )
-        };
+        let model = self.handle.pointer();
+        let code = engine.action("nominal").run(|| {
+            // SAFETY: all that is pointed to lives until the call returns.
+            unsafe { nominal(model, &named.table(), &mut value, &mut error) }
+        });
         decode(code, &error, "nominal", &target.to_string(), &engine.path)?;
         if !value.is_finite() {
             return Err(broken(

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use asid_core::{Backend, Capabilities, Error, Result};
 
 use crate::adapter::LoadedBackend;
+use crate::crash::Action;
 use crate::library::Library;
 use crate::table::{self, ABI_MAJOR, ABI_MINOR, ENTRY};
 use crate::text;
@@ -32,7 +33,34 @@ pub struct Checked {
     version: String,
     about: String,
     capabilities: Capabilities,
+    /// What is noted while a function is called, by its name.
+    actions: Vec<(&'static str, Action)>,
 }
+
+impl Checked {
+    /// The note of a call of a function of the table.
+    #[must_use]
+    pub fn action(&self, name: &str) -> Action {
+        let known = self.actions.iter().find(|(n, _)| *n == name);
+        known.map_or_else(|| Action::new(&self.path, name), |(_, action)| *action)
+    }
+}
+
+/// Functions that are called again and again.
+const OFTEN: [&str; 12] = [
+    "rollout",
+    "read",
+    "diverged_count",
+    "status",
+    "steps_taken",
+    "set_parameters",
+    "reset",
+    "set_state",
+    "save",
+    "restore",
+    "copy_state",
+    "destroy_snapshot",
+];
 
 impl std::fmt::Debug for Engine {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
@@ -50,8 +78,10 @@ pub fn engine(library: &'static Library, path: &Path) -> Result<Option<Engine>> 
     let Ok(entry) = (unsafe { library.get::<table::EntryFn>(ENTRY) }) else {
         return Ok(None);
     };
-    // SAFETY: the header lets the host call it once, before anything else.
-    let table = unsafe { entry() };
+    let table = Action::new(path, ENTRY).run(|| {
+        // SAFETY: the header lets the host call it once, before anything else.
+        unsafe { entry() }
+    });
     // SAFETY: the header promises a table that stays valid, or null.
     unsafe { Engine::from_table(table, path) }.map(Some)
 }
@@ -99,6 +129,13 @@ impl Engine {
         if let Some(missing) = missing_function(&table) {
             return Err(refuse(format!("its table has no `{missing}` (NULL)")));
         }
+        let unknown = table.capabilities & !Capabilities::all().bits();
+        if minor <= ABI_MINOR && unknown != 0 {
+            return Err(refuse(format!(
+                "its table claims capability bit {}, which version {ABI_MAJOR}.{ABI_MINOR} does not have",
+                unknown.trailing_zeros()
+            )));
+        }
         let text = |pointer, what: &str| {
             // SAFETY: null or a zero-terminated string, as the header says.
             unsafe { text::read(pointer, what) }.map_err(|e| refuse(e.to_string()))
@@ -115,6 +152,7 @@ impl Engine {
                 version: text(table.version, "the engine's version")?,
                 about: text(table.about, "the engine's description")?,
                 capabilities: Capabilities::from_bits_truncate(table.capabilities),
+                actions: OFTEN.map(|name| (name, Action::new(path, name))).into(),
                 path: path.to_path_buf(),
                 table,
             }),

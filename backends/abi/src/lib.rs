@@ -14,6 +14,7 @@
 //! All `unsafe` code of the project that is not an engine's own is in this crate.
 
 mod adapter;
+mod crash;
 mod engine;
 pub mod export;
 mod failure;

@@ -7,6 +7,8 @@ use std::path::Path;
 
 use asid_core::{Error, Result};
 
+use crate::crash::{self, Action};
+
 /// An open library.
 pub type Library = libloading::Library;
 
@@ -27,9 +29,13 @@ pub fn open(path: &Path) -> Result<&'static Library> {
     if found.is_dir() {
         return Err(refuse("is a folder, not a library".into()));
     }
-    // SAFETY: the library's initialisers run. That a file named as a plugin is
-    // meant to be run is the user's decision, as with any program.
-    let library = unsafe { Library::new(&found) }.map_err(|e| {
+    crash::watch();
+    let opened = Action::new(path, "opening the file (is it cut short?)").run(|| {
+        // SAFETY: the library's initialisers run. That a file named as a plugin is
+        // meant to be run is the user's decision, as with any program.
+        unsafe { Library::new(&found) }
+    });
+    let library = opened.map_err(|e| {
         refuse(format!(
             "is not a library that can be loaded: {}",
             why(&e, &found)

@@ -28,7 +28,8 @@ use crate::text;
 pub struct LoadedSimulator {
     model: Arc<ModelHandle>,
     pointer: NonNull<table::Batch>,
-    columns: usize,
+    /// What each column sets.
+    columns: Vec<String>,
     status: Vec<Status>,
     /// First entry of `qpos` of each quaternion.
     quaternions: Vec<usize>,
@@ -45,8 +46,10 @@ impl Drop for LoadedSimulator {
         if self.poison.is_none()
             && let Some(destroy) = self.model.engine.table.destroy_batch
         {
-            // SAFETY: made by `make_batch`, destroyed here only.
-            unsafe { destroy(self.pointer.as_ptr()) }
+            self.model.engine.action("destroy_batch").run(|| {
+                // SAFETY: made by `make_batch`, destroyed here only.
+                unsafe { destroy(self.pointer.as_ptr()) }
+            });
         }
     }
 }
@@ -65,8 +68,10 @@ unsafe impl Sync for SavedStates {}
 impl Drop for SavedStates {
     fn drop(&mut self) {
         if let Some(destroy) = self.model.engine.table.destroy_snapshot {
-            // SAFETY: made by `save`, destroyed here only, used by nobody.
-            unsafe { destroy(self.pointer.as_ptr()) }
+            self.model.engine.action("destroy_snapshot").run(|| {
+                // SAFETY: made by `save`, destroyed here only, used by nobody.
+                unsafe { destroy(self.pointer.as_ptr()) }
+            });
         }
     }
 }
@@ -100,8 +105,10 @@ impl LoadedSimulator {
         let make = function(engine.table.make_batch, "make_batch", engine)?;
         let mut pointer = std::ptr::null_mut();
         let mut error = table::Error::empty();
-        // SAFETY: all that is pointed to lives until the call returns.
-        let code = unsafe { make(model.pointer(), &settings, &mut pointer, &mut error) };
+        let code = engine.action("make_batch").run(|| {
+            // SAFETY: all that is pointed to lives until the call returns.
+            unsafe { make(model.pointer(), &settings, &mut pointer, &mut error) }
+        });
         decode(code, &error, "make_batch", "", &engine.path)?;
         let pointer = NonNull::new(pointer).ok_or_else(|| {
             broken(
@@ -121,7 +128,7 @@ impl LoadedSimulator {
             })
             .collect();
         Ok(Self {
-            columns: targets.len(),
+            columns: config.targets.iter().map(ToString::to_string).collect(),
             status: vec![Status::Running; config.size],
             quaternions,
             poison: None,
@@ -151,12 +158,17 @@ impl LoadedSimulator {
         }
         let f = function(f, name, &self.model.engine)?;
         let mut error = table::Error::empty();
-        let code = run(f, self.pointer.as_ptr(), &mut error);
+        let code = self
+            .model
+            .engine
+            .action(name)
+            .run(|| run(f, self.pointer.as_ptr(), &mut error));
         if code == table::PANIC {
             self.poison = Some(text::from_buffer(&error.message));
         }
         let subject = match code {
             table::INCAPABLE => self.engine_name(),
+            table::PARAMETER => self.columns.join(", "),
             _ => String::new(),
         };
         decode(code, &error, name, &subject, path)
@@ -170,8 +182,10 @@ impl LoadedSimulator {
             "diverged_count",
             self.engine(),
         )?;
-        // SAFETY: the batch lives and is used by this thread only.
-        let diverged = unsafe { count(pointer) };
+        let diverged = self.engine().action("diverged_count").run(|| {
+            // SAFETY: the batch lives and is used by this thread only.
+            unsafe { count(pointer) }
+        });
         if diverged == 0 {
             self.status
                 .iter_mut()
@@ -183,8 +197,10 @@ impl LoadedSimulator {
         for first in (0..self.status.len()).step_by(STATUS_CHUNK) {
             let mut chunk = [RUNNING; STATUS_CHUNK];
             let n = STATUS_CHUNK.min(self.status.len() - first);
-            // SAFETY: `chunk` holds `n` structures; the batch as above.
-            unsafe { get(pointer, first as u64, n as u64, chunk.as_mut_ptr()) };
+            self.engine().action("status").run(|| {
+                // SAFETY: `chunk` holds `n` structures; the batch as above.
+                unsafe { get(pointer, first as u64, n as u64, chunk.as_mut_ptr()) }
+            });
             for (status, said) in self.status[first..].iter_mut().zip(&chunk[..n]) {
                 *status = if said.diverged == 0 {
                     Status::Running
@@ -328,7 +344,7 @@ impl Simulator for LoadedSimulator {
 
     fn set_parameters(&mut self, sims: &[usize], values: &[f64]) -> Result<()> {
         check_sims(sims, self.batch_size())?;
-        expect("parameters", values.len(), sims.len() * self.columns)?;
+        expect("parameters", values.len(), sims.len() * self.columns.len())?;
         finite("parameters", values)?;
         let set = self.engine().table.set_parameters;
         self.call("set_parameters", set, |f, batch, error| {
@@ -385,7 +401,7 @@ impl Simulator for LoadedSimulator {
     }
 
     fn rollout(&mut self, rollout: &Rollout<'_>, out: &mut [f64]) -> Result<()> {
-        rollout.check(self.layout(), self.batch_size(), self.columns, out)?;
+        rollout.check(self.layout(), self.batch_size(), self.columns.len(), out)?;
         if rollout.substeps == 0 {
             return Err(Error::Shape(
                 "a frame needs at least one physics step".into(),
@@ -597,8 +613,12 @@ impl Simulator for LoadedSimulator {
 
     fn steps_taken(&self) -> u64 {
         match self.engine().table.steps_taken {
-            // SAFETY: the batch lives and is used by this thread only.
-            Some(count) if self.poison.is_none() => unsafe { count(self.pointer.as_ptr()) },
+            Some(count) if self.poison.is_none() => {
+                self.engine().action("steps_taken").run(|| {
+                    // SAFETY: the batch lives and is used by this thread only.
+                    unsafe { count(self.pointer.as_ptr()) }
+                })
+            }
             _ => 0,
         }
     }

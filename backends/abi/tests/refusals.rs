@@ -82,6 +82,10 @@ fn every_wrong_engine_is_refused_in_one_line_that_names_the_file() {
             "built for version 2.0 of the engine ABI, this program reads 1.0",
         ),
         ("CUT_SHORT", "its table is cut short"),
+        (
+            "UNKNOWN_CLAIM",
+            "claims capability bit 40, which version 1.0 does not have",
+        ),
         ("NULL_TABLE", "cannot work on this machine"),
         ("LACKS_ROLLOUT", "its table has no `rollout` (NULL)"),
         ("LOAD_FAILS", "scene pendulum: this engine likes no scene"),

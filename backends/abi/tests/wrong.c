@@ -83,6 +83,9 @@ static asid_code rollout(asid_batch *batch, const asid_rollout *r, double *out,
   uint64_t i;
   (void)batch, (void)error;
   for (i = 0; i < r->count * r->frames * r->width; i++) out[i] = 0.25;
+#ifdef ROLLOUT_CRASHES
+  *(volatile int *)0 = 1;
+#endif
 #ifdef READS_NAN
   out[r->count * r->frames * r->width - 1] = 0.0 / 0.0;
 #endif
@@ -127,7 +130,11 @@ static const asid_backend table = {
     .name = "still",
     .version = "1",
     .about = "an engine in which nothing moves",
+#ifdef UNKNOWN_CLAIM
+    .capabilities = ASID_ARTICULATION | UINT64_C(1) << 40,
+#else
     .capabilities = ASID_ARTICULATION,
+#endif
     .load = load,
     .destroy_model = destroy_model,
     .nominal = nominal,
