@@ -104,6 +104,21 @@ impl Fault {
         Self::HookDisturbs,
     ];
 
+    /// True where an engine that does everything is spoilt by it: what takes contact, and
+    /// the commonest of the others.
+    pub fn of_a_whole_engine(self) -> bool {
+        !self.of_a_mechanism()
+            || matches!(
+                self,
+                Self::TorqueIgnored
+                    | Self::QuaternionSwapped
+                    | Self::StaleSensor
+                    | Self::SharedNoise
+                    | Self::ForgetsVelocity
+                    | Self::ForceReversed
+            )
+    }
+
     /// True where an engine of mechanisms without contact can have it.
     pub fn of_a_mechanism(self) -> bool {
         !matches!(
