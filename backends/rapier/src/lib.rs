@@ -57,7 +57,8 @@
 //!   end of the step where MuJoCo takes that of the start.
 //! - Not simulated, and refused: `<general>` and other actuators with states,
 //!   tendons, flexes, meshes, height fields and ellipsoids in contact, fluids,
-//!   damped free joints, springs and limits of ball joints. Sensors other than
+//!   damped free joints, springs and limits of ball joints, a `<pair>` whose friction
+//!   differs by direction. Sensors other than
 //!   positions, orientations and velocities of frames and joints are refused when
 //!   they are asked for.
 //!
