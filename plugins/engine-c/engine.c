@@ -8,10 +8,10 @@
 #include "asid_backend.h"
 
 enum { MOST = 32 }; /* bodies, sensors, parameters */
-enum { POSITION, ORIENTATION, VELOCITY, RATE };
+enum { POSITION, ORIENTATION, VELOCITY, RATE, UNKNOWN };
 
 typedef struct flyer {
-  double mass, com[3], inertia[3]; /* the inertia along the body's own axes */
+  double mass, com[3], moments[3], axes[4]; /* principal moments, body_from_principal */
 } flyer;
 
 typedef struct sensor {
@@ -65,10 +65,10 @@ static asid_code check(const asid_world *w, asid_error *error) {
     if (i > w->njoint || w->joints[i - 1].body != i || w->joints[i - 1].kind != ASID_FREE)
       return fail(error, ASID_SCENE, "this engine needs one free joint on each body", b->name);
     const asid_joint *j = &w->joints[i - 1];
+    if (!(b->mass > 0 && b->moments[0] > 0 && b->moments[1] > 0 && b->moments[2] > 0))
+      return fail(error, ASID_SCENE, "a body flies without mass or inertia", b->name);
     if (j->damping != 0 || j->armature != 0 || j->frictionloss != 0 || j->stiffness != 0)
       return fail(error, ASID_SCENE, "this engine has no springs and dampers", j->name);
-    if (b->inertia[3] != 0 || b->inertia[4] != 0 || b->inertia[5] != 0)
-      return fail(error, ASID_SCENE, "this engine needs the inertia along the body's axes", b->name);
   }
   for (size_t i = 0; i < w->ngeom; i++)
     if (w->geoms[i].contype != 0 || w->geoms[i].conaffinity != 0)
@@ -76,25 +76,25 @@ static asid_code check(const asid_world *w, asid_error *error) {
   return ASID_OK;
 }
 
-/* What a sensor reads, and where. */
-static asid_code find_sensor(const asid_world *w, const asid_sensor *from, sensor *to, asid_error *error) {
+/* What a sensor reads, and where. One that this engine cannot read is no reason to refuse
+ * the scene: it is refused when somebody records it. */
+static void find_sensor(const asid_world *w, const asid_sensor *from, sensor *to) {
   static const char *const kinds[] = {"framepos", "framequat", "framelinvel", "frameangvel"};
   uint64_t body = from->object;
   to->quat[0] = 1;
-  while (to->reading <= RATE && strcmp(from->kind, kinds[to->reading]) != 0) to->reading++;
+  while (to->reading < UNKNOWN && strcmp(from->kind, kinds[to->reading]) != 0) to->reading++;
   if (strcmp(from->object_kind, "site") == 0) {
     body = w->sites[from->object].body;
     memcpy(to->pos, w->sites[from->object].pos, sizeof to->pos);
     memcpy(to->quat, w->sites[from->object].quat, sizeof to->quat);
   } else if (strcmp(from->object_kind, "body") == 0) { /* the frame of the centre of mass */
     memcpy(to->pos, w->bodies[body].com, sizeof to->pos);
+    memcpy(to->quat, w->bodies[body].iquat, sizeof to->quat);
   } else if (strcmp(from->object_kind, "xbody") != 0) {
     body = 0;
   }
-  if (to->reading > RATE || body == 0)
-    return fail(error, ASID_SCENE, "this engine reads poses and velocities of flying bodies only, not", from->name);
-  to->flyer = (size_t)body - 1;
-  return ASID_OK;
+  if (body == 0) to->reading = UNKNOWN;
+  else to->flyer = (size_t)body - 1;
 }
 
 static asid_code load(const asid_scene *scene, asid_model **model, asid_error *error) {
@@ -110,22 +110,20 @@ static asid_code load(const asid_scene *scene, asid_model **model, asid_error *e
   for (size_t i = 0; i < m->n; i++) {
     m->flyers[i].mass = w->bodies[i + 1].mass;
     memcpy(m->flyers[i].com, w->bodies[i + 1].com, sizeof m->flyers[i].com);
-    memcpy(m->flyers[i].inertia, w->bodies[i + 1].inertia, sizeof m->flyers[i].inertia);
+    memcpy(m->flyers[i].moments, w->bodies[i + 1].moments, sizeof m->flyers[i].moments);
+    memcpy(m->flyers[i].axes, w->bodies[i + 1].iquat, sizeof m->flyers[i].axes);
   }
   memcpy(m->start.qpos, w->nkeyframe ? w->keyframes[0].qpos : w->qpos0, w->nq * sizeof(double));
   if (w->nkeyframe) memcpy(m->start.qvel, w->keyframes[0].qvel, w->nv * sizeof(double));
-  for (size_t i = 0; i < m->nsensor && code == ASID_OK; i++)
-    code = find_sensor(w, &w->sensors[i], &m->sensors[i], error);
-  if (code == ASID_OK) *model = m;
-  else free(m);
-  return code;
+  for (size_t i = 0; i < m->nsensor; i++) find_sensor(w, &w->sensors[i], &m->sensors[i]);
+  *model = m;
+  return ASID_OK;
 }
 
 static void destroy_model(asid_model *m) { free(m); }
 
 /* The parameter that a target means: here a component of gravity. */
 static asid_code find_column(const asid_target *t, size_t *column, asid_error *error) {
-  snprintf(error->subject, sizeof error->subject, "%s/%s/%s", t->element, t->name, t->attribute);
   if (strcmp(t->element, "option") != 0 || strcmp(t->attribute, "gravity") != 0 || t->index > 2)
     return fail(error, ASID_PARAMETER, "this engine can change option/gravity/{0,1,2} only", "");
   *column = (size_t)t->index;
@@ -220,21 +218,30 @@ static void velocity_at(const double *q, const double *v, const double point[3],
   for (int i = 0; i < 3; i++) out[i] += v[i];
 }
 
-/* One step of one body: Newton at the centre of mass and Euler about it, velocities
- * first, then the pose with the new ones. */
-static void fly(const flyer *f, double *q, double *v, const double *gravity, const double *wrench, double dt) {
-  double speed[3], arm[3], torque[3], momentum[3], gyroscopic[3], centre[3], turning[3], angle = 0;
+/* One step of one body: Newton at the centre of mass and Euler about it, in the principal
+ * axes; velocities first, then the pose with the new ones. `wrench` acts at the centre of
+ * mass, in the world; `joint` is the generalised force of the free joint. */
+static void fly(const flyer *f, double *q, double *v, const double *gravity, const double *wrench,
+                const double *joint, double dt) {
+  double speed[3], arm[3], torque[3], push[3], spin[3], momentum[3], gyroscopic[3], centre[3], turning[3], angle = 0;
   velocity_at(q, v, f->com, speed);
   rotate(q + 3, 1, f->com, arm);
+  /* A force at the origin also turns the body about its centre of mass. */
+  rotate(q + 3, -1, joint, push);
+  cross(push, f->com, push);
   rotate(q + 3, -1, wrench + 3, torque);
-  for (int i = 0; i < 3; i++) momentum[i] = f->inertia[i] * v[3 + i];
-  cross(v + 3, momentum, gyroscopic);
+  for (int i = 0; i < 3; i++) torque[i] += joint[3 + i] + push[i];
+  rotate(f->axes, -1, torque, torque);
+  rotate(f->axes, -1, v + 3, spin);
+  for (int i = 0; i < 3; i++) momentum[i] = f->moments[i] * spin[i];
+  cross(spin, momentum, gyroscopic);
   for (int i = 0; i < 3; i++) {
-    speed[i] += dt * (gravity[i] + wrench[i] / f->mass);
-    v[3 + i] += dt * (torque[i] - gyroscopic[i]) / f->inertia[i];
+    speed[i] += dt * (gravity[i] + (wrench[i] + joint[i]) / f->mass);
+    spin[i] += dt * (torque[i] - gyroscopic[i]) / f->moments[i];
     centre[i] = q[i] + arm[i] + dt * speed[i];
-    angle = hypot(angle, dt * v[3 + i]);
+    angle = hypot(angle, dt * spin[i]);
   }
+  rotate(f->axes, 1, spin, v + 3);
   double half = angle > 0 ? sin(angle / 2) / angle * dt : 0;
   double turn[4] = {cos(angle / 2), half * v[3], half * v[4], half * v[5]};
   product(q + 3, turn, q + 3);
@@ -247,18 +254,21 @@ static void fly(const flyer *f, double *q, double *v, const double *gravity, con
 }
 
 /* One step of one simulation; a state that makes no sense any more ends it. */
-static void step(asid_batch *b, size_t sim, const asid_rollout *r, size_t cell) {
+static void step(asid_batch *b, size_t sim, const asid_rollout *r, size_t row, size_t frame, size_t substep) {
   static const double nothing[6] = {0};
   const asid_model *m = b->model;
   state *s = &b->sims[sim].now;
+  double joint[6 * MOST] = {0};
+  asid_step_view view = {s->time, s->qpos, s->qvel, NULL, joint}; /* no commands: nu is 0 */
+  if (r->hook) r->hook(r->hook_context, row, frame * r->substeps + substep, &view);
   s->time += m->timestep;
   b->steps++;
   for (size_t i = 0; i < m->n; i++) {
     const double *wrench = nothing;
     for (size_t k = 0; k < r->force_count; k++)
-      if (r->forces[k].body == i + 1) wrench = r->forces[k].wrench + 6 * cell;
+      if (r->forces[k].body == i + 1) wrench = r->forces[k].wrench + 6 * (row * r->frames + frame);
     double *q = s->qpos + 7 * i, *v = s->qvel + 6 * i;
-    fly(&m->flyers[i], q, v, b->sims[sim].gravity, wrench, m->timestep);
+    fly(&m->flyers[i], q, v, b->sims[sim].gravity, wrench, joint + 6 * i, m->timestep);
     for (int k = 0; k < 6; k++)
       if (!(fabs(q[k]) < 1e10 && fabs(v[k]) < 1e10)) { /* NaN is not below either */
         s->status.diverged = 1;
@@ -294,25 +304,34 @@ static void record(const asid_batch *b, size_t sim, const asid_channel *channels
   }
 }
 
+/* Refuses to record what this engine cannot read. */
+static asid_code can_record(const asid_batch *b, const asid_channel *channels, uint64_t count, asid_error *error) {
+  for (size_t i = 0; i < count; i++)
+    if (channels[i].kind == ASID_CHANNEL_SENSOR && b->model->sensors[channels[i].a].reading == UNKNOWN)
+      return fail(error, ASID_INCAPABLE, "read sensors other than poses and velocities of flying bodies", "");
+  return ASID_OK;
+}
+
 static asid_code rollout(asid_batch *b, const asid_rollout *r, double *out, asid_error *error) {
-  (void)error;
-  for (size_t row = 0; row < r->count; row++)
+  asid_code code = can_record(b, r->channels, r->channel_count, error);
+  for (size_t row = 0; row < r->count && code == ASID_OK; row++)
     for (size_t frame = 0; frame < r->frames; frame++) {
       size_t sim = r->sims[row], cell = row * r->frames + frame;
       for (size_t i = 0; i < r->change_count; i++)
         if (r->changes[i].frame == frame)
           b->sims[sim].gravity[b->columns[r->changes[i].column]] = r->changes[i].values[row];
-      for (size_t i = 0; i < r->substeps && !b->sims[sim].now.status.diverged; i++) step(b, sim, r, cell);
+      for (size_t i = 0; i < r->substeps && !b->sims[sim].now.status.diverged; i++) step(b, sim, r, row, frame, i);
       record(b, sim, r->channels, r->channel_count, r->width, out + r->width * cell);
     }
-  return ASID_OK;
+  return code;
 }
 
 static asid_code read_now(asid_batch *b, const uint64_t *sims, uint64_t count, const asid_channel *channels,
                           uint64_t channel_count, uint64_t width, double *out, asid_error *error) {
-  (void)error;
-  for (size_t i = 0; i < count; i++) record(b, sims[i], channels, channel_count, width, out + width * i);
-  return ASID_OK;
+  asid_code code = can_record(b, channels, channel_count, error);
+  for (size_t i = 0; i < count && code == ASID_OK; i++)
+    record(b, sims[i], channels, channel_count, width, out + width * i);
+  return code;
 }
 
 static asid_code save(asid_batch *b, const uint64_t *sims, uint64_t count, asid_snapshot **snapshot,
@@ -352,8 +371,8 @@ static const asid_backend TABLE = {
     .name = "flight",
     .version = "0.1",
     .about = "rigid bodies in free flight, in plain C",
-    .capabilities = ASID_FREE_BODIES | ASID_EXTERNAL_FORCES | ASID_PARAMETER_CHANGES | ASID_EXACT_SNAPSHOT |
-                    ASID_DOUBLE_PRECISION,
+    .capabilities = ASID_FREE_BODIES | ASID_EXTERNAL_FORCES | ASID_PARAMETER_CHANGES | ASID_STEP_HOOKS |
+                    ASID_EXACT_SNAPSHOT | ASID_DOUBLE_PRECISION,
     .load = load,
     .destroy_model = destroy_model,
     .nominal = nominal,

@@ -30,8 +30,7 @@ static void quat_product(const double a[4], const double b[4], double out[4]) {
   memcpy(out + 1, v, sizeof v);
 }
 
-/* v turned by q. */
-static void rotate(const double q[4], const double v[3], double out[3]) {
+void quat_rotate(const double q[4], const double v[3], double out[3]) {
   double t[3], u[3];
   cross(q + 1, v, t);
   cross(q + 1, t, u);
@@ -40,7 +39,7 @@ static void rotate(const double q[4], const double v[3], double out[3]) {
 
 static void rotate_back(const double q[4], const double v[3], double out[3]) {
   double inverse[4] = {q[0], -q[1], -q[2], -q[3]};
-  rotate(inverse, v, out);
+  quat_rotate(inverse, v, out);
 }
 
 /* Turns q by `scale` times a rotation vector in its own frame. */
@@ -101,13 +100,13 @@ static void move_joint(const asid_joint *j, const double *q, const double *v, mo
     for (int i = 0; i < 3; i++) axes[i][3 + i] = 1;
     advance(b, axes, v, 3);
     for (int i = 0; i < 3; i++) {
-      rotate(b->quat, unit[i], axis);
+      quat_rotate(b->quat, unit[i], axis);
       turning(axis, b->pos, axes[3 + i]);
     }
     advance(b, axes + 3, v + 3, 3);
     return;
   }
-  rotate(b->quat, j->axis, axis);
+  quat_rotate(b->quat, j->axis, axis);
   if (j->kind == ASID_SLIDE) {
     for (int i = 0; i < 3; i++) b->pos[i] += axis[i] * (q[0] - j->ref);
     memset(axes[0], 0, 3 * sizeof(double));
@@ -116,15 +115,15 @@ static void move_joint(const asid_joint *j, const double *q, const double *v, mo
     return;
   }
   /* A hinge or ball turns the body about the anchor, which stays. */
-  rotate(b->quat, j->pos, anchor);
+  quat_rotate(b->quat, j->pos, anchor);
   for (int i = 0; i < 3; i++) anchor[i] += b->pos[i];
   if (j->kind == ASID_HINGE) turn(b->quat, j->axis, q[0] - j->ref);
   else quat_product(b->quat, q, b->quat);
-  rotate(b->quat, j->pos, b->pos);
+  quat_rotate(b->quat, j->pos, b->pos);
   for (int i = 0; i < 3; i++) b->pos[i] = anchor[i] - b->pos[i];
   int n = j->kind == ASID_HINGE ? 1 : 3;
   for (int i = 0; i < n; i++) {
-    if (n == 3) rotate(b->quat, unit[i], axis);
+    if (n == 3) quat_rotate(b->quat, unit[i], axis);
     turning(axis, anchor, axes[i]);
   }
   advance(b, axes, v, n);
@@ -140,7 +139,7 @@ void mechanism_move(const mechanism *m, const double *p, const double *qpos, con
     const motion *parent = &w->bodies[m->bodies[i].parent];
     motion *b = &w->bodies[i];
     *b = *parent;
-    rotate(parent->quat, m->bodies[i].pos, b->pos);
+    quat_rotate(parent->quat, m->bodies[i].pos, b->pos);
     for (int k = 0; k < 3; k++) b->pos[k] += parent->pos[k];
     quat_product(parent->quat, m->bodies[i].quat, b->quat);
     for (; next < m->njoint && m->joints[next].body == i; next++) {
@@ -156,12 +155,12 @@ void inertia_at_origin(const motion *b, const double values[10], double out[10])
   double tensor[3][3] = {{own[0], own[3], own[4]}, {own[3], own[1], own[5]}, {own[4], own[5], own[2]}};
   double half[3][3], c[3];
   /* R I R^T: each row of I turned, then each column of that. */
-  for (int i = 0; i < 3; i++) rotate(b->quat, tensor[i], half[i]);
+  for (int i = 0; i < 3; i++) quat_rotate(b->quat, tensor[i], half[i]);
   for (int k = 0; k < 3; k++) {
     double line[3] = {half[0][k], half[1][k], half[2][k]};
-    rotate(b->quat, line, tensor[k]);
+    quat_rotate(b->quat, line, tensor[k]);
   }
-  rotate(b->quat, values + 1, c);
+  quat_rotate(b->quat, values + 1, c);
   for (int i = 0; i < 3; i++) c[i] += b->pos[i];
   double mass = values[0], square = dot(c, c, 3);
   out[0] = mass;
@@ -336,7 +335,7 @@ void sensor_read(const mechanism *m, const sensor *s, const double *p, const dou
   const motion *b = &w->bodies[s->object];
   double place[3], quat[4], velocity[3];
   static const double unit[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
-  rotate(b->quat, s->parameter ? p + s->parameter : s->pos, place);
+  quat_rotate(b->quat, s->parameter ? p + s->parameter : s->pos, place);
   for (int i = 0; i < 3; i++) place[i] += b->pos[i];
   quat_product(b->quat, s->quat, quat);
   cross(b->velocity, place, velocity);
@@ -348,6 +347,6 @@ void sensor_read(const mechanism *m, const sensor *s, const double *p, const dou
     case READ_RATE: memcpy(out, b->velocity, sizeof velocity); break;
     case READ_OWN_VELOCITY: rotate_back(quat, velocity, out); break;
     case READ_OWN_RATE: rotate_back(quat, b->velocity, out); break;
-    default: rotate(quat, unit[s->reading - READ_X], out); break;
+    default: quat_rotate(quat, unit[s->reading - READ_X], out); break;
   }
 }

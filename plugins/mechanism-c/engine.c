@@ -103,8 +103,7 @@ static asid_code make_batch(const asid_model *model, const asid_batch_config *co
   if (!b->columns || !b->values || !b->parameters || !b->states || !b->status || !b->ctrl || !b->force ||
       !b->wrench || !b->work.bodies || !b->work.axes || !b->work.mass || !b->work.force)
     code = refuse(error, ASID_FAILED, "", "out of memory");
-  for (size_t i = 0; i < columns && code == ASID_OK; i++)
-    code = column_find(m, &config->targets[i], &b->columns[i], error);
+  if (code == ASID_OK) code = columns_find(m, config->targets, columns, b->columns, error);
   if (code != ASID_OK) {
     destroy_batch(b);
     return code;
@@ -158,10 +157,8 @@ static asid_code set_state(asid_batch *b, const uint64_t *sims, uint64_t count, 
 
 static asid_code can_record(const asid_batch *b, const asid_channel *channels, uint64_t count, asid_error *error) {
   for (size_t i = 0; i < count; i++) {
-    if (channels[i].kind == ASID_CHANNEL_CONTACT)
-      return refuse(error, ASID_INCAPABLE, "mechanism", "record contact forces: it has no contact");
     if (channels[i].kind == ASID_CHANNEL_SENSOR && b->m->sensors[channels[i].a].reading == READ_NOTHING)
-      return refuse(error, ASID_INCAPABLE, "mechanism", "read sensor number %d of this scene", (int)channels[i].a);
+      return refuse(error, ASID_INCAPABLE, "", "read sensor number %d of this scene", (int)channels[i].a);
   }
   return ASID_OK;
 }

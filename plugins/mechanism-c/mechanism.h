@@ -34,7 +34,7 @@ typedef struct mechanism {
   double *nominal;
 } mechanism;
 
-enum { PER_JOINT = 3, PER_ACTUATOR = 3, PER_BODY = 10, PER_GEOM = 4 };
+enum { PER_JOINT = 3, PER_ACTUATOR = 3, PER_BODY = 13, PER_GEOM = 4 };
 
 /* A body in motion. Spatial vectors are angular, then linear, at the world's origin. */
 typedef struct motion {
@@ -63,9 +63,11 @@ typedef struct column {
   size_t at;    /* in the row                                                       */
   int pass;     /* columns are applied pass by pass                                 */
   int sign;     /* 0: any value, 1: not negative, 2: positive                       */
-  size_t object;
+  size_t body;  /* whose mass properties it changes; 0 where it changes none        */
 } column;
 asid_code column_find(const mechanism *m, const asid_target *target, column *found, asid_error *error);
+asid_code columns_find(const mechanism *m, const asid_target *targets, size_t count, column *found,
+                       asid_error *error);
 asid_code column_check(const column *c, double value, asid_error *error);
 void parameters_fill(const mechanism *m, const column *columns, size_t count, const double *values, double *p);
 
@@ -85,6 +87,9 @@ void sensor_read(const mechanism *m, const sensor *s, const double *p, const dou
 /* dynamics.c: inertia of a body about the origin of the frame that it is placed in by
  * `pos` and `quat`, from mass, centre and inertia in its own. */
 void inertia_at_origin(const motion *placed, const double own[10], double out[10]);
+
+/* dynamics.c: v turned by q. */
+void quat_rotate(const double q[4], const double v[3], double out[3]);
 
 /* dynamics.c: quaternions at unit length. */
 void mechanism_normalise(const mechanism *m, double *qpos);

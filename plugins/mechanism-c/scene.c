@@ -76,12 +76,6 @@ static asid_code check(const asid_world *world, asid_error *error) {
   return ASID_OK;
 }
 
-/* Principal axes other than the body's own are beyond this engine. */
-static int is_turned(const asid_body *b) {
-  double off = fabs(b->inertia[3]) + fabs(b->inertia[4]) + fabs(b->inertia[5]);
-  return off > 1e-12 * (b->inertia[0] + b->inertia[1] + b->inertia[2]);
-}
-
 static sensor resolve_sensor(const mechanism *m, const asid_world *world, const asid_sensor *from) {
   static const struct { const char *kind; int reading; } readings[] = {
       {"jointpos", READ_JOINT_POSITION}, {"jointvel", READ_JOINT_VELOCITY}, {"ballquat", READ_JOINT_POSITION},
@@ -103,8 +97,8 @@ static sensor resolve_sensor(const mechanism *m, const asid_world *world, const 
     s.parameter = m->geom_at + PER_GEOM * from->object + 1;
     memcpy(s.quat, world->geoms[from->object].quat, sizeof s.quat);
   } else if (strcmp(from->object_kind, "body") == 0) {
-    int oriented = s.reading != READ_POSITION && s.reading != READ_VELOCITY && s.reading != READ_RATE;
-    if (oriented && is_turned(&world->bodies[from->object])) s.reading = READ_NOTHING;
+    /* The frame of the principal axes, at the centre of mass. */
+    memcpy(s.quat, world->bodies[from->object].iquat, sizeof s.quat);
     s.parameter = m->body_at + PER_BODY * from->object + 1;
   } else if (strcmp(from->object_kind, "xbody") != 0) {
     s.reading = READ_NOTHING;
@@ -137,6 +131,7 @@ static void nominal_parameters(mechanism *m, const asid_world *world) {
     at[0] = m->bodies[i].mass;
     memcpy(at + 1, m->bodies[i].com, sizeof m->bodies[i].com);
     memcpy(at + 4, m->bodies[i].inertia, sizeof m->bodies[i].inertia);
+    memcpy(at + 10, m->bodies[i].moments, sizeof m->bodies[i].moments);
   }
   for (size_t i = 0; i < m->ngeom; i++) {
     double *at = p + m->geom_at + PER_GEOM * i;
@@ -227,7 +222,17 @@ static const struct known {
     {"option", "gravity", 0, 3, 0, 0},  {"joint", "damping", 0, 1, 1, 0}, {"joint", "stiffness", 1, 1, 1, 0},
     {"joint", "armature", 2, 1, 1, 0},  {"actuator", "gear", 0, 1, 0, 0}, {"actuator", "kp", 1, 1, 1, 0},
     {"actuator", "kv", 2, 1, 1, 0},     {"geom", "mass", 0, 1, 1, 1},     {"geom", "pos", 1, 3, 0, 1},
-    {"body", "mass", 0, 1, 2, 2},       {"body", "ipos", 1, 3, 0, 3},     {"body", "inertia", 4, 3, 2, 3}};
+    {"body", "mass", 0, 1, 2, 2},       {"body", "ipos", 1, 3, 0, 3},     {"body", "inertia", 10, 3, 2, 4}};
+
+/* True where a sensor reads the directions of a body's principal axes. */
+static int axes_are_read(const mechanism *m, size_t body) {
+  for (size_t i = 0; i < m->nsensor; i++) {
+    int r = m->sensors[i].reading;
+    int oriented = r == READ_ORIENTATION || r == READ_X || r == READ_Y || r == READ_Z;
+    if (oriented && m->sensors[i].parameter == m->body_at + PER_BODY * body + 1) return 1;
+  }
+  return 0;
+}
 
 /* Why a target cannot be set although there is such a thing; NULL where it can. */
 static const char *obstacle(const mechanism *m, const struct known *k, size_t i) {
@@ -235,11 +240,10 @@ static const char *obstacle(const mechanism *m, const struct known *k, size_t i)
     const asid_geom *g = &m->geoms[i];
     if (g->body == 0 || m->bodies[g->body].inertial) return "no mass follows from this geom";
     if (g->mass <= 0) return "the geom has no mass that could be scaled";
+    if (axes_are_read(m, g->body)) return "a sensor reads the principal axes of its body, which would turn";
   }
   if (strcmp(k->element, "body") == 0) {
     if (i == 0) return "the world has no mass";
-    if (strcmp(k->attribute, "inertia") == 0 && is_turned(&m->bodies[i]))
-      return "its principal axes are not those of the body";
   }
   if (strcmp(k->element, "joint") == 0 && strcmp(k->attribute, "stiffness") == 0 && m->joints[i].kind < ASID_HINGE)
     return "springs are for hinges and slides";
@@ -252,15 +256,13 @@ static const char *obstacle(const mechanism *m, const struct known *k, size_t i)
 }
 
 asid_code column_find(const mechanism *m, const asid_target *target, column *found, asid_error *error) {
-  char name[256];
-  snprintf(name, sizeof name, "%s/%s/%s/%d", target->element, target->name, target->attribute, (int)target->index);
   for (size_t i = 0; i < sizeof KNOWN / sizeof *KNOWN; i++) {
     const struct known *k = &KNOWN[i];
     if (strcmp(target->element, k->element) != 0 || strcmp(target->attribute, k->attribute) != 0) continue;
     size_t start = 0, object = 0;
     if (strcmp(k->element, "option") != 0) {
       if (target->object == ASID_NONE)
-        return refuse(error, ASID_PARAMETER, name, "there is no %s `%s`", k->element, target->name);
+        return refuse(error, ASID_PARAMETER, "", "there is no %s `%s`", k->element, target->name);
       object = (size_t)target->object;
       start = strcmp(k->element, "joint") == 0      ? m->joint_at + PER_JOINT * object
               : strcmp(k->element, "actuator") == 0 ? m->actuator_at + PER_ACTUATOR * object
@@ -268,13 +270,33 @@ asid_code column_find(const mechanism *m, const asid_target *target, column *fou
                                                     : m->geom_at + PER_GEOM * object;
     }
     if (target->index >= k->entries)
-      return refuse(error, ASID_PARAMETER, name, "the index is out of 0..%d", (int)k->entries);
+      return refuse(error, ASID_PARAMETER, "", "the index is out of 0..%d", (int)k->entries);
     const char *why = obstacle(m, k, object);
-    if (why) return refuse(error, ASID_PARAMETER, name, "%s", why);
-    *found = (column){start + k->offset + target->index, k->pass, k->sign, object};
+    if (why) return refuse(error, ASID_PARAMETER, "", "%s", why);
+    size_t body = strcmp(k->element, "geom") == 0 ? m->geoms[object].body : strcmp(k->element, "body") == 0 ? object : 0;
+    *found = (column){start + k->offset + target->index, k->pass, k->sign, body};
     return ASID_OK;
   }
-  return refuse(error, ASID_PARAMETER, name, "this engine has no such parameter");
+  return refuse(error, ASID_PARAMETER, "", "this engine has no such parameter");
+}
+
+/* All columns of a batch, each with the name of its target in what is said of it. */
+asid_code columns_find(const mechanism *m, const asid_target *targets, size_t count, column *found,
+                       asid_error *error) {
+  for (size_t i = 0; i < count; i++) {
+    const asid_target *t = &targets[i];
+    asid_code code = column_find(m, t, &found[i], error);
+    /* A body follows its geoms or its own numbers: both at once would have two answers. */
+    for (size_t k = 0; k < i && code == ASID_OK; k++)
+      if (found[i].body != 0 && found[i].body == found[k].body && (found[i].pass == 1) != (found[k].pass == 1))
+        code = refuse(error, ASID_PARAMETER, "", "sets the same mass properties as another parameter: use one of them");
+    if (code != ASID_OK) {
+      snprintf(error->subject, sizeof error->subject, "%s%s%s/%s/%d", t->element, *t->name ? "/" : "", t->name,
+               t->attribute, (int)t->index);
+      return code;
+    }
+  }
+  return ASID_OK;
 }
 
 asid_code column_check(const column *c, double value, asid_error *error) {
@@ -308,15 +330,26 @@ static void body_of_geoms(const mechanism *m, size_t body, double *p) {
   for (int k = 0; k < 6; k++) out[4 + k] = sum[4 + k] - mass * back[k];
 }
 
+/* Sets a principal moment, the axes as they are. */
+static void set_moment(const mechanism *m, const column *c, double value, double *p) {
+  static const int row[6] = {0, 1, 2, 0, 0, 1}, col[6] = {0, 1, 2, 1, 2, 2};
+  size_t at = m->body_at + PER_BODY * c->body;
+  double unit[3] = {0}, axis[3], change = value - p[c->at];
+  unit[c->at - at - 10] = 1;
+  quat_rotate(m->bodies[c->body].iquat, unit, axis);
+  for (int k = 0; k < 6; k++) p[at + 4 + k] += change * axis[row[k]] * axis[col[k]];
+}
+
 void parameters_fill(const mechanism *m, const column *columns, size_t count, const double *values, double *p) {
   memcpy(p, m->nominal, m->nparameter * sizeof *p);
-  for (int pass = 0; pass < 4; pass++)
+  for (int pass = 0; pass < 5; pass++)
     for (size_t i = 0; i < count; i++) {
       const column *c = &columns[i];
       if (c->pass != pass) continue;
       if (pass == 2) /* the inertia grows with the mass */
-        for (int k = 0; k < 6; k++) p[c->at + 4 + k] *= values[i] / p[c->at];
+        for (int k = 0; k < 9; k++) p[c->at + 4 + k] *= values[i] / p[c->at];
+      if (pass == 4) set_moment(m, c, values[i], p);
       p[c->at] = values[i];
-      if (pass == 1) body_of_geoms(m, (size_t)m->geoms[c->object].body, p);
+      if (pass == 1) body_of_geoms(m, c->body, p);
     }
 }

@@ -89,6 +89,7 @@ impl LoadedSimulator {
             });
         }
         let engine = &model.engine;
+        let columns: Vec<String> = config.targets.iter().map(ToString::to_string).collect();
         let named: Vec<NamedTarget> = config
             .targets
             .iter()
@@ -109,7 +110,11 @@ impl LoadedSimulator {
             // SAFETY: all that is pointed to lives until the call returns.
             unsafe { make(model.pointer(), &settings, &mut pointer, &mut error) }
         });
-        decode(code, &error, "make_batch", "", &engine.path)?;
+        let about = match code {
+            table::PARAMETER => columns.join(", "),
+            _ => String::new(),
+        };
+        decode(code, &error, "make_batch", &about, &engine.path)?;
         let pointer = NonNull::new(pointer).ok_or_else(|| {
             broken(
                 &engine.path,
@@ -128,7 +133,7 @@ impl LoadedSimulator {
             })
             .collect();
         Ok(Self {
-            columns: config.targets.iter().map(ToString::to_string).collect(),
+            columns,
             status: vec![Status::Running; config.size],
             quaternions,
             poison: None,
@@ -261,6 +266,15 @@ impl LoadedSimulator {
             backend: self.engine_name(),
             what: format!("{what} (plugin {})", self.engine().path.display()),
         })
+    }
+
+    /// Sees to it that an engine is asked for contact forces only where it has them.
+    fn require_readings(&self, record: &Recording) -> Result<()> {
+        let is_contact = |c: &Channel| matches!(c, Channel::ContactForce { .. });
+        match record.channels().iter().any(is_contact) {
+            true => self.require(Capabilities::CONTACT_FORCES, "record contact forces"),
+            false => Ok(()),
+        }
     }
 
     fn engine_capabilities(&self) -> Capabilities {
@@ -422,6 +436,7 @@ impl Simulator for LoadedSimulator {
                 "call the host before physics steps",
             )?;
         }
+        self.require_readings(rollout.record)?;
         for change in rollout.changes {
             finite("a parameter change", change.values)?;
         }
@@ -488,6 +503,7 @@ impl Simulator for LoadedSimulator {
         check_sims(sims, self.batch_size())?;
         let width = record.width();
         expect("output", out.len(), sims.len() * width)?;
+        self.require_readings(record)?;
         let channels = channels(record);
         let read = self.engine().table.read;
         self.call("read", read, |f, batch, error| {

@@ -86,7 +86,7 @@ fn everything(backend: &dyn Backend) -> Vec<f64> {
     let mut sim = batch(&*model, 3);
     let record = model
         .layout()
-        .recording(&["tip", "turn", "qvel.a", "contact.a/b"])
+        .recording(&["tip", "turn", "qvel.a"])
         .unwrap();
     let width = record.width();
     let all = [0, 1, 2];
@@ -208,6 +208,60 @@ fn wrong_calls_stop_at_the_adapter() {
     );
     let unknown = model.nominal(&"geom/x/mass".parse().unwrap()).unwrap_err();
     assert!(unknown.to_string().contains("(plugin libengine.so)"));
+}
+
+#[test]
+fn what_is_not_claimed_is_refused_before_the_engine_is_called() {
+    unsafe extern "C" fn never(
+        _: *mut abi::Batch,
+        _: *const abi::Rollout,
+        _: *mut f64,
+        _: *mut abi::Error,
+    ) -> abi::Code {
+        abi::PANIC
+    }
+    let mut table = table::<Sound>("an engine");
+    table.rollout = Some(never);
+    // SAFETY: a table that was just made, and is leaked.
+    let engine = unsafe { Engine::from_table(keep(table), Path::new("libengine.so")) }.unwrap();
+    let model = engine.backend("e").load(&scene()).unwrap();
+    let mut sim = batch(&*model, 1);
+    let record = model.layout().recording(&["contact.a/b"]).unwrap();
+    let mut out = [0.0];
+    let rollout = Rollout::new(&[0], 1, 1, Control::Shared(&[]), &record);
+    let expected = "backend `free-flight` cannot record contact forces (plugin libengine.so)";
+    let said = sim.rollout(&rollout, &mut out).unwrap_err().to_string();
+    assert_eq!(said, expected);
+    let said = sim.read(&[0], &record, &mut out).unwrap_err().to_string();
+    assert_eq!(said, expected);
+    assert_eq!(sim.steps_taken(), 0);
+}
+
+#[test]
+fn targets_that_the_engine_does_not_name_are_named_by_the_host() {
+    let mut table = table::<Sound>("an engine");
+    unsafe extern "C" fn nameless(
+        _: *const abi::Model,
+        _: *const abi::BatchConfig,
+        _: *mut *mut abi::Batch,
+        _: *mut abi::Error,
+    ) -> abi::Code {
+        abi::PARAMETER
+    }
+    table.make_batch = Some(nameless);
+    // SAFETY: a table that was just made, and is leaked.
+    let engine = unsafe { Engine::from_table(keep(table), Path::new("lib.so")) }.unwrap();
+    let model = engine.backend("e").load(&scene()).unwrap();
+    let config = BatchConfig {
+        size: 1,
+        threads: 1,
+        targets: vec!["geom/g/friction/2".parse().unwrap()],
+    };
+    let error = model.simulator(&config).err().unwrap().to_string();
+    assert!(
+        error.starts_with("parameter `geom/g/friction/2`: "),
+        "{error}"
+    );
 }
 
 #[test]

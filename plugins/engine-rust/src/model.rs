@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use asid_core::layout::JointKind;
+use asid_core::layout::{Channel, JointKind, Recording};
 use asid_core::mass::{GeomMass, MassProperties};
 use asid_core::mjcf_rs::body::{GeomType, InertiaSpec};
 use asid_core::nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
@@ -21,8 +21,8 @@ pub struct Compiled {
     pub bodies: Vec<Body>,
     /// Index of each in [`Layout::bodies`].
     pub places: Vec<usize>,
-    /// Frame that each sensor looks at.
-    pub frames: Vec<Frame>,
+    /// Frame that each sensor looks at; none where this engine cannot read it.
+    pub frames: Vec<Option<Frame>>,
     /// Gravity, m/s².
     pub gravity: Vector3<f64>,
     /// Positions of a reset.
@@ -117,7 +117,7 @@ impl FlightModel {
             });
             places.push(i);
         }
-        let frames = frames(&document, &layout, &places, &bodies).map_err(refuse)?;
+        let frames = frames(&document, &layout, &places, &bodies);
         let [x, y, z] = document.option.gravity;
         let start = match layout.keyframes.first() {
             Some(key) => key.qpos.clone(),
@@ -165,58 +165,87 @@ fn pose(pose: &mjcf_rs::Pose) -> (Vector3<f64>, UnitQuaternion<f64>) {
     )
 }
 
-/// The frame of every sensor; an error names the first sensor that is not one of a frame.
+/// The axes that the principal moments of a body are along: as the document states them,
+/// or those of the inertia.
+fn axes_of(body: &mjcf_rs::body::Body) -> UnitQuaternion<f64> {
+    match &body.inertial {
+        Some(inertial) if matches!(inertial.inertia, InertiaSpec::Diagonal(_)) => {
+            pose(&inertial.pose).1
+        }
+        _ => mass_of(body).principal().1,
+    }
+}
+
+/// The frame of every sensor. A sensor of another kind is no reason to refuse the
+/// scene: it is refused when somebody records it.
 fn frames(
     document: &mjcf_rs::Model,
     layout: &Layout,
     places: &[usize],
     bodies: &[Body],
-) -> std::result::Result<Vec<Frame>, String> {
+) -> Vec<Option<Frame>> {
     const KINDS: [&str; 4] = ["framepos", "framequat", "framelinvel", "frameangvel"];
-    let mut frames = Vec::new();
-    for (sensor, place) in document.sensors.iter().zip(&layout.sensors) {
-        let name = sensor.objname.as_deref().unwrap_or_default();
-        let refuse = |why: &str| format!("sensor `{}` ({}): {why}", place.name, place.kind);
+    let frame = |sensor: &mjcf_rs::extras::Sensor| {
         if !KINDS.contains(&sensor.kind.as_str()) || sensor.refname.is_some() {
-            return Err(refuse("this engine has only frame sensors, in the world"));
+            return None;
         }
-        let flying = |body: usize| {
-            let found = places.iter().position(|&p| p == body);
-            found.ok_or_else(|| refuse("its body does not fly"))
-        };
-        let by_name = |body: &String| body == name;
-        frames.push(match sensor.objtype.as_deref() {
-            Some(kind @ ("body" | "xbody")) => {
-                let at = layout.bodies.iter().position(by_name);
-                let body = flying(at.ok_or_else(|| refuse("there is no such body"))?)?;
-                let own = Vector3::zeros();
-                Frame {
+        let name = sensor.objname.as_deref()?;
+        let flying = |body: usize| places.iter().position(|&p| p == body);
+        match sensor.objtype.as_deref()? {
+            kind @ ("body" | "xbody") => {
+                let at = layout.bodies.iter().position(|body| body == name)?;
+                let body = flying(at)?;
+                let of_mass = kind == "body";
+                Some(Frame {
                     body,
-                    position: if kind == "body" {
-                        bodies[body].center
-                    } else {
-                        own
+                    position: match of_mass {
+                        true => bodies[body].center,
+                        false => Vector3::zeros(),
                     },
-                    rotation: UnitQuaternion::identity(),
-                }
+                    rotation: match of_mass {
+                        true => axes_of(&document.bodies[at].body),
+                        false => UnitQuaternion::identity(),
+                    },
+                })
             }
-            Some("site") => {
-                let found = document.site_by_name(name);
-                let (at, site) = found.ok_or_else(|| refuse("there is no such site"))?;
+            "site" => {
+                let (at, site) = document.site_by_name(name)?;
                 let (position, rotation) = pose(&document.bodies[at].body.sites[site].pose);
-                Frame {
+                Some(Frame {
                     body: flying(at)?,
                     position,
                     rotation,
-                }
+                })
             }
-            _ => return Err(refuse("this engine looks at bodies and sites")),
-        });
-    }
-    Ok(frames)
+            _ => None,
+        }
+    };
+    document.sensors.iter().map(frame).collect()
 }
 
 impl Compiled {
+    /// Refuses to record what this engine cannot read.
+    ///
+    /// # Errors
+    /// [`Error::Incapable`], naming the sensor.
+    pub fn check_readings(&self, record: &Recording) -> Result<()> {
+        for channel in record.channels() {
+            let what = match *channel {
+                Channel::ContactForce { .. } => "record contact forces".to_owned(),
+                Channel::Sensor { index } if self.frames[index].is_none() => {
+                    let sensor = &self.layout.sensors[index];
+                    format!("read sensor `{}` ({})", sensor.name, sensor.kind)
+                }
+                _ => continue,
+            };
+            return Err(Error::Incapable {
+                backend: "free-flight".into(),
+                what,
+            });
+        }
+        Ok(())
+    }
+
     /// What a target changes, and its value in the scene.
     ///
     /// # Errors

@@ -145,14 +145,16 @@ impl Sim {
                 Channel::Velocity { start, len } => {
                     out.copy_from_slice(&self.state.qvel[start..start + len]);
                 }
-                Channel::ContactForce { .. } => out.fill(0.0),
+                Channel::ContactForce { .. } => out.fill(f64::NAN), // refused before
                 Channel::Sensor { index } => self.sense(compiled, index, out),
             }
         }
     }
 
     fn sense(&self, compiled: &Compiled, sensor: usize, out: &mut [f64]) {
-        let frame = &compiled.frames[sensor];
+        let Some(frame) = &compiled.frames[sensor] else {
+            return out.fill(f64::NAN); // refused before
+        };
         let motion = self.motion(frame.body);
         match compiled.layout.sensors[sensor].kind.as_str() {
             "framepos" => {
@@ -331,6 +333,7 @@ impl Simulator for FlightSimulator {
                 "a frame needs at least one physics step".into(),
             ));
         }
+        self.compiled.check_readings(rollout.record)?;
         for change in rollout.changes {
             for &value in change.values {
                 check_value(self.columns[change.column], value)?;
@@ -379,6 +382,7 @@ impl Simulator for FlightSimulator {
         check_sims(sims, self.batch_size())?;
         let width = record.width();
         expect("output", out.len(), sims.len() * width)?;
+        self.compiled.check_readings(record)?;
         for (&sim, row) in sims.iter().zip(out.chunks_mut(width.max(1))) {
             if self.status[sim].is_running() {
                 self.sims[sim].record(&self.compiled, record, row);
