@@ -11,7 +11,7 @@ mod plugin_support;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use asid::core::{Backend, Capabilities};
+use asid::core::{Backend, BatchConfig, Capabilities, Control, Error, Rollout, Scene};
 use asid_conformance::{Outcome, Row, table};
 use cli_support::{Workplace, names};
 use serde_json::Value;
@@ -94,6 +94,112 @@ fn the_engine_of_mechanisms_conforms() {
     assert!(conforms(&*engine) > 110);
 }
 
+/// Readings after `steps` frames of one step from rest, at a command of 1, with parameters.
+fn readings(
+    engine: &dyn Backend,
+    inside: &str,
+    channels: &[&str],
+    parameters: &[(&str, f64)],
+    steps: usize,
+) -> asid::core::Result<Vec<f64>> {
+    let xml = format!("<mujoco>{inside}</mujoco>");
+    let model = engine.load(&Scene::from_xml("it", &xml, &[])?)?;
+    let config = BatchConfig {
+        size: 1,
+        threads: 1,
+        targets: parameters
+            .iter()
+            .map(|p| p.0.parse())
+            .collect::<asid::core::Result<_>>()?,
+    };
+    let mut simulator = model.simulator(&config)?;
+    let values: Vec<f64> = parameters.iter().map(|p| p.1).collect();
+    simulator.set_parameters(&[0], &values)?;
+    let record = model.layout().recording(channels)?;
+    let mut out = vec![0.0; record.width()];
+    let control = vec![1.0; model.layout().nu()];
+    let rollout = Rollout::new(&[0], 1, steps, Control::Shared(&control), &record);
+    simulator.rollout(&rollout, &mut out)?;
+    Ok(out)
+}
+
+fn close(found: &[f64], expected: &[f64]) -> bool {
+    let near = |(a, b): (&f64, &f64)| (a - b).abs() < 1e-9;
+    found.len() == expected.len() && found.iter().zip(expected).all(near)
+}
+
+#[test]
+fn principal_axes_may_be_turned() {
+    let place = Workplace::new();
+    let (flight, mechanism) = (place.path("libflight.so"), place.path("libmechanism.so"));
+    build("plugins/engine-c", &["engine.c"], &flight);
+    let sources = ["engine.c", "scene.c", "dynamics.c"];
+    build("plugins/mechanism-c", &sources, &mechanism);
+    // The first principal axis is (1, 1, 0) of the body: half of a right angle about z.
+    let (c, s) = (
+        std::f64::consts::FRAC_PI_8.cos(),
+        std::f64::consts::FRAC_PI_8.sin(),
+    );
+    let body = |joint: &str| {
+        format!(
+            r#"<option gravity="0 0 0" timestep="0.01"/><worldbody><body name="b">{joint}<inertial pos="0 0 0"
+            quat="{c} 0 0 {s}" mass="2" diaginertia=".1 .2 .25"/></body></worldbody>
+            <sensor><framequat name="axes" objtype="body" objname="b"/>
+            <framequat name="own" objtype="xbody" objname="b"/></sensor>"#
+        )
+    };
+    let still = [c, 0.0, 0.0, s, 1.0, 0.0, 0.0, 0.0];
+    for library in [&flight, &mechanism] {
+        let engine = engine(library);
+        let free = body(r#"<freejoint name="j"/>"#);
+        let found = readings(&*engine, &free, &["axes", "own"], &[], 5).unwrap();
+        assert!(close(&found, &still), "{}: {found:?}", engine.name());
+        // About a principal axis it goes on turning; about another one it would tumble.
+        let turning =
+            free.clone() + r#"<keyframe><key qpos="0 0 0 1 0 0 0" qvel="0 0 0 1 1 0"/></keyframe>"#;
+        let found = readings(&*engine, &turning, &["qvel.j"], &[], 50).unwrap();
+        let kept = close(&found, &[0.0, 0.0, 0.0, 1.0, 1.0, 0.0]);
+        assert!(kept, "{}: {found:?}", engine.name());
+    }
+    // 20 steps of 0.01 s at 1 N m: the rate is 0.2 over the moment about the hinge.
+    let engine = engine(&mechanism);
+    let wheel =
+        body(r#"<joint name="j" axis="1 1 0"/>"#) + r#"<actuator><motor joint="j"/></actuator>"#;
+    let rate = |parameters: &[(&str, f64)]| {
+        readings(&*engine, &wheel, &["qvel.j"], parameters, 20).unwrap()
+    };
+    assert!(close(&rate(&[]), &[0.2 / 0.1]));
+    assert!(close(&rate(&[("body/b/inertia/0", 0.5)]), &[0.2 / 0.5]));
+    assert!(close(&rate(&[("body/b/inertia/1", 0.5)]), &[0.2 / 0.1]));
+    assert!(close(&rate(&[("body/b/mass", 4.0)]), &[0.2 / 0.2]));
+    let both = [("body/b/inertia/0", 0.5), ("body/b/mass", 4.0)];
+    assert!(close(&rate(&both), &[0.2 / 0.5]));
+}
+
+#[test]
+fn a_sensor_that_cannot_be_read_is_refused_when_it_is_recorded() {
+    let place = Workplace::new();
+    let library = place.path("libflight.so");
+    build("plugins/engine-c", &["engine.c"], &library);
+    let engine = engine(&library);
+    let inside = r#"<worldbody><body name="b"><freejoint name="j"/>
+        <geom size="1" contype="0" conaffinity="0"/></body></worldbody>
+        <sensor><clock name="time"/><framepos name="place" objtype="xbody" objname="b"/></sensor>"#;
+    assert!(readings(&*engine, inside, &["place"], &[], 1).is_ok());
+    let error = readings(&*engine, inside, &["time"], &[], 1).unwrap_err();
+    assert!(matches!(error, Error::Incapable { .. }), "{error}");
+    let said = error.to_string();
+    assert!(
+        said.starts_with("backend `flight` cannot read sensors"),
+        "{said}"
+    );
+    // The host names the target that an engine refuses.
+    let target = [("body/b/mass", 1.0)];
+    let error = readings(&*engine, inside, &["place"], &target, 1).unwrap_err();
+    let said = error.to_string();
+    assert!(said.starts_with("parameter `body/b/mass/0`: "), "{said}");
+}
+
 #[test]
 fn what_an_engine_lacks_is_one_line() {
     let place = Workplace::new();
@@ -127,7 +233,7 @@ fn what_an_engine_lacks_is_one_line() {
         (two.into(), "geoms `g` and `h` could touch"),
     ] {
         let xml = format!("<mujoco>{inside}</mujoco>");
-        let scene = asid::core::Scene::from_xml("it", &xml, &[]).unwrap();
+        let scene = Scene::from_xml("it", &xml, &[]).unwrap();
         let error = engine.load(&scene).err().unwrap().to_string();
         assert!(error.starts_with("scene it: this engine "), "{error}");
         assert!(error.contains(expected), "{expected}: {error}");
@@ -263,6 +369,11 @@ fn new_writes_what_can_be_built_and_nothing_over_anything() {
         (["new", "engine-c", "file"], "no folder"),
         (["new", "engine-c", "My_Engine"], "a-z, 0-9 and -"),
         (["new", "engine-d", "x"], "engine-c"),
+        (["new", "engine-c", "mujoco"], "`mujoco` is built in"),
+        (
+            ["new", "mechanism-c", "deep/rapier"],
+            "`rapier` is built in",
+        ),
     ] {
         let output = place.run(&arguments);
         let said = String::from_utf8(output.stderr).unwrap();

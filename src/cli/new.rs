@@ -5,6 +5,9 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use asid_core::Error;
+use asid_core::registry::{
+    self, BackendEntry, EffectEntry, Entry, ExplorerEntry, Origin, TaskEntry,
+};
 use clap::builder::{PossibleValue, PossibleValuesParser};
 
 /// Arguments of `new`.
@@ -24,6 +27,9 @@ struct Kind {
     /// Text in the files that holds the plugin's name, and how a new name is written in
     /// its place, as `{}`.
     rename: (&'static str, &'static str),
+    /// True where a name is that of something built in, beside which a plugin would be
+    /// listed under another name than its own.
+    taken: fn(&str) -> bool,
     /// A Cargo package: crates of this repository are named by their folders.
     cargo: bool,
     /// Names and contents.
@@ -51,6 +57,7 @@ const KINDS: &[Kind] = &[
         name: "engine-c",
         about: "a physics engine in one C file: rigid bodies in free flight",
         rename: ("\"flight\"", "\"{}\""),
+        taken: is_built_in::<BackendEntry>,
         cargo: false,
         files: &[
             HEADER,
@@ -66,6 +73,7 @@ const KINDS: &[Kind] = &[
         name: "mechanism-c",
         about: "a larger engine in C: trees of joints, drives and sensors, without contact",
         rename: ("\"mechanism\"", "\"{}\""),
+        taken: is_built_in::<BackendEntry>,
         cargo: false,
         files: &[
             HEADER,
@@ -93,6 +101,7 @@ const KINDS: &[Kind] = &[
         name: "task",
         about: "a task in Rust: a payload is weighed by swinging it, then swung to an angle",
         rename: ("payload-swing", "{}"),
+        taken: is_built_in::<TaskEntry>,
         cargo: true,
         files: &[
             (
@@ -123,6 +132,7 @@ const KINDS: &[Kind] = &[
         name: "explorer",
         about: "an explorer in Rust: sums of sines with random phases",
         rename: ("multisine", "{}"),
+        taken: is_built_in::<ExplorerEntry>,
         cargo: true,
         files: &[
             (
@@ -145,6 +155,7 @@ const KINDS: &[Kind] = &[
         name: "effect",
         about: "an effect in Rust: a magnet draws a joint to one place",
         rename: ("magnetic-catch", "{}"),
+        taken: is_built_in::<EffectEntry>,
         cargo: true,
         files: &[
             (
@@ -168,6 +179,11 @@ const KINDS: &[Kind] = &[
         ],
     },
 ];
+
+/// True where something of this kind and name is linked in.
+fn is_built_in<E: Entry>(name: &str) -> bool {
+    registry::find::<E>(name).is_ok_and(|e| matches!(e.origin(), Origin::Linked(_)))
+}
 
 impl Kind {
     fn value(&self) -> PossibleValue {
@@ -193,6 +209,16 @@ pub fn new(arguments: &Arguments) -> Result<()> {
         kind.ok_or_else(|| Error::unknown("kind", &arguments.kind, KINDS.iter().map(|k| k.name)))?;
     let dir = &arguments.dir;
     let name = plugin_name(dir)?;
+    if (kind.taken)(&name) {
+        let message = format!(
+            "`{name}` is built in, and the folder's name becomes the plugin's; choose another"
+        );
+        return Err(Error::File {
+            path: dir.clone(),
+            message,
+        }
+        .into());
+    }
     prepare(dir)?;
     for (file, text) in kind.files {
         let path = dir.join(file);

@@ -72,7 +72,9 @@ enum {
   ASID_PANIC = 8      /* a defect of the engine; the handle is of no use any more  */
 };
 
-/* Filled in by a function that fails: UTF-8, one line, terminated by a zero. */
+/* Filled in by a function that fails: UTF-8, one line, terminated by a zero. Of a call
+ * that succeeds it is not read. `subject` of a target is `element/name/attribute/index`.
+ * It may stay empty: the host then names the scene, the targets or the engine. */
 typedef struct asid_error {
   char subject[256];
   char message[1024];
@@ -204,7 +206,9 @@ typedef struct asid_actuator {
 } asid_actuator;
 
 /* A sensor. `object_kind` is that of MJCF: `joint`, `body` (the frame of the
- * centre of mass), `xbody` (the frame of the body), `geom`, `site`, `actuator`. */
+ * principal axes: `com`, `iquat`), `xbody` (the frame of the body), `geom`, `site`,
+ * `actuator`. One that the engine cannot read is no reason to refuse a scene: recording
+ * it is ASID_INCAPABLE. */
 typedef struct asid_sensor {
   const char *name;
   const char *kind;        /* MJCF element, such as `framepos`                  */
@@ -247,7 +251,14 @@ typedef struct asid_world {
   const asid_keyframe *keyframes;
   /* What the document holds and this structure does not, such as `equality/weld` or
    * `geom/arm solref`, one text each. An engine that builds its world from this
-   * structure must refuse what it would otherwise silently leave out. */
+   * structure must refuse what it would otherwise silently leave out. Spelling:
+   *     SECTION/ELEMENT             a whole element: equality/weld, tendon/fixed,
+   *                                 contact/exclude, sensor/contact, body/composite
+   *     ELEMENT/NAME ATTRIBUTE      geom/arm solref, joint/j springdamper, body/b
+   *                                 gravcomp, actuator/m dyntype, sensor/s cutoff
+   *     ELEMENT ATTRIBUTE           where it has no name: option integrator, flag contact
+   *     default/ELEMENT ATTRIBUTE   in a class of defaults
+   *     geom/NAME mesh              also hfield, sdf: a shape that is no primitive     */
   uint64_t nleft_out;
   const char *const *left_out;
 } asid_world;
@@ -338,7 +349,8 @@ enum {
   ASID_CHANNEL_SENSOR = 0,  /* all entries of sensor `a`                         */
   ASID_CHANNEL_QPOS = 1,    /* `b` positions from `a` on                         */
   ASID_CHANNEL_QVEL = 2,    /* `b` velocities from `a` on                        */
-  ASID_CHANNEL_CONTACT = 3  /* sum of the normal forces between bodies a and b, N */
+  ASID_CHANNEL_CONTACT = 3  /* sum of the normal forces between bodies a and b, N;
+                               never asked for unless ASID_CONTACT_FORCES         */
 };
 typedef struct asid_channel {
   int32_t kind;
@@ -348,7 +360,7 @@ typedef struct asid_channel {
 } asid_channel;
 
 /* A wrench on one body, constant over each frame: force (N), then torque (N m), in
- * the world frame, at the body's centre of mass. */
+ * the world frame, at the body's centre of mass. A body has at most one entry. */
 typedef struct asid_force {
   uint64_t body;
   const double *wrench;       /* count x frames x 6                              */
@@ -361,7 +373,9 @@ typedef struct asid_change {
   const double *values;       /* count: one a simulation of the rollout          */
 } asid_change;
 
-/* What the host sees of a simulation before a physics step, and may change. */
+/* What the host sees of a simulation before a physics step, and may change. An array
+ * of no entries may be NULL: `ctrl` where nu is 0. What the host leaves in `ctrl` and
+ * `force` holds over the whole step, whatever the order of the integrator. */
 typedef struct asid_step_view {
   double time;                /* simulated time of the state, s                  */
   const double *qpos;         /* nq                                              */
@@ -383,8 +397,8 @@ typedef struct asid_rollout {
   const uint64_t *sims;
   uint64_t frames;
   uint64_t substeps;
-  const double *control;      /* frames x nu, or count x frames x nu             */
-  int32_t shared_control;     /* 1: one trajectory for all                       */
+  const double *control;      /* count x frames x nu; frames x nu where shared   */
+  int32_t shared_control;     /* 1: one trajectory for all simulations           */
   int32_t padding;
   uint64_t force_count;       /* 0 unless ASID_EXTERNAL_FORCES is claimed        */
   const asid_force *forces;
@@ -464,13 +478,15 @@ typedef struct asid_backend {
 
   /* Runs a rollout and writes count x frames x width readings, each of the state
    * at the end of its frame, before any later command acts. A simulation that
-   * diverges stands still and records NaN from that frame on. The engine uses its
-   * own threads within the call. Threads: one a batch. */
+   * diverges stands still and records NaN from that frame on. ASID_INCAPABLE for a
+   * sensor that the engine cannot read. The engine uses its own threads within the
+   * call. Threads: one a batch. */
   asid_code (*rollout)(asid_batch *batch, const asid_rollout *rollout, double *out,
                        asid_error *error);
 
   /* Reads the present state without a step, count x width, and disturbs nothing.
-   * Sensors that depend on a command see the last one. Threads: one a batch. */
+   * Sensors that depend on a command see the last one. A row of a simulation that has
+   * diverged is NaN, and the call ASID_OK. Errors as `rollout`. Threads: one a batch. */
   asid_code (*read)(asid_batch *batch, const uint64_t *sims, uint64_t count,
                     const asid_channel *channels, uint64_t channel_count, uint64_t width,
                     double *out, asid_error *error);
@@ -503,7 +519,8 @@ typedef struct asid_backend {
    * each status after each call. Threads: one a batch. */
   uint64_t (*diverged_count)(const asid_batch *batch);
 
-  /* Physics steps taken by all simulations since the batch was made.
+  /* Physics steps taken by all simulations since the batch was made: steps that were
+   * taken, the last one of a simulation that diverged among them, and none after it.
    * Threads: one a batch. */
   uint64_t (*steps_taken)(const asid_batch *batch);
 } asid_backend;

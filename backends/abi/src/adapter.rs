@@ -12,7 +12,7 @@ use asid_core::{
 use crate::engine::{Checked, Engine};
 use crate::failure::{broken, decode, encode};
 use crate::simulator::LoadedSimulator;
-use crate::table;
+use crate::table::{self, Code};
 use crate::text;
 use crate::world::World;
 use crate::{layout, table::NONE};
@@ -159,7 +159,8 @@ impl LoadedModel {
             // SAFETY: all that is pointed to lives until the call returns.
             unsafe { load((&raw const host).cast(), &mut pointer, &mut error) }
         });
-        decode(code, &error, "load", scene.name(), &engine.path)?;
+        let about = about(code, &engine, scene.name());
+        decode(code, &error, "load", &about, &engine.path)?;
         let pointer = NonNull::new(pointer)
             .ok_or_else(|| broken(&engine.path, "load", "says that all is well and gives NULL"))?;
         // From here on the model is destroyed whatever happens.
@@ -223,7 +224,8 @@ impl Model for LoadedModel {
             // SAFETY: all that is pointed to lives until the call returns.
             unsafe { nominal(model, &named.table(), &mut value, &mut error) }
         });
-        decode(code, &error, "nominal", &target.to_string(), &engine.path)?;
+        let about = about(code, engine, &target.to_string());
+        decode(code, &error, "nominal", &about, &engine.path)?;
         if !value.is_finite() {
             return Err(broken(
                 &engine.path,
@@ -278,6 +280,16 @@ impl NamedTarget {
 /// A function of the table; one that an engine may leave out is an error to call.
 pub fn function<F>(function: Option<F>, name: &str, engine: &Checked) -> Result<F> {
     function.ok_or_else(|| broken(&engine.path, name, "the engine has no such function"))
+}
+
+/// What an error is about where the engine does not say: itself where it cannot do
+/// something, else what it was asked for.
+pub fn about(code: Code, engine: &Checked, asked: &str) -> String {
+    if code != table::INCAPABLE {
+        return asked.to_owned();
+    }
+    // SAFETY: checked when the table was.
+    unsafe { text::read(engine.table.name, "name") }.unwrap_or_default()
 }
 
 fn empty_layout() -> Layout {

@@ -113,8 +113,9 @@ static BEFORE: Mutex<Vec<(libc::c_int, libc::sigaction)>> = Mutex::new(Vec::new(
 #[cfg(all(unix, not(miri)))]
 extern "C" fn handle(signal: libc::c_int, _: *mut libc::siginfo_t, _: *mut libc::c_void) {
     let note = NOTE.load(Ordering::Relaxed);
-    // SAFETY: a note is never freed; `write` and `_exit` may be called here.
+    // SAFETY: a note is never freed.
     if let Some(note) = unsafe { note.as_ref() } {
+        // SAFETY: `write` and `_exit` may be called in a handler of signals.
         unsafe {
             libc::write(2, note.line.as_ptr().cast(), note.line.len());
             libc::_exit(1);

@@ -130,7 +130,12 @@ impl Engine {
             return Err(refuse(format!("its table has no `{missing}` (NULL)")));
         }
         let unknown = table.capabilities & !Capabilities::all().bits();
-        if minor <= ABI_MINOR && unknown != 0 {
+        #[allow(
+            clippy::absurd_extreme_comparisons,
+            reason = "not of the first minor version only"
+        )]
+        let known_version = minor <= ABI_MINOR;
+        if known_version && unknown != 0 {
             return Err(refuse(format!(
                 "its table claims capability bit {}, which version {ABI_MAJOR}.{ABI_MINOR} does not have",
                 unknown.trailing_zeros()

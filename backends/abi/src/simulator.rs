@@ -16,7 +16,7 @@ use asid_core::{
     BatchConfig, Capabilities, Control, Error, Result, Rollout, Simulator, Snapshot, Status,
 };
 
-use crate::adapter::{ModelHandle, NamedTarget, function};
+use crate::adapter::{ModelHandle, NamedTarget, about, function};
 use crate::engine::Checked;
 use crate::failure::{broken, decode};
 use crate::hook::{self, HostHook};
@@ -110,10 +110,11 @@ impl LoadedSimulator {
             // SAFETY: all that is pointed to lives until the call returns.
             unsafe { make(model.pointer(), &settings, &mut pointer, &mut error) }
         });
-        let about = match code {
+        let asked = match code {
             table::PARAMETER => columns.join(", "),
             _ => String::new(),
         };
+        let about = about(code, engine, &asked);
         decode(code, &error, "make_batch", &about, &engine.path)?;
         let pointer = NonNull::new(pointer).ok_or_else(|| {
             broken(

@@ -42,6 +42,12 @@ pub fn bodies(model: &Model, layout: &Layout, texts: &mut Texts) -> Vec<table::B
             };
             let m = mass.inertia;
             let (moments, axes) = principal(body, stated.is_some(), &mass);
+            let least = if i == 0 {
+                0.0
+            } else {
+                model.compiler.bound_inertia
+            };
+            let moments = moments.map(|m| m.max(least));
             table::Body {
                 name: texts.add(name),
                 parent: entry.parent.map_or(table::NONE, |p| p as u64),
