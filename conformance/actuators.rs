@@ -2,6 +2,7 @@
 
 use asid_core::{Backend, Capabilities, Result};
 
+use crate::check::Measure::Figure;
 use crate::check::{Check, Tolerance};
 use crate::rig::{Rig, STEP, largest, last, relative};
 
@@ -15,7 +16,7 @@ pub const CHECKS: &[Check] = &[
         unit: "",
         tolerance: Tolerance::same(0.01),
         reason: "first order in the step: w dt / 2 of the step at w = 10 rad/s",
-        measure: step_response,
+        measure: Figure(step_response),
     },
     Check {
         name: "actuators/stiff-servo-response",
@@ -23,7 +24,7 @@ pub const CHECKS: &[Check] = &[
         unit: "",
         tolerance: Tolerance::same(0.01),
         reason: "kp = 4000, kv = 400 on 0.1 kg m^2, an implicit integrator: first order, slow rate 10 /s times dt / 2",
-        measure: stiff_response,
+        measure: Figure(stiff_response),
     },
     Check {
         name: "actuators/stiff-servo-rests-on-target",
@@ -31,7 +32,7 @@ pub const CHECKS: &[Check] = &[
         unit: "rad",
         tolerance: Tolerance::by_precision(1e-6, 1e-5),
         reason: "20 slow time constants leave exp(-20), and rounding",
-        measure: stiff_rest,
+        measure: Figure(stiff_rest),
     },
     Check {
         name: "actuators/servo-sags-under-load",
@@ -39,7 +40,7 @@ pub const CHECKS: &[Check] = &[
         unit: "",
         tolerance: Tolerance::by_precision(1e-6, 1e-4),
         reason: "at rest kp times the error is the load: rounding",
-        measure: sag,
+        measure: Figure(sag),
     },
     Check {
         name: "actuators/force-limit",
@@ -47,7 +48,7 @@ pub const CHECKS: &[Check] = &[
         unit: "",
         tolerance: Tolerance::by_precision(1e-9, 1e-4),
         reason: "beyond its limit a servo is a constant force, whose acceleration is exact: rounding",
-        measure: force_limit,
+        measure: Figure(force_limit),
     },
     Check {
         name: "actuators/command-limit",
@@ -55,7 +56,7 @@ pub const CHECKS: &[Check] = &[
         unit: "",
         tolerance: Tolerance::by_precision(1e-9, 1e-4),
         reason: "a command beyond its range acts like the end of the range: rounding",
-        measure: command_limit,
+        measure: Figure(command_limit),
     },
     Check {
         name: "actuators/velocity-servo",
@@ -63,7 +64,7 @@ pub const CHECKS: &[Check] = &[
         unit: "",
         tolerance: Tolerance::same(0.01),
         reason: "approach with rate kv / I = 10 /s: first order, rate times dt / 2",
-        measure: velocity_servo,
+        measure: Figure(velocity_servo),
     },
     Check {
         name: "actuators/gear-of-a-motor",
@@ -71,7 +72,7 @@ pub const CHECKS: &[Check] = &[
         unit: "",
         tolerance: Tolerance::by_precision(1e-9, 1e-4),
         reason: "torque is gear times command, constant: rounding",
-        measure: motor_gear,
+        measure: Figure(motor_gear),
     },
     Check {
         name: "actuators/gear-of-a-servo",
@@ -79,7 +80,7 @@ pub const CHECKS: &[Check] = &[
         unit: "rad",
         tolerance: Tolerance::by_precision(1e-6, 1e-5),
         reason: "the servo holds gear times angle at the command: exp(-20) after 20 slow time constants",
-        measure: servo_gear,
+        measure: Figure(servo_gear),
     },
     Check {
         name: "actuators/each-acts-on-its-joint",
@@ -87,7 +88,7 @@ pub const CHECKS: &[Check] = &[
         unit: "",
         tolerance: Tolerance::by_precision(1e-9, 1e-4),
         reason: "commands in the order of the actuators reach the joints that these name: rounding",
-        measure: own_joint,
+        measure: Figure(own_joint),
     },
 ];
 

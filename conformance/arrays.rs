@@ -3,6 +3,7 @@
 use asid_core::{Backend, Capabilities, Result};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
+use crate::check::Measure::Figure;
 use crate::check::{Check, Tolerance};
 use crate::faults::ANY;
 use crate::rig::{Rig, STEP, largest, last, relative};
@@ -19,7 +20,7 @@ pub const CHECKS: &[Check] = &[
         unit: "",
         tolerance: Tolerance::same(0.0),
         reason: "names and places follow from the document alone: wrong of nine",
-        measure: crate::layout::layout,
+        measure: Figure(crate::layout::layout),
     },
     Check {
         name: "arrays/reset-is-the-first-keyframe",
@@ -27,7 +28,7 @@ pub const CHECKS: &[Check] = &[
         unit: "",
         tolerance: EXACT,
         reason: "positions and velocities of the first <key>: rounding",
-        measure: crate::layout::keyframe,
+        measure: Figure(crate::layout::keyframe),
     },
     Check {
         name: "arrays/quaternion-order",
@@ -35,7 +36,7 @@ pub const CHECKS: &[Check] = &[
         unit: "",
         tolerance: EXACT,
         reason: "w x y z: a quarter turn about z carries x to y: rounding",
-        measure: quaternion_order,
+        measure: Figure(quaternion_order),
     },
     Check {
         name: "arrays/quaternions-are-normalised",
@@ -43,7 +44,7 @@ pub const CHECKS: &[Check] = &[
         unit: "",
         tolerance: EXACT,
         reason: "set_state takes a quaternion of any length: rounding",
-        measure: normalised,
+        measure: Figure(normalised),
     },
     Check {
         name: "arrays/free-joint-linear-velocity",
@@ -51,7 +52,7 @@ pub const CHECKS: &[Check] = &[
         unit: "m",
         tolerance: Tolerance::by_precision(1e-11, 1e-5),
         reason: "linear velocity is in the world frame and uniform: rounding of 50 steps",
-        measure: free_linear,
+        measure: Figure(free_linear),
     },
     Check {
         name: "arrays/free-joint-angular-velocity",
@@ -59,7 +60,7 @@ pub const CHECKS: &[Check] = &[
         unit: "rad",
         tolerance: Tolerance::by_precision(1e-9, 1e-4),
         reason: "angular velocity is in the body frame and uniform about a principal axis: rounding of 250 steps",
-        measure: free_angular,
+        measure: Figure(free_angular),
     },
     Check {
         name: "arrays/readings-are-of-the-end-of-a-frame",
@@ -67,7 +68,7 @@ pub const CHECKS: &[Check] = &[
         unit: "m",
         tolerance: EXACT,
         reason: "a sensor and qpos of one row are of one state; a step before it is 4 mm away: rounding",
-        measure: readings_are_fresh,
+        measure: Figure(readings_are_fresh),
     },
     Check {
         name: "arrays/substeps",
@@ -75,7 +76,7 @@ pub const CHECKS: &[Check] = &[
         unit: "",
         tolerance: Tolerance::by_precision(1e-9, 1e-4),
         reason: "a frame lasts its substeps: uniform motion, rounding",
-        measure: substeps,
+        measure: Figure(substeps),
     },
 ];
 

@@ -7,6 +7,7 @@ use asid_core::{Backend, Capabilities, Result};
 use serde::{Deserialize, Serialize};
 
 use crate::deviations;
+use crate::named::Named;
 
 /// Largest figure that passes, for engines of double and of single precision.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -56,7 +57,26 @@ pub struct Check {
     /// Where the tolerance comes from.
     pub reason: &'static str,
     /// Measures the figure: a deviation, zero at best.
-    pub measure: fn(&dyn Backend) -> Result<f64>,
+    pub measure: Measure,
+}
+
+/// How a check measures its figure.
+#[derive(Clone, Copy, Debug)]
+pub enum Measure {
+    /// Of every engine that claims what the check needs.
+    Figure(fn(&dyn Backend) -> Result<f64>),
+    /// Of what an engine takes without having to: `None` where it refuses all of it, or
+    /// where nothing that it claims could show it.
+    Taken(fn(&dyn Backend) -> Result<Option<f64>>),
+}
+
+impl Measure {
+    fn of(self, backend: &dyn Backend) -> Result<Option<f64>> {
+        match self {
+            Self::Figure(measure) => measure(backend).map(Some),
+            Self::Taken(measure) => measure(backend),
+        }
+    }
 }
 
 impl Check {
@@ -87,18 +107,25 @@ impl Check {
             row.note = format!("does not claim {}", names.join(", "));
             return row;
         }
-        if !capabilities.intersects(crate::MOVES) {
+        let asked_of_all = ["faults", "claims"].contains(&self.family());
+        if !capabilities.intersects(crate::MOVES) && !asked_of_all {
             row.note = "claims neither ARTICULATION nor FREE_BODIES: nothing moves".into();
             return row;
         }
         row.outcome = Outcome::Fail;
-        match catch_unwind(AssertUnwindSafe(|| (self.measure)(backend))) {
-            Ok(Ok(value)) if value.abs() <= tolerance => {
+        let named = Named::new(backend, self.name);
+        match catch_unwind(AssertUnwindSafe(|| self.measure.of(&named))) {
+            Ok(Ok(None)) => {
+                row.outcome = Outcome::NotClaimed;
+                row.note =
+                    "refuses what it need not take, or claims nothing that would show it".into();
+            }
+            Ok(Ok(Some(value))) if value.abs() <= tolerance => {
                 row.value = Some(value);
                 row.outcome = Outcome::Pass;
             }
-            Ok(Ok(value)) if value.is_finite() => row.value = Some(value),
-            Ok(Ok(value)) => row.note = format!("the figure is {value}"),
+            Ok(Ok(Some(value))) if value.is_finite() => row.value = Some(value),
+            Ok(Ok(Some(value))) => row.note = format!("the figure is {value}"),
             Ok(Err(error)) => row.note = error.to_string(),
             Err(panic) => {
                 let text = panic
@@ -110,6 +137,16 @@ impl Check {
             }
         }
         excused(row, deviations::find(backend.name(), self.name))
+    }
+
+    /// The documents that an engine is given when it is asked, in their order and each once:
+    /// those up to the first that ends the check where it refuses one.
+    #[must_use]
+    pub fn scenes(&self, backend: &dyn Backend) -> Vec<String> {
+        let named = Named::new(backend, self.name);
+        // What comes of it is not asked for.
+        let _ = catch_unwind(AssertUnwindSafe(|| self.measure.of(&named)));
+        named.scenes()
     }
 }
 
@@ -134,7 +171,7 @@ pub enum Outcome {
     Pass,
     /// Beyond it, or an error where there should be none.
     Fail,
-    /// The engine does not claim what the check needs.
+    /// The engine does not claim what the check needs, or refuses what it need not take.
     NotClaimed,
     /// Beyond the tolerance, and within what the table of deviations allows.
     KnownDeviation,

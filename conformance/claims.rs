@@ -1,176 +1,170 @@
 //! What an engine does not claim, it refuses; what it takes, acts.
 //!
 //! A part of a scene that is silently left out gives a wrong answer without a
-//! word. So each capability that an engine lacks is asked of it all the same: it
-//! may refuse, and it may do more than it claims, but it may not go on as if
-//! nothing had been said.
+//! word. So each part is asked of every engine: it may refuse, and it may do more
+//! than it claims, but it may not go on as if nothing had been said. And what an
+//! engine claims, some check must be able to see.
 
 use asid_core::simulator::{ExternalForce, ParameterChange, StepHook, StepView};
-use asid_core::{Backend, Capabilities, Result};
+use asid_core::{Backend, Capabilities, Error, Result};
 
 use crate::check::Check;
+use crate::check::Measure::Taken;
 use crate::faults::{ANY, check};
+use crate::parts::{Part, parts};
 use crate::rig::{Extras, Rig, Rows, Size, differing_bits};
-use crate::subject::{GHOST, falling};
+use crate::subject::falling;
 
 /// The checks of this family.
 pub const CHECKS: &[Check] = &[
     check(
-        "claims/no-part-of-a-scene-is-left-out",
+        "claims/something-moves",
         ANY,
-        "what is not claimed is refused, or acts; softness is not asked for: silently left out of up to twelve",
+        "FREE_BODIES or ARTICULATION is claimed: without either there is nothing to check",
+        something_moves,
+    ),
+    check(
+        "claims/every-bit-is-checked",
+        ANY,
+        "each bit that is claimed has a check that needs no bit which is not: bits without one",
+        every_bit,
+    ),
+    probe(
+        "claims/no-part-of-a-scene-is-left-out",
+        "what a document says of joints, drives, equalities, shapes and the air is refused, or acts; softness is not asked for: silently left out",
         scenes,
     ),
-    check(
+    probe(
         "claims/no-part-of-a-rollout-is-left-out",
-        ANY,
-        "wrenches, changes and hooks that are not claimed are refused, or act: silently left out of up to three",
+        "wrenches, changes and hooks are refused, or act: silently left out of three",
         rollouts,
     ),
-    check(
+    probe(
         "claims/no-target-is-left-out",
-        ANY,
-        "parameters that are not claimed are refused, or act: silently left out of up to four",
+        "parameters of masses, joints and contacts are refused, or act: silently left out",
         targets,
     ),
 ];
 
-/// Readings of 50 steps from a state, `None` where the engine refuses the document.
-fn readings(
-    backend: &dyn Backend,
-    inside: &str,
-    channel: &str,
-    speed: f64,
-) -> Result<Option<Rows>> {
-    let Ok(mut rig) = Rig::new(backend, inside, &[channel]) else {
+const fn probe(
+    name: &'static str,
+    reason: &'static str,
+    measure: fn(&dyn Backend) -> Result<Option<f64>>,
+) -> Check {
+    Check {
+        measure: Taken(measure),
+        ..check(name, ANY, reason, |_| Ok(0.0))
+    }
+}
+
+fn something_moves(backend: &dyn Backend) -> Result<f64> {
+    if backend.capabilities().intersects(crate::MOVES) {
+        return Ok(0.0);
+    }
+    Err(Error::Failed(
+        "claims neither FREE_BODIES nor ARTICULATION, so none of its motion can be checked: an engine claims at least one".into(),
+    ))
+}
+
+/// What a claimed bit lacks, where every check of it needs more than is claimed.
+fn unchecked(bit: Capabilities, claimed: Capabilities) -> Option<String> {
+    let lacking: Vec<Capabilities> = crate::checks()
+        .filter(|check| check.needs.contains(bit))
+        .map(|check| check.needs - claimed)
+        .collect();
+    // The fewest bits that would have it checked; no check names a bit of arithmetic.
+    let least = *lacking.iter().min_by_key(|bits| bits.bits().count_ones())?;
+    let names = |bits: Capabilities| {
+        let names: Vec<&str> = bits.iter_names().map(|(name, _)| name).collect();
+        names.join(" and ")
+    };
+    (!least.is_empty()).then(|| {
+        format!(
+            "{} is claimed, but every check of it also needs {}",
+            names(bit),
+            names(least)
+        )
+    })
+}
+
+fn every_bit(backend: &dyn Backend) -> Result<f64> {
+    let claimed = backend.capabilities();
+    told(
+        claimed
+            .iter()
+            .filter_map(|bit| unchecked(bit, claimed))
+            .collect(),
+        "",
+    )
+}
+
+/// Zero, or an error that names what was found.
+fn told(found: Vec<String>, before: &str) -> Result<f64> {
+    if found.is_empty() {
+        return Ok(0.0);
+    }
+    Err(Error::Failed(format!("{before}{}", found.join("; "))))
+}
+
+/// Readings of 50 steps of a document, `None` where the engine refuses it.
+fn readings(backend: &dyn Backend, part: &Part, inside: &str) -> Result<Option<Rows>> {
+    let Ok(mut rig) = Rig::new(backend, inside, &[part.channel]) else {
         return Ok(None);
     };
-    if speed != 0.0 {
-        rig.place(&[0.0], &[speed])?;
+    if let Some((qpos, qvel)) = &part.state {
+        rig.place(qpos, qvel)?;
     }
     rig.run(50, &rig.command(1.0)).map(Some)
 }
 
-/// A part of a document: with it and without it.
-struct Part {
-    bits: Capabilities,
-    channel: &'static str,
-    speed: f64,
-    with: String,
-    without: String,
-}
-
-/// A wheel, turning at 2 rad/s, with something on its joint or beside it.
-fn wheel(bits: Capabilities, joint: &str, beside: &str) -> Part {
-    let document = |joint: &str, beside: &str| {
-        format!(
-            r#"<option gravity="0 0 0"/><worldbody><body name="b"><joint name="j" axis="0 0 1" {joint}/>
-            <inertial pos="0 0 0" mass="1" diaginertia=".1 .1 .1"/></body></worldbody>{beside}"#
-        )
-    };
-    Part {
-        bits,
-        channel: "qpos.j",
-        speed: 2.0,
-        with: document(joint, beside),
-        without: document("", ""),
-    }
-}
-
-/// A body that falls onto the floor from 5 mm.
-fn lands(bits: Capabilities, joint: &str, geom: &str, assets: &str) -> Part {
-    let document = |touch: &str| {
-        format!(
-            r#"{assets}<worldbody><geom type="plane" size="5 5 .1"{touch}/>
-            <body name="b" pos="0 0 1.005">{joint}<geom {geom}{touch}/></body></worldbody>"#
-        )
-    };
-    Part {
-        bits,
-        channel: "qpos.j",
-        speed: 0.0,
-        with: document(""),
-        without: document(GHOST),
-    }
-}
-
-fn parts(capabilities: Capabilities) -> Vec<Part> {
-    let mut parts = Vec::new();
-    if capabilities.contains(Capabilities::ARTICULATION) {
-        let motor = r#"<actuator><motor joint="j"/></actuator>"#;
-        let lock = r#"<equality><joint joint1="j"/></equality>"#;
-        parts.extend([
-            wheel(Capabilities::JOINT_IMPEDANCE, r#"damping="0.2""#, ""),
-            wheel(Capabilities::JOINT_IMPEDANCE, r#"stiffness="2""#, ""),
-            wheel(Capabilities::JOINT_FRICTION, r#"frictionloss="0.2""#, ""),
-            wheel(Capabilities::JOINT_LIMITS, r#"range="-0.1 0.1""#, ""),
-            wheel(Capabilities::ACTUATORS, "", motor),
-            wheel(Capabilities::EQUALITY, "", lock),
-        ]);
-    }
-    let falls = [
-        (
-            Capabilities::ARTICULATION,
-            r#"<joint name="j" type="slide" axis="0 0 1"/>"#,
-        ),
-        (Capabilities::FREE_BODIES, r#"<freejoint name="j"/>"#),
-    ];
-    let ball = r#"type="sphere" size="1" mass="1""#;
-    let mesh = r#"<asset><mesh name="m" vertex="-1 -1 -1 1 -1 -1 0 1 -1 0 0 1"/></asset>"#;
-    for (bits, joint) in falls {
-        if capabilities.contains(bits) {
-            let shape = r#"type="mesh" mesh="m" mass="1""#;
-            parts.push(lands(Capabilities::CONTACT, joint, ball, ""));
-            parts.push(lands(Capabilities::MESHES, joint, shape, mesh));
-        }
-    }
-    parts
-}
-
-fn scenes(backend: &dyn Backend) -> Result<f64> {
+fn scenes(backend: &dyn Backend) -> Result<Option<f64>> {
     let capabilities = backend.capabilities();
-    let mut left_out = 0.0;
-    for part in parts(capabilities) {
-        if capabilities.contains(part.bits) {
-            continue;
-        }
-        let with = readings(backend, &part.with, part.channel, part.speed)?;
-        let without = readings(backend, &part.without, part.channel, part.speed)?;
-        if let (Some(with), Some(without)) = (with, without) {
-            left_out += f64::from(u8::from(differing_bits(&with, &without) == 0.0));
+    let mut left_out = Vec::new();
+    let parts = parts(capabilities);
+    if parts.is_empty() {
+        return Ok(None);
+    }
+    for part in &parts {
+        let with = readings(backend, part, &part.with)?;
+        let without = readings(backend, part, &part.without)?;
+        if let (Some(with), Some(without)) = (with, without)
+            && differing_bits(&with, &without) == 0.0
+        {
+            left_out.push(part.name.clone());
         }
     }
     // A body on a joint of a kind that is not known must not stand still.
-    let body = |joint: &str| {
-        format!(
-            r#"<worldbody><body name="b">{joint}
-            <inertial pos=".3 0 0" mass="1" diaginertia=".1 .1 .1"/></body></worldbody>"#
-        )
-    };
-    for (bits, joint, channel) in [
+    for (bits, name, joint) in [
         (
             Capabilities::FREE_BODIES,
-            "<freejoint name=\"f\"/>",
-            "qpos.f",
+            "<freejoint>",
+            r#"<freejoint name="j"/>"#,
         ),
         (
             Capabilities::ARTICULATION,
-            "<joint name=\"j\" axis=\"0 1 0\"/>",
-            "qpos.j",
+            "a hinge",
+            r#"<joint name="j" axis="0 1 0"/>"#,
         ),
         (
             Capabilities::ARTICULATION,
-            "<joint name=\"j\" type=\"ball\"/>",
-            "qpos.j",
+            "a ball joint",
+            r#"<joint name="j" type="ball"/>"#,
         ),
     ] {
+        let inside = format!(
+            r#"<worldbody><body name="b">{joint}
+            <inertial pos=".3 0 0" mass="1" diaginertia=".1 .1 .1"/></body></worldbody>"#
+        );
         if !capabilities.contains(bits)
-            && let Some(rows) = readings(backend, &body(joint), channel, 0.0)?
+            && let Ok(mut rig) = Rig::new(backend, &inside, &["qpos.j"])
         {
-            left_out += f64::from(u8::from(rows.first() == rows.last()));
+            let rows = rig.run(50, &[])?;
+            if rows.first() == rows.last() {
+                left_out.push(name.to_owned());
+            }
         }
     }
-    Ok(left_out)
+    told(left_out, "silently left out: ").map(Some)
 }
 
 struct Stops;
@@ -195,40 +189,71 @@ fn ignores<'a>(backend: &dyn Backend, change: impl FnOnce(&mut Extras<'a>)) -> R
     Ok(rows.is_ok_and(|rows| differing_bits(&rows, &plain) == 0.0))
 }
 
-fn rollouts(backend: &dyn Backend) -> Result<f64> {
-    let lacks = |bits: Capabilities| !backend.capabilities().contains(bits);
+fn rollouts(backend: &dyn Backend) -> Result<Option<f64>> {
+    if Rig::new(backend, falling(backend).inside, &[]).is_err()
+        && !backend.capabilities().intersects(crate::MOVES)
+    {
+        return Ok(None);
+    }
     let wrench = [5.0; 18];
-    let mut left_out = 0;
-    if lacks(Capabilities::EXTERNAL_FORCES) {
-        left_out += usize::from(ignores(backend, |extras| {
-            extras.forces.push(ExternalForce {
-                body: 1,
-                wrench: &wrench,
-            });
-        })?);
+    let mut left_out = Vec::new();
+    if ignores(backend, |extras| {
+        extras.forces.push(ExternalForce {
+            body: 1,
+            wrench: &wrench,
+        });
+    })? {
+        left_out.push("wrenches on bodies".to_owned());
     }
-    if lacks(Capabilities::PARAMETER_CHANGES) {
-        left_out += usize::from(ignores(backend, |extras| {
-            extras.changes.push(ParameterChange {
-                frame: 1,
-                column: 0,
-                values: &[-1.0],
-            });
-        })?);
+    if ignores(backend, |extras| {
+        extras.changes.push(ParameterChange {
+            frame: 1,
+            column: 0,
+            values: &[-1.0],
+        });
+    })? {
+        left_out.push("changes of parameters".to_owned());
     }
-    if lacks(Capabilities::STEP_HOOKS) {
-        left_out += usize::from(ignores(backend, |extras| extras.hook = Some(&Stops))?);
+    if ignores(backend, |extras| extras.hook = Some(&Stops))? {
+        left_out.push("hooks".to_owned());
     }
-    Ok(left_out as f64)
+    told(left_out, "silently left out: ").map(Some)
 }
 
-fn targets(backend: &dyn Backend) -> Result<f64> {
-    const TREE: Capabilities = Capabilities::ARTICULATION;
-    const TOUCHING: Capabilities = Capabilities::FREE_BODIES.union(Capabilities::CONTACT);
-    let arm = r#"<worldbody><body name="b"><joint name="j" axis="0 1 0"/>
-        <inertial pos=".3 0 0" mass="1" diaginertia=".1 .1 .1"/></body></worldbody>"#;
-    let ball = r#"<worldbody><geom type="plane" size="5 5 .1"/><body pos="0 0 .0999">
-        <freejoint name="j"/><geom name="g" type="sphere" size=".1" mass="1"/></body></worldbody>"#;
+/// A parameter in a scene where it acts: what must be claimed for the scene, the target,
+/// two values.
+type Probe = (Capabilities, &'static str, &'static str, [f64; 2]);
+
+const ARM: &str = r#"<worldbody><body name="b"><joint name="j" axis="0 1 0"/>
+    <inertial pos=".3 0 0" mass="1" diaginertia=".1 .1 .1"/></body></worldbody>"#;
+const BALL: &str = r#"<worldbody><geom type="plane" size="5 5 .1"/><body pos="0 0 .0999">
+    <freejoint name="j"/><geom name="g" type="sphere" size=".1" mass="1"/></body></worldbody>"#;
+/// A body that tumbles.
+const STONE: &str = r#"<worldbody><body name="b"><freejoint name="j"/>
+    <inertial pos=".3 0 0" mass="1" diaginertia=".1 .2 .25"/></body></worldbody>
+    <keyframe><key qvel="0 0 0 1 2 3" qpos="0 0 0 1 0 0 0"/></keyframe>"#;
+
+const TREE: Capabilities = Capabilities::ARTICULATION;
+const FREE: Capabilities = Capabilities::FREE_BODIES;
+const TARGETS: [Probe; 10] = [
+    (TREE, ARM, "body/b/ipos/0", [0.3, 0.6]),
+    (TREE, ARM, "body/b/inertia/1", [0.1, 0.6]),
+    (TREE, ARM, "joint/j/damping", [0.0, 0.5]),
+    (TREE, ARM, "joint/j/stiffness", [0.0, 0.5]),
+    (TREE, ARM, "joint/j/armature", [0.0, 0.5]),
+    (TREE, ARM, "joint/j/frictionloss", [0.0, 0.5]),
+    (FREE, STONE, "body/b/ipos/0", [0.3, 0.6]),
+    (FREE, STONE, "body/b/inertia/1", [0.2, 0.3]),
+    (FREE, STONE, "joint/j/damping", [0.0, 0.5]),
+    (
+        FREE.union(Capabilities::CONTACT),
+        BALL,
+        "geom/g/solref/0",
+        [0.02, 0.1],
+    ),
+];
+
+fn targets(backend: &dyn Backend) -> Result<Option<f64>> {
     let run = |inside: &str, target: &str, value: f64| -> Result<Option<Rows>> {
         let size = Size {
             sims: 1,
@@ -243,48 +268,23 @@ fn targets(backend: &dyn Backend) -> Result<f64> {
         }
         rig.run(20, &[]).map(Some)
     };
-    let capabilities = backend.capabilities();
-    let mut left_out = 0;
-    for (needs, bit, inside, target, values) in [
-        (
-            TREE,
-            Capabilities::MASS_PARAMETERS,
-            arm,
-            "body/b/ipos/0",
-            [0.3, 0.6],
-        ),
-        (
-            TREE,
-            Capabilities::JOINT_IMPEDANCE,
-            arm,
-            "joint/j/damping",
-            [0.0, 0.5],
-        ),
-        (
-            TREE,
-            Capabilities::JOINT_FRICTION,
-            arm,
-            "joint/j/frictionloss",
-            [0.0, 0.5],
-        ),
-        (
-            TOUCHING,
-            Capabilities::CONTACT_STIFFNESS,
-            ball,
-            "geom/g/solref/0",
-            [0.02, 0.1],
-        ),
-    ] {
-        if capabilities.contains(bit) || !capabilities.contains(needs) {
+    let mut asked = false;
+    let mut left_out = Vec::new();
+    for (needs, inside, target, values) in TARGETS {
+        if !backend.capabilities().contains(needs) {
             continue;
         }
+        asked = true;
         let both = (
             run(inside, target, values[0])?,
             run(inside, target, values[1])?,
         );
-        if let (Some(one), Some(two)) = both {
-            left_out += usize::from(differing_bits(&one, &two) == 0.0);
+        if let (Some(one), Some(two)) = both
+            && differing_bits(&one, &two) == 0.0
+        {
+            left_out.push(target.to_owned());
         }
     }
-    Ok(left_out as f64)
+    let found = told(left_out, "silently left out: ")?;
+    Ok(asked.then_some(found))
 }

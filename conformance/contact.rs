@@ -2,6 +2,7 @@
 
 use asid_core::{Backend, Capabilities, Result};
 
+use crate::check::Measure::Figure;
 use crate::check::{Check, Tolerance};
 use crate::rig::{G, Rig, broken, largest, last, relative};
 
@@ -16,7 +17,7 @@ pub const CHECKS: &[Check] = &[
         unit: "m",
         tolerance: Tolerance::same(5e-4),
         reason: "the default softness (20 ms, d = 0.9) yields (1 - d) g / (d k) = 0.4 mm",
-        measure: rest_heights,
+        measure: Figure(rest_heights),
     },
     Check {
         name: "contact/rest-height-of-a-mesh",
@@ -24,7 +25,7 @@ pub const CHECKS: &[Check] = &[
         unit: "m",
         tolerance: Tolerance::same(5e-4),
         reason: "as contact/rest-height-of-shapes",
-        measure: mesh_height,
+        measure: Figure(mesh_height),
     },
     Check {
         name: "contact/rest-is-still",
@@ -32,7 +33,7 @@ pub const CHECKS: &[Check] = &[
         unit: "m/s",
         tolerance: Tolerance::same(1e-4),
         reason: "50 time constants of contact after the start nothing is left: g dt / 200",
-        measure: rest_is_still,
+        measure: Figure(rest_is_still),
     },
     Check {
         name: "contact/rest-does-not-wander",
@@ -40,7 +41,7 @@ pub const CHECKS: &[Check] = &[
         unit: "m",
         tolerance: Tolerance::same(1e-5),
         reason: "nothing pushes sideways: rounding of a solver in 1000 steps",
-        measure: rest_wanders,
+        measure: Figure(rest_wanders),
     },
     Check {
         name: "contact/force-is-the-weight",
@@ -48,7 +49,7 @@ pub const CHECKS: &[Check] = &[
         unit: "",
         tolerance: Tolerance::same(1e-3),
         reason: "at rest forces balance: what an iterative solver leaves over",
-        measure: weight,
+        measure: Figure(weight),
     },
     Check {
         name: "contact/force-on-a-slope",
@@ -56,7 +57,7 @@ pub const CHECKS: &[Check] = &[
         unit: "",
         tolerance: Tolerance::same(1e-3),
         reason: "the normal force is m g cos a, at rest under friction: what an iterative solver leaves over",
-        measure: weight_on_slope,
+        measure: Figure(weight_on_slope),
     },
     Check {
         name: "contact/force-passes-through",
@@ -66,7 +67,7 @@ pub const CHECKS: &[Check] = &[
         unit: "",
         tolerance: Tolerance::same(1e-3),
         reason: "a finger pushes a box against a wall by 5 N, and both contacts carry it: what an iterative solver leaves over",
-        measure: force_passes,
+        measure: Figure(force_passes),
     },
     Check {
         name: "contact/stack-of-three-stands",
@@ -74,7 +75,7 @@ pub const CHECKS: &[Check] = &[
         unit: "m",
         tolerance: Tolerance::same(2.5e-3),
         reason: "the default softness yields 0.4 mm for each weight carried: 3 + 2 + 1 of them",
-        measure: stack_stands,
+        measure: Figure(stack_stands),
     },
     Check {
         name: "contact/stack-forces",
@@ -82,7 +83,7 @@ pub const CHECKS: &[Check] = &[
         unit: "",
         tolerance: Tolerance::same(5e-3),
         reason: "each contact carries what is above it: what an iterative solver leaves over in three layers",
-        measure: stack_forces,
+        measure: Figure(stack_forces),
     },
     Check {
         name: "contact/tips-only-beyond-the-edge",
@@ -90,7 +91,7 @@ pub const CHECKS: &[Check] = &[
         unit: "",
         tolerance: Tolerance::same(0.0),
         reason: "a box with its centre 5 mm inside a ledge stands, 5 mm beyond it falls: wrong of two",
-        measure: tips_over,
+        measure: Figure(tips_over),
     },
     Check {
         name: "contact/collision-momentum",
@@ -98,7 +99,7 @@ pub const CHECKS: &[Check] = &[
         unit: "",
         tolerance: Tolerance::by_precision(1e-9, 1e-5),
         reason: "contact forces are opposite and equal: rounding",
-        measure: collision_momentum,
+        measure: Figure(collision_momentum),
     },
     Check {
         name: "contact/collision-gives-no-energy",
@@ -106,7 +107,7 @@ pub const CHECKS: &[Check] = &[
         unit: "",
         tolerance: Tolerance::same(1e-3),
         reason: "contact of default damping only takes energy: what is given, and rounding",
-        measure: collision_energy,
+        measure: Figure(collision_energy),
     },
     Check {
         name: "contact/undamped-contact-bounces",
@@ -114,7 +115,7 @@ pub const CHECKS: &[Check] = &[
         unit: "",
         tolerance: Tolerance::same(0.05),
         reason: "a spring gives back what it takes; contact begins within a step: 2 w dt of the energy at w = 50 /s",
-        measure: bounces,
+        measure: Figure(bounces),
     },
 ];
 

@@ -2,6 +2,7 @@
 
 use asid_core::{Backend, Capabilities, Result};
 
+use crate::check::Measure::Figure;
 use crate::check::{Check, Tolerance};
 use crate::pair::{both, ends, pair};
 use crate::rig::{G, Rows, STEP, largest, last, relative};
@@ -16,7 +17,7 @@ pub const CHECKS: &[Check] = &[
         unit: "",
         tolerance: Tolerance::same(0.01),
         reason: "distance v^2 / (2 mu g) by the parameter's mu: as friction/stopping-distance",
-        measure: sliding_friction,
+        measure: Figure(sliding_friction),
     },
     Check {
         name: "parameters/torsional-friction",
@@ -24,7 +25,7 @@ pub const CHECKS: &[Check] = &[
         unit: "",
         tolerance: Tolerance::same(0.01),
         reason: "it turns by w^2 / (2 a) with a = mu_t g / (2/5 R^2) by the parameter's mu_t: as friction/spin-down",
-        measure: torsional_friction,
+        measure: Figure(torsional_friction),
     },
     Check {
         name: "parameters/rolling-friction",
@@ -32,7 +33,7 @@ pub const CHECKS: &[Check] = &[
         unit: "",
         tolerance: Tolerance::same(0.01),
         reason: "deceleration 5/7 mu_r g / R by the parameter's mu_r: as friction/roll-out-distance",
-        measure: rolling_friction,
+        measure: Figure(rolling_friction),
     },
     Check {
         name: "parameters/contact-softness",
@@ -40,7 +41,7 @@ pub const CHECKS: &[Check] = &[
         unit: "",
         tolerance: Tolerance::same(0.02),
         reason: "at rest it sinks in by (1 - d) g / (d k) with k falling as the square of the time constant, d being constant",
-        measure: softness,
+        measure: Figure(softness),
     },
     Check {
         name: "parameters/geom-position-moves-its-contact",
@@ -48,7 +49,7 @@ pub const CHECKS: &[Check] = &[
         unit: "m",
         tolerance: Tolerance::same(5e-4),
         reason: "a ball set 30 mm lower in its body holds that 30 mm higher: softness as contact/rest-height-of-shapes",
-        measure: geom_position_contact,
+        measure: Figure(geom_position_contact),
     },
 ];
 

@@ -3,6 +3,7 @@
 use asid_core::{Backend, Capabilities, Result};
 use nalgebra::{Matrix2, UnitQuaternion, Vector2, Vector3};
 
+use crate::check::Measure::Figure;
 use crate::check::{Check, Tolerance};
 use crate::rig::{G, Rig, STEP, largest, last, period, relative};
 
@@ -17,7 +18,7 @@ pub const CHECKS: &[Check] = &[
         unit: "m",
         tolerance: Tolerance::same(1.02 * G * STEP / 2.0),
         reason: "a first-order integrator is off by at most g dt t / 2 after t = 1 s",
-        measure: free_fall_position,
+        measure: Figure(free_fall_position),
     },
     Check {
         name: "dynamics/free-fall-velocity",
@@ -25,7 +26,7 @@ pub const CHECKS: &[Check] = &[
         unit: "m/s",
         tolerance: Tolerance::by_precision(1e-11, 3e-4),
         reason: "constant acceleration is exact: rounding of 500 additions at 10 m/s",
-        measure: free_fall_velocity,
+        measure: Figure(free_fall_velocity),
     },
     Check {
         name: "dynamics/free-tumbling-momentum",
@@ -33,7 +34,7 @@ pub const CHECKS: &[Check] = &[
         unit: "",
         tolerance: Tolerance::same(0.027),
         reason: "first order in the step: w^2 dt t / 2 at w = 5.2 rad/s after t = 1 s",
-        measure: tumbling_momentum,
+        measure: Figure(tumbling_momentum),
     },
     Check {
         name: "dynamics/momentum-of-a-thrown-arm",
@@ -41,7 +42,7 @@ pub const CHECKS: &[Check] = &[
         unit: "m/s",
         tolerance: Tolerance::same(0.021),
         reason: "velocities belong to the pose of a step before: w dt of 1 m/s at w = 10 rad/s",
-        measure: thrown_arm,
+        measure: Figure(thrown_arm),
     },
     Check {
         name: "dynamics/pendulum-energy",
@@ -49,7 +50,7 @@ pub const CHECKS: &[Check] = &[
         unit: "",
         tolerance: Tolerance::same(0.01),
         reason: "a symplectic integrator of first order strays by w dt = 0.009 of the swing, and does not drift",
-        measure: pendulum_energy,
+        measure: Figure(pendulum_energy),
     },
     Check {
         name: "dynamics/pendulum-period",
@@ -57,7 +58,7 @@ pub const CHECKS: &[Check] = &[
         unit: "",
         tolerance: Tolerance::same(2e-4),
         reason: "second order in the step: (w dt)^2 = 8e-5, and crossings read between steps",
-        measure: pendulum_period,
+        measure: Figure(pendulum_period),
     },
     Check {
         name: "dynamics/unit-torque-on-a-hinge",
@@ -65,7 +66,7 @@ pub const CHECKS: &[Check] = &[
         unit: "",
         tolerance: Tolerance::by_precision(1e-9, 1e-4),
         reason: "from rest, constant acceleration is exact: rounding",
-        measure: unit_torque,
+        measure: Figure(unit_torque),
     },
     Check {
         name: "dynamics/inertia-of-shapes",
@@ -73,7 +74,7 @@ pub const CHECKS: &[Check] = &[
         unit: "",
         tolerance: Tolerance::by_precision(1e-9, 1e-4),
         reason: "mass and inertia of turned shapes by density, from textbook formulas: rounding",
-        measure: inertia_of_shapes,
+        measure: Figure(inertia_of_shapes),
     },
     Check {
         name: "dynamics/unit-force-on-a-slide",
@@ -81,15 +82,15 @@ pub const CHECKS: &[Check] = &[
         unit: "",
         tolerance: Tolerance::by_precision(1e-9, 1e-4),
         reason: "constant acceleration is exact: rounding",
-        measure: unit_force,
+        measure: Figure(unit_force),
     },
     Check {
         name: "dynamics/coupled-links",
         needs: TREE.union(Capabilities::ACTUATORS),
         unit: "",
-        tolerance: Tolerance::by_precision(1e-9, 1e-4),
-        reason: "one step from rest is the inverse of the mass matrix times the torque: rounding",
-        measure: coupled_links,
+        tolerance: Tolerance::by_precision(1e-4, 2e-4),
+        reason: "one step from rest is the inverse of the mass matrix times the torque: an integrator may see that the links turn by 1e-4 rad within it, at up to 0.09 rad/s",
+        measure: Figure(coupled_links),
     },
     Check {
         name: "dynamics/coriolis",
@@ -97,7 +98,7 @@ pub const CHECKS: &[Check] = &[
         unit: "",
         tolerance: Tolerance::same(0.01),
         reason: "first order in the step: w dt = 0.01 of the angular momentum at w = 5 rad/s",
-        measure: coriolis,
+        measure: Figure(coriolis),
     },
     Check {
         name: "dynamics/ball-joint",
@@ -105,7 +106,7 @@ pub const CHECKS: &[Check] = &[
         unit: "rad",
         tolerance: Tolerance::by_precision(1e-9, 2e-4),
         reason: "constant rate is integrated exactly: rounding of 500 quaternion products",
-        measure: ball_joint,
+        measure: Figure(ball_joint),
     },
 ];
 

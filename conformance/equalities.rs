@@ -2,6 +2,7 @@
 
 use asid_core::{Backend, Capabilities, Result};
 
+use crate::check::Measure::Figure;
 use crate::check::{Check, Tolerance};
 use crate::rig::{G, Rig, largest, last, period, relative};
 
@@ -15,7 +16,7 @@ pub const CHECKS: &[Check] = &[
         unit: "m",
         tolerance: Tolerance::same(1e-3),
         reason: "the default softness (20 ms, d = 0.9) yields (1 - d) g / (d k) = 0.4 mm: twice that",
-        measure: weld_holds,
+        measure: Figure(weld_holds),
     },
     Check {
         name: "joints/coupling-shares-torque",
@@ -23,7 +24,7 @@ pub const CHECKS: &[Check] = &[
         unit: "",
         tolerance: Tolerance::same(0.01),
         reason: "both wheels turn as one inertia of I (1 + 2^2); first order, dt / t = 0.002, and the softness of the coupling delays it by some of its 20 ms",
-        measure: coupling,
+        measure: Figure(coupling),
     },
     Check {
         name: "joints/connect-holds-a-point",
@@ -31,7 +32,7 @@ pub const CHECKS: &[Check] = &[
         unit: "m",
         tolerance: Tolerance::same(1.5e-3),
         reason: "the default softness yields 0.4 mm under g, and three times that under the pull of a swing from 1 rad",
-        measure: connect_holds,
+        measure: Figure(connect_holds),
     },
     Check {
         name: "joints/connect-swings",
@@ -39,7 +40,7 @@ pub const CHECKS: &[Check] = &[
         unit: "",
         tolerance: Tolerance::same(5e-3),
         reason: "a free body held by a point is a pendulum: its period, with (w dt)^2, and 1 mm of give in 500",
-        measure: connect_swings,
+        measure: Figure(connect_swings),
     },
 ];
 

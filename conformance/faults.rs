@@ -6,6 +6,7 @@
 use asid_core::simulator::{ExternalForce, ParameterChange};
 use asid_core::{Backend, Capabilities, Control, Error, Result, Rollout, Scene};
 
+use crate::check::Measure::Figure;
 use crate::check::{Check, Tolerance};
 use crate::rig::{Rig, broken, differing_bits};
 use crate::subject::{batch, stirred, subject};
@@ -26,7 +27,7 @@ pub const fn check(
         unit: "",
         tolerance: Tolerance::same(0.0),
         reason,
-        measure,
+        measure: Figure(measure),
     }
 }
 
@@ -94,9 +95,11 @@ fn not_finite(backend: &dyn Backend) -> Result<f64> {
     let (qpos, qvel) = (vec![0.1; nq], vec![0.0; nv]);
     let spoilt = |values: &[f64], with: f64| {
         let mut values = values.to_vec();
-        values[0] = with;
+        values.iter_mut().take(1).for_each(|value| *value = with);
         values
     };
+    // Where nothing moves, there is no state to spoil.
+    let still = nq == 0;
     let mut commanded = |value: f64| {
         let ctrl = rig.command(value);
         ctrl.is_empty() || rig.run(3, &ctrl).is_err()
@@ -104,8 +107,8 @@ fn not_finite(backend: &dyn Backend) -> Result<f64> {
     Ok(broken([
         commanded(f64::NAN),
         commanded(f64::INFINITY),
-        rig.place(&spoilt(&qpos, f64::NAN), &qvel).is_err(),
-        rig.place(&qpos, &spoilt(&qvel, f64::INFINITY)).is_err(),
+        still || rig.place(&spoilt(&qpos, f64::NAN), &qvel).is_err(),
+        still || rig.place(&qpos, &spoilt(&qvel, f64::INFINITY)).is_err(),
         rig.set(&[f64::NAN, 0.0]).is_err(),
         rig.set(&[-9.81, f64::NEG_INFINITY]).is_err(),
     ]))
@@ -126,14 +129,14 @@ fn wrong_lengths(backend: &dyn Backend) -> Result<f64> {
     let rollouts = [
         roll(Control::Shared(&control[..2 * nu + 1]), &mut out),
         roll(Control::PerSimulation(&control), &mut out),
-        roll(Control::Shared(&control[..2 * nu]), &mut out[..width]),
+        width == 0 || roll(Control::Shared(&control[..2 * nu]), &mut out[..width]),
     ];
     Ok(broken([
         rollouts[0],
         rollouts[1],
         rollouts[2],
-        simulator.read(&[0], &rig.record, &mut out).is_err(),
-        (simulator.set_state(&[0], &vec![0.0; nq - 1], &vec![0.0; nv])).is_err(),
+        width == 0 || simulator.read(&[0], &rig.record, &mut out).is_err(),
+        (simulator.set_state(&[0], &vec![0.0; nq + 1], &vec![0.0; nv])).is_err(),
         (simulator.set_state(&[0], &vec![0.0; nq], &vec![0.0; nv + 1])).is_err(),
         simulator.set_parameters(&[0, 1], &[-9.81, 0.0]).is_err(),
         simulator.set_parameters(&[0], &[-9.81]).is_err(),
@@ -229,14 +232,18 @@ fn bad_call_changes_nothing(backend: &dyn Backend) -> Result<f64> {
     let before = rig.read()?;
     let (nq, nv) = (rig.simulator.layout().nq, rig.simulator.layout().nv);
     let mut qvel = vec![0.0; 3 * nv];
-    qvel[3 * nv - 1] = f64::NAN;
+    qvel.iter_mut()
+        .rev()
+        .take(1)
+        .for_each(|rate| *rate = f64::NAN);
     let mut refused = (ctrl.is_empty() || rig.run(5, &ctrl).is_err())
         && rig.set(&[-5.0, 0.1, -5.0, 0.1, -5.0, f64::NAN]).is_err()
         && rig.simulator.reset(&[0, 7]).is_err()
-        && (rig
-            .simulator
-            .set_state(&[0, 1, 2], &vec![0.5; 3 * nq], &qvel))
-        .is_err();
+        && (nv == 0
+            || rig
+                .simulator
+                .set_state(&[0, 1, 2], &vec![0.5; 3 * nq], &qvel)
+                .is_err());
     if (backend.capabilities()).contains(Capabilities::PARAMETER_CHANGES) {
         refused &= rig
             .run_with(3, 1, &half, |extras| {

@@ -4,6 +4,7 @@ use asid_core::{Backend, Capabilities, Result};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 use crate::arrays::floating;
+use crate::check::Measure::Figure;
 use crate::check::{Check, Tolerance};
 use crate::rig::{Rig, largest};
 
@@ -19,7 +20,7 @@ pub const CHECKS: &[Check] = &[
         unit: "m",
         tolerance: EXACT,
         reason: "forward kinematics by hand: rounding of lengths of 1 m",
-        measure: site_position,
+        measure: Figure(site_position),
     },
     Check {
         name: "frames/site-orientation",
@@ -27,7 +28,7 @@ pub const CHECKS: &[Check] = &[
         unit: "",
         tolerance: EXACT,
         reason: "forward kinematics by hand, quaternion w x y z of either sign: rounding",
-        measure: site_orientation,
+        measure: Figure(site_orientation),
     },
     Check {
         name: "frames/orientations-of-a-document",
@@ -35,7 +36,7 @@ pub const CHECKS: &[Check] = &[
         unit: "",
         tolerance: EXACT,
         reason: "one rotation written as quat, axisangle, euler, xyaxes and zaxis: rounding",
-        measure: orientations,
+        measure: Figure(orientations),
     },
     Check {
         name: "frames/degrees-of-a-document",
@@ -43,7 +44,7 @@ pub const CHECKS: &[Check] = &[
         unit: "",
         tolerance: EXACT,
         reason: "axisangle, euler and ref are degrees where a document says nothing else, keyframes and readings radians, lengths metres: rounding",
-        measure: degrees,
+        measure: Figure(degrees),
     },
     Check {
         name: "frames/site-velocity",
@@ -51,7 +52,7 @@ pub const CHECKS: &[Check] = &[
         unit: "m/s",
         tolerance: Tolerance::by_precision(1e-11, 1e-5),
         reason: "w x r + R v by hand, in the world frame: rounding at 3 m/s",
-        measure: site_velocity,
+        measure: Figure(site_velocity),
     },
     Check {
         name: "frames/site-angular-velocity",
@@ -59,7 +60,7 @@ pub const CHECKS: &[Check] = &[
         unit: "rad/s",
         tolerance: Tolerance::by_precision(1e-11, 1e-5),
         reason: "sum of the joints' axes in the world frame: rounding at 3 rad/s",
-        measure: site_rate,
+        measure: Figure(site_rate),
     },
     Check {
         name: "frames/joint-sensors",
@@ -67,7 +68,7 @@ pub const CHECKS: &[Check] = &[
         unit: "",
         tolerance: EXACT,
         reason: "jointpos and jointvel are qpos and qvel: rounding",
-        measure: joint_sensors,
+        measure: Figure(joint_sensors),
     },
     Check {
         name: "frames/body-and-inertial-frame",
@@ -75,7 +76,7 @@ pub const CHECKS: &[Check] = &[
         unit: "m",
         tolerance: EXACT,
         reason: "objtype body is the centre of mass, xbody the origin of the body: rounding",
-        measure: body_frames,
+        measure: Figure(body_frames),
     },
 ];
 

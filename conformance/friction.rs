@@ -2,6 +2,7 @@
 
 use asid_core::{Backend, Capabilities, Result};
 
+use crate::check::Measure::Figure;
 use crate::check::{Check, Tolerance};
 use crate::rig::{G, Rig, STEP, broken, largest, last, relative};
 
@@ -17,7 +18,7 @@ pub const CHECKS: &[Check] = &[
         unit: "m/s",
         tolerance: Tolerance::same(1e-4),
         reason: "softened friction creeps by (1 - d) a / (d b impratio) = 0.03 mm/s at the scene's impratio of 100: three times that",
-        measure: incline_holds,
+        measure: Figure(incline_holds),
     },
     Check {
         name: "friction/block-slides-down-an-incline",
@@ -25,7 +26,7 @@ pub const CHECKS: &[Check] = &[
         unit: "",
         tolerance: Tolerance::same(0.01),
         reason: "g (sin a - mu cos a) is a difference of near numbers: a thousandth of the friction is four thousandths of it",
-        measure: incline_slides,
+        measure: Figure(incline_slides),
     },
     Check {
         name: "friction/stopping-distance",
@@ -33,7 +34,7 @@ pub const CHECKS: &[Check] = &[
         unit: "",
         tolerance: Tolerance::same(0.01),
         reason: "first order in the step: mu g dt / v = 0.006 of v^2 / (2 mu g), and settling into contact",
-        measure: stopping_distance,
+        measure: Figure(stopping_distance),
     },
     Check {
         name: "friction/larger-of-the-pair-counts",
@@ -41,7 +42,7 @@ pub const CHECKS: &[Check] = &[
         unit: "",
         tolerance: Tolerance::same(0.01),
         reason: "as stopping-distance",
-        measure: larger_counts,
+        measure: Figure(larger_counts),
     },
     Check {
         name: "friction/same-in-every-direction",
@@ -49,7 +50,7 @@ pub const CHECKS: &[Check] = &[
         unit: "",
         tolerance: Tolerance::same(0.01),
         reason: "Coulomb's cone is round: as stopping-distance, and no drift sideways",
-        measure: every_direction,
+        measure: Figure(every_direction),
     },
     Check {
         name: "friction/grip-holds-up-to-its-bound",
@@ -59,7 +60,7 @@ pub const CHECKS: &[Check] = &[
         unit: "",
         tolerance: Tolerance::same(0.0),
         reason: "two fingers carry 2 mu F: nine tenths of that stay, eleven tenths fall: wrong of two",
-        measure: grip,
+        measure: Figure(grip),
     },
     Check {
         name: "friction/sliding-ball-ends-rolling",
@@ -67,7 +68,7 @@ pub const CHECKS: &[Check] = &[
         unit: "",
         tolerance: Tolerance::same(0.01),
         reason: "5/7 of the speed is left by momentum alone; contact gives way to a hundredth of the slip",
-        measure: ends_rolling,
+        measure: Figure(ends_rolling),
     },
     Check {
         name: "friction/ball-rolls-on-without-resistance",
@@ -75,7 +76,7 @@ pub const CHECKS: &[Check] = &[
         unit: "",
         tolerance: Tolerance::same(2.3e-3),
         reason: "nothing slows a rolling ball; one sunk in by 0.4 mm of 50 rolls on a smaller radius: 2/7 of 0.8 %",
-        measure: rolls_on,
+        measure: Figure(rolls_on),
     },
     Check {
         name: "friction/roll-out-distance",
@@ -83,7 +84,7 @@ pub const CHECKS: &[Check] = &[
         unit: "",
         tolerance: Tolerance::same(0.01),
         reason: "v^2 / (2 a) with a = 5/7 mu_r g / R; the cone leaves sliding friction 0.9996 of rolling's part",
-        measure: roll_out,
+        measure: Figure(roll_out),
     },
     Check {
         name: "friction/ball-holds-on-a-slope",
@@ -91,7 +92,7 @@ pub const CHECKS: &[Check] = &[
         unit: "m/s",
         tolerance: Tolerance::same(1e-3),
         reason: "below mu_r / R a ball stays: rolling friction is softened (R / mu_r)^2 times more than sliding, and at impratio 1000 creeps by 0.2 mm/s: five times that",
-        measure: ball_holds,
+        measure: Figure(ball_holds),
     },
     Check {
         name: "friction/spin-down",
@@ -99,7 +100,7 @@ pub const CHECKS: &[Check] = &[
         unit: "",
         tolerance: Tolerance::same(0.01),
         reason: "it turns by w^2 / (2 a), a = mu_t N / I: first order, a dt / w = 0.003, and as much for a step without a known N",
-        measure: spin_down,
+        measure: Figure(spin_down),
     },
     Check {
         name: "friction/spin-stops",
@@ -107,7 +108,7 @@ pub const CHECKS: &[Check] = &[
         unit: "rad/s",
         tolerance: Tolerance::same(0.01),
         reason: "from 60 rad/s it stops after 0.6 s, and softened friction leaves nothing after 1 s",
-        measure: spin_stops,
+        measure: Figure(spin_stops),
     },
 ];
 

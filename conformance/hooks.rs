@@ -6,6 +6,7 @@ use asid_core::registry::{self, EffectEntry};
 use asid_core::simulator::{StepHook, StepView};
 use asid_core::{Backend, Capabilities, Error, Result};
 
+use crate::check::Measure::Figure;
 use crate::check::{Check, Tolerance};
 use crate::effects::By;
 use crate::rig::{Rig, STEP, broken, differing_bits, largest, state_channels};
@@ -22,7 +23,7 @@ pub const CHECKS: &[Check] = &[
         unit: "",
         tolerance: NONE,
         reason: "positions and velocities shown are those recorded at the end of the step before: readings that differ in any bit",
-        measure: sees_step_before,
+        measure: Figure(sees_step_before),
     },
     Check {
         name: "effects/hook-is-called-once-a-step",
@@ -30,7 +31,7 @@ pub const CHECKS: &[Check] = &[
         unit: "",
         tolerance: NONE,
         reason: "each row of the rollout, each step, in order, with the command of its frame and no force: broken of four",
-        measure: once_a_step,
+        measure: Figure(once_a_step),
     },
     Check {
         name: "effects/hook-sees-the-time-of-the-state",
@@ -38,7 +39,7 @@ pub const CHECKS: &[Check] = &[
         unit: "s",
         tolerance: Tolerance::by_precision(1e-9, 1e-6),
         reason: "zero after a reset, on by a step each step, back to its own where a state is loaded: rounding",
-        measure: sees_time,
+        measure: Figure(sees_time),
     },
     Check {
         name: "effects/hook-that-does-nothing",
@@ -46,7 +47,7 @@ pub const CHECKS: &[Check] = &[
         unit: "",
         tolerance: NONE,
         reason: "to the bit: readings that differ from those without a hook",
-        measure: idle,
+        measure: Figure(idle),
     },
     Check {
         name: "effects/null-values-change-nothing",
@@ -54,7 +55,7 @@ pub const CHECKS: &[Check] = &[
         unit: "",
         tolerance: NONE,
         reason: "every effect that is registered, at each of its sites, to the bit: readings that differ from those without it",
-        measure: null_values,
+        measure: Figure(null_values),
     },
 ];
 

@@ -2,6 +2,7 @@
 
 use asid_core::{Backend, Capabilities, Result};
 
+use crate::check::Measure::Figure;
 use crate::check::{Check, Tolerance};
 use crate::rig::{Rig, STEP, largest, last, period, relative};
 
@@ -17,7 +18,7 @@ pub const CHECKS: &[Check] = &[
         unit: "",
         tolerance: Tolerance::by_precision(1e-9, 1e-4),
         reason: "constant acceleration is exact: rounding",
-        measure: armature,
+        measure: Figure(armature),
     },
     Check {
         name: "joints/defaults-are-inherited",
@@ -25,7 +26,7 @@ pub const CHECKS: &[Check] = &[
         unit: "",
         tolerance: Tolerance::by_precision(1e-9, 1e-4),
         reason: "armature from the default class, a class below it, childclass and the joint itself: constant acceleration, rounding",
-        measure: defaults,
+        measure: Figure(defaults),
     },
     Check {
         name: "joints/damping-decay",
@@ -33,7 +34,7 @@ pub const CHECKS: &[Check] = &[
         unit: "",
         tolerance: Tolerance::same(1.05e-3),
         reason: "first order in the step: rate dt / 2 = 0.001 after one time constant",
-        measure: damping_decay,
+        measure: Figure(damping_decay),
     },
     Check {
         name: "joints/terminal-speed",
@@ -41,7 +42,7 @@ pub const CHECKS: &[Check] = &[
         unit: "",
         tolerance: Tolerance::by_precision(1e-6, 1e-4),
         reason: "exp(-20) is left of the start after 20 time constants, and rounding",
-        measure: terminal_speed,
+        measure: Figure(terminal_speed),
     },
     Check {
         name: "joints/spring-frequency",
@@ -49,7 +50,7 @@ pub const CHECKS: &[Check] = &[
         unit: "",
         tolerance: Tolerance::same(4e-4),
         reason: "second order in the step: (w dt)^2 at w = 10 rad/s",
-        measure: spring_frequency,
+        measure: Figure(spring_frequency),
     },
     Check {
         name: "joints/spring-amplitude",
@@ -57,7 +58,7 @@ pub const CHECKS: &[Check] = &[
         unit: "",
         tolerance: Tolerance::same(0.1),
         reason: "an implicit spring of first order takes w^2 dt t / 2 out of the amplitude in t = 1 s",
-        measure: spring_amplitude,
+        measure: Figure(spring_amplitude),
     },
     Check {
         name: "joints/spring-rest",
@@ -65,7 +66,7 @@ pub const CHECKS: &[Check] = &[
         unit: "rad",
         tolerance: Tolerance::by_precision(1e-6, 1e-5),
         reason: "damped over 20 time constants it rests at springref, whatever ref is: rounding",
-        measure: spring_rest,
+        measure: Figure(spring_rest),
     },
     Check {
         name: "joints/dry-friction-holds",
@@ -73,7 +74,7 @@ pub const CHECKS: &[Check] = &[
         unit: "rad/s",
         tolerance: Tolerance::same(5e-4),
         reason: "friction softened to d = 0.999 creeps by (1 - d) a / b with a = 9 rad/s^2, b = 100 /s: five times that",
-        measure: dry_friction_holds,
+        measure: Figure(dry_friction_holds),
     },
     Check {
         name: "joints/dry-friction-breaks-away",
@@ -81,7 +82,7 @@ pub const CHECKS: &[Check] = &[
         unit: "",
         tolerance: Tolerance::same(0.005),
         reason: "saturated friction is constant; one step in 200 may pass at breakaway",
-        measure: dry_friction_breakaway,
+        measure: Figure(dry_friction_breakaway),
     },
     Check {
         name: "joints/dry-friction-slows",
@@ -89,7 +90,7 @@ pub const CHECKS: &[Check] = &[
         unit: "",
         tolerance: Tolerance::by_precision(1e-6, 1e-4),
         reason: "saturated friction is constant and its deceleration exact: rounding",
-        measure: dry_friction_slows,
+        measure: Figure(dry_friction_slows),
     },
     Check {
         name: "joints/limit-holds",
@@ -97,7 +98,7 @@ pub const CHECKS: &[Check] = &[
         unit: "rad",
         tolerance: Tolerance::same(1e-3),
         reason: "the default softness (20 ms, d = 0.9) yields (1 - d) a / (d k) = 0.2 mrad at a = 5 rad/s^2: five times that",
-        measure: limit_holds,
+        measure: Figure(limit_holds),
     },
     Check {
         name: "joints/limit-in-degrees",
@@ -105,7 +106,7 @@ pub const CHECKS: &[Check] = &[
         unit: "rad",
         tolerance: Tolerance::same(1e-3),
         reason: "as limit-holds; angles of a document are degrees unless it says otherwise",
-        measure: limit_in_degrees,
+        measure: Figure(limit_in_degrees),
     },
     Check {
         name: "joints/slide-limit-is-in-metres",
@@ -113,7 +114,7 @@ pub const CHECKS: &[Check] = &[
         unit: "m",
         tolerance: Tolerance::same(1e-3),
         reason: "as limit-holds at g in place of 5 rad/s^2: 0.4 mm, twice that; lengths of a document are metres whatever its angles are",
-        measure: slide_limit,
+        measure: Figure(slide_limit),
     },
 ];
 

@@ -59,19 +59,23 @@ mod equalities;
 mod faults;
 mod forces;
 mod frames;
+mod free_bodies;
 mod friction;
 mod hooks;
 mod joints;
 mod layout;
 mod lifetime;
 mod mechanism_parameters;
+mod named;
 mod pair;
 mod parameters;
+mod parts;
 mod rig;
+mod sensors;
 mod state;
 mod subject;
 
-pub use check::{Check, Outcome, Row, Tolerance, table};
+pub use check::{Check, Measure, Outcome, Row, Tolerance, table};
 
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -90,8 +94,10 @@ pub fn checks() -> impl Iterator<Item = &'static Check> {
         actuators::CHECKS,
         arrays::CHECKS,
         frames::CHECKS,
+        sensors::CHECKS,
         contact_parameters::CHECKS,
         mechanism_parameters::CHECKS,
+        free_bodies::CHECKS,
         parameters::CHECKS,
         forces::CHECKS,
         effects::CHECKS,
@@ -168,13 +174,22 @@ pub fn run(backend: &dyn Backend) -> Vec<Row> {
     run_checks(backend, &all, 1, &|_| {})
 }
 
-/// Runs some checks on a backend, several at a time; `done` hears of each row as it comes.
+/// What is told while checks run.
+#[derive(Clone, Copy, Debug)]
+pub enum Event<'a> {
+    /// A check begins.
+    Begins(&'a Check),
+    /// A check has its row.
+    Ends(&'a Row),
+}
+
+/// Runs some checks on a backend, several at a time; `told` hears when each begins and ends.
 /// Rows are in the order of the checks, and do not depend on `threads`.
 pub fn run_checks(
     backend: &dyn Backend,
     checks: &[&Check],
     threads: usize,
-    done: &(dyn Fn(&Row) + Sync),
+    told: &(dyn Fn(Event<'_>) + Sync),
 ) -> Vec<Row> {
     let next = AtomicUsize::new(0);
     let rows: Vec<Mutex<Option<Row>>> = checks.iter().map(|_| Mutex::new(None)).collect();
@@ -183,8 +198,9 @@ pub fn run_checks(
             let i = next.fetch_add(1, Ordering::Relaxed);
             checks.get(i).zip(rows.get(i))
         } {
+            told(Event::Begins(check));
             let row = check.run(backend);
-            done(&row);
+            told(Event::Ends(&row));
             if let Ok(mut place) = place.lock() {
                 *place = Some(row);
             }

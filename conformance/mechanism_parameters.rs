@@ -2,6 +2,7 @@
 
 use asid_core::{Backend, Capabilities, Result};
 
+use crate::check::Measure::Figure;
 use crate::check::{Check, Tolerance};
 use crate::pair::{both, ends, pair};
 use crate::rig::{G, STEP, largest};
@@ -20,7 +21,7 @@ pub const CHECKS: &[Check] = &[
         unit: "",
         tolerance: ROUNDING,
         reason: EXACT,
-        measure: geom_position,
+        measure: Figure(geom_position),
     },
     Check {
         name: "parameters/geom-mass",
@@ -28,7 +29,7 @@ pub const CHECKS: &[Check] = &[
         unit: "",
         tolerance: ROUNDING,
         reason: EXACT,
-        measure: geom_mass,
+        measure: Figure(geom_mass),
     },
     Check {
         name: "parameters/body-mass",
@@ -36,7 +37,7 @@ pub const CHECKS: &[Check] = &[
         unit: "",
         tolerance: ROUNDING,
         reason: EXACT,
-        measure: body_mass,
+        measure: Figure(body_mass),
     },
     Check {
         name: "parameters/body-centre-of-mass",
@@ -44,7 +45,7 @@ pub const CHECKS: &[Check] = &[
         unit: "",
         tolerance: ROUNDING,
         reason: EXACT,
-        measure: body_centre,
+        measure: Figure(body_centre),
     },
     Check {
         name: "parameters/body-inertia",
@@ -52,7 +53,7 @@ pub const CHECKS: &[Check] = &[
         unit: "",
         tolerance: ROUNDING,
         reason: EXACT,
-        measure: body_inertia,
+        measure: Figure(body_inertia),
     },
     Check {
         name: "parameters/joint-armature",
@@ -60,7 +61,7 @@ pub const CHECKS: &[Check] = &[
         unit: "",
         tolerance: ROUNDING,
         reason: EXACT,
-        measure: joint_armature,
+        measure: Figure(joint_armature),
     },
     Check {
         name: "parameters/joint-damping",
@@ -68,7 +69,7 @@ pub const CHECKS: &[Check] = &[
         unit: "",
         tolerance: Tolerance::by_precision(1e-6, 1e-4),
         reason: "terminal speed is torque over damping: exp(-20), and rounding",
-        measure: joint_damping,
+        measure: Figure(joint_damping),
     },
     Check {
         name: "parameters/joint-friction",
@@ -76,7 +77,7 @@ pub const CHECKS: &[Check] = &[
         unit: "",
         tolerance: Tolerance::same(0.005),
         reason: "torque less friction, constant; one step in 200 may pass at breakaway",
-        measure: joint_friction,
+        measure: Figure(joint_friction),
     },
     Check {
         name: "parameters/joint-stiffness",
@@ -84,7 +85,7 @@ pub const CHECKS: &[Check] = &[
         unit: "",
         tolerance: Tolerance::by_precision(1e-6, 1e-4),
         reason: "at rest the angle is torque over stiffness: exp(-20), and rounding",
-        measure: joint_stiffness,
+        measure: Figure(joint_stiffness),
     },
     Check {
         name: "parameters/servo-gain",
@@ -92,7 +93,7 @@ pub const CHECKS: &[Check] = &[
         unit: "",
         tolerance: Tolerance::by_precision(1e-6, 1e-4),
         reason: "at rest kp times the error is the load: exp(-20), and rounding",
-        measure: servo_gain,
+        measure: Figure(servo_gain),
     },
     Check {
         name: "parameters/velocity-gain",
@@ -100,7 +101,7 @@ pub const CHECKS: &[Check] = &[
         unit: "",
         tolerance: Tolerance::by_precision(1e-6, 1e-4),
         reason: "at rest kv (c - v) = damping v: exp(-20), and rounding",
-        measure: velocity_gain,
+        measure: Figure(velocity_gain),
     },
     Check {
         name: "parameters/gear",
@@ -108,7 +109,7 @@ pub const CHECKS: &[Check] = &[
         unit: "",
         tolerance: ROUNDING,
         reason: EXACT,
-        measure: gear,
+        measure: Figure(gear),
     },
 ];
 

@@ -4,6 +4,7 @@
 
 use asid_core::{Backend, Capabilities, Result, Snapshot};
 
+use crate::check::Measure::Figure;
 use crate::check::{Check, Tolerance};
 use crate::rig::{Rig, Rows, broken, differing_bits};
 use crate::subject::{batch, command, elsewhere, roll, stir, stirred};
@@ -25,7 +26,7 @@ const fn check(
         unit: "",
         tolerance: NONE,
         reason: TO_THE_BIT,
-        measure,
+        measure: Figure(measure),
     }
 }
 
@@ -51,7 +52,7 @@ pub const CHECKS: &[Check] = &[
         unit: "",
         tolerance: NONE,
         reason: "simulations times frames times substeps: wrong of two",
-        measure: counted,
+        measure: Figure(counted),
     },
 ];
 

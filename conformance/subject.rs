@@ -86,9 +86,35 @@ pub fn subject(backend: &dyn Backend) -> Subject {
         );
         channels.extend(["qpos.a", "qvel.a", "qpos.b", "qvel.b", "qpos.c", "qvel.c"]);
     }
+    if !capabilities.intersects(crate::MOVES) {
+        return unclaimed(backend);
+    }
     Subject {
         inside: format!(r#"<option cone="elliptic"/><worldbody>{bodies}</worldbody>{actuators}"#),
         channels,
+    }
+}
+
+/// The scene for an engine that claims no motion: a cart on a rail if it takes one, else
+/// a body that nothing moves.
+fn unclaimed(backend: &dyn Backend) -> Subject {
+    let body = |joint: &str| {
+        format!(
+            r#"<worldbody><body name="cart">{joint}
+            <geom type="sphere" size=".1" mass="1"{GHOST}/></body></worldbody>"#
+        )
+    };
+    let inside = body(r#"<joint name="cart" type="slide" axis="1 0 0"/>"#);
+    let moves = crate::rig::scene(&inside).and_then(|scene| backend.load(&scene));
+    match moves {
+        Ok(_) => Subject {
+            inside,
+            channels: vec!["qpos.cart", "qvel.cart"],
+        },
+        Err(_) => Subject {
+            inside: body(""),
+            channels: Vec::new(),
+        },
     }
 }
 

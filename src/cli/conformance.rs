@@ -2,9 +2,10 @@
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
+use std::sync::Mutex;
 
 use anyhow::Result;
-use asid_conformance::{Check, Outcome, Row, checks, run_checks, table};
+use asid_conformance::{Check, Event, FAMILIES, Outcome, Row, checks, run_checks, table};
 use asid_core::registry::{self, BackendEntry, Origin};
 use asid_core::{Backend, Error, Progress as _};
 use serde::Serialize;
@@ -26,6 +27,12 @@ pub struct Arguments {
     /// Only checks whose name holds this text, such as friction/ (repeatable) [default: all]
     #[arg(long, value_name = "TEXT")]
     check: Vec<String>,
+    /// Name the checks, what each needs and where its tolerance comes from, and ask nothing
+    #[arg(long, conflicts_with = "scene")]
+    list: bool,
+    /// The MJCF documents that the first engine is given by the checks, instead of their rows
+    #[arg(long, requires = "check")]
+    scene: bool,
     /// Checks at a time; figures do not depend on it [default: one a core]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = super::options::threads)]
     threads: Option<usize>,
@@ -114,8 +121,14 @@ struct Resolved {
 /// Runs the checks, prints the table and writes the folder.
 pub fn conformance(arguments: &Arguments) -> Result<()> {
     let (backends, patterns) = wanted(arguments)?;
-    let engines = asked(&backends)?;
     let chosen = chosen(&patterns)?;
+    if arguments.list {
+        return list(&chosen, arguments.json);
+    }
+    let engines = asked(&backends)?;
+    if arguments.scene {
+        return scenes(&chosen, &*engines[0].backend);
+    }
     let out = (arguments.out.as_deref())
         .map(|out| OutFolder::claim(Some(out), "conformance"))
         .transpose()?;
@@ -128,8 +141,12 @@ pub fn conformance(arguments: &Arguments) -> Result<()> {
     let mut rows = Vec::new();
     let mut said = Vec::new();
     for asked in &engines {
-        bars.note(asked.entry.name);
-        let mut own = run_checks(&*asked.backend, &chosen, threads, &|_| bars.advance(1));
+        let mut own = run_checks(
+            &*asked.backend,
+            &chosen,
+            threads,
+            &told(&bars, asked.entry.name),
+        );
         // An engine that is there twice has two names, of which it knows one.
         own.iter_mut()
             .for_each(|row| row.engine = asked.entry.name.to_owned());
@@ -159,6 +176,81 @@ pub fn conformance(arguments: &Arguments) -> Result<()> {
     }
     print(arguments, &result, out.map(|out| out.path()).as_deref())?;
     verdict(&result)
+}
+
+/// Shows how far an engine is, with the check that has been running for longest.
+fn told<'a>(bars: &'a Bars, engine: &'a str) -> impl Fn(Event<'_>) + Sync + 'a {
+    let running = Mutex::new(Vec::<String>::new());
+    move |event| {
+        let Ok(mut running) = running.lock() else {
+            return;
+        };
+        match event {
+            Event::Begins(check) => running.push(check.name.to_owned()),
+            Event::Ends(row) => {
+                running.retain(|name| *name != row.check);
+                bars.advance(1);
+            }
+        }
+        bars.note(&match running.first() {
+            Some(oldest) => format!("{engine} {oldest}"),
+            None => engine.to_owned(),
+        });
+    }
+}
+
+/// What `--list` prints.
+#[derive(Serialize)]
+struct Listed {
+    name: &'static str,
+    needs: Vec<&'static str>,
+    unit: &'static str,
+    reason: &'static str,
+}
+
+/// Prints the checks with what they need and where their tolerances come from.
+fn list(checks: &[&Check], json: bool) -> Result<()> {
+    let listed: Vec<Listed> = (checks.iter())
+        .map(|check| Listed {
+            name: check.name,
+            needs: bits(check.needs),
+            unit: check.unit,
+            reason: check.reason,
+        })
+        .collect();
+    let mut stdout = std::io::stdout().lock();
+    if json {
+        writeln!(stdout, "{}", serde_json::to_string_pretty(&listed)?)?;
+        return Ok(());
+    }
+    for check in listed {
+        let needs = match &check.needs[..] {
+            [] => "nothing".to_owned(),
+            needs => needs.join(" "),
+        };
+        writeln!(
+            stdout,
+            "{}\n    needs {needs}\n    {}",
+            check.name, check.reason
+        )?;
+    }
+    Ok(())
+}
+
+/// Prints the documents that an engine is given.
+fn scenes(checks: &[&Check], engine: &dyn Backend) -> Result<()> {
+    let mut stdout = std::io::stdout().lock();
+    for check in checks {
+        let scenes = check.scenes(engine);
+        for (i, xml) in scenes.iter().enumerate() {
+            let (check, of) = (check.name, scenes.len());
+            writeln!(stdout, "<!-- {check}, {} of {of} -->\n{xml}\n", i + 1)?;
+        }
+        if scenes.is_empty() {
+            writeln!(stdout, "<!-- {}: no document -->\n", check.name)?;
+        }
+    }
+    Ok(())
 }
 
 /// Names of capabilities, in the order of their bits.
@@ -233,13 +325,32 @@ fn asked(names: &[String]) -> Result<Vec<Asked>> {
 fn chosen(patterns: &[String]) -> Result<Vec<&'static Check>> {
     let all: Vec<&Check> = checks().collect();
     if let Some(text) = (patterns.iter()).find(|p| !all.iter().any(|c| c.name.contains(&***p))) {
-        return Err(Error::unknown("check", text, all.iter().map(|c| c.name)).into());
+        return Err(unknown(text, &all).into());
     }
     let holds = |check: &&Check| patterns.iter().any(|p| check.name.contains(p.as_str()));
     Ok(all
         .into_iter()
         .filter(|check| patterns.is_empty() || holds(check))
         .collect())
+}
+
+/// An error for a text that no check holds: the checks that come close, and the families.
+fn unknown(text: &str, all: &[&Check]) -> Error {
+    const MOST: usize = 5;
+    let mut error = Error::unknown("check", text, all.iter().map(|c| c.name));
+    if let Error::UnknownName { near, .. } = &mut error {
+        let families = FAMILIES.iter().map(|(family, _)| format!("{family}/"));
+        match near.len() {
+            1 => {}
+            // All of them: none is near.
+            n if n == all.len() => *near = families.collect(),
+            _ => {
+                near.truncate(MOST);
+                near.extend(families);
+            }
+        }
+    }
+    error
 }
 
 fn write(
@@ -297,10 +408,9 @@ fn sentence(engine: &Engine) -> String {
 
 /// An error where a row fails.
 fn verdict(result: &ConformanceResult) -> Result<()> {
-    let failed: Vec<String> = result
-        .rows
+    let failing: Vec<&Row> = result.rows.iter().filter(|row| row.is_failure()).collect();
+    let failed: Vec<String> = failing
         .iter()
-        .filter(|row| row.is_failure())
         .map(|row| format!("{} on {}", row.check, row.engine))
         .collect();
     if failed.is_empty() {
@@ -316,6 +426,11 @@ fn verdict(result: &ConformanceResult) -> Result<()> {
         0 => String::new(),
         more => format!(" and {more} more"),
     };
+    if let [row] = &failing[..]
+        && !row.note.is_empty()
+    {
+        return Err(Error::Failed(format!("1 check fails: {shown}: {}", row.note)).into());
+    }
     let word = if failed.len() == 1 {
         "check fails"
     } else {
