@@ -369,11 +369,8 @@ fn new_writes_what_can_be_built_and_nothing_over_anything() {
         (["new", "engine-c", "file"], "no folder"),
         (["new", "engine-c", "My_Engine"], "a-z, 0-9 and -"),
         (["new", "engine-d", "x"], "engine-c"),
-        (["new", "engine-c", "mujoco"], "`mujoco` is built in"),
-        (
-            ["new", "mechanism-c", "deep/rapier"],
-            "`rapier` is built in",
-        ),
+        (["new", "engine-c", "mujoco"], "`mujoco` is one of"),
+        (["new", "mechanism-c", "deep/rapier"], "`rapier` is one of"),
     ] {
         let output = place.run(&arguments);
         let said = String::from_utf8(output.stderr).unwrap();

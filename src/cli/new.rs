@@ -180,9 +180,10 @@ const KINDS: &[Kind] = &[
     },
 ];
 
-/// True where something of this kind and name is linked in.
+/// True where something of this kind and name is linked in, or is in other builds.
 fn is_built_in<E: Entry>(name: &str) -> bool {
-    registry::find::<E>(name).is_ok_and(|e| matches!(e.origin(), Origin::Linked(_)))
+    let linked = |e: &E| matches!(e.origin(), Origin::Linked(_));
+    registry::find::<E>(name).is_ok_and(linked) || super::list::missing(E::KIND, name).is_some()
 }
 
 impl Kind {
@@ -211,7 +212,7 @@ pub fn new(arguments: &Arguments) -> Result<()> {
     let name = plugin_name(dir)?;
     if (kind.taken)(&name) {
         let message = format!(
-            "`{name}` is built in, and the folder's name becomes the plugin's; choose another"
+            "`{name}` is one of ASID's own, and the folder's name becomes the plugin's; choose another"
         );
         return Err(Error::File {
             path: dir.clone(),
