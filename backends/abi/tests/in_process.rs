@@ -220,8 +220,21 @@ fn what_is_not_claimed_is_refused_before_the_engine_is_called() {
     ) -> abi::Code {
         abi::PANIC
     }
+    unsafe extern "C" fn never_read(
+        _: *mut abi::Batch,
+        _: *const u64,
+        _: u64,
+        _: *const abi::Channel,
+        _: u64,
+        _: u64,
+        _: *mut f64,
+        _: *mut abi::Error,
+    ) -> abi::Code {
+        abi::PANIC
+    }
     let mut table = table::<Sound>("an engine");
     table.rollout = Some(never);
+    table.read = Some(never_read);
     // SAFETY: a table that was just made, and is leaked.
     let engine = unsafe { Engine::from_table(keep(table), Path::new("libengine.so")) }.unwrap();
     let model = engine.backend("e").load(&scene()).unwrap();
