@@ -94,6 +94,7 @@ fn what_is_not_there_is_a_wrong_call() {
             ["--check", "friction/stoping-distance"],
             "friction/stopping-distance",
         ),
+        (["--check", "frictoin/"], "known: `dynamics/`"),
         (["--backend", "rapir"], "rapier"),
         (["--threads", "0"], "whole number"),
         (["--plugin", "no.so"], "no.so"),
@@ -102,7 +103,32 @@ fn what_is_not_there_is_a_wrong_call() {
         assert_eq!(output.status.code(), Some(2), "{}", stderr(&output));
         assert!(stderr(&output).contains(said), "{}", stderr(&output));
         assert_eq!(stderr(&output).lines().count(), 1);
+        assert!(stderr(&output).len() < 600, "{}", stderr(&output));
     }
+}
+
+#[test]
+fn checks_and_their_scenes_are_printed_without_rows() {
+    let place = Workplace::new();
+    let output = place.run(&["conformance", "--list", "--check", "pendulum-energy"]);
+    assert!(output.status.success(), "{}", stderr(&output));
+    let listed = stdout(&output);
+    assert!(listed.starts_with("dynamics/pendulum-energy\n    needs ARTICULATION\n"));
+    assert_eq!(listed.lines().count(), 3, "{listed}");
+    let output = place.run(&["conformance", "--list", "--json"]);
+    let listed: Value = serde_json::from_str(&stdout(&output)).unwrap();
+    assert_eq!(
+        listed.as_array().unwrap().len(),
+        asid_conformance::checks().count()
+    );
+
+    let call = ["conformance", "--backend", "rapier", "--scene", "--check"];
+    let output = place.run(&[&call[..], &["dynamics/pendulum-energy"]].concat());
+    assert!(output.status.success(), "{}", stderr(&output));
+    let printed = stdout(&output);
+    let document = printed.split_once("-->").unwrap().1;
+    let document = roxmltree::Document::parse(document.trim()).unwrap();
+    assert!(document.root_element().has_tag_name("mujoco"));
 }
 
 /// An engine in C that falls by nine tenths of gravity: alone in the table when its

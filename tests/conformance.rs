@@ -13,7 +13,7 @@ mod mutant;
 mod narrow;
 
 use asid::core::registry::{self, BackendEntry};
-use asid::core::{Backend, Capabilities, Error};
+use asid::core::{Backend, Capabilities, Error, Model, Scene};
 use asid_conformance::{Check, Outcome, Row, checks, run_checks, table};
 use fault::Fault;
 use mutant::Mutant;
@@ -33,6 +33,30 @@ fn engines() -> Vec<Box<dyn Backend>> {
         .collect();
     assert!(!engines.is_empty(), "no engine is linked in");
     engines
+}
+
+/// An engine that loads nothing.
+struct Refusing<'a>(&'a dyn Backend);
+
+impl Backend for Refusing<'_> {
+    fn name(&self) -> &str {
+        "refusing"
+    }
+
+    fn version(&self) -> String {
+        self.0.version()
+    }
+
+    fn capabilities(&self) -> Capabilities {
+        self.0.capabilities()
+    }
+
+    fn load(&self, scene: &Scene) -> asid::core::Result<std::sync::Arc<dyn Model>> {
+        Err(Error::Scene {
+            scene: scene.name().to_owned(),
+            message: "too difficult".into(),
+        })
+    }
 }
 
 /// All rows of an engine, two checks at a time.
@@ -143,6 +167,66 @@ fn faults_of_a_mechanism_are_caught() {
     let faults = Fault::ALL.into_iter().filter(|f| f.of_a_mechanism());
     let missed = missed(&Narrow::new(&*engine, bits), faults);
     assert!(missed.is_empty(), "no check sees {missed:?}");
+}
+
+#[test]
+fn faults_of_free_bodies_are_caught() {
+    let engine = engines().swap_remove(0);
+    let bits = Capabilities::FREE_BODIES
+        | Capabilities::EXTERNAL_FORCES
+        | Capabilities::STEP_HOOKS
+        | Capabilities::MASS_PARAMETERS
+        | Capabilities::EXACT_SNAPSHOT
+        | Capabilities::DOUBLE_PRECISION;
+    let engine = Narrow::new(&*engine, bits);
+    let missed = missed(&engine, Fault::OF_FREE_BODIES.into_iter());
+    assert!(missed.is_empty(), "no check sees {missed:?}");
+}
+
+/// A row of an engine that claims some bits and no others.
+fn row(bits: Capabilities, check: &str) -> Row {
+    let engine = engines().swap_remove(0);
+    let check = checks().find(|c| c.name == check).unwrap();
+    check.run(&Narrow::new(&*engine, bits))
+}
+
+#[test]
+fn an_engine_that_claims_no_motion_fails() {
+    let nothing = Capabilities::EXACT_SNAPSHOT;
+    let engine = engines().swap_remove(0);
+    let rows = rows(&Narrow::new(&*engine, nothing));
+    let failed: Vec<&Row> = rows.iter().filter(|row| row.is_failure()).collect();
+    assert_eq!(failed.len(), 1, "{}", table(&rows));
+    assert_eq!(failed[0].check, "claims/something-moves");
+    assert!(failed[0].note.starts_with("claims neither FREE_BODIES"));
+    // What may be asked of anything is asked.
+    let faults = rows.iter().filter(|row| row.family() == "faults");
+    assert!(faults.filter(|r| r.outcome == Outcome::Pass).count() >= 6);
+}
+
+#[test]
+fn a_bit_without_a_check_fails_by_name() {
+    let bits = Capabilities::FREE_BODIES | Capabilities::ACTUATORS;
+    let found = row(bits, "claims/every-bit-is-checked");
+    assert_eq!(
+        found.note,
+        "ACTUATORS is claimed, but every check of it also needs ARTICULATION"
+    );
+    let sound = bits | Capabilities::ARTICULATION;
+    let found = row(sound, "claims/every-bit-is-checked");
+    assert_eq!(found.outcome, Outcome::Pass, "{}", found.note);
+}
+
+#[test]
+fn a_refused_scene_is_named_by_its_check() {
+    let engine = engines().swap_remove(0);
+    let check = checks().find(|c| c.name == "dynamics/pendulum-energy");
+    let check = check.unwrap();
+    let scenes = check.scenes(&*engine);
+    assert_eq!(scenes.len(), 1);
+    assert!(scenes[0].contains("<joint name=\"j\""), "{}", scenes[0]);
+    let note = check.run(&Refusing(&*engine)).note;
+    assert_eq!(note, "scene of dynamics/pendulum-energy: too difficult");
 }
 
 #[test]

@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 use std::sync::{Mutex, PoisonError};
 
+use asid::core::nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use asid::core::simulator::{StepHook, StepView};
 
 /// What is wrong with an engine.
@@ -68,6 +69,28 @@ pub enum Fault {
     HookCountsSimulations,
     /// A hook is there, and what is read is another number by its last bit.
     HookDisturbs,
+    /// The axes of a body's inertia are those of the body.
+    InertiaTurnIgnored,
+    /// A hook's force on a free joint acts at the centre of mass.
+    HookForceAtCentre,
+    /// A mass that is set leaves the inertia as it was.
+    MassWithoutInertia,
+    /// A mass may be set, and does nothing.
+    MassUnused,
+    /// A negative mass is taken for its magnitude.
+    NegativeMass,
+    /// `frameangvel` of a site reads in the site's frame.
+    RateInOwnFrame,
+    /// `gyro` reads in the world.
+    GyroInWorld,
+    /// `velocimeter` reads in the world.
+    VelocimeterInWorld,
+    /// A site is turned as its body.
+    SiteTurnIgnored,
+    /// Equalities are left out.
+    EqualitiesLeftOut,
+    /// The air is left out.
+    AirLeftOut,
 }
 
 impl Fault {
@@ -104,6 +127,22 @@ impl Fault {
         Self::HookDisturbs,
     ];
 
+    /// What an engine of free bodies can have wrong about a body.
+    pub const OF_FREE_BODIES: [Self; 12] = [
+        Self::InertiaTurnIgnored,
+        Self::HookForceAtCentre,
+        Self::MassWithoutInertia,
+        Self::MassUnused,
+        Self::NegativeMass,
+        Self::RateInOwnFrame,
+        Self::GyroInWorld,
+        Self::VelocimeterInWorld,
+        Self::SiteTurnIgnored,
+        Self::EqualitiesLeftOut,
+        Self::AirLeftOut,
+        Self::DampingIgnored,
+    ];
+
     /// True where an engine that does everything is spoilt by it: what takes contact, and
     /// the commonest of the others.
     pub fn of_a_whole_engine(self) -> bool {
@@ -138,6 +177,8 @@ pub struct SpoiltHook<'a> {
     pub sims: &'a [usize],
     /// Length of a physics step, s.
     pub timestep: f64,
+    /// Centre of mass in the first body's frame, m.
+    pub centre: Vector3<f64>,
     /// State of each row a step ago.
     pub before: Mutex<HashMap<usize, [Vec<f64>; 2]>>,
 }
@@ -170,5 +211,14 @@ impl StepHook for SpoiltHook<'_> {
                 force: view.force,
             },
         );
+        if self.fault == Fault::HookForceAtCentre && qpos.len() == 7 {
+            let q = Quaternion::new(qpos[3], qpos[4], qpos[5], qpos[6]);
+            let force = Vector3::from_column_slice(&view.force[..3]);
+            let own = UnitQuaternion::from_quaternion(q).inverse() * force;
+            let torque = self.centre.cross(&own);
+            for (f, t) in view.force[3..6].iter_mut().zip(torque.iter()) {
+                *f += t;
+            }
+        }
     }
 }

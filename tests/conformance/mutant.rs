@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 
 use asid::core::layout::Channel;
+use asid::core::nalgebra::Vector3;
 use asid::core::simulator::{ExternalForce, StepHook};
 use asid::core::{
     Backend, BatchConfig, Capabilities, Control, Layout, Model, Recording, Result, Rollout, Scene,
@@ -73,6 +74,34 @@ impl Backend for Mutant<'_> {
                 let xml = rewritten(scene.xml(), "ctrlrange", |_| "-1e6 1e6".into());
                 rewritten(&xml, "forcerange", |_| "-1e6 1e6".into())
             }
+            Fault::InertiaTurnIgnored => upright(scene.xml(), "<inertial"),
+            Fault::SiteTurnIgnored => upright(scene.xml(), "<site"),
+            Fault::RateInOwnFrame => scene.xml().replace(
+                r#"<frameangvel name="r" objtype="site" objname="s"/>"#,
+                r#"<gyro name="r" site="s"/>"#,
+            ),
+            Fault::GyroInWorld => scene.xml().replace(
+                r#"<gyro name="r" site="s"/>"#,
+                r#"<frameangvel name="r" objtype="site" objname="s"/>"#,
+            ),
+            Fault::VelocimeterInWorld => scene.xml().replace(
+                r#"<velocimeter name="r" site="s"/>"#,
+                r#"<framelinvel name="r" objtype="site" objname="s"/>"#,
+            ),
+            Fault::EqualitiesLeftOut => match scene.xml().split_once("<equality>") {
+                Some((before, rest)) => {
+                    let after = rest.split_once("</equality>").unwrap().1;
+                    format!("{before}{after}")
+                }
+                None => scene.xml().to_owned(),
+            },
+            Fault::AirLeftOut => ["density", "viscosity", "wind"].iter().fold(
+                scene.xml().to_owned(),
+                |xml, attribute| {
+                    // Of the air, not of a geom.
+                    xml.replace(&format!("<option {attribute}="), "<option iterations=")
+                },
+            ),
             _ => scene.xml().to_owned(),
         };
         Ok(Arc::new(MutantModel {
@@ -80,6 +109,7 @@ impl Backend for Mutant<'_> {
                 .inner
                 .load(&Scene::from_xml(scene.name(), &xml, &[])?)?,
             fault: self.fault,
+            centre: centre(&xml),
         }))
     }
 }
@@ -96,9 +126,33 @@ fn rewritten(xml: &str, attribute: &str, change: impl Fn(&str) -> String) -> Str
     out
 }
 
+/// A document whose elements of a kind are not turned by a quaternion.
+fn upright(xml: &str, element: &str) -> String {
+    let mut parts = xml.split(element);
+    let mut out = parts.next().unwrap_or_default().to_owned();
+    for part in parts {
+        let (own, rest) = part.split_once('>').unwrap();
+        let own = rewritten(own, "quat", |_| "1 0 0 0".into());
+        out += &format!("{element}{own}>{rest}");
+    }
+    out
+}
+
+/// Centre of mass of the first body that states one.
+fn centre(xml: &str) -> Vector3<f64> {
+    let place = xml.split_once("<inertial pos=\"").unwrap_or_default().1;
+    let place = place.split('"').next().unwrap_or_default();
+    let numbers: Vec<f64> = (place.split_whitespace().map(|x| x.parse().unwrap())).collect();
+    match numbers[..] {
+        [x, y, z] => Vector3::new(x, y, z),
+        _ => Vector3::zeros(),
+    }
+}
+
 struct MutantModel {
     inner: Arc<dyn Model>,
     fault: Fault,
+    centre: Vector3<f64>,
 }
 
 impl Model for MutantModel {
@@ -111,8 +165,28 @@ impl Model for MutantModel {
     }
 
     fn simulator(&self, config: &BatchConfig) -> Result<Box<dyn Simulator>> {
+        let mass = |target: &Target| target.element == "body" && target.attribute == "mass";
+        let masses: Vec<Option<f64>> = (config.targets.iter())
+            .map(|target| mass(target).then(|| self.inner.nominal(target)).transpose())
+            .collect::<Result<_>>()?;
+        let mut config = config.clone();
+        let mut more = Vec::new();
+        if self.fault == Fault::MassWithoutInertia {
+            // The inertia is a parameter that stays.
+            for target in config.targets.clone().into_iter().filter(mass) {
+                for index in 0..3 {
+                    let target: Target = format!("body/{}/inertia/{index}", target.name).parse()?;
+                    more.push(self.inner.nominal(&target)?);
+                    config.targets.push(target);
+                }
+            }
+        }
+        let config = &config;
         Ok(Box::new(MutantSimulator {
             inner: self.inner.simulator(config)?,
+            centre: self.centre,
+            masses,
+            more,
             fault: self.fault,
             threads: config.threads,
             running: vec![Status::Running; config.size],
@@ -125,6 +199,12 @@ struct MutantSimulator {
     fault: Fault,
     threads: usize,
     running: Vec<Status>,
+    /// Centre of mass of the first body.
+    centre: Vector3<f64>,
+    /// Nominal value of each parameter that is a mass.
+    masses: Vec<Option<f64>>,
+    /// Values of parameters that the caller does not know of.
+    more: Vec<f64>,
 }
 
 impl MutantSimulator {
@@ -262,6 +342,21 @@ impl Simulator for MutantSimulator {
     }
 
     fn set_parameters(&mut self, sims: &[usize], values: &[f64]) -> Result<()> {
+        let mut row_after_row = Vec::with_capacity(values.len());
+        for row in values.chunks(self.masses.len().max(1)) {
+            for (value, mass) in row.iter().zip(&self.masses) {
+                row_after_row.push(match (mass, self.fault) {
+                    (Some(nominal), Fault::MassUnused) => *nominal,
+                    (Some(_), Fault::NegativeMass) => value.abs(),
+                    _ => *value,
+                });
+            }
+            row_after_row.extend(&self.more);
+        }
+        let values = match self.fault {
+            Fault::MassUnused | Fault::NegativeMass | Fault::MassWithoutInertia => &row_after_row,
+            _ => values,
+        };
         self.inner.set_parameters(sims, values)?;
         if self.fault == Fault::SharedParameters && !sims.is_empty() {
             let columns = values.len() / sims.len();
@@ -313,6 +408,7 @@ impl Simulator for MutantSimulator {
             fault: self.fault,
             sims: rollout.sims,
             timestep: self.layout().timestep,
+            centre: self.centre,
             before: Mutex::default(),
         });
         let sims = self.order(rollout.sims);

@@ -11,6 +11,7 @@ use asid_core::{
 };
 
 use crate::flight::Body;
+use crate::refusal;
 use crate::simulator::FlightSimulator;
 
 /// What all batches of a scene share.
@@ -59,7 +60,7 @@ impl FlightModel {
     ///
     /// # Errors
     /// [`Error::Scene`] for everything that this engine would have to ignore:
-    /// other joints than free ones, shapes that could meet, drives, equalities.
+    /// other joints than free ones, shapes that could meet, and whatever else `refusal` names.
     pub fn load(scene: &Scene) -> Result<Self> {
         let refuse = |message: String| Error::Scene {
             scene: scene.name().to_owned(),
@@ -73,14 +74,8 @@ impl FlightModel {
                 joint.name
             )));
         }
-        for (what, n) in [
-            ("drives", document.actuators.len()),
-            ("equalities", document.equality.len()),
-            ("tendons", document.tendons.len()),
-        ] {
-            if n > 0 {
-                return Err(refuse(format!("this engine has no {what}")));
-            }
+        if let Some(what) = refusal::lacking(scene, &document) {
+            return Err(refuse(what));
         }
         let mut geoms = document.bodies.iter().flat_map(|b| &b.body.geoms);
         if geoms.any(|g| matches!(g.type_, GeomType::Mesh | GeomType::Hfield)) {
