@@ -107,6 +107,7 @@ pub fn pipeline(session: &Session, truth: &[f64]) -> Result<RunOutcome> {
         explorer: Some(&*explorer),
         identifier: Some(&*identifier),
         solver: &*solver,
+        known: None,
     };
     let problem = session.problem();
     let mut world = session.world(truth)?;
