@@ -237,6 +237,11 @@ pub trait Task: Send + Sync {
     fn metric(&self, readings: &[f64]) -> Vec<f64>;
     /// What came of an attempt.
     fn outcome(&self, readings: &[f64]) -> Outcome;
+    /// Corners of the box that every tracked and every own position stays in while the task is
+    /// explored, low then high, m.
+    fn bounds(&self) -> [[f64; 3]; 2] {
+        [[-1.5, -1.5, -0.1], [1.5, 1.5, 1.5]]
+    }
     /// What a picture from above shows.
     fn top_view(&self) -> TopView {
         TopView::default()

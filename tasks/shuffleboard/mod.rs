@@ -283,6 +283,11 @@ impl Task for Shuffleboard {
         metric::outcome(self.zone, readings)
     }
 
+    /// A puck that the hand throws at 0.4 m/s, at the least friction.
+    fn bounds(&self) -> [[f64; 3]; 2] {
+        [[-0.3, -0.9, -0.02], [1.3, 0.9, 0.3]]
+    }
+
     fn top_view(&self) -> TopView {
         let circle = (0..24).map(|i| {
             let (sin, cos) = (f64::from(i) * std::f64::consts::TAU / 24.0).sin_cos();

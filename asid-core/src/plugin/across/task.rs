@@ -113,6 +113,10 @@ where
         outcome
     }
 
+    fn bounds(&self) -> [[f64; 3]; 2] {
+        self.run(|task| task.bounds())
+    }
+
     fn top_view(&self) -> TopView {
         self.run(|task| task.top_view())
     }
