@@ -2,3 +2,4 @@
 
 pub mod panda;
 pub mod rod_balancing;
+pub mod shuffleboard;

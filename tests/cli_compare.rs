@@ -90,6 +90,51 @@ fn a_comparison_sums_up_its_runs_and_merges_with_others() {
 }
 
 #[test]
+fn the_oracle_knows_a_truth_that_is_drawn_from_the_whole_prior() {
+    let place = Workplace::new();
+    let output = place.run(&tiny(&[
+        "compare",
+        "rod-balancing",
+        "--method",
+        "oracle",
+        "--condition",
+        "prior",
+        "--seeds",
+        "2",
+        "--quiet",
+        "--out",
+        "a",
+    ]));
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    let runs: Value = serde_json::from_str(&place.read("a/runs.json")).unwrap();
+    let truths: Vec<f64> = runs
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|run| {
+            assert_eq!(
+                (run["method"].as_str(), run["condition"].as_str()),
+                (Some("oracle"), Some("prior"))
+            );
+            let p = &run["parameters"][0];
+            assert_eq!(p["estimate"], p["truth"]);
+            assert_eq!(p["std"], 0.0);
+            p["truth"].as_f64().unwrap()
+        })
+        .collect();
+    assert!(truths[0] != truths[1] && truths.iter().all(|t| t.abs() <= 0.1));
+    assert!(
+        place
+            .read("a/config.toml")
+            .contains("condition = \"prior\"")
+    );
+}
+
+#[test]
 fn unknown_methods_and_conditions_list_the_near_ones() {
     let place = Workplace::new();
     for (flag, name, expected) in [

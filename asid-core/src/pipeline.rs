@@ -108,8 +108,8 @@ pub struct RunOutcome {
     pub costs: Vec<StageCost>,
 }
 
-/// The algorithms of a run. Without explorer or identifier the solver gets the prior:
-/// domain randomisation.
+/// The algorithms of a run. Without explorer or identifier the solver gets what is known
+/// otherwise, and the prior where nothing is: domain randomisation.
 #[derive(Clone, Copy)]
 pub struct Method<'m> {
     /// How to explore.
@@ -118,6 +118,8 @@ pub struct Method<'m> {
     pub identifier: Option<&'m dyn Identifier>,
     /// How to solve.
     pub solver: &'m dyn TaskSolver,
+    /// Values of the unknowns that the solver is told where nothing is identified.
+    pub known: Option<&'m [f64]>,
 }
 
 /// Explore, identify, solve and attempt.
@@ -154,9 +156,12 @@ pub fn run(
         identified = Some(identifier.identify(problem, std::slice::from_ref(&real.episode))?);
         costs.push(clock.lap("identify"));
     }
-    let belief = match &identified {
-        Some(found) => found.posterior.clone(),
-        None => Posterior::prior(
+    let belief = match (&identified, method.known) {
+        (Some(found), _) => found.posterior.clone(),
+        (None, Some(values)) => {
+            Posterior::from_samples(problem.parameters, vec![values.to_vec()], &[1.0])
+        }
+        (None, None) => Posterior::prior(
             problem.parameters,
             PRIOR_SAMPLES,
             &mut problem.streams.stream("prior belief"),

@@ -63,10 +63,12 @@ pub trait RealWorld {
 /// A simulator with a hidden truth, its own start poses and noisy trackers.
 pub struct SimulatedWorld<'a> {
     task: &'a dyn Task,
+    parameters: &'a [Parameter],
     batch: Batch,
     signals: SignalSet,
     truth: Vec<f64>,
     streams: Streams,
+    wear: Rng,
     start: Option<Vec<f64>>,
     effects: Effects,
 }
@@ -80,7 +82,7 @@ impl<'a> SimulatedWorld<'a> {
     pub fn new(
         task: &'a dyn Task,
         model: &dyn Model,
-        parameters: &[Parameter],
+        parameters: &'a [Parameter],
         truth: &[f64],
         signals: &[Signal],
         streams: Streams,
@@ -102,10 +104,12 @@ impl<'a> SimulatedWorld<'a> {
         let signals = SignalSet::new(model.layout(), signals)?;
         Ok(Self {
             task,
+            parameters,
             batch,
             signals,
             truth: truth.to_vec(),
             streams,
+            wear: streams.stream("wear"),
             start: None,
             effects: Effects(Vec::new()),
         })
@@ -139,6 +143,17 @@ impl<'a> SimulatedWorld<'a> {
     /// Adds the physics steps taken in this world to `counter`.
     pub fn count_physics(&self, counter: &AtomicU64) {
         counter.fetch_add(self.batch.simulator.steps_taken(), Ordering::Relaxed);
+    }
+
+    /// The true values as they are by now.
+    #[must_use]
+    pub fn truth(&self) -> &[f64] {
+        &self.truth
+    }
+
+    fn wear(&mut self) {
+        self.task
+            .wear(self.parameters, &mut self.truth, &mut self.wear);
     }
 
     fn begin(&mut self, start: &[f64]) -> Result<()> {
@@ -236,6 +251,7 @@ impl RealWorld for SimulatedWorld<'_> {
                     .any(|r| r[width..].iter().any(|force| *force > 0.0)),
             );
         }
+        self.wear();
         let last = episode.ctrl[episode.ctrl.len() - nu..].to_vec();
         episode.ctrl.extend(last);
         episode.time = (0..=protocol.frames())
@@ -285,6 +301,7 @@ impl RealWorld for SimulatedWorld<'_> {
         rollout.hook = self.effects.hook();
         self.batch.simulator.rollout(&rollout, &mut readings)?;
         self.check()?;
+        self.wear();
         Ok(Attempt {
             outcome: self.task.outcome(&readings),
             action,

@@ -8,6 +8,7 @@ use crate::backend::Capabilities;
 use crate::error::Result;
 use crate::layout::Layout;
 use crate::parameter::Parameter;
+use crate::rng::Rng;
 use crate::scene::Scene;
 use crate::signal::Signal;
 
@@ -52,13 +53,34 @@ impl Coordinate {
     }
 }
 
-/// A named set of true values, such as `left`.
+/// A named case that a task is tried in, such as `left`: true values, or a goal.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Condition {
     /// Name in tables.
     pub name: String,
-    /// Values by parameter name.
-    pub truth: Vec<(String, f64)>,
+    /// Smallest and largest true value by parameter name, equal where the value is fixed;
+    /// they may lie outside the prior. Of a parameter without an entry the whole prior is drawn from.
+    pub truth: Vec<(String, [f64; 2])>,
+}
+
+impl Condition {
+    /// A condition of fixed true values.
+    #[must_use]
+    pub fn fixed(name: &str, truth: &[(&str, f64)]) -> Self {
+        Self {
+            name: name.into(),
+            truth: truth.iter().map(|&(n, v)| (n.to_owned(), [v, v])).collect(),
+        }
+    }
+
+    /// A condition whose true values are drawn from ranges, and from the prior where none is given.
+    #[must_use]
+    pub fn drawn(name: &str, ranges: &[(&str, [f64; 2])]) -> Self {
+        Self {
+            name: name.into(),
+            truth: ranges.iter().map(|&(n, r)| (n.to_owned(), r)).collect(),
+        }
+    }
 }
 
 /// How the unknowns are explored.
@@ -177,8 +199,19 @@ pub trait Task: Send + Sync {
     fn optional_parameters(&self) -> Vec<Parameter> {
         Vec::new()
     }
-    /// Named true values for tables.
+    /// The named cases of tables.
     fn conditions(&self) -> Vec<Condition>;
+    /// The task as it is set in one of its conditions; `None` where the condition is of
+    /// true values alone.
+    ///
+    /// # Errors
+    /// When the condition's task cannot be made.
+    fn under(&self, _condition: &str) -> Result<Option<Box<dyn Task>>> {
+        Ok(None)
+    }
+    /// What an episode or an attempt in the real world does to the truth, of which simulators
+    /// know nothing: `truth` holds the values of `parameters`.
+    fn wear(&self, _parameters: &[Parameter], _truth: &mut [f64], _rng: &mut Rng) {}
     /// How it is explored.
     fn exploration(&self) -> &ExplorationProtocol;
     /// What is to be achieved.
@@ -204,6 +237,11 @@ pub trait Task: Send + Sync {
     fn metric(&self, readings: &[f64]) -> Vec<f64>;
     /// What came of an attempt.
     fn outcome(&self, readings: &[f64]) -> Outcome;
+    /// Corners of the box that every tracked and every own position stays in while the task is
+    /// explored, low then high, m.
+    fn bounds(&self) -> [[f64; 3]; 2] {
+        [[-1.5, -1.5, -0.1], [1.5, 1.5, 1.5]]
+    }
     /// What a picture from above shows.
     fn top_view(&self) -> TopView {
         TopView::default()

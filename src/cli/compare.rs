@@ -10,7 +10,7 @@ use asid_core::pipeline::{self, Method};
 use asid_core::registry::{ExplorerEntry, IdentifierEntry, SolverEntry, TaskEntry, find};
 use asid_core::task::Condition;
 
-use super::config::ASID;
+use super::config::{ASID, check_condition};
 use super::options::{Algorithms, Common, Real};
 use super::output::{OutFolder, write_json, write_text};
 use super::result::Versions;
@@ -26,10 +26,11 @@ mod table;
 pub struct Arguments {
     /// Tasks [default: all]
     tasks: Vec<String>,
-    /// Method: asid, random, dr (repeatable) [default: all]
+    /// Method: asid, random, dr (repeatable) [default: these], or oracle, whose solver knows the truth
     #[arg(long, value_name = "M")]
     method: Vec<String>,
-    /// Condition of the task, such as left (repeatable) [default: all]
+    /// Condition of the task, such as left (repeatable) [default: all], or prior, whose truths are
+    /// drawn from the whole prior
     #[arg(long, value_name = "NAME")]
     condition: Vec<String>,
     /// Runs of each method and condition
@@ -49,23 +50,36 @@ struct MethodEntry {
     name: &'static str,
     explorer: Option<&'static str>,
     identifies: bool,
+    knows: bool,
 }
 
-const METHODS: [MethodEntry; 3] = [
+/// Methods that need not be named: all but the oracle, which shows what the task allows.
+const BY_DEFAULT: usize = 3;
+
+const METHODS: [MethodEntry; 4] = [
     MethodEntry {
         name: "asid",
         explorer: Some(ASID.explorer),
         identifies: true,
+        knows: false,
     },
     MethodEntry {
         name: "random",
         explorer: Some("random"),
         identifies: true,
+        knows: false,
     },
     MethodEntry {
         name: "dr",
         explorer: None,
         identifies: false,
+        knows: false,
+    },
+    MethodEntry {
+        name: "oracle",
+        explorer: None,
+        identifies: false,
+        knows: true,
     },
 ];
 
@@ -116,8 +130,7 @@ pub fn compare(arguments: &Arguments) -> Result<()> {
                     let left = clock.elapsed().as_secs_f64() / done as f64 * (total - done) as f64;
                     let _ = write!(
                         std::io::stderr(),
-                        "\r{done}/{total} runs, {left:.0} s left ({task}, {}, {})      ",
-                        condition.name,
+                        "\r{done}/{total} runs, {left:.0} s left ({task}, {condition}, {})      ",
                         method.name
                     );
                 }
@@ -218,7 +231,7 @@ fn write(
 
 fn chosen_methods(names: &[String]) -> Result<Vec<&'static MethodEntry>> {
     if names.is_empty() {
-        return Ok(METHODS.iter().collect());
+        return Ok(METHODS[..BY_DEFAULT].iter().collect());
     }
     names
         .iter()
@@ -231,25 +244,20 @@ fn chosen_methods(names: &[String]) -> Result<Vec<&'static MethodEntry>> {
         .collect()
 }
 
-fn chosen_conditions(all: &[Condition], names: &[String]) -> Result<Vec<Condition>> {
+fn chosen_conditions(all: &[Condition], names: &[String]) -> Result<Vec<String>> {
     if names.is_empty() {
-        return Ok(all.to_vec());
+        return Ok(all.iter().map(|c| c.name.clone()).collect());
     }
-    names
-        .iter()
-        .map(|name| {
-            let found = all.iter().find(|c| &c.name == name).cloned();
-            found.ok_or_else(|| {
-                Error::unknown("condition", name, all.iter().map(|c| &*c.name)).into()
-            })
-        })
-        .collect()
+    for name in names {
+        check_condition(all, name)?;
+    }
+    Ok(names.to_vec())
 }
 
 fn open(
     arguments: &Arguments,
     task: &str,
-    condition: &Condition,
+    condition: &str,
     method: &MethodEntry,
     k: u64,
 ) -> Result<Session> {
@@ -261,19 +269,12 @@ fn open(
         algorithms.explorer = method.explorer.map(str::to_owned);
         common.set.retain(|s| !s.starts_with("explorer."));
     }
-    let real = Real {
-        truth: condition
-            .truth
-            .iter()
-            .map(|(n, v)| format!("{n}={v}"))
-            .collect(),
-        ..Real::default()
-    };
-    Session::open(task, &common, &algorithms, &real)
+    common.set.push(format!("condition={condition:?}"));
+    Session::open(task, &common, &algorithms, &Real::default())
 }
 
 /// One run of a method under a condition.
-fn one(session: &Session, condition: &Condition, method: &MethodEntry) -> Result<Run> {
+fn one(session: &Session, condition: &str, method: &MethodEntry) -> Result<Run> {
     let clock = Instant::now();
     let config = &session.config;
     let explorer = (find::<ExplorerEntry>(&config.explorer.name)?.make)(&config.explorer.settings)?;
@@ -287,12 +288,13 @@ fn one(session: &Session, condition: &Condition, method: &MethodEntry) -> Result
         explorer: method.explorer.map(|_| &*explorer),
         identifier: method.identifies.then_some(&*identifier),
         solver: &*solver,
+        known: method.knows.then_some(&*truth),
     };
     let outcome = pipeline::run(&problem, chosen, &mut world)?;
     let expected = outcome.information.expected_std.last();
     Ok(Run {
         task: config.task.clone(),
-        condition: condition.name.clone(),
+        condition: condition.to_owned(),
         method: method.name.to_owned(),
         backend: config.backend.clone(),
         seed: config.seed,

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
-use asid_core::task::Coordinate;
+use asid_core::task::{Condition, Coordinate};
 use asid_core::{EffectSpec, Error, Parameter, Task, registry};
 use serde::Serialize;
 
@@ -84,6 +84,9 @@ pub struct Config {
     pub task: String,
     /// Engine of the simulator.
     pub backend: String,
+    /// Condition of the task; `prior` for the whole prior.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub condition: Option<String>,
     /// Seed.
     pub seed: u64,
     /// Files of the plugins that it needs.
@@ -110,11 +113,12 @@ pub struct Config {
 }
 
 /// Keys at the top of a configuration.
-const KEYS: [&str; 13] = [
+const KEYS: [&str; 14] = [
     "schema",
     "command",
     "task",
     "backend",
+    "condition",
     "seed",
     "plugins",
     "start",
@@ -187,6 +191,10 @@ impl Config {
             (None, Some(name)) => name,
             (None, None) => default_backend(),
         };
+        let condition = text(&table, "condition")?;
+        if let Some(name) = &condition {
+            check_condition(&task.conditions(), name)?;
+        }
         let real_table = section(&table, "real")?;
         check_keys(
             "real",
@@ -227,6 +235,7 @@ impl Config {
         let mut config = Self {
             command: stage,
             task: task.name().to_owned(),
+            condition,
             seed: match (common.seed, table.get("seed")) {
                 (Some(seed), _) => seed,
                 (None, None) => 0,
@@ -294,6 +303,18 @@ impl Config {
         files.extend(specs.map(|spec| file_of::<EffectEntry>(&spec.name)));
         used(&files)
     }
+}
+
+/// The condition whose truths are drawn from the whole prior; every task has it.
+pub const PRIOR: &str = "prior";
+
+/// Checks that a task has a condition of this name.
+pub fn check_condition(all: &[Condition], name: &str) -> Result<()> {
+    let known = || all.iter().map(|c| &*c.name).chain([PRIOR]);
+    if known().any(|k| k == name) {
+        return Ok(());
+    }
+    Err(Error::unknown("condition", name, known()).into())
 }
 
 /// Plugins that a configuration file names.

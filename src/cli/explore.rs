@@ -19,7 +19,7 @@ use serde::Serialize;
 use super::config::Stage;
 use super::options::{Algorithms, Common, Real};
 use super::output::{OutFolder, write_json};
-use super::result::{CostResult, ExplorationResult, SCHEMA, Versions};
+use super::result::{CostResult, ExplorationResult, SCHEMA, Versions, figure};
 use super::session::Session;
 use super::{stage, trace};
 
@@ -120,7 +120,7 @@ pub fn explore(arguments: &Arguments) -> Result<()> {
         .parameters
         .iter()
         .zip(information.expected_std.last().into_iter().flatten())
-        .map(|(p, std)| format!("{} ± {std:.4} {}", p.name, p.unit))
+        .map(|(p, std)| format!("{} ± {} {}", p.name, figure(*std), p.unit))
         .collect();
     let lines = [
         format!("start: {}", stage::start_line(&session)),

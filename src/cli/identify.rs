@@ -14,7 +14,7 @@ use serde::Serialize;
 use super::config::Stage;
 use super::options::{Algorithms, Common, Real};
 use super::output::{OutFolder, write_json};
-use super::result::{CostResult, ParameterResult, SCHEMA, Versions};
+use super::result::{CostResult, ParameterResult, SCHEMA, Versions, figure};
 use super::session::Session;
 use super::{failure, stage, trace};
 
@@ -128,10 +128,11 @@ pub fn identify(arguments: &Arguments) -> Result<()> {
         .marginals
         .iter()
         .map(|m| {
-            let [low, high] = m.interval95;
+            let [low, high] = m.interval95.map(figure);
+            let [estimate, std] = [m.estimate, m.std].map(figure);
             format!(
-                "{}: {:.4} ± {:.4} {} (95 %: {low:.4} to {high:.4})",
-                m.name, m.estimate, m.std, m.unit
+                "{}: {estimate} ± {std} {} (95 %: {low} to {high})",
+                m.name, m.unit
             )
         })
         .collect();

@@ -9,6 +9,15 @@ use super::session::Session;
 /// Layout version.
 pub const SCHEMA: u32 = 1;
 
+/// A value or its deviation for people: four decimals, and two figures where these would not show it.
+pub fn figure(x: f64) -> String {
+    if x != 0.0 && x.abs() < 1e-3 {
+        format!("{x:.1e}")
+    } else {
+        format!("{x:.4}")
+    }
+}
+
 /// An unknown: truth where it is known, estimate and interval.
 #[derive(Serialize)]
 pub struct ParameterResult {

@@ -9,7 +9,7 @@ use asid_core::registry::{ExplorerEntry, IdentifierEntry, SolverEntry, find};
 
 use super::options::{Algorithms, Common, Real};
 use super::output::{OutFolder, write_json, write_text};
-use super::result::RunResult;
+use super::result::{RunResult, figure};
 use super::session::Session;
 use super::trace;
 
@@ -61,17 +61,20 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         return Ok(());
     }
     for (m, t) in outcome.belief.marginals.iter().zip(&truth) {
+        let [estimate, std, low, high, truth] =
+            [m.estimate, m.std, m.interval95[0], m.interval95[1], *t].map(figure);
         writeln!(
             stdout,
-            "{}: {:.4} ± {:.4} {} (95 %: {:.4} to {:.4}), truth {t:.4}",
-            m.name, m.estimate, m.std, m.unit, m.interval95[0], m.interval95[1]
+            "{}: {estimate} ± {std} {} (95 %: {low} to {high}), truth {truth}",
+            m.name, m.unit
         )?;
     }
     let protocol = session.task.downstream();
     let attempt = &outcome.attempt.outcome;
+    let digits = if attempt.value.abs() < 1.0 { 3 } else { 2 };
     writeln!(
         stdout,
-        "{}: {:.2}, {}",
+        "{}: {:.digits$}, {}",
         protocol.metric,
         attempt.value,
         if attempt.success {
@@ -107,6 +110,7 @@ pub fn pipeline(session: &Session, truth: &[f64]) -> Result<RunOutcome> {
         explorer: Some(&*explorer),
         identifier: Some(&*identifier),
         solver: &*solver,
+        known: None,
     };
     let problem = session.problem();
     let mut world = session.world(truth)?;

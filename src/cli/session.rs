@@ -46,8 +46,13 @@ impl Session {
         algorithms: &Algorithms,
         real: &Real,
     ) -> Result<Self> {
-        let task = (registry::find::<TaskEntry>(task)?.make)()?;
+        let mut task = (registry::find::<TaskEntry>(task)?.make)()?;
         let (config, parameters) = Config::resolve(stage, &*task, common, algorithms, real)?;
+        if let Some(condition) = &config.condition
+            && let Some(other) = task.under(condition)?
+        {
+            task = other;
+        }
         let backend = backend(&config.backend)?;
         require(&*backend, task.requires())?;
         let model = backend.load(task.scene())?;
@@ -109,13 +114,30 @@ impl Session {
             .collect()
     }
 
-    /// The hidden truth: as given, and drawn from the prior by the seed otherwise.
+    /// The hidden truth: as given, and otherwise drawn by the seed from the condition's
+    /// range or from the prior.
     pub fn truth(&self) -> Vec<f64> {
         let mut rng = Streams::new(self.config.seed).stream("truth");
+        let conditions = self.task.conditions();
+        let chosen = self.config.condition.as_ref();
+        let condition = conditions.iter().find(|c| Some(&c.name) == chosen);
         self.parameters
             .iter()
             .map(|p| {
-                let drawn = p.sample(&mut rng);
+                let named = condition.and_then(|c| c.truth.iter().find(|(n, _)| *n == p.name));
+                let drawn = match named {
+                    // A fixed value to the bit, also on a logarithmic scale.
+                    Some((_, [low, high])) if low == high => {
+                        let _ = p.sample(&mut rng);
+                        *low
+                    }
+                    Some((_, range)) => Parameter {
+                        range: *range,
+                        ..p.clone()
+                    }
+                    .sample(&mut rng),
+                    None => p.sample(&mut rng),
+                };
                 self.config
                     .real
                     .truth

@@ -136,20 +136,24 @@ pub fn learning(curve: &[CurvePoint], label: &str) -> Option<r::LearningCurve> {
     })
 }
 
-/// The condition whose truth this is; empty where it is none's.
+/// The condition that was chosen, or else whose truth this is; empty where it is none's.
 fn condition(session: &Session, truth: &[f64]) -> String {
+    if let Some(name) = &session.config.condition {
+        return name.clone();
+    }
     let names: Vec<&str> = session.parameters.iter().map(|p| &*p.name).collect();
     session
         .task
         .conditions()
         .into_iter()
         .find(|c| {
-            c.truth.iter().all(|(n, v)| {
-                names
-                    .iter()
-                    .position(|k| k == n)
-                    .is_some_and(|i| truth[i] == *v)
-            })
+            !c.truth.is_empty()
+                && c.truth.iter().all(|(n, [low, high])| {
+                    names
+                        .iter()
+                        .position(|k| k == n)
+                        .is_some_and(|i| low == high && truth[i] == *low)
+                })
         })
         .map(|c| c.name)
         .unwrap_or_default()

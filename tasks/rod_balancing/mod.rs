@@ -162,10 +162,7 @@ impl Task for RodBalancing {
 
     fn conditions(&self) -> Vec<Condition> {
         [("left", -0.08), ("middle", 0.0), ("right", 0.08)]
-            .map(|(name, offset)| Condition {
-                name: name.into(),
-                truth: vec![("mass_offset".into(), offset)],
-            })
+            .map(|(name, offset)| Condition::fixed(name, &[("mass_offset", offset)]))
             .into()
     }
 

@@ -123,9 +123,8 @@ impl Task for PayloadSwing {
 
     fn conditions(&self) -> Vec<Condition> {
         [("light", 0.3, 0.02), ("heavy", 0.9, 0.05)]
-            .map(|(name, mass, damping)| Condition {
-                name: name.into(),
-                truth: vec![("mass".into(), mass), ("damping".into(), damping)],
+            .map(|(name, mass, damping)| {
+                Condition::fixed(name, &[("mass", mass), ("damping", damping)])
             })
             .into()
     }

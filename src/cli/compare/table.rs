@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use serde::{Deserialize, Serialize};
 
+use super::super::result::figure;
 use super::statistics::{bootstrap, interquartile_mean, median};
 
 /// What one run found of one unknown.
@@ -167,6 +168,8 @@ pub fn cells(r: &Row) -> [String; 11] {
             .collect::<Vec<_>>()
             .join(", ")
     };
+    // Metrics in metres or radians are small numbers.
+    let digits = if r.interval95[1].abs() < 1.0 { 3 } else { 1 };
     [
         r.task.clone(),
         r.backend.clone(),
@@ -175,14 +178,18 @@ pub fn cells(r: &Row) -> [String; 11] {
         r.n.to_string(),
         r.metric.clone(),
         format!(
-            "{:.1} ({:.1} to {:.1})",
+            "{:.digits$} ({:.digits$} to {:.digits$})",
             r.mean, r.interval95[0], r.interval95[1]
         ),
         format!("{:.0} %", 100.0 * r.success_rate),
-        list(&|i| format!("{:.4} {}", i.median_abs_error, i.unit)),
+        list(&|i| with_unit(i.median_abs_error, &i.unit)),
         list(&|i| format!("{:.0} %", 100.0 * i.coverage95)),
-        list(&|i| format!("{:.4} {}", i.median_width95, i.unit)),
+        list(&|i| with_unit(i.median_width95, &i.unit)),
     ]
+}
+
+fn with_unit(x: f64, unit: &str) -> String {
+    format!("{} {unit}", figure(x)).trim_end().to_owned()
 }
 
 /// The table as Markdown.

@@ -7,6 +7,7 @@ use crate::backend::Capabilities;
 use crate::error::Result;
 use crate::layout::Layout;
 use crate::parameter::Parameter;
+use crate::rng::Rng;
 use crate::scene::Scene;
 use crate::task::{
     Commander, Condition, DownstreamProtocol, ExplorationProtocol, Outcome, Outline, Task, TopView,
@@ -43,6 +44,22 @@ where
 
     fn conditions(&self) -> Vec<Condition> {
         self.run(|task| task.conditions())
+    }
+
+    fn under(&self, condition: &str) -> Result<Option<Box<dyn Task>>> {
+        let task = self.try_run(|task| task.under(condition))?;
+        Ok(task.map(|inner| {
+            let mut across = Across::new(inner, self.border);
+            across.name = self.name;
+            Box::new(across) as Box<dyn Task>
+        }))
+    }
+
+    fn wear(&self, parameters: &[Parameter], truth: &mut [f64], rng: &mut Rng) {
+        let given = truth.to_vec();
+        self.run(|task| task.wear(parameters, truth, rng));
+        self.border
+            .check_finite(&given, truth, "a true value after the task's wear");
     }
 
     fn exploration(&self) -> &ExplorationProtocol {
@@ -94,6 +111,10 @@ where
             "the task's outcome, metric and cost,",
         );
         outcome
+    }
+
+    fn bounds(&self) -> [[f64; 3]; 2] {
+        self.run(|task| task.bounds())
     }
 
     fn top_view(&self) -> TopView {

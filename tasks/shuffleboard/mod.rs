@@ -1,0 +1,326 @@
+//! Shuffleboard: find how a puck slides by pushing it for two seconds, then shoot it into a zone
+//! with one strike.
+//!
+//! The puck lies on a waxed board; unknown are its sliding and its torsional friction. The closed gripper
+//! is the stick. The task's action is the speed of one strike from behind, and the puck must come to rest
+//! in the near or in the far zone. The real board wears: every shot raises its friction by up to a
+//! few per cent, of which the simulator knows nothing.
+//!
+//! Source: ASID (Memmel et al., ICLR 2024), section 5.2 and its appendix.
+
+mod metric;
+mod pushing;
+mod striking;
+
+use asid_core::kinematics::Chain;
+use asid_core::parameter::{Parameter, Scale};
+use asid_core::rng::Rng;
+use asid_core::signal::{Signal, yaw};
+use asid_core::task::{
+    Commander, Condition, Coordinate, DownstreamProtocol, ExplorationProtocol, Outcome, Outline,
+    Task, TopView,
+};
+use asid_core::{Capabilities, Error, Layout, Result, Scene};
+use rand::Rng as _;
+
+use crate::panda;
+
+/// Radius of the puck, m.
+const PUCK_RADIUS: f64 = 0.0381;
+
+/// Height of the puck's middle on the board, m.
+const PUCK_REST_HEIGHT: f64 = 0.0127;
+
+/// Middle of the board, m.
+const LANE: [f64; 2] = [0.67, 0.0];
+
+/// Half sizes of the board along and across, m.
+const LANE_HALF: [f64; 2] = [0.505, 0.115];
+
+/// Largest rise of the friction in one shot.
+const WEAR: f64 = 0.06;
+
+/// The zone that the puck is to come to rest in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Zone {
+    /// x from 0.675 to 0.925 m.
+    Near,
+    /// x from 0.925 to 1.175 m, the board's end.
+    Far,
+}
+
+impl Zone {
+    /// Both zones.
+    pub const ALL: [Self; 2] = [Self::Near, Self::Far];
+
+    /// Name of the task's condition.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Near => "near",
+            Self::Far => "far",
+        }
+    }
+
+    /// Where its middle is along the board, m.
+    #[must_use]
+    pub fn middle(self) -> f64 {
+        match self {
+            Self::Near => 0.8,
+            Self::Far => 1.05,
+        }
+    }
+}
+
+/// The task.
+pub struct Shuffleboard {
+    zone: Zone,
+    scene: Scene,
+    home: Vec<f64>,
+    exploration: ExplorationProtocol,
+    downstream: DownstreamProtocol,
+}
+
+asid_core::register!(TaskEntry {
+    name: "shuffleboard",
+    about: "find a puck's friction by pushing it, then shoot it into a zone",
+    make: || Ok(Box::new(Shuffleboard::new(Zone::Near)?)),
+});
+
+impl Shuffleboard {
+    /// The task with this zone as its goal.
+    ///
+    /// # Errors
+    /// When the scene that is built in cannot be read.
+    pub fn new(zone: Zone) -> Result<Self> {
+        let scene = Scene::from_xml(
+            "shuffleboard",
+            include_str!("scene.xml"),
+            &[("../panda.xml", panda::PANDA_XML)],
+        )?;
+        let description = scene.description()?;
+        let home = description
+            .keyframes
+            .first()
+            .map(|k| k.qpos[..panda::ARM_JOINTS].to_vec())
+            .ok_or_else(|| Error::Scene {
+                scene: scene.name().to_owned(),
+                message: "has no keyframe".into(),
+            })?;
+        Chain::to_site(&scene, panda::END_EFFECTOR)?;
+        let exploration = ExplorationProtocol {
+            horizon: 20,
+            frames_per_step: 5,
+            frame_period: pushing::FRAME_PERIOD,
+            action: vec![
+                Coordinate::new("dx", "m", [-0.1, 0.1]),
+                Coordinate::new("dy", "m", [-0.1, 0.1]),
+            ],
+            start: start(0.01),
+            signals: vec![
+                Signal {
+                    sensor: "puck_pos".into(),
+                    noise: 0.002,
+                },
+                Signal {
+                    sensor: "puck_quat".into(),
+                    noise: 0.01,
+                },
+            ],
+            proprioception: panda::proprioception(),
+            contact: ["finger_left", "finger_right"]
+                .map(|f| [f.into(), "puck".into()])
+                .into(),
+        };
+        let downstream = DownstreamProtocol {
+            metric: "zone_error_m".into(),
+            unit: "m".into(),
+            rule: format!(
+                "at rest on the board within {} m of the {} zone's middle",
+                metric::ZONE_HALF,
+                zone.name()
+            ),
+            threshold: Some(metric::ZONE_HALF),
+            frames: striking::frames(),
+            frame_period: striking::FRAME_PERIOD,
+            action: vec![Coordinate::new("speed", "m/s", striking::SPEEDS)],
+            start: start(0.005),
+            channels: vec!["puck_pos".into()],
+            phases: striking::phases(),
+        };
+        Ok(Self {
+            zone,
+            scene,
+            home,
+            exploration,
+            downstream,
+        })
+    }
+}
+
+/// The puck lies at x = 0.4 m in the middle of the board, give or take `slack`.
+fn start(slack: f64) -> Vec<Coordinate> {
+    vec![
+        Coordinate::new("x", "m", [0.4 - slack, 0.4 + slack]),
+        Coordinate::new("y", "m", [-slack, slack]),
+        Coordinate::new("yaw", "rad", [-0.1, 0.1]),
+    ]
+}
+
+impl Task for Shuffleboard {
+    fn name(&self) -> &str {
+        "shuffleboard"
+    }
+
+    fn about(&self) -> &str {
+        "find a puck's friction by pushing it, then shoot it into a zone"
+    }
+
+    fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    fn requires(&self) -> Capabilities {
+        Capabilities::ARTICULATION
+            | Capabilities::CONTACT
+            | Capabilities::ACTUATORS
+            | Capabilities::FREE_BODIES
+            | Capabilities::TORSIONAL_FRICTION
+    }
+
+    fn parameters(&self) -> Vec<Parameter> {
+        [
+            (
+                "sliding_friction",
+                "geom/puck/friction/0",
+                [0.01, 0.035],
+                "",
+            ),
+            (
+                "torsional_friction",
+                "geom/puck/friction/1",
+                [5e-4, 5e-3],
+                "m",
+            ),
+        ]
+        .into_iter()
+        .map(|(name, target, range, unit)| Parameter {
+            name: name.into(),
+            targets: target.parse().into_iter().collect(),
+            range,
+            scale: Scale::Log,
+            unit: unit.into(),
+        })
+        .collect()
+    }
+
+    /// Each sets its zone as the goal; the truth is drawn from the prior.
+    fn conditions(&self) -> Vec<Condition> {
+        Zone::ALL
+            .map(|zone| Condition::drawn(zone.name(), &[]))
+            .into()
+    }
+
+    fn under(&self, condition: &str) -> Result<Option<Box<dyn Task>>> {
+        let zone = Zone::ALL.into_iter().find(|z| z.name() == condition);
+        zone.map(|z| Ok(Box::new(Self::new(z)?) as Box<dyn Task>))
+            .transpose()
+    }
+
+    fn wear(&self, parameters: &[Parameter], truth: &mut [f64], rng: &mut Rng) {
+        let factor = 1.0 + WEAR * rng.random::<f64>();
+        for (p, x) in parameters.iter().zip(truth) {
+            if p.name.ends_with("_friction") {
+                *x *= factor;
+            }
+        }
+    }
+
+    fn exploration(&self) -> &ExplorationProtocol {
+        &self.exploration
+    }
+
+    fn downstream(&self) -> &DownstreamProtocol {
+        &self.downstream
+    }
+
+    fn place(&self, layout: &Layout, start: &[f64], qpos: &mut [f64]) -> Result<()> {
+        let at = layout.joint("puck_free")?.qpos;
+        let half = start[2] / 2.0;
+        let pose = [
+            start[0],
+            start[1],
+            PUCK_REST_HEIGHT,
+            half.cos(),
+            0.0,
+            0.0,
+            half.sin(),
+        ];
+        qpos[at..at + 7].copy_from_slice(&pose);
+        Ok(())
+    }
+
+    fn locate(&self, signals: &[f64]) -> Vec<f64> {
+        vec![signals[0], signals[1], yaw(&signals[3..7])]
+    }
+
+    fn commander(&self) -> Result<Box<dyn Commander>> {
+        Ok(Box::new(pushing::Pushing::new(&self.scene, &self.home)?))
+    }
+
+    fn attempt(&self, start: &[f64], action: &[f64]) -> Result<Vec<f64>> {
+        striking::commands(&self.scene, &self.home, start, action[0])
+    }
+
+    fn metric(&self, readings: &[f64]) -> Vec<f64> {
+        readings
+            .chunks_exact(3)
+            .map(|row| metric::zone_error(self.zone, row))
+            .collect()
+    }
+
+    fn outcome(&self, readings: &[f64]) -> Outcome {
+        metric::outcome(self.zone, readings)
+    }
+
+    /// A puck that the hand throws at 0.4 m/s, at the least friction.
+    fn bounds(&self) -> [[f64; 3]; 2] {
+        [[-0.3, -0.9, -0.02], [1.3, 0.9, 0.3]]
+    }
+
+    fn top_view(&self) -> TopView {
+        let circle = (0..24).map(|i| {
+            let (sin, cos) = (f64::from(i) * std::f64::consts::TAU / 24.0).sin_cos();
+            [PUCK_RADIUS * cos, PUCK_RADIUS * sin]
+        });
+        let zone = |z: Zone| Outline {
+            label: format!("{} zone", z.name()),
+            corners: rectangle([z.middle(), 0.0], [metric::ZONE_HALF, LANE_HALF[1]]),
+        };
+        TopView {
+            object: Outline {
+                label: "puck".into(),
+                corners: circle.collect(),
+            },
+            fixtures: vec![
+                Outline {
+                    label: "board".into(),
+                    corners: rectangle(LANE, LANE_HALF),
+                },
+                zone(Zone::Near),
+                zone(Zone::Far),
+            ],
+            bounds: [[0.1, -0.25], [1.25, 0.25]],
+        }
+    }
+}
+
+/// Corners of an axis-aligned rectangle.
+fn rectangle([x, y]: [f64; 2], [a, b]: [f64; 2]) -> Vec<[f64; 2]> {
+    vec![
+        [x - a, y - b],
+        [x + a, y - b],
+        [x + a, y + b],
+        [x - a, y + b],
+    ]
+}
