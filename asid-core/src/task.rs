@@ -153,6 +153,15 @@ pub struct TopView {
     pub bounds: [[f64; 2]; 2],
 }
 
+/// A part whose pose is tracked.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TrackedPart {
+    /// Sensor of its position.
+    pub position: String,
+    /// Sensor of its orientation.
+    pub orientation: String,
+}
+
 /// Turns exploration actions into commands of the actuators, feed-forward.
 pub trait Commander: Send {
     /// Back to the start of an episode.
@@ -204,6 +213,11 @@ pub trait Task: Send + Sync {
     fn metric(&self, readings: &[f64]) -> Vec<f64>;
     /// What came of an attempt.
     fn outcome(&self, readings: &[f64]) -> Outcome;
+    /// The two tracked parts whose joint is in question, the one that holds first; `None`
+    /// where there are no such parts.
+    fn parts(&self) -> Option<[TrackedPart; 2]> {
+        None
+    }
     /// What a picture from above shows.
     fn top_view(&self) -> TopView {
         TopView::default()

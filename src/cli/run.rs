@@ -9,7 +9,7 @@ use asid_core::registry::{ExplorerEntry, IdentifierEntry, SolverEntry, find};
 
 use super::options::{Algorithms, Common, Real};
 use super::output::{OutFolder, write_json, write_text};
-use super::result::RunResult;
+use super::result::{RunResult, articulation_line};
 use super::session::Session;
 use super::trace;
 
@@ -39,8 +39,11 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let truth = session.truth();
     let outcome = pipeline(&session, &truth)?;
     let wall_s = clock.elapsed().as_secs_f64();
-    let result = RunResult::new(&session, &truth, &outcome, wall_s);
-    let report = trace::run_report(&session, &truth, &outcome, wall_s, command_line())?;
+    let result = RunResult::new(&session, &truth, &outcome, wall_s)?;
+    let mut report = trace::run_report(&session, &truth, &outcome, wall_s, command_line())?;
+    report
+        .notes
+        .extend(result.articulation.as_ref().map(articulation_line));
     out.write(|folder| {
         write_json(&folder.join("result.json"), &result)?;
         write_text(
@@ -66,6 +69,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             "{}: {:.4} ± {:.4} {} (95 %: {:.4} to {:.4}), truth {t:.4}",
             m.name, m.estimate, m.std, m.unit, m.interval95[0], m.interval95[1]
         )?;
+    }
+    if let Some(found) = &result.articulation {
+        writeln!(stdout, "{}", articulation_line(found))?;
     }
     let protocol = session.task.downstream();
     let attempt = &outcome.attempt.outcome;
