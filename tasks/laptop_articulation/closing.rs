@@ -17,7 +17,7 @@ const BEHIND: f64 = 0.10;
 /// Phases of the motion: name and seconds.
 const PHASES: [(&str, f64); 5] = [
     ("approach", 0.9),
-    ("push", 1.0),
+    ("push", 1.4),
     ("hold", 0.1),
     ("retreat", 0.5),
     ("wait", 0.3),

@@ -133,6 +133,8 @@ impl Task for LaptopArticulation {
             | Capabilities::CONTACT
             | Capabilities::ACTUATORS
             | Capabilities::JOINT_FRICTION
+            | Capabilities::JOINT_IMPEDANCE
+            | Capabilities::MASS_PARAMETERS
     }
 
     fn parameters(&self) -> Vec<Parameter> {
