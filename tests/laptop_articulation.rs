@@ -10,8 +10,10 @@ use asid::core::episode::ChannelColumns;
 use asid::core::fisher::FisherSettings;
 use asid::core::pipeline::episode_information;
 use asid::core::progress::Silent;
-use asid::core::registry::{BackendEntry, TaskEntry, all, find};
+use asid::core::registry::{BackendEntry, IdentifierEntry, TaskEntry, all, find};
+use asid::core::signal::SignalSet;
 use asid::core::{Backend, Control, Episode, Parameter, Problem, Rollout, Streams};
+use rand::Rng as _;
 
 /// Calls `check` with a problem for each engine.
 fn on_every_engine(check: impl Fn(&str, &Problem<'_>)) {
@@ -166,5 +168,47 @@ fn start_poses_are_located_from_what_is_placed() {
                 assert!((a - b).abs() < 1e-5, "{engine}: {a} {b}");
             }
         }
+    });
+}
+
+#[test]
+fn an_episode_without_contact_leaves_the_question_open() {
+    on_every_engine(|engine, problem| {
+        let layout = problem.model.layout();
+        let start: Vec<f64> = (problem.task.exploration().start.iter())
+            .map(|c| c.center())
+            .collect();
+        let names: Vec<String> = problem.signals.iter().map(|s| s.sensor.clone()).collect();
+        let recording = layout.recording(&names).unwrap();
+        let mut batch = problem.batch(1).unwrap();
+        batch.set_parameters(&[0], &[1.0, 0.01]).unwrap();
+        batch.place(problem.task, &[0], &start).unwrap();
+        let mut row = vec![0.0; recording.width()];
+        batch.simulator.read(&[0], &recording, &mut row).unwrap();
+        // A few noisy looks at a laptop that nobody touches.
+        let signals = SignalSet::new(layout, problem.signals).unwrap();
+        let mut rng = problem.streams.stream("noise");
+        let readings: Vec<f64> = (0..6)
+            .flat_map(|_| {
+                let mut seen = row.clone();
+                signals.add_noise(&mut seen, || 12.0_f64.sqrt() * (rng.random::<f64>() - 0.5));
+                seen
+            })
+            .collect();
+        let episode = Episode {
+            actuators: layout.actuators.iter().map(|a| a.name.clone()).collect(),
+            ctrl: layout.keyframes[0].ctrl.repeat(6),
+            ..log(problem, &readings)
+        };
+        let settings = "population = 16\niterations = 3".parse().unwrap();
+        let identifier = (find::<IdentifierEntry>("reps").unwrap().make)(&settings).unwrap();
+        let found = identifier.identify(problem, &[episode]).unwrap();
+        // Even odds but for what the Metropolis walks' 1000 samples leave open.
+        let [articulated, offset] = &found.posterior.marginals[..] else {
+            panic!("two unknowns");
+        };
+        let p = articulated.estimate;
+        assert!((0.3..0.7).contains(&p), "{engine}: {p}");
+        assert!(offset.std > 0.009, "{engine}: {offset:?}");
     });
 }

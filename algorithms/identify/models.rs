@@ -15,7 +15,7 @@ use super::sampling::Evidence;
 const MAX_BINARY: usize = 5;
 
 /// A model this many nats behind the best after the search is not looked at any more.
-const HOPELESS: f64 = 40.0;
+const HOPELESS: f64 = 100.0;
 
 /// All combinations of the binary unknowns' values: one entry an unknown, `None` for the
 /// others. One model without any value where no unknown is binary.

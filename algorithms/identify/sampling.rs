@@ -146,7 +146,8 @@ pub fn summary(
 /// What speaks for a model.
 #[derive(Clone, Copy, Debug)]
 pub struct Evidence {
-    /// Half the sum of squared residuals at the best point.
+    /// Half the sum of squared residuals at the emulator's best point. The best of the
+    /// draws is a matter of luck, which would tell models apart that no reading tells apart.
     pub loss: f64,
     /// Logarithm of the posterior's deviations over the prior's, summed: what a model
     /// pays for unknowns that had to be found.
@@ -210,7 +211,7 @@ pub fn posterior(
         variance.sqrt().clamp(1e-9, 1.0).ln()
     });
     let evidence = Evidence {
-        loss: samples.best_loss(),
+        loss: 0.5 * emulator.residual.powi(2) * likelihood.present() as f64,
         narrowing: widths.sum(),
     };
     let episodes = (n - d) / problem.task.exploration().start.len().max(1);
