@@ -56,6 +56,14 @@ pub const CHECKS: &[Check] = &[
         measure: Figure(body_inertia),
     },
     Check {
+        name: "parameters/joint-anchor",
+        needs: Capabilities::ARTICULATION.union(MASS),
+        unit: "",
+        tolerance: ROUNDING,
+        reason: "place by geometry, and acceleration by the inertia about the new axis: rounding",
+        measure: joint_anchor,
+    },
+    Check {
         name: "parameters/joint-armature",
         needs: IMPEDANCE,
         unit: "",
@@ -127,6 +135,30 @@ fn arm(backend: &dyn Backend, parameter: (&str, f64)) -> Result<[f64; 2]> {
 fn arm_theory(m: f64, r: f64) -> f64 {
     let near = 0.04 + 0.4 * 0.05 * 0.05;
     G * (0.2 + m * r) / (near + m * (r * r + 0.4 * 0.02 * 0.02))
+}
+
+/// A level bar whose hinge moves along it, turned by a right angle and then let go.
+fn joint_anchor(backend: &dyn Backend) -> Result<f64> {
+    let inside = r#"<worldbody><body name="bar" pos="0 0 1"><joint name="j" axis="0 1 0"/>
+      <geom type="sphere" size=".05" pos=".4 0 0" mass="1" contype="0" conaffinity="0"/></body></worldbody>
+      <sensor><framepos name="at" objtype="xbody" objname="bar"/></sensor>"#;
+    let anchor = ("joint/j/pos/0", 0.1);
+    let mut rig = pair(backend, inside, &["qvel.j", "at"], &[anchor])?;
+    let fall = |arm: f64| G * arm / (arm * arm + 0.4 * 0.05 * 0.05);
+    let rows = rig.run(1, &[])?;
+    let falls = both(
+        [rows[0][0] / STEP, rows[1][0] / STEP],
+        [fall(0.4), fall(0.3)],
+    );
+    // The axis at x = 0.1 stays; the body's origin, 0.1 m behind it, goes up by that.
+    let quarter = std::f64::consts::FRAC_PI_2;
+    rig.simulator.set_state(&[0, 1], &[quarter; 2], &[0.0; 2])?;
+    let mut at = vec![0.0; 2 * rig.record.width()];
+    rig.simulator.read(&[0, 1], &rig.record, &mut at)?;
+    let wanted = [[0.0, 0.0, 1.0], [0.1, 0.0, 1.1]].concat();
+    let found = [&at[1..4], &at[5..8]].concat();
+    let places = found.iter().zip(wanted).map(|(a, b)| (a - b).abs());
+    Ok(largest(places.chain([falls])))
 }
 
 fn geom_position(backend: &dyn Backend) -> Result<f64> {

@@ -67,7 +67,7 @@ impl Identifier for CemIdentifier {
             episodes,
             self.budget(),
             &self.sampling,
-            |mean, std, low, high| Cem::new(settings, mean, std, low, high),
+            |mean, std, low, high| Cem::new(settings.clone(), mean, std, low, high),
         )
     }
 }

@@ -1,7 +1,7 @@
 //! The likelihood of real episodes under a simulator.
 //!
-//! A point of the search space is `[z, s_1, s_2, …]`: the unknowns in prior-scaled
-//! coordinates, then the start pose of each episode as an offset from what its
+//! A point of the search space is `[z, s_1, s_2, …]`: the unknowns (but for those that
+//! are held at a value) in prior-scaled coordinates, then the start pose of each episode as an offset from what its
 //! first reading shows, in standard deviations of that reading. The episode's
 //! commands are replayed from there; what differs from the readings, divided by
 //! their noise, is the whitened residual.
@@ -35,6 +35,8 @@ pub struct Likelihood<'a> {
     episodes: Vec<Observed>,
     predicted: Vec<f64>,
     present: usize,
+    /// Values of the unknowns that are not searched for.
+    fixed: Vec<Option<f64>>,
 }
 
 impl<'a> Likelihood<'a> {
@@ -104,6 +106,7 @@ impl<'a> Likelihood<'a> {
             episodes: observed,
             predicted: Vec::new(),
             present,
+            fixed: vec![None; problem.parameters.len()],
             problem,
         })
     }
@@ -114,16 +117,27 @@ impl<'a> Likelihood<'a> {
         self.size
     }
 
+    /// Holds some unknowns at a value: they are no entries of a point any more.
+    pub fn hold(&mut self, values: &[Option<f64>]) {
+        self.fixed.copy_from_slice(values);
+    }
+
+    /// Unknowns that are entries of a point.
+    #[must_use]
+    pub fn sought(&self) -> usize {
+        self.fixed.iter().filter(|f| f.is_none()).count()
+    }
+
     /// Entries of a point.
     #[must_use]
     pub fn dimension(&self) -> usize {
-        self.problem.parameters.len() + self.episodes.iter().map(|e| e.start.len()).sum::<usize>()
+        self.sought() + self.episodes.iter().map(|e| e.start.len()).sum::<usize>()
     }
 
     /// Smallest and largest value of each entry.
     #[must_use]
     pub fn bounds(&self) -> (Vec<f64>, Vec<f64>) {
-        let d = self.problem.parameters.len();
+        let d = self.sought();
         let high: Vec<f64> = (0..self.dimension())
             .map(|i| {
                 if i < d {
@@ -145,11 +159,12 @@ impl<'a> Likelihood<'a> {
     /// The unknowns at a point, in their units.
     #[must_use]
     pub fn parameters(&self, point: &[f64]) -> Vec<f64> {
+        let mut free = point.iter();
         self.problem
             .parameters
             .iter()
-            .zip(point)
-            .map(|(p, z)| p.from_scaled(*z))
+            .zip(&self.fixed)
+            .filter_map(|(p, fixed)| fixed.or_else(|| free.next().map(|z| p.from_scaled(*z))))
             .collect()
     }
 
@@ -157,7 +172,7 @@ impl<'a> Likelihood<'a> {
     #[must_use]
     pub fn start(&self, point: &[f64], k: usize) -> Vec<f64> {
         let before: usize = self.episodes[..k].iter().map(|e| e.start.len()).sum();
-        let from = self.problem.parameters.len() + before;
+        let from = self.sought() + before;
         let e = &self.episodes[k];
         e.start
             .iter()

@@ -5,9 +5,11 @@
 //! they predict, give a posterior. The interval comes from the likelihood, never from
 //! the spread of an elite, which measures only how far a search has converged.
 
+pub mod articulation;
 pub mod cem;
 pub mod emulator;
 pub mod likelihood;
+pub mod models;
 pub mod reps;
 pub mod sampling;
 pub mod search;

@@ -67,7 +67,7 @@ impl Identifier for RepsIdentifier {
             episodes,
             self.budget(),
             &self.sampling,
-            |mean, std, low, high| Reps::new(settings, mean, std, low, high),
+            |mean, std, low, high| Reps::new(settings.clone(), mean, std, low, high),
         )
     }
 }

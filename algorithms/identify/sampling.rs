@@ -143,7 +143,18 @@ pub fn summary(
     }
 }
 
-/// Rounds of draws after a search, and the posterior.
+/// What speaks for a model.
+#[derive(Clone, Copy, Debug)]
+pub struct Evidence {
+    /// Half the sum of squared residuals at the emulator's best point. The best of the
+    /// draws is a matter of luck, which would tell models apart that no reading tells apart.
+    pub loss: f64,
+    /// Logarithm of the posterior's deviations over the prior's, summed: what a model
+    /// pays for unknowns that had to be found.
+    pub narrowing: f64,
+}
+
+/// Rounds of draws after a search, the posterior, and what speaks for it.
 ///
 /// # Errors
 /// When the engine fails or nearly every simulation diverged.
@@ -154,10 +165,10 @@ pub fn posterior(
     mut samples: Samples,
     mut iterations: Vec<IterationSummary>,
     rng: &mut Rng,
-) -> Result<Identified> {
+) -> Result<(Identified, Evidence)> {
     let (low, high) = likelihood.bounds();
     let n = likelihood.dimension();
-    let d = problem.parameters.len();
+    let d = likelihood.sought();
     let too_few = || Error::Failed("nearly every simulation of the episode diverged".into());
     if samples.points.len() < 2 {
         return Err(too_few());
@@ -193,12 +204,23 @@ pub fn posterior(
     let (emulator, drawn) = found.ok_or_else(too_few)?;
     let best = emulator.best();
     let values: Vec<Vec<f64>> = drawn.iter().map(|p| likelihood.parameters(p)).collect();
+    let widths = (0..d).map(|i| {
+        let column = drawn.iter().map(|p| p[i]);
+        let mean = column.clone().sum::<f64>() / drawn.len() as f64;
+        let variance = column.map(|z| (z - mean).powi(2)).sum::<f64>() / drawn.len() as f64;
+        variance.sqrt().clamp(1e-9, 1.0).ln()
+    });
+    let evidence = Evidence {
+        loss: 0.5 * emulator.residual.powi(2) * likelihood.present() as f64,
+        narrowing: widths.sum(),
+    };
     let episodes = (n - d) / problem.task.exploration().start.len().max(1);
-    Ok(Identified {
+    let identified = Identified {
         posterior: Posterior::from_samples(problem.parameters, values, &vec![1.0; drawn.len()]),
         starts: (0..episodes).map(|k| likelihood.start(&best, k)).collect(),
         iterations,
         residual: emulator.residual,
         roughness: emulator.roughness,
-    })
+    };
+    Ok((identified, evidence))
 }

@@ -6,6 +6,7 @@ use asid_core::rng::Rng;
 use asid_core::{Episode, Error, Problem, Result};
 
 use super::Likelihood;
+use super::models;
 use super::sampling::{self, Samples, SamplingSettings};
 use crate::optimise::{Cem, Reps};
 
@@ -73,6 +74,9 @@ impl Budget {
 /// Searches with what `start` makes of the first mean, deviations and bounds, then
 /// samples the posterior.
 ///
+/// Binary unknowns make several models, which are searched one by one and compared; see
+/// [`super::models`].
+///
 /// # Errors
 /// When the engine fails or nearly every simulation diverged.
 pub fn identify<S: Search>(
@@ -80,34 +84,53 @@ pub fn identify<S: Search>(
     episodes: &[Episode],
     budget: Budget,
     settings: &SamplingSettings,
-    start: impl FnOnce(&[f64], &[f64], &[f64], &[f64]) -> S,
+    start: impl Fn(&[f64], &[f64], &[f64], &[f64]) -> S,
 ) -> Result<Identified> {
     let size = budget.population.max(settings.draws);
     let mut likelihood = Likelihood::new(problem, episodes, size)?;
-    let (low, high) = likelihood.bounds();
-    let n = likelihood.dimension();
-    let mut search = start(&vec![0.0; n], &vec![1.0; n], &low, &high);
-    let mut rng = problem.streams.stream("identify");
-    let mut samples = Samples::default();
-    let mut iterations = Vec::new();
-    let total = budget.iterations + settings.rounds;
+    let models = models::all(problem.parameters)?;
+    let total = (budget.iterations + settings.rounds) * models.len();
     problem.progress.begin("identify", total as u64);
-    for _ in 0..budget.iterations {
-        let points = search.ask(budget.population, &mut rng);
-        let residuals = likelihood.residuals(&points)?;
-        let losses = samples.add(&points, residuals);
-        search.tell(&points, &losses);
-        iterations.push(sampling::summary(&likelihood, &points, samples.best_loss()));
-        problem.progress.advance(1);
+    let mut searched = Vec::with_capacity(models.len());
+    for model in models {
+        likelihood.hold(&model);
+        let (low, high) = likelihood.bounds();
+        let n = likelihood.dimension();
+        let mut search = start(&vec![0.0; n], &vec![1.0; n], &low, &high);
+        // The same draws for every model: where the data tell nothing, so does the comparison.
+        let mut rng = problem.streams.stream("identify");
+        let mut samples = Samples::default();
+        let mut iterations = Vec::new();
+        for _ in 0..budget.iterations {
+            let points = search.ask(budget.population, &mut rng);
+            let residuals = likelihood.residuals(&points)?;
+            let losses = samples.add(&points, residuals);
+            search.tell(&points, &losses);
+            iterations.push(sampling::summary(&likelihood, &points, samples.best_loss()));
+            problem.progress.advance(1);
+        }
+        searched.push((model, samples, iterations, rng));
     }
-    let found = sampling::posterior(
-        problem,
-        &mut likelihood,
-        settings,
-        samples,
-        iterations,
-        &mut rng,
+    let scale = models::Scale::new(
+        searched.iter().map(|s| s.1.best_loss()),
+        likelihood.present(),
     );
+    let mut found = Vec::with_capacity(searched.len());
+    for (model, samples, iterations, mut rng) in searched {
+        if scale.is_hopeless(samples.best_loss()) {
+            problem.progress.advance(settings.rounds as u64);
+            continue;
+        }
+        likelihood.hold(&model);
+        found.push(sampling::posterior(
+            problem,
+            &mut likelihood,
+            settings,
+            samples,
+            iterations,
+            &mut rng,
+        )?);
+    }
     problem.progress.end();
-    found
+    models::average(problem.parameters, found, likelihood.present())
 }

@@ -232,7 +232,13 @@ impl<'a> FisherBatch<'a> {
                     if let Some(parameter) = self.problem.parameters.get(entry) {
                         let bound = Parameter::scaled_bound();
                         let z = parameter.to_scaled(t[entry]);
-                        let moved = (z + sign * self.settings.delta).clamp(-bound, bound);
+                        // A binary unknown's copies are the two models, one prior
+                        // deviation either side of their mean.
+                        let moved = if parameter.is_binary() {
+                            sign
+                        } else {
+                            (z + sign * self.settings.delta).clamp(-bound, bound)
+                        };
                         t[entry] = parameter.from_scaled(moved);
                         taken += sign * moved;
                     } else {
@@ -361,7 +367,12 @@ impl<'a> FisherBatch<'a> {
             for k in 0..rows {
                 self.jacobian[entry * rows + k] = self.difference[k] / step;
             }
-            if self.settings.roughness {
+            let binary = self
+                .problem
+                .parameters
+                .get(entry)
+                .is_some_and(Parameter::is_binary);
+            if self.settings.roughness && !binary {
                 // up + down - 2 middle: nothing on a straight line, luck and curvature otherwise.
                 self.signals.difference(up, row(0), &mut self.difference);
                 self.signals.difference(row(0), down, &mut self.below);

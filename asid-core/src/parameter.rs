@@ -12,7 +12,7 @@ use crate::rng::Rng;
 use crate::target::Target;
 
 /// Scale on which a parameter is uniform a priori and on which steps are taken.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Scale {
     /// As it is.
@@ -20,6 +20,9 @@ pub enum Scale {
     Linear,
     /// Its logarithm.
     Log,
+    /// Two models, 0 and 1, each as likely as the other: what the targets are set to in
+    /// the first and in the second. The range is `[0, 1]`; a value of 0.5 or more is the second.
+    Binary([f64; 2]),
 }
 
 /// A named unknown with a uniform prior over its range, on its scale.
@@ -69,6 +72,13 @@ impl Parameter {
                 "range [{low}, {high}] must be positive on a log scale"
             ));
         }
+        if let Scale::Binary([off, on]) = self.scale
+            && (self.range != [0.0, 1.0] || !off.is_finite() || !on.is_finite() || off == on)
+        {
+            return fail(format!(
+                "is binary: its range must be [0, 1], not [{low}, {high}], and its two settings finite and different"
+            ));
+        }
         if self.targets.is_empty() {
             return fail("has no target".into());
         }
@@ -82,6 +92,7 @@ impl Parameter {
         match self.scale {
             Scale::Linear => low + u * (high - low),
             Scale::Log => (low.ln() + u * (high / low).ln()).exp(),
+            Scale::Binary(_) => f64::from(u8::from(u >= 0.5)),
         }
     }
 
@@ -90,7 +101,7 @@ impl Parameter {
     pub fn to_unit(&self, value: f64) -> f64 {
         let [low, high] = self.range;
         match self.scale {
-            Scale::Linear => (value - low) / (high - low),
+            Scale::Linear | Scale::Binary(_) => (value - low) / (high - low),
             Scale::Log => (value / low).ln() / (high / low).ln(),
         }
     }
@@ -98,13 +109,39 @@ impl Parameter {
     /// Prior-scaled coordinate of a value: zero mean, unit deviation under the prior.
     #[must_use]
     pub fn to_scaled(&self, value: f64) -> f64 {
-        (self.to_unit(value) - 0.5) / UNIFORM_STD
+        (self.to_unit(value) - 0.5) / self.unit_std()
+    }
+
+    /// Whether it has two values only.
+    #[must_use]
+    pub fn is_binary(&self) -> bool {
+        matches!(self.scale, Scale::Binary(_))
+    }
+
+    /// What its targets are set to at a value: the value itself, but for a binary one.
+    #[must_use]
+    pub fn setting(&self, value: f64) -> f64 {
+        match self.scale {
+            Scale::Binary([off, on]) => {
+                if value >= 0.5 {
+                    on
+                } else {
+                    off
+                }
+            }
+            Scale::Linear | Scale::Log => value,
+        }
+    }
+
+    /// Prior standard deviation of the fraction of the range.
+    fn unit_std(&self) -> f64 {
+        if self.is_binary() { 0.5 } else { UNIFORM_STD }
     }
 
     /// Value at a prior-scaled coordinate, clamped to the range.
     #[must_use]
     pub fn from_scaled(&self, z: f64) -> f64 {
-        self.from_unit((z * UNIFORM_STD + 0.5).clamp(0.0, 1.0))
+        self.from_unit((z * self.unit_std() + 0.5).clamp(0.0, 1.0))
     }
 
     /// Largest prior-scaled coordinate; the smallest is its negative.
@@ -124,9 +161,9 @@ impl Parameter {
     pub fn unscale_std(&self, value: f64, scaled: f64) -> f64 {
         let [low, high] = self.range;
         scaled
-            * UNIFORM_STD
+            * self.unit_std()
             * match self.scale {
-                Scale::Linear => high - low,
+                Scale::Linear | Scale::Binary(_) => high - low,
                 Scale::Log => value * (high / low).ln(),
             }
     }
@@ -178,6 +215,22 @@ mod tests {
                 assert!((p.to_unit(x) - u).abs() < 1e-12);
                 assert!((p.from_scaled(p.to_scaled(x)) - x).abs() < 1e-12);
             }
+        }
+    }
+
+    #[test]
+    fn a_binary_parameter_is_one_of_two_settings() {
+        let p = parameter([0.0, 1.0], Scale::Binary([7.0, 0.2]));
+        assert!(p.check().is_ok());
+        assert_eq!([p.setting(0.0), p.setting(1.0)], [7.0, 0.2]);
+        // Mean 1/2 and deviation 1/2: the two models lie one prior deviation either side.
+        assert_eq!([p.to_scaled(0.0), p.to_scaled(1.0)], [-1.0, 1.0]);
+        assert_eq!([p.from_scaled(-0.2), p.from_scaled(0.2)], [0.0, 1.0]);
+        let mut rng = Streams::new(2).stream("t");
+        let ones = (0..2000).filter(|_| p.sample(&mut rng) == 1.0).count();
+        assert!((900..1100).contains(&ones), "{ones}");
+        for (range, settings) in [([0.0, 2.0], [0.0, 1.0]), ([0.0, 1.0], [3.0, 3.0])] {
+            assert!(parameter(range, Scale::Binary(settings)).check().is_err());
         }
     }
 

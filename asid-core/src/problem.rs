@@ -53,7 +53,7 @@ impl Problem<'_> {
             targets,
         })?;
         Ok(Batch {
-            repeats: self.parameters.iter().map(|p| p.targets.len()).collect(),
+            parameters: self.parameters.to_vec(),
             home: home(self.model.layout()),
             columns: Vec::new(),
             simulator,
@@ -121,7 +121,7 @@ pub fn home(layout: &Layout) -> (Vec<f64>, Vec<f64>) {
 pub struct Batch {
     /// The simulator.
     pub simulator: Box<dyn Simulator>,
-    repeats: Vec<usize>,
+    parameters: Vec<Parameter>,
     home: (Vec<f64>, Vec<f64>),
     columns: Vec<f64>,
 }
@@ -132,11 +132,12 @@ impl Batch {
     /// # Errors
     /// As [`Simulator::set_parameters`].
     pub fn set_parameters(&mut self, sims: &[usize], values: &[f64]) -> Result<()> {
-        let d = self.repeats.len();
+        let d = self.parameters.len();
         self.columns.clear();
         for row in values.chunks_exact(d.max(1)) {
-            for (&x, &times) in row.iter().zip(&self.repeats) {
-                self.columns.extend(std::iter::repeat_n(x, times));
+            for (&x, p) in row.iter().zip(&self.parameters) {
+                self.columns
+                    .extend(std::iter::repeat_n(p.setting(x), p.targets.len()));
             }
         }
         self.simulator.set_parameters(sims, &self.columns)

@@ -19,6 +19,7 @@ use crate::error::{Error, Result};
 /// | `body/NAME/mass` | mass, the inertia scaled with it | kg |
 /// | `body/NAME/ipos/{0,1,2}` | centre of mass in its body | m |
 /// | `body/NAME/inertia/{0,1,2}` | principal moments | kg m² |
+/// | `joint/NAME/pos/{0,1,2}` | anchor of a hinge in its body; joint coordinates stay | m |
 /// | `joint/NAME/damping`, `frictionloss`, `stiffness`, `armature` | of each degree of freedom | SI |
 /// | `actuator/NAME/kp`, `kv`, `gear` | gains of a servo, ratio of a drive | SI |
 /// | `option/gravity/{0,1,2}` | gravity | m/s² |

@@ -175,6 +175,15 @@ pub struct TopView {
     pub bounds: [[f64; 2]; 2],
 }
 
+/// A part whose pose is tracked.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TrackedPart {
+    /// Sensor of its position.
+    pub position: String,
+    /// Sensor of its orientation.
+    pub orientation: String,
+}
+
 /// Turns exploration actions into commands of the actuators, feed-forward.
 pub trait Commander: Send {
     /// Back to the start of an episode.
@@ -241,6 +250,11 @@ pub trait Task: Send + Sync {
     /// explored, low then high, m.
     fn bounds(&self) -> [[f64; 3]; 2] {
         [[-1.5, -1.5, -0.1], [1.5, 1.5, 1.5]]
+    }
+    /// The two tracked parts whose joint is in question, the one that holds first; `None`
+    /// where there are no such parts.
+    fn parts(&self) -> Option<[TrackedPart; 2]> {
+        None
     }
     /// What a picture from above shows.
     fn top_view(&self) -> TopView {

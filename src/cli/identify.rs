@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use anyhow::Result;
+use asid_algorithms::identify::articulation::Articulation;
 use asid_core::identify::Identified;
 use asid_core::registry::{IdentifierEntry, find};
 use asid_core::{Episode, Error, Parameter};
@@ -14,7 +15,9 @@ use serde::Serialize;
 use super::config::Stage;
 use super::options::{Algorithms, Common, Real};
 use super::output::{OutFolder, write_json};
-use super::result::{CostResult, ParameterResult, SCHEMA, Versions, figure};
+use super::result::{
+    CostResult, ParameterResult, SCHEMA, Versions, articulation, articulation_line, figure,
+};
 use super::session::Session;
 use super::{failure, stage, trace};
 
@@ -57,6 +60,8 @@ struct IdentifyResult {
     identifier: String,
     seed: u64,
     parameters: Vec<ParameterResult>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    articulation: Option<Articulation>,
     /// Root mean square of the residuals at the best fit, in standard deviations of the noise.
     residual: f64,
     /// Start pose of each episode at the best fit.
@@ -109,6 +114,7 @@ pub fn identify(arguments: &Arguments) -> Result<()> {
             .iter()
             .map(|m| ParameterResult::new(m, None))
             .collect(),
+        articulation: articulation(&session, &episodes)?,
         residual: found.residual,
         starts: found
             .starts
@@ -136,12 +142,16 @@ pub fn identify(arguments: &Arguments) -> Result<()> {
             )
         })
         .collect();
+    lines.extend(result.articulation.as_ref().map(articulation_line));
     lines.push(format!(
         "residual: {:.2} times the sensors' noise",
         found.residual
     ));
     let names = copies(arguments.log.len());
-    let report = report(&session, &episodes, &found, &names, wall_s)?;
+    let mut report = report(&session, &episodes, &found, &names, wall_s)?;
+    report
+        .notes
+        .extend(result.articulation.as_ref().map(articulation_line));
     stage::finish(&session, common, &out, &result, &report, &lines, |folder| {
         write_json(&folder.join("posterior.json"), &found.posterior)?;
         for (path, name) in arguments.log.iter().zip(&names) {

@@ -1,7 +1,9 @@
 //! `result.json`.
 
+use asid_algorithms::identify::articulation::{Articulation, Joint, of_episodes};
 use asid_core::pipeline::{EpisodeInformation, RunOutcome};
 use asid_core::posterior::Marginal;
+use asid_core::{Episode, Result};
 use serde::Serialize;
 
 use super::session::Session;
@@ -111,15 +113,30 @@ pub struct RunResult {
     seed: u64,
     parameters: Vec<ParameterResult>,
     exploration: ExplorationResult,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub articulation: Option<Articulation>,
     downstream: DownstreamResult,
     cost: CostResult,
     versions: Versions,
 }
 
 impl RunResult {
-    pub fn new(session: &Session, truth: &[f64], outcome: &RunOutcome, wall_s: f64) -> Self {
+    /// What came of a run.
+    ///
+    /// # Errors
+    /// When the task's tracked parts do not make sense.
+    pub fn new(
+        session: &Session,
+        truth: &[f64],
+        outcome: &RunOutcome,
+        wall_s: f64,
+    ) -> Result<Self> {
         let config = &session.config;
-        Self {
+        let episodes = outcome
+            .real
+            .as_ref()
+            .map(|r| std::slice::from_ref(&r.episode));
+        Ok(Self {
             schema: SCHEMA,
             task: config.task.clone(),
             backend: config.backend.clone(),
@@ -139,6 +156,7 @@ impl RunResult {
                 &outcome.information,
                 outcome.real.as_ref().map_or(0.0, |r| r.contact_fraction),
             ),
+            articulation: articulation(session, episodes.unwrap_or_default())?,
             downstream: DownstreamResult {
                 metric: session.task.downstream().metric.clone(),
                 value: outcome.attempt.outcome.value,
@@ -146,6 +164,34 @@ impl RunResult {
             },
             cost: session.cost(wall_s),
             versions: Versions::of(session),
-        }
+        })
     }
+}
+
+/// How the task's two tracked parts are joined, from real episodes; `None` where it has no
+/// such parts or there is no episode.
+pub fn articulation(session: &Session, episodes: &[Episode]) -> Result<Option<Articulation>> {
+    if episodes.is_empty() {
+        return Ok(None);
+    }
+    let layout = session.model.layout();
+    of_episodes(&*session.task, layout, &session.signals, episodes)
+}
+
+/// `revolute joint (100 %), axis …, origin …` of an articulation, for people.
+pub fn articulation_line(found: &Articulation) -> String {
+    let (name, p) = match found.joint {
+        Joint::Rigid => ("rigid", found.probability[0]),
+        Joint::Revolute => ("revolute", found.probability[1]),
+        Joint::Prismatic => ("prismatic", found.probability[2]),
+    };
+    let vector = |v: &[f64; 3]| format!("({:.3}, {:.3}, {:.3})", v[0], v[1], v[2]);
+    let mut line = format!("joint of the tracked parts: {name} ({:.1} %)", 100.0 * p);
+    if let Some(axis) = &found.axis {
+        line += &format!(", axis {}", vector(axis));
+    }
+    if let Some(origin) = &found.origin {
+        line += &format!(" through {} m", vector(origin));
+    }
+    line
 }

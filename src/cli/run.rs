@@ -9,7 +9,7 @@ use asid_core::registry::{ExplorerEntry, IdentifierEntry, SolverEntry, find};
 
 use super::options::{Algorithms, Common, Real};
 use super::output::{OutFolder, write_json, write_text};
-use super::result::{RunResult, figure};
+use super::result::{RunResult, articulation_line, figure};
 use super::session::Session;
 use super::trace;
 
@@ -39,8 +39,11 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let truth = session.truth();
     let outcome = pipeline(&session, &truth)?;
     let wall_s = clock.elapsed().as_secs_f64();
-    let result = RunResult::new(&session, &truth, &outcome, wall_s);
-    let report = trace::run_report(&session, &truth, &outcome, wall_s, command_line())?;
+    let result = RunResult::new(&session, &truth, &outcome, wall_s)?;
+    let mut report = trace::run_report(&session, &truth, &outcome, wall_s, command_line())?;
+    report
+        .notes
+        .extend(result.articulation.as_ref().map(articulation_line));
     out.write(|folder| {
         write_json(&folder.join("result.json"), &result)?;
         write_text(
@@ -68,6 +71,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             "{}: {estimate} ± {std} {} (95 %: {low} to {high}), truth {truth}",
             m.name, m.unit
         )?;
+    }
+    if let Some(found) = &result.articulation {
+        writeln!(stdout, "{}", articulation_line(found))?;
     }
     let protocol = session.task.downstream();
     let attempt = &outcome.attempt.outcome;

@@ -194,7 +194,7 @@ pub fn parameters(
                 std: m.std,
                 interval95: m.interval95,
                 prior: Some(match p.scale {
-                    Scale::Linear => r::Prior::Uniform { low, high },
+                    Scale::Linear | Scale::Binary(_) => r::Prior::Uniform { low, high },
                     Scale::Log => r::Prior::LogUniform { low, high },
                 }),
                 narrowing: std::iter::once(prior_quantiles)

@@ -7,6 +7,7 @@
 use std::ffi::CStr;
 
 use asid_core::Target;
+use asid_core::layout::{Joint, JointKind};
 use asid_core::{Error, Result};
 use mujoco_rs::mujoco_c::{mjtBias, mjtGain};
 use mujoco_rs::wrappers::mj_model::{MjModel, MjtGeomBase};
@@ -29,6 +30,7 @@ pub enum Field {
     DofDamping,
     DofFrictionloss,
     DofArmature,
+    JntPos,
     JntStiffness,
     ActuatorGainprm,
     ActuatorBiasprm,
@@ -51,6 +53,7 @@ impl Field {
             Self::DofDamping => c"dof_damping",
             Self::DofFrictionloss => c"dof_frictionloss",
             Self::DofArmature => c"dof_armature",
+            Self::JntPos => c"jnt_pos",
             Self::JntStiffness => c"jnt_stiffness",
             Self::ActuatorGainprm => c"actuator_gainprm",
             Self::ActuatorBiasprm => c"actuator_biasprm",
@@ -339,6 +342,9 @@ impl Resolver<'_> {
 
     fn joint(&self) -> Result<Column> {
         let joint = self.compiled.layout.joint(&self.target.name)?;
+        if self.target.attribute == "pos" {
+            return self.anchor(joint);
+        }
         self.index(1)?;
         let dofs = joint.qvel..joint.qvel + joint.kind.qvel_len();
         let model = self.model();
@@ -347,13 +353,7 @@ impl Resolver<'_> {
             "frictionloss" => (Field::DofFrictionloss, model.dof_frictionloss()[joint.qvel]),
             "armature" => (Field::DofArmature, model.dof_armature()[joint.qvel]),
             "stiffness" => {
-                let id = self
-                    .compiled
-                    .layout
-                    .joints
-                    .iter()
-                    .position(|j| j.name == joint.name)
-                    .unwrap_or(0);
+                let id = self.joint_id(joint);
                 let entry = (Field::JntStiffness, id, 1.0);
                 return Ok(self.column(
                     model.jnt_stiffness()[id],
@@ -361,11 +361,35 @@ impl Resolver<'_> {
                     vec![entry],
                 ));
             }
-            _ => return Err(self.no_attribute("damping, frictionloss, stiffness, armature")),
+            _ => return Err(self.no_attribute("pos, damping, frictionloss, stiffness, armature")),
         };
         let entries = dofs.map(|dof| (field, dof, 1.0)).collect();
         let mut column = self.column(nominal, Domain::NonNegative, entries);
         column.derives = field == Field::DofArmature;
+        Ok(column)
+    }
+
+    fn joint_id(&self, joint: &Joint) -> usize {
+        let joints = &self.compiled.layout.joints;
+        joints
+            .iter()
+            .position(|j| j.name == joint.name)
+            .unwrap_or(0)
+    }
+
+    /// The place of a hinge's axis.
+    fn anchor(&self, joint: &Joint) -> Result<Column> {
+        let axis = self.index(3)?;
+        if joint.kind != JointKind::Hinge {
+            return Err(parameter(
+                self.target,
+                "only the anchor of a hinge can be changed",
+            ));
+        }
+        let id = self.joint_id(joint);
+        let entry = (Field::JntPos, 3 * id + axis, 1.0);
+        let mut column = self.column(self.model().jnt_pos()[id][axis], Domain::Any, vec![entry]);
+        column.derives = true;
         Ok(column)
     }
 

@@ -232,7 +232,7 @@ impl State {
         }
     }
 
-    /// Rebuilds masses and places of geoms where they differ from `tables`.
+    /// Rebuilds masses, places of geoms and anchors of joints where they differ from `tables`.
     pub fn rebuild(&mut self, compiled: &Compiled, tables: &Tables) {
         let wanted = &tables.structure;
         if self.structure == *wanted {
@@ -284,7 +284,34 @@ impl State {
                 collider.set_position_wrt_parent(pose);
             }
         }
+        if self.structure.anchors != wanted.anchors {
+            self.anchor(compiled, &wanted.anchors);
+        }
         self.structure = wanted.clone();
+    }
+
+    /// Moves hinges' axes within their bodies; the joints' coordinates stay.
+    fn anchor(&mut self, compiled: &Compiled, wanted: &[Vector3<f64>]) {
+        for (i, joint) in compiled.joints.iter().enumerate() {
+            if self.structure.anchors[i] == wanted[i] {
+                continue;
+            }
+            let Some((multibody, id)) = joint.handle.and_then(|h| self.multibodies.get_mut(h))
+            else {
+                continue;
+            };
+            if let Some(link) = multibody.link_mut(id) {
+                let data = &mut link.joint.data;
+                let (parent, child) = (data.local_frame1, data.local_frame2);
+                let to = convert::to_vector(&wanted[i]);
+                // With the joint at zero both frames are one place.
+                let parent_from_child = parent.rotation * child.rotation.inverse();
+                data.local_frame1.translation += parent_from_child * (to - child.translation);
+                data.local_frame2.translation = to;
+            }
+            multibody.forward_kinematics(&self.bodies, true);
+            multibody.update_rigid_bodies(&mut self.bodies, true);
+        }
     }
 }
 

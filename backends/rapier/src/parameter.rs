@@ -1,6 +1,6 @@
 //! Parameters: what a target is in this engine, its value, and setting it.
 
-use asid_core::layout::Layout;
+use asid_core::layout::{JointKind, Layout};
 use asid_core::{Error, Result, Target};
 use mjcf_rs::Model;
 use mjcf_rs::extras::ActuatorKind;
@@ -98,6 +98,8 @@ pub enum Knob {
     BodyCenter(usize, usize),
     /// `body/NAME/inertia/I`.
     BodyInertia(usize, usize),
+    /// `joint/NAME/pos/I`.
+    Anchor(usize, usize),
     /// `joint/NAME/damping`.
     Damping(usize),
     /// `joint/NAME/frictionloss`.
@@ -200,7 +202,18 @@ impl Knob {
                 if slot.handle.is_none() {
                     return Err(incapable_of(target, "a free joint"));
                 }
+                let alone = layout.joints.len()
+                    == 1 + (compiled.joints.iter().enumerate())
+                        .filter(|&(i, j)| i != joint && j.body != slot.body)
+                        .count();
                 match attribute {
+                    "pos" if slot.kind != JointKind::Hinge => {
+                        return Err(bad(target, "only the anchor of a hinge can be changed"));
+                    }
+                    "pos" if !alone => {
+                        return Err(incapable_of(target, "a body with several joints"));
+                    }
+                    "pos" => Self::Anchor(joint, i),
                     "damping" => Self::Damping(joint),
                     "frictionloss" => Self::Frictionloss(joint),
                     "stiffness" if slot.kind.qvel_len() > 1 => {
@@ -211,7 +224,7 @@ impl Knob {
                     _ => {
                         return Err(unknown(
                             target,
-                            "damping, frictionloss, stiffness, armature",
+                            "pos, damping, frictionloss, stiffness, armature",
                         ));
                     }
                 }
@@ -234,6 +247,7 @@ impl Knob {
         let entries = match knob {
             Self::GeomFriction(..)
             | Self::GeomPosition(..)
+            | Self::Anchor(..)
             | Self::BodyCenter(..)
             | Self::BodyInertia(..)
             | Self::Gravity(_) => 3,
@@ -255,6 +269,7 @@ impl Knob {
             Self::BodyMass(b) => inertia(b).mass,
             Self::BodyCenter(b, i) => inertia(b).center[i],
             Self::BodyInertia(b, i) => inertia(b).moments[i],
+            Self::Anchor(j, i) => tables.structure.anchors[j][i],
             Self::Damping(j) => tables.joints[j].damping,
             Self::Frictionloss(j) => tables.joints[j].frictionloss,
             Self::Stiffness(j) => tables.joints[j].stiffness,
@@ -275,6 +290,7 @@ impl Knob {
             Self::BodyMass(b) => tables.structure.bodies[b].mass = Some(value),
             Self::BodyCenter(b, i) => tables.structure.bodies[b].center[i] = Some(value),
             Self::BodyInertia(b, i) => tables.structure.bodies[b].inertia[i] = Some(value),
+            Self::Anchor(j, i) => tables.structure.anchors[j][i] = value,
             Self::Damping(j) => tables.joints[j].damping = value,
             Self::Frictionloss(j) => tables.joints[j].frictionloss = value,
             Self::Stiffness(j) => tables.joints[j].stiffness = value,
@@ -295,6 +311,7 @@ impl Knob {
                 | Self::BodyMass(_)
                 | Self::BodyCenter(..)
                 | Self::BodyInertia(..)
+                | Self::Anchor(..)
         )
     }
 
@@ -307,7 +324,11 @@ impl Knob {
             return Err(bad(target, format!("{value} is not finite")));
         }
         match self {
-            Self::GeomPosition(..) | Self::BodyCenter(..) | Self::Gravity(_) | Self::Gear(_) => {}
+            Self::GeomPosition(..)
+            | Self::Anchor(..)
+            | Self::BodyCenter(..)
+            | Self::Gravity(_)
+            | Self::Gear(_) => {}
             Self::BodyMass(_) | Self::BodyInertia(..) if value <= 0.0 => {
                 return Err(bad(target, format!("must be positive, not {value}")));
             }

@@ -21,6 +21,8 @@ pub struct Structure {
     pub geoms: Vec<GeomValues>,
     /// What parameters set on each body directly.
     pub bodies: Vec<BodyValues>,
+    /// Anchor of each joint in its body, m.
+    pub anchors: Vec<Vector3<f64>>,
 }
 
 /// Structural values of one geom.
@@ -82,6 +84,12 @@ impl MassModel {
         let mut structure = Structure {
             geoms: Vec::new(),
             bodies: vec![BodyValues::default(); model.bodies.len()],
+            anchors: model
+                .bodies
+                .iter()
+                .flat_map(|b| &b.body.joints)
+                .map(|j| Vector3::from(j.pos))
+                .collect(),
         };
         for entry in &model.bodies {
             let first = mass_model.geoms.len();

@@ -1,0 +1,537 @@
+//! How two tracked parts are joined: rigidly, by a hinge or by a slide, and about which
+//! axis, from their tracked poses alone.
+//!
+//! The pose of the moving part in the frame of the fixed one is the same at all times
+//! (rigid), turned about an axis by an angle of its own at each time (revolute), or shifted
+//! along one (prismatic). Each kind is fitted by least squares on the readings,
+//! whitened by what the noise of both trackers makes of the relative pose: the noise of
+//! the fixed part's orientation turns the other part about it, so that position and
+//! rotation go together. Angles and shifts are eliminated for each trial of axis, origin and
+//! mean pose (variable projection; Golub and Pereyra 1973). The kind is chosen by the Bayesian
+//! information criterion, which charges every angle and shift.
+
+use asid_core::signal::{Signal, unit_quaternion};
+use asid_core::task::Task;
+use asid_core::{Episode, Error, Layout, Result};
+use nalgebra::{DMatrix, DVector, Isometry3, Matrix3, Matrix6, UnitQuaternion, Vector3, Vector6};
+use serde::{Deserialize, Serialize};
+
+/// A kind of joint.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Joint {
+    /// The parts do not move against each other.
+    Rigid,
+    /// A hinge.
+    Revolute,
+    /// A slide.
+    Prismatic,
+}
+
+/// Standard deviations of a tracker.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Noise {
+    /// Of each entry of a position, m.
+    pub position: f64,
+    /// Of each rotation angle, rad.
+    pub rotation: f64,
+}
+
+/// How two parts are joined.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Articulation {
+    /// The most probable kind.
+    pub joint: Joint,
+    /// Probability of each kind: rigid, revolute, prismatic.
+    pub probability: [f64; 3],
+    /// Unit vector along the axis in the fixed part's frame; `None` for a rigid joint.
+    pub axis: Option<[f64; 3]>,
+    /// Standard deviation of the axis, rad.
+    pub axis_std: Option<f64>,
+    /// Point of the axis nearest to the moving part, in the fixed part's frame, m; `None`
+    /// but for a revolute joint.
+    pub origin: Option<[f64; 3]>,
+    /// Standard deviation of the origin across the axis, m.
+    pub origin_std: Option<f64>,
+    /// How far the joint moved: largest less smallest angle (rad) or shift (m).
+    pub travel: f64,
+    /// Root mean square of the whitened residual.
+    pub residual: f64,
+}
+
+/// Entries of the fit besides the angles: mean pose, axis, origin.
+const POSE: usize = 6;
+
+/// Steps of the least squares.
+const STEPS: usize = 30;
+
+/// Step of the difference quotients.
+const DELTA: f64 = 1e-6;
+
+/// A relative pose and what whitens its residual.
+struct Reading {
+    pose: Isometry3<f64>,
+    whitener: Matrix6<f64>,
+}
+
+/// How the two parts that a task tracks are joined, from all readings of the episodes; `None`
+/// where it tracks no two parts.
+///
+/// # Errors
+/// When the task names sensors that are not tracked, or no row has both poses.
+pub fn of_episodes(
+    task: &dyn Task,
+    layout: &Layout,
+    signals: &[Signal],
+    episodes: &[Episode],
+) -> Result<Option<Articulation>> {
+    let Some(parts) = task.parts() else {
+        return Ok(None);
+    };
+    let noise = |name: &str| {
+        (signals.iter().find(|s| s.sensor == name))
+            .map(|s| s.noise)
+            .ok_or_else(|| Error::unknown("signal", name, signals.iter().map(|s| &*s.sensor)))
+    };
+    let mut noises = Vec::with_capacity(2);
+    for part in &parts {
+        noises.push(Noise {
+            position: noise(&part.position)?,
+            rotation: noise(&part.orientation)?,
+        });
+    }
+    let names: Vec<String> = (parts.iter())
+        .flat_map(|p| [p.position.clone(), p.orientation.clone()])
+        .collect();
+    let poses: Vec<[Isometry3<f64>; 2]> = episodes
+        .iter()
+        .flat_map(|e| {
+            let rows = e.select(layout, &names);
+            let complete = rows
+                .chunks_exact(14)
+                .filter(|r| r.iter().all(|x| x.is_finite()))
+                .map(|r| [pose(&r[..7]), pose(&r[7..])]);
+            complete.collect::<Vec<_>>()
+        })
+        .collect();
+    estimate(&poses, [noises[0], noises[1]]).map(Some)
+}
+
+/// `world_from_part` of a position and an orientation.
+fn pose(row: &[f64]) -> Isometry3<f64> {
+    Isometry3::from_parts(
+        Vector3::new(row[0], row[1], row[2]).into(),
+        unit_quaternion(&row[3..7]),
+    )
+}
+
+/// How the second part is joined to the first, from their poses in the world and the noise
+/// of each part's tracker.
+///
+/// # Errors
+/// When there are too few poses to tell.
+pub fn estimate(poses: &[[Isometry3<f64>; 2]], noise: [Noise; 2]) -> Result<Articulation> {
+    if poses.len() < 3 {
+        return Err(Error::Failed(format!(
+            "{} complete readings of both parts are too few to tell how they are joined",
+            poses.len()
+        )));
+    }
+    let readings: Vec<Reading> = poses
+        .iter()
+        .filter_map(|[fixed, moving]| Reading::new(fixed.inverse() * moving, noise))
+        .collect();
+    let fits = [Joint::Rigid, Joint::Revolute, Joint::Prismatic].map(|joint| fit(joint, &readings));
+    let best = fits.iter().map(|f| f.bic).fold(f64::INFINITY, f64::min);
+    let weights = [0, 1, 2].map(|i| (0.5 * (best - fits[i].bic)).exp());
+    let total: f64 = weights.iter().sum();
+    let [rigid, revolute, prismatic] = fits;
+    let found = [rigid, revolute, prismatic]
+        .into_iter()
+        .min_by(|a, b| a.bic.total_cmp(&b.bic))
+        .ok_or_else(|| Error::Failed("no joint fits".into()))?;
+    Ok(found.articulation(&readings, weights.map(|w| w / total)))
+}
+
+impl Reading {
+    /// `None` where the noise is zero.
+    fn new(pose: Isometry3<f64>, [fixed, moving]: [Noise; 2]) -> Option<Self> {
+        let arm = pose.translation.vector.cross_matrix();
+        let (a, b) = (fixed.rotation.powi(2), moving.rotation.powi(2));
+        let place = fixed.position.powi(2) + moving.position.powi(2);
+        let mut covariance = Matrix6::zeros();
+        let eye = Matrix3::identity();
+        covariance
+            .fixed_view_mut::<3, 3>(0, 0)
+            .copy_from(&(eye * place + arm * arm.transpose() * a));
+        covariance
+            .fixed_view_mut::<3, 3>(0, 3)
+            .copy_from(&(-arm * a));
+        covariance
+            .fixed_view_mut::<3, 3>(3, 0)
+            .copy_from(&(-arm.transpose() * a));
+        covariance
+            .fixed_view_mut::<3, 3>(3, 3)
+            .copy_from(&(eye * (a + b)));
+        let whitener = covariance.cholesky()?.l().try_inverse()?;
+        Some(Self { pose, whitener })
+    }
+
+    /// Whitened residual: this reading against a predicted pose.
+    fn residual(&self, predicted: &Isometry3<f64>) -> Vector6<f64> {
+        let shift = self.pose.translation.vector - predicted.translation.vector;
+        let turn = (self.pose.rotation * predicted.rotation.inverse()).scaled_axis();
+        self.whitener * Vector6::new(shift.x, shift.y, shift.z, turn.x, turn.y, turn.z)
+    }
+}
+
+/// Mean pose, axis and origin of a trial.
+#[derive(Clone)]
+struct Trial {
+    joint: Joint,
+    mean: Isometry3<f64>,
+    axis: Vector3<f64>,
+    origin: Vector3<f64>,
+}
+
+impl Trial {
+    fn entries(&self) -> usize {
+        match self.joint {
+            Joint::Rigid => POSE,
+            Joint::Prismatic => POSE + 2,
+            Joint::Revolute => POSE + 4,
+        }
+    }
+
+    /// The trial a step away: position and rotation of the mean, then the axis tilted and the
+    /// origin moved across it.
+    fn moved(&self, step: &[f64]) -> Self {
+        let mut out = self.clone();
+        out.mean.translation.vector += Vector3::new(step[0], step[1], step[2]);
+        let turn = Vector3::new(step[3], step[4], step[5]);
+        out.mean.rotation = UnitQuaternion::from_scaled_axis(turn) * out.mean.rotation;
+        let [u, v] = across(&self.axis);
+        if step.len() >= POSE + 2 {
+            out.axis = (self.axis + u * step[6] + v * step[7]).normalize();
+        }
+        if step.len() >= POSE + 4 {
+            out.origin += u * step[8] + v * step[9];
+        }
+        out
+    }
+
+    /// Relative pose where the joint has moved by `q` from the mean.
+    fn pose(&self, q: f64) -> Isometry3<f64> {
+        match self.joint {
+            Joint::Rigid => self.mean,
+            Joint::Prismatic => {
+                let mut pose = self.mean;
+                pose.translation.vector += self.axis * q;
+                pose
+            }
+            Joint::Revolute => {
+                let turn = UnitQuaternion::from_scaled_axis(self.axis * q);
+                let arm = self.mean.translation.vector - self.origin;
+                Isometry3::from_parts((self.origin + turn * arm).into(), turn * self.mean.rotation)
+            }
+        }
+    }
+
+    /// Residuals of all readings, the joint's coordinate chosen best for each.
+    fn residuals(&self, readings: &[Reading], q: &mut [f64]) -> DVector<f64> {
+        let mut out = DVector::zeros(6 * readings.len());
+        for (k, reading) in readings.iter().enumerate() {
+            let mut r = reading.residual(&self.pose(q[k]));
+            if self.joint != Joint::Rigid {
+                for _ in 0..4 {
+                    let slope = (reading.residual(&self.pose(q[k] + DELTA)) - r) / DELTA;
+                    let step = -slope.dot(&r) / slope.norm_squared().max(1e-12);
+                    q[k] += step;
+                    r = reading.residual(&self.pose(q[k]));
+                    if step.abs() < 1e-10 {
+                        break;
+                    }
+                }
+            }
+            out.rows_mut(6 * k, 6).copy_from(&r);
+        }
+        out
+    }
+}
+
+/// Two unit vectors across a third.
+fn across(axis: &Vector3<f64>) -> [Vector3<f64>; 2] {
+    let other = if axis.x.abs() < 0.7 {
+        Vector3::x()
+    } else {
+        Vector3::y()
+    };
+    let u = axis.cross(&other).normalize();
+    [u, axis.cross(&u)]
+}
+
+/// A fitted kind of joint.
+struct Fit {
+    trial: Trial,
+    q: Vec<f64>,
+    loss: f64,
+    bic: f64,
+    covariance: Option<DMatrix<f64>>,
+}
+
+/// The direction in which vectors spread most.
+fn principal(vectors: impl Iterator<Item = Vector3<f64>>) -> Vector3<f64> {
+    let spread: Matrix3<f64> = vectors.map(|v| v * v.transpose()).sum();
+    let eigen = spread.symmetric_eigen();
+    eigen
+        .eigenvectors
+        .column(eigen.eigenvalues.imax())
+        .into_owned()
+}
+
+/// A first trial, and the joint's coordinates in it.
+fn first(joint: Joint, readings: &[Reading]) -> (Trial, Vec<f64>) {
+    let n = readings.len() as f64;
+    let places = || readings.iter().map(|r| r.pose.translation.vector);
+    let center = places().sum::<Vector3<f64>>() / n;
+    // The mean rotation, from a reading on.
+    let mut rotation = readings[readings.len() / 2].pose.rotation;
+    for _ in 0..10 {
+        let off = |r: &Reading| (r.pose.rotation * rotation.inverse()).scaled_axis();
+        let mean = readings.iter().map(off).sum::<Vector3<f64>>() / n;
+        rotation = UnitQuaternion::from_scaled_axis(mean) * rotation;
+    }
+    let turns = || {
+        readings
+            .iter()
+            .map(|r| (r.pose.rotation * rotation.inverse()).scaled_axis())
+    };
+    let mut trial = Trial {
+        joint,
+        mean: Isometry3::from_parts(center.into(), rotation),
+        axis: Vector3::x(),
+        origin: center,
+    };
+    match joint {
+        Joint::Rigid => (trial, vec![0.0; readings.len()]),
+        Joint::Prismatic => {
+            trial.axis = principal(places().map(|p| p - center));
+            let q = places().map(|p| trial.axis.dot(&(p - center))).collect();
+            (trial, q)
+        }
+        Joint::Revolute => {
+            trial.axis = principal(turns());
+            let q: Vec<f64> = turns().map(|t| trial.axis.dot(&t)).collect();
+            // p = (1 - R) origin + R mean, linear in both; along the axis the origin is free.
+            let mut normal = nalgebra::Matrix6::<f64>::identity() * 1e-6;
+            let mut right = Vector6::zeros();
+            for (angle, p) in q.iter().zip(places()) {
+                let turn = UnitQuaternion::from_scaled_axis(trial.axis * *angle);
+                let turn = turn.to_rotation_matrix().into_inner();
+                let mut a = nalgebra::Matrix3x6::zeros();
+                a.fixed_view_mut::<3, 3>(0, 0)
+                    .copy_from(&(Matrix3::identity() - turn));
+                a.fixed_view_mut::<3, 3>(0, 3).copy_from(&turn);
+                normal += a.transpose() * a;
+                // The origin is sought as an offset from the moving part's mean place.
+                right += a.transpose() * (p - center);
+            }
+            if let Some(x) = normal.cholesky().map(|c| c.solve(&right)) {
+                trial.origin = center + Vector3::new(x[0], x[1], x[2]);
+                trial.mean.translation.vector = center + Vector3::new(x[3], x[4], x[5]);
+            }
+            (trial, q)
+        }
+    }
+}
+
+/// The best fit of a kind of joint, by Levenberg's method.
+fn fit(joint: Joint, readings: &[Reading]) -> Fit {
+    let (mut trial, mut q) = first(joint, readings);
+    let entries = trial.entries();
+    let mut residual = trial.residuals(readings, &mut q);
+    let mut loss = 0.5 * residual.norm_squared();
+    let mut damping = 1e-3;
+    let mut covariance = None;
+    for _ in 0..STEPS {
+        let mut jacobian = DMatrix::zeros(residual.len(), entries);
+        for i in 0..entries {
+            let mut step = vec![0.0; entries];
+            step[i] = DELTA;
+            let up = trial.moved(&step).residuals(readings, &mut q.clone());
+            jacobian.set_column(i, &((up - &residual) / DELTA));
+        }
+        let normal = jacobian.transpose() * &jacobian;
+        let gradient = jacobian.transpose() * &residual;
+        // What the readings do not see stays where it is.
+        let floor = DMatrix::identity(entries, entries) * 1e-6;
+        covariance = (&normal + &floor).cholesky().map(|c| c.inverse());
+        let mut scaled = &normal + floor;
+        for i in 0..entries {
+            scaled[(i, i)] += damping * normal[(i, i)];
+        }
+        let Some(step) = scaled.cholesky().map(|c| c.solve(&-gradient)) else {
+            break;
+        };
+        let next = trial.moved(step.as_slice());
+        let mut next_q = q.clone();
+        let next_residual = next.residuals(readings, &mut next_q);
+        let next_loss = 0.5 * next_residual.norm_squared();
+        if next_loss < loss {
+            let done = loss - next_loss < 1e-6;
+            (trial, q, residual, loss) = (next, next_q, next_residual, next_loss);
+            damping *= 0.2;
+            if done {
+                break;
+            }
+        } else {
+            damping *= 8.0;
+        }
+    }
+    // The mean pose already holds one coordinate.
+    let coordinates = if joint == Joint::Rigid {
+        0
+    } else {
+        readings.len() - 1
+    };
+    let data = (6 * readings.len()) as f64;
+    Fit {
+        bic: 2.0 * loss + (entries + coordinates) as f64 * data.ln(),
+        trial,
+        q,
+        loss,
+        covariance,
+    }
+}
+
+impl Fit {
+    fn articulation(self, readings: &[Reading], probability: [f64; 3]) -> Articulation {
+        let joint = self.trial.joint;
+        let deviation = |i: usize| {
+            let covariance = self.covariance.as_ref()?;
+            Some((covariance[(i, i)] + covariance[(i + 1, i + 1)]).sqrt())
+        };
+        let axis = self.trial.axis;
+        let along = axis.dot(&(self.trial.mean.translation.vector - self.trial.origin));
+        let origin = self.trial.origin + axis * along;
+        let low = self.q.iter().copied().fold(f64::INFINITY, f64::min);
+        let high = self.q.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let moves = joint != Joint::Rigid;
+        let turns = joint == Joint::Revolute;
+        Articulation {
+            joint,
+            probability,
+            axis: moves.then(|| axis.into()),
+            axis_std: if moves { deviation(POSE) } else { None },
+            origin: turns.then(|| origin.into()),
+            origin_std: if turns { deviation(POSE + 2) } else { None },
+            travel: high - low,
+            residual: (2.0 * self.loss / (6 * readings.len()) as f64).sqrt(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use asid_core::Streams;
+    use rand_distr::{Distribution, StandardNormal};
+
+    const NOISE: Noise = Noise {
+        position: 0.002,
+        rotation: 0.01,
+    };
+
+    /// Poses of two parts, the first sliding over a table, the second moved by `joint`.
+    fn tracked(seed: u64, joint: impl Fn(f64) -> Isometry3<f64>) -> Vec<[Isometry3<f64>; 2]> {
+        let mut rng = Streams::new(seed).stream("t");
+        let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
+        (0..100)
+            .map(|k| {
+                let t = f64::from(k) / 99.0;
+                let fixed = Isometry3::new(
+                    Vector3::new(0.5 + 0.05 * t, 0.1, 0.0),
+                    Vector3::z() * (0.7 + 0.2 * t),
+                );
+                [fixed, fixed * joint(t)].map(|pose| {
+                    let shift = Vector3::from_fn(|_, _| NOISE.position * normal());
+                    let turn = Vector3::from_fn(|_, _| NOISE.rotation * normal());
+                    Isometry3::from_parts(
+                        (pose.translation.vector + shift).into(),
+                        UnitQuaternion::from_scaled_axis(turn) * pose.rotation,
+                    )
+                })
+            })
+            .collect()
+    }
+
+    fn mean_pose() -> Isometry3<f64> {
+        Isometry3::new(Vector3::new(0.0, 0.05, 0.12), Vector3::x() * -1.8)
+    }
+
+    #[test]
+    fn a_hinge_is_found_with_axis_and_origin() {
+        let axis = Vector3::new(-1.0, 0.2, 0.1).normalize();
+        let origin = Vector3::new(0.0, 0.1, 0.03);
+        for seed in 0..5 {
+            // It stands still at first, as a lid before it is touched.
+            let found = estimate(
+                &tracked(seed, |t| {
+                    let angle = (2.0 * t - 1.0).max(0.0) * 0.6;
+                    let turn = UnitQuaternion::from_scaled_axis(axis * angle);
+                    let about = origin - turn * origin;
+                    Isometry3::from_parts(about.into(), turn) * mean_pose()
+                }),
+                [NOISE; 2],
+            )
+            .unwrap();
+            assert_eq!(found.joint, Joint::Revolute, "{found:?}");
+            assert!(found.probability[1] > 0.99);
+            assert!((found.travel - 0.6).abs() < 0.06, "{}", found.travel);
+            let a = Vector3::from(found.axis.unwrap());
+            let tilt = a.cross(&axis).norm().asin();
+            let off = (Vector3::from(found.origin.unwrap()) - origin)
+                .cross(&axis)
+                .norm();
+            // The deviations that it gives itself hold (4 of them), and are those of the noise.
+            let (tilt_std, off_std) = (found.axis_std.unwrap(), found.origin_std.unwrap());
+            assert!(
+                tilt < 4.0 * tilt_std && tilt_std < 0.02,
+                "{tilt} {tilt_std}"
+            );
+            assert!(off < 4.0 * off_std && off_std < 0.005, "{off} {off_std}");
+            assert!((found.residual - 1.0).abs() < 0.1, "{}", found.residual);
+        }
+    }
+
+    #[test]
+    fn a_slide_is_found_with_its_direction() {
+        let axis = Vector3::new(0.6, 0.0, 0.8);
+        let found = estimate(
+            &tracked(3, |t| {
+                let mut pose = mean_pose();
+                pose.translation.vector += axis * (0.05 * t);
+                pose
+            }),
+            [NOISE; 2],
+        )
+        .unwrap();
+        assert_eq!(found.joint, Joint::Prismatic, "{found:?}");
+        let tilt = Vector3::from(found.axis.unwrap())
+            .cross(&axis)
+            .norm()
+            .asin();
+        assert!(tilt < 4.0 * found.axis_std.unwrap(), "{found:?}");
+        assert!(found.origin.is_none());
+    }
+
+    #[test]
+    fn parts_that_move_together_are_rigid() {
+        for seed in 0..5 {
+            let found = estimate(&tracked(seed, |_| mean_pose()), [NOISE; 2]).unwrap();
+            assert_eq!(found.joint, Joint::Rigid, "{found:?}");
+            assert!(found.axis.is_none() && found.origin.is_none());
+        }
+        assert!(estimate(&[], [NOISE; 2]).is_err());
+    }
+}

@@ -1,0 +1,241 @@
+//! Laptop articulation: find whether a laptop's lid turns, and about which axis, by
+//! pushing it; then close it to a set angle.
+//!
+//! Base and lid are plates of 0.30 x 0.20 x 0.01 m. `articulated` says whether the hinge
+//! gives way to the hand or holds; `hinge_offset` is how far above the rear edge's
+//! nominal place its axis lies. The closed gripper is swept at a fixed height over the
+//! table. The task's action is how far in front of the hinge the hand stops when it
+//! closes the lid: where the lid then stands depends on the axis.
+//!
+//! Source: ASID (Memmel et al., ICLR 2024), section 5.1 and its appendix.
+
+mod closing;
+mod metric;
+mod sweeping;
+
+use asid_core::kinematics::Chain;
+use asid_core::parameter::{Parameter, Scale};
+use asid_core::signal::Signal;
+use asid_core::task::{
+    Commander, Condition, Coordinate, DownstreamProtocol, ExplorationProtocol, Outcome, Outline,
+    Task, TopView, TrackedPart,
+};
+use asid_core::{Capabilities, Error, Layout, Result, Scene};
+
+use crate::panda;
+
+/// Half sizes of base and lid: along the hinge, across it, thickness, m.
+const PLATE_HALF: [f64; 3] = [0.15, 0.1, 0.005];
+
+/// Dry friction of a hinge that holds, and of one that gives way to a hand, N m.
+const HINGE_FRICTION: [f64; 2] = [200.0, 0.3];
+
+/// Largest distance of the hinge's axis from its nominal height, m.
+const MAX_OFFSET: f64 = 0.02;
+
+/// The task.
+pub struct LaptopArticulation {
+    scene: Scene,
+    home: Vec<f64>,
+    exploration: ExplorationProtocol,
+    downstream: DownstreamProtocol,
+}
+
+asid_core::register!(TaskEntry {
+    name: "laptop-articulation",
+    about: "find whether a laptop's lid turns and about which axis, then close it to a set angle",
+    make: || Ok(Box::new(LaptopArticulation::new()?)),
+});
+
+impl LaptopArticulation {
+    /// The task with its published ranges.
+    ///
+    /// # Errors
+    /// When the scene that is built in cannot be read.
+    pub fn new() -> Result<Self> {
+        let scene = Scene::from_xml(
+            "laptop-articulation",
+            include_str!("scene.xml"),
+            &[("../panda.xml", panda::PANDA_XML)],
+        )?;
+        let description = scene.description()?;
+        let home = description
+            .keyframes
+            .first()
+            .map(|k| k.qpos[..panda::ARM_JOINTS].to_vec())
+            .ok_or_else(|| Error::Scene {
+                scene: scene.name().to_owned(),
+                message: "has no keyframe".into(),
+            })?;
+        Chain::to_site(&scene, panda::END_EFFECTOR)?;
+        let sensors = ["base_pos", "base_quat", "lid_pos", "lid_quat"];
+        let exploration = ExplorationProtocol {
+            horizon: 20,
+            frames_per_step: 5,
+            frame_period: sweeping::FRAME_PERIOD,
+            action: vec![
+                Coordinate::new("dx", "m", [-0.1, 0.1]),
+                Coordinate::new("dy", "m", [-0.1, 0.1]),
+            ],
+            start: vec![
+                Coordinate::new("x", "m", [0.45, 0.65]),
+                Coordinate::new("y", "m", [-0.1, 0.1]),
+                Coordinate::new("yaw", "rad", [0.0, std::f64::consts::PI]),
+                Coordinate::new("lid", "rad", [1.2, 2.5]),
+            ],
+            signals: sensors
+                .map(|sensor| Signal {
+                    sensor: sensor.into(),
+                    noise: if sensor.ends_with("pos") { 0.002 } else { 0.01 },
+                })
+                .into(),
+            proprioception: panda::proprioception(),
+            contact: ["finger_left", "finger_right", "hand"]
+                .map(|f| [f.into(), "lid".into()])
+                .into(),
+        };
+        let downstream = DownstreamProtocol {
+            metric: "lid_error_rad".into(),
+            unit: "rad".into(),
+            rule: "lid moved by over 0.01 rad and within 0.05 rad of 0.8 rad".into(),
+            threshold: Some(metric::MAX_ERROR),
+            frames: closing::frames(),
+            frame_period: closing::FRAME_PERIOD,
+            action: closing::action(),
+            start: closing::start(),
+            channels: sensors.map(str::to_owned).into(),
+            phases: closing::phases(),
+        };
+        Ok(Self {
+            scene,
+            home,
+            exploration,
+            downstream,
+        })
+    }
+}
+
+impl Task for LaptopArticulation {
+    fn name(&self) -> &str {
+        "laptop-articulation"
+    }
+
+    fn about(&self) -> &str {
+        "find whether a laptop's lid turns and about which axis, then close it to a set angle"
+    }
+
+    fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    fn requires(&self) -> Capabilities {
+        Capabilities::ARTICULATION
+            | Capabilities::CONTACT
+            | Capabilities::ACTUATORS
+            | Capabilities::JOINT_FRICTION
+            | Capabilities::JOINT_IMPEDANCE
+            | Capabilities::MASS_PARAMETERS
+    }
+
+    fn parameters(&self) -> Vec<Parameter> {
+        vec![
+            Parameter {
+                name: "articulated".into(),
+                targets: parse(["joint/hinge/frictionloss"]),
+                range: [0.0, 1.0],
+                scale: Scale::Binary(HINGE_FRICTION),
+                unit: String::new(),
+            },
+            Parameter {
+                name: "hinge_offset".into(),
+                targets: parse(["joint/hinge/pos/2"]),
+                range: [-MAX_OFFSET, MAX_OFFSET],
+                scale: Scale::Linear,
+                unit: "m".into(),
+            },
+        ]
+    }
+
+    fn conditions(&self) -> Vec<Condition> {
+        [("articulated", 1.0), ("rigid", 0.0)]
+            .map(|(name, value)| Condition {
+                name: name.into(),
+                truth: vec![("articulated".into(), value)],
+            })
+            .into()
+    }
+
+    fn exploration(&self) -> &ExplorationProtocol {
+        &self.exploration
+    }
+
+    fn downstream(&self) -> &DownstreamProtocol {
+        &self.downstream
+    }
+
+    fn place(&self, layout: &Layout, start: &[f64], qpos: &mut [f64]) -> Result<()> {
+        let at = layout.joint("base_free")?.qpos;
+        let half = start[2] / 2.0;
+        let pose = [
+            start[0],
+            start[1],
+            PLATE_HALF[2],
+            half.cos(),
+            0.0,
+            0.0,
+            half.sin(),
+        ];
+        qpos[at..at + 7].copy_from_slice(&pose);
+        qpos[layout.joint("hinge")?.qpos] = 0.0;
+        qpos[layout.joint("mount")?.qpos] = start[3];
+        Ok(())
+    }
+
+    fn locate(&self, signals: &[f64]) -> Vec<f64> {
+        metric::locate(signals)
+    }
+
+    fn commander(&self) -> Result<Box<dyn Commander>> {
+        Ok(Box::new(sweeping::Sweeping::new(&self.scene, &self.home)?))
+    }
+
+    fn attempt(&self, start: &[f64], action: &[f64]) -> Result<Vec<f64>> {
+        closing::commands(&self.scene, &self.home, start, action[0])
+    }
+
+    fn metric(&self, readings: &[f64]) -> Vec<f64> {
+        metric::errors(readings)
+    }
+
+    fn outcome(&self, readings: &[f64]) -> Outcome {
+        metric::outcome(readings)
+    }
+
+    fn parts(&self) -> Option<[TrackedPart; 2]> {
+        Some(["base", "lid"].map(|part| TrackedPart {
+            position: format!("{part}_pos"),
+            orientation: format!("{part}_quat"),
+        }))
+    }
+
+    fn top_view(&self) -> TopView {
+        let [x, y, _] = PLATE_HALF;
+        TopView {
+            object: Outline {
+                label: "base".into(),
+                corners: vec![[-x, -y], [x, -y], [x, y], [-x, y]],
+            },
+            fixtures: Vec::new(),
+            bounds: [[0.1, -0.6], [1.0, 0.5]],
+        }
+    }
+
+    fn side_view(&self, readings: &[f64]) -> Vec<Outline> {
+        metric::side_view(readings)
+    }
+}
+
+/// Targets of parameters that are built in.
+fn parse<const N: usize>(targets: [&str; N]) -> Vec<asid_core::Target> {
+    targets.iter().filter_map(|t| t.parse().ok()).collect()
+}
