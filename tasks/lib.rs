@@ -2,3 +2,5 @@
 
 pub mod panda;
 pub mod rod_balancing;
+pub mod sphere;
+pub mod sphere_striking;

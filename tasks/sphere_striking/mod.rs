@@ -1,0 +1,73 @@
+//! Sphere striking: find a floor's rolling friction by pushing a ball about, then strike the ball
+//! so that it comes to rest in a goal.
+//!
+//! A ball of 0.03 m and 0.02 kg lies in an arena with four walls. On a floor of rolling friction
+//! `mu` (m) a rolling ball is slowed by `5/7 mu g / r`, so that a strike right for 1e-3 m stops a
+//! fifth as far at 5e-3 m.
+//!
+//! Source: ASID (Memmel et al., ICLR 2024), section 5.1 and its appendix.
+
+use asid_core::parameter::{Parameter, Scale};
+use asid_core::task::Condition;
+
+use crate::sphere::{Spec, Sphere, targets, walls};
+
+/// Name on the command line.
+const NAME: &str = "sphere-striking";
+/// One line for `asid list`.
+const ABOUT: &str = "find a floor's rolling friction, then strike a ball into a goal";
+
+asid_core::register!(TaskEntry {
+    name: NAME,
+    about: ABOUT,
+    make: || Ok(Box::new(Sphere::new(spec())?)),
+});
+
+/// The task with its published ranges.
+fn spec() -> Spec {
+    Spec {
+        name: NAME,
+        about: ABOUT,
+        xml: include_str!("scene.xml"),
+        parameters: vec![Parameter {
+            name: "rolling_friction".into(),
+            targets: targets(["geom/floor/friction/2"]),
+            range: [1e-3, 5e-3],
+            scale: Scale::Linear,
+            unit: "m".into(),
+        }],
+        optional: vec![
+            Parameter {
+                name: "sliding_friction".into(),
+                targets: targets(["geom/floor/friction/0"]),
+                range: [0.2, 0.8],
+                scale: Scale::Linear,
+                unit: String::new(),
+            },
+            Parameter {
+                name: "stiffness".into(),
+                targets: targets(["geom/ball/solref/0"]),
+                range: [0.005, 0.03],
+                scale: Scale::Log,
+                unit: "s".into(),
+            },
+        ],
+        conditions: vec![
+            Condition {
+                name: "in-range".into(),
+                truth: Vec::new(),
+            },
+            Condition {
+                name: "out-of-range".into(),
+                truth: vec![("rolling_friction".into(), 5.6e-3)],
+            },
+        ],
+        horizon: 20,
+        explored_from: [[0.43, 0.65], [-0.2, 0.23]],
+        struck_from: [[0.55, 0.65], [0.03, 0.05]],
+        goal: [0.65, -0.40],
+        speed: [0.3, 1.4],
+        seconds: 4.5,
+        fixtures: walls(),
+    }
+}
