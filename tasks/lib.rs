@@ -3,4 +3,7 @@
 pub mod panda;
 pub mod rod_balancing;
 pub mod sphere;
+pub mod sphere_distractors;
+pub mod sphere_free;
+pub mod sphere_patches;
 pub mod sphere_striking;

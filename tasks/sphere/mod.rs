@@ -5,6 +5,7 @@
 //!
 //! Source: ASID (Memmel et al., ICLR 2024), section 5.1 and its appendix.
 
+mod friction;
 mod metric;
 mod steering;
 mod strike;
@@ -19,6 +20,8 @@ use asid_core::task::{
 use asid_core::{Capabilities, Error, Layout, Result, Scene, Target};
 
 use crate::panda;
+
+pub use friction::{conditions, rolling_friction};
 
 /// Radius of the ball, m.
 const BALL_RADIUS: f64 = 0.03;
@@ -262,8 +265,8 @@ pub fn walls() -> Vec<Outline> {
     ]
 }
 
-/// Targets of parameters that are built in.
+/// The target of a parameter that is built in.
 #[must_use]
-pub fn targets<const N: usize>(targets: [&str; N]) -> Vec<Target> {
-    targets.iter().filter_map(|t| t.parse().ok()).collect()
+pub fn target(target: &str) -> Vec<Target> {
+    target.parse().into_iter().collect()
 }

@@ -8,9 +8,8 @@
 //! Source: ASID (Memmel et al., ICLR 2024), section 5.1 and its appendix.
 
 use asid_core::parameter::{Parameter, Scale};
-use asid_core::task::Condition;
 
-use crate::sphere::{Spec, Sphere, targets, walls};
+use crate::sphere::{Spec, Sphere, conditions, rolling_friction, target, walls};
 
 /// Name on the command line.
 const NAME: &str = "sphere-striking";
@@ -29,39 +28,25 @@ fn spec() -> Spec {
         name: NAME,
         about: ABOUT,
         xml: include_str!("scene.xml"),
-        parameters: vec![Parameter {
-            name: "rolling_friction".into(),
-            targets: targets(["geom/floor/friction/2"]),
-            range: [1e-3, 5e-3],
-            scale: Scale::Linear,
-            unit: "m".into(),
-        }],
+        parameters: vec![rolling_friction("floor")],
         optional: vec![
             Parameter {
                 name: "sliding_friction".into(),
-                targets: targets(["geom/floor/friction/0"]),
+                targets: target("geom/floor/friction/0"),
                 range: [0.2, 0.8],
                 scale: Scale::Linear,
                 unit: String::new(),
             },
+            // Time constant of the contact of ball and paddle: the smaller, the stiffer.
             Parameter {
                 name: "stiffness".into(),
-                targets: targets(["geom/ball/solref/0"]),
-                range: [0.005, 0.03],
+                targets: target("geom/ball/solref/0"),
+                range: [0.01, 0.06],
                 scale: Scale::Log,
                 unit: "s".into(),
             },
         ],
-        conditions: vec![
-            Condition {
-                name: "in-range".into(),
-                truth: Vec::new(),
-            },
-            Condition {
-                name: "out-of-range".into(),
-                truth: vec![("rolling_friction".into(), 5.6e-3)],
-            },
-        ],
+        conditions: conditions(),
         horizon: 20,
         explored_from: [[0.43, 0.65], [-0.2, 0.23]],
         struck_from: [[0.55, 0.65], [0.03, 0.05]],
