@@ -4,3 +4,8 @@ pub mod laptop_articulation;
 pub mod panda;
 pub mod rod_balancing;
 pub mod shuffleboard;
+pub mod sphere;
+pub mod sphere_distractors;
+pub mod sphere_free;
+pub mod sphere_patches;
+pub mod sphere_striking;

@@ -1,0 +1,43 @@
+//! The unknown of the tasks with one floor, and its named truths.
+
+use asid_core::Target;
+use asid_core::parameter::{Parameter, Scale};
+use asid_core::task::Condition;
+
+/// Range of rolling friction, m.
+const RANGE: [f64; 2] = [1e-3, 5e-3];
+
+/// The truth out of range: the middle of 5.2e-3 to 6e-3 m.
+const OUT_OF_RANGE: f64 = 5.6e-3;
+
+/// Rolling friction of a geom, m.
+#[must_use]
+pub fn rolling_friction(geom: &str) -> Parameter {
+    Parameter {
+        name: "rolling_friction".into(),
+        targets: vec![Target {
+            element: "geom".into(),
+            name: geom.into(),
+            attribute: "friction".into(),
+            index: 2,
+        }],
+        range: RANGE,
+        scale: Scale::Linear,
+        unit: "m".into(),
+    }
+}
+
+/// A truth drawn from the prior by the seed, and one beyond it.
+#[must_use]
+pub fn conditions() -> Vec<Condition> {
+    vec![
+        Condition {
+            name: "in-range".into(),
+            truth: Vec::new(),
+        },
+        Condition {
+            name: "out-of-range".into(),
+            truth: vec![("rolling_friction".into(), OUT_OF_RANGE)],
+        },
+    ]
+}

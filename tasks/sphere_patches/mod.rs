@@ -1,0 +1,76 @@
+//! Sphere patches: find the rolling frictions of three patches of floor, then strike a ball from the
+//! first over the second so that it comes to rest in the last.
+//!
+//! Source: ASID (Memmel et al., ICLR 2024), section 5.1 and its appendix.
+
+use asid_core::parameter::{Parameter, Scale};
+use asid_core::task::Condition;
+
+use crate::sphere::{Area, Spec, Sphere, rectangle, target, walls};
+
+/// Name on the command line.
+const NAME: &str = "sphere-patches";
+/// One line for `asid list`.
+const ABOUT: &str = "find the rolling frictions of three patches, then strike a ball into the last";
+
+/// Range of each rolling friction, m. The paper's reaches down to 1e-5 m, where a ball takes 9 s to
+/// stop and one part in a thousand of its energy decides whether it stops in the goal.
+const RANGE: [f64; 2] = [2e-4, 1e-3];
+
+/// Rolling friction of every patch out of range, m.
+const OUT_OF_RANGE: f64 = 1.2e-3;
+
+/// The patches, first to last: ranges of x and y, m.
+pub const PATCHES: [Area; 3] = [
+    [[0.2, 0.8], [0.056, 0.368]],
+    [[0.2, 0.8], [-0.256, 0.056]],
+    [[0.2, 0.8], [-0.568, -0.256]],
+];
+
+asid_core::register!(TaskEntry {
+    name: NAME,
+    about: ABOUT,
+    make: || Ok(Box::new(Sphere::new(spec())?)),
+});
+
+/// Name of a patch's unknown.
+fn unknown(patch: usize) -> String {
+    format!("rolling_friction_{patch}")
+}
+
+fn spec() -> Spec {
+    let mut fixtures = walls();
+    fixtures.extend(PATCHES.map(|area| rectangle("patch", area)));
+    Spec {
+        name: NAME,
+        about: ABOUT,
+        xml: include_str!("scene.xml"),
+        parameters: (1..=3)
+            .map(|patch| Parameter {
+                name: unknown(patch),
+                targets: target(&format!("geom/patch_{patch}/friction/2")),
+                range: RANGE,
+                scale: Scale::Log,
+                unit: "m".into(),
+            })
+            .collect(),
+        optional: Vec::new(),
+        conditions: vec![
+            Condition {
+                name: "in-range".into(),
+                truth: Vec::new(),
+            },
+            Condition {
+                name: "out-of-range".into(),
+                truth: (1..=3).map(|p| (unknown(p), OUT_OF_RANGE)).collect(),
+            },
+        ],
+        horizon: 60,
+        explored_from: [[0.43, 0.65], [0.10, 0.23]],
+        struck_from: [[0.55, 0.65], [0.22, 0.24]],
+        goal: [0.60, -0.38],
+        speed: [0.15, 0.9],
+        seconds: 7.0,
+        fixtures,
+    }
+}

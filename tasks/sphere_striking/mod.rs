@@ -1,0 +1,58 @@
+//! Sphere striking: find a floor's rolling friction by pushing a ball about, then strike the ball
+//! so that it comes to rest in a goal.
+//!
+//! A ball of 0.03 m and 0.02 kg lies in an arena with four walls. On a floor of rolling friction
+//! `mu` (m) a rolling ball is slowed by `5/7 mu g / r`, so that a strike right for 1e-3 m stops a
+//! fifth as far at 5e-3 m.
+//!
+//! Source: ASID (Memmel et al., ICLR 2024), section 5.1 and its appendix.
+
+use asid_core::parameter::{Parameter, Scale};
+
+use crate::sphere::{Spec, Sphere, conditions, rolling_friction, target, walls};
+
+/// Name on the command line.
+const NAME: &str = "sphere-striking";
+/// One line for `asid list`.
+const ABOUT: &str = "find a floor's rolling friction, then strike a ball into a goal";
+
+asid_core::register!(TaskEntry {
+    name: NAME,
+    about: ABOUT,
+    make: || Ok(Box::new(Sphere::new(spec())?)),
+});
+
+/// The task with its published ranges.
+fn spec() -> Spec {
+    Spec {
+        name: NAME,
+        about: ABOUT,
+        xml: include_str!("scene.xml"),
+        parameters: vec![rolling_friction("floor")],
+        optional: vec![
+            Parameter {
+                name: "sliding_friction".into(),
+                targets: target("geom/floor/friction/0"),
+                range: [0.2, 0.8],
+                scale: Scale::Linear,
+                unit: String::new(),
+            },
+            // Time constant of the contact of ball and paddle: the smaller, the stiffer.
+            Parameter {
+                name: "stiffness".into(),
+                targets: target("geom/ball/solref/0"),
+                range: [0.01, 0.06],
+                scale: Scale::Log,
+                unit: "s".into(),
+            },
+        ],
+        conditions: conditions(),
+        horizon: 20,
+        explored_from: [[0.43, 0.65], [-0.2, 0.23]],
+        struck_from: [[0.55, 0.65], [0.03, 0.05]],
+        goal: [0.65, -0.40],
+        speed: [0.3, 1.4],
+        seconds: 4.5,
+        fixtures: walls(),
+    }
+}

@@ -1,0 +1,187 @@
+//! Physics of the tasks with a ball on every engine that is built in: rolling friction stops the
+//! ball where theory says, on each patch, and the softness of the paddle's contact moves the outcome.
+
+#![allow(clippy::unwrap_used)]
+
+use std::sync::atomic::AtomicU64;
+
+use asid::core::progress::Silent;
+use asid::core::registry::{BackendEntry, TaskEntry, all, find};
+use asid::core::{Capabilities, Control, Parameter, Problem, Rollout, Streams};
+
+const RADIUS: f64 = 0.03;
+const G: f64 = 9.81;
+
+/// Calls `check` with a problem for each engine that can do what the task and `parameters` ask for.
+fn on_every_engine(
+    task: &str,
+    optional: &str,
+    needs: Capabilities,
+    check: impl Fn(&str, &Problem<'_>),
+) {
+    let task = (find::<TaskEntry>(task).unwrap().make)().unwrap();
+    let mut parameters: Vec<Parameter> = task.parameters();
+    let optional = task
+        .optional_parameters()
+        .into_iter()
+        .filter(|p| p.name == optional);
+    parameters.extend(optional);
+    let signals = task.exploration().signals.clone();
+    for entry in all::<BackendEntry>() {
+        let backend = (entry.make)().unwrap();
+        if !backend.capabilities().contains(task.requires() | needs) {
+            println!("{}: not claimed", entry.name);
+            continue;
+        }
+        let model = backend.load(task.scene()).unwrap();
+        let (physics, env) = (AtomicU64::new(0), AtomicU64::new(0));
+        let problem = Problem {
+            task: &*task,
+            model: &*model,
+            capabilities: backend.capabilities(),
+            parameters: &parameters,
+            signals: &signals,
+            threads: 0,
+            streams: Streams::new(0),
+            progress: &Silent,
+            physics_counter: &physics,
+            env_counter: &env,
+        };
+        check(entry.name, &problem);
+    }
+}
+
+/// How far a ball rolls that starts at `from` (m) with `speed` along y (m/s), for each row of unknowns.
+fn roll_out(problem: &Problem<'_>, from: [f64; 2], speed: f64, unknowns: &[Vec<f64>]) -> Vec<f64> {
+    let layout = problem.model.layout();
+    let n = unknowns.len();
+    let sims: Vec<usize> = (0..n).collect();
+    let mut batch = problem.batch(n).unwrap();
+    batch.set_parameters(&sims, &unknowns.concat()).unwrap();
+    batch.place(problem.task, &sims, &from.repeat(n)).unwrap();
+    let home = asid::core::problem::home(layout);
+    let ball = layout.joint("ball_free").unwrap().clone();
+    let mut qpos = home.0.clone();
+    problem.task.place(layout, &from, &mut qpos).unwrap();
+    let ctrl = layout.keyframes[0].ctrl.clone();
+    let recording = layout.recording(&["ball_pos"]).unwrap();
+    let run = |batch: &mut asid::core::problem::Batch, frames: usize| {
+        let mut out = vec![0.0; n * frames * 3];
+        let commands = ctrl.repeat(frames);
+        let rollout = Rollout::new(&sims, frames, 10, Control::Shared(&commands), &recording);
+        batch.simulator.rollout(&rollout, &mut out).unwrap();
+        out
+    };
+    // It lies at the height that the floor's softness leaves, and then rolls.
+    let settled = run(&mut batch, 20);
+    qpos[ball.qpos + 2] = settled[settled.len() - 1];
+    let mut qvel = home.1.clone();
+    qvel[ball.qvel + 1] = speed;
+    qvel[ball.qvel + 3] = -speed / RADIUS;
+    batch
+        .simulator
+        .set_state(&sims, &qpos.repeat(n), &qvel.repeat(n))
+        .unwrap();
+    run(&mut batch, 150)
+        .chunks_exact(150 * 3)
+        .map(|rows| (rows[149 * 3 + 1] - from[1]).abs())
+        .collect()
+}
+
+/// A solid ball of radius r is slowed by 5/7 mu g / r.
+fn theory(speed: f64, friction: f64) -> f64 {
+    speed * speed / (2.0 * 5.0 / 7.0 * friction * G / RADIUS)
+}
+
+#[test]
+fn rolling_friction_stops_the_ball_where_theory_says() {
+    for task in ["sphere-striking", "sphere-free", "sphere-distractors"] {
+        on_every_engine(task, "", Capabilities::empty(), |engine, problem| {
+            let frictions = [1e-3, 2e-3, 3.5e-3, 5e-3, 6e-3];
+            let unknowns: Vec<Vec<f64>> = frictions.iter().map(|f| vec![*f]).collect();
+            let ways = roll_out(problem, [0.6, 0.2], -0.35, &unknowns);
+            for (way, friction) in ways.iter().zip(frictions) {
+                let expected = theory(0.35, friction);
+                let error = way / expected - 1.0;
+                // A ball sunk in by 0.25 mm rolls on a radius 0.8 % smaller.
+                assert!(error.abs() < 0.03, "{task}, {engine}, {friction}: {error}");
+            }
+        });
+    }
+}
+
+#[test]
+fn each_patch_stops_the_ball_by_its_own_friction() {
+    on_every_engine(
+        "sphere-patches",
+        "",
+        Capabilities::empty(),
+        |engine, problem| {
+            for (patch, y) in [0.26, -0.05, -0.36].into_iter().enumerate() {
+                let frictions = [4e-4, 7e-4, 1e-3];
+                let unknowns: Vec<Vec<f64>> = frictions
+                    .iter()
+                    .map(|f| {
+                        let mut row = vec![2e-4; 3];
+                        row[patch] = *f;
+                        row
+                    })
+                    .collect();
+                let ways = roll_out(problem, [0.6, y], -0.15, &unknowns);
+                for (way, friction) in ways.iter().zip(frictions) {
+                    let error = way / theory(0.15, friction) - 1.0;
+                    assert!(
+                        error.abs() < 0.05,
+                        "{engine}, patch {patch}, {friction}: {error}"
+                    );
+                }
+            }
+        },
+    );
+}
+
+#[test]
+fn a_softer_ball_leaves_the_paddle_faster() {
+    on_every_engine(
+        "sphere-striking",
+        "stiffness",
+        Capabilities::CONTACT_STIFFNESS,
+        |engine, problem| {
+            let protocol = problem.task.downstream();
+            let start: Vec<f64> = protocol.start.iter().map(|c| c.center()).collect();
+            let constants = [0.01, 0.025, 0.06];
+            let sims: Vec<usize> = (0..constants.len()).collect();
+            let mut batch = problem.batch(constants.len()).unwrap();
+            let unknowns: Vec<f64> = constants.iter().flat_map(|c| [5e-3, *c]).collect();
+            batch.set_parameters(&sims, &unknowns).unwrap();
+            batch
+                .place(problem.task, &sims, &start.repeat(constants.len()))
+                .unwrap();
+            let control = problem.task.attempt(&start, &[0.9, 0.0]).unwrap();
+            let recording = problem
+                .model
+                .layout()
+                .recording(&protocol.channels)
+                .unwrap();
+            let mut out = vec![0.0; constants.len() * protocol.frames * 3];
+            let substeps = problem.substeps(protocol.frame_period).unwrap();
+            let rollout = Rollout::new(
+                &sims,
+                protocol.frames,
+                substeps,
+                Control::Shared(&control),
+                &recording,
+            );
+            batch.simulator.rollout(&rollout, &mut out).unwrap();
+            let ends: Vec<f64> = out
+                .chunks_exact(protocol.frames * 3)
+                .map(|rows| rows[rows.len() - 2])
+                .collect();
+            // The spring of the contact gives back what it took when the paddle stops.
+            assert!(
+                ends[0] > ends[1] + 0.003 && ends[1] > ends[2] + 0.003,
+                "{engine}: {ends:?}"
+            );
+        },
+    );
+}
