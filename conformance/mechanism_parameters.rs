@@ -57,11 +57,11 @@ pub const CHECKS: &[Check] = &[
     },
     Check {
         name: "parameters/joint-anchor",
-        needs: Capabilities::ARTICULATION.union(MASS),
+        needs: Capabilities::ARTICULATION.union(Capabilities::JOINT_ANCHORS),
         unit: "",
         tolerance: ROUNDING,
         reason: "place by geometry, and acceleration by the inertia about the new axis: rounding",
-        measure: joint_anchor,
+        measure: Figure(joint_anchor),
     },
     Check {
         name: "parameters/joint-armature",

@@ -249,6 +249,8 @@ mod tests {
     use asid_core::registry::{BackendEntry, TaskEntry, find};
     use asid_core::{Capabilities, RealWorld as _, SimulatedWorld, Streams};
 
+    use asid_core::registry::ExplorerEntry;
+
     use super::*;
 
     /// Runs `check` on rod balancing in the engine that needs no native library.

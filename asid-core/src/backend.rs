@@ -51,6 +51,8 @@ bitflags::bitflags! {
         const JOINT_LIMITS = 1 << 17;
         /// Masses, centres of mass and inertia can be parameters.
         const MASS_PARAMETERS = 1 << 18;
+        /// Anchors of joints can be parameters.
+        const JOINT_ANCHORS = 1 << 19;
     }
 }
 

@@ -158,10 +158,7 @@ impl Task for LaptopArticulation {
 
     fn conditions(&self) -> Vec<Condition> {
         [("articulated", 1.0), ("rigid", 0.0)]
-            .map(|(name, value)| Condition {
-                name: name.into(),
-                truth: vec![("articulated".into(), value)],
-            })
+            .map(|(name, value)| Condition::fixed(name, &[("articulated", value)]))
             .into()
     }
 

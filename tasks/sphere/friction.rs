@@ -7,8 +7,8 @@ use asid_core::task::Condition;
 /// Range of rolling friction, m.
 const RANGE: [f64; 2] = [1e-3, 5e-3];
 
-/// The truth out of range: the middle of 5.2e-3 to 6e-3 m.
-const OUT_OF_RANGE: f64 = 5.6e-3;
+/// Truths out of range, m.
+const OUT_OF_RANGE: [f64; 2] = [5.2e-3, 6e-3];
 
 /// Rolling friction of a geom, m.
 #[must_use]
@@ -31,13 +31,7 @@ pub fn rolling_friction(geom: &str) -> Parameter {
 #[must_use]
 pub fn conditions() -> Vec<Condition> {
     vec![
-        Condition {
-            name: "in-range".into(),
-            truth: Vec::new(),
-        },
-        Condition {
-            name: "out-of-range".into(),
-            truth: vec![("rolling_friction".into(), OUT_OF_RANGE)],
-        },
+        Condition::drawn("in-range", &[]),
+        Condition::drawn("out-of-range", &[("rolling_friction", OUT_OF_RANGE)]),
     ]
 }

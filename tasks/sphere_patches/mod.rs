@@ -56,13 +56,10 @@ fn spec() -> Spec {
             .collect(),
         optional: Vec::new(),
         conditions: vec![
-            Condition {
-                name: "in-range".into(),
-                truth: Vec::new(),
-            },
+            Condition::drawn("in-range", &[]),
             Condition {
                 name: "out-of-range".into(),
-                truth: (1..=3).map(|p| (unknown(p), OUT_OF_RANGE)).collect(),
+                truth: (1..=3).map(|p| (unknown(p), [OUT_OF_RANGE; 2])).collect(),
             },
         ],
         horizon: 60,

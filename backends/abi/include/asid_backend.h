@@ -103,6 +103,7 @@ typedef struct asid_error {
 #define ASID_FREE_BODIES         (UINT64_C(1) << 16) /* free joints                                */
 #define ASID_JOINT_LIMITS        (UINT64_C(1) << 17) /* ranges of joints                           */
 #define ASID_MASS_PARAMETERS     (UINT64_C(1) << 18) /* mass, centre, inertia can be parameters    */
+#define ASID_JOINT_ANCHORS       (UINT64_C(1) << 19) /* anchors of joints can be parameters        */
 
 /* -------------------------------------------------- the world of a document */
 

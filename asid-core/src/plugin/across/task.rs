@@ -11,6 +11,7 @@ use crate::rng::Rng;
 use crate::scene::Scene;
 use crate::task::{
     Commander, Condition, DownstreamProtocol, ExplorationProtocol, Outcome, Outline, Task, TopView,
+    TrackedPart,
 };
 
 impl<T> Task for Across<T>
@@ -115,6 +116,10 @@ where
 
     fn bounds(&self) -> [[f64; 3]; 2] {
         self.run(|task| task.bounds())
+    }
+
+    fn parts(&self) -> Option<[TrackedPart; 2]> {
+        self.run(|task| task.parts())
     }
 
     fn top_view(&self) -> TopView {
