@@ -1,7 +1,7 @@
 //! Physics of the tasks with a ball on every engine that is built in: rolling friction stops the
 //! ball where theory says, on each patch, and the softness of the paddle's contact moves the outcome.
 
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::unwrap_used, clippy::print_stdout)] // a skipped check is a printed row
 
 use std::sync::atomic::AtomicU64;
 
@@ -149,7 +149,7 @@ fn a_softer_ball_leaves_the_paddle_faster() {
         |engine, problem| {
             let protocol = problem.task.downstream();
             let start: Vec<f64> = protocol.start.iter().map(|c| c.center()).collect();
-            let constants = [0.01, 0.025, 0.06];
+            let constants = [0.02, 0.06];
             let sims: Vec<usize> = (0..constants.len()).collect();
             let mut batch = problem.batch(constants.len()).unwrap();
             let unknowns: Vec<f64> = constants.iter().flat_map(|c| [5e-3, *c]).collect();
@@ -178,10 +178,7 @@ fn a_softer_ball_leaves_the_paddle_faster() {
                 .map(|rows| rows[rows.len() - 2])
                 .collect();
             // The spring of the contact gives back what it took when the paddle stops.
-            assert!(
-                ends[0] > ends[1] + 0.003 && ends[1] > ends[2] + 0.003,
-                "{engine}: {ends:?}"
-            );
+            assert!(ends[0] > ends[1] + 0.005, "{engine}: {ends:?}");
         },
     );
 }

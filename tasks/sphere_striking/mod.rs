@@ -33,7 +33,7 @@ fn spec() -> Spec {
             Parameter {
                 name: "sliding_friction".into(),
                 targets: target("geom/floor/friction/0"),
-                range: [0.2, 0.8],
+                range: [0.5, 1.5],
                 scale: Scale::Linear,
                 unit: String::new(),
             },
