@@ -334,21 +334,35 @@ fn chosen(patterns: &[String]) -> Result<Vec<&'static Check>> {
         .collect())
 }
 
-/// An error for a text that no check holds: the checks that come close, and the families.
+/// An error for a text that no check holds: the names that come close, else the families.
 fn unknown(text: &str, all: &[&Check]) -> Error {
     const MOST: usize = 5;
-    let mut error = Error::unknown("check", text, all.iter().map(|c| c.name));
+    let families: Vec<String> = (FAMILIES.iter())
+        .map(|(family, _)| format!("{family}/"))
+        .collect();
+    // A name may be meant without its family, or a family alone.
+    let bare = |name: &'static str| name.split_once('/').map_or(name, |(_, bare)| bare);
+    let names = all.iter().flat_map(|check| [check.name, bare(check.name)]);
+    let known = names.chain(families.iter().map(String::as_str));
+    let mut error = Error::unknown("check", text, known);
     if let Error::UnknownName { near, .. } = &mut error {
-        let families = FAMILIES.iter().map(|(family, _)| format!("{family}/"));
-        match near.len() {
-            1 => {}
+        if near.len() > all.len() {
             // All of them: none is near.
-            n if n == all.len() => *near = families.collect(),
-            _ => {
-                near.truncate(MOST);
-                near.extend(families);
+            *near = families;
+        } else {
+            near.truncate(2 * MOST);
+        }
+        for name in near.iter_mut() {
+            if let Some(check) = all.iter().find(|check| bare(check.name) == name) {
+                check.name.clone_into(name);
             }
         }
+        let mut seen = Vec::new();
+        near.retain(|name| {
+            let first = !seen.contains(name);
+            seen.push(name.clone());
+            first
+        });
     }
     error
 }
