@@ -32,6 +32,11 @@
 //! | `JOINT_ANCHORS` | `joint/…/pos` |
 //! | `MASS_PARAMETERS` | `geom/…/pos`, `geom/…/mass`, `body/…/mass`, `ipos`, `inertia` |
 //!
+//! What an engine need not take, it may refuse and is not asked about: an inertia along
+//! other axes than the body's, further kinds of sensors, dampers on a free joint, masses as
+//! parameters that it does not claim. What it takes must be right. An engine that claims
+//! nothing that moves fails, and so does a claimed bit that no check can see without others.
+//!
 //! Snapshots, determinism, hostile calls, divergence and the rules of parameters are
 //! asked of every engine, in a scene made of what it claims.
 //!

@@ -94,7 +94,12 @@ fn what_is_not_there_is_a_wrong_call() {
             ["--check", "friction/stoping-distance"],
             "friction/stopping-distance",
         ),
-        (["--check", "frictoin/"], "known: `dynamics/`"),
+        (["--check", "frictoin/"], "`friction/`"),
+        (["--check", "pendulum-enery"], "`dynamics/pendulum-energy`"),
+        (
+            ["--check", "nothing like it"],
+            "known: `dynamics/`, `joints/`",
+        ),
         (["--backend", "rapir"], "rapier"),
         (["--threads", "0"], "whole number"),
         (["--plugin", "no.so"], "no.so"),
@@ -139,11 +144,11 @@ fn a_wrong_plugin_fails_alone() {
     let place = Workplace::new();
     let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
     let source = std::fs::read_to_string(root.join("plugins/engine-c/engine.c")).unwrap();
-    let right = "gravity[i] + wrench[i]";
+    let right = "gravity[i] + (wrench[i]";
     assert_eq!(source.matches(right).count(), 1, "the example has changed");
     place.write(
         "engine.c",
-        &source.replace(right, "0.9 * gravity[i] + wrench[i]"),
+        &source.replace(right, "0.9 * gravity[i] + (wrench[i]"),
     );
     let compiler = std::env::var("CC").unwrap_or_else(|_| "cc".into());
     let built = std::process::Command::new(compiler)

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
 use anyhow::Result;
-use asid_conformance::{Check, Event, FAMILIES, Outcome, Row, checks, run_checks, table};
+use asid_conformance::{Event, Outcome, Row, run_checks, table};
 use asid_core::registry::{self, BackendEntry, Origin};
 use asid_core::{Backend, Error, Progress as _};
 use serde::Serialize;
@@ -16,6 +16,7 @@ use super::progress::Bars;
 use super::{failure, plugins, session};
 
 mod cell;
+mod choice;
 mod page;
 
 /// Arguments of `conformance`.
@@ -121,13 +122,13 @@ struct Resolved {
 /// Runs the checks, prints the table and writes the folder.
 pub fn conformance(arguments: &Arguments) -> Result<()> {
     let (backends, patterns) = wanted(arguments)?;
-    let chosen = chosen(&patterns)?;
+    let chosen = choice::chosen(&patterns)?;
     if arguments.list {
-        return list(&chosen, arguments.json);
+        return choice::list(&chosen, arguments.json);
     }
     let engines = asked(&backends)?;
     if arguments.scene {
-        return scenes(&chosen, &*engines[0].backend);
+        return choice::scenes(&chosen, &*engines[0].backend);
     }
     let out = (arguments.out.as_deref())
         .map(|out| OutFolder::claim(Some(out), "conformance"))
@@ -199,60 +200,6 @@ fn told<'a>(bars: &'a Bars, engine: &'a str) -> impl Fn(Event<'_>) + Sync + 'a {
     }
 }
 
-/// What `--list` prints.
-#[derive(Serialize)]
-struct Listed {
-    name: &'static str,
-    needs: Vec<&'static str>,
-    unit: &'static str,
-    reason: &'static str,
-}
-
-/// Prints the checks with what they need and where their tolerances come from.
-fn list(checks: &[&Check], json: bool) -> Result<()> {
-    let listed: Vec<Listed> = (checks.iter())
-        .map(|check| Listed {
-            name: check.name,
-            needs: bits(check.needs),
-            unit: check.unit,
-            reason: check.reason,
-        })
-        .collect();
-    let mut stdout = std::io::stdout().lock();
-    if json {
-        writeln!(stdout, "{}", serde_json::to_string_pretty(&listed)?)?;
-        return Ok(());
-    }
-    for check in listed {
-        let needs = match &check.needs[..] {
-            [] => "nothing".to_owned(),
-            needs => needs.join(" "),
-        };
-        writeln!(
-            stdout,
-            "{}\n    needs {needs}\n    {}",
-            check.name, check.reason
-        )?;
-    }
-    Ok(())
-}
-
-/// Prints the documents that an engine is given.
-fn scenes(checks: &[&Check], engine: &dyn Backend) -> Result<()> {
-    let mut stdout = std::io::stdout().lock();
-    for check in checks {
-        let scenes = check.scenes(engine);
-        for (i, xml) in scenes.iter().enumerate() {
-            let (check, of) = (check.name, scenes.len());
-            writeln!(stdout, "<!-- {check}, {} of {of} -->\n{xml}\n", i + 1)?;
-        }
-        if scenes.is_empty() {
-            writeln!(stdout, "<!-- {}: no document -->\n", check.name)?;
-        }
-    }
-    Ok(())
-}
-
 /// Names of capabilities, in the order of their bits.
 fn bits(capabilities: asid_core::Capabilities) -> Vec<&'static str> {
     capabilities.iter_names().map(|(name, _)| name).collect()
@@ -319,38 +266,6 @@ fn asked(names: &[String]) -> Result<Vec<Asked>> {
         );
     }
     Ok(engines)
-}
-
-/// The checks whose names hold one of some texts, all where there is none.
-fn chosen(patterns: &[String]) -> Result<Vec<&'static Check>> {
-    let all: Vec<&Check> = checks().collect();
-    if let Some(text) = (patterns.iter()).find(|p| !all.iter().any(|c| c.name.contains(&***p))) {
-        return Err(unknown(text, &all).into());
-    }
-    let holds = |check: &&Check| patterns.iter().any(|p| check.name.contains(p.as_str()));
-    Ok(all
-        .into_iter()
-        .filter(|check| patterns.is_empty() || holds(check))
-        .collect())
-}
-
-/// An error for a text that no check holds: the checks that come close, and the families.
-fn unknown(text: &str, all: &[&Check]) -> Error {
-    const MOST: usize = 5;
-    let mut error = Error::unknown("check", text, all.iter().map(|c| c.name));
-    if let Error::UnknownName { near, .. } = &mut error {
-        let families = FAMILIES.iter().map(|(family, _)| format!("{family}/"));
-        match near.len() {
-            1 => {}
-            // All of them: none is near.
-            n if n == all.len() => *near = families.collect(),
-            _ => {
-                near.truncate(MOST);
-                near.extend(families);
-            }
-        }
-    }
-    error
 }
 
 fn write(

@@ -11,6 +11,8 @@ use asid::core::simulator::{StepHook, StepView};
 pub enum Fault {
     /// Nothing.
     None,
+    /// Nothing: Runge and Kutta's integrator of fourth order, where the engine has one.
+    FourthOrder,
     /// Sliding friction of every geom is half of what the scene says.
     FrictionHalved,
     /// The friction of the larger of two geoms counts, whatever their priorities.

@@ -74,6 +74,10 @@ impl Backend for Mutant<'_> {
                 let xml = rewritten(scene.xml(), "ctrlrange", |_| "-1e6 1e6".into());
                 rewritten(&xml, "forcerange", |_| "-1e6 1e6".into())
             }
+            Fault::FourthOrder => {
+                let first = r#"<mujoco><option integrator="RK4"/>"#;
+                scene.xml().replacen("<mujoco>", first, 1)
+            }
             Fault::InertiaTurnIgnored => upright(scene.xml(), "<inertial"),
             Fault::SiteTurnIgnored => upright(scene.xml(), "<site"),
             Fault::RateInOwnFrame => scene.xml().replace(

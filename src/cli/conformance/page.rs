@@ -101,7 +101,7 @@ fn verdict(engine: &Engine) -> String {
     if count.not_claimed > 0 {
         let plural = if count.not_claimed == 1 { "is" } else { "are" };
         parts.push(format!(
-            "{} {plural} not asked, as it does not claim what they need",
+            "{} {plural} not asked, as it does not claim what they need or refuses it",
             count.not_claimed
         ));
     }
@@ -272,6 +272,8 @@ fn not_claimed(result: &ConformanceResult) -> Section {
         ]);
     }
     Section::new("Not claimed")
-        .lead("An engine is asked for what it claims, and for refusing the rest.")
+        .lead(
+            "An engine is asked for what it claims, and that it refuses the rest or gets it right.",
+        )
         .table(table)
 }
