@@ -14,6 +14,7 @@
 //! All `unsafe` code of the project that is not an engine's own is in this crate.
 
 mod adapter;
+mod batch;
 mod crash;
 mod engine;
 pub mod export;
@@ -21,8 +22,11 @@ mod failure;
 mod hook;
 mod layout;
 pub mod library;
+mod readings;
+mod rollout;
 mod simulator;
 mod slices;
+mod snapshot;
 pub mod table;
 mod text;
 pub mod world;
