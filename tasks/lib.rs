@@ -9,3 +9,4 @@ pub mod sphere_distractors;
 pub mod sphere_free;
 pub mod sphere_patches;
 pub mod sphere_striking;
+pub mod steering;

@@ -11,7 +11,6 @@
 
 mod closing;
 mod metric;
-mod sweeping;
 
 use asid_core::kinematics::Chain;
 use asid_core::parameter::{Parameter, Scale};
@@ -23,6 +22,7 @@ use asid_core::task::{
 use asid_core::{Capabilities, Error, Layout, Result, Scene};
 
 use crate::panda;
+use crate::steering::{self, Steering};
 
 /// Half sizes of base and lid: along the hinge, across it, thickness, m.
 const PLATE_HALF: [f64; 3] = [0.15, 0.1, 0.005];
@@ -32,6 +32,15 @@ const HINGE_FRICTION: [f64; 2] = [200.0, 0.3];
 
 /// Largest distance of the hinge's axis from its nominal height, m.
 const MAX_OFFSET: f64 = 0.02;
+
+/// The closed gripper is swept over the base, at a height at which it meets the lid.
+const STEERING: Steering = Steering {
+    max_step: 0.05, // 0.5 m/s
+    x: [0.25, 0.75],
+    y: [-0.5, 0.45],
+    reach: 0.76,
+    fingers: 0.0,
+};
 
 /// The task.
 pub struct LaptopArticulation {
@@ -71,8 +80,8 @@ impl LaptopArticulation {
         let sensors = ["base_pos", "base_quat", "lid_pos", "lid_quat"];
         let exploration = ExplorationProtocol {
             horizon: 20,
-            frames_per_step: 5,
-            frame_period: sweeping::FRAME_PERIOD,
+            frames_per_step: steering::FRAMES,
+            frame_period: steering::FRAME_PERIOD,
             action: vec![
                 Coordinate::new("dx", "m", [-0.1, 0.1]),
                 Coordinate::new("dy", "m", [-0.1, 0.1]),
@@ -193,7 +202,7 @@ impl Task for LaptopArticulation {
     }
 
     fn commander(&self) -> Result<Box<dyn Commander>> {
-        Ok(Box::new(sweeping::Sweeping::new(&self.scene, &self.home)?))
+        STEERING.commander(&self.scene, &self.home)
     }
 
     fn attempt(&self, start: &[f64], action: &[f64]) -> Result<Vec<f64>> {

@@ -12,7 +12,6 @@
 
 mod metric;
 mod placing;
-mod pushing;
 
 use asid_core::kinematics::Chain;
 use asid_core::parameter::{Parameter, Scale};
@@ -24,6 +23,16 @@ use asid_core::task::{
 use asid_core::{Capabilities, Error, Layout, Result, Scene};
 
 use crate::panda;
+use crate::steering::{self, Steering};
+
+/// The closed gripper pushes the rod about on the table.
+const STEERING: Steering = Steering {
+    max_step: 0.04, // 0.4 m/s
+    x: [0.30, 0.70],
+    y: [-0.4, 0.4],
+    reach: 0.74,
+    fingers: 0.0,
+};
 
 /// Half sizes of the rod along its axes, m; the long one is y.
 const ROD_HALF: [f64; 3] = [0.02, 0.15, 0.02];
@@ -75,8 +84,8 @@ impl RodBalancing {
         let pi = std::f64::consts::PI;
         let exploration = ExplorationProtocol {
             horizon: 20,
-            frames_per_step: 5,
-            frame_period: pushing::FRAME_PERIOD,
+            frames_per_step: steering::FRAMES,
+            frame_period: steering::FRAME_PERIOD,
             action: vec![
                 Coordinate::new("dx", "m", [-0.1, 0.1]),
                 Coordinate::new("dy", "m", [-0.1, 0.1]),
@@ -195,7 +204,7 @@ impl Task for RodBalancing {
     }
 
     fn commander(&self) -> Result<Box<dyn Commander>> {
-        Ok(Box::new(pushing::Pushing::new(&self.scene, &self.home)?))
+        STEERING.commander(&self.scene, &self.home)
     }
 
     fn attempt(&self, start: &[f64], action: &[f64]) -> Result<Vec<f64>> {

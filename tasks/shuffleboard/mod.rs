@@ -9,7 +9,6 @@
 //! Source: ASID (Memmel et al., ICLR 2024), section 5.2 and its appendix.
 
 mod metric;
-mod pushing;
 mod striking;
 
 use asid_core::kinematics::Chain;
@@ -24,6 +23,7 @@ use asid_core::{Capabilities, Error, Layout, Result, Scene};
 use rand::Rng as _;
 
 use crate::panda;
+use crate::steering::{self, Steering};
 
 /// Radius of the puck, m.
 const PUCK_RADIUS: f64 = 0.0381;
@@ -72,6 +72,15 @@ impl Zone {
     }
 }
 
+/// The closed gripper moves over the near end of the board.
+const STEERING: Steering = Steering {
+    max_step: 0.04, // 0.4 m/s
+    x: [0.28, 0.50],
+    y: [-0.115, 0.115],
+    reach: f64::INFINITY,
+    fingers: 0.0,
+};
+
 /// The task.
 pub struct Shuffleboard {
     zone: Zone,
@@ -110,8 +119,8 @@ impl Shuffleboard {
         Chain::to_site(&scene, panda::END_EFFECTOR)?;
         let exploration = ExplorationProtocol {
             horizon: 20,
-            frames_per_step: 5,
-            frame_period: pushing::FRAME_PERIOD,
+            frames_per_step: steering::FRAMES,
+            frame_period: steering::FRAME_PERIOD,
             action: vec![
                 Coordinate::new("dx", "m", [-0.1, 0.1]),
                 Coordinate::new("dy", "m", [-0.1, 0.1]),
@@ -265,7 +274,7 @@ impl Task for Shuffleboard {
     }
 
     fn commander(&self) -> Result<Box<dyn Commander>> {
-        Ok(Box::new(pushing::Pushing::new(&self.scene, &self.home)?))
+        STEERING.commander(&self.scene, &self.home)
     }
 
     fn attempt(&self, start: &[f64], action: &[f64]) -> Result<Vec<f64>> {

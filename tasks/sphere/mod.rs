@@ -7,7 +7,6 @@
 
 mod friction;
 mod metric;
-mod steering;
 mod strike;
 
 use asid_core::kinematics::Chain;
@@ -20,6 +19,7 @@ use asid_core::task::{
 use asid_core::{Capabilities, Error, Layout, Result, Scene, Target};
 
 use crate::panda;
+use crate::steering::{self, Steering};
 
 pub use friction::{conditions, rolling_friction};
 
@@ -28,6 +28,15 @@ const BALL_RADIUS: f64 = 0.03;
 
 /// Command of each finger, m from the middle: the pads meet the ball 30 degrees left and right.
 const FINGERS: f64 = 0.012;
+
+/// The paddle moves at the height of the ball's middle; a ball fits between it and each wall.
+const STEERING: Steering = Steering {
+    max_step: 0.04, // 0.4 m/s
+    x: [0.30, 0.70],
+    y: [-0.46, 0.26],
+    reach: 0.74,
+    fingers: FINGERS,
+};
 
 /// Noise of the tracker of the ball, m.
 const NOISE: f64 = 0.002;
@@ -191,7 +200,7 @@ impl Task for Sphere {
     }
 
     fn commander(&self) -> Result<Box<dyn Commander>> {
-        Ok(Box::new(steering::Steering::new(&self.scene, &self.home)?))
+        STEERING.commander(&self.scene, &self.home)
     }
 
     fn attempt(&self, start: &[f64], action: &[f64]) -> Result<Vec<f64>> {
