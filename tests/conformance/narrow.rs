@@ -110,7 +110,7 @@ fn of_target(target: &Target) -> Capabilities {
         ("geom", "friction", 2) => Capabilities::ROLLING_FRICTION,
         ("geom", "solref", _) => Capabilities::CONTACT_STIFFNESS,
         ("geom" | "body", ..) => Capabilities::MASS_PARAMETERS,
-        ("joint", "pos", _) => Capabilities::MASS_PARAMETERS,
+        ("joint", "pos", _) => Capabilities::JOINT_ANCHORS,
         ("joint", "frictionloss", _) => Capabilities::JOINT_FRICTION,
         ("joint", ..) => Capabilities::JOINT_IMPEDANCE,
         ("actuator", ..) => Capabilities::ACTUATORS,
