@@ -14,7 +14,7 @@ const REST_WAY: f64 = 0.001;
 /// Frames over which rest is judged: 0.1 s.
 const REST_FRAMES: usize = 10;
 
-/// Cost of an attempt that diverged, m.
+/// Distance and cost of an attempt that diverged, m.
 const LOST_COST: f64 = 2.0;
 
 /// Distance of the ball from the goal in the plane, m.
@@ -29,7 +29,7 @@ pub fn outcome(readings: &[f64], goal: [f64; 2]) -> Outcome {
     let last = row(rows - 1);
     if last.iter().any(|x| !x.is_finite()) {
         return Outcome {
-            value: f64::NAN,
+            value: LOST_COST,
             success: false,
             cost: LOST_COST,
         };
