@@ -1,5 +1,8 @@
 //! The arm that every task shares: a Franka Panda with its hand.
 
+use asid_core::kinematics::Chain;
+use asid_core::{Error, Result, Scene};
+
 /// The arm's document, included by each scene as `../panda.xml`.
 pub const PANDA_XML: &str = include_str!("panda.xml");
 
@@ -18,4 +21,23 @@ pub fn proprioception() -> Vec<String> {
     std::iter::once("ee_pos".to_owned())
         .chain((1..=ARM_JOINTS).map(|i| format!("joint{i}_pos")))
         .collect()
+}
+
+/// A scene with the arm, and the arm's posture in its first keyframe, rad.
+///
+/// # Errors
+/// When the document cannot be read, or has no arm or no keyframe.
+pub fn scene(name: &str, xml: &str) -> Result<(Scene, Vec<f64>)> {
+    let scene = Scene::from_xml(name, xml, &[("../panda.xml", PANDA_XML)])?;
+    let description = scene.description()?;
+    let key = description.keyframes.first();
+    let home = key
+        .and_then(|k| k.qpos.get(..ARM_JOINTS))
+        .ok_or_else(|| Error::Scene {
+            scene: scene.name().to_owned(),
+            message: "has no keyframe of the arm".into(),
+        })?
+        .to_vec();
+    Chain::to_site(&scene, END_EFFECTOR)?;
+    Ok((scene, home))
 }

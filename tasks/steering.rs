@@ -2,7 +2,7 @@
 //! scene at a fixed height, by displacements in the plane.
 
 use asid_core::cartesian::{CartesianController, CartesianSettings};
-use asid_core::task::Commander;
+use asid_core::task::{Commander, Coordinate};
 use asid_core::{Result, Scene};
 use nalgebra::Vector3;
 
@@ -16,6 +16,14 @@ pub const FRAMES: usize = 5;
 
 /// Largest entry of an action, m.
 pub const LARGEST: f64 = 0.1;
+
+/// Entries of an action: the hand's displacement in the plane.
+#[must_use]
+pub fn action() -> Vec<Coordinate> {
+    ["dx", "dy"]
+        .map(|name| Coordinate::new(name, "m", [-LARGEST, LARGEST]))
+        .into()
+}
 
 /// How far and where a task lets the hand go.
 #[derive(Clone, Copy, Debug)]

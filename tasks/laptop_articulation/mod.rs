@@ -12,14 +12,13 @@
 mod closing;
 mod metric;
 
-use asid_core::kinematics::Chain;
 use asid_core::parameter::{Parameter, Scale};
 use asid_core::signal::Signal;
 use asid_core::task::{
     Commander, Condition, Coordinate, DownstreamProtocol, ExplorationProtocol, Outcome, Outline,
     Task, TopView, TrackedPart,
 };
-use asid_core::{Capabilities, Error, Layout, Result, Scene};
+use asid_core::{Capabilities, Layout, Result, Scene};
 
 use crate::panda;
 use crate::steering::{self, Steering};
@@ -62,30 +61,13 @@ impl LaptopArticulation {
     /// # Errors
     /// When the scene that is built in cannot be read.
     pub fn new() -> Result<Self> {
-        let scene = Scene::from_xml(
-            "laptop-articulation",
-            include_str!("scene.xml"),
-            &[("../panda.xml", panda::PANDA_XML)],
-        )?;
-        let description = scene.description()?;
-        let home = description
-            .keyframes
-            .first()
-            .map(|k| k.qpos[..panda::ARM_JOINTS].to_vec())
-            .ok_or_else(|| Error::Scene {
-                scene: scene.name().to_owned(),
-                message: "has no keyframe".into(),
-            })?;
-        Chain::to_site(&scene, panda::END_EFFECTOR)?;
+        let (scene, home) = panda::scene("laptop-articulation", include_str!("scene.xml"))?;
         let sensors = ["base_pos", "base_quat", "lid_pos", "lid_quat"];
         let exploration = ExplorationProtocol {
             horizon: 20,
             frames_per_step: steering::FRAMES,
             frame_period: steering::FRAME_PERIOD,
-            action: vec![
-                Coordinate::new("dx", "m", [-0.1, 0.1]),
-                Coordinate::new("dy", "m", [-0.1, 0.1]),
-            ],
+            action: steering::action(),
             start: vec![
                 Coordinate::new("x", "m", [0.45, 0.65]),
                 Coordinate::new("y", "m", [-0.1, 0.1]),
@@ -150,14 +132,14 @@ impl Task for LaptopArticulation {
         vec![
             Parameter {
                 name: "articulated".into(),
-                targets: parse(["joint/hinge/frictionloss"]),
+                targets: crate::targets(["joint/hinge/frictionloss"]),
                 range: [0.0, 1.0],
                 scale: Scale::Binary(HINGE_FRICTION),
                 unit: String::new(),
             },
             Parameter {
                 name: "hinge_offset".into(),
-                targets: parse(["joint/hinge/pos/2"]),
+                targets: crate::targets(["joint/hinge/pos/2"]),
                 range: [-MAX_OFFSET, MAX_OFFSET],
                 scale: Scale::Linear,
                 unit: "m".into(),
@@ -239,9 +221,4 @@ impl Task for LaptopArticulation {
     fn side_view(&self, readings: &[f64]) -> Vec<Outline> {
         metric::side_view(readings)
     }
-}
-
-/// Targets of parameters that are built in.
-fn parse<const N: usize>(targets: [&str; N]) -> Vec<asid_core::Target> {
-    targets.iter().filter_map(|t| t.parse().ok()).collect()
 }

@@ -4,7 +4,8 @@ use asid_core::signal::unit_quaternion;
 use asid_core::task::{Outcome, Outline};
 use nalgebra::Vector3;
 
-use super::{LEDGE, LEDGE_HALF, ROD_HALF, rectangle};
+use super::{LEDGE, LEDGE_HALF, ROD_HALF};
+use crate::rectangle;
 
 /// Largest tilt of a success, degrees.
 pub const MAX_TILT: f64 = 5.0;

@@ -13,14 +13,13 @@
 mod metric;
 mod placing;
 
-use asid_core::kinematics::Chain;
 use asid_core::parameter::{Parameter, Scale};
 use asid_core::signal::{Signal, yaw};
 use asid_core::task::{
     Commander, Condition, Coordinate, DownstreamProtocol, ExplorationProtocol, Outcome, Outline,
     Task, TopView,
 };
-use asid_core::{Capabilities, Error, Layout, Result, Scene};
+use asid_core::{Capabilities, Layout, Result, Scene};
 
 use crate::panda;
 use crate::steering::{self, Steering};
@@ -66,30 +65,13 @@ impl RodBalancing {
     /// # Errors
     /// When the scene that is built in cannot be read.
     pub fn new() -> Result<Self> {
-        let scene = Scene::from_xml(
-            "rod-balancing",
-            include_str!("scene.xml"),
-            &[("../panda.xml", panda::PANDA_XML)],
-        )?;
-        let description = scene.description()?;
-        let home = description
-            .keyframes
-            .first()
-            .map(|k| k.qpos[..panda::ARM_JOINTS].to_vec())
-            .ok_or_else(|| Error::Scene {
-                scene: scene.name().to_owned(),
-                message: "has no keyframe".into(),
-            })?;
-        Chain::to_site(&scene, panda::END_EFFECTOR)?;
+        let (scene, home) = panda::scene("rod-balancing", include_str!("scene.xml"))?;
         let pi = std::f64::consts::PI;
         let exploration = ExplorationProtocol {
             horizon: 20,
             frames_per_step: steering::FRAMES,
             frame_period: steering::FRAME_PERIOD,
-            action: vec![
-                Coordinate::new("dx", "m", [-0.1, 0.1]),
-                Coordinate::new("dy", "m", [-0.1, 0.1]),
-            ],
+            action: steering::action(),
             start: vec![
                 Coordinate::new("x", "m", [0.5, 0.6]),
                 Coordinate::new("y", "m", [-0.2, 0.2]),
@@ -151,7 +133,7 @@ impl Task for RodBalancing {
     fn parameters(&self) -> Vec<Parameter> {
         vec![Parameter {
             name: "mass_offset".into(),
-            targets: parse(["geom/rod_mass/pos/1"]),
+            targets: crate::targets(["geom/rod_mass/pos/1"]),
             range: [-0.1, 0.1],
             scale: Scale::Linear,
             unit: "m".into(),
@@ -162,7 +144,7 @@ impl Task for RodBalancing {
         // The table's own coefficient is the smallest of the range, so that the rod's wins everywhere in it.
         vec![Parameter {
             name: "friction".into(),
-            targets: parse(["geom/rod_1/friction/0", "geom/rod_5/friction/0"]),
+            targets: crate::targets(["geom/rod_1/friction/0", "geom/rod_5/friction/0"]),
             range: [0.2, 0.5],
             scale: Scale::Linear,
             unit: String::new(),
@@ -228,7 +210,7 @@ impl Task for RodBalancing {
             },
             fixtures: vec![Outline {
                 label: "ledge".into(),
-                corners: rectangle([LEDGE[0], LEDGE[1]], LEDGE_HALF),
+                corners: crate::rectangle([LEDGE[0], LEDGE[1]], LEDGE_HALF),
             }],
             bounds: [[0.1, -0.6], [0.8, 0.5]],
         }
@@ -237,19 +219,4 @@ impl Task for RodBalancing {
     fn side_view(&self, readings: &[f64]) -> Vec<Outline> {
         metric::side_view(readings)
     }
-}
-
-/// Corners of an axis-aligned rectangle.
-fn rectangle([x, y]: [f64; 2], [a, b]: [f64; 2]) -> Vec<[f64; 2]> {
-    vec![
-        [x - a, y - b],
-        [x + a, y - b],
-        [x + a, y + b],
-        [x - a, y + b],
-    ]
-}
-
-/// Targets of parameters that are built in.
-fn parse<const N: usize>(targets: [&str; N]) -> Vec<asid_core::Target> {
-    targets.iter().filter_map(|t| t.parse().ok()).collect()
 }

@@ -11,7 +11,6 @@
 mod metric;
 mod striking;
 
-use asid_core::kinematics::Chain;
 use asid_core::parameter::{Parameter, Scale};
 use asid_core::rng::Rng;
 use asid_core::signal::{Signal, yaw};
@@ -19,7 +18,7 @@ use asid_core::task::{
     Commander, Condition, Coordinate, DownstreamProtocol, ExplorationProtocol, Outcome, Outline,
     Task, TopView,
 };
-use asid_core::{Capabilities, Error, Layout, Result, Scene};
+use asid_core::{Capabilities, Layout, Result, Scene};
 use rand::Rng as _;
 
 use crate::panda;
@@ -102,29 +101,12 @@ impl Shuffleboard {
     /// # Errors
     /// When the scene that is built in cannot be read.
     pub fn new(zone: Zone) -> Result<Self> {
-        let scene = Scene::from_xml(
-            "shuffleboard",
-            include_str!("scene.xml"),
-            &[("../panda.xml", panda::PANDA_XML)],
-        )?;
-        let description = scene.description()?;
-        let home = description
-            .keyframes
-            .first()
-            .map(|k| k.qpos[..panda::ARM_JOINTS].to_vec())
-            .ok_or_else(|| Error::Scene {
-                scene: scene.name().to_owned(),
-                message: "has no keyframe".into(),
-            })?;
-        Chain::to_site(&scene, panda::END_EFFECTOR)?;
+        let (scene, home) = panda::scene("shuffleboard", include_str!("scene.xml"))?;
         let exploration = ExplorationProtocol {
             horizon: 20,
             frames_per_step: steering::FRAMES,
             frame_period: steering::FRAME_PERIOD,
-            action: vec![
-                Coordinate::new("dx", "m", [-0.1, 0.1]),
-                Coordinate::new("dy", "m", [-0.1, 0.1]),
-            ],
+            action: steering::action(),
             start: start(0.01),
             signals: vec![
                 Signal {
@@ -304,7 +286,7 @@ impl Task for Shuffleboard {
         });
         let zone = |z: Zone| Outline {
             label: format!("{} zone", z.name()),
-            corners: rectangle([z.middle(), 0.0], [metric::ZONE_HALF, LANE_HALF[1]]),
+            corners: crate::rectangle([z.middle(), 0.0], [metric::ZONE_HALF, LANE_HALF[1]]),
         };
         TopView {
             object: Outline {
@@ -314,7 +296,7 @@ impl Task for Shuffleboard {
             fixtures: vec![
                 Outline {
                     label: "board".into(),
-                    corners: rectangle(LANE, LANE_HALF),
+                    corners: crate::rectangle(LANE, LANE_HALF),
                 },
                 zone(Zone::Near),
                 zone(Zone::Far),
@@ -322,14 +304,4 @@ impl Task for Shuffleboard {
             bounds: [[0.1, -0.25], [1.25, 0.25]],
         }
     }
-}
-
-/// Corners of an axis-aligned rectangle.
-fn rectangle([x, y]: [f64; 2], [a, b]: [f64; 2]) -> Vec<[f64; 2]> {
-    vec![
-        [x - a, y - b],
-        [x + a, y - b],
-        [x + a, y + b],
-        [x - a, y + b],
-    ]
 }

@@ -9,14 +9,13 @@ mod friction;
 mod metric;
 mod strike;
 
-use asid_core::kinematics::Chain;
 use asid_core::parameter::Parameter;
 use asid_core::signal::Signal;
 use asid_core::task::{
     Commander, Condition, Coordinate, DownstreamProtocol, ExplorationProtocol, Outcome, Outline,
     Task, TopView,
 };
-use asid_core::{Capabilities, Error, Layout, Result, Scene, Target};
+use asid_core::{Capabilities, Layout, Result, Scene, Target};
 
 use crate::panda;
 use crate::steering::{self, Steering};
@@ -89,25 +88,12 @@ impl Sphere {
     /// # Errors
     /// When the scene cannot be read or lacks the arm or a keyframe.
     pub fn new(spec: Spec) -> Result<Self> {
-        let scene = Scene::from_xml(spec.name, spec.xml, &[("../panda.xml", panda::PANDA_XML)])?;
-        let description = scene.description()?;
-        let home = description
-            .keyframes
-            .first()
-            .map(|k| k.qpos[..panda::ARM_JOINTS].to_vec())
-            .ok_or_else(|| Error::Scene {
-                scene: scene.name().to_owned(),
-                message: "has no keyframe".into(),
-            })?;
-        Chain::to_site(&scene, panda::END_EFFECTOR)?;
+        let (scene, home) = panda::scene(spec.name, spec.xml)?;
         let exploration = ExplorationProtocol {
             horizon: spec.horizon,
             frames_per_step: steering::FRAMES,
             frame_period: steering::FRAME_PERIOD,
-            action: vec![
-                Coordinate::new("dx", "m", [-0.1, 0.1]),
-                Coordinate::new("dy", "m", [-0.1, 0.1]),
-            ],
+            action: steering::action(),
             start: place_in(spec.explored_from),
             signals: vec![Signal {
                 sensor: "ball_pos".into(),
