@@ -2,15 +2,16 @@
 
 use std::sync::Mutex;
 
+use asid_core::effect::{Acts, Site};
 use asid_core::registry::{self, EffectEntry};
 use asid_core::simulator::{StepHook, StepView};
-use asid_core::{Backend, Capabilities, Error, Result};
+use asid_core::{Backend, Capabilities, Error, Plant, Result};
 
 use crate::check::Measure::Figure;
 use crate::check::{Check, Tolerance};
 use crate::effects::By;
-use crate::rig::{Rig, STEP, broken, differing_bits, largest, state_channels};
-use crate::subject::{batch, stirred};
+use crate::rig::{Rig, STEP, broken, differing_bits, largest, scene, state_channels};
+use crate::subject::{batch, stirred, subject};
 
 const HOOKS: Capabilities = Capabilities::STEP_HOOKS;
 const NONE: Tolerance = Tolerance::same(0.0);
@@ -176,17 +177,32 @@ fn null_values(backend: &dyn Backend) -> Result<f64> {
     let ctrl = rig.command(0.4);
     let start = rig.simulator.save(&[0])?;
     let without = rig.run(30, &ctrl)?;
+    let plant = Plant::of(&scene(&subject(backend).inside)?)?;
     let mut different = 0.0;
     for entry in registry::all::<EffectEntry>() {
         let effect = (entry.make)();
-        let nulls: Vec<f64> = effect.parameters().iter().map(|p| p.null).collect();
-        let layout = rig.model.layout();
-        let hooks: Result<Vec<_>> = (effect.sites(layout).iter())
-            .map(|site| effect.attach(layout, site, &nulls))
-            .collect();
-        for hook in hooks? {
+        if effect.acts() == Acts::Measurement || !effect.targets(&plant, "").is_empty() {
+            continue;
+        }
+        let values: Vec<f64> = effect.parameters().iter().map(|p| p.null).collect();
+        for name in effect.sites(&plant) {
+            if !effect.targets(&plant, &name).is_empty() {
+                continue;
+            }
+            let acting = effect.attach(&Site {
+                plant: &plant,
+                name: &name,
+                values: &values,
+                columns: &[],
+            })?;
+            let acting = Mutex::new(acting);
+            let hook = By(|_, view: &mut StepView<'_>| {
+                if let Ok(mut acting) = acting.lock() {
+                    acting.before_step(view);
+                }
+            });
             rig.simulator.load(&start, &[0], &[0])?;
-            let with = rig.run_with(30, 1, &ctrl, |extras| extras.hook = Some(&*hook))?;
+            let with = rig.run_with(30, 1, &ctrl, |extras| extras.hook = Some(&hook))?;
             different += differing_bits(&with, &without);
         }
     }

@@ -3,8 +3,9 @@
 #![allow(clippy::unwrap_used)]
 
 use asid::core::effect::EffectSpec;
+use asid::core::refined::Refined;
 use asid::core::registry::{BackendEntry, EffectEntry, all};
-use asid::core::{BatchConfig, Capabilities, Control, Rollout, Scene};
+use asid::core::{BatchConfig, Capabilities, Control, Model as _, Plant, Rollout, Scene};
 
 /// A motor on a hinge about the vertical axis: inertia 0.5 kg m² about it, from the rotor alone.
 const ROTOR: &str = r#"<mujoco><compiler angle="radian"/><option timestep="0.002" gravity="0 0 0"/>
@@ -27,9 +28,9 @@ fn speeds(effect: Option<&str>, speed: f64, command: f64) -> Vec<(String, f64, f
         if !backend.capabilities().contains(Capabilities::STEP_HOOKS) {
             continue;
         }
-        let model = backend.load(&scene).unwrap();
+        let specs: Vec<EffectSpec> = effect.iter().map(|e| e.parse().unwrap()).collect();
+        let model = Refined::load(&*backend, &scene, &specs).unwrap();
         let layout = model.layout();
-        let hook = effect.map(|e| e.parse::<EffectSpec>().unwrap().attach(layout).unwrap());
         let config = BatchConfig {
             size: 1,
             threads: 1,
@@ -39,8 +40,7 @@ fn speeds(effect: Option<&str>, speed: f64, command: f64) -> Vec<(String, f64, f
         simulator.set_state(&[0], &[0.0], &[speed]).unwrap();
         let recording = layout.recording(&["speed"]).unwrap();
         let control = [command];
-        let mut rollout = Rollout::new(&[0], 1, STEPS, Control::Shared(&control), &recording);
-        rollout.hook = hook.as_deref().map(|h| h as _);
+        let rollout = Rollout::new(&[0], 1, STEPS, Control::Shared(&control), &recording);
         let mut out = [0.0];
         simulator.rollout(&rollout, &mut out).unwrap();
         let double = backend
@@ -92,7 +92,8 @@ fn every_effect_is_off_at_its_null_value_to_the_bit() {
         for site in ["drive", "spin"] {
             let scene = Scene::from_xml("rotor", ROTOR, &[]).unwrap();
             let backend = (all::<BackendEntry>()[0].make)().unwrap();
-            let sites = (entry.make)().sites(backend.load(&scene).unwrap().layout());
+            let effect = (entry.make)();
+            let sites = effect.sites(&Plant::of(&scene).unwrap());
             if !sites.iter().any(|s| s == site) {
                 continue;
             }
@@ -106,7 +107,6 @@ fn every_effect_is_off_at_its_null_value_to_the_bit() {
 fn unknown_sites_and_parameters_list_the_near_ones() {
     let scene = Scene::from_xml("rotor", ROTOR, &[]).unwrap();
     let backend = (all::<BackendEntry>()[0].make)().unwrap();
-    let model = backend.load(&scene).unwrap();
     for (text, expected) in [
         (
             "actuator-gian@drive",
@@ -115,7 +115,7 @@ fn unknown_sites_and_parameters_list_the_near_ones() {
         ("actuator-gain@driv", "did you mean `drive`?"),
         ("actuator-gain@drive:gian=1", "did you mean `gain`?"),
     ] {
-        let Err(error) = text.parse::<EffectSpec>().unwrap().attach(model.layout()) else {
+        let Err(error) = Refined::load(&*backend, &scene, &[text.parse().unwrap()]) else {
             panic!("{text} was accepted");
         };
         assert!(error.to_string().contains(expected), "{error}");

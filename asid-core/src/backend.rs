@@ -53,6 +53,8 @@ bitflags::bitflags! {
         const MASS_PARAMETERS = 1 << 18;
         /// Anchors of joints can be parameters.
         const JOINT_ANCHORS = 1 << 19;
+        /// A hook may change friction, damping and stiffness for a step.
+        const LIVE_PARAMETERS = 1 << 20;
     }
 }
 

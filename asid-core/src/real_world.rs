@@ -5,7 +5,6 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use rand_distr::{Distribution, StandardNormal};
 
 use crate::backend::Model;
-use crate::effect::Effects;
 use crate::episode::{ChannelColumns, Episode};
 use crate::error::{Error, Result};
 use crate::explore::Policy;
@@ -70,7 +69,6 @@ pub struct SimulatedWorld<'a> {
     streams: Streams,
     wear: Rng,
     start: Option<Vec<f64>>,
-    effects: Effects,
 }
 
 impl<'a> SimulatedWorld<'a> {
@@ -111,7 +109,6 @@ impl<'a> SimulatedWorld<'a> {
             streams,
             wear: streams.stream("wear"),
             start: None,
-            effects: Effects(Vec::new()),
         })
     }
 
@@ -119,13 +116,6 @@ impl<'a> SimulatedWorld<'a> {
     #[must_use]
     pub fn with_exploration_start(mut self, start: Vec<f64>) -> Self {
         self.start = Some(start);
-        self
-    }
-
-    /// The same world with effects that the method's simulator lacks.
-    #[must_use]
-    pub fn with_effects(mut self, effects: Effects) -> Self {
-        self.effects = effects;
         self
     }
 
@@ -237,9 +227,7 @@ impl RealWorld for SimulatedWorld<'_> {
             }
             actions.extend_from_slice(&action);
             commander.commands(&action, &mut ctrl);
-            let mut rollout =
-                Rollout::new(&[0], frames, substeps, Control::Shared(&ctrl), &recording);
-            rollout.hook = self.effects.hook();
+            let rollout = Rollout::new(&[0], frames, substeps, Control::Shared(&ctrl), &recording);
             self.batch.simulator.rollout(&rollout, &mut out)?;
             self.check()?;
             episode.ctrl.extend_from_slice(&ctrl);
@@ -291,14 +279,13 @@ impl RealWorld for SimulatedWorld<'_> {
         let recording = layout.recording(&protocol.channels)?;
         let substeps = substeps(&layout, protocol.frame_period)?;
         let mut readings = vec![0.0; protocol.frames * recording.width()];
-        let mut rollout = Rollout::new(
+        let rollout = Rollout::new(
             &[0],
             protocol.frames,
             substeps,
             Control::Shared(&ctrl),
             &recording,
         );
-        rollout.hook = self.effects.hook();
         self.batch.simulator.rollout(&rollout, &mut readings)?;
         self.check()?;
         self.wear();

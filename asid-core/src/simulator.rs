@@ -130,6 +130,12 @@ pub struct StepView<'a> {
     pub ctrl: &'a mut [f64],
     /// Generalised force to add in this step, `nv`; zero on entry.
     pub force: &'a mut [f64],
+    /// The simulation's parameters, one a column of [`BatchConfig::targets`]; on entry as
+    /// [`Simulator::set_parameters`] left them. Where the engine has
+    /// [`LIVE_PARAMETERS`](crate::Capabilities::LIVE_PARAMETERS) friction of geoms and
+    /// joints, damping and stiffness may be changed, for this step only, and other columns
+    /// mean nothing; elsewhere it is empty.
+    pub parameters: &'a mut [f64],
 }
 
 /// Physics that an engine does not have, called before each physics step of

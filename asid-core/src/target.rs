@@ -25,7 +25,8 @@ use crate::error::{Error, Result};
 /// | `option/gravity/{0,1,2}` | gravity | m/s² |
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct Target {
-    /// Kind of element: `geom`, `body`, `joint`, `actuator`, `option`.
+    /// Kind of element: `geom`, `body`, `joint`, `actuator`, `option`; `effect` for an effect's
+    /// parameter, whose name is `NAME@SITE`.
     pub element: String,
     /// Name of the element; empty for `option`.
     pub name: String,
@@ -54,7 +55,9 @@ impl FromStr for Target {
             [e, n, a, i] => (e, n, a, i),
             _ => return Err(bad("not a target")),
         };
-        const ELEMENTS: [&str; 6] = ["geom", "body", "joint", "actuator", "equality", "option"];
+        const ELEMENTS: [&str; 7] = [
+            "geom", "body", "joint", "actuator", "equality", "option", "effect",
+        ];
         if !ELEMENTS.contains(&element) {
             return Err(bad(&format!(
                 "`{element}` is not one of {}",

@@ -1,19 +1,14 @@
 //! Effects on the way from the command to the drive.
 
-use asid_core::effect::{Acts, Effect, EffectParameter};
-use asid_core::simulator::{StepHook, StepView};
-use asid_core::{Layout, Result};
+use asid_core::effect::{Acting, Acts, Effect, EffectParameter, Site};
+use asid_core::simulator::StepView;
+use asid_core::{Plant, Result};
 
 asid_core::register!(EffectEntry {
     name: "actuator-gain",
     about: "the command is scaled",
     make: || Box::new(Affine {
-        parameters: &[EffectParameter {
-            name: "gain",
-            unit: "",
-            range: [0.5, 1.5],
-            null: 1.0
-        }],
+        parameters: const { &[EffectParameter::new("gain", "", [0.2, 2.0], 1.0)] },
     }),
 });
 
@@ -21,12 +16,14 @@ asid_core::register!(EffectEntry {
     name: "actuator-bias",
     about: "the command is shifted",
     make: || Box::new(Affine {
-        parameters: &[EffectParameter {
-            name: "bias",
-            unit: "",
-            range: [-0.1, 0.1],
-            null: 0.0
-        }],
+        parameters: const {
+            &[EffectParameter::new(
+                "bias",
+                "unit of the command",
+                [-10.0, 10.0],
+                0.0,
+            )]
+        },
     }),
 });
 
@@ -35,14 +32,14 @@ struct Affine {
     parameters: &'static [EffectParameter],
 }
 
-struct AffineHook {
+struct AffineAt {
     actuator: usize,
     gain: f64,
     bias: f64,
 }
 
-impl StepHook for AffineHook {
-    fn before_step(&self, _row: usize, _step: usize, view: &mut StepView<'_>) {
+impl Acting for AffineAt {
+    fn before_step(&mut self, view: &mut StepView<'_>) {
         let command = &mut view.ctrl[self.actuator];
         *command = self.gain * *command + self.bias;
     }
@@ -57,21 +54,18 @@ impl Effect for Affine {
         self.parameters
     }
 
-    fn sites(&self, layout: &Layout) -> Vec<String> {
-        layout.actuators.iter().map(|a| a.name.clone()).collect()
+    fn sites(&self, plant: &Plant) -> Vec<String> {
+        let actuators = plant.layout.actuators.iter();
+        actuators.map(|a| a.name.clone()).collect()
     }
 
-    fn attach(
-        &self,
-        layout: &Layout,
-        site: &str,
-        values: &[f64],
-    ) -> Result<Box<dyn StepHook + Send>> {
+    fn attach(&self, site: &Site<'_>) -> Result<Box<dyn Acting>> {
         let scaled = self.parameters[0].name == "gain";
-        Ok(Box::new(AffineHook {
-            actuator: layout.actuator(site)?,
-            gain: if scaled { values[0] } else { 1.0 },
-            bias: if scaled { 0.0 } else { values[0] },
+        let value = site.values[0];
+        Ok(Box::new(AffineAt {
+            actuator: site.plant.layout.actuator(site.name)?,
+            gain: if scaled { value } else { 1.0 },
+            bias: if scaled { 0.0 } else { value },
         }))
     }
 }

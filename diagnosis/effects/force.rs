@@ -1,9 +1,8 @@
 //! Effects that are forces during the step.
 
-use asid_core::effect::{Acts, Effect, EffectParameter};
-use asid_core::layout::JointKind;
-use asid_core::simulator::{StepHook, StepView};
-use asid_core::{Layout, Result};
+use asid_core::effect::{Acting, Acts, Effect, EffectParameter, Site};
+use asid_core::simulator::StepView;
+use asid_core::{Plant, Result};
 
 asid_core::register!(EffectEntry {
     name: "viscous-friction",
@@ -16,13 +15,13 @@ asid_core::register!(EffectEntry {
 /// It is explicit in time: stable while `damping` is below the joint's inertia over the time step.
 struct ViscousFriction;
 
-struct ViscousHook {
+struct ViscousAt {
     dof: usize,
     damping: f64,
 }
 
-impl StepHook for ViscousHook {
-    fn before_step(&self, _row: usize, _step: usize, view: &mut StepView<'_>) {
+impl Acting for ViscousAt {
+    fn before_step(&mut self, view: &mut StepView<'_>) {
         view.force[self.dof] -= self.damping * view.qvel[self.dof];
     }
 }
@@ -33,32 +32,27 @@ impl Effect for ViscousFriction {
     }
 
     fn parameters(&self) -> &'static [EffectParameter] {
-        &[EffectParameter {
-            name: "damping",
-            unit: "N m s/rad",
-            range: [0.0, 10.0],
-            null: 0.0,
-        }]
+        const {
+            &[EffectParameter::new(
+                "damping",
+                "N m s/rad or N s/m",
+                [0.0, 100.0],
+                0.0,
+            )]
+        }
     }
 
-    fn sites(&self, layout: &Layout) -> Vec<String> {
-        layout
-            .joints
-            .iter()
-            .filter(|j| matches!(j.kind, JointKind::Hinge | JointKind::Slide))
-            .map(|j| j.name.clone())
+    fn sites(&self, plant: &Plant) -> Vec<String> {
+        let joints = plant.scalar_joints();
+        joints
+            .map(|j| plant.layout.joints[j].name.clone())
             .collect()
     }
 
-    fn attach(
-        &self,
-        layout: &Layout,
-        site: &str,
-        values: &[f64],
-    ) -> Result<Box<dyn StepHook + Send>> {
-        Ok(Box::new(ViscousHook {
-            dof: layout.joint(site)?.qvel,
-            damping: values[0],
+    fn attach(&self, site: &Site<'_>) -> Result<Box<dyn Acting>> {
+        Ok(Box::new(ViscousAt {
+            dof: site.plant.layout.joint(site.name)?.qvel,
+            damping: site.values[0],
         }))
     }
 }

@@ -4,11 +4,13 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use anyhow::Result;
-use asid_core::effect::{EffectSpec, Effects};
+use asid_core::effect::EffectSpec;
+use asid_core::refined::Refined;
 use asid_core::registry::{self, BackendEntry, Entry, TaskEntry};
 use asid_core::signal::Signal;
 use asid_core::{
-    Backend, Capabilities, Error, Model, Parameter, Problem, Scene, SimulatedWorld, Streams, Task,
+    Backend, Capabilities, Error, Model, Parameter, Plant, Problem, Scene, SimulatedWorld, Streams,
+    Task,
 };
 
 use super::config::{Config, Stage};
@@ -151,10 +153,13 @@ impl Session {
     /// The simulated real world with this truth.
     pub fn world(&self, truth: &[f64]) -> Result<SimulatedWorld<'_>> {
         let real = &self.config.real;
+        let scene = match &real.model {
+            None => self.task.scene().clone(),
+            Some(path) => Scene::from_file(path)?,
+        };
         let model = match &real.model {
             None if real.backend == self.config.backend => Arc::clone(&self.model),
-            None => load(&real.backend, &*self.task, self.task.scene())?,
-            Some(path) => load(&real.backend, &*self.task, &Scene::from_file(path)?)?,
+            _ => load(&real.backend, &*self.task, &scene)?,
         };
         if let Some(path) = &real.model {
             self.check_real(&*model).map_err(|e| Error::Scene {
@@ -165,21 +170,24 @@ impl Session {
         let effects = real
             .effects
             .iter()
-            .map(|text| text.parse::<EffectSpec>()?.attach(model.layout()))
+            .map(|text| text.parse::<EffectSpec>())
             .collect::<asid_core::Result<Vec<_>>>()?;
-        if !effects.is_empty() {
-            require(&*backend(&real.backend)?, Capabilities::STEP_HOOKS)?;
-        }
+        let model = if effects.is_empty() {
+            model
+        } else {
+            let backend = backend(&real.backend)?;
+            let plant = Arc::new(Plant::of(&scene)?);
+            Refined::new(&*backend, model, plant, &[], &effects)?
+        };
         let streams = Streams::new(self.config.seed).child("real world");
-        let world = SimulatedWorld::new(
+        Ok(SimulatedWorld::new(
             &*self.task,
             &*model,
             &self.parameters,
             truth,
             &self.signals,
             streams,
-        )?;
-        Ok(world.with_effects(Effects(effects)))
+        )?)
     }
 
     /// Checks that a model has what the task's protocols need.

@@ -211,6 +211,7 @@ impl StepHook for SpoiltHook<'_> {
                 qvel: &qvel,
                 ctrl: view.ctrl,
                 force: view.force,
+                parameters: view.parameters,
             },
         );
         if self.fault == Fault::HookForceAtCentre && qpos.len() == 7 {

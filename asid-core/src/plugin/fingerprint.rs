@@ -74,6 +74,8 @@ probes!(
     crate::identify::Identified,
     crate::solve::Solved<'static>,
     crate::effect::EffectParameter,
+    crate::effect::Site<'static>,
+    crate::plant::Plant,
     crate::registry::TaskEntry,
     crate::registry::EffectEntry,
     crate::registry::ExplorerEntry,

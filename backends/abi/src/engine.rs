@@ -129,7 +129,8 @@ impl Engine {
         if let Some(missing) = missing_function(&table) {
             return Err(refuse(format!("its table has no `{missing}` (NULL)")));
         }
-        let unknown = table.capabilities & !Capabilities::all().bits();
+        let known = Capabilities::all() - Capabilities::LIVE_PARAMETERS;
+        let unknown = table.capabilities & !known.bits();
         #[allow(
             clippy::absurd_extreme_comparisons,
             reason = "not of the first minor version only"

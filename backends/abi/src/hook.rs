@@ -78,6 +78,7 @@ pub unsafe extern "C" fn call(
             qvel: slice(view.qvel, nv),
             ctrl: slice_mut(view.ctrl, nu),
             force: slice_mut(view.force, nv),
+            parameters: &mut [],
         }
     };
     let done = catch_unwind(AssertUnwindSafe(|| {

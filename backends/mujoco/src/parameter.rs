@@ -122,6 +122,12 @@ impl Plan {
         self.columns.len()
     }
 
+    /// The columns.
+    #[must_use]
+    pub fn columns(&self) -> &[Column] {
+        &self.columns
+    }
+
     /// True where a body's centre or axes may move, so that no shortcut for
     /// bodies of diagonal inertia holds.
     #[must_use]

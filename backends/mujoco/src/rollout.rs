@@ -1,11 +1,12 @@
 //! Frames and physics steps of one simulation, on its thread.
 
 use asid_core::layout::{Channel, Recording};
-use asid_core::simulator::{Control, Rollout, StepView};
+use asid_core::simulator::{Control, Rollout, StepHook, StepView};
 use mujoco_rs::mujoco_c::{mjtIntegrator, mjtStage};
 use mujoco_rs::wrappers::mj_model::MjModel;
 
 use crate::ffi::{BadNumber, Sim, is_bad};
+use crate::target::Column;
 
 /// What has to be computed before a row can be read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -53,6 +54,8 @@ pub struct Frames<'a> {
     pub sensors: &'a [(usize, usize)],
     /// Whether a step can be taken in two halves.
     pub halves: bool,
+    /// The batch's columns, which a hook may change.
+    pub columns: &'a [Column],
 }
 
 /// Whether the model's integrator lets a step be taken in two halves; the
@@ -74,6 +77,57 @@ pub struct Job<'a> {
     pub steps: u64,
     /// Why and when it stopped, where it did.
     pub stopped: Option<(f64, BadNumber)>,
+    /// The simulation's parameters: as set, as a hook wants them, as the model has them.
+    /// Empty without a hook.
+    pub parameters: [Vec<f64>; 3],
+}
+
+/// Shows the parameters to a hook and writes what it changed into the model; see
+/// [`asid_core::Capabilities::LIVE_PARAMETERS`]. Returns whether the model changed, or
+/// `None` where a number is bad.
+fn call_hook(
+    job: &mut Job<'_>,
+    sim: &mut Sim<'_>,
+    frames: &Frames<'_>,
+    (hook, step): (&dyn StepHook, usize),
+    command: &[f64],
+) -> Option<bool> {
+    let [set, wanted, written] = &mut job.parameters;
+    wanted.copy_from_slice(set);
+    let time = sim.time();
+    let (qpos, qvel, ctrl, force) = sim.hook_view();
+    ctrl.copy_from_slice(command);
+    force.fill(0.0);
+    let mut view = StepView {
+        time,
+        qpos,
+        qvel,
+        ctrl,
+        force,
+        parameters: wanted,
+    };
+    hook.before_step(job.row, step, &mut view);
+    let good = |x: &[f64]| !x.iter().any(|&x| is_bad(x));
+    if !(good(view.ctrl) && good(view.force) && good(view.parameters)) {
+        return None;
+    }
+    if wanted == written {
+        return Some(false);
+    }
+    write_live(sim, frames.columns, wanted, written);
+    Some(true)
+}
+
+/// Writes the columns that may change during a rollout, where they differ from `written`.
+fn write_live(sim: &mut Sim<'_>, columns: &[Column], wanted: &[f64], written: &mut [f64]) {
+    for (column, (&value, before)) in columns.iter().zip(wanted.iter().zip(&mut *written)) {
+        if value != *before {
+            for &(field, entry, factor) in &column.entries {
+                sim.write_live(field, entry, factor * value);
+            }
+            *before = value;
+        }
+    }
 }
 
 /// Runs the frames of one simulation. It allocates nothing and owns nothing
@@ -102,22 +156,13 @@ pub fn run(job: &mut Job<'_>, sim: &mut Sim<'_>, frames: &Frames<'_>) {
         for substep in 0..rollout.substeps {
             if let Some(hook) = rollout.hook {
                 let step = frame * rollout.substeps + substep;
-                let time = sim.time();
-                let (qpos, qvel, ctrl, force) = sim.hook_view();
-                ctrl.copy_from_slice(command);
-                force.fill(0.0);
-                let mut view = StepView {
-                    time,
-                    qpos,
-                    qvel,
-                    ctrl,
-                    force,
-                };
-                hook.before_step(job.row, step, &mut view);
-                let good = |x: &[f64]| !x.iter().any(|&x| is_bad(x));
-                if !(good(view.ctrl) && good(view.force)) {
-                    job.stopped = Some((time, BadNumber::Command));
-                    return;
+                match call_hook(job, sim, frames, (hook, step), command) {
+                    // The first half of a step knows the parameters of before.
+                    Some(changed) => half_done &= !changed,
+                    None => {
+                        job.stopped = Some((sim.time(), BadNumber::Command));
+                        return;
+                    }
                 }
             }
             if std::mem::take(&mut half_done) {
@@ -144,6 +189,8 @@ pub fn run(job: &mut Job<'_>, sim: &mut Sim<'_>, frames: &Frames<'_>) {
     // Forces belong to the rollout and not to the state that it leaves.
     sim.wrenches().fill(0.0);
     sim.hook_view().3.fill(0.0);
+    let [set, _, written] = &mut job.parameters;
+    write_live(sim, frames.columns, set, written);
 }
 
 /// Computes what a row needs for the present state.

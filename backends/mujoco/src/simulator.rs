@@ -165,6 +165,12 @@ impl MujocoSimulator {
                 (None, None) => None,
             };
             if let Some((time, message)) = stopped {
+                // What a hook changed is still in the model.
+                let columns = self.plan.len();
+                let set = &self.values[sim * columns..(sim + 1) * columns];
+                let unknown = vec![f64::NAN; columns];
+                let (batch, fields) = (&mut self.batch, &self.fields);
+                self.plan.write(batch, fields, sim, &unknown, set);
                 self.status[sim] = Status::Diverged {
                     time,
                     message: format!("{message} at {time:.6} s"),
@@ -313,6 +319,7 @@ impl Simulator for MujocoSimulator {
                 frames: 0,
                 steps: 0,
                 stopped: None,
+                parameters: std::array::from_fn(|_| Vec::new()),
             });
         }
         for range in segments {
@@ -328,7 +335,15 @@ impl Simulator for MujocoSimulator {
                 stage,
                 sensors: &self.sensors,
                 halves: self.halves,
+                columns: self.plan.columns(),
             };
+            if rollout.hook.is_some() {
+                let columns = self.plan.len();
+                for (&sim, job) in sims.iter().zip(&mut jobs) {
+                    let set = &self.values[sim * columns..(sim + 1) * columns];
+                    job.parameters = std::array::from_fn(|_| set.to_vec());
+                }
+            }
             let numbers = ids(sims.iter().copied());
             for job in &mut jobs {
                 job.steps = 0;

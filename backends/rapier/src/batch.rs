@@ -232,6 +232,7 @@ impl Simulator for Batch {
                         ctrl,
                         wrenches: &wrenches,
                         hook: rollout.hook,
+                        knobs: &knobs,
                         row,
                         step: frame * rollout.substeps + substep,
                     };

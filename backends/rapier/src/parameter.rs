@@ -302,6 +302,14 @@ impl Knob {
         }
     }
 
+    /// True where the value may change from step to step.
+    pub fn is_live(self) -> bool {
+        matches!(
+            self,
+            Self::GeomFriction(..) | Self::Damping(_) | Self::Frictionloss(_) | Self::Stiffness(_)
+        )
+    }
+
     /// True where the value lives in rapier's bodies and shapes.
     pub fn is_structural(self) -> bool {
         matches!(

@@ -14,7 +14,7 @@ use crate::compiled::Compiled;
 use crate::contact::{self, Touching};
 use crate::convert;
 use crate::pairs::Hooks;
-use crate::parameter::Tables;
+use crate::parameter::{Knob, Tables};
 use crate::settings::MAX_SPEED;
 use crate::state::State;
 
@@ -48,6 +48,7 @@ pub struct World {
     qvel: Vec<f64>,
     ctrl: Vec<f64>,
     force: Vec<f64>,
+    live: Vec<f64>,
 }
 
 /// What acts on one physics step.
@@ -58,6 +59,8 @@ pub struct StepInput<'a> {
     pub wrenches: &'a [(usize, &'a [f64])],
     /// Physics the engine lacks.
     pub hook: Option<&'a dyn StepHook>,
+    /// Columns of the batch, which the hook may change for the step.
+    pub knobs: &'a [Knob],
     /// Row of the rollout, for the hook.
     pub row: usize,
     /// Physics step since the start of the rollout, for the hook.
@@ -80,6 +83,7 @@ impl World {
             qvel: vec![0.0; compiled.layout.nv],
             ctrl: vec![0.0; compiled.layout.nu()],
             force: vec![0.0; compiled.layout.nv],
+            live: Vec::new(),
         };
         world.reset(compiled);
         world
@@ -148,6 +152,14 @@ impl World {
             self.state
                 .coordinates(compiled, &mut self.qpos, &mut self.qvel);
             self.force.fill(0.0);
+            self.live.clear();
+            self.live.extend(input.knobs.iter().map(|knob| {
+                if knob.is_live() {
+                    knob.get(&self.tables, compiled)
+                } else {
+                    0.0
+                }
+            }));
             hook.before_step(
                 input.row,
                 input.step,
@@ -157,8 +169,10 @@ impl World {
                     qvel: &self.qvel,
                     ctrl: &mut self.ctrl,
                     force: &mut self.force,
+                    parameters: &mut self.live,
                 },
             );
+            self.swap_live(compiled, input.knobs);
             hooked = &self.force;
         }
         self.state.refresh_link_velocities(compiled);
@@ -221,6 +235,22 @@ impl World {
         }
         for (&body, &before) in compiled.floating.iter().zip(&self.rotations) {
             self.state.correct_root(compiled, body, before);
+        }
+        if input.hook.is_some() {
+            self.swap_live(compiled, input.knobs);
+        }
+    }
+
+    /// Exchanges the parameters that may change during a rollout with what the hook wants.
+    fn swap_live(&mut self, compiled: &Compiled, knobs: &[Knob]) {
+        for (knob, wanted) in knobs.iter().zip(&mut self.live) {
+            if knob.is_live() {
+                let set = knob.get(&self.tables, compiled);
+                if *wanted != set {
+                    knob.set(&mut self.tables, *wanted);
+                }
+                *wanted = set;
+            }
         }
     }
 

@@ -10,10 +10,9 @@
 //! from the motion. The force is explicit in time: accurate while the joint takes several
 //! steps to cross a width.
 
-use asid_core::effect::{Acts, Effect, EffectParameter};
-use asid_core::layout::JointKind;
-use asid_core::simulator::{StepHook, StepView};
-use asid_core::{Error, Layout, Result};
+use asid_core::effect::{Acting, Acts, Effect, EffectParameter, Site, Start};
+use asid_core::simulator::StepView;
+use asid_core::{Error, Plant, Result};
 
 asid_core::register!(EffectEntry {
     name: "magnetic-catch",
@@ -32,41 +31,26 @@ impl Effect for MagneticCatch {
     }
 
     fn parameters(&self) -> &'static [EffectParameter] {
-        &[
-            EffectParameter {
-                name: "depth",
-                unit: "J",
-                range: [0.0, 1.0],
-                null: 0.0,
-            },
-            EffectParameter {
-                name: "place",
-                unit: "rad or m",
-                range: [-1.0, 1.0],
-                null: 0.0,
-            },
-            EffectParameter {
-                name: "width",
-                unit: "rad or m",
-                range: [0.01, 0.5],
-                null: 0.1,
-            },
-        ]
+        const {
+            &[
+                EffectParameter::new("depth", "J", [0.0, 1.0], 0.0),
+                EffectParameter::new("place", "rad or m", [-1.0, 1.0], 0.0)
+                    .starting(Start::Values(&[-0.6, 0.0, 0.6])),
+                EffectParameter::new("width", "rad or m", [0.01, 0.5], 0.1)
+                    .starting(Start::Values(&[0.1])),
+            ]
+        }
     }
 
-    fn sites(&self, layout: &Layout) -> Vec<String> {
-        let simple = |kind| matches!(kind, JointKind::Hinge | JointKind::Slide);
-        let joints = layout.joints.iter().filter(|j| simple(j.kind));
-        joints.map(|j| j.name.clone()).collect()
+    fn sites(&self, plant: &Plant) -> Vec<String> {
+        let joints = plant.scalar_joints();
+        joints
+            .map(|j| plant.layout.joints[j].name.clone())
+            .collect()
     }
 
-    fn attach(
-        &self,
-        layout: &Layout,
-        site: &str,
-        values: &[f64],
-    ) -> Result<Box<dyn StepHook + Send>> {
-        let [depth, place, width] = values else {
+    fn attach(&self, site: &Site<'_>) -> Result<Box<dyn Acting>> {
+        let [depth, place, width] = site.values else {
             return Err(Error::Shape("magnetic-catch has three values".into()));
         };
         if *width <= 0.0 {
@@ -75,7 +59,7 @@ impl Effect for MagneticCatch {
                 message: format!("{width} is not above 0"),
             });
         }
-        let joint = layout.joint(site)?;
+        let joint = site.plant.layout.joint(site.name)?;
         Ok(Box::new(Catch {
             qpos: joint.qpos,
             dof: joint.qvel,
@@ -95,8 +79,8 @@ struct Catch {
     width: f64,
 }
 
-impl StepHook for Catch {
-    fn before_step(&self, _row: usize, _step: usize, view: &mut StepView<'_>) {
+impl Acting for Catch {
+    fn before_step(&mut self, view: &mut StepView<'_>) {
         let x = (view.qpos[self.qpos] - self.place) / self.width;
         view.force[self.dof] -= self.depth / self.width * x * (-0.5 * x * x).exp();
     }

@@ -2,7 +2,8 @@
 
 #![allow(clippy::unwrap_used)]
 
-use asid_core::{Backend as _, BatchConfig, Control, EffectSpec, Rollout, Scene};
+use asid_core::refined::Refined;
+use asid_core::{BatchConfig, Control, EffectSpec, Model as _, Rollout, Scene};
 
 // The crate registers the effect by being linked in.
 use magnetic_catch as _;
@@ -19,7 +20,8 @@ const FRAMES: usize = 1000;
 /// Angle and speed after each step of 2 ms, from an angle and a speed.
 fn motion(effect: Option<&str>, angle: f64, speed: f64) -> Vec<[f64; 2]> {
     let scene = Scene::from_xml("rotor", ROTOR, &[]).unwrap();
-    let model = asid_rapier::Rapier.load(&scene).unwrap();
+    let specs: Vec<EffectSpec> = effect.iter().map(|e| e.parse().unwrap()).collect();
+    let model = Refined::load(&asid_rapier::Rapier, &scene, &specs).unwrap();
     let config = BatchConfig {
         size: 1,
         threads: 1,
@@ -27,11 +29,8 @@ fn motion(effect: Option<&str>, angle: f64, speed: f64) -> Vec<[f64; 2]> {
     };
     let mut simulator = model.simulator(&config).unwrap();
     simulator.set_state(&[0], &[angle], &[speed]).unwrap();
-    let attach = |text: &str| text.parse::<EffectSpec>().unwrap().attach(model.layout());
-    let hook = effect.map(|text| attach(text).unwrap());
     let recording = model.layout().recording(&["angle", "speed"]).unwrap();
-    let mut rollout = Rollout::new(&[0], FRAMES, 1, Control::Shared(&[]), &recording);
-    rollout.hook = hook.as_deref().map(|hook| hook as _);
+    let rollout = Rollout::new(&[0], FRAMES, 1, Control::Shared(&[]), &recording);
     let mut out = vec![0.0; FRAMES * 2];
     simulator.rollout(&rollout, &mut out).unwrap();
     out.chunks_exact(2).map(|row| [row[0], row[1]]).collect()
@@ -83,8 +82,8 @@ fn off_at_its_null_value_to_the_bit() {
 #[test]
 fn a_width_of_zero_is_refused() {
     let scene = Scene::from_xml("rotor", ROTOR, &[]).unwrap();
-    let model = asid_rapier::Rapier.load(&scene).unwrap();
     let spec: EffectSpec = "magnetic-catch@spin:width=0".parse().unwrap();
-    let error = spec.attach(model.layout()).map(|_| ()).unwrap_err();
+    let refined = Refined::load(&asid_rapier::Rapier, &scene, &[spec]);
+    let error = refined.map(|_| ()).unwrap_err();
     assert!(error.to_string().contains("not above 0"), "{error}");
 }

@@ -202,6 +202,7 @@ impl Sim {
                         qvel: &self.state.qvel,
                         ctrl: &mut [],
                         force: &mut generalised,
+                        parameters: &mut [],
                     };
                     hook.before_step(row, frame * rollout.substeps + substep, &mut view);
                 }

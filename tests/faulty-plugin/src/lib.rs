@@ -2,17 +2,17 @@
 //!
 //! The tasks are `payload-swing` with one method that fails.
 
-use asid_core::effect::{Acts, Effect, EffectParameter};
+use asid_core::effect::{Acting, Acts, Effect, EffectParameter, Site};
 use asid_core::explore::{Explored, Explorer, Policy};
 use asid_core::identify::{Identified, Identifier};
 use asid_core::registry::Settings;
-use asid_core::simulator::{StepHook, StepView};
+use asid_core::simulator::StepView;
 use asid_core::solve::{Solved, TaskSolver};
 use asid_core::task::{
     Commander, Condition, DownstreamProtocol, ExplorationProtocol, Outcome, Task,
 };
 use asid_core::{
-    Capabilities, Episode, Error, Layout, Parameter, Posterior, Problem, Result, Scene,
+    Capabilities, Episode, Error, Layout, Parameter, Plant, Posterior, Problem, Result, Scene,
 };
 use payload_swing::PayloadSwing;
 
@@ -268,20 +268,20 @@ impl Effect for FaultyEffect {
         &[]
     }
 
-    fn sites(&self, _layout: &Layout) -> Vec<String> {
-        Vec::new()
+    fn sites(&self, _: &Plant) -> Vec<String> {
+        vec![String::new()]
     }
 
-    fn attach(&self, _: &Layout, _: &str, _: &[f64]) -> Result<Box<dyn StepHook + Send>> {
-        Ok(Box::new(FaultyHook(self.0)))
+    fn attach(&self, _: &Site<'_>) -> Result<Box<dyn Acting>> {
+        Ok(Box::new(FaultyForce(self.0)))
     }
 }
 
 /// The force of [`FaultyEffect`].
-struct FaultyHook(fn() -> f64);
+struct FaultyForce(fn() -> f64);
 
-impl StepHook for FaultyHook {
-    fn before_step(&self, _row: usize, _step: usize, view: &mut StepView<'_>) {
+impl Acting for FaultyForce {
+    fn before_step(&mut self, view: &mut StepView<'_>) {
         view.force.fill((self.0)());
     }
 }

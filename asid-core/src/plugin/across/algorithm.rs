@@ -1,20 +1,21 @@
 //! Explorers, identifiers, solvers, effects, and what they make.
 
-use crate::effect::{Acts, Effect, EffectParameter};
+use crate::effect::{Acting, Acts, Effect, EffectParameter, Site};
 use crate::episode::Episode;
 use crate::error::Result;
 use crate::explore::{CurvePoint, Explored, Explorer, Policy};
 use crate::identify::{Identified, Identifier};
-use crate::layout::Layout;
+use crate::plant::Plant;
 use crate::posterior::Posterior;
 use crate::problem::Problem;
-use crate::simulator::StepHook;
+use crate::simulator::StepView;
 use crate::solve::{Solved, TaskPolicy, TaskSolver};
 
 use super::super::border::Border;
 use super::Across;
-use crate::backend::Model;
+use crate::backend::{Capabilities, Model};
 use crate::progress::Progress;
+use crate::target::Target;
 use crate::task::Task;
 
 /// What a problem refers to, wrapped for the side that is handed it.
@@ -134,18 +135,62 @@ impl Effect for Across<Box<dyn Effect>> {
         self.run(|effect| effect.parameters())
     }
 
-    fn sites(&self, layout: &Layout) -> Vec<String> {
-        self.run(|effect| effect.sites(layout))
+    fn sites(&self, plant: &Plant) -> Vec<String> {
+        self.run(|effect| effect.sites(plant))
     }
 
-    fn attach(
-        &self,
-        layout: &Layout,
-        site: &str,
-        values: &[f64],
-    ) -> Result<Box<dyn StepHook + Send>> {
-        let hook = self.try_run(|effect| effect.attach(layout, site, values))?;
-        Ok(Box::new(Across::new(hook, self.border)))
+    fn targets(&self, plant: &Plant, site: &str) -> Vec<Target> {
+        self.run(|effect| effect.targets(plant, site))
+    }
+
+    fn steps(&self) -> bool {
+        self.run(|effect| effect.steps())
+    }
+
+    fn needs(&self) -> Capabilities {
+        self.run(|effect| effect.needs())
+    }
+
+    fn attach(&self, site: &Site<'_>) -> Result<Box<dyn Acting>> {
+        let acting = self.try_run(|effect| effect.attach(site))?;
+        Ok(Box::new(Across::new(acting, self.border)))
+    }
+}
+
+impl Acting for Across<Box<dyn Acting>> {
+    fn set(&self, columns: &mut [f64]) {
+        self.run(|acting| acting.set(columns));
+        self.border
+            .check_finite(&[], columns, "a parameter set by an effect");
+    }
+
+    fn before_step(&mut self, view: &mut StepView<'_>) {
+        self.run_mut(|acting| acting.before_step(view));
+        let given = [view.qpos, view.qvel];
+        if given.iter().all(|v| v.iter().all(|x| x.is_finite())) {
+            self.border
+                .check_finite(&[], view.ctrl, "the command of an effect");
+            self.border
+                .check_finite(&[], view.force, "the force of an effect");
+            self.border
+                .check_finite(&[], view.parameters, "a parameter set by an effect");
+        }
+    }
+
+    fn read(&mut self, time: f64, reading: &mut [f64]) {
+        self.run_mut(|acting| acting.read(time, reading));
+    }
+
+    fn restart(&mut self) {
+        self.run_mut(|acting| acting.restart());
+    }
+
+    fn save(&self, memory: &mut Vec<f64>) {
+        self.run(|acting| acting.save(memory));
+    }
+
+    fn load(&mut self, memory: &[f64]) {
+        self.run_mut(|acting| acting.load(memory));
     }
 }
 

@@ -2,6 +2,7 @@
 
 use std::marker::PhantomData;
 
+use crate::target::Field;
 use mujoco_rs::mujoco_c::{
     mj_contactForce, mj_forward, mj_step, mj_step1, mj_step2, mjData, mjModel,
 };
@@ -91,6 +92,27 @@ impl Sim<'_> {
     pub fn wrenches(&mut self) -> &mut [f64] {
         // SAFETY: `6 nbody` doubles, borrowed from `self`.
         unsafe { slice_mut((*self.d).xfrc_applied, (*self.m).nbody as usize * 6) }
+    }
+
+    /// Sets an entry of a field that may change during a rollout; other fields are left alone.
+    /// The field has values of its own in this simulation ([`super::Batch::expand`]).
+    pub fn write_live(&mut self, field: Field, entry: usize, value: f64) {
+        // SAFETY: `m` is live; its arrays have the lengths compared with, and belong to this
+        // simulation alone where they are expanded, as the caller promises.
+        unsafe {
+            let m = &*self.m;
+            let (array, len) = match field {
+                Field::GeomFriction => (m.geom_friction, 3 * m.ngeom),
+                Field::GeomSolref => (m.geom_solref, 2 * m.ngeom),
+                Field::DofDamping => (m.dof_damping, m.nv),
+                Field::DofFrictionloss => (m.dof_frictionloss, m.nv),
+                Field::JntStiffness => (m.jnt_stiffness, m.njnt),
+                _ => return,
+            };
+            if entry < len as usize {
+                *array.add(entry) = value;
+            }
+        }
     }
 
     /// One physics step.

@@ -1,62 +1,11 @@
-//! Physical effects that a simulator can be given.
-//!
-//! An effect is attached at a *site* (a joint, an actuator, …) with values of its
-//! parameters, and acts through a [`StepHook`] before each physics step: on the
-//! command, or as a force. At its parameters' null values it does exactly nothing.
-//! The simulated real world can be given effects that the method's simulator lacks.
+//! An effect with its site and values, as users write it.
 
 use std::str::FromStr;
 
+use super::Effect;
 use crate::error::{Error, Result};
-use crate::layout::Layout;
+use crate::plant::Plant;
 use crate::registry::{EffectEntry, all, find};
-use crate::simulator::{StepHook, StepView};
-
-/// Where an effect acts.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Acts {
-    /// On the model's parameters.
-    Model,
-    /// On the command on its way to the drive.
-    Command,
-    /// As a force during the step.
-    Force,
-    /// On the reading on its way from the sensor.
-    Measurement,
-}
-
-/// A parameter of an effect.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct EffectParameter {
-    /// Name, such as `gain`.
-    pub name: &'static str,
-    /// SI unit.
-    pub unit: &'static str,
-    /// Plausible values.
-    pub range: [f64; 2],
-    /// Value at which the effect is off.
-    pub null: f64,
-}
-
-/// A physical effect.
-pub trait Effect: Send + Sync {
-    /// Where it acts.
-    fn acts(&self) -> Acts;
-    /// Its parameters.
-    fn parameters(&self) -> &'static [EffectParameter];
-    /// Names of the sites of a scene that it can be attached to.
-    fn sites(&self, layout: &Layout) -> Vec<String>;
-    /// Attaches it at a site, with one value a parameter.
-    ///
-    /// # Errors
-    /// When the scene has no such site.
-    fn attach(
-        &self,
-        layout: &Layout,
-        site: &str,
-        values: &[f64],
-    ) -> Result<Box<dyn StepHook + Send>>;
-}
 
 /// An effect with its site and values, written `name@site:parameter=value,…`;
 /// parameters that are left out are at their null value.
@@ -136,20 +85,40 @@ impl std::fmt::Display for EffectSpec {
 }
 
 impl EffectSpec {
-    /// Finds the effect and attaches it.
+    /// Finds the effect, and checks that the machine has the site.
     ///
     /// # Errors
-    /// When there is no such effect, site or parameter; the message lists near names.
-    pub fn attach(&self, layout: &Layout) -> Result<Box<dyn StepHook + Send>> {
+    /// When there is no such effect or site; the message lists near names.
+    pub fn find(&self, plant: &Plant) -> Result<Box<dyn Effect>> {
         let effect = (find::<EffectEntry>(&self.name)?.make)();
-        let sites = effect.sites(layout);
-        if !sites.contains(&self.site) && !sites.is_empty() {
-            return Err(Error::unknown(
-                "site",
-                &self.site,
-                sites.iter().map(String::as_str),
-            ));
+        let sites = effect.sites(plant);
+        if sites.contains(&self.site) {
+            return Ok(effect);
         }
+        if sites.iter().all(String::is_empty) && !sites.is_empty() {
+            return Err(Error::Config {
+                key: format!("effect {}", self.name),
+                message: format!("acts on the whole scene: write it without `@{}`", self.site),
+            });
+        }
+        if sites.is_empty() {
+            return Err(Error::Config {
+                key: format!("effect {}", self.name),
+                message: "this scene has nothing that it could act on".into(),
+            });
+        }
+        Err(Error::unknown(
+            "site",
+            &self.site,
+            sites.iter().map(String::as_str),
+        ))
+    }
+
+    /// One value a parameter of `effect`: as given, else null.
+    ///
+    /// # Errors
+    /// When a parameter is unknown, or a value makes no sense; the message lists near names.
+    pub fn values_of(&self, effect: &dyn Effect) -> Result<Vec<f64>> {
         let parameters = effect.parameters();
         let mut values: Vec<f64> = parameters.iter().map(|p| p.null).collect();
         for (name, value) in &self.values {
@@ -161,25 +130,16 @@ impl EffectSpec {
                 })?;
             values[i] = *value;
         }
-        effect.attach(layout, &self.site, &values)
+        Ok(values)
     }
-}
 
-/// Several effects, one after the other.
-pub struct Effects(pub Vec<Box<dyn StepHook + Send>>);
-
-impl Effects {
-    /// The hook of a rollout; none where there is no effect, which costs nothing.
+    /// Name and site, `NAME@SITE`; the name alone for an effect of the whole scene.
     #[must_use]
-    pub fn hook(&self) -> Option<&dyn StepHook> {
-        (!self.0.is_empty()).then_some(self)
-    }
-}
-
-impl StepHook for Effects {
-    fn before_step(&self, row: usize, step: usize, view: &mut StepView<'_>) {
-        for effect in &self.0 {
-            effect.before_step(row, step, view);
+    pub fn label(&self) -> String {
+        if self.site.is_empty() {
+            self.name.clone()
+        } else {
+            format!("{}@{}", self.name, self.site)
         }
     }
 }
