@@ -1,3 +1,22 @@
-//! The catalogue of effects: what a real machine does and its model may lack.
+//! Diagnosis of the sim-to-real gap: where it lies, which unmodelled effect causes it, and
+//! how far it shrinks once that effect is added.
+//!
+//! - [`effects`] is the catalogue: what a real machine does and its model may lack.
+//! - [`study`] is what the user brings: a model, logs of the real machine, what is fitted already.
+//! - [`predict`] replays the logs in a model, for many parameter values at once; [`fit`]
+//!   is least squares over such replays.
 
+pub mod bench;
+pub mod candidate;
+pub mod data;
 pub mod effects;
+pub mod fit;
+pub mod machine;
+pub mod noise;
+pub mod predict;
+pub mod refined_model;
+pub mod roughness;
+pub mod screen;
+pub mod search;
+pub mod study;
+pub mod trajectory;

@@ -32,6 +32,25 @@ pub struct Episode {
     pub channels: Vec<ChannelColumns>,
     /// Readings, `rows x width`; NaN where missing.
     pub readings: Vec<f64>,
+    /// State at the first row, where the log has it.
+    pub initial: Option<InitialState>,
+}
+
+/// State at the first row of a log; NaN where the log does not say.
+#[derive(Clone, Debug, PartialEq)]
+pub struct InitialState {
+    /// Positions, `nq`.
+    pub qpos: Vec<f64>,
+    /// Velocities, `nv`.
+    pub qvel: Vec<f64>,
+}
+
+impl InitialState {
+    /// True where nothing is left open.
+    #[must_use]
+    pub fn is_complete(&self) -> bool {
+        self.qpos.iter().chain(&self.qvel).all(|x| x.is_finite())
+    }
 }
 
 impl Episode {
@@ -136,7 +155,7 @@ impl Episode {
     }
 
     /// Reads a log of a scene with this layout. Columns may come in any order and
-    /// sensors may be missing; columns `qpos.*` and `qvel.*` are passed over.
+    /// sensors may be missing; columns `qpos.*` and `qvel.*` hold the state at the first row.
     ///
     /// # Errors
     /// When the file cannot be read or a row or column is wrong; the message names both.
@@ -193,12 +212,12 @@ impl Episode {
             });
             reading_columns.extend(found);
         }
+        let state_columns = state_columns(layout, &header).map_err(&fail)?;
         for (i, name) in header.iter().enumerate() {
             let known = i == time_column
                 || ctrl_columns.contains(&i)
                 || reading_columns.contains(&i)
-                || name.starts_with("qpos.")
-                || name.starts_with("qvel.");
+                || state_columns.iter().any(|(c, _, _)| *c == i);
             if !known {
                 let known = layout.sensors.iter().map(|s| &*s.name);
                 return Err(fail(format!(
@@ -261,6 +280,21 @@ impl Episode {
             for &c in &reading_columns {
                 episode.readings.push(number(c)?);
             }
+            if i == 0 && !state_columns.is_empty() {
+                let mut state = InitialState {
+                    qpos: vec![f64::NAN; layout.nq],
+                    qvel: vec![f64::NAN; layout.nv],
+                };
+                for &(c, velocity, at) in &state_columns {
+                    let row = if velocity {
+                        &mut state.qvel
+                    } else {
+                        &mut state.qpos
+                    };
+                    row[at] = number(c)?;
+                }
+                episode.initial = Some(state);
+            }
         }
         if episode.rows() < 2 {
             return Err(fail(format!(
@@ -273,6 +307,37 @@ impl Episode {
         }
         Ok(episode)
     }
+}
+
+/// Columns of the state at the first row: column, whether it is a velocity, and its place in
+/// `qpos` or `qvel`.
+fn state_columns(layout: &Layout, header: &[String]) -> Result<Vec<(usize, bool, usize)>, String> {
+    let mut found = Vec::new();
+    for (i, name) in header.iter().enumerate() {
+        let (rest, velocity) = match (name.strip_prefix("qpos."), name.strip_prefix("qvel.")) {
+            (Some(rest), _) => (rest, false),
+            (_, Some(rest)) => (rest, true),
+            _ => continue,
+        };
+        let place = layout.joints.iter().find_map(|j| {
+            let (first, len) = if velocity {
+                (j.qvel, j.kind.qvel_len())
+            } else {
+                (j.qpos, j.kind.qpos_len())
+            };
+            match rest.strip_prefix(&*j.name)? {
+                "" if len == 1 => Some(first),
+                entry => {
+                    let entry: usize = entry.strip_prefix('.')?.parse().ok()?;
+                    (entry < len).then_some(first + entry)
+                }
+            }
+        });
+        let place =
+            place.ok_or_else(|| format!("column `{name}` is no coordinate of a joint of the scene"))?;
+        found.push((i, velocity, place));
+    }
+    Ok(found)
 }
 
 /// The shortest text that reads back as the same number.

@@ -8,38 +8,33 @@ use crate::error::Result;
 use crate::layout::{Layout, Recording};
 use crate::simulator::{Control, Rollout, Simulator};
 
-/// A log prepared for replay.
+/// How a log's commands are replayed, and how its rows lie among the recorded states.
 #[derive(Clone, Debug)]
-pub struct Replay {
-    ctrl: Vec<f64>,
-    frames: usize,
-    substeps: usize,
+pub struct ReplayPlan {
+    /// Commands, `frames x nu`.
+    pub ctrl: Vec<f64>,
+    /// Frames of the rollout.
+    pub frames: usize,
+    /// Physics steps a frame.
+    pub substeps: usize,
     rows: usize,
     /// For each row, the earlier of the two recorded states (0 is the start) and how far
     /// beyond it the row lies; `None` where every row is a recorded state.
     between: Option<Vec<(usize, f64)>>,
-    recording: Recording,
-    quaternions: Vec<usize>,
-    buffer: Vec<f64>,
 }
 
-impl Replay {
-    /// Prepares `episode` for a scene; `channels` are what is predicted.
-    ///
-    /// # Errors
-    /// When the scene has no such channel.
-    pub fn new(layout: &Layout, episode: &Episode, channels: &[String]) -> Result<Self> {
-        let recording = layout.recording(channels)?;
-        let quaternions = channels
-            .iter()
-            .enumerate()
-            .filter(|(_, name)| layout.sensor(name).is_ok_and(|s| s.len == 4))
-            .map(|(i, _)| recording.range(i).start)
-            .collect();
-        let (nu, rows) = (layout.nu(), episode.rows());
+impl ReplayPlan {
+    /// Plans the replay of the first `rows` rows (at least two) of `episode`.
+    #[must_use]
+    pub fn new(layout: &Layout, episode: &Episode, rows: usize) -> Self {
+        let nu = layout.nu();
+        let rows = rows.clamp(2, episode.rows());
         let start = episode.time[0];
         let dt = layout.timestep;
-        let steps: Vec<f64> = episode.time.iter().map(|t| (t - start) / dt).collect();
+        let steps: Vec<f64> = episode.time[..rows]
+            .iter()
+            .map(|t| (t - start) / dt)
+            .collect();
         let stride = steps[1].round();
         // Within a thousandth of a step a row is on the grid: times are often rounded in logs.
         let regular = stride >= 1.0
@@ -48,18 +43,15 @@ impl Replay {
                 .enumerate()
                 .all(|(i, s)| (s - stride * i as f64).abs() < 1e-3);
         if regular {
-            return Ok(Self {
+            return Self {
                 ctrl: episode.ctrl[..(rows - 1) * nu].to_vec(),
                 frames: rows - 1,
                 substeps: stride as usize,
                 rows,
                 between: None,
-                recording,
-                quaternions,
-                buffer: Vec::new(),
-            });
+            };
         }
-        let frames = steps[rows - 1].ceil() as usize;
+        let frames = (steps[rows - 1].ceil() as usize).max(1);
         let mut ctrl = Vec::with_capacity(frames * nu);
         let mut row = 0;
         for k in 0..frames {
@@ -75,14 +67,87 @@ impl Replay {
                 (earlier, s - earlier as f64)
             })
             .collect();
-        Ok(Self {
+        Self {
             ctrl,
             frames,
             substeps: 1,
             rows,
             between: Some(between),
+        }
+    }
+
+    /// Rows of the log that are replayed.
+    #[must_use]
+    pub fn rows(&self) -> usize {
+        self.rows
+    }
+
+    /// Physics steps of one replay.
+    #[must_use]
+    pub fn physics_steps(&self) -> usize {
+        self.frames * self.substeps
+    }
+
+    /// The log's rows from what was recorded: `first` is the state at the start (`width`),
+    /// `recorded` the states at the ends of the frames (`frames x width`), `quaternions`
+    /// where quaternions begin in a row; `out` is `rows x width`.
+    pub fn resample(
+        &self,
+        first: &[f64],
+        recorded: &[f64],
+        quaternions: &[usize],
+        out: &mut [f64],
+    ) {
+        let width = first.len();
+        let state = |k: usize| -> &[f64] {
+            match k {
+                0 => first,
+                _ => &recorded[(k - 1) * width..k * width],
+            }
+        };
+        for (k, row) in out.chunks_exact_mut(width.max(1)).enumerate() {
+            match &self.between {
+                None => row.copy_from_slice(state(k)),
+                Some(between) => {
+                    let (earlier, along) = between[k];
+                    interpolate(state(earlier), state(earlier + 1), along, quaternions, row);
+                }
+            }
+        }
+    }
+}
+
+/// Where the quaternions among some sensors begin in a row of them.
+#[must_use]
+pub fn quaternions(layout: &Layout, recording: &Recording, channels: &[String]) -> Vec<usize> {
+    channels
+        .iter()
+        .enumerate()
+        .filter(|(_, name)| layout.sensor(name).is_ok_and(|s| s.len == 4))
+        .map(|(i, _)| recording.range(i).start)
+        .collect()
+}
+
+/// A log prepared for replay.
+#[derive(Clone, Debug)]
+pub struct Replay {
+    plan: ReplayPlan,
+    recording: Recording,
+    quaternions: Vec<usize>,
+    buffer: Vec<f64>,
+}
+
+impl Replay {
+    /// Prepares `episode` for a scene; `channels` are what is predicted.
+    ///
+    /// # Errors
+    /// When the scene has no such channel.
+    pub fn new(layout: &Layout, episode: &Episode, channels: &[String]) -> Result<Self> {
+        let recording = layout.recording(channels)?;
+        Ok(Self {
+            plan: ReplayPlan::new(layout, episode, episode.rows()),
+            quaternions: quaternions(layout, &recording, channels),
             recording,
-            quaternions,
             buffer: Vec::new(),
         })
     }
@@ -90,7 +155,7 @@ impl Replay {
     /// Rows of the log.
     #[must_use]
     pub fn rows(&self) -> usize {
-        self.rows
+        self.plan.rows
     }
 
     /// Entries of a predicted row.
@@ -102,7 +167,7 @@ impl Replay {
     /// Physics steps of one replay.
     #[must_use]
     pub fn physics_steps(&self) -> usize {
-        self.frames * self.substeps
+        self.plan.physics_steps()
     }
 
     /// Predicts all rows from the simulations' present states: `sims x rows x width`.
@@ -115,42 +180,26 @@ impl Replay {
         sims: &[usize],
         out: &mut [f64],
     ) -> Result<()> {
-        let width = self.width();
-        let states = self.frames + 1;
+        let (width, plan) = (self.width(), &self.plan);
         let mut first = vec![0.0; sims.len() * width];
         simulator.read(sims, &self.recording, &mut first)?;
-        self.buffer.resize(sims.len() * self.frames * width, 0.0);
+        self.buffer.resize(sims.len() * plan.frames * width, 0.0);
         let rollout = Rollout::new(
             sims,
-            self.frames,
-            self.substeps,
-            Control::Shared(&self.ctrl),
+            plan.frames,
+            plan.substeps,
+            Control::Shared(&plan.ctrl),
             &self.recording,
         );
         simulator.rollout(&rollout, &mut self.buffer)?;
+        let recorded = plan.frames * width;
         for i in 0..sims.len() {
-            let state = |k: usize| -> &[f64] {
-                if k == 0 {
-                    &first[i * width..(i + 1) * width]
-                } else {
-                    &self.buffer[(i * self.frames + k - 1) * width..][..width]
-                }
-            };
-            let rows = &mut out[i * self.rows * width..(i + 1) * self.rows * width];
-            match &self.between {
-                None => {
-                    for (k, row) in rows.chunks_exact_mut(width).enumerate() {
-                        debug_assert!(k < states);
-                        row.copy_from_slice(state(k));
-                    }
-                }
-                Some(between) => {
-                    for (row, &(earlier, along)) in rows.chunks_exact_mut(width).zip(between) {
-                        let (a, b) = (state(earlier), state(earlier + 1));
-                        interpolate(a, b, along, &self.quaternions, row);
-                    }
-                }
-            }
+            plan.resample(
+                &first[i * width..(i + 1) * width],
+                &self.buffer[i * recorded..(i + 1) * recorded],
+                &self.quaternions,
+                &mut out[i * plan.rows * width..(i + 1) * plan.rows * width],
+            );
         }
         Ok(())
     }

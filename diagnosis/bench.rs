@@ -1,0 +1,255 @@
+//! The bench on which explanations are tried: the machine, the logs, their noise and
+//! scatter, and the starts of the episodes.
+
+use asid_core::layout::Layout;
+use asid_core::{EffectSpec, Parameter, Result};
+
+use crate::candidate::Candidate;
+use crate::data::Logs;
+use crate::fit::{Effort, Fit, Open, Unknown, cost, fit};
+use crate::machine::Machine;
+use crate::predict::{Point, Predictor, State};
+use crate::roughness::Whitening;
+
+/// Points that one batch takes.
+pub const CAPACITY: usize = 8;
+
+/// Logs with what is known of their noise and starts.
+#[derive(Clone, Debug)]
+pub struct Record {
+    /// The logs.
+    pub logs: Logs,
+    /// Starts of the episodes, as given or first estimated.
+    pub starts: Vec<State>,
+    /// Scatter of predictions, one an episode; empty before it is known.
+    pub whitening: Vec<Whitening>,
+    /// Number of readings.
+    pub readings: usize,
+}
+
+impl Record {
+    /// Without scatter.
+    #[must_use]
+    pub fn new(logs: Logs, starts: Vec<State>) -> Self {
+        let readings = logs.present().iter().filter(|p| **p).count();
+        Self {
+            logs,
+            starts,
+            whitening: Vec::new(),
+            readings,
+        }
+    }
+
+    /// The first share of each episode. What is known of the scatter is of the whole.
+    #[must_use]
+    pub fn cut(&self, layout: &Layout, share: f64) -> Self {
+        Self::new(self.logs.cut(layout, share), self.starts.clone())
+    }
+
+    /// Some of the episodes.
+    #[must_use]
+    pub fn some(&self, which: &[usize]) -> Self {
+        let logs = self.logs.some(which);
+        let mut record = Self::new(logs, which.iter().map(|&i| self.starts[i].clone()).collect());
+        if !self.whitening.is_empty() {
+            record.whitening = which.iter().map(|&i| self.whitening[i].clone()).collect();
+        }
+        record
+    }
+}
+
+/// A set of effects with its parameters fitted.
+#[derive(Clone, Debug)]
+pub struct Explanation {
+    /// Effects at their sites, with the values of all their parameters.
+    pub effects: Vec<EffectSpec>,
+    /// The study's parameters, then those of the effects.
+    pub unknowns: Vec<Unknown>,
+    /// The fit to the training logs.
+    pub fit: Fit,
+    /// Sum of squares of the whitened residuals of the logs held out; NaN before the last stage.
+    pub held_out: f64,
+    /// Starts of the held-out episodes under it.
+    pub held_starts: Vec<State>,
+}
+
+impl Explanation {
+    /// Labels of its effects, sorted; empty for none.
+    #[must_use]
+    pub fn labels(&self) -> Vec<String> {
+        let mut labels: Vec<String> = self.effects.iter().map(EffectSpec::label).collect();
+        labels.sort();
+        labels
+    }
+
+    /// Parameters, in the order of the fit's point.
+    #[must_use]
+    pub fn parameters(&self) -> Vec<Parameter> {
+        self.unknowns.iter().map(|u| u.parameter.clone()).collect()
+    }
+
+    /// Sum of squares over all logs.
+    #[must_use]
+    pub fn cost(&self) -> f64 {
+        self.fit.cost + self.held_out
+    }
+}
+
+/// The bench.
+pub struct Bench {
+    /// The machine.
+    pub machine: Machine,
+    /// Logs to fit to.
+    pub train: Record,
+    /// Logs held out.
+    pub test: Record,
+    /// The study's parameters.
+    pub parameters: Vec<Parameter>,
+    /// Coordinates of the starts that the logs do not give.
+    pub open: Open,
+    /// The training logs in growing parts, the last of which is the whole.
+    pub stages: Vec<Stage>,
+}
+
+/// Part of the training logs.
+///
+/// Over a long episode a wrong model drifts so far off that its gradient says nothing, and
+/// a chaotic one has none. Over a short one every model is nearly linear: fits begin there
+/// and follow the episode as it grows. Where contacts make a rollout dear, fits begin with
+/// some of the episodes.
+#[derive(Clone, Debug)]
+pub struct Stage {
+    /// The logs.
+    pub record: Record,
+    /// Which of the training episodes they are.
+    pub episodes: Vec<usize>,
+}
+
+/// An effect to be tried: a candidate, and values to start from.
+pub type Trial<'a> = (&'a Candidate, Vec<f64>);
+
+impl Bench {
+    /// Names and places.
+    #[must_use]
+    pub fn layout(&self) -> &Layout {
+        &self.machine.plant.layout
+    }
+
+    /// The study's parameters, then those of the effects.
+    #[must_use]
+    pub fn unknowns(&self, trials: &[Trial<'_>]) -> Vec<Unknown> {
+        let mut all: Vec<Unknown> = self.parameters.iter().cloned().map(Unknown::free).collect();
+        for (candidate, _) in trials {
+            all.extend(
+                candidate
+                    .unknowns()
+                    .into_iter()
+                    .map(|(parameter, free)| Unknown { parameter, free }),
+            );
+        }
+        all
+    }
+
+    /// A predictor of some logs in the model with some effects.
+    ///
+    /// # Errors
+    /// When the engine refuses an effect or a parameter.
+    pub fn predictor<'r>(
+        &self,
+        trials: &[Trial<'_>],
+        record: &'r Record,
+    ) -> Result<Predictor<'r>> {
+        let specs: Vec<EffectSpec> = trials.iter().map(|(c, _)| c.spec.clone()).collect();
+        let model = self.machine.with(&specs)?;
+        let parameters: Vec<Parameter> = self
+            .unknowns(trials)
+            .into_iter()
+            .map(|u| u.parameter)
+            .collect();
+        let threads = self.machine.threads;
+        let mut predictor =
+            Predictor::new(&*model, &parameters, &record.logs, CAPACITY, threads)?;
+        predictor.set_whitening(record.whitening.clone());
+        Ok(predictor)
+    }
+
+    /// Fits the study's parameters, from `theta` on, together with some effects', to one
+    /// stage; at the last stage it looks at the logs held out.
+    ///
+    /// # Errors
+    /// As [`Bench::predictor`], and when a rollout fails.
+    pub fn explain(
+        &self,
+        stage: usize,
+        trials: &[Trial<'_>],
+        theta: &[f64],
+        starts: &[State],
+        effort: Effort,
+    ) -> Result<Explanation> {
+        let unknowns = self.unknowns(trials);
+        let mut values = theta.to_vec();
+        trials.iter().for_each(|(_, v)| values.extend(v));
+        let Stage { record, episodes } = &self.stages[stage];
+        let point = Point {
+            theta: values,
+            starts: episodes.iter().map(|&e| starts[e].clone()).collect(),
+        };
+        let mut predictor = self.predictor(trials, record)?;
+        let mut fit = fit(
+            &mut predictor,
+            self.layout(),
+            &unknowns,
+            point,
+            &self.open,
+            effort,
+        )?;
+        let mut all = starts.to_vec();
+        for (&e, start) in episodes.iter().zip(&fit.point.starts) {
+            all[e] = start.clone();
+        }
+        fit.point.starts = all;
+        let mut at = self.parameters.len();
+        let effects = trials
+            .iter()
+            .map(|(candidate, _)| {
+                let names = candidate.parameters().iter().map(|p| p.name.to_owned());
+                let n = candidate.parameters().len();
+                let values = fit.point.theta[at..at + n].iter().copied();
+                at += n;
+                EffectSpec {
+                    values: names.zip(values).collect(),
+                    ..candidate.spec.clone()
+                }
+            })
+            .collect();
+        let mut explanation = Explanation {
+            effects,
+            unknowns,
+            fit,
+            held_out: f64::NAN,
+            held_starts: self.test.starts.clone(),
+        };
+        if stage + 1 == self.stages.len() {
+            let residuals = self.held_out(trials, &mut explanation)?;
+            explanation.held_out = cost(&residuals);
+        }
+        Ok(explanation)
+    }
+
+    /// Number of readings of a stage.
+    #[must_use]
+    pub fn readings(&self, stage: usize) -> f64 {
+        self.stages[stage].record.readings as f64
+    }
+
+    /// Whitened residuals of the logs held out.
+    fn held_out(&self, trials: &[Trial<'_>], of: &mut Explanation) -> Result<Vec<f64>> {
+        let mut predictor = self.predictor(trials, &self.test)?;
+        let point = Point {
+            theta: of.fit.point.theta.clone(),
+            starts: of.held_starts.clone(),
+        };
+        let mut residuals = predictor.residuals(&[point])?;
+        Ok(residuals.pop().unwrap_or_default())
+    }
+}

@@ -1,0 +1,178 @@
+//! Candidates: effects at sites, and where the search for their parameters begins.
+
+use asid_core::effect::{Acts, Effect, EffectParameter, Reference, Start};
+use asid_core::parameter::Scale;
+use asid_core::registry::{EffectEntry, all};
+use asid_core::{EffectSpec, Parameter, Plant, Target};
+
+use crate::machine::Machine;
+use crate::trajectory::Trajectory;
+
+/// An effect at a site.
+pub struct Candidate {
+    /// The effect.
+    pub effect: Box<dyn Effect>,
+    /// Name and site, all parameters at null.
+    pub spec: EffectSpec,
+    /// Points to start from, one value a parameter.
+    pub starts: Vec<Vec<f64>>,
+}
+
+/// A candidate that was left out, and why.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct LeftOut {
+    /// `NAME@SITE`.
+    pub label: String,
+    /// Why.
+    pub why: String,
+}
+
+/// Most starts of one candidate.
+const MAX_STARTS: usize = 24;
+
+impl Candidate {
+    /// `NAME@SITE`.
+    #[must_use]
+    pub fn label(&self) -> String {
+        self.spec.label()
+    }
+
+    /// Its parameters.
+    #[must_use]
+    pub fn parameters(&self) -> &'static [EffectParameter] {
+        self.effect.parameters()
+    }
+
+    /// Its parameters as columns of a batch: whether each is searched for continuously.
+    #[must_use]
+    pub fn unknowns(&self) -> Vec<(Parameter, bool)> {
+        self.parameters()
+            .iter()
+            .map(|p| {
+                let target = Target {
+                    element: "effect".into(),
+                    name: self.label(),
+                    attribute: p.name.into(),
+                    index: 0,
+                };
+                let parameter = Parameter {
+                    name: format!("{}.{}", self.label(), p.name),
+                    targets: vec![target],
+                    range: p.range,
+                    scale: Scale::Linear,
+                    unit: p.unit.into(),
+                };
+                let free = !matches!(p.start, Start::Choice(_) | Start::Given);
+                (parameter, free)
+            })
+            .collect()
+    }
+
+    /// Parameters that act in proportion from their null value on.
+    #[must_use]
+    pub fn slopes(&self) -> Vec<usize> {
+        let parameters = self.parameters().iter().enumerate();
+        parameters
+            .filter(|(_, p)| p.start == Start::Slope)
+            .map(|(i, _)| i)
+            .collect()
+    }
+}
+
+/// All effects at all sites that the engine can give the scene, but for those that the
+/// model has already.
+#[must_use]
+pub fn enumerate(machine: &Machine, shown: &Trajectory) -> (Vec<Candidate>, Vec<LeftOut>) {
+    let plant = &machine.plant;
+    let (mut found, mut left_out) = (Vec::new(), Vec::new());
+    for entry in all::<EffectEntry>() {
+        let sites = (entry.make)().sites(plant);
+        for site in sites {
+            let effect = (entry.make)();
+            let spec = EffectSpec {
+                name: entry.name.to_owned(),
+                site: site.clone(),
+                values: Vec::new(),
+            };
+            let label = spec.label();
+            if machine.given_effects().iter().any(|e| e.label() == label) {
+                continue;
+            }
+            // A sensor that no log has cannot tell of its own effects.
+            if effect.acts() == Acts::Measurement && !shown.sensors.contains(&site) {
+                continue;
+            }
+            if let Err(error) = machine.with(std::slice::from_ref(&spec)) {
+                left_out.push(LeftOut {
+                    label,
+                    why: error.to_string(),
+                });
+                continue;
+            }
+            let starts = starts(&*effect, plant, &site, shown);
+            found.push(Candidate {
+                effect,
+                spec,
+                starts,
+            });
+        }
+    }
+    (found, left_out)
+}
+
+/// All combinations of the parameters' start values.
+fn starts(effect: &dyn Effect, plant: &Plant, site: &str, shown: &Trajectory) -> Vec<Vec<f64>> {
+    let mut all: Vec<Vec<f64>> = vec![Vec::new()];
+    let parameters = effect.parameters();
+    let axis = parameters
+        .iter()
+        .position(|p| matches!(p.start, Start::Choice(_)));
+    // Choices first: places are measured along the axis chosen.
+    let mut order: Vec<usize> = (0..parameters.len()).collect();
+    order.sort_by_key(|&i| !matches!(parameters[i].start, Start::Choice(_)));
+    for start in &mut all {
+        start.extend(parameters.iter().map(|p| p.null));
+    }
+    for i in order {
+        let p = &parameters[i];
+        all = all
+            .iter()
+            .flat_map(|row| {
+                let values = match p.start {
+                    Start::Slope | Start::Given => vec![p.null],
+                    Start::Values(v) | Start::Choice(v) => v.to_vec(),
+                    Start::Multiples(reference, v) => {
+                        let unit = measure(plant, site, reference, shown);
+                        v.iter().map(|x| x * unit).collect()
+                    }
+                    Start::Places(quantiles) => {
+                        let axis = axis.map_or(0, |a| row[a] as usize);
+                        shown.places(plant, site, axis, quantiles)
+                    }
+                };
+                values.into_iter().map(|x| {
+                    let mut other = row.clone();
+                    other[i] = x.clamp(p.range[0], p.range[1]);
+                    other
+                })
+            })
+            .collect();
+    }
+    all.truncate(MAX_STARTS);
+    all
+}
+
+/// What the logs show of a site, in the unit of the reference.
+fn measure(plant: &Plant, site: &str, reference: Reference, shown: &Trajectory) -> f64 {
+    let layout = &plant.layout;
+    let actuator = layout.actuators.iter().position(|a| a.name == site);
+    let joint = layout.joints.iter().position(|j| j.name == site);
+    let driven = joint.or_else(|| actuator.and_then(|a| plant.drives[a].map(|d| d.joint)));
+    match reference {
+        Reference::Command => actuator.map_or(1.0, |a| shown.command(plant, a)),
+        Reference::Speed => driven.map_or(1.0, |j| shown.speed(plant, j)),
+        Reference::Reading => shown.reading(site),
+        Reference::Force => driven.map_or(1.0, |j| shown.force(plant, j)),
+    }
+}
+

@@ -1,0 +1,230 @@
+//! Logs prepared for comparison: entries, noise, and which readings count.
+
+use asid_core::replay::ReplayPlan;
+use asid_core::signal::{Signal, SignalSet};
+use asid_core::{Episode, Layout, Result};
+
+/// One compared number of a row: a component of a sensor, or of a rotation.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Entry {
+    /// Name, `sensor` or `sensor.i`; for an orientation `i` counts the axes of the rotation
+    /// vector between two readings.
+    pub label: String,
+    /// Index of its sensor in [`Logs::sensors`].
+    pub sensor: usize,
+    /// Component of the sensor.
+    pub component: usize,
+}
+
+/// A sensor that is in the logs.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LoggedSensor {
+    /// Name in the scene.
+    pub name: String,
+    /// SI unit.
+    pub unit: String,
+    /// Standard deviation of its noise, in its unit (rad for an orientation).
+    pub noise: f64,
+    /// True for an orientation.
+    pub rotation: bool,
+}
+
+/// One log, prepared.
+#[derive(Clone, Debug)]
+pub struct LoggedEpisode {
+    /// File name, for messages and tables.
+    pub name: String,
+    /// The log.
+    pub episode: Episode,
+    /// Readings of the compared sensors, `rows x width`, NaN where missing.
+    pub readings: Vec<f64>,
+    /// How it is replayed.
+    pub plan: ReplayPlan,
+}
+
+/// Some logs of one machine.
+#[derive(Clone, Debug)]
+pub struct Logs {
+    /// Sensors that any of the logs has, in the scene's order.
+    pub sensors: Vec<LoggedSensor>,
+    /// What is compared in a row.
+    pub entries: Vec<Entry>,
+    /// The episodes.
+    pub episodes: Vec<LoggedEpisode>,
+    differences: SignalSet,
+}
+
+/// Unit of a sensor of this kind on this machine.
+fn unit_of(plant: &asid_core::Plant, sensor: usize) -> String {
+    use asid_core::layout::JointKind;
+    use asid_core::plant::Reads;
+    let s = &plant.layout.sensors[sensor];
+    let slide =
+        matches!(plant.sensors[sensor], Reads::Joint(j) if plant.joint_kind(j) == JointKind::Slide);
+    match (s.kind.as_str(), slide) {
+        ("jointpos", true) => "m".into(),
+        ("jointpos", false) => "rad".into(),
+        ("jointvel", true) => "m/s".into(),
+        ("jointvel", false) => "rad/s".into(),
+        ("framequat" | "ballquat", _) => "rad".into(),
+        _ => s.unit().to_owned(),
+    }
+}
+
+impl Logs {
+    /// Prepares logs; `sensors` are those compared, by name.
+    ///
+    /// # Errors
+    /// When the scene has no such sensor.
+    pub fn new(
+        plant: &asid_core::Plant,
+        sensors: &[String],
+        episodes: Vec<(String, Episode)>,
+    ) -> Result<Self> {
+        let layout = &plant.layout;
+        let mut logged = Vec::new();
+        let mut entries = Vec::new();
+        let mut signals = Vec::new();
+        for name in sensors {
+            let sensor = layout.sensor(name)?;
+            let place = layout.sensors.iter().position(|s| s.name == *name);
+            let rotation = sensor.len == 4;
+            let len = if rotation { 3 } else { sensor.len };
+            for component in 0..len {
+                entries.push(Entry {
+                    label: if len == 1 {
+                        name.clone()
+                    } else {
+                        format!("{name}.{component}")
+                    },
+                    sensor: logged.len(),
+                    component,
+                });
+            }
+            logged.push(LoggedSensor {
+                name: name.clone(),
+                unit: place.map_or_else(String::new, |p| unit_of(plant, p)),
+                noise: 1.0,
+                rotation,
+            });
+            signals.push(Signal {
+                sensor: name.clone(),
+                noise: 1.0,
+            });
+        }
+        let episodes = episodes
+            .into_iter()
+            .map(|(name, episode)| LoggedEpisode {
+                name,
+                readings: episode.select(layout, sensors),
+                plan: ReplayPlan::new(layout, &episode, episode.rows()),
+                episode,
+            })
+            .collect();
+        Ok(Self {
+            differences: SignalSet::new(layout, &signals)?,
+            sensors: logged,
+            entries,
+            episodes,
+        })
+    }
+
+    /// The same logs, some of the episodes only.
+    #[must_use]
+    pub fn some(&self, which: &[usize]) -> Self {
+        Self {
+            sensors: self.sensors.clone(),
+            entries: self.entries.clone(),
+            episodes: which.iter().map(|&i| self.episodes[i].clone()).collect(),
+            differences: self.differences.clone(),
+        }
+    }
+
+    /// The same logs, each cut after a share of its rows.
+    #[must_use]
+    pub fn cut(&self, layout: &Layout, share: f64) -> Self {
+        let mut logs = self.clone();
+        let width = self.differences.width();
+        for e in &mut logs.episodes {
+            let rows = ((e.plan.rows() as f64 * share).ceil() as usize).clamp(2, e.plan.rows());
+            e.plan = ReplayPlan::new(layout, &e.episode, rows);
+            e.readings.truncate(rows * width);
+        }
+        logs
+    }
+
+    /// Entries of a row of readings.
+    #[must_use]
+    pub fn width(&self) -> usize {
+        self.differences.width()
+    }
+
+    /// Names of the sensors, as a recording asks for them.
+    #[must_use]
+    pub fn channels(&self) -> Vec<String> {
+        self.sensors.iter().map(|s| s.name.clone()).collect()
+    }
+
+    /// Where the residuals of episode `i` begin in a residual vector.
+    #[must_use]
+    pub fn offset(&self, i: usize) -> usize {
+        let before = self.episodes[..i].iter();
+        before.map(|e| e.plan.rows()).sum::<usize>() * self.entries.len()
+    }
+
+    /// Length of a residual vector.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.offset(self.episodes.len())
+    }
+
+    /// True where there are no logs.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.episodes.is_empty()
+    }
+
+    /// Differences `logged - predicted` of one episode in the sensors' units (`rows x
+    /// entries`), NaN where a reading is missing; `predicted` is `rows x width`.
+    pub fn difference(&self, episode: usize, predicted: &[f64], out: &mut [f64]) {
+        let (w, n) = (self.width(), self.entries.len());
+        let e = &self.episodes[episode];
+        for (k, row) in out.chunks_exact_mut(n).enumerate() {
+            let (a, b) = (
+                &e.readings[k * w..(k + 1) * w],
+                &predicted[k * w..(k + 1) * w],
+            );
+            self.differences.difference(a, b, row);
+        }
+    }
+
+    /// Whether each entry of a residual vector has a reading behind it.
+    #[must_use]
+    pub fn present(&self) -> Vec<bool> {
+        let mut present = vec![false; self.len()];
+        let n = self.entries.len();
+        for (i, e) in self.episodes.iter().enumerate() {
+            let offset = self.offset(i);
+            let mut row = vec![0.0; e.plan.rows() * n];
+            self.difference(i, &e.readings.clone(), &mut row);
+            for (p, x) in present[offset..].iter_mut().zip(&row) {
+                *p = x.is_finite();
+            }
+        }
+        present
+    }
+
+    /// Sets the noise of the sensors, in their order.
+    pub fn set_noise(&mut self, noise: &[f64]) {
+        for (sensor, &noise) in self.sensors.iter_mut().zip(noise) {
+            sensor.noise = noise;
+        }
+    }
+
+    /// Noise of each entry.
+    #[must_use]
+    pub fn entry_noise(&self) -> Vec<f64> {
+        let noise = |e: &Entry| self.sensors[e.sensor].noise;
+        self.entries.iter().map(noise).collect()
+    }
+}

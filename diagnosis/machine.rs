@@ -1,0 +1,76 @@
+//! The model under diagnosis on an engine, with or without effects.
+
+use std::sync::Arc;
+
+use asid_core::refined::Refined;
+use asid_core::{Backend, EffectSpec, Model, Plant, Result, Scene, Target};
+
+/// A scene compiled by an engine, what is known of its machine, and what the study's model
+/// file has set and added already.
+pub struct Machine {
+    /// The engine.
+    pub backend: Box<dyn Backend>,
+    /// The machine.
+    pub plant: Arc<Plant>,
+    /// Threads; 0 for one a core.
+    pub threads: usize,
+    model: Arc<dyn Model>,
+    fixed: Vec<(Target, f64)>,
+    effects: Vec<EffectSpec>,
+}
+
+impl Machine {
+    /// Compiles a scene.
+    ///
+    /// # Errors
+    /// When the engine refuses it, or a value or effect of the model file.
+    pub fn new(
+        backend: Box<dyn Backend>,
+        scene: &Scene,
+        fixed: &[(Target, f64)],
+        effects: &[EffectSpec],
+        threads: usize,
+    ) -> Result<Self> {
+        let machine = Self {
+            plant: Arc::new(Plant::of(scene)?),
+            model: backend.load(scene)?,
+            backend,
+            threads,
+            fixed: fixed.to_vec(),
+            effects: effects.to_vec(),
+        };
+        machine.with(&[])?;
+        Ok(machine)
+    }
+
+    /// The model with more effects.
+    ///
+    /// # Errors
+    /// As [`Refined::new`].
+    pub fn with(&self, more: &[EffectSpec]) -> Result<Arc<dyn Model>> {
+        let effects = [&self.effects[..], more].concat();
+        if effects.is_empty() && self.fixed.is_empty() {
+            return Ok(Arc::clone(&self.model));
+        }
+        let (model, plant) = (Arc::clone(&self.model), Arc::clone(&self.plant));
+        Ok(Refined::new(
+            &*self.backend,
+            model,
+            plant,
+            &self.fixed,
+            &effects,
+        )?)
+    }
+
+    /// Effects that the study's model has already.
+    #[must_use]
+    pub fn given_effects(&self) -> &[EffectSpec] {
+        &self.effects
+    }
+
+    /// Values that the study's model sets.
+    #[must_use]
+    pub fn given_values(&self) -> &[(Target, f64)] {
+        &self.fixed
+    }
+}

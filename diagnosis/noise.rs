@@ -1,0 +1,111 @@
+//! The noise floor of each sensor, estimated from the record itself.
+//!
+//! What a model leaves is smooth where the model is wrong and rough where the sensor is
+//! noisy: third differences of consecutive residuals remove the first and keep the second.
+//! For white noise of deviation s they have the deviation s sqrt(20). The median of their
+//! magnitudes is blind to the few moments (impacts) at which the residual is not smooth.
+
+use crate::data::Logs;
+
+/// Ratio of a normal variable's deviation to the median of its magnitude.
+const NORMAL: f64 = 1.482_602_218_505_602;
+
+/// Estimates the noise of each sensor from residuals `logged - predicted` in the sensors'
+/// units (`rows x entries`, NaN where missing), one array an episode. A sensor whose
+/// readings come in steps has at least the deviation of a step, step / sqrt(12).
+#[must_use]
+pub fn estimate(logs: &Logs, residuals: &[Vec<f64>]) -> Vec<f64> {
+    let n = logs.entries.len();
+    (0..logs.sensors.len())
+        .map(|sensor| {
+            let mut differences = Vec::new();
+            let entries = logs.entries.iter().enumerate();
+            for (j, _) in entries.filter(|(_, e)| e.sensor == sensor) {
+                for episode in residuals {
+                    let series: Vec<f64> =
+                        episode.iter().skip(j).step_by(n).copied().collect();
+                    differences.extend(
+                        series
+                            .windows(4)
+                            .map(|w| (w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0]).abs())
+                            .filter(|d| d.is_finite()),
+                    );
+                }
+            }
+            let rough = median(&mut differences).map_or(0.0, |m| NORMAL * m / 20.0_f64.sqrt());
+            rough
+                .max(step(logs, sensor) / 12.0_f64.sqrt())
+                .max(smallest(logs, sensor))
+        })
+        .collect()
+}
+
+/// Median, `None` of nothing.
+#[must_use]
+pub fn median(values: &mut [f64]) -> Option<f64> {
+    if values.is_empty() {
+        return None;
+    }
+    let middle = values.len() / 2;
+    Some(*values.select_nth_unstable_by(middle, f64::total_cmp).1)
+}
+
+/// Readings of a sensor, component after component.
+fn readings(logs: &Logs, sensor: usize) -> Vec<Vec<f64>> {
+    let width = logs.width();
+    let mut at = 0;
+    for s in &logs.sensors[..sensor] {
+        let rotation = s.rotation;
+        let entries = logs.entries.iter();
+        let len = entries.filter(|e| logs.sensors[e.sensor].name == s.name).count();
+        at += if rotation { 4 } else { len };
+    }
+    let own = logs.entries.iter().filter(|e| e.sensor == sensor).count();
+    let own = if logs.sensors[sensor].rotation { 4 } else { own };
+    (at..at + own)
+        .map(|c| {
+            let episodes = logs.episodes.iter();
+            episodes
+                .flat_map(|e| e.readings.iter().skip(c).step_by(width).copied())
+                .filter(|x| x.is_finite())
+                .collect()
+        })
+        .collect()
+}
+
+/// Step of a sensor whose readings are multiples of one; 0 where they are not.
+#[must_use]
+pub fn step(logs: &Logs, sensor: usize) -> f64 {
+    let mut steps: Vec<f64> = readings(logs, sensor)
+        .into_iter()
+        .filter_map(|mut values| {
+            values.sort_by(f64::total_cmp);
+            let gaps = values.windows(2).map(|w| w[1] - w[0]);
+            let gap = gaps.filter(|g| *g > 1e-12).fold(f64::INFINITY, f64::min);
+            let multiples = values.iter().filter(|v| {
+                let k = (*v - values[0]) / gap;
+                (k - k.round()).abs() < 1e-3
+            });
+            // Few distinct values for many readings, all on one grid.
+            let distinct = values.windows(2).filter(|w| w[1] > w[0]).count() + 1;
+            (gap.is_finite()
+                && multiples.count() == values.len()
+                && 2 * distinct < values.len())
+            .then_some(gap)
+        })
+        .collect();
+    median(&mut steps).unwrap_or(0.0)
+}
+
+/// A deviation above 0 for a sensor without any noise: a millionth of its spread.
+fn smallest(logs: &Logs, sensor: usize) -> f64 {
+    let spread = readings(logs, sensor)
+        .iter()
+        .map(|v| {
+            let high = v.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            let low = v.iter().copied().fold(f64::INFINITY, f64::min);
+            high - low
+        })
+        .fold(0.0, f64::max);
+    (1e-6 * spread).max(1e-12)
+}

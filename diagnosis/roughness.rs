@@ -1,0 +1,171 @@
+//! What the simulator itself cannot repeat.
+//!
+//! Where contacts amplify the smallest difference, an open-loop rollout is one of many
+//! that fit equally well, and its distance from the log is no fault of the model. An
+//! ensemble of rollouts from starts that differ by next to nothing (or by what is not
+//! known of the start) spans the directions in which predictions scatter. Residuals are
+//! whitened with that scatter added to the sensors' noise, as correlated noise of low rank:
+//! `S = I + U L U'` in units of the noise, for log and prediction both scatter.
+
+use asid_core::Result;
+use asid_core::layout::Layout;
+use nalgebra::DMatrix;
+use rand::Rng as _;
+
+use crate::predict::{Point, Predictor};
+
+/// Rollouts of the ensemble.
+const MEMBERS: usize = 12;
+/// Log and prediction scatter alike, so a difference has twice the variance.
+const BOTH: f64 = 2.0;
+
+/// Correlated noise of the residuals of one episode: `S^(-1/2) = I - U G U'`.
+#[derive(Clone, Debug, Default)]
+pub struct Whitening {
+    /// Orthonormal directions.
+    directions: Vec<Vec<f64>>,
+    /// `1 - (1 + variance)^(-1/2)` of each.
+    shrink: Vec<f64>,
+}
+
+impl Whitening {
+    /// From deviations of an ensemble about its mean, in units of the noise, one vector a member.
+    #[must_use]
+    pub fn of(deviations: &[Vec<f64>]) -> Self {
+        let m = deviations.len();
+        if m < 2 {
+            return Self::default();
+        }
+        let gram = DMatrix::from_fn(m, m, |i, j| {
+            let pairs = deviations[i].iter().zip(&deviations[j]);
+            pairs.map(|(a, b)| a * b).sum::<f64>()
+        });
+        let eigen = gram.symmetric_eigen();
+        let mut whitening = Self::default();
+        for (k, &value) in eigen.eigenvalues.iter().enumerate() {
+            let variance = BOTH * value / (m - 1) as f64;
+            if variance < 0.01 {
+                continue;
+            }
+            let length = value.sqrt();
+            let mut direction = vec![0.0; deviations[0].len()];
+            for (i, member) in deviations.iter().enumerate() {
+                let weight = eigen.eigenvectors[(i, k)] / length;
+                for (d, x) in direction.iter_mut().zip(member) {
+                    *d += weight * x;
+                }
+            }
+            whitening.directions.push(direction);
+            whitening.shrink.push(1.0 - (1.0 + variance).powf(-0.5));
+        }
+        whitening
+    }
+
+    /// Whitens residuals of the episode in place.
+    pub fn apply(&self, residuals: &mut [f64]) {
+        for (direction, shrink) in self.directions.iter().zip(&self.shrink) {
+            let along: f64 = direction.iter().zip(&*residuals).map(|(d, r)| d * r).sum();
+            if along.is_finite() {
+                for (r, d) in residuals.iter_mut().zip(direction) {
+                    *r -= shrink * along * d;
+                }
+            }
+        }
+    }
+
+    /// Number of directions in which predictions scatter.
+    #[must_use]
+    pub fn rank(&self) -> usize {
+        self.shrink.len()
+    }
+
+    /// Number of directions that tell next to nothing: scatter beyond three times the noise.
+    #[must_use]
+    pub fn lost(&self) -> usize {
+        self.shrink.iter().filter(|s| **s > 0.68).count()
+    }
+}
+
+/// How far the members' starts are apart, for each of the `2 nv` coordinates.
+#[derive(Clone, Debug)]
+pub struct Spread(pub Vec<f64>);
+
+impl Spread {
+    /// Starts that are known: differences that no sensor sees (m, rad, and per second).
+    #[must_use]
+    pub fn of_known_starts(layout: &Layout) -> Self {
+        Self(vec![1e-6; 2 * layout.nv])
+    }
+}
+
+/// Estimates the scatter about a point, one whitening an episode.
+///
+/// # Errors
+/// As [`Predictor::residuals`].
+pub fn estimate(
+    predictor: &mut Predictor<'_>,
+    layout: &Layout,
+    point: &Point,
+    spread: &Spread,
+    rng: &mut asid_core::rng::Rng,
+) -> Result<Vec<Whitening>> {
+    let points: Vec<Point> = (0..MEMBERS)
+        .map(|_| {
+            let mut other = point.clone();
+            for start in &mut other.starts {
+                for (coordinate, by) in spread.0.iter().enumerate() {
+                    // Uniform with the deviation asked for.
+                    let u: f64 = rng.random_range(-1.0..1.0);
+                    start.shift(layout, coordinate, by * u * 3.0_f64.sqrt());
+                }
+            }
+            other
+        })
+        .collect();
+    predictor.set_whitening(Vec::new());
+    let members = predictor.residuals(&points)?;
+    let logs = predictor.logs();
+    Ok((0..logs.episodes.len())
+        .map(|e| {
+            let range = logs.offset(e)..logs.offset(e + 1);
+            let finite: Vec<&[f64]> = members
+                .iter()
+                .map(|m| &m[range.clone()])
+                .filter(|m| m.iter().all(|x| x.is_finite()))
+                .collect();
+            if finite.len() < 2 {
+                return Whitening::default();
+            }
+            let n = finite.len() as f64;
+            let mean: Vec<f64> = (0..range.len())
+                .map(|k| finite.iter().map(|m| m[k]).sum::<f64>() / n)
+                .collect();
+            let deviations: Vec<Vec<f64>> = finite
+                .iter()
+                .map(|m| m.iter().zip(&mean).map(|(x, y)| x - y).collect())
+                .collect();
+            Whitening::of(&deviations)
+        })
+        .collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn whitened_residuals_have_the_identity_for_covariance() {
+        // Two directions with variances 2 * 8 / 1 and 0: S = I + 16 u u'.
+        let u = [0.6, 0.8, 0.0];
+        let member = |s: f64| u.iter().map(|x| s * x).collect::<Vec<f64>>();
+        let whitening = Whitening::of(&[member(2.0), member(-2.0)]);
+        assert_eq!(whitening.rank(), 1);
+        let mut along = u;
+        whitening.apply(&mut along);
+        let length = along.iter().map(|x| x * x).sum::<f64>();
+        assert!((length - 1.0 / 17.0).abs() < 1e-12, "{length}");
+        let mut across = [-0.8, 0.6, 2.0];
+        whitening.apply(&mut across);
+        assert!((across[0] + 0.8).abs() < 1e-12 && across[2] == 2.0);
+    }
+}

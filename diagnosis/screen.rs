@@ -1,0 +1,369 @@
+//! Which candidates could explain what is left: a score test, in one batch each.
+//!
+//! The gradient of the residual in a candidate's parameters, taken at its null value, is
+//! projected off everything that the study's parameters and the starts can do; what of
+//! the residual it then explains is the candidate's gain to first order. Parameters
+//! without a gradient at null (a width, a place, a limit) are tried at a few values. The
+//! step that the linear fit proposes is then really taken, at full length and shorter.
+
+use asid_core::Result;
+
+use crate::bench::{Bench, Explanation, Record, Stage, Trial};
+use crate::candidate::Candidate;
+use crate::fit::{Differences, Unknown, cost, linearise, nudged};
+use crate::predict::Point;
+
+/// How promising a candidate is.
+#[derive(Clone, Debug)]
+pub struct Screened {
+    /// Index of the candidate.
+    pub candidate: usize,
+    /// Values of its parameters to start a fit from.
+    pub values: Vec<f64>,
+    /// The study's parameters, and those of effects before it, that go with them.
+    pub theta: Vec<f64>,
+    /// Sum of squares really reached with them.
+    pub cost: f64,
+}
+
+/// Directions in which the residual may move without the candidate: an orthonormal basis.
+pub struct Nuisance {
+    /// Per episode: place in the vector, and basis of its start's directions.
+    starts: Vec<(std::ops::Range<usize>, Vec<Vec<f64>>)>,
+    /// Basis of the parameters' directions, off the starts'.
+    basis: Vec<Vec<f64>>,
+    /// For each basis vector its coordinates in the parameters.
+    combination: Vec<Vec<f64>>,
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(x, y)| x * y).sum()
+}
+
+/// Takes `along` out of `v`, and returns how much there was.
+fn take_out(v: &mut [f64], along: &[f64]) -> f64 {
+    let amount = dot(v, along);
+    for (x, a) in v.iter_mut().zip(along) {
+        *x -= amount * a;
+    }
+    amount
+}
+
+impl Nuisance {
+    /// From columns of the parameters (whole vectors) and of the starts (all episodes at once).
+    #[must_use]
+    pub fn new(
+        columns: &[Vec<f64>],
+        start_columns: &[Vec<f64>],
+        episodes: &[std::ops::Range<usize>],
+    ) -> Self {
+        let mut starts = Vec::new();
+        for range in episodes {
+            let mut basis: Vec<Vec<f64>> = Vec::new();
+            for column in start_columns {
+                let mut v = column[range.clone()].to_vec();
+                let size = dot(&v, &v).sqrt();
+                basis.iter().for_each(|b| {
+                    take_out(&mut v, b);
+                });
+                let left = dot(&v, &v).sqrt();
+                if left > 1e-6 * size && left > 0.0 {
+                    v.iter_mut().for_each(|x| *x /= left);
+                    basis.push(v);
+                }
+            }
+            starts.push((range.clone(), basis));
+        }
+        let mut nuisance = Self {
+            starts,
+            basis: Vec::new(),
+            combination: Vec::new(),
+        };
+        for (i, column) in columns.iter().enumerate() {
+            let mut v = column.clone();
+            let size = dot(&v, &v).sqrt();
+            nuisance.project_starts(&mut v);
+            let mut combination = vec![0.0; columns.len()];
+            combination[i] = 1.0;
+            for (b, c) in nuisance.basis.iter().zip(&nuisance.combination) {
+                let amount = take_out(&mut v, b);
+                for (x, y) in combination.iter_mut().zip(c) {
+                    *x -= amount * y;
+                }
+            }
+            let left = dot(&v, &v).sqrt();
+            if left > 1e-6 * size && left > 0.0 {
+                v.iter_mut().for_each(|x| *x /= left);
+                combination.iter_mut().for_each(|x| *x /= left);
+                nuisance.basis.push(v);
+                nuisance.combination.push(combination);
+            }
+        }
+        nuisance
+    }
+
+    fn project_starts(&self, v: &mut [f64]) {
+        for (range, basis) in &self.starts {
+            let part = &mut v[range.clone()];
+            basis.iter().for_each(|b| {
+                take_out(part, b);
+            });
+        }
+    }
+
+    /// Takes out what the nuisance parameters can do; returns how much each parameter does.
+    pub fn project(&self, v: &mut [f64]) -> Vec<f64> {
+        self.project_starts(v);
+        let mut amounts = vec![0.0; self.combination.first().map_or(0, Vec::len)];
+        for (b, c) in self.basis.iter().zip(&self.combination) {
+            let amount = take_out(v, b);
+            for (x, y) in amounts.iter_mut().zip(c) {
+                *x += amount * y;
+            }
+        }
+        amounts
+    }
+}
+
+/// What a screening starts from: an explanation, linearised.
+pub struct Base<'a> {
+    /// Effects that it has, with their fitted values.
+    pub trials: Vec<Trial<'a>>,
+    /// Values of the study's parameters and of the effects.
+    pub point: Point,
+    unknowns: Vec<Unknown>,
+    residuals: Vec<f64>,
+    /// The residuals off the nuisance directions, and what each parameter would move.
+    rest: Vec<f64>,
+    shift: Vec<f64>,
+    nuisance: Nuisance,
+}
+
+impl<'a> Base<'a> {
+    /// Linearises an explanation on a stage.
+    ///
+    /// # Errors
+    /// When a rollout fails.
+    pub fn new(
+        bench: &Bench,
+        stage: usize,
+        trials: &[Trial<'a>],
+        from: &Explanation,
+    ) -> Result<Self> {
+        let Stage { record, episodes } = &bench.stages[stage];
+        let starts = &from.fit.point.starts;
+        let point = Point {
+            theta: from.fit.point.theta.clone(),
+            starts: episodes.iter().map(|&e| starts[e].clone()).collect(),
+        };
+        let trials: Vec<Trial<'a>> = trials
+            .iter()
+            .zip(&from.effects)
+            .map(|((c, _), e)| (*c, e.values.iter().map(|(_, x)| *x).collect()))
+            .collect();
+        let unknowns = bench.unknowns(&trials);
+        let mut predictor = bench.predictor(&trials, record)?;
+        let mut differences = Differences::new(unknowns.len());
+        let mut line = None;
+        for _ in 0..3 {
+            line = Some(linearise(
+                &mut predictor,
+                bench.layout(),
+                &unknowns,
+                &point,
+                &bench.open,
+                &mut differences,
+            )?);
+        }
+        let (residuals, columns, start_columns) = line
+            .map(|l| (l.residuals, l.columns, l.start_columns))
+            .unwrap_or_default();
+        let episodes: Vec<_> = (0..record.logs.episodes.len())
+            .map(|e| record.logs.offset(e)..record.logs.offset(e + 1))
+            .collect();
+        let nuisance = Nuisance::new(&columns, &start_columns, &episodes);
+        let mut rest = residuals.clone();
+        let shift = nuisance.project(&mut rest);
+        Ok(Self {
+            trials,
+            point,
+            unknowns,
+            residuals,
+            rest,
+            shift,
+            nuisance,
+        })
+    }
+
+    /// Sum of squares before any candidate.
+    #[must_use]
+    pub fn cost(&self) -> f64 {
+        cost(&self.residuals)
+    }
+}
+
+/// Response, root mean square in units of the noise, that slopes are measured with.
+const AIM: f64 = 0.3;
+/// First difference for a slope, as a share of its range.
+const FIRST: f64 = 1e-4;
+
+/// Screens one candidate.
+///
+/// # Errors
+/// When a rollout fails.
+pub fn screen(
+    bench: &Bench,
+    record: &Record,
+    base: &Base<'_>,
+    (index, candidate): (usize, &Candidate),
+) -> Result<Option<Screened>> {
+    let mut trials: Vec<Trial<'_>> = base.trials.clone();
+    trials.push((candidate, Vec::new()));
+    let mut predictor = bench.predictor(&trials, record)?;
+    let own: Vec<Unknown> = bench.unknowns(&trials).split_off(base.unknowns.len());
+    let at = |values: &[f64]| -> Point {
+        let mut point = base.point.clone();
+        point.theta.extend_from_slice(values);
+        point
+    };
+    let slopes = candidate.slopes();
+    let n = record.readings.max(1) as f64;
+    let mut best: Option<(f64, Vec<f64>, Vec<f64>)> = None;
+    let mut shares = vec![FIRST; own.len()];
+    for start in &candidate.starts {
+        // Columns: one a slope, per share of its range; or one for the whole step.
+        let mut columns: Vec<Vec<f64>> = Vec::new();
+        let change = |other: &[f64]| -> Vec<f64> {
+            let pairs = base.residuals.iter().zip(other);
+            pairs
+                .map(|(a, b)| if b.is_finite() { a - b } else { 0.0 })
+                .collect()
+        };
+        if slopes.is_empty() {
+            let residuals = predictor.residuals(&[at(start)])?;
+            columns.push(change(&residuals[0]));
+        } else {
+            for round in 0..2 {
+                let moved: Vec<(Vec<f64>, f64)> = slopes
+                    .iter()
+                    .map(|&j| {
+                        let mut values = start.clone();
+                        let (value, share) = nudged(&own[j].parameter, start[j], shares[j]);
+                        values[j] = value;
+                        (values, share)
+                    })
+                    .collect();
+                let points: Vec<Point> = moved.iter().map(|(v, _)| at(v)).collect();
+                let residuals = predictor.residuals(&points)?;
+                columns.clear();
+                let mut again = false;
+                for ((r, (_, share)), &j) in residuals.iter().zip(&moved).zip(&slopes) {
+                    let mut column = change(r);
+                    let response = (dot(&column, &column) / n).sqrt();
+                    column.iter_mut().for_each(|x| *x /= share);
+                    columns.push(column);
+                    let factor = if response > 0.0 { AIM / response } else { 100.0 };
+                    if !(0.1..10.0).contains(&factor) {
+                        again = true;
+                        shares[j] = (shares[j] * factor.clamp(1e-4, 1e3)).clamp(1e-9, 0.05);
+                    }
+                }
+                if !again || round == 1 {
+                    break;
+                }
+            }
+        }
+        let mut projected = columns.clone();
+        let moves: Vec<Vec<f64>> = projected.iter_mut().map(|c| base.nuisance.project(c)).collect();
+        let room: Vec<[f64; 2]> = if slopes.is_empty() {
+            vec![[0.0, 1.5]]
+        } else {
+            slopes
+                .iter()
+                .map(|&j| {
+                    let u = own[j].parameter.to_unit(start[j]);
+                    [-u, 1.0 - u]
+                })
+                .collect()
+        };
+        let weights = bounded(&projected, &base.rest, &room);
+        if weights.iter().all(|w| *w == 0.0) {
+            continue;
+        }
+        // The step really taken, at several lengths.
+        let points: Vec<Point> = [1.0, 0.5, 0.2]
+            .iter()
+            .map(|length| {
+                let mut values = start.clone();
+                for (&j, w) in slopes.iter().zip(&weights) {
+                    let p = &own[j].parameter;
+                    let u = p.to_unit(start[j]) + length * w;
+                    values[j] = p.from_unit(u.clamp(0.0, 1.0));
+                }
+                let mut point = at(&values);
+                let free = base.unknowns.iter().enumerate().filter(|(_, u)| u.free);
+                for (k, (i, unknown)) in free.enumerate() {
+                    let by: f64 = base.shift[k]
+                        - moves.iter().zip(&weights).map(|(m, w)| m[k] * w).sum::<f64>();
+                    let p = &unknown.parameter;
+                    let u = p.to_unit(point.theta[i]) + length * by;
+                    point.theta[i] = p.from_unit(u.clamp(0.0, 1.0));
+                }
+                point
+            })
+            .collect();
+        let residuals = predictor.residuals(&points)?;
+        for (point, r) in points.iter().zip(&residuals) {
+            let reached = cost(r);
+            if reached.is_finite() && best.as_ref().is_none_or(|(c, ..)| reached < *c) {
+                let (theta, values) = point.theta.split_at(base.point.theta.len());
+                best = Some((reached, theta.to_vec(), values.to_vec()));
+            }
+        }
+    }
+    Ok(best.map(|(cost, theta, values)| Screened {
+        candidate: index,
+        values,
+        theta,
+        cost,
+    }))
+}
+
+/// Least squares of `target` in `columns` with each weight within its room: what would
+/// leave it is held at its end, one after the other.
+fn bounded(columns: &[Vec<f64>], target: &[f64], room: &[[f64; 2]]) -> Vec<f64> {
+    let n = columns.len();
+    let mut fixed: Vec<Option<f64>> = vec![None; n];
+    for _ in 0..=n {
+        let free: Vec<usize> = (0..n).filter(|&i| fixed[i].is_none()).collect();
+        let mut rest = target.to_vec();
+        for (i, w) in fixed.iter().enumerate() {
+            if let Some(w) = w {
+                rest.iter_mut().zip(&columns[i]).for_each(|(r, c)| *r -= w * c);
+            }
+        }
+        let m = free.len();
+        let gram = nalgebra::DMatrix::from_fn(m, m, |a, b| dot(&columns[free[a]], &columns[free[b]]));
+        let right = nalgebra::DVector::from_fn(m, |a, _| dot(&columns[free[a]], &rest));
+        let solution = crate::fit::inverse(&gram, 1e-9) * right;
+        let mut worst = None;
+        for (k, &i) in free.iter().enumerate() {
+            let [low, high] = room[i];
+            let over = (low - solution[k]).max(solution[k] - high);
+            if over > 0.0 && worst.is_none_or(|(_, _, o)| over > o) {
+                worst = Some((i, solution[k].clamp(low, high), over));
+            }
+        }
+        match worst {
+            Some((i, value, _)) => fixed[i] = Some(value),
+            None => {
+                let mut weights: Vec<f64> = fixed.iter().map(|f| f.unwrap_or(0.0)).collect();
+                for (k, &i) in free.iter().enumerate() {
+                    weights[i] = solution[k];
+                }
+                return weights;
+            }
+        }
+    }
+    fixed.iter().map(|f| f.unwrap_or(0.0)).collect()
+}

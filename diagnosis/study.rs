@@ -1,0 +1,289 @@
+//! A study: a model, logs of the real machine, and what the user fits already.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use asid_core::parameter::Scale;
+use asid_core::{EffectSpec, Episode, Error, Layout, Parameter, Plant, Result, Scene, Target};
+use serde::Deserialize;
+
+use crate::refined_model::RefinedModel;
+
+/// The file, as written.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Document {
+    model: PathBuf,
+    train: Vec<String>,
+    #[serde(default)]
+    test: Vec<String>,
+    #[serde(default)]
+    parameter: Vec<StudyParameter>,
+    #[serde(default)]
+    noise: BTreeMap<String, f64>,
+}
+
+/// A parameter, as written.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct StudyParameter {
+    name: String,
+    #[serde(default)]
+    target: Option<Target>,
+    #[serde(default)]
+    targets: Vec<Target>,
+    range: [f64; 2],
+    #[serde(default)]
+    scale: Scale,
+    #[serde(default)]
+    unit: String,
+}
+
+/// A study, read and checked.
+#[derive(Clone, Debug)]
+pub struct Study {
+    /// Name: that of its folder or file.
+    pub name: String,
+    /// Model file as the study names it, made absolute by the study's folder.
+    pub model: PathBuf,
+    /// The document.
+    pub scene: Scene,
+    /// Values that a refined model sets.
+    pub fixed: Vec<(Target, f64)>,
+    /// Effects that a refined model has.
+    pub effects: Vec<EffectSpec>,
+    /// What the user fits already.
+    pub parameters: Vec<Parameter>,
+    /// Logs to fit to, by file name.
+    pub train: Vec<(String, Episode)>,
+    /// Logs held out.
+    pub test: Vec<(String, Episode)>,
+    /// Noise by sensor, where it is given.
+    pub noise: BTreeMap<String, f64>,
+}
+
+impl Study {
+    /// Reads a study file, or a folder with `study.toml`.
+    ///
+    /// # Errors
+    /// When a file is missing or wrong; the message names file, row and column.
+    pub fn read(path: &Path) -> Result<Self> {
+        let file = if path.is_dir() {
+            path.join("study.toml")
+        } else {
+            path.to_owned()
+        };
+        let fail = |message: String| Error::File {
+            path: file.clone(),
+            message,
+        };
+        let text = std::fs::read_to_string(&file).map_err(|e| {
+            fail(match e.kind() {
+                std::io::ErrorKind::NotFound => {
+                    "no such file: a study is a TOML file, or a folder with study.toml".into()
+                }
+                _ => e.to_string(),
+            })
+        })?;
+        let document: Document = toml::from_str(&text).map_err(|e| fail(one_line(&e)))?;
+        let folder = file.parent().map(Path::to_path_buf).unwrap_or_default();
+        let model = folder.join(&document.model);
+        let source = RefinedModel::open(&model)?;
+        let plant = Plant::of(&source.scene)?;
+        let parameters = document
+            .parameter
+            .iter()
+            .map(|p| parameter(p).map_err(&fail))
+            .collect::<Result<Vec<_>>>()?;
+        for (i, p) in parameters.iter().enumerate() {
+            p.check()?;
+            if parameters[..i].iter().any(|q| q.name == p.name) {
+                return Err(fail(format!("two parameters are named `{}`", p.name)));
+            }
+        }
+        for (sensor, &noise) in &document.noise {
+            plant
+                .layout
+                .sensor(sensor)
+                .map_err(|e| fail(format!("[noise] {e}")))?;
+            if !(noise.is_finite() && noise > 0.0) {
+                return Err(fail(format!(
+                    "[noise] {sensor} = {noise}: a standard deviation is above 0"
+                )));
+            }
+        }
+        let train = logs(&folder, &document.train, &plant.layout, "train").map_err(|e| match e {
+            Error::Config { message, .. } => fail(message),
+            other => other,
+        })?;
+        let test = logs(&folder, &document.test, &plant.layout, "test").map_err(|e| match e {
+            Error::Config { message, .. } => fail(message),
+            other => other,
+        })?;
+        if let Some((name, _)) = test.iter().find(|(n, _)| train.iter().any(|(m, _)| m == n)) {
+            return Err(fail(format!(
+                "{name} is among `train` and among `test`: what is held out must not be fitted"
+            )));
+        }
+        let name = if path.is_dir() {
+            path.file_name()
+        } else {
+            path.file_stem()
+        };
+        Self {
+            name: name.map_or_else(|| "study".into(), |n| n.to_string_lossy().into_owned()),
+            model,
+            scene: source.scene,
+            fixed: source.parameters,
+            effects: source.effects,
+            parameters,
+            train,
+            test,
+            noise: document.noise,
+        }
+        .with_test()
+    }
+
+    /// Holds out whole episodes where the study names no test logs: a third of them, the last.
+    ///
+    /// # Errors
+    /// When there is a single log and none to hold out.
+    pub fn with_test(mut self) -> Result<Self> {
+        if self.test.is_empty() {
+            let n = self.train.len();
+            if n < 2 {
+                return Err(Error::Config {
+                    key: "test".into(),
+                    message: format!(
+                        "study {}: one log cannot be both fitted and held out; give a second episode",
+                        self.name
+                    ),
+                });
+            }
+            let held = (n / 3).max(1);
+            self.test = self.train.split_off(n - held);
+        }
+        Ok(self)
+    }
+}
+
+fn one_line(error: &toml::de::Error) -> String {
+    error.message().split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+fn parameter(written: &StudyParameter) -> Result<Parameter, String> {
+    let mut targets = written.targets.clone();
+    targets.extend(written.target.clone());
+    if targets.is_empty() {
+        return Err(format!("parameter `{}` has no `target`", written.name));
+    }
+    Ok(Parameter {
+        name: written.name.clone(),
+        targets,
+        range: written.range,
+        scale: written.scale,
+        unit: written.unit.clone(),
+    })
+}
+
+/// Reads the logs that some patterns name, each once, sorted by name within a pattern.
+fn logs(
+    folder: &Path,
+    patterns: &[String],
+    layout: &Layout,
+    key: &str,
+) -> Result<Vec<(String, Episode)>> {
+    let mut files: Vec<PathBuf> = Vec::new();
+    for pattern in patterns {
+        let found = matching(folder, pattern)?;
+        if found.is_empty() {
+            return Err(Error::Config {
+                key: key.into(),
+                message: format!("`{key}`: no file matches `{pattern}`"),
+            });
+        }
+        for file in found {
+            if !files.contains(&file) {
+                files.push(file);
+            }
+        }
+    }
+    if files.is_empty() && key == "train" {
+        return Err(Error::Config {
+            key: key.into(),
+            message: "`train` names no logs".into(),
+        });
+    }
+    files
+        .iter()
+        .map(|file| {
+            let name = file.strip_prefix(folder).unwrap_or(file);
+            let episode = Episode::read_csv(file, layout)?;
+            Ok((name.display().to_string(), episode))
+        })
+        .collect()
+}
+
+/// Files of a folder whose name matches a pattern with `*` in its last part, sorted.
+fn matching(folder: &Path, pattern: &str) -> Result<Vec<PathBuf>> {
+    let path = folder.join(pattern);
+    let (Some(parent), Some(last)) = (path.parent(), path.file_name()) else {
+        return Ok(Vec::new());
+    };
+    let last = last.to_string_lossy();
+    if !last.contains('*') {
+        return Ok(vec![path.clone()]);
+    }
+    let entries = std::fs::read_dir(parent).map_err(|e| Error::File {
+        path: parent.to_owned(),
+        message: e.to_string(),
+    })?;
+    let mut found: Vec<PathBuf> = entries
+        .filter_map(|entry| entry.ok().map(|e| e.path()))
+        .filter(|p| {
+            p.file_name()
+                .is_some_and(|n| matches(&last, &n.to_string_lossy()))
+        })
+        .collect();
+    found.sort();
+    Ok(found)
+}
+
+/// Whether a name matches a pattern whose `*` stand for any characters.
+fn matches(pattern: &str, name: &str) -> bool {
+    let mut parts = pattern.split('*');
+    let first = parts.next().unwrap_or_default();
+    let Some(mut rest) = name.strip_prefix(first) else {
+        return false;
+    };
+    let parts: Vec<&str> = parts.collect();
+    let Some((last, middle)) = parts.split_last() else {
+        return rest.is_empty();
+    };
+    for part in middle {
+        match rest.find(part) {
+            Some(at) => rest = &rest[at + part.len()..],
+            None => return false,
+        }
+    }
+    rest.ends_with(last)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::matches;
+
+    #[test]
+    fn a_star_stands_for_any_characters() {
+        for (pattern, name, expected) in [
+            ("train_*.csv", "train_0.csv", true),
+            ("train_*.csv", "test_0.csv", false),
+            ("*.csv", "a.csv", true),
+            ("a*b*c", "axxbyyc", true),
+            ("a*b*c", "axxc", false),
+            ("log.csv", "log.csv", true),
+        ] {
+            assert_eq!(matches(pattern, name), expected, "{pattern} {name}");
+        }
+    }
+}
