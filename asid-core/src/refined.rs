@@ -101,6 +101,8 @@ impl Refined {
                 sensor,
             });
         }
+        // A force may depend on the command that reaches the drive.
+        placed.sort_by_key(|p| p.effect.acts() != Acts::Command);
         for (target, _) in fixed {
             model.nominal(target)?;
         }

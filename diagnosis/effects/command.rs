@@ -1,14 +1,18 @@
-//! Effects on the way from the command to the drive.
+//! What a drive makes of its command: gain, bias, saturation, dead band.
 
-use asid_core::effect::{Acting, Acts, Effect, EffectParameter, Site};
+use asid_core::effect::{Acting, Acts, Effect, EffectParameter, Reference, Site, Start};
+use asid_core::plant::{Drive, DriveLaw};
 use asid_core::simulator::StepView;
 use asid_core::{Plant, Result};
+
+use super::{at_least, drives, values};
 
 asid_core::register!(EffectEntry {
     name: "actuator-gain",
     about: "the command is scaled",
     make: || Box::new(Affine {
-        parameters: const { &[EffectParameter::new("gain", "", [0.2, 2.0], 1.0)] },
+        parameters: const { &[EffectParameter::new("gain", "1", [0.2, 2.0], 1.0)] },
+        scaled: true,
     }),
 });
 
@@ -24,16 +28,32 @@ asid_core::register!(EffectEntry {
                 0.0,
             )]
         },
+        scaled: false,
     }),
 });
 
-/// `gain * command + bias`, with one of the two as its parameter.
+asid_core::register!(EffectEntry {
+    name: "actuator-saturation",
+    about: "the force of a drive is limited",
+    make: || Box::new(Saturation),
+});
+
+asid_core::register!(EffectEntry {
+    name: "actuator-deadband",
+    about: "small commands do nothing",
+    make: || Box::new(Deadband),
+});
+
+/// `gain * command + bias`, with one of the two as its parameter. The command is clamped to its
+/// range before.
 struct Affine {
     parameters: &'static [EffectParameter],
+    scaled: bool,
 }
 
 struct AffineAt {
     actuator: usize,
+    range: [f64; 2],
     gain: f64,
     bias: f64,
 }
@@ -41,7 +61,7 @@ struct AffineAt {
 impl Acting for AffineAt {
     fn before_step(&mut self, view: &mut StepView<'_>) {
         let command = &mut view.ctrl[self.actuator];
-        *command = self.gain * *command + self.bias;
+        *command = self.gain * command.clamp(self.range[0], self.range[1]) + self.bias;
     }
 }
 
@@ -55,17 +75,137 @@ impl Effect for Affine {
     }
 
     fn sites(&self, plant: &Plant) -> Vec<String> {
-        let actuators = plant.layout.actuators.iter();
-        actuators.map(|a| a.name.clone()).collect()
+        drives(plant)
     }
 
     fn attach(&self, site: &Site<'_>) -> Result<Box<dyn Acting>> {
-        let scaled = self.parameters[0].name == "gain";
-        let value = site.values[0];
+        let [value] = values(site)?;
+        let (actuator, drive) = site.plant.drive(site.name)?;
         Ok(Box::new(AffineAt {
-            actuator: site.plant.layout.actuator(site.name)?,
-            gain: if scaled { value } else { 1.0 },
-            bias: if scaled { 0.0 } else { value },
+            actuator,
+            range: drive
+                .ctrl_range
+                .unwrap_or([f64::NEG_INFINITY, f64::INFINITY]),
+            gain: if self.scaled { value } else { 1.0 },
+            bias: if self.scaled { 0.0 } else { value },
+        }))
+    }
+}
+
+/// Force (N or N m) beyond which no drive's limit is looked for.
+const UNLIMITED: f64 = 1000.0;
+
+/// The force on the joint, gear included, is held within `±limit`: the command is replaced by the
+/// one that makes the drive ask for the limit, at the position and speed at the start of the step.
+struct Saturation;
+
+struct SaturationAt {
+    actuator: usize,
+    qpos: usize,
+    dof: usize,
+    drive: Drive,
+    limit: f64,
+}
+
+impl Acting for SaturationAt {
+    fn before_step(&mut self, view: &mut StepView<'_>) {
+        let (q, v) = (view.qpos[self.qpos], view.qvel[self.dof]);
+        let force = self.drive.force(view.ctrl[self.actuator], q, v);
+        if force.abs() > self.limit {
+            let held = self.limit.copysign(force);
+            if let Some(command) = self.drive.command_for(held, q, v) {
+                view.ctrl[self.actuator] = command;
+            }
+        }
+    }
+}
+
+impl Effect for Saturation {
+    fn acts(&self) -> Acts {
+        Acts::Command
+    }
+
+    fn parameters(&self) -> &'static [EffectParameter] {
+        const {
+            &[
+                EffectParameter::new("limit", "N or N m", [0.0, UNLIMITED], UNLIMITED)
+                    .starting(Start::Multiples(Reference::Force, &[0.9, 0.7, 0.5])),
+            ]
+        }
+    }
+
+    fn sites(&self, plant: &Plant) -> Vec<String> {
+        drives(plant)
+    }
+
+    fn attach(&self, site: &Site<'_>) -> Result<Box<dyn Acting>> {
+        let [limit] = values(site)?;
+        let (actuator, drive) = site.plant.drive(site.name)?;
+        let joint = &site.plant.layout.joints[drive.joint];
+        Ok(Box::new(SaturationAt {
+            actuator,
+            qpos: joint.qpos,
+            dof: joint.qvel,
+            drive,
+            limit: at_least(site, "limit", limit, 0.0)?,
+        }))
+    }
+}
+
+/// What the drive answers to is nearer to zero by `width`, and zero within: for a motor (N or N m)
+/// and a velocity servo (rad/s or m/s) the command, for a position servo the difference of
+/// command and position (rad or m before the gear), since no position is small by itself.
+struct Deadband;
+
+struct DeadbandAt {
+    actuator: usize,
+    qpos: usize,
+    drive: Drive,
+    width: f64,
+}
+
+/// `x` nearer to zero by `width`.
+fn shrink(x: f64, width: f64) -> f64 {
+    (x.abs() - width).max(0.0).copysign(x)
+}
+
+impl Acting for DeadbandAt {
+    fn before_step(&mut self, view: &mut StepView<'_>) {
+        let command = &mut view.ctrl[self.actuator];
+        let zero = match self.drive.law {
+            DriveLaw::Position { .. } => self.drive.gear * view.qpos[self.qpos],
+            DriveLaw::Motor | DriveLaw::Velocity { .. } => 0.0,
+        };
+        *command = zero + shrink(*command - zero, self.width);
+    }
+}
+
+impl Effect for Deadband {
+    fn acts(&self) -> Acts {
+        Acts::Command
+    }
+
+    fn parameters(&self) -> &'static [EffectParameter] {
+        const {
+            &[
+                EffectParameter::new("width", "unit of the command", [0.0, 10.0], 0.0)
+                    .starting(Start::Multiples(Reference::Command, &[0.03, 0.1, 0.3])),
+            ]
+        }
+    }
+
+    fn sites(&self, plant: &Plant) -> Vec<String> {
+        drives(plant)
+    }
+
+    fn attach(&self, site: &Site<'_>) -> Result<Box<dyn Acting>> {
+        let [width] = values(site)?;
+        let (actuator, drive) = site.plant.drive(site.name)?;
+        Ok(Box::new(DeadbandAt {
+            actuator,
+            qpos: site.plant.layout.joints[drive.joint].qpos,
+            drive,
+            width: at_least(site, "width", width, 0.0)?,
         }))
     }
 }

@@ -1,0 +1,103 @@
+//! A scene on each engine, with and without effects.
+
+use asid::core::effect::{Effect, EffectSpec};
+use asid::core::refined::{Refined, needs};
+use asid::core::registry::{BackendEntry, EffectEntry, all};
+use asid::core::{
+    Backend, BatchConfig, Capabilities, Control, Model as _, Plant, Rollout, Scene, Simulator,
+};
+
+/// Engines that can do something.
+pub fn engines(needed: Capabilities) -> Vec<Box<dyn Backend>> {
+    let made = all::<BackendEntry>()
+        .into_iter()
+        .map(|e| (e.make)().unwrap());
+    made.filter(|b| b.capabilities().contains(needed)).collect()
+}
+
+/// Engines that can give a scene an effect, written as users write it.
+pub fn engines_for(effect: &str) -> Vec<Box<dyn Backend>> {
+    let spec: EffectSpec = effect.parse().unwrap();
+    let entries = all::<EffectEntry>();
+    let entry = entries.iter().find(|e| e.name == spec.name).unwrap();
+    let effect: Box<dyn Effect> = (entry.make)();
+    engines(needs(&*effect))
+}
+
+pub fn scene(xml: &str) -> Scene {
+    Scene::from_xml("bench", xml, &[]).unwrap()
+}
+
+/// A simulation of a scene with effects.
+pub struct Bench {
+    pub engine: String,
+    pub plant: Plant,
+    pub simulator: Box<dyn Simulator>,
+    names: Vec<String>,
+}
+
+impl Bench {
+    pub fn new(backend: &dyn Backend, xml: &str, effects: &[&str]) -> Self {
+        let scene = scene(xml);
+        let specs: Vec<EffectSpec> = effects.iter().map(|e| e.parse().unwrap()).collect();
+        let model = Refined::load(backend, &scene, &specs)
+            .unwrap_or_else(|e| panic!("{}, {effects:?}: {e}", backend.name()));
+        let config = BatchConfig {
+            size: 1,
+            threads: 1,
+            targets: Vec::new(),
+        };
+        let sensors = &model.layout().sensors;
+        Self {
+            engine: backend.name().to_owned(),
+            plant: Plant::of(&scene).unwrap(),
+            names: sensors.iter().map(|s| s.name.clone()).collect(),
+            simulator: model.simulator(&config).unwrap(),
+        }
+    }
+
+    pub fn state(&mut self, qpos: &[f64], qvel: &[f64]) -> &mut Self {
+        self.simulator.set_state(&[0], qpos, qvel).unwrap();
+        self
+    }
+
+    /// All sensors after each frame of `substeps`, one command a frame.
+    pub fn run(&mut self, substeps: usize, commands: &[Vec<f64>]) -> Vec<Vec<f64>> {
+        let recording = self.plant.layout.recording(&self.names).unwrap();
+        let control = commands.concat();
+        let control = Control::Shared(&control);
+        let frames = commands.len();
+        let rollout = Rollout::new(&[0], frames, substeps, control, &recording);
+        let mut out = vec![0.0; frames * recording.width()];
+        self.simulator.rollout(&rollout, &mut out).unwrap();
+        assert!(self.simulator.status()[0].is_running(), "{}", self.engine);
+        out.chunks_exact(recording.width()).map(Vec::from).collect()
+    }
+
+    /// The same with one command for a number of frames of one step.
+    pub fn hold(&mut self, frames: usize, command: &[f64]) -> Vec<Vec<f64>> {
+        self.run(1, &vec![command.to_vec(); frames])
+    }
+}
+
+/// Runs a check on each engine that can give the scene the effects.
+pub fn on_each(xml: &str, effects: &[&str], mut check: impl FnMut(&mut Bench)) {
+    let able = engines_for(effects.first().unwrap_or(&"viscous-friction"));
+    for backend in able {
+        if effects
+            .iter()
+            .all(|e| engines_for(e).iter().any(|b| b.name() == backend.name()))
+        {
+            check(&mut Bench::new(&*backend, xml, effects));
+        }
+    }
+}
+
+/// Asserts that a figure is near what theory says, by an absolute tolerance.
+#[track_caller]
+pub fn near(what: &str, found: f64, expected: f64, tolerance: f64) {
+    assert!(
+        (found - expected).abs() <= tolerance,
+        "{what}: {found}, expected {expected} within {tolerance}"
+    );
+}

@@ -1,0 +1,36 @@
+//! Effects against theory on every engine that is built in, and off at their null value to the bit.
+
+#![allow(clippy::unwrap_used)]
+
+mod bench;
+mod contract;
+
+use asid::core::Scene;
+use asid::core::refined::Refined;
+use asid::core::registry::{BackendEntry, all};
+
+/// A motor on a hinge about the vertical axis: inertia 0.5 kg m² about it, from the rotor alone.
+const ROTOR: &str = r#"<mujoco><compiler angle="radian"/><option timestep="0.002" gravity="0 0 0"/>
+  <worldbody><body name="rotor"><joint name="spin" axis="0 0 1"/>
+    <inertial pos="0 0 0" mass="1" diaginertia="0.5 0.5 0.5"/></body></worldbody>
+  <actuator><motor name="drive" joint="spin" gear="1"/></actuator>
+  <sensor><jointpos name="angle" joint="spin"/><jointvel name="speed" joint="spin"/></sensor></mujoco>"#;
+
+#[test]
+fn unknown_sites_and_parameters_list_the_near_ones() {
+    let scene = Scene::from_xml("rotor", ROTOR, &[]).unwrap();
+    let backend = (all::<BackendEntry>()[0].make)().unwrap();
+    for (text, expected) in [
+        (
+            "actuator-gian@drive",
+            "known: `actuator-bias`, `actuator-gain`",
+        ),
+        ("actuator-gain@driv", "did you mean `drive`?"),
+        ("actuator-gain@drive:gian=1", "did you mean `gain`?"),
+    ] {
+        let Err(error) = Refined::load(&*backend, &scene, &[text.parse().unwrap()]) else {
+            panic!("{text} was accepted");
+        };
+        assert!(error.to_string().contains(expected), "{error}");
+    }
+}
