@@ -14,6 +14,7 @@ pub mod fit;
 pub mod machine;
 pub mod noise;
 pub mod predict;
+pub mod prepare;
 pub mod refined_model;
 pub mod roughness;
 pub mod screen;

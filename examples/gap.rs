@@ -3,8 +3,8 @@
 use std::time::Instant;
 use asid::core::progress::Silent;
 use asid::core::registry::{BackendEntry, find};
-use asid::core::{Streams, Model as _};
-use asid::diagnosis::{bench::*, candidate, data::Logs, fit::*, machine::Machine, noise, predict::*, roughness, search, study::Study, trajectory::Trajectory};
+use asid::core::Streams;
+use asid::diagnosis::{candidate, machine::Machine, prepare, search, study::Study, trajectory::Trajectory};
 
 fn main() {
     for path in std::env::args().skip(1) {
@@ -12,47 +12,24 @@ fn main() {
         let backend = (find::<BackendEntry>("mujoco").unwrap().make)().unwrap();
         let machine = Machine::new(backend, &study.scene, &study.fixed, &study.effects, 0).unwrap();
         let plant = machine.plant.clone();
-        let sensors: Vec<String> = plant.layout.sensors.iter().map(|s| s.name.clone()).collect();
-        let starts = |logs: &Logs| -> Vec<State> { logs.episodes.iter().map(|e| { let i = e.episode.initial.clone().unwrap(); State { qpos: i.qpos, qvel: i.qvel } }).collect() };
-        let train = Logs::new(&plant, &sensors, study.train.clone()).unwrap();
-        let test = Logs::new(&plant, &sensors, study.test.clone()).unwrap();
-        let (s, st) = (starts(&train), starts(&test));
-        let mut bench = Bench { machine, train: Record::new(train, s.clone()), test: Record::new(test, st), parameters: study.parameters.clone(), open: vec![] };
-        let model = bench.machine.with(&[]).unwrap();
         let t = Instant::now();
-        let mut point = Point { theta: study.parameters.iter().map(|p| model.nominal(&p.targets[0]).unwrap()).collect(), starts: s };
-        let spread = roughness::Spread::of_known_starts(&plant.layout);
-        let unknowns = bench.unknowns(&[]);
-        let mut rng = Streams::new(0).stream("r");
-        for k in 0..2 {
-            let (sigma, wt) = {
-                let mut p = bench.predictor(&[], &bench.train).unwrap();
-                if k == 0 { point = scan(&mut p, &unknowns, point, 8).unwrap(); }
-                let pr = p.readings(&[point.clone()]).unwrap().remove(0);
-                let logs = &bench.train.logs;
-                let r: Vec<Vec<f64>> = (0..logs.episodes.len()).map(|e| { let mut o = vec![0.0; logs.episodes[e].plan.rows()*logs.entries.len()]; logs.difference(e, &pr[e], &mut o); o }).collect();
-                (noise::estimate(logs, &r), ())
-            };
-            let _ = wt;
-            bench.train.logs.set_noise(&sigma);
-            bench.test.logs.set_noise(&sigma);
-            let w = { let mut p = bench.predictor(&[], &bench.train).unwrap(); roughness::estimate(&mut p, &plant.layout, &point, &spread, &mut rng).unwrap() };
-            bench.train.whitening = w;
-            let w = { let mut p = bench.predictor(&[], &bench.test).unwrap(); roughness::estimate(&mut p, &plant.layout, &Point { theta: point.theta.clone(), starts: bench.test.starts.clone() }, &spread, &mut rng).unwrap() };
-            bench.test.whitening = w;
-            let e = bench.explain(&[], &point.theta, &point.starts, if k == 0 { Effort::BRIEF } else { Effort::FULL }).unwrap();
-            point = e.fit.point.clone();
-        }
-        let none = bench.explain(&[], &point.theta, &point.starts, Effort::BRIEF).unwrap();
-        let shown = Trajectory::of(&*model, &plant, &bench.parameters, &bench.train.logs, &point, 0).unwrap();
+        let mut rng = Streams::new(0).stream("scatter");
+        let p = prepare::prepare(&study, machine, &mut rng).unwrap();
+        let (bench, none) = (p.bench, p.none);
+        let last = bench.stages.len() - 1;
+        let model = bench.machine.with(&[]).unwrap();
+        let shown = Trajectory::of(&*model, &plant, &bench.parameters, &bench.train.logs, &none[last].fit.point, 0).unwrap();
         let (candidates, left) = candidate::enumerate(&bench.machine, &shown);
-        println!("== {path} candidates {} left out {} none {:?}", candidates.len(), left.len(), t.elapsed());
-        for l in &left { println!("   left out {} {}", l.label, l.why); }
-        let f = search::search(&bench, &candidates, none, search::Breadth::default(), &Silent).unwrap();
+        println!("== {path} candidates {} left out {} prepared {:?} stages {:?} rms {:?}", candidates.len(), left.len(), t.elapsed(), (0..=last).map(|i| bench.readings(i)).collect::<Vec<_>>(), none.iter().enumerate().map(|(i, e)| (e.fit.cost / bench.readings(i)).sqrt()).collect::<Vec<_>>());
+        for l in left.iter().take(3) { println!("   left out {} {}", l.label, l.why); }
+        let s = search::Search { bench: &bench, candidates: &candidates, breadth: search::Breadth::default(), progress: &Silent };
+        let t0 = t.elapsed();
+        let f = s.run(none).unwrap();
         let (n, m) = (bench.train.readings as f64, bench.test.readings as f64);
-        println!("   searched {:?}; none {:.3} {:.3} {:?}", t.elapsed(), (f.none.fit.cost / n).sqrt(), (f.none.held_out / m).sqrt(), f.none.fit.point.theta);
-        for s in f.screened.iter().take(6) { println!("     screened {} {:.3} {:?}", candidates[s.candidate].label(), (s.cost / n).sqrt(), s.values); }
-        for x in f.found.iter().filter(|x| x.candidates.len() == 1).take(6).chain(f.found.iter().filter(|x| x.candidates.len() == 2).take(4)).chain(f.found.iter().filter(|x| x.candidates.len() == 3).take(2)) {
+        println!("   {:?} searched {:?}; none {:.3} {:.3} {:?}", t0, t.elapsed(), (f.none.fit.cost / n).sqrt(), (f.none.held_out / m).sqrt(), f.none.fit.point.theta);
+        let n0 = bench.readings(0);
+        for s in f.screened.iter().take(8) { println!("     screened {} {:.3} {:?}", candidates[s.candidate].label(), (s.cost / n0).sqrt(), s.values); }
+        for x in f.found.iter().filter(|x| x.candidates.len() == 1).take(6).chain(f.found.iter().filter(|x| x.candidates.len() == 2).take(3)) {
             println!("     {:.3} {:.3} {} theta {:?}", (x.explanation.fit.cost / n).sqrt(), (x.explanation.held_out / m).sqrt(), x.explanation.effects.iter().map(|e| e.to_string()).collect::<Vec<_>>().join(" + "), &x.explanation.fit.point.theta[..bench.parameters.len()]);
         }
     }
