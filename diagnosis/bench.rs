@@ -236,6 +236,12 @@ impl Bench {
         Ok(explanation)
     }
 
+    /// Whether predictions scatter in some episode.
+    #[must_use]
+    pub fn is_rough(&self) -> bool {
+        self.train.whitening.iter().any(|w| w.lost() > 0)
+    }
+
     /// Number of readings of a stage.
     #[must_use]
     pub fn readings(&self, stage: usize) -> f64 {

@@ -16,6 +16,8 @@ pub struct Candidate {
     pub spec: EffectSpec,
     /// Points to start from, one value a parameter.
     pub starts: Vec<Vec<f64>>,
+    /// Range of each parameter: that of the effect, or where the logs can tell of it.
+    pub ranges: Vec<[f64; 2]>,
 }
 
 /// A candidate that was left out, and why.
@@ -48,7 +50,8 @@ impl Candidate {
     pub fn unknowns(&self) -> Vec<(Parameter, bool)> {
         self.parameters()
             .iter()
-            .map(|p| {
+            .zip(&self.ranges)
+            .map(|(p, &range)| {
                 let target = Target {
                     element: "effect".into(),
                     name: self.label(),
@@ -58,7 +61,7 @@ impl Candidate {
                 let parameter = Parameter {
                     name: format!("{}.{}", self.label(), p.name),
                     targets: vec![target],
-                    range: p.range,
+                    range,
                     scale: Scale::Linear,
                     unit: p.unit.into(),
                 };
@@ -110,14 +113,33 @@ pub fn enumerate(machine: &Machine, shown: &Trajectory) -> (Vec<Candidate>, Vec<
                 continue;
             }
             let starts = starts(&*effect, plant, &site, shown);
+            let ranges = ranges(&*effect, plant, &site, shown);
             found.push(Candidate {
                 effect,
                 spec,
                 starts,
+                ranges,
             });
         }
     }
     (found, left_out)
+}
+
+/// Ranges of the parameters; a place lies where the body goes.
+fn ranges(effect: &dyn Effect, plant: &Plant, site: &str, shown: &Trajectory) -> Vec<[f64; 2]> {
+    let parameters = effect.parameters().iter();
+    parameters
+        .map(|p| {
+            if !matches!(p.start, Start::Places(_)) {
+                return p.range;
+            }
+            let ends = (0..2).map(|axis| shown.places(plant, site, axis, &[0.0, 1.0]));
+            let all: Vec<f64> = ends.flatten().collect();
+            let low = all.iter().copied().fold(f64::INFINITY, f64::min);
+            let high = all.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            if low < high { [low, high] } else { p.range }
+        })
+        .collect()
 }
 
 /// All combinations of the parameters' start values.

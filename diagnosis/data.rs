@@ -153,6 +153,26 @@ impl Logs {
         logs
     }
 
+    /// Share of the episodes after which no reading moves by more than a few deviations of
+    /// the noise any more.
+    #[must_use]
+    pub fn moving_share(&self) -> f64 {
+        let n = self.entries.len();
+        let noise = self.entry_noise();
+        let mut share: f64 = 0.0;
+        for (i, e) in self.episodes.iter().enumerate() {
+            let rows = e.plan.rows();
+            let width = self.width();
+            let last = e.readings[(rows - 1) * width..].to_vec();
+            let mut difference = vec![0.0; rows * n];
+            self.difference(i, &last.repeat(rows), &mut difference);
+            let moving = |row: &[f64]| row.iter().zip(&noise).any(|(d, s)| d.abs() > 8.0 * s);
+            let end = difference.chunks_exact(n).rposition(moving).unwrap_or(0);
+            share = share.max((end + 1) as f64 / rows as f64);
+        }
+        (share + 0.05).min(1.0)
+    }
+
     /// Entries of a row of readings.
     #[must_use]
     pub fn width(&self) -> usize {

@@ -55,6 +55,17 @@ impl Effort {
     };
 }
 
+impl Effort {
+    /// The same where predictions scatter: no step is finer than the scatter, and each is dear.
+    #[must_use]
+    pub fn rough(self) -> Self {
+        Self {
+            iterations: self.iterations.min(6),
+            tolerance: self.tolerance.max(3e-3),
+        }
+    }
+}
+
 /// What a fit found.
 #[derive(Clone, Debug)]
 pub struct Fit {
@@ -73,14 +84,19 @@ pub struct Fit {
     pub free: Vec<usize>,
 }
 
-/// Response of the residuals, root mean square, that a difference aims at, and the least
-/// multiple of what scatter alone makes.
-const AIM: f64 = 0.3;
-const ABOVE_SCATTER: f64 = 5.0;
+/// Response of the residuals, root mean square, that a difference aims at.
+pub const AIM: f64 = 0.3;
+/// The least multiple of what scatter alone makes that a difference aims at.
+pub const ABOVE_SCATTER: f64 = 5.0;
+/// First difference where predictions scatter, as a share of the range.
+pub const ROUGH_START: f64 = 1e-2;
 /// Multiples of the difference that a derivative is taken over where predictions scatter.
 const STENCIL: [f64; 2] = [-1.0, 1.0];
+/// Response to the whole range, root mean square in units of the noise, below which a
+/// parameter does nothing here, and is left where it is.
+pub const NOTHING: f64 = 0.05;
 /// Shift of a start that shows how predictions scatter, m or rad.
-const PROBE: f64 = 1e-6;
+pub const PROBE: f64 = 1e-9;
 /// Smallest and largest difference, as a share of the range; the last where predictions scatter.
 const STEPS: [f64; 3] = [1e-8, 0.02, 0.1];
 
@@ -381,6 +397,12 @@ pub fn fit(
     let free: Vec<usize> = (0..unknowns.len()).filter(|&i| unknowns[i].free).collect();
     let bounds = bounds(predictor);
     let mut differences = Differences::new(unknowns.len());
+    let effort = if predictor.is_rough() {
+        differences.0.fill(ROUGH_START);
+        effort.rough()
+    } else {
+        effort
+    };
     let mut point = point;
     let mut damping = 1e-3;
     let mut line = linearise(predictor, layout, unknowns, &point, open, &mut differences)?;
@@ -444,7 +466,12 @@ fn trial(
         .iter()
         .map(|&i| unknowns[i].parameter.to_unit(point.theta[i]))
         .collect();
-    let mut held = vec![false; free.len()];
+    let readings = line.residuals.len().max(1) as f64;
+    let mut held: Vec<bool> = line
+        .columns
+        .iter()
+        .map(|c| (cost(c) / readings).sqrt() < NOTHING)
+        .collect();
     let mut step = normal.step(damping, &held);
     // Where the step leaves a bound that it starts from, that parameter stays.
     for _ in 0..free.len() {

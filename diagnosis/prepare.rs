@@ -17,9 +17,11 @@ use crate::roughness::{self, Spread};
 use crate::study::Study;
 
 /// Shares of the episodes that fits grow through.
-const SHARES: [f64; 3] = [0.1, 0.3, 1.0];
+const SHARES: [f64; 4] = [0.1, 0.3, 0.6, 1.0];
 /// Root mean square of the residuals up to which a gradient is believed.
 const NEAR: f64 = 30.0;
+/// Root mean square from which on a gap is seen.
+const SEEN: f64 = 1.5;
 /// Values of each parameter that are looked at before the first fit.
 const SCAN: usize = CAPACITY;
 
@@ -127,7 +129,7 @@ pub fn prepare(study: &Study, machine: Machine, rng: &mut Rng) -> Result<Prepare
     set_noise(&mut bench, &study.noise, &point)?;
     bench.stages = vec![whole(&bench)];
     scatter(&mut bench, &point, rng)?;
-    let none = if rough(&bench) {
+    let none = if bench.is_rough() {
         identify_rough(&mut bench, study, point, rng)?
     } else {
         identify_smooth(&mut bench, study, point)?
@@ -145,10 +147,6 @@ fn whole(bench: &Bench) -> Stage {
         record: bench.train.clone(),
         episodes: (0..bench.train.logs.episodes.len()).collect(),
     }
-}
-
-fn rough(bench: &Bench) -> bool {
-    bench.train.whitening.iter().any(|w| w.lost() > 0)
 }
 
 /// Estimates the noise at a point; what the study gives stays.
@@ -236,8 +234,12 @@ fn identify_smooth(bench: &mut Bench, study: &Study, point: Point) -> Result<Vec
             continue;
         }
         // The longest stage on which a gradient can be believed comes first.
-        let near = |i: usize| (fits[i].fit.cost / bench.readings(i)).sqrt() < NEAR;
-        let first = (0..SHARES.len()).rev().find(|&i| near(i)).unwrap_or(0);
+        let rms = |i: usize| (fits[i].fit.cost / bench.readings(i)).sqrt();
+        let mut first = (0..SHARES.len()).rev().find(|&i| rms(i) < NEAR).unwrap_or(0);
+        // Unless nothing of the gap is seen on it yet.
+        while first + 1 < SHARES.len() && rms(first) < SEEN && rms(SHARES.len() - 1) > SEEN {
+            first += 1;
+        }
         bench.stages.drain(..first);
         fits.drain(..first);
         return Ok(fits);
@@ -262,6 +264,11 @@ fn identify_rough(
         };
         vec![part, whole(bench)]
     };
+    // What only rests at the end of an episode tells nothing more.
+    let layout = bench.layout().clone();
+    let share = bench.train.logs.moving_share();
+    bench.train = bench.train.cut(&layout, share);
+    scatter(bench, &point, rng)?;
     bench.stages = stages(bench);
     let first = scan_and_fit(bench, 0, &point, Effort::BRIEF)?;
     set_noise(bench, &study.noise, &first.fit.point)?;

@@ -94,7 +94,7 @@ impl Spread {
     /// Starts that are known: differences that no sensor sees (m, rad, and per second).
     #[must_use]
     pub fn of_known_starts(layout: &Layout) -> Self {
-        Self(vec![1e-6; 2 * layout.nv])
+        Self(vec![1e-9; 2 * layout.nv])
     }
 }
 

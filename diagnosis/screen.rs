@@ -10,7 +10,9 @@ use asid_core::Result;
 
 use crate::bench::{Bench, Explanation, Record, Stage, Trial};
 use crate::candidate::Candidate;
-use crate::fit::{Differences, Unknown, cost, linearise, nudged};
+use crate::fit::{
+    ABOVE_SCATTER, AIM, Differences, NOTHING, PROBE, ROUGH_START, Unknown, cost, linearise, nudged,
+};
 use crate::predict::Point;
 
 /// How promising a candidate is.
@@ -137,6 +139,9 @@ pub struct Base<'a> {
     rest: Vec<f64>,
     shift: Vec<f64>,
     nuisance: Nuisance,
+    /// Response that slopes are measured with, and the first share of the range to try.
+    aim: f64,
+    first: f64,
 }
 
 impl<'a> Base<'a> {
@@ -164,6 +169,19 @@ impl<'a> Base<'a> {
         let unknowns = bench.unknowns(&trials);
         let mut predictor = bench.predictor(&trials, record)?;
         let mut differences = Differences::new(unknowns.len());
+        let (mut aim, mut first) = (AIM, FIRST);
+        if predictor.is_rough() {
+            differences.0.fill(ROUGH_START);
+            let mut other = point.clone();
+            for start in &mut other.starts {
+                (0..2 * bench.layout().nv).for_each(|c| start.shift(bench.layout(), c, PROBE));
+            }
+            let both = predictor.residuals(&[point.clone(), other])?;
+            let apart = both[0].iter().zip(&both[1]).map(|(a, b)| (a - b).powi(2));
+            let scatter = (apart.sum::<f64>() / record.readings.max(1) as f64).sqrt();
+            aim = AIM.max(ABOVE_SCATTER * scatter);
+            first = ROUGH_START;
+        }
         let mut line = None;
         for _ in 0..3 {
             line = Some(linearise(
@@ -192,6 +210,8 @@ impl<'a> Base<'a> {
             rest,
             shift,
             nuisance,
+            aim,
+            first,
         })
     }
 
@@ -202,12 +222,13 @@ impl<'a> Base<'a> {
     }
 }
 
-/// Response, root mean square in units of the noise, that slopes are measured with.
-const AIM: f64 = 0.3;
 /// First difference for a slope, as a share of its range.
 const FIRST: f64 = 1e-4;
 
-/// Screens one candidate.
+/// Starts of a candidate that are kept.
+const KEPT: usize = 3;
+
+/// Screens one candidate: its best starts, best first.
 ///
 /// # Errors
 /// When a rollout fails.
@@ -216,7 +237,7 @@ pub fn screen(
     record: &Record,
     base: &Base<'_>,
     (index, candidate): (usize, &Candidate),
-) -> Result<Option<Screened>> {
+) -> Result<Vec<Screened>> {
     let mut trials: Vec<Trial<'_>> = base.trials.clone();
     trials.push((candidate, Vec::new()));
     let mut predictor = bench.predictor(&trials, record)?;
@@ -228,8 +249,8 @@ pub fn screen(
     };
     let slopes = candidate.slopes();
     let n = record.readings.max(1) as f64;
-    let mut best: Option<(f64, Vec<f64>, Vec<f64>)> = None;
-    let mut shares = vec![FIRST; own.len()];
+    let mut found: Vec<Screened> = Vec::new();
+    let mut shares = vec![base.first; own.len()];
     for start in &candidate.starts {
         // Columns: one a slope, per share of its range; or one for the whole step.
         let mut columns: Vec<Vec<f64>> = Vec::new();
@@ -262,10 +283,10 @@ pub fn screen(
                     let response = (dot(&column, &column) / n).sqrt();
                     column.iter_mut().for_each(|x| *x /= share);
                     columns.push(column);
-                    let factor = if response > 0.0 { AIM / response } else { 100.0 };
+                    let factor = if response > 0.0 { base.aim / response } else { 100.0 };
                     if !(0.1..10.0).contains(&factor) {
                         again = true;
-                        shares[j] = (shares[j] * factor.clamp(1e-4, 1e3)).clamp(1e-9, 0.05);
+                        shares[j] = (shares[j] * factor.clamp(1e-4, 1e3)).clamp(1e-9, 0.1);
                     }
                 }
                 if !again || round == 1 {
@@ -313,27 +334,42 @@ pub fn screen(
             })
             .collect();
         let residuals = predictor.residuals(&points)?;
-        for (point, r) in points.iter().zip(&residuals) {
-            let reached = cost(r);
-            if reached.is_finite() && best.as_ref().is_none_or(|(c, ..)| reached < *c) {
-                let (theta, values) = point.theta.split_at(base.point.theta.len());
-                best = Some((reached, theta.to_vec(), values.to_vec()));
-            }
+        let reached = points.iter().zip(residuals.iter().map(|r| cost(r)));
+        let best = reached
+            .filter(|(_, c)| c.is_finite())
+            .min_by(|a, b| a.1.total_cmp(&b.1));
+        if let Some((point, cost)) = best {
+            let (theta, values) = point.theta.split_at(base.point.theta.len());
+            found.push(Screened {
+                candidate: index,
+                values: values.to_vec(),
+                theta: theta.to_vec(),
+                cost,
+            });
         }
     }
-    Ok(best.map(|(cost, theta, values)| Screened {
-        candidate: index,
-        values,
-        theta,
-        cost,
-    }))
+    found.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+    let choices: Vec<usize> = (0..own.len()).filter(|&i| !own[i].free).collect();
+    let mut kept: Vec<Screened> = Vec::new();
+    for s in found {
+        // At most two of one choice, so that every choice has its turn.
+        let same = |k: &&Screened| choices.iter().all(|&i| k.values[i] == s.values[i]);
+        if kept.len() < KEPT && kept.iter().filter(same).count() < 2 {
+            kept.push(s);
+        }
+    }
+    Ok(kept)
 }
 
 /// Least squares of `target` in `columns` with each weight within its room: what would
 /// leave it is held at its end, one after the other.
 fn bounded(columns: &[Vec<f64>], target: &[f64], room: &[[f64; 2]]) -> Vec<f64> {
     let n = columns.len();
-    let mut fixed: Vec<Option<f64>> = vec![None; n];
+    let readings = target.len().max(1) as f64;
+    let mut fixed: Vec<Option<f64>> = columns
+        .iter()
+        .map(|c| ((dot(c, c) / readings).sqrt() < NOTHING).then_some(0.0))
+        .collect();
     for _ in 0..=n {
         let free: Vec<usize> = (0..n).filter(|&i| fixed[i].is_none()).collect();
         let mut rest = target.to_vec();

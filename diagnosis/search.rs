@@ -20,7 +20,7 @@ pub struct Breadth {
     pub first: usize,
     /// Of these, those that are followed to the last.
     pub last: usize,
-    /// Explanations of each size that more effects are tried upon.
+    /// Explanations that more effects are tried upon.
     pub beam: usize,
     /// Most effects together.
     pub depth: usize,
@@ -29,8 +29,8 @@ pub struct Breadth {
 impl Default for Breadth {
     fn default() -> Self {
         Self {
-            first: 16,
-            last: 6,
+            first: 14,
+            last: 5,
             beam: 2,
             depth: 2,
         }
@@ -44,22 +44,36 @@ pub struct Found {
     pub candidates: Vec<usize>,
     /// The fit.
     pub explanation: Explanation,
-    /// The stage it was fitted to.
-    pub stage: usize,
 }
 
 /// What a search found.
 pub struct Findings {
     /// Without any effect, at the last stage.
     pub none: Explanation,
-    /// Sets of effects that were followed to the last stage, best first within a size.
+    /// Sets of effects that were followed to the last stage, lowest cost first.
     pub found: Vec<Found>,
-    /// Candidates with the cost that screening reached alone, best first.
+    /// Candidates with the cost that screening on the first stage reached, best first.
     pub screened: Vec<Screened>,
 }
 
-/// Gain of the cost, per reading, that counts as leaving nothing to explain.
-const AT_FLOOR: f64 = 0.04;
+/// Excess of the root mean square residual, in units of the noise, that no further effect
+/// is looked for below: another program's version of the same effect leaves as much.
+pub const NEGLIGIBLE: f64 = 2.0;
+
+/// Growth of a gap from one stage to the next from which on it counts as another gap.
+const GROWN: f64 = 3.0;
+
+/// Multiple of the best cost up to which a fit is worth its end.
+const NEAR_BEST: f64 = 10.0;
+
+/// Single effects that are followed whatever sets do.
+const SINGLES: usize = 3;
+
+/// What a cost per reading has beyond the noise, as a root mean square.
+#[must_use]
+pub fn excess(cost_per_reading: f64) -> f64 {
+    (cost_per_reading - 1.0).max(0.0).sqrt()
+}
 
 /// A search under way.
 pub struct Search<'a> {
@@ -74,131 +88,130 @@ pub struct Search<'a> {
 }
 
 impl Search<'_> {
-    /// Searches upon `none`, one fit a stage.
+    /// Searches upon `none`, one fit a stage. On each stage what was found before is
+    /// followed; where its best leaves a gap, one more effect is tried upon it.
     ///
     /// # Errors
     /// When a rollout fails.
-    pub fn run(&self, none: Vec<Explanation>) -> Result<Findings> {
+    pub fn run(&self, none: &[Explanation]) -> Result<Findings> {
         let last = self.bench.stages.len() - 1;
-        let mut findings = Findings {
-            none: none[last].clone(),
-            found: Vec::new(),
-            screened: Vec::new(),
+        let nothing = |stage: usize| Found {
+            candidates: Vec::new(),
+            explanation: none[stage].clone(),
         };
-        // Where a set of effects stands on each stage.
-        let mut bases: Vec<(Vec<usize>, Vec<Explanation>)> = vec![(Vec::new(), none)];
-        for depth in 1..=self.breadth.depth {
-            let mut level: Vec<(Vec<usize>, Vec<Explanation>)> = Vec::new();
-            for (members, base) in &bases {
-                let screened = self.round(members, &base[0])?;
-                if depth == 1 {
-                    findings.screened.clone_from(&screened);
+        let screened = self.round(0, &nothing(0))?;
+        let mut all = self.fit_round(0, &nothing(0), &screened, &[], self.quota(0))?;
+        self.sort(&mut all);
+        let mut before = NEGLIGIBLE / GROWN;
+        for stage in 0..=last {
+            all = self.follow(stage, all)?;
+            for _ in 1..self.breadth.depth {
+                // A gap that was not there on the shorter stages.
+                let gap = self.gap(stage, &all);
+                if gap < NEGLIGIBLE.max(GROWN * before) {
+                    break;
                 }
-                let share = if depth == 1 { 1 } else { 2 };
-                let quota = self.quota(share);
-                let known = |set: &Vec<usize>| level.iter().any(|(m, _)| same(m, set));
-                let picked: Vec<&Screened> = screened
-                    .iter()
-                    .filter(|s| {
-                        let mut set = members.clone();
-                        set.push(s.candidate);
-                        set.sort_unstable();
-                        !known(&set)
-                    })
-                    .take(quota[0])
-                    .collect();
-                level.extend(self.follow(members, &base[0], &picked, &quota)?);
+                let smaller = all.iter().filter(|f| f.candidates.len() < self.breadth.depth);
+                let beam = if stage == 0 { self.breadth.beam } else { 1 };
+                let bases: Vec<Found> = smaller.take(beam).cloned().collect();
+                for base in bases {
+                    let round = self.round(stage, &base)?;
+                    let quota = (self.quota(stage) / 2).max(2);
+                    let new = self.fit_round(stage, &base, &round, &all, quota)?;
+                    all.extend(new);
+                }
+                self.sort(&mut all);
             }
-            let cost = |e: &(Vec<usize>, Vec<Explanation>)| e.1[last].fit.cost;
-            level.sort_by(|a, b| cost(a).total_cmp(&cost(b)));
-            findings.found.extend(level.iter().map(|(members, fits)| Found {
-                candidates: members.clone(),
-                explanation: fits[last].clone(),
-                stage: last,
-            }));
-            let Some(best) = level.first() else { break };
-            if cost(best) / self.bench.readings(last) - 1.0 < AT_FLOOR {
-                break;
-            }
-            level.truncate(self.breadth.beam);
-            bases = level;
+            before = self.gap(stage, &all);
         }
-        Ok(findings)
+        Ok(Findings {
+            none: none[last].clone(),
+            found: all,
+            screened,
+        })
     }
 
-    /// How many explanations each stage takes, from the first to the last.
-    fn quota(&self, share: usize) -> Vec<usize> {
+    fn sort(&self, all: &mut [Found]) {
+        all.sort_by(|a, b| {
+            let cost = |f: &Found| f.explanation.fit.cost;
+            cost(a).total_cmp(&cost(b))
+        });
+    }
+
+    /// What the best leaves.
+    fn gap(&self, stage: usize, all: &[Found]) -> f64 {
+        let best = all.first().map_or(f64::INFINITY, |f| f.explanation.fit.cost);
+        excess(best / self.bench.readings(stage))
+    }
+
+    /// How many explanations a stage takes: fewer where predictions scatter and fits are dear.
+    fn quota(&self, stage: usize) -> usize {
         let n = self.bench.stages.len();
-        let (first, last) = (self.breadth.first as f64, self.breadth.last as f64);
-        (0..n)
-            .map(|i| {
-                let along = if n == 1 { 1.0 } else { i as f64 / (n - 1) as f64 };
-                let k = first * (last / first).powf(along);
-                ((k / share as f64).round() as usize).max(2)
-            })
-            .collect()
+        let share = if self.bench.is_rough() { 0.6 } else { 1.0 };
+        let (first, last) = (self.breadth.first as f64 * share, self.breadth.last as f64 * share);
+        let along = if n == 1 {
+            0.0
+        } else {
+            stage as f64 / (n - 1) as f64
+        };
+        (first * (last / first).powf(along)).round() as usize
     }
 
-    /// Fits one more effect each to the first stage, and follows the best to the last.
-    fn follow(
-        &self,
-        members: &[usize],
-        base: &Explanation,
-        picked: &[&Screened],
-        quota: &[usize],
-    ) -> Result<Vec<(Vec<usize>, Vec<Explanation>)>> {
-        let trials = trials(self.candidates, members, base);
-        let mut fitted = Vec::new();
-        self.progress.begin("fitting", picked.len() as u64);
-        for s in picked {
-            let first = self.fit_one(&trials, base, s)?;
-            fitted.push(([members, &[s.candidate]].concat(), vec![first]));
+    /// Fits the best of the stage before on to this one.
+    fn follow(&self, stage: usize, mut all: Vec<Found>) -> Result<Vec<Found>> {
+        if stage == 0 {
+            return Ok(all);
+        }
+        // The best, and the best singles whatever their place.
+        let quota = self.quota(stage);
+        let (mut place, mut singles) = (0, 0);
+        all.retain(|f| {
+            place += 1;
+            singles += usize::from(f.candidates.len() == 1);
+            place <= quota || (f.candidates.len() == 1 && singles <= SINGLES)
+        });
+        self.progress.begin("fitting longer", all.len() as u64);
+        for found in &mut all {
+            found.explanation = self.extend(stage, found, Effort::BRIEF)?;
             self.progress.advance(1);
         }
-        self.progress.end();
-        for (stage, &n) in quota.iter().enumerate().skip(1) {
-            let cost = |e: &(Vec<usize>, Vec<Explanation>)| e.1[stage - 1].fit.cost;
-            fitted.sort_by(|a, b| cost(a).total_cmp(&cost(b)));
-            fitted.truncate(n);
-            self.progress.begin("fitting longer", fitted.len() as u64);
-            for (members, fits) in &mut fitted {
-                let next = self.extend(stage, members, &fits[stage - 1])?;
-                fits.push(next);
-                self.progress.advance(1);
+        self.sort(&mut all);
+        // To the end only what may be the best.
+        let best = all.first().map_or(0.0, |f| f.explanation.fit.cost);
+        if stage + 1 == self.bench.stages.len() {
+            for found in &mut all {
+                if found.explanation.fit.cost < NEAR_BEST * best {
+                    found.explanation = self.extend(stage, found, Effort::FULL)?;
+                }
             }
-            self.progress.end();
+            self.sort(&mut all);
         }
-        Ok(fitted)
+        self.progress.end();
+        Ok(all)
     }
 
-    /// Fits an explanation on from where it stands to another stage.
+    /// Fits an explanation on from where it stands to a stage.
     ///
     /// # Errors
     /// When a rollout fails.
-    pub fn extend(
-        &self,
-        stage: usize,
-        members: &[usize],
-        from: &Explanation,
-    ) -> Result<Explanation> {
-        let trials = trials(self.candidates, members, from);
-        let study = self.bench.parameters.len();
-        let theta = &from.fit.point.theta[..study];
+    pub fn extend(&self, stage: usize, found: &Found, effort: Effort) -> Result<Explanation> {
+        let from = &found.explanation;
+        let trials = trials(self.candidates, &found.candidates, from);
+        let theta = &from.fit.point.theta[..self.bench.parameters.len()];
         let starts = &from.fit.point.starts;
-        self.bench
-            .explain(stage, &trials, theta, starts, Effort::FULL)
+        self.bench.explain(stage, &trials, theta, starts, effort)
     }
 
     /// Screens all candidates upon an explanation, best first.
-    fn round(&self, members: &[usize], base: &Explanation) -> Result<Vec<Screened>> {
-        let trials = trials(self.candidates, members, base);
-        let linear = Base::new(self.bench, 0, &trials, base)?;
-        let record = &self.bench.stages[0].record;
+    fn round(&self, stage: usize, base: &Found) -> Result<Vec<Screened>> {
+        let trials = trials(self.candidates, &base.candidates, &base.explanation);
+        let linear = Base::new(self.bench, stage, &trials, &base.explanation)?;
+        let record = &self.bench.stages[stage].record;
         let mut all = Vec::new();
         self.progress
             .begin("screening", self.candidates.len() as u64);
         for (i, candidate) in self.candidates.iter().enumerate() {
-            if !members.contains(&i) {
+            if !base.candidates.contains(&i) {
                 match screen(self.bench, record, &linear, (i, candidate)) {
                     Ok(found) => all.extend(found),
                     // A pair that the engine refuses is no candidate.
@@ -213,9 +226,52 @@ impl Search<'_> {
         Ok(all)
     }
 
-    /// Fits one more effect to the first stage from where screening left it.
+    /// Fits the best of a round of screening, but for sets that are known.
+    fn fit_round(
+        &self,
+        stage: usize,
+        base: &Found,
+        round: &[Screened],
+        known: &[Found],
+        quota: usize,
+    ) -> Result<Vec<Found>> {
+        let trials = trials(self.candidates, &base.candidates, &base.explanation);
+        let with = |s: &Screened| [&base.candidates[..], &[s.candidate]].concat();
+        let mut new: Vec<Vec<&Screened>> = Vec::new();
+        for s in round {
+            if known.iter().any(|f| same(&f.candidates, &with(s))) {
+                continue;
+            }
+            match new.iter().position(|n| n[0].candidate == s.candidate) {
+                Some(i) => new[i].push(s),
+                None if new.len() < quota => new.push(vec![s]),
+                None => {}
+            }
+        }
+        let mut fitted = Vec::with_capacity(new.len());
+        self.progress.begin("fitting", new.len() as u64);
+        for starts in new {
+            let mut best: Option<Explanation> = None;
+            for s in &starts {
+                let fit = self.fit_one(stage, &trials, &base.explanation, s)?;
+                if best.as_ref().is_none_or(|b| fit.fit.cost < b.fit.cost) {
+                    best = Some(fit);
+                }
+            }
+            fitted.extend(best.map(|explanation| Found {
+                candidates: with(starts[0]),
+                explanation,
+            }));
+            self.progress.advance(1);
+        }
+        self.progress.end();
+        Ok(fitted)
+    }
+
+    /// Fits one more effect from where screening left it.
     fn fit_one(
         &self,
+        stage: usize,
         trials: &[Trial<'_>],
         base: &Explanation,
         screened: &Screened,
@@ -235,15 +291,15 @@ impl Search<'_> {
             screened.values.clone(),
         ));
         let (theta, starts) = (&screened.theta[..study], &base.fit.point.starts);
-        self.bench.explain(0, &all, theta, starts, Effort::BRIEF)
+        let last = stage + 1 == self.bench.stages.len();
+        let effort = if last { Effort::FULL } else { Effort::BRIEF };
+        self.bench.explain(stage, &all, theta, starts, effort)
     }
 }
 
 /// Whether two lists hold the same members.
-fn same(a: &[usize], sorted: &[usize]) -> bool {
-    let mut a = a.to_vec();
-    a.sort_unstable();
-    a == sorted
+fn same(a: &[usize], b: &[usize]) -> bool {
+    a.len() == b.len() && a.iter().all(|x| b.contains(x))
 }
 
 /// The effects of an explanation as trials with their fitted values.

@@ -24,7 +24,7 @@ fn main() {
         for l in left.iter().take(3) { println!("   left out {} {}", l.label, l.why); }
         let s = search::Search { bench: &bench, candidates: &candidates, breadth: search::Breadth::default(), progress: &Silent };
         let t0 = t.elapsed();
-        let f = s.run(none).unwrap();
+        let f = s.run(&none).unwrap();
         let (n, m) = (bench.train.readings as f64, bench.test.readings as f64);
         println!("   {:?} searched {:?}; none {:.3} {:.3} {:?}", t0, t.elapsed(), (f.none.fit.cost / n).sqrt(), (f.none.held_out / m).sqrt(), f.none.fit.point.theta);
         let n0 = bench.readings(0);
