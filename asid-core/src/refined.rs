@@ -216,7 +216,7 @@ impl Model for Refined {
             places,
             columns,
             base,
-            time: vec![0.0; config.size],
+            steps: vec![0; config.size],
             rows: (0..config.size).map(|_| Mutex::default()).collect(),
         };
         let all: Vec<usize> = (0..config.size).collect();
@@ -246,15 +246,15 @@ struct RefinedSimulator {
     columns: Vec<Column>,
     /// Values of the engine's columns before any effect.
     base: Vec<f64>,
-    /// Simulated time of each simulation, s.
-    time: Vec<f64>,
+    /// Physics steps of each simulation since its episode began.
+    steps: Vec<u64>,
     rows: Vec<Mutex<Row>>,
 }
 
-/// Memories of a simulation's effects, and its time.
+/// Memories of a simulation's effects, and its steps.
 #[derive(Clone)]
 struct Memory {
-    time: f64,
+    steps: u64,
     effects: Vec<Vec<f64>>,
 }
 
@@ -279,13 +279,13 @@ impl RefinedSimulator {
             memory
         });
         Memory {
-            time: self.time[sim],
+            steps: self.steps[sim],
             effects: effects.collect(),
         }
     }
 
     fn remember(&mut self, sim: usize, memory: &Memory) {
-        self.time[sim] = memory.time;
+        self.steps[sim] = memory.steps;
         let mut row = lock(&self.rows[sim]);
         for (acting, memory) in row.iter_mut().zip(&memory.effects) {
             if let Some(acting) = acting {
@@ -299,12 +299,12 @@ impl RefinedSimulator {
     }
 
     /// Lets the sensors' effects change `frames` rows of a simulation's readings, the first
-    /// at `time`.
+    /// after `first` physics steps of its episode and each `substeps` later than the one before.
     fn measure(
         &self,
         sim: usize,
         record: &Recording,
-        (time, period): (f64, f64),
+        (first, substeps): (u64, u64),
         readings: &mut [f64],
     ) {
         if self.placed.iter().all(|p| p.sensor.is_none()) {
@@ -321,7 +321,9 @@ impl RefinedSimulator {
             {
                 let range = record.range(i);
                 for (k, frame) in readings.chunks_exact_mut(record.width()).enumerate() {
-                    acting.read(time + k as f64 * period, &mut frame[range.clone()]);
+                    let steps = first + k as u64 * substeps;
+                    let time = steps as f64 * self.inner.layout().timestep;
+                    acting.read(time, &mut frame[range.clone()]);
                 }
             }
         }
@@ -407,7 +409,7 @@ impl Simulator for RefinedSimulator {
     fn reset(&mut self, sims: &[usize]) -> Result<()> {
         self.inner.reset(sims)?;
         for &sim in sims {
-            self.time[sim] = 0.0;
+            self.steps[sim] = 0;
             lock(&self.rows[sim])
                 .iter_mut()
                 .flatten()
@@ -436,14 +438,14 @@ impl Simulator for RefinedSimulator {
             with.hook = Some(&hook);
         }
         self.inner.rollout(&with, out)?;
-        let period = rollout.substeps as f64 * self.inner.layout().timestep;
+        let substeps = rollout.substeps as u64;
         let row = rollout.frames * rollout.record.width();
         for (&sim, readings) in rollout.sims.iter().zip(out.chunks_exact_mut(row.max(1))) {
-            let first = self.time[sim] + period;
-            self.measure(sim, rollout.record, (first, period), readings);
+            let first = self.steps[sim] + substeps;
+            self.measure(sim, rollout.record, (first, substeps), readings);
         }
         for &sim in rollout.sims {
-            self.time[sim] += rollout.frames as f64 * period;
+            self.steps[sim] += rollout.frames as u64 * substeps;
         }
         Ok(())
     }
@@ -451,7 +453,7 @@ impl Simulator for RefinedSimulator {
     fn read(&mut self, sims: &[usize], record: &Recording, out: &mut [f64]) -> Result<()> {
         self.inner.read(sims, record, out)?;
         for (&sim, row) in sims.iter().zip(out.chunks_exact_mut(record.width().max(1))) {
-            self.measure(sim, record, (self.time[sim], 0.0), row);
+            self.measure(sim, record, (self.steps[sim], 0), row);
         }
         Ok(())
     }

@@ -3,9 +3,9 @@
 use asid_core::effect::{Acting, Acts, Effect, EffectParameter, Reference, Site, Start};
 use asid_core::plant::{Drive, DriveLaw};
 use asid_core::simulator::StepView;
-use asid_core::{Plant, Result};
+use asid_core::{Capabilities, Plant, Result, Target};
 
-use super::{at_least, drives, values};
+use super::{at_least, drives, target, values};
 
 asid_core::register!(EffectEntry {
     name: "actuator-gain",
@@ -95,14 +95,17 @@ impl Effect for Affine {
 /// Force (N or N m) beyond which no drive's limit is looked for.
 const UNLIMITED: f64 = 1000.0;
 
-/// The force on the joint, gear included, is held within `±limit`: the command is replaced by the
-/// one that makes the drive ask for the limit, at the position and speed at the start of the step.
+/// The force on the joint, gear included, is held within `±limit`. Where the drive asks for more at
+/// the start of a step, its command is replaced by the one that makes the limit, and as much damping is
+/// taken from the joint as a servo adds: engines integrate both implicitly, so that the force is
+/// the limit for the whole step.
 struct Saturation;
 
 struct SaturationAt {
     actuator: usize,
     qpos: usize,
     dof: usize,
+    damping: usize,
     drive: Drive,
     limit: f64,
 }
@@ -111,11 +114,17 @@ impl Acting for SaturationAt {
     fn before_step(&mut self, view: &mut StepView<'_>) {
         let (q, v) = (view.qpos[self.qpos], view.qvel[self.dof]);
         let force = self.drive.force(view.ctrl[self.actuator], q, v);
-        if force.abs() > self.limit {
-            let held = self.limit.copysign(force);
-            if let Some(command) = self.drive.command_for(held, q, v) {
-                view.ctrl[self.actuator] = command;
-            }
+        if force.abs() <= self.limit {
+            return;
+        }
+        let damping = match self.drive.law {
+            DriveLaw::Motor => 0.0,
+            DriveLaw::Position { kv, .. } | DriveLaw::Velocity { kv } => kv,
+        };
+        let held = self.limit.copysign(force);
+        if let Some(command) = self.drive.command_for(held, q, 0.0) {
+            view.ctrl[self.actuator] = command;
+            view.parameters[self.damping] -= self.drive.gear * self.drive.gear * damping;
         }
     }
 }
@@ -138,6 +147,19 @@ impl Effect for Saturation {
         drives(plant)
     }
 
+    fn targets(&self, plant: &Plant, site: &str) -> Vec<Target> {
+        let drive = plant.drive(site);
+        let joint = drive.map(|(_, d)| &plant.layout.joints[d.joint].name);
+        joint
+            .into_iter()
+            .map(|j| target("joint", j, "damping", 0))
+            .collect()
+    }
+
+    fn needs(&self) -> Capabilities {
+        Capabilities::JOINT_IMPEDANCE | Capabilities::LIVE_PARAMETERS
+    }
+
     fn attach(&self, site: &Site<'_>) -> Result<Box<dyn Acting>> {
         let [limit] = values(site)?;
         let (actuator, drive) = site.plant.drive(site.name)?;
@@ -146,6 +168,7 @@ impl Effect for Saturation {
             actuator,
             qpos: joint.qpos,
             dof: joint.qvel,
+            damping: site.columns[0],
             drive,
             limit: at_least(site, "limit", limit, 0.0)?,
         }))

@@ -1,8 +1,9 @@
 //! The coefficients of a contact's friction.
 //!
 //! A site is one geom of a pair that can touch: the one that is fixed, else the one whose friction
-//! counts. A pair takes the larger coefficient of its two geoms, so the effect scales the site's own
-//! and that of every partner whose coefficient is as large or larger, or has the priority.
+//! counts. A pair takes the larger coefficient of its two geoms, so the effect scales the site's own,
+//! that of every partner whose coefficient is as large or larger or has the priority, and that of
+//! whatever lies free on a fixed site.
 
 use asid_core::effect::{Acting, Acts, Effect, EffectParameter, Site};
 use asid_core::{Capabilities, Plant, Result, Target};
@@ -133,14 +134,16 @@ pub(super) fn partners(plant: &Plant, geom: usize, entry: usize) -> Vec<usize> {
         .filter(|&pair| named_by(plant, pair, entry) == geom)
         .map(|[a, b]| if a == geom { b } else { a })
         .collect();
-    let free = |g: &usize| {
-        let weld = plant.bodies[plant.geoms[*g].body].weld;
-        plant.free_joint(weld).is_some()
-    };
-    if all.iter().any(free) {
-        return all.into_iter().filter(free).collect();
+    if all.iter().any(|&g| is_free(plant, g)) {
+        return all.into_iter().filter(|&g| is_free(plant, g)).collect();
     }
     all
+}
+
+/// Whether a geom is on a body with a free joint.
+fn is_free(plant: &Plant, geom: usize) -> bool {
+    let weld = plant.bodies[plant.geoms[geom].body].weld;
+    plant.free_joint(weld).is_some()
 }
 
 /// The coefficients that make the friction of a geom's contacts.
@@ -149,13 +152,15 @@ pub(super) fn targets(plant: &Plant, site: &str, entry: usize) -> Vec<Target> {
         return Vec::new();
     };
     let own = &plant.geoms[geom];
+    let fixed = !plant.moves(own.body);
     let mut targets = Vec::new();
     let mut counts = false;
     for partner in partners(plant, geom, entry) {
         let other = &plant.geoms[partner];
         counts |= other.priority <= own.priority;
         let as_large = other.friction[entry] >= own.friction[entry];
-        if other.priority > own.priority || (other.priority == own.priority && as_large) {
+        let lies = fixed && is_free(plant, partner);
+        if other.priority > own.priority || (other.priority == own.priority && (as_large || lies)) {
             let name = &plant.layout.geoms[partner];
             targets.push(target("geom", name, "friction", entry));
         }

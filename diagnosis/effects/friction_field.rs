@@ -1,8 +1,8 @@
 //! Sliding friction that differs by place, by time and by direction.
 //!
 //! The sites and the coefficients that are scaled are those of `sliding-friction`
-//! ([`super::contact_friction`]); the factor is computed anew before each step from the motion of the
-//! body that slides on the site.
+//! ([`super::contact_friction`]); the factor is computed anew before each step, for each body that slides
+//! on the site from its own motion.
 
 use asid_core::effect::{Acting, Acts, Effect, EffectParameter, Site, Start};
 use asid_core::nalgebra::Vector3;
@@ -53,9 +53,11 @@ enum Field {
 
 struct FieldAt {
     field: Field,
-    columns: Vec<usize>,
-    body: BodyPoint,
     values: [f64; 3],
+    /// What slides on the site, and its factor in this step.
+    bodies: Vec<(BodyPoint, f64)>,
+    /// Each column with the bodies whose least factor scales it.
+    columns: Vec<(usize, Vec<usize>)>,
 }
 
 impl FieldAt {
@@ -80,20 +82,53 @@ impl FieldAt {
 
 impl Acting for FieldAt {
     fn before_step(&mut self, view: &mut StepView<'_>) {
-        let motion = self.body.motion(view.qpos, view.qvel);
-        let factor = self.factor(view.time, &motion);
-        for &column in &self.columns {
-            view.parameters[column] *= factor;
+        for i in 0..self.bodies.len() {
+            let motion = self.bodies[i].0.motion(view.qpos, view.qvel);
+            self.bodies[i].1 = self.factor(view.time, &motion);
+        }
+        for (column, bodies) in &self.columns {
+            let factors = bodies.iter().map(|&b| self.bodies[b].1);
+            view.parameters[*column] *= factors.fold(f64::INFINITY, f64::min);
         }
     }
 }
 
-/// The body that slides on a site of these effects, as an index in the layout.
+/// The bodies that slide on a site of these effects, as indices in the layout.
 #[must_use]
-pub fn sliding_body(plant: &Plant, site: &str) -> Option<usize> {
-    let geom = plant.geom(site).ok()?;
-    let partner = *partners(plant, geom, 0).first()?;
-    Some(plant.bodies[plant.geoms[partner].body].weld)
+pub fn sliding_bodies(plant: &Plant, site: &str) -> Vec<usize> {
+    let geoms = plant.geom(site).map(|g| partners(plant, g, 0));
+    let mut bodies: Vec<usize> = geoms
+        .unwrap_or_default()
+        .into_iter()
+        .map(|g| plant.bodies[plant.geoms[g].body].weld)
+        .collect();
+    bodies.dedup();
+    bodies
+}
+
+/// For each target of a site the sliding bodies that it makes the friction of: the partner's own for a
+/// partner; for the site the first that takes its coefficient, and where none does all, since the least
+/// factor then keeps it out of every contact.
+fn bodies_of_targets(plant: &Plant, site: &str, bodies: &[usize]) -> Vec<Vec<usize>> {
+    let place = |geom: usize| {
+        let body = plant.bodies[plant.geoms[geom].body].weld;
+        bodies.iter().position(|&b| b == body)
+    };
+    let own = |name: &str| {
+        let geom = plant.geom(name).ok()?;
+        if name != site {
+            return Some(vec![place(geom)?]);
+        }
+        let takes = |g: &usize| plant.dominant([geom, *g], 0) == geom;
+        let first = partners(plant, geom, 0).into_iter().find(takes);
+        first.map(|g| place(g).into_iter().collect())
+    };
+    let all = || (0..bodies.len()).collect();
+    let targets = targets(plant, site, 0);
+    targets
+        .iter()
+        .map(|t| own(&t.name).unwrap_or_else(all))
+        .collect()
 }
 
 impl Effect for Field {
@@ -158,17 +193,14 @@ impl Effect for Field {
                 [cos, sin, 0.0]
             }
         };
-        let Some(body) = sliding_body(site.plant, site.name) else {
-            return Err(asid_core::Error::Failed(format!(
-                "nothing slides on geom `{}`",
-                site.name
-            )));
-        };
+        let bodies = sliding_bodies(site.plant, site.name);
+        let of_targets = bodies_of_targets(site.plant, site.name, &bodies);
+        let point = |&body: &usize| (BodyPoint::origin(site.plant, body), 1.0);
         Ok(Box::new(FieldAt {
             field: *self,
-            columns: site.columns.to_vec(),
-            body: BodyPoint::origin(site.plant, body),
             values,
+            bodies: bodies.iter().map(point).collect(),
+            columns: site.columns.iter().copied().zip(of_targets).collect(),
         }))
     }
 }

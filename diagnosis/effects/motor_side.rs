@@ -15,7 +15,9 @@
 //! The first part is applied as a force and `K dt` as damping of the joint, which engines
 //! integrate implicitly: it is stable however stiff the spring is, a gap's ends are rigid and do
 //! not bounce, and as `C` and `w` vanish it becomes the drive at the joint with the rotor's inertia
-//! added. A rotor without inertia needs a law with `b` or `d`.
+//! added. What the damping took over the step, however an engine divides it, follows from the way that
+//! the joint went: `v1` is then `(q1 - q) / dt`, so that rotor and joint exchange equal impulses. A
+//! rotor without inertia needs a law with `b` or `d`.
 
 use std::cell::Cell;
 
@@ -78,6 +80,8 @@ struct Begun {
     /// Transmitted force `force - damping v1`.
     force: f64,
     damping: f64,
+    /// Where the joint was.
+    from: f64,
 }
 
 /// A rotor and its drive.
@@ -175,6 +179,7 @@ impl MotorSide {
                 law,
                 force: law.a,
                 damping: 0.0,
+                from: q,
             };
         }
         let ahead = rotor[0] + dt * push / resistance - q;
@@ -185,17 +190,20 @@ impl MotorSide {
                 law,
                 force: 0.0,
                 damping: 0.0,
+                from: q,
             };
         }
         Begun {
             law,
             force: stiffness * (ahead - self.half_gap.copysign(stretch)),
             damping: stiffness * dt,
+            from: q,
         }
     }
 
-    /// The rotor after a step that ended with the joint at `q` with speed `v`.
-    fn complete(&self, begun: &Begun, rotor: [f64; 2], q: f64, v: f64) -> [f64; 2] {
+    /// The rotor after a step that ended with the joint at `q`.
+    fn complete(&self, begun: &Begun, rotor: [f64; 2], q: f64) -> [f64; 2] {
+        let v = (q - begun.from) / self.timestep;
         let force = begun.force - begun.damping * v;
         let (resistance, push) = self.coefficients(begun.law, rotor);
         if resistance <= 0.0 {
@@ -247,12 +255,12 @@ impl Acting for MotorSide {
         let (q, v) = (view.qpos[self.qpos], view.qvel[self.dof]);
         let law = self.law(view.ctrl[self.actuator]);
         let rotor = match &self.state {
-            Some((rotor, begun)) => self.complete(begun, *rotor, q, v),
+            Some((rotor, begun)) => self.complete(begun, *rotor, q),
             None => self.settled(law, q, v),
         };
         let mut begun = self.begin(law, rotor, q, v);
         if let Some([low, high]) = self.limits() {
-            let [angle, speed] = self.complete(&begun, rotor, q + v * self.timestep, v);
+            let [angle, speed] = self.complete(&begun, rotor, q + v * self.timestep);
             let asked = law.a - law.b * angle - law.d * speed;
             if asked < low || asked > high {
                 let held = Law {
@@ -279,18 +287,19 @@ impl Acting for MotorSide {
         if let Some((rotor, begun)) = &self.state {
             let Law { a, b, d } = begun.law;
             memory.extend(rotor);
-            memory.extend([a, b, d, begun.force, begun.damping]);
+            memory.extend([a, b, d, begun.force, begun.damping, begun.from]);
         }
     }
 
     fn load(&mut self, memory: &[f64]) {
         self.state = match *memory {
-            [angle, speed, a, b, d, force, damping] => {
+            [angle, speed, a, b, d, force, damping, from] => {
                 let law = Law { a, b, d };
                 let begun = Begun {
                     law,
                     force,
                     damping,
+                    from,
                 };
                 Some(([angle, speed], begun))
             }

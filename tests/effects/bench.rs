@@ -33,6 +33,8 @@ pub struct Bench {
     pub engine: String,
     pub plant: Plant,
     pub simulator: Box<dyn Simulator>,
+    /// Relative error of the engine's arithmetic over a run.
+    pub rounding: f64,
     names: Vec<String>,
 }
 
@@ -53,6 +55,13 @@ impl Bench {
             plant: Plant::of(&scene).unwrap(),
             names: sensors.iter().map(|s| s.name.clone()).collect(),
             simulator: model.simulator(&config).unwrap(),
+            rounding: match backend
+                .capabilities()
+                .contains(Capabilities::DOUBLE_PRECISION)
+            {
+                true => 1e-9,
+                false => 2e-4,
+            },
         }
     }
 

@@ -3,14 +3,26 @@
 #![allow(clippy::unwrap_used)]
 
 mod bench;
+mod bodies;
+mod commands;
+mod contacts;
 mod contract;
+mod joints;
+mod motor_side;
+mod sensors;
 
 use asid::core::Scene;
 use asid::core::refined::Refined;
 use asid::core::registry::{BackendEntry, all};
 
+/// Inertia of the rotor, kg m².
+pub const INERTIA: f64 = 0.5;
+
+/// Time step of the scenes, s.
+pub const DT: f64 = 0.002;
+
 /// A motor on a hinge about the vertical axis: inertia 0.5 kg m² about it, from the rotor alone.
-const ROTOR: &str = r#"<mujoco><compiler angle="radian"/><option timestep="0.002" gravity="0 0 0"/>
+pub const ROTOR: &str = r#"<mujoco><compiler angle="radian"/><option timestep="0.002" gravity="0 0 0"/>
   <worldbody><body name="rotor"><joint name="spin" axis="0 0 1"/>
     <inertial pos="0 0 0" mass="1" diaginertia="0.5 0.5 0.5"/></body></worldbody>
   <actuator><motor name="drive" joint="spin" gear="1"/></actuator>

@@ -1,0 +1,99 @@
+//! Effects on the command, on a rotor that integrates its torque.
+
+use super::bench::{Bench, near, on_each};
+use super::{DT, INERTIA, ROTOR};
+
+/// A stiff, strongly damped servo without a load.
+const SERVO: &str = r#"<mujoco><compiler angle="radian"/><option timestep="0.002" gravity="0 0 0" integrator="implicitfast"/>
+  <worldbody><body name="rotor"><joint name="spin" axis="0 0 1"/>
+    <inertial pos="0 0 0" mass="1" diaginertia="0.5 0.5 0.5"/></body></worldbody>
+  <actuator><position name="drive" joint="spin" kp="20" kv="20"/></actuator>
+  <sensor><jointpos name="angle" joint="spin"/><jointvel name="speed" joint="spin"/></sensor></mujoco>"#;
+
+/// Speed after `steps` steps of no torque and then one of 1 N m for the rest of a second.
+fn speed_after_a_step(bench: &mut Bench, steps: usize) -> f64 {
+    let commands: Vec<_> = (0..500).map(|k| vec![f64::from(k >= steps)]).collect();
+    bench.run(1, &commands)[499][1]
+}
+
+#[test]
+fn a_delay_shifts_a_step_by_exactly_its_time() {
+    for delay in [0.0006, 0.04, 0.0473] {
+        on_each(
+            ROTOR,
+            &[&format!("actuator-delay@drive:delay={delay}")],
+            |bench| {
+                let expected = (1.0 - 100.0 * DT - delay) / INERTIA;
+                let speed = speed_after_a_step(bench, 100);
+                near(&bench.engine, speed, expected, 2.0 * bench.rounding);
+            },
+        );
+    }
+}
+
+#[test]
+fn before_the_first_row_the_command_was_the_same() {
+    for effect in [
+        "actuator-delay@drive:delay=0.05",
+        "actuator-lag@drive:time_constant=0.1",
+    ] {
+        on_each(ROTOR, &[effect], |bench| {
+            let speed = speed_after_a_step(bench, 0);
+            near(&bench.engine, speed, 1.0 / INERTIA, 2.0 * bench.rounding);
+        });
+    }
+}
+
+#[test]
+fn a_lag_is_an_exponential() {
+    for lag in [0.001, 0.08] {
+        on_each(
+            ROTOR,
+            &[&format!("actuator-lag@drive:time_constant={lag}")],
+            |bench| {
+                let t = 1.0 - 50.0 * DT;
+                // Integral of 1 - exp(-t/T) over the inertia.
+                let expected = (t + lag * (-t / lag).exp_m1()) / INERTIA;
+                let speed = speed_after_a_step(bench, 50);
+                near(&bench.engine, speed, expected, 2.0 * bench.rounding);
+            },
+        );
+    }
+}
+
+#[test]
+fn gain_bias_saturation_and_dead_band_change_the_torque() {
+    for (effect, command, torque) in [
+        ("actuator-gain@drive:gain=0.7", 1.0, 0.7),
+        ("actuator-bias@drive:bias=-0.05", 1.0, 0.95),
+        ("actuator-saturation@drive:limit=0.4", 1.0, 0.4),
+        ("actuator-saturation@drive:limit=0.4", -0.3, -0.3),
+        ("actuator-deadband@drive:width=0.1", -1.0, -0.9),
+        ("actuator-deadband@drive:width=0.1", 0.09, 0.0),
+    ] {
+        on_each(ROTOR, &[effect], |bench| {
+            let speed = bench.hold(500, &[command])[499][1];
+            near(effect, speed, torque / INERTIA, 2.0 * bench.rounding);
+        });
+    }
+}
+
+#[test]
+fn a_saturated_servo_pushes_with_its_limit() {
+    on_each(SERVO, &["actuator-saturation@drive:limit=2"], |bench| {
+        // 20 N m and more are asked for until speed and damping come near them.
+        let speed = bench.hold(50, &[1.5])[49][1];
+        near(&bench.engine, speed, 2.0 * 50.0 * DT / INERTIA, 0.02);
+    });
+}
+
+#[test]
+fn a_servo_with_a_dead_band_stops_short_of_its_command() {
+    on_each(SERVO, &["actuator-deadband@drive:width=0.1"], |bench| {
+        // Overdamped: it creeps up to the edge of the band.
+        let angle = bench.hold(4000, &[0.5])[3999][0];
+        near(&bench.engine, angle, 0.4, 1e-3);
+        let angle = bench.hold(500, &[0.45])[499][0];
+        near(&bench.engine, angle, 0.4, 1e-3);
+    });
+}

@@ -1,0 +1,150 @@
+//! Friction, springs and inertia of a joint, on a rotor and its motor.
+
+use super::bench::{Bench, engines_for, near, on_each};
+use super::{DT, INERTIA, ROTOR};
+
+#[test]
+fn viscous_and_dry_friction_are_those_of_the_engine() {
+    for (effect, attribute) in [
+        ("viscous-friction@spin:damping=0.8", r#"damping="0.8""#),
+        ("coulomb-friction@spin:force=0.4", r#"frictionloss="0.4""#),
+        ("armature@spin:inertia=0.2", r#"armature="0.2""#),
+    ] {
+        let native = ROTOR.replace(
+            r#"name="spin" axis"#,
+            &format!(r#"name="spin" {attribute} axis"#),
+        );
+        assert_ne!(native, ROTOR);
+        for backend in engines_for(effect) {
+            let run = |xml: &str, effects: &[&str]| {
+                let mut bench = Bench::new(&*backend, xml, effects);
+                bench.state(&[0.0], &[1.0]).hold(200, &[0.3])
+            };
+            assert_eq!(
+                run(&native, &[]),
+                run(ROTOR, &[effect]),
+                "{effect}, {}",
+                backend.name()
+            );
+        }
+    }
+}
+
+#[test]
+fn viscous_friction_is_an_exponential() {
+    on_each(ROTOR, &["viscous-friction@spin:damping=0.8"], |bench| {
+        let speed = bench.state(&[0.0], &[3.0]).hold(500, &[0.0])[499][1];
+        // An implicit step takes 1 / (1 + x) where e^-x is right, x = damping dt / inertia.
+        let expected = 3.0 * (-0.8_f64 / INERTIA).exp();
+        near(&bench.engine, speed, expected, 0.003 * expected);
+    });
+}
+
+#[test]
+fn coulomb_friction_stops_a_rotor_in_time_and_holds_it() {
+    let (force, offset) = (0.4, 0.1);
+    on_each(
+        ROTOR,
+        &["coulomb-friction@spin:force=0.4,offset=0.1"],
+        |bench| {
+            for direction in [1.0, -1.0] {
+                let against = force + direction * offset;
+                let time = INERTIA / against;
+                let rows = bench.state(&[0.0], &[direction]).hold(900, &[0.0]);
+                let half = (time / 2.0 / DT) as usize;
+                let expected = direction * (1.0 - against * half as f64 * DT / INERTIA);
+                near(&bench.engine, rows[half - 1][1], expected, 2e-3);
+                near(&bench.engine, rows[899][1], 0.0, 2e-3);
+                // Held just below what breaks it away, gone just above.
+                let held = bench
+                    .state(&[0.0], &[0.0])
+                    .hold(500, &[0.95 * direction * against]);
+                near(&bench.engine, held[499][1], 0.0, 5e-3);
+                let torque = 1.2 * direction * against;
+                let gone = bench.state(&[0.0], &[0.0]).hold(500, &[torque]);
+                near(
+                    &bench.engine,
+                    gone[499][1],
+                    0.2 * direction * against / INERTIA,
+                    0.01,
+                );
+            }
+        },
+    );
+}
+
+#[test]
+fn stribeck_friction_breaks_away_high_and_slides_low() {
+    let effect = "stribeck-friction@spin:coulomb=0.2,breakaway=0.3,speed=0.05";
+    on_each(ROTOR, &[effect], |bench| {
+        let held = bench.state(&[0.0], &[0.0]).hold(500, &[0.47])[499][1];
+        near(&bench.engine, held, 0.0, 0.01);
+        let rows = bench.state(&[0.0], &[0.0]).hold(1000, &[0.55]);
+        let rate = (rows[999][1] - rows[799][1]) / (200.0 * DT);
+        near(&bench.engine, rate, (0.55 - 0.2) / INERTIA, 5e-3);
+        let rows = bench.state(&[0.0], &[1.0]).hold(200, &[0.0]);
+        near(
+            &bench.engine,
+            rows[199][1],
+            1.0 - 0.2 * 200.0 * DT / INERTIA,
+            2e-3,
+        );
+    });
+}
+
+#[test]
+fn load_friction_takes_a_share_of_the_drive() {
+    on_each(ROTOR, &["load-friction@spin:coefficient=0.3"], |bench| {
+        for torque in [1.0, -2.0] {
+            let speed = bench.state(&[0.0], &[0.0]).hold(500, &[torque])[499][1];
+            near(&bench.engine, speed, 0.7 * torque / INERTIA, 5e-3);
+        }
+        let coasting = bench.state(&[0.0], &[1.0]).hold(500, &[0.0])[499][1];
+        near(&bench.engine, coasting, 1.0, 1e-3);
+    });
+}
+
+#[test]
+fn a_spring_swings_about_its_rest() {
+    let (stiffness, rest): (f64, f64) = (8.0, 0.3);
+    on_each(
+        ROTOR,
+        &["joint-stiffness@spin:stiffness=8,rest=0.3"],
+        |bench| {
+            let rows = bench.state(&[0.5], &[0.0]).hold(500, &[0.0]);
+            let omega = (stiffness / INERTIA).sqrt();
+            for (k, row) in rows.iter().enumerate() {
+                let t = (k + 1) as f64 * DT;
+                // Half a step of phase.
+                near(
+                    &bench.engine,
+                    row[0],
+                    rest + 0.2 * (omega * t).cos(),
+                    0.2 * omega * DT,
+                );
+            }
+        },
+    );
+}
+
+#[test]
+fn ripple_keeps_energy() {
+    let (sin, cos, teeth) = (0.3, -0.2, 5.0);
+    let effect = "torque-ripple@spin:amplitude_sin=0.3,amplitude_cos=-0.2,teeth=5";
+    on_each(ROTOR, &[effect], |bench| {
+        let energy = |q: f64, v: f64| {
+            let (s, c) = (teeth * q).sin_cos();
+            0.5 * INERTIA * v * v + (sin * c - cos * s) / teeth
+        };
+        let whole = energy(0.1, 1.0);
+        for row in bench.state(&[0.1], &[1.0]).hold(1000, &[0.0]) {
+            // Half a step's work.
+            near(
+                &bench.engine,
+                energy(row[0], row[1]),
+                whole,
+                0.36 * 1.3 * DT,
+            );
+        }
+    });
+}

@@ -1,0 +1,176 @@
+//! Backlash and compliance: what a joint feels of a drive that does not sit on it.
+
+use super::bench::{Bench, engines_for, near, on_each};
+use super::{DT, INERTIA};
+
+/// A rotor on a servo or a motor, with the attributes of its joint.
+fn machine(joint: &str, drive: &str) -> String {
+    format!(
+        r#"<mujoco><compiler angle="radian"/><option timestep="0.002" gravity="0 0 -9.81" integrator="implicitfast"/>
+  <worldbody><body name="rotor"><joint name="spin" {joint}/>
+    <inertial pos="0.2 0 0" mass="1" diaginertia="0.46 0.46 0.46"/></body></worldbody>
+  <actuator><{drive} name="drive" joint="spin"/></actuator>
+  <sensor><jointpos name="angle" joint="spin"/><jointvel name="speed" joint="spin"/></sensor></mujoco>"#
+    )
+}
+
+/// Inertia about the joint, with the centre of mass off it: that of the other scenes.
+const ABOUT: f64 = 0.46 + 0.2 * 0.2;
+
+const LEVEL: &str = r#"axis="0 0 1""#;
+const STIFF: &str = r#"position kp="400" kv="80""#;
+
+#[test]
+fn the_inertia_is_as_said() {
+    assert!((ABOUT - INERTIA).abs() < 1e-12);
+}
+
+/// Angle after the command has gone to a value within eight seconds and stayed for two: so slowly that
+/// the joint never runs ahead of its drive.
+fn settle(bench: &mut Bench, from: f64, to: f64) -> f64 {
+    let ramp = |k: usize| vec![from + (to - from) * (k as f64 / 4000.0).min(1.0)];
+    let commands: Vec<_> = (0..5000).map(ramp).collect();
+    bench.run(1, &commands)[4999][0]
+}
+
+#[test]
+fn play_loses_exactly_its_width() {
+    let (friction, width) = (0.5, 0.06);
+    let xml = machine(r#"axis="0 0 1" damping="0.5" frictionloss="0.5""#, STIFF);
+    on_each(&xml, &[&format!("backlash@spin:width={width}")], |bench| {
+        let up = settle(bench, 0.0, 0.5);
+        let down = settle(bench, 0.5, -0.5);
+        // Dry friction holds the joint where the drive leaves it, by at most its own share short.
+        let short = friction / 400.0;
+        near(
+            &bench.engine,
+            up,
+            0.5 - width / 2.0 - short / 2.0,
+            0.6 * short,
+        );
+        near(&bench.engine, up - down, 1.0 - width - short, 1.2 * short);
+    });
+}
+
+#[test]
+fn under_a_load_of_one_sign_play_is_an_offset() {
+    let width = 0.06;
+    let xml = machine(r#"axis="0 1 0" damping="2""#, STIFF);
+    for backend in engines_for("backlash") {
+        let mut plain = Bench::new(&*backend, &xml, &[]);
+        let mut loose = Bench::new(&*backend, &xml, &[&format!("backlash@spin:width={width}")]);
+        let angles = [&mut plain, &mut loose].map(|b| settle(b, 0.1, -0.2));
+        // The weight pulls it down: a positive turn about y. cos changes little over the offset.
+        near(&plain.engine, angles[1] - angles[0], width / 2.0, 1e-3);
+    }
+}
+
+#[test]
+fn a_motor_crosses_the_play_and_takes_its_load_along() {
+    let (rotor, width, torque) = (0.1, 0.2, 1.0);
+    let xml = machine(r#"axis="0 0 1" armature="0.1""#, "motor");
+    on_each(&xml, &[&format!("backlash@spin:width={width}")], |bench| {
+        let push = bench.hold(200, &[torque]);
+        let whole = INERTIA + rotor;
+        let speed = torque * 200.0 * DT / whole;
+        near(&bench.engine, push[199][1], speed, 1e-3);
+        // The rotor turns back against a load that goes on as it was.
+        let back = bench.hold(500, &[-torque]);
+        let crossing = (2.0 * width * rotor / torque).sqrt();
+        let steps = (crossing / DT) as usize;
+        near(&bench.engine, back[steps - 3][1], speed, 1e-3);
+        assert!(
+            back[steps + 3][1] < speed - 0.1,
+            "{}: {:?}",
+            bench.engine,
+            back[steps + 3]
+        );
+        // Nothing is lost of the momentum, and nothing bounces.
+        near(
+            &bench.engine,
+            back[499][1],
+            -torque * 300.0 * DT / whole,
+            1e-3,
+        );
+    });
+}
+
+#[test]
+fn a_stiff_spring_and_no_play_are_the_drive_itself() {
+    let driven = r#"axis="0 1 0" damping="0.3" armature="0.1""#;
+    for drive in [
+        STIFF,
+        "motor",
+        r#"velocity kv="5""#,
+        r#"position kp="60" kv="2" forcerange="-4 4""#,
+    ] {
+        let xml = machine(driven, drive);
+        for effect in [
+            "joint-compliance@spin:compliance=1e-7",
+            "backlash@spin:width=1e-7",
+        ] {
+            for backend in engines_for("backlash") {
+                let command = |k: usize| vec![1.5 * (0.05 * k as f64).sin()];
+                let commands: Vec<_> = (0..100).map(command).collect();
+                let mut plain = Bench::new(&*backend, &xml, &[]);
+                let mut with = Bench::new(&*backend, &xml, &[effect]);
+                let rows = [&mut plain, &mut with].map(|b| b.run(5, &commands));
+                for (a, b) in rows[0].iter().zip(&rows[1]) {
+                    // Backward Euler here, the engine's own order there: one step's worth of motion.
+                    near(
+                        &format!("{effect}, {drive}, {}", plain.engine),
+                        b[0],
+                        a[0],
+                        0.01,
+                    );
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_spring_in_series_sags_under_the_load() {
+    let (compliance, kp) = (0.02, 400.0);
+    let xml = machine(r#"axis="0 1 0" damping="2""#, STIFF);
+    on_each(
+        &xml,
+        &[&format!("joint-compliance@spin:compliance={compliance}")],
+        |bench| {
+            let angle = settle(bench, 0.0, 0.0);
+            let load = 9.81 * 0.2 * angle.cos();
+            near(&bench.engine, angle, load * (1.0 / kp + compliance), 1e-4);
+        },
+    );
+}
+
+#[test]
+fn rotor_and_load_swing_against_each_other() {
+    let (rotor, compliance, torque) = (0.1, 0.05, 1.0);
+    let xml = machine(r#"axis="0 0 1" armature="0.1""#, "motor");
+    let effect = format!("joint-compliance@spin:compliance={compliance}");
+    on_each(&xml, &[&effect], |bench| {
+        let rows = bench.hold(600, &[torque]);
+        let mean = torque / (INERTIA + rotor);
+        // The acceleration swings about its mean with sqrt(k (1/I + 1/J)).
+        let above: Vec<bool> = rows
+            .windows(2)
+            .map(|w| (w[1][1] - w[0][1]) / DT > mean)
+            .collect();
+        let crossings: Vec<usize> = (1..above.len())
+            .filter(|&k| above[k] != above[k - 1])
+            .collect();
+        let period = 2.0 * (crossings[4] - crossings[0]) as f64 / 4.0 * DT;
+        let expected =
+            std::f64::consts::TAU / (1.0 / compliance * (1.0 / INERTIA + 1.0 / rotor)).sqrt();
+        near(&bench.engine, period, expected, 0.01 * expected);
+    });
+}
+
+#[test]
+fn without_rotor_inertia_a_motor_is_no_site() {
+    let xml = machine(LEVEL, "motor");
+    let spec: asid::core::EffectSpec = "backlash@spin".parse().unwrap();
+    let plant = asid::core::Plant::of(&super::bench::scene(&xml)).unwrap();
+    assert!(spec.find(&plant).is_err());
+}
