@@ -16,6 +16,7 @@ pub mod noise;
 pub mod predict;
 pub mod prepare;
 pub mod refined_model;
+pub mod result;
 pub mod roughness;
 pub mod screen;
 pub mod search;
