@@ -107,6 +107,8 @@ pub struct Bench {
     pub parameters: Vec<Parameter>,
     /// Coordinates of the starts that the logs do not give.
     pub open: Open,
+    /// The first tenth of the logs held out, on which open starts are fitted.
+    pub head: Record,
     /// The training logs in growing parts, the last of which is the whole.
     pub stages: Vec<Stage>,
 }
@@ -239,7 +241,7 @@ impl Bench {
     /// Whether predictions scatter in some episode.
     #[must_use]
     pub fn is_rough(&self) -> bool {
-        self.train.whitening.iter().any(|w| w.lost() > 0)
+        self.train.whitening.iter().any(|w| w.rough)
     }
 
     /// Number of readings of a stage.
@@ -248,14 +250,76 @@ impl Bench {
         self.stages[stage].record.readings as f64
     }
 
-    /// Whitened residuals of the logs held out.
-    fn held_out(&self, trials: &[Trial<'_>], of: &mut Explanation) -> Result<Vec<f64>> {
+    /// Whitened residuals of the logs held out, at its parameters; where starts are open they
+    /// are fitted on the first tenth, which then does not count.
+    ///
+    /// # Errors
+    /// When a rollout fails.
+    pub fn held_out(&self, trials: &[Trial<'_>], of: &mut Explanation) -> Result<Vec<f64>> {
+        let theta = of.fit.point.theta.clone();
+        of.held_starts = self.head_starts(trials, &theta, &of.held_starts)?;
         let mut predictor = self.predictor(trials, &self.test)?;
         let point = Point {
-            theta: of.fit.point.theta.clone(),
+            theta,
             starts: of.held_starts.clone(),
         };
-        let mut residuals = predictor.residuals(&[point])?;
-        Ok(residuals.pop().unwrap_or_default())
+        let mut residuals = predictor.residuals(&[point])?.pop().unwrap_or_default();
+        self.mask_head(&mut residuals);
+        Ok(residuals)
+    }
+
+    /// Starts of the held-out episodes, fitted on their first tenth where they are open.
+    ///
+    /// # Errors
+    /// When a rollout fails.
+    pub fn head_starts(
+        &self,
+        trials: &[Trial<'_>],
+        theta: &[f64],
+        from: &[State],
+    ) -> Result<Vec<State>> {
+        if self.open.is_empty() {
+            return Ok(from.to_vec());
+        }
+        let mut unknowns = self.unknowns(trials);
+        unknowns.iter_mut().for_each(|u| u.free = false);
+        let mut predictor = self.predictor(trials, &self.head)?;
+        let point = Point {
+            theta: theta.to_vec(),
+            starts: from.to_vec(),
+        };
+        let fit = fit(
+            &mut predictor,
+            self.layout(),
+            &unknowns,
+            point,
+            &self.open,
+            Effort::BRIEF,
+        )?;
+        Ok(fit.point.starts)
+    }
+
+    /// Takes the first tenth of the held-out episodes out of their residuals, where starts
+    /// were fitted on it.
+    pub fn mask_head(&self, residuals: &mut [f64]) {
+        if self.open.is_empty() {
+            return;
+        }
+        let n = self.test.logs.entries.len();
+        for e in 0..self.test.logs.episodes.len() {
+            let first = self.test.logs.offset(e);
+            let rows = self.head.logs.episodes[e].plan.rows();
+            residuals[first..first + rows * n].fill(0.0);
+        }
+    }
+
+    /// Readings of the held-out logs that count.
+    #[must_use]
+    pub fn held_readings(&self) -> f64 {
+        if self.open.is_empty() {
+            self.test.readings as f64
+        } else {
+            (self.test.readings - self.head.readings) as f64
+        }
     }
 }

@@ -153,6 +153,16 @@ impl Logs {
         logs
     }
 
+    /// The same logs, replayed with another time step.
+    #[must_use]
+    pub fn replanned(&self, layout: &Layout) -> Self {
+        let mut logs = self.clone();
+        for e in &mut logs.episodes {
+            e.plan = ReplayPlan::new(layout, &e.episode, e.plan.rows());
+        }
+        logs
+    }
+
     /// Share of the episodes after which no reading moves by more than a few deviations of
     /// the noise any more.
     #[must_use]

@@ -8,9 +8,13 @@
 
 pub mod bench;
 pub mod candidate;
+pub mod checks;
 pub mod data;
+pub mod diagnose;
 pub mod effects;
+pub mod experiment;
 pub mod fit;
+pub mod localise;
 pub mod machine;
 pub mod noise;
 pub mod predict;
@@ -20,5 +24,7 @@ pub mod result;
 pub mod roughness;
 pub mod screen;
 pub mod search;
+pub mod sentence;
 pub mod study;
 pub mod trajectory;
+pub mod verdict;

@@ -9,7 +9,9 @@ use asid_core::{Backend, EffectSpec, Model, Plant, Result, Scene, Target};
 /// file has set and added already.
 pub struct Machine {
     /// The engine.
-    pub backend: Box<dyn Backend>,
+    pub backend: Arc<dyn Backend>,
+    /// The document.
+    pub scene: Scene,
     /// The machine.
     pub plant: Arc<Plant>,
     /// Threads; 0 for one a core.
@@ -25,7 +27,7 @@ impl Machine {
     /// # Errors
     /// When the engine refuses it, or a value or effect of the model file.
     pub fn new(
-        backend: Box<dyn Backend>,
+        backend: Arc<dyn Backend>,
         scene: &Scene,
         fixed: &[(Target, f64)],
         effects: &[EffectSpec],
@@ -35,12 +37,28 @@ impl Machine {
             plant: Arc::new(Plant::of(scene)?),
             model: backend.load(scene)?,
             backend,
+            scene: scene.clone(),
             threads,
             fixed: fixed.to_vec(),
             effects: effects.to_vec(),
         };
         machine.with(&[])?;
         Ok(machine)
+    }
+
+    /// The same machine with half the time step.
+    ///
+    /// # Errors
+    /// As [`Machine::new`].
+    pub fn halved(&self) -> Result<Self> {
+        let scene = self.scene.with_timestep(self.plant.layout.timestep / 2.0)?;
+        Self::new(
+            Arc::clone(&self.backend),
+            &scene,
+            &self.fixed,
+            &self.effects,
+            self.threads,
+        )
     }
 
     /// The model with more effects.

@@ -225,7 +225,7 @@ impl<'a> Predictor<'a> {
     /// Whether predictions scatter by more than the noise in some direction.
     #[must_use]
     pub fn is_rough(&self) -> bool {
-        self.whitening.iter().map(Whitening::lost).sum::<usize>() > 0
+        self.whitening.iter().any(|w| w.rough)
     }
 
     /// Residuals `(logged - predicted) / noise` at some points, one vector a point over all

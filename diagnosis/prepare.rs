@@ -3,17 +3,19 @@
 
 use std::collections::BTreeMap;
 
+use asid_core::plant::Reads;
 use asid_core::problem::home;
 use asid_core::rng::Rng;
-use asid_core::{Layout, Result};
+use asid_core::signal::{rotation_difference, unit_quaternion};
+use asid_core::{Layout, Plant, Result};
 
 use crate::bench::{Bench, CAPACITY, Explanation, Record, Stage};
 use crate::data::Logs;
-use crate::fit::{Effort, Unknown, scan};
+use crate::fit::{Differences, Effort, Unknown, fit, inverse, linearise, scan};
 use crate::machine::Machine;
 use crate::noise;
-use crate::predict::{Point, State};
-use crate::roughness::{self, Spread};
+use crate::predict::{Point, Predictor, State};
+use crate::roughness::{self, Spread, Whitening};
 use crate::study::Study;
 
 /// Shares of the episodes that fits grow through.
@@ -22,6 +24,8 @@ const SHARES: [f64; 4] = [0.1, 0.3, 0.6, 1.0];
 const NEAR: f64 = 30.0;
 /// Root mean square from which on a gap is seen.
 const SEEN: f64 = 1.5;
+/// Share of a held-out episode that an open start is fitted on.
+const HEAD: f64 = 0.1;
 /// Values of each parameter that are looked at before the first fit.
 const SCAN: usize = CAPACITY;
 
@@ -53,9 +57,12 @@ fn logged_sensors(layout: &Layout, study: &Study) -> Vec<String> {
         .collect()
 }
 
-/// The start of an episode as the log has it; the rest from the scene's own start.
-fn given_start(layout: &Layout, episode: &asid_core::Episode) -> State {
+/// The start of an episode as the log has it; the rest as its first readings say, or from
+/// the scene's own start.
+fn given_start(plant: &Plant, episode: &asid_core::Episode) -> State {
+    let layout = &plant.layout;
     let (mut qpos, mut qvel) = home(layout);
+    first_readings(plant, episode, &mut qpos, &mut qvel);
     if let Some(initial) = &episode.initial {
         for (x, given) in qpos.iter_mut().zip(&initial.qpos) {
             if given.is_finite() {
@@ -69,6 +76,101 @@ fn given_start(layout: &Layout, episode: &asid_core::Episode) -> State {
         }
     }
     State { qpos, qvel }
+}
+
+/// Rows that a velocity is first taken over.
+const FIRST_ROWS: usize = 6;
+
+/// Sets what sensors of joints and of free bodies say of the start.
+fn first_readings(
+    plant: &Plant,
+    episode: &asid_core::Episode,
+    qpos: &mut [f64],
+    qvel: &mut [f64],
+) {
+    let layout = &plant.layout;
+    // First present row of a sensor and one a little later, with the time between.
+    let seen = |sensor: &str| -> Option<(Vec<f64>, Vec<f64>, f64)> {
+        let range = episode.channel(sensor)?;
+        let whole = |k: &usize| episode.reading(*k)[range.clone()].iter().all(|x| x.is_finite());
+        let mut rows = (0..episode.rows()).filter(whole);
+        let first = rows.next()?;
+        let later = rows.take(FIRST_ROWS).last().unwrap_or(first);
+        let get = |k: usize| episode.reading(k)[range.clone()].to_vec();
+        Some((get(first), get(later), episode.time[later] - episode.time[first]))
+    };
+    for (i, sensor) in layout.sensors.iter().enumerate() {
+        let Some((first, later, dt)) = seen(&sensor.name) else {
+            continue;
+        };
+        let rate = |k: usize| if dt > 0.0 { (later[k] - first[k]) / dt } else { 0.0 };
+        match plant.sensors[i] {
+            Reads::Joint(j) => {
+                let joint = &layout.joints[j];
+                match &*sensor.kind {
+                    "jointpos" => {
+                        qpos[joint.qpos] = first[0];
+                        qvel[joint.qvel] = rate(0);
+                    }
+                    "jointvel" => qvel[joint.qvel] = first[0],
+                    _ => {}
+                }
+            }
+            Reads::Body(b) => {
+                let Some(joint) = plant.free_joint(b).map(|j| &layout.joints[j]) else {
+                    continue;
+                };
+                match &*sensor.kind {
+                    "framepos" => {
+                        qpos[joint.qpos..joint.qpos + 3].copy_from_slice(&first);
+                        for k in 0..3 {
+                            qvel[joint.qvel + k] = rate(k);
+                        }
+                    }
+                    "framequat" => {
+                        qpos[joint.qpos + 3..joint.qpos + 7].copy_from_slice(&first);
+                        let turn = rotation_difference(&later, &first);
+                        let own = unit_quaternion(&first).inverse()
+                            * nalgebra::Vector3::from(turn)
+                            / dt.max(1e-9);
+                        qvel[joint.qvel + 3..joint.qvel + 6].copy_from_slice(own.as_slice());
+                    }
+                    _ => {}
+                }
+            }
+            Reads::Other => {}
+        }
+    }
+    // A speed that is measured is better than a difference.
+    for (i, sensor) in layout.sensors.iter().enumerate() {
+        if let (Reads::Joint(j), "jointvel") = (plant.sensors[i], &*sensor.kind)
+            && let Some((first, ..)) = seen(&sensor.name)
+        {
+            qvel[layout.joints[j].qvel] = first[0];
+        }
+    }
+}
+
+/// Coordinates of the starts (`nv` positions, then `nv` velocities) that some log leaves open.
+fn open_coordinates(layout: &Layout, study: &Study) -> Vec<usize> {
+    let nv = layout.nv;
+    let mut open = vec![false; 2 * nv];
+    for (_, episode) in study.train.iter().chain(&study.test) {
+        let Some(initial) = &episode.initial else {
+            return (0..2 * nv).collect();
+        };
+        for joint in &layout.joints {
+            let dofs = joint.qvel..joint.qvel + joint.kind.qvel_len();
+            let places = joint.qpos..joint.qpos + joint.kind.qpos_len();
+            if initial.qpos[places].iter().any(|x| !x.is_finite()) {
+                dofs.clone().for_each(|d| open[d] = true);
+            }
+            for d in dofs {
+                open[nv + d] |= !initial.qvel[d].is_finite();
+            }
+        }
+    }
+    (0..2 * nv).filter(|&c| open[c]).collect()
 }
 
 /// Residuals `logged - predicted` without whitening, in the sensors' units, one array an
@@ -103,7 +205,7 @@ pub fn prepare(study: &Study, machine: Machine, rng: &mut Rng) -> Result<Prepare
     let layout = machine.plant.layout.clone();
     let sensors = logged_sensors(&layout, study);
     let record = |logs: &[(String, asid_core::Episode)]| -> Result<Record> {
-        let starts = logs.iter().map(|(_, e)| given_start(&layout, e)).collect();
+        let starts = logs.iter().map(|(_, e)| given_start(&machine.plant, e)).collect();
         let logs = Logs::new(&machine.plant, &sensors, logs.to_vec())?;
         Ok(Record::new(logs, starts))
     };
@@ -117,22 +219,26 @@ pub fn prepare(study: &Study, machine: Machine, rng: &mut Rng) -> Result<Prepare
     let mut bench = Bench {
         machine,
         train,
-        test,
         parameters: study.parameters.clone(),
-        open: Vec::new(),
+        open: open_coordinates(&layout, study),
+        head: test.cut(&layout, HEAD),
+        test,
         stages: Vec::new(),
     };
+    let halved = bench.machine.halved().ok();
+    let mut scatter = Scatter { halved, rng };
     let point = Point {
         theta: nominal.clone(),
         starts: bench.train.starts.clone(),
     };
     set_noise(&mut bench, &study.noise, &point)?;
     bench.stages = vec![whole(&bench)];
-    scatter(&mut bench, &point, rng)?;
+    let point = settle_starts(&mut bench, point)?;
+    scatter.estimate(&mut bench, &point)?;
     let none = if bench.is_rough() {
-        identify_rough(&mut bench, study, point, rng)?
+        identify_rough(&mut bench, study, point, &mut scatter)?
     } else {
-        identify_smooth(&mut bench, study, point)?
+        identify_smooth(&mut bench, study, point, &mut scatter)?
     };
     Ok(Prepared {
         bench,
@@ -164,23 +270,121 @@ fn set_noise(bench: &mut Bench, given: &BTreeMap<String, f64>, point: &Point) ->
     Ok(())
 }
 
-/// Estimates the scatter of predictions about a point.
-fn scatter(bench: &mut Bench, point: &Point, rng: &mut Rng) -> Result<()> {
+/// Fits open starts alone, so that the model as given begins where the logs do.
+fn settle_starts(bench: &mut Bench, point: Point) -> Result<Point> {
+    if bench.open.is_empty() {
+        return Ok(point);
+    }
     let layout = bench.layout().clone();
-    let spread = Spread::of_known_starts(&layout);
-    bench.train.whitening = {
-        let mut predictor = bench.predictor(&[], &bench.train)?;
-        roughness::estimate(&mut predictor, &layout, point, &spread, rng)?
-    };
-    bench.test.whitening = {
-        let mut predictor = bench.predictor(&[], &bench.test)?;
-        let point = Point {
+    let mut unknowns = bench.unknowns(&[]);
+    unknowns.iter_mut().for_each(|u| u.free = false);
+    let head = bench.train.cut(&layout, HEAD);
+    let mut predictor = bench.predictor(&[], &head)?;
+    let fitted = fit(&mut predictor, &layout, &unknowns, point, &bench.open, Effort::BRIEF)?;
+    bench.train.starts.clone_from(&fitted.point.starts);
+    let theta = &fitted.point.theta;
+    bench.test.starts = bench.head_starts(&[], theta, &bench.test.starts)?;
+    bench.head.starts.clone_from(&bench.test.starts);
+    Ok(fitted.point)
+}
+
+/// Estimates what predictions scatter by.
+struct Scatter<'r> {
+    /// The same machine with half the time step.
+    halved: Option<Machine>,
+    rng: &'r mut Rng,
+}
+
+impl Scatter<'_> {
+    /// Sets the scatter about a point: on the training logs, whose starts are known or
+    /// fitted, what nobody can repeat; on those held out also what their starts leave open.
+    fn estimate(&mut self, bench: &mut Bench, point: &Point) -> Result<()> {
+        let layout = bench.layout().clone();
+        let known = Spread::of_known_starts(&layout);
+        let train = self.of(bench, &bench.train, point, &known)?;
+        let held = Point {
             theta: point.theta.clone(),
             starts: bench.test.starts.clone(),
         };
-        roughness::estimate(&mut predictor, &layout, &point, &spread, rng)?
-    };
-    Ok(())
+        let spread = if bench.open.is_empty() {
+            known
+        } else {
+            start_spread(bench, &held)?
+        };
+        let test = self.of(bench, &bench.test, &held, &spread)?;
+        bench.train.whitening = train;
+        bench.test.whitening = test;
+        Ok(())
+    }
+
+    fn of(
+        &mut self,
+        bench: &Bench,
+        record: &Record,
+        point: &Point,
+        spread: &Spread,
+    ) -> Result<Vec<Whitening>> {
+        let layout = bench.layout();
+        let mut predictor = bench.predictor(&[], record)?;
+        let mut all = roughness::estimate(&mut predictor, layout, point, spread, self.rng)?;
+        let rough: Vec<bool> = all.iter().map(|d| Whitening::of(d).lost() > 0).collect();
+        if let Some(halved) = &self.halved {
+            // A different integrator is one more direction.
+            let model = halved.with(&[])?;
+            let logs = record.logs.replanned(model.layout());
+            let threads = halved.threads;
+            let mut finer = Predictor::new(&*model, &bench.parameters, &logs, 1, threads)?;
+            predictor.set_whitening(Vec::new());
+            let here = predictor.residuals(std::slice::from_ref(point))?;
+            let there = finer.residuals(std::slice::from_ref(point))?;
+            for (e, directions) in all.iter_mut().enumerate() {
+                let range = record.logs.offset(e)..record.logs.offset(e + 1);
+                let pairs = here[0][range.clone()].iter().zip(&there[0][range]);
+                let change: Vec<f64> = pairs.map(|(a, b)| a - b).collect();
+                if change.iter().all(|x| x.is_finite()) {
+                    directions.push(change);
+                }
+            }
+        }
+        let whitenings = all.iter().map(|d| Whitening::of(d)).zip(rough);
+        Ok(whitenings
+            .map(|(mut whitening, rough)| {
+                whitening.rough = rough;
+                whitening
+            })
+            .collect())
+    }
+}
+
+/// How well the starts of the held-out episodes are known from their first tenth: the
+/// median over episodes, for each coordinate.
+fn start_spread(bench: &Bench, point: &Point) -> Result<Spread> {
+    let layout = bench.layout();
+    let mut unknowns = bench.unknowns(&[]);
+    unknowns.iter_mut().for_each(|u| u.free = false);
+    let mut predictor = bench.predictor(&[], &bench.head)?;
+    predictor.set_whitening(Vec::new());
+    let mut differences = Differences::new(unknowns.len());
+    let open = &bench.open;
+    let line = linearise(&mut predictor, layout, &unknowns, point, open, &mut differences)?;
+    let logs = &bench.head.logs;
+    let mut spread = vec![0.0; 2 * layout.nv];
+    for (k, &coordinate) in open.iter().enumerate() {
+        let mut deviations: Vec<f64> = (0..logs.episodes.len())
+            .map(|e| {
+                let range = logs.offset(e)..logs.offset(e + 1);
+                let n = open.len();
+                let block = nalgebra::DMatrix::from_fn(n, n, |i, j| {
+                    let (a, b) = (&line.start_columns[i], &line.start_columns[j]);
+                    let pairs = a[range.clone()].iter().zip(&b[range.clone()]);
+                    pairs.map(|(x, y)| x * y).sum::<f64>()
+                });
+                inverse(&block, 1e-9)[(k, k)].max(0.0).sqrt()
+            })
+            .collect();
+        spread[coordinate] = noise::median(&mut deviations).unwrap_or(0.0).min(0.1);
+    }
+    Ok(Spread(spread))
 }
 
 /// Looks over the ranges on a stage and fits from the best.
@@ -196,17 +400,25 @@ fn scan_and_fit(bench: &Bench, stage: usize, point: &Point, effort: Effort) -> R
 }
 
 /// Where predictions are smooth: fits grow with the episodes.
-fn identify_smooth(bench: &mut Bench, study: &Study, point: Point) -> Result<Vec<Explanation>> {
+fn identify_smooth(
+    bench: &mut Bench,
+    study: &Study,
+    point: Point,
+    scatter: &mut Scatter<'_>,
+) -> Result<Vec<Explanation>> {
     let layout = bench.layout().clone();
     let all: Vec<usize> = (0..bench.train.logs.episodes.len()).collect();
     bench.train.whitening.clear();
-    bench.test.whitening.clear();
     let mut point = point;
     for round in 0..2 {
         bench.stages = SHARES
             .iter()
             .map(|&share| Stage {
-                record: bench.train.cut(&layout, share),
+                record: if share < 1.0 {
+                    bench.train.cut(&layout, share)
+                } else {
+                    bench.train.clone()
+                },
                 episodes: all.clone(),
             })
             .collect();
@@ -231,6 +443,7 @@ fn identify_smooth(bench: &mut Bench, study: &Study, point: Point) -> Result<Vec
         point = best.fit.point.clone();
         if round == 0 {
             set_noise(bench, &study.noise, &point)?;
+            scatter.estimate(bench, &point)?;
             continue;
         }
         // The longest stage on which a gradient can be believed comes first.
@@ -253,7 +466,7 @@ fn identify_rough(
     bench: &mut Bench,
     study: &Study,
     point: Point,
-    rng: &mut Rng,
+    scatter: &mut Scatter<'_>,
 ) -> Result<Vec<Explanation>> {
     let n = bench.train.logs.episodes.len();
     let some: Vec<usize> = (0..n).step_by(2).collect();
@@ -268,11 +481,11 @@ fn identify_rough(
     let layout = bench.layout().clone();
     let share = bench.train.logs.moving_share();
     bench.train = bench.train.cut(&layout, share);
-    scatter(bench, &point, rng)?;
+    scatter.estimate(bench, &point)?;
     bench.stages = stages(bench);
     let first = scan_and_fit(bench, 0, &point, Effort::BRIEF)?;
     set_noise(bench, &study.noise, &first.fit.point)?;
-    scatter(bench, &first.fit.point, rng)?;
+    scatter.estimate(bench, &first.fit.point)?;
     bench.stages = stages(bench);
     let from = &first.fit.point;
     let part = bench.explain(0, &[], &from.theta, &from.starts, Effort::BRIEF)?;

@@ -26,30 +26,32 @@ pub struct Whitening {
     directions: Vec<Vec<f64>>,
     /// `1 - (1 + variance)^(-1/2)` of each.
     shrink: Vec<f64>,
+    /// Whether next to nothing at the start makes a difference that sensors see.
+    pub rough: bool,
 }
 
 impl Whitening {
-    /// From deviations of an ensemble about its mean, in units of the noise, one vector a member.
+    /// From directions of scatter in units of the noise, each as long as its deviation:
+    /// `S = I + sum v v'`.
     #[must_use]
-    pub fn of(deviations: &[Vec<f64>]) -> Self {
-        let m = deviations.len();
-        if m < 2 {
+    pub fn of(scatter: &[Vec<f64>]) -> Self {
+        let m = scatter.len();
+        if m == 0 {
             return Self::default();
         }
         let gram = DMatrix::from_fn(m, m, |i, j| {
-            let pairs = deviations[i].iter().zip(&deviations[j]);
+            let pairs = scatter[i].iter().zip(&scatter[j]);
             pairs.map(|(a, b)| a * b).sum::<f64>()
         });
         let eigen = gram.symmetric_eigen();
         let mut whitening = Self::default();
-        for (k, &value) in eigen.eigenvalues.iter().enumerate() {
-            let variance = BOTH * value / (m - 1) as f64;
+        for (k, &variance) in eigen.eigenvalues.iter().enumerate() {
             if variance < 0.01 {
                 continue;
             }
-            let length = value.sqrt();
-            let mut direction = vec![0.0; deviations[0].len()];
-            for (i, member) in deviations.iter().enumerate() {
+            let length = variance.sqrt();
+            let mut direction = vec![0.0; scatter[0].len()];
+            for (i, member) in scatter.iter().enumerate() {
                 let weight = eigen.eigenvectors[(i, k)] / length;
                 for (d, x) in direction.iter_mut().zip(member) {
                     *d += weight * x;
@@ -98,7 +100,8 @@ impl Spread {
     }
 }
 
-/// Estimates the scatter about a point, one whitening an episode.
+/// Directions in which predictions scatter about a point, each as long as its deviation,
+/// for each episode.
 ///
 /// # Errors
 /// As [`Predictor::residuals`].
@@ -108,7 +111,7 @@ pub fn estimate(
     point: &Point,
     spread: &Spread,
     rng: &mut asid_core::rng::Rng,
-) -> Result<Vec<Whitening>> {
+) -> Result<Vec<Vec<Vec<f64>>>> {
     let points: Vec<Point> = (0..MEMBERS)
         .map(|_| {
             let mut other = point.clone();
@@ -134,17 +137,15 @@ pub fn estimate(
                 .filter(|m| m.iter().all(|x| x.is_finite()))
                 .collect();
             if finite.len() < 2 {
-                return Whitening::default();
+                return Vec::new();
             }
             let n = finite.len() as f64;
             let mean: Vec<f64> = (0..range.len())
                 .map(|k| finite.iter().map(|m| m[k]).sum::<f64>() / n)
                 .collect();
-            let deviations: Vec<Vec<f64>> = finite
-                .iter()
-                .map(|m| m.iter().zip(&mean).map(|(x, y)| x - y).collect())
-                .collect();
-            Whitening::of(&deviations)
+            let scale = (BOTH / (n - 1.0)).sqrt();
+            let off = |m: &&[f64]| m.iter().zip(&mean).map(|(x, y)| scale * (x - y)).collect();
+            finite.iter().map(off).collect()
         })
         .collect())
 }
@@ -155,10 +156,11 @@ mod tests {
 
     #[test]
     fn whitened_residuals_have_the_identity_for_covariance() {
-        // Two directions with variances 2 * 8 / 1 and 0: S = I + 16 u u'.
+        // S = I + (8 + 8) u u'.
         let u = [0.6, 0.8, 0.0];
         let member = |s: f64| u.iter().map(|x| s * x).collect::<Vec<f64>>();
-        let whitening = Whitening::of(&[member(2.0), member(-2.0)]);
+        let along = 8.0_f64.sqrt();
+        let whitening = Whitening::of(&[member(along), member(-along)]);
         assert_eq!(whitening.rank(), 1);
         let mut along = u;
         whitening.apply(&mut along);

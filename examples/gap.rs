@@ -10,7 +10,7 @@ fn main() {
     for path in std::env::args().skip(1) {
         let study = Study::read(std::path::Path::new(&path)).unwrap();
         let backend = (find::<BackendEntry>("mujoco").unwrap().make)().unwrap();
-        let machine = Machine::new(backend, &study.scene, &study.fixed, &study.effects, 0).unwrap();
+        let machine = Machine::new(backend.into(), &study.scene, &study.fixed, &study.effects, 0).unwrap();
         let plant = machine.plant.clone();
         let t = Instant::now();
         let mut rng = Streams::new(0).stream("scatter");
@@ -22,10 +22,11 @@ fn main() {
         let (candidates, left) = candidate::enumerate(&bench.machine, &shown);
         println!("== {path} candidates {} left out {} prepared {:?} stages {:?} rms {:?}", candidates.len(), left.len(), t.elapsed(), (0..=last).map(|i| bench.readings(i)).collect::<Vec<_>>(), none.iter().enumerate().map(|(i, e)| (e.fit.cost / bench.readings(i)).sqrt()).collect::<Vec<_>>());
         for l in left.iter().take(3) { println!("   left out {} {}", l.label, l.why); }
+        println!("   rough {} rank {:?} test {:?}", bench.is_rough(), bench.train.whitening.iter().map(|w| w.rank()).collect::<Vec<_>>(), bench.test.whitening.iter().map(|w| (w.rank(), w.lost())).collect::<Vec<_>>());
         let s = search::Search { bench: &bench, candidates: &candidates, breadth: search::Breadth::default(), progress: &Silent };
         let t0 = t.elapsed();
         let f = s.run(&none).unwrap();
-        let (n, m) = (bench.train.readings as f64, bench.test.readings as f64);
+        let (n, m) = (bench.train.readings as f64, bench.held_readings());
         println!("   {:?} searched {:?}; none {:.3} {:.3} {:?}", t0, t.elapsed(), (f.none.fit.cost / n).sqrt(), (f.none.held_out / m).sqrt(), f.none.fit.point.theta);
         let n0 = bench.readings(0);
         for s in f.screened.iter().take(8) { println!("     screened {} {:.3} {:?}", candidates[s.candidate].label(), (s.cost / n0).sqrt(), s.values); }

@@ -1,0 +1,215 @@
+//! Checks before any diagnosis: are the logs and the study's parameters fit for it?
+
+use asid_core::{Parameter, Result};
+
+use crate::bench::{Bench, Explanation};
+use crate::data::Logs;
+use crate::fit::slope;
+use crate::machine::Machine;
+use crate::prepare::plain_residuals;
+use crate::result::CheckResult;
+
+fn check(name: &str, ok: bool, detail: String) -> CheckResult {
+    CheckResult {
+        check: name.into(),
+        ok,
+        detail,
+    }
+}
+
+/// Share of missing readings that is still called good.
+const MISSING: f64 = 0.2;
+/// Share of a parameter's range that its deviation must be below.
+const PINNED: f64 = 0.25;
+/// Root mean square change by a halved time step that does not matter, in units of the noise.
+const FINE: f64 = 0.5;
+
+/// Readings present, rates, and lengths.
+#[must_use]
+pub fn data(train: &Logs, test: &Logs) -> CheckResult {
+    let present: usize = [train, test]
+        .iter()
+        .map(|l| l.present().iter().filter(|p| **p).count())
+        .sum();
+    let all = train.len() + test.len();
+    let missing = 1.0 - present as f64 / all.max(1) as f64;
+    let episodes = || train.episodes.iter().chain(&test.episodes);
+    let seconds: f64 = episodes()
+        .map(|e| e.episode.time[e.episode.rows() - 1] - e.episode.time[0])
+        .sum();
+    check(
+        "data",
+        missing <= MISSING,
+        format!(
+            "{} + {} episodes, {seconds:.1} s, {present} readings, {:.1} % missing",
+            train.episodes.len(),
+            test.episodes.len(),
+            100.0 * missing
+        ),
+    )
+}
+
+/// Readings in another unit: their slope over the predictions is one of the usual factors.
+///
+/// # Errors
+/// When a rollout fails.
+pub fn units(bench: &Bench, none: &Explanation) -> Result<CheckResult> {
+    let record = &bench.train;
+    let residuals = plain_residuals(bench, record, &[], &none.fit.point)?;
+    let logs = &record.logs;
+    let (n, width) = (logs.entries.len(), logs.width());
+    let mut found = Vec::new();
+    let mut column = 0;
+    for (i, sensor) in logs.sensors.iter().enumerate() {
+        let own: Vec<usize> = (0..n).filter(|&j| logs.entries[j].sensor == i).collect();
+        if sensor.rotation {
+            column += 4;
+            continue;
+        }
+        let (mut xy, mut xx, mut yy) = (0.0, 0.0, 0.0);
+        for (&j, c) in own.iter().zip(column..) {
+            for (e, log) in logs.episodes.iter().enumerate() {
+                let pairs = (0..log.plan.rows()).map(|k| {
+                    let y = log.readings[k * width + c];
+                    (y - residuals[e][k * n + j], y)
+                });
+                let pairs: Vec<_> = pairs.filter(|(x, y)| x.is_finite() && y.is_finite()).collect();
+                let m = pairs.len().max(1) as f64;
+                let mean = |f: fn(&(f64, f64)) -> f64| pairs.iter().map(f).sum::<f64>() / m;
+                let (mx, my) = (mean(|p| p.0), mean(|p| p.1));
+                for (x, y) in &pairs {
+                    xy += (x - mx) * (y - my);
+                    xx += (x - mx) * (x - mx);
+                    yy += (y - my) * (y - my);
+                }
+            }
+        }
+        column += own.len();
+        let (slope, correlation) = (xy / xx, xy / (xx * yy).sqrt());
+        for (factor, what) in [
+            (180.0 / std::f64::consts::PI, "degrees"),
+            (1000.0, "thousandths of the unit (mm, mrad)"),
+            (100.0, "hundredths of the unit (cm)"),
+        ] {
+            if correlation > 0.9 && (slope / factor - 1.0).abs() < 0.1 {
+                found.push(format!(
+                    "`{}` reads {slope:.1} times what the model has: is it in {what}? Logs are in SI units",
+                    sensor.name
+                ));
+            }
+        }
+    }
+    let ok = found.is_empty();
+    let detail = if ok {
+        "readings have the size that the model predicts".into()
+    } else {
+        found.join("; ")
+    };
+    Ok(check("units", ok, detail))
+}
+
+/// Does each of the study's parameters show, and which of their combinations do not?
+#[must_use]
+pub fn identifiability(parameters: &[Parameter], none: &Explanation) -> Vec<CheckResult> {
+    if parameters.is_empty() {
+        return vec![check("excitation", true, "the study fits no parameter".into())];
+    }
+    let fit = &none.fit;
+    let p = fit.free.len();
+    // In shares of the range.
+    let scale: Vec<f64> = (0..p)
+        .map(|k| slope(&parameters[fit.free[k]], fit.point.theta[fit.free[k]]))
+        .collect();
+    let deviation = |k: usize| fit.covariance[(k, k)].max(0.0).sqrt() / scale[k].abs();
+    let information = |k: usize| fit.jacobian.column(k).norm() * scale[k].abs();
+    let silent: Vec<&str> = (0..p)
+        .filter(|&k| information(k) * PINNED < 1.0)
+        .map(|k| &*parameters[fit.free[k]].name)
+        .collect();
+    let excitation = if silent.is_empty() {
+        check("excitation", true, "every parameter shows in the readings".into())
+    } else {
+        check(
+            "excitation",
+            false,
+            format!(
+                "{} hardly show in these logs: over a quarter of the range the readings change by less than the noise; move more",
+                silent.join(", ")
+            ),
+        )
+    };
+    let loose: Vec<String> = (0..p)
+        .filter(|&k| information(k) * PINNED >= 1.0 && deviation(k) > PINNED)
+        .map(|k| parameters[fit.free[k]].name.clone())
+        .collect();
+    let together = if loose.is_empty() {
+        check("identifiability", true, "no combination of parameters is open".into())
+    } else {
+        check(
+            "identifiability",
+            false,
+            format!(
+                "the logs see {} only in combination with each other: their values are not to be believed one by one",
+                loose.join(", ")
+            ),
+        )
+    };
+    let correlations = correlated(parameters, none);
+    let mut all = vec![excitation, together];
+    if let Some(text) = correlations {
+        all.push(check("correlation", true, text));
+    }
+    all
+}
+
+/// The most correlated pair of parameters, where it is beyond 0.95.
+fn correlated(parameters: &[Parameter], none: &Explanation) -> Option<String> {
+    let c = &none.fit.covariance;
+    let p = c.nrows();
+    let mut worst: Option<(f64, usize, usize)> = None;
+    for i in 0..p {
+        for j in 0..i {
+            let r = c[(i, j)] / (c[(i, i)] * c[(j, j)]).sqrt();
+            if r.abs() > 0.95 && worst.is_none_or(|(w, ..)| r.abs() > w.abs()) {
+                worst = Some((r, i, j));
+            }
+        }
+    }
+    let name = |k: usize| &parameters[none.fit.free[k]].name;
+    worst.map(|(r, i, j)| format!("{} and {} trade off: correlation {r:.3}", name(i), name(j)))
+}
+
+/// Does the gap depend on the time step? `halved` is the same machine with half of it.
+///
+/// # Errors
+/// When a rollout fails.
+pub fn time_step(bench: &Bench, none: &Explanation, halved: &Machine) -> Result<CheckResult> {
+    let parameters = &bench.parameters;
+    let point = &none.fit.point;
+    let read = |machine: &Machine| -> Result<Vec<Vec<f64>>> {
+        let model = machine.with(&[])?;
+        let logs = crate::data::Logs::replanned(&bench.train.logs, model.layout());
+        let mut predictor = crate::predict::Predictor::new(
+            &*model,
+            parameters,
+            &logs,
+            1,
+            machine.threads,
+        )?;
+        predictor.set_whitening(bench.train.whitening.clone());
+        predictor.residuals(std::slice::from_ref(point))
+    };
+    let (a, b) = (read(&bench.machine)?, read(halved)?);
+    let square: f64 = a[0].iter().zip(&b[0]).map(|(x, y)| (x - y).powi(2)).sum();
+    let change = (square / bench.train.readings.max(1) as f64).sqrt();
+    let gap = (none.fit.cost / bench.train.readings.max(1) as f64).sqrt();
+    let ok = change < FINE || change < 0.2 * gap;
+    Ok(check(
+        "time-step",
+        ok,
+        format!(
+            "half the time step changes the predictions by {change:.2} of the noise, where the gap is {gap:.2}{}",
+            if ok { "" } else { ": make the model's time step smaller first" }
+        ),
+    ))
+}

@@ -1,0 +1,223 @@
+//! Where the gap lies: by signal, by regime of motion, and under which readable condition.
+//!
+//! Open loop, an error that a force makes in one place is carried on for the rest of the
+//! episode. Shares are of the residual itself, which is what the user sees; conditions are
+//! looked for where the residual *grows*, which is where its cause acts.
+
+use asid_core::Plant;
+use asid_core::layout::JointKind;
+use asid_core::plant::Reads;
+
+use crate::data::Logs;
+use crate::result::Where;
+use crate::trajectory::{Path, Trajectory};
+
+/// Share of an episode that counts as its beginning.
+const BEGINNING: f64 = 0.03;
+/// Share of the largest speed below which a joint stands or turns round.
+const SLOW: f64 = 0.03;
+/// Rows over which the growth of a residual is taken.
+const WINDOW: usize = 5;
+/// A condition must hold for at most this share of the rows, and for at least this share
+/// of the growth.
+const FEW: f64 = 0.6;
+const MOST: f64 = 0.8;
+/// Cells that are listed.
+const LISTED: usize = 8;
+
+/// Shares of the excess squared residual, largest first; `residuals` are in units of the
+/// noise, without whitening, 0 where missing.
+#[must_use]
+pub fn localise(plant: &Plant, logs: &Logs, shown: &Trajectory, residuals: &[f64]) -> Vec<Where> {
+    let n = logs.entries.len();
+    let mut cells: Vec<(usize, String, f64)> = Vec::new();
+    for e in 0..logs.episodes.len() {
+        let path = &shown.episodes[e];
+        let rows = logs.episodes[e].plan.rows();
+        for (j, entry) in logs.entries.iter().enumerate() {
+            let name = &logs.sensors[entry.sensor].name;
+            for k in 0..rows {
+                let r = residuals[logs.offset(e) + k * n + j];
+                if !r.is_finite() || r == 0.0 {
+                    continue;
+                }
+                let regime = regime(plant, shown, path, name, k, rows);
+                let excess = r * r - 1.0;
+                match cells.iter_mut().find(|(i, g, _)| *i == j && *g == regime) {
+                    Some(cell) => cell.2 += excess,
+                    None => cells.push((j, regime, excess)),
+                }
+            }
+        }
+    }
+    cells.retain(|c| c.2 > 0.0);
+    cells.sort_by(|a, b| b.2.total_cmp(&a.2));
+    cells.truncate(LISTED);
+    let total: f64 = cells.iter().map(|c| c.2).sum();
+    cells
+        .into_iter()
+        .map(|(j, regime, excess)| Where {
+            signal: logs.entries[j].label.clone(),
+            regime,
+            share: excess / total,
+            condition: condition(logs, residuals, j),
+        })
+        .collect()
+}
+
+/// What the part of the machine that a sensor reads is doing in a row.
+fn regime(
+    plant: &Plant,
+    shown: &Trajectory,
+    path: &Path,
+    sensor: &str,
+    row: usize,
+    rows: usize,
+) -> String {
+    let layout = &plant.layout;
+    if (row as f64) < BEGINNING * rows as f64 {
+        return "start".into();
+    }
+    let place = layout.sensors.iter().position(|s| s.name == sensor);
+    match place.map(|p| plant.sensors[p]) {
+        Some(Reads::Joint(j)) if layout.joints[j].kind != JointKind::Free => {
+            joint_regime(plant, path, j, row)
+        }
+        Some(Reads::Body(b)) => body_regime(plant, shown, path, b, row),
+        _ => "motion".into(),
+    }
+}
+
+fn joint_regime(plant: &Plant, path: &Path, joint: usize, row: usize) -> String {
+    let layout = &plant.layout;
+    let (nq, nv, nu) = (layout.nq, layout.nv, layout.nu());
+    let place = &layout.joints[joint];
+    let speeds = || path.qvel.iter().skip(place.qvel).step_by(nv);
+    let largest = speeds().fold(0.0, |a: f64, v| a.max(v.abs()));
+    let speed = path.qvel[row * nv + place.qvel];
+    let saturated = plant.drives_of(joint).any(|(i, d)| {
+        let u = path.ctrl[row * nu + i];
+        let outside = d.ctrl_range.is_some_and(|[a, b]| u <= a || u >= b);
+        let q = path.qpos[row * nq + place.qpos];
+        let limited = d.force_range.is_some_and(|[a, b]| {
+            let force = d.force(u, q, speed) / d.gear;
+            force <= a || force >= b
+        });
+        outside || limited
+    });
+    if saturated {
+        return "saturated".into();
+    }
+    if speed.abs() > SLOW * largest {
+        return "moving".into();
+    }
+    let before = speeds().nth(row.saturating_sub(WINDOW)).copied();
+    let after = speeds().nth(row + WINDOW).copied();
+    match (before, after) {
+        (Some(a), Some(b)) if a * b < 0.0 => "reversal".into(),
+        _ => "standing".into(),
+    }
+}
+
+fn body_regime(plant: &Plant, shown: &Trajectory, path: &Path, body: usize, row: usize) -> String {
+    let pairs = shown.pairs.len();
+    let forces = &path.contact[row * pairs..(row + 1) * pairs];
+    let touching = shown
+        .pairs
+        .iter()
+        .zip(forces)
+        .filter(|(p, f)| p.contains(&body) && **f > 0.0)
+        .max_by(|a, b| a.1.total_cmp(b.1));
+    let Some((pair, _)) = touching else {
+        return "free".into();
+    };
+    let other = if pair[0] == body { pair[1] } else { pair[0] };
+    // With several contacts, that with the thing that moves is the one of interest.
+    let mover = shown
+        .pairs
+        .iter()
+        .zip(forces)
+        .filter(|(p, f)| p.contains(&body) && **f > 0.0)
+        .map(|(p, _)| if p[0] == body { p[1] } else { p[0] })
+        .find(|&b| plant.moves(b));
+    let names = &plant.layout.bodies;
+    let other = mover.unwrap_or(other);
+    format!("contact {}/{}", names[body], names[other])
+}
+
+/// A threshold on a reading, a command or the time that most of an entry's growth lies
+/// beyond.
+fn condition(logs: &Logs, residuals: &[f64], entry: usize) -> Option<String> {
+    let n = logs.entries.len();
+    let actuators = logs.episodes.first()?.episode.actuators.len();
+    // Features: the entries of plain sensors, then commands, then time.
+    let mut growth = Vec::new();
+    let mut features: Vec<Vec<f64>> = Vec::new();
+    let mut names: Vec<String> = Vec::new();
+    let width = logs.width();
+    let mut column = 0;
+    let mut columns = Vec::new();
+    for (i, sensor) in logs.sensors.iter().enumerate() {
+        let own: Vec<_> = logs.entries.iter().filter(|e| e.sensor == i).collect();
+        if sensor.rotation {
+            column += 4;
+            continue;
+        }
+        for e in own {
+            names.push(e.label.clone());
+            columns.push(column);
+            column += 1;
+        }
+    }
+    if let Some(e) = logs.episodes.first() {
+        names.extend(e.episode.actuators.iter().map(|a| format!("ctrl.{a}")));
+    }
+    names.push("time".into());
+    features.resize(names.len(), Vec::new());
+    for (e, log) in logs.episodes.iter().enumerate() {
+        let rows = log.plan.rows();
+        let at = |k: usize| residuals[logs.offset(e) + k * n + entry];
+        for k in WINDOW..rows {
+            let d = at(k) - at(k - WINDOW);
+            if !d.is_finite() {
+                continue;
+            }
+            // The noise of a difference has a variance of two.
+            growth.push((d * d - 2.0).max(0.0));
+            let middle = k - WINDOW / 2;
+            for (f, &c) in columns.iter().enumerate() {
+                features[f].push(log.readings[middle * width + c]);
+            }
+            for a in 0..actuators {
+                features[columns.len() + a].push(log.episode.ctrl[middle * actuators + a]);
+            }
+            let last = features.len() - 1;
+            features[last].push(log.episode.time[middle] - log.episode.time[0]);
+        }
+    }
+    let total: f64 = growth.iter().sum();
+    if total <= growth.len() as f64 {
+        return None;
+    }
+    let mut best: Option<(f64, String)> = None;
+    for (name, values) in names.iter().zip(&features) {
+        let mut order: Vec<usize> = (0..values.len()).filter(|&i| values[i].is_finite()).collect();
+        order.sort_by(|&a, &b| values[a].total_cmp(&values[b]));
+        let m = order.len();
+        let mut below = 0.0;
+        for (k, &i) in order.iter().enumerate() {
+            below += growth[i];
+            let rows = (k + 1) as f64 / m as f64;
+            let share = below / total;
+            for (share, rows, sign) in [(share, rows, '<'), (1.0 - share, 1.0 - rows, '>')] {
+                if rows < FEW && rows > 0.02 && share > MOST {
+                    let merit = share - rows;
+                    if best.as_ref().is_none_or(|(b, _)| merit > *b) {
+                        best = Some((merit, format!("{name} {sign} {:.3}", values[i])));
+                    }
+                }
+            }
+        }
+    }
+    best.map(|(_, text)| text)
+}

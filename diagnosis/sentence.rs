@@ -1,0 +1,72 @@
+//! The answer in one sentence.
+
+use crate::result::{DiagnosisResult, Kind};
+
+/// Says what a result means, in one sentence; `labels` are the effects of the best
+/// explanation, whether or not it is the verdict.
+#[must_use]
+pub fn sentence(result: &DiagnosisResult, labels: &[String]) -> String {
+    let place = result.places.first().map_or_else(String::new, |w| {
+        let condition = w
+            .condition
+            .as_ref()
+            .map_or_else(String::new, |c| format!(", where {c}"));
+        let regime = match w.regime.as_str() {
+            "motion" => String::new(),
+            "free" => " in free flight".into(),
+            other => format!(" ({other})"),
+        };
+        format!("The gap is in {}{regime}{condition}; ", w.signal)
+    });
+    let percent = |x: f64| format!("{:.0} %", 100.0 * x);
+    let failed: Vec<&str> = result
+        .checks
+        .iter()
+        .filter(|c| !c.ok)
+        .map(|c| &*c.check)
+        .collect();
+    let caution = if failed.is_empty() {
+        String::new()
+    } else {
+        format!(" But a check failed ({}): see there first.", failed.join(", "))
+    };
+    let closed = || match (result.gap.closed, result.gap.closed_interval95) {
+        (Some(c), Some([low, high])) => format!(
+            "{} of it ({:.0} to {:.0})",
+            percent(c),
+            100.0 * low,
+            100.0 * high
+        ),
+        _ => "what there is of it".into(),
+    };
+    let body = match result.verdict.kind {
+        Kind::None => format!(
+            "No gap beyond the sensors' noise is left once the study's parameters are fitted (gap {:.2} on the logs held out).",
+            result.gap.identified
+        ),
+        Kind::Effects => {
+            let ambiguous = if result.verdict.ambiguous_with.is_empty() {
+                String::new()
+            } else {
+                let sets = result.verdict.ambiguous_with.iter();
+                let names: Vec<String> = sets.map(|s| s.join(" + ")).collect();
+                format!(" These data cannot tell it from {}.", names.join(", nor from "))
+            };
+            format!(
+                "{place}{} explains {}.{ambiguous}",
+                result.verdict.effects.join(" with "),
+                closed()
+            )
+        }
+        Kind::Unknown => format!(
+            "{place}nothing in the catalogue explains it: {} comes nearest, with {}.",
+            if labels.is_empty() {
+                "no effect".into()
+            } else {
+                labels.join(" with ")
+            },
+            closed()
+        ),
+    };
+    body + &caution
+}

@@ -1,0 +1,255 @@
+//! From fitted explanations to probabilities, a verdict, and what cannot be told from it.
+//!
+//! Sums of squares over all logs are compared, those held out included. They are tempered
+//! by how badly and how correlatedly the best explanation still misses, so that many
+//! readings of one and the same error count once. A further effect has to earn its place:
+//! whoever wrote the real world's friction wrote it differently, and the small rest that
+//! this leaves is no second effect.
+
+use crate::bench::{Bench, Explanation};
+use crate::search::{Findings, Found, NEGLIGIBLE, excess};
+
+/// A set of effects with its probability and what it costs.
+#[derive(Clone, Debug)]
+pub struct Hypothesis {
+    /// Place in [`Findings::found`]; `None` for no effect.
+    pub found: Option<usize>,
+    /// Labels, sorted.
+    pub labels: Vec<String>,
+    /// Sum of squares over all logs.
+    pub cost: f64,
+    /// Free parameters of its effects that do something.
+    pub size: usize,
+    /// Probability.
+    pub probability: f64,
+}
+
+/// What kind of answer, with its probability.
+#[derive(Clone, Debug)]
+pub struct Judgement {
+    /// All sets, most probable first.
+    pub hypotheses: Vec<Hypothesis>,
+    /// Probability that nothing in the catalogue explains the gap.
+    pub unknown: f64,
+    /// Index of the verdict in `hypotheses`, whether or not `unknown` is more probable.
+    pub best: usize,
+    /// Indices of hypotheses that these data cannot tell from it.
+    pub ambiguous: Vec<usize>,
+    /// By how much sums of squares overstate what they tell.
+    pub temperature: f64,
+    /// Share of the excess that the best leaves.
+    pub rest: f64,
+}
+
+/// Share of the excess left from which on an unknown effect is as likely as not, and how
+/// sharply that changes with its logarithm.
+const REST: f64 = 0.1;
+const SHARPNESS: f64 = 0.35;
+/// Excess that the explanations in [`REST`] are thought of with, in deviations of the noise.
+const USUAL: f64 = 8.0;
+/// A further effect must bring the excess below this share of what it was.
+const WORTH: f64 = 0.4;
+/// Difference of tempered sums of squares up to which two sets cannot be told apart: a
+/// likelihood ratio of 400.
+const APART: f64 = 12.0;
+/// Prior odds against each further effect.
+const FURTHER: f64 = 20.0;
+
+/// Correlation of neighbouring residuals, averaged over entries and episodes by their size.
+#[must_use]
+pub fn correlation(bench: &Bench, residuals: &[f64]) -> f64 {
+    let logs = &bench.train.logs;
+    let n = logs.entries.len();
+    let (mut product, mut square) = (0.0, 0.0);
+    for e in 0..logs.episodes.len() {
+        let part = &residuals[logs.offset(e)..logs.offset(e + 1)];
+        for k in n..part.len() {
+            product += part[k] * part[k - n];
+            square += part[k] * part[k];
+        }
+    }
+    if square > 0.0 {
+        (product / square).clamp(0.0, 0.98)
+    } else {
+        0.0
+    }
+}
+
+/// Number of free effect parameters whose range makes a difference.
+fn size(bench: &Bench, explanation: &Explanation) -> usize {
+    let study = bench.parameters.len();
+    let fit = &explanation.fit;
+    let effect = fit.free.iter().enumerate().filter(|(_, i)| **i >= study);
+    effect
+        .filter(|(k, i)| {
+            let [low, high] = explanation.unknowns[**i].parameter.range;
+            let column = fit.jacobian.column(*k);
+            let response = column.norm() * (high - low) / (column.len().max(1) as f64).sqrt();
+            response > crate::fit::NOTHING
+        })
+        .count()
+}
+
+/// Whether a set is another one with something added that does nothing, or all of it and more.
+fn contains(larger: &Found, smaller: &[String]) -> bool {
+    let labels = larger.explanation.labels();
+    labels.len() > smaller.len() && smaller.iter().all(|l| labels.contains(l))
+}
+
+/// Whether one of its effects stands at its null value: the set is a smaller one, or a
+/// special case of another effect.
+fn reduces(found: &Found, bench: &Bench) -> bool {
+    let mut at = bench.parameters.len();
+    found.explanation.effects.iter().any(|effect| {
+        let unknowns = &found.explanation.unknowns[at..at + effect.values.len()];
+        at += effect.values.len();
+        let entry = asid_core::registry::find::<asid_core::registry::EffectEntry>(&effect.name);
+        let Ok(entry) = entry else { return false };
+        let made = (entry.make)();
+        made.parameters()
+            .iter()
+            .zip(&effect.values)
+            .zip(unknowns)
+            .any(|((p, (_, value)), unknown)| {
+                let [low, high] = unknown.parameter.range;
+                let at_end = p.null == low || p.null == high;
+                unknown.free && at_end && (value - p.null).abs() < 1e-4 * (high - low)
+            })
+    })
+}
+
+/// Judges what a search found; `scatter` is the deviation of a sum of squares that the
+/// simulator's own scatter makes, and `candidates` how many effects were tried.
+#[must_use]
+pub fn judge(bench: &Bench, findings: &Findings, candidates: usize, scatter: f64) -> Judgement {
+    let readings = (bench.train.readings + bench.test.readings) as f64;
+    let mut all = vec![Hypothesis {
+        found: None,
+        labels: Vec::new(),
+        cost: findings.none.cost(),
+        size: 0,
+        probability: 0.0,
+    }];
+    for (i, found) in findings.found.iter().enumerate() {
+        let cost = found.explanation.cost();
+        if cost.is_finite() && !reduces(found, bench) {
+            all.push(Hypothesis {
+                found: Some(i),
+                labels: found.explanation.labels(),
+                cost,
+                size: size(bench, &found.explanation),
+                probability: 0.0,
+            });
+        }
+    }
+    let lowest = all.iter().map(|h| h.cost).fold(f64::INFINITY, f64::min);
+    let residuals = all
+        .iter()
+        .find(|h| h.cost == lowest)
+        .and_then(|h| h.found)
+        .map_or(&findings.none.fit.residuals, |i| {
+            &findings.found[i].explanation.fit.residuals
+        });
+    let rho = correlation(bench, residuals);
+    let temperature = (lowest / readings).max(1.0) * (1.0 + rho) / (1.0 - rho)
+        + scatter / (2.0 * APART.sqrt());
+    // Twice the negative logarithm of the posterior, up to a constant.
+    let score = |h: &Hypothesis| {
+        let choice = 2.0 * (candidates.max(1) as f64).ln() * h.labels.len() as f64;
+        let further = 2.0 * FURTHER.ln() * h.labels.len().saturating_sub(1) as f64;
+        h.cost / temperature + h.size as f64 * readings.ln() + choice + further
+    };
+    let gap = |h: &Hypothesis| excess(h.cost / readings);
+    // The simplest set that no larger one betters by enough.
+    let mut best = 0;
+    let most = all.iter().map(|h| h.labels.len()).max().unwrap_or(0);
+    for count in 1..=most {
+        let next = (0..all.len())
+            .filter(|&i| all[i].labels.len() == count)
+            .min_by(|&a, &b| score(&all[a]).total_cmp(&score(&all[b])));
+        let Some(next) = next else { continue };
+        let (before, after) = (&all[best], &all[next]);
+        let better = score(after) < score(before);
+        let further = before.labels.is_empty()
+            || (gap(before) > NEGLIGIBLE && gap(after) < WORTH * gap(before));
+        if better && further {
+            best = next;
+        }
+    }
+    let base = score(&all[best]);
+    for i in 0..all.len() {
+        let mut worse = score(&all[i]) - base;
+        // What the rule of parsimony passes over is not more probable than what it picks.
+        if i != best {
+            worse = worse.max(if all[i].labels.len() > all[best].labels.len() {
+                2.0
+            } else {
+                0.0
+            });
+        }
+        all[i].probability = (-0.5 * worse).exp();
+    }
+    let sum: f64 = all.iter().map(|h| h.probability).sum();
+    let left = gap(&all[best]);
+    let rest = (left / gap(&all[0]).max(1e-9)).powi(2).min(1.0);
+    let unknown = if best == 0 {
+        0.02
+    } else {
+        let sigmoid = |x: f64| 1.0 / (1.0 + (-x).exp());
+        let share = sigmoid((rest / REST).ln() / SHARPNESS + 0.5 * (left / USUAL).max(1e-9).ln());
+        (share * sigmoid((left - NEGLIGIBLE) / 0.3)).clamp(0.001, 0.999)
+    };
+    for h in &mut all {
+        h.probability *= (1.0 - unknown) / sum;
+    }
+    let ambiguous = (0..all.len())
+        .filter(|&i| {
+            let Some(found) = all[i].found.map(|f| &findings.found[f]) else {
+                return false;
+            };
+            i != best
+                && best != 0
+                && !contains(found, &all[best].labels)
+                && all[i].labels.len() <= all[best].labels.len()
+                && (all[i].cost - all[best].cost) / temperature < APART
+        })
+        .collect();
+    let mut judgement = Judgement {
+        best,
+        ambiguous,
+        unknown,
+        temperature,
+        rest,
+        hypotheses: all,
+    };
+    judgement.sort();
+    judgement
+}
+
+impl Judgement {
+    /// Most probable first.
+    fn sort(&mut self) {
+        let mut order: Vec<usize> = (0..self.hypotheses.len()).collect();
+        let p = |i: usize| self.hypotheses[i].probability;
+        order.sort_by(|&a, &b| p(b).total_cmp(&p(a)));
+        let place = |old: usize| order.iter().position(|&o| o == old).unwrap_or(0);
+        let (best, ambiguous) = (place(self.best), self.ambiguous.iter().map(|&i| place(i)));
+        let mut ambiguous: Vec<usize> = ambiguous.collect();
+        ambiguous.sort_unstable();
+        self.hypotheses = order.iter().map(|&i| self.hypotheses[i].clone()).collect();
+        self.best = best;
+        self.ambiguous = ambiguous;
+    }
+
+    /// The hypothesis of the verdict.
+    #[must_use]
+    pub fn verdict(&self) -> &Hypothesis {
+        &self.hypotheses[self.best]
+    }
+
+    /// Whether nothing in the catalogue explains the gap.
+    #[must_use]
+    pub fn is_unknown(&self) -> bool {
+        self.unknown > self.verdict().probability
+    }
+}
