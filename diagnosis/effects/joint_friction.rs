@@ -1,7 +1,7 @@
 //! Friction of hinges and slides.
 //!
-//! Damping and dry friction are the engine's own, which holds a joint at rest and solves it together
-//! with everything else. The laws follow B. Armstrong-Hélouvry, P. Dupont, C. Canudas de Wit, "A survey
+//! Viscous friction is the engine's own damping; dry friction is [`super::dry`]. The laws follow
+//! B. Armstrong-Hélouvry, P. Dupont, C. Canudas de Wit, "A survey
 //! of models, analysis tools and compensation methods for the control of machines with friction",
 //! Automatica 30 (1994), and for friction that grows with the load M. Duclusaud et al., "Extended
 //! friction models for the physics simulation of servo actuators", ICRA 2025.
@@ -11,6 +11,7 @@ use asid_core::plant::Drive;
 use asid_core::simulator::StepView;
 use asid_core::{Capabilities, Plant, Result, Target};
 
+use super::dry::{CREEP, DryFriction};
 use super::{at_least, scalar_joints, target, values};
 
 asid_core::register!(EffectEntry {
@@ -90,24 +91,33 @@ impl Effect for Viscous {
 }
 
 /// Friction `force + offset` against motion in the positive direction, and `force - offset` against
-/// the other: `force` adds to the joint's `frictionloss`, and `-offset` is a force that always acts.
+/// the other: dry friction `force`, and `-offset` is a force that always acts. Below the speed `creep` the
+/// friction is viscous: machines and simulators differ in how hard they stick.
 struct Coulomb;
 
 struct CoulombAt {
-    column: usize,
+    dry: DryFriction,
     dof: usize,
     force: f64,
     offset: f64,
 }
 
 impl Acting for CoulombAt {
-    fn set(&self, columns: &mut [f64]) {
-        let value = &mut columns[self.column];
-        *value = (*value + self.force).max(0.0);
+    fn before_step(&mut self, view: &mut StepView<'_>) {
+        self.dry.resist(view, self.force);
+        view.force[self.dof] -= self.offset;
     }
 
-    fn before_step(&mut self, view: &mut StepView<'_>) {
-        view.force[self.dof] -= self.offset;
+    fn restart(&mut self) {
+        self.dry.before = None;
+    }
+
+    fn save(&self, memory: &mut Vec<f64>) {
+        memory.extend(self.dry.before);
+    }
+
+    fn load(&mut self, memory: &[f64]) {
+        self.dry.before = memory.first().copied();
     }
 }
 
@@ -122,6 +132,8 @@ impl Effect for Coulomb {
                 EffectParameter::new("force", "N m or N", [0.0, 50.0], 0.0),
                 EffectParameter::new("offset", "N m or N", [-50.0, 50.0], 0.0)
                     .starting(Start::Given),
+                EffectParameter::new("creep", "rad/s or m/s", [1e-4, 0.1], CREEP)
+                    .starting(Start::Given),
             ]
         }
     }
@@ -131,17 +143,17 @@ impl Effect for Coulomb {
     }
 
     fn targets(&self, _plant: &Plant, site: &str) -> Vec<Target> {
-        vec![target("joint", site, "frictionloss", 0)]
+        vec![target("joint", site, "damping", 0)]
     }
 
     fn needs(&self) -> Capabilities {
-        Capabilities::JOINT_FRICTION
+        Capabilities::JOINT_IMPEDANCE | Capabilities::LIVE_PARAMETERS
     }
 
     fn attach(&self, site: &Site<'_>) -> Result<Box<dyn Acting>> {
-        let [force, offset] = values(site)?;
+        let [force, offset, creep] = values(site)?;
         Ok(Box::new(CoulombAt {
-            column: site.columns[0],
+            dry: DryFriction::new(site, creep)?,
             dof: site.plant.layout.joint(site.name)?.qvel,
             force,
             offset,
@@ -154,7 +166,7 @@ impl Effect for Coulomb {
 struct Stribeck;
 
 struct StribeckAt {
-    column: usize,
+    dry: DryFriction,
     dof: usize,
     breakaway: f64,
     coulomb: f64,
@@ -164,8 +176,20 @@ struct StribeckAt {
 impl Acting for StribeckAt {
     fn before_step(&mut self, view: &mut StepView<'_>) {
         let x = view.qvel[self.dof] / self.speed;
-        let friction = &mut view.parameters[self.column];
-        *friction = (*friction + self.coulomb + self.breakaway * (-x * x).exp()).max(0.0);
+        let friction = self.coulomb + self.breakaway * (-x * x).exp();
+        self.dry.resist(view, friction);
+    }
+
+    fn restart(&mut self) {
+        self.dry.before = None;
+    }
+
+    fn save(&self, memory: &mut Vec<f64>) {
+        memory.extend(self.dry.before);
+    }
+
+    fn load(&mut self, memory: &[f64]) {
+        self.dry.before = memory.first().copied();
     }
 }
 
@@ -190,17 +214,17 @@ impl Effect for Stribeck {
     }
 
     fn targets(&self, _plant: &Plant, site: &str) -> Vec<Target> {
-        vec![target("joint", site, "frictionloss", 0)]
+        vec![target("joint", site, "damping", 0)]
     }
 
     fn needs(&self) -> Capabilities {
-        Capabilities::JOINT_FRICTION | Capabilities::LIVE_PARAMETERS
+        Capabilities::JOINT_IMPEDANCE | Capabilities::LIVE_PARAMETERS
     }
 
     fn attach(&self, site: &Site<'_>) -> Result<Box<dyn Acting>> {
         let [breakaway, coulomb, speed] = values(site)?;
         Ok(Box::new(StribeckAt {
-            column: site.columns[0],
+            dry: DryFriction::new(site, CREEP)?,
             dof: site.plant.layout.joint(site.name)?.qvel,
             breakaway,
             coulomb,
@@ -214,7 +238,7 @@ impl Effect for Stribeck {
 struct Load;
 
 struct LoadAt {
-    column: usize,
+    dry: DryFriction,
     qpos: usize,
     dof: usize,
     drives: Vec<(usize, Drive)>,
@@ -226,7 +250,19 @@ impl Acting for LoadAt {
         let (q, v) = (view.qpos[self.qpos], view.qvel[self.dof]);
         let forces = self.drives.iter();
         let force: f64 = forces.map(|(i, d)| d.force(view.ctrl[*i], q, v)).sum();
-        view.parameters[self.column] += self.coefficient * force.abs();
+        self.dry.resist(view, self.coefficient * force.abs());
+    }
+
+    fn restart(&mut self) {
+        self.dry.before = None;
+    }
+
+    fn save(&self, memory: &mut Vec<f64>) {
+        memory.extend(self.dry.before);
+    }
+
+    fn load(&mut self, memory: &[f64]) {
+        self.dry.before = memory.first().copied();
     }
 }
 
@@ -248,11 +284,11 @@ impl Effect for Load {
     }
 
     fn targets(&self, _plant: &Plant, site: &str) -> Vec<Target> {
-        vec![target("joint", site, "frictionloss", 0)]
+        vec![target("joint", site, "damping", 0)]
     }
 
     fn needs(&self) -> Capabilities {
-        Capabilities::JOINT_FRICTION | Capabilities::LIVE_PARAMETERS
+        Capabilities::JOINT_IMPEDANCE | Capabilities::LIVE_PARAMETERS
     }
 
     fn attach(&self, site: &Site<'_>) -> Result<Box<dyn Acting>> {
@@ -261,7 +297,7 @@ impl Effect for Load {
         let joints = &site.plant.layout.joints;
         let index = joints.iter().position(|j| j.name == site.name);
         Ok(Box::new(LoadAt {
-            column: site.columns[0],
+            dry: DryFriction::new(site, CREEP)?,
             qpos: joint.qpos,
             dof: joint.qvel,
             drives: index.map_or_else(Vec::new, |j| {

@@ -5,7 +5,7 @@
 //! [`gravity`]. In contacts: [`contact_friction`], [`friction_field`], [`contact_softness`]. On
 //! readings: [`sensor`], [`sensor_dynamics`].
 //!
-//! Where the engine has the same physics (damping, dry friction and rotor inertia of a joint, friction
+//! Where the engine has the same physics (damping and rotor inertia of a joint, friction
 //! and softness of contacts, masses, gravity) an effect changes the engine's own parameter, which is
 //! integrated as stably as the engine can; the rest are forces and commands, step by step. A change of
 //! a parameter scales or adds to the value that the simulation has, so that it composes with a study
@@ -18,6 +18,7 @@ pub mod compliance;
 pub mod contact_friction;
 pub mod contact_softness;
 pub mod delay;
+mod dry;
 pub mod friction_field;
 pub mod gravity;
 pub mod joint_force;

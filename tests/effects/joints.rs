@@ -4,10 +4,9 @@ use super::bench::{Bench, engines_for, near, on_each};
 use super::{DT, INERTIA, ROTOR};
 
 #[test]
-fn viscous_and_dry_friction_are_those_of_the_engine() {
+fn viscous_friction_and_rotors_are_those_of_the_engine() {
     for (effect, attribute) in [
         ("viscous-friction@spin:damping=0.8", r#"damping="0.8""#),
-        ("coulomb-friction@spin:force=0.4", r#"frictionloss="0.4""#),
         ("armature@spin:inertia=0.2", r#"armature="0.2""#),
     ] {
         let native = ROTOR.replace(
@@ -45,7 +44,7 @@ fn coulomb_friction_stops_a_rotor_in_time_and_holds_it() {
     let (force, offset) = (0.4, 0.1);
     on_each(
         ROTOR,
-        &["coulomb-friction@spin:force=0.4,offset=0.1"],
+        &["coulomb-friction@spin:force=0.4,offset=0.1,creep=0.001"],
         |bench| {
             for direction in [1.0, -1.0] {
                 let against = force + direction * offset;
