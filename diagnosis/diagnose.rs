@@ -29,6 +29,24 @@ pub struct Settings {
     pub breadth: Breadth,
 }
 
+/// What a diagnosis has worked with, for what comes after it.
+pub struct Work {
+    /// Machine and logs.
+    pub bench: Bench,
+    /// Effects at their sites.
+    pub candidates: Vec<Candidate>,
+    /// Those that could not be tried.
+    pub left_out: Vec<LeftOut>,
+    /// What the search found.
+    pub findings: Findings,
+    /// Fits without any effect, one a stage.
+    pub none: Vec<Explanation>,
+    /// What was made of it.
+    pub judgement: Judgement,
+    /// Values of the study's parameters in the model as given.
+    pub nominal: Vec<f64>,
+}
+
 /// A finished diagnosis.
 pub struct Diagnosis {
     /// `result.json`.
@@ -61,7 +79,7 @@ pub fn diagnose(
     machine: Machine,
     settings: Settings,
     progress: &dyn Progress,
-) -> Result<Diagnosis> {
+) -> Result<(Diagnosis, Work)> {
     let streams = Streams::new(settings.seed);
     progress.begin("fitting the study's parameters", 1);
     let Prepared {
@@ -91,17 +109,29 @@ pub fn diagnose(
     let findings = final_noise(&mut bench, study, &candidates, findings)?;
     let scatter = cost_scatter(&bench, &findings.none)?;
     let judgement = judge(&bench, &findings, candidates.len(), scatter);
-    Telling {
+    let work = Work {
+        bench,
+        candidates,
+        left_out,
+        findings,
+        none,
+        judgement,
+        nominal,
+    };
+    progress.begin("telling", 1);
+    let diagnosis = Telling {
         study,
-        bench: &bench,
-        candidates: &candidates,
-        left_out: &left_out,
-        findings: &findings,
-        judgement: &judgement,
-        nominal: &nominal,
+        bench: &work.bench,
+        candidates: &work.candidates,
+        left_out: &work.left_out,
+        findings: &work.findings,
+        judgement: &work.judgement,
+        nominal: &work.nominal,
         settings,
     }
-    .tell()
+    .tell()?;
+    progress.end();
+    Ok((diagnosis, work))
 }
 
 /// Takes the noise from the residuals of the best explanation, which hide least of it, and

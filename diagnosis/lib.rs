@@ -22,6 +22,7 @@ pub mod prepare;
 pub mod refined_model;
 pub mod result;
 pub mod roughness;
+pub mod score;
 pub mod screen;
 pub mod search;
 pub mod sentence;

@@ -4,7 +4,11 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use asid_core::parameter::Scale;
-use asid_core::{EffectSpec, Episode, Error, Layout, Parameter, Plant, Result, Scene, Target};
+use asid_core::episode::InitialState;
+use asid_core::problem::home;
+use asid_core::{
+    EffectSpec, Episode, Error, Layout, Parameter, Plant, Result, Scene, Target, Task,
+};
 use serde::Deserialize;
 
 use crate::refined_model::RefinedModel;
@@ -144,6 +148,41 @@ impl Study {
         .with_test()
     }
 
+    /// A built-in task as a study: its scene and unknowns, the noise of its trackers. The
+    /// machine begins where the scene's first keyframe has it; where the object begins is
+    /// estimated.
+    ///
+    /// # Errors
+    /// When a log is wrong, or there is none to hold out.
+    pub fn of_task(task: &dyn Task, train: &[PathBuf], test: &[PathBuf]) -> Result<Self> {
+        let scene = task.scene().clone();
+        let layout = Plant::of(&scene)?.layout;
+        let start = task_start(task, &layout)?;
+        let read = |files: &[PathBuf]| -> Result<Vec<(String, Episode)>> {
+            files
+                .iter()
+                .map(|file| {
+                    let mut episode = Episode::read_csv(file, &layout)?;
+                    episode.initial.get_or_insert_with(|| start.clone());
+                    Ok((file.display().to_string(), episode))
+                })
+                .collect()
+        };
+        let signals = &task.exploration().signals;
+        Self {
+            name: task.name().to_owned(),
+            model: PathBuf::from(scene.name()),
+            fixed: Vec::new(),
+            effects: Vec::new(),
+            parameters: task.parameters(),
+            train: read(train)?,
+            test: read(test)?,
+            noise: signals.iter().map(|s| (s.sensor.clone(), s.noise)).collect(),
+            scene,
+        }
+        .with_test()
+    }
+
     /// Holds out whole episodes where the study names no test logs: a third of them, the last.
     ///
     /// # Errors
@@ -165,6 +204,27 @@ impl Study {
         }
         Ok(self)
     }
+}
+
+/// The scene's first keyframe, with what a start pose of the object changes left open.
+fn task_start(task: &dyn Task, layout: &Layout) -> Result<InitialState> {
+    let (home, qvel) = home(layout);
+    let coordinates = &task.exploration().start;
+    let place = |u: f64| -> Result<Vec<f64>> {
+        let start: Vec<f64> = coordinates.iter().map(|c| c.at(u)).collect();
+        let mut qpos = home.clone();
+        task.place(layout, &start, &mut qpos)?;
+        Ok(qpos)
+    };
+    let (low, high) = (place(0.2)?, place(0.9)?);
+    let mut qpos = home;
+    for joint in &layout.joints {
+        let places = joint.qpos..joint.qpos + joint.kind.qpos_len();
+        if low[places.clone()] != high[places.clone()] {
+            qpos[places].fill(f64::NAN);
+        }
+    }
+    Ok(InitialState { qpos, qvel })
 }
 
 fn one_line(error: &toml::de::Error) -> String {

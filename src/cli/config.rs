@@ -12,7 +12,8 @@ use serde::Serialize;
 use super::options::{Algorithms, Common, Real};
 use super::plugins::{file_of, used};
 use component::{Component, component};
-use table::{check_keys, numbers, read_table, section, set, text, wrong};
+use table::{check_keys, numbers, section, text, wrong};
+pub use table::{read_table, set};
 use unknowns::{ParameterConfig, noise, unknowns};
 
 mod component;

@@ -69,6 +69,11 @@ pub fn warn(text: &str) {
     tell(&format!("warning: {}", one_line(text)));
 }
 
+/// A line on standard error that is no warning.
+pub fn note(text: &str) {
+    tell(&one_line(text));
+}
+
 /// Runs `work`; a panic in it, which is a defect of this program or of a plugin, ends as one line.
 ///
 /// Engines catch panics of their own and report them as a simulation's status, so

@@ -3,6 +3,7 @@
 mod compare;
 mod config;
 mod conformance;
+mod diagnose;
 mod doctor;
 mod explore;
 mod export;
@@ -21,6 +22,7 @@ mod session;
 mod solve;
 mod stage;
 mod trace;
+mod withheld;
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -58,6 +60,10 @@ enum Command {
     Compare(compare::Arguments),
     /// Every check against every engine: theory, and the contract of a backend
     Conformance(conformance::Arguments),
+    /// Where the sim-to-real gap lies, which effect causes it, how far it shrinks
+    Diagnose(diagnose::Arguments),
+    /// Diagnoses of cases whose effect is withheld, scored
+    Withheld(withheld::Arguments),
     /// A task's scene as MJCF
     Export(export::Arguments),
     /// A folder that a plugin starts from
@@ -75,6 +81,8 @@ impl Command {
             Self::Identify(a) => &a.common,
             Self::Solve(a) => &a.common,
             Self::Compare(a) => &a.common,
+            Self::Diagnose(a) => &a.common,
+            Self::Withheld(a) => &a.common,
             Self::Conformance(a) => return a.config.as_deref(),
             Self::List(_) | Self::Doctor(_) | Self::Export(_) | Self::New(_) | Self::Report(_) => {
                 return None;
@@ -141,6 +149,8 @@ fn run_command(cli: &Cli, mut named: Vec<PathBuf>) -> Result<()> {
         Command::Solve(arguments) => solve::solve(arguments),
         Command::Compare(arguments) => compare::compare(arguments),
         Command::Conformance(arguments) => conformance::conformance(arguments),
+        Command::Diagnose(arguments) => diagnose::diagnose(arguments),
+        Command::Withheld(arguments) => withheld::withheld(arguments),
         Command::Export(arguments) => export::export(arguments),
         Command::New(arguments) => new::new(arguments),
         Command::Report(arguments) => report::report(arguments),

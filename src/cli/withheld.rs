@@ -1,0 +1,142 @@
+//! `asid withheld`: diagnoses of cases whose effect is withheld, scored.
+//!
+//! The labels are read only when every diagnosis is done, and by this command alone.
+
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use anyhow::Result;
+use asid_core::Error;
+use asid_core::progress::Silent;
+use asid_diagnosis::diagnose::{Settings, diagnose};
+use asid_diagnosis::score::{Answer, Label, Score, read_labels, same_physics};
+use asid_diagnosis::study::Study;
+
+use super::diagnose::{default_backend, machine};
+use super::failure;
+use super::options::Common;
+use super::output::{OutFolder, write_json};
+use super::progress::Bars;
+use asid_core::Progress as _;
+
+/// Arguments of `withheld`.
+#[derive(clap::Args)]
+#[command(after_help = "\
+The folder holds one study a case, and labels.json, which is read once all diagnoses are done. The result has \
+a line a case, the confusion matrix and the figures of docs/diagnosis.md.")]
+pub struct Arguments {
+    /// Folder of the cases
+    #[arg(long, value_name = "DIR")]
+    cases: PathBuf,
+    /// Some of the cases only (repeatable)
+    #[arg(long, value_name = "NAME")]
+    case: Vec<String>,
+    /// The time step of every model, divided by this
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    finer: u32,
+    #[command(flatten)]
+    pub common: Common,
+}
+
+/// Folders with a study, sorted.
+fn cases(folder: &Path, only: &[String]) -> Result<Vec<PathBuf>> {
+    let fail = |message: String| Error::File {
+        path: folder.to_owned(),
+        message,
+    };
+    let entries = std::fs::read_dir(folder).map_err(|e| fail(e.to_string()))?;
+    let mut found: Vec<PathBuf> = entries
+        .filter_map(|e| Some(e.ok()?.path()))
+        .filter(|p| p.join("study.toml").is_file())
+        .filter(|p| only.is_empty() || only.contains(&name(p)))
+        .collect();
+    found.sort();
+    if found.is_empty() {
+        return Err(fail("holds no folder with a study.toml".into()).into());
+    }
+    Ok(found)
+}
+
+fn name(path: &Path) -> String {
+    path.file_name()
+        .map_or_else(String::new, |n| n.to_string_lossy().into_owned())
+}
+
+/// Diagnoses all cases and scores them.
+pub fn withheld(arguments: &Arguments) -> Result<()> {
+    let common = &arguments.common;
+    let folders = cases(&arguments.cases, &arguments.case)?;
+    let engine = common.backend.clone().unwrap_or_else(default_backend);
+    let out = common
+        .out
+        .as_deref()
+        .map(|path| OutFolder::claim(Some(path), "withheld"))
+        .transpose()?;
+    let settings = Settings {
+        seed: common.seed.unwrap_or(0),
+        ..Settings::default()
+    };
+    let bars = Bars::new(common.quiet);
+    let mut done = Vec::with_capacity(folders.len());
+    bars.begin("cases", folders.len() as u64);
+    for folder in &folders {
+        let clock = Instant::now();
+        let mut study = Study::read(folder)?;
+        if arguments.finer > 1 {
+            let step = asid_core::Plant::of(&study.scene)?.layout.timestep;
+            study.scene = study
+                .scene
+                .with_timestep(step / f64::from(arguments.finer))?;
+        }
+        let machine = machine(&study, &engine, common.threads.unwrap_or(0))?;
+        let (diagnosis, work) = diagnose(&study, machine, settings, &Silent)?;
+        let seconds = clock.elapsed().as_secs_f64();
+        failure::note(&format!(
+            "{}: {seconds:.1} s: {}",
+            study.name, diagnosis.result.sentence
+        ));
+        done.push((study, diagnosis, work, seconds));
+        bars.advance(1);
+    }
+    bars.end();
+    // Everything is decided; now the labels.
+    let labels = read_labels(&arguments.cases.join("labels.json"))?;
+    let mut answers = Vec::new();
+    for (study, diagnosis, work, seconds) in &done {
+        let label: &Label = labels.get(&study.name).ok_or_else(|| Error::File {
+            path: arguments.cases.join("labels.json"),
+            message: format!("has no label of `{}`", study.name),
+        })?;
+        let class = same_physics(work, &diagnosis.result, label)?;
+        answers.push(Answer::new(
+            &study.name,
+            &diagnosis.result,
+            label,
+            class,
+            *seconds,
+        ));
+    }
+    let score = Score::of(answers);
+    if let Some(out) = &out {
+        out.write(|folder| {
+            write_json(&folder.join("result.json"), &score)?;
+            for (study, diagnosis, _, _) in &done {
+                write_json(
+                    &folder.join(format!("{}.json", study.name)),
+                    &diagnosis.result,
+                )?;
+            }
+            Ok(())
+        })?;
+    }
+    let mut stdout = std::io::stdout().lock();
+    if common.json {
+        writeln!(stdout, "{}", serde_json::to_string_pretty(&score)?)?;
+    } else {
+        for line in score.lines() {
+            writeln!(stdout, "{line}")?;
+        }
+    }
+    Ok(())
+}
