@@ -83,12 +83,19 @@ impl Candidate {
 }
 
 /// All effects at all sites that the engine can give the scene, but for those that the
-/// model has already.
+/// model has already, and those named in `without`.
 #[must_use]
-pub fn enumerate(machine: &Machine, shown: &Trajectory) -> (Vec<Candidate>, Vec<LeftOut>) {
+pub fn enumerate(
+    machine: &Machine,
+    shown: &Trajectory,
+    without: &[String],
+) -> (Vec<Candidate>, Vec<LeftOut>) {
     let plant = &machine.plant;
     let (mut found, mut left_out) = (Vec::new(), Vec::new());
     for entry in all::<EffectEntry>() {
+        if without.iter().any(|name| name == entry.name) {
+            continue;
+        }
         let sites = (entry.make)().sites(plant);
         for site in sites {
             let effect = (entry.make)();

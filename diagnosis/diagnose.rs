@@ -21,12 +21,14 @@ use crate::trajectory::Trajectory;
 use crate::verdict::{Judgement, judge};
 
 /// Settings of a diagnosis.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct Settings {
     /// Seed of all chance.
     pub seed: u64,
     /// How widely to search.
     pub breadth: Breadth,
+    /// Effects of the catalogue that are left out, by name.
+    pub without: Vec<String>,
 }
 
 /// What a diagnosis has worked with, for what comes after it.
@@ -98,7 +100,7 @@ pub fn diagnose(
         &last.fit.point,
         bench.machine.threads,
     )?;
-    let (candidates, left_out) = enumerate(&bench.machine, &shown);
+    let (candidates, left_out) = enumerate(&bench.machine, &shown, &settings.without);
     let findings = Search {
         bench: &bench,
         candidates: &candidates,
@@ -525,6 +527,7 @@ impl Telling<'_> {
             checks::units(bench, none)?,
         ];
         all.extend(checks::identifiability(&bench.parameters, none));
+        all.push(checks::repeatability(bench));
         if let Ok(halved) = bench.machine.halved() {
             all.push(checks::time_step(bench, none, &halved)?);
         }
@@ -538,7 +541,12 @@ impl Telling<'_> {
             .ambiguous
             .first()
             .copied()
-            .or_else(|| (0..j.hypotheses.len()).find(|&i| i != j.best));
+            .or_else(|| {
+                let rivals = || (0..j.hypotheses.len()).filter(|&i| i != j.best);
+                rivals()
+                    .find(|&i| !j.hypotheses[i].labels.is_empty())
+                    .or_else(|| rivals().next())
+            });
         let Some(rival) = rival else {
             return Ok(NextExperiment::default());
         };

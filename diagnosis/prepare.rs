@@ -24,6 +24,9 @@ const SHARES: [f64; 4] = [0.1, 0.3, 0.6, 1.0];
 const NEAR: f64 = 30.0;
 /// Root mean square from which on a gap is seen.
 const SEEN: f64 = 1.5;
+/// Deviation of the integrator's error in units of what half the time step changes: an
+/// integrator of first order is still as far off again.
+const INTEGRATOR: f64 = 3.0;
 /// Share of a held-out episode that an open start is fitted on.
 const HEAD: f64 = 0.1;
 /// Values of each parameter that are looked at before the first fit.
@@ -340,7 +343,7 @@ impl Scatter<'_> {
             for (e, directions) in all.iter_mut().enumerate() {
                 let range = record.logs.offset(e)..record.logs.offset(e + 1);
                 let pairs = here[0][range.clone()].iter().zip(&there[0][range]);
-                let change: Vec<f64> = pairs.map(|(a, b)| a - b).collect();
+                let change: Vec<f64> = pairs.map(|(a, b)| INTEGRATOR * (a - b)).collect();
                 if change.iter().all(|x| x.is_finite()) {
                     directions.push(change);
                 }

@@ -75,6 +75,13 @@ impl Whitening {
         }
     }
 
+    /// Sum of the variances of all directions, in units of the noise.
+    #[must_use]
+    pub fn variance(&self) -> f64 {
+        let variance = |s: &f64| (1.0 - s).powi(-2) - 1.0;
+        self.shrink.iter().map(variance).sum()
+    }
+
     /// Number of directions in which predictions scatter.
     #[must_use]
     pub fn rank(&self) -> usize {

@@ -36,6 +36,8 @@ pub struct Nuisance {
     basis: Vec<Vec<f64>>,
     /// For each basis vector its coordinates in the parameters.
     combination: Vec<Vec<f64>>,
+    /// Number of parameters.
+    parameters: usize,
 }
 
 fn dot(a: &[f64], b: &[f64]) -> f64 {
@@ -80,6 +82,7 @@ impl Nuisance {
             starts,
             basis: Vec::new(),
             combination: Vec::new(),
+            parameters: columns.len(),
         };
         for (i, column) in columns.iter().enumerate() {
             let mut v = column.clone();
@@ -116,7 +119,7 @@ impl Nuisance {
     /// Takes out what the nuisance parameters can do; returns how much each parameter does.
     pub fn project(&self, v: &mut [f64]) -> Vec<f64> {
         self.project_starts(v);
-        let mut amounts = vec![0.0; self.combination.first().map_or(0, Vec::len)];
+        let mut amounts = vec![0.0; self.parameters];
         for (b, c) in self.basis.iter().zip(&self.combination) {
             let amount = take_out(v, b);
             for (x, y) in amounts.iter_mut().zip(c) {

@@ -40,10 +40,17 @@ pub fn sentence(result: &DiagnosisResult, labels: &[String]) -> String {
         _ => "what there is of it".into(),
     };
     let body = match result.verdict.kind {
-        Kind::None => format!(
-            "No gap beyond the sensors' noise is left once the study's parameters are fitted (gap {:.2} on the logs held out).",
-            result.gap.identified
-        ),
+        Kind::None => {
+            let scatter = if result.gap.identified > 1.2 {
+                ", all of it within what the simulation itself cannot repeat: see the check `repeatability`"
+            } else {
+                ""
+            };
+            format!(
+                "No gap is left beyond the sensors' noise and what nobody can repeat, once the study's parameters are fitted (gap {:.2} on the logs held out{scatter}).",
+                result.gap.identified
+            )
+        }
         Kind::Effects => {
             let ambiguous = if result.verdict.ambiguous_with.is_empty() {
                 String::new()

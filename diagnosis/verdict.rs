@@ -90,6 +90,26 @@ fn size(bench: &Bench, explanation: &Explanation) -> usize {
         .count()
 }
 
+/// Whether a set is another one with one effect replaced by a refinement of it.
+fn refines(findings: &Findings, set: &Hypothesis, simpler: &Hypothesis) -> bool {
+    let (Some(a), Some(b)) = (set.found, simpler.found) else {
+        return false;
+    };
+    let effects = |i: usize| &findings.found[i].explanation.effects;
+    let mut differ = effects(a)
+        .iter()
+        .filter(|x| !effects(b).iter().any(|y| y.label() == x.label()));
+    let (Some(fine), None) = (differ.next(), differ.next()) else {
+        return false;
+    };
+    let entry = asid_core::registry::find::<asid_core::registry::EffectEntry>(&fine.name);
+    let coarse: &[&str] = entry.map_or(&[], |e| (e.make)().refines());
+    set.labels.len() == simpler.labels.len()
+        && effects(b)
+            .iter()
+            .any(|y| coarse.contains(&&*y.name) && y.site == fine.site)
+}
+
 /// Whether a set is another one with something added that does nothing, or all of it and more.
 fn contains(larger: &Found, smaller: &[String]) -> bool {
     let labels = larger.explanation.labels();
@@ -160,12 +180,22 @@ pub fn judge(bench: &Bench, findings: &Findings, candidates: usize, scatter: f64
         h.cost / temperature + h.size as f64 * readings.ln() + choice + further
     };
     let gap = |h: &Hypothesis| excess(h.cost / readings);
+    // A refinement that hardly betters the simpler effect is no answer of its own.
+    let idle: Vec<bool> = all
+        .iter()
+        .map(|h| {
+            all.iter().any(|simpler| {
+                refines(findings, h, simpler)
+                    && !(gap(simpler) > NEGLIGIBLE && gap(h) < WORTH * gap(simpler))
+            })
+        })
+        .collect();
     // The simplest set that no larger one betters by enough.
     let mut best = 0;
     let most = all.iter().map(|h| h.labels.len()).max().unwrap_or(0);
     for count in 1..=most {
         let next = (0..all.len())
-            .filter(|&i| all[i].labels.len() == count)
+            .filter(|&i| all[i].labels.len() == count && !idle[i])
             .min_by(|&a, &b| score(&all[a]).total_cmp(&score(&all[b])));
         let Some(next) = next else { continue };
         let (before, after) = (&all[best], &all[next]);
@@ -181,11 +211,8 @@ pub fn judge(bench: &Bench, findings: &Findings, candidates: usize, scatter: f64
         let mut worse = score(&all[i]) - base;
         // What the rule of parsimony passes over is not more probable than what it picks.
         if i != best {
-            worse = worse.max(if all[i].labels.len() > all[best].labels.len() {
-                2.0
-            } else {
-                0.0
-            });
+            let passed_over = all[i].labels.len() > all[best].labels.len() || idle[i];
+            worse = worse.max(if passed_over { 4.0 } else { 0.0 });
         }
         all[i].probability = (-0.5 * worse).exp();
     }
@@ -209,6 +236,7 @@ pub fn judge(bench: &Bench, findings: &Findings, candidates: usize, scatter: f64
             };
             i != best
                 && best != 0
+                && !idle[i]
                 && !contains(found, &all[best].labels)
                 && all[i].labels.len() <= all[best].labels.len()
                 && (all[i].cost - all[best].cost) / temperature < APART

@@ -198,6 +198,10 @@ impl Effect for Stribeck {
         Acts::Force
     }
 
+    fn refines(&self) -> &'static [&'static str] {
+        &["coulomb-friction"]
+    }
+
     fn parameters(&self) -> &'static [EffectParameter] {
         const {
             &[

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use anyhow::Result;
-use asid_core::registry::{self, BackendEntry, TaskEntry, find};
+use asid_core::registry::{self, BackendEntry, EffectEntry, TaskEntry, find};
 use asid_core::{Backend, Capabilities, Error, Target};
 use asid_diagnosis::diagnose::{Diagnosis, Settings, diagnose as diagnose_study};
 use asid_diagnosis::machine::Machine;
@@ -43,6 +43,9 @@ pub struct Arguments {
     /// Logs of the task held out
     #[arg(long, value_name = "FILE", num_args = 1.., requires = "task")]
     test: Vec<PathBuf>,
+    /// An effect of the catalogue that is not to be tried (repeatable)
+    #[arg(long, value_name = "EFFECT")]
+    without: Vec<String>,
     #[command(flatten)]
     pub common: Common,
 }
@@ -63,6 +66,8 @@ struct Config {
     backend: String,
     #[serde(default)]
     seed: u64,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    without: Vec<String>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     plugins: Vec<PathBuf>,
     #[serde(default)]
@@ -120,6 +125,10 @@ impl Config {
             config.backend.clone_from(name);
         }
         config.seed = common.seed.unwrap_or(config.seed);
+        config.without.extend(arguments.without.iter().cloned());
+        for name in &config.without {
+            find::<EffectEntry>(name)?;
+        }
         let SearchConfig {
             first, last, depth, ..
         } = config.search;
@@ -144,6 +153,7 @@ impl Config {
                 beam,
                 depth,
             },
+            without: self.without.clone(),
         }
     }
 

@@ -32,6 +32,9 @@ pub struct Arguments {
     /// Some of the cases only (repeatable)
     #[arg(long, value_name = "NAME")]
     case: Vec<String>,
+    /// An effect of the catalogue that is not to be tried (repeatable)
+    #[arg(long, value_name = "EFFECT")]
+    without: Vec<String>,
     /// The time step of every model, divided by this
     #[arg(long, value_name = "N", default_value_t = 1)]
     finer: u32,
@@ -75,6 +78,7 @@ pub fn withheld(arguments: &Arguments) -> Result<()> {
         .transpose()?;
     let settings = Settings {
         seed: common.seed.unwrap_or(0),
+        without: arguments.without.clone(),
         ..Settings::default()
     };
     let bars = Bars::new(common.quiet);
@@ -90,7 +94,7 @@ pub fn withheld(arguments: &Arguments) -> Result<()> {
                 .with_timestep(step / f64::from(arguments.finer))?;
         }
         let machine = machine(&study, &engine, common.threads.unwrap_or(0))?;
-        let (diagnosis, work) = diagnose(&study, machine, settings, &Silent)?;
+        let (diagnosis, work) = diagnose(&study, machine, settings.clone(), &Silent)?;
         let seconds = clock.elapsed().as_secs_f64();
         failure::note(&format!(
             "{}: {seconds:.1} s: {}",

@@ -153,6 +153,11 @@ pub trait Effect: Send + Sync {
     fn steps(&self) -> bool {
         matches!(self.acts(), Acts::Command | Acts::Force)
     }
+    /// Names of effects that it is a refinement of: with some of its parameters at their null
+    /// values it is one of them. The simpler one is preferred unless that leaves much more.
+    fn refines(&self) -> &'static [&'static str] {
+        &[]
+    }
     /// What an engine must be able to do for it, besides setting its targets and, where it
     /// [steps](Effect::steps), calling hooks.
     fn needs(&self) -> Capabilities {

@@ -147,6 +147,10 @@ impl Effect for Across<Box<dyn Effect>> {
         self.run(|effect| effect.steps())
     }
 
+    fn refines(&self) -> &'static [&'static str] {
+        self.run(|effect| effect.refines())
+    }
+
     fn needs(&self) -> Capabilities {
         self.run(|effect| effect.needs())
     }

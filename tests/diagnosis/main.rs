@@ -1,0 +1,139 @@
+//! Diagnoses of a machine whose fault is known to the test alone, and how they fail when
+//! they should.
+
+#![allow(clippy::unwrap_used)]
+
+mod world;
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::Arc;
+
+use asid::core::progress::Silent;
+use asid::core::registry::{BackendEntry, all};
+use asid::core::{Backend, Capabilities};
+use asid::diagnosis::diagnose::{Diagnosis, Settings, Work, diagnose};
+use asid::diagnosis::machine::Machine;
+use asid::diagnosis::result::Kind;
+use asid::diagnosis::score::{Answer, Label, Score};
+use asid::diagnosis::study::Study;
+use world::{MASS, Truth, write_study};
+
+/// The engine that diagnoses by default: in double precision where one is built in.
+fn engine() -> Arc<dyn Backend> {
+    let made: Vec<Box<dyn Backend>> = all::<BackendEntry>()
+        .into_iter()
+        .map(|e| (e.make)().unwrap())
+        .collect();
+    let double = |b: &Box<dyn Backend>| b.capabilities().contains(Capabilities::DOUBLE_PRECISION);
+    let at = made.iter().position(double).unwrap_or(0);
+    made.into_iter().nth(at).unwrap().into()
+}
+
+fn run(truth: Truth, without: &[&str]) -> (Diagnosis, Work) {
+    let folder = tempfile::tempdir().unwrap();
+    write_study(folder.path(), truth);
+    run_on(folder.path(), without)
+}
+
+fn run_on(folder: &Path, without: &[&str]) -> (Diagnosis, Work) {
+    let study = Study::read(folder).unwrap();
+    let (fixed, effects) = (&study.fixed, &study.effects);
+    let machine = Machine::new(engine(), &study.scene, fixed, effects, 0).unwrap();
+    let settings = Settings {
+        without: without.iter().map(|s| (*s).to_owned()).collect(),
+        ..Settings::default()
+    };
+    diagnose(&study, machine, settings, &Silent).unwrap()
+}
+
+/// Cases with the labels that a scorer would have.
+const CASES: [(Truth, &[&str]); 4] = [
+    (Truth::None, &[]),
+    (Truth::Coulomb(1.2), &["coulomb-friction@rail"]),
+    (Truth::Delay(0.03), &["actuator-delay@belt"]),
+    (Truth::SensorBias(0.02), &["sensor-bias@x"]),
+];
+
+fn label(effects: &[&str]) -> Label {
+    Label {
+        world: "cart".into(),
+        effects: effects.iter().map(|s| (*s).to_owned()).collect(),
+        parameters: BTreeMap::from([("mass".to_owned(), MASS)]),
+    }
+}
+
+#[test]
+fn faults_are_named_and_closed_and_shuffled_labels_score_nothing() {
+    let done: Vec<_> = CASES.iter().map(|(truth, _)| run(*truth, &[]).0).collect();
+    for (diagnosis, (truth, effects)) in done.iter().zip(CASES) {
+        let r = &diagnosis.result;
+        let said = r.verdict.effects.iter().map(String::as_str);
+        assert!(said.eq(effects.iter().copied()), "{truth:?}: {}", r.sentence);
+        assert!(r.gap.refined < 1.6, "{truth:?}: {:?}", r.gap);
+        if !effects.is_empty() {
+            assert!(r.gap.closed.unwrap() > 0.95, "{truth:?}: {:?}", r.gap);
+        }
+        let error = (r.parameters[0].estimate / MASS - 1.0).abs();
+        assert!(error < 0.05, "{truth:?}: mass off by {error}");
+        let sum: f64 = r.hypotheses.iter().map(|h| h.probability).sum();
+        assert!((sum - 1.0).abs() < 1e-9, "probabilities sum to {sum}");
+        let shares: f64 = r.places.iter().map(|w| w.share).sum();
+        assert!((shares - 1.0).abs() < 1e-9 || r.places.is_empty());
+    }
+    let score = |shift: usize| {
+        let answers = done.iter().enumerate().map(|(i, d)| {
+            let (_, effects) = CASES[(i + shift) % CASES.len()];
+            Answer::new("case", &d.result, &label(effects), false, 0.0)
+        });
+        Score::of(answers.collect())
+    };
+    assert_eq!(score(0).right, CASES.len());
+    // Every label is another case's: nothing can be right.
+    let shuffled = score(1);
+    assert_eq!(shuffled.right, 0);
+    assert!(shuffled.log_score < shuffled.base_log_score);
+    assert!(shuffled.brier > 0.5, "{}", shuffled.brier);
+}
+
+#[test]
+fn with_the_right_effect_out_of_the_catalogue_its_name_is_not_given() {
+    // Nothing else in the catalogue is a spring, and what comes nearest leaves a gap.
+    let (diagnosis, _) = run(Truth::Spring(15.0), &["joint-stiffness"]);
+    let r = &diagnosis.result;
+    assert!(!r.verdict.effects.contains(&"joint-stiffness@rail".to_owned()));
+    assert!(r.gap.refined > 2.0, "{:?}", r.gap);
+    let (with, _) = run(Truth::Spring(15.0), &[]);
+    assert_eq!(with.result.verdict.effects, ["joint-stiffness@rail"]);
+}
+
+#[test]
+fn an_effect_of_no_catalogue_is_unknown() {
+    let (diagnosis, _) = run(Truth::Magnet(3.0), &[]);
+    assert_eq!(diagnosis.result.verdict.kind, Kind::Unknown, "{}", diagnosis.result.sentence);
+}
+
+#[test]
+fn noise_in_place_of_logs_is_no_effect() {
+    // Commands and readings of a machine that does not move: nothing is to be found, and
+    // the check of the excitation says why.
+    let (diagnosis, _) = run(Truth::Noise, &[]);
+    let r = &diagnosis.result;
+    assert_eq!(r.verdict.kind, Kind::None, "{}", r.sentence);
+    let excitation = r.checks.iter().find(|c| c.check == "excitation").unwrap();
+    assert!(!excitation.ok, "{}", excitation.detail);
+}
+
+#[test]
+fn the_same_study_gives_the_same_result_at_any_number_of_threads() {
+    let folder = tempfile::tempdir().unwrap();
+    write_study(folder.path(), Truth::Coulomb(0.8));
+    let study = Study::read(folder.path()).unwrap();
+    let results = [1, 2].map(|threads| {
+        let (fixed, effects) = (&study.fixed, &study.effects);
+        let machine = Machine::new(engine(), &study.scene, fixed, effects, threads).unwrap();
+        let settings = Settings::default();
+        diagnose(&study, machine, settings, &Silent).unwrap().0.result
+    });
+    assert_eq!(results[0], results[1]);
+}

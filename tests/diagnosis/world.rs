@@ -1,0 +1,129 @@
+//! A cart on a rail, integrated by hand: another program than any engine here.
+//!
+//! `m x'' = u - b x' + f(x, x', t)` by Runge and Kutta's method at a tenth of a
+//! millisecond, so that a diagnosis on these logs is no inverse crime.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use rand::{Rng as _, SeedableRng as _};
+use rand_chacha::ChaCha8Rng;
+
+/// The model as its owner has it: 1 kg where the cart has another mass, and no effect.
+pub const NOMINAL: &str = r#"<mujoco model="cart"><option timestep="0.002" integrator="implicitfast" gravity="0 0 0"/>
+  <worldbody><body name="cart"><joint name="rail" type="slide" axis="1 0 0" damping="2"/>
+    <geom name="cart" type="box" size="0.05 0.05 0.05" mass="1"/></body></worldbody>
+  <actuator><motor name="belt" joint="rail" ctrlrange="-20 20"/></actuator>
+  <sensor><jointpos name="x" joint="rail"/><jointvel name="dx" joint="rail"/></sensor></mujoco>
+"#;
+
+/// What the real cart has that the model lacks.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Truth {
+    /// Nothing.
+    None,
+    /// Dry friction, N, smoothed over 5 mm/s.
+    Coulomb(f64),
+    /// A spring, N/m.
+    Spring(f64),
+    /// The command comes later, s.
+    Delay(f64),
+    /// The position is read too large, m.
+    SensorBias(f64),
+    /// A magnet at 0.05 m, N: in no catalogue.
+    Magnet(f64),
+    /// There are no readings but noise.
+    Noise,
+}
+
+/// Mass of the real cart, kg.
+pub const MASS: f64 = 1.3;
+const DAMPING: f64 = 2.0;
+const SECONDS: f64 = 2.4;
+/// Deviations of the noise, m and m/s.
+const NOISE: [f64; 2] = [5e-4, 5e-3];
+
+/// A command of a few sines, different for each episode, N.
+fn command(episode: usize, t: f64) -> f64 {
+    let k = episode as f64;
+    let phase = 1.7 * k;
+    4.0 * ((2.5 + 0.6 * k) * t + phase).sin() + 2.5 * ((6.0 + 0.5 * k) * t).sin()
+}
+
+/// The force of what the model lacks.
+fn extra(truth: Truth, x: f64, v: f64) -> f64 {
+    match truth {
+        Truth::Coulomb(force) => -force * (v / 5e-3).tanh(),
+        Truth::Spring(k) => -k * x,
+        Truth::Magnet(force) => {
+            let s = (x - 0.05) / 0.04;
+            -force * s * (-0.5 * s * s).exp()
+        }
+        _ => 0.0,
+    }
+}
+
+/// The command that arrives: held for 10 ms, and later by the delay.
+fn arriving(truth: Truth, episode: usize, t: f64) -> f64 {
+    let late = if let Truth::Delay(tau) = truth { tau } else { 0.0 };
+    // Half a step of the integrator off the edge, so that rounding does not matter.
+    let row = ((t - late + 5e-5) / 0.01).floor().max(0.0);
+    command(episode, row * 0.01)
+}
+
+/// One episode as a log.
+pub fn log(truth: Truth, episode: usize) -> String {
+    let mut rng = ChaCha8Rng::seed_from_u64(77 + episode as u64);
+    let mut normal = || -> f64 {
+        // The sum of twelve uniform numbers is normal enough.
+        (0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0
+    };
+    let (mut x, mut v) = (0.0, 0.0);
+    let h = 1e-4;
+    let mut text = "time,ctrl.belt,x,dx,qpos.rail,qvel.rail\n".to_owned();
+    for row in 0..(SECONDS / 0.01) as usize {
+        let time = row as f64 * 0.01;
+        let bias = if let Truth::SensorBias(b) = truth { b } else { 0.0 };
+        let seen = match truth {
+            Truth::Noise => [0.0, 0.0],
+            _ => [x + bias, v],
+        };
+        let readings = [seen[0] + NOISE[0] * normal(), seen[1] + NOISE[1] * normal()];
+        let start = if row == 0 { "0,0" } else { "," };
+        let u = if truth == Truth::Noise { 0.0 } else { command(episode, time) };
+        let _ = writeln!(text, "{time:.3},{u},{},{},{start}", readings[0], readings[1]);
+        for step in 0..100 {
+            let t = time + f64::from(step) * h;
+            let u = arriving(truth, episode, t);
+            let a = |x: f64, v: f64| (u - DAMPING * v + extra(truth, x, v)) / MASS;
+            let (k1, l1) = (v, a(x, v));
+            let (k2, l2) = (v + h / 2.0 * l1, a(x + h / 2.0 * k1, v + h / 2.0 * l1));
+            let (k3, l3) = (v + h / 2.0 * l2, a(x + h / 2.0 * k2, v + h / 2.0 * l2));
+            let (k4, l4) = (v + h * l3, a(x + h * k3, v + h * l3));
+            x += h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4);
+            v += h / 6.0 * (l1 + 2.0 * l2 + 2.0 * l3 + l4);
+        }
+    }
+    text
+}
+
+/// Writes a study of four training and two test episodes.
+pub fn write_study(folder: &Path, truth: Truth) {
+    std::fs::create_dir_all(folder).unwrap();
+    std::fs::write(folder.join("nominal.xml"), NOMINAL).unwrap();
+    for episode in 0..6 {
+        let kind = if episode < 4 { "train" } else { "test" };
+        let name = format!("{kind}_{episode}.csv");
+        std::fs::write(folder.join(name), log(truth, episode)).unwrap();
+    }
+    let study = r#"model = "nominal.xml"
+train = ["train_*.csv"]
+test = ["test_*.csv"]
+[[parameter]]
+name = "mass"
+target = "geom/cart/mass"
+range = [0.4, 3.0]
+unit = "kg"
+"#;
+    std::fs::write(folder.join("study.toml"), study).unwrap();
+}
