@@ -30,8 +30,10 @@ fn spec() -> Spec {
         explored_from: [[0.43, 0.65], [-0.2, 0.2]],
         struck_from: [[0.55, 0.65], [0.03, 0.05]],
         goal: [0.65, -0.40],
+        line: None,
         speed: [0.3, 1.4],
         seconds: 4.5,
         fixtures: walls(),
+        settings: &[],
     }
 }

@@ -6,7 +6,7 @@
 use asid_core::parameter::{Parameter, Scale};
 use asid_core::task::Condition;
 
-use crate::sphere::{Area, Spec, Sphere, rectangle, target, walls};
+use crate::sphere::{Area, Setting, Spec, Sphere, rectangle, target, walls};
 
 /// Name on the command line.
 const NAME: &str = "sphere-patches";
@@ -26,6 +26,23 @@ pub const PATCHES: [Area; 3] = [
     [[0.2, 0.8], [-0.256, 0.056]],
     [[0.2, 0.8], [-0.568, -0.256]],
 ];
+
+/// An episode is three times as long as in the other tasks, so each search simulates fewer of them.
+const SETTINGS: [Setting; 3] = [
+    explorer("hold", 10),
+    explorer("population", 16),
+    explorer("prior_samples", 1),
+];
+
+/// A setting of the explorer that is used where none is named.
+const fn explorer(key: &'static str, value: i64) -> Setting {
+    Setting {
+        section: "explorer",
+        algorithm: "fisher-cem",
+        key,
+        value,
+    }
+}
 
 asid_core::register!(TaskEntry {
     name: NAME,
@@ -66,8 +83,10 @@ fn spec() -> Spec {
         explored_from: [[0.43, 0.65], [0.10, 0.23]],
         struck_from: [[0.55, 0.65], [0.22, 0.24]],
         goal: [0.60, -0.38],
-        speed: [0.15, 0.9],
+        line: Some(-0.46),
+        speed: [0.15, 0.7],
         seconds: 7.0,
         fixtures,
+        settings: &SETTINGS,
     }
 }
