@@ -9,7 +9,7 @@ use std::time::Instant;
 
 use asid::core::progress::Silent;
 use asid::core::real_world::RealEpisode;
-use asid::core::registry::{BackendEntry, TaskEntry, all};
+use asid::core::registry::{BackendEntry, ExplorerEntry, TaskEntry, all};
 use asid::core::rng::Rng;
 use asid::core::sensitivity::check_parameters;
 use asid::core::task::Outcome;
@@ -88,10 +88,23 @@ fn on(task: &dyn Task, parameters: &[Parameter], engine: &BackendEntry) {
         physics_counter: &physics,
         env_counter: &env,
     };
+    settings_are_taken(task);
     for (name, check) in CHECKS {
         println!("{row} {name:16} {}", check(&problem));
     }
     println!("{row} {:.1} s", clock.elapsed().as_secs_f64());
+}
+
+/// What a task sets of an algorithm is a setting of it.
+fn settings_are_taken(task: &dyn Task) {
+    for entry in all::<ExplorerEntry>() {
+        let mut settings = (entry.defaults)();
+        for (key, value) in task.settings("explorer", entry.name) {
+            let before = settings.insert(key.clone(), value);
+            assert!(before.is_some(), "{} has no setting {key}", entry.name);
+        }
+        (entry.make)(&settings).unwrap();
+    }
 }
 
 fn centers(problem: &Problem<'_>) -> Vec<f64> {
