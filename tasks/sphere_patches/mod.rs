@@ -33,7 +33,7 @@ pub const PATCHES: [Area; 3] = [
 const SETTINGS: [Setting; 4] = [
     explorer("hold", 15),
     explorer("iterations", 3),
-    explorer("population", 40),
+    explorer("population", 24),
     explorer("prior_samples", 1),
 ];
 
@@ -83,7 +83,7 @@ fn spec() -> Spec {
             },
         ],
         horizon: 60,
-        explored_from: [[0.43, 0.65], [0.10, 0.23]],
+        explored_from: [[0.43, 0.65], [0.10, 0.19]],
         struck_from: [[0.55, 0.63], [0.22, 0.24]],
         goal: [0.60, -0.38],
         line: Some(-0.46),
