@@ -30,7 +30,7 @@ const BALL_RADIUS: f64 = 0.03;
 const FINGERS: f64 = 0.012;
 
 /// The paddle moves at the height of the ball's middle; a ball fits between it and each wall.
-const STEERING: Steering = Steering {
+pub const STEERING: Steering = Steering {
     max_step: 0.04, // 0.4 m/s
     x: [0.30, 0.70],
     y: [-0.46, 0.26],
@@ -58,6 +58,8 @@ pub struct Spec {
     pub optional: Vec<Parameter>,
     /// Named truths.
     pub conditions: Vec<Condition>,
+    /// Where the hand may go.
+    pub steering: Steering,
     /// Control steps of exploration.
     pub horizon: usize,
     /// Where the ball lies when exploration begins.
@@ -210,7 +212,7 @@ impl Task for Sphere {
     }
 
     fn commander(&self) -> Result<Box<dyn Commander>> {
-        STEERING.commander(&self.scene, &self.home)
+        self.spec.steering.commander(&self.scene, &self.home)
     }
 
     fn attempt(&self, start: &[f64], action: &[f64]) -> Result<Vec<f64>> {

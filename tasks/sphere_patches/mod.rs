@@ -6,7 +6,8 @@
 use asid_core::parameter::{Parameter, Scale};
 use asid_core::task::Condition;
 
-use crate::sphere::{Area, Setting, Spec, Sphere, rectangle, target, walls};
+use crate::sphere::{Area, STEERING, Setting, Spec, Sphere, rectangle, target, walls};
+use crate::steering::Steering;
 
 /// Name on the command line.
 const NAME: &str = "sphere-patches";
@@ -82,9 +83,13 @@ fn spec() -> Spec {
                 truth: (1..=3).map(|p| (unknown(p), [OUT_OF_RANGE; 2])).collect(),
             },
         ],
+        steering: Steering {
+            y: [-0.46, 0.29], // from where the hand begins
+            ..STEERING
+        },
         horizon: 60,
         explored_from: [[0.43, 0.65], [0.10, 0.19]],
-        struck_from: [[0.55, 0.63], [0.22, 0.24]],
+        struck_from: [[0.55, 0.63], [0.21, 0.23]],
         goal: [0.60, -0.38],
         line: Some(-0.46),
         speed: [0.15, 0.7],
