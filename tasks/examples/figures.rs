@@ -53,41 +53,44 @@ fn median(mut values: Vec<f64>) -> f64 {
     }
 }
 
-/// Errors of each unknown, and how often the interval holds the truth.
+/// Errors of each unknown beside what its posterior expects, and how often the interval holds the truth.
 fn unknowns(runs: &[Run]) {
     let of = |run: &Run| run.result["parameters"].as_array().cloned();
     let count = runs.first().and_then(of).map_or(0, |p| p.len());
     for i in 0..count {
         let all: Vec<&Value> = runs.iter().map(|r| &r.result["parameters"][i]).collect();
-        let expected = |r: &Run| number(&r.result["exploration"]["expected_std"][i]);
-        let error = |p: &Value| (number(&p["estimate"]) - number(&p["truth"])).abs();
+        let name = all[0]["name"].as_str().unwrap_or_default();
+        let unit = all[0]["unit"].as_str().unwrap_or_default();
+        let truth = |p: &Value| number(&p["truth"]);
+        let error = |p: &Value| (number(&p["estimate"]) - truth(p)).abs();
+        if all
+            .iter()
+            .all(|p| unit.is_empty() && [0.0, 1.0].contains(&truth(p)))
+        {
+            let sure = all.iter().filter(|p| error(p) < 0.1).count();
+            println!(
+                "{name}: the true value has over 90 % in {sure} of {}",
+                all.len()
+            );
+            continue;
+        }
         let held = all.iter().filter(|p| {
             let [low, high] = [0, 1].map(|k| number(&p["interval95"][k]));
-            (low..=high).contains(&number(&p["truth"]))
+            (low..=high).contains(&truth(p))
         });
+        let of_truth = |x: &dyn Fn(&Run, &Value) -> f64| {
+            let each = runs.iter().zip(&all);
+            100.0 * median(each.map(|(r, p)| x(r, p) / truth(p).abs()).collect())
+        };
         println!(
-            "{}: median error {:.2e} {unit} ({:.1} % of the truth), median expected deviation {:.2e} {unit} \
-             ({:.1} %), the 95 % interval holds the truth in {} of {}, rounded right in {}",
-            all[0]["name"].as_str().unwrap_or_default(),
+            "{name}: median error {:.2e} {unit} ({:.1} % of the truth), its posterior's deviation {:.1} %, \
+             expected from the episode {:.1} %; the 95 % interval holds the truth in {} of {}",
             median(all.iter().map(|p| error(p)).collect()),
-            100.0
-                * median(
-                    all.iter()
-                        .map(|p| error(p) / number(&p["truth"]).abs())
-                        .collect()
-                ),
-            median(runs.iter().map(expected).collect()),
-            100.0
-                * median(
-                    runs.iter()
-                        .zip(&all)
-                        .map(|(r, p)| expected(r) / number(&p["truth"]).abs())
-                        .collect()
-                ),
+            of_truth(&|_, p| error(p)),
+            of_truth(&|_, p| number(&p["std"])),
+            of_truth(&|r, _| number(&r.result["exploration"]["expected_std"][i])),
             held.count(),
             all.len(),
-            all.iter().filter(|p| error(p) < 0.5).count(),
-            unit = all[0]["unit"].as_str().unwrap_or_default(),
         );
     }
 }
