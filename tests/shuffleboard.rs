@@ -1,6 +1,6 @@
 //! The shuffleboard's physics on every engine that is built in.
 
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::unwrap_used, clippy::print_stdout)] // what each engine gives is printed
 
 use std::sync::atomic::AtomicU64;
 
@@ -126,6 +126,9 @@ fn torsional_friction_shortens_the_spin_of_the_puck() {
         for (turn, t) in turns.iter().zip(torsional) {
             let rim = mu * RADIUS;
             let (low, high) = (angle(rim + t), angle(rim.hypot(t)));
+            println!(
+                "{engine}, torsional friction {t} m: {turn:.2} rad, theory {low:.2} to {high:.2} rad"
+            );
             assert!(
                 (0.9 * low..1.1 * high).contains(turn),
                 "{engine}, torsional friction {t}: {turn} rad, not {low} to {high}"

@@ -1,5 +1,7 @@
 //! Physics of the tasks with a ball on every engine that is built in: rolling friction stops the
 //! ball where theory says, on each patch, and the softness of the paddle's contact moves the outcome.
+//!
+//! `cargo test --features mujoco --test sphere -- --nocapture` prints what each engine gives.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout)] // a skipped check is a printed row
 
@@ -103,6 +105,7 @@ fn rolling_friction_stops_the_ball_where_theory_says() {
             for (way, friction) in ways.iter().zip(frictions) {
                 let expected = theory(0.35, friction);
                 let error = way / expected - 1.0;
+                println!("{task}, {engine}, {friction} m: {way:.4} m, theory {expected:.4} m");
                 // A ball sunk in by 0.25 mm rolls on a radius 0.8 % smaller.
                 assert!(error.abs() < 0.03, "{task}, {engine}, {friction}: {error}");
             }
@@ -129,12 +132,55 @@ fn each_patch_stops_the_ball_by_its_own_friction() {
                     .collect();
                 let ways = roll_out(problem, [0.6, y], -0.15, &unknowns);
                 for (way, friction) in ways.iter().zip(frictions) {
-                    let error = way / theory(0.15, friction) - 1.0;
+                    let expected = theory(0.15, friction);
+                    let error = way / expected - 1.0;
+                    let number = patch + 1;
+                    println!(
+                        "patch {number}, {engine}, {friction} m: {way:.4} m, theory {expected:.4} m"
+                    );
                     assert!(
                         error.abs() < 0.05,
                         "{engine}, patch {patch}, {friction}: {error}"
                     );
                 }
+            }
+        },
+    );
+}
+
+#[test]
+fn a_ball_at_rest_sinks_into_a_soft_floor_as_its_time_constant_says() {
+    on_every_engine(
+        "sphere-striking",
+        "",
+        Capabilities::empty(),
+        |engine, problem| {
+            let layout = problem.model.layout();
+            let mut batch = problem.batch(1).unwrap();
+            batch.set_parameters(&[0], &[3e-3]).unwrap();
+            batch.place(problem.task, &[0], &[0.6, 0.2]).unwrap();
+            let recording = layout.recording(&["ball_pos"]).unwrap();
+            let frames = 100;
+            let ctrl = layout.keyframes[0].ctrl.repeat(frames);
+            let mut out = vec![0.0; frames * 3];
+            let rollout = Rollout::new(&[0], frames, 10, Control::Shared(&ctrl), &recording);
+            batch.simulator.rollout(&rollout, &mut out).unwrap();
+            let sunk = RADIUS - out[out.len() - 1];
+            // A spring and damper of time constant 0.02 s, damped critically, of which the impedance 0.5 acts:
+            // the rest of the weight's acceleration is let through.
+            let theory = (1.0 - 0.5) * G * 0.02 * 0.02;
+            println!(
+                "{engine}: sunk in by {:.3} mm, theory {:.3} mm",
+                1e3 * sunk,
+                1e3 * theory
+            );
+            if problem
+                .capabilities
+                .contains(Capabilities::CONTACT_STIFFNESS)
+            {
+                assert!((sunk / theory - 1.0).abs() < 0.01, "{engine}: {sunk}");
+            } else {
+                assert!(sunk.abs() < 1e-4, "{engine}: {sunk}");
             }
         },
     );
@@ -177,6 +223,9 @@ fn a_softer_ball_leaves_the_paddle_faster() {
                 .chunks_exact(protocol.frames * 3)
                 .map(|rows| rows[rows.len() - 2])
                 .collect();
+            println!(
+                "{engine}: time constants {constants:?} s, the ball rests at y = {ends:.4?} m"
+            );
             // The spring of the contact gives back what it took when the paddle stops.
             assert!(ends[0] > ends[1] + 0.005, "{engine}: {ends:?}");
         },

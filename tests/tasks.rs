@@ -9,7 +9,9 @@ use std::time::Instant;
 
 use asid::core::progress::Silent;
 use asid::core::real_world::RealEpisode;
-use asid::core::registry::{BackendEntry, TaskEntry, all};
+use asid::core::registry::{
+    BackendEntry, ExplorerEntry, IdentifierEntry, Settings, SolverEntry, TaskEntry, all,
+};
 use asid::core::rng::Rng;
 use asid::core::sensitivity::check_parameters;
 use asid::core::task::Outcome;
@@ -88,10 +90,31 @@ fn on(task: &dyn Task, parameters: &[Parameter], engine: &BackendEntry) {
         physics_counter: &physics,
         env_counter: &env,
     };
+    settings_are_taken(task);
     for (name, check) in CHECKS {
         println!("{row} {name:16} {}", check(&problem));
     }
     println!("{row} {:.1} s", clock.elapsed().as_secs_f64());
+}
+
+/// What a task sets of an algorithm is a setting of it.
+fn settings_are_taken(task: &dyn Task) {
+    let merged = |section: &str, name: &str, mut settings: Settings| {
+        for (key, value) in task.settings(section, name) {
+            let before = settings.insert(key.clone(), value);
+            assert!(before.is_some(), "{section} {name} has no setting {key}");
+        }
+        settings
+    };
+    for e in all::<ExplorerEntry>() {
+        (e.make)(&merged("explorer", e.name, (e.defaults)())).unwrap();
+    }
+    for e in all::<IdentifierEntry>() {
+        (e.make)(&merged("identifier", e.name, (e.defaults)())).unwrap();
+    }
+    for e in all::<SolverEntry>() {
+        (e.make)(&merged("solver", e.name, (e.defaults)())).unwrap();
+    }
 }
 
 fn centers(problem: &Problem<'_>) -> Vec<f64> {

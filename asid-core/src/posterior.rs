@@ -44,6 +44,16 @@ impl Posterior {
             .map(|(i, p)| {
                 let values: Vec<f64> = samples.iter().map(|s| s[i]).collect();
                 let mean: f64 = values.iter().zip(&weights).map(|(x, w)| x * w).sum();
+                // Rounding can carry the mean of values that are all alike past them.
+                let low = values.iter().copied().fold(f64::INFINITY, f64::min);
+                let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+                let mean = if mean < low {
+                    low
+                } else if mean > high {
+                    high
+                } else {
+                    mean
+                };
                 let variance: f64 = values
                     .iter()
                     .zip(&weights)
@@ -154,15 +164,30 @@ mod tests {
         assert!((q - 2.0).abs() < 1e-9);
     }
 
-    #[test]
-    fn resampling_keeps_the_mean() {
-        let parameters = [Parameter {
+    fn parameter() -> Parameter {
+        Parameter {
             name: "p".into(),
             targets: vec!["geom/a/friction/0".parse().unwrap()],
             range: [0.0, 1.0],
             scale: crate::parameter::Scale::Linear,
             unit: String::new(),
-        }];
+        }
+    }
+
+    #[test]
+    fn the_mean_of_samples_that_are_alike_is_that_sample() {
+        for n in 1..2000 {
+            // Weights whose rounded sum is not 1, as those of a comparison of models.
+            let weights: Vec<f64> = (0..n).map(|i| 1.0 / (1.0 + f64::from(i % 7))).collect();
+            let samples = vec![vec![1.0]; n as usize];
+            let posterior = Posterior::from_samples(&[parameter()], samples, &weights);
+            assert_eq!(posterior.mean(), [1.0]);
+        }
+    }
+
+    #[test]
+    fn resampling_keeps_the_mean() {
+        let parameters = [parameter()];
         let samples: Vec<Vec<f64>> = (0..50).map(|i| vec![f64::from(i) / 50.0]).collect();
         let weights: Vec<f64> = (0..50).map(f64::from).collect();
         let posterior = Posterior::from_samples(&parameters, samples, &weights);

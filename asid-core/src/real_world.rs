@@ -8,13 +8,14 @@ use crate::backend::Model;
 use crate::episode::{ChannelColumns, Episode};
 use crate::error::{Error, Result};
 use crate::explore::Policy;
+use crate::layout::{Layout, Recording};
 use crate::parameter::Parameter;
 use crate::plugin::blames_a_plugin;
 use crate::problem::{Batch, Problem, substeps};
 use crate::progress::Silent;
 use crate::rng::{Rng, Streams};
 use crate::signal::{Signal, SignalSet};
-use crate::simulator::{Control, Rollout, Status};
+use crate::simulator::{Control, Rollout, Simulator, Status};
 use crate::solve::TaskPolicy;
 use crate::task::{Outcome, Task};
 
@@ -25,7 +26,8 @@ pub struct RealEpisode {
     pub episode: Episode,
     /// Actions of the policy, `horizon x action`, in the task's units.
     pub actions: Vec<f64>,
-    /// Share of control steps at whose frames the machine touched the object.
+    /// Share of control steps in which the machine touched the object, as seen after every
+    /// physics step: a touch can be shorter than a frame.
     pub contact_fraction: f64,
     /// True start pose, where it is known.
     pub true_start: Option<Vec<f64>>,
@@ -58,6 +60,9 @@ pub trait RealWorld {
     /// When the policy or the world fails.
     fn attempt(&mut self, policy: &mut dyn TaskPolicy) -> Result<Attempt>;
 }
+
+/// The simulation beside the world's own, which is 0.
+const COPY: usize = 1;
 
 /// A simulator with a hidden truth, its own start poses and noisy trackers.
 pub struct SimulatedWorld<'a> {
@@ -98,7 +103,7 @@ impl<'a> SimulatedWorld<'a> {
             physics_counter: &steps,
             env_counter: &steps,
         };
-        let batch = problem.batch(1)?;
+        let batch = problem.batch(2)?;
         let signals = SignalSet::new(model.layout(), signals)?;
         Ok(Self {
             task,
@@ -147,7 +152,8 @@ impl<'a> SimulatedWorld<'a> {
     }
 
     fn begin(&mut self, start: &[f64]) -> Result<()> {
-        self.batch.set_parameters(&[0], &self.truth)?;
+        let both = self.truth.repeat(2);
+        self.batch.set_parameters(&[0, COPY], &both)?;
         self.batch.place(self.task, &[0], start)
     }
 
@@ -159,6 +165,50 @@ impl<'a> SimulatedWorld<'a> {
             }
             _ => Ok(()),
         }
+    }
+}
+
+/// Looks for touches between the frames. A copy of the world plays the control step and is read
+/// after every physics step, so that looking leaves the world as it is.
+struct Touch {
+    recording: Recording,
+    frames: usize,
+    substeps: usize,
+    ctrl: Vec<f64>,
+    forces: Vec<f64>,
+}
+
+impl Touch {
+    /// Of these channels, in control steps of so many frames and physics steps a frame.
+    fn new(layout: &Layout, channels: &[String], frames: usize, substeps: usize) -> Result<Self> {
+        let recording = layout.recording(channels)?;
+        Ok(Self {
+            ctrl: vec![0.0; frames * substeps * layout.nu()],
+            forces: vec![0.0; frames * substeps * recording.width()],
+            recording,
+            frames,
+            substeps,
+        })
+    }
+
+    /// Whether a force is seen after any physics step of a control step that the copy plays.
+    fn between(
+        &mut self,
+        simulator: &mut dyn Simulator,
+        ctrl: &[f64],
+    ) -> Result<bool> {
+        if self.forces.is_empty() {
+            return Ok(false);
+        }
+        let nu = ctrl.len() / self.frames;
+        let steps = self.frames * self.substeps;
+        for i in 0..steps {
+            self.ctrl[i * nu..][..nu].copy_from_slice(&ctrl[i / self.substeps * nu..][..nu]);
+        }
+        let control = Control::Shared(&self.ctrl);
+        let rollout = Rollout::new(&[COPY], steps, 1, control, &self.recording);
+        simulator.rollout(&rollout, &mut self.forces)?;
+        Ok(self.forces.iter().any(|force| *force > 0.0))
     }
 }
 
@@ -175,16 +225,18 @@ impl RealWorld for SimulatedWorld<'_> {
         let layout = self.batch.simulator.layout().clone();
         let mut noise = self.streams.stream("exploration noise");
         let names = protocol.channels();
-        let width = layout.recording(&names)?.width();
+        let pairs = protocol.contact.iter();
         let mut all = names.clone();
-        all.extend(
-            protocol
-                .contact
-                .iter()
-                .map(|[a, b]| format!("contact.{a}/{b}")),
-        );
+        all.extend(pairs.map(|[a, b]| format!("contact.{a}/{b}")));
         let recording = layout.recording(&all)?;
+        let width = layout.recording(&names)?.width();
         let substeps = substeps(&layout, protocol.frame_period)?;
+        let mut touch = Touch::new(
+            &layout,
+            &all[names.len()..],
+            protocol.frames_per_step,
+            substeps,
+        )?;
         let (frames, nu) = (protocol.frames_per_step, layout.nu());
         let mut commander = self.task.commander()?;
         commander.reset();
@@ -227,6 +279,7 @@ impl RealWorld for SimulatedWorld<'_> {
             }
             actions.extend_from_slice(&action);
             commander.commands(&action, &mut ctrl);
+            self.batch.simulator.copy_state(&[0], &[COPY])?;
             let rollout = Rollout::new(&[0], frames, substeps, Control::Shared(&ctrl), &recording);
             self.batch.simulator.rollout(&rollout, &mut out)?;
             self.check()?;
@@ -234,10 +287,11 @@ impl RealWorld for SimulatedWorld<'_> {
             for frame in out.chunks_exact(all_width) {
                 episode.readings.extend(observe(frame));
             }
-            touched += usize::from(
-                out.chunks_exact(all_width)
-                    .any(|r| r[width..].iter().any(|force| *force > 0.0)),
-            );
+            let at_a_frame = out
+                .chunks_exact(all_width)
+                .any(|r| r[width..].iter().any(|force| *force > 0.0));
+            let simulator = &mut *self.batch.simulator;
+            touched += usize::from(at_a_frame || touch.between(simulator, &ctrl)?);
         }
         self.wear();
         let last = episode.ctrl[episode.ctrl.len() - nu..].to_vec();

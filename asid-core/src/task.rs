@@ -8,6 +8,7 @@ use crate::backend::Capabilities;
 use crate::error::Result;
 use crate::layout::Layout;
 use crate::parameter::Parameter;
+use crate::registry::Settings;
 use crate::rng::Rng;
 use crate::scene::Scene;
 use crate::signal::Signal;
@@ -207,6 +208,11 @@ pub trait Task: Send + Sync {
     /// Further unknowns that can be switched on by name.
     fn optional_parameters(&self) -> Vec<Parameter> {
         Vec::new()
+    }
+    /// Settings of an algorithm that suit this task better than the algorithm's defaults:
+    /// `section` is `explorer`, `identifier` or `solver`, `algorithm` its name.
+    fn settings(&self, _section: &str, _algorithm: &str) -> Settings {
+        Settings::new()
     }
     /// The named cases of tables.
     fn conditions(&self) -> Vec<Condition>;

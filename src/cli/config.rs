@@ -251,18 +251,21 @@ impl Config {
             start,
             assumed,
             explorer: component::<dyn asid_core::Explorer>(
+                task,
                 &table,
                 "explorer",
                 algorithms.explorer.as_deref(),
                 ASID.explorer,
             )?,
             identifier: component::<dyn asid_core::Identifier>(
+                task,
                 &table,
                 "identifier",
                 algorithms.identifier.as_deref(),
                 ASID.identifier,
             )?,
             solver: component::<dyn asid_core::TaskSolver>(
+                task,
                 &table,
                 "solver",
                 algorithms.solver.as_deref(),

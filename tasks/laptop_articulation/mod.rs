@@ -41,6 +41,13 @@ const STEERING: Steering = Steering {
     fingers: 0.0,
 };
 
+/// A point of the hinge's axis in the base's frame, m, with the axis `hinge_offset` (m) above its
+/// nominal place; the axis is along x.
+#[must_use]
+pub fn hinge(hinge_offset: f64) -> [f64; 3] {
+    [0.0, PLATE_HALF[1], 0.015 + hinge_offset]
+}
+
 /// The task.
 pub struct LaptopArticulation {
     scene: Scene,

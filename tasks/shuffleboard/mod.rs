@@ -2,7 +2,7 @@
 //! with one strike.
 //!
 //! The puck lies on a waxed board; unknown are its sliding and its torsional friction. The closed gripper
-//! is the stick. The task's action is the speed of one strike from behind, and the puck must come to rest
+//! is the stick. The task's action is the strength of one strike from behind, and the puck must come to rest
 //! in the near or in the far zone. The real board wears: every shot raises its friction by up to a
 //! few per cent, of which the simulator knows nothing.
 //!
@@ -134,7 +134,7 @@ impl Shuffleboard {
             threshold: Some(metric::ZONE_HALF),
             frames: striking::frames(),
             frame_period: striking::FRAME_PERIOD,
-            action: vec![Coordinate::new("speed", "m/s", striking::SPEEDS)],
+            action: vec![Coordinate::new("strength", "", striking::STRENGTH)],
             start: start(0.005),
             channels: vec!["puck_pos".into()],
             phases: striking::phases(),

@@ -10,8 +10,12 @@ use crate::panda;
 /// Length of a frame, s.
 pub const FRAME_PERIOD: f64 = 0.01;
 
-/// Speeds of a strike, m/s.
-pub const SPEEDS: [f64; 2] = [0.2, 0.8];
+/// Strength of a strike: doublings of [`MIDDLE_SPEED`]. The way of the puck goes with the square of the
+/// speed over the friction, so that a step of strength counts the same at every friction and for either zone.
+pub const STRENGTH: [f64; 2] = [-1.0, 1.0];
+
+/// Speed of a strike of strength 0, m/s.
+const MIDDLE_SPEED: f64 = 0.4;
 
 /// From the middle of the closed pads to their front, m.
 const PAD_FRONT: f64 = 0.014;
@@ -59,9 +63,14 @@ fn way(speed: f64, t: f64) -> f64 {
     RUN_UP + STROKE + RUN_OUT * (1.0 - left * left)
 }
 
+/// Speed of a strike, m/s: 0.2 to 0.8.
+fn speed(strength: f64) -> f64 {
+    MIDDLE_SPEED * strength.exp2()
+}
+
 /// Commands of an attempt, `frames x actuators`, for a puck believed to lie at `start`
-/// (x, y, yaw) and a strike of `speed` (m/s).
-pub fn commands(scene: &Scene, home: &[f64], start: &[f64], speed: f64) -> Result<Vec<f64>> {
+/// (x, y, yaw) and a strike of `strength`.
+pub fn commands(scene: &Scene, home: &[f64], start: &[f64], strength: f64) -> Result<Vec<f64>> {
     let settings = CartesianSettings::default();
     let mut controller = CartesianController::new(scene, panda::END_EFFECTOR, home, settings)?;
     let from = controller.position();
@@ -76,7 +85,7 @@ pub fn commands(scene: &Scene, home: &[f64], start: &[f64], speed: f64) -> Resul
         let target = if t <= APPROACH + STAND {
             from.lerp(&behind, u * u * u * (10.0 - 15.0 * u + 6.0 * u * u))
         } else {
-            behind + Vector3::x() * way(speed, t - APPROACH - STAND)
+            behind + Vector3::x() * way(speed(strength), t - APPROACH - STAND)
         };
         controller.follow(target, FRAME_PERIOD, &mut row[..panda::ARM_JOINTS]);
     }
@@ -89,7 +98,7 @@ mod tests {
 
     #[test]
     fn the_hand_moves_at_the_speed_of_the_strike_where_it_meets_the_puck() {
-        for speed in SPEEDS {
+        for speed in STRENGTH.map(speed) {
             let meets = 2.0 * RUN_UP / speed + 0.5 * STROKE / speed;
             let h = 1e-4;
             let measured = (way(speed, meets + h) - way(speed, meets - h)) / (2.0 * h);

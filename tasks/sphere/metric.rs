@@ -2,6 +2,8 @@
 
 use asid_core::task::Outcome;
 
+use super::strike::FRAME_PERIOD;
+
 /// Entries of a row of readings: the ball's position.
 pub const WIDTH: usize = 3;
 
@@ -22,8 +24,14 @@ pub fn distance(row: &[f64], goal: [f64; 2]) -> f64 {
     (row[0] - goal[0]).hypot(row[1] - goal[1])
 }
 
+/// Cost of the speed of a ball that goes past the line behind the goal, s.
+const OVERSHOOT: f64 = 1.0;
+
 /// What came of an attempt: the distance in the last row, if the ball rests there.
-pub fn outcome(readings: &[f64], goal: [f64; 2]) -> Outcome {
+///
+/// `line` is a y behind the goal. Every ball that is too fast ends before the same wall, so the cost counts
+/// how fast it goes past that line: a search is led back to the goal.
+pub fn outcome(readings: &[f64], goal: [f64; 2], line: Option<f64>) -> Outcome {
     let rows = readings.len() / WIDTH;
     let row = |k: usize| &readings[k * WIDTH..][..WIDTH];
     let last = row(rows - 1);
@@ -40,8 +48,19 @@ pub fn outcome(readings: &[f64], goal: [f64; 2]) -> Outcome {
     Outcome {
         value,
         success: rests && value <= GOAL_RADIUS,
-        cost: value,
+        cost: value + OVERSHOOT * line.map_or(0.0, |y| speed_at(readings, y)),
     }
+}
+
+/// Speed at which the ball goes past a y, towards lower ones, m/s; 0 where it does not get there.
+fn speed_at(readings: &[f64], y: f64) -> f64 {
+    let mut steps = readings
+        .chunks_exact(WIDTH)
+        .zip(readings.chunks_exact(WIDTH).skip(1));
+    let past = steps.find(|(before, after)| before[1] > y && after[1] <= y);
+    past.map_or(0.0, |(before, after)| {
+        distance(after, [before[0], before[1]]) / FRAME_PERIOD
+    })
 }
 
 #[cfg(test)]
@@ -52,15 +71,31 @@ mod tests {
     fn a_ball_at_rest_in_the_goal_is_a_success_and_one_that_passes_is_none() {
         let goal = [0.1, -0.2];
         let still: Vec<f64> = [0.13, -0.24, 0.03].repeat(40);
-        let there = outcome(&still, goal);
+        let there = outcome(&still, goal, None);
         assert!(there.success && (there.value - 0.05).abs() < 1e-12);
         let mut passing = still.clone();
         for (k, row) in passing.chunks_exact_mut(WIDTH).enumerate() {
             row[0] = 0.1 - 0.01 * (39 - k) as f64;
         }
-        let passes = outcome(&passing, goal);
+        let passes = outcome(&passing, goal, None);
         assert!(!passes.success && passes.value < 0.05);
-        assert!(!outcome(&[0.2, -0.2, 0.03].repeat(40), goal).success);
-        assert!(!outcome(&[f64::NAN; 120], goal).success);
+        assert!(!outcome(&[0.2, -0.2, 0.03].repeat(40), goal, None).success);
+        assert!(!outcome(&[f64::NAN; 120], goal, None).success);
+    }
+
+    #[test]
+    fn a_faster_ball_at_the_same_wall_costs_more() {
+        let to_the_wall = |way: f64| -> Vec<f64> {
+            let y = |k: usize| (-way * k as f64).max(-0.5);
+            (0..200).flat_map(|k| [0.0, y(k), 0.03]).collect()
+        };
+        let tried = |way: f64| outcome(&to_the_wall(way), [0.0, -0.38], Some(-0.46));
+        let (slow, fast) = (tried(0.004), tried(0.008));
+        assert_eq!(slow.value, fast.value);
+        assert!((slow.cost - slow.value - 0.4).abs() < 1e-9);
+        assert!((fast.cost - fast.value - 0.8).abs() < 1e-9);
+        let short: Vec<f64> = [0.0, -0.40, 0.03].repeat(40);
+        let rests = outcome(&short, [0.0, -0.38], Some(-0.46));
+        assert_eq!(rests.cost, rests.value);
     }
 }

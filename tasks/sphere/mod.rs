@@ -10,6 +10,7 @@ mod metric;
 mod strike;
 
 use asid_core::parameter::Parameter;
+use asid_core::registry::Settings;
 use asid_core::signal::Signal;
 use asid_core::task::{
     Commander, Condition, Coordinate, DownstreamProtocol, ExplorationProtocol, Outcome, Outline,
@@ -29,7 +30,7 @@ const BALL_RADIUS: f64 = 0.03;
 const FINGERS: f64 = 0.012;
 
 /// The paddle moves at the height of the ball's middle; a ball fits between it and each wall.
-const STEERING: Steering = Steering {
+pub const STEERING: Steering = Steering {
     max_step: 0.04, // 0.4 m/s
     x: [0.30, 0.70],
     y: [-0.46, 0.26],
@@ -57,6 +58,8 @@ pub struct Spec {
     pub optional: Vec<Parameter>,
     /// Named truths.
     pub conditions: Vec<Condition>,
+    /// Where the hand may go.
+    pub steering: Steering,
     /// Control steps of exploration.
     pub horizon: usize,
     /// Where the ball lies when exploration begins.
@@ -65,12 +68,28 @@ pub struct Spec {
     pub struck_from: Area,
     /// Where it is to come to rest, m.
     pub goal: [f64; 2],
+    /// A y behind the goal past which a ball has been struck too hard, m; see the metric.
+    pub line: Option<f64>,
     /// Range of the paddle's speed, m/s.
     pub speed: [f64; 2],
     /// Length of an attempt, s.
     pub seconds: f64,
     /// Things that stand still, for pictures.
     pub fixtures: Vec<Outline>,
+    /// Numbers of algorithms that suit the task better than their defaults.
+    pub settings: &'static [Setting],
+}
+
+/// A whole number among an algorithm's settings.
+pub struct Setting {
+    /// `explorer`, `identifier` or `solver`.
+    pub section: &'static str,
+    /// Name of the algorithm.
+    pub algorithm: &'static str,
+    /// Name of the setting.
+    pub key: &'static str,
+    /// Its value.
+    pub value: i64,
 }
 
 /// A task of the family.
@@ -163,6 +182,13 @@ impl Task for Sphere {
         self.spec.optional.clone()
     }
 
+    fn settings(&self, section: &str, algorithm: &str) -> Settings {
+        let all = self.spec.settings.iter();
+        all.filter(|s| s.section == section && s.algorithm == algorithm)
+            .map(|s| (s.key.to_owned(), s.value.into()))
+            .collect()
+    }
+
     fn conditions(&self) -> Vec<Condition> {
         self.spec.conditions.clone()
     }
@@ -186,7 +212,7 @@ impl Task for Sphere {
     }
 
     fn commander(&self) -> Result<Box<dyn Commander>> {
-        STEERING.commander(&self.scene, &self.home)
+        self.spec.steering.commander(&self.scene, &self.home)
     }
 
     fn attempt(&self, start: &[f64], action: &[f64]) -> Result<Vec<f64>> {
@@ -210,7 +236,7 @@ impl Task for Sphere {
     }
 
     fn outcome(&self, readings: &[f64]) -> Outcome {
-        metric::outcome(readings, self.spec.goal)
+        metric::outcome(readings, self.spec.goal, self.spec.line)
     }
 
     fn top_view(&self) -> TopView {

@@ -5,7 +5,7 @@
 //!
 //! Source: ASID (Memmel et al., ICLR 2024), appendix.
 
-use crate::sphere::{Spec, Sphere, conditions, rolling_friction, walls};
+use crate::sphere::{STEERING, Spec, Sphere, conditions, rolling_friction, walls};
 
 /// Name on the command line.
 const NAME: &str = "sphere-distractors";
@@ -26,12 +26,15 @@ fn spec() -> Spec {
         parameters: vec![rolling_friction("ball")],
         optional: Vec::new(),
         conditions: conditions(),
+        steering: STEERING,
         horizon: 20,
         explored_from: [[0.43, 0.65], [-0.2, 0.2]],
         struck_from: [[0.55, 0.65], [0.03, 0.05]],
         goal: [0.65, -0.40],
+        line: None,
         speed: [0.3, 1.4],
         seconds: 4.5,
         fixtures: walls(),
+        settings: &[],
     }
 }

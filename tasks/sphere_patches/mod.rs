@@ -6,7 +6,8 @@
 use asid_core::parameter::{Parameter, Scale};
 use asid_core::task::Condition;
 
-use crate::sphere::{Area, Spec, Sphere, rectangle, target, walls};
+use crate::sphere::{Area, STEERING, Setting, Spec, Sphere, rectangle, target, walls};
+use crate::steering::Steering;
 
 /// Name on the command line.
 const NAME: &str = "sphere-patches";
@@ -26,6 +27,33 @@ pub const PATCHES: [Area; 3] = [
     [[0.2, 0.8], [-0.256, 0.056]],
     [[0.2, 0.8], [-0.568, -0.256]],
 ];
+
+/// An episode is three times as long as in the other tasks. The search for a plan is broad rather than
+/// deep, for few plans carry the ball into every patch: fewer segments, more plans, each tried at one
+/// value of the unknowns. So is that for a strike: slow balls stop at a seam of two patches, whatever
+/// their speed, and a search that begins with few strikes can settle there.
+const SETTINGS: [Setting; 6] = [
+    setting("explorer", "fisher-cem", "hold", 15),
+    setting("explorer", "fisher-cem", "iterations", 3),
+    setting("explorer", "fisher-cem", "population", 24),
+    setting("explorer", "fisher-cem", "prior_samples", 1),
+    setting("solver", "cem", "population", 24),
+    setting("solver", "cem", "belief_samples", 2),
+];
+
+const fn setting(
+    section: &'static str,
+    algorithm: &'static str,
+    key: &'static str,
+    value: i64,
+) -> Setting {
+    Setting {
+        section,
+        algorithm,
+        key,
+        value,
+    }
+}
 
 asid_core::register!(TaskEntry {
     name: NAME,
@@ -62,12 +90,18 @@ fn spec() -> Spec {
                 truth: (1..=3).map(|p| (unknown(p), [OUT_OF_RANGE; 2])).collect(),
             },
         ],
+        steering: Steering {
+            y: [-0.46, 0.29], // from where the hand begins
+            ..STEERING
+        },
         horizon: 60,
-        explored_from: [[0.43, 0.65], [0.10, 0.23]],
-        struck_from: [[0.55, 0.65], [0.22, 0.24]],
+        explored_from: [[0.43, 0.65], [0.10, 0.19]],
+        struck_from: [[0.55, 0.63], [0.21, 0.23]],
         goal: [0.60, -0.38],
-        speed: [0.15, 0.9],
+        line: Some(-0.46),
+        speed: [0.15, 0.7],
         seconds: 7.0,
         fixtures,
+        settings: &SETTINGS,
     }
 }

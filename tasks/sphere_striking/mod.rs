@@ -9,7 +9,7 @@
 
 use asid_core::parameter::{Parameter, Scale};
 
-use crate::sphere::{Spec, Sphere, conditions, rolling_friction, target, walls};
+use crate::sphere::{STEERING, Spec, Sphere, conditions, rolling_friction, target, walls};
 
 /// Name on the command line.
 const NAME: &str = "sphere-striking";
@@ -47,12 +47,15 @@ fn spec() -> Spec {
             },
         ],
         conditions: conditions(),
+        steering: STEERING,
         horizon: 20,
         explored_from: [[0.43, 0.65], [-0.2, 0.23]],
         struck_from: [[0.55, 0.65], [0.03, 0.05]],
         goal: [0.65, -0.40],
+        line: None,
         speed: [0.3, 1.4],
         seconds: 4.5,
         fixtures: walls(),
+        settings: &[],
     }
 }

@@ -1,6 +1,7 @@
-//! An algorithm with its settings: defaults, then what is given.
+//! An algorithm with its settings: its defaults, then those of the task, then what is given.
 
 use anyhow::Result;
+use asid_core::Task;
 use asid_core::registry::{self, AlgorithmEntry, Entry, Settings};
 use serde::Serialize;
 
@@ -20,6 +21,7 @@ pub struct Component {
 /// those of the algorithm named there; another one on the command line starts
 /// from its defaults.
 pub fn component<T: ?Sized + 'static>(
+    task: &dyn Task,
     table: &toml::Table,
     key: &str,
     option: Option<&str>,
@@ -42,6 +44,7 @@ where
         crate::cli::list::missing(AlgorithmEntry::<T>::KIND, &name).unwrap_or(unknown)
     })?;
     let mut settings = (entry.defaults)();
+    merge(key, &mut settings, task.settings(key, &name))?;
     merge(key, &mut settings, given)?;
     (entry.make)(&settings)?;
     Ok(Component { name, settings })

@@ -7,6 +7,7 @@ use crate::backend::Capabilities;
 use crate::error::Result;
 use crate::layout::Layout;
 use crate::parameter::Parameter;
+use crate::registry::Settings;
 use crate::rng::Rng;
 use crate::scene::Scene;
 use crate::task::{
@@ -41,6 +42,10 @@ where
 
     fn optional_parameters(&self) -> Vec<Parameter> {
         self.run(|task| task.optional_parameters())
+    }
+
+    fn settings(&self, section: &str, algorithm: &str) -> Settings {
+        self.run(|task| task.settings(section, algorithm))
     }
 
     fn conditions(&self) -> Vec<Condition> {
