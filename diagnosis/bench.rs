@@ -50,7 +50,10 @@ impl Record {
     #[must_use]
     pub fn some(&self, which: &[usize]) -> Self {
         let logs = self.logs.some(which);
-        let mut record = Self::new(logs, which.iter().map(|&i| self.starts[i].clone()).collect());
+        let mut record = Self::new(
+            logs,
+            which.iter().map(|&i| self.starts[i].clone()).collect(),
+        );
         if !self.whitening.is_empty() {
             record.whitening = which.iter().map(|&i| self.whitening[i].clone()).collect();
         }
@@ -156,11 +159,7 @@ impl Bench {
     ///
     /// # Errors
     /// When the engine refuses an effect or a parameter.
-    pub fn predictor<'r>(
-        &self,
-        trials: &[Trial<'_>],
-        record: &'r Record,
-    ) -> Result<Predictor<'r>> {
+    pub fn predictor<'r>(&self, trials: &[Trial<'_>], record: &'r Record) -> Result<Predictor<'r>> {
         let specs: Vec<EffectSpec> = trials.iter().map(|(c, _)| c.spec.clone()).collect();
         let model = self.machine.with(&specs)?;
         let parameters: Vec<Parameter> = self
@@ -169,8 +168,7 @@ impl Bench {
             .map(|u| u.parameter)
             .collect();
         let threads = self.machine.threads;
-        let mut predictor =
-            Predictor::new(&*model, &parameters, &record.logs, CAPACITY, threads)?;
+        let mut predictor = Predictor::new(&*model, &parameters, &record.logs, CAPACITY, threads)?;
         predictor.set_whitening(record.whitening.clone());
         Ok(predictor)
     }

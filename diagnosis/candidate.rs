@@ -204,4 +204,3 @@ fn measure(plant: &Plant, site: &str, reference: Reference, shown: &Trajectory) 
         Reference::Force => driven.map_or(1.0, |j| shown.force(plant, j)),
     }
 }
-

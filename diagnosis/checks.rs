@@ -73,7 +73,9 @@ pub fn units(bench: &Bench, none: &Explanation) -> Result<CheckResult> {
                     let y = log.readings[k * width + c];
                     (y - residuals[e][k * n + j], y)
                 });
-                let pairs: Vec<_> = pairs.filter(|(x, y)| x.is_finite() && y.is_finite()).collect();
+                let pairs: Vec<_> = pairs
+                    .filter(|(x, y)| x.is_finite() && y.is_finite())
+                    .collect();
                 let m = pairs.len().max(1) as f64;
                 let mean = |f: fn(&(f64, f64)) -> f64| pairs.iter().map(f).sum::<f64>() / m;
                 let (mx, my) = (mean(|p| p.0), mean(|p| p.1));
@@ -112,7 +114,11 @@ pub fn units(bench: &Bench, none: &Explanation) -> Result<CheckResult> {
 #[must_use]
 pub fn identifiability(parameters: &[Parameter], none: &Explanation) -> Vec<CheckResult> {
     if parameters.is_empty() {
-        return vec![check("excitation", true, "the study fits no parameter".into())];
+        return vec![check(
+            "excitation",
+            true,
+            "the study fits no parameter".into(),
+        )];
     }
     let fit = &none.fit;
     let p = fit.free.len();
@@ -127,7 +133,11 @@ pub fn identifiability(parameters: &[Parameter], none: &Explanation) -> Vec<Chec
         .map(|k| &*parameters[fit.free[k]].name)
         .collect();
     let excitation = if silent.is_empty() {
-        check("excitation", true, "every parameter shows in the readings".into())
+        check(
+            "excitation",
+            true,
+            "every parameter shows in the readings".into(),
+        )
     } else {
         check(
             "excitation",
@@ -143,7 +153,11 @@ pub fn identifiability(parameters: &[Parameter], none: &Explanation) -> Vec<Chec
         .map(|k| parameters[fit.free[k]].name.clone())
         .collect();
     let together = if loose.is_empty() {
-        check("identifiability", true, "no combination of parameters is open".into())
+        check(
+            "identifiability",
+            true,
+            "no combination of parameters is open".into(),
+        )
     } else {
         check(
             "identifiability",
@@ -182,7 +196,12 @@ fn correlated(parameters: &[Parameter], none: &Explanation) -> Option<String> {
 /// How far predictions of the held-out logs scatter by what nobody can repeat.
 #[must_use]
 pub fn repeatability(bench: &Bench) -> CheckResult {
-    let variance: f64 = bench.test.whitening.iter().map(crate::roughness::Whitening::variance).sum();
+    let variance: f64 = bench
+        .test
+        .whitening
+        .iter()
+        .map(crate::roughness::Whitening::variance)
+        .sum();
     let scatter = (variance / bench.test.readings.max(1) as f64).sqrt();
     check(
         "repeatability",
@@ -203,13 +222,8 @@ pub fn time_step(bench: &Bench, none: &Explanation, halved: &Machine) -> Result<
     let read = |machine: &Machine| -> Result<Vec<Vec<f64>>> {
         let model = machine.with(&[])?;
         let logs = crate::data::Logs::replanned(&bench.train.logs, model.layout());
-        let mut predictor = crate::predict::Predictor::new(
-            &*model,
-            parameters,
-            &logs,
-            1,
-            machine.threads,
-        )?;
+        let mut predictor =
+            crate::predict::Predictor::new(&*model, parameters, &logs, 1, machine.threads)?;
         predictor.set_whitening(bench.train.whitening.clone());
         predictor.residuals(std::slice::from_ref(point))
     };
@@ -223,7 +237,11 @@ pub fn time_step(bench: &Bench, none: &Explanation, halved: &Machine) -> Result<
         ok,
         format!(
             "half the time step changes the predictions by {change:.2} of the noise, where the gap is {gap:.2}{}",
-            if ok { "" } else { ": make the model's time step smaller first" }
+            if ok {
+                ""
+            } else {
+                ": make the model's time step smaller first"
+            }
         ),
     ))
 }

@@ -9,8 +9,8 @@ use crate::experiment;
 use crate::fit::cost;
 use crate::localise::localise;
 use crate::machine::Machine;
-use crate::prepare::{Prepared, plain_residuals, prepare};
 use crate::predict::Point;
+use crate::prepare::{Prepared, plain_residuals, prepare};
 use crate::result::{
     DiagnosisResult, DiagnosisTrace, EffectResult, Gap, HypothesisResult, Kind, NextExperiment,
     ParameterResult, SignalGap, SignalTrace, Verdict,
@@ -150,7 +150,10 @@ fn final_noise(
         .min_by(|a, b| a.explanation.fit.cost.total_cmp(&b.explanation.fit.cost))
         .filter(|f| f.explanation.fit.cost < findings.none.fit.cost);
     let (members, explanation) = match best {
-        Some(f) => (trials(candidates, &f.candidates, &f.explanation), &f.explanation),
+        Some(f) => (
+            trials(candidates, &f.candidates, &f.explanation),
+            &f.explanation,
+        ),
         None => (Vec::new(), &findings.none),
     };
     let residuals = plain_residuals(bench, &bench.train, &members, &explanation.fit.point)?;
@@ -201,7 +204,11 @@ fn cost_scatter(bench: &Bench, none: &Explanation) -> Result<f64> {
             point
         })
         .collect();
-    let costs: Vec<f64> = predictor.residuals(&points)?.iter().map(|r| cost(r)).collect();
+    let costs: Vec<f64> = predictor
+        .residuals(&points)?
+        .iter()
+        .map(|r| cost(r))
+        .collect();
     let n = costs.len() as f64;
     let mean = costs.iter().sum::<f64>() / n;
     let variance = costs.iter().map(|c| (c - mean).powi(2)).sum::<f64>() / (n - 1.0);
@@ -537,16 +544,12 @@ impl Telling<'_> {
     /// What would tell the verdict from its nearest rival.
     fn next(&self, best: Option<&Found>) -> Result<NextExperiment> {
         let j = self.judgement;
-        let rival = j
-            .ambiguous
-            .first()
-            .copied()
-            .or_else(|| {
-                let rivals = || (0..j.hypotheses.len()).filter(|&i| i != j.best);
-                rivals()
-                    .find(|&i| !j.hypotheses[i].labels.is_empty())
-                    .or_else(|| rivals().next())
-            });
+        let rival = j.ambiguous.first().copied().or_else(|| {
+            let rivals = || (0..j.hypotheses.len()).filter(|&i| i != j.best);
+            rivals()
+                .find(|&i| !j.hypotheses[i].labels.is_empty())
+                .or_else(|| rivals().next())
+        });
         let Some(rival) = rival else {
             return Ok(NextExperiment::default());
         };
@@ -594,7 +597,11 @@ impl Telling<'_> {
                             sensor.unit.clone()
                         },
                         noise: sensor.noise,
-                        time: log.episode.time[..rows].iter().step_by(stride).copied().collect(),
+                        time: log.episode.time[..rows]
+                            .iter()
+                            .step_by(stride)
+                            .copied()
+                            .collect(),
                         real: pick(&log.readings, at),
                         nominal: pick(&nominal.readings[e], at),
                         identified: pick(&identified.readings[e], at),

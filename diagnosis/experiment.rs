@@ -59,7 +59,11 @@ pub fn next(
     let n = train.logs.episodes.len();
     let mut best: Option<(f64, usize, (f64, f64))> = None;
     let passive = layout.nu() == 0;
-    let variants = if passive { &VARIANTS[..1] } else { &VARIANTS[..] };
+    let variants = if passive {
+        &VARIANTS[..1]
+    } else {
+        &VARIANTS[..]
+    };
     for &(size, stretch) in variants {
         let episodes = train
             .logs

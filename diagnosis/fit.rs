@@ -128,7 +128,11 @@ pub fn scan(
             other.theta[i] = unknown.parameter.from_unit((k as f64 + 0.5) / n as f64);
             points.push(other);
         }
-        let costs: Vec<f64> = predictor.residuals(&points)?.iter().map(|r| cost(r)).collect();
+        let costs: Vec<f64> = predictor
+            .residuals(&points)?
+            .iter()
+            .map(|r| cost(r))
+            .collect();
         let lowest = (0..costs.len()).min_by(|&a, &b| costs[a].total_cmp(&costs[b]));
         point = points.swap_remove(lowest.unwrap_or(0));
     }
@@ -477,7 +481,8 @@ fn trial(
     for _ in 0..free.len() {
         let mut again = false;
         for k in 0..free.len() {
-            let leaves = (unit[k] <= 1e-12 && step[k] < 0.0) || (unit[k] >= 1.0 - 1e-12 && step[k] > 0.0);
+            let leaves =
+                (unit[k] <= 1e-12 && step[k] < 0.0) || (unit[k] >= 1.0 - 1e-12 && step[k] > 0.0);
             if leaves && !held[k] {
                 held[k] = true;
                 again = true;

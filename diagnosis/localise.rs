@@ -201,7 +201,9 @@ fn condition(logs: &Logs, residuals: &[f64], entry: usize) -> Option<String> {
     }
     let mut best: Option<(f64, String)> = None;
     for (name, values) in names.iter().zip(&features) {
-        let mut order: Vec<usize> = (0..values.len()).filter(|&i| values[i].is_finite()).collect();
+        let mut order: Vec<usize> = (0..values.len())
+            .filter(|&i| values[i].is_finite())
+            .collect();
         order.sort_by(|&a, &b| values[a].total_cmp(&values[b]));
         let m = order.len();
         let mut below = 0.0;

@@ -22,8 +22,7 @@ pub fn estimate(logs: &Logs, residuals: &[Vec<f64>]) -> Vec<f64> {
             let entries = logs.entries.iter().enumerate();
             for (j, _) in entries.filter(|(_, e)| e.sensor == sensor) {
                 for episode in residuals {
-                    let series: Vec<f64> =
-                        episode.iter().skip(j).step_by(n).copied().collect();
+                    let series: Vec<f64> = episode.iter().skip(j).step_by(n).copied().collect();
                     differences.extend(
                         series
                             .windows(4)
@@ -57,11 +56,17 @@ fn readings(logs: &Logs, sensor: usize) -> Vec<Vec<f64>> {
     for s in &logs.sensors[..sensor] {
         let rotation = s.rotation;
         let entries = logs.entries.iter();
-        let len = entries.filter(|e| logs.sensors[e.sensor].name == s.name).count();
+        let len = entries
+            .filter(|e| logs.sensors[e.sensor].name == s.name)
+            .count();
         at += if rotation { 4 } else { len };
     }
     let own = logs.entries.iter().filter(|e| e.sensor == sensor).count();
-    let own = if logs.sensors[sensor].rotation { 4 } else { own };
+    let own = if logs.sensors[sensor].rotation {
+        4
+    } else {
+        own
+    };
     (at..at + own)
         .map(|c| {
             let episodes = logs.episodes.iter();
@@ -88,10 +93,8 @@ pub fn step(logs: &Logs, sensor: usize) -> f64 {
             });
             // Few distinct values for many readings, all on one grid.
             let distinct = values.windows(2).filter(|w| w[1] > w[0]).count() + 1;
-            (gap.is_finite()
-                && multiples.count() == values.len()
-                && 2 * distinct < values.len())
-            .then_some(gap)
+            (gap.is_finite() && multiples.count() == values.len() && 2 * distinct < values.len())
+                .then_some(gap)
         })
         .collect();
     median(&mut steps).unwrap_or(0.0)

@@ -85,28 +85,37 @@ fn given_start(plant: &Plant, episode: &asid_core::Episode) -> State {
 const FIRST_ROWS: usize = 6;
 
 /// Sets what sensors of joints and of free bodies say of the start.
-fn first_readings(
-    plant: &Plant,
-    episode: &asid_core::Episode,
-    qpos: &mut [f64],
-    qvel: &mut [f64],
-) {
+fn first_readings(plant: &Plant, episode: &asid_core::Episode, qpos: &mut [f64], qvel: &mut [f64]) {
     let layout = &plant.layout;
     // First present row of a sensor and one a little later, with the time between.
     let seen = |sensor: &str| -> Option<(Vec<f64>, Vec<f64>, f64)> {
         let range = episode.channel(sensor)?;
-        let whole = |k: &usize| episode.reading(*k)[range.clone()].iter().all(|x| x.is_finite());
+        let whole = |k: &usize| {
+            episode.reading(*k)[range.clone()]
+                .iter()
+                .all(|x| x.is_finite())
+        };
         let mut rows = (0..episode.rows()).filter(whole);
         let first = rows.next()?;
         let later = rows.take(FIRST_ROWS).last().unwrap_or(first);
         let get = |k: usize| episode.reading(k)[range.clone()].to_vec();
-        Some((get(first), get(later), episode.time[later] - episode.time[first]))
+        Some((
+            get(first),
+            get(later),
+            episode.time[later] - episode.time[first],
+        ))
     };
     for (i, sensor) in layout.sensors.iter().enumerate() {
         let Some((first, later, dt)) = seen(&sensor.name) else {
             continue;
         };
-        let rate = |k: usize| if dt > 0.0 { (later[k] - first[k]) / dt } else { 0.0 };
+        let rate = |k: usize| {
+            if dt > 0.0 {
+                (later[k] - first[k]) / dt
+            } else {
+                0.0
+            }
+        };
         match plant.sensors[i] {
             Reads::Joint(j) => {
                 let joint = &layout.joints[j];
@@ -133,8 +142,7 @@ fn first_readings(
                     "framequat" => {
                         qpos[joint.qpos + 3..joint.qpos + 7].copy_from_slice(&first);
                         let turn = rotation_difference(&later, &first);
-                        let own = unit_quaternion(&first).inverse()
-                            * nalgebra::Vector3::from(turn)
+                        let own = unit_quaternion(&first).inverse() * nalgebra::Vector3::from(turn)
                             / dt.max(1e-9);
                         qvel[joint.qvel + 3..joint.qvel + 6].copy_from_slice(own.as_slice());
                     }
@@ -208,7 +216,10 @@ pub fn prepare(study: &Study, machine: Machine, rng: &mut Rng) -> Result<Prepare
     let layout = machine.plant.layout.clone();
     let sensors = logged_sensors(&layout, study);
     let record = |logs: &[(String, asid_core::Episode)]| -> Result<Record> {
-        let starts = logs.iter().map(|(_, e)| given_start(&machine.plant, e)).collect();
+        let starts = logs
+            .iter()
+            .map(|(_, e)| given_start(&machine.plant, e))
+            .collect();
         let logs = Logs::new(&machine.plant, &sensors, logs.to_vec())?;
         Ok(Record::new(logs, starts))
     };
@@ -283,7 +294,14 @@ fn settle_starts(bench: &mut Bench, point: Point) -> Result<Point> {
     unknowns.iter_mut().for_each(|u| u.free = false);
     let head = bench.train.cut(&layout, HEAD);
     let mut predictor = bench.predictor(&[], &head)?;
-    let fitted = fit(&mut predictor, &layout, &unknowns, point, &bench.open, Effort::BRIEF)?;
+    let fitted = fit(
+        &mut predictor,
+        &layout,
+        &unknowns,
+        point,
+        &bench.open,
+        Effort::BRIEF,
+    )?;
     bench.train.starts.clone_from(&fitted.point.starts);
     let theta = &fitted.point.theta;
     bench.test.starts = bench.head_starts(&[], theta, &bench.test.starts)?;
@@ -369,7 +387,14 @@ fn start_spread(bench: &Bench, point: &Point) -> Result<Spread> {
     predictor.set_whitening(Vec::new());
     let mut differences = Differences::new(unknowns.len());
     let open = &bench.open;
-    let line = linearise(&mut predictor, layout, &unknowns, point, open, &mut differences)?;
+    let line = linearise(
+        &mut predictor,
+        layout,
+        &unknowns,
+        point,
+        open,
+        &mut differences,
+    )?;
     let logs = &bench.head.logs;
     let mut spread = vec![0.0; 2 * layout.nv];
     for (k, &coordinate) in open.iter().enumerate() {
@@ -435,7 +460,8 @@ fn identify_smooth(
                 bench.explain(stage, &[], &from.theta, &from.starts, Effort::FULL)?
             };
             if last {
-                let followed = bench.explain(stage, &[], &from.theta, &from.starts, Effort::FULL)?;
+                let followed =
+                    bench.explain(stage, &[], &from.theta, &from.starts, Effort::FULL)?;
                 if followed.fit.cost < fit.fit.cost {
                     fit = followed;
                 }
@@ -451,7 +477,10 @@ fn identify_smooth(
         }
         // The longest stage on which a gradient can be believed comes first.
         let rms = |i: usize| (fits[i].fit.cost / bench.readings(i)).sqrt();
-        let mut first = (0..SHARES.len()).rev().find(|&i| rms(i) < NEAR).unwrap_or(0);
+        let mut first = (0..SHARES.len())
+            .rev()
+            .find(|&i| rms(i) < NEAR)
+            .unwrap_or(0);
         // Unless nothing of the gap is seen on it yet.
         while first + 1 < SHARES.len() && rms(first) < SEEN && rms(SHARES.len() - 1) > SEEN {
             first += 1;

@@ -70,7 +70,9 @@ impl RefinedModel {
             message,
         };
         if depth >= MAX_DEPTH {
-            return Err(fail("refined models refer to each other in a circle".into()));
+            return Err(fail(
+                "refined models refer to each other in a circle".into(),
+            ));
         }
         let text = std::fs::read_to_string(path).map_err(|e| {
             fail(match e.kind() {
@@ -86,16 +88,20 @@ impl RefinedModel {
         let mut base = Self::open_at(&folder.join(&document.model), depth + 1)?;
         for p in document.parameter {
             if !p.value.is_finite() {
-                return Err(fail(format!("target {}: {} is no number", p.target, p.value)));
+                return Err(fail(format!(
+                    "target {}: {} is no number",
+                    p.target, p.value
+                )));
             }
             base.parameters.retain(|(t, _)| *t != p.target);
             base.parameters.push((p.target, p.value));
         }
-        base.effects.extend(document.effect.into_iter().map(|e| EffectSpec {
-            name: e.effect,
-            site: e.site,
-            values: e.parameters.into_iter().collect(),
-        }));
+        base.effects
+            .extend(document.effect.into_iter().map(|e| EffectSpec {
+                name: e.effect,
+                site: e.site,
+                values: e.parameters.into_iter().collect(),
+            }));
         Ok(base)
     }
 

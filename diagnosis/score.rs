@@ -339,7 +339,8 @@ impl Score {
         for bin in 0..5 {
             let low = f64::from(bin) / 5.0;
             let inside = |a: &&Answer| {
-                a.probability > low && a.probability <= low + 0.2 || bin == 0 && a.probability == 0.0
+                a.probability > low && a.probability <= low + 0.2
+                    || bin == 0 && a.probability == 0.0
             };
             let some: Vec<&Answer> = answers.iter().filter(inside).collect();
             let gap: f64 = some.iter().map(|a| a.probability - right(a)).sum();
@@ -396,7 +397,17 @@ impl Score {
         let percent = |x: Option<f64>| x.map_or("-".into(), |x| format!("{:.1} %", 100.0 * x));
         let mut lines = vec![format!(
             "{:10} {:5} {:46} {:46} {:>5} {:>3} {:>8} {:>8} {:>8} {:>7} {:>6}",
-            "case", "right", "truth", "verdict", "p", "set", "ident.", "refined", "closed", "param.", "s"
+            "case",
+            "right",
+            "truth",
+            "verdict",
+            "p",
+            "set",
+            "ident.",
+            "refined",
+            "closed",
+            "param.",
+            "s"
         )];
         for a in &self.answers {
             lines.push(format!(

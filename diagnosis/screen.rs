@@ -286,7 +286,11 @@ pub fn screen(
                     let response = (dot(&column, &column) / n).sqrt();
                     column.iter_mut().for_each(|x| *x /= share);
                     columns.push(column);
-                    let factor = if response > 0.0 { base.aim / response } else { 100.0 };
+                    let factor = if response > 0.0 {
+                        base.aim / response
+                    } else {
+                        100.0
+                    };
                     if !(0.1..10.0).contains(&factor) {
                         again = true;
                         shares[j] = (shares[j] * factor.clamp(1e-4, 1e3)).clamp(1e-9, 0.1);
@@ -298,7 +302,10 @@ pub fn screen(
             }
         }
         let mut projected = columns.clone();
-        let moves: Vec<Vec<f64>> = projected.iter_mut().map(|c| base.nuisance.project(c)).collect();
+        let moves: Vec<Vec<f64>> = projected
+            .iter_mut()
+            .map(|c| base.nuisance.project(c))
+            .collect();
         let room: Vec<[f64; 2]> = if slopes.is_empty() {
             vec![[0.0, 1.5]]
         } else {
@@ -328,7 +335,11 @@ pub fn screen(
                 let free = base.unknowns.iter().enumerate().filter(|(_, u)| u.free);
                 for (k, (i, unknown)) in free.enumerate() {
                     let by: f64 = base.shift[k]
-                        - moves.iter().zip(&weights).map(|(m, w)| m[k] * w).sum::<f64>();
+                        - moves
+                            .iter()
+                            .zip(&weights)
+                            .map(|(m, w)| m[k] * w)
+                            .sum::<f64>();
                     let p = &unknown.parameter;
                     let u = p.to_unit(point.theta[i]) + length * by;
                     point.theta[i] = p.from_unit(u.clamp(0.0, 1.0));
@@ -378,11 +389,14 @@ fn bounded(columns: &[Vec<f64>], target: &[f64], room: &[[f64; 2]]) -> Vec<f64> 
         let mut rest = target.to_vec();
         for (i, w) in fixed.iter().enumerate() {
             if let Some(w) = w {
-                rest.iter_mut().zip(&columns[i]).for_each(|(r, c)| *r -= w * c);
+                rest.iter_mut()
+                    .zip(&columns[i])
+                    .for_each(|(r, c)| *r -= w * c);
             }
         }
         let m = free.len();
-        let gram = nalgebra::DMatrix::from_fn(m, m, |a, b| dot(&columns[free[a]], &columns[free[b]]));
+        let gram =
+            nalgebra::DMatrix::from_fn(m, m, |a, b| dot(&columns[free[a]], &columns[free[b]]));
         let right = nalgebra::DVector::from_fn(m, |a, _| dot(&columns[free[a]], &rest));
         let solution = crate::fit::inverse(&gram, 1e-9) * right;
         let mut worst = None;

@@ -111,7 +111,9 @@ impl Search<'_> {
                 if gap < NEGLIGIBLE.max(GROWN * before) {
                     break;
                 }
-                let smaller = all.iter().filter(|f| f.candidates.len() < self.breadth.depth);
+                let smaller = all
+                    .iter()
+                    .filter(|f| f.candidates.len() < self.breadth.depth);
                 let beam = if stage == 0 { self.breadth.beam } else { 1 };
                 let bases: Vec<Found> = smaller.take(beam).cloned().collect();
                 for base in bases {
@@ -140,7 +142,9 @@ impl Search<'_> {
 
     /// What the best leaves.
     fn gap(&self, stage: usize, all: &[Found]) -> f64 {
-        let best = all.first().map_or(f64::INFINITY, |f| f.explanation.fit.cost);
+        let best = all
+            .first()
+            .map_or(f64::INFINITY, |f| f.explanation.fit.cost);
         excess(best / self.bench.readings(stage))
     }
 
@@ -148,7 +152,10 @@ impl Search<'_> {
     fn quota(&self, stage: usize) -> usize {
         let n = self.bench.stages.len();
         let share = if self.bench.is_rough() { 0.6 } else { 1.0 };
-        let (first, last) = (self.breadth.first as f64 * share, self.breadth.last as f64 * share);
+        let (first, last) = (
+            self.breadth.first as f64 * share,
+            self.breadth.last as f64 * share,
+        );
         let along = if n == 1 {
             0.0
         } else {

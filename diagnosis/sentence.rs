@@ -28,7 +28,10 @@ pub fn sentence(result: &DiagnosisResult, labels: &[String]) -> String {
     let caution = if failed.is_empty() {
         String::new()
     } else {
-        format!(" But a check failed ({}): see there first.", failed.join(", "))
+        format!(
+            " But a check failed ({}): see there first.",
+            failed.join(", ")
+        )
     };
     let closed = || match (result.gap.closed, result.gap.closed_interval95) {
         (Some(c), Some([low, high])) => format!(
@@ -57,7 +60,10 @@ pub fn sentence(result: &DiagnosisResult, labels: &[String]) -> String {
             } else {
                 let sets = result.verdict.ambiguous_with.iter();
                 let names: Vec<String> = sets.map(|s| s.join(" + ")).collect();
-                format!(" These data cannot tell it from {}.", names.join(", nor from "))
+                format!(
+                    " These data cannot tell it from {}.",
+                    names.join(", nor from ")
+                )
             };
             format!(
                 "{place}{} explains {}.{ambiguous}",

@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use asid_core::parameter::Scale;
 use asid_core::episode::InitialState;
+use asid_core::parameter::Scale;
 use asid_core::problem::home;
 use asid_core::{
     EffectSpec, Episode, Error, Layout, Parameter, Plant, Result, Scene, Target, Task,
@@ -116,10 +116,11 @@ impl Study {
                 )));
             }
         }
-        let train = logs(&folder, &document.train, &plant.layout, "train").map_err(|e| match e {
-            Error::Config { message, .. } => fail(message),
-            other => other,
-        })?;
+        let train =
+            logs(&folder, &document.train, &plant.layout, "train").map_err(|e| match e {
+                Error::Config { message, .. } => fail(message),
+                other => other,
+            })?;
         let test = logs(&folder, &document.test, &plant.layout, "test").map_err(|e| match e {
             Error::Config { message, .. } => fail(message),
             other => other,
@@ -177,7 +178,10 @@ impl Study {
             parameters: task.parameters(),
             train: read(train)?,
             test: read(test)?,
-            noise: signals.iter().map(|s| (s.sensor.clone(), s.noise)).collect(),
+            noise: signals
+                .iter()
+                .map(|s| (s.sensor.clone(), s.noise))
+                .collect(),
             scene,
         }
         .with_test()
@@ -228,7 +232,11 @@ fn task_start(task: &dyn Task, layout: &Layout) -> Result<InitialState> {
 }
 
 fn one_line(error: &toml::de::Error) -> String {
-    error.message().split_whitespace().collect::<Vec<_>>().join(" ")
+    error
+        .message()
+        .split_whitespace()
+        .collect::<Vec<_>>()
+        .join(" ")
 }
 
 fn parameter(written: &StudyParameter) -> Result<Parameter, String> {

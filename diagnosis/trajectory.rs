@@ -127,7 +127,9 @@ impl Trajectory {
         let (nv, at) = (plant.layout.nv, plant.layout.joints[joint].qvel);
         let episodes = self.episodes.iter();
         let speeds = episodes.flat_map(|e| e.qvel.iter().skip(at).step_by(nv));
-        speeds.filter(|v| v.is_finite()).fold(0.0, |a, v| a.max(v.abs()))
+        speeds
+            .filter(|v| v.is_finite())
+            .fold(0.0, |a, v| a.max(v.abs()))
     }
 
     /// Largest force of the drives on a hinge or slide, N or N m.
@@ -217,7 +219,13 @@ fn spreads(logs: &Logs) -> Vec<(String, f64)> {
         let len = if sensor.rotation { 4 } else { own };
         let mut values = Vec::new();
         for e in &logs.episodes {
-            values.extend(e.readings.iter().skip(at).step_by(width).filter(|x| x.is_finite()));
+            values.extend(
+                e.readings
+                    .iter()
+                    .skip(at)
+                    .step_by(width)
+                    .filter(|x| x.is_finite()),
+            );
         }
         let n = values.len().max(1) as f64;
         let mean = values.iter().sum::<f64>() / n;

@@ -171,8 +171,8 @@ pub fn judge(bench: &Bench, findings: &Findings, candidates: usize, scatter: f64
             &findings.found[i].explanation.fit.residuals
         });
     let rho = correlation(bench, residuals);
-    let temperature = (lowest / readings).max(1.0) * (1.0 + rho) / (1.0 - rho)
-        + scatter / (2.0 * APART.sqrt());
+    let temperature =
+        (lowest / readings).max(1.0) * (1.0 + rho) / (1.0 - rho) + scatter / (2.0 * APART.sqrt());
     // Twice the negative logarithm of the posterior, up to a constant.
     let score = |h: &Hypothesis| {
         let choice = 2.0 * (candidates.max(1) as f64).ln() * h.labels.len() as f64;

@@ -27,7 +27,9 @@ impl StepHook for Beyond {
 }
 
 fn engines(needed: Capabilities) -> Vec<Box<dyn Backend>> {
-    let made = all::<BackendEntry>().into_iter().map(|e| (e.make)().unwrap());
+    let made = all::<BackendEntry>()
+        .into_iter()
+        .map(|e| (e.make)().unwrap());
     made.filter(|b| b.capabilities().contains(needed)).collect()
 }
 
@@ -43,7 +45,9 @@ fn rest(simulator: &mut dyn Simulator, hook: Option<&dyn StepHook>) -> f64 {
     let mut out = [0.0; 3];
     simulator.rollout(&settle, &mut out).unwrap();
     let qpos = [0.0, 0.0, out[2], 1.0, 0.0, 0.0, 0.0];
-    simulator.set_state(&[0], &qpos, &[1.0, 0.0, 0.0, 0.0, 0.0, 0.0]).unwrap();
+    simulator
+        .set_state(&[0], &qpos, &[1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+        .unwrap();
     let mut rollout = Rollout::new(&[0], 1, 2000, Control::Shared(&[]), &recording);
     rollout.hook = hook;
     simulator.rollout(&rollout, &mut out).unwrap();
@@ -64,11 +68,19 @@ fn a_hook_changes_friction_from_step_to_step_and_for_a_rollout_only() {
         let (mu, after, place, g) = (0.2, 0.5, 0.1, 9.81);
         let plain = rest(&mut *simulator, None);
         let expected = 1.0 / (2.0 * mu * g);
-        assert!((plain / expected - 1.0).abs() < 0.03, "{}: {plain}, {expected}", backend.name());
+        assert!(
+            (plain / expected - 1.0).abs() < 0.03,
+            "{}: {plain}, {expected}",
+            backend.name()
+        );
         // v² = 1 - 2 mu g place is left at the place, and is used up by the other friction.
         let hooked = rest(&mut *simulator, Some(&Beyond(place, after)));
         let expected = place + (1.0 - 2.0 * mu * g * place) / (2.0 * after * g);
-        assert!((hooked / expected - 1.0).abs() < 0.03, "{}: {hooked}, {expected}", backend.name());
+        assert!(
+            (hooked / expected - 1.0).abs() < 0.03,
+            "{}: {hooked}, {expected}",
+            backend.name()
+        );
         assert_eq!(rest(&mut *simulator, None), plain, "{}", backend.name());
     }
 }

@@ -333,8 +333,8 @@ fn state_columns(layout: &Layout, header: &[String]) -> Result<Vec<(usize, bool,
                 }
             }
         });
-        let place =
-            place.ok_or_else(|| format!("column `{name}` is no coordinate of a joint of the scene"))?;
+        let place = place
+            .ok_or_else(|| format!("column `{name}` is no coordinate of a joint of the scene"))?;
         found.push((i, velocity, place));
     }
     Ok(found)

@@ -192,11 +192,7 @@ impl Touch {
     }
 
     /// Whether a force is seen after any physics step of a control step that the copy plays.
-    fn between(
-        &mut self,
-        simulator: &mut dyn Simulator,
-        ctrl: &[f64],
-    ) -> Result<bool> {
+    fn between(&mut self, simulator: &mut dyn Simulator, ctrl: &[f64]) -> Result<bool> {
         if self.forces.is_empty() {
             return Ok(false);
         }

@@ -112,9 +112,9 @@ impl Config {
         for setting in &common.set {
             config::set(&mut table, setting)?;
         }
-        let mut config: Self = table.try_into().map_err(|e: toml::de::Error| {
-            config_error("config", e.message().replace('\n', " "))
-        })?;
+        let mut config: Self = table
+            .try_into()
+            .map_err(|e: toml::de::Error| config_error("config", e.message().replace('\n', " ")))?;
         if arguments.study.is_some() || arguments.task.is_some() {
             config.study.clone_from(&arguments.study);
             config.task.clone_from(&arguments.task);
@@ -285,8 +285,17 @@ fn lines(result: &DiagnosisResult, engine: &str, seconds: f64) -> Vec<String> {
         "gap on logs held out, in units of the noise: {:.2} as given, {:.2} identified, {:.2} refined",
         gap.nominal, gap.identified, gap.refined
     ));
-    for h in result.hypotheses.iter().take(4).filter(|h| h.probability > 0.001) {
-        line(&format!("  {:5.1} %  {}", 100.0 * h.probability, h.effects.join(" + ")));
+    for h in result
+        .hypotheses
+        .iter()
+        .take(4)
+        .filter(|h| h.probability > 0.001)
+    {
+        line(&format!(
+            "  {:5.1} %  {}",
+            100.0 * h.probability,
+            h.effects.join(" + ")
+        ));
     }
     for e in result.effects.iter().filter(|e| {
         let label = if e.site.is_empty() {
@@ -309,4 +318,3 @@ fn lines(result: &DiagnosisResult, engine: &str, seconds: f64) -> Vec<String> {
     line(&format!("{engine}, {seconds:.1} s"));
     all
 }
-

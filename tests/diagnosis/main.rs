@@ -69,7 +69,11 @@ fn faults_are_named_and_closed_and_shuffled_labels_score_nothing() {
     for (diagnosis, (truth, effects)) in done.iter().zip(CASES) {
         let r = &diagnosis.result;
         let said = r.verdict.effects.iter().map(String::as_str);
-        assert!(said.eq(effects.iter().copied()), "{truth:?}: {}", r.sentence);
+        assert!(
+            said.eq(effects.iter().copied()),
+            "{truth:?}: {}",
+            r.sentence
+        );
         // The model steps by 2 ms, which puts it about 2 deviations off the real cart.
         assert!(r.gap.refined < 2.5, "{truth:?}: {:?}", r.gap);
         if !effects.is_empty() {
@@ -102,7 +106,11 @@ fn with_the_right_effect_out_of_the_catalogue_its_name_is_not_given() {
     // Nothing else in the catalogue is a spring, and what comes nearest leaves a gap.
     let (diagnosis, _) = run(Truth::Spring(15.0), &["joint-stiffness"]);
     let r = &diagnosis.result;
-    assert!(!r.verdict.effects.contains(&"joint-stiffness@rail".to_owned()));
+    assert!(
+        !r.verdict
+            .effects
+            .contains(&"joint-stiffness@rail".to_owned())
+    );
     assert!(r.gap.refined > 2.0, "{:?}", r.gap);
     let (with, _) = run(Truth::Spring(15.0), &[]);
     assert_eq!(with.result.verdict.effects, ["joint-stiffness@rail"]);
@@ -111,7 +119,12 @@ fn with_the_right_effect_out_of_the_catalogue_its_name_is_not_given() {
 #[test]
 fn an_effect_of_no_catalogue_is_unknown() {
     let (diagnosis, _) = run(Truth::Magnet(3.0), &[]);
-    assert_eq!(diagnosis.result.verdict.kind, Kind::Unknown, "{}", diagnosis.result.sentence);
+    assert_eq!(
+        diagnosis.result.verdict.kind,
+        Kind::Unknown,
+        "{}",
+        diagnosis.result.sentence
+    );
 }
 
 #[test]
@@ -134,7 +147,10 @@ fn the_same_study_gives_the_same_result_at_any_number_of_threads() {
         let (fixed, effects) = (&study.fixed, &study.effects);
         let machine = Machine::new(engine(), &study.scene, fixed, effects, threads).unwrap();
         let settings = Settings::default();
-        diagnose(&study, machine, settings, &Silent).unwrap().0.result
+        diagnose(&study, machine, settings, &Silent)
+            .unwrap()
+            .0
+            .result
     });
     assert_eq!(results[0], results[1]);
 }

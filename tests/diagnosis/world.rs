@@ -65,7 +65,11 @@ fn extra(truth: Truth, x: f64, v: f64) -> f64 {
 
 /// The command that arrives: held for 10 ms, and later by the delay.
 fn arriving(truth: Truth, episode: usize, t: f64) -> f64 {
-    let late = if let Truth::Delay(tau) = truth { tau } else { 0.0 };
+    let late = if let Truth::Delay(tau) = truth {
+        tau
+    } else {
+        0.0
+    };
     // Half a step of the integrator off the edge, so that rounding does not matter.
     let row = ((t - late + 5e-5) / 0.01).floor().max(0.0);
     command(episode, row * 0.01)
@@ -83,15 +87,27 @@ pub fn log(truth: Truth, episode: usize) -> String {
     let mut text = "time,ctrl.belt,x,dx,qpos.rail,qvel.rail\n".to_owned();
     for row in 0..(SECONDS / 0.01) as usize {
         let time = row as f64 * 0.01;
-        let bias = if let Truth::SensorBias(b) = truth { b } else { 0.0 };
+        let bias = if let Truth::SensorBias(b) = truth {
+            b
+        } else {
+            0.0
+        };
         let seen = match truth {
             Truth::Noise => [0.0, 0.0],
             _ => [x + bias, v],
         };
         let readings = [seen[0] + NOISE[0] * normal(), seen[1] + NOISE[1] * normal()];
         let start = if row == 0 { "0,0" } else { "," };
-        let u = if truth == Truth::Noise { 0.0 } else { command(episode, time) };
-        let _ = writeln!(text, "{time:.3},{u},{},{},{start}", readings[0], readings[1]);
+        let u = if truth == Truth::Noise {
+            0.0
+        } else {
+            command(episode, time)
+        };
+        let _ = writeln!(
+            text,
+            "{time:.3},{u},{},{},{start}",
+            readings[0], readings[1]
+        );
         for step in 0..100 {
             let t = time + f64::from(step) * h;
             let u = arriving(truth, episode, t);

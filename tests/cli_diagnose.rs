@@ -1,0 +1,209 @@
+//! `asid diagnose` and `asid withheld` as the user runs them.
+
+#![allow(clippy::unwrap_used)]
+
+#[path = "diagnosis/world.rs"]
+mod world;
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+use serde_json::Value;
+use world::{Truth, write_study};
+
+fn asid(arguments: &[&str]) -> Output {
+    let program = env!("CARGO_BIN_EXE_asid");
+    Command::new(program).args(arguments).output().unwrap()
+}
+
+fn text(path: &Path) -> &str {
+    path.to_str().unwrap()
+}
+
+fn json(path: &Path) -> Value {
+    serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
+}
+
+/// One line on standard error, and the exit status.
+fn refusal(arguments: &[&str]) -> (String, Option<i32>) {
+    let out = asid(arguments);
+    let said = String::from_utf8(out.stderr).unwrap();
+    assert_eq!(said.lines().count(), 1, "{said}");
+    (said.trim().to_owned(), out.status.code())
+}
+
+#[test]
+fn a_fault_is_found_and_its_refined_model_has_none() {
+    let folder = tempfile::tempdir().unwrap();
+    let (study, out) = (folder.path().join("study"), folder.path().join("out"));
+    write_study(&study, Truth::Coulomb(1.2));
+    let done = asid(&["diagnose", text(&study), "--quiet", "--out", text(&out)]);
+    assert!(
+        done.status.success(),
+        "{}",
+        String::from_utf8_lossy(&done.stderr)
+    );
+    let said = String::from_utf8(done.stdout).unwrap();
+    assert!(said.contains("coulomb-friction@rail explains"), "{said}");
+    let result = json(&out.join("result.json"));
+    assert_eq!(result["schema"], 1);
+    assert_eq!(result["verdict"]["kind"], "effects");
+    assert_eq!(result["verdict"]["effects"][0], "coulomb-friction@rail");
+    for file in [
+        "config.toml",
+        "refined.toml",
+        "trace.json",
+        "train-1.csv",
+        "test-2.csv",
+    ] {
+        assert!(out.join(file).is_file(), "{file}");
+    }
+    // The refined model stands in for the model: nothing is left to explain.
+    let refined = out.join("refined.toml");
+    let toml = std::fs::read_to_string(study.join("study.toml")).unwrap();
+    let toml = toml.replace("nominal.xml", text(&refined));
+    std::fs::write(study.join("study.toml"), toml).unwrap();
+    let again = asid(&[
+        "diagnose",
+        text(&study),
+        "--quiet",
+        "--json",
+        "--out",
+        text(&folder.path().join("b")),
+    ]);
+    let result: Value = serde_json::from_slice(&again.stdout).unwrap();
+    let nominal = result["gap"]["nominal"].as_f64().unwrap();
+    assert!(nominal < 3.0, "gap {nominal} with the refined model");
+}
+
+#[test]
+fn labels_are_read_by_the_scorer_only_and_last() {
+    let folder = tempfile::tempdir().unwrap();
+    let cases = folder.path().join("cases");
+    write_study(&cases.join("case-0"), Truth::SensorBias(0.02));
+    // Without labels every diagnosis is done and told before the scorer asks for them.
+    let arguments = ["withheld", "--cases", text(&cases), "--quiet"];
+    let without = asid(&arguments);
+    let said = String::from_utf8(without.stderr).unwrap();
+    assert_eq!(without.status.code(), Some(2));
+    let lines: Vec<&str> = said.lines().collect();
+    assert!(lines[0].contains("sensor-bias@x explains"), "{said}");
+    assert!(lines[1].contains("labels.json"), "{said}");
+    // Wrong labels change nothing of what is said.
+    let labels = r#"{"case-0": {"world": "cart", "effects": ["actuator-delay@belt"], "parameters": {"mass": 1.3}}}"#;
+    std::fs::write(cases.join("labels.json"), labels).unwrap();
+    let out = folder.path().join("out");
+    let with = asid(&[
+        "withheld",
+        "--cases",
+        text(&cases),
+        "--quiet",
+        "--out",
+        text(&out),
+    ]);
+    let told = String::from_utf8(with.stderr).unwrap();
+    let sentence = |s: &str| s.split(" s: ").nth(1).unwrap_or_default().to_owned();
+    assert_eq!(sentence(told.lines().next().unwrap()), sentence(lines[0]));
+    assert_eq!(json(&out.join("result.json"))["right"], 0);
+}
+
+#[test]
+fn bad_studies_and_logs_are_refused_in_one_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let study = folder.path().join("study");
+    write_study(&study, Truth::None);
+    let log = study.join("train_0.csv");
+    let good = std::fs::read_to_string(&log).unwrap();
+    let toml = study.join("study.toml");
+    let written = std::fs::read_to_string(&toml).unwrap();
+    let with_log = |text: String| std::fs::write(&log, text).unwrap();
+    let cases: [(&str, Box<dyn Fn()>, &str); 7] = [
+        (
+            "unknown column",
+            Box::new(|| with_log(good.replace(",dx,", ",ddx,"))),
+            "column `ddx`",
+        ),
+        (
+            "text",
+            Box::new(|| with_log(good.replacen("\n0.010,", "\n0.010,abc", 1))),
+            "row 3, column `ctrl.belt`",
+        ),
+        (
+            "time back",
+            Box::new(|| with_log(good.replace("\n0.020,", "\n0.005,"))),
+            "row 4: time 0.005",
+        ),
+        (
+            "no coordinate",
+            Box::new(|| with_log(good.replace("qpos.rail", "qpos.rial"))),
+            "column `qpos.rial`",
+        ),
+        (
+            "one row",
+            Box::new(|| with_log(good.lines().take(2).collect::<Vec<_>>().join("\n"))),
+            "at least 2",
+        ),
+        (
+            "key",
+            Box::new(|| std::fs::write(&toml, format!("speed = 3\n{written}")).unwrap()),
+            "unknown field `speed`",
+        ),
+        (
+            "pattern",
+            Box::new(|| std::fs::write(&toml, written.replace("train_*", "tarin_*")).unwrap()),
+            "no file matches `tarin_*.csv`",
+        ),
+    ];
+    for (name, spoil, expected) in cases {
+        spoil();
+        let (said, status) = refusal(&["diagnose", text(&study), "--quiet"]);
+        assert!(said.contains(expected), "{name}: {said}");
+        assert_eq!(status, Some(2), "{name}: {said}");
+        with_log(good.clone());
+        std::fs::write(&toml, &written).unwrap();
+    }
+    let (said, status) = refusal(&["diagnose", text(&folder.path().join("nowhere"))]);
+    assert!(said.contains("no such file") && status == Some(2), "{said}");
+}
+
+#[test]
+fn degrees_in_place_of_radians_are_noticed() {
+    let folder = tempfile::tempdir().unwrap();
+    let study = folder.path().join("study");
+    write_study(&study, Truth::None);
+    for entry in std::fs::read_dir(&study).unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_some_and(|e| e == "csv") {
+            let log = std::fs::read_to_string(&path).unwrap();
+            let scaled = log.lines().enumerate().map(|(i, line)| {
+                let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+                if i > 0 {
+                    let x: f64 = cells[2].parse().unwrap();
+                    cells[2] = (x * 180.0 / std::f64::consts::PI).to_string();
+                }
+                cells.join(",") + "\n"
+            });
+            std::fs::write(&path, scaled.collect::<String>()).unwrap();
+        }
+    }
+    let out = asid(&[
+        "diagnose",
+        text(&study),
+        "--quiet",
+        "--json",
+        "--out",
+        text(&folder.path().join("o")),
+    ]);
+    let result: Value = serde_json::from_slice(&out.stdout).unwrap();
+    let units = result["checks"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .find(|c| c["check"] == "units")
+        .unwrap();
+    assert_eq!(units["ok"], false);
+    assert!(
+        units["detail"].as_str().unwrap().contains("degrees"),
+        "{units}"
+    );
+}
