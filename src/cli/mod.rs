@@ -3,6 +3,8 @@
 mod compare;
 mod config;
 mod conformance;
+#[cfg_attr(not(test), expect(dead_code, reason = "for asid diagnose"))]
+mod diagnosis_report;
 mod doctor;
 mod explore;
 mod export;
