@@ -69,6 +69,7 @@ pub struct Page {
     title: String,
     kicker: String,
     lead: String,
+    answer: String,
     badge: Option<(String, Tone)>,
     facts: Vec<(String, String)>,
     tiles: Vec<Tile>,
@@ -84,6 +85,7 @@ impl Page {
             title: title.to_owned(),
             kicker: String::new(),
             lead: String::new(),
+            answer: String::new(),
             badge: None,
             facts: Vec::new(),
             tiles: Vec::new(),
@@ -103,6 +105,13 @@ impl Page {
     #[must_use]
     pub fn lead(mut self, lead: impl Into<String>) -> Self {
         self.lead = lead.into();
+        self
+    }
+
+    /// Sets the answer in one sentence where it is what the page is for: larger, above the lead.
+    #[must_use]
+    pub fn answer(mut self, answer: impl Into<String>) -> Self {
+        self.answer = answer.into();
         self
     }
 
@@ -170,10 +179,11 @@ impl Page {
             "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\" />\n\
              <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\" />\n\
              <meta name=\"color-scheme\" content=\"light dark\" />\n<title>{title}</title>\n<style>\n{STYLE}</style>\n</head>\n\
-             <body>\n<header>{kicker}<h1>{title}{badge}</h1>{lead}{facts}</header>\n<main>\n{tiles}{sections}</main>\n{footer}\
+             <body>\n<header>{kicker}<h1>{title}{badge}</h1>{answer}{lead}{facts}</header>\n<main>\n{tiles}{sections}</main>\n{footer}\
              <script>\n{SCRIPT}</script>\n</body>\n</html>\n",
             title = escape(&self.title),
             kicker = some("p", "kicker", &self.kicker),
+            answer = some("p", "lead answer", &self.answer),
             lead = some("p", "lead", &self.lead),
             facts = if self.facts.is_empty() { "" } else { &facts },
             tiles = if tiles.is_empty() {

@@ -23,6 +23,7 @@ mod layer;
 mod marks;
 mod outline;
 mod plan;
+mod ranking;
 mod scale;
 
 pub use chart::Chart;
@@ -32,6 +33,7 @@ pub use frame::Axis;
 pub use layer::{Dash, Layer};
 pub use outline::Outline;
 pub use plan::Plan;
+pub use ranking::{Ranked, Ranking};
 pub use scale::{Scale, Spacing, Ticks};
 
 /// Width of a plot that stands beside another one, in SVG units.
@@ -67,6 +69,14 @@ pub enum Colour {
     Purple,
     /// Ochre.
     Ochre,
+    /// The first of four steps from little to much.
+    Cool,
+    /// The second.
+    Warm,
+    /// The third.
+    Hot,
+    /// The fourth.
+    Fierce,
 }
 
 impl Colour {
@@ -81,6 +91,10 @@ impl Colour {
             Self::Green => "c-green",
             Self::Purple => "c-purple",
             Self::Ochre => "c-ochre",
+            Self::Cool => "c-cool",
+            Self::Warm => "c-warm",
+            Self::Hot => "c-hot",
+            Self::Fierce => "c-fierce",
         }
     }
 }

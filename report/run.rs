@@ -20,7 +20,6 @@ mod episode;
 mod exploration;
 mod final_density;
 mod head;
-mod nullable;
 mod posterior;
 mod signals;
 mod trace;

@@ -7,7 +7,7 @@ use crate::plot::{NARROW, Plot, WIDE};
 pub struct Figure {
     title: String,
     caption: String,
-    plot: Box<dyn Plot + Send + Sync>,
+    plots: Vec<Box<dyn Plot + Send + Sync>>,
 }
 
 impl std::fmt::Debug for Figure {
@@ -29,19 +29,45 @@ impl Figure {
         Self {
             title: title.into(),
             caption: caption.into(),
-            plot: Box::new(plot),
+            plots: vec![Box::new(plot)],
         }
+    }
+
+    /// Adds a plot beneath those there are, under the same title.
+    #[must_use]
+    pub fn beneath(mut self, plot: impl Plot + Send + Sync + 'static) -> Self {
+        self.plots.push(Box::new(plot));
+        self
     }
 
     /// The figure; one with a row to itself carries a second layout for wide screens.
     pub(super) fn html(&self, id: &str, alone: bool) -> String {
-        let narrow = self.plot.svg(id, NARROW);
-        let drawing = if alone {
-            let wide = self.plot.svg(&format!("{id}w"), WIDE);
-            format!("<div class=\"on-narrow\">{narrow}</div><div class=\"on-wide\">{wide}</div>")
-        } else {
-            narrow
+        let draw = |(i, plot): (usize, &(dyn Plot + Send + Sync))| {
+            let (id, class) = match i {
+                0 => (id.to_owned(), ""),
+                i => (format!("{id}-{i}"), "beneath"),
+            };
+            let narrow = plot.svg(&id, NARROW);
+            let drawing = if alone {
+                let wide = plot.svg(&format!("{id}w"), WIDE);
+                format!(
+                    "<div class=\"on-narrow\">{narrow}</div><div class=\"on-wide\">{wide}</div>"
+                )
+            } else {
+                narrow
+            };
+            match class {
+                "" => drawing,
+                class => format!("<div class=\"{class}\">{drawing}</div>"),
+            }
         };
+        let drawing: String = self
+            .plots
+            .iter()
+            .map(|plot| &**plot)
+            .enumerate()
+            .map(draw)
+            .collect();
         let class = if alone { "alone" } else { "" };
         let caption = if self.caption.is_empty() {
             String::new()

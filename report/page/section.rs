@@ -12,6 +12,8 @@ pub(super) enum Block {
     Command(String),
     Facts(Vec<(String, String)>),
     Heading(String),
+    Text(String),
+    Folded(String, Vec<Block>),
 }
 
 /// A titled part of a page.
@@ -79,6 +81,23 @@ impl Section {
         self
     }
 
+    /// Adds a paragraph.
+    #[must_use]
+    pub fn text(mut self, text: impl Into<String>) -> Self {
+        self.blocks.push(Block::Text(text.into()));
+        self
+    }
+
+    /// Adds the body of another section, out of sight until its summary is clicked.
+    #[must_use]
+    pub fn folded(mut self, summary: impl Into<String>, inner: Self) -> Self {
+        if !inner.blocks.is_empty() {
+            self.blocks
+                .push(Block::Folded(summary.into(), inner.blocks));
+        }
+        self
+    }
+
     /// Adds a heading inside the section.
     #[must_use]
     pub fn heading(mut self, heading: impl Into<String>) -> Self {
@@ -138,6 +157,14 @@ impl Block {
                     })
                     .collect();
                 format!("<dl class=\"facts\">{rows}</dl>")
+            }
+            Self::Text(text) => format!("<p class=\"text\">{}</p>", escape(text)),
+            Self::Folded(summary, blocks) => {
+                let inner: String = blocks.iter().map(|b| b.html(section, figures)).collect();
+                format!(
+                    "<details><summary>{}</summary><div class=\"body\">{inner}</div></details>\n",
+                    escape(summary)
+                )
             }
             Self::Heading(text) => format!("<h3 class=\"heading\">{}</h3>", escape(text)),
         }

@@ -95,6 +95,9 @@ impl Chart {
         let mut entries: Vec<Entry> = Vec::new();
         for layer in &self.layers {
             let key = match layer.mark {
+                Mark::Line(_) if layer.width.is_some() => {
+                    Key::Broad(layer.width.unwrap_or_default(), layer.opacity)
+                }
                 Mark::Vertical(_) | Mark::Span(..) => continue,
                 Mark::Line(_) | Mark::Steps(_) | Mark::Horizontal(_) => Key::Line(layer.dash),
                 Mark::Whiskers(_) => Key::Line(Dash::Solid),

@@ -16,6 +16,7 @@ pub struct Axis {
     pub(crate) zero: bool,
     pub(crate) bare: bool,
     pub(crate) marks: Vec<(f64, String)>,
+    pub(crate) gutter: f64,
 }
 
 impl Axis {
@@ -57,6 +58,13 @@ impl Axis {
         self
     }
 
+    /// Leaves at least this much room for tick labels, so that plots beneath each other line up.
+    #[must_use]
+    pub fn gutter(mut self, width: f64) -> Self {
+        self.gutter = width;
+        self
+    }
+
     /// Fixes what stands along the axis: `(position, text)`, increasing, such as the names of categories.
     #[must_use]
     pub fn marks(mut self, marks: Vec<(f64, String)>) -> Self {
@@ -81,7 +89,7 @@ impl Axis {
         }
     }
 
-    fn text(&self, exponent: i32) -> String {
+    pub(super) fn text(&self, exponent: i32) -> String {
         let unit = unit_symbol(&self.unit);
         let power = if exponent == 0 {
             String::new()
@@ -133,7 +141,7 @@ impl Frame {
             .labels
             .iter()
             .map(|l| text_width(l, FONT_SIZE))
-            .fold(0.0, f64::max);
+            .fold(y.0.gutter, f64::max);
         [if y.0.bare { 4.0 } else { widest + 9.0 }, 14.0]
     }
 
@@ -245,7 +253,7 @@ fn y_ticks((axis, domain): (&Axis, [f64; 2]), range: [f64; 2], plot_height: f64)
 }
 
 /// As many ticks as stand apart by more than their own labels.
-fn x_ticks(axis: &Axis, scale: &Scale, width: f64) -> Ticks {
+pub(super) fn x_ticks(axis: &Axis, scale: &Scale, width: f64) -> Ticks {
     let mut most = (width / 55.0).floor().max(2.0) as usize;
     loop {
         let ticks = axis.ticks(scale, most);

@@ -17,6 +17,8 @@ const LABEL_GAP: f64 = 9.0;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Key {
     Line(Dash),
+    /// A broad and faint line: its width and opacity.
+    Broad(f64, f64),
     Fill(f64),
     Dot(f64),
     /// Faint to strong dots: time.
@@ -163,6 +165,12 @@ fn key(entry: &Entry, x: f64, y: f64) -> String {
         Key::Line(dash) => {
             format!("<path class=\"line {class}\" d=\"M{} {y0}H{x1}\"{}/>", coordinate(x), dash.attribute())
         }
+        Key::Broad(wide, opacity) => format!(
+            "<path class=\"line {class}\" d=\"M{} {y0}H{x1}\" stroke-opacity=\"{}\" style=\"stroke-width:{}\"/>",
+            coordinate(x),
+            coordinate(opacity),
+            coordinate(wide),
+        ),
         Key::Fill(opacity) => format!(
             "<rect class=\"fill {class}\" x=\"{}\" y=\"{}\" width=\"{KEY_WIDTH}\" height=\"10\" rx=\"1.5\" fill-opacity=\"{}\"/>",
             coordinate(x),

@@ -62,6 +62,7 @@ pub struct Layer {
     pub(crate) label: Option<String>,
     pub(crate) dash: Dash,
     pub(crate) opacity: f64,
+    pub(crate) width: Option<f64>,
 }
 
 impl Layer {
@@ -72,6 +73,7 @@ impl Layer {
             label: None,
             dash: Dash::Solid,
             opacity: 1.0,
+            width: None,
         }
     }
 
@@ -182,6 +184,23 @@ impl Layer {
     pub fn opacity(mut self, opacity: f64) -> Self {
         self.opacity = opacity.clamp(0.0, 1.0);
         self
+    }
+
+    /// Sets the width of lines in SVG units; other marks ignore it.
+    #[must_use]
+    pub fn width(mut self, width: f64) -> Self {
+        self.width = Some(width);
+        self
+    }
+
+    /// The attribute that draws lines at a width of their own.
+    pub(crate) fn width_style(&self) -> String {
+        self.width.map_or_else(String::new, |width| {
+            format!(
+                " style=\"stroke-width:{};stroke-linecap:round\"",
+                super::coordinate(width)
+            )
+        })
     }
 
     /// Sets the radius of dots in SVG units; other marks ignore it.

@@ -20,8 +20,9 @@ pub(super) fn draw(layer: &Layer, frame: &Frame) -> String {
             return String::new();
         }
         format!(
-            "<path class=\"line {class}\" d=\"{path}\" stroke-opacity=\"{opacity}\"{}/>",
-            layer.dash.attribute()
+            "<path class=\"line {class}\" d=\"{path}\" stroke-opacity=\"{opacity}\"{}{}/>",
+            layer.dash.attribute(),
+            layer.width_style()
         )
     };
     let fill = |path: &str| {

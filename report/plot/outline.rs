@@ -12,6 +12,8 @@ pub struct Outline {
     pub(super) circle: Option<f64>,
     pub(super) closed: bool,
     pub(super) dots: bool,
+    /// Dots grow from faint to strong.
+    pub(super) fade: bool,
     pub(super) colour: Colour,
     pub(super) dash: Dash,
     pub(super) fill: f64,
@@ -27,6 +29,7 @@ impl Outline {
             circle: None,
             closed: true,
             dots: false,
+            fade: false,
             colour: Colour::Ink,
             dash: Dash::Solid,
             fill: 0.1,
@@ -64,6 +67,17 @@ impl Outline {
     /// Dots that grow from faint to strong along the sequence: time.
     #[must_use]
     pub fn trail(points: Vec<[f64; 2]>) -> Self {
+        Self {
+            closed: false,
+            dots: true,
+            fade: true,
+            ..Self::new(points)
+        }
+    }
+
+    /// Dots that are all alike.
+    #[must_use]
+    pub fn spots(points: Vec<[f64; 2]>) -> Self {
         Self {
             closed: false,
             dots: true,
@@ -176,7 +190,11 @@ pub(super) fn draw(outline: &Outline, frame: &Frame) -> String {
             .map(|(i, [cx, cy])| {
                 format!(
                     "<circle class=\"fill {class}\" fill-opacity=\"{}\" cx=\"{}\" cy=\"{}\" r=\"3\"/>",
-                    coordinate(0.35 + 0.65 * i as f64 / last),
+                    coordinate(if outline.fade {
+                        0.35 + 0.65 * i as f64 / last
+                    } else {
+                        0.85
+                    }),
                     coordinate(*cx),
                     coordinate(*cy)
                 )

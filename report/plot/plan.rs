@@ -81,6 +81,7 @@ impl Plan {
         let entry = |o: &Outline| {
             let (text, series) = o.label.clone()?;
             let key = match (series || o.dots, o.closed) {
+                _ if o.dots && !o.fade => Key::Dot(0.85),
                 (true, _) => Key::Fade,
                 (false, true) if o.dash == Dash::Solid => Key::Fill(o.fill),
                 _ => Key::Line(o.dash),

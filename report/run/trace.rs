@@ -10,7 +10,7 @@ pub use stages::{
 
 use serde::{Deserialize, Serialize};
 
-use super::nullable;
+use crate::nullable;
 
 /// Version of the layout of `trace.json`.
 pub const SCHEMA: u32 = 1;

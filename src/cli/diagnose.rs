@@ -16,11 +16,13 @@ use asid_diagnosis::search::Breadth;
 use asid_diagnosis::study::Study;
 use serde::{Deserialize, Serialize};
 
+use super::diagnosis_report::{self, Meta};
 use super::options::Common;
 use super::output::{OutFolder, write_json, write_text};
 use super::progress::Bars;
 use super::session::backend;
 use super::{config, failure};
+use asid_report::diagnosis as report;
 
 /// Arguments of `diagnose`.
 #[derive(clap::Args)]
@@ -217,7 +219,13 @@ pub fn diagnose(arguments: &Arguments) -> Result<()> {
     };
     out.write(|folder| {
         write_json(&folder.join("result.json"), &diagnosis.result)?;
-        write_json(&folder.join("trace.json"), &diagnosis.trace)?;
+        let report = diagnosis_report::diagnosis(
+            &diagnosis.result,
+            &diagnosis.trace,
+            meta(&study, &engine, config.seed),
+        );
+        write_json(&folder.join("trace.json"), &report)?;
+        write_text(&folder.join("report.html"), &report::page(&report))?;
         write_text(&folder.join("config.toml"), &toml::to_string(&config)?)?;
         write_text(
             &folder.join("refined.toml"),
@@ -242,6 +250,30 @@ pub fn diagnose(arguments: &Arguments) -> Result<()> {
         failure::warn(&format!("check {}: {}", check.check, check.detail));
     }
     Ok(())
+}
+
+/// What the report tells besides the result.
+fn meta(study: &Study, engine: &str, seed: u64) -> Meta {
+    let parameters = study.parameters.iter();
+    Meta {
+        command: super::run::command_line(),
+        engine: engine.to_owned(),
+        seed,
+        parameters: parameters
+            .map(|p| (p.name.clone(), p.unit.clone(), None))
+            .collect(),
+        held_out: study.test.len(),
+        fitted_to: study.train.len(),
+        files: vec![
+            ("result.json", "the numbers"),
+            ("refined.toml", "the model with the effects of the verdict"),
+            (
+                "config.toml",
+                "the settings: `--config` with it repeats this",
+            ),
+            ("trace.json", "the data of this report"),
+        ],
+    }
 }
 
 /// The text of the refined model; its document is copied beside it where it needs no other file.

@@ -4,6 +4,7 @@ mod compare;
 mod config;
 mod conformance;
 mod diagnose;
+mod diagnosis_report;
 mod doctor;
 mod explore;
 mod export;

@@ -22,10 +22,17 @@ pub fn report(arguments: &Arguments) -> Result<()> {
     };
     let text = std::fs::read_to_string(&path)
         .map_err(|e| fail(format!("{e}; is this the folder of a finished run?")))?;
-    let report: RunReport = serde_json::from_str(&text).map_err(|e| fail(e.to_string()))?;
+    let value: serde_json::Value = serde_json::from_str(&text).map_err(|e| fail(e.to_string()))?;
+    let page = if value.get("study").is_some() {
+        let diagnosis = serde_json::from_value(value).map_err(|e| fail(e.to_string()))?;
+        asid_report::diagnosis::page(&diagnosis)
+    } else {
+        let report: RunReport = serde_json::from_value(value).map_err(|e| fail(e.to_string()))?;
+        report.html()
+    };
     let html = arguments.dir.join("report.html");
     let staging = arguments.dir.join(".report.html");
-    super::output::write_text(&staging, &report.html())?;
+    super::output::write_text(&staging, &page)?;
     std::fs::rename(&staging, &html).map_err(|e| Error::File {
         path: html,
         message: e.to_string(),

@@ -1,13 +1,16 @@
-//! Writes run reports of made-up but realistic data, to look at the layout.
+//! Writes reports of made-up but realistic data, to look at the layout.
 //!
-//! `cargo run -p asid-report --example gallery -- FOLDER` writes `full`,
-//! `bare` and `crowded` below it, each with `trace.json` and `report.html`.
+//! `cargo run -p asid-report --example gallery -- FOLDER` writes runs (`full`, `bare`
+//! and `crowded`, each with `trace.json`) and diagnoses (`patch`, `complete`,
+//! `unexplained` and `empty`) below it, each with `report.html`.
 
+mod diagnosed;
 mod synthetic;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use asid_core::error::{Error, Result};
+use asid_report::diagnosis::{Diagnosis, page};
 
 fn main() -> Result<()> {
     let folder = PathBuf::from(std::env::args().nth(1).unwrap_or_else(|| "gallery".into()));
@@ -17,12 +20,30 @@ fn main() -> Result<()> {
         ("crowded", synthetic::crowded_run()),
     ];
     for (name, run) in runs {
-        let path = folder.join(name);
-        std::fs::create_dir_all(&path).map_err(|e| Error::File {
-            path: path.clone(),
+        run.write(&made(&folder, name)?)?;
+    }
+    let diagnoses = [
+        ("patch", diagnosed::patch()),
+        ("complete", diagnosed::complete()),
+        ("unexplained", diagnosed::crowded()),
+        ("empty", Diagnosis::default()),
+    ];
+    for (name, diagnosis) in diagnoses {
+        let path = made(&folder, name)?.join("report.html");
+        std::fs::write(&path, page(&diagnosis)).map_err(|e| Error::File {
+            path,
             message: e.to_string(),
         })?;
-        run.write(&path)?;
     }
     Ok(())
+}
+
+/// The folder of a report, made where it is not there.
+fn made(folder: &Path, name: &str) -> Result<PathBuf> {
+    let path = folder.join(name);
+    std::fs::create_dir_all(&path).map_err(|e| Error::File {
+        path: path.clone(),
+        message: e.to_string(),
+    })?;
+    Ok(path)
 }

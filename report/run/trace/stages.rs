@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::super::nullable;
 use super::{NamedValue, Shape};
+use crate::nullable;
 
 /// What the exploration was for and what the real episode gathered.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

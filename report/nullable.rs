@@ -15,12 +15,12 @@ impl<'de> Deserialize<'de> for Number {
 }
 
 /// One number.
-pub(super) fn scalar<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+pub(crate) fn scalar<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
     Number::deserialize(deserializer).map(|n| n.0)
 }
 
 /// A list of numbers.
-pub(super) fn list<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<f64>, D::Error> {
+pub(crate) fn list<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<f64>, D::Error> {
     Ok(Vec::<Number>::deserialize(deserializer)?
         .into_iter()
         .map(|n| n.0)
@@ -28,7 +28,7 @@ pub(super) fn list<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<f64
 }
 
 /// A fixed number of numbers.
-pub(super) fn array<'de, D: Deserializer<'de>, const N: usize>(
+pub(crate) fn array<'de, D: Deserializer<'de>, const N: usize>(
     deserializer: D,
 ) -> Result<[f64; N], D::Error> {
     let numbers = list(deserializer)?;
@@ -39,7 +39,7 @@ pub(super) fn array<'de, D: Deserializer<'de>, const N: usize>(
 }
 
 /// A list of rows of `N` numbers.
-pub(super) fn rows<'de, D: Deserializer<'de>, const N: usize>(
+pub(crate) fn rows<'de, D: Deserializer<'de>, const N: usize>(
     deserializer: D,
 ) -> Result<Vec<[f64; N]>, D::Error> {
     Vec::<Vec<Number>>::deserialize(deserializer)?

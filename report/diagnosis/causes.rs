@@ -1,0 +1,196 @@
+//! Which effect: probabilities, the verdict in words, and the effects with their values.
+
+use super::data::{Diagnosis, Effect, Hypothesis, Kind};
+use super::head::refined;
+use super::words::{count, found, gap, hypothesis, joined, percent, probability, set, values};
+use crate::markup::capitalise;
+use crate::number::NOT_A_NUMBER;
+use crate::page::{Cell, Column, Figure, Section, Table};
+use crate::plot::{Axis, Colour, Ranked, Ranking};
+
+/// Hypotheses that are shown one by one.
+const MOST: usize = 10;
+
+/// Probability under which an effect that is in no verdict is folded away.
+const LITTLE: f64 = 0.01;
+
+pub(super) fn section(d: &Diagnosis) -> Section {
+    let lead = "An effect is written name@site, the site being the part of the scene that it acts on. A hypothesis is a set of effects of the catalogue, refitted together with the study's parameters. Its probability \
+                comes from how well it predicts the episodes held out; an effect's own is the sum over the hypotheses that it is in.";
+    let mut section = Section::new("Which effect").lead(lead);
+    section = explanation(d).into_iter().fold(section, Section::text);
+    section = section.figures(vec![figure(d)]);
+    let (shown, folded): (Vec<&Effect>, Vec<&Effect>) =
+        d.effects.iter().partition(|e| matters(d, e));
+    if !shown.is_empty() {
+        section = section
+            .heading("Each effect by itself")
+            .table(table(&shown));
+    }
+    if !folded.is_empty() {
+        let summary = count(folded.len(), "less probable effect");
+        section = section.folded(summary, Section::new("").table(table(&folded)));
+    }
+    section
+}
+
+/// Whether an effect is probable, in the verdict, or cannot be told from it.
+fn matters(d: &Diagnosis, effect: &Effect) -> bool {
+    let label = effect.label();
+    let sets = d.verdict.ambiguous_with.iter().chain([&d.verdict.effects]);
+    effect.probability >= LITTLE || sets.flatten().any(|e| *e == label)
+}
+
+/// The verdict in words, a paragraph each for what it is and what it leaves open.
+fn explanation(d: &Diagnosis) -> Vec<String> {
+    let found = found(d);
+    let sure = probability(d.verdict.probability);
+    let mut first = match d.verdict.kind {
+        Kind::None => format!(
+            "No effect is missing (probability {sure}): with the study's own parameters fitted, the model predicts the held-out \
+             episodes to {} times the noise.",
+            gap(d.gap.identified)
+        ),
+        Kind::Effects => {
+            let lacks = match d.verdict.probability {
+                p if p >= 0.95 => "lacks",
+                p if p >= 0.5 => "probably lacks",
+                _ => "may lack",
+            };
+            let mut text = format!(
+                "The simulation {lacks} {} (probability {sure}).",
+                joined(&found, "and")
+            );
+            for effect in d.effects.iter().filter(|e| found.contains(&e.label())) {
+                text.push_str(&described(effect, found.len() > 1));
+            }
+            text
+        }
+        Kind::Unknown => format!(
+            "The gap of {} times the noise is real, and no effect of the catalogue explains it (probability {sure}).",
+            gap(d.gap.identified)
+        ),
+    };
+    if d.verdict.kind == Kind::Unknown && refined(d) && !found.is_empty() {
+        first.push_str(&format!(
+            " The best that was found, {}, brings it to {}.",
+            set(&found),
+            gap(d.gap.refined)
+        ));
+    }
+    if d.verdict.kind != Kind::None && d.verdict.unexplained.is_finite() {
+        first.push_str(&format!(
+            " Unexplained: {} of the squared gap above the noise floor.",
+            percent(d.verdict.unexplained)
+        ));
+    }
+    let rivals: Vec<String> = d.verdict.ambiguous_with.iter().map(|s| set(s)).collect();
+    let mut paragraphs = vec![first];
+    if !rivals.is_empty() {
+        let each = if rivals.len() == 1 {
+            "once refitted, it predicts the same readings to within what the noise lets one see, so that either may be the cause"
+        } else {
+            "once refitted, each predicts the same readings to within what the noise lets one see, so that any may be the cause"
+        };
+        paragraphs.push(format!(
+            "These data cannot tell it from {}: {each}.",
+            joined(&rivals, "or")
+        ));
+    } else if d.verdict.kind == Kind::Effects {
+        paragraphs.push(
+            "These data tell it from every other explanation that was tried, as surely as the probabilities say.".to_owned(),
+        );
+    }
+    paragraphs
+}
+
+/// What an effect is and how strong, as a sentence with a space before it; by name where it is not the only one.
+fn described(effect: &Effect, by_name: bool) -> String {
+    let values = match &*values(effect) {
+        "" => String::new(),
+        values => format!("fitted: {values}"),
+    };
+    let parts = [capitalise(&effect.about), values];
+    let told: Vec<String> = parts.into_iter().filter(|p| !p.is_empty()).collect();
+    match (told.is_empty(), by_name) {
+        (true, _) => String::new(),
+        (false, true) => format!(" {}: {}.", effect.label(), told.join("; ")),
+        (false, false) => format!(" {}.", capitalise(&told.join("; "))),
+    }
+}
+
+fn figure(d: &Diagnosis) -> Figure {
+    let special = |h: &Hypothesis| matches!(&*hypothesis(h).0, "none" | "unknown");
+    // `none` and `unknown` are always told, however improbable.
+    let shown = |(i, h): &(usize, &Hypothesis)| *i < MOST || special(h);
+    let all = || d.hypotheses.iter().enumerate();
+    let mut rows: Vec<Ranked> = all().filter(shown).map(|(_, h)| row(d, h)).collect();
+    let rest: Vec<&Hypothesis> = all().filter(|h| !shown(h)).map(|h| h.1).collect();
+    if !rest.is_empty() {
+        let sum = rest
+            .iter()
+            .map(|h| h.probability)
+            .filter(|p| p.is_finite())
+            .sum();
+        let name = match rest.len() {
+            1 => "one other".to_owned(),
+            n => format!("{n} others together"),
+        };
+        rows.push(Ranked::new(name, sum, probability(sum)));
+    }
+    let mut caption = "Together 1. Blue: the verdict".to_owned();
+    if !d.verdict.ambiguous_with.is_empty() {
+        caption.push_str("; purple: what these data cannot tell from it");
+    }
+    caption.push('.');
+    let ranking = Ranking::new(
+        "Probability of each hypothesis",
+        Axis::new("probability", "").domain([0.0, 1.0]),
+    )
+    .rows(rows)
+    .description(caption.clone());
+    Figure::new("How probable each explanation is", ranking, caption)
+}
+
+fn row(d: &Diagnosis, h: &Hypothesis) -> Ranked {
+    let (name, note) = hypothesis(h);
+    let verdict = match d.verdict.kind {
+        Kind::None => name == "none",
+        Kind::Unknown => name == "unknown",
+        Kind::Effects => h.effects == d.verdict.effects,
+    };
+    let colour = if verdict {
+        Colour::Blue
+    } else if d.verdict.ambiguous_with.contains(&h.effects) {
+        Colour::Purple
+    } else {
+        Colour::Muted
+    };
+    let row = Ranked::new(name, h.probability, probability(h.probability))
+        .note(note)
+        .colour(colour);
+    if verdict { row.strong() } else { row }
+}
+
+fn table(effects: &[&Effect]) -> Table {
+    let columns = vec![
+        Column::prose("effect"),
+        Column::prose("fitted values"),
+        Column::number("probability"),
+        Column::number("closes alone"),
+    ];
+    effects.iter().fold(Table::new(columns), |table, e| {
+        let values = match &*values(e) {
+            "" => "–".to_owned(),
+            values => values.to_owned(),
+        };
+        table.row(vec![
+            Cell::from(e.label()).note(e.about.clone()),
+            values.into(),
+            probability(e.probability).into(),
+            e.closes
+                .map_or_else(|| NOT_A_NUMBER.to_owned(), percent)
+                .into(),
+        ])
+    })
+}

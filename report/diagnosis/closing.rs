@@ -1,0 +1,138 @@
+//! The end of the page: the study's parameters, the checks, what to do next, and how to repeat it.
+
+use super::data::{Diagnosis, Kind, Parameter};
+use super::words::{count, joined};
+use crate::markup::capitalise;
+use crate::number::{Precision, quantity, round};
+use crate::page::{Cell, Column, Section, Table, Tone};
+
+pub(super) fn next(d: &Diagnosis) -> Option<Section> {
+    if d.next_experiment.is_empty() && d.separates.is_empty() {
+        return None;
+    }
+    let section = Section::new("The next experiment")
+        .lead("What the robot could do to tell apart what these logs cannot.");
+    let section = if d.separates.is_empty() {
+        section
+    } else {
+        section.facts(vec![(
+            "tells apart".to_owned(),
+            joined(&d.separates, "and"),
+        )])
+    };
+    Some(if d.next_experiment.is_empty() {
+        section
+    } else {
+        section.text(capitalise(&d.next_experiment))
+    })
+}
+
+pub(super) fn parameters(d: &Diagnosis) -> Option<Section> {
+    if d.parameters.is_empty() {
+        return None;
+    }
+    let lead = match d.verdict.kind {
+        Kind::Effects => {
+            "What the study fits anyway, as found together with the verdict's effects: without them, these values would make up for \
+             what the model lacks."
+        }
+        Kind::Unknown => {
+            "What the study fits anyway, as found: these values may make up for what the model lacks."
+        }
+        Kind::None => "What the study fits anyway, as found.",
+    };
+    let nominal = d.parameters.iter().any(|p| p.nominal.is_some());
+    let mut columns = vec![Column::text("parameter")];
+    if nominal {
+        columns.push(Column::number("as given"));
+    }
+    columns.extend([
+        Column::number("estimate ± std"),
+        Column::number("95 % interval"),
+    ]);
+    let table = d.parameters.iter().fold(Table::new(columns), |table, p| {
+        let precision = Precision::of(p.estimate, p.std);
+        let mut row: Vec<Cell> = vec![p.name.clone().into()];
+        if nominal {
+            let given = p.nominal.map(|n| quantity(&round(n, 4), &p.unit));
+            row.push(given.unwrap_or_else(|| "–".to_owned()).into());
+        }
+        let estimate = precision.with_uncertainty(p.estimate, p.std);
+        row.push(quantity(&estimate, &p.unit).into());
+        row.push(interval(p, precision).into());
+        table.row(row)
+    });
+    Some(
+        Section::new("The study's parameters")
+            .lead(lead)
+            .table(table),
+    )
+}
+
+fn interval(p: &Parameter, precision: Precision) -> String {
+    if p.interval95.iter().all(|x| x.is_finite()) {
+        quantity(&precision.interval(p.interval95), &p.unit)
+    } else {
+        "–".to_owned()
+    }
+}
+
+pub(super) fn checks(d: &Diagnosis) -> Option<Section> {
+    if d.checks.is_empty() {
+        return None;
+    }
+    let columns = vec![Column::prose("check"), Column::text("result")];
+    let ordered = (d.checks.iter().filter(|c| !c.ok)).chain(d.checks.iter().filter(|c| c.ok));
+    let table = ordered.fold(Table::new(columns), |table, c| {
+        let result = if c.ok {
+            Cell::toned("ok", Tone::Good)
+        } else {
+            Cell::toned("not ok", Tone::Bad)
+        };
+        table.row(vec![
+            Cell::from(c.name.clone()).note(c.detail.clone()),
+            result,
+        ])
+    });
+    Some(
+        Section::new("Checks")
+            .lead("Whether the logs and the model can carry a diagnosis at all. What is not ok comes first.")
+            .table(table),
+    )
+}
+
+pub(super) fn left_out(d: &Diagnosis) -> Option<Section> {
+    if d.left_out.is_empty() {
+        return None;
+    }
+    let columns = vec![Column::text("candidate"), Column::prose("why")];
+    let table = d.left_out.iter().fold(Table::new(columns), |table, left| {
+        table.row(vec![left.name.clone().into(), left.value.clone().into()])
+    });
+    let summary = format!("{} of the catalogue", count(d.left_out.len(), "candidate"));
+    Some(
+        Section::new("What was not tried")
+            .lead("Effects that this model, engine or data do not allow: the diagnosis says nothing of them.")
+            .folded(summary, Section::new("").table(table)),
+    )
+}
+
+pub(super) fn repeat(d: &Diagnosis) -> Option<Section> {
+    if d.command.is_empty() && d.files.is_empty() && d.versions.is_empty() {
+        return None;
+    }
+    let mut section = Section::new("Repeat it")
+        .lead("The same seed and binary give the same result, at any thread count.");
+    if !d.command.is_empty() {
+        section = section.command(d.command.clone());
+    }
+    let versions = d.versions.iter().map(|v| (v.name.clone(), v.value.clone()));
+    section = section.facts(versions.collect());
+    if !d.files.is_empty() {
+        let columns = vec![Column::text("file"), Column::prose("holds")];
+        section = section.table(d.files.iter().fold(Table::new(columns), |table, f| {
+            table.row(vec![f.name.clone().into(), f.what.clone().into()])
+        }));
+    }
+    Some(section)
+}

@@ -1,0 +1,98 @@
+//! The data of a diagnosis' pictures.
+
+use serde::{Deserialize, Serialize};
+
+use crate::nullable;
+
+/// One signal of one held-out episode. What is missing or diverged is NaN.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct SignalTrace {
+    /// Episode's file.
+    pub episode: String,
+    /// Entry, `sensor` or `sensor.i`.
+    pub signal: String,
+    /// Unit.
+    pub unit: String,
+    /// Deviation of the sensor's noise, in its unit.
+    #[serde(deserialize_with = "nullable::scalar")]
+    pub noise: f64,
+    /// Times, s.
+    #[serde(deserialize_with = "nullable::list")]
+    pub time: Vec<f64>,
+    /// Log.
+    #[serde(deserialize_with = "nullable::list")]
+    pub real: Vec<f64>,
+    /// The model as given.
+    #[serde(deserialize_with = "nullable::list")]
+    pub nominal: Vec<f64>,
+    /// After fitting the study's parameters.
+    #[serde(deserialize_with = "nullable::list")]
+    pub identified: Vec<f64>,
+    /// With the verdict's effects.
+    #[serde(deserialize_with = "nullable::list")]
+    pub refined: Vec<f64>,
+}
+
+impl SignalTrace {
+    /// Residuals of a simulation in units of the noise; in the signal's unit where no noise is known.
+    pub(super) fn residuals(&self, simulated: &[f64]) -> Vec<f64> {
+        let unit = if self.has_noise() { self.noise } else { 1.0 };
+        self.real
+            .iter()
+            .zip(simulated)
+            .map(|(real, simulated)| (real - simulated) / unit)
+            .collect()
+    }
+
+    /// Root mean square of the residuals; NaN where there are none.
+    pub(super) fn gap(&self, simulated: &[f64]) -> f64 {
+        let squares = self.residuals(simulated).into_iter().map(|r| r * r);
+        let finite: Vec<f64> = squares.filter(|s| s.is_finite()).collect();
+        (finite.iter().sum::<f64>() / finite.len() as f64).sqrt()
+    }
+
+    /// Whether residuals can be told in units of the noise.
+    pub(super) fn has_noise(&self) -> bool {
+        self.noise.is_finite() && self.noise > 0.0
+    }
+}
+
+/// A single effect that was tried to the end.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Rung {
+    /// Effect at its site.
+    pub label: String,
+    /// Gap with it.
+    #[serde(deserialize_with = "nullable::scalar")]
+    pub gap: f64,
+}
+
+/// Residuals by place.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Map {
+    /// Names of the axes.
+    pub axes: [String; 2],
+    /// Unit of both axes.
+    pub unit: String,
+    /// Position on both axes, and the residual there in units of the noise.
+    #[serde(deserialize_with = "nullable::rows")]
+    pub points: Vec<[f64; 3]>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_gap_counts_readings_that_are_there_in_units_of_the_noise() {
+        let trace = SignalTrace {
+            noise: 0.5,
+            real: vec![1.0, f64::NAN, 2.0],
+            ..SignalTrace::default()
+        };
+        // Residuals of 3 and 4 times the noise.
+        assert!((trace.gap(&[2.5, 7.0, 0.0]) - 12.5f64.sqrt()).abs() < 1e-12);
+        assert!(trace.gap(&[]).is_nan());
+    }
+}

@@ -1,0 +1,104 @@
+//! How sets of effects, probabilities and shares are told.
+
+use super::data::{Diagnosis, Effect, EffectValue, Hypothesis};
+use crate::number::{NOT_A_NUMBER, decimals, quantity, round, significant, unit_symbol};
+
+/// `a + b`.
+pub(super) fn set(effects: &[String]) -> String {
+    effects.join(" + ")
+}
+
+/// A hypothesis by name, and what it says where that is not an effect's name.
+pub(super) fn hypothesis(hypothesis: &Hypothesis) -> (String, &'static str) {
+    match &hypothesis.effects[..] {
+        [] => ("none".to_owned(), "no effect is missing"),
+        [one] if one == "none" => ("none".to_owned(), "no effect is missing"),
+        [one] if one == "unknown" => ("unknown".to_owned(), "an effect that no catalogue has"),
+        several => (set(several), ""),
+    }
+}
+
+/// The verdict's effects, without the words that stand for none.
+pub(super) fn found(diagnosis: &Diagnosis) -> Vec<String> {
+    let effects = diagnosis.verdict.effects.iter();
+    effects
+        .filter(|e| *e != "none" && *e != "unknown")
+        .cloned()
+        .collect()
+}
+
+/// A gap in units of the noise.
+pub(super) fn gap(gap: f64) -> String {
+    significant(gap, if gap.abs() < 99.5 { 2 } else { 3 })
+}
+
+/// A probability with two decimals, never rounded to certainty.
+pub(super) fn probability(probability: f64) -> String {
+    match probability {
+        p if p > 0.0 && p < 0.005 => "under 0.01".to_owned(),
+        p if (0.995..1.0).contains(&p) => "over 0.99".to_owned(),
+        p => decimals(p, 2),
+    }
+}
+
+/// A share as `12 %`.
+pub(super) fn percent(share: f64) -> String {
+    match share {
+        s if !s.is_finite() => NOT_A_NUMBER.to_owned(),
+        s if s > 0.0 && s < 0.005 => format!("under {}", quantity("1", "%")),
+        s => quantity(&decimals(100.0 * s, 0), "%"),
+    }
+}
+
+/// `place = 0.41 m`.
+pub(super) fn value(value: &EffectValue) -> String {
+    let number = round(value.value, 3);
+    // What a parameter's unit depends on is told in words.
+    let told = if unit_symbol(&value.unit).contains(' ') && value.unit.len() > 6 {
+        format!("{number} ({})", value.unit)
+    } else {
+        quantity(&number, &value.unit)
+    };
+    format!("{} = {told}", value.name)
+}
+
+/// The fitted values of an effect; those that have no part in it are left out.
+pub(super) fn values(effect: &Effect) -> String {
+    let acting = effect.values.iter().filter(|v| v.null != Some(v.value));
+    acting.map(value).collect::<Vec<_>>().join(", ")
+}
+
+/// `a`, `a and b`, `a, b and c`.
+pub(super) fn joined(names: &[String], last: &str) -> String {
+    match names {
+        [] => String::new(),
+        [one] => one.clone(),
+        [rest @ .., end] => format!("{} {last} {end}", rest.join(", ")),
+    }
+}
+
+/// `1 episode`, `2 episodes`.
+pub(super) fn count(number: usize, what: &str) -> String {
+    format!("{number} {what}{}", if number == 1 { "" } else { "s" })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nothing_is_rounded_to_certain_or_to_impossible() {
+        assert_eq!(probability(0.9999), "over 0.99");
+        assert_eq!(probability(1e-9), "under 0.01");
+        assert_eq!((&*probability(1.0), &*probability(0.0)), ("1.00", "0.00"));
+        assert_eq!(percent(0.001), "under 1\u{a0}%");
+        assert_eq!(percent(f64::NAN), NOT_A_NUMBER);
+    }
+
+    #[test]
+    fn names_are_listed_as_in_a_sentence() {
+        let names = ["a", "b", "c"].map(str::to_owned);
+        assert_eq!(joined(&names, "and"), "a, b and c");
+        assert_eq!(joined(&names[..1], "or"), "a");
+    }
+}

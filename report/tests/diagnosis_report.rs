@@ -1,0 +1,141 @@
+//! The page of a diagnosis: whole, well-formed and legible, whatever was found.
+
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+#[path = "../examples/gallery/diagnosed.rs"]
+mod diagnosed;
+mod legible;
+
+use asid_report::diagnosis::{Diagnosis, Kind, Verdict, page};
+use legible::xml;
+use roxmltree::Document;
+
+/// A diagnosis of each kind, one of nothing, and ones whose numbers are none.
+fn diagnoses() -> [Diagnosis; 6] {
+    let mut numberless = diagnosed::patch();
+    numberless.gap = Default::default();
+    for signal in &mut numberless.signals {
+        signal.noise = f64::NAN;
+        signal.real.fill(f64::NAN);
+        signal.refined.clear();
+    }
+    numberless.places[0].share = f64::NAN;
+    numberless.ladder[0].gap = f64::NAN;
+    numberless.effects[0].values[1].value = f64::NAN;
+    numberless.effects[1].closes = None;
+    let mut timeless = diagnosed::complete();
+    timeless.signals[0].time.clear();
+    timeless.signals[1].nominal.fill(f64::INFINITY);
+    [
+        diagnosed::patch(),
+        diagnosed::complete(),
+        diagnosed::crowded(),
+        Diagnosis::default(),
+        numberless,
+        timeless,
+    ]
+}
+
+#[test]
+fn every_page_is_well_formed_self_contained_and_legible() {
+    for d in diagnoses() {
+        let html = page(&d);
+        legible::well_formed(&html, &d.study);
+        legible::fetches_nothing(&html);
+        legible::texts_apart(&html, &d.study);
+    }
+}
+
+#[test]
+fn names_from_files_cannot_break_out_of_the_page() {
+    let hostile = "</title><script>alert(1)</script>&\"'";
+    let mut d = diagnosed::patch();
+    d.study = hostile.into();
+    d.sentence = hostile.into();
+    d.signals[0].signal = hostile.into();
+    d.signals[0].unit = hostile.into();
+    d.signals[3].episode = hostile.into();
+    d.places[0].condition = hostile.into();
+    d.hypotheses[0].effects = vec![hostile.into()];
+    d.effects[0].site = hostile.into();
+    d.verdict.ambiguous_with[0][0] = hostile.into();
+    d.ladder[1].label = hostile.into();
+    d.checks[0].detail = hostile.into();
+    d.left_out[0].value = hostile.into();
+    d.next_experiment = hostile.into();
+    d.command = hostile.into();
+    d.map.as_mut().unwrap().axes[0] = hostile.into();
+    let html = page(&d);
+    assert!(Document::parse(xml(&html)).is_ok());
+    assert!(!html.contains("<script>alert"));
+}
+
+#[test]
+fn stored_data_give_the_same_page() {
+    for d in diagnoses() {
+        // NaN is null in JSON and comes back as NaN; so does what is infinite.
+        let text = serde_json::to_string(&d).unwrap();
+        let once: Diagnosis = serde_json::from_str(&text).unwrap();
+        let twice: Diagnosis =
+            serde_json::from_str(&serde_json::to_string(&once).unwrap()).unwrap();
+        assert!(page(&once) == page(&twice), "{} differs", d.study);
+    }
+}
+
+#[test]
+fn each_kind_of_verdict_is_told_with_what_cannot_be_told_from_it() {
+    let html = page(&diagnosed::patch());
+    for told in [
+        "The real board is rougher beyond 0.41 m",
+        "cause narrowed down",
+        "41 → 14 → 1.9",
+        "95 % interval 96 to 99",
+        "probably lacks friction-patch@board",
+        "These data cannot tell it from friction-drift@board",
+        "excitation",
+        "noise floor",
+    ] {
+        assert!(html.contains(told), "{told}");
+    }
+    let mut sure = diagnosed::patch();
+    sure.verdict.ambiguous_with.clear();
+    assert!(page(&sure).contains("cause found") && page(&sure).contains("These data tell it from"));
+
+    let html = page(&diagnosed::complete());
+    assert!(html.contains("No effect is missing") && !html.contains(">refined<"));
+    let html = page(&diagnosed::crowded());
+    assert!(
+        html.contains("cause unknown") && html.contains("no effect of the catalogue explains it")
+    );
+}
+
+#[test]
+fn a_verdict_of_two_effects_describes_both() {
+    let mut d = diagnosed::patch();
+    let both = ["friction-patch@board", "gravity-tilt"].map(str::to_owned);
+    d.verdict = Verdict {
+        kind: Kind::Effects,
+        effects: both.to_vec(),
+        probability: 0.99,
+        ..Verdict::default()
+    };
+    let html = page(&d);
+    assert!(html.contains("lacks friction-patch@board and gravity-tilt"));
+    assert!(html.contains("gravity-tilt: The ground is not level; fitted: pitch = −0.021"));
+}
+
+#[test]
+fn missing_readings_interrupt_the_lines() {
+    let mut d = diagnosed::complete();
+    d.signals.truncate(1);
+    let count = |d: &Diagnosis| {
+        let html = page(d);
+        let document = Document::parse(xml(&html)).unwrap();
+        let paths = document.descendants().filter_map(|n| n.attribute("d"));
+        paths.map(|d| d.matches('M').count()).sum::<usize>()
+    };
+    let whole = count(&d);
+    d.signals[0].identified[40..50].fill(f64::NAN);
+    // Two widths; the identified model in the picture and in its residual.
+    assert_eq!(count(&d), whole + 4);
+}
