@@ -10,6 +10,7 @@ mod export;
 mod failure;
 mod identify;
 mod list;
+mod model;
 mod new;
 mod options;
 mod output;
