@@ -163,9 +163,10 @@ impl Config {
                     None => model::of_task(&*task),
                     Some(path) => {
                         let backend = backend(&self.backend)?;
+                        let scene = backend.load(task.scene())?;
                         let needs = Needs {
                             task: &*task,
-                            layout: backend.load(task.scene())?.layout(),
+                            layout: scene.layout(),
                             parameters: &task.parameters(),
                         };
                         needs.open(&*backend, path, "simulator", &[])?.0
