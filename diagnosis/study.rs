@@ -149,14 +149,23 @@ impl Study {
         .with_test()
     }
 
-    /// A built-in task as a study: its scene and unknowns, the noise of its trackers. The
-    /// machine begins where the scene's first keyframe has it; where the object begins is
-    /// estimated.
+    /// A built-in task as a study: its unknowns and the noise of its trackers, in a model: its
+    /// scene, or one that fits the task. The machine begins where the model's first keyframe has
+    /// it; where the object begins is estimated.
     ///
     /// # Errors
     /// When a log is wrong, or there is none to hold out.
-    pub fn of_task(task: &dyn Task, train: &[PathBuf], test: &[PathBuf]) -> Result<Self> {
-        let scene = task.scene().clone();
+    pub fn of_task(
+        task: &dyn Task,
+        model: RefinedModel,
+        train: &[PathBuf],
+        test: &[PathBuf],
+    ) -> Result<Self> {
+        let RefinedModel {
+            scene,
+            parameters: fixed,
+            effects,
+        } = model;
         let layout = Plant::of(&scene)?.layout;
         let start = task_start(task, &layout)?;
         let read = |files: &[PathBuf]| -> Result<Vec<(String, Episode)>> {
@@ -173,8 +182,8 @@ impl Study {
         Self {
             name: task.name().to_owned(),
             model: PathBuf::from(scene.name()),
-            fixed: Vec::new(),
-            effects: Vec::new(),
+            fixed,
+            effects,
             parameters: task.parameters(),
             train: read(train)?,
             test: read(test)?,

@@ -122,6 +122,19 @@ impl Acting for SaturationAt {
             DriveLaw::Position { kv, .. } | DriveLaw::Velocity { kv } => kv,
         };
         let held = self.limit.copysign(force);
+        // Where the engine's own limit of the servo would cut in, its damping is not there to
+        // be made up for.
+        let pulled = held / self.drive.gear - damping * self.drive.gear * v;
+        if self
+            .drive
+            .force_range
+            .is_some_and(|[low, high]| pulled <= low || pulled >= high)
+        {
+            if let Some(command) = self.drive.command_for(held, q, v) {
+                view.ctrl[self.actuator] = command;
+            }
+            return;
+        }
         if let Some(command) = self.drive.command_for(held, q, 0.0) {
             view.ctrl[self.actuator] = command;
             view.parameters[self.damping] -= self.drive.gear * self.drive.gear * damping;

@@ -11,7 +11,7 @@ use asid_core::registry::{ExplorerEntry, IdentifierEntry, SolverEntry, TaskEntry
 use asid_core::task::Condition;
 
 use super::config::{ASID, check_condition};
-use super::options::{Algorithms, Common, Real};
+use super::options::{Algorithms, Common, Worlds};
 use super::output::{OutFolder, write_json, write_text};
 use super::result::Versions;
 use super::session::Session;
@@ -43,6 +43,8 @@ pub struct Arguments {
     pub common: Common,
     #[command(flatten)]
     algorithms: Algorithms,
+    #[command(flatten)]
+    worlds: Worlds,
 }
 
 /// A method: explorer (where it explores), identifier and solver.
@@ -270,7 +272,7 @@ fn open(
         common.set.retain(|s| !s.starts_with("explorer."));
     }
     common.set.push(format!("condition={condition:?}"));
-    Session::open(task, &common, &algorithms, &Real::default())
+    Session::open(task, &common, &algorithms, &arguments.worlds)
 }
 
 /// One run of a method under a condition.

@@ -7,9 +7,10 @@ use std::path::{Path, PathBuf};
 use anyhow::Result;
 use asid_core::task::{Condition, Coordinate};
 use asid_core::{EffectSpec, Error, Parameter, Task, registry};
+use asid_diagnosis::refined_model::RefinedModel;
 use serde::Serialize;
 
-use super::options::{Algorithms, Common, Real};
+use super::options::{Algorithms, Common, Real, Worlds};
 use super::plugins::{file_of, used};
 use component::{Component, component};
 use table::{check_keys, numbers, section, text, wrong};
@@ -64,7 +65,7 @@ impl Stage {
 pub struct RealConfig {
     /// Engine.
     pub backend: String,
-    /// Model file; empty for the task's scene.
+    /// Model file, MJCF or TOML; empty for the task's scene.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub model: Option<PathBuf>,
     /// Effects that the simulator lacks, as `name@site:parameter=value`.
@@ -73,6 +74,16 @@ pub struct RealConfig {
     /// True values that were given; the others are drawn from the prior.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub truth: BTreeMap<String, f64>,
+}
+
+impl RealConfig {
+    /// Whether nothing is said of a real world other than the simulator on this engine.
+    pub fn is_simulator(&self, backend: &str) -> bool {
+        self.backend == backend
+            && self.model.is_none()
+            && self.effects.is_empty()
+            && self.truth.is_empty()
+    }
 }
 
 /// Everything that decides the result of a command.
@@ -85,6 +96,9 @@ pub struct Config {
     pub task: String,
     /// Engine of the simulator.
     pub backend: String,
+    /// Model file of the simulator, MJCF or TOML; empty for the task's scene.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub model: Option<PathBuf>,
     /// Condition of the task; `prior` for the whole prior.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub condition: Option<String>,
@@ -114,11 +128,12 @@ pub struct Config {
 }
 
 /// Keys at the top of a configuration.
-const KEYS: [&str; 14] = [
+const KEYS: [&str; 15] = [
     "schema",
     "command",
     "task",
     "backend",
+    "model",
     "condition",
     "seed",
     "plugins",
@@ -155,8 +170,9 @@ impl Config {
         task: &dyn Task,
         common: &Common,
         algorithms: &Algorithms,
-        real: &Real,
+        worlds: &Worlds,
     ) -> Result<(Self, Vec<Parameter>)> {
+        let Worlds { simulator, real } = worlds;
         let mut table = match &common.config {
             Some(path) => read_table(path)?,
             None => toml::Table::new(),
@@ -228,14 +244,15 @@ impl Config {
                 return Err(Error::unknown("parameter", name, known).into());
             }
         }
-        let model = match (&real.real_model, text(&real_table, "model")?) {
-            (Some(path), _) => Some(path.clone()),
-            (None, path) => path.map(PathBuf::from),
+        let file = |given: &Option<PathBuf>, table: &toml::Table| -> Result<Option<PathBuf>> {
+            let set = text(table, "model")?.map(PathBuf::from);
+            Ok(given.clone().or(set))
         };
         let (start, assumed) = start(stage, task, &section(&table, "start")?)?;
         let mut config = Self {
             command: stage,
             task: task.name().to_owned(),
+            model: file(&simulator.model, &table)?,
             condition,
             seed: match (common.seed, table.get("seed")) {
                 (Some(seed), _) => seed,
@@ -277,7 +294,7 @@ impl Config {
                     (None, Some(name)) => name,
                     (None, None) => backend.clone(),
                 },
-                model,
+                model: file(&real.real_model, &real_table)?,
                 effects: effects(&real_table, real)?,
                 truth,
             },
@@ -305,6 +322,12 @@ impl Config {
         let effects = self.real.effects.iter();
         let specs = effects.filter_map(|text| text.parse::<EffectSpec>().ok());
         files.extend(specs.map(|spec| file_of::<EffectEntry>(&spec.name)));
+        // A file that cannot be opened is told of where it is used.
+        let models = [&self.model, &self.real.model].into_iter().flatten();
+        for model in models.filter_map(|path| RefinedModel::open(path).ok()) {
+            let names = model.effects.iter().map(|e| &e.name);
+            files.extend(names.map(|name| file_of::<EffectEntry>(name)));
+        }
         used(&files)
     }
 }

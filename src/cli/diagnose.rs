@@ -17,6 +17,7 @@ use asid_diagnosis::study::Study;
 use serde::{Deserialize, Serialize};
 
 use super::diagnosis_report::{self, Meta};
+use super::model::{self, Needs};
 use super::options::Common;
 use super::output::{OutFolder, write_json, write_text};
 use super::progress::Bars;
@@ -48,6 +49,9 @@ pub struct Arguments {
     /// An effect of the catalogue that is not to be tried (repeatable)
     #[arg(long, value_name = "EFFECT")]
     without: Vec<String>,
+    /// Model of the task in place of its scene: MJCF, or TOML of a refined model
+    #[arg(long, value_name = "FILE", requires = "task")]
+    model: Option<PathBuf>,
     #[command(flatten)]
     pub common: Common,
 }
@@ -60,6 +64,8 @@ struct Config {
     study: Option<PathBuf>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     task: Option<String>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    model: Option<PathBuf>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     train: Vec<PathBuf>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -120,6 +126,7 @@ impl Config {
         if arguments.study.is_some() || arguments.task.is_some() {
             config.study.clone_from(&arguments.study);
             config.task.clone_from(&arguments.task);
+            config.model.clone_from(&arguments.model);
             config.train.clone_from(&arguments.train);
             config.test.clone_from(&arguments.test);
         }
@@ -164,7 +171,20 @@ impl Config {
             (Some(path), _) => Ok(Study::read(path)?),
             (None, Some(name)) => {
                 let task = (find::<TaskEntry>(name)?.make)()?;
-                Ok(Study::of_task(&*task, &self.train, &self.test)?)
+                let model = match &self.model {
+                    None => model::of_task(&*task),
+                    Some(path) => {
+                        let backend = backend(&self.backend)?;
+                        let scene = backend.load(task.scene())?;
+                        let needs = Needs {
+                            task: &*task,
+                            layout: scene.layout(),
+                            parameters: &task.parameters(),
+                        };
+                        needs.open(&*backend, path, "simulator", &[])?.0
+                    }
+                };
+                Ok(Study::of_task(&*task, model, &self.train, &self.test)?)
             }
             (None, None) => Err(config_error("study", "is missing".into())),
         }

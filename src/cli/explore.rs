@@ -17,7 +17,7 @@ use asid_core::{Episode, Parameter, RealWorld as _, SimulatedWorld};
 use serde::Serialize;
 
 use super::config::Stage;
-use super::options::{Algorithms, Common, Real};
+use super::options::{Algorithms, Common, Worlds};
 use super::output::{OutFolder, write_json};
 use super::result::{CostResult, ExplorationResult, SCHEMA, Versions, figure};
 use super::session::Session;
@@ -30,7 +30,9 @@ The start pose of the object is given by --set start.NAME=VALUE, such as --set s
 what is not given takes the middle of its range.
 
 The folder holds commands.csv (time in s and the command of each actuator), predicted.csv (the log \
-that the simulator expects), policy.json, result.json, config.toml, report.html and trace.json.")]
+that the simulator expects), policy.json, result.json, config.toml, report.html and trace.json. With a \
+--truth or another option of the real world the episode is also played there, from the same start pose: \
+real.csv is its log, for `asid identify` and `asid diagnose`.")]
 pub struct Arguments {
     /// The task: see `asid list`
     task: String,
@@ -39,6 +41,8 @@ pub struct Arguments {
     explorer: Option<String>,
     #[command(flatten)]
     pub common: Common,
+    #[command(flatten)]
+    worlds: Worlds,
 }
 
 /// `result.json` of `explore`.
@@ -68,7 +72,7 @@ pub fn explore(arguments: &Arguments) -> Result<()> {
         &arguments.task,
         common,
         &algorithms,
-        &Real::default(),
+        &arguments.worlds,
     )?;
     let out = OutFolder::claim(
         common.out.as_deref(),
@@ -85,6 +89,14 @@ pub fn explore(arguments: &Arguments) -> Result<()> {
     let played = nominal_world(&session, &center)?
         .with_exploration_start(start.clone())
         .explore(&mut *explored.policy)?;
+    let real = if config.real.is_simulator(&config.backend) {
+        None
+    } else {
+        let mut world = session
+            .world(&session.truth())?
+            .with_exploration_start(start.clone());
+        Some(world.explore(&mut *explored.policy)?)
+    };
     let searched = explored.policy.take_curve();
     let curve = if searched.is_empty() {
         explored.curve
@@ -126,21 +138,22 @@ pub fn explore(arguments: &Arguments) -> Result<()> {
         format!("start: {}", stage::start_line(&session)),
         format!("expected after the episode: {}", expected.join(", ")),
     ];
-    let mut report = stage::report(
-        &session,
-        wall_s,
-        &[
-            (
-                "commands.csv",
-                "the commands to play: time in s, one column an actuator",
-            ),
-            (
-                "predicted.csv",
-                "log of the episode that the simulator expects, without noise",
-            ),
-            ("policy.json", "the exploration policy"),
-        ],
+    let mut files = vec![
+        (
+            "commands.csv",
+            "the commands to play: time in s, one column an actuator",
+        ),
+        (
+            "predicted.csv",
+            "log of the episode that the simulator expects, without noise",
+        ),
+        ("policy.json", "the exploration policy"),
+    ];
+    files.extend(
+        real.as_ref()
+            .map(|_| ("real.csv", "log of the real episode")),
     );
+    let mut report = stage::report(&session, wall_s, &files);
     report.explorer.clone_from(&config.explorer.name);
     report.answer = format!(
         "From {}, the episode is expected to tell {}.",
@@ -159,6 +172,9 @@ pub fn explore(arguments: &Arguments) -> Result<()> {
         write_json(&folder.join("policy.json"), &policy)?;
         commands_of(&played).write_csv(&folder.join("commands.csv"))?;
         played.episode.write_csv(&folder.join("predicted.csv"))?;
+        if let Some(real) = &real {
+            real.episode.write_csv(&folder.join("real.csv"))?;
+        }
         Ok(())
     })
 }

@@ -13,7 +13,7 @@ use asid_report::run::{RealWorld, RunReport};
 use serde::Serialize;
 
 use super::config::Stage;
-use super::options::{Algorithms, Common, Real};
+use super::options::{Algorithms, Common, Simulator, Worlds};
 use super::output::{OutFolder, write_json};
 use super::result::{
     CostResult, ParameterResult, SCHEMA, Versions, articulation, articulation_line, figure,
@@ -47,6 +47,8 @@ pub struct Arguments {
     /// How to identify: see `asid list`
     #[arg(long, value_name = "NAME")]
     identifier: Option<String>,
+    #[command(flatten)]
+    simulator: Simulator,
     #[command(flatten)]
     pub common: Common,
 }
@@ -84,7 +86,7 @@ pub fn identify(arguments: &Arguments) -> Result<()> {
         &arguments.task,
         common,
         &algorithms,
-        &Real::default(),
+        &Worlds::from(&arguments.simulator),
     )?;
     let episodes: Vec<Episode> = arguments
         .log

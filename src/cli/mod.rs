@@ -11,6 +11,7 @@ mod export;
 mod failure;
 mod identify;
 mod list;
+mod model;
 mod new;
 mod options;
 mod output;

@@ -56,6 +56,15 @@ pub struct Algorithms {
     pub solver: Option<String>,
 }
 
+/// The simulator that a method works in.
+#[derive(clap::Args, Clone, Debug, Default)]
+pub struct Simulator {
+    /// Model of the simulator: MJCF, or TOML of a refined model, such as the refined.toml of a
+    /// diagnosis [default: the task's scene]
+    #[arg(long, value_name = "FILE")]
+    pub model: Option<PathBuf>,
+}
+
 /// The simulated real world.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub struct Real {
@@ -65,11 +74,30 @@ pub struct Real {
     /// Engine of the real world [default: the simulator's]
     #[arg(long, value_name = "NAME")]
     pub real_backend: Option<String>,
-    /// Model of the real world, MJCF [default: the task's scene]
-    #[arg(long, value_name = "FILE.xml")]
+    /// Model of the real world: MJCF, or TOML of a refined model [default: the task's scene]
+    #[arg(long, value_name = "FILE")]
     pub real_model: Option<PathBuf>,
     /// An effect of the real world that the simulator lacks, such as
     /// viscous-friction@joint1:damping=2 (repeatable)
     #[arg(long, value_name = "NAME@SITE:PARAMETER=VALUE")]
     pub real_effect: Vec<String>,
+}
+
+/// The simulator of a method, and the real world that it is tried in.
+#[derive(clap::Args, Clone, Debug, Default)]
+pub struct Worlds {
+    #[command(flatten)]
+    pub simulator: Simulator,
+    #[command(flatten)]
+    pub real: Real,
+}
+
+impl From<&Simulator> for Worlds {
+    /// Without a simulated real world.
+    fn from(simulator: &Simulator) -> Self {
+        Self {
+            simulator: simulator.clone(),
+            real: Real::default(),
+        }
+    }
 }

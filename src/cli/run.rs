@@ -7,7 +7,7 @@ use anyhow::Result;
 use asid_core::pipeline::{self, Method, RunOutcome};
 use asid_core::registry::{ExplorerEntry, IdentifierEntry, SolverEntry, find};
 
-use super::options::{Algorithms, Common, Real};
+use super::options::{Algorithms, Common, Worlds};
 use super::output::{OutFolder, write_json, write_text};
 use super::result::{RunResult, articulation_line, figure};
 use super::session::Session;
@@ -23,7 +23,7 @@ pub struct Arguments {
     #[command(flatten)]
     algorithms: Algorithms,
     #[command(flatten)]
-    real: Real,
+    worlds: Worlds,
 }
 
 /// Runs the pipeline and writes its folder.
@@ -33,7 +33,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         &arguments.task,
         &arguments.common,
         &arguments.algorithms,
-        &arguments.real,
+        &arguments.worlds,
     )?;
     let out = OutFolder::claim(arguments.common.out.as_deref(), &arguments.task)?;
     let truth = session.truth();

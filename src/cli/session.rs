@@ -5,16 +5,16 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use anyhow::Result;
 use asid_core::effect::EffectSpec;
-use asid_core::refined::Refined;
 use asid_core::registry::{self, BackendEntry, Entry, TaskEntry};
 use asid_core::signal::Signal;
 use asid_core::{
-    Backend, Capabilities, Error, Model, Parameter, Plant, Problem, Scene, SimulatedWorld, Streams,
-    Task,
+    Backend, Capabilities, Error, Model, Parameter, Problem, SimulatedWorld, Streams, Task,
 };
+use asid_diagnosis::refined_model::RefinedModel;
 
 use super::config::{Config, Stage};
-use super::options::{Algorithms, Common, Real};
+use super::model::{self, Needs};
+use super::options::{Algorithms, Common, Worlds};
 use super::progress::Bars;
 use super::result::CostResult;
 
@@ -24,6 +24,9 @@ pub struct Session {
     pub config: Config,
     pub parameters: Vec<Parameter>,
     pub signals: Vec<Signal>,
+    /// The task's scene as it is.
+    scene: Arc<dyn Model>,
+    /// The simulator of the method.
     pub model: Arc<dyn Model>,
     pub engine: String,
     capabilities: Capabilities,
@@ -35,8 +38,13 @@ pub struct Session {
 
 impl Session {
     /// Opens a task for the whole pipeline; see [`Session::open_stage`].
-    pub fn open(task: &str, common: &Common, algorithms: &Algorithms, real: &Real) -> Result<Self> {
-        Self::open_stage(Stage::Run, task, common, algorithms, real)
+    pub fn open(
+        task: &str,
+        common: &Common,
+        algorithms: &Algorithms,
+        worlds: &Worlds,
+    ) -> Result<Self> {
+        Self::open_stage(Stage::Run, task, common, algorithms, worlds)
     }
 
     /// Finds the task and the engine, resolves the settings, loads the scene and
@@ -46,10 +54,10 @@ impl Session {
         task: &str,
         common: &Common,
         algorithms: &Algorithms,
-        real: &Real,
+        worlds: &Worlds,
     ) -> Result<Self> {
         let mut task = (registry::find::<TaskEntry>(task)?.make)()?;
-        let (config, parameters) = Config::resolve(stage, &*task, common, algorithms, real)?;
+        let (config, parameters) = Config::resolve(stage, &*task, common, algorithms, worlds)?;
         if let Some(condition) = &config.condition
             && let Some(other) = task.under(condition)?
         {
@@ -57,10 +65,21 @@ impl Session {
         }
         let backend = backend(&config.backend)?;
         require(&*backend, task.requires())?;
-        let model = backend.load(task.scene())?;
+        let scene = backend.load(task.scene())?;
         for target in parameters.iter().flat_map(|p| &p.targets) {
-            model.nominal(target)?;
+            scene.nominal(target)?;
         }
+        let model = match &config.model {
+            None => Arc::clone(&scene),
+            Some(path) => {
+                let needs = Needs {
+                    task: &*task,
+                    layout: scene.layout(),
+                    parameters: &parameters,
+                };
+                needs.open(&*backend, path, "simulator", &[])?.1
+            }
+        };
         let signals = config
             .noise
             .iter()
@@ -79,6 +98,7 @@ impl Session {
             task,
             parameters,
             signals,
+            scene,
             model,
             engine: format!("{} {}", backend.name(), backend.version()),
             capabilities: backend.capabilities(),
@@ -153,31 +173,34 @@ impl Session {
     /// The simulated real world with this truth.
     pub fn world(&self, truth: &[f64]) -> Result<SimulatedWorld<'_>> {
         let real = &self.config.real;
-        let scene = match &real.model {
-            None => self.task.scene().clone(),
-            Some(path) => Scene::from_file(path)?,
-        };
-        let model = match &real.model {
-            None if real.backend == self.config.backend => Arc::clone(&self.model),
-            _ => load(&real.backend, &*self.task, &scene)?,
-        };
-        if let Some(path) = &real.model {
-            self.check_real(&*model).map_err(|e| Error::Scene {
-                scene: path.display().to_string(),
-                message: format!("cannot stand for the task's real world: {e}"),
-            })?;
-        }
         let effects = real
             .effects
             .iter()
             .map(|text| text.parse::<EffectSpec>())
             .collect::<asid_core::Result<Vec<_>>>()?;
-        let model = if effects.is_empty() {
-            model
+        let same_engine = real.backend == self.config.backend;
+        let model = if same_engine && real.model.is_none() && effects.is_empty() {
+            Arc::clone(&self.scene)
         } else {
             let backend = backend(&real.backend)?;
-            let plant = Arc::new(Plant::of(&scene)?);
-            Refined::new(&*backend, model, plant, &[], &effects)?
+            require(&*backend, self.task.requires())?;
+            match &real.model {
+                None => model::compile(
+                    &*backend,
+                    &RefinedModel {
+                        effects,
+                        ..model::of_task(&*self.task)
+                    },
+                )?,
+                Some(path) => {
+                    let needs = Needs {
+                        task: &*self.task,
+                        layout: self.scene.layout(),
+                        parameters: &self.parameters,
+                    };
+                    needs.open(&*backend, path, "real world", &effects)?.1
+                }
+            }
         };
         let streams = Streams::new(self.config.seed).child("real world");
         Ok(SimulatedWorld::new(
@@ -190,45 +213,6 @@ impl Session {
         )?)
     }
 
-    /// Checks that a model has what the task's protocols need.
-    fn check_real(&self, model: &dyn Model) -> asid_core::Result<()> {
-        let (ours, theirs) = (self.model.layout(), model.layout());
-        let (exploration, downstream) = (self.task.exploration(), self.task.downstream());
-        if ours.actuators.len() != theirs.actuators.len() {
-            return Err(Error::Shape(format!(
-                "it has {} actuators, the task commands {}",
-                theirs.actuators.len(),
-                ours.actuators.len()
-            )));
-        }
-        for (i, actuator) in ours.actuators.iter().enumerate() {
-            if theirs.actuator(&actuator.name)? != i {
-                return Err(Error::Shape(format!(
-                    "actuator `{}` has another place in the order",
-                    actuator.name
-                )));
-            }
-        }
-        theirs.recording(&exploration.channels())?;
-        theirs.recording(&downstream.channels)?;
-        for body in exploration.contact.iter().flatten() {
-            theirs.body(body)?;
-        }
-        for target in self.parameters.iter().flat_map(|p| &p.targets) {
-            model.nominal(target)?;
-        }
-        for frame_period in [exploration.frame_period, downstream.frame_period] {
-            asid_core::problem::substeps(theirs, frame_period)?;
-        }
-        let (mut qpos, _) = asid_core::problem::home(theirs);
-        let middle: Vec<f64> = exploration
-            .start
-            .iter()
-            .map(asid_core::task::Coordinate::center)
-            .collect();
-        self.task.place(theirs, &middle, &mut qpos)
-    }
-
     /// Cost so far.
     pub fn cost(&self, wall_s: f64) -> CostResult {
         CostResult {
@@ -237,12 +221,6 @@ impl Session {
             env_steps: self.env_steps.load(Ordering::Relaxed),
         }
     }
-}
-
-fn load(backend_name: &str, task: &dyn Task, scene: &Scene) -> Result<Arc<dyn Model>> {
-    let backend = backend(backend_name)?;
-    require(&*backend, task.requires())?;
-    Ok(backend.load(scene)?)
 }
 
 /// The engine of this name; one that was left out of the build says how to get it.

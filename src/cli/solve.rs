@@ -11,7 +11,7 @@ use asid_core::{Control, Error, Posterior, Rollout};
 use serde::Serialize;
 
 use super::config::Stage;
-use super::options::{Algorithms, Common, Real};
+use super::options::{Algorithms, Common, Simulator, Worlds};
 use super::output::{OutFolder, write_json};
 use super::result::{CostResult, ParameterResult, SCHEMA, Versions};
 use super::session::Session;
@@ -44,6 +44,8 @@ pub struct Arguments {
     /// How to solve: see `asid list`
     #[arg(long, value_name = "NAME")]
     solver: Option<String>,
+    #[command(flatten)]
+    simulator: Simulator,
     #[command(flatten)]
     pub common: Common,
 }
@@ -97,7 +99,7 @@ pub fn solve(arguments: &Arguments) -> Result<()> {
         &arguments.task,
         common,
         &algorithms,
-        &Real::default(),
+        &Worlds::from(&arguments.simulator),
     )?;
     let belief = belief(&session, &arguments.posterior)?;
     let out = OutFolder::claim(common.out.as_deref(), &format!("{}-solve", arguments.task))?;

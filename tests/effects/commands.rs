@@ -87,6 +87,23 @@ fn a_saturated_servo_pushes_with_its_limit() {
     });
 }
 
+/// The servo ran away: its damping was made up for where its own limit had switched it off.
+#[test]
+fn a_saturated_servo_with_a_limit_of_its_own_does_not_run_away() {
+    let limited = SERVO.replace("kv=\"20\"", "kv=\"20\" forcerange=\"-5 5\"");
+    on_each(&limited, &["actuator-saturation@drive:limit=4"], |bench| {
+        // Swung to and fro by far more than the limit can follow.
+        let commands: Vec<_> = (0..3000)
+            .map(|k| vec![if (k / 100) % 2 == 0 { 9.0 } else { -9.0 }])
+            .collect();
+        let rows = bench.run(1, &commands);
+        let fastest = rows.iter().map(|row| row[1].abs()).fold(0.0, f64::max);
+        // A push of 4 N m for 0.2 s: twice that speed at most, for starts in between.
+        let bound = 2.0 * 4.0 * 0.2 / INERTIA;
+        assert!(fastest < bound, "{}: {fastest} rad/s", bench.engine);
+    });
+}
+
 #[test]
 fn a_servo_with_a_dead_band_stops_short_of_its_command() {
     on_each(SERVO, &["actuator-deadband@drive:width=0.1"], |bench| {
