@@ -52,6 +52,8 @@ const WORTH: f64 = 0.4;
 /// Difference of tempered sums of squares up to which two sets cannot be told apart: a
 /// likelihood ratio of 400.
 const APART: f64 = 12.0;
+/// Prior odds against a wind on a machine's link, where a joint or drive does the same.
+const UNUSUAL: f64 = 10.0;
 /// Prior odds against each further effect.
 const FURTHER: f64 = 20.0;
 
@@ -88,6 +90,19 @@ fn size(bench: &Bench, explanation: &Explanation) -> usize {
             response > crate::fit::NOTHING
         })
         .count()
+}
+
+/// Whether an effect is a force on a body that is held by joints: friction and drives are
+/// what one thinks of first there.
+fn odd(bench: &Bench, label: &str) -> bool {
+    let (name, site) = label.split_once('@').unwrap_or((label, ""));
+    let plant = &bench.machine.plant;
+    let of_a_body = matches!(
+        name,
+        "constant-force" | "linear-drag" | "quadratic-drag" | "magnus"
+    );
+    let body = plant.layout.body(site);
+    of_a_body && body.is_ok_and(|b| plant.free_joint(b).is_none())
 }
 
 /// Whether a set is another one with one effect replaced by a refinement of it.
@@ -175,9 +190,10 @@ pub fn judge(bench: &Bench, findings: &Findings, candidates: usize, scatter: f64
         (lowest / readings).max(1.0) * (1.0 + rho) / (1.0 - rho) + scatter / (2.0 * APART.sqrt());
     // Twice the negative logarithm of the posterior, up to a constant.
     let score = |h: &Hypothesis| {
+        let unusual = 2.0 * UNUSUAL.ln() * h.labels.iter().filter(|l| odd(bench, l)).count() as f64;
         let choice = 2.0 * (candidates.max(1) as f64).ln() * h.labels.len() as f64;
         let further = 2.0 * FURTHER.ln() * h.labels.len().saturating_sub(1) as f64;
-        h.cost / temperature + h.size as f64 * readings.ln() + choice + further
+        h.cost / temperature + h.size as f64 * readings.ln() + choice + further + unusual
     };
     let gap = |h: &Hypothesis| excess(h.cost / readings);
     // A refinement that hardly betters the simpler effect is no answer of its own.
