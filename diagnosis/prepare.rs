@@ -3,6 +3,7 @@
 
 use std::collections::BTreeMap;
 
+use asid_core::layout::JointKind;
 use asid_core::plant::Reads;
 use asid_core::problem::home;
 use asid_core::rng::Rng;
@@ -71,6 +72,16 @@ fn given_start(plant: &Plant, episode: &asid_core::Episode) -> State {
             if given.is_finite() {
                 *x = *given;
             }
+        }
+        // Some components given and others read are no unit quaternion yet.
+        for joint in &layout.joints {
+            let first = match joint.kind {
+                JointKind::Free => joint.qpos + 3,
+                JointKind::Ball => joint.qpos,
+                JointKind::Hinge | JointKind::Slide => continue,
+            };
+            let turn = unit_quaternion(&qpos[first..first + 4]);
+            qpos[first..first + 4].copy_from_slice(&[turn.w, turn.i, turn.j, turn.k]);
         }
         for (x, given) in qvel.iter_mut().zip(&initial.qvel) {
             if given.is_finite() {
@@ -162,6 +173,29 @@ fn first_readings(plant: &Plant, episode: &asid_core::Episode, qpos: &mut [f64],
     }
 }
 
+/// Which degrees of freedom of a joint the values of its position that are missing leave open:
+/// of a quaternion the axes of the components that are, all where that is no single axis.
+fn open_places(kind: JointKind, places: &[f64]) -> Vec<usize> {
+    let missing = |i: usize| !places[i].is_finite();
+    let turn = |first: usize, axes: std::ops::Range<usize>| -> Vec<usize> {
+        let of: Vec<usize> = axes.clone().filter(|a| missing(first + 1 + a - axes.start)).collect();
+        match (missing(first), of.len()) {
+            (false, 0) => Vec::new(),
+            (_, 1) => of,
+            _ => axes.collect(),
+        }
+    };
+    match kind {
+        JointKind::Hinge | JointKind::Slide => (0..1).filter(|&i| missing(i)).collect(),
+        JointKind::Ball => turn(0, 0..3),
+        JointKind::Free => {
+            let mut open: Vec<usize> = (0..3).filter(|&i| missing(i)).collect();
+            open.extend(turn(3, 3..6));
+            open
+        }
+    }
+}
+
 /// Coordinates of the starts (`nv` positions, then `nv` velocities) that some log leaves open.
 fn open_coordinates(layout: &Layout, study: &Study) -> Vec<usize> {
     let nv = layout.nv;
@@ -172,9 +206,9 @@ fn open_coordinates(layout: &Layout, study: &Study) -> Vec<usize> {
         };
         for joint in &layout.joints {
             let dofs = joint.qvel..joint.qvel + joint.kind.qvel_len();
-            let places = joint.qpos..joint.qpos + joint.kind.qpos_len();
-            if initial.qpos[places].iter().any(|x| !x.is_finite()) {
-                dofs.clone().for_each(|d| open[d] = true);
+            let places = &initial.qpos[joint.qpos..joint.qpos + joint.kind.qpos_len()];
+            for d in open_places(joint.kind, places) {
+                open[joint.qvel + d] = true;
             }
             for d in dofs {
                 open[nv + d] |= !initial.qvel[d].is_finite();

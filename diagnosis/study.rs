@@ -219,7 +219,8 @@ impl Study {
     }
 }
 
-/// The scene's first keyframe, with what a start pose of the object changes left open.
+/// The scene's first keyframe, with what a start pose of the object changes left open: of a
+/// puck on a board the place on it and the turn about its normal, not its height.
 fn task_start(task: &dyn Task, layout: &Layout) -> Result<InitialState> {
     let (home, qvel) = home(layout);
     let coordinates = &task.exploration().start;
@@ -230,13 +231,8 @@ fn task_start(task: &dyn Task, layout: &Layout) -> Result<InitialState> {
         Ok(qpos)
     };
     let (low, high) = (place(0.2)?, place(0.9)?);
-    let mut qpos = home;
-    for joint in &layout.joints {
-        let places = joint.qpos..joint.qpos + joint.kind.qpos_len();
-        if low[places.clone()] != high[places.clone()] {
-            qpos[places].fill(f64::NAN);
-        }
-    }
+    let open = |(here, (a, b)): (f64, (&f64, &f64))| if a == b { here } else { f64::NAN };
+    let qpos = home.into_iter().zip(low.iter().zip(&high)).map(open).collect();
     Ok(InitialState { qpos, qvel })
 }
 
