@@ -139,15 +139,32 @@ pub fn scan(
     Ok(point)
 }
 
-/// Differences to take derivatives with, as shares of each parameter's range; they adapt.
+/// Differences to take derivatives with; they adapt.
 #[derive(Clone, Debug)]
-pub struct Differences(pub Vec<f64>);
+pub struct Differences {
+    /// Of each parameter, as a share of its range.
+    pub shares: Vec<f64>,
+    /// Of each open coordinate of the starts, m or rad or per second.
+    pub starts: Vec<f64>,
+}
 
 impl Differences {
-    /// A first guess for `n` parameters.
+    /// A first guess for `n` parameters and `open` coordinates of the starts.
     #[must_use]
-    pub fn new(n: usize) -> Self {
-        Self(vec![1e-4; n])
+    pub fn new(n: usize, open: usize) -> Self {
+        Self {
+            shares: vec![1e-4; n],
+            starts: vec![START_STEP; open],
+        }
+    }
+
+    /// A first guess where predictions scatter.
+    #[must_use]
+    pub fn rough(n: usize, open: usize) -> Self {
+        Self {
+            shares: vec![ROUGH_START; n],
+            starts: vec![ROUGH_START_STEP; open],
+        }
     }
 }
 
@@ -179,8 +196,11 @@ pub struct Linearisation {
 /// Coordinates of the starts that are not known: the same for all episodes of a set.
 pub type Open = Vec<usize>;
 
-/// Scale of a start's coordinates, m or rad or per second.
+/// First difference of a start's coordinates, m or rad or per second; where predictions scatter;
+/// smallest and largest.
 const START_STEP: f64 = 1e-5;
+const ROUGH_START_STEP: f64 = 1e-3;
+const START_STEPS: [f64; 2] = [1e-6, 1e-2];
 
 /// Linearises the predictions.
 ///
@@ -209,17 +229,18 @@ pub fn linearise(
     for &i in &free {
         for by in stencil {
             let mut other = point.clone();
-            let share = by * differences.0[i];
+            let share = by * differences.shares[i];
             let (value, share) = nudged(&unknowns[i].parameter, point.theta[i], share);
             other.theta[i] = value;
             moved.push(share);
             points.push(other);
         }
     }
-    for &coordinate in open {
+    let start_steps = differences.starts.clone();
+    for (&coordinate, &step) in open.iter().zip(&start_steps) {
         let mut other = point.clone();
         for start in &mut other.starts {
-            start.shift(layout, coordinate, START_STEP);
+            start.shift(layout, coordinate, step);
         }
         points.push(other);
     }
@@ -263,7 +284,7 @@ pub fn linearise(
             }
         }
         columns.push(column);
-        let h = &mut differences.0[i];
+        let h = &mut differences.shares[i];
         *h = if response > 0.0 {
             *h * (aim / response).clamp(1e-3, 1e3)
         } else {
@@ -271,10 +292,13 @@ pub fn linearise(
         }
         .clamp(STEPS[0], if rough { STEPS[2] } else { STEPS[1] });
     }
-    let start_columns = open
-        .iter()
-        .map(|_| next().0.iter().map(|d| d / START_STEP).collect())
-        .collect();
+    let mut start_columns = Vec::with_capacity(open.len());
+    for (h, step) in differences.starts.iter_mut().zip(&start_steps) {
+        let (change, response) = next();
+        start_columns.push(change.iter().map(|d| d / step).collect());
+        let factor = if response > 0.0 { aim / response } else { 100.0 };
+        *h = (step * factor.clamp(1e-3, 1e3)).clamp(START_STEPS[0], START_STEPS[1]);
+    }
     Ok(Linearisation {
         residuals: base,
         columns,
@@ -355,6 +379,10 @@ impl Normal {
     /// Step of the free parameters; those in `held` do not move.
     fn step(&self, damping: f64, held: &[bool]) -> DVector<f64> {
         let p = self.gradient.len();
+        // Starts alone.
+        if p == 0 {
+            return DVector::zeros(0);
+        }
         let mut a = self.information.clone();
         let mut g = self.gradient.clone();
         for i in 0..p {
@@ -400,12 +428,10 @@ pub fn fit(
 ) -> Result<Fit> {
     let free: Vec<usize> = (0..unknowns.len()).filter(|&i| unknowns[i].free).collect();
     let bounds = bounds(predictor);
-    let mut differences = Differences::new(unknowns.len());
-    let effort = if predictor.is_rough() {
-        differences.0.fill(ROUGH_START);
-        effort.rough()
+    let (mut differences, effort) = if predictor.is_rough() {
+        (Differences::rough(unknowns.len(), open.len()), effort.rough())
     } else {
-        effort
+        (Differences::new(unknowns.len(), open.len()), effort)
     };
     let mut point = point;
     let mut damping = 1e-3;
@@ -419,7 +445,9 @@ pub fn fit(
         let before = differences.clone();
         line = linearise(predictor, layout, unknowns, &point, open, &mut differences)?;
         let settled = |(a, b): (&f64, &f64)| (a / b).max(b / a) < 4.0;
-        if before.0.iter().zip(&differences.0).all(settled) {
+        if before.shares.iter().zip(&differences.shares).all(settled)
+            && before.starts.iter().zip(&differences.starts).all(settled)
+        {
             break;
         }
     }

@@ -385,7 +385,7 @@ fn start_spread(bench: &Bench, point: &Point) -> Result<Spread> {
     unknowns.iter_mut().for_each(|u| u.free = false);
     let mut predictor = bench.predictor(&[], &bench.head)?;
     predictor.set_whitening(Vec::new());
-    let mut differences = Differences::new(unknowns.len());
+    let mut differences = Differences::new(unknowns.len(), bench.open.len());
     let open = &bench.open;
     let line = linearise(
         &mut predictor,
