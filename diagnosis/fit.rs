@@ -296,7 +296,11 @@ pub fn linearise(
     for (h, step) in differences.starts.iter_mut().zip(&start_steps) {
         let (change, response) = next();
         start_columns.push(change.iter().map(|d| d / step).collect());
-        let factor = if response > 0.0 { aim / response } else { 100.0 };
+        let factor = if response > 0.0 {
+            aim / response
+        } else {
+            100.0
+        };
         *h = (step * factor.clamp(1e-3, 1e3)).clamp(START_STEPS[0], START_STEPS[1]);
     }
     Ok(Linearisation {
@@ -429,7 +433,10 @@ pub fn fit(
     let free: Vec<usize> = (0..unknowns.len()).filter(|&i| unknowns[i].free).collect();
     let bounds = bounds(predictor);
     let (mut differences, effort) = if predictor.is_rough() {
-        (Differences::rough(unknowns.len(), open.len()), effort.rough())
+        (
+            Differences::rough(unknowns.len(), open.len()),
+            effort.rough(),
+        )
     } else {
         (Differences::new(unknowns.len(), open.len()), effort)
     };

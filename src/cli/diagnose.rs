@@ -80,6 +80,7 @@ struct Config {
 struct SearchConfig {
     first: usize,
     last: usize,
+    singles: usize,
     beam: usize,
     depth: usize,
 }
@@ -89,12 +90,14 @@ impl Default for SearchConfig {
         let Breadth {
             first,
             last,
+            singles,
             beam,
             depth,
         } = Breadth::default();
         Self {
             first,
             last,
+            singles,
             beam,
             depth,
         }
@@ -142,6 +145,7 @@ impl Config {
         let SearchConfig {
             first,
             last,
+            singles,
             beam,
             depth,
         } = self.search;
@@ -150,6 +154,7 @@ impl Config {
             breadth: Breadth {
                 first,
                 last,
+                singles,
                 beam,
                 depth,
             },
