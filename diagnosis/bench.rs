@@ -110,6 +110,9 @@ pub struct Bench {
     pub parameters: Vec<Parameter>,
     /// Coordinates of the starts that the logs do not give.
     pub open: Open,
+    /// Those of them that are fitted together with the parameters; the others stay as the first
+    /// tenth of their episode has them.
+    pub fitted: Open,
     /// The first tenth of the logs held out, on which open starts are fitted.
     pub head: Record,
     /// The training logs in growing parts, the last of which is the whole.
@@ -200,7 +203,7 @@ impl Bench {
             self.layout(),
             &unknowns,
             point,
-            &self.open,
+            &self.fitted,
             effort,
         )?;
         let mut all = starts.to_vec();

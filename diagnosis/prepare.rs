@@ -28,6 +28,11 @@ const SEEN: f64 = 1.5;
 /// Deviation of the integrator's error in units of what half the time step changes: an
 /// integrator of first order is still as far off again.
 const INTEGRATOR: f64 = 3.0;
+/// Root mean square up to which a model follows the first tenth of an episode, so that its start
+/// can be taken from there.
+const QUIET: f64 = 3.0;
+/// Share of the gap up to which what is open of the starts is small.
+const SMALL: f64 = 0.3;
 /// Share of a held-out episode that an open start is fitted on.
 const HEAD: f64 = 0.1;
 /// Values of each parameter that are looked at before the first fit.
@@ -264,25 +269,34 @@ pub fn prepare(study: &Study, machine: Machine, rng: &mut Rng) -> Result<Prepare
         .iter()
         .map(|p| Ok(model.nominal(&p.targets[0])?.clamp(p.range[0], p.range[1])))
         .collect::<Result<Vec<_>>>()?;
+    let open = open_coordinates(&layout, study);
     let mut bench = Bench {
         machine,
         train,
         parameters: study.parameters.clone(),
-        open: open_coordinates(&layout, study),
+        fitted: open.clone(),
+        open,
         head: test.cut(&layout, HEAD),
         test,
         stages: Vec::new(),
     };
     let halved = bench.machine.halved().ok();
-    let mut scatter = Scatter { halved, rng };
+    let mut scatter = Scatter {
+        halved,
+        rng,
+        starts: Spread::of_known_starts(&layout),
+    };
     let point = Point {
         theta: nominal.clone(),
         starts: bench.train.starts.clone(),
     };
     set_noise(&mut bench, &study.noise, &point)?;
     bench.stages = vec![whole(&bench)];
-    let point = settle_starts(&mut bench, point)?;
+    let (point, left) = settle_starts(&mut bench, point)?;
     scatter.estimate(&mut bench, &point)?;
+    if !bench.open.is_empty() && left < QUIET {
+        scatter.keep_starts(&mut bench, &point)?;
+    }
     let none = if bench.is_rough() {
         identify_rough(&mut bench, study, point, &mut scatter)?
     } else {
@@ -313,15 +327,17 @@ fn set_noise(bench: &mut Bench, given: &BTreeMap<String, f64>, point: &Point) ->
         .zip(estimated)
         .map(|(s, x)| given.get(&s.name).copied().unwrap_or(x))
         .collect();
-    bench.train.logs.set_noise(&noise);
-    bench.test.logs.set_noise(&noise);
+    for record in [&mut bench.train, &mut bench.test, &mut bench.head] {
+        record.logs.set_noise(&noise);
+    }
     Ok(())
 }
 
-/// Fits open starts alone, so that the model as given begins where the logs do.
-fn settle_starts(bench: &mut Bench, point: Point) -> Result<Point> {
+/// Fits open starts alone, so that the model as given begins where the logs do; with the root
+/// mean square that this leaves of the first tenth.
+fn settle_starts(bench: &mut Bench, point: Point) -> Result<(Point, f64)> {
     if bench.open.is_empty() {
-        return Ok(point);
+        return Ok((point, 0.0));
     }
     let layout = bench.layout().clone();
     let mut unknowns = bench.unknowns(&[]);
@@ -340,7 +356,8 @@ fn settle_starts(bench: &mut Bench, point: Point) -> Result<Point> {
     let theta = &fitted.point.theta;
     bench.test.starts = bench.head_starts(&[], theta, &bench.test.starts)?;
     bench.head.starts.clone_from(&bench.test.starts);
-    Ok(fitted.point)
+    let left = (fitted.cost / head.readings.max(1) as f64).sqrt();
+    Ok((fitted.point, left))
 }
 
 /// Estimates what predictions scatter by.
@@ -348,6 +365,8 @@ struct Scatter<'r> {
     /// The same machine with half the time step.
     halved: Option<Machine>,
     rng: &'r mut Rng,
+    /// How far apart the starts of the training logs may be.
+    starts: Spread,
 }
 
 impl Scatter<'_> {
@@ -355,20 +374,38 @@ impl Scatter<'_> {
     /// fitted, what nobody can repeat; on those held out also what their starts leave open.
     fn estimate(&mut self, bench: &mut Bench, point: &Point) -> Result<()> {
         let layout = bench.layout().clone();
-        let known = Spread::of_known_starts(&layout);
-        let train = self.of(bench, &bench.train, point, &known)?;
+        let train = self.of(bench, &bench.train, point, &self.starts.clone())?;
         let held = Point {
             theta: point.theta.clone(),
             starts: bench.test.starts.clone(),
         };
         let spread = if bench.open.is_empty() {
-            known
+            Spread::of_known_starts(&layout)
         } else {
-            start_spread(bench, &held)?
+            start_spread(bench, &bench.head, &held)?
         };
         let test = self.of(bench, &bench.test, &held, &spread)?;
         bench.train.whitening = train;
         bench.test.whitening = test;
+        Ok(())
+    }
+
+    /// Keeps the starts that the first tenths of the training logs give, where what they leave open
+    /// is far less than the gap: it counts as scatter, and fits are the cheaper for it.
+    fn keep_starts(&mut self, bench: &mut Bench, point: &Point) -> Result<()> {
+        let head = bench.train.cut(&bench.layout().clone(), HEAD);
+        let spread = start_spread(bench, &head, point)?;
+        let whitening = self.of(bench, &bench.train, point, &spread)?;
+        let variance: f64 = whitening.iter().map(Whitening::variance).sum();
+        let mut predictor = bench.predictor(&[], &bench.train)?;
+        predictor.set_whitening(Vec::new());
+        let residuals = predictor.residuals(std::slice::from_ref(point))?;
+        let gap: f64 = residuals[0].iter().map(|r| r * r).sum();
+        if variance < SMALL * SMALL * gap {
+            bench.fitted.clear();
+            bench.train.whitening = whitening;
+            self.starts = spread;
+        }
         Ok(())
     }
 
@@ -411,16 +448,25 @@ impl Scatter<'_> {
     }
 }
 
-/// How well the starts of the held-out episodes are known from their first tenth: the
-/// median over episodes, for each coordinate.
-fn start_spread(bench: &Bench, point: &Point) -> Result<Spread> {
+/// How well starts are known from the first tenth of their episodes, `head`: the median over
+/// episodes, for each coordinate.
+fn start_spread(bench: &Bench, head: &Record, point: &Point) -> Result<Spread> {
     let layout = bench.layout();
     let mut unknowns = bench.unknowns(&[]);
     unknowns.iter_mut().for_each(|u| u.free = false);
-    let mut predictor = bench.predictor(&[], &bench.head)?;
+    let mut predictor = bench.predictor(&[], head)?;
     predictor.set_whitening(Vec::new());
     let mut differences = Differences::new(unknowns.len(), bench.open.len());
     let open = &bench.open;
+    // Once for the size of the differences.
+    linearise(
+        &mut predictor,
+        layout,
+        &unknowns,
+        point,
+        open,
+        &mut differences,
+    )?;
     let line = linearise(
         &mut predictor,
         layout,
@@ -429,7 +475,7 @@ fn start_spread(bench: &Bench, point: &Point) -> Result<Spread> {
         open,
         &mut differences,
     )?;
-    let logs = &bench.head.logs;
+    let logs = &head.logs;
     let mut spread = vec![0.0; 2 * layout.nv];
     for (k, &coordinate) in open.iter().enumerate() {
         let mut deviations: Vec<f64> = (0..logs.episodes.len())

@@ -171,10 +171,10 @@ impl<'a> Base<'a> {
             .collect();
         let unknowns = bench.unknowns(&trials);
         let mut predictor = bench.predictor(&trials, record)?;
-        let mut differences = Differences::new(unknowns.len(), bench.open.len());
+        let mut differences = Differences::new(unknowns.len(), bench.fitted.len());
         let (mut aim, mut first) = (AIM, FIRST);
         if predictor.is_rough() {
-            differences = Differences::rough(unknowns.len(), bench.open.len());
+            differences = Differences::rough(unknowns.len(), bench.fitted.len());
             let mut other = point.clone();
             for start in &mut other.starts {
                 (0..2 * bench.layout().nv).for_each(|c| start.shift(bench.layout(), c, PROBE));
@@ -192,7 +192,7 @@ impl<'a> Base<'a> {
                 bench.layout(),
                 &unknowns,
                 &point,
-                &bench.open,
+                &bench.fitted,
                 &mut differences,
             )?);
         }

@@ -20,6 +20,8 @@ pub struct Breadth {
     pub first: usize,
     /// Of these, those that are followed to the last.
     pub last: usize,
+    /// Single effects that are followed to the last whatever sets of more do.
+    pub singles: usize,
     /// Explanations that more effects are tried upon.
     pub beam: usize,
     /// Most effects together.
@@ -31,6 +33,7 @@ impl Default for Breadth {
         Self {
             first: 14,
             last: 5,
+            singles: 3,
             beam: 2,
             depth: 2,
         }
@@ -65,9 +68,6 @@ const GROWN: f64 = 3.0;
 
 /// Multiple of the best cost up to which a fit is worth its end.
 const NEAR_BEST: f64 = 10.0;
-
-/// Single effects that are followed whatever sets do.
-const SINGLES: usize = 3;
 
 /// What a cost per reading has beyond the noise, as a root mean square.
 #[must_use]
@@ -175,7 +175,7 @@ impl Search<'_> {
         all.retain(|f| {
             place += 1;
             singles += usize::from(f.candidates.len() == 1);
-            place <= quota || (f.candidates.len() == 1 && singles <= SINGLES)
+            place <= quota || (f.candidates.len() == 1 && singles <= self.breadth.singles)
         });
         self.progress.begin("fitting longer", all.len() as u64);
         for found in &mut all {

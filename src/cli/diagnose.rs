@@ -88,6 +88,7 @@ struct Config {
 struct SearchConfig {
     first: usize,
     last: usize,
+    singles: usize,
     beam: usize,
     depth: usize,
 }
@@ -97,12 +98,14 @@ impl Default for SearchConfig {
         let Breadth {
             first,
             last,
+            singles,
             beam,
             depth,
         } = Breadth::default();
         Self {
             first,
             last,
+            singles,
             beam,
             depth,
         }
@@ -151,6 +154,7 @@ impl Config {
         let SearchConfig {
             first,
             last,
+            singles,
             beam,
             depth,
         } = self.search;
@@ -159,6 +163,7 @@ impl Config {
             breadth: Breadth {
                 first,
                 last,
+                singles,
                 beam,
                 depth,
             },
