@@ -183,7 +183,10 @@ fn first_readings(plant: &Plant, episode: &asid_core::Episode, qpos: &mut [f64],
 fn open_places(kind: JointKind, places: &[f64]) -> Vec<usize> {
     let missing = |i: usize| !places[i].is_finite();
     let turn = |first: usize, axes: std::ops::Range<usize>| -> Vec<usize> {
-        let of: Vec<usize> = axes.clone().filter(|a| missing(first + 1 + a - axes.start)).collect();
+        let of: Vec<usize> = axes
+            .clone()
+            .filter(|a| missing(first + 1 + a - axes.start))
+            .collect();
         match (missing(first), of.len()) {
             (false, 0) => Vec::new(),
             (_, 1) => of,

@@ -232,7 +232,11 @@ fn task_start(task: &dyn Task, layout: &Layout) -> Result<InitialState> {
     };
     let (low, high) = (place(0.2)?, place(0.9)?);
     let open = |(here, (a, b)): (f64, (&f64, &f64))| if a == b { here } else { f64::NAN };
-    let qpos = home.into_iter().zip(low.iter().zip(&high)).map(open).collect();
+    let qpos = home
+        .into_iter()
+        .zip(low.iter().zip(&high))
+        .map(open)
+        .collect();
     Ok(InitialState { qpos, qvel })
 }
 

@@ -421,6 +421,7 @@ mod tests {
                 2.0,
                 std::f64::consts::PI,
             ],
+            initial: None,
         };
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("log.csv");

@@ -1,6 +1,6 @@
 //! Friction of hinges and slides.
 //!
-//! Viscous friction is the engine's own damping; dry friction is [`super::dry`]. The laws follow
+//! Viscous friction is the engine's own damping; dry friction is `dry.rs`. The laws follow
 //! B. Armstrong-Hélouvry, P. Dupont, C. Canudas de Wit, "A survey
 //! of models, analysis tools and compensation methods for the control of machines with friction",
 //! Automatica 30 (1994), and for friction that grows with the load M. Duclusaud et al., "Extended

@@ -218,7 +218,7 @@ mod tests {
             parameters: vec![("damping".into(), "N m s/rad".into(), Some(0.1))],
             ..Meta::default()
         };
-        let html = page(&result, &trace, meta);
+        let html = r::page(&diagnosis(&result, &trace, meta));
         for told in [
             "The elbow answers late.",
             "delay = 0.03\u{a0}s",
