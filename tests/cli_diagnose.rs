@@ -107,6 +107,9 @@ fn labels_are_read_by_the_scorer_only_and_last() {
     assert_eq!(json(&out.join("result.json"))["right"], 0);
 }
 
+/// What is spoilt, how, and what is said of it.
+type Spoilt<'a> = (&'a str, Box<dyn Fn() + 'a>, &'a str);
+
 #[test]
 fn bad_studies_and_logs_are_refused_in_one_line() {
     let folder = tempfile::tempdir().unwrap();
@@ -117,7 +120,7 @@ fn bad_studies_and_logs_are_refused_in_one_line() {
     let toml = study.join("study.toml");
     let written = std::fs::read_to_string(&toml).unwrap();
     let with_log = |text: String| std::fs::write(&log, text).unwrap();
-    let cases: [(&str, Box<dyn Fn()>, &str); 7] = [
+    let cases: [Spoilt<'_>; 7] = [
         (
             "unknown column",
             Box::new(|| with_log(good.replace(",dx,", ",ddx,"))),

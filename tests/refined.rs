@@ -5,9 +5,7 @@
 
 use asid::core::registry::{BackendEntry, all};
 use asid::core::simulator::{StepHook, StepView};
-use asid::core::{
-    Backend, BatchConfig, Capabilities, Control, Model as _, Rollout, Scene, Simulator,
-};
+use asid::core::{Backend, BatchConfig, Capabilities, Control, Rollout, Scene, Simulator};
 
 /// A block that slides on a floor along x.
 const BLOCK: &str = r#"<mujoco><compiler angle="radian"/><option timestep="0.001" cone="elliptic" impratio="10"/>

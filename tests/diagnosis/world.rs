@@ -18,6 +18,7 @@ pub const NOMINAL: &str = r#"<mujoco model="cart"><option timestep="0.002" integ
 "#;
 
 /// What the real cart has that the model lacks.
+#[allow(dead_code)] // Each test program uses some of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Truth {
     /// Nothing.
