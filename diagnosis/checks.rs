@@ -6,6 +6,7 @@ use crate::bench::{Bench, Explanation};
 use crate::data::Logs;
 use crate::fit::slope;
 use crate::machine::Machine;
+use crate::predict::Point;
 use crate::prepare::plain_residuals;
 use crate::result::CheckResult;
 
@@ -19,6 +20,8 @@ fn check(name: &str, ok: bool, detail: String) -> CheckResult {
 
 /// Share of missing readings that is still called good.
 const MISSING: f64 = 0.2;
+/// Logarithm of what a reading's size may be off by for a unit to be recognised.
+const UNIT: f64 = 0.27;
 /// Share of a parameter's range that its deviation must be below.
 const PINNED: f64 = 0.25;
 /// Root mean square change by a halved time step that does not matter, in units of the noise.
@@ -53,9 +56,14 @@ pub fn data(train: &Logs, test: &Logs) -> CheckResult {
 ///
 /// # Errors
 /// When a rollout fails.
-pub fn units(bench: &Bench, none: &Explanation) -> Result<CheckResult> {
+pub fn units(bench: &Bench, nominal: &[f64]) -> Result<CheckResult> {
     let record = &bench.train;
-    let residuals = plain_residuals(bench, record, &[], &none.fit.point)?;
+    // The model as given: a fit would have bent its parameters to the wrong unit.
+    let point = Point {
+        theta: nominal.to_vec(),
+        starts: record.starts.clone(),
+    };
+    let residuals = plain_residuals(bench, record, &[], &point)?;
     let logs = &record.logs;
     let (n, width) = (logs.entries.len(), logs.width());
     let mut found = Vec::new();
@@ -93,7 +101,7 @@ pub fn units(bench: &Bench, none: &Explanation) -> Result<CheckResult> {
             (1000.0, "thousandths of the unit (mm, mrad)"),
             (100.0, "hundredths of the unit (cm)"),
         ] {
-            if correlation > 0.9 && (slope / factor - 1.0).abs() < 0.1 {
+            if correlation > 0.9 && (slope / factor).ln().abs() < UNIT {
                 found.push(format!(
                     "`{}` reads {slope:.1} times what the model has: is it in {what}? Logs are in SI units",
                     sensor.name

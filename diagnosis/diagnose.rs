@@ -531,7 +531,7 @@ impl Telling<'_> {
         let bench = self.bench;
         let mut all = vec![
             checks::data(&bench.train.logs, &bench.test.logs),
-            checks::units(bench, none)?,
+            checks::units(bench, self.nominal)?,
         ];
         all.extend(checks::identifiability(&bench.parameters, none));
         all.push(checks::repeatability(bench));
