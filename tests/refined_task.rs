@@ -23,14 +23,18 @@ fn refused(place: &Workplace, arguments: &[&str], expected: &[&str]) {
     assert_eq!(output.status.code(), Some(2), "{arguments:?}: {line}");
     assert_eq!(line.lines().count(), 1, "{arguments:?}: {line}");
     for text in expected {
-        assert!(line.contains(text), "{arguments:?}: `{text}` is not in: {line}");
+        assert!(
+            line.contains(text),
+            "{arguments:?}: `{text}` is not in: {line}"
+        );
     }
     assert_eq!(place.names(), before, "{arguments:?} left something");
 }
 
 /// A figure of a folder's result.json.
 fn figure(place: &Workplace, folder: &str, pointer: &str) -> f64 {
-    let result: Value = serde_json::from_str(&place.read(&format!("{folder}/result.json"))).unwrap();
+    let result: Value =
+        serde_json::from_str(&place.read(&format!("{folder}/result.json"))).unwrap();
     result.pointer(pointer).unwrap().as_f64().unwrap()
 }
 
@@ -50,7 +54,14 @@ fn refined(place: &Workplace, task: &str) {
 fn the_effects_of_a_refined_model_are_in_the_simulator_and_its_config_repeats_it() {
     let place = Workplace::new();
     refined(&place, "shuffleboard");
-    let solve = ["solve", "shuffleboard", "--posterior", "prior", "--threads", "1"];
+    let solve = [
+        "solve",
+        "shuffleboard",
+        "--posterior",
+        "prior",
+        "--threads",
+        "1",
+    ];
     let solve = |more: &[&str]| done(&place, &tiny(&[&solve[..], more].concat()));
     solve(&["--out", "plain"]);
     // The scene as a file is the scene.
@@ -61,15 +72,31 @@ fn the_effects_of_a_refined_model_are_in_the_simulator_and_its_config_repeats_it
     assert_eq!(value("plain").to_bits(), value("same").to_bits());
     assert!((value("plain") - value("other")).abs() > 1e-3);
     assert_eq!(value("other").to_bits(), value("again").to_bits());
-    assert!(place.read("other/config.toml").contains("model = \"refined.toml\""));
+    assert!(
+        place
+            .read("other/config.toml")
+            .contains("model = \"refined.toml\"")
+    );
 }
 
 #[test]
 fn the_episode_of_a_refined_real_world_is_played_and_explained_by_the_same_model() {
     let place = Workplace::new();
     refined(&place, "shuffleboard");
-    let truth = ["--truth", "sliding_friction=0.02", "--truth", "torsional_friction=0.002"];
-    let explore = ["explore", "shuffleboard", "--real-model", "refined.toml", "--out", "real"];
+    let truth = [
+        "--truth",
+        "sliding_friction=0.02",
+        "--truth",
+        "torsional_friction=0.002",
+    ];
+    let explore = [
+        "explore",
+        "shuffleboard",
+        "--real-model",
+        "refined.toml",
+        "--out",
+        "real",
+    ];
     done(&place, &tiny(&[&explore[..], &truth].concat()));
     let log = place.path("real/real.csv");
     let task = asid_tasks::shuffleboard::Shuffleboard::new(asid_tasks::shuffleboard::Zone::Near);
@@ -82,7 +109,10 @@ fn the_episode_of_a_refined_real_world_is_played_and_explained_by_the_same_model
         done(&place, &tiny(&[&all[..], more].concat()));
         figure(&place, out, "/residual")
     };
-    let (plain, refined) = (identify("plain", &[]), identify("refined", &["--model", "refined.toml"]));
+    let (plain, refined) = (
+        identify("plain", &[]),
+        identify("refined", &["--model", "refined.toml"]),
+    );
     assert!(plain > 3.0 * refined, "{plain} {refined}");
 }
 
@@ -118,8 +148,23 @@ fn models_that_cannot_stand_for_the_simulator_are_refused_in_one_line() {
         place.write(name, text);
         for command in [
             &["run", "rod-balancing", "--out", "out"][..],
-            &["solve", "rod-balancing", "--posterior", "prior", "--out", "out"],
-            &["compare", "rod-balancing", "--seeds", "1", "--quiet", "--out", "out"],
+            &[
+                "solve",
+                "rod-balancing",
+                "--posterior",
+                "prior",
+                "--out",
+                "out",
+            ],
+            &[
+                "compare",
+                "rod-balancing",
+                "--seeds",
+                "1",
+                "--quiet",
+                "--out",
+                "out",
+            ],
         ] {
             let arguments = tiny(&[command, &["--model", name]].concat());
             refused(&place, &arguments, &[expected]);

@@ -149,7 +149,10 @@ pub fn explore(arguments: &Arguments) -> Result<()> {
         ),
         ("policy.json", "the exploration policy"),
     ];
-    files.extend(real.as_ref().map(|_| ("real.csv", "log of the real episode")));
+    files.extend(
+        real.as_ref()
+            .map(|_| ("real.csv", "log of the real episode")),
+    );
     let mut report = stage::report(&session, wall_s, &files);
     report.explorer.clone_from(&config.explorer.name);
     report.answer = format!(

@@ -36,7 +36,13 @@ fn refine(
     }
     let plant = Arc::new(Plant::of(scene)?);
     let effects = [&source.effects[..], more].concat();
-    Ok(Refined::new(backend, model, plant, &source.parameters, &effects)?)
+    Ok(Refined::new(
+        backend,
+        model,
+        plant,
+        &source.parameters,
+        &effects,
+    )?)
 }
 
 /// What a task needs of a model that takes the place of its scene.

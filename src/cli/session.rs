@@ -38,7 +38,12 @@ pub struct Session {
 
 impl Session {
     /// Opens a task for the whole pipeline; see [`Session::open_stage`].
-    pub fn open(task: &str, common: &Common, algorithms: &Algorithms, worlds: &Worlds) -> Result<Self> {
+    pub fn open(
+        task: &str,
+        common: &Common,
+        algorithms: &Algorithms,
+        worlds: &Worlds,
+    ) -> Result<Self> {
         Self::open_stage(Stage::Run, task, common, algorithms, worlds)
     }
 
