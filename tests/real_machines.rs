@@ -26,11 +26,16 @@ fn engine() -> Arc<dyn Backend> {
 
 /// Diagnoses some of the episodes of a study by single effects.
 fn singles(study: &str, train: &[&str], test: &[&str]) -> Diagnosis {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("studies").join(study);
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("studies")
+        .join(study);
     let mut study = Study::read(&folder).unwrap();
     study.train.retain(|(name, _)| train.contains(&&**name));
     study.test.retain(|(name, _)| test.contains(&&**name));
-    assert_eq!(study.train.len() + study.test.len(), train.len() + test.len());
+    assert_eq!(
+        study.train.len() + study.test.len(),
+        train.len() + test.len()
+    );
     let machine = Machine::new(engine(), &study.scene, &study.fixed, &study.effects, 0).unwrap();
     let settings = Settings {
         breadth: Breadth {
@@ -51,12 +56,20 @@ fn singles(study: &str, train: &[&str], test: &[&str]) -> Diagnosis {
 fn a_servo_lacks_friction_first_of_all() {
     let found = singles(
         "servo-pendulum",
-        &["train_sin-sin_0.csv", "train_sin-time-square_2.csv", "train_up-and-down_0.csv"],
+        &[
+            "train_sin-sin_0.csv",
+            "train_sin-time-square_2.csv",
+            "train_up-and-down_0.csv",
+        ],
         &["test_sin-sin_1.csv", "test_up-and-down_1.csv"],
     );
     let (best, gap) = &found.trace.ladder[0];
     let identified = found.result.gap.identified;
     assert!(best.contains("friction@output"), "{:?}", found.trace.ladder);
     // Half of the root mean square, on episodes that were not fitted.
-    assert!(*gap < 0.5 * identified, "{gap} of {identified}: {:?}", found.trace.ladder);
+    assert!(
+        *gap < 0.5 * identified,
+        "{gap} of {identified}: {:?}",
+        found.trace.ladder
+    );
 }
