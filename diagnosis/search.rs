@@ -20,7 +20,7 @@ pub struct Breadth {
     pub first: usize,
     /// Of these, those that are followed to the last.
     pub last: usize,
-    /// Single effects that are followed to the last whatever sets of more do.
+    /// Of the single effects, those that are followed to the last whatever sets of more do.
     pub singles: usize,
     /// Explanations that more effects are tried upon.
     pub beam: usize,
@@ -33,7 +33,7 @@ impl Default for Breadth {
         Self {
             first: 14,
             last: 5,
-            singles: 3,
+            singles: 5,
             beam: 2,
             depth: 2,
         }
@@ -169,13 +169,15 @@ impl Search<'_> {
         if stage == 0 {
             return Ok(all);
         }
-        // The best, and the best singles whatever their place.
+        // The best, and as many of the singles whatever their place: on a short stage a pair hides
+        // which of its two acts over the whole.
         let quota = self.quota(stage);
+        let alone = quota.max(self.breadth.singles);
         let (mut place, mut singles) = (0, 0);
         all.retain(|f| {
             place += 1;
             singles += usize::from(f.candidates.len() == 1);
-            place <= quota || (f.candidates.len() == 1 && singles <= self.breadth.singles)
+            place <= quota || (f.candidates.len() == 1 && singles <= alone)
         });
         self.progress.begin("fitting longer", all.len() as u64);
         for found in &mut all {

@@ -1,0 +1,75 @@
+//! Studies of real machines: what is known of them is found in their logs.
+
+#![allow(clippy::unwrap_used)]
+
+use std::path::Path;
+use std::sync::Arc;
+
+use asid::core::progress::Silent;
+use asid::core::registry::{BackendEntry, all};
+use asid::core::{Backend, Capabilities};
+use asid::diagnosis::diagnose::{Diagnosis, Settings, diagnose};
+use asid::diagnosis::machine::Machine;
+use asid::diagnosis::search::Breadth;
+use asid::diagnosis::study::Study;
+
+/// The engine that diagnoses by default: in double precision where one is built in.
+fn engine() -> Arc<dyn Backend> {
+    let made: Vec<Box<dyn Backend>> = all::<BackendEntry>()
+        .into_iter()
+        .map(|e| (e.make)().unwrap())
+        .collect();
+    let double = |b: &Box<dyn Backend>| b.capabilities().contains(Capabilities::DOUBLE_PRECISION);
+    let at = made.iter().position(double).unwrap_or(0);
+    made.into_iter().nth(at).unwrap().into()
+}
+
+/// Diagnoses some of the episodes of a study by single effects.
+fn singles(study: &str, train: &[&str], test: &[&str]) -> Diagnosis {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("studies")
+        .join(study);
+    let mut study = Study::read(&folder).unwrap();
+    study.train.retain(|(name, _)| train.contains(&&**name));
+    study.test.retain(|(name, _)| test.contains(&&**name));
+    assert_eq!(
+        study.train.len() + study.test.len(),
+        train.len() + test.len()
+    );
+    let machine = Machine::new(engine(), &study.scene, &study.fixed, &study.effects, 0).unwrap();
+    let settings = Settings {
+        breadth: Breadth {
+            first: 10,
+            last: 4,
+            singles: 4,
+            depth: 1,
+            ..Breadth::default()
+        },
+        ..Settings::default()
+    };
+    diagnose(&study, machine, settings, &Silent).unwrap().0
+}
+
+/// The authors of these logs find that friction which grows with the load is what a servo's
+/// model lacks most (Duclusaud et al., Extended friction models, 2025).
+#[test]
+fn a_servo_lacks_friction_first_of_all() {
+    let found = singles(
+        "servo-pendulum",
+        &[
+            "train_sin-sin_0.csv",
+            "train_sin-time-square_2.csv",
+            "train_up-and-down_0.csv",
+        ],
+        &["test_sin-sin_1.csv", "test_up-and-down_1.csv"],
+    );
+    let (best, gap) = &found.trace.ladder[0];
+    let identified = found.result.gap.identified;
+    assert!(best.contains("friction@output"), "{:?}", found.trace.ladder);
+    // Half of the root mean square, on episodes that were not fitted.
+    assert!(
+        *gap < 0.5 * identified,
+        "{gap} of {identified}: {:?}",
+        found.trace.ladder
+    );
+}
