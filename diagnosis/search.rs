@@ -169,10 +169,10 @@ impl Search<'_> {
         if stage == 0 {
             return Ok(all);
         }
-        // The best, and as many of the singles whatever their place: on a short stage a pair hides
+        // The best, and some of the singles whatever their place: on a short stage a pair hides
         // which of its two acts over the whole.
         let quota = self.quota(stage);
-        let alone = quota.max(self.breadth.singles);
+        let alone = self.breadth.singles;
         let (mut place, mut singles) = (0, 0);
         all.retain(|f| {
             place += 1;

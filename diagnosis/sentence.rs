@@ -71,6 +71,11 @@ pub fn sentence(result: &DiagnosisResult, labels: &[String]) -> String {
                 closed()
             )
         }
+        Kind::Unknown if result.gap.closed.is_some_and(|c| c > 0.5) => format!(
+            "{place}{} explains {}, and what is left is more than an effect of the catalogue usually leaves: there is something else.",
+            labels.join(" with "),
+            closed()
+        ),
         Kind::Unknown => format!(
             "{place}nothing in the catalogue explains it: {} comes nearest, with {}.",
             if labels.is_empty() {

@@ -43,7 +43,7 @@ pub struct Judgement {
 
 /// Share of the excess left from which on an unknown effect is as likely as not, and how
 /// sharply that changes with its logarithm.
-const REST: f64 = 0.1;
+const REST: f64 = 0.15;
 const SHARPNESS: f64 = 0.35;
 /// Excess that the explanations in [`REST`] are thought of with, in deviations of the noise.
 const USUAL: f64 = 8.0;

@@ -15,13 +15,13 @@ use asid::diagnosis::study::Study;
 
 /// The engine that diagnoses by default: in double precision where one is built in.
 fn engine() -> Arc<dyn Backend> {
-    let made: Vec<Box<dyn Backend>> = all::<BackendEntry>()
+    let mut made: Vec<Arc<dyn Backend>> = all::<BackendEntry>()
         .into_iter()
-        .map(|e| (e.make)().unwrap())
+        .map(|e| (e.make)().unwrap().into())
         .collect();
-    let double = |b: &Box<dyn Backend>| b.capabilities().contains(Capabilities::DOUBLE_PRECISION);
+    let double = |b: &Arc<dyn Backend>| b.capabilities().contains(Capabilities::DOUBLE_PRECISION);
     let at = made.iter().position(double).unwrap_or(0);
-    made.into_iter().nth(at).unwrap().into()
+    made.swap_remove(at)
 }
 
 /// Diagnoses some of the episodes of a study by single effects.
