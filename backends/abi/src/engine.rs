@@ -129,8 +129,7 @@ impl Engine {
         if let Some(missing) = missing_function(&table) {
             return Err(refuse(format!("its table has no `{missing}` (NULL)")));
         }
-        let known = Capabilities::all() - Capabilities::LIVE_PARAMETERS;
-        let unknown = table.capabilities & !known.bits();
+        let unknown = table.capabilities & !table::capabilities().bits();
         #[allow(
             clippy::absurd_extreme_comparisons,
             reason = "not of the first minor version only"

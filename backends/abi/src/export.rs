@@ -12,7 +12,7 @@ mod model;
 use std::ffi::{c_char, c_void};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use asid_core::{Backend, Capabilities, Result};
+use asid_core::{Backend, Result};
 
 use crate::failure::encode;
 use crate::table::{self, ABI_MAJOR, ABI_MINOR, Code};
@@ -79,8 +79,7 @@ macro_rules! export_backend {
 pub fn table<E: Export>(about: &str) -> table::Backend {
     let (name, version, capabilities) = match E::backend() {
         Ok(b) => {
-            // The table's hook shows no parameters.
-            let capabilities = b.capabilities() - Capabilities::LIVE_PARAMETERS;
+            let capabilities = b.capabilities() & table::capabilities();
             (b.name().to_owned(), b.version(), capabilities.bits())
         }
         Err(_) => ("unavailable".to_owned(), String::new(), 0),

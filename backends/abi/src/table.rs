@@ -7,6 +7,8 @@
 
 use std::ffi::{c_char, c_void};
 
+use asid_core::Capabilities;
+
 /// Version of the ABI: another major is refused, a smaller minor is read as far
 /// as it goes.
 pub const ABI_MAJOR: u32 = 1;
@@ -288,3 +290,9 @@ c_structs! {
 unsafe impl Sync for Backend {}
 // SAFETY: as above.
 unsafe impl Send for Backend {}
+
+/// Capabilities that an engine can claim over this table: its hook shows no parameters.
+#[must_use]
+pub fn capabilities() -> Capabilities {
+    Capabilities::all() - Capabilities::LIVE_PARAMETERS
+}
