@@ -27,5 +27,6 @@ pub mod screen;
 pub mod search;
 pub mod sentence;
 pub mod study;
+mod telling;
 pub mod trajectory;
 pub mod verdict;

@@ -461,23 +461,19 @@ fn start_spread(bench: &Bench, head: &Record, point: &Point) -> Result<Spread> {
     predictor.set_whitening(Vec::new());
     let mut differences = Differences::new(unknowns.len(), bench.open.len());
     let open = &bench.open;
+    let mut line = || {
+        linearise(
+            &mut predictor,
+            layout,
+            &unknowns,
+            point,
+            open,
+            &mut differences,
+        )
+    };
     // Once for the size of the differences.
-    linearise(
-        &mut predictor,
-        layout,
-        &unknowns,
-        point,
-        open,
-        &mut differences,
-    )?;
-    let line = linearise(
-        &mut predictor,
-        layout,
-        &unknowns,
-        point,
-        open,
-        &mut differences,
-    )?;
+    line()?;
+    let line = line()?;
     let logs = &head.logs;
     let mut spread = vec![0.0; 2 * layout.nv];
     for (k, &coordinate) in open.iter().enumerate() {

@@ -1,0 +1,481 @@
+//! What a search found, told as a result: gaps, probabilities, places, pictures.
+
+use asid_core::{Result, Streams};
+
+use crate::bench::{Bench, Explanation, Record, Trial};
+use crate::candidate::{Candidate, LeftOut};
+use crate::checks;
+use crate::diagnose::{Diagnosis, Settings};
+use crate::experiment;
+use crate::localise::localise;
+use crate::predict::Point;
+use crate::result::{
+    DiagnosisResult, DiagnosisTrace, EffectResult, Gap, HypothesisResult, Kind, NextExperiment,
+    ParameterResult, SignalGap, SignalTrace, Verdict,
+};
+use crate::search::{Findings, Found, trials};
+use crate::study::Study;
+use crate::trajectory::Trajectory;
+use crate::verdict::Judgement;
+
+/// Samples of the bootstrap.
+const RESAMPLES: usize = 2000;
+/// Identified gap up to which there is nothing to close.
+const NO_GAP: f64 = 1.05;
+/// Points of one curve in the trace.
+const CURVE: usize = 600;
+/// Held-out episodes in the trace.
+const SHOWN: usize = 3;
+/// Points of the map.
+const MAP: usize = 4000;
+
+/// All that a result is told from.
+pub(crate) struct Telling<'a> {
+    pub(crate) study: &'a Study,
+    pub(crate) bench: &'a Bench,
+    pub(crate) candidates: &'a [Candidate],
+    pub(crate) left_out: &'a [LeftOut],
+    pub(crate) findings: &'a Findings,
+    pub(crate) judgement: &'a Judgement,
+    pub(crate) nominal: &'a [f64],
+    pub(crate) settings: Settings,
+}
+
+/// Predictions of the held-out logs by one model: readings and plain residuals in units of
+/// the noise.
+struct HeldOut {
+    readings: Vec<Vec<f64>>,
+    residuals: Vec<f64>,
+}
+
+impl Telling<'_> {
+    fn found(&self, hypothesis: usize) -> Option<&Found> {
+        let place = self.judgement.hypotheses[hypothesis].found?;
+        Some(&self.findings.found[place])
+    }
+
+    fn trials(&self, found: Option<&Found>) -> Vec<Trial<'_>> {
+        found.map_or_else(Vec::new, |f| {
+            trials(self.candidates, &f.candidates, &f.explanation)
+        })
+    }
+
+    fn explanation(&self, found: Option<&Found>) -> Explanation {
+        found.map_or_else(|| self.findings.none.clone(), |f| f.explanation.clone())
+    }
+
+    /// Replays the held-out logs without whitening.
+    fn held(&self, trials: &[Trial<'_>], theta: &[f64]) -> Result<HeldOut> {
+        let bench = self.bench;
+        let starts = bench.head_starts(trials, theta, &bench.test.starts)?;
+        let mut predictor = bench.predictor(trials, &bench.test)?;
+        predictor.set_whitening(Vec::new());
+        let point = Point {
+            theta: theta.to_vec(),
+            starts,
+        };
+        let readings = predictor.readings(std::slice::from_ref(&point))?.pop();
+        let mut residuals = predictor.residuals(&[point])?.pop().unwrap_or_default();
+        bench.mask_head(&mut residuals);
+        Ok(HeldOut {
+            readings: readings.unwrap_or_default(),
+            residuals,
+        })
+    }
+
+    pub(crate) fn tell(&self) -> Result<Diagnosis> {
+        let j = self.judgement;
+        let best = self.found(j.best);
+        let (members, explanation) = (self.trials(best), self.explanation(best));
+        let none = &self.findings.none;
+        let nominal = self.held(&[], self.nominal)?;
+        let identified = self.held(&[], &none.fit.point.theta)?;
+        let refined = self.held(&members, &explanation.fit.point.theta)?;
+        let gap = self.gap(&nominal, &identified, &refined);
+        let kind = if j.is_unknown() {
+            Kind::Unknown
+        } else if best.is_none() {
+            Kind::None
+        } else {
+            Kind::Effects
+        };
+        let effects = self.effects(gap.identified)?;
+        let hypotheses = self.hypotheses();
+        let labels = explanation.labels();
+        let verdict = Verdict {
+            kind,
+            effects: if kind == Kind::Effects {
+                labels.clone()
+            } else {
+                Vec::new()
+            },
+            probability: if kind == Kind::Unknown {
+                j.unknown
+            } else {
+                j.verdict().probability
+            },
+            ambiguous_with: if kind == Kind::Effects {
+                j.ambiguous
+                    .iter()
+                    .map(|&i| j.hypotheses[i].labels.clone())
+                    .collect()
+            } else {
+                Vec::new()
+            },
+            unexplained: gap.closed.map_or(0.0, |c| 1.0 - c),
+        };
+        let places = self.places(none)?;
+        let mut result = DiagnosisResult {
+            schema: 1,
+            study: self.study.name.clone(),
+            sentence: String::new(),
+            gap,
+            places,
+            hypotheses,
+            effects,
+            verdict,
+            parameters: self.parameters(&explanation),
+            checks: self.checks(none)?,
+            next_experiment: self.next(best)?,
+        };
+        result.sentence = crate::sentence::sentence(&result, &labels);
+        let trace = self.trace(&nominal, &identified, &refined)?;
+        let study = self.bench.parameters.len();
+        Ok(Diagnosis {
+            result,
+            trace,
+            effects: explanation.effects.clone(),
+            values: explanation.fit.point.theta[..study].to_vec(),
+        })
+    }
+
+    /// Root mean square of some of the residuals that have a reading, capped where a
+    /// simulation diverged.
+    fn rms(&self, residuals: &[f64], sensor: Option<usize>, episode: Option<usize>) -> (f64, f64) {
+        let logs = &self.bench.test.logs;
+        let n = logs.entries.len();
+        let present = logs.present();
+        let (mut square, mut count) = (0.0, 0.0);
+        for e in 0..logs.episodes.len() {
+            if episode.is_some_and(|x| x != e) {
+                continue;
+            }
+            let head = if self.bench.open.is_empty() {
+                0
+            } else {
+                self.bench.head.logs.episodes[e].plan.rows() * n
+            };
+            for k in logs.offset(e) + head..logs.offset(e + 1) {
+                if present[k] && sensor.is_none_or(|s| logs.entries[k % n].sensor == s) {
+                    let r = residuals[k];
+                    square += if r.is_finite() { r * r } else { 1e12 };
+                    count += 1.0;
+                }
+            }
+        }
+        (square, count)
+    }
+
+    fn gap(&self, nominal: &HeldOut, identified: &HeldOut, refined: &HeldOut) -> Gap {
+        let logs = &self.bench.test.logs;
+        let root = |(square, count): (f64, f64)| (square / f64::max(count, 1.0)).sqrt();
+        let of = |h: &HeldOut, sensor| root(self.rms(&h.residuals, sensor, None));
+        let (i, r) = (of(identified, None), of(refined, None));
+        let closed = |i2: f64, r2: f64| (1.0 - (r2 - 1.0) / (i2 - 1.0)).clamp(0.0, 1.0);
+        let has_gap = i > NO_GAP;
+        let interval = has_gap.then(|| {
+            let episodes: Vec<_> = (0..logs.episodes.len())
+                .map(|e| {
+                    let part = |h: &HeldOut| self.rms(&h.residuals, None, Some(e));
+                    (part(identified), part(refined))
+                })
+                .collect();
+            let mut rng = Streams::new(self.settings.seed).stream("bootstrap");
+            let mut all: Vec<f64> = (0..RESAMPLES)
+                .map(|_| {
+                    let (mut a, mut b, mut n) = (0.0, 0.0, 0.0);
+                    for _ in 0..episodes.len() {
+                        use rand::Rng as _;
+                        let ((x, count), (y, _)) = episodes[rng.random_range(0..episodes.len())];
+                        a += x;
+                        b += y;
+                        n += count;
+                    }
+                    let (a, b) = (a / f64::max(n, 1.0), b / f64::max(n, 1.0));
+                    if a > 1.0 { closed(a, b) } else { 0.0 }
+                })
+                .collect();
+            all.sort_by(f64::total_cmp);
+            let pick = |q: f64| all[(q * (RESAMPLES - 1) as f64).round() as usize];
+            [pick(0.025), pick(0.975)]
+        });
+        Gap {
+            noise_floor: 1.0,
+            nominal: of(nominal, None),
+            identified: i,
+            refined: r,
+            closed: has_gap.then(|| closed(i * i, r * r)),
+            closed_interval95: interval,
+            signals: logs
+                .sensors
+                .iter()
+                .enumerate()
+                .map(|(s, sensor)| SignalGap {
+                    signal: sensor.name.clone(),
+                    noise: sensor.noise,
+                    unit: sensor.unit.clone(),
+                    nominal: of(nominal, Some(s)),
+                    identified: of(identified, Some(s)),
+                    refined: of(refined, Some(s)),
+                })
+                .collect(),
+        }
+    }
+
+    fn hypotheses(&self) -> Vec<HypothesisResult> {
+        let mut all: Vec<HypothesisResult> = self
+            .judgement
+            .hypotheses
+            .iter()
+            .map(|h| HypothesisResult {
+                effects: if h.labels.is_empty() {
+                    vec!["none".into()]
+                } else {
+                    h.labels.clone()
+                },
+                probability: h.probability,
+            })
+            .collect();
+        all.push(HypothesisResult {
+            effects: vec!["unknown".into()],
+            probability: self.judgement.unknown,
+        });
+        all.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+        all
+    }
+
+    /// Effects of the hypotheses, each as fitted in the most probable set that has it.
+    fn effects(&self, identified: f64) -> Result<Vec<EffectResult>> {
+        let j = self.judgement;
+        let mut all: Vec<EffectResult> = Vec::new();
+        for (i, h) in j.hypotheses.iter().enumerate() {
+            let Some(found) = self.found(i) else { continue };
+            for effect in &found.explanation.effects {
+                let known = all
+                    .iter_mut()
+                    .find(|e| e.effect == effect.name && e.site == effect.site);
+                if let Some(known) = known {
+                    known.probability += h.probability;
+                    continue;
+                }
+                let alone = self.findings.found.iter().find(|f| {
+                    f.candidates.len() == 1 && f.explanation.effects[0].label() == effect.label()
+                });
+                let gap_closed = match alone {
+                    Some(f) if identified > NO_GAP => {
+                        let trials = trials(self.candidates, &f.candidates, &f.explanation);
+                        let held = self.held(&trials, &f.explanation.fit.point.theta)?;
+                        let (square, count) = self.rms(&held.residuals, None, None);
+                        let r2 = square / f64::max(count, 1.0);
+                        Some((1.0 - (r2 - 1.0) / (identified * identified - 1.0)).clamp(0.0, 1.0))
+                    }
+                    _ => None,
+                };
+                all.push(EffectResult {
+                    effect: effect.name.clone(),
+                    site: effect.site.clone(),
+                    probability: h.probability,
+                    gap_closed,
+                    parameters: effect.values.iter().cloned().collect(),
+                });
+            }
+        }
+        all.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+        Ok(all)
+    }
+
+    fn parameters(&self, explanation: &Explanation) -> Vec<ParameterResult> {
+        let fit = &explanation.fit;
+        self.bench
+            .parameters
+            .iter()
+            .enumerate()
+            .map(|(i, p)| {
+                let estimate = fit.point.theta[i];
+                let k = fit.free.iter().position(|&f| f == i);
+                let variance = k.map_or(0.0, |k| fit.covariance[(k, k)].max(0.0));
+                let std = (variance * self.judgement.temperature).sqrt();
+                let [low, high] = p.range;
+                ParameterResult {
+                    name: p.name.clone(),
+                    estimate,
+                    std,
+                    interval95: [
+                        (estimate - 1.96 * std).max(low),
+                        (estimate + 1.96 * std).min(high),
+                    ],
+                }
+            })
+            .collect()
+    }
+
+    /// Where the gap of the identified model lies, in all logs.
+    fn places(&self, none: &Explanation) -> Result<Vec<crate::result::Where>> {
+        let record = &self.bench.train;
+        let mut predictor = self.bench.predictor(&[], record)?;
+        predictor.set_whitening(Vec::new());
+        let residuals = predictor.residuals(std::slice::from_ref(&none.fit.point))?;
+        let shown = self.shown(record, none)?;
+        let plant = &self.bench.machine.plant;
+        Ok(localise(plant, &record.logs, &shown, &residuals[0]))
+    }
+
+    fn shown(&self, record: &Record, none: &Explanation) -> Result<Trajectory> {
+        Trajectory::of(
+            &*self.bench.machine.with(&[])?,
+            &self.bench.machine.plant,
+            &self.bench.parameters,
+            &record.logs,
+            &none.fit.point,
+            self.bench.machine.threads,
+        )
+    }
+
+    fn checks(&self, none: &Explanation) -> Result<Vec<crate::result::CheckResult>> {
+        let bench = self.bench;
+        let mut all = vec![
+            checks::data(&bench.train.logs, &bench.test.logs),
+            checks::units(bench, self.nominal)?,
+        ];
+        all.extend(checks::identifiability(&bench.parameters, none));
+        all.push(checks::repeatability(bench));
+        if let Ok(halved) = bench.machine.halved() {
+            all.push(checks::time_step(bench, none, &halved)?);
+        }
+        Ok(all)
+    }
+
+    /// What would tell the verdict from its nearest rival.
+    fn next(&self, best: Option<&Found>) -> Result<NextExperiment> {
+        let j = self.judgement;
+        let rival = j.ambiguous.first().copied().or_else(|| {
+            let rivals = || (0..j.hypotheses.len()).filter(|&i| i != j.best);
+            rivals()
+                .find(|&i| !j.hypotheses[i].labels.is_empty())
+                .or_else(|| rivals().next())
+        });
+        let Some(rival) = rival else {
+            return Ok(NextExperiment::default());
+        };
+        let rival = self.found(rival);
+        let (one, other) = (self.explanation(best), self.explanation(rival));
+        experiment::next(
+            self.bench,
+            (&self.trials(best), &one),
+            (&self.trials(rival), &other),
+        )
+    }
+
+    fn trace(
+        &self,
+        nominal: &HeldOut,
+        identified: &HeldOut,
+        refined: &HeldOut,
+    ) -> Result<DiagnosisTrace> {
+        let logs = &self.bench.test.logs;
+        let width = logs.width();
+        let mut signals = Vec::new();
+        for (e, log) in logs.episodes.iter().enumerate().take(SHOWN) {
+            let rows = log.plan.rows();
+            let stride = rows.div_ceil(CURVE);
+            let pick = |all: &[f64], column: usize| -> Vec<Option<f64>> {
+                let values = all.iter().skip(column).step_by(width).step_by(stride);
+                values.map(|x| x.is_finite().then_some(*x)).collect()
+            };
+            let mut column = 0;
+            for (s, sensor) in logs.sensors.iter().enumerate() {
+                let own = logs.entries.iter().filter(|x| x.sensor == s).count();
+                let len = if sensor.rotation { 4 } else { own };
+                for c in 0..len {
+                    let at = column + c;
+                    signals.push(SignalTrace {
+                        episode: log.name.clone(),
+                        signal: if len == 1 {
+                            sensor.name.clone()
+                        } else {
+                            format!("{}.{c}", sensor.name)
+                        },
+                        unit: if sensor.rotation {
+                            String::new()
+                        } else {
+                            sensor.unit.clone()
+                        },
+                        noise: sensor.noise,
+                        time: log.episode.time[..rows]
+                            .iter()
+                            .step_by(stride)
+                            .copied()
+                            .collect(),
+                        real: pick(&log.readings, at),
+                        nominal: pick(&nominal.readings[e], at),
+                        identified: pick(&identified.readings[e], at),
+                        refined: pick(&refined.readings[e], at),
+                    });
+                }
+                column += len;
+            }
+        }
+        let mut ladder = Vec::new();
+        for found in &self.findings.found {
+            if found.candidates.len() == 1 {
+                let trials = trials(self.candidates, &found.candidates, &found.explanation);
+                let held = self.held(&trials, &found.explanation.fit.point.theta)?;
+                let (square, count) = self.rms(&held.residuals, None, None);
+                let label = found.explanation.effects[0].label();
+                ladder.push((label, (square / f64::max(count, 1.0)).sqrt()));
+            }
+        }
+        ladder.sort_by(|a, b| a.1.total_cmp(&b.1));
+        let (map, map_axes) = self.map(identified);
+        Ok(DiagnosisTrace {
+            signals,
+            ladder,
+            map,
+            map_axes,
+            left_out: self
+                .left_out
+                .iter()
+                .map(|l| (l.label.clone(), l.why.clone()))
+                .collect(),
+        })
+    }
+
+    /// Where a position sensor was, and how large its residual there.
+    fn map(&self, identified: &HeldOut) -> (Vec<[f64; 3]>, [String; 2]) {
+        let logs = &self.bench.test.logs;
+        let (n, width) = (logs.entries.len(), logs.width());
+        let mut column = 0;
+        for (s, sensor) in logs.sensors.iter().enumerate() {
+            let own: Vec<usize> = (0..n).filter(|&j| logs.entries[j].sensor == s).collect();
+            if !sensor.rotation && own.len() == 3 && sensor.unit == "m" {
+                let mut map = Vec::new();
+                for (e, log) in logs.episodes.iter().enumerate() {
+                    for k in 0..log.plan.rows() {
+                        let at = &log.readings[k * width + column..][..2];
+                        let r = &identified.residuals[logs.offset(e) + k * n..][..n];
+                        let size = own.iter().map(|&j| r[j] * r[j]).sum::<f64>().sqrt();
+                        if at.iter().all(|x| x.is_finite()) && size.is_finite() {
+                            map.push([at[0], at[1], size]);
+                        }
+                    }
+                }
+                let stride = map.len().div_ceil(MAP).max(1);
+                let map = map.into_iter().step_by(stride).collect();
+                let axis = |i: usize| format!("{}.{i} (m)", sensor.name);
+                return (map, [axis(0), axis(1)]);
+            }
+            column += if sensor.rotation { 4 } else { own.len() };
+        }
+        (Vec::new(), [String::new(), String::new()])
+    }
+}
