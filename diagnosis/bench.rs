@@ -46,6 +46,12 @@ impl Record {
         Self::new(self.logs.cut(layout, share), self.starts.clone())
     }
 
+    /// The first share of each episode, its own; the scatter is forgotten.
+    #[must_use]
+    pub fn cut_each(&self, layout: &Layout, shares: &[f64]) -> Self {
+        Self::new(self.logs.cut_each(layout, shares), self.starts.clone())
+    }
+
     /// Some of the episodes.
     #[must_use]
     pub fn some(&self, which: &[usize]) -> Self {

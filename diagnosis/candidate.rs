@@ -112,6 +112,12 @@ pub fn enumerate(
             if effect.acts() == Acts::Measurement && !shown.sensors.contains(&site) {
                 continue;
             }
+            // What acts in contacts alone does nothing where there are none.
+            if of_contacts(&*effect, plant, &site) && !shown.touches(plant, &site) {
+                let why = "nothing touches it in these logs".to_owned();
+                left_out.push(LeftOut { label, why });
+                continue;
+            }
             if let Err(error) = machine.with(std::slice::from_ref(&spec)) {
                 left_out.push(LeftOut {
                     label,
@@ -130,6 +136,15 @@ pub fn enumerate(
         }
     }
     (found, left_out)
+}
+
+/// Whether an effect changes nothing but how a geom's contacts behave.
+fn of_contacts(effect: &dyn Effect, plant: &Plant, site: &str) -> bool {
+    let targets = effect.targets(plant, site);
+    let contact = |t: &Target| {
+        t.element == "geom" && matches!(&*t.attribute, "friction" | "solref" | "solimp")
+    };
+    !targets.is_empty() && targets.iter().all(contact)
 }
 
 /// Ranges of the parameters; a place lies where the body goes.

@@ -143,9 +143,15 @@ impl Logs {
     /// The same logs, each cut after a share of its rows.
     #[must_use]
     pub fn cut(&self, layout: &Layout, share: f64) -> Self {
+        self.cut_each(layout, &vec![share; self.episodes.len()])
+    }
+
+    /// The same logs, each cut after its own share of its rows.
+    #[must_use]
+    pub fn cut_each(&self, layout: &Layout, shares: &[f64]) -> Self {
         let mut logs = self.clone();
         let width = self.differences.width();
-        for e in &mut logs.episodes {
+        for (e, share) in logs.episodes.iter_mut().zip(shares) {
             let rows = ((e.plan.rows() as f64 * share).ceil() as usize).clamp(2, e.plan.rows());
             e.plan = ReplayPlan::new(layout, &e.episode, rows);
             e.readings.truncate(rows * width);
@@ -163,13 +169,13 @@ impl Logs {
         logs
     }
 
-    /// Share of the episodes after which no reading moves by more than a few deviations of
-    /// the noise any more.
+    /// Share of each episode after which no reading moves by more than a few deviations of the
+    /// noise any more.
     #[must_use]
-    pub fn moving_share(&self) -> f64 {
+    pub fn moving_shares(&self) -> Vec<f64> {
         let n = self.entries.len();
         let noise = self.entry_noise();
-        let mut share: f64 = 0.0;
+        let mut shares = Vec::with_capacity(self.episodes.len());
         for (i, e) in self.episodes.iter().enumerate() {
             let rows = e.plan.rows();
             let width = self.width();
@@ -178,9 +184,9 @@ impl Logs {
             self.difference(i, &last.repeat(rows), &mut difference);
             let moving = |row: &[f64]| row.iter().zip(&noise).any(|(d, s)| d.abs() > 8.0 * s);
             let end = difference.chunks_exact(n).rposition(moving).unwrap_or(0);
-            share = share.max((end + 1) as f64 / rows as f64);
+            shares.push(((end + 1) as f64 / rows as f64 + 0.05).min(1.0));
         }
-        (share + 0.05).min(1.0)
+        shares
     }
 
     /// Entries of a row of readings.

@@ -571,6 +571,28 @@ fn identify_smooth(
     Ok(Vec::new())
 }
 
+/// Episodes that fits begin with where each rollout is dear.
+const FEW: usize = 3;
+
+/// Episodes to begin with: half of them, few in all, every other one by the size of its gap, so
+/// that those in which much is amiss are among them.
+fn telling(bench: &Bench, point: &Point) -> Result<Vec<usize>> {
+    let logs = &bench.train.logs;
+    let n = logs.episodes.len();
+    let mut predictor = bench.predictor(&[], &bench.train)?;
+    let residuals = predictor.residuals(std::slice::from_ref(point))?;
+    let gap = |e: usize| -> f64 {
+        let own = &residuals[0][logs.offset(e)..logs.offset(e + 1)];
+        own.iter().map(|r| r * r).sum()
+    };
+    let gaps: Vec<f64> = (0..n).map(gap).collect();
+    let mut order: Vec<usize> = (0..n).collect();
+    order.sort_by(|&a, &b| gaps[b].total_cmp(&gaps[a]));
+    let mut some: Vec<usize> = order.into_iter().step_by(2).take(FEW).collect();
+    some.sort_unstable();
+    Ok(some)
+}
+
 /// Where predictions scatter: fits begin with half of the episodes, and the scatter is
 /// estimated again where they arrive.
 fn identify_rough(
@@ -579,8 +601,12 @@ fn identify_rough(
     point: Point,
     scatter: &mut Scatter<'_>,
 ) -> Result<Vec<Explanation>> {
-    let n = bench.train.logs.episodes.len();
-    let some: Vec<usize> = (0..n).step_by(2).collect();
+    // What only rests at the end of an episode tells nothing more.
+    let layout = bench.layout().clone();
+    let shares = bench.train.logs.moving_shares();
+    bench.train = bench.train.cut_each(&layout, &shares);
+    scatter.estimate(bench, &point)?;
+    let some = telling(bench, &point)?;
     let stages = |bench: &Bench| {
         let part = Stage {
             record: bench.train.some(&some),
@@ -588,11 +614,6 @@ fn identify_rough(
         };
         vec![part, whole(bench)]
     };
-    // What only rests at the end of an episode tells nothing more.
-    let layout = bench.layout().clone();
-    let share = bench.train.logs.moving_share();
-    bench.train = bench.train.cut(&layout, share);
-    scatter.estimate(bench, &point)?;
     bench.stages = stages(bench);
     let first = scan_and_fit(bench, 0, &point, Effort::BRIEF)?;
     set_noise(bench, &study.noise, &first.fit.point)?;

@@ -11,7 +11,7 @@ use crate::diagnose::Work;
 use crate::fit::Effort;
 use crate::predict::Point;
 use crate::result::{DiagnosisResult, Kind};
-use crate::screen::{Base, screen};
+use crate::screen::{Base, Proposal, propose, take};
 use crate::search::trials;
 
 /// What a case is.
@@ -147,7 +147,10 @@ fn refit(work: &Work, effects: &[String]) -> Result<Option<(Vec<usize>, Explanat
         let before = trials(&work.candidates, &members, &explanation);
         let base = Base::new(bench, 0, &before, &explanation)?;
         let one = &work.candidates[candidate];
-        let starts = screen(bench, &bench.stages[0].record, &base, (candidate, one))?;
+        let record = &bench.stages[0].record;
+        let proposals = propose(bench, record, &base, (candidate, one))?;
+        let proposals: Vec<&Proposal> = proposals.iter().collect();
+        let starts = take(bench, record, &base, one, &proposals)?;
         let Some(start) = starts.first() else {
             return Ok(None);
         };

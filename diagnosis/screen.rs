@@ -6,14 +6,14 @@
 //! without a gradient at null (a width, a place, a limit) are tried at a few values. The
 //! step that the linear fit proposes is then really taken, at full length and shorter.
 
-use asid_core::Result;
+use asid_core::{Parameter, Result};
 
 use crate::bench::{Bench, Explanation, Record, Stage, Trial};
 use crate::candidate::Candidate;
 use crate::fit::{
     ABOVE_SCATTER, AIM, Differences, NOTHING, PROBE, ROUGH_START, Unknown, cost, linearise, nudged,
 };
-use crate::predict::Point;
+use crate::predict::{Point, Predictor};
 
 /// How promising a candidate is.
 #[derive(Clone, Debug)]
@@ -223,6 +223,41 @@ impl<'a> Base<'a> {
     pub fn cost(&self) -> f64 {
         cost(&self.residuals)
     }
+
+    /// The point, with values of a candidate's parameters behind it.
+    fn with(&self, values: &[f64]) -> Point {
+        let mut point = self.point.clone();
+        point.theta.extend_from_slice(values);
+        point
+    }
+
+    /// Values of all parameters after a share of a step: of the candidate's `slopes` by
+    /// `weights`, of the parameters before it by what they have to move in exchange.
+    fn step(
+        &self,
+        own: &[Unknown],
+        start: &[f64],
+        slopes: &[usize],
+        (weights, moves): (&[f64], &[Vec<f64>]),
+        length: f64,
+    ) -> Vec<f64> {
+        let moved = |parameter: &Parameter, value: f64, by: f64| {
+            let u = parameter.to_unit(value) + length * by;
+            parameter.from_unit(u.clamp(0.0, 1.0))
+        };
+        let mut theta = self.point.theta.clone();
+        let free = self.unknowns.iter().enumerate().filter(|(_, u)| u.free);
+        for (k, (i, unknown)) in free.enumerate() {
+            let exchanged: f64 = moves.iter().zip(weights).map(|(m, w)| m[k] * w).sum();
+            theta[i] = moved(&unknown.parameter, theta[i], self.shift[k] - exchanged);
+        }
+        let mut values = start.to_vec();
+        for (&j, &w) in slopes.iter().zip(weights) {
+            values[j] = moved(&own[j].parameter, start[j], w);
+        }
+        theta.extend(values);
+        theta
+    }
 }
 
 /// First difference for a slope, as a share of its range.
@@ -231,77 +266,40 @@ const FIRST: f64 = 1e-4;
 /// Starts of a candidate that are kept.
 const KEPT: usize = 3;
 
-/// Screens one candidate: its best starts, best first.
+/// Shares of a proposed step that are tried.
+const LENGTHS: [f64; 3] = [1.0, 0.5, 0.2];
+
+/// A step that the linear fit proposes for a candidate.
+#[derive(Clone, Debug)]
+pub struct Proposal {
+    /// Index of the candidate.
+    pub candidate: usize,
+    /// Sum of squares that it takes off to first order.
+    pub gain: f64,
+    /// Values of all parameters at each of the lengths.
+    thetas: Vec<Vec<f64>>,
+}
+
+/// Proposals of one candidate, one a start that gains at all.
 ///
 /// # Errors
 /// When a rollout fails.
-pub fn screen(
+pub fn propose(
     bench: &Bench,
     record: &Record,
     base: &Base<'_>,
     (index, candidate): (usize, &Candidate),
-) -> Result<Vec<Screened>> {
+) -> Result<Vec<Proposal>> {
     let mut trials: Vec<Trial<'_>> = base.trials.clone();
     trials.push((candidate, Vec::new()));
     let mut predictor = bench.predictor(&trials, record)?;
     let own: Vec<Unknown> = bench.unknowns(&trials).split_off(base.unknowns.len());
-    let at = |values: &[f64]| -> Point {
-        let mut point = base.point.clone();
-        point.theta.extend_from_slice(values);
-        point
-    };
     let slopes = candidate.slopes();
-    let n = record.readings.max(1) as f64;
-    let mut found: Vec<Screened> = Vec::new();
+    let mut proposals = Vec::new();
     let mut shares = vec![base.first; own.len()];
     for start in &candidate.starts {
-        // Columns: one a slope, per share of its range; or one for the whole step.
-        let mut columns: Vec<Vec<f64>> = Vec::new();
-        let change = |other: &[f64]| -> Vec<f64> {
-            let pairs = base.residuals.iter().zip(other);
-            pairs
-                .map(|(a, b)| if b.is_finite() { a - b } else { 0.0 })
-                .collect()
-        };
-        if slopes.is_empty() {
-            let residuals = predictor.residuals(&[at(start)])?;
-            columns.push(change(&residuals[0]));
-        } else {
-            for round in 0..2 {
-                let moved: Vec<(Vec<f64>, f64)> = slopes
-                    .iter()
-                    .map(|&j| {
-                        let mut values = start.clone();
-                        let (value, share) = nudged(&own[j].parameter, start[j], shares[j]);
-                        values[j] = value;
-                        (values, share)
-                    })
-                    .collect();
-                let points: Vec<Point> = moved.iter().map(|(v, _)| at(v)).collect();
-                let residuals = predictor.residuals(&points)?;
-                columns.clear();
-                let mut again = false;
-                for ((r, (_, share)), &j) in residuals.iter().zip(&moved).zip(&slopes) {
-                    let mut column = change(r);
-                    let response = (dot(&column, &column) / n).sqrt();
-                    column.iter_mut().for_each(|x| *x /= share);
-                    columns.push(column);
-                    let factor = if response > 0.0 {
-                        base.aim / response
-                    } else {
-                        100.0
-                    };
-                    if !(0.1..10.0).contains(&factor) {
-                        again = true;
-                        shares[j] = (shares[j] * factor.clamp(1e-4, 1e3)).clamp(1e-9, 0.1);
-                    }
-                }
-                if !again || round == 1 {
-                    break;
-                }
-            }
-        }
-        let mut projected = columns.clone();
+        let columns = columns(&mut predictor, base, &own, start, &mut shares, &slopes)?;
+        let mut projected = columns;
         let moves: Vec<Vec<f64>> = projected
             .iter_mut()
             .map(|c| base.nuisance.project(c))
@@ -321,32 +319,100 @@ pub fn screen(
         if weights.iter().all(|w| *w == 0.0) {
             continue;
         }
-        // The step really taken, at several lengths.
-        let points: Vec<Point> = [1.0, 0.5, 0.2]
+        let mut left = base.rest.clone();
+        for (column, w) in projected.iter().zip(&weights) {
+            left.iter_mut().zip(column).for_each(|(r, c)| *r -= w * c);
+        }
+        let step = |length: &f64| base.step(&own, start, &slopes, (&weights, &moves), *length);
+        proposals.push(Proposal {
+            candidate: index,
+            gain: cost(&base.rest) - cost(&left),
+            thetas: LENGTHS.iter().map(step).collect(),
+        });
+    }
+    Ok(proposals)
+}
+
+/// Columns of a candidate at a start: one a slope, per share of its range; one for the whole
+/// start where it has none.
+fn columns(
+    predictor: &mut Predictor<'_>,
+    base: &Base<'_>,
+    own: &[Unknown],
+    start: &[f64],
+    shares: &mut [f64],
+    slopes: &[usize],
+) -> Result<Vec<Vec<f64>>> {
+    let change = |other: &[f64]| -> Vec<f64> {
+        let pairs = base.residuals.iter().zip(other);
+        pairs
+            .map(|(a, b)| if b.is_finite() { a - b } else { 0.0 })
+            .collect()
+    };
+    if slopes.is_empty() {
+        let residuals = predictor.residuals(&[base.with(start)])?;
+        return Ok(vec![change(&residuals[0])]);
+    }
+    let n = predictor.present().iter().filter(|p| **p).count().max(1) as f64;
+    let mut columns: Vec<Vec<f64>> = Vec::new();
+    for _ in 0..2 {
+        let moved: Vec<(Vec<f64>, f64)> = slopes
             .iter()
-            .map(|length| {
-                let mut values = start.clone();
-                for (&j, w) in slopes.iter().zip(&weights) {
-                    let p = &own[j].parameter;
-                    let u = p.to_unit(start[j]) + length * w;
-                    values[j] = p.from_unit(u.clamp(0.0, 1.0));
-                }
-                let mut point = at(&values);
-                let free = base.unknowns.iter().enumerate().filter(|(_, u)| u.free);
-                for (k, (i, unknown)) in free.enumerate() {
-                    let by: f64 = base.shift[k]
-                        - moves
-                            .iter()
-                            .zip(&weights)
-                            .map(|(m, w)| m[k] * w)
-                            .sum::<f64>();
-                    let p = &unknown.parameter;
-                    let u = p.to_unit(point.theta[i]) + length * by;
-                    point.theta[i] = p.from_unit(u.clamp(0.0, 1.0));
-                }
-                point
+            .map(|&j| {
+                let mut values = start.to_vec();
+                let (value, share) = nudged(&own[j].parameter, start[j], shares[j]);
+                values[j] = value;
+                (values, share)
             })
             .collect();
+        let points: Vec<Point> = moved.iter().map(|(v, _)| base.with(v)).collect();
+        let residuals = predictor.residuals(&points)?;
+        columns.clear();
+        let mut again = false;
+        for ((r, (_, share)), &j) in residuals.iter().zip(&moved).zip(slopes) {
+            let mut column = change(r);
+            let response = (dot(&column, &column) / n).sqrt();
+            column.iter_mut().for_each(|x| *x /= share);
+            columns.push(column);
+            let factor = if response > 0.0 {
+                base.aim / response
+            } else {
+                100.0
+            };
+            if !(0.1..10.0).contains(&factor) {
+                again = true;
+                shares[j] = (shares[j] * factor.clamp(1e-4, 1e3)).clamp(1e-9, 0.1);
+            }
+        }
+        if !again {
+            break;
+        }
+    }
+    Ok(columns)
+}
+
+/// Takes a candidate's proposed steps: what it really reaches from its starts, best first.
+///
+/// # Errors
+/// When a rollout fails.
+pub fn take(
+    bench: &Bench,
+    record: &Record,
+    base: &Base<'_>,
+    candidate: &Candidate,
+    proposals: &[&Proposal],
+) -> Result<Vec<Screened>> {
+    let mut trials: Vec<Trial<'_>> = base.trials.clone();
+    trials.push((candidate, Vec::new()));
+    let mut predictor = bench.predictor(&trials, record)?;
+    let own: Vec<Unknown> = bench.unknowns(&trials).split_off(base.unknowns.len());
+    let mut found: Vec<Screened> = Vec::new();
+    for proposal in proposals {
+        let point = |theta: &Vec<f64>| Point {
+            theta: theta.clone(),
+            starts: base.point.starts.clone(),
+        };
+        let points: Vec<Point> = proposal.thetas.iter().map(point).collect();
         let residuals = predictor.residuals(&points)?;
         let reached = points.iter().zip(residuals.iter().map(|r| cost(r)));
         let best = reached
@@ -355,7 +421,7 @@ pub fn screen(
         if let Some((point, cost)) = best {
             let (theta, values) = point.theta.split_at(base.point.theta.len());
             found.push(Screened {
-                candidate: index,
+                candidate: proposal.candidate,
                 values: values.to_vec(),
                 theta: theta.to_vec(),
                 cost,
@@ -373,6 +439,32 @@ pub fn screen(
         }
     }
     Ok(kept)
+}
+
+/// Gain, as a share of the largest, from which on a proposal is worth taking.
+const WORTH_TAKING: f64 = 0.01;
+/// Candidates whose proposals are taken whatever they gain.
+const ALWAYS: usize = 30;
+
+/// Proposals that are worth their rollouts, by candidate, the best candidate first: a step
+/// that gains next to nothing to first order is not taken where there are many candidates.
+#[must_use]
+pub fn worthwhile(proposals: &[Proposal]) -> Vec<(usize, Vec<&Proposal>)> {
+    let mut order: Vec<&Proposal> = proposals.iter().collect();
+    order.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    let most = order.first().map_or(0.0, |p| p.gain);
+    let mut chosen: Vec<(usize, Vec<&Proposal>)> = Vec::new();
+    for proposal in order {
+        let at = chosen.iter().position(|(c, _)| *c == proposal.candidate);
+        match at {
+            Some(i) => chosen[i].1.push(proposal),
+            None if chosen.len() < ALWAYS || proposal.gain > WORTH_TAKING * most => {
+                chosen.push((proposal.candidate, vec![proposal]));
+            }
+            None => {}
+        }
+    }
+    chosen
 }
 
 /// Least squares of `target` in `columns` with each weight within its room: what would

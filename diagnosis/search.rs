@@ -11,7 +11,7 @@ use asid_core::{Error, Progress, Result};
 use crate::bench::{Bench, Explanation, Trial};
 use crate::candidate::Candidate;
 use crate::fit::Effort;
-use crate::screen::{Base, Screened, screen};
+use crate::screen::{Base, Screened, propose, take, worthwhile};
 
 /// How widely to search.
 #[derive(Clone, Copy, Debug)]
@@ -216,18 +216,27 @@ impl Search<'_> {
         let trials = trials(self.candidates, &base.candidates, &base.explanation);
         let linear = Base::new(self.bench, stage, &trials, &base.explanation)?;
         let record = &self.bench.stages[stage].record;
-        let mut all = Vec::new();
+        let mut proposals = Vec::new();
         self.progress
             .begin("screening", self.candidates.len() as u64);
         for (i, candidate) in self.candidates.iter().enumerate() {
             if !base.candidates.contains(&i) {
-                match screen(self.bench, record, &linear, (i, candidate)) {
-                    Ok(found) => all.extend(found),
+                match propose(self.bench, record, &linear, (i, candidate)) {
+                    Ok(found) => proposals.extend(found),
                     // A pair that the engine refuses is no candidate.
                     Err(Error::Parameter { .. } | Error::Incapable { .. }) => {}
                     Err(other) => return Err(other),
                 }
             }
+            self.progress.advance(1);
+        }
+        self.progress.end();
+        let chosen = worthwhile(&proposals);
+        let mut all = Vec::new();
+        self.progress.begin("trying the best", chosen.len() as u64);
+        for (i, proposals) in &chosen {
+            let candidate = &self.candidates[*i];
+            all.extend(take(self.bench, record, &linear, candidate, proposals)?);
             self.progress.advance(1);
         }
         self.progress.end();

@@ -3,7 +3,9 @@
 //! Logs show some sensors; candidates and regimes need the whole state, which the model
 //! replays from the same commands.
 
-use asid_core::{BatchConfig, Control, Model, Parameter, Plant, Result, Rollout};
+use asid_core::layout::Recording;
+use asid_core::replay::ReplayPlan;
+use asid_core::{BatchConfig, Control, Model, Parameter, Plant, Result, Rollout, Simulator};
 
 use crate::data::Logs;
 use crate::predict::{Point, columns_of};
@@ -17,6 +19,8 @@ pub struct Trajectory {
     pub episodes: Vec<Path>,
     /// Pairs of bodies that can touch.
     pub pairs: Vec<[usize; 2]>,
+    /// Whether each pair does, after any physics step of any episode.
+    touched: Vec<bool>,
     readings: Vec<(String, f64)>,
 }
 
@@ -73,11 +77,20 @@ impl Trajectory {
             threads,
             targets: parameters.iter().flat_map(|p| p.targets.clone()).collect(),
         })?;
+        let touches = layout.recording(&names[names.len() - pairs.len()..])?;
+        let mut touched = vec![false; pairs.len()];
         let mut episodes = Vec::with_capacity(logs.episodes.len());
         for (e, start) in logs.episodes.iter().zip(&point.starts) {
-            simulator.reset(&[0])?;
-            simulator.set_parameters(&[0], &columns_of(parameters, &point.theta))?;
-            simulator.set_state(&[0], &start.qpos, &start.qvel)?;
+            let begin = |simulator: &mut dyn Simulator| -> Result<()> {
+                simulator.reset(&[0])?;
+                simulator.set_parameters(&[0], &columns_of(parameters, &point.theta))?;
+                simulator.set_state(&[0], &start.qpos, &start.qvel)
+            };
+            begin(&mut *simulator)?;
+            if !pairs.is_empty() {
+                look_for_touches(&mut *simulator, &e.plan, nu, &touches, &mut touched)?;
+                begin(&mut *simulator)?;
+            }
             let mut first = vec![0.0; width];
             simulator.read(&[0], &recording, &mut first)?;
             let plan = &e.plan;
@@ -104,7 +117,19 @@ impl Trajectory {
             readings: spreads(logs),
             episodes,
             pairs,
+            touched,
         })
+    }
+
+    /// Whether a geom's body touches anything in these episodes.
+    #[must_use]
+    pub fn touches(&self, plant: &Plant, geom: &str) -> bool {
+        let Ok(geom) = plant.geom(geom) else {
+            return false;
+        };
+        let body = plant.geoms[geom].body;
+        let pairs = self.pairs.iter().zip(&self.touched);
+        pairs.into_iter().any(|(p, &t)| t && p.contains(&body))
     }
 
     /// Largest command of an actuator; about its mean where it is a position.
@@ -193,6 +218,31 @@ impl Trajectory {
         let pick = |q: f64| values[((q * (values.len() - 1) as f64).round()) as usize];
         quantiles.iter().map(|&q| pick(q)).collect()
     }
+}
+
+/// Replays an episode and looks at the contacts after every physics step: a tap is shorter than the
+/// time between two rows.
+fn look_for_touches(
+    simulator: &mut dyn Simulator,
+    plan: &ReplayPlan,
+    nu: usize,
+    touches: &Recording,
+    touched: &mut [bool],
+) -> Result<()> {
+    let width = touches.width();
+    let mut out = vec![0.0; plan.substeps * width];
+    for frame in 0..plan.frames {
+        let ctrl = plan.ctrl[frame * nu..(frame + 1) * nu].repeat(plan.substeps);
+        let control = Control::Shared(&ctrl);
+        let rollout = Rollout::new(&[0], plan.substeps, 1, control, touches);
+        simulator.rollout(&rollout, &mut out)?;
+        for forces in out.chunks_exact(width) {
+            for (t, force) in touched.iter_mut().zip(forces) {
+                *t |= *force > 0.0;
+            }
+        }
+    }
+    Ok(())
 }
 
 /// Bodies that can touch a geom, and its own where it moves.

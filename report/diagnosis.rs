@@ -20,6 +20,7 @@ mod ladder;
 mod lines;
 mod pictures;
 mod places;
+mod real_world;
 mod trace;
 mod words;
 
@@ -27,6 +28,7 @@ pub use data::{
     Check, Diagnosis, Effect, EffectValue, Gap, Hypothesis, Kind, Parameter, Place, SignalGap,
     Verdict,
 };
+pub use real_world::{RealWorld, TaskTrial};
 pub use trace::{Map, Rung, SignalTrace};
 
 /// The report as one self-contained HTML page.
@@ -35,6 +37,7 @@ pub fn page(diagnosis: &Diagnosis) -> String {
     let d = diagnosis;
     let sections = [
         Some(ladder::section(d)),
+        real_world::section(d),
         Some(pictures::section(d)),
         Some(places::section(d)),
         Some(causes::section(d)),

@@ -6,14 +6,15 @@
 //! from the prior, and judged by its mean return. Draws differ from iteration to
 //! iteration, so the best of each meet once more at common ones.
 
-use asid_core::explore::{CurvePoint, Explored, Explorer, Policy};
+use asid_core::explore::{CurvePoint, Explored, Explorer};
 use asid_core::fisher::{FisherBatch, FisherSettings};
 use asid_core::registry;
 use asid_core::rng::Rng;
 use asid_core::{Error, Posterior, Problem, Result};
 use serde::{Deserialize, Serialize};
 
-use crate::optimise::{Cem, CemSettings, require};
+use super::open_loop::{OpenLoop, Planned, Planner};
+use crate::optimise::{CemSettings, require};
 
 /// Settings of the planner.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -86,25 +87,18 @@ impl FisherCem {
         self.fisher.check()
     }
 
-    /// The best open-loop actions (`horizon x action`, in the task's units) for a
-    /// start pose, and the mean return over the search.
-    ///
-    /// # Errors
-    /// When the engine fails.
-    pub fn plan(
-        &self,
-        problem: &Problem<'_>,
-        start: &[f64],
-    ) -> Result<(Vec<f64>, Vec<CurvePoint>)> {
+    fn open_loop(&self) -> OpenLoop {
+        OpenLoop {
+            hold: self.hold,
+            std: self.std,
+        }
+    }
+}
+
+impl Planner for FisherCem {
+    fn plan(&self, problem: &Problem<'_>, start: &[f64]) -> Result<(Vec<f64>, Vec<CurvePoint>)> {
         let protocol = problem.task.exploration();
-        let n = protocol.horizon.div_ceil(self.hold) * protocol.action.len();
-        let mut cem = Cem::new(
-            self.cem.clone(),
-            &vec![0.0; n],
-            &vec![self.std; n],
-            &vec![-1.0; n],
-            &vec![1.0; n],
-        );
+        let mut cem = self.open_loop().search(protocol, self.cem.clone());
         let mut rng = problem.streams.stream("fisher-cem");
         let mut trials = Trials::new(self, problem, start)?;
         let mut curve = Vec::new();
@@ -123,14 +117,7 @@ impl FisherCem {
             let mut order: Vec<usize> = (0..returns.len()).collect();
             order.sort_by(|&i, &j| returns[j].total_cmp(&returns[i]));
             finalists.extend(order.iter().take(kept).map(|&i| candidates[i].clone()));
-            let mean = returns.iter().sum::<f64>() / returns.len() as f64;
-            let variance =
-                returns.iter().map(|r| (r - mean).powi(2)).sum::<f64>() / returns.len() as f64;
-            curve.push(CurvePoint {
-                x: (iteration + 1) as f64,
-                mean,
-                std: variance.sqrt(),
-            });
+            curve.push(CurvePoint::of(iteration + 1, &returns));
         }
         finalists.push(cem.mean().to_vec());
         finalists.truncate(self.population);
@@ -167,18 +154,9 @@ impl<'a> Trials<'a> {
         })
     }
 
-    /// Actions of all control steps of a candidate, in the task's units.
     fn actions(&self, candidate: &[f64]) -> Vec<f64> {
         let protocol = self.problem.task.exploration();
-        let a = protocol.action.len();
-        (0..protocol.horizon)
-            .flat_map(|h| {
-                candidate[h / self.explorer.hold * a..][..a]
-                    .iter()
-                    .zip(&protocol.action)
-                    .map(|(u, c)| c.at((u + 1.0) / 2.0))
-            })
-            .collect()
+        self.explorer.open_loop().actions(protocol, candidate)
     }
 
     /// Mean return of each candidate over `samples` draws of the unknowns, the same for all.
@@ -220,70 +198,22 @@ impl<'a> Trials<'a> {
     }
 }
 
-/// A plan made for the start pose of the episode.
-struct PlannedPolicy<'a> {
-    explorer: &'a FisherCem,
-    problem: &'a Problem<'a>,
-    plan: Vec<f64>,
-    curve: Vec<CurvePoint>,
-    planned_for: Option<Vec<f64>>,
-}
-
-impl Policy for PlannedPolicy<'_> {
-    fn reset(&mut self) {}
-
-    fn act(&mut self, step: usize, reading: &[f64], action: &mut [f64]) -> Result<()> {
-        if self.planned_for.is_none() {
-            let start = self.problem.task.locate(reading);
-            (self.plan, self.curve) = self.explorer.plan(self.problem, &start)?;
-            self.planned_for = Some(start);
-        }
-        let a = action.len();
-        action.copy_from_slice(&self.plan[step * a..(step + 1) * a]);
-        Ok(())
-    }
-
-    fn take_curve(&mut self) -> Vec<CurvePoint> {
-        std::mem::take(&mut self.curve)
-    }
-
-    fn export(&self) -> serde_json::Value {
-        let a = self.problem.task.exploration().action.len();
-        let actions: Vec<&[f64]> = self.plan.chunks_exact(a).collect();
-        serde_json::json!({"kind": "open-loop", "start": self.planned_for, "actions": actions})
-    }
-}
-
 impl Explorer for FisherCem {
     fn explore<'a>(
         &'a self,
         problem: &'a Problem<'a>,
         start: Option<&[f64]>,
     ) -> Result<Explored<'a>> {
-        let (plan, curve) = match start {
-            Some(start) => self.plan(problem, start)?,
-            None => (Vec::new(), Vec::new()),
-        };
-        Ok(Explored {
-            policy: Box::new(PlannedPolicy {
-                explorer: self,
-                problem,
-                plan,
-                curve: Vec::new(),
-                planned_for: start.map(<[f64]>::to_vec),
-            }),
-            curve,
-            curve_label: "iteration",
-            objective: format!(
-                "{} ({} form{})",
-                self.fisher.objective.name(),
-                self.fisher.form.name(),
-                if self.fisher.nuisance {
-                    ", start pose co-estimated"
-                } else {
-                    ""
-                }
-            ),
-        })
+        let objective = format!(
+            "{} ({} form{})",
+            self.fisher.objective.name(),
+            self.fisher.form.name(),
+            if self.fisher.nuisance {
+                ", start pose co-estimated"
+            } else {
+                ""
+            }
+        );
+        Planned::explored(self, problem, start, objective)
     }
 }

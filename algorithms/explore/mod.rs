@@ -1,9 +1,12 @@
 //! Exploration: policies that make an episode tell the most about the unknowns.
 
+pub mod discriminating;
 pub mod environment;
 pub mod fisher_cem;
 pub mod observation;
+pub mod open_loop;
 pub mod random;
 
+pub use discriminating::{Discriminating, Rival};
 pub use environment::FisherEnvironment;
 pub use observation::Observer;

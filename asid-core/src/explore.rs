@@ -35,6 +35,21 @@ pub struct CurvePoint {
     pub std: f64,
 }
 
+impl CurvePoint {
+    /// Of the returns of an iteration, counted from 1.
+    #[must_use]
+    pub fn of(iteration: usize, returns: &[f64]) -> Self {
+        let n = returns.len() as f64;
+        let mean = returns.iter().sum::<f64>() / n;
+        let variance = returns.iter().map(|r| (r - mean).powi(2)).sum::<f64>() / n;
+        Self {
+            x: iteration as f64,
+            mean,
+            std: variance.sqrt(),
+        }
+    }
+}
+
 /// A policy and how it came about.
 pub struct Explored<'a> {
     /// The policy.

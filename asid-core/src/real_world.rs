@@ -44,6 +44,8 @@ pub struct Attempt {
     pub believed_start: Vec<f64>,
     /// Readings of the task's channels, `frames x width`.
     pub readings: Vec<f64>,
+    /// The log: commands, and what trackers and the machine's own sensors read.
+    pub episode: Episode,
 }
 
 /// What can be explored once and tried once.
@@ -208,6 +210,27 @@ impl Touch {
     }
 }
 
+/// A log without rows.
+fn blank(layout: &Layout, channels: &[String]) -> Result<Episode> {
+    let columns = |name: &String| -> Result<ChannelColumns> {
+        Ok(ChannelColumns {
+            name: name.clone(),
+            len: layout.sensor(name)?.len,
+        })
+    };
+    Ok(Episode {
+        actuators: layout.actuators.iter().map(|a| a.name.clone()).collect(),
+        channels: channels.iter().map(columns).collect::<Result<_>>()?,
+        ..Episode::default()
+    })
+}
+
+/// Times of the start and of the ends of frames, s, without the dust of products.
+fn times(frames: usize, period: f64) -> Vec<f64> {
+    let at = |k| (k as f64 * period * 1e9).round() / 1e9;
+    (0..=frames).map(at).collect()
+}
+
 fn draw(coordinates: &[crate::task::Coordinate], rng: &mut Rng) -> Vec<f64> {
     use rand::Rng as _;
     coordinates.iter().map(|c| c.at(rng.random())).collect()
@@ -238,19 +261,7 @@ impl RealWorld for SimulatedWorld<'_> {
         commander.reset();
         policy.reset();
 
-        let mut episode = Episode {
-            actuators: layout.actuators.iter().map(|a| a.name.clone()).collect(),
-            channels: names
-                .iter()
-                .map(|n| {
-                    Ok(ChannelColumns {
-                        name: n.clone(),
-                        len: layout.sensor(n)?.len,
-                    })
-                })
-                .collect::<Result<_>>()?,
-            ..Episode::default()
-        };
+        let mut episode = blank(&layout, &names)?;
         let all_width = recording.width();
         let mut row = vec![0.0; all_width];
         self.batch.simulator.read(&[0], &recording, &mut row)?;
@@ -292,9 +303,7 @@ impl RealWorld for SimulatedWorld<'_> {
         self.wear();
         let last = episode.ctrl[episode.ctrl.len() - nu..].to_vec();
         episode.ctrl.extend(last);
-        episode.time = (0..=protocol.frames())
-            .map(|k| (k as f64 * protocol.frame_period * 1e9).round() / 1e9)
-            .collect();
+        episode.time = times(protocol.frames(), protocol.frame_period);
         Ok(RealEpisode {
             episode,
             actions,
@@ -326,24 +335,48 @@ impl RealWorld for SimulatedWorld<'_> {
         let mut action = vec![0.0; protocol.action.len()];
         policy.act(&believed, &mut action)?;
         let ctrl = self.task.attempt(&believed, &action)?;
-        let recording = layout.recording(&protocol.channels)?;
-        let substeps = substeps(&layout, protocol.frame_period)?;
-        let mut readings = vec![0.0; protocol.frames * recording.width()];
-        let rollout = Rollout::new(
-            &[0],
-            protocol.frames,
-            substeps,
-            Control::Shared(&ctrl),
-            &recording,
+        // The metric's channels, then those of the log.
+        let names = self.task.exploration().channels();
+        let mut all = protocol.channels.clone();
+        all.extend(names.iter().cloned());
+        let recording = layout.recording(&all)?;
+        let (width, own) = (
+            recording.width(),
+            layout.recording(&protocol.channels)?.width(),
         );
-        self.batch.simulator.rollout(&rollout, &mut readings)?;
+        let substeps = substeps(&layout, protocol.frame_period)?;
+        let mut out = vec![0.0; (protocol.frames + 1) * width];
+        let (first, frames) = out.split_at_mut(width);
+        self.batch.simulator.read(&[0], &recording, first)?;
+        let control = Control::Shared(&ctrl);
+        let rollout = Rollout::new(&[0], protocol.frames, substeps, control, &recording);
+        self.batch.simulator.rollout(&rollout, frames)?;
         self.check()?;
         self.wear();
+        let readings: Vec<f64> = frames
+            .chunks_exact(width)
+            .flat_map(|row| row[..own].to_vec())
+            .collect();
+        let mut episode = blank(&layout, &names)?;
+        let mut noise = self.streams.stream("task noise");
+        let tracked = self.signals.width();
+        for row in out.chunks_exact_mut(width) {
+            let seen = &mut row[own..];
+            self.signals
+                .add_noise(&mut seen[..tracked], || StandardNormal.sample(&mut noise));
+            episode.readings.extend_from_slice(seen);
+        }
+        let nu = layout.nu();
+        episode.ctrl = ctrl;
+        let last = episode.ctrl[episode.ctrl.len() - nu..].to_vec();
+        episode.ctrl.extend(last);
+        episode.time = times(protocol.frames, protocol.frame_period);
         Ok(Attempt {
             outcome: self.task.outcome(&readings),
             action,
             believed_start: believed,
             readings,
+            episode,
         })
     }
 }

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::real_world::RealWorld;
 use super::trace::{Map, Rung, SignalTrace};
 use crate::nullable;
 use crate::run::{FileEntry, NamedText};
@@ -46,6 +47,8 @@ pub struct Diagnosis {
     pub map: Option<Map>,
     /// Candidates that could not be tried: name and why.
     pub left_out: Vec<NamedText>,
+    /// The task in the real world, before and after; `None` for a study.
+    pub real_world: Option<RealWorld>,
     /// Engine of the simulations.
     pub engine: String,
     /// The command line that repeats the diagnosis.

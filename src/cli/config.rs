@@ -175,7 +175,7 @@ impl Config {
         let Worlds { simulator, real } = worlds;
         let mut table = match &common.config {
             Some(path) => read_table(path)?,
-            None => toml::Table::new(),
+            None => common.base.clone(),
         };
         // A start pose in the settings of one stage means nothing to another.
         if text(&table, "command")?.is_some_and(|c| c != stage.name()) {

@@ -1,35 +1,41 @@
 //! `asid diagnose`: where the sim-to-real gap lies, which effect causes it, how far it shrinks.
 
+mod config;
+mod real_world;
+
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
 use anyhow::Result;
-use asid_core::registry::{self, BackendEntry, EffectEntry, TaskEntry, find};
-use asid_core::{Backend, Capabilities, Error, Target};
-use asid_diagnosis::diagnose::{Diagnosis, Settings, diagnose as diagnose_study};
+use asid_core::{Backend, Target};
+use asid_diagnosis::diagnose::{Diagnosis, diagnose as diagnose_study};
 use asid_diagnosis::machine::Machine;
 use asid_diagnosis::refined_model::RefinedModel;
 use asid_diagnosis::result::DiagnosisResult;
-use asid_diagnosis::search::Breadth;
 use asid_diagnosis::study::Study;
-use serde::{Deserialize, Serialize};
+use asid_report::diagnosis as report;
+use serde::Serialize;
 
 use super::diagnosis_report::{self, Meta};
-use super::model::{self, Needs};
-use super::options::Common;
+use super::failure;
+use super::options::{Algorithms, Common, Worlds};
 use super::output::{OutFolder, write_json, write_text};
 use super::progress::Bars;
 use super::session::backend;
-use super::{config, failure};
-use asid_report::diagnosis as report;
+use config::Config;
+pub use config::default_backend;
 
 /// Arguments of `diagnose`.
 #[derive(clap::Args)]
 #[command(after_help = "\
 A study is a TOML file, or a folder with study.toml: the model, logs to fit to and logs held out, and what \
 is fitted already. docs/diagnosis.md tells how to write one, and how to read the answer.
+
+With --task a built-in task takes the study's place. Without --train it is run some times in its simulated \
+real world (--real-effect and the like); the logs of these runs are diagnosed, the answer is added to the \
+simulator, and the task is run again.
 
 The folder holds result.json, refined.toml (the model with the effects of the verdict, for a study's \
 `model`), config.toml, copies of the logs, report.html and trace.json.")]
@@ -38,182 +44,69 @@ pub struct Arguments {
     #[arg(required_unless_present_any = ["task", "config"], conflicts_with = "task")]
     study: Option<PathBuf>,
     /// A built-in task in place of a study
-    #[arg(long, value_name = "TASK", requires = "train")]
+    #[arg(long, value_name = "TASK")]
     task: Option<String>,
-    /// Logs of the task to fit to
+    /// Logs of the task to fit to [default: those of its runs]
     #[arg(long, value_name = "FILE", num_args = 1.., requires = "task")]
     train: Vec<PathBuf>,
     /// Logs of the task held out
-    #[arg(long, value_name = "FILE", num_args = 1.., requires = "task")]
+    #[arg(long, value_name = "FILE", num_args = 1.., requires = "train")]
     test: Vec<PathBuf>,
+    /// Runs of the task whose logs are diagnosed, a third of them held out [default: 6]
+    #[arg(long, value_name = "N", conflicts_with = "train")]
+    runs: Option<usize>,
+    /// Episodes that are then played to tell the rival explanations apart [default: 0]
+    #[arg(long, value_name = "N", conflicts_with = "train")]
+    experiments: Option<usize>,
+    /// Runs of the task that are counted, without and with the answer [default: 5]
+    #[arg(long, value_name = "N")]
+    seeds: Option<u64>,
     /// An effect of the catalogue that is not to be tried (repeatable)
     #[arg(long, value_name = "EFFECT")]
     without: Vec<String>,
-    /// Model of the task in place of its scene: MJCF, or TOML of a refined model
-    #[arg(long, value_name = "FILE", requires = "task")]
-    model: Option<PathBuf>,
     #[command(flatten)]
     pub common: Common,
+    #[command(flatten)]
+    algorithms: Algorithms,
+    #[command(flatten)]
+    worlds: Worlds,
 }
 
-/// `config.toml` of a diagnosis.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Config {
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    study: Option<PathBuf>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    task: Option<String>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    model: Option<PathBuf>,
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    train: Vec<PathBuf>,
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    test: Vec<PathBuf>,
-    #[serde(default = "default_backend")]
-    backend: String,
-    #[serde(default)]
-    seed: u64,
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    without: Vec<String>,
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    plugins: Vec<PathBuf>,
-    #[serde(default)]
-    search: SearchConfig,
-}
+impl Arguments {
+    /// Whether the command line describes runs of a task in a simulated real world.
+    fn describes_a_run(&self) -> bool {
+        let real = &self.worlds.real;
+        let Algorithms {
+            explorer,
+            identifier,
+            solver,
+        } = &self.algorithms;
+        !real.truth.is_empty()
+            || !real.real_effect.is_empty()
+            || real.real_backend.is_some()
+            || real.real_model.is_some()
+            || [explorer, identifier, solver].iter().any(|a| a.is_some())
+    }
 
-/// How widely to search.
-#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-struct SearchConfig {
-    first: usize,
-    last: usize,
-    singles: usize,
-    beam: usize,
-    depth: usize,
-}
-
-impl Default for SearchConfig {
-    fn default() -> Self {
-        let Breadth {
-            first,
-            last,
-            singles,
-            beam,
-            depth,
-        } = Breadth::default();
-        Self {
-            first,
-            last,
-            singles,
-            beam,
-            depth,
-        }
+    /// Whether the task is to be run: for its logs, or to try the answer.
+    fn runs_task(&self, table: &toml::Table) -> bool {
+        let task = self.task.is_some() || (self.study.is_none() && table.contains_key("task"));
+        let logs = !self.train.is_empty() || table.contains_key("train");
+        task && (!logs
+            || self.seeds.is_some()
+            || self.describes_a_run()
+            || table.contains_key("seeds"))
     }
 }
 
-impl Config {
-    /// The configuration file, `--set`, then the command line.
-    fn resolve(arguments: &Arguments) -> Result<Self> {
-        let common = &arguments.common;
-        let mut table = match &common.config {
-            Some(path) => config::read_table(path)?,
-            None => toml::Table::new(),
-        };
-        for setting in &common.set {
-            config::set(&mut table, setting)?;
-        }
-        let mut config: Self = table
-            .try_into()
-            .map_err(|e: toml::de::Error| config_error("config", e.message().replace('\n', " ")))?;
-        if arguments.study.is_some() || arguments.task.is_some() {
-            config.study.clone_from(&arguments.study);
-            config.task.clone_from(&arguments.task);
-            config.model.clone_from(&arguments.model);
-            config.train.clone_from(&arguments.train);
-            config.test.clone_from(&arguments.test);
-        }
-        if let Some(name) = &common.backend {
-            config.backend.clone_from(name);
-        }
-        config.seed = common.seed.unwrap_or(config.seed);
-        config.without.extend(arguments.without.iter().cloned());
-        for name in &config.without {
-            find::<EffectEntry>(name)?;
-        }
-        let SearchConfig {
-            first, last, depth, ..
-        } = config.search;
-        if first == 0 || last == 0 || depth == 0 || config.search.beam == 0 {
-            return Err(config_error("search", "every number is at least 1".into()));
-        }
-        Ok(config)
-    }
-
-    fn settings(&self) -> Settings {
-        let SearchConfig {
-            first,
-            last,
-            singles,
-            beam,
-            depth,
-        } = self.search;
-        Settings {
-            seed: self.seed,
-            breadth: Breadth {
-                first,
-                last,
-                singles,
-                beam,
-                depth,
-            },
-            without: self.without.clone(),
-        }
-    }
-
-    fn study(&self) -> Result<Study> {
-        match (&self.study, &self.task) {
-            (Some(path), _) => Ok(Study::read(path)?),
-            (None, Some(name)) => {
-                let task = (find::<TaskEntry>(name)?.make)()?;
-                let model = match &self.model {
-                    None => model::of_task(&*task),
-                    Some(path) => {
-                        let backend = backend(&self.backend)?;
-                        let scene = backend.load(task.scene())?;
-                        let needs = Needs {
-                            task: &*task,
-                            layout: scene.layout(),
-                            parameters: &task.parameters(),
-                        };
-                        needs.open(&*backend, path, "simulator", &[])?.0
-                    }
-                };
-                Ok(Study::of_task(&*task, model, &self.train, &self.test)?)
-            }
-            (None, None) => Err(config_error("study", "is missing".into())),
-        }
-    }
-}
-
-/// The engine that is used where none is named: the first built in that computes in double
-/// precision, for which replays of logs are smooth in every parameter; else the first.
-pub fn default_backend() -> String {
-    let all = registry::all::<BackendEntry>();
-    let double = |entry: &&&BackendEntry| {
-        let made = (entry.make)();
-        made.is_ok_and(|b| b.capabilities().contains(Capabilities::DOUBLE_PRECISION))
-    };
-    let found = all.iter().find(double).or(all.first());
-    found.map_or_else(String::new, |e| e.name.to_owned())
-}
-
-fn config_error(key: &str, message: String) -> anyhow::Error {
-    Error::Config {
-        key: key.into(),
-        message,
-    }
-    .into()
+/// `result.json`.
+#[derive(Serialize)]
+struct Output<'a> {
+    #[serde(flatten)]
+    result: &'a DiagnosisResult,
+    /// The task in the real world, before and after.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    real_world: Option<&'a report::RealWorld>,
 }
 
 /// The machine of a study on an engine.
@@ -228,30 +121,96 @@ pub fn machine(study: &Study, engine: &str, threads: usize) -> Result<Machine> {
     )?)
 }
 
-/// Diagnoses a study.
+/// Diagnoses a study, or a task.
 pub fn diagnose(arguments: &Arguments) -> Result<()> {
     let clock = Instant::now();
     let common = &arguments.common;
-    let config = Config::resolve(arguments)?;
-    let study = config.study()?;
-    let machine = machine(&study, &config.backend, common.threads.unwrap_or(0))?;
-    let out = OutFolder::claim(common.out.as_deref(), &format!("{}-diagnose", study.name))?;
+    let (config, of_run) = Config::resolve(arguments)?;
     let progress = Bars::new(common.quiet);
-    let (diagnosis, _) = diagnose_study(&study, machine, config.settings(), &progress)?;
+    let world = of_run
+        .map(|of_run| {
+            let (algorithms, worlds) = (&arguments.algorithms, &arguments.worlds);
+            real_world::Machine::new(&config, of_run, common, algorithms, worlds)
+        })
+        .transpose()?;
+    let subject = config.task.clone().or_else(|| {
+        let path = config.study.as_ref()?;
+        Some(path.file_stem()?.to_string_lossy().into_owned())
+    });
+    let stem = format!("{}-diagnose", subject.unwrap_or_else(|| "study".into()));
+    let plays = world.is_some() && config.train.is_empty();
+    // What is wrong with a study is told before anything is claimed or run.
+    let given = if plays {
+        None
+    } else {
+        Some(config.study(None)?)
+    };
+    let out = OutFolder::claim(common.out.as_deref(), &stem)?;
+    let runs = match &world {
+        Some(world) => world.before(plays, &progress)?,
+        None => Vec::new(),
+    };
+    let mut study = match (given, &world) {
+        (Some(study), _) => study,
+        (None, Some(world)) => config.study(Some(world.logs(&runs)))?,
+        (None, None) => config.study(None)?,
+    };
+    let machine = machine(&study, &config.backend, common.threads.unwrap_or(0))?;
+    let (mut diagnosis, work) = diagnose_study(&study, machine, config.settings(), &progress)?;
+    let mut experiments = None;
+    if let (Some(world), Some(n @ 1..)) = (&world, config.experiments)
+        && let Some(played) = world.tell_apart(&work, n, &progress)?
+    {
+        let (train, test) = world.logs(&runs);
+        let logs = (
+            [train, played.logs.0].concat(),
+            [test, played.logs.1].concat(),
+        );
+        experiments = Some(format!(
+            "{}. Before them: {}",
+            played.what, diagnosis.result.sentence
+        ));
+        study = config.study(Some(logs))?;
+        let again = self::machine(&study, &config.backend, common.threads.unwrap_or(0))?;
+        diagnosis = diagnose_study(&study, again, config.settings(), &progress)?.0;
+    }
+    drop(work);
+    let tried = match &world {
+        Some(world) => {
+            let compared = world.compare(&runs, &diagnosis.effects, &progress)?;
+            Some(report::RealWorld {
+                experiments: experiments.unwrap_or_default(),
+                ..compared
+            })
+        }
+        None => None,
+    };
     let engine = {
         let backend = backend(&config.backend)?;
         format!("{} {}", backend.name(), backend.version())
     };
+    let mut settings = toml::Table::try_from(&config)?;
+    if let Some(world) = &world {
+        // The diagnosis' own settings win.
+        let of_run = world.settings()?.into_iter();
+        let more: Vec<_> = of_run.filter(|(k, _)| !settings.contains_key(k)).collect();
+        settings.extend(more);
+    }
+    let result = Output {
+        result: &diagnosis.result,
+        real_world: tried.as_ref(),
+    };
     out.write(|folder| {
-        write_json(&folder.join("result.json"), &diagnosis.result)?;
-        let report = diagnosis_report::diagnosis(
+        write_json(&folder.join("result.json"), &result)?;
+        let mut report = diagnosis_report::diagnosis(
             &diagnosis.result,
             &diagnosis.trace,
             meta(&study, &engine, config.seed),
         );
+        report.real_world.clone_from(&tried);
         write_json(&folder.join("trace.json"), &report)?;
         write_text(&folder.join("report.html"), &report::page(&report))?;
-        write_text(&folder.join("config.toml"), &toml::to_string(&config)?)?;
+        write_text(&folder.join("config.toml"), &toml::to_string(&settings)?)?;
         write_text(
             &folder.join("refined.toml"),
             &refined(&study, &diagnosis, folder)?,
@@ -261,11 +220,13 @@ pub fn diagnose(arguments: &Arguments) -> Result<()> {
     })?;
     let mut stdout = std::io::stdout().lock();
     if common.json {
-        let text = serde_json::to_string_pretty(&diagnosis.result)?;
-        writeln!(stdout, "{text}")?;
+        writeln!(stdout, "{}", serde_json::to_string_pretty(&result)?)?;
     } else {
         let seconds = clock.elapsed().as_secs_f64();
         for line in lines(&diagnosis.result, &engine, seconds) {
+            writeln!(stdout, "{line}")?;
+        }
+        for line in tried.iter().flat_map(report::RealWorld::lines) {
             writeln!(stdout, "{line}")?;
         }
         writeln!(stdout, "results: {}", out.path().display())?;

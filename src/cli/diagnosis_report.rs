@@ -131,6 +131,7 @@ pub fn diagnosis(result: &DiagnosisResult, trace: &DiagnosisTrace, meta: Meta) -
             text("engine", &meta.engine),
             text("git", env!("ASID_GIT")),
         ],
+        real_world: None,
         engine: meta.engine,
         command: meta.command,
         files: files(&meta.files),

@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use asid_diagnosis::refined_model::RefinedModel;
+
 /// Most threads that may be asked for.
 const MAX_THREADS: usize = 1024;
 
@@ -25,6 +27,9 @@ pub struct Common {
     /// Threads; results do not depend on it [default: one a core]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = threads)]
     pub threads: Option<usize>,
+    /// Settings below those of `config`, from elsewhere than the command line.
+    #[arg(skip)]
+    pub base: toml::Table,
     /// Settings from a file, such as a run's config.toml
     #[arg(long, value_name = "FILE.toml")]
     pub config: Option<PathBuf>,
@@ -63,6 +68,9 @@ pub struct Simulator {
     /// diagnosis [default: the task's scene]
     #[arg(long, value_name = "FILE")]
     pub model: Option<PathBuf>,
+    /// A refined model that is no file yet, in place of `model`.
+    #[arg(skip)]
+    pub refined: Option<RefinedModel>,
 }
 
 /// The simulated real world.

@@ -51,6 +51,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             &toml::to_string_pretty(&session.config)?,
         )?;
         write_json(&folder.join("posterior.json"), &outcome.belief)?;
+        let attempt = &outcome.attempt.episode;
+        attempt.write_csv(&folder.join("attempt.csv"))?;
         if let Some(real) = &outcome.real {
             real.episode.write_csv(&folder.join("real.csv"))?;
             write_json(&folder.join("policy.json"), &outcome.policy)?;

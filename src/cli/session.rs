@@ -69,16 +69,15 @@ impl Session {
         for target in parameters.iter().flat_map(|p| &p.targets) {
             scene.nominal(target)?;
         }
-        let model = match &config.model {
-            None => Arc::clone(&scene),
-            Some(path) => {
-                let needs = Needs {
-                    task: &*task,
-                    layout: scene.layout(),
-                    parameters: &parameters,
-                };
-                needs.open(&*backend, path, "simulator", &[])?.1
-            }
+        let needs = Needs {
+            task: &*task,
+            layout: scene.layout(),
+            parameters: &parameters,
+        };
+        let model = match (&worlds.simulator.refined, &config.model) {
+            (Some(source), _) => model::compile(&*backend, source)?,
+            (None, Some(path)) => needs.open(&*backend, path, "simulator", &[])?.1,
+            (None, None) => Arc::clone(&scene),
         };
         let signals = config
             .noise

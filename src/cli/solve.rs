@@ -7,7 +7,7 @@ use std::time::Instant;
 use anyhow::Result;
 use asid_core::real_world::Attempt;
 use asid_core::registry::{SolverEntry, find};
-use asid_core::{Control, Error, Posterior, Rollout};
+use asid_core::{Control, Episode, Error, Posterior, Rollout};
 use serde::Serialize;
 
 use super::config::Stage;
@@ -314,6 +314,7 @@ fn try_out(
             action: action.to_vec(),
             believed_start: start.to_vec(),
             readings: mean.to_vec(),
+            episode: Episode::default(),
         },
     ))
 }

@@ -91,6 +91,7 @@ pub fn run_report(
                 "all settings; given to --config, it repeats the run",
             ),
             ("real.csv", "log of the real episode"),
+            ("attempt.csv", "log of the attempt at the task"),
             ("policy.json", "the exploration policy"),
             ("posterior.json", "the posterior, for asid solve"),
             ("trace.json", "the data of this report"),

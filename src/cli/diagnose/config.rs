@@ -1,0 +1,290 @@
+//! The settings of a diagnosis, and the study they lead to.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::Result;
+use asid_core::registry::{self, BackendEntry, EffectEntry, TaskEntry, find};
+use asid_core::{Capabilities, Episode, Error};
+use asid_diagnosis::diagnose::Settings;
+use asid_diagnosis::refined_model::RefinedModel;
+use asid_diagnosis::search::Breadth;
+use asid_diagnosis::study::Study;
+use serde::{Deserialize, Serialize};
+
+use super::super::config;
+use super::super::model::{self, Needs};
+use super::super::session::backend;
+use super::Arguments;
+
+/// `config.toml` of a diagnosis.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Config {
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub study: Option<PathBuf>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub task: Option<String>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub model: Option<PathBuf>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub train: Vec<PathBuf>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub test: Vec<PathBuf>,
+    #[serde(default = "default_backend")]
+    pub backend: String,
+    #[serde(default)]
+    pub seed: u64,
+    /// Runs of a task whose logs are diagnosed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub runs: Option<usize>,
+    /// Episodes that are then played to tell rivals apart.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub experiments: Option<usize>,
+    /// Which of their logs.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub logs: Option<RunLogs>,
+    /// Seeds that the task is tried with, before and after.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub seeds: Option<u64>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    without: Vec<String>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    plugins: Vec<PathBuf>,
+    #[serde(default)]
+    search: SearchConfig,
+}
+
+/// Logs of a run of a task.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum RunLogs {
+    /// Of exploration.
+    Exploration,
+    /// Of the attempt at the task.
+    Attempt,
+    /// Both.
+    #[default]
+    Both,
+}
+
+impl RunLogs {
+    pub fn exploration(self) -> bool {
+        self != Self::Attempt
+    }
+
+    pub fn attempt(self) -> bool {
+        self != Self::Exploration
+    }
+}
+
+/// Keys that are a diagnosis' own; where a task is run, the others are that run's.
+const OWN: [&str; 14] = [
+    "study",
+    "task",
+    "model",
+    "train",
+    "test",
+    "backend",
+    "seed",
+    "runs",
+    "experiments",
+    "logs",
+    "seeds",
+    "without",
+    "plugins",
+    "search",
+];
+
+/// How widely to search.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct SearchConfig {
+    first: usize,
+    last: usize,
+    singles: usize,
+    beam: usize,
+    depth: usize,
+}
+
+impl Default for SearchConfig {
+    fn default() -> Self {
+        let Breadth {
+            first,
+            last,
+            singles,
+            beam,
+            depth,
+        } = Breadth::default();
+        Self {
+            first,
+            last,
+            singles,
+            beam,
+            depth,
+        }
+    }
+}
+
+impl Config {
+    /// The configuration file, `--set`, then the command line; and apart from it the settings of
+    /// the task's runs, where the task is to be run.
+    pub fn resolve(arguments: &Arguments) -> Result<(Self, Option<toml::Table>)> {
+        let common = &arguments.common;
+        let mut table = match &common.config {
+            Some(path) => config::read_table(path)?,
+            None => toml::Table::new(),
+        };
+        for setting in &common.set {
+            config::set(&mut table, setting)?;
+        }
+        let mut of_run = toml::Table::new();
+        let runs_task = arguments.runs_task(&table);
+        if runs_task {
+            let others: Vec<String> = table
+                .keys()
+                .filter(|k| !OWN.contains(&k.as_str()))
+                .cloned()
+                .collect();
+            for key in others {
+                of_run.extend(table.remove_entry(&key));
+            }
+        }
+        let mut config: Self = table
+            .try_into()
+            .map_err(|e: toml::de::Error| wrong("config", e.message().replace('\n', " ")))?;
+        if arguments.study.is_some() || arguments.task.is_some() {
+            config.study.clone_from(&arguments.study);
+            config.task.clone_from(&arguments.task);
+            config.train.clone_from(&arguments.train);
+            config.test.clone_from(&arguments.test);
+        }
+        if let Some(model) = &arguments.worlds.simulator.model {
+            config.model = Some(model.clone());
+        }
+        if let Some(name) = &common.backend {
+            config.backend.clone_from(name);
+        }
+        config.seed = common.seed.unwrap_or(config.seed);
+        config.runs = arguments.runs.or(config.runs);
+        config.experiments = arguments.experiments.or(config.experiments);
+        config.seeds = arguments.seeds.or(config.seeds);
+        config.without.extend(arguments.without.iter().cloned());
+        for name in &config.without {
+            find::<EffectEntry>(name)?;
+        }
+        let SearchConfig {
+            first, last, depth, ..
+        } = config.search;
+        if first == 0 || last == 0 || depth == 0 || config.search.beam == 0 {
+            return Err(wrong("search", "every number is at least 1"));
+        }
+        if runs_task {
+            config.runs.get_or_insert(RUNS);
+            config.logs.get_or_insert_default();
+            config.seeds.get_or_insert(SEEDS);
+            if config.train.is_empty() && config.runs.unwrap_or(RUNS) < 2 {
+                return Err(wrong(
+                    "--runs",
+                    "at least 2: one to fit to and one to hold out",
+                ));
+            }
+        } else if config.runs.is_some()
+            || config.seeds.is_some()
+            || config.experiments.is_some()
+            || arguments.describes_a_run()
+        {
+            return Err(wrong(
+                "--task",
+                "a study's machine cannot be run from here: --runs, --seeds, algorithms and what \
+                 describes a simulated real world go with --task",
+            ));
+        }
+        Ok((config, runs_task.then_some(of_run)))
+    }
+
+    pub fn settings(&self) -> Settings {
+        let SearchConfig {
+            first,
+            last,
+            singles,
+            beam,
+            depth,
+        } = self.search;
+        Settings {
+            seed: self.seed,
+            breadth: Breadth {
+                first,
+                last,
+                singles,
+                beam,
+                depth,
+            },
+            without: self.without.clone(),
+        }
+    }
+
+    /// The study: as written, or of a task with the logs that the settings name or `played`.
+    pub fn study(&self, played: Option<Logs>) -> Result<Study> {
+        match (&self.study, &self.task) {
+            (Some(path), _) => Ok(Study::read(path)?),
+            (None, Some(name)) => {
+                let task = (find::<TaskEntry>(name)?.make)()?;
+                let model = match &self.model {
+                    None => model::of_task(&*task),
+                    Some(path) => {
+                        let backend = backend(&self.backend)?;
+                        let scene = backend.load(task.scene())?;
+                        let needs = Needs {
+                            task: &*task,
+                            layout: scene.layout(),
+                            parameters: &task.parameters(),
+                        };
+                        needs.open(&*backend, path, "simulator", &[])?.0
+                    }
+                };
+                let (train, test) = match played {
+                    Some(logs) => logs,
+                    None => (read(&self.train, &model)?, read(&self.test, &model)?),
+                };
+                Ok(Study::of_task(&*task, model, train, test)?)
+            }
+            (None, None) => Err(wrong("study", "is missing")),
+        }
+    }
+}
+
+/// Logs to fit to and logs held out, with their names.
+pub type Logs = (Vec<(String, Episode)>, Vec<(String, Episode)>);
+
+/// Runs whose logs are diagnosed, and seeds that the task is tried with, where nothing is said.
+const RUNS: usize = 6;
+const SEEDS: u64 = 5;
+
+fn read(files: &[PathBuf], model: &RefinedModel) -> Result<Vec<(String, Episode)>> {
+    let layout = asid_core::Plant::of(&model.scene)?.layout;
+    let one = |file: &PathBuf| -> Result<(String, Episode)> {
+        let episode = Episode::read_csv(Path::new(file), &layout)?;
+        Ok((file.display().to_string(), episode))
+    };
+    files.iter().map(one).collect()
+}
+
+/// The engine that is used where none is named: the first built in that computes in double
+/// precision, for which replays of logs are smooth in every parameter; else the first.
+pub fn default_backend() -> String {
+    let all = registry::all::<BackendEntry>();
+    let double = |entry: &&&BackendEntry| {
+        let made = (entry.make)();
+        made.is_ok_and(|b| b.capabilities().contains(Capabilities::DOUBLE_PRECISION))
+    };
+    let found = all.iter().find(double).or(all.first());
+    found.map_or_else(String::new, |e| e.name.to_owned())
+}
+
+fn wrong(key: &str, message: impl Into<String>) -> anyhow::Error {
+    Error::Config {
+        key: key.into(),
+        message: message.into(),
+    }
+    .into()
+}

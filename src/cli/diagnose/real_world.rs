@@ -1,0 +1,301 @@
+//! A task in its simulated real world: where the logs of a diagnosis come from, and where its
+//! answer is tried.
+//!
+//! The machine is one: its hidden truth is the same in every run. Start poses, trackers'
+//! noise and wear are drawn anew from seed to seed.
+
+use anyhow::Result;
+use asid_algorithms::explore::{Discriminating, Rival};
+use asid_core::{EffectSpec, Episode, Explorer as _, Progress, RealWorld as _};
+use asid_diagnosis::diagnose::Work;
+use asid_diagnosis::refined_model::RefinedModel;
+use asid_diagnosis::search::trials;
+use asid_report::diagnosis::{RealWorld, TaskTrial};
+
+use super::super::model;
+use super::super::options::{Algorithms, Common, Real, Worlds};
+use super::super::run::pipeline;
+use super::super::session::Session;
+use super::config::{Config, Logs, RunLogs};
+
+/// A task, its machine, and how often it is run.
+pub struct Machine {
+    task: String,
+    common: Common,
+    algorithms: Algorithms,
+    worlds: Worlds,
+    runs: usize,
+    seeds: u64,
+    logs: RunLogs,
+}
+
+/// Episodes that tell explanations apart.
+pub struct Experiments {
+    /// Their logs.
+    pub logs: Logs,
+    /// What they were for, in words.
+    pub what: String,
+}
+
+/// Explanations that are told apart, at most.
+const RIVALS: usize = 3;
+/// Probability that a rival counts with at least: what seems out of the question may be only
+/// for these data.
+const LEAST: f64 = 0.1;
+/// Seeds of the experiments begin so far from those of the runs.
+const APART: u64 = 1000;
+
+/// The most probable explanations as simulators with the values that were fitted.
+fn rivals(work: &Work) -> Result<Vec<Rival>> {
+    let hypotheses = work.judgement.hypotheses.iter().take(RIVALS);
+    hypotheses
+        .map(|h| {
+            let (members, explanation) = match h.found {
+                Some(i) => {
+                    let found = &work.findings.found[i];
+                    (&found.candidates[..], &found.explanation)
+                }
+                None => (&[][..], &work.findings.none),
+            };
+            let trials = trials(&work.candidates, members, explanation);
+            let specs: Vec<EffectSpec> = trials.iter().map(|(c, _)| c.spec.clone()).collect();
+            let unknowns = work.bench.unknowns(&trials).into_iter();
+            Ok(Rival {
+                label: match h.labels.as_slice() {
+                    [] => "no effect".to_owned(),
+                    labels => labels.join(" + "),
+                },
+                model: work.bench.machine.with(&specs)?,
+                parameters: unknowns.map(|u| u.parameter).collect(),
+                theta: explanation.fit.point.theta.clone(),
+                weight: h.probability.max(LEAST),
+            })
+        })
+        .collect()
+}
+
+/// One run of the pipeline.
+pub struct Run {
+    value: f64,
+    success: bool,
+    exploration: Option<Episode>,
+    attempt: Episode,
+}
+
+impl Machine {
+    /// The machine that the settings describe: `of_run` are those of the task's runs.
+    pub fn new(
+        config: &Config,
+        of_run: toml::Table,
+        common: &Common,
+        algorithms: &Algorithms,
+        worlds: &Worlds,
+    ) -> Result<Self> {
+        let mut machine = Self {
+            task: config.task.clone().unwrap_or_default(),
+            common: Common {
+                backend: Some(config.backend.clone()),
+                seed: Some(config.seed),
+                threads: common.threads,
+                base: of_run,
+                quiet: true,
+                ..Common::default()
+            },
+            algorithms: algorithms.clone(),
+            worlds: worlds.clone(),
+            runs: config.runs.unwrap_or_default(),
+            seeds: config.seeds.unwrap_or_default(),
+            logs: config.logs.unwrap_or_default(),
+        };
+        machine.worlds.simulator.model.clone_from(&config.model);
+        // The truth is drawn once.
+        let session = machine.session(0, &machine.worlds)?;
+        let truth = session.parameters.iter().zip(session.truth());
+        machine.worlds.real.truth = truth.map(|(p, x)| format!("{}={x:?}", p.name)).collect();
+        Ok(machine)
+    }
+
+    fn session(&self, k: u64, worlds: &Worlds) -> Result<Session> {
+        let mut common = self.common.clone();
+        common.seed = common.seed.map(|seed| seed + k);
+        Session::open(&self.task, &common, &self.algorithms, worlds)
+    }
+
+    /// The settings of its runs, resolved.
+    pub fn settings(&self) -> Result<toml::Table> {
+        let config = self.session(0, &self.worlds)?.config;
+        Ok(toml::Table::try_from(&config)?)
+    }
+
+    fn play(&self, n: u64, worlds: &Worlds, progress: &dyn Progress) -> Result<Vec<Run>> {
+        (0..n)
+            .map(|k| {
+                let session = self.session(k, worlds)?;
+                let outcome = pipeline(&session, &session.truth())?;
+                progress.advance(1);
+                Ok(Run {
+                    value: outcome.attempt.outcome.value,
+                    success: outcome.attempt.outcome.success,
+                    exploration: outcome.real.map(|r| r.episode),
+                    attempt: outcome.attempt.episode,
+                })
+            })
+            .collect()
+    }
+
+    /// Runs with the model as it is: those that are diagnosed, and those that are counted.
+    pub fn before(&self, diagnosed: bool, progress: &dyn Progress) -> Result<Vec<Run>> {
+        let n = if diagnosed {
+            self.seeds.max(self.runs as u64)
+        } else {
+            self.seeds
+        };
+        progress.begin("running the task", n);
+        let runs = self.play(n, &self.worlds, progress)?;
+        progress.end();
+        Ok(runs)
+    }
+
+    /// The logs of the first runs, of which the last third is held out.
+    pub fn logs(&self, runs: &[Run]) -> Logs {
+        let held = (self.runs / 3).max(1);
+        let mut logs: Logs = (Vec::new(), Vec::new());
+        for (k, run) in runs.iter().take(self.runs).enumerate() {
+            let to = if k + held < self.runs {
+                &mut logs.0
+            } else {
+                &mut logs.1
+            };
+            let explored = run.exploration.iter().map(|e| ("exploration", e));
+            let explored = explored.filter(|_| self.logs.exploration());
+            let attempt = self.logs.attempt().then_some(("attempt", &run.attempt));
+            let both = explored.chain(attempt);
+            to.extend(both.map(|(what, e)| (format!("run {}, {what}", k + 1), e.clone())));
+        }
+        logs
+    }
+
+    /// Plays `n` episodes that the most probable explanations expect to differ in most; of them the
+    /// last third is held out. `None` where there is a single explanation.
+    pub fn tell_apart(
+        &self,
+        work: &Work,
+        n: usize,
+        progress: &dyn Progress,
+    ) -> Result<Option<Experiments>> {
+        let rivals = rivals(work)?;
+        if rivals.len() < 2 {
+            return Ok(None);
+        }
+        let labels: Vec<String> = rivals.iter().map(|r| r.label.clone()).collect();
+        let explorer = Discriminating::new(rivals)?;
+        let held = if n > 1 { (n / 3).max(1) } else { 0 };
+        let mut logs: Logs = (Vec::new(), Vec::new());
+        progress.begin("telling apart", n as u64);
+        for k in 0..n {
+            let session = self.session(APART + k as u64, &self.worlds)?;
+            let problem = session.problem();
+            let mut explored = explorer.explore(&problem, None)?;
+            let mut world = session.world(&session.truth())?;
+            let played = world.explore(&mut *explored.policy)?;
+            let to = if k + held < n {
+                &mut logs.0
+            } else {
+                &mut logs.1
+            };
+            to.push((format!("experiment {}", k + 1), played.episode));
+            progress.advance(1);
+        }
+        progress.end();
+        let what = format!(
+            "{n} episodes were played to tell apart {}",
+            labels.join(", ")
+        );
+        Ok(Some(Experiments { logs, what }))
+    }
+
+    /// The task in the real world with the model as it is, with the effects of a verdict added
+    /// to it, and without what was added to the real world.
+    pub fn compare(
+        &self,
+        before: &[Run],
+        effects: &[EffectSpec],
+        progress: &dyn Progress,
+    ) -> Result<RealWorld> {
+        let n = self.seeds;
+        let session = self.session(0, &self.worlds)?;
+        let counted = &before[..before.len().min(n as usize)];
+        let mut trials = Vec::new();
+        let real = &session.config.real;
+        if real.model.is_some()
+            || !real.effects.is_empty()
+            || real.backend != session.config.backend
+        {
+            progress.begin("without the effect", n);
+            let plain = Worlds {
+                real: Real {
+                    truth: self.worlds.real.truth.clone(),
+                    ..Real::default()
+                },
+                ..self.worlds.clone()
+            };
+            let mut ideal = Self {
+                worlds: plain.clone(),
+                common: self.common.clone(),
+                task: self.task.clone(),
+                algorithms: self.algorithms.clone(),
+                ..*self
+            };
+            ideal.common.base.remove("real");
+            let runs = ideal.play(n, &plain, progress)?;
+            trials.push(trial(
+                "a real world without the effect",
+                "the model as given",
+                &runs,
+            ));
+            progress.end();
+        }
+        let here = "the real world";
+        trials.push(trial(here, "the model as given", counted));
+        if !effects.is_empty() {
+            progress.begin("with the refined model", n);
+            let mut worlds = self.worlds.clone();
+            let source = match &self.worlds.simulator.model {
+                Some(path) => RefinedModel::open(path)?,
+                None => model::of_task(&*session.task),
+            };
+            worlds.simulator = super::super::options::Simulator {
+                model: None,
+                refined: Some(RefinedModel {
+                    effects: [&source.effects[..], effects].concat(),
+                    ..source
+                }),
+            };
+            let runs = self.play(n, &worlds, progress)?;
+            trials.push(trial(here, "the refined model", &runs));
+            progress.end();
+        }
+        let protocol = session.task.downstream();
+        let truth = session.parameters.iter().zip(session.truth());
+        Ok(RealWorld {
+            task: self.task.clone(),
+            condition: session.config.condition.clone().unwrap_or_default(),
+            metric: protocol.metric.clone(),
+            unit: protocol.unit.clone(),
+            rule: protocol.rule.clone(),
+            effects: real.effects.clone(),
+            experiments: String::new(),
+            truth: truth.map(|(p, x)| (p.name.clone(), x)).collect(),
+            trials,
+        })
+    }
+}
+
+fn trial(world: &str, simulator: &str, runs: &[Run]) -> TaskTrial {
+    TaskTrial {
+        world: world.to_owned(),
+        simulator: simulator.to_owned(),
+        values: runs.iter().map(|r| r.value).collect(),
+        successes: runs.iter().filter(|r| r.success).count(),
+    }
+}
