@@ -139,6 +139,10 @@ fn a_run_leaves_the_contracts_folder_and_its_config_repeats_it_at_any_thread_cou
     assert_eq!(timeless(&result), timeless(&place.read("b/result.json")));
     assert_eq!(place.read("a/config.toml"), place.read("b/config.toml"));
     assert_eq!(log, place.read("b/real.csv"));
+    // The attempt is logged with the same columns.
+    let attempt = place.read("a/attempt.csv");
+    assert_eq!(attempt.lines().next(), log.lines().next());
+    assert_eq!(attempt, place.read("b/attempt.csv"));
 
     // The stage alone, on the run's own log, finds what the run found.
     done(

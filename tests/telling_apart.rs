@@ -1,0 +1,211 @@
+//! Exploration that tells rival explanations apart, and the loop from a task's runs through their
+//! diagnosis back to the task.
+
+#![allow(clippy::unwrap_used)]
+
+mod cli_support;
+
+use std::sync::Arc;
+use std::sync::atomic::AtomicU64;
+
+use asid::algorithms::explore::{Discriminating, Rival};
+use asid::core::progress::Silent;
+use asid::core::registry::{BackendEntry, EffectEntry, TaskEntry, all, find};
+use asid::core::{Explorer as _, Model, Problem, Streams};
+use cli_support::{Workplace, names, tiny};
+use serde_json::Value;
+
+/// A puck that slides with this friction.
+fn puck(problem: &Problem<'_>, model: &Arc<dyn Model>, friction: f64) -> Rival {
+    Rival {
+        label: format!("friction {friction}"),
+        model: Arc::clone(model),
+        parameters: problem.parameters.to_vec(),
+        theta: vec![friction, 0.002],
+        weight: 0.5,
+    }
+}
+
+/// Calls `check` with the shuffleboard on the first engine.
+fn on_the_shuffleboard(check: impl Fn(&Problem<'_>, &Arc<dyn Model>)) {
+    let task = (find::<TaskEntry>("shuffleboard").unwrap().make)().unwrap();
+    let backend = (all::<BackendEntry>()[0].make)().unwrap();
+    let model = backend.load(task.scene()).unwrap();
+    let (physics, env) = (AtomicU64::new(0), AtomicU64::new(0));
+    let problem = Problem {
+        task: &*task,
+        model: &*model,
+        capabilities: backend.capabilities(),
+        parameters: &task.parameters(),
+        signals: &task.exploration().signals,
+        threads: 0,
+        streams: Streams::new(0),
+        progress: &Silent,
+        physics_counter: &physics,
+        env_counter: &env,
+    };
+    check(&problem, &model);
+}
+
+#[test]
+fn rivals_differ_only_where_the_puck_slides_and_the_plan_makes_it_slide() {
+    on_the_shuffleboard(|problem, model| {
+        let protocol = problem.task.exploration();
+        let start: Vec<f64> = protocol.start.iter().map(|c| c.center()).collect();
+        let still = vec![0.0; protocol.horizon * protocol.action.len()];
+        let ahead: Vec<f64> = (0..protocol.horizon)
+            .flat_map(|_| protocol.action.iter().enumerate())
+            .map(|(i, c)| if i == 0 { c.range[1] } else { 0.0 })
+            .collect();
+        let plans = [still, ahead];
+
+        // The same explanation twice cannot be told apart, whatever is done.
+        let same = [0.02, 0.02].map(|f| puck(problem, model, f));
+        let mut explorer = Discriminating::new(same.to_vec()).unwrap();
+        let none = explorer.divergence(problem, &start, &plans).unwrap();
+        assert!(none.iter().all(|d| *d < 1e-20), "{none:?}");
+
+        // Two frictions differ once the puck slides: the slower by a share of its path that
+        // tracking to 2 mm sees many times over.
+        explorer.rivals = [0.012, 0.03].map(|f| puck(problem, model, f)).to_vec();
+        let apart = explorer.divergence(problem, &start, &plans).unwrap();
+        assert!(apart[0] < 0.1 && apart[1] > 100.0, "{apart:?}");
+
+        // Half of the squared distance in units of the noise, by the weights of both.
+        explorer.rivals[0].weight = 0.9;
+        explorer.rivals[1].weight = 0.1;
+        let weighted = explorer.divergence(problem, &start, &plans).unwrap();
+        assert!((weighted[1] / apart[1] - 0.09 / 0.25).abs() < 1e-9);
+
+        explorer.iterations = 2;
+        explorer.population = 8;
+        let mut explored = explorer.explore(problem, Some(&start)).unwrap();
+        let curve = explored.curve.clone();
+        let plan: Vec<f64> = (0..protocol.horizon)
+            .flat_map(|h| {
+                let mut action = vec![0.0; protocol.action.len()];
+                explored.policy.act(h, &[], &mut action).unwrap();
+                action
+            })
+            .collect();
+        let best = explorer.divergence(problem, &start, &[plan]).unwrap()[0];
+        assert!(best > 10.0 && best >= curve[0].mean, "{best} {curve:?}");
+        assert!(explored.objective.contains("friction 0.012"));
+    });
+}
+
+#[test]
+fn one_explanation_cannot_be_told_apart() {
+    on_the_shuffleboard(|problem, model| {
+        let one = vec![puck(problem, model, 0.02)];
+        let error = Discriminating::new(one).err().unwrap().to_string();
+        assert!(error.contains("at least two"), "{error}");
+    });
+}
+
+#[test]
+fn a_task_is_run_diagnosed_and_run_again() {
+    let place = Workplace::new();
+    // A catalogue of two makes it quick.
+    let kept = ["actuator-bias", "sensor-bias"];
+    let without: Vec<&str> = all::<EffectEntry>()
+        .iter()
+        .map(|e| e.name)
+        .filter(|n| !kept.contains(n))
+        .flat_map(|n| ["--without", n])
+        .collect();
+    let call = [
+        "diagnose",
+        "--task",
+        "shuffleboard",
+        "--runs",
+        "2",
+        "--experiments",
+        "1",
+        "--seeds",
+        "1",
+        "--real-effect",
+        "actuator-bias@joint1:bias=0.02",
+        "--set",
+        "logs=exploration",
+        "--set",
+        "search.depth=1",
+        "--out",
+        "a",
+    ];
+    let output = place.run(&tiny(&[&call[..], &without[..]].concat()));
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{errors}");
+    let result: Value = serde_json::from_str(&place.read("a/result.json")).unwrap();
+    assert_eq!(
+        result["verdict"]["effects"][0], "actuator-bias@joint1",
+        "{result:#}"
+    );
+    let world = &result["real_world"];
+    assert_eq!(world["effects"][0], "actuator-bias@joint1:bias=0.02");
+    assert!(
+        world["experiments"]
+            .as_str()
+            .unwrap()
+            .contains("actuator-bias@joint1")
+    );
+    let trials = world["trials"].as_array().unwrap();
+    let told: Vec<&str> = trials
+        .iter()
+        .map(|t| {
+            assert_eq!(t["values"].as_array().unwrap().len(), 1);
+            t["simulator"].as_str().unwrap()
+        })
+        .collect();
+    assert_eq!(
+        told,
+        [
+            "the model as given",
+            "the model as given",
+            "the refined model"
+        ]
+    );
+    assert_eq!(
+        names(&place.path("a")),
+        [
+            "config.toml",
+            "model.xml",
+            "refined.toml",
+            "report.html",
+            "result.json",
+            "test-1.csv",
+            "trace.json",
+            "train-1.csv",
+            "train-2.csv"
+        ]
+    );
+    let page = place.read("a/report.html");
+    assert!(page.contains("The task, before and after"));
+
+    // The folder's settings repeat it.
+    let again = place.run(&["diagnose", "--config", "a/config.toml", "--out", "b"]);
+    assert!(
+        again.status.success(),
+        "{}",
+        String::from_utf8_lossy(&again.stderr)
+    );
+    assert_eq!(place.read("a/result.json"), place.read("b/result.json"));
+    assert_eq!(place.read("a/config.toml"), place.read("b/config.toml"));
+}
+
+#[test]
+fn a_study_has_no_machine_that_could_be_run() {
+    let place = Workplace::new();
+    let output = place.run(&["diagnose", "study", "--runs", "3"]);
+    let line = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(2), "{line}");
+    assert!(
+        line.contains("--task") && line.lines().count() == 1,
+        "{line}"
+    );
+    let output = place.run(&["diagnose", "--task", "shuffleboard", "--runs", "1"]);
+    let line = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(2), "{line}");
+    assert!(line.contains("--runs"), "{line}");
+    assert!(place.names().is_empty());
+}
