@@ -297,7 +297,7 @@ fn logs(
         .iter()
         .map(|file| {
             let name = file.strip_prefix(folder).unwrap_or(file);
-            let episode = Episode::read_csv(file, layout)?;
+            let episode = Episode::read(file, layout)?;
             Ok((name.display().to_string(), episode))
         })
         .collect()

@@ -153,191 +153,6 @@ impl Episode {
             message: e.to_string(),
         })
     }
-
-    /// Reads a log of a scene with this layout. Columns may come in any order and
-    /// sensors may be missing; columns `qpos.*` and `qvel.*` hold the state at the first row.
-    ///
-    /// # Errors
-    /// When the file cannot be read or a row or column is wrong; the message names both.
-    pub fn read_csv(path: &Path, layout: &Layout) -> Result<Self> {
-        let fail = |message: String| Error::Log {
-            path: path.to_owned(),
-            message,
-        };
-        let mut reader = csv::ReaderBuilder::new()
-            .trim(csv::Trim::All)
-            .from_path(path)
-            .map_err(|e| fail(crate::scene::one_line(&e.to_string())))?;
-        let header: Vec<String> = reader
-            .headers()
-            .map_err(|e| fail(crate::scene::one_line(&e.to_string())))?
-            .iter()
-            .map(str::to_owned)
-            .collect();
-        let column = |name: &str| header.iter().position(|h| h == name);
-        let time_column = column("time").ok_or_else(|| fail("has no column `time`".into()))?;
-        let mut ctrl_columns = Vec::with_capacity(layout.nu());
-        for a in &layout.actuators {
-            let name = format!("ctrl.{}", a.name);
-            ctrl_columns.push(column(&name).ok_or_else(|| {
-                fail(format!(
-                    "has no column `{name}`, the command of an actuator"
-                ))
-            })?);
-        }
-        let mut channels = Vec::new();
-        let mut reading_columns = Vec::new();
-        for s in &layout.sensors {
-            let names: Vec<String> = if s.len == 1 {
-                vec![s.name.clone()]
-            } else {
-                (0..s.len).map(|i| format!("{}.{i}", s.name)).collect()
-            };
-            let found: Vec<usize> = names.iter().filter_map(|n| column(n)).collect();
-            if found.is_empty() {
-                continue;
-            }
-            if found.len() < names.len() {
-                let missing = names.iter().find(|n| column(n).is_none());
-                return Err(fail(format!(
-                    "sensor `{}` has {} entries but column `{}` is missing",
-                    s.name,
-                    s.len,
-                    missing.map_or("", String::as_str)
-                )));
-            }
-            channels.push(ChannelColumns {
-                name: s.name.clone(),
-                len: s.len,
-            });
-            reading_columns.extend(found);
-        }
-        let state_columns = state_columns(layout, &header).map_err(&fail)?;
-        for (i, name) in header.iter().enumerate() {
-            let known = i == time_column
-                || ctrl_columns.contains(&i)
-                || reading_columns.contains(&i)
-                || state_columns.iter().any(|(c, _, _)| *c == i);
-            if !known {
-                let known = layout.sensors.iter().map(|s| &*s.name);
-                return Err(fail(format!(
-                    "column `{name}` is no sensor or actuator of the scene; {}",
-                    Error::unknown("sensor", name, known)
-                )));
-            }
-        }
-        if channels.is_empty() {
-            return Err(fail("has no column of a sensor of the scene".into()));
-        }
-        let mut episode = Self {
-            actuators: layout.actuators.iter().map(|a| a.name.clone()).collect(),
-            channels,
-            ..Self::default()
-        };
-        for (i, record) in reader.records().enumerate() {
-            let row = i + 2;
-            let record = record.map_err(|e| {
-                fail(format!(
-                    "row {row}: {}",
-                    crate::scene::one_line(&e.to_string())
-                ))
-            })?;
-            let number = |c: usize| -> Result<f64> {
-                let text = record.get(c).unwrap_or("");
-                if text.is_empty() {
-                    return Ok(f64::NAN);
-                }
-                match text.parse::<f64>() {
-                    Ok(x) if x.is_finite() => Ok(x),
-                    _ => Err(fail(format!(
-                        "row {row}, column `{}`: `{text}` is not a finite number",
-                        header[c]
-                    ))),
-                }
-            };
-            let time = number(time_column)?;
-            if time.is_nan() {
-                return Err(fail(format!("row {row}: the time is missing")));
-            }
-            if let Some(&last) = episode.time.last()
-                && time <= last
-            {
-                return Err(fail(format!(
-                    "row {row}: time {time} does not come after {last}"
-                )));
-            }
-            episode.time.push(time);
-            for &c in &ctrl_columns {
-                let x = number(c)?;
-                if x.is_nan() {
-                    return Err(fail(format!(
-                        "row {row}, column `{}`: a command is missing",
-                        header[c]
-                    )));
-                }
-                episode.ctrl.push(x);
-            }
-            for &c in &reading_columns {
-                episode.readings.push(number(c)?);
-            }
-            if i == 0 && !state_columns.is_empty() {
-                let mut state = InitialState {
-                    qpos: vec![f64::NAN; layout.nq],
-                    qvel: vec![f64::NAN; layout.nv],
-                };
-                for &(c, velocity, at) in &state_columns {
-                    let row = if velocity {
-                        &mut state.qvel
-                    } else {
-                        &mut state.qpos
-                    };
-                    row[at] = number(c)?;
-                }
-                episode.initial = Some(state);
-            }
-        }
-        if episode.rows() < 2 {
-            return Err(fail(format!(
-                "has {} rows of data; at least 2 are needed",
-                episode.rows()
-            )));
-        }
-        if episode.readings.iter().all(|x| x.is_nan()) {
-            return Err(fail("every reading is missing".into()));
-        }
-        Ok(episode)
-    }
-}
-
-/// Columns of the state at the first row: column, whether it is a velocity, and its place in
-/// `qpos` or `qvel`.
-fn state_columns(layout: &Layout, header: &[String]) -> Result<Vec<(usize, bool, usize)>, String> {
-    let mut found = Vec::new();
-    for (i, name) in header.iter().enumerate() {
-        let (rest, velocity) = match (name.strip_prefix("qpos."), name.strip_prefix("qvel.")) {
-            (Some(rest), _) => (rest, false),
-            (_, Some(rest)) => (rest, true),
-            _ => continue,
-        };
-        let place = layout.joints.iter().find_map(|j| {
-            let (first, len) = if velocity {
-                (j.qvel, j.kind.qvel_len())
-            } else {
-                (j.qpos, j.kind.qpos_len())
-            };
-            match rest.strip_prefix(&*j.name)? {
-                "" if len == 1 => Some(first),
-                entry => {
-                    let entry: usize = entry.strip_prefix('.')?.parse().ok()?;
-                    (entry < len).then_some(first + entry)
-                }
-            }
-        });
-        let place = place
-            .ok_or_else(|| format!("column `{name}` is no coordinate of a joint of the scene"))?;
-        found.push((i, velocity, place));
-    }
-    Ok(found)
 }
 
 /// The shortest text that reads back as the same number.
@@ -388,7 +203,7 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("log.csv");
         std::fs::write(&path, text).unwrap();
-        Episode::read_csv(&path, &layout())
+        Episode::read(&path, &layout())
     }
 
     #[test]
@@ -426,7 +241,7 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("log.csv");
         episode.write_csv(&path).unwrap();
-        let back = Episode::read_csv(&path, &layout()).unwrap();
+        let back = Episode::read(&path, &layout()).unwrap();
         assert_eq!(back.time, episode.time);
         assert_eq!(back.ctrl, episode.ctrl);
         for (a, b) in back.readings.iter().zip(&episode.readings) {

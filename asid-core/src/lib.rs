@@ -24,6 +24,7 @@ pub mod identify;
 pub mod information;
 pub mod kinematics;
 pub mod layout;
+mod log;
 pub mod mass;
 pub mod parameter;
 pub mod pipeline;

@@ -8,7 +8,7 @@ use anyhow::{Context, Result};
 use crate::library::repository;
 
 /// Features that bring in every engine and the networks.
-pub const ALL_FEATURES: &str = "--features=mujoco,torch";
+pub const ALL_FEATURES: &str = "--features=mujoco,torch,parquet";
 
 /// Stages that have run, in order.
 #[derive(Default)]

@@ -263,7 +263,7 @@ const SEEDS: u64 = 5;
 fn read(files: &[PathBuf], model: &RefinedModel) -> Result<Vec<(String, Episode)>> {
     let layout = asid_core::Plant::of(&model.scene)?.layout;
     let one = |file: &PathBuf| -> Result<(String, Episode)> {
-        let episode = Episode::read_csv(Path::new(file), &layout)?;
+        let episode = Episode::read(Path::new(file), &layout)?;
         Ok((file.display().to_string(), episode))
     };
     files.iter().map(one).collect()
