@@ -4,14 +4,11 @@
 //! know of it (the law of a servo, the parent of a body, the friction that wins in
 //! a contact) is read from the document, once, for all engines.
 
-use mjcf_rs::Model as Document;
-use mjcf_rs::extras::ActuatorKind;
+mod jacobian;
+mod reading;
 
-use crate::document;
 use crate::error::{Error, Result};
 use crate::layout::{JointKind, Layout};
-use crate::mass::{GeomMass, MassProperties};
-use crate::scene::Scene;
 
 /// How an actuator turns its command into a force.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -165,106 +162,6 @@ pub struct Plant {
 }
 
 impl Plant {
-    /// Reads a scene.
-    ///
-    /// # Errors
-    /// When the document is not valid MJCF.
-    pub fn of(scene: &Scene) -> Result<Self> {
-        let model = scene.description()?;
-        let layout = document::layout(scene, &model)?;
-        let mut bodies = Vec::with_capacity(model.bodies.len());
-        let (mut joints, mut geoms) = (Vec::new(), Vec::new());
-        for (i, entry) in model.bodies.iter().enumerate() {
-            let body = &entry.body;
-            let first = joints.len();
-            joints.extend(body.joints.iter().map(|j| PlantJoint {
-                body: i,
-                anchor: j.pos,
-                axis: j.axis,
-                reference: j.ref_,
-                frictionloss: j.frictionloss,
-                armature: j.armature,
-            }));
-            geoms.extend(body.geoms.iter().map(|g| PlantGeom {
-                body: i,
-                friction: g.friction,
-                condim: g.condim,
-                priority: g.priority,
-                has_mass: i > 0 && body.inertial.is_none() && GeomMass::of(g).is_some(),
-            }));
-            let (mass, center) = match &body.inertial {
-                Some(inertial) => {
-                    let p = inertial.pose.translation;
-                    (inertial.mass, [p.x, p.y, p.z])
-                }
-                None => {
-                    let masses: Vec<_> = body.geoms.iter().filter_map(GeomMass::of).collect();
-                    let all = MassProperties::of_geoms(&masses);
-                    (all.mass, all.center.into())
-                }
-            };
-            let parent = entry.parent.unwrap_or(0);
-            let weld = match entry.parent {
-                Some(p) if body.joints.is_empty() => {
-                    bodies.get(p).map_or(0, |b: &PlantBody| b.weld)
-                }
-                _ => i,
-            };
-            bodies.push(PlantBody {
-                parent,
-                joints: first..joints.len(),
-                mass: if i == 0 { 0.0 } else { mass },
-                center,
-                weld,
-            });
-        }
-        let drives = model
-            .actuators
-            .iter()
-            .zip(&layout.actuators)
-            .map(|(a, place)| drive(&model, &layout, a, place.ctrl_range))
-            .collect();
-        let sensors = model
-            .sensors
-            .iter()
-            .map(|s| {
-                let name = s.objname.as_deref().unwrap_or_default();
-                let joint = layout.joints.iter().position(|j| j.name == name);
-                let body = layout.bodies.iter().position(|b| b == name);
-                match (s.kind.as_str(), joint, body) {
-                    (kind, Some(j), _) if kind.starts_with("joint") => Reads::Joint(j),
-                    (kind, _, Some(b)) if kind.starts_with("frame") => Reads::Body(b),
-                    _ => Reads::Other,
-                }
-            })
-            .collect();
-        let contacts = contacts(&model, &layout, &bodies, &geoms);
-        let poses = model
-            .bodies
-            .iter()
-            .map(|entry| {
-                let (t, q) = (entry.body.pose.translation, entry.body.pose.rotation);
-                nalgebra::Isometry3::from_parts(
-                    nalgebra::Translation3::new(t.x, t.y, t.z),
-                    nalgebra::UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(
-                        q.w, q.x, q.y, q.z,
-                    )),
-                )
-            })
-            .collect();
-        Ok(Self {
-            layout,
-            gravity: model.option.gravity,
-            bodies,
-            joints,
-            geoms,
-            drives,
-            sensors,
-            contacts,
-            poses,
-        })
-    }
-
     /// Drives of a joint, as indices of actuators.
     pub fn drives_of(&self, joint: usize) -> impl Iterator<Item = (usize, &Drive)> {
         let drives = self.drives.iter().enumerate();
@@ -306,194 +203,6 @@ impl Plant {
         }
     }
 
-    /// Pose `world_from_body` and Jacobian (`6 x nv`, row-major: linear then angular
-    /// velocity of the body's point `at` per unit of each entry of `qvel`) in a state.
-    /// `jacobian` is overwritten; it has `6 nv` entries.
-    pub fn point_jacobian(
-        &self,
-        qpos: &[f64],
-        body: usize,
-        at: [f64; 3],
-        jacobian: &mut [f64],
-    ) -> nalgebra::Isometry3<f64> {
-        use nalgebra::{Isometry3, Point3, Translation3, Unit, UnitQuaternion, Vector3};
-        let nv = self.layout.nv;
-        jacobian.fill(0.0);
-        let mut path = [0_usize; MAX_DEPTH];
-        let mut depth = 0;
-        let mut up = body;
-        while up != 0 && depth < MAX_DEPTH {
-            path[depth] = up;
-            depth += 1;
-            up = self.bodies[up].parent;
-        }
-        // Two passes: the pose of the point first, then the columns that need it.
-        let mut tip = Vector3::zeros();
-        let mut world = Isometry3::identity();
-        for pass in 0..2 {
-            world = Isometry3::identity();
-            for &b in path[..depth].iter().rev() {
-                world *= self.poses[b];
-                for j in self.bodies[b].joints.clone() {
-                    let (place, joint) = (&self.layout.joints[j], &self.joints[j]);
-                    let q = &qpos[place.qpos..];
-                    let mut set = |row: usize, column: usize, v: Vector3<f64>| {
-                        for k in 0..3 {
-                            jacobian[(row + k) * nv + column] = v[k];
-                        }
-                    };
-                    match place.kind {
-                        JointKind::Free => {
-                            let turn = crate::signal::unit_quaternion(&q[3..7]);
-                            world =
-                                Isometry3::from_parts(Translation3::new(q[0], q[1], q[2]), turn);
-                            if pass == 1 {
-                                let arm = tip - world.translation.vector;
-                                for k in 0..3 {
-                                    let unit = Vector3::ith(k, 1.0);
-                                    set(0, place.qvel + k, unit);
-                                    let axis = turn * unit;
-                                    set(0, place.qvel + 3 + k, axis.cross(&arm));
-                                    set(3, place.qvel + 3 + k, axis);
-                                }
-                            }
-                        }
-                        JointKind::Ball => {
-                            let anchor = Vector3::from(joint.anchor);
-                            let turn = crate::signal::unit_quaternion(&q[..4]);
-                            let pivot = world * Point3::from(anchor);
-                            world *= Isometry3::from_parts(
-                                Translation3::from(anchor - turn * anchor),
-                                turn,
-                            );
-                            if pass == 1 {
-                                let arm = tip - pivot.coords;
-                                for k in 0..3 {
-                                    let axis = world.rotation * Vector3::ith(k, 1.0);
-                                    set(0, place.qvel + k, axis.cross(&arm));
-                                    set(3, place.qvel + k, axis);
-                                }
-                            }
-                        }
-                        JointKind::Hinge | JointKind::Slide => {
-                            let moved = q[0] - joint.reference;
-                            let own = Unit::new_normalize(Vector3::from(joint.axis));
-                            let axis = world.rotation * own.into_inner();
-                            let anchor = Vector3::from(joint.anchor);
-                            let pivot = world * Point3::from(anchor);
-                            if place.kind == JointKind::Hinge {
-                                let turn = UnitQuaternion::from_axis_angle(&own, moved);
-                                world *= Isometry3::from_parts(
-                                    Translation3::from(anchor - turn * anchor),
-                                    turn,
-                                );
-                                if pass == 1 {
-                                    set(0, place.qvel, axis.cross(&(tip - pivot.coords)));
-                                    set(3, place.qvel, axis);
-                                }
-                            } else {
-                                world *= Translation3::from(own.into_inner() * moved);
-                                if pass == 1 {
-                                    set(0, place.qvel, axis);
-                                }
-                            }
-                        }
-                    }
-                }
-            }
-            tip = (world * Point3::from(Vector3::from(at))).coords;
-        }
-        world
-    }
-}
-
-/// Deepest chain of bodies.
-const MAX_DEPTH: usize = 64;
-
-fn drive(
-    model: &Document,
-    layout: &Layout,
-    actuator: &mjcf_rs::extras::Actuator,
-    ctrl_range: Option<[f64; 2]>,
-) -> Option<Drive> {
-    let name = actuator.joint.as_deref()?;
-    let joint = layout.joints.iter().position(|j| j.name == name)?;
-    if !matches!(
-        layout.joints[joint].kind,
-        JointKind::Hinge | JointKind::Slide
-    ) {
-        return None;
-    }
-    let law = match actuator.kind {
-        ActuatorKind::Motor => DriveLaw::Motor,
-        ActuatorKind::Position => DriveLaw::Position {
-            kp: actuator.kp.unwrap_or(1.0),
-            kv: actuator.kv.unwrap_or(0.0),
-        },
-        ActuatorKind::Velocity => DriveLaw::Velocity {
-            kv: actuator.kv.unwrap_or(1.0),
-        },
-        _ => return None,
-    };
-    let limited = actuator
-        .force_limited
-        .resolve(model.compiler.autolimits, actuator.force_range.is_some());
-    Some(Drive {
-        joint,
-        law,
-        gear: actuator.gear[0],
-        ctrl_range,
-        force_range: actuator.force_range.filter(|_| limited),
-    })
-}
-
-/// MuJoCo's rules: contact bits in either direction, no contact between a body and what it
-/// is welded to or its parent (unless that is fixed), excluded and explicit pairs.
-fn contacts(
-    model: &Document,
-    layout: &Layout,
-    bodies: &[PlantBody],
-    geoms: &[PlantGeom],
-) -> Vec<[usize; 2]> {
-    let all: Vec<_> = model.bodies.iter().flat_map(|b| &b.body.geoms).collect();
-    let body = |name: &str| layout.bodies.iter().position(|b| b == name);
-    let excluded: Vec<_> = model
-        .contact
-        .excludes
-        .iter()
-        .map(|e| (body(&e.body1), body(&e.body2)))
-        .collect();
-    let explicit: Vec<_> = model
-        .contact
-        .pairs
-        .iter()
-        .map(|p| {
-            let find = |name: &str| layout.geoms.iter().position(|g| g == name);
-            (find(&p.geom1), find(&p.geom2))
-        })
-        .collect();
-    let mut found = Vec::new();
-    for a in 0..geoms.len() {
-        for b in a + 1..geoms.len() {
-            let (p, q) = (geoms[a].body, geoms[b].body);
-            let (u, v) = (bodies[p].weld, bodies[q].weld);
-            let above = |w: usize| bodies[bodies[w].parent].weld;
-            let family = (u != 0 && v != 0) && (u == above(v) || v == above(u));
-            let bits = all[a].contype & all[b].conaffinity != 0
-                || all[b].contype & all[a].conaffinity != 0;
-            let among = |pairs: &[(Option<usize>, Option<usize>)], x: usize, y: usize| {
-                pairs.contains(&(Some(x), Some(y))) || pairs.contains(&(Some(y), Some(x)))
-            };
-            let meets = bits && u != v && !family && !among(&excluded, p, q);
-            if meets || among(&explicit, a, b) {
-                found.push([a, b]);
-            }
-        }
-    }
-    found
-}
-
-impl Plant {
     /// Index of the actuator of this name with its drive.
     ///
     /// # Errors
@@ -530,6 +239,7 @@ impl Plant {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::Scene;
 
     const MACHINE: &str = r#"<mujoco><compiler angle="radian"/><worldbody>
       <geom name="floor" type="plane" size="1 1 1" friction="0.4 0.005 0.0001"/>
