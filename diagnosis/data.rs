@@ -264,3 +264,61 @@ impl Logs {
         self.entries.iter().map(noise).collect()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use asid_core::{Plant, Scene};
+
+    use super::*;
+
+    /// Readings of a slide at 0, 0.1, … s.
+    fn log(name: &str, readings: &[f64]) -> (String, Episode) {
+        let rows: Vec<String> = readings
+            .iter()
+            .enumerate()
+            .map(|(k, x)| format!("{},{x}", 0.1 * k as f64))
+            .collect();
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("log.csv");
+        std::fs::write(&path, format!("time,place\n{}\n", rows.join("\n"))).unwrap();
+        (
+            name.to_owned(),
+            Episode::read(&path, &plant().layout).unwrap(),
+        )
+    }
+
+    fn plant() -> Plant {
+        let scene = r#"<mujoco><worldbody><body name="b">
+            <joint name="slide" type="slide"/><geom size="0.1" mass="1"/></body></worldbody>
+            <sensor><jointpos name="place" joint="slide"/></sensor></mujoco>"#;
+        Plant::of(&Scene::from_xml("slide", scene, &[]).unwrap()).unwrap()
+    }
+
+    #[test]
+    fn an_episode_is_cut_where_its_own_motion_ends() {
+        // One that comes to rest after 2 of 20 rows does not hide behind one that never does.
+        let resting: Vec<f64> = (0..20)
+            .map(|k| if k < 2 { k as f64 } else { 5.0 })
+            .collect();
+        let moving: Vec<f64> = (0..10).map(|k| k as f64).collect();
+        let plant = plant();
+        let logs = vec![log("resting", &resting), log("moving", &moving)];
+        let mut logs = Logs::new(&plant, &["place".to_owned()], logs).unwrap();
+        logs.set_noise(&[0.01]);
+        let shares = logs.moving_shares();
+        // The last row that moves is the second; a twentieth more is kept.
+        assert!(
+            (shares[0] - (2.0 / 20.0 + 0.05)).abs() < 1e-12,
+            "{shares:?}"
+        );
+        assert!(
+            (shares[1] - (9.0 / 10.0 + 0.05)).abs() < 1e-12,
+            "{shares:?}"
+        );
+        let cut = logs.cut_each(&plant.layout, &shares);
+        let rows: Vec<usize> = cut.episodes.iter().map(|e| e.plan.rows()).collect();
+        // Rounded up.
+        assert_eq!(rows, [4, 10]);
+        assert_eq!(cut.len(), 14);
+    }
+}

@@ -266,8 +266,9 @@ const FIRST: f64 = 1e-4;
 /// Starts of a candidate that are kept.
 const KEPT: usize = 3;
 
-/// Shares of a proposed step that are tried.
-const LENGTHS: [f64; 3] = [1.0, 0.5, 0.2];
+/// Multiples of a proposed step that are tried. Longer ones too: a delay of several times what the
+/// commands change in moves a reading by less than the first of it promises.
+const LENGTHS: [f64; 5] = [4.0, 2.0, 1.0, 0.5, 0.2];
 
 /// A step that the linear fit proposes for a candidate.
 #[derive(Clone, Debug)]
@@ -323,14 +324,41 @@ pub fn propose(
         for (column, w) in projected.iter().zip(&weights) {
             left.iter_mut().zip(column).for_each(|(r, c)| *r -= w * c);
         }
+        // Without slopes the start itself is the step, and only what makes room for it moves.
+        let lengths = if slopes.is_empty() {
+            &LENGTHS[2..]
+        } else {
+            &LENGTHS[..]
+        };
         let step = |length: &f64| base.step(&own, start, &slopes, (&weights, &moves), *length);
+        let mut thetas: Vec<Vec<f64>> = lengths.iter().map(step).collect();
+        if let (true, &[slope]) = (bench.is_rough(), &slopes[..]) {
+            thetas.extend(along(&own[slope].parameter, start[slope]).map(|value| {
+                let mut values = start.clone();
+                values[slope] = value;
+                base.with(&values).theta
+            }));
+        }
         proposals.push(Proposal {
             candidate: index,
             gain: cost(&base.rest) - cost(&left),
-            thetas: LENGTHS.iter().map(step).collect(),
+            thetas,
         });
     }
     Ok(proposals)
+}
+
+/// Shares of the way to each end of its range at which a parameter is tried whatever its slope.
+const ALONG: [f64; 4] = [0.05, 0.15, 0.4, 0.7];
+
+/// Values towards both ends of the range. Where predictions scatter, a small change may move an
+/// object that is pushed by as much as a large one does, and its slope then says little.
+fn along(parameter: &Parameter, from: f64) -> impl Iterator<Item = f64> {
+    let u = parameter.to_unit(from).clamp(0.0, 1.0);
+    let ends = [0.0, 1.0]
+        .into_iter()
+        .filter(move |end| (end - u).abs() > 1e-9);
+    ends.flat_map(move |end| ALONG.map(|share| parameter.from_unit(u + share * (end - u))))
 }
 
 /// Columns of a candidate at a start: one a slope, per share of its range; one for the whole
@@ -511,4 +539,77 @@ fn bounded(columns: &[Vec<f64>], target: &[f64], room: &[[f64; 2]]) -> Vec<f64> 
         }
     }
     fixed.iter().map(|f| f.unwrap_or(0.0)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn proposal(candidate: usize, gain: f64) -> Proposal {
+        Proposal {
+            candidate,
+            gain,
+            thetas: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn the_best_are_tried_whatever_they_gain_and_the_rest_for_a_hundredth_of_the_best() {
+        // Candidate k gains 1000 - k, but for the last hundred, which gain next to nothing.
+        let mut proposals: Vec<Proposal> =
+            (0..50).map(|k| proposal(k, 1000.0 - k as f64)).collect();
+        proposals.extend((50..150).map(|k| proposal(k, 1.0)));
+        // A second start of a candidate that is tried is tried.
+        proposals.push(proposal(3, 0.0));
+        let chosen = worthwhile(&proposals);
+        let candidates: Vec<usize> = chosen.iter().map(|(c, _)| *c).collect();
+        assert_eq!(candidates, (0..50).collect::<Vec<_>>());
+        assert_eq!(chosen[3].1.len(), 2);
+        // Where nothing gains much, thirty are tried all the same.
+        let few: Vec<Proposal> = (0..40)
+            .map(|k| proposal(k, if k == 0 { 1e6 } else { 1.0 }))
+            .collect();
+        assert_eq!(worthwhile(&few).len(), 30);
+        assert!(worthwhile(&[]).is_empty());
+    }
+
+    #[test]
+    fn values_are_tried_towards_both_ends_of_a_range_and_not_beyond_one() {
+        let parameter = |low: f64| Parameter {
+            name: "gain".into(),
+            targets: Vec::new(),
+            range: [low, 2.0],
+            scale: asid_core::parameter::Scale::Linear,
+            unit: String::new(),
+        };
+        let delay: Vec<f64> = along(&parameter(0.0), 0.0).collect();
+        assert_eq!(delay.len(), ALONG.len());
+        assert!(
+            (delay[0] - 0.1).abs() < 1e-12 && (delay[3] - 1.4).abs() < 1e-12,
+            "{delay:?}"
+        );
+        let gain: Vec<f64> = along(&parameter(0.0), 1.0).collect();
+        assert_eq!(gain.len(), 2 * ALONG.len());
+        assert!(
+            (gain[0] - 0.95).abs() < 1e-12 && (gain[7] - 1.7).abs() < 1e-12,
+            "{gain:?}"
+        );
+    }
+
+    #[test]
+    fn weights_stay_within_their_room_and_the_others_make_up_for_it() {
+        let columns = [vec![1.0, 0.0, 0.0], vec![1.0, 1.0, 0.0]];
+        let target = [3.0, 1.0, 0.0];
+        let free = bounded(&columns, &target, &[[-10.0, 10.0], [-10.0, 10.0]]);
+        assert!(
+            (free[0] - 2.0).abs() < 1e-6 && (free[1] - 1.0).abs() < 1e-6,
+            "{free:?}"
+        );
+        // With the first held at 1, the second is (2 + 1) / 2.
+        let held = bounded(&columns, &target, &[[-1.0, 1.0], [-10.0, 10.0]]);
+        assert!(
+            (held[0] - 1.0).abs() < 1e-12 && (held[1] - 1.5).abs() < 1e-6,
+            "{held:?}"
+        );
+    }
 }
