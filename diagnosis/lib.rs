@@ -17,6 +17,7 @@ pub mod fit;
 pub mod localise;
 pub mod machine;
 pub mod noise;
+pub mod nuisance;
 pub mod predict;
 pub mod prepare;
 pub mod refined_model;
