@@ -6,14 +6,15 @@
 //! without a gradient at null (a width, a place, a limit) are tried at a few values. The
 //! step that the linear fit proposes is then really taken, at full length and shorter.
 
-use asid_core::Result;
+use asid_core::{Layout, Result};
 
-use crate::bench::{Bench, Explanation, Record, Stage, Trial};
+use crate::bench::{Bench, Explanation, Record, Trial};
 use crate::candidate::Candidate;
 use crate::fit::{
-    ABOVE_SCATTER, AIM, Differences, NOTHING, PROBE, ROUGH_START, Unknown, cost, linearise, nudged,
+    ABOVE_SCATTER, AIM, Differences, NOTHING, Open, PROBE, ROUGH_START, Unknown, cost, inverse,
+    linearise, nudged,
 };
-use crate::predict::Point;
+use crate::predict::{Point, State};
 
 /// How promising a candidate is.
 #[derive(Clone, Debug)]
@@ -142,6 +143,9 @@ pub struct Base<'a> {
     rest: Vec<f64>,
     shift: Vec<f64>,
     nuisance: Nuisance,
+    /// What the parameters and the starts do, where starts are open.
+    columns: Vec<Vec<f64>>,
+    starts: Starts,
     /// Response that slopes are measured with, and the first share of the range to try.
     aim: f64,
     first: f64,
@@ -158,12 +162,9 @@ impl<'a> Base<'a> {
         trials: &[Trial<'a>],
         from: &Explanation,
     ) -> Result<Self> {
-        let Stage { record, episodes } = &bench.stages[stage];
-        let starts = &from.fit.point.starts;
-        let point = Point {
-            theta: from.fit.point.theta.clone(),
-            starts: episodes.iter().map(|&e| starts[e].clone()).collect(),
-        };
+        let part = &bench.stages[stage];
+        let (record, open) = (&part.record, &part.open);
+        let point = part.point(from.fit.point.theta.clone(), &from.fit.point.starts);
         let trials: Vec<Trial<'a>> = trials
             .iter()
             .zip(&from.effects)
@@ -171,10 +172,10 @@ impl<'a> Base<'a> {
             .collect();
         let unknowns = bench.unknowns(&trials);
         let mut predictor = bench.predictor(&trials, record)?;
-        let mut differences = Differences::new(unknowns.len(), bench.fitted.len());
+        let mut differences = Differences::new(unknowns.len(), open.len());
         let (mut aim, mut first) = (AIM, FIRST);
         if predictor.is_rough() {
-            differences = Differences::rough(unknowns.len(), bench.fitted.len());
+            differences = Differences::rough(unknowns.len(), open.len());
             let mut other = point.clone();
             for start in &mut other.starts {
                 (0..2 * bench.layout().nv).for_each(|c| start.shift(bench.layout(), c, PROBE));
@@ -192,7 +193,7 @@ impl<'a> Base<'a> {
                 bench.layout(),
                 &unknowns,
                 &point,
-                &bench.fitted,
+                open,
                 &mut differences,
             )?);
         }
@@ -213,6 +214,8 @@ impl<'a> Base<'a> {
             rest,
             shift,
             nuisance,
+            starts: Starts::new(open, start_columns, episodes),
+            columns,
             aim,
             first,
         })
@@ -222,6 +225,45 @@ impl<'a> Base<'a> {
     #[must_use]
     pub fn cost(&self) -> f64 {
         cost(&self.residuals)
+    }
+}
+
+/// What open starts do, and how they follow a step of everything else.
+struct Starts {
+    open: Open,
+    columns: Vec<Vec<f64>>,
+    /// Per episode: place in the vector, and inverse of the starts' normal equations.
+    episodes: Vec<(std::ops::Range<usize>, nalgebra::DMatrix<f64>)>,
+}
+
+impl Starts {
+    fn new(open: &Open, columns: Vec<Vec<f64>>, episodes: Vec<std::ops::Range<usize>>) -> Self {
+        let m = columns.len();
+        let normal = |range: std::ops::Range<usize>| {
+            let part = |i: usize| &columns[i][range.clone()];
+            let gram = nalgebra::DMatrix::from_fn(m, m, |i, j| dot(part(i), part(j)));
+            (range.clone(), inverse(&gram, 1e-12))
+        };
+        Self {
+            open: open.clone(),
+            episodes: episodes.into_iter().map(normal).collect(),
+            columns,
+        }
+    }
+
+    /// Moves starts to where they leave least of `residuals`, to first order.
+    fn follow(&self, layout: &Layout, residuals: &[f64], starts: &mut [State]) {
+        if self.open.is_empty() {
+            return;
+        }
+        for ((range, inverse), start) in self.episodes.iter().zip(starts) {
+            let along = self.columns.iter();
+            let along = along.map(|c| dot(&c[range.clone()], &residuals[range.clone()]));
+            let moves = inverse * nalgebra::DVector::from_iterator(self.columns.len(), along);
+            for (&coordinate, by) in self.open.iter().zip(moves.iter()) {
+                start.shift(layout, coordinate, *by);
+            }
+        }
     }
 }
 
@@ -332,6 +374,13 @@ pub fn screen(
                     values[j] = p.from_unit(u.clamp(0.0, 1.0));
                 }
                 let mut point = at(&values);
+                let mut left = base.residuals.clone();
+                let mut take = |by: f64, column: &[f64]| {
+                    left.iter_mut()
+                        .zip(column)
+                        .for_each(|(r, c)| *r -= length * by * c);
+                };
+                weights.iter().zip(&columns).for_each(|(w, c)| take(*w, c));
                 let free = base.unknowns.iter().enumerate().filter(|(_, u)| u.free);
                 for (k, (i, unknown)) in free.enumerate() {
                     let by: f64 = base.shift[k]
@@ -343,7 +392,9 @@ pub fn screen(
                     let p = &unknown.parameter;
                     let u = p.to_unit(point.theta[i]) + length * by;
                     point.theta[i] = p.from_unit(u.clamp(0.0, 1.0));
+                    take(by, &base.columns[k]);
                 }
+                base.starts.follow(bench.layout(), &left, &mut point.starts);
                 point
             })
             .collect();
