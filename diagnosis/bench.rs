@@ -135,8 +135,31 @@ pub struct Bench {
 pub struct Stage {
     /// The logs.
     pub record: Record,
-    /// Which of the training episodes they are.
+    /// Which of the starts of a point are theirs: those of the training episodes come first, then
+    /// those of their windows.
     pub episodes: Vec<usize>,
+    /// Coordinates of the starts that are fitted together with the parameters.
+    pub open: Open,
+}
+
+impl Stage {
+    /// How finely a fit to it searches.
+    fn effort(&self, bench: &Bench, effort: Effort) -> Effort {
+        let windows = self.episodes.iter().any(|&e| e >= bench.train.starts.len());
+        Effort {
+            chord: windows,
+            ..effort
+        }
+    }
+
+    /// A point of the whole as it is for this stage.
+    #[must_use]
+    pub fn point(&self, theta: Vec<f64>, starts: &[State]) -> Point {
+        Point {
+            theta,
+            starts: self.episodes.iter().map(|&e| starts[e].clone()).collect(),
+        }
+    }
 }
 
 /// An effect to be tried: a candidate, and values to start from.
@@ -198,22 +221,19 @@ impl Bench {
         let unknowns = self.unknowns(trials);
         let mut values = theta.to_vec();
         trials.iter().for_each(|(_, v)| values.extend(v));
-        let Stage { record, episodes } = &self.stages[stage];
-        let point = Point {
-            theta: values,
-            starts: episodes.iter().map(|&e| starts[e].clone()).collect(),
-        };
-        let mut predictor = self.predictor(trials, record)?;
+        let part = &self.stages[stage];
+        let point = part.point(values, starts);
+        let mut predictor = self.predictor(trials, &part.record)?;
         let mut fit = fit(
             &mut predictor,
             self.layout(),
             &unknowns,
             point,
-            &self.fitted,
-            effort,
+            &part.open,
+            part.effort(self, effort),
         )?;
         let mut all = starts.to_vec();
-        for (&e, start) in episodes.iter().zip(&fit.point.starts) {
+        for (&e, start) in part.episodes.iter().zip(&fit.point.starts) {
             all[e] = start.clone();
         }
         fit.point.starts = all;

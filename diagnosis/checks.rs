@@ -5,6 +5,7 @@ use asid_core::{Parameter, Result};
 use crate::bench::{Bench, Explanation};
 use crate::data::Logs;
 use crate::fit::slope;
+use crate::forces::{Missing, Short};
 use crate::machine::Machine;
 use crate::predict::Point;
 use crate::prepare::plain_residuals;
@@ -218,6 +219,55 @@ pub fn repeatability(bench: &Bench) -> CheckResult {
             "on the logs held out predictions scatter by {scatter:.1} of the noise by differences that nobody controls (starts, contacts, the integrator): a gap of that size is no effect"
         ),
     )
+}
+
+/// What short replays leave, and what forces the model lacks at its joints over them, before and
+/// with the verdict's effects.
+#[must_use]
+pub fn windows(before: &Short, after: &Short, seconds: f64) -> Vec<CheckResult> {
+    const PLACES: [&str; 2] = [" in free motion", " in contact"];
+    let touch = before.gaps.iter().all(Option::is_some);
+    let place = |touching: bool| {
+        if touch {
+            PLACES[usize::from(touching)]
+        } else {
+            ""
+        }
+    };
+    let gap = |touching: bool| {
+        let [a, b] = [before, after].map(|s| s.gaps[usize::from(touching)]);
+        let (a, b) = (a?, b?);
+        let place = place(touching);
+        Some(format!(
+            "{a:.1} of the noise{place} ({b:.1} with the best explanation)"
+        ))
+    };
+    let gaps: Vec<String> = [false, true].into_iter().filter_map(gap).collect();
+    let replays = format!(
+        "replays of windows of {seconds:.2} s, each from a start of its own, leave {}",
+        gaps.join(" and ")
+    );
+    let mut all = vec![check("windows", true, replays)];
+    let joint = |(a, b): (&Missing, &Missing)| {
+        let [mean, error] = a.against;
+        format!(
+            "{}{} {:.3} {} ({mean:.3} ± {error:.3} against the motion), of which {:.3} are left with the best explanation",
+            a.joint,
+            place(a.touching),
+            a.force,
+            a.unit,
+            b.force
+        )
+    };
+    let joints: Vec<String> = before.joints.iter().zip(&after.joints).map(joint).collect();
+    if !joints.is_empty() {
+        let forces = format!(
+            "over these windows the model lacks a force, root mean square, of {}",
+            joints.join("; of ")
+        );
+        all.push(check("forces", true, forces));
+    }
+    all
 }
 
 /// Does the gap depend on the time step? `halved` is the same machine with half of it.

@@ -159,6 +159,29 @@ impl Logs {
         logs
     }
 
+    /// The logs cut into windows of `rows` rows, one after the other, each a log of its own; what
+    /// is left over at the end of an episode stays out unless it is half as long.
+    #[must_use]
+    pub fn windows(&self, layout: &Layout, rows: usize) -> Self {
+        let width = self.width();
+        let mut logs = self.some(&[]);
+        for e in &self.episodes {
+            let mut first = 0;
+            while e.plan.rows() >= first + rows.div_ceil(2).max(2) {
+                let part = first..(first + rows).min(e.plan.rows());
+                let episode = e.episode.part(part.clone());
+                logs.episodes.push(LoggedEpisode {
+                    name: e.name.clone(),
+                    readings: e.readings[part.start * width..part.end * width].to_vec(),
+                    plan: ReplayPlan::new(layout, &episode, episode.rows()),
+                    episode,
+                });
+                first = part.end;
+            }
+        }
+        logs
+    }
+
     /// The same logs, replayed with another time step.
     #[must_use]
     pub fn replanned(&self, layout: &Layout) -> Self {
@@ -167,6 +190,13 @@ impl Logs {
             e.plan = ReplayPlan::new(layout, &e.episode, e.plan.rows());
         }
         logs
+    }
+
+    /// Duration of the longest, s.
+    #[must_use]
+    pub fn longest(&self) -> f64 {
+        let last = |e: &LoggedEpisode| e.episode.time[e.plan.rows() - 1] - e.episode.time[0];
+        self.episodes.iter().map(last).fold(0.0, f64::max)
     }
 
     /// Share of each episode after which no reading moves by more than a few deviations of the

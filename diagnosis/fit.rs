@@ -40,6 +40,9 @@ pub struct Effort {
     pub iterations: usize,
     /// Share of the cost below which a step counts as none.
     pub tolerance: f64,
+    /// Whether derivatives in the starts are taken once and kept: over a short window they hardly
+    /// change.
+    pub chord: bool,
 }
 
 impl Effort {
@@ -47,11 +50,13 @@ impl Effort {
     pub const FULL: Self = Self {
         iterations: 25,
         tolerance: 1e-4,
+        chord: false,
     };
     /// A quick look.
     pub const BRIEF: Self = Self {
         iterations: 6,
         tolerance: 1e-3,
+        chord: false,
     };
 }
 
@@ -62,6 +67,7 @@ impl Effort {
         Self {
             iterations: self.iterations.min(6),
             tolerance: self.tolerance.max(3e-3),
+            ..self
         }
     }
 }
@@ -146,6 +152,8 @@ pub struct Differences {
     pub shares: Vec<f64>,
     /// Of each open coordinate of the starts, m or rad or per second.
     pub starts: Vec<f64>,
+    /// Derivatives in the starts, where they are not taken anew.
+    pub kept: Option<Vec<Vec<f64>>>,
 }
 
 impl Differences {
@@ -155,6 +163,7 @@ impl Differences {
         Self {
             shares: vec![1e-4; n],
             starts: vec![START_STEP; open],
+            kept: None,
         }
     }
 
@@ -164,6 +173,7 @@ impl Differences {
         Self {
             shares: vec![ROUGH_START; n],
             starts: vec![ROUGH_START_STEP; open],
+            kept: None,
         }
     }
 }
@@ -236,7 +246,10 @@ pub fn linearise(
             points.push(other);
         }
     }
-    let start_steps = differences.starts.clone();
+    let mut start_steps = differences.starts.clone();
+    if differences.kept.is_some() {
+        start_steps.clear();
+    }
     for (&coordinate, &step) in open.iter().zip(&start_steps) {
         let mut other = point.clone();
         for start in &mut other.starts {
@@ -292,7 +305,7 @@ pub fn linearise(
         }
         .clamp(STEPS[0], if rough { STEPS[2] } else { STEPS[1] });
     }
-    let mut start_columns = Vec::with_capacity(open.len());
+    let mut start_columns = differences.kept.clone().unwrap_or_default();
     for (h, step) in differences.starts.iter_mut().zip(&start_steps) {
         let (change, response) = next();
         start_columns.push(change.iter().map(|d| d / step).collect());
@@ -457,6 +470,9 @@ pub fn fit(
         {
             break;
         }
+    }
+    if effort.chord {
+        differences.kept = Some(line.start_columns.clone());
     }
     for _ in 0..effort.iterations {
         let mut accepted = None;

@@ -3,6 +3,11 @@
 //! An effect explains only what these cannot: its response is projected off their
 //! directions, start by start within its own episode first, then the parameters.
 
+use asid_core::Layout;
+
+use crate::fit::{Open, inverse};
+use crate::predict::State;
+
 /// Directions in which the residual may move without the candidate: an orthonormal basis.
 pub struct Nuisance {
     /// Per episode: place in the vector, and basis of its start's directions.
@@ -102,5 +107,46 @@ impl Nuisance {
             }
         }
         amounts
+    }
+}
+
+/// What open starts do, and how they follow a step of everything else.
+pub struct Starts {
+    open: Open,
+    columns: Vec<Vec<f64>>,
+    /// Per episode: place in the vector, and inverse of the starts' normal equations.
+    episodes: Vec<(std::ops::Range<usize>, nalgebra::DMatrix<f64>)>,
+}
+
+impl Starts {
+    /// From the columns of the open coordinates, of all episodes at once.
+    #[must_use]
+    pub fn new(open: &Open, columns: Vec<Vec<f64>>, episodes: Vec<std::ops::Range<usize>>) -> Self {
+        let m = columns.len();
+        let normal = |range: std::ops::Range<usize>| {
+            let part = |i: usize| &columns[i][range.clone()];
+            let gram = nalgebra::DMatrix::from_fn(m, m, |i, j| dot(part(i), part(j)));
+            (range.clone(), inverse(&gram, 1e-12))
+        };
+        Self {
+            open: open.clone(),
+            episodes: episodes.into_iter().map(normal).collect(),
+            columns,
+        }
+    }
+
+    /// Moves starts to where they leave least of `residuals`, to first order.
+    pub fn follow(&self, layout: &Layout, residuals: &[f64], starts: &mut [State]) {
+        if self.open.is_empty() {
+            return;
+        }
+        for ((range, inverse), start) in self.episodes.iter().zip(starts) {
+            let along = self.columns.iter();
+            let along = along.map(|c| dot(&c[range.clone()], &residuals[range.clone()]));
+            let moves = inverse * nalgebra::DVector::from_iterator(self.columns.len(), along);
+            for (&coordinate, by) in self.open.iter().zip(moves.iter()) {
+                start.shift(layout, coordinate, *by);
+            }
+        }
     }
 }

@@ -66,7 +66,7 @@ impl State {
 pub struct Point {
     /// Values, in the parameters' units.
     pub theta: Vec<f64>,
-    /// Starts, one an episode.
+    /// Starts, one an episode; further ones are of no matter.
     pub starts: Vec<State>,
 }
 
@@ -174,7 +174,7 @@ impl<'a> Predictor<'a> {
         }
         self.simulator.reset(&sims)?;
         self.simulator.set_parameters(&sims, &columns)?;
-        let states = || points.iter().flat_map(|p| &p.starts);
+        let states = || points.iter().flat_map(|p| &p.starts[..n]);
         let qpos: Vec<f64> = states().flat_map(|s| &s.qpos).copied().collect();
         let qvel: Vec<f64> = states().flat_map(|s| &s.qvel).copied().collect();
         self.simulator.set_state(&sims, &qpos, &qvel)?;

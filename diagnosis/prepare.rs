@@ -9,15 +9,17 @@ use asid_core::problem::home;
 use asid_core::rng::Rng;
 use asid_core::signal::{rotation_difference, unit_quaternion};
 use asid_core::{Layout, Plant, Result};
+use nalgebra::DMatrix;
 
 use crate::bench::{Bench, CAPACITY, Explanation, Record, Stage};
 use crate::data::Logs;
-use crate::fit::{Differences, Effort, Unknown, fit, inverse, linearise, scan};
+use crate::fit::{Differences, Effort, Unknown, fit, linearise, scan};
 use crate::machine::Machine;
 use crate::noise;
 use crate::predict::{Point, Predictor, State};
 use crate::roughness::{self, Spread, Whitening};
 use crate::study::Study;
+use crate::windows;
 
 /// Shares of the episodes that fits grow through.
 const SHARES: [f64; 4] = [0.1, 0.3, 0.6, 1.0];
@@ -33,6 +35,8 @@ const INTEGRATOR: f64 = 3.0;
 const QUIET: f64 = 3.0;
 /// Share of the gap up to which what is open of the starts is small.
 const SMALL: f64 = 0.3;
+/// Deviation of a start, m or rad or per second, that no record is too short to tell.
+const VAGUE: f64 = 0.1;
 /// Share of a held-out episode that an open start is fitted on.
 const HEAD: f64 = 0.1;
 /// Values of each parameter that are looked at before the first fit.
@@ -68,7 +72,7 @@ fn logged_sensors(layout: &Layout, study: &Study) -> Vec<String> {
 
 /// The start of an episode as the log has it; the rest as its first readings say, or from
 /// the scene's own start.
-fn given_start(plant: &Plant, episode: &asid_core::Episode) -> State {
+pub fn given_start(plant: &Plant, episode: &asid_core::Episode) -> State {
     let layout = &plant.layout;
     let (mut qpos, mut qvel) = home(layout);
     first_readings(plant, episode, &mut qpos, &mut qvel);
@@ -317,6 +321,7 @@ fn whole(bench: &Bench) -> Stage {
     Stage {
         record: bench.train.clone(),
         episodes: (0..bench.train.logs.episodes.len()).collect(),
+        open: bench.fitted.clone(),
     }
 }
 
@@ -451,8 +456,7 @@ impl Scatter<'_> {
     }
 }
 
-/// How well starts are known from the first tenth of their episodes, `head`: the median over
-/// episodes, for each coordinate.
+/// How well starts are known from the first tenth of their episodes, `head`.
 fn start_spread(bench: &Bench, head: &Record, point: &Point) -> Result<Spread> {
     let layout = bench.layout();
     let mut unknowns = bench.unknowns(&[]);
@@ -475,34 +479,29 @@ fn start_spread(bench: &Bench, head: &Record, point: &Point) -> Result<Spread> {
     line()?;
     let line = line()?;
     let logs = &head.logs;
-    let mut spread = vec![0.0; 2 * layout.nv];
-    for (k, &coordinate) in open.iter().enumerate() {
-        let mut deviations: Vec<f64> = (0..logs.episodes.len())
-            .map(|e| {
-                let range = logs.offset(e)..logs.offset(e + 1);
-                let n = open.len();
-                let block = nalgebra::DMatrix::from_fn(n, n, |i, j| {
-                    let (a, b) = (&line.start_columns[i], &line.start_columns[j]);
-                    let pairs = a[range.clone()].iter().zip(&b[range.clone()]);
-                    pairs.map(|(x, y)| x * y).sum::<f64>()
-                });
-                inverse(&block, 1e-9)[(k, k)].max(0.0).sqrt()
-            })
-            .collect();
-        spread[coordinate] = noise::median(&mut deviations).unwrap_or(0.0).min(0.1);
-    }
-    Ok(Spread(spread))
+    let root = |e: usize| {
+        let range = logs.offset(e)..logs.offset(e + 1);
+        let part = |i: usize| &line.start_columns[i][range.clone()];
+        let information = DMatrix::from_fn(open.len(), open.len(), |i, j| {
+            let pairs = part(i).iter().zip(part(j));
+            let sum: f64 = pairs.map(|(x, y)| x * y).sum();
+            sum + if i == j { VAGUE.powi(-2) } else { 0.0 }
+        });
+        let eigen = information.symmetric_eigen();
+        let deviations = eigen.eigenvalues.map(|x| x.max(1e-12).sqrt().recip());
+        eigen.eigenvectors * DMatrix::from_diagonal(&deviations)
+    };
+    let roots = (0..logs.episodes.len()).map(root).collect();
+    Ok(Spread::Open(open.clone(), roots))
 }
 
 /// Looks over the ranges on a stage and fits from the best.
 fn scan_and_fit(bench: &Bench, stage: usize, point: &Point, effort: Effort) -> Result<Explanation> {
     let unknowns: Vec<Unknown> = bench.unknowns(&[]);
-    let Stage { record, episodes } = &bench.stages[stage];
-    let start = Point {
-        theta: point.theta.clone(),
-        starts: episodes.iter().map(|&e| point.starts[e].clone()).collect(),
-    };
-    let best = scan(&mut bench.predictor(&[], record)?, &unknowns, start, SCAN)?;
+    let part = &bench.stages[stage];
+    let start = part.point(point.theta.clone(), &point.starts);
+    let mut predictor = bench.predictor(&[], &part.record)?;
+    let best = scan(&mut predictor, &unknowns, start, SCAN)?;
     bench.explain(stage, &[], &best.theta, &point.starts, effort)
 }
 
@@ -517,8 +516,9 @@ fn identify_smooth(
     let all: Vec<usize> = (0..bench.train.logs.episodes.len()).collect();
     bench.train.whitening.clear();
     let mut point = point;
+    let windows = windows::rows(&bench.machine.plant, &bench.train.logs, &bench.open);
     for round in 0..2 {
-        bench.stages = SHARES
+        let mut stages: Vec<Stage> = SHARES
             .iter()
             .map(|&share| Stage {
                 record: if share < 1.0 {
@@ -527,8 +527,13 @@ fn identify_smooth(
                     bench.train.clone()
                 },
                 episodes: all.clone(),
+                open: bench.fitted.clone(),
             })
             .collect();
+        if let Some(rows) = windows {
+            (stages[0], point) = windows::stage(bench, rows, &point)?;
+        }
+        bench.stages = stages;
         let mut fits: Vec<Explanation> = Vec::new();
         for stage in 0..SHARES.len() {
             let from = fits.last().map_or(&point, |f| &f.fit.point);
@@ -556,16 +561,17 @@ fn identify_smooth(
         }
         // The longest stage on which a gradient can be believed comes first.
         let rms = |i: usize| (fits[i].fit.cost / bench.readings(i)).sqrt();
-        let mut first = (0..SHARES.len())
+        let begin = usize::from(windows.is_some());
+        let mut first = (begin..SHARES.len())
             .rev()
             .find(|&i| rms(i) < NEAR)
-            .unwrap_or(0);
+            .unwrap_or(begin);
         // Unless nothing of the gap is seen on it yet.
         while first + 1 < SHARES.len() && rms(first) < SEEN && rms(SHARES.len() - 1) > SEEN {
             first += 1;
         }
-        bench.stages.drain(..first);
-        fits.drain(..first);
+        bench.stages.drain(begin..first);
+        fits.drain(begin..first);
         return Ok(fits);
     }
     Ok(Vec::new())
@@ -607,19 +613,28 @@ fn identify_rough(
     bench.train = bench.train.cut_each(&layout, &shares);
     scatter.estimate(bench, &point)?;
     let some = telling(bench, &point)?;
-    let stages = |bench: &Bench| {
-        let part = Stage {
-            record: bench.train.some(&some),
-            episodes: some.clone(),
+    let rows = windows::rows(&bench.machine.plant, &bench.train.logs, &bench.open);
+    let stages = |bench: &Bench, point: &Point| -> Result<(Vec<Stage>, Point)> {
+        let (part, point) = match rows {
+            Some(rows) => windows::stage(bench, rows, point)?,
+            None => {
+                let part = Stage {
+                    record: bench.train.some(&some),
+                    episodes: some.clone(),
+                    open: bench.fitted.clone(),
+                };
+                (part, point.clone())
+            }
         };
-        vec![part, whole(bench)]
+        Ok((vec![part, whole(bench)], point))
     };
-    bench.stages = stages(bench);
+    let (found, point) = stages(bench, &point)?;
+    bench.stages = found;
     let first = scan_and_fit(bench, 0, &point, Effort::BRIEF)?;
     set_noise(bench, &study.noise, &first.fit.point)?;
     scatter.estimate(bench, &first.fit.point)?;
-    bench.stages = stages(bench);
-    let from = &first.fit.point;
+    let (found, from) = stages(bench, &first.fit.point)?;
+    bench.stages = found;
     let part = bench.explain(0, &[], &from.theta, &from.starts, Effort::BRIEF)?;
     let from = &part.fit.point;
     let all = bench.explain(1, &[], &from.theta, &from.starts, Effort::BRIEF)?;

@@ -9,7 +9,7 @@
 
 use asid_core::Result;
 use asid_core::layout::Layout;
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use rand::Rng as _;
 
 use crate::predict::{Point, Predictor};
@@ -95,15 +95,42 @@ impl Whitening {
     }
 }
 
-/// How far the members' starts are apart, for each of the `2 nv` coordinates.
+/// How far the members' starts are apart.
 #[derive(Clone, Debug)]
-pub struct Spread(pub Vec<f64>);
+pub enum Spread {
+    /// Starts that are known: differences that no sensor sees (m, rad, and per second) in this
+    /// many coordinates.
+    Known(usize),
+    /// Starts that are open in some coordinates: for each episode a root of their covariance.
+    Open(Vec<usize>, Vec<DMatrix<f64>>),
+}
+
+/// Difference of starts that are known.
+const UNSEEN: f64 = 1e-9;
 
 impl Spread {
-    /// Starts that are known: differences that no sensor sees (m, rad, and per second).
+    /// Of a machine whose starts are known.
     #[must_use]
     pub fn of_known_starts(layout: &Layout) -> Self {
-        Self(vec![1e-9; 2 * layout.nv])
+        Self::Known(2 * layout.nv)
+    }
+
+    /// Draws shifts of an episode's start: coordinates and by how much.
+    fn draw(&self, episode: usize, rng: &mut asid_core::rng::Rng) -> Vec<(usize, f64)> {
+        // Uniform with the deviation asked for.
+        let mut unit = || -> f64 { 3.0_f64.sqrt() * rng.random_range(-1.0..1.0) };
+        match self {
+            Self::Known(n) => (0..*n).map(|c| (c, UNSEEN * unit())).collect(),
+            Self::Open(coordinates, roots) => {
+                let normal = DVector::from_fn(coordinates.len(), |_, _| unit());
+                let shift = &roots[episode] * normal;
+                coordinates
+                    .iter()
+                    .copied()
+                    .zip(shift.iter().copied())
+                    .collect()
+            }
+        }
     }
 }
 
@@ -119,14 +146,13 @@ pub fn estimate(
     spread: &Spread,
     rng: &mut asid_core::rng::Rng,
 ) -> Result<Vec<Vec<Vec<f64>>>> {
+    let episodes = predictor.logs().episodes.len();
     let points: Vec<Point> = (0..MEMBERS)
         .map(|_| {
             let mut other = point.clone();
-            for start in &mut other.starts {
-                for (coordinate, by) in spread.0.iter().enumerate() {
-                    // Uniform with the deviation asked for.
-                    let u: f64 = rng.random_range(-1.0..1.0);
-                    start.shift(layout, coordinate, by * u * 3.0_f64.sqrt());
+            for (e, start) in other.starts.iter_mut().enumerate().take(episodes) {
+                for (coordinate, by) in spread.draw(e, rng) {
+                    start.shift(layout, coordinate, by);
                 }
             }
             other
@@ -176,5 +202,25 @@ mod tests {
         let mut across = [-0.8, 0.6, 2.0];
         whitening.apply(&mut across);
         assert!((across[0] + 0.8).abs() < 1e-12 && across[2] == 2.0);
+    }
+
+    #[test]
+    fn open_starts_are_drawn_with_their_covariance() {
+        // Place and speed of a short record trade off: a correlation of -0.9.
+        let root = DMatrix::from_row_slice(2, 2, &[0.01, 0.0, -0.09, 0.0436]);
+        let spread = Spread::Open(vec![0, 3], vec![DMatrix::zeros(2, 2), root.clone()]);
+        let mut rng = asid_core::Streams::new(0).stream("test");
+        let n = 20_000;
+        let mut covariance = DMatrix::<f64>::zeros(2, 2);
+        for _ in 0..n {
+            let shifts = spread.draw(1, &mut rng);
+            assert_eq!([shifts[0].0, shifts[1].0], [0, 3]);
+            let v = DVector::from_vec(vec![shifts[0].1, shifts[1].1]);
+            covariance += &v * v.transpose() / f64::from(n);
+        }
+        let expected = &root * root.transpose();
+        // 20 000 draws tell a variance to 2 %.
+        let error = (covariance - &expected).norm() / expected.norm();
+        assert!(error < 0.04, "{error}");
     }
 }

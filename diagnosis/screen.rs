@@ -6,14 +6,14 @@
 //! without a gradient at null (a width, a place, a limit) are tried at a few values. The
 //! step that the linear fit proposes is then really taken, at full length and shorter.
 
-use asid_core::{Parameter, Result};
+use asid_core::{Layout, Parameter, Result};
 
-use crate::bench::{Bench, Explanation, Record, Stage, Trial};
+use crate::bench::{Bench, Explanation, Record, Trial};
 use crate::candidate::Candidate;
 use crate::fit::{
     ABOVE_SCATTER, AIM, Differences, NOTHING, PROBE, ROUGH_START, Unknown, cost, linearise, nudged,
 };
-use crate::nuisance::{Nuisance, dot};
+use crate::nuisance::{Nuisance, Starts, dot};
 use crate::predict::{Point, Predictor};
 
 /// How promising a candidate is.
@@ -41,6 +41,9 @@ pub struct Base<'a> {
     rest: Vec<f64>,
     shift: Vec<f64>,
     nuisance: Nuisance,
+    /// What the parameters and the starts do, where starts are open.
+    columns: Vec<Vec<f64>>,
+    starts: Starts,
     /// Response that slopes are measured with, and the first share of the range to try.
     aim: f64,
     first: f64,
@@ -57,12 +60,9 @@ impl<'a> Base<'a> {
         trials: &[Trial<'a>],
         from: &Explanation,
     ) -> Result<Self> {
-        let Stage { record, episodes } = &bench.stages[stage];
-        let starts = &from.fit.point.starts;
-        let point = Point {
-            theta: from.fit.point.theta.clone(),
-            starts: episodes.iter().map(|&e| starts[e].clone()).collect(),
-        };
+        let part = &bench.stages[stage];
+        let (record, open) = (&part.record, &part.open);
+        let point = part.point(from.fit.point.theta.clone(), &from.fit.point.starts);
         let trials: Vec<Trial<'a>> = trials
             .iter()
             .zip(&from.effects)
@@ -70,10 +70,10 @@ impl<'a> Base<'a> {
             .collect();
         let unknowns = bench.unknowns(&trials);
         let mut predictor = bench.predictor(&trials, record)?;
-        let mut differences = Differences::new(unknowns.len(), bench.fitted.len());
+        let mut differences = Differences::new(unknowns.len(), open.len());
         let (mut aim, mut first) = (AIM, FIRST);
         if predictor.is_rough() {
-            differences = Differences::rough(unknowns.len(), bench.fitted.len());
+            differences = Differences::rough(unknowns.len(), open.len());
             let mut other = point.clone();
             for start in &mut other.starts {
                 (0..2 * bench.layout().nv).for_each(|c| start.shift(bench.layout(), c, PROBE));
@@ -91,7 +91,7 @@ impl<'a> Base<'a> {
                 bench.layout(),
                 &unknowns,
                 &point,
-                &bench.fitted,
+                open,
                 &mut differences,
             )?);
         }
@@ -112,6 +112,8 @@ impl<'a> Base<'a> {
             rest,
             shift,
             nuisance,
+            starts: Starts::new(open, start_columns, episodes),
+            columns,
             aim,
             first,
         })
@@ -130,33 +132,54 @@ impl<'a> Base<'a> {
         point
     }
 
-    /// Values of all parameters after a share of a step: of the candidate's `slopes` by
-    /// `weights`, of the parameters before it by what they have to move in exchange.
-    fn step(
-        &self,
-        own: &[Unknown],
-        start: &[f64],
-        slopes: &[usize],
-        (weights, moves): (&[f64], &[Vec<f64>]),
-        length: f64,
-    ) -> Vec<f64> {
+    /// The point after a share of a step: of the candidate's `slopes` by `weights`, of the
+    /// parameters before it by what they have to move in exchange, and of open starts by what is
+    /// then best for them.
+    fn step(&self, layout: &Layout, own: &[Unknown], line: &Line<'_>, length: f64) -> Point {
         let moved = |parameter: &Parameter, value: f64, by: f64| {
             let u = parameter.to_unit(value) + length * by;
             parameter.from_unit(u.clamp(0.0, 1.0))
         };
-        let mut theta = self.point.theta.clone();
+        let mut left = self.residuals.clone();
+        let mut take = |by: f64, column: &[f64]| {
+            let pairs = left.iter_mut().zip(column);
+            pairs.for_each(|(r, c)| *r -= length * by * c);
+        };
+        let mut point = self.point.clone();
         let free = self.unknowns.iter().enumerate().filter(|(_, u)| u.free);
         for (k, (i, unknown)) in free.enumerate() {
-            let exchanged: f64 = moves.iter().zip(weights).map(|(m, w)| m[k] * w).sum();
-            theta[i] = moved(&unknown.parameter, theta[i], self.shift[k] - exchanged);
+            let exchanged: f64 = (line.moves.iter().zip(&line.weights))
+                .map(|(m, w)| m[k] * w)
+                .sum();
+            let by = self.shift[k] - exchanged;
+            point.theta[i] = moved(&unknown.parameter, point.theta[i], by);
+            take(by, &self.columns[k]);
         }
-        let mut values = start.to_vec();
-        for (&j, &w) in slopes.iter().zip(weights) {
-            values[j] = moved(&own[j].parameter, start[j], w);
+        let mut values = line.start.to_vec();
+        for (&j, &w) in line.slopes.iter().zip(&line.weights) {
+            values[j] = moved(&own[j].parameter, line.start[j], w);
         }
-        theta.extend(values);
-        theta
+        for (&w, column) in line.weights.iter().zip(line.columns) {
+            take(w, column);
+        }
+        point.theta.extend(values);
+        self.starts.follow(layout, &left, &mut point.starts);
+        point
     }
+}
+
+/// A candidate at one of its starts, linearised and fitted.
+struct Line<'l> {
+    /// Values of its parameters.
+    start: &'l [f64],
+    /// Those that have slopes.
+    slopes: &'l [usize],
+    /// What they do, per share of their range.
+    columns: &'l [Vec<f64>],
+    /// How much of each the fit takes.
+    weights: Vec<f64>,
+    /// What each parameter before it has to move in exchange.
+    moves: Vec<Vec<f64>>,
 }
 
 /// First difference for a slope, as a share of its range.
@@ -176,8 +199,8 @@ pub struct Proposal {
     pub candidate: usize,
     /// Sum of squares that it takes off to first order.
     pub gain: f64,
-    /// Values of all parameters at each of the lengths.
-    thetas: Vec<Vec<f64>>,
+    /// Points that are worth a rollout.
+    points: Vec<Point>,
 }
 
 /// Proposals of one candidate, one a start that gains at all.
@@ -199,7 +222,7 @@ pub fn propose(
     let mut shares = vec![base.first; own.len()];
     for start in &candidate.starts {
         let columns = columns(&mut predictor, base, &own, start, &mut shares, &slopes)?;
-        let mut projected = columns;
+        let mut projected = columns.clone();
         let moves: Vec<Vec<f64>> = projected
             .iter_mut()
             .map(|c| base.nuisance.project(c))
@@ -229,19 +252,26 @@ pub fn propose(
         } else {
             &LENGTHS[..]
         };
-        let step = |length: &f64| base.step(&own, start, &slopes, (&weights, &moves), *length);
-        let mut thetas: Vec<Vec<f64>> = lengths.iter().map(step).collect();
+        let line = Line {
+            start,
+            slopes: &slopes,
+            columns: &columns,
+            weights,
+            moves,
+        };
+        let step = |length: &f64| base.step(bench.layout(), &own, &line, *length);
+        let mut points: Vec<Point> = lengths.iter().map(step).collect();
         if let (true, &[slope]) = (bench.is_rough(), &slopes[..]) {
-            thetas.extend(along(&own[slope].parameter, start[slope]).map(|value| {
+            points.extend(along(&own[slope].parameter, start[slope]).map(|value| {
                 let mut values = start.clone();
                 values[slope] = value;
-                base.with(&values).theta
+                base.with(&values)
             }));
         }
         proposals.push(Proposal {
             candidate: index,
             gain: cost(&base.rest) - cost(&left),
-            thetas,
+            points,
         });
     }
     Ok(proposals)
@@ -335,13 +365,11 @@ pub fn take(
     let own: Vec<Unknown> = bench.unknowns(&trials).split_off(base.unknowns.len());
     let mut found: Vec<Screened> = Vec::new();
     for proposal in proposals {
-        let point = |theta: &Vec<f64>| Point {
-            theta: theta.clone(),
-            starts: base.point.starts.clone(),
-        };
-        let points: Vec<Point> = proposal.thetas.iter().map(point).collect();
-        let residuals = predictor.residuals(&points)?;
-        let reached = points.iter().zip(residuals.iter().map(|r| cost(r)));
+        let residuals = predictor.residuals(&proposal.points)?;
+        let reached = proposal
+            .points
+            .iter()
+            .zip(residuals.iter().map(|r| cost(r)));
         let best = reached
             .filter(|(_, c)| c.is_finite())
             .min_by(|a, b| a.1.total_cmp(&b.1));
@@ -448,7 +476,7 @@ mod tests {
         Proposal {
             candidate,
             gain,
-            thetas: Vec::new(),
+            points: Vec::new(),
         }
     }
 

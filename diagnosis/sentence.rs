@@ -3,9 +3,9 @@
 use crate::result::{DiagnosisResult, Kind};
 
 /// Says what a result means, in one sentence; `labels` are the effects of the best
-/// explanation, whether or not it is the verdict.
+/// explanation, whether or not it is the verdict, and `rest` what they leave, where one knows.
 #[must_use]
-pub fn sentence(result: &DiagnosisResult, labels: &[String]) -> String {
+pub fn sentence(result: &DiagnosisResult, labels: &[String], rest: Option<&str>) -> String {
     let place = result.places.first().map_or_else(String::new, |w| {
         let condition = w
             .condition
@@ -72,9 +72,10 @@ pub fn sentence(result: &DiagnosisResult, labels: &[String]) -> String {
             )
         }
         Kind::Unknown if result.gap.closed.is_some_and(|c| c > 0.5) => format!(
-            "{place}{} explains {}, and what is left is more than an effect of the catalogue usually leaves: there is something else.",
+            "{place}{} explains {}, and what is left is more than an effect of the catalogue usually leaves: there is something else{}.",
             labels.join(" with "),
-            closed()
+            closed(),
+            rest.map_or_else(String::new, |r| format!(": {r}"))
         ),
         Kind::Unknown => format!(
             "{place}nothing in the catalogue explains it: {} comes nearest, with {}.",

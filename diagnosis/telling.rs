@@ -7,6 +7,7 @@ use crate::candidate::{Candidate, LeftOut};
 use crate::checks;
 use crate::diagnose::{Diagnosis, Settings};
 use crate::experiment;
+use crate::forces::{self, Short};
 use crate::localise::localise;
 use crate::predict::Point;
 use crate::result::{
@@ -17,6 +18,7 @@ use crate::search::{Findings, Found, trials};
 use crate::study::Study;
 use crate::trajectory::Trajectory;
 use crate::verdict::Judgement;
+use crate::windows;
 
 /// Samples of the bootstrap.
 const RESAMPLES: usize = 2000;
@@ -39,6 +41,24 @@ pub(crate) struct Telling<'a> {
     pub(crate) judgement: &'a Judgement,
     pub(crate) nominal: &'a [f64],
     pub(crate) settings: Settings,
+}
+
+/// Share of the force that the model lacks at a joint from which on it counts as unexplained.
+const UNEXPLAINED: f64 = 0.7;
+
+/// The joint at which most of the force that the model lacks is left, in words.
+fn least_explained(before: &Short, after: &Short) -> Option<String> {
+    let pairs = before.joints.iter().zip(&after.joints);
+    let shares = pairs.map(|(a, b)| (b.force / a.force, a, b));
+    let (share, a, b) = shares
+        .filter(|(share, ..)| share.is_finite())
+        .max_by(|x, y| x.0.total_cmp(&y.0))?;
+    (share > UNEXPLAINED).then(|| {
+        format!(
+            "at {}, {:.2} of the {:.2} {} that the model lacks over short windows are left",
+            a.joint, b.force, a.force, a.unit
+        )
+    })
 }
 
 /// Predictions of the held-out logs by one model: readings and plain residuals in units of
@@ -125,6 +145,7 @@ impl Telling<'_> {
             unexplained: gap.closed.map_or(0.0, |c| 1.0 - c),
         };
         let places = self.places(none)?;
+        let short = self.short(none, (&members, &explanation))?;
         let mut result = DiagnosisResult {
             schema: 1,
             study: self.study.name.clone(),
@@ -135,10 +156,11 @@ impl Telling<'_> {
             effects,
             verdict,
             parameters: self.parameters(&explanation),
-            checks: self.checks(none)?,
+            checks: self.checks(none, short.as_ref())?,
             next_experiment: self.next(best)?,
         };
-        result.sentence = crate::sentence::sentence(&result, &labels);
+        let rest = short.and_then(|(before, after, _)| least_explained(&before, &after));
+        result.sentence = crate::sentence::sentence(&result, &labels, rest.as_deref());
         let trace = self.trace(&nominal, &identified, &refined)?;
         let study = self.bench.parameters.len();
         Ok(Diagnosis {
@@ -341,7 +363,32 @@ impl Telling<'_> {
         )
     }
 
-    fn checks(&self, none: &Explanation) -> Result<Vec<crate::result::CheckResult>> {
+    /// What short replays tell, where the logs allow them: without any effect, with those of the
+    /// best explanation, and how long they are, s.
+    fn short(
+        &self,
+        none: &Explanation,
+        (members, best): (&[Trial<'_>], &Explanation),
+    ) -> Result<Option<(Short, Short, f64)>> {
+        let bench = self.bench;
+        let plant = &bench.machine.plant;
+        let Some(rows) = windows::rows(plant, &bench.train.logs, &bench.open) else {
+            return Ok(None);
+        };
+        let record = windows::cut(plant, &bench.train, rows);
+        let study = bench.parameters.len();
+        let of = |trials: &[Trial<'_>], e: &Explanation| {
+            forces::missing(bench, &record, trials, &e.fit.point.theta[..study])
+        };
+        let seconds = record.logs.longest();
+        Ok(Some((of(&[], none)?, of(members, best)?, seconds)))
+    }
+
+    fn checks(
+        &self,
+        none: &Explanation,
+        short: Option<&(Short, Short, f64)>,
+    ) -> Result<Vec<crate::result::CheckResult>> {
         let bench = self.bench;
         let mut all = vec![
             checks::data(&bench.train.logs, &bench.test.logs),
@@ -351,6 +398,9 @@ impl Telling<'_> {
         all.push(checks::repeatability(bench));
         if let Ok(halved) = bench.machine.halved() {
             all.push(checks::time_step(bench, none, &halved)?);
+        }
+        if let Some((before, after, seconds)) = short {
+            all.extend(checks::windows(before, after, *seconds));
         }
         Ok(all)
     }

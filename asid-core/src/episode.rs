@@ -73,6 +73,21 @@ impl Episode {
         &self.readings[i * w..(i + 1) * w]
     }
 
+    /// Some consecutive rows as a log of their own, whose start is not known unless it is this log's.
+    #[must_use]
+    pub fn part(&self, rows: std::ops::Range<usize>) -> Self {
+        let (nu, width) = (self.actuators.len(), self.width());
+        let initial = self.initial.clone().filter(|_| rows.start == 0);
+        Self {
+            time: self.time[rows.clone()].to_vec(),
+            actuators: self.actuators.clone(),
+            ctrl: self.ctrl[rows.start * nu..rows.end * nu].to_vec(),
+            channels: self.channels.clone(),
+            readings: self.readings[rows.start * width..rows.end * width].to_vec(),
+            initial,
+        }
+    }
+
     /// The latest reading while an episode is being recorded.
     pub(crate) fn reading_tail(&self, width: usize) -> &[f64] {
         &self.readings[self.readings.len() - width..]

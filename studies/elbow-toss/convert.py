@@ -9,7 +9,7 @@ import sys
 
 import numpy as np
 
-TRAIN, TEST = 40, 20  # the first 40 tosses train, the next 20 test
+TRAIN, TEST = 20, 10  # the first 20 tosses train, the next 10 test
 ROWS = 60  # of 121: the flight and the first impacts, 0.4 s
 STEP_S = 0.0068
 COLUMNS = ["pose_pos.0", "pose_pos.1", "pose_pos.2"] + [f"pose_quat.{i}" for i in range(4)] + ["hinge_angle"]

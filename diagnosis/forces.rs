@@ -1,0 +1,237 @@
+//! The force that a model lacks at each joint, measured over short windows of the logs.
+//!
+//! Over a long replay an error at one joint moves all others. Over a window, whose start is
+//! fitted, a force that the model lacks shows at its own joint: the constant force on every
+//! joint that explains most of what the window leaves is a linear fit, for which a
+//! replay a joint tells all slopes at once.
+
+use asid_core::layout::JointKind;
+use asid_core::registry::{EffectEntry, find};
+use asid_core::{EffectSpec, Result};
+use nalgebra::{DMatrix, DVector};
+
+use crate::bench::{Bench, Record, Trial};
+use crate::candidate::Candidate;
+use crate::fit::{Differences, Unknown, inverse, linearise};
+use crate::predict::Point;
+use crate::trajectory::Trajectory;
+use crate::windows::settle;
+
+/// The effect whose parameter is a constant force on a joint.
+const EFFECT: &str = "coulomb-friction";
+const FORCE: &str = "offset";
+
+/// What one model lacks at a joint in some of the windows.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Missing {
+    /// Joint.
+    pub joint: String,
+    /// Unit of the force.
+    pub unit: &'static str,
+    /// Whether the machine touches something in these windows.
+    pub touching: bool,
+    /// How many they are.
+    pub windows: usize,
+    /// Root mean square over them, off what the noise alone makes.
+    pub force: f64,
+    /// Mean of the part that acts against the motion, with its standard error.
+    pub against: [f64; 2],
+}
+
+/// What short replays of one model leave.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Short {
+    /// Root mean square of the residuals in units of the noise, over windows in which the machine
+    /// touches nothing, and over those in which it does; `None` where there are none.
+    pub gaps: [Option<f64>; 2],
+    /// What it lacks at each hinge and slide.
+    pub joints: Vec<Missing>,
+}
+
+/// The constant force at one joint.
+fn candidate(joint: &str) -> Result<Candidate> {
+    let effect = (find::<EffectEntry>(EFFECT)?.make)();
+    let spec = EffectSpec {
+        name: EFFECT.into(),
+        site: joint.into(),
+        values: Vec::new(),
+    };
+    let parameters = effect.parameters().iter();
+    Ok(Candidate {
+        starts: Vec::new(),
+        ranges: parameters.map(|p| p.range).collect(),
+        effect,
+        spec,
+    })
+}
+
+/// What a model leaves of windows, and lacks at each hinge and slide; `theta` are the study's
+/// parameters.
+///
+/// # Errors
+/// When a rollout fails.
+pub fn missing(
+    bench: &Bench,
+    windows: &Record,
+    trials: &[Trial<'_>],
+    theta: &[f64],
+) -> Result<Short> {
+    let layout = bench.layout();
+    let scalar = |k: JointKind| matches!(k, JointKind::Hinge | JointKind::Slide);
+    let joints: Vec<_> = layout.joints.iter().filter(|j| scalar(j.kind)).collect();
+    let forces = joints.iter().map(|j| candidate(&j.name));
+    let forces = forces.collect::<Result<Vec<_>>>()?;
+    // A joint that has the effect already has its force among the parameters.
+    let mut all: Vec<Trial<'_>> = trials.to_vec();
+    for force in &forces {
+        if !trials.iter().any(|(c, _)| c.label() == force.label()) {
+            let nulls = force.parameters().iter().map(|p| p.null).collect();
+            all.push((force, nulls));
+        }
+    }
+    let starts = settle(bench, windows, trials, theta)?;
+    let mut point = Point {
+        theta: theta.to_vec(),
+        starts,
+    };
+    all.iter().for_each(|(_, v)| point.theta.extend(v));
+    let mut unknowns = bench.unknowns(&all);
+    unknowns.iter_mut().for_each(|u| u.free = false);
+    let name = |f: &Candidate| format!("{}.{FORCE}", f.label());
+    let place =
+        |f: &Candidate, all: &[Unknown]| all.iter().position(|u| u.parameter.name == name(f));
+    let places: Vec<usize> = forces.iter().filter_map(|f| place(f, &unknowns)).collect();
+    places.iter().for_each(|&i| unknowns[i].free = true);
+    let mut differences = Differences::new(unknowns.len(), bench.open.len());
+    let mut predictor = bench.predictor(&all, windows)?;
+    let mut line = || {
+        linearise(
+            &mut predictor,
+            layout,
+            &unknowns,
+            &point,
+            &bench.open,
+            &mut differences,
+        )
+    };
+    // Twice for the size of the differences.
+    line()?;
+    line()?;
+    let line = line()?;
+    // Columns come in the order of the parameters; forces in that of the joints.
+    let mut order = places.clone();
+    order.sort_unstable();
+    let column = |i: usize| &line.columns[order.iter().position(|&o| o == i).unwrap_or(0)];
+    let columns: Vec<&Vec<f64>> = places.iter().map(|&i| column(i)).collect();
+    let columns: Vec<&Vec<f64>> = columns.into_iter().chain(&line.start_columns).collect();
+    let (n, m) = (columns.len(), places.len());
+    let logs = &windows.logs;
+    let shown = Trajectory::of(
+        &*bench.machine.with(&[])?,
+        &bench.machine.plant,
+        &bench.parameters,
+        logs,
+        &point,
+        bench.machine.threads,
+    )?;
+    let mut sums = vec![[Sum::default(); 2]; m];
+    let mut gaps = [(0.0, 0.0); 2];
+    let present = predictor.present();
+    for (e, path) in shown.episodes.iter().enumerate() {
+        let touching = path.contact.iter().any(|f| *f > 0.0);
+        let range = logs.offset(e)..logs.offset(e + 1);
+        for k in range.clone().filter(|&k| present[k]) {
+            let (square, count) = &mut gaps[usize::from(touching)];
+            *square += line.residuals[k].powi(2);
+            *count += 1.0;
+        }
+        let part = |i: usize| &columns[i][range.clone()];
+        let normal = DMatrix::from_fn(n, n, |i, j| dot(part(i), part(j)));
+        let covariance = inverse(&normal, 1e-12);
+        let along = DVector::from_fn(n, |i, _| dot(part(i), &line.residuals[range.clone()]));
+        let found = &covariance * along;
+        for (k, joint) in joints.iter().enumerate() {
+            // From shares of the range to the unit.
+            let [low, high] = unknowns[places[k]].parameter.range;
+            let force = -found[k] * (high - low);
+            let variance = covariance[(k, k)] * (high - low).powi(2);
+            let speeds = path.qvel.iter().skip(joint.qvel).step_by(layout.nv);
+            let motion: f64 = speeds.sum();
+            sums[k][usize::from(touching)].add(force, variance, motion);
+        }
+    }
+    let mut all = Vec::new();
+    for (joint, sums) in joints.iter().zip(sums) {
+        for (touching, sum) in [false, true].into_iter().zip(sums) {
+            if sum.count > 0.0 {
+                all.push(Missing {
+                    joint: joint.name.clone(),
+                    unit: if joint.kind == JointKind::Slide {
+                        "N"
+                    } else {
+                        "N m"
+                    },
+                    touching,
+                    windows: sum.count as usize,
+                    force: (sum.excess / sum.count).max(0.0).sqrt(),
+                    against: sum.against(),
+                });
+            }
+        }
+    }
+    let root = |(square, count): (f64, f64)| (count > 0.0).then(|| (square / count).sqrt());
+    Ok(Short {
+        gaps: gaps.map(root),
+        joints: all,
+    })
+}
+
+/// Sums over windows.
+#[derive(Clone, Copy, Debug, Default)]
+struct Sum {
+    count: f64,
+    /// Of squared forces, off their variance.
+    excess: f64,
+    /// Of forces against the motion, and of their squares.
+    against: f64,
+    square: f64,
+}
+
+impl Sum {
+    fn add(&mut self, force: f64, variance: f64, motion: f64) {
+        let against = -force * motion.signum();
+        self.count += 1.0;
+        self.excess += force * force - variance;
+        self.against += against;
+        self.square += against * against;
+    }
+
+    /// Mean against the motion, with its standard error.
+    fn against(&self) -> [f64; 2] {
+        let mean = self.against / self.count;
+        let variance = self.square / self.count - mean * mean;
+        [mean, (variance.max(0.0) / self.count).sqrt()]
+    }
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(x, y)| x * y).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_acts_against_the_motion_is_told_from_what_does_not() {
+        // 0.2 against the motion beside a constant 0.1, in as many windows this way as that.
+        let mut sum = Sum::default();
+        for motion in [1.0, -1.0, 2.0, -3.0] {
+            sum.add(0.1 - 0.2 * f64::signum(motion), 0.0, motion);
+        }
+        let [mean, error] = sum.against();
+        assert!((mean - 0.2).abs() < 1e-12, "{mean}");
+        assert!((error - 0.05).abs() < 1e-12, "{error}");
+        assert!((sum.excess / sum.count - 0.05).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,186 @@
+//! Logs cut into short windows, each from a start of its own.
+//!
+//! Where sensors read where the machine is, any row can be a start, not only the first. Over a
+//! window a model cannot drift far off, whatever it lacks and however long the log, so that
+//! its gradient can be believed everywhere; and what the machine does late in a log counts
+//! as much as what it does first. The windows' starts are nuisance parameters, as any that
+//! are not known.
+
+use asid_core::layout::JointKind;
+use asid_core::plant::Reads;
+use asid_core::{Plant, Result};
+
+use crate::bench::{Bench, Record, Stage, Trial};
+use crate::data::Logs;
+use crate::fit::{Effort, fit};
+use crate::predict::{Point, State};
+use crate::prepare::given_start;
+
+/// Share of the longest log that a window is, and its fewest rows.
+const SHARE: f64 = 0.1;
+const ROWS: usize = 10;
+
+/// Rows of a window; `None` where the logs give starts, or do not show where the machine is.
+#[must_use]
+pub fn rows(plant: &Plant, logs: &Logs, open: &[usize]) -> Option<usize> {
+    let layout = &plant.layout;
+    if open.len() < 2 * layout.nv || open.is_empty() {
+        return None;
+    }
+    let read = |j: usize, kind: &str| {
+        let joint = &layout.joints[j];
+        layout.sensors.iter().enumerate().any(|(i, s)| {
+            let of_it = match plant.sensors[i] {
+                Reads::Joint(k) => k == j,
+                Reads::Body(b) => joint.kind == JointKind::Free && plant.free_joint(b) == Some(j),
+                Reads::Other => false,
+            };
+            of_it && s.kind == kind && logs.sensors.iter().any(|l| l.name == s.name)
+        })
+    };
+    let known = (0..layout.joints.len()).all(|j| match layout.joints[j].kind {
+        JointKind::Hinge | JointKind::Slide => read(j, "jointpos"),
+        JointKind::Free => read(j, "framepos") && read(j, "framequat"),
+        JointKind::Ball => false,
+    });
+    let longest = logs.episodes.iter().map(|e| e.plan.rows()).max()?;
+    known.then(|| ((SHARE * longest as f64).ceil() as usize).max(ROWS))
+}
+
+/// The windows of some logs, with their starts as the readings say.
+#[must_use]
+pub fn cut(plant: &Plant, record: &Record, rows: usize) -> Record {
+    let logs = record.logs.windows(&plant.layout, rows);
+    let episodes = logs.episodes.iter();
+    let starts = episodes.map(|e| given_start(plant, &e.episode)).collect();
+    Record::new(logs, starts)
+}
+
+/// Starts of some windows in a model with some effects, fitted at values of the study's
+/// parameters.
+///
+/// # Errors
+/// When a rollout fails.
+pub fn settle(
+    bench: &Bench,
+    windows: &Record,
+    trials: &[Trial<'_>],
+    theta: &[f64],
+) -> Result<Vec<State>> {
+    let mut unknowns = bench.unknowns(trials);
+    unknowns.iter_mut().for_each(|u| u.free = false);
+    let mut point = Point {
+        theta: theta.to_vec(),
+        starts: windows.starts.clone(),
+    };
+    trials.iter().for_each(|(_, v)| point.theta.extend(v));
+    let mut predictor = bench.predictor(trials, windows)?;
+    let found = fit(
+        &mut predictor,
+        bench.layout(),
+        &unknowns,
+        point,
+        &bench.open,
+        Effort {
+            chord: true,
+            ..Effort::BRIEF
+        },
+    )?;
+    Ok(found.point.starts)
+}
+
+/// The windows of the training logs as a stage, and a point with their starts behind those of the
+/// training logs.
+///
+/// # Errors
+/// When a rollout fails.
+pub fn stage(bench: &Bench, rows: usize, point: &Point) -> Result<(Stage, Point)> {
+    let record = cut(&bench.machine.plant, &bench.train, rows);
+    let (n, m) = (bench.train.logs.episodes.len(), record.logs.episodes.len());
+    let mut point = point.clone();
+    if point.starts.len() != n + m {
+        point.starts.truncate(n);
+        point
+            .starts
+            .extend(settle(bench, &record, &[], &point.theta)?);
+    }
+    let stage = Stage {
+        record,
+        episodes: (n..n + m).collect(),
+        open: bench.open.clone(),
+    };
+    Ok((stage, point))
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+    use asid_core::episode::ChannelColumns;
+    use asid_core::{Episode, Scene};
+
+    const ARM: &str = r#"<mujoco><option timestep="0.01"/><worldbody>
+      <body name="a"><joint name="a" type="hinge" axis="0 1 0"/><geom size="0.1" mass="1"/>
+      <body name="b"><joint name="b" type="hinge" axis="0 1 0"/><geom size="0.1" mass="1"/></body></body>
+      </worldbody><sensor><jointpos name="qa" joint="a"/><jointpos name="qb" joint="b"/></sensor></mujoco>"#;
+
+    /// A log of `rows` rows, 10 ms apart: angle `a` turns at 2 rad/s, `b` stands at 1 rad.
+    fn logs(plant: &Plant, sensors: &[&str], rows: usize) -> Logs {
+        let names: Vec<String> = sensors.iter().map(|s| (*s).to_owned()).collect();
+        let column = |name: &String| ChannelColumns {
+            name: name.clone(),
+            len: 1,
+        };
+        let time: Vec<f64> = (0..rows).map(|k| 0.01 * k as f64).collect();
+        let reading = |t: f64| {
+            sensors
+                .iter()
+                .map(move |s| if *s == "qa" { 2.0 * t } else { 1.0 })
+        };
+        let episode = Episode {
+            readings: time.iter().flat_map(|&t| reading(t)).collect(),
+            channels: names.iter().map(column).collect(),
+            time,
+            ..Episode::default()
+        };
+        Logs::new(plant, &names, vec![("log".into(), episode)]).unwrap()
+    }
+
+    fn plant() -> Plant {
+        Plant::of(&Scene::from_xml("arm", ARM, &[]).unwrap()).unwrap()
+    }
+
+    #[test]
+    fn windows_are_cut_where_starts_are_open_and_every_joint_is_read() {
+        let plant = plant();
+        let open: Vec<usize> = (0..4).collect();
+        let both = logs(&plant, &["qa", "qb"], 300);
+        assert_eq!(rows(&plant, &both, &open), Some(30));
+        assert_eq!(rows(&plant, &both, &[]), None, "given starts");
+        assert_eq!(rows(&plant, &both, &open[..2]), None, "speeds are known");
+        let one = logs(&plant, &["qa"], 300);
+        assert_eq!(rows(&plant, &one, &open), None, "nobody reads b");
+        let short = logs(&plant, &["qa", "qb"], 40);
+        assert_eq!(rows(&plant, &short, &open), Some(10));
+    }
+
+    #[test]
+    fn windows_hold_every_row_once_and_start_as_read() {
+        let plant = plant();
+        let whole = logs(&plant, &["qa", "qb"], 34);
+        let record = cut(&plant, &Record::new(whole.clone(), Vec::new()), 10);
+        // The last four rows are less than half a window.
+        assert_eq!(record.logs.episodes.len(), 3);
+        let readings: Vec<f64> = record
+            .logs
+            .episodes
+            .iter()
+            .flat_map(|e| e.readings.clone())
+            .collect();
+        assert_eq!(readings, whole.episodes[0].readings[..60]);
+        for (k, start) in record.starts.iter().enumerate() {
+            assert!((start.qpos[0] - 0.2 * k as f64).abs() < 1e-12 && start.qpos[1] == 1.0);
+            assert!((start.qvel[0] - 2.0).abs() < 1e-9 && start.qvel[1] == 0.0);
+        }
+    }
+}
