@@ -38,7 +38,7 @@ const SETTINGS: [Setting; 7] = [
     setting("explorer", "fisher-cem", "iterations", Whole(3)),
     setting("explorer", "fisher-cem", "population", Whole(24)),
     setting("explorer", "fisher-cem", "prior_samples", Whole(1)),
-    setting("explorer", "fisher-cem", "std", Real(0.3)),
+    setting("explorer", "fisher-cem", "std", Real(0.2)),
     setting("solver", "cem", "population", Whole(24)),
     setting("solver", "cem", "belief_samples", Whole(2)),
 ];
@@ -97,7 +97,7 @@ fn spec() -> Spec {
             ..STEERING
         },
         horizon: 60,
-        explored_from: [[0.43, 0.65], [0.10, 0.19]],
+        explored_from: [[0.43, 0.65], [0.17, 0.23]],
         struck_from: [[0.55, 0.63], [0.21, 0.23]],
         goal: [0.60, -0.38],
         line: Some(-0.46),
