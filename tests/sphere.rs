@@ -160,7 +160,7 @@ fn each_patch_stops_the_ball_by_its_own_friction() {
                         "patch {number}, {engine}, {friction} m: {way:.4} m, theory {expected:.4} m"
                     );
                     assert!(
-                        error.abs() < 0.05,
+                        error.abs() < 0.02,
                         "{engine}, patch {patch}, {friction}: {error}"
                     );
                 }
