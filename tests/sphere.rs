@@ -113,6 +113,27 @@ fn rolling_friction_stops_the_ball_where_theory_says() {
     }
 }
 
+/// Patches that a ball sinks into have a ridge at each seam, which throws a slow ball back.
+#[test]
+fn a_slow_ball_rolls_over_the_seams() {
+    on_every_engine(
+        "sphere-patches",
+        "",
+        Capabilities::empty(),
+        |engine, problem| {
+            for seam in [0.056, -0.256] {
+                let way = roll_out(problem, [0.6, seam + 0.03], -0.1, &[vec![2e-4; 3]])[0];
+                let expected = theory(0.1, 2e-4);
+                println!("seam at {seam}, {engine}: {way:.4} m, theory {expected:.4} m");
+                assert!(
+                    (way / expected - 1.0).abs() < 0.1,
+                    "{engine}, {seam}: {way}"
+                );
+            }
+        },
+    );
+}
+
 #[test]
 fn each_patch_stops_the_ball_by_its_own_friction() {
     on_every_engine(
@@ -139,7 +160,7 @@ fn each_patch_stops_the_ball_by_its_own_friction() {
                         "patch {number}, {engine}, {friction} m: {way:.4} m, theory {expected:.4} m"
                     );
                     assert!(
-                        error.abs() < 0.05,
+                        error.abs() < 0.02,
                         "{engine}, patch {patch}, {friction}: {error}"
                     );
                 }

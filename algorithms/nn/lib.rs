@@ -20,6 +20,9 @@ pub mod normaliser;
 mod orthogonal;
 pub mod policy;
 pub mod ppo;
+pub mod ppo_solver;
+#[cfg(test)]
+mod ppo_solver_tests;
 mod rollout;
 pub mod surrogate;
 
@@ -29,3 +32,4 @@ pub use fisher_ppo::FisherPpo;
 pub use normaliser::Normaliser;
 pub use policy::Policy;
 pub use ppo::{PpoProgress, Trained, train};
+pub use ppo_solver::PpoSolver;

@@ -1,16 +1,13 @@
 //! The task action by the cross-entropy method: minimise the expected cost over
 //! samples of the belief. With the prior as the belief this is domain randomisation.
 
-use asid_core::problem::Batch;
 use asid_core::registry;
 use asid_core::rng::Rng;
-use asid_core::signal::SignalSet;
 use asid_core::solve::{Solved, TaskPolicy, TaskSolver, Trial};
-use asid_core::{Control, Error, Posterior, Problem, Recording, Result, Rollout};
-use rand::Rng as _;
-use rand_distr::{Distribution, StandardNormal};
+use asid_core::{Error, Posterior, Problem, Result};
 use serde::{Deserialize, Serialize};
 
+use super::Attempts;
 use crate::optimise::{Cem, CemSettings};
 
 /// Settings of the solver.
@@ -77,7 +74,8 @@ impl TaskSolver for CemSolver {
     fn solve<'a>(&'a self, problem: &'a Problem<'a>, belief: &Posterior) -> Result<Solved<'a>> {
         let protocol = problem.task.downstream();
         let mut rng = problem.streams.stream("solve");
-        let mut attempts = Attempts::new(problem, belief, self.population, self.belief_samples)?;
+        let samples = self.belief_samples;
+        let mut attempts = Attempts::new(problem, belief, samples * self.population.max(2))?;
         let low: Vec<f64> = protocol.action.iter().map(|c| c.range[0]).collect();
         let high: Vec<f64> = protocol.action.iter().map(|c| c.range[1]).collect();
         let center: Vec<f64> = protocol.action.iter().map(|c| c.center()).collect();
@@ -90,7 +88,9 @@ impl TaskSolver for CemSolver {
         problem.progress.begin("solve", self.iterations as u64);
         for iteration in 0..self.iterations {
             let actions = cem.ask(self.population, &mut rng);
-            let costs = attempts.costs(&actions, &mut rng)?;
+            // Fresh for each refit, the same for all its actions.
+            let situations = attempts.draw(samples, &mut rng)?;
+            let costs = attempts.mean_costs(&situations, &actions)?;
             pool.extend(actions.iter().cloned().zip(costs.iter().copied()));
             pool.sort_by(|a, b| a.1.total_cmp(&b.1));
             pool.truncate(self.population);
@@ -103,7 +103,7 @@ impl TaskSolver for CemSolver {
             }));
             problem.progress.advance(1);
         }
-        let action = settled(&trials, &mut attempts, &mut rng)?;
+        let action = settled(&trials, &mut attempts, samples, &mut rng)?;
         problem.progress.end();
         Ok(Solved {
             policy: Box::new(FixedAction(action)),
@@ -117,7 +117,12 @@ const TIE: f64 = 0.02;
 
 /// The middle of the best actions: where a whole stretch of actions does equally well, its
 /// middle is the safest. Should that middle do worse than the best trial, the best trial it is.
-fn settled(trials: &[Trial], attempts: &mut Attempts<'_>, rng: &mut Rng) -> Result<Vec<f64>> {
+fn settled(
+    trials: &[Trial],
+    attempts: &mut Attempts<'_>,
+    samples: usize,
+    rng: &mut Rng,
+) -> Result<Vec<f64>> {
     let mut order: Vec<&Trial> = trials.iter().filter(|t| t.cost.is_finite()).collect();
     order.sort_by(|a, b| a.cost.total_cmp(&b.cost));
     let (Some(best), Some(median)) = (order.first(), order.get(order.len() / 2)) else {
@@ -138,109 +143,11 @@ fn settled(trials: &[Trial], attempts: &mut Attempts<'_>, rng: &mut Rng) -> Resu
             0.5 * (low + high)
         })
         .collect();
-    let tried = attempts.costs(&[middle.clone(), best.action.clone()], rng)?;
+    let situations = attempts.draw(samples, rng)?;
+    let tried = attempts.mean_costs(&situations, &[middle.clone(), best.action.clone()])?;
     Ok(if tried[0] <= tried[1].max(limit) {
         middle
     } else {
         best.action.clone()
     })
-}
-
-/// Attempts at the task in the simulator, over samples of the belief.
-struct Attempts<'a> {
-    problem: &'a Problem<'a>,
-    belief: &'a Posterior,
-    samples: usize,
-    batch: Batch,
-    signals: SignalSet,
-    tracked: Recording,
-    recording: Recording,
-    substeps: usize,
-}
-
-impl<'a> Attempts<'a> {
-    fn new(
-        problem: &'a Problem<'a>,
-        belief: &'a Posterior,
-        population: usize,
-        samples: usize,
-    ) -> Result<Self> {
-        let protocol = problem.task.downstream();
-        let layout = problem.model.layout();
-        let names: Vec<&str> = problem.signals.iter().map(|s| &*s.sensor).collect();
-        Ok(Self {
-            batch: problem.batch(samples * population.max(2))?,
-            signals: SignalSet::new(layout, problem.signals)?,
-            tracked: layout.recording(&names)?,
-            recording: layout.recording(&protocol.channels)?,
-            substeps: problem.substeps(protocol.frame_period)?,
-            problem,
-            belief,
-            samples,
-        })
-    }
-
-    /// Mean cost of each action over fresh samples of the unknowns, of the start pose and of
-    /// what the trackers show of it; the same for all actions.
-    fn costs(&mut self, actions: &[Vec<f64>], rng: &mut Rng) -> Result<Vec<f64>> {
-        let (problem, samples) = (self.problem, self.samples);
-        let protocol = problem.task.downstream();
-        let n = samples * actions.len();
-        let sims: Vec<usize> = (0..n).collect();
-        let theta: Vec<f64> = self.belief.resample(samples, rng).concat();
-        let starts: Vec<f64> = (0..samples)
-            .flat_map(|_| {
-                protocol
-                    .start
-                    .iter()
-                    .map(|c| c.at(rng.random()))
-                    .collect::<Vec<_>>()
-            })
-            .collect();
-        self.batch
-            .set_parameters(&sims, &theta.repeat(actions.len()))?;
-        self.batch
-            .place(problem.task, &sims, &starts.repeat(actions.len()))?;
-        let width = self.tracked.width();
-        let mut seen = vec![0.0; samples * width];
-        self.batch
-            .simulator
-            .read(&sims[..samples], &self.tracked, &mut seen)?;
-        let believed: Vec<Vec<f64>> = seen
-            .chunks_exact_mut(width)
-            .map(|reading| {
-                self.signals
-                    .add_noise(reading, || StandardNormal.sample(rng));
-                problem.task.locate(reading)
-            })
-            .collect();
-        let nu = problem.model.layout().nu();
-        let mut control = Vec::with_capacity(n * protocol.frames * nu);
-        for action in actions {
-            for start in &believed {
-                control.extend(problem.task.attempt(start, action)?);
-            }
-        }
-        let width = self.recording.width();
-        let mut readings = vec![0.0; n * protocol.frames * width];
-        let before = self.batch.simulator.steps_taken();
-        let rollout = Rollout::new(
-            &sims,
-            protocol.frames,
-            self.substeps,
-            Control::PerSimulation(&control),
-            &self.recording,
-        );
-        self.batch.simulator.rollout(&rollout, &mut readings)?;
-        problem.count_physics(&self.batch, before);
-        Ok(readings
-            .chunks_exact(samples * protocol.frames * width)
-            .map(|tried| {
-                let costs = tried
-                    .chunks_exact(protocol.frames * width)
-                    .map(|r| problem.task.outcome(r).cost);
-                costs.sum::<f64>() / samples as f64
-            })
-            .collect())
-    }
 }

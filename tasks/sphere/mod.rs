@@ -80,7 +80,7 @@ pub struct Spec {
     pub settings: &'static [Setting],
 }
 
-/// A whole number among an algorithm's settings.
+/// A number among an algorithm's settings.
 pub struct Setting {
     /// `explorer`, `identifier` or `solver`.
     pub section: &'static str,
@@ -89,7 +89,16 @@ pub struct Setting {
     /// Name of the setting.
     pub key: &'static str,
     /// Its value.
-    pub value: i64,
+    pub value: Number,
+}
+
+/// Value of a setting.
+#[derive(Clone, Copy, Debug)]
+pub enum Number {
+    /// Of something that is counted.
+    Whole(i64),
+    /// Of something that is measured.
+    Real(f64),
 }
 
 /// A task of the family.
@@ -185,7 +194,13 @@ impl Task for Sphere {
     fn settings(&self, section: &str, algorithm: &str) -> Settings {
         let all = self.spec.settings.iter();
         all.filter(|s| s.section == section && s.algorithm == algorithm)
-            .map(|s| (s.key.to_owned(), s.value.into()))
+            .map(|s| {
+                let value = match s.value {
+                    Number::Whole(n) => n.into(),
+                    Number::Real(x) => x.into(),
+                };
+                (s.key.to_owned(), value)
+            })
             .collect()
     }
 

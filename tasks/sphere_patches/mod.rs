@@ -6,6 +6,7 @@
 use asid_core::parameter::{Parameter, Scale};
 use asid_core::task::Condition;
 
+use crate::sphere::Number::{self, Real, Whole};
 use crate::sphere::{Area, STEERING, Setting, Spec, Sphere, rectangle, target, walls};
 use crate::steering::Steering;
 
@@ -32,20 +33,21 @@ pub const PATCHES: [Area; 3] = [
 /// deep, for few plans carry the ball into every patch: fewer segments, more plans, each tried at one
 /// value of the unknowns. So is that for a strike: slow balls stop at a seam of two patches, whatever
 /// their speed, and a search that begins with few strikes can settle there.
-const SETTINGS: [Setting; 6] = [
-    setting("explorer", "fisher-cem", "hold", 15),
-    setting("explorer", "fisher-cem", "iterations", 3),
-    setting("explorer", "fisher-cem", "population", 24),
-    setting("explorer", "fisher-cem", "prior_samples", 1),
-    setting("solver", "cem", "population", 24),
-    setting("solver", "cem", "belief_samples", 2),
+const SETTINGS: [Setting; 7] = [
+    setting("explorer", "fisher-cem", "hold", Whole(15)),
+    setting("explorer", "fisher-cem", "iterations", Whole(3)),
+    setting("explorer", "fisher-cem", "population", Whole(24)),
+    setting("explorer", "fisher-cem", "prior_samples", Whole(1)),
+    setting("explorer", "fisher-cem", "std", Real(0.2)),
+    setting("solver", "cem", "population", Whole(24)),
+    setting("solver", "cem", "belief_samples", Whole(2)),
 ];
 
 const fn setting(
     section: &'static str,
     algorithm: &'static str,
     key: &'static str,
-    value: i64,
+    value: Number,
 ) -> Setting {
     Setting {
         section,
@@ -95,7 +97,7 @@ fn spec() -> Spec {
             ..STEERING
         },
         horizon: 60,
-        explored_from: [[0.43, 0.65], [0.10, 0.19]],
+        explored_from: [[0.43, 0.65], [0.17, 0.23]],
         struck_from: [[0.55, 0.63], [0.21, 0.23]],
         goal: [0.60, -0.38],
         line: Some(-0.46),
