@@ -244,7 +244,7 @@ pub fn windows(before: &Short, after: &Short, seconds: f64) -> Vec<CheckResult> 
     };
     let gaps: Vec<String> = [false, true].into_iter().filter_map(gap).collect();
     let replays = format!(
-        "replays of windows of {seconds:.2} s, each from a start of its own, leave {}",
+        "the median replay of a window of {seconds:.2} s, each from a start of its own, leaves {}",
         gaps.join(" and ")
     );
     let mut all = vec![check("windows", true, replays)];

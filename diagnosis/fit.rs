@@ -460,6 +460,10 @@ pub fn fit(
     if free.is_empty() && open.is_empty() {
         return Ok(finish(unknowns, free, point, line, &bounds));
     }
+    if effort.chord {
+        line = linearise(predictor, layout, unknowns, &point, open, &mut differences)?;
+        differences.kept = Some(line.start_columns.clone());
+    }
     // The first differences are a guess; they are right once they hardly change.
     for _ in 0..4 {
         let before = differences.clone();
@@ -470,9 +474,6 @@ pub fn fit(
         {
             break;
         }
-    }
-    if effort.chord {
-        differences.kept = Some(line.start_columns.clone());
     }
     for _ in 0..effort.iterations {
         let mut accepted = None;

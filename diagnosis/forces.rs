@@ -13,6 +13,7 @@ use nalgebra::{DMatrix, DVector};
 use crate::bench::{Bench, Record, Trial};
 use crate::candidate::Candidate;
 use crate::fit::{Differences, Unknown, inverse, linearise};
+use crate::noise::{NORMAL, median};
 use crate::predict::Point;
 use crate::trajectory::Trajectory;
 use crate::windows::settle;
@@ -34,15 +35,16 @@ pub struct Missing {
     pub windows: usize,
     /// Root mean square over them, off what the noise alone makes.
     pub force: f64,
-    /// Mean of the part that acts against the motion, with its standard error.
+    /// Median of what acts against the motion, with its standard error: a window in which the machine
+    /// meets something that the model does not is no measure of it.
     pub against: [f64; 2],
 }
 
 /// What short replays of one model leave.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Short {
-    /// Root mean square of the residuals in units of the noise, over windows in which the machine
-    /// touches nothing, and over those in which it does; `None` where there are none.
+    /// Root mean square of the residuals of a window in units of the noise, the median of those in
+    /// which the machine touches nothing, and of those in which it does; `None` where there are none.
     pub gaps: [Option<f64>; 2],
     /// What it lacks at each hinge and slide.
     pub joints: Vec<Missing>,
@@ -134,17 +136,16 @@ pub fn missing(
         &point,
         bench.machine.threads,
     )?;
-    let mut sums = vec![[Sum::default(); 2]; m];
-    let mut gaps = [(0.0, 0.0); 2];
+    let mut sums = vec![<[Sum; 2]>::default(); m];
+    let mut gaps = [Vec::new(), Vec::new()];
     let present = predictor.present();
     for (e, path) in shown.episodes.iter().enumerate() {
         let touching = path.contact.iter().any(|f| *f > 0.0);
         let range = logs.offset(e)..logs.offset(e + 1);
-        for k in range.clone().filter(|&k| present[k]) {
-            let (square, count) = &mut gaps[usize::from(touching)];
-            *square += line.residuals[k].powi(2);
-            *count += 1.0;
-        }
+        let readings = range.clone().filter(|&k| present[k]);
+        let squares: Vec<f64> = readings.map(|k| line.residuals[k].powi(2)).collect();
+        let mean = squares.iter().sum::<f64>() / squares.len().max(1) as f64;
+        gaps[usize::from(touching)].push(mean.sqrt());
         let part = |i: usize| &columns[i][range.clone()];
         let normal = DMatrix::from_fn(n, n, |i, j| dot(part(i), part(j)));
         let covariance = inverse(&normal, 1e-12);
@@ -163,7 +164,8 @@ pub fn missing(
     let mut all = Vec::new();
     for (joint, sums) in joints.iter().zip(sums) {
         for (touching, sum) in [false, true].into_iter().zip(sums) {
-            if sum.count > 0.0 {
+            let windows = sum.against.len();
+            if windows > 0 {
                 all.push(Missing {
                     joint: joint.name.clone(),
                     unit: if joint.kind == JointKind::Slide {
@@ -172,45 +174,43 @@ pub fn missing(
                         "N m"
                     },
                     touching,
-                    windows: sum.count as usize,
-                    force: (sum.excess / sum.count).max(0.0).sqrt(),
+                    windows,
+                    force: (sum.excess / windows as f64).max(0.0).sqrt(),
                     against: sum.against(),
                 });
             }
         }
     }
-    let root = |(square, count): (f64, f64)| (count > 0.0).then(|| (square / count).sqrt());
     Ok(Short {
-        gaps: gaps.map(root),
+        gaps: gaps.map(|mut g| median(&mut g)),
         joints: all,
     })
 }
 
-/// Sums over windows.
-#[derive(Clone, Copy, Debug, Default)]
+/// What windows add up to.
+#[derive(Clone, Debug, Default)]
 struct Sum {
-    count: f64,
-    /// Of squared forces, off their variance.
+    /// Squared forces, off their variance.
     excess: f64,
-    /// Of forces against the motion, and of their squares.
-    against: f64,
-    square: f64,
+    /// Forces against the motion.
+    against: Vec<f64>,
 }
 
 impl Sum {
     fn add(&mut self, force: f64, variance: f64, motion: f64) {
-        let against = -force * motion.signum();
-        self.count += 1.0;
         self.excess += force * force - variance;
-        self.against += against;
-        self.square += against * against;
+        self.against.push(-force * motion.signum());
     }
 
-    /// Mean against the motion, with its standard error.
+    /// Median against the motion, with its standard error.
     fn against(&self) -> [f64; 2] {
-        let mean = self.against / self.count;
-        let variance = self.square / self.count - mean * mean;
-        [mean, (variance.max(0.0) / self.count).sqrt()]
+        let middle = median(&mut self.against.clone()).unwrap_or(0.0);
+        let mut off: Vec<f64> = self.against.iter().map(|x| (x - middle).abs()).collect();
+        let deviation = NORMAL * median(&mut off).unwrap_or(0.0);
+        // A median is this much less certain than a mean.
+        let loss = std::f64::consts::FRAC_PI_2.sqrt();
+        let n = self.against.len().max(1) as f64;
+        [middle, loss * deviation / n.sqrt()]
     }
 }
 
@@ -223,15 +223,22 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_acts_against_the_motion_is_told_from_what_does_not() {
-        // 0.2 against the motion beside a constant 0.1, in as many windows this way as that.
+    fn what_acts_against_the_motion_is_told_from_what_does_not_and_from_a_blow() {
+        // 0.2 against the motion beside a constant 0.01, in as many windows this way as that.
         let mut sum = Sum::default();
-        for motion in [1.0, -1.0, 2.0, -3.0] {
-            sum.add(0.1 - 0.2 * f64::signum(motion), 0.0, motion);
+        for k in 0..100 {
+            let motion = if k % 2 == 0 { 1.0 + f64::from(k) } else { -3.0 };
+            sum.add(0.01 - 0.2 * f64::signum(motion), 0.0, motion);
         }
-        let [mean, error] = sum.against();
-        assert!((mean - 0.2).abs() < 1e-12, "{mean}");
-        assert!((error - 0.05).abs() < 1e-12, "{error}");
-        assert!((sum.excess / sum.count - 0.05).abs() < 1e-12);
+        let excess = sum.excess / 100.0;
+        assert!(
+            (excess - (0.2 * 0.2 + 0.01 * 0.01)).abs() < 1e-12,
+            "{excess}"
+        );
+        sum.add(50.0, 0.0, 1.0);
+        let [middle, error] = sum.against();
+        assert!((middle - 0.2).abs() < 0.0101, "{middle}");
+        // All lie within 0.02 of the median.
+        assert!(error < 1.2534 * 1.4827 * 0.02 / 10.0 + 1e-12, "{error}");
     }
 }

@@ -8,7 +8,7 @@
 use crate::data::Logs;
 
 /// Ratio of a normal variable's deviation to the median of its magnitude.
-const NORMAL: f64 = 1.482_602_218_505_602;
+pub const NORMAL: f64 = 1.482_602_218_505_602;
 
 /// Estimates the noise of each sensor from residuals `logged - predicted` in the sensors'
 /// units (`rows x entries`, NaN where missing), one array an episode. A sensor whose

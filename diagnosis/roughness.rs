@@ -118,12 +118,12 @@ impl Spread {
     /// Draws shifts of an episode's start: coordinates and by how much.
     fn draw(&self, episode: usize, rng: &mut asid_core::rng::Rng) -> Vec<(usize, f64)> {
         // Uniform with the deviation asked for.
-        let mut unit = || -> f64 { 3.0_f64.sqrt() * rng.random_range(-1.0..1.0) };
+        let mut draw = |by: f64| -> f64 { by * rng.random_range(-1.0..1.0) * 3.0_f64.sqrt() };
         match self {
-            Self::Known(n) => (0..*n).map(|c| (c, UNSEEN * unit())).collect(),
+            Self::Known(n) => (0..*n).map(|c| (c, draw(UNSEEN))).collect(),
             Self::Open(coordinates, roots) => {
-                let normal = DVector::from_fn(coordinates.len(), |_, _| unit());
-                let shift = &roots[episode] * normal;
+                let unit = DVector::from_fn(coordinates.len(), |_, _| draw(1.0));
+                let shift = &roots[episode] * unit;
                 coordinates
                     .iter()
                     .copied()
