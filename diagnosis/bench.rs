@@ -143,11 +143,16 @@ pub struct Stage {
 }
 
 impl Stage {
+    /// Whether it is windows and not episodes from their start on.
+    #[must_use]
+    pub fn is_windows(&self, bench: &Bench) -> bool {
+        self.episodes.iter().any(|&e| e >= bench.train.starts.len())
+    }
+
     /// How finely a fit to it searches.
     fn effort(&self, bench: &Bench, effort: Effort) -> Effort {
-        let windows = self.episodes.iter().any(|&e| e >= bench.train.starts.len());
         Effort {
-            chord: windows,
+            chord: self.is_windows(bench),
             ..effort
         }
     }

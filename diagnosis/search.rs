@@ -53,6 +53,9 @@ pub struct Found {
 pub struct Findings {
     /// Without any effect, at the last stage.
     pub none: Explanation,
+    /// What it leaves of short windows, root mean square beyond the noise; `None` where the logs do
+    /// not allow them.
+    pub short: Option<f64>,
     /// Sets of effects that were followed to the last stage, lowest cost first.
     pub found: Vec<Found>,
     /// Candidates with the cost that screening on the first stage reached, best first.
@@ -128,6 +131,9 @@ impl Search<'_> {
         }
         Ok(Findings {
             none: none[last].clone(),
+            short: self.bench.stages[0]
+                .is_windows(self.bench)
+                .then(|| excess(none[0].fit.cost / self.bench.readings(0))),
             found: all,
             screened,
         })

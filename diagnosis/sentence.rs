@@ -77,6 +77,9 @@ pub fn sentence(result: &DiagnosisResult, labels: &[String], rest: Option<&str>)
             closed(),
             rest.map_or_else(String::new, |r| format!(": {r}"))
         ),
+        Kind::Unknown if labels.is_empty() => format!(
+            "{place}nothing in the catalogue explains it, and no part of it that long replays tell (see the check `repeatability`)."
+        ),
         Kind::Unknown => format!(
             "{place}nothing in the catalogue explains it: {} comes nearest, with {}.",
             if labels.is_empty() {

@@ -235,10 +235,12 @@ pub fn judge(bench: &Bench, findings: &Findings, candidates: usize, scatter: f64
     let sum: f64 = all.iter().map(|h| h.probability).sum();
     let left = gap(&all[best]);
     let rest = (left / gap(&all[0]).max(1e-9)).powi(2).min(1.0);
+    let sigmoid = |x: f64| 1.0 / (1.0 + (-x).exp());
     let unknown = if best == 0 {
-        0.02
+        // Where long replays tell nothing, short ones may still leave a gap.
+        let short = findings.short.unwrap_or(0.0);
+        sigmoid((short - NEGLIGIBLE) / 0.3).clamp(0.02, 0.999)
     } else {
-        let sigmoid = |x: f64| 1.0 / (1.0 + (-x).exp());
         let share = sigmoid((rest / REST).ln() / SHARPNESS + 0.5 * (left / USUAL).max(1e-9).ln());
         (share * sigmoid((left - NEGLIGIBLE) / 0.3)).clamp(0.001, 0.999)
     };

@@ -73,3 +73,27 @@ fn a_servo_lacks_friction_first_of_all() {
         found.trace.ladder
     );
 }
+
+/// Published friction of this machine's elbow is 0.12 N m (Wiebe et al., Open source dual-purpose acrobot
+/// and pendubot platform, 2023). Long replays part whatever the model, so that fits begin with windows.
+#[test]
+fn a_double_pendulum_lacks_friction_at_its_elbow() {
+    let found = singles(
+        "double-pendulum",
+        &[
+            "train_a_1s.csv",
+            "train_b_4s.csv",
+            "train_c_1s.csv",
+            "train_d_7s.csv",
+        ],
+        &["test_e_4s.csv", "test_f_1s.csv"],
+    );
+    let (best, gap) = &found.trace.ladder[0];
+    let identified = found.result.gap.identified;
+    assert!(best.contains("friction@elbow"), "{:?}", found.trace.ladder);
+    assert!(
+        *gap < 0.5 * identified,
+        "{gap} of {identified}: {:?}",
+        found.trace.ladder
+    );
+}

@@ -13,10 +13,12 @@ use asid::core::progress::Silent;
 use asid::core::registry::{BackendEntry, all};
 use asid::core::{Backend, Capabilities};
 use asid::diagnosis::diagnose::{Diagnosis, Settings, Work, diagnose};
+use asid::diagnosis::forces;
 use asid::diagnosis::machine::Machine;
 use asid::diagnosis::result::Kind;
 use asid::diagnosis::score::{Answer, Label, Score};
 use asid::diagnosis::study::Study;
+use asid::diagnosis::windows;
 use world::{MASS, Truth, write_study};
 
 /// The engine that diagnoses by default: in double precision where one is built in.
@@ -99,6 +101,63 @@ fn faults_are_named_and_closed_and_shuffled_labels_score_nothing() {
     assert_eq!(shuffled.right, 0);
     assert!(shuffled.log_score < shuffled.base_log_score);
     assert!(shuffled.brier > 0.5, "{}", shuffled.brier);
+}
+
+/// Takes the states at the start out of the logs of a folder.
+fn forget_starts(folder: &Path) {
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_some_and(|e| e == "csv") {
+            let text = std::fs::read_to_string(&path).unwrap();
+            let rows = text.lines().map(|line| {
+                let cells: Vec<&str> = line.split(',').collect();
+                cells[..cells.len() - 2].join(",") + "\n"
+            });
+            std::fs::write(&path, rows.collect::<String>()).unwrap();
+        }
+    }
+}
+
+#[test]
+fn where_starts_are_open_friction_is_named_and_its_force_is_read_off_short_windows() {
+    let folder = tempfile::tempdir().unwrap();
+    write_study(folder.path(), Truth::Coulomb(1.2));
+    forget_starts(folder.path());
+    let (diagnosis, work) = run_on(folder.path(), &[]);
+    let r = &diagnosis.result;
+    // Whether it also falls from a breakaway value, starts that are open do not tell.
+    let dry = ["coulomb-friction@rail", "stribeck-friction@rail"];
+    let [named] = &r.verdict.effects[..] else {
+        panic!("{}", r.sentence)
+    };
+    assert!(dry.contains(&&**named), "{}", r.sentence);
+    let bench = &work.bench;
+    let rows = windows::rows(&bench.machine.plant, &bench.train.logs, &bench.open).unwrap();
+    let record = windows::cut(&bench.machine.plant, &bench.train, rows);
+    // The mass is told apart from friction only together with it.
+    let theta = [diagnosis.values[0]];
+    let lacks = forces::missing(bench, &record, &[], &theta).unwrap();
+    let [rail] = &lacks.joints[..] else {
+        panic!("{lacks:?}")
+    };
+    // In a window that holds a reversal the friction is partly one and partly the other.
+    let [against, error] = rail.against;
+    assert!((0.7..1.3).contains(&against), "{rail:?}");
+    assert!(error < 0.15 * against, "{rail:?}");
+    assert!(!rail.touching && rail.unit == "N");
+    let singles = work.findings.found.iter().map(|f| &f.explanation.effects);
+    let mut singles = singles.filter(|e| e.len() == 1 && e[0].label() == *named);
+    let found = &singles.next().unwrap()[0];
+    let values: Vec<f64> = found.values.iter().map(|(_, v)| *v).collect();
+    let candidate = work.candidates.iter().find(|c| c.label() == found.label());
+    let trials = [(candidate.unwrap(), values)];
+    let left = forces::missing(bench, &record, &trials, &theta).unwrap();
+    assert!(left.joints[0].force < 0.2 * rail.force, "{left:?}");
+    let [Some(before), Some(after)] = [lacks.gaps[0], left.gaps[0]] else {
+        panic!("{lacks:?} {left:?}")
+    };
+    assert!(after < 2.0 && before > 2.0 * after, "{before} {after}");
+    assert!(lacks.gaps[1].is_none(), "nothing can be touched: {lacks:?}");
 }
 
 #[test]
