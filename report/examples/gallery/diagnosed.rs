@@ -148,6 +148,28 @@ pub fn patch() -> Diagnosis {
             ("contact-restitution@board", "rapier cannot set it"),
             ("inertia@puck", "cannot be joined with the study's geom/puck/mass"),
         ]),
+        real_world: Some(RealWorld {
+            task: "shuffleboard".into(),
+            condition: "far".into(),
+            metric: "zone_error_m".into(),
+            unit: "m".into(),
+            rule: "at rest in the far zone".into(),
+            effects: vec!["friction-patch@board:ratio=0.35,place=0.75".into()],
+            truth: vec![("sliding_friction".into(), 0.02)],
+            trials: [
+                ("a real world without the effect", "the model as given", 0.06, 3),
+                ("the real world", "the model as given", 0.4, 0),
+                ("the real world", "the refined model", 0.08, 3),
+            ]
+            .map(|(world, simulator, error, successes)| TaskTrial {
+                world: world.into(),
+                simulator: simulator.into(),
+                values: vec![0.5 * error, error, error, 1.5 * error],
+                successes,
+            })
+            .into(),
+            ..RealWorld::default()
+        }),
         engine: "rapier 0.36.1".into(),
         command: "asid diagnose studies/puck-on-board --backend rapier --seed 0 --out diagnoses/puck".into(),
         versions: texts(&[("asid", "0.1.0"), ("seed", "0"), ("git", "6c5e301")]),
