@@ -188,9 +188,8 @@ const FIRST: f64 = 1e-4;
 /// Starts of a candidate that are kept.
 const KEPT: usize = 3;
 
-/// Multiples of a proposed step that are tried. Longer ones too: a delay of several times what the
-/// commands change in moves a reading by less than the first of it promises.
-const LENGTHS: [f64; 5] = [4.0, 2.0, 1.0, 0.5, 0.2];
+/// Shares of a proposed step that are tried.
+const LENGTHS: [f64; 3] = [1.0, 0.5, 0.2];
 
 /// A step that the linear fit proposes for a candidate.
 #[derive(Clone, Debug)]
@@ -246,12 +245,6 @@ pub fn propose(
         for (column, w) in projected.iter().zip(&weights) {
             left.iter_mut().zip(column).for_each(|(r, c)| *r -= w * c);
         }
-        // Without slopes the start itself is the step, and only what makes room for it moves.
-        let lengths = if slopes.is_empty() {
-            &LENGTHS[2..]
-        } else {
-            &LENGTHS[..]
-        };
         let line = Line {
             start,
             slopes: &slopes,
@@ -260,7 +253,7 @@ pub fn propose(
             moves,
         };
         let step = |length: &f64| base.step(bench.layout(), &own, &line, *length);
-        let mut points: Vec<Point> = lengths.iter().map(step).collect();
+        let mut points: Vec<Point> = LENGTHS.iter().map(step).collect();
         if let (true, &[slope]) = (bench.is_rough(), &slopes[..]) {
             points.extend(along(&own[slope].parameter, start[slope]).map(|value| {
                 let mut values = start.clone();

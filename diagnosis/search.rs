@@ -69,6 +69,9 @@ pub const NEGLIGIBLE: f64 = 2.0;
 /// Growth of a gap from one stage to the next from which on it counts as another gap.
 const GROWN: f64 = 3.0;
 
+/// How many times as many single effects are followed where fits begin with short windows.
+const AFTER_WINDOWS: usize = 3;
+
 /// Multiple of the best cost up to which a fit is worth its end.
 const NEAR_BEST: f64 = 10.0;
 
@@ -178,7 +181,12 @@ impl Search<'_> {
         // The best, and some of the singles whatever their place: on a short stage a pair hides
         // which of its two acts over the whole.
         let quota = self.quota(stage);
-        let alone = self.breadth.singles;
+        // Short windows rank effects by what they do at once, long replays by what adds up.
+        let alone = if self.bench.stages[0].is_windows(self.bench) {
+            AFTER_WINDOWS * self.breadth.singles
+        } else {
+            self.breadth.singles
+        };
         let (mut place, mut singles) = (0, 0);
         all.retain(|f| {
             place += 1;
