@@ -14,7 +14,7 @@ use crate::bench::{Bench, Record, Stage, Trial};
 use crate::data::Logs;
 use crate::fit::{Effort, fit};
 use crate::predict::{Point, State};
-use crate::prepare::given_start;
+use crate::starts::given_start;
 
 /// Share of the longest log that a window is, and its fewest rows.
 const SHARE: f64 = 0.1;

@@ -1,0 +1,170 @@
+//! Where episodes begin: as their logs say, as their first readings show, and what neither tells.
+
+use asid_core::layout::JointKind;
+use asid_core::plant::Reads;
+use asid_core::problem::home;
+use asid_core::signal::{rotation_difference, unit_quaternion};
+use asid_core::{Layout, Plant};
+
+use crate::predict::State;
+use crate::study::Study;
+
+/// The start of an episode as the log has it; the rest as its first readings say, or from
+/// the scene's own start.
+pub fn given_start(plant: &Plant, episode: &asid_core::Episode) -> State {
+    let layout = &plant.layout;
+    let (mut qpos, mut qvel) = home(layout);
+    first_readings(plant, episode, &mut qpos, &mut qvel);
+    if let Some(initial) = &episode.initial {
+        for (x, given) in qpos.iter_mut().zip(&initial.qpos) {
+            if given.is_finite() {
+                *x = *given;
+            }
+        }
+        // Some components given and others read are no unit quaternion yet.
+        for joint in &layout.joints {
+            let first = match joint.kind {
+                JointKind::Free => joint.qpos + 3,
+                JointKind::Ball => joint.qpos,
+                JointKind::Hinge | JointKind::Slide => continue,
+            };
+            let turn = unit_quaternion(&qpos[first..first + 4]);
+            qpos[first..first + 4].copy_from_slice(&[turn.w, turn.i, turn.j, turn.k]);
+        }
+        for (x, given) in qvel.iter_mut().zip(&initial.qvel) {
+            if given.is_finite() {
+                *x = *given;
+            }
+        }
+    }
+    State { qpos, qvel }
+}
+
+/// Rows that a velocity is first taken over.
+const FIRST_ROWS: usize = 6;
+
+/// Sets what sensors of joints and of free bodies say of the start.
+fn first_readings(plant: &Plant, episode: &asid_core::Episode, qpos: &mut [f64], qvel: &mut [f64]) {
+    let layout = &plant.layout;
+    // First present row of a sensor and one a little later, with the time between.
+    let seen = |sensor: &str| -> Option<(Vec<f64>, Vec<f64>, f64)> {
+        let range = episode.channel(sensor)?;
+        let whole = |k: &usize| {
+            episode.reading(*k)[range.clone()]
+                .iter()
+                .all(|x| x.is_finite())
+        };
+        let mut rows = (0..episode.rows()).filter(whole);
+        let first = rows.next()?;
+        let later = rows.take(FIRST_ROWS).last().unwrap_or(first);
+        let get = |k: usize| episode.reading(k)[range.clone()].to_vec();
+        Some((
+            get(first),
+            get(later),
+            episode.time[later] - episode.time[first],
+        ))
+    };
+    for (i, sensor) in layout.sensors.iter().enumerate() {
+        let Some((first, later, dt)) = seen(&sensor.name) else {
+            continue;
+        };
+        let rate = |k: usize| {
+            if dt > 0.0 {
+                (later[k] - first[k]) / dt
+            } else {
+                0.0
+            }
+        };
+        match plant.sensors[i] {
+            Reads::Joint(j) => {
+                let joint = &layout.joints[j];
+                match &*sensor.kind {
+                    "jointpos" => {
+                        qpos[joint.qpos] = first[0];
+                        qvel[joint.qvel] = rate(0);
+                    }
+                    "jointvel" => qvel[joint.qvel] = first[0],
+                    _ => {}
+                }
+            }
+            Reads::Body(b) => {
+                let Some(joint) = plant.free_joint(b).map(|j| &layout.joints[j]) else {
+                    continue;
+                };
+                match &*sensor.kind {
+                    "framepos" => {
+                        qpos[joint.qpos..joint.qpos + 3].copy_from_slice(&first);
+                        for k in 0..3 {
+                            qvel[joint.qvel + k] = rate(k);
+                        }
+                    }
+                    "framequat" => {
+                        qpos[joint.qpos + 3..joint.qpos + 7].copy_from_slice(&first);
+                        let turn = rotation_difference(&later, &first);
+                        let own = unit_quaternion(&first).inverse() * nalgebra::Vector3::from(turn)
+                            / dt.max(1e-9);
+                        qvel[joint.qvel + 3..joint.qvel + 6].copy_from_slice(own.as_slice());
+                    }
+                    _ => {}
+                }
+            }
+            Reads::Other => {}
+        }
+    }
+    // A speed that is measured is better than a difference.
+    for (i, sensor) in layout.sensors.iter().enumerate() {
+        if let (Reads::Joint(j), "jointvel") = (plant.sensors[i], &*sensor.kind)
+            && let Some((first, ..)) = seen(&sensor.name)
+        {
+            qvel[layout.joints[j].qvel] = first[0];
+        }
+    }
+}
+
+/// Which degrees of freedom of a joint the values of its position that are missing leave open:
+/// of a quaternion the axes of the components that are, all where that is no single axis.
+fn open_places(kind: JointKind, places: &[f64]) -> Vec<usize> {
+    let missing = |i: usize| !places[i].is_finite();
+    let turn = |first: usize, axes: std::ops::Range<usize>| -> Vec<usize> {
+        let of: Vec<usize> = axes
+            .clone()
+            .filter(|a| missing(first + 1 + a - axes.start))
+            .collect();
+        match (missing(first), of.len()) {
+            (false, 0) => Vec::new(),
+            (_, 1) => of,
+            _ => axes.collect(),
+        }
+    };
+    match kind {
+        JointKind::Hinge | JointKind::Slide => (0..1).filter(|&i| missing(i)).collect(),
+        JointKind::Ball => turn(0, 0..3),
+        JointKind::Free => {
+            let mut open: Vec<usize> = (0..3).filter(|&i| missing(i)).collect();
+            open.extend(turn(3, 3..6));
+            open
+        }
+    }
+}
+
+/// Coordinates of the starts (`nv` positions, then `nv` velocities) that some log leaves open.
+pub(crate) fn open_coordinates(layout: &Layout, study: &Study) -> Vec<usize> {
+    let nv = layout.nv;
+    let mut open = vec![false; 2 * nv];
+    for (_, episode) in study.train.iter().chain(&study.test) {
+        let Some(initial) = &episode.initial else {
+            return (0..2 * nv).collect();
+        };
+        for joint in &layout.joints {
+            let dofs = joint.qvel..joint.qvel + joint.kind.qvel_len();
+            let places = &initial.qpos[joint.qpos..joint.qpos + joint.kind.qpos_len()];
+            for d in open_places(joint.kind, places) {
+                open[joint.qvel + d] = true;
+            }
+            for d in dofs {
+                open[nv + d] |= !initial.qvel[d].is_finite();
+            }
+        }
+    }
+    (0..2 * nv).filter(|&c| open[c]).collect()
+}
