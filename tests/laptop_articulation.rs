@@ -3,41 +3,21 @@
 
 #![allow(clippy::unwrap_used)]
 
-use std::sync::atomic::AtomicU64;
+#[allow(dead_code)] // not every test needs all of it
+mod task_support;
 
 use asid::algorithms::identify::articulation::{self, Joint};
 use asid::core::episode::ChannelColumns;
 use asid::core::fisher::FisherSettings;
 use asid::core::pipeline::episode_information;
-use asid::core::progress::Silent;
-use asid::core::registry::{BackendEntry, IdentifierEntry, TaskEntry, all, find};
+use asid::core::registry::{IdentifierEntry, find};
 use asid::core::signal::SignalSet;
-use asid::core::{Backend, Control, Episode, Parameter, Problem, Rollout, Streams};
+use asid::core::{Control, Episode, Problem, Rollout};
 use rand::Rng as _;
 
 /// Calls `check` with a problem for each engine.
 fn on_every_engine(check: impl Fn(&str, &Problem<'_>)) {
-    let task = (find::<TaskEntry>("laptop-articulation").unwrap().make)().unwrap();
-    let parameters: Vec<Parameter> = task.parameters();
-    let signals = task.exploration().signals.clone();
-    for entry in all::<BackendEntry>() {
-        let backend: Box<dyn Backend> = (entry.make)().unwrap();
-        let model = backend.load(task.scene()).unwrap();
-        let (physics, env) = (AtomicU64::new(0), AtomicU64::new(0));
-        let problem = Problem {
-            task: &*task,
-            model: &*model,
-            capabilities: backend.capabilities(),
-            parameters: &parameters,
-            signals: &signals,
-            threads: 0,
-            streams: Streams::new(0),
-            progress: &Silent,
-            physics_counter: &physics,
-            env_counter: &env,
-        };
-        check(entry.name, &problem);
-    }
+    task_support::on_every_engine("laptop-articulation", 0, check);
 }
 
 /// Readings of attempts with these (articulated, offset, reach), from the middle of the start range.

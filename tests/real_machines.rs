@@ -2,27 +2,16 @@
 
 #![allow(clippy::unwrap_used)]
 
+mod diagnosis_support;
+
 use std::path::Path;
-use std::sync::Arc;
 
 use asid::core::progress::Silent;
-use asid::core::registry::{BackendEntry, all};
-use asid::core::{Backend, Capabilities};
 use asid::diagnosis::diagnose::{Diagnosis, Settings, diagnose};
 use asid::diagnosis::machine::Machine;
 use asid::diagnosis::search::Breadth;
 use asid::diagnosis::study::Study;
-
-/// The engine that diagnoses by default: in double precision where one is built in.
-fn engine() -> Arc<dyn Backend> {
-    let mut made: Vec<Arc<dyn Backend>> = all::<BackendEntry>()
-        .into_iter()
-        .map(|e| (e.make)().unwrap().into())
-        .collect();
-    let double = |b: &Arc<dyn Backend>| b.capabilities().contains(Capabilities::DOUBLE_PRECISION);
-    let at = made.iter().position(double).unwrap_or(0);
-    made.swap_remove(at)
-}
+use diagnosis_support::engine;
 
 /// Diagnoses some of the episodes of a study by single effects.
 fn singles(study: &str, train: &[&str], test: &[&str]) -> Diagnosis {

@@ -3,40 +3,18 @@
 
 #![allow(clippy::unwrap_used)]
 
-use std::sync::atomic::AtomicU64;
+#[allow(dead_code)] // not every test needs all of it
+mod task_support;
 
 use asid::algorithms::identify::Likelihood;
 use asid::core::fisher::FisherSettings;
 use asid::core::pipeline::episode_information;
-use asid::core::progress::Silent;
-use asid::core::registry::{BackendEntry, ExplorerEntry, IdentifierEntry, TaskEntry, all, find};
-use asid::core::{
-    Backend, Control, Parameter, Policy, Problem, RealWorld, Rollout, SimulatedWorld, Streams,
-};
+use asid::core::registry::{ExplorerEntry, IdentifierEntry, find};
+use asid::core::{Control, Policy, Problem, RealWorld, Rollout, SimulatedWorld};
 
 /// Calls `check` with a problem for each engine.
 fn on_every_engine(seed: u64, check: impl Fn(&str, &Problem<'_>)) {
-    let task = (find::<TaskEntry>("rod-balancing").unwrap().make)().unwrap();
-    let parameters: Vec<Parameter> = task.parameters();
-    let signals = task.exploration().signals.clone();
-    for entry in all::<BackendEntry>() {
-        let backend: Box<dyn Backend> = (entry.make)().unwrap();
-        let model = backend.load(task.scene()).unwrap();
-        let (physics, env) = (AtomicU64::new(0), AtomicU64::new(0));
-        let problem = Problem {
-            task: &*task,
-            model: &*model,
-            capabilities: backend.capabilities(),
-            parameters: &parameters,
-            signals: &signals,
-            threads: 0,
-            streams: Streams::new(seed),
-            progress: &Silent,
-            physics_counter: &physics,
-            env_counter: &env,
-        };
-        check(entry.name, &problem);
-    }
+    task_support::on_every_engine("rod-balancing", seed, check);
 }
 
 /// Outcomes of attempts at these offsets and pick points, from the middle of the start range.

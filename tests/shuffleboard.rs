@@ -2,13 +2,11 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout)] // what each engine gives is printed
 
-use std::sync::atomic::AtomicU64;
+#[allow(dead_code)] // not every test needs all of it
+mod task_support;
 
-use asid::core::progress::Silent;
-use asid::core::registry::{BackendEntry, TaskEntry, all, find};
-use asid::core::{
-    Control, Parameter, Policy, Problem, RealWorld, Rollout, SimulatedWorld, Streams, Task,
-};
+use asid::core::registry::{TaskEntry, find};
+use asid::core::{Control, Policy, Problem, RealWorld, Rollout, SimulatedWorld, Task};
 
 /// Radius of the puck, m.
 const RADIUS: f64 = 0.0381;
@@ -16,27 +14,7 @@ const G: f64 = 9.81;
 
 /// Calls `check` with a problem for each engine.
 fn on_every_engine(check: impl Fn(&str, &Problem<'_>)) {
-    let task = (find::<TaskEntry>("shuffleboard").unwrap().make)().unwrap();
-    let parameters: Vec<Parameter> = task.parameters();
-    let signals = task.exploration().signals.clone();
-    for entry in all::<BackendEntry>() {
-        let backend = (entry.make)().unwrap();
-        let model = backend.load(task.scene()).unwrap();
-        let (physics, env) = (AtomicU64::new(0), AtomicU64::new(0));
-        let problem = Problem {
-            task: &*task,
-            model: &*model,
-            capabilities: backend.capabilities(),
-            parameters: &parameters,
-            signals: &signals,
-            threads: 0,
-            streams: Streams::new(0),
-            progress: &Silent,
-            physics_counter: &physics,
-            env_counter: &env,
-        };
-        check(entry.name, &problem);
-    }
+    task_support::on_every_engine("shuffleboard", 0, check);
 }
 
 /// Where a puck far from the hand comes to rest and by what angle it has turned, from the velocity

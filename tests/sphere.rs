@@ -5,11 +5,11 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout)] // a skipped check is a printed row
 
-use std::sync::atomic::AtomicU64;
+#[allow(dead_code)] // not every test needs all of it
+mod task_support;
 
-use asid::core::progress::Silent;
 use asid::core::registry::{BackendEntry, TaskEntry, all, find};
-use asid::core::{Capabilities, Control, Parameter, Problem, Rollout, Streams};
+use asid::core::{Capabilities, Control, Parameter, Problem, Rollout};
 
 const RADIUS: f64 = 0.03;
 const G: f64 = 9.81;
@@ -28,28 +28,15 @@ fn on_every_engine(
         .into_iter()
         .filter(|p| p.name == optional);
     parameters.extend(optional);
-    let signals = task.exploration().signals.clone();
     for entry in all::<BackendEntry>() {
         let backend = (entry.make)().unwrap();
         if !backend.capabilities().contains(task.requires() | needs) {
             println!("{}: not claimed", entry.name);
             continue;
         }
-        let model = backend.load(task.scene()).unwrap();
-        let (physics, env) = (AtomicU64::new(0), AtomicU64::new(0));
-        let problem = Problem {
-            task: &*task,
-            model: &*model,
-            capabilities: backend.capabilities(),
-            parameters: &parameters,
-            signals: &signals,
-            threads: 0,
-            streams: Streams::new(0),
-            progress: &Silent,
-            physics_counter: &physics,
-            env_counter: &env,
-        };
-        check(entry.name, &problem);
+        task_support::on_engine(&*backend, &*task, &parameters, 0, |problem, _| {
+            check(entry.name, problem);
+        });
     }
 }
 

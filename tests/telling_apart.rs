@@ -6,13 +6,14 @@
 #[allow(dead_code)] // not every test needs all of it
 mod cli_support;
 
+#[allow(dead_code)] // not every test needs all of it
+mod task_support;
+
 use std::sync::Arc;
-use std::sync::atomic::AtomicU64;
 
 use asid::algorithms::explore::{Discriminating, Rival};
-use asid::core::progress::Silent;
-use asid::core::registry::{BackendEntry, EffectEntry, TaskEntry, all, find};
-use asid::core::{Explorer as _, Model, Problem, Streams};
+use asid::core::registry::{BackendEntry, EffectEntry, all};
+use asid::core::{Explorer as _, Model, Problem};
 use cli_support::{Workplace, names, tiny};
 use serde_json::Value;
 
@@ -29,23 +30,9 @@ fn puck(problem: &Problem<'_>, model: &Arc<dyn Model>, friction: f64) -> Rival {
 
 /// Calls `check` with the shuffleboard on the first engine.
 fn on_the_shuffleboard(check: impl Fn(&Problem<'_>, &Arc<dyn Model>)) {
-    let task = (find::<TaskEntry>("shuffleboard").unwrap().make)().unwrap();
+    let task = task_support::task("shuffleboard");
     let backend = (all::<BackendEntry>()[0].make)().unwrap();
-    let model = backend.load(task.scene()).unwrap();
-    let (physics, env) = (AtomicU64::new(0), AtomicU64::new(0));
-    let problem = Problem {
-        task: &*task,
-        model: &*model,
-        capabilities: backend.capabilities(),
-        parameters: &task.parameters(),
-        signals: &task.exploration().signals,
-        threads: 0,
-        streams: Streams::new(0),
-        progress: &Silent,
-        physics_counter: &physics,
-        env_counter: &env,
-    };
-    check(&problem, &model);
+    task_support::on_engine(&*backend, &*task, &task.parameters(), 0, check);
 }
 
 #[test]

@@ -204,16 +204,7 @@ impl Explorer for FisherCem {
         problem: &'a Problem<'a>,
         start: Option<&[f64]>,
     ) -> Result<Explored<'a>> {
-        let objective = format!(
-            "{} ({} form{})",
-            self.fisher.objective.name(),
-            self.fisher.form.name(),
-            if self.fisher.nuisance {
-                ", start pose co-estimated"
-            } else {
-                ""
-            }
-        );
+        let objective = self.fisher.describe();
         Planned::explored(self, problem, start, objective)
     }
 }

@@ -126,16 +126,7 @@ impl Explorer for FisherPpo {
             policy: Box::new(TrainedPolicy::new(problem, &self.fisher, policy)?),
             curve,
             curve_label: "environment steps",
-            objective: format!(
-                "{} ({} form{})",
-                self.fisher.objective.name(),
-                self.fisher.form.name(),
-                if self.fisher.nuisance {
-                    ", start pose co-estimated"
-                } else {
-                    ""
-                }
-            ),
+            objective: self.fisher.describe(),
         })
     }
 }

@@ -180,11 +180,12 @@ fn cell(x: f64) -> String {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use crate::layout::{Actuator, Sensor};
 
-    fn layout() -> Layout {
+    /// A servo with its angle and the place of its tip.
+    pub(crate) fn layout() -> Layout {
         Layout {
             timestep: 0.01,
             nq: 0,

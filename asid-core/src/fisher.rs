@@ -90,6 +90,18 @@ impl Default for FisherSettings {
 }
 
 impl FisherSettings {
+    /// The objective in words, such as `a-optimal (trajectory form)`.
+    #[must_use]
+    pub fn describe(&self) -> String {
+        let start = if self.nuisance {
+            ", start pose co-estimated"
+        } else {
+            ""
+        };
+        let (objective, form) = (self.objective.name(), self.form.name());
+        format!("{objective} ({form} form{start})")
+    }
+
     /// Checks that the settings go together.
     ///
     /// # Errors

@@ -3,15 +3,14 @@
 
 #![allow(clippy::unwrap_used)]
 
+#[path = "../diagnosis_support/mod.rs"]
+mod diagnosis_support;
 mod world;
 
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::sync::Arc;
 
 use asid::core::progress::Silent;
-use asid::core::registry::{BackendEntry, all};
-use asid::core::{Backend, Capabilities};
 use asid::diagnosis::diagnose::{Diagnosis, Settings, Work, diagnose};
 use asid::diagnosis::forces;
 use asid::diagnosis::machine::Machine;
@@ -19,18 +18,8 @@ use asid::diagnosis::result::Kind;
 use asid::diagnosis::score::{Answer, Label, Score};
 use asid::diagnosis::study::Study;
 use asid::diagnosis::windows;
+use diagnosis_support::engine;
 use world::{MASS, Truth, write_study};
-
-/// The engine that diagnoses by default: in double precision where one is built in.
-fn engine() -> Arc<dyn Backend> {
-    let mut made: Vec<Arc<dyn Backend>> = all::<BackendEntry>()
-        .into_iter()
-        .map(|e| (e.make)().unwrap().into())
-        .collect();
-    let double = |b: &Arc<dyn Backend>| b.capabilities().contains(Capabilities::DOUBLE_PRECISION);
-    let at = made.iter().position(double).unwrap_or(0);
-    made.swap_remove(at)
-}
 
 fn run(truth: Truth, without: &[&str]) -> (Diagnosis, Work) {
     let folder = tempfile::tempdir().unwrap();

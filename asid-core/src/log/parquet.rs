@@ -57,29 +57,7 @@ mod tests {
     use parquet::schema::parser::parse_message_type;
 
     use super::*;
-    use crate::layout::{Actuator, Sensor};
-
-    fn layout() -> Layout {
-        Layout {
-            timestep: 0.01,
-            nq: 0,
-            nv: 0,
-            bodies: vec!["world".into()],
-            geoms: vec![],
-            joints: vec![],
-            actuators: vec![Actuator {
-                name: "servo".into(),
-                ctrl_range: None,
-            }],
-            sensors: vec![Sensor {
-                name: "angle".into(),
-                kind: "jointpos".into(),
-                address: 0,
-                len: 1,
-            }],
-            keyframes: vec![],
-        }
-    }
+    use crate::episode::tests::layout;
 
     /// Writes columns of doubles; `angle` may be null.
     fn write(path: &Path, time: &[f64], ctrl: &[f64], angle: &[Option<f64>]) {

@@ -1,0 +1,17 @@
+//! What tests of diagnoses have in common.
+
+use std::sync::Arc;
+
+use asid::core::registry::{BackendEntry, all};
+use asid::core::{Backend, Capabilities};
+
+/// The engine that diagnoses by default: in double precision where one is built in.
+pub fn engine() -> Arc<dyn Backend> {
+    let mut made: Vec<Arc<dyn Backend>> = all::<BackendEntry>()
+        .into_iter()
+        .map(|e| (e.make)().unwrap().into())
+        .collect();
+    let double = |b: &Arc<dyn Backend>| b.capabilities().contains(Capabilities::DOUBLE_PRECISION);
+    let at = made.iter().position(double).unwrap_or(0);
+    made.swap_remove(at)
+}
