@@ -250,8 +250,10 @@ pub fn windows(before: &Short, after: &Short, seconds: f64) -> Vec<CheckResult> 
     let mut all = vec![check("windows", true, replays)];
     let joint = |(a, b): (&Missing, &Missing)| {
         let [mean, error] = a.against;
+        // Two digits of the error.
+        let digits = (1.0 - error.abs().max(1e-9).log10().floor()).clamp(3.0, 9.0) as usize;
         format!(
-            "{}{} {:.3} {} ({mean:.3} ± {error:.3} against the motion), of which {:.3} are left with the best explanation",
+            "{}{} {:.3} {} ({mean:.digits$} ± {error:.digits$} against the motion), of which {:.3} are left with the best explanation",
             a.joint,
             place(a.touching),
             a.force,

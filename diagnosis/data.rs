@@ -4,6 +4,9 @@ use asid_core::replay::ReplayPlan;
 use asid_core::signal::{Signal, SignalSet};
 use asid_core::{Episode, Layout, Result};
 
+/// Rows that a part of a log has at least, where the log has as many: fewer tell no speed.
+const FEWEST: f64 = 6.0;
+
 /// One compared number of a row: a component of a sensor, or of a rotation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Entry {
@@ -140,10 +143,12 @@ impl Logs {
         }
     }
 
-    /// The same logs, each cut after a share of its rows.
+    /// The same logs, each cut after a share of its rows, but not so short that no speed can be told.
     #[must_use]
     pub fn cut(&self, layout: &Layout, share: f64) -> Self {
-        self.cut_each(layout, &vec![share; self.episodes.len()])
+        let least = |e: &LoggedEpisode| share.max(FEWEST / e.plan.rows() as f64);
+        let shares: Vec<f64> = self.episodes.iter().map(least).collect();
+        self.cut_each(layout, &shares)
     }
 
     /// The same logs, each cut after its own share of its rows.
@@ -264,6 +269,23 @@ impl Logs {
         }
     }
 
+    /// Speed of change at each row of predicted readings (`rows x width`) of one episode, in the
+    /// sensors' units per second (`rows x entries`).
+    #[must_use]
+    pub fn speeds(&self, episode: usize, predicted: &[f64]) -> Vec<f64> {
+        let (w, n) = (self.width(), self.entries.len());
+        let time = &self.episodes[episode].episode.time;
+        let rows = predicted.len() / w;
+        let mut out = vec![0.0; rows * n];
+        for (k, row) in out.chunks_exact_mut(n).enumerate() {
+            let (a, b) = (k.saturating_sub(1), (k + 1).min(rows - 1));
+            let reading = |k: usize| &predicted[k * w..(k + 1) * w];
+            self.differences.difference(reading(b), reading(a), row);
+            row.iter_mut().for_each(|x| *x /= time[b] - time[a]);
+        }
+        out
+    }
+
     /// Whether each entry of a residual vector has a reading behind it.
     #[must_use]
     pub fn present(&self) -> Vec<bool> {
@@ -350,5 +372,21 @@ mod tests {
         // Rounded up.
         assert_eq!(rows, [4, 10]);
         assert_eq!(cut.len(), 14);
+        // A tenth of them would be two rows and one.
+        let heads = logs.cut(&plant.layout, 0.1);
+        assert!(heads.episodes.iter().all(|e| e.plan.rows() == 6));
+    }
+
+    #[test]
+    fn speeds_are_those_of_the_readings() {
+        let plant = plant();
+        let reading = |k: i32| 0.5 * f64::from(k).powi(2);
+        let readings: Vec<f64> = (0..5).map(reading).collect();
+        let logs = Logs::new(&plant, &["place".to_owned()], vec![log("a", &readings)]).unwrap();
+        // k a row of 0.1 s in the middle, half a row less at the ends.
+        let speeds = logs.speeds(0, &readings);
+        for (speed, k) in speeds.iter().zip([0.5, 1.0, 2.0, 3.0, 3.5]) {
+            assert!((speed - 10.0 * k).abs() < 1e-9, "{speeds:?}");
+        }
     }
 }

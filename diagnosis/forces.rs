@@ -35,8 +35,9 @@ pub struct Missing {
     pub windows: usize,
     /// Root mean square over them, off what the noise alone makes.
     pub force: f64,
-    /// Median of what acts against the motion, with its standard error: a window in which the machine
-    /// meets something that the model does not is no measure of it.
+    /// Median of what acts against the motion, weighted by how well a window tells it, with its
+    /// standard error: a window in which the machine meets something that the model does not is no
+    /// measure of it.
     pub against: [f64; 2],
 }
 
@@ -192,25 +193,38 @@ pub fn missing(
 struct Sum {
     /// Squared forces, off their variance.
     excess: f64,
-    /// Forces against the motion.
-    against: Vec<f64>,
+    /// Forces against the motion, with their deviations.
+    against: Vec<(f64, f64)>,
 }
 
 impl Sum {
     fn add(&mut self, force: f64, variance: f64, motion: f64) {
         self.excess += force * force - variance;
-        self.against.push(-force * motion.signum());
+        self.against
+            .push((-force * motion.signum(), variance.sqrt()));
     }
 
-    /// Median against the motion, with its standard error.
+    /// Weighted median against the motion, with its standard error: a window weighs by how well it
+    /// tells a force, and the deviations are right up to a factor that the windows themselves tell.
     fn against(&self) -> [f64; 2] {
-        let middle = median(&mut self.against.clone()).unwrap_or(0.0);
-        let mut off: Vec<f64> = self.against.iter().map(|x| (x - middle).abs()).collect();
-        let deviation = NORMAL * median(&mut off).unwrap_or(0.0);
+        let least = f64::MIN_POSITIVE;
+        let mut sorted: Vec<(f64, f64)> = self.against.clone();
+        sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let weight: f64 = sorted.iter().map(|(_, s)| 1.0 / s.max(least)).sum();
+        let mut below = 0.0;
+        let middle = sorted.iter().find(|(_, s)| {
+            below += 1.0 / s.max(least);
+            below >= 0.5 * weight
+        });
+        let middle = middle.map_or(0.0, |m| m.0);
+        let off = sorted
+            .iter()
+            .map(|(x, s)| (x - middle).abs() / s.max(least));
+        let factor = NORMAL * median(&mut off.collect::<Vec<f64>>()).unwrap_or(0.0);
         // A median is this much less certain than a mean.
         let loss = std::f64::consts::FRAC_PI_2.sqrt();
-        let n = self.against.len().max(1) as f64;
-        [middle, loss * deviation / n.sqrt()]
+        let n = sorted.len().max(1) as f64;
+        [middle, loss * factor * n.sqrt() / weight.max(least)]
     }
 }
 
@@ -228,14 +242,14 @@ mod tests {
         let mut sum = Sum::default();
         for k in 0..100 {
             let motion = if k % 2 == 0 { 1.0 + f64::from(k) } else { -3.0 };
-            sum.add(0.01 - 0.2 * f64::signum(motion), 0.0, motion);
+            sum.add(0.01 - 0.2 * f64::signum(motion), 1e-4, motion);
         }
         let excess = sum.excess / 100.0;
         assert!(
-            (excess - (0.2 * 0.2 + 0.01 * 0.01)).abs() < 1e-12,
+            (excess - (0.2 * 0.2 + 0.01 * 0.01 - 1e-4)).abs() < 1e-12,
             "{excess}"
         );
-        sum.add(50.0, 0.0, 1.0);
+        sum.add(50.0, 1e-4, 1.0);
         let [middle, error] = sum.against();
         assert!((middle - 0.2).abs() < 0.0101, "{middle}");
         // All lie within 0.02 of the median.

@@ -128,7 +128,7 @@ pub fn prepare(study: &Study, machine: Machine, rng: &mut Rng) -> Result<Prepare
     let mut scatter = Scatter {
         halved,
         rng,
-        starts: Spread::of_known_starts(&layout),
+        starts: Spread::of_known_starts(&layout, bench.machine.backend.capabilities()),
     };
     let point = Point {
         theta: nominal.clone(),
@@ -225,7 +225,7 @@ impl Scatter<'_> {
             starts: bench.test.starts.clone(),
         };
         let spread = if bench.open.is_empty() {
-            Spread::of_known_starts(&layout)
+            Spread::of_known_starts(&layout, bench.machine.backend.capabilities())
         } else {
             start_spread(bench, &bench.head, &held)?
         };
@@ -282,6 +282,12 @@ impl Scatter<'_> {
                     directions.push(change);
                 }
             }
+        }
+        predictor.set_whitening(Vec::new());
+        let readings = predictor.readings(std::slice::from_ref(point))?;
+        for (e, directions) in all.iter_mut().enumerate() {
+            let clocks = roughness::clocks(&record.logs, e, &readings[0][e], layout.timestep);
+            directions.extend(clocks);
         }
         let whitenings = all.iter().map(|d| Whitening::of(d)).zip(rough);
         Ok(whitenings

@@ -7,11 +7,12 @@
 //! whitened with that scatter added to the sensors' noise, as correlated noise of low rank:
 //! `S = I + U L U'` in units of the noise, for log and prediction both scatter.
 
-use asid_core::Result;
 use asid_core::layout::Layout;
+use asid_core::{Capabilities, Result};
 use nalgebra::{DMatrix, DVector};
 use rand::Rng as _;
 
+use crate::data::Logs;
 use crate::predict::{Point, Predictor};
 
 /// Rollouts of the ensemble.
@@ -98,21 +99,24 @@ impl Whitening {
 /// How far the members' starts are apart.
 #[derive(Clone, Debug)]
 pub enum Spread {
-    /// Starts that are known: differences that no sensor sees (m, rad, and per second) in this
+    /// Starts that are known: a difference that no sensor sees (m, rad, and per second) in this
     /// many coordinates.
-    Known(usize),
+    Known(usize, f64),
     /// Starts that are open in some coordinates: for each episode a root of their covariance.
     Open(Vec<usize>, Vec<DMatrix<f64>>),
 }
 
-/// Difference of starts that are known.
+/// Difference of starts that are known, where the engine computes in double precision.
 const UNSEEN: f64 = 1e-9;
+/// The same in single precision: thousands of steps round by more than what `UNSEEN` grows to.
+const UNSEEN_SINGLE: f64 = 1e-6;
 
 impl Spread {
-    /// Of a machine whose starts are known.
+    /// Of a machine whose starts are known, on an engine that can do so much.
     #[must_use]
-    pub fn of_known_starts(layout: &Layout) -> Self {
-        Self::Known(2 * layout.nv)
+    pub fn of_known_starts(layout: &Layout, engine: Capabilities) -> Self {
+        let double = engine.contains(Capabilities::DOUBLE_PRECISION);
+        Self::Known(2 * layout.nv, if double { UNSEEN } else { UNSEEN_SINGLE })
     }
 
     /// Draws shifts of an episode's start: coordinates and by how much.
@@ -120,7 +124,7 @@ impl Spread {
         // Uniform with the deviation asked for.
         let mut draw = |by: f64| -> f64 { by * rng.random_range(-1.0..1.0) * 3.0_f64.sqrt() };
         match self {
-            Self::Known(n) => (0..*n).map(|c| (c, draw(UNSEEN))).collect(),
+            Self::Known(n, by) => (0..*n).map(|c| (c, draw(*by))).collect(),
             Self::Open(coordinates, roots) => {
                 let unit = DVector::from_fn(coordinates.len(), |_, _| draw(1.0));
                 let shift = &roots[episode] * unit;
@@ -183,6 +187,38 @@ pub fn estimate(
         .collect())
 }
 
+/// Deviation of an engine's clock in time steps. A step ends at one time, and an engine's
+/// velocities are those of its start, its middle or its end, as its integrator has it.
+const CLOCK: f64 = 0.5;
+
+/// Directions in which a sensor of one episode moves if the engine reads it a part of a
+/// `timestep` (s) early or late, in units of the noise, each as long as its deviation; one a
+/// sensor. `readings` are the predicted ones, `rows x width`. A lag of the machine that is
+/// finer than the step of its model cannot be told from this.
+#[must_use]
+pub fn clocks(logs: &Logs, episode: usize, readings: &[f64], timestep: f64) -> Vec<Vec<f64>> {
+    let speeds = logs.speeds(episode, readings);
+    if !speeds.iter().all(|x| x.is_finite()) {
+        return Vec::new();
+    }
+    let present = &logs.present()[logs.offset(episode)..logs.offset(episode + 1)];
+    let noise = logs.entry_noise();
+    let n = noise.len();
+    let of = |sensor: usize| {
+        let shift = |(k, speed): (usize, &f64)| {
+            let entry = k % n;
+            let moves = present[k] && logs.entries[entry].sensor == sensor;
+            if moves {
+                CLOCK * timestep * speed / noise[entry]
+            } else {
+                0.0
+            }
+        };
+        speeds.iter().enumerate().map(shift).collect()
+    };
+    (0..logs.sensors.len()).map(of).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -222,5 +258,42 @@ mod tests {
         // 20 000 draws tell a variance to 2 %.
         let error = (covariance - &expected).norm() / expected.norm();
         assert!(error < 0.04, "{error}");
+    }
+
+    #[test]
+    fn a_lag_finer_than_the_time_step_is_no_gap() {
+        use asid_core::{Episode, Plant, Scene};
+        let scene = r#"<mujoco><option timestep="0.002"/><worldbody><body>
+            <joint name="slide" type="slide"/><geom size="0.1" mass="1"/></body></worldbody>
+            <sensor><jointpos name="place" joint="slide"/></sensor></mujoco>"#;
+        let plant = Plant::of(&Scene::from_xml("slide", scene, &[]).unwrap()).unwrap();
+        let wave = |t: f64| (3.0 * t).sin();
+        let time: Vec<f64> = (0..200).map(|k| 0.02 * f64::from(k)).collect();
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("log.csv");
+        let rows: String = time.iter().map(|t| format!("{t},{}\n", wave(*t))).collect();
+        std::fs::write(&path, format!("time,place\n{rows}")).unwrap();
+        let log = (
+            "log".to_owned(),
+            Episode::read(&path, &plant.layout).unwrap(),
+        );
+        let mut logs = Logs::new(&plant, &["place".to_owned()], vec![log]).unwrap();
+        logs.set_noise(&[1e-4]);
+        let whitening = |lag: f64| {
+            let late: Vec<f64> = time.iter().map(|t| wave(t - lag)).collect();
+            let whitening = Whitening::of(&clocks(&logs, 0, &late, 0.002));
+            let mut residuals = vec![0.0; logs.len()];
+            logs.difference(0, &late, &mut residuals);
+            residuals.iter_mut().for_each(|r| *r /= 1e-4);
+            let square = |r: &[f64]| r.iter().map(|x| x * x).sum::<f64>();
+            let before = square(&residuals);
+            whitening.apply(&mut residuals);
+            (before, square(&residuals))
+        };
+        // A lag of half a step is one deviation, ten steps are twenty.
+        let (before, after) = whitening(0.001);
+        assert!(before > 1000.0 && after < 2.0, "{before} {after}");
+        let (_, after) = whitening(0.02);
+        assert!(after > 300.0, "{after}");
     }
 }

@@ -302,6 +302,8 @@ pub struct Score {
     pub confusion: BTreeMap<String, BTreeMap<String, usize>>,
     /// Each case.
     pub answers: Vec<Answer>,
+    /// Cases that the engine cannot simulate, with the reason; they count nowhere.
+    pub left_out: BTreeMap<String, String>,
 }
 
 fn median(mut values: Vec<f64>) -> Option<f64> {
@@ -323,9 +325,9 @@ fn plain(effects: &[String]) -> String {
 const FLOOR: f64 = 1e-6;
 
 impl Score {
-    /// Figures of some answers.
+    /// Figures of some answers; `left_out` are cases without one, with the reason.
     #[must_use]
-    pub fn of(answers: Vec<Answer>) -> Self {
+    pub fn of(answers: Vec<Answer>, left_out: BTreeMap<String, String>) -> Self {
         let n = answers.len().max(1) as f64;
         let count = |f: &dyn Fn(&Answer) -> bool| answers.iter().filter(|a| f(a)).count();
         let is = |names: &[String], what: &str| names == [what.to_owned()];
@@ -391,6 +393,7 @@ impl Score {
             slowest: answers.iter().map(|a| a.seconds).fold(0.0, f64::max),
             confusion,
             answers,
+            left_out,
         }
     }
 
@@ -427,6 +430,9 @@ impl Score {
                 percent(a.parameter_error),
                 a.seconds
             ));
+        }
+        for (case, why) in &self.left_out {
+            lines.push(format!("{case:10} left out: {why}"));
         }
         lines.push(String::new());
         lines.push("truth -> verdict:".into());

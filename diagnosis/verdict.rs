@@ -49,6 +49,9 @@ const SHARPNESS: f64 = 0.35;
 const USUAL: f64 = 8.0;
 /// A further effect must bring the excess below this share of what it was.
 const WORTH: f64 = 0.4;
+/// A first effect in a gap that is small anyway must bring the excess below this share of what it
+/// was: a part of what an engine's own errors leave can always be had from some effect.
+const WORTH_FIRST: f64 = 0.6;
 /// Difference of tempered sums of squares up to which two sets cannot be told apart: a
 /// likelihood ratio of 400.
 const APART: f64 = 12.0;
@@ -216,9 +219,12 @@ pub fn judge(bench: &Bench, findings: &Findings, candidates: usize, scatter: f64
         let Some(next) = next else { continue };
         let (before, after) = (&all[best], &all[next]);
         let better = score(after) < score(before);
-        let further = before.labels.is_empty()
-            || (gap(before) > NEGLIGIBLE && gap(after) < WORTH * gap(before));
-        if better && further {
+        let worth = if before.labels.is_empty() {
+            gap(before) > NEGLIGIBLE || gap(after) < WORTH_FIRST * gap(before)
+        } else {
+            gap(before) > NEGLIGIBLE && gap(after) < WORTH * gap(before)
+        };
+        if better && worth {
             best = next;
         }
     }

@@ -44,7 +44,9 @@ pub fn rows(plant: &Plant, logs: &Logs, open: &[usize]) -> Option<usize> {
         JointKind::Ball => false,
     });
     let longest = logs.episodes.iter().map(|e| e.plan.rows()).max()?;
-    known.then(|| ((SHARE * longest as f64).ceil() as usize).max(ROWS))
+    let window = ((SHARE * longest as f64).ceil() as usize).max(ROWS);
+    // Logs of hardly more than a window are windows as they are.
+    known.then_some(if longest < 3 * ROWS { longest } else { window })
 }
 
 /// The windows of some logs, with their starts as the readings say.
@@ -162,6 +164,8 @@ mod tests {
         assert_eq!(rows(&plant, &one, &open), None, "nobody reads b");
         let short = logs(&plant, &["qa", "qb"], 40);
         assert_eq!(rows(&plant, &short, &open), Some(10));
+        let shorter = logs(&plant, &["qa", "qb"], 17);
+        assert_eq!(rows(&plant, &shorter, &open), Some(17));
     }
 
     #[test]

@@ -107,6 +107,43 @@ fn labels_are_read_by_the_scorer_only_and_last() {
     assert_eq!(json(&out.join("result.json"))["right"], 0);
 }
 
+#[test]
+fn a_case_that_the_engine_cannot_simulate_is_left_out_with_the_reason() {
+    let folder = tempfile::tempdir().unwrap();
+    let (cases, out) = (folder.path().join("cases"), folder.path().join("out"));
+    write_study(&cases.join("ball"), Truth::None);
+    let model = cases.join("ball/nominal.xml");
+    let bouncing =
+        r#"<worldbody><geom name="floor" type="plane" size="1 1 1" solref="-40000 -18"/>"#;
+    let scene = std::fs::read_to_string(&model).unwrap();
+    std::fs::write(&model, scene.replacen("<worldbody>", bouncing, 1)).unwrap();
+    std::fs::write(cases.join("labels.json"), "{}").unwrap();
+    let mut arguments = vec!["withheld", "--cases", text(&cases), "--backend", "rapier"];
+    arguments.extend(["--quiet", "--out", text(&out)]);
+    let done = asid(&arguments);
+    let said = String::from_utf8(done.stdout).unwrap();
+    assert!(
+        done.status.success() && said.contains("ball       left out: "),
+        "{said}"
+    );
+    let result = json(&out.join("result.json"));
+    let why = result["left_out"]["ball"].as_str().unwrap();
+    assert!(
+        why.contains("`floor` on line") && why.contains("0.87 of their speed"),
+        "{why}"
+    );
+    assert_eq!(result["cases"], 0);
+    // Of a single study it is the answer.
+    let (line, code) = refusal(&[
+        "diagnose",
+        text(&cases.join("ball")),
+        "--backend",
+        "rapier",
+        "--quiet",
+    ]);
+    assert!(code == Some(2) && line.contains("cannot bounce"), "{line}");
+}
+
 /// What is spoilt, how, and what is said of it.
 type Spoilt<'a> = (&'a str, Box<dyn Fn() + 'a>, &'a str);
 

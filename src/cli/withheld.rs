@@ -2,6 +2,7 @@
 //!
 //! The labels are read only when every diagnosis is done, and by this command alone.
 
+use std::collections::BTreeMap;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -24,7 +25,8 @@ use asid_core::Progress as _;
 #[derive(clap::Args)]
 #[command(after_help = "\
 The folder holds one study a case, and labels.json, which is read once all diagnoses are done. The result has \
-a line a case, the confusion matrix and the figures of docs/diagnosis.md.")]
+a line a case, the confusion matrix and the figures of docs/diagnosis.md. Cases that the engine cannot simulate are \
+left out, with the reason.")]
 pub struct Arguments {
     /// Folder of the cases
     #[arg(long, value_name = "DIR")]
@@ -66,6 +68,11 @@ fn name(path: &Path) -> String {
         .map_or_else(String::new, |n| n.to_string_lossy().into_owned())
 }
 
+/// Whether an engine says that it cannot simulate a scene.
+fn is_refusal(error: &anyhow::Error) -> bool {
+    matches!(error.downcast_ref(), Some(Error::Scene { .. }))
+}
+
 /// Diagnoses all cases and scores them.
 pub fn withheld(arguments: &Arguments) -> Result<()> {
     let common = &arguments.common;
@@ -83,6 +90,7 @@ pub fn withheld(arguments: &Arguments) -> Result<()> {
     };
     let bars = Bars::new(common.quiet);
     let mut done = Vec::with_capacity(folders.len());
+    let mut left_out = BTreeMap::new();
     bars.begin("cases", folders.len() as u64);
     for folder in &folders {
         let clock = Instant::now();
@@ -93,7 +101,15 @@ pub fn withheld(arguments: &Arguments) -> Result<()> {
                 .scene
                 .with_timestep(step / f64::from(arguments.finer))?;
         }
-        let machine = machine(&study, &engine, common.threads.unwrap_or(0))?;
+        let machine = match machine(&study, &engine, common.threads.unwrap_or(0)) {
+            Err(error) if is_refusal(&error) => {
+                failure::note(&format!("{}: left out: {error}", study.name));
+                left_out.insert(study.name, error.to_string());
+                bars.advance(1);
+                continue;
+            }
+            machine => machine?,
+        };
         let (diagnosis, work) = diagnose(&study, machine, settings.clone(), &Silent)?;
         let seconds = clock.elapsed().as_secs_f64();
         failure::note(&format!(
@@ -121,7 +137,7 @@ pub fn withheld(arguments: &Arguments) -> Result<()> {
             *seconds,
         ));
     }
-    let score = Score::of(answers);
+    let score = Score::of(answers, left_out);
     if let Some(out) = &out {
         out.write(|folder| {
             write_json(&folder.join("result.json"), &score)?;

@@ -82,7 +82,7 @@ fn faults_are_named_and_closed_and_shuffled_labels_score_nothing() {
             let (_, effects) = CASES[(i + shift) % CASES.len()];
             Answer::new("case", &d.result, &label(effects), false, 0.0)
         });
-        Score::of(answers.collect())
+        Score::of(answers.collect(), BTreeMap::new())
     };
     assert_eq!(score(0).right, CASES.len());
     // Every label is another case's: nothing can be right.

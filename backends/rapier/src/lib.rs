@@ -41,7 +41,8 @@
 //! - Single precision: a derivative by differences needs steps of about a
 //!   hundredth of a parameter's range.
 //! - Contacts are equally stiff everywhere (200 Hz, overdamped): `solref` and
-//!   `solimp` are not read, and restitution is zero. Contacts do not lift a sliding
+//!   `solimp` are not read, and restitution is zero; a `solref` that bounces is
+//!   refused. Contacts do not lift a sliding
 //!   body as MuJoCo's convex cone does, so trajectories depend on parameters more
 //!   smoothly.
 //! - Bounds of sliding, spinning and rolling friction are independent; a contact

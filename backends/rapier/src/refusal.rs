@@ -3,7 +3,8 @@
 //! Loaders skip what they do not know. A part of a scene that changes the
 //! physics must not be skipped in silence, so it is looked for by name here and
 //! refused with one line. Settings of another engine's solver (`solref`,
-//! `solimp`, `impratio`, integrators) are not physics of the scene and pass.
+//! `solimp`, `impratio`, integrators) are not physics of the scene and pass,
+//! but for a contact so little damped that it throws bodies back.
 
 use std::collections::HashSet;
 
@@ -139,6 +140,21 @@ fn check_document(scene: &Scene) -> Result<()> {
                 ));
             }
         }
+        let collides = ["contype", "conaffinity"]
+            .iter()
+            .any(|a| node.attribute(*a) != Some("0"));
+        if (tag == "geom" && collides || tag == "pair")
+            && let Some(back) = node.attribute("solref").and_then(restitution)
+            && back > BOUNCE
+        {
+            return Err(refuse(
+                scene,
+                format!(
+                    "cannot bounce: by its `solref` {} throws bodies back with {back:.2} of their speed",
+                    place(&node)
+                ),
+            ));
+        }
         let fluid = ["wind", "density", "viscosity"];
         if tag == "option"
             && let Some(attribute) = fluid.iter().find(|a| {
@@ -184,6 +200,28 @@ fn check_document(scene: &Scene) -> Result<()> {
         }
     }
     Ok(())
+}
+
+/// Share of its speed with which a body leaves a contact of this `solref`, from which on it is
+/// refused: rapier's contacts throw nothing back.
+const BOUNCE: f64 = 0.1;
+
+/// Coefficient of restitution of an impact on a spring and damper, `exp(-pi z / sqrt(1 - z^2))` with
+/// the damping ratio `z`. `solref` holds time constant and damping ratio, or, negative, stiffness
+/// and damping for a unit of mass, of which `z = damping / (2 sqrt(stiffness))`.
+fn restitution(solref: &str) -> Option<f64> {
+    let mut numbers = solref.split_whitespace().map(str::parse::<f64>);
+    let (first, second) = (numbers.next()?.ok()?, numbers.next()?.ok()?);
+    let ratio = if first < 0.0 {
+        -second / (2.0 * (-first).sqrt())
+    } else {
+        second
+    };
+    Some(if ratio < 1.0 {
+        (-std::f64::consts::PI * ratio / (1.0 - ratio * ratio).sqrt()).exp()
+    } else {
+        0.0
+    })
 }
 
 fn check_bodies(scene: &Scene, model: &Model) -> Result<()> {

@@ -134,6 +134,10 @@ fn what_it_cannot_simulate_is_refused_by_name() {
         ("<worldbody><body name=\"none\"><freejoint/></body></worldbody>".into(), "`none` moves but has no mass"),
         ("<option viscosity=\"0.1\"/><worldbody/>".into(), "`viscosity` of <option>"),
         ("<option><flag gravity=\"disable\"/></option><worldbody/>".into(), "`gravity` of <flag>"),
+        (
+            "<worldbody><geom name=\"b\" type=\"sphere\" size=\"1\" solref=\"-40000 -18\"/></worldbody>".into(),
+            "`b` on line 1 throws bodies back with 0.87 of their speed",
+        ),
         ("<worldbody/><keyframe><key name=\"k\" qpos=\"1\"/></keyframe>".into(), "keyframe `k`"),
         ("<worldbody/><contact><exclude body1=\"x\" body2=\"y\"/></contact>".into(), "names body `x`"),
     ];
@@ -147,6 +151,10 @@ fn what_it_cannot_simulate_is_refused_by_name() {
     // Settings of another engine's solver are not physics of the scene.
     let inside = r#"<option integrator="implicitfast" cone="elliptic" impratio="10"/>
       <worldbody><body><freejoint/><geom size=".1" solref="0.01 1" solimp="0.9 0.95 0.001"/></body></worldbody>"#;
+    assert!(Rapier.load(&scene(inside)).is_ok());
+    // A stiff contact that is damped well does not bounce.
+    let inside =
+        r#"<worldbody><body><freejoint/><geom size=".1" solref="-40000 -400"/></body></worldbody>"#;
     assert!(Rapier.load(&scene(inside)).is_ok());
 }
 
