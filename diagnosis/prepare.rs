@@ -128,7 +128,7 @@ pub fn prepare(study: &Study, machine: Machine, rng: &mut Rng) -> Result<Prepare
     let mut scatter = Scatter {
         halved,
         rng,
-        starts: Spread::of_known_starts(&layout, bench.machine.backend.capabilities()),
+        starts: Spread::of_known_starts(&layout),
     };
     let point = Point {
         theta: nominal.clone(),
@@ -225,7 +225,7 @@ impl Scatter<'_> {
             starts: bench.test.starts.clone(),
         };
         let spread = if bench.open.is_empty() {
-            Spread::of_known_starts(&layout, bench.machine.backend.capabilities())
+            Spread::of_known_starts(&layout)
         } else {
             start_spread(bench, &bench.head, &held)?
         };

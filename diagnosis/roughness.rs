@@ -7,8 +7,8 @@
 //! whitened with that scatter added to the sensors' noise, as correlated noise of low rank:
 //! `S = I + U L U'` in units of the noise, for log and prediction both scatter.
 
+use asid_core::Result;
 use asid_core::layout::Layout;
-use asid_core::{Capabilities, Result};
 use nalgebra::{DMatrix, DVector};
 use rand::Rng as _;
 
@@ -99,24 +99,21 @@ impl Whitening {
 /// How far the members' starts are apart.
 #[derive(Clone, Debug)]
 pub enum Spread {
-    /// Starts that are known: a difference that no sensor sees (m, rad, and per second) in this
+    /// Starts that are known: differences that no sensor sees (m, rad, and per second) in this
     /// many coordinates.
-    Known(usize, f64),
+    Known(usize),
     /// Starts that are open in some coordinates: for each episode a root of their covariance.
     Open(Vec<usize>, Vec<DMatrix<f64>>),
 }
 
-/// Difference of starts that are known, where the engine computes in double precision.
+/// Difference of starts that are known.
 const UNSEEN: f64 = 1e-9;
-/// The same in single precision: thousands of steps round by more than what `UNSEEN` grows to.
-const UNSEEN_SINGLE: f64 = 1e-6;
 
 impl Spread {
-    /// Of a machine whose starts are known, on an engine that can do so much.
+    /// Of a machine whose starts are known.
     #[must_use]
-    pub fn of_known_starts(layout: &Layout, engine: Capabilities) -> Self {
-        let double = engine.contains(Capabilities::DOUBLE_PRECISION);
-        Self::Known(2 * layout.nv, if double { UNSEEN } else { UNSEEN_SINGLE })
+    pub fn of_known_starts(layout: &Layout) -> Self {
+        Self::Known(2 * layout.nv)
     }
 
     /// Draws shifts of an episode's start: coordinates and by how much.
@@ -124,7 +121,7 @@ impl Spread {
         // Uniform with the deviation asked for.
         let mut draw = |by: f64| -> f64 { by * rng.random_range(-1.0..1.0) * 3.0_f64.sqrt() };
         match self {
-            Self::Known(n, by) => (0..*n).map(|c| (c, draw(*by))).collect(),
+            Self::Known(n) => (0..*n).map(|c| (c, draw(UNSEEN))).collect(),
             Self::Open(coordinates, roots) => {
                 let unit = DVector::from_fn(coordinates.len(), |_, _| draw(1.0));
                 let shift = &roots[episode] * unit;

@@ -13,6 +13,7 @@ mod closing;
 mod metric;
 
 use asid_core::parameter::{Parameter, Scale};
+use asid_core::registry::Settings;
 use asid_core::signal::Signal;
 use asid_core::task::{
     Commander, Condition, Coordinate, DownstreamProtocol, ExplorationProtocol, Outcome, Outline,
@@ -152,6 +153,21 @@ impl Task for LaptopArticulation {
                 unit: "m".into(),
             },
         ]
+    }
+
+    /// A push that the base gives way to leaves the axis known to some millimetres, a tenth of its
+    /// range: the reach is judged by more samples of the belief, and searched for among more.
+    fn settings(&self, section: &str, algorithm: &str) -> Settings {
+        let all: &[(&str, i64)] = match (section, algorithm) {
+            ("solver", "cem") => &[
+                ("belief_samples", 10),
+                ("iterations", 6),
+                ("population", 16),
+            ],
+            _ => &[],
+        };
+        let settings = all.iter().map(|&(key, n)| (key.to_owned(), n.into()));
+        settings.collect()
     }
 
     fn conditions(&self) -> Vec<Condition> {
