@@ -6,7 +6,8 @@ use asid_core::{EffectSpec, Parameter, Result};
 
 use crate::candidate::Candidate;
 use crate::data::Logs;
-use crate::fit::{Effort, Fit, Open, Unknown, cost, fit};
+use crate::fit::{Effort, Fit, Unknown, cost, fit};
+use crate::linearise::Open;
 use crate::machine::Machine;
 use crate::predict::{Point, Predictor, State};
 use crate::roughness::Whitening;

@@ -4,8 +4,8 @@ use asid_core::{Parameter, Result};
 
 use crate::bench::{Bench, Explanation};
 use crate::data::Logs;
-use crate::fit::slope;
 use crate::forces::{Missing, Short};
+use crate::linearise::slope;
 use crate::machine::Machine;
 use crate::predict::Point;
 use crate::prepare::plain_residuals;

@@ -183,7 +183,7 @@ fn cost_scatter(bench: &Bench, none: &Explanation) -> Result<f64> {
         .map(|k| {
             let mut point = none.fit.point.clone();
             for start in &mut point.starts {
-                start.shift(bench.layout(), 0, f64::from(k) * crate::fit::PROBE);
+                start.shift(bench.layout(), 0, f64::from(k) * crate::linearise::PROBE);
             }
             point
         })

@@ -12,8 +12,10 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::bench::{Bench, Record, Trial};
 use crate::candidate::Candidate;
-use crate::fit::{Differences, Unknown, inverse, linearise};
+use crate::fit::Unknown;
+use crate::linearise::{Differences, linearise};
 use crate::noise::{NORMAL, median};
+use crate::normal::inverse;
 use crate::predict::Point;
 use crate::trajectory::Trajectory;
 use crate::windows::settle;

@@ -5,7 +5,8 @@
 
 use asid_core::Layout;
 
-use crate::fit::{Open, inverse};
+use crate::linearise::Open;
+use crate::normal::inverse;
 use crate::predict::State;
 
 /// Directions in which the residual may move without the candidate: an orthonormal basis.

@@ -90,7 +90,7 @@ fn size(bench: &Bench, explanation: &Explanation) -> usize {
             let [low, high] = explanation.unknowns[**i].parameter.range;
             let column = fit.jacobian.column(*k);
             let response = column.norm() * (high - low) / (column.len().max(1) as f64).sqrt();
-            response > crate::fit::NOTHING
+            response > crate::linearise::NOTHING
         })
         .count()
 }

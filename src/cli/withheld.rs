@@ -11,7 +11,8 @@ use anyhow::Result;
 use asid_core::Error;
 use asid_core::progress::Silent;
 use asid_diagnosis::diagnose::{Settings, diagnose};
-use asid_diagnosis::score::{Answer, Label, Score, read_labels, same_physics};
+use asid_diagnosis::same_physics::same_physics;
+use asid_diagnosis::score::{Answer, Label, Score, read_labels};
 use asid_diagnosis::study::Study;
 
 use super::diagnose::{default_backend, machine};

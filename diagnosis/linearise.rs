@@ -1,0 +1,216 @@
+//! Derivatives of predictions: differences of rollouts, all columns of a Jacobian in one batch. A start acts on
+//! its own episode only, so that one rollout of all episodes moves all of them at once.
+//!
+//! A difference aims at a response that is seen and small: it adapts from one linearisation to
+//! the next. Where contacts make predictions scatter it is well above the scatter and taken to both sides.
+
+use asid_core::layout::Layout;
+use asid_core::parameter::Scale;
+use asid_core::{Parameter, Result};
+
+use crate::fit::Unknown;
+use crate::predict::{Point, Predictor};
+
+/// Response of the residuals, root mean square, that a difference aims at.
+pub const AIM: f64 = 0.3;
+/// The least multiple of what scatter alone makes that a difference aims at.
+pub const ABOVE_SCATTER: f64 = 5.0;
+/// First difference where predictions scatter, as a share of the range.
+pub const ROUGH_START: f64 = 1e-2;
+/// Multiples of the difference that a derivative is taken over where predictions scatter.
+const STENCIL: [f64; 2] = [-1.0, 1.0];
+/// Response to the whole range, root mean square in units of the noise, below which a
+/// parameter does nothing here, and is left where it is.
+pub const NOTHING: f64 = 0.05;
+/// Shift of a start that shows how predictions scatter, m or rad.
+pub const PROBE: f64 = 1e-9;
+/// Smallest and largest difference, as a share of the range; the last where predictions scatter.
+const STEPS: [f64; 3] = [1e-8, 0.02, 0.1];
+
+/// Differences to take derivatives with; they adapt.
+#[derive(Clone, Debug)]
+pub struct Differences {
+    /// Of each parameter, as a share of its range.
+    pub shares: Vec<f64>,
+    /// Of each open coordinate of the starts, m or rad or per second.
+    pub starts: Vec<f64>,
+    /// Derivatives in the starts, where they are not taken anew.
+    pub kept: Option<Vec<Vec<f64>>>,
+}
+
+impl Differences {
+    /// A first guess for `n` parameters and `open` coordinates of the starts.
+    #[must_use]
+    pub fn new(n: usize, open: usize) -> Self {
+        Self {
+            shares: vec![1e-4; n],
+            starts: vec![START_STEP; open],
+            kept: None,
+        }
+    }
+
+    /// A first guess where predictions scatter.
+    #[must_use]
+    pub fn rough(n: usize, open: usize) -> Self {
+        Self {
+            shares: vec![ROUGH_START; n],
+            starts: vec![ROUGH_START_STEP; open],
+            kept: None,
+        }
+    }
+}
+
+/// Value moved by a share of the range, to whichever side there is room; and the share
+/// that it was really moved by.
+#[must_use]
+pub fn nudged(parameter: &Parameter, value: f64, share: f64) -> (f64, f64) {
+    let u = parameter.to_unit(value).clamp(0.0, 1.0);
+    let to = if (0.0..=1.0).contains(&(u + share)) {
+        u + share
+    } else {
+        u - share
+    };
+    (parameter.from_unit(to), to - u)
+}
+
+/// Derivatives of the prediction at a point, in units of each parameter's range:
+/// residuals there and the columns, first the free parameters, then the coordinates of
+/// the starts.
+pub struct Linearisation {
+    /// Residuals at the point.
+    pub residuals: Vec<f64>,
+    /// One column a free parameter.
+    pub columns: Vec<Vec<f64>>,
+    /// One column an open coordinate: of every episode at once.
+    pub start_columns: Vec<Vec<f64>>,
+}
+
+/// Coordinates of the starts that are not known: the same for all episodes of a set.
+pub type Open = Vec<usize>;
+
+/// First difference of a start's coordinates, m or rad or per second; where predictions scatter;
+/// smallest and largest.
+const START_STEP: f64 = 1e-5;
+const ROUGH_START_STEP: f64 = 1e-3;
+const START_STEPS: [f64; 2] = [1e-6, 1e-2];
+
+/// Linearises the predictions.
+///
+/// # Errors
+/// As [`Predictor::residuals`].
+pub fn linearise(
+    predictor: &mut Predictor<'_>,
+    layout: &Layout,
+    unknowns: &[Unknown],
+    point: &Point,
+    open: &Open,
+    differences: &mut Differences,
+) -> Result<Linearisation> {
+    let free: Vec<usize> = (0..unknowns.len()).filter(|&i| unknowns[i].free).collect();
+    let rough = predictor.is_rough();
+    let stencil: &[f64] = if rough { &STENCIL } else { &[1.0] };
+    let mut points = vec![point.clone()];
+    if rough {
+        let mut other = point.clone();
+        for start in &mut other.starts {
+            (0..2 * layout.nv).for_each(|c| start.shift(layout, c, PROBE));
+        }
+        points.push(other);
+    }
+    let mut moved = Vec::with_capacity(free.len() * stencil.len());
+    for &i in &free {
+        for by in stencil {
+            let mut other = point.clone();
+            let share = by * differences.shares[i];
+            let (value, share) = nudged(&unknowns[i].parameter, point.theta[i], share);
+            other.theta[i] = value;
+            moved.push(share);
+            points.push(other);
+        }
+    }
+    let mut start_steps = differences.starts.clone();
+    if differences.kept.is_some() {
+        start_steps.clear();
+    }
+    for (&coordinate, &step) in open.iter().zip(&start_steps) {
+        let mut other = point.clone();
+        for start in &mut other.starts {
+            start.shift(layout, coordinate, step);
+        }
+        points.push(other);
+    }
+    let present = predictor.present().iter().filter(|p| **p).count().max(1) as f64;
+    let mut residuals = predictor.residuals(&points)?.into_iter();
+    let base = residuals.next().unwrap_or_default();
+    let mut next = || -> (Vec<f64>, f64) {
+        let other = residuals.next().unwrap_or_default();
+        let mut square = 0.0;
+        let change: Vec<f64> = base
+            .iter()
+            .zip(&other)
+            .map(|(a, b)| {
+                let d = a - b;
+                if !d.is_finite() {
+                    return 0.0;
+                }
+                square += d * d;
+                d
+            })
+            .collect();
+        (change, (square / present).sqrt())
+    };
+    let aim = if rough {
+        AIM.max(ABOVE_SCATTER * next().1)
+    } else {
+        AIM
+    };
+    let mut columns = Vec::with_capacity(free.len());
+    for (k, &i) in free.iter().enumerate() {
+        // Least squares over the stencil, through the point itself.
+        let shares = &moved[k * stencil.len()..(k + 1) * stencil.len()];
+        let square: f64 = shares.iter().map(|s| s * s).sum();
+        let mut column = vec![0.0; base.len()];
+        let mut response: f64 = 0.0;
+        for &share in shares {
+            let (change, size) = next();
+            response = response.max(size);
+            for (c, d) in column.iter_mut().zip(&change) {
+                *c += d * share / square;
+            }
+        }
+        columns.push(column);
+        let h = &mut differences.shares[i];
+        *h = if response > 0.0 {
+            *h * (aim / response).clamp(1e-3, 1e3)
+        } else {
+            *h * 100.0
+        }
+        .clamp(STEPS[0], if rough { STEPS[2] } else { STEPS[1] });
+    }
+    let mut start_columns = differences.kept.clone().unwrap_or_default();
+    for (h, step) in differences.starts.iter_mut().zip(&start_steps) {
+        let (change, response) = next();
+        start_columns.push(change.iter().map(|d| d / step).collect());
+        let factor = if response > 0.0 {
+            aim / response
+        } else {
+            100.0
+        };
+        *h = (step * factor.clamp(1e-3, 1e3)).clamp(START_STEPS[0], START_STEPS[1]);
+    }
+    Ok(Linearisation {
+        residuals: base,
+        columns,
+        start_columns,
+    })
+}
+
+/// Change of the value per share of the range.
+#[must_use]
+pub fn slope(parameter: &Parameter, value: f64) -> f64 {
+    let [low, high] = parameter.range;
+    match parameter.scale {
+        Scale::Log => value * (high / low).ln(),
+        Scale::Linear | Scale::Binary(_) => high - low,
+    }
+}

@@ -1,0 +1,110 @@
+//! Normal equations of a fit, in arrow form: the starts of an episode act on that episode alone, and
+//! are eliminated there (Schur's complement).
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::linearise::Linearisation;
+
+/// Normal equations with the starts eliminated.
+pub(crate) struct Normal {
+    /// `free x free`.
+    pub(crate) information: DMatrix<f64>,
+    /// `free`.
+    pub(crate) gradient: DVector<f64>,
+    /// For each episode: inverse of its block, its coupling, and its gradient.
+    episodes: Vec<(DMatrix<f64>, DMatrix<f64>, DVector<f64>)>,
+}
+
+/// Pseudo-inverse of a symmetric matrix, scaled to a unit diagonal first: directions whose
+/// share is below `tolerance` stay out.
+#[must_use]
+pub(crate) fn inverse(matrix: &DMatrix<f64>, tolerance: f64) -> DMatrix<f64> {
+    let n = matrix.nrows();
+    if n == 0 {
+        return DMatrix::zeros(0, 0);
+    }
+    let scale = |i: usize| 1.0 / matrix[(i, i)].abs().sqrt().max(1e-150);
+    let scaled = DMatrix::from_fn(n, n, |i, j| matrix[(i, j)] * scale(i) * scale(j));
+    let inverse = scaled
+        .pseudo_inverse(tolerance)
+        .unwrap_or_else(|_| DMatrix::zeros(n, n));
+    DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] * scale(i) * scale(j))
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(x, y)| x * y).sum()
+}
+
+impl Normal {
+    pub(crate) fn new(
+        line: &Linearisation,
+        bounds: &[std::ops::Range<usize>],
+        damping: f64,
+    ) -> Self {
+        let p = line.columns.len();
+        let mut information = DMatrix::zeros(p, p);
+        let mut gradient = DVector::zeros(p);
+        for i in 0..p {
+            gradient[i] = dot(&line.columns[i], &line.residuals);
+            for j in 0..=i {
+                let x = dot(&line.columns[i], &line.columns[j]);
+                information[(i, j)] = x;
+                information[(j, i)] = x;
+            }
+        }
+        let m = line.start_columns.len();
+        let mut episodes = Vec::new();
+        if m > 0 {
+            for range in bounds {
+                let part = |c: &Vec<f64>| c[range.clone()].to_vec();
+                let starts: Vec<Vec<f64>> = line.start_columns.iter().map(part).collect();
+                let columns: Vec<Vec<f64>> = line.columns.iter().map(part).collect();
+                let r = &line.residuals[range.clone()];
+                let mut block = DMatrix::from_fn(m, m, |i, j| dot(&starts[i], &starts[j]));
+                let coupling = DMatrix::from_fn(p, m, |i, j| dot(&columns[i], &starts[j]));
+                let g = DVector::from_fn(m, |i, _| dot(&starts[i], r));
+                for i in 0..m {
+                    block[(i, i)] += damping * block[(i, i)] + 1e-9;
+                }
+                let inverse = inverse(&block, 1e-12);
+                information -= &coupling * &inverse * coupling.transpose();
+                gradient -= &coupling * &inverse * &g;
+                episodes.push((inverse, coupling, g));
+            }
+        }
+        Self {
+            information,
+            gradient,
+            episodes,
+        }
+    }
+
+    /// Step of the free parameters; those in `held` do not move.
+    pub(crate) fn step(&self, damping: f64, held: &[bool]) -> DVector<f64> {
+        let p = self.gradient.len();
+        // Starts alone.
+        if p == 0 {
+            return DVector::zeros(0);
+        }
+        let mut a = self.information.clone();
+        let mut g = self.gradient.clone();
+        for i in 0..p {
+            a[(i, i)] += damping * self.information[(i, i)].abs() + 1e-12;
+            if held[i] {
+                for j in 0..p {
+                    a[(i, j)] = 0.0;
+                    a[(j, i)] = 0.0;
+                }
+                a[(i, i)] = 1.0;
+                g[i] = 0.0;
+            }
+        }
+        a.lu().solve(&g).unwrap_or_else(|| DVector::zeros(p))
+    }
+
+    /// Steps of an episode's start, given that of the parameters.
+    pub(crate) fn start_step(&self, episode: usize, step: &DVector<f64>) -> DVector<f64> {
+        let (inverse, coupling, g) = &self.episodes[episode];
+        inverse * (g - coupling.transpose() * step)
+    }
+}
