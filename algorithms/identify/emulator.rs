@@ -22,6 +22,7 @@
 use asid_core::rng::Rng;
 use nalgebra::{DMatrix, DVector};
 
+use super::precision::Precision;
 use crate::optimise::Gaussian;
 
 /// Ridge on the regression, relative to the number of points.
@@ -76,10 +77,32 @@ fn feature_slope(u: &[f64], k: usize) -> Vec<f64> {
     slope
 }
 
+/// By how much the variance of the unknowns is larger than the weights say: the sandwich formula, at
+/// slopes `b` (readings x entries), for roughness as it shows in `epsilon`.
+fn inflation(
+    precision: &Precision,
+    b: &DMatrix<f64>,
+    epsilon: &DMatrix<f64>,
+    freedom: f64,
+    sought: usize,
+) -> Option<f64> {
+    let n = b.ncols();
+    let bw = precision.weigh(&b.transpose());
+    // Standardised coordinates: what the data do not see keeps the region's width.
+    let h = &bw * b + DMatrix::identity(n, n) * 1e-9;
+    let projected = &bw * epsilon.transpose();
+    let middle = &bw * bw.transpose() + &projected * projected.transpose() / freedom;
+    let inverse = h.cholesky()?.inverse();
+    let sandwich = &inverse * middle * &inverse;
+    let inflated = (0..sought).map(|i| sandwich[(i, i)] / inverse[(i, i)]);
+    Some(inflated.fold(1.0, f64::max))
+}
+
 impl Emulator {
     /// Fits residuals of points in a region; `sought` is how many leading entries are
     /// unknowns (the others are start poses). `readings` is how many residual entries
-    /// are present. `None` where there are too few points.
+    /// are present. Readings are weighed by their roughness alone or, if `correlated`, also by how it
+    /// runs along the episode. `None` where there are too few points.
     #[must_use]
     pub fn fit(
         region: &Gaussian,
@@ -87,6 +110,7 @@ impl Emulator {
         residuals: &[&[f64]],
         sought: usize,
         readings: usize,
+        correlated: bool,
     ) -> Option<Self> {
         let n = region.mean().len();
         let f = features_len(n);
@@ -107,9 +131,12 @@ impl Emulator {
         let freedom = (count - f) as f64;
         let spread: DVector<f64> =
             DVector::from_fn(m, |k, _| epsilon.column(k).norm_squared() / freedom);
-        let weights = spread.map(|s| 1.0 / (1.0 + s));
-        let weighted = DMatrix::from_fn(f, m, |i, k| a[(i, k)] * weights[k]);
-        let gram = &weighted * a.transpose();
+        let precision = if correlated {
+            Precision::correlated(&epsilon, freedom)
+        } else {
+            Precision::diagonal(&spread)
+        };
+        let gram = precision.weigh(&a) * a.transpose();
         let mut emulator = Self {
             region: region.clone(),
             gram,
@@ -131,16 +158,23 @@ impl Emulator {
                 .collect();
             move |i, k| slopes[k][i]
         });
-        let bw = DMatrix::from_fn(n, m, |k, i| b[(i, k)] * weights[i]);
-        // Standardised coordinates: what the data do not see keeps the region's width.
-        let h = &bw * &b + DMatrix::identity(n, n) * 1e-9;
-        let projected = &bw * epsilon.transpose();
-        let middle = &bw * bw.transpose() + &projected * projected.transpose() / freedom;
-        let inverse = h.cholesky()?.inverse();
-        let sandwich = &inverse * middle * &inverse;
-        let inflation = (0..sought)
-            .map(|i| sandwich[(i, i)] / inverse[(i, i)])
-            .fold(1.0, f64::max);
+        let inflation = if correlated {
+            // A covariance says nothing of the luck that it was made of: each half is asked of
+            // the other.
+            let share = freedom / count as f64;
+            let half = |k: usize| {
+                let rows: Vec<usize> = (k..count).step_by(2).collect();
+                epsilon.select_rows(&rows)
+            };
+            let halves = [half(0), half(1)];
+            let of = |weighing: &DMatrix<f64>, asked: &DMatrix<f64>| {
+                let precision = Precision::correlated(weighing, share * weighing.nrows() as f64);
+                inflation(&precision, &b, asked, share * asked.nrows() as f64, sought)
+            };
+            0.5 * (of(&halves[0], &halves[1])? + of(&halves[1], &halves[0])?)
+        } else {
+            inflation(&precision, &b, &epsilon, freedom, sought)?
+        };
         emulator.temperature = 1.0 / (inflation * mismatch.max(1.0));
         Some(emulator)
     }
@@ -268,7 +302,7 @@ mod tests {
 
     /// A linear simulator with `m` readings, roughness of size `rough` that lasts `run`
     /// readings, and a draw of noise.
-    fn fitted(seed: u64, rough: f64, run: usize) -> (f64, f64) {
+    fn fitted(seed: u64, rough: f64, run: usize, correlated: bool) -> (f64, f64) {
         let mut rng = Streams::new(seed).stream("e");
         let m = 200;
         let slope = 0.5;
@@ -298,7 +332,7 @@ mod tests {
             .collect();
         let p: Vec<&[f64]> = points.iter().map(Vec::as_slice).collect();
         let r: Vec<&[f64]> = residuals.iter().map(Vec::as_slice).collect();
-        let emulator = Emulator::fit(&region, &p, &r, 1, m).unwrap();
+        let emulator = Emulator::fit(&region, &p, &r, 1, m, correlated).unwrap();
         let mut walk = Streams::new(seed).stream("w");
         let samples = emulator.sample(&[-9.0], &[9.0], 1000, &mut walk);
         let mean = samples.iter().map(|s| s[0]).sum::<f64>() / 1000.0;
@@ -309,9 +343,11 @@ mod tests {
     #[test]
     fn without_roughness_it_is_linear_regression() {
         // Truth 0, 200 readings of slope 0.5 and noise 1: deviation 1 / (0.5 sqrt 200) = 0.141.
-        let (mean, std) = fitted(1, 0.0, 1);
-        assert!(mean.abs() < 4.0 * 0.141, "{mean}");
-        assert!((std / 0.141 - 1.0).abs() < 0.15, "{std}");
+        for correlated in [false, true] {
+            let (mean, std) = fitted(1, 0.0, 1, correlated);
+            assert!(mean.abs() < 4.0 * 0.141, "{mean}");
+            assert!((std / 0.141 - 1.0).abs() < 0.15, "{std}");
+        }
     }
 
     #[test]
@@ -319,11 +355,55 @@ mod tests {
         // Luck of 3 noise deviations that lasts 20 readings: ten independent pieces, so the
         // deviation of the estimate is 3 / (0.5 sqrt 10) = 1.9. Were every reading taken for
         // independent, it would seem to be 0.45.
-        let runs: Vec<(f64, f64)> = (0..60).map(|s| fitted(s, 3.0, 20)).collect();
-        let covered = runs.iter().filter(|(m, s)| m.abs() < 1.96 * s).count();
-        // A binomial of 60 at 0.95 is at least 51 with probability 0.998. The box of three region
-        // deviations cuts the widest posteriors.
-        assert!(covered >= 50, "{covered} of 60");
+        for correlated in [false, true] {
+            let runs: Vec<(f64, f64)> = (0..60).map(|s| fitted(s, 3.0, 20, correlated)).collect();
+            let covered = runs.iter().filter(|(m, s)| m.abs() < 1.96 * s).count();
+            eprintln!(
+                "{correlated} {covered} {}",
+                runs.iter().map(|r| r.1).sum::<f64>() / 60.0
+            );
+            // A binomial of 60 at 0.95 is at least 51 with probability 0.998. The box of three region
+            // deviations cuts the widest posteriors.
+            assert!(covered >= 50, "{covered} of 60");
+        }
+    }
+
+    #[test]
+    fn what_takes_no_part_in_the_luck_keeps_its_weight_if_the_correlation_is_known() {
+        // Luck moves even readings up and odd ones down together, the unknown moves all up: the two
+        // have nothing in common, and 200 readings of slope 0.5 tell the unknown to 0.141. Taken alone
+        // each reading has a deviation of sqrt(1 + 9), and tells 0.447 in all.
+        let (m, slope, rough) = (200, 0.5, 3.0);
+        let region = Gaussian::diagonal(&[0.2], &[1.0], &[-9.0], &[9.0]);
+        let mut rng = Streams::new(3).stream("e");
+        let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
+        let side = |k: usize| if k.is_multiple_of(2) { 1.0 } else { -1.0 };
+        let real = rough * normal();
+        let observed: Vec<f64> = (0..m).map(|k| real * side(k) + normal()).collect();
+        let mut draws = Streams::new(3).stream("d");
+        let points: Vec<Vec<f64>> = (0..64).map(|_| region.sample(&mut draws)).collect();
+        let residuals: Vec<Vec<f64>> = points
+            .iter()
+            .map(|x| {
+                let luck = rough * normal();
+                let reading = |k: usize| slope * x[0] + luck * side(k) - observed[k];
+                (0..m).map(reading).collect()
+            })
+            .collect();
+        let p: Vec<&[f64]> = points.iter().map(Vec::as_slice).collect();
+        let r: Vec<&[f64]> = residuals.iter().map(Vec::as_slice).collect();
+        let [alone, together] = [false, true].map(|correlated| {
+            let emulator = Emulator::fit(&region, &p, &r, 1, m, correlated).unwrap();
+            let mut walk = Streams::new(3).stream("w");
+            let samples = emulator.sample(&[-9.0], &[9.0], 2000, &mut walk);
+            let mean = samples.iter().map(|s| s[0]).sum::<f64>() / 2000.0;
+            assert!(mean.abs() < 4.0 * 0.141, "{mean}");
+            let variance = samples.iter().map(|s| (s[0] - mean).powi(2)).sum::<f64>() / 2000.0;
+            variance.sqrt()
+        });
+        assert!(alone > 0.4, "{alone}");
+        // A fifth of the roughness is left at each reading: sqrt(1 + 0.2 * 9) * 0.141.
+        assert!(together < 0.27, "{together}");
     }
 
     #[test]

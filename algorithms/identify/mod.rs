@@ -10,6 +10,7 @@ pub mod cem;
 pub mod emulator;
 pub mod likelihood;
 pub mod models;
+pub mod precision;
 pub mod reps;
 pub mod sampling;
 pub mod search;

@@ -28,6 +28,8 @@ pub struct SamplingSettings {
     pub widen: f64,
     /// Samples of the posterior that are kept.
     pub samples: usize,
+    /// Whether readings are weighed by how roughness runs along the episode, or by its size alone.
+    pub correlated: bool,
 }
 
 impl Default for SamplingSettings {
@@ -37,6 +39,7 @@ impl Default for SamplingSettings {
             draws: 64,
             widen: 2.0,
             samples: 1000,
+            correlated: false,
         }
     }
 }
@@ -192,8 +195,16 @@ pub fn posterior(
             .collect();
         let points: Vec<&[f64]> = near.iter().map(|&i| &*samples.points[i]).collect();
         let residuals: Vec<&[f64]> = near.iter().map(|&i| &*samples.residuals[i]).collect();
-        let emulator = Emulator::fit(&region, &points, &residuals, d, likelihood.present())
-            .ok_or_else(too_few)?;
+        let present = likelihood.present();
+        let emulator = Emulator::fit(
+            &region,
+            &points,
+            &residuals,
+            d,
+            present,
+            settings.correlated,
+        )
+        .ok_or_else(too_few)?;
         let drawn = emulator.sample(&low, &high, settings.samples.max(2), rng);
         iterations.push(summary(likelihood, &drawn, samples.best_loss()));
         region = Gaussian::fit(&drawn, &vec![1.0; drawn.len()], &vec![1e-3; n], &low, &high)
