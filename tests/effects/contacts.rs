@@ -98,7 +98,9 @@ fn friction_differs_by_direction() {
 fn rolling_and_torsional_friction_scale() {
     let (radius, mass) = (0.05, 0.1);
     let factor = 2.0;
-    on_each(BALL, &["rolling-friction@floor:factor=2"], |bench| {
+    // Damped critically, on engines too that cannot bounce.
+    let ball = BALL.replace("-40000 -18", "-40000 -400");
+    on_each(&ball, &["rolling-friction@floor:factor=2"], |bench| {
         let rest = bench.run(500, &[vec![]])[0][2];
         let place = [0.0, 0.0, rest, 1.0, 0.0, 0.0, 0.0];
         bench.state(&place, &[0.5, 0.0, 0.0, 0.0, 0.5 / radius, 0.0]);
@@ -107,7 +109,7 @@ fn rolling_and_torsional_friction_scale() {
         let x = bench.run(5000, &[vec![]])[0][0];
         near(&bench.engine, x, expected, 0.03 * expected);
     });
-    on_each(BALL, &["torsional-friction@floor:factor=2"], |bench| {
+    on_each(&ball, &["torsional-friction@floor:factor=2"], |bench| {
         let rest = bench.run(500, &[vec![]])[0][2];
         let place = [0.0, 0.0, rest, 1.0, 0.0, 0.0, 0.0];
         bench.state(&place, &[0.0, 0.0, 0.0, 0.0, 0.0, 30.0]);
