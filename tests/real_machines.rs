@@ -39,6 +39,17 @@ fn singles(study: &str, train: &[&str], test: &[&str]) -> Diagnosis {
     diagnose(&study, machine, settings, &Silent).unwrap().0
 }
 
+/// Of all single effects friction of a joint leaves the least, and less than half of the root mean
+/// square, on episodes that were not fitted.
+fn friction_comes_first(found: &Diagnosis, joint: &str) {
+    let ladder = &found.trace.ladder;
+    let (best, gap) = &ladder[0];
+    let identified = found.result.gap.identified;
+    let friction = format!("friction@{joint}");
+    assert!(best.contains(&friction), "{ladder:?}");
+    assert!(*gap < 0.5 * identified, "{gap} of {identified}: {ladder:?}");
+}
+
 /// The authors of these logs find that friction which grows with the load is what a servo's
 /// model lacks most (Duclusaud et al., Extended friction models, 2025).
 #[test]
@@ -52,15 +63,7 @@ fn a_servo_lacks_friction_first_of_all() {
         ],
         &["test_sin-sin_1.csv", "test_up-and-down_1.csv"],
     );
-    let (best, gap) = &found.trace.ladder[0];
-    let identified = found.result.gap.identified;
-    assert!(best.contains("friction@output"), "{:?}", found.trace.ladder);
-    // Half of the root mean square, on episodes that were not fitted.
-    assert!(
-        *gap < 0.5 * identified,
-        "{gap} of {identified}: {:?}",
-        found.trace.ladder
-    );
+    friction_comes_first(&found, "output");
 }
 
 /// Published friction of this machine's elbow is 0.12 N m (Wiebe et al., Open source dual-purpose acrobot
@@ -77,12 +80,5 @@ fn a_double_pendulum_lacks_friction_at_its_elbow() {
         ],
         &["test_e_4s.csv", "test_f_1s.csv"],
     );
-    let (best, gap) = &found.trace.ladder[0];
-    let identified = found.result.gap.identified;
-    assert!(best.contains("friction@elbow"), "{:?}", found.trace.ladder);
-    assert!(
-        *gap < 0.5 * identified,
-        "{gap} of {identified}: {:?}",
-        found.trace.ladder
-    );
+    friction_comes_first(&found, "elbow");
 }
