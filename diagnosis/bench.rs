@@ -53,6 +53,20 @@ impl Record {
         Self::new(self.logs.cut_each(layout, shares), self.starts.clone())
     }
 
+    /// Sets the scatter, one an episode; readings beyond a horizon no longer count. With what it
+    /// was.
+    pub fn set_whitening(&mut self, whitening: Vec<Whitening>) -> Vec<Whitening> {
+        let present = self.logs.present();
+        let counts = |e: usize| {
+            let own = &present[self.logs.offset(e)..self.logs.offset(e + 1)];
+            let horizon = whitening.get(e).and_then(|w| w.horizon);
+            let seen = horizon.map_or(own, |horizon| &own[..horizon]);
+            seen.iter().filter(|p| **p).count()
+        };
+        self.readings = (0..self.logs.episodes.len()).map(counts).sum();
+        std::mem::replace(&mut self.whitening, whitening)
+    }
+
     /// Some of the episodes.
     #[must_use]
     pub fn some(&self, which: &[usize]) -> Self {
@@ -171,6 +185,12 @@ impl Stage {
 /// An effect to be tried: a candidate, and values to start from.
 pub type Trial<'a> = (&'a Candidate, Vec<f64>);
 
+/// The effects of trials at their sites.
+#[must_use]
+pub fn specs(trials: &[Trial<'_>]) -> Vec<EffectSpec> {
+    trials.iter().map(|(c, _)| c.spec.clone()).collect()
+}
+
 impl Bench {
     /// Names and places.
     #[must_use]
@@ -193,18 +213,20 @@ impl Bench {
         all
     }
 
+    /// Parameters in the order of [`Bench::unknowns`].
+    #[must_use]
+    pub fn all_parameters(&self, trials: &[Trial<'_>]) -> Vec<Parameter> {
+        let unknowns = self.unknowns(trials).into_iter();
+        unknowns.map(|u| u.parameter).collect()
+    }
+
     /// A predictor of some logs in the model with some effects.
     ///
     /// # Errors
     /// When the engine refuses an effect or a parameter.
     pub fn predictor<'r>(&self, trials: &[Trial<'_>], record: &'r Record) -> Result<Predictor<'r>> {
-        let specs: Vec<EffectSpec> = trials.iter().map(|(c, _)| c.spec.clone()).collect();
-        let model = self.machine.with(&specs)?;
-        let parameters: Vec<Parameter> = self
-            .unknowns(trials)
-            .into_iter()
-            .map(|u| u.parameter)
-            .collect();
+        let model = self.machine.with(&specs(trials))?;
+        let parameters = self.all_parameters(trials);
         let threads = self.machine.threads;
         let mut predictor = Predictor::new(&*model, &parameters, &record.logs, CAPACITY, threads)?;
         predictor.set_whitening(record.whitening.clone());
@@ -275,6 +297,42 @@ impl Bench {
     #[must_use]
     pub fn is_rough(&self) -> bool {
         self.train.whitening.iter().any(|w| w.rough)
+    }
+
+    /// Sets the scatter of a stage, and at the last one also that of the logs held out. With what
+    /// they were.
+    pub(crate) fn set_scatter(
+        &mut self,
+        stage: usize,
+        [of_stage, held_out]: [Vec<Whitening>; 2],
+    ) -> [Vec<Whitening>; 2] {
+        if stage + 1 < self.stages.len() {
+            let before = self.stages[stage].record.set_whitening(of_stage);
+            return [before, held_out];
+        }
+        self.train.set_whitening(of_stage.clone());
+        [
+            self.stages[stage].record.set_whitening(of_stage),
+            self.test.set_whitening(held_out),
+        ]
+    }
+
+    /// Sum of squares that an explanation leaves of a stage.
+    ///
+    /// # Errors
+    /// When a rollout fails.
+    pub fn left(
+        &self,
+        stage: usize,
+        trials: &[Trial<'_>],
+        explanation: &Explanation,
+    ) -> Result<f64> {
+        let point = &explanation.fit.point;
+        let part = &self.stages[stage];
+        let mut predictor = self.predictor(trials, &part.record)?;
+        let point = part.point(point.theta.clone(), &point.starts);
+        let residuals = predictor.residuals(std::slice::from_ref(&point))?;
+        Ok(cost(&residuals[0]))
     }
 
     /// Number of readings of a stage.

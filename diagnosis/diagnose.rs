@@ -2,11 +2,11 @@
 
 use asid_core::{EffectSpec, Progress, Result, Streams};
 
-use crate::bench::{Bench, Explanation, Trial};
+use crate::bench::{Bench, Explanation, Record, Trial};
 use crate::candidate::{Candidate, LeftOut, enumerate};
 use crate::fit::cost;
 use crate::machine::Machine;
-use crate::predict::Point;
+use crate::predict::{Point, State};
 use crate::prepare::{Prepared, plain_residuals, prepare};
 use crate::result::{DiagnosisResult, DiagnosisTrace};
 use crate::search::{Breadth, Findings, Search, trials};
@@ -72,7 +72,8 @@ pub fn diagnose(
         mut bench,
         none,
         nominal,
-    } = prepare(study, machine, &mut streams.stream("scatter"))?;
+        mut scatter,
+    } = prepare(study, machine, streams.stream("scatter"))?;
     progress.end();
     let last = &none[none.len() - 1];
     let model = bench.machine.with(&[])?;
@@ -86,7 +87,8 @@ pub fn diagnose(
     )?;
     let (candidates, left_out) = enumerate(&bench.machine, &shown, &settings.without);
     let findings = Search {
-        bench: &bench,
+        bench: &mut bench,
+        scatter: &mut scatter,
         candidates: &candidates,
         breadth: settings.breadth,
         progress,
@@ -173,28 +175,31 @@ fn rescore(bench: &Bench, trials: &[Trial<'_>], of: &mut Explanation) -> Result<
     Ok(())
 }
 
-/// Deviation of the sum of squares that next to nothing at the starts makes.
+/// Deviation of the sum of squares over all logs that next to nothing at the starts makes.
 fn cost_scatter(bench: &Bench, none: &Explanation) -> Result<f64> {
     if !bench.is_rough() {
         return Ok(0.0);
     }
-    let mut predictor = bench.predictor(&[], &bench.train)?;
-    let points: Vec<Point> = (1..=8)
-        .map(|k| {
-            let mut point = none.fit.point.clone();
+    let of = |record: &Record, starts: &[State]| -> Result<f64> {
+        let mut predictor = bench.predictor(&[], record)?;
+        let point = |k: i32| {
+            let mut point = Point {
+                theta: none.fit.point.theta.clone(),
+                starts: starts.to_vec(),
+            };
             for start in &mut point.starts {
                 start.shift(bench.layout(), 0, f64::from(k) * crate::linearise::PROBE);
             }
             point
-        })
-        .collect();
-    let costs: Vec<f64> = predictor
-        .residuals(&points)?
-        .iter()
-        .map(|r| cost(r))
-        .collect();
-    let n = costs.len() as f64;
-    let mean = costs.iter().sum::<f64>() / n;
-    let variance = costs.iter().map(|c| (c - mean).powi(2)).sum::<f64>() / (n - 1.0);
-    Ok(variance.sqrt())
+        };
+        let points: Vec<Point> = (1..=8).map(point).collect();
+        let residuals = predictor.residuals(&points)?;
+        let costs: Vec<f64> = residuals.iter().map(|r| cost(r)).collect();
+        let n = costs.len() as f64;
+        let mean = costs.iter().sum::<f64>() / n;
+        Ok(costs.iter().map(|c| (c - mean).powi(2)).sum::<f64>() / (n - 1.0))
+    };
+    let train = of(&bench.train, &none.fit.point.starts)?;
+    let test = of(&bench.test, &none.held_starts)?;
+    Ok((train + test).sqrt())
 }

@@ -40,6 +40,8 @@ pub struct Prepared {
     pub none: Vec<Explanation>,
     /// Values of the study's parameters in the model as given.
     pub nominal: Vec<f64>,
+    /// What the bench's scatter is estimated with.
+    pub scatter: Scatter,
 }
 
 /// Sensors that some of the logs have, in the scene's order.
@@ -88,7 +90,7 @@ pub fn plain_residuals(
 ///
 /// # Errors
 /// When a parameter cannot be set or a rollout fails.
-pub fn prepare(study: &Study, machine: Machine, rng: &mut Rng) -> Result<Prepared> {
+pub fn prepare(study: &Study, machine: Machine, rng: Rng) -> Result<Prepared> {
     let layout = machine.plant.layout.clone();
     let sensors = logged_sensors(&layout, study);
     let record = |logs: &[(String, asid_core::Episode)]| -> Result<Record> {
@@ -143,6 +145,7 @@ pub fn prepare(study: &Study, machine: Machine, rng: &mut Rng) -> Result<Prepare
         bench,
         none,
         nominal,
+        scatter,
     })
 }
 
@@ -213,7 +216,7 @@ fn identify_smooth(
     bench: &mut Bench,
     study: &Study,
     point: Point,
-    scatter: &mut Scatter<'_>,
+    scatter: &mut Scatter,
 ) -> Result<Vec<Explanation>> {
     let layout = bench.layout().clone();
     let all: Vec<usize> = (0..bench.train.logs.episodes.len()).collect();
@@ -308,7 +311,7 @@ fn identify_rough(
     bench: &mut Bench,
     study: &Study,
     point: Point,
-    scatter: &mut Scatter<'_>,
+    scatter: &mut Scatter,
 ) -> Result<Vec<Explanation>> {
     // What only rests at the end of an episode tells nothing more.
     let layout = bench.layout().clone();

@@ -29,6 +29,8 @@ pub struct Whitening {
     shrink: Vec<f64>,
     /// Whether next to nothing at the start makes a difference that sensors see.
     pub rough: bool,
+    /// Residual from which on predictions tell nothing; `None` where all count.
+    pub horizon: Option<usize>,
 }
 
 impl Whitening {
@@ -64,8 +66,11 @@ impl Whitening {
         whitening
     }
 
-    /// Whitens residuals of the episode in place.
+    /// Whitens residuals of the episode in place; those beyond the horizon become zero.
     pub fn apply(&self, residuals: &mut [f64]) {
+        if let Some(horizon) = self.horizon {
+            residuals[horizon..].fill(0.0);
+        }
         for (direction, shrink) in self.directions.iter().zip(&self.shrink) {
             let along: f64 = direction.iter().zip(&*residuals).map(|(d, r)| d * r).sum();
             if along.is_finite() {
@@ -114,6 +119,19 @@ impl Spread {
     #[must_use]
     pub fn of_known_starts(layout: &Layout) -> Self {
         Self::Known(2 * layout.nv)
+    }
+
+    /// That of some episodes. Windows of episodes, whose starts are fitted, come after them and
+    /// count as known.
+    pub(crate) fn of(&self, episodes: &[usize]) -> Self {
+        match self {
+            Self::Open(coordinates, roots) if episodes.iter().all(|&e| e < roots.len()) => {
+                let own = episodes.iter().map(|&e| roots[e].clone());
+                Self::Open(coordinates.clone(), own.collect())
+            }
+            Self::Open(coordinates, _) => Self::Known(coordinates.len()),
+            Self::Known(n) => Self::Known(*n),
+        }
     }
 
     /// Draws shifts of an episode's start: coordinates and by how much.
@@ -235,6 +253,16 @@ mod tests {
         let mut across = [-0.8, 0.6, 2.0];
         whitening.apply(&mut across);
         assert!((across[0] + 0.8).abs() < 1e-12 && across[2] == 2.0);
+    }
+
+    #[test]
+    fn residuals_beyond_the_horizon_do_not_count() {
+        let mut whitening = Whitening::of(&[vec![3.0, 0.0, 0.0, 0.0]]);
+        whitening.horizon = Some(2);
+        let mut residuals = [1.0, 2.0, 300.0, 400.0];
+        whitening.apply(&mut residuals);
+        assert!((residuals[0] - 0.1_f64.sqrt()).abs() < 1e-12);
+        assert_eq!(residuals[1..], [2.0, 0.0, 0.0]);
     }
 
     #[test]

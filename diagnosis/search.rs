@@ -6,11 +6,14 @@
 //! single leaves a gap, all candidates are screened again upon it and upon its nearest
 //! rivals, and so on.
 
+mod settle;
+
 use asid_core::{Error, Progress, Result};
 
 use crate::bench::{Bench, Explanation, Trial};
 use crate::candidate::Candidate;
 use crate::fit::Effort;
+use crate::scatter::Scatter;
 use crate::screen::{Base, Screened, propose, take, worthwhile};
 
 /// How widely to search.
@@ -84,7 +87,9 @@ pub fn excess(cost_per_reading: f64) -> f64 {
 /// A search under way.
 pub struct Search<'a> {
     /// The bench.
-    pub bench: &'a Bench,
+    pub bench: &'a mut Bench,
+    /// What its scatter is estimated with.
+    pub scatter: &'a mut Scatter,
     /// The candidates.
     pub candidates: &'a [Candidate],
     /// How widely.
@@ -99,7 +104,7 @@ impl Search<'_> {
     ///
     /// # Errors
     /// When a rollout fails.
-    pub fn run(&self, none: &[Explanation]) -> Result<Findings> {
+    pub fn run(&mut self, none: &[Explanation]) -> Result<Findings> {
         let last = self.bench.stages.len() - 1;
         let nothing = |stage: usize| Found {
             candidates: Vec::new(),
@@ -110,7 +115,9 @@ impl Search<'_> {
         self.sort(&mut all);
         let mut before = NEGLIGIBLE / GROWN;
         for stage in 0..=last {
+            self.foresee(stage, &all)?;
             all = self.follow(stage, all)?;
+            self.settle(stage, &mut all)?;
             for _ in 1..self.breadth.depth {
                 // A gap that was not there on the shorter stages.
                 let gap = self.gap(stage, &all);

@@ -50,7 +50,8 @@ const USUAL: f64 = 8.0;
 /// A further effect must bring the excess below this share of what it was.
 const WORTH: f64 = 0.4;
 /// A first effect in a gap that is small anyway must bring the excess below this share of what it
-/// was: a part of what an engine's own errors leave can always be had from some effect.
+/// was, on the logs fitted to as on those held out: a part of what an engine's own errors leave can
+/// always be had from some effect.
 const WORTH_FIRST: f64 = 0.6;
 /// Difference of tempered sums of squares up to which two sets cannot be told apart: a
 /// likelihood ratio of 400.
@@ -199,6 +200,15 @@ pub fn judge(bench: &Bench, findings: &Findings, candidates: usize, scatter: f64
         h.cost / temperature + h.size as f64 * readings.ln() + choice + further + unusual
     };
     let gap = |h: &Hypothesis| excess(h.cost / readings);
+    // On the logs that were fitted to, and on those held out.
+    let gaps = |h: &Hypothesis| {
+        let found = h.found.map(|i| &findings.found[i].explanation);
+        let explanation = found.unwrap_or(&findings.none);
+        [
+            excess(explanation.fit.cost / bench.train.readings as f64),
+            excess(explanation.held_out / bench.held_readings()),
+        ]
+    };
     // A refinement that hardly betters the simpler effect is no answer of its own.
     let idle: Vec<bool> = all
         .iter()
@@ -220,7 +230,8 @@ pub fn judge(bench: &Bench, findings: &Findings, candidates: usize, scatter: f64
         let (before, after) = (&all[best], &all[next]);
         let better = score(after) < score(before);
         let worth = if before.labels.is_empty() {
-            gap(before) > NEGLIGIBLE || gap(after) < WORTH_FIRST * gap(before)
+            let mut pairs = gaps(before).into_iter().zip(gaps(after));
+            gap(before) > NEGLIGIBLE || pairs.all(|(before, after)| after < WORTH_FIRST * before)
         } else {
             gap(before) > NEGLIGIBLE && gap(after) < WORTH * gap(before)
         };

@@ -3,6 +3,7 @@
 
 #![allow(clippy::unwrap_used)]
 
+mod arm;
 #[path = "../diagnosis_support/mod.rs"]
 mod diagnosis_support;
 mod world;
@@ -201,4 +202,23 @@ fn the_same_study_gives_the_same_result_at_any_number_of_threads() {
             .result
     });
     assert_eq!(results[0], results[1]);
+}
+
+#[test]
+fn a_chaotic_arm_is_fitted_up_to_its_horizon_and_its_integrator_is_no_second_effect() {
+    let folder = tempfile::tempdir().unwrap();
+    arm::write_study(folder.path());
+    let (diagnosis, _) = run_on(folder.path(), &[]);
+    let r = &diagnosis.result;
+    assert_eq!(
+        r.verdict.effects,
+        ["actuator-gain@m_shoulder"],
+        "{}",
+        r.sentence
+    );
+    assert!(r.verdict.probability > 0.9, "{}", r.sentence);
+    let gain = diagnosis.effects[0].values[0].1;
+    assert!((gain / arm::GAIN - 1.0).abs() < 1e-3, "gain {gain}");
+    let mass = diagnosis.values[0];
+    assert!((mass / arm::FORE - 1.0).abs() < 1e-3, "mass {mass}");
 }
