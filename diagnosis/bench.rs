@@ -10,7 +10,7 @@ use crate::fit::{Effort, Fit, Unknown, cost, fit};
 use crate::linearise::Open;
 use crate::machine::Machine;
 use crate::predict::{Point, Predictor, State};
-use crate::roughness::Whitening;
+use crate::whitening::Scattering;
 
 /// Points that one batch takes.
 pub const CAPACITY: usize = 8;
@@ -22,8 +22,8 @@ pub struct Record {
     pub logs: Logs,
     /// Starts of the episodes, as given or first estimated.
     pub starts: Vec<State>,
-    /// Scatter of predictions, one an episode; empty before it is known.
-    pub whitening: Vec<Whitening>,
+    /// Scatter of predictions; none before it is known.
+    pub scattering: Scattering,
     /// Number of readings.
     pub readings: usize,
 }
@@ -36,7 +36,7 @@ impl Record {
         Self {
             logs,
             starts,
-            whitening: Vec::new(),
+            scattering: Scattering::default(),
             readings,
         }
     }
@@ -53,18 +53,17 @@ impl Record {
         Self::new(self.logs.cut_each(layout, shares), self.starts.clone())
     }
 
-    /// Sets the scatter, one an episode; readings beyond a horizon no longer count. With what it
-    /// was.
-    pub fn set_whitening(&mut self, whitening: Vec<Whitening>) -> Vec<Whitening> {
+    /// Sets the scatter; readings beyond a horizon no longer count. With what it was.
+    pub fn set_scattering(&mut self, scattering: Scattering) -> Scattering {
         let present = self.logs.present();
         let counts = |e: usize| {
             let own = &present[self.logs.offset(e)..self.logs.offset(e + 1)];
-            let horizon = whitening.get(e).and_then(|w| w.horizon);
+            let horizon = scattering.episodes.get(e).and_then(|w| w.horizon);
             let seen = horizon.map_or(own, |horizon| &own[..horizon]);
             seen.iter().filter(|p| **p).count()
         };
         self.readings = (0..self.logs.episodes.len()).map(counts).sum();
-        std::mem::replace(&mut self.whitening, whitening)
+        std::mem::replace(&mut self.scattering, scattering)
     }
 
     /// Some of the episodes.
@@ -75,9 +74,7 @@ impl Record {
             logs,
             which.iter().map(|&i| self.starts[i].clone()).collect(),
         );
-        if !self.whitening.is_empty() {
-            record.whitening = which.iter().map(|&i| self.whitening[i].clone()).collect();
-        }
+        record.set_scattering(self.scattering.some(&self.logs, which));
         record
     }
 }
@@ -93,6 +90,8 @@ pub struct Explanation {
     pub fit: Fit,
     /// Sum of squares of the whitened residuals of the logs held out; NaN before the last stage.
     pub held_out: f64,
+    /// The same without whitening.
+    pub held_plain: f64,
     /// Starts of the held-out episodes under it.
     pub held_starts: Vec<State>,
 }
@@ -229,7 +228,7 @@ impl Bench {
         let parameters = self.all_parameters(trials);
         let threads = self.machine.threads;
         let mut predictor = Predictor::new(&*model, &parameters, &record.logs, CAPACITY, threads)?;
-        predictor.set_whitening(record.whitening.clone());
+        predictor.set_scattering(record.scattering.clone());
         Ok(predictor)
     }
 
@@ -284,11 +283,11 @@ impl Bench {
             unknowns,
             fit,
             held_out: f64::NAN,
+            held_plain: f64::NAN,
             held_starts: self.test.starts.clone(),
         };
         if stage + 1 == self.stages.len() {
-            let residuals = self.held_out(trials, &mut explanation)?;
-            explanation.held_out = cost(&residuals);
+            self.hold_out(trials, &mut explanation)?;
         }
         Ok(explanation)
     }
@@ -296,7 +295,7 @@ impl Bench {
     /// Whether predictions scatter in some episode.
     #[must_use]
     pub fn is_rough(&self) -> bool {
-        self.train.whitening.iter().any(|w| w.rough)
+        self.train.scattering.is_rough()
     }
 
     /// Sets the scatter of a stage, and at the last one also that of the logs held out. With what
@@ -304,16 +303,16 @@ impl Bench {
     pub(crate) fn set_scatter(
         &mut self,
         stage: usize,
-        [of_stage, held_out]: [Vec<Whitening>; 2],
-    ) -> [Vec<Whitening>; 2] {
+        [of_stage, held_out]: [Scattering; 2],
+    ) -> [Scattering; 2] {
         if stage + 1 < self.stages.len() {
-            let before = self.stages[stage].record.set_whitening(of_stage);
+            let before = self.stages[stage].record.set_scattering(of_stage);
             return [before, held_out];
         }
-        self.train.set_whitening(of_stage.clone());
+        self.train.set_scattering(of_stage.clone());
         [
-            self.stages[stage].record.set_whitening(of_stage),
-            self.test.set_whitening(held_out),
+            self.stages[stage].record.set_scattering(of_stage),
+            self.test.set_scattering(held_out),
         ]
     }
 
@@ -341,22 +340,28 @@ impl Bench {
         self.stages[stage].record.readings as f64
     }
 
-    /// Whitened residuals of the logs held out, at its parameters; where starts are open they
-    /// are fitted on the first tenth, which then does not count.
+    /// Replays the logs held out at an explanation's parameters and sets what it leaves of them;
+    /// where starts are open they are fitted on the first tenth, which then does not count.
     ///
     /// # Errors
     /// When a rollout fails.
-    pub fn held_out(&self, trials: &[Trial<'_>], of: &mut Explanation) -> Result<Vec<f64>> {
+    pub fn hold_out(&self, trials: &[Trial<'_>], of: &mut Explanation) -> Result<()> {
         let theta = of.fit.point.theta.clone();
         of.held_starts = self.head_starts(trials, &theta, &of.held_starts)?;
         let mut predictor = self.predictor(trials, &self.test)?;
+        predictor.set_scattering(Scattering::default());
         let point = Point {
             theta,
             starts: of.held_starts.clone(),
         };
         let mut residuals = predictor.residuals(&[point])?.pop().unwrap_or_default();
+        let mut plain = residuals.clone();
+        self.mask_head(&mut plain);
+        of.held_plain = cost(&plain);
+        self.test.scattering.apply(&self.test.logs, &mut residuals);
         self.mask_head(&mut residuals);
-        Ok(residuals)
+        of.held_out = cost(&residuals);
+        Ok(())
     }
 
     /// Starts of the held-out episodes, fitted on their first tenth where they are open.

@@ -4,10 +4,11 @@ use asid_core::{Parameter, Result};
 
 use crate::bench::{Bench, Explanation};
 use crate::data::Logs;
+use crate::fit::cost;
 use crate::forces::{Missing, Short};
 use crate::linearise::slope;
 use crate::machine::Machine;
-use crate::predict::Point;
+use crate::predict::{Point, Predictor};
 use crate::prepare::plain_residuals;
 use crate::result::CheckResult;
 
@@ -205,12 +206,7 @@ fn correlated(parameters: &[Parameter], none: &Explanation) -> Option<String> {
 /// How far predictions of the held-out logs scatter by what nobody can repeat.
 #[must_use]
 pub fn repeatability(bench: &Bench) -> CheckResult {
-    let variance: f64 = bench
-        .test
-        .whitening
-        .iter()
-        .map(crate::roughness::Whitening::variance)
-        .sum();
+    let variance = bench.test.scattering.variance();
     let scatter = (variance / bench.test.readings.max(1) as f64).sqrt();
     check(
         "repeatability",
@@ -277,26 +273,27 @@ pub fn windows(before: &Short, after: &Short, seconds: f64) -> Vec<CheckResult> 
 /// # Errors
 /// When a rollout fails.
 pub fn time_step(bench: &Bench, none: &Explanation, halved: &Machine) -> Result<CheckResult> {
-    let parameters = &bench.parameters;
     let point = &none.fit.point;
-    let read = |machine: &Machine| -> Result<Vec<Vec<f64>>> {
+    let read = |machine: &Machine| -> Result<Vec<f64>> {
         let model = machine.with(&[])?;
-        let logs = crate::data::Logs::replanned(&bench.train.logs, model.layout());
-        let mut predictor =
-            crate::predict::Predictor::new(&*model, parameters, &logs, 1, machine.threads)?;
-        predictor.set_whitening(bench.train.whitening.clone());
-        predictor.residuals(std::slice::from_ref(point))
+        let logs = bench.train.logs.replanned(model.layout());
+        let mut predictor = Predictor::new(&*model, &bench.parameters, &logs, 1, machine.threads)?;
+        let mut residuals = predictor.residuals(std::slice::from_ref(point))?;
+        Ok(residuals.pop().unwrap_or_default())
     };
-    let (a, b) = (read(&bench.machine)?, read(halved)?);
-    let square: f64 = a[0].iter().zip(&b[0]).map(|(x, y)| (x - y).powi(2)).sum();
-    let change = (square / bench.train.readings.max(1) as f64).sqrt();
+    let (here, there) = (read(&bench.machine)?, read(halved)?);
+    let mut change: Vec<f64> = here.iter().zip(&there).map(|(a, b)| a - b).collect();
+    let rms = |r: &[f64]| (cost(r) / bench.train.readings.max(1) as f64).sqrt();
+    let plain = rms(&change);
+    bench.train.scattering.apply(&bench.train.logs, &mut change);
+    let left = rms(&change);
     let gap = (none.fit.cost / bench.train.readings.max(1) as f64).sqrt();
-    let ok = change < FINE || change < 0.5 * gap;
+    let ok = left < FINE || left < 0.5 * gap;
     Ok(check(
         "time-step",
         ok,
         format!(
-            "half the time step changes the predictions by {change:.2} of the noise, where the gap is {gap:.2}{}",
+            "half the time step changes the predictions by {plain:.2} of the noise; without what goes with the step alone {left:.2}, where the gap is {gap:.2}{}",
             if ok {
                 ""
             } else {

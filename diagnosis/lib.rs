@@ -37,4 +37,5 @@ pub mod study;
 mod telling;
 pub mod trajectory;
 pub mod verdict;
-pub mod windows;
+pub mod whitening;
+mod windows;

@@ -7,7 +7,7 @@ use asid_core::{Model, Parameter, Result};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 use crate::data::Logs;
-use crate::roughness::Whitening;
+use crate::whitening::Scattering;
 
 /// State at the start of an episode.
 #[derive(Clone, Debug, PartialEq)]
@@ -97,7 +97,7 @@ pub struct Predictor<'a> {
     groups: Vec<Group>,
     capacity: usize,
     present: Vec<bool>,
-    whitening: Vec<Whitening>,
+    scattering: Scattering,
 }
 
 impl<'a> Predictor<'a> {
@@ -126,7 +126,7 @@ impl<'a> Predictor<'a> {
             quaternions: quaternions(layout, &recording, &channels),
             groups: groups(logs, layout.nu(), capacity),
             present: logs.present(),
-            whitening: Vec::new(),
+            scattering: Scattering::default(),
             logs,
             simulator,
             recording,
@@ -217,15 +217,15 @@ impl<'a> Predictor<'a> {
         Ok(())
     }
 
-    /// Whitens residuals with the scatter of predictions, one an episode; none for noise alone.
-    pub fn set_whitening(&mut self, whitening: Vec<Whitening>) {
-        self.whitening = whitening;
+    /// Whitens residuals with the scatter of predictions.
+    pub fn set_scattering(&mut self, scattering: Scattering) {
+        self.scattering = scattering;
     }
 
     /// Whether predictions scatter by more than the noise in some direction.
     #[must_use]
     pub fn is_rough(&self) -> bool {
-        self.whitening.iter().any(|w| w.rough)
+        self.scattering.is_rough()
     }
 
     /// Residuals `(logged - predicted) / noise` at some points, one vector a point over all
@@ -255,10 +255,7 @@ impl<'a> Predictor<'a> {
                         (true, false) => f64::INFINITY,
                     };
                 }
-                for (e, whitening) in self.whitening.iter().enumerate() {
-                    let range = self.logs.offset(e)..self.logs.offset(e + 1);
-                    whitening.apply(&mut all[range]);
-                }
+                self.scattering.apply(self.logs, &mut all);
                 all
             })
             .collect())

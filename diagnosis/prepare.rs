@@ -16,6 +16,7 @@ use crate::roughness::Spread;
 use crate::scatter::Scatter;
 use crate::starts::{given_start, open_coordinates};
 use crate::study::Study;
+use crate::whitening::Scattering;
 use crate::windows;
 
 /// Shares of the episodes that fits grow through.
@@ -119,9 +120,12 @@ pub fn prepare(study: &Study, machine: Machine, rng: Rng) -> Result<Prepared> {
         test,
         stages: Vec::new(),
     };
-    let halved = bench.machine.halved().ok();
+    let finer = bench.machine.halved().and_then(|half| {
+        let quarter = half.halved()?;
+        Ok([half, quarter])
+    });
     let mut scatter = Scatter {
-        halved,
+        finer: finer.ok(),
         rng,
         starts: Spread::of_known_starts(&layout),
     };
@@ -220,7 +224,7 @@ fn identify_smooth(
 ) -> Result<Vec<Explanation>> {
     let layout = bench.layout().clone();
     let all: Vec<usize> = (0..bench.train.logs.episodes.len()).collect();
-    bench.train.whitening.clear();
+    bench.train.set_scattering(Scattering::default());
     let mut point = point;
     let windows = windows::rows(&bench.machine.plant, &bench.train.logs, &bench.open);
     for round in 0..2 {

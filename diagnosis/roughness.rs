@@ -3,9 +3,8 @@
 //! Where contacts amplify the smallest difference, an open-loop rollout is one of many
 //! that fit equally well, and its distance from the log is no fault of the model. An
 //! ensemble of rollouts from starts that differ by next to nothing (or by what is not
-//! known of the start) spans the directions in which predictions scatter. Residuals are
-//! whitened with that scatter added to the sensors' noise, as correlated noise of low rank:
-//! `S = I + U L U'` in units of the noise, for log and prediction both scatter.
+//! known of the start) spans the directions in which predictions scatter; log and prediction
+//! both do. Residuals are whitened with it ([whitening](crate::whitening)).
 
 use asid_core::Result;
 use asid_core::layout::Layout;
@@ -14,92 +13,12 @@ use rand::Rng as _;
 
 use crate::data::Logs;
 use crate::predict::{Point, Predictor};
+use crate::whitening::Scattering;
 
 /// Rollouts of the ensemble.
 const MEMBERS: usize = 12;
 /// Log and prediction scatter alike, so a difference has twice the variance.
 const BOTH: f64 = 2.0;
-
-/// Correlated noise of the residuals of one episode: `S^(-1/2) = I - U G U'`.
-#[derive(Clone, Debug, Default)]
-pub struct Whitening {
-    /// Orthonormal directions.
-    directions: Vec<Vec<f64>>,
-    /// `1 - (1 + variance)^(-1/2)` of each.
-    shrink: Vec<f64>,
-    /// Whether next to nothing at the start makes a difference that sensors see.
-    pub rough: bool,
-    /// Residual from which on predictions tell nothing; `None` where all count.
-    pub horizon: Option<usize>,
-}
-
-impl Whitening {
-    /// From directions of scatter in units of the noise, each as long as its deviation:
-    /// `S = I + sum v v'`.
-    #[must_use]
-    pub fn of(scatter: &[Vec<f64>]) -> Self {
-        let m = scatter.len();
-        if m == 0 {
-            return Self::default();
-        }
-        let gram = DMatrix::from_fn(m, m, |i, j| {
-            let pairs = scatter[i].iter().zip(&scatter[j]);
-            pairs.map(|(a, b)| a * b).sum::<f64>()
-        });
-        let eigen = gram.symmetric_eigen();
-        let mut whitening = Self::default();
-        for (k, &variance) in eigen.eigenvalues.iter().enumerate() {
-            if variance < 0.01 {
-                continue;
-            }
-            let length = variance.sqrt();
-            let mut direction = vec![0.0; scatter[0].len()];
-            for (i, member) in scatter.iter().enumerate() {
-                let weight = eigen.eigenvectors[(i, k)] / length;
-                for (d, x) in direction.iter_mut().zip(member) {
-                    *d += weight * x;
-                }
-            }
-            whitening.directions.push(direction);
-            whitening.shrink.push(1.0 - (1.0 + variance).powf(-0.5));
-        }
-        whitening
-    }
-
-    /// Whitens residuals of the episode in place; those beyond the horizon become zero.
-    pub fn apply(&self, residuals: &mut [f64]) {
-        if let Some(horizon) = self.horizon {
-            residuals[horizon..].fill(0.0);
-        }
-        for (direction, shrink) in self.directions.iter().zip(&self.shrink) {
-            let along: f64 = direction.iter().zip(&*residuals).map(|(d, r)| d * r).sum();
-            if along.is_finite() {
-                for (r, d) in residuals.iter_mut().zip(direction) {
-                    *r -= shrink * along * d;
-                }
-            }
-        }
-    }
-
-    /// Sum of the variances of all directions, in units of the noise.
-    #[must_use]
-    pub fn variance(&self) -> f64 {
-        let variance = |s: &f64| (1.0 - s).powi(-2) - 1.0;
-        self.shrink.iter().map(variance).sum()
-    }
-
-    /// Number of directions in which predictions scatter.
-    #[must_use]
-    pub fn rank(&self) -> usize {
-        self.shrink.len()
-    }
-
-    /// Number of directions that tell next to nothing: scatter beyond three times the noise.
-    #[must_use]
-    pub fn lost(&self) -> usize {
-        self.shrink.iter().filter(|s| **s > 0.68).count()
-    }
-}
 
 /// How far the members' starts are apart.
 #[derive(Clone, Debug)]
@@ -177,7 +96,7 @@ pub fn estimate(
             other
         })
         .collect();
-    predictor.set_whitening(Vec::new());
+    predictor.set_scattering(Scattering::default());
     let members = predictor.residuals(&points)?;
     let logs = predictor.logs();
     Ok((0..logs.episodes.len())
@@ -237,33 +156,7 @@ pub fn clocks(logs: &Logs, episode: usize, readings: &[f64], timestep: f64) -> V
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn whitened_residuals_have_the_identity_for_covariance() {
-        // S = I + (8 + 8) u u'.
-        let u = [0.6, 0.8, 0.0];
-        let member = |s: f64| u.iter().map(|x| s * x).collect::<Vec<f64>>();
-        let along = 8.0_f64.sqrt();
-        let whitening = Whitening::of(&[member(along), member(-along)]);
-        assert_eq!(whitening.rank(), 1);
-        let mut along = u;
-        whitening.apply(&mut along);
-        let length = along.iter().map(|x| x * x).sum::<f64>();
-        assert!((length - 1.0 / 17.0).abs() < 1e-12, "{length}");
-        let mut across = [-0.8, 0.6, 2.0];
-        whitening.apply(&mut across);
-        assert!((across[0] + 0.8).abs() < 1e-12 && across[2] == 2.0);
-    }
-
-    #[test]
-    fn residuals_beyond_the_horizon_do_not_count() {
-        let mut whitening = Whitening::of(&[vec![3.0, 0.0, 0.0, 0.0]]);
-        whitening.horizon = Some(2);
-        let mut residuals = [1.0, 2.0, 300.0, 400.0];
-        whitening.apply(&mut residuals);
-        assert!((residuals[0] - 0.1_f64.sqrt()).abs() < 1e-12);
-        assert_eq!(residuals[1..], [2.0, 0.0, 0.0]);
-    }
+    use crate::whitening::Whitening;
 
     #[test]
     fn open_starts_are_drawn_with_their_covariance() {

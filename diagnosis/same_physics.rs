@@ -10,6 +10,7 @@ use crate::result::{DiagnosisResult, Kind};
 use crate::score::Label;
 use crate::screen::{Base, Proposal, propose, take};
 use crate::search::trials;
+use crate::whitening::Scattering;
 
 /// Difference of noise-free predictions, root mean square in units of the noise, up to which
 /// two explanations are the same physics.
@@ -75,7 +76,7 @@ pub fn same_physics(work: &Work, result: &DiagnosisResult, label: &Label) -> Res
 /// Residuals of the held-out logs without whitening: they differ by predictions alone.
 fn predictions(work: &Work, trials: &[Trial<'_>], of: &Explanation) -> Result<Vec<f64>> {
     let mut predictor = work.bench.predictor(trials, &work.bench.test)?;
-    predictor.set_whitening(Vec::new());
+    predictor.set_scattering(Scattering::default());
     let point = Point {
         theta: of.fit.point.theta.clone(),
         starts: of.held_starts.clone(),

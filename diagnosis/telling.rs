@@ -18,6 +18,7 @@ use crate::search::{Findings, Found, trials};
 use crate::study::Study;
 use crate::trajectory::Trajectory;
 use crate::verdict::Judgement;
+use crate::whitening::Scattering;
 use crate::windows;
 
 mod trace;
@@ -85,7 +86,7 @@ impl Telling<'_> {
         let bench = self.bench;
         let starts = bench.head_starts(trials, theta, &bench.test.starts)?;
         let mut predictor = bench.predictor(trials, &bench.test)?;
-        predictor.set_whitening(Vec::new());
+        predictor.set_scattering(Scattering::default());
         let point = Point {
             theta: theta.to_vec(),
             starts,
@@ -341,7 +342,7 @@ impl Telling<'_> {
     fn places(&self, none: &Explanation) -> Result<Vec<crate::result::Where>> {
         let record = &self.bench.train;
         let mut predictor = self.bench.predictor(&[], record)?;
-        predictor.set_whitening(Vec::new());
+        predictor.set_scattering(Scattering::default());
         let residuals = predictor.residuals(std::slice::from_ref(&none.fit.point))?;
         let shown = self.shown(record, none)?;
         let plant = &self.bench.machine.plant;

@@ -53,6 +53,9 @@ const WORTH: f64 = 0.4;
 /// was, on the logs fitted to as on those held out: a part of what an engine's own errors leave can
 /// always be had from some effect.
 const WORTH_FIRST: f64 = 0.6;
+/// It must also shrink the plain gap of the logs held out below this share: what does not is no
+/// explanation, however well it goes with what is left of whitened residuals.
+const SHRINKS: f64 = 0.9;
 /// Difference of tempered sums of squares up to which two sets cannot be told apart: a
 /// likelihood ratio of 400.
 const APART: f64 = 12.0;
@@ -129,6 +132,19 @@ fn refines(findings: &Findings, set: &Hypothesis, simpler: &Hypothesis) -> bool 
             .any(|y| coarse.contains(&&*y.name) && y.site == fine.site)
 }
 
+/// Whether a set is another one with one effect replaced by a force on a body that is held by
+/// joints.
+fn stands_in(bench: &Bench, set: &Hypothesis, other: &Hypothesis) -> bool {
+    let differ = |a: &Hypothesis, b: &Hypothesis| -> Vec<String> {
+        let own = a.labels.iter().filter(|l| !b.labels.contains(l));
+        own.cloned().collect()
+    };
+    match (&differ(set, other)[..], &differ(other, set)[..]) {
+        ([a], [b]) => odd(bench, a) && !odd(bench, b),
+        _ => false,
+    }
+}
+
 /// Whether a set is another one with something added that does nothing, or all of it and more.
 fn contains(larger: &Found, smaller: &[String]) -> bool {
     let labels = larger.explanation.labels();
@@ -200,21 +216,26 @@ pub fn judge(bench: &Bench, findings: &Findings, candidates: usize, scatter: f64
         h.cost / temperature + h.size as f64 * readings.ln() + choice + further + unusual
     };
     let gap = |h: &Hypothesis| excess(h.cost / readings);
+    let explanation = |h: &Hypothesis| {
+        let found = h.found.map(|i| &findings.found[i].explanation);
+        found.unwrap_or(&findings.none)
+    };
     // On the logs that were fitted to, and on those held out.
     let gaps = |h: &Hypothesis| {
-        let found = h.found.map(|i| &findings.found[i].explanation);
-        let explanation = found.unwrap_or(&findings.none);
+        let of = explanation(h);
         [
-            excess(explanation.fit.cost / bench.train.readings as f64),
-            excess(explanation.held_out / bench.held_readings()),
+            excess(of.fit.cost / bench.train.readings as f64),
+            excess(of.held_out / bench.held_readings()),
         ]
     };
-    // A refinement that hardly betters the simpler effect is no answer of its own.
+    let plain = |h: &Hypothesis| excess(explanation(h).held_plain / bench.held_readings());
+    // A refinement that hardly betters the simpler effect is no answer of its own, nor is an
+    // unusual effect that hardly betters a usual one.
     let idle: Vec<bool> = all
         .iter()
         .map(|h| {
             all.iter().any(|simpler| {
-                refines(findings, h, simpler)
+                (refines(findings, h, simpler) || stands_in(bench, h, simpler))
                     && !(gap(simpler) > NEGLIGIBLE && gap(h) < WORTH * gap(simpler))
             })
         })
@@ -231,7 +252,9 @@ pub fn judge(bench: &Bench, findings: &Findings, candidates: usize, scatter: f64
         let better = score(after) < score(before);
         let worth = if before.labels.is_empty() {
             let mut pairs = gaps(before).into_iter().zip(gaps(after));
-            gap(before) > NEGLIGIBLE || pairs.all(|(before, after)| after < WORTH_FIRST * before)
+            gap(before) > NEGLIGIBLE
+                || pairs.all(|(before, after)| after < WORTH_FIRST * before)
+                    && plain(after) < SHRINKS * plain(before)
         } else {
             gap(before) > NEGLIGIBLE && gap(after) < WORTH * gap(before)
         };
@@ -245,7 +268,7 @@ pub fn judge(bench: &Bench, findings: &Findings, candidates: usize, scatter: f64
         // What the rule of parsimony passes over is not more probable than what it picks.
         if i != best {
             let passed_over = all[i].labels.len() > all[best].labels.len() || idle[i];
-            worse = worse.max(if passed_over { 4.0 } else { 0.0 });
+            worse = worse.max(if passed_over { 6.0 } else { 0.0 });
         }
         all[i].probability = (-0.5 * worse).exp();
     }
@@ -256,7 +279,7 @@ pub fn judge(bench: &Bench, findings: &Findings, candidates: usize, scatter: f64
     let unknown = if best == 0 {
         // Where long replays tell nothing, short ones may still leave a gap.
         let short = findings.short.unwrap_or(0.0);
-        sigmoid((short - NEGLIGIBLE) / 0.3).clamp(0.02, 0.999)
+        sigmoid((short.max(left) - NEGLIGIBLE) / 0.3).clamp(0.02, 0.999)
     } else {
         let share = sigmoid((rest / REST).ln() / SHARPNESS + 0.5 * (left / USUAL).max(1e-9).ln());
         (share * sigmoid((left - NEGLIGIBLE) / 0.3)).clamp(0.001, 0.999)
