@@ -202,6 +202,30 @@ mod tests {
     }
 
     #[test]
+    fn one_number_for_all_episodes_leaves_what_differs_between_them() {
+        // Two episodes of two readings, which an error moves along (3, 4) in either.
+        let [error, none] = [[30.0, 40.0], [0.0; 2]];
+        let own = [
+            Whitening::of(&[error.to_vec()]),
+            Whitening::of(&[error.to_vec()]),
+        ];
+        let shared = Whitening::of(&[[error, error].concat()]);
+        let differs = [error, error.map(|x: f64| -x)].concat();
+        let mut left = differs.clone();
+        own[0].apply(&mut left[..2]);
+        own[1].apply(&mut left[2..]);
+        let square = |r: &[f64]| r.iter().map(|x| x * x).sum::<f64>();
+        assert!(square(&left) < 2.0);
+        let mut left = differs.clone();
+        shared.apply(&mut left);
+        assert_eq!(left, differs);
+        let mut left = [error, none].concat();
+        shared.apply(&mut left);
+        // Half of it is common to both, half is not.
+        assert!((square(&left) / 1250.0 - 1.0).abs() < 1e-3, "{left:?}");
+    }
+
+    #[test]
     fn parts_of_a_scatter_are_the_scatter_of_parts() {
         let whitening = Whitening::of(&[vec![1.0, 2.0, -1.0], vec![0.5, 0.0, 3.0]]);
         let again = Whitening::of(&whitening.scatter());

@@ -5,7 +5,7 @@ use asid_core::plant::{Drive, DriveLaw};
 use asid_core::simulator::StepView;
 use asid_core::{Capabilities, Plant, Result, Target};
 
-use super::{at_least, drives, target, values};
+use super::{actuators, at_least, drives, target, values};
 
 asid_core::register!(EffectEntry {
     name: "actuator-gain",
@@ -75,17 +75,17 @@ impl Effect for Affine {
     }
 
     fn sites(&self, plant: &Plant) -> Vec<String> {
-        drives(plant)
+        actuators(plant)
     }
 
     fn attach(&self, site: &Site<'_>) -> Result<Box<dyn Acting>> {
         let [value] = values(site)?;
-        let (actuator, drive) = site.plant.drive(site.name)?;
+        let layout = &site.plant.layout;
+        let actuator = layout.actuator(site.name)?;
+        let range = layout.actuators[actuator].ctrl_range;
         Ok(Box::new(AffineAt {
             actuator,
-            range: drive
-                .ctrl_range
-                .unwrap_or([f64::NEG_INFINITY, f64::INFINITY]),
+            range: range.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]),
             gain: if self.scaled { value } else { 1.0 },
             bias: if self.scaled { 0.0 } else { value },
         }))

@@ -10,7 +10,7 @@ use asid_core::effect::{Acting, Acts, Effect, EffectParameter, Site};
 use asid_core::simulator::StepView;
 use asid_core::{Plant, Result};
 
-use super::{at_least, drives, values};
+use super::{actuators, at_least, values};
 
 asid_core::register!(EffectEntry {
     name: "actuator-delay",
@@ -76,7 +76,7 @@ impl Effect for Delay {
     }
 
     fn sites(&self, plant: &Plant) -> Vec<String> {
-        drives(plant)
+        actuators(plant)
     }
 
     fn attach(&self, site: &Site<'_>) -> Result<Box<dyn Acting>> {
@@ -139,7 +139,7 @@ impl Effect for Lag {
     }
 
     fn sites(&self, plant: &Plant) -> Vec<String> {
-        drives(plant)
+        actuators(plant)
     }
 
     fn attach(&self, site: &Site<'_>) -> Result<Box<dyn Acting>> {

@@ -70,6 +70,12 @@ fn scalar_joints(plant: &Plant) -> Vec<String> {
         .collect()
 }
 
+/// Names of all actuators: their commands can be late or off whatever they drive.
+fn actuators(plant: &Plant) -> Vec<String> {
+    let actuators = plant.layout.actuators.iter();
+    actuators.map(|a| a.name.clone()).collect()
+}
+
 /// Names of the plain drives.
 fn drives(plant: &Plant) -> Vec<String> {
     let actuators = plant.layout.actuators.iter().zip(&plant.drives);

@@ -40,9 +40,11 @@ fn run_on(folder: &Path, without: &[&str]) -> (Diagnosis, Work) {
 }
 
 /// Cases with the labels that a scorer would have.
-const CASES: [(Truth, &[&str]); 4] = [
+const CASES: [(Truth, &[&str]); 5] = [
     (Truth::None, &[]),
     (Truth::Coulomb(1.2), &["coulomb-friction@rail"]),
+    // A drag on the cart is the same, and not what one thinks of first.
+    (Truth::Viscous(1.5), &["viscous-friction@rail"]),
     (Truth::Delay(0.03), &["actuator-delay@belt"]),
     (Truth::SensorBias(0.02), &["sensor-bias@x"]),
 ];

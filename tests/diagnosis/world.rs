@@ -25,6 +25,8 @@ pub enum Truth {
     None,
     /// Dry friction, N, smoothed over 5 mm/s.
     Coulomb(f64),
+    /// More viscous friction, N s/m.
+    Viscous(f64),
     /// A spring, N/m.
     Spring(f64),
     /// The command comes later, s.
@@ -55,6 +57,7 @@ fn command(episode: usize, t: f64) -> f64 {
 fn extra(truth: Truth, x: f64, v: f64) -> f64 {
     match truth {
         Truth::Coulomb(force) => -force * (v / 5e-3).tanh(),
+        Truth::Viscous(d) => -d * v,
         Truth::Spring(k) => -k * x,
         Truth::Magnet(force) => {
             let s = (x - 0.05) / 0.04;

@@ -53,6 +53,25 @@ impl BodyInertia {
         }
     }
 
+    /// Place of a principal axis in the order of the moments, the largest first.
+    #[must_use]
+    pub fn rank_of_axis(&self, axis: usize) -> usize {
+        let own = self.inertia[axis];
+        let before = |&i: &usize| {
+            let other = self.inertia[i];
+            other > own || (other == own && i < axis)
+        };
+        (0..3).filter(before).count()
+    }
+
+    /// The principal axis at a place in the order of the moments, the largest first.
+    #[must_use]
+    pub fn axis_of_rank(&self, rank: usize) -> usize {
+        (0..3)
+            .find(|&axis| self.rank_of_axis(axis) == rank)
+            .unwrap_or(rank)
+    }
+
     /// True where a body with these properties can exist: positive mass and
     /// moments, none larger than the sum of the other two.
     #[must_use]

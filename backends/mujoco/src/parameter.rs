@@ -18,7 +18,9 @@ struct BodyPlan {
 }
 
 impl BodyPlan {
-    /// Mass properties for one simulation's values of all columns.
+    /// Mass properties for one simulation's values of all columns. Where geoms are among them,
+    /// a centre of mass moves by as much as its column differs from the scene, and a moment is
+    /// scaled by as much.
     fn inertia(&self, columns: &[Column], values: &[f64]) -> BodyInertia {
         // What the scene says stays what the engine compiled, to the bit.
         if self
@@ -29,6 +31,8 @@ impl BodyPlan {
             return self.nominal.clone();
         }
         let mut out = self.nominal.clone();
+        // What the scene's own centre and moments are, of which those of the columns differ.
+        let mut was = None;
         if let Some(geoms) = &self.geoms {
             let mut masses = geoms.masses.clone();
             for &(column, part) in &self.parts {
@@ -39,6 +43,7 @@ impl BodyPlan {
                 }
             }
             out = BodyInertia::of_geoms(&masses);
+            was = Some(BodyInertia::of_geoms(&geoms.masses));
         }
         // The mass first: it scales the moments that the scene has, and a moment
         // that is itself a parameter is then as given.
@@ -51,8 +56,20 @@ impl BodyPlan {
         }
         for &(column, part) in &self.parts {
             match part {
-                Part::Center(axis) => out.ipos[axis] = values[column],
-                Part::Moment(axis) => out.inertia[axis] = values[column],
+                Part::Center(axis) => {
+                    out.ipos[axis] = match &was {
+                        Some(was) => out.ipos[axis] + values[column] - was.ipos[axis],
+                        None => values[column],
+                    }
+                }
+                Part::Moment(axis) => match &was {
+                    // By its place in the order of size: the axes may come in another one.
+                    Some(was) => {
+                        let axis = was.axis_of_rank(self.nominal.rank_of_axis(axis));
+                        out.inertia[axis] *= values[column] / was.inertia[axis];
+                    }
+                    None => out.inertia[axis] = values[column],
+                },
                 _ => {}
             }
         }
@@ -95,11 +112,10 @@ impl Plan {
                         &mut bodies[last]
                     }
                 };
-                if let Some(&(other, _)) = plan
-                    .parts
-                    .iter()
-                    .find(|(_, p)| p.of_geom() != part.of_geom())
-                {
+                let clash = |p: Part| p.of_geom() && part == Part::Mass;
+                let clashes =
+                    |&&(_, p): &&(usize, Part)| clash(p) || (p == Part::Mass && part.of_geom());
+                if let Some(&(other, _)) = plan.parts.iter().find(clashes) {
                     return Err(parameter(
                         target,
                         &format!(

@@ -129,30 +129,39 @@ impl MassModel {
         self.geoms[geom].is_some()
     }
 
-    /// Mass properties of a body.
-    pub fn inertia(&self, body: usize, structure: &Structure) -> Inertia {
-        let mut inertia = self.inertials[body].unwrap_or_else(|| {
-            let geoms: Vec<GeomMass> = self.geoms_of[body]
-                .clone()
-                .filter_map(|g| {
-                    let mut mass = self.geoms[g].clone()?;
+    /// That of a body's geoms, as the document has them or with other values.
+    fn of_geoms(&self, body: usize, structure: Option<&Structure>) -> Inertia {
+        let geoms: Vec<GeomMass> = self.geoms_of[body]
+            .clone()
+            .filter_map(|g| {
+                let mut mass = self.geoms[g].clone()?;
+                if let Some(structure) = structure {
                     mass.mass = structure.geoms[g].mass;
                     mass.position = structure.geoms[g].position;
-                    Some(mass)
-                })
-                .collect();
-            let all = MassProperties::of_geoms(&geoms);
-            let (moments, axes) = all.principal();
-            Inertia {
-                mass: all.mass,
-                center: all.center,
-                moments,
-                axes,
-            }
-        });
+                }
+                Some(mass)
+            })
+            .collect();
+        let all = MassProperties::of_geoms(&geoms);
+        let (moments, axes) = all.principal();
+        Inertia {
+            mass: all.mass,
+            center: all.center,
+            moments,
+            axes,
+        }
+    }
+
+    /// Mass properties of a body. Where its geoms are not as in the document, a centre of mass that is
+    /// set moves by as much as it differs from the document, and a moment is scaled by as much.
+    pub fn inertia(&self, body: usize, structure: &Structure) -> Inertia {
+        let given = self.inertials[body];
+        let mut inertia = given.unwrap_or_else(|| self.of_geoms(body, Some(structure)));
+        let values = &structure.bodies[body];
+        let document = given.is_none().then(|| self.of_geoms(body, None));
+        let document = document.filter(|document| *document != inertia);
         inertia.mass = inertia.mass.max(self.bound_mass);
         inertia.moments = inertia.moments.map(|m| m.max(self.bound_inertia));
-        let values = &structure.bodies[body];
         if let Some(mass) = values.mass {
             if inertia.mass > 0.0 {
                 inertia.moments *= mass / inertia.mass;
@@ -160,8 +169,14 @@ impl MassModel {
             inertia.mass = mass;
         }
         for axis in 0..3 {
-            inertia.center[axis] = values.center[axis].unwrap_or(inertia.center[axis]);
-            inertia.moments[axis] = values.inertia[axis].unwrap_or(inertia.moments[axis]);
+            if let Some(center) = values.center[axis] {
+                let moved = document.map_or(0.0, |was| inertia.center[axis] - was.center[axis]);
+                inertia.center[axis] = center + moved;
+            }
+            if let Some(moment) = values.inertia[axis] {
+                let scaled = document.map_or(1.0, |was| inertia.moments[axis] / was.moments[axis]);
+                inertia.moments[axis] = moment * scaled;
+            }
         }
         inertia
     }
