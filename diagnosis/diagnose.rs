@@ -2,12 +2,13 @@
 
 use asid_core::{EffectSpec, Progress, Result, Streams};
 
-use crate::bench::{Bench, Explanation, Record, Trial};
+use crate::bench::{Bench, Explanation, Trial};
 use crate::candidate::{Candidate, LeftOut, enumerate};
 use crate::fit::cost;
 use crate::machine::Machine;
 use crate::predict::{Point, State};
 use crate::prepare::{Prepared, plain_residuals, prepare};
+use crate::record::Record;
 use crate::result::{DiagnosisResult, DiagnosisTrace};
 use crate::search::{Breadth, Findings, Search, trials};
 use crate::study::Study;

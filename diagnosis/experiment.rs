@@ -6,9 +6,10 @@
 
 use asid_core::{Episode, Result};
 
-use crate::bench::{Bench, Explanation, Record, Trial};
+use crate::bench::{Bench, Explanation, Trial};
 use crate::data::Logs;
 use crate::predict::Point;
+use crate::record::Record;
 use crate::result::NextExperiment;
 
 /// Factors on the commands' size about their mean, and on time.

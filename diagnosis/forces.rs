@@ -10,13 +10,14 @@ use asid_core::registry::{EffectEntry, find};
 use asid_core::{EffectSpec, Result};
 use nalgebra::{DMatrix, DVector};
 
-use crate::bench::{Bench, Record, Trial};
+use crate::bench::{Bench, Trial};
 use crate::candidate::Candidate;
 use crate::fit::Unknown;
 use crate::linearise::{Differences, linearise};
 use crate::noise::{NORMAL, median};
 use crate::normal::inverse;
 use crate::predict::Point;
+use crate::record::Record;
 use crate::trajectory::Trajectory;
 use crate::windows::settle;
 

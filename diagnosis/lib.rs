@@ -23,6 +23,7 @@ mod normal;
 pub mod nuisance;
 pub mod predict;
 pub mod prepare;
+pub mod record;
 pub mod refined_model;
 pub mod result;
 pub mod roughness;

@@ -6,12 +6,13 @@ use std::collections::BTreeMap;
 use asid_core::rng::Rng;
 use asid_core::{Layout, Result};
 
-use crate::bench::{Bench, CAPACITY, Explanation, Record, Stage};
+use crate::bench::{Bench, CAPACITY, Explanation, Stage};
 use crate::data::Logs;
 use crate::fit::{Effort, Unknown, fit, scan};
 use crate::machine::Machine;
 use crate::noise;
 use crate::predict::Point;
+use crate::record::Record;
 use crate::roughness::Spread;
 use crate::scatter::Scatter;
 use crate::starts::{given_start, open_coordinates};

@@ -4,12 +4,13 @@ use asid_core::rng::Rng;
 use asid_core::{Layout, Result};
 use nalgebra::DMatrix;
 
-use crate::bench::{Bench, Explanation, Record, Trial, specs};
+use crate::bench::{Bench, Explanation, Trial, specs};
 use crate::data::Logs;
 use crate::linearise::{Differences, linearise};
 use crate::machine::Machine;
 use crate::predict::{Point, Predictor};
 use crate::prepare::HEAD;
+use crate::record::Record;
 use crate::roughness::{self, Spread};
 use crate::whitening::{Scattering, Whitening};
 

@@ -8,12 +8,13 @@
 
 use asid_core::{Layout, Parameter, Result};
 
-use crate::bench::{Bench, Explanation, Record, Trial};
+use crate::bench::{Bench, Explanation, Trial};
 use crate::candidate::Candidate;
 use crate::fit::{Unknown, cost};
 use crate::linearise::{ABOVE_SCATTER, AIM, Differences, PROBE, ROUGH_START, linearise};
 use crate::nuisance::{Nuisance, Starts};
 use crate::predict::Point;
+use crate::record::Record;
 
 mod propose;
 

@@ -2,7 +2,7 @@
 
 use asid_core::{Result, Streams};
 
-use crate::bench::{Bench, Explanation, Record, Trial};
+use crate::bench::{Bench, Explanation, Trial};
 use crate::candidate::{Candidate, LeftOut};
 use crate::checks;
 use crate::diagnose::{Diagnosis, Settings};
@@ -10,6 +10,7 @@ use crate::experiment;
 use crate::forces::{self, Short};
 use crate::localise::localise;
 use crate::predict::Point;
+use crate::record::Record;
 use crate::result::{
     DiagnosisResult, EffectResult, Gap, HypothesisResult, Kind, NextExperiment, ParameterResult,
     SignalGap, Verdict,

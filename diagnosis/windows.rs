@@ -10,10 +10,11 @@ use asid_core::layout::JointKind;
 use asid_core::plant::Reads;
 use asid_core::{Plant, Result};
 
-use crate::bench::{Bench, Record, Stage, Trial};
+use crate::bench::{Bench, Stage, Trial};
 use crate::data::Logs;
 use crate::fit::{Effort, fit};
 use crate::predict::{Point, State};
+use crate::record::Record;
 use crate::starts::given_start;
 
 /// Share of the longest log that a window is, and its fewest rows.

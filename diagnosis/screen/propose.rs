@@ -3,12 +3,13 @@
 use asid_core::{Parameter, Result};
 
 use super::Base;
-use crate::bench::{Bench, Record, Trial};
+use crate::bench::{Bench, Trial};
 use crate::candidate::Candidate;
 use crate::fit::{Unknown, cost};
 use crate::linearise::{NOTHING, nudged};
 use crate::nuisance::dot;
 use crate::predict::{Point, Predictor};
+use crate::record::Record;
 
 /// A candidate at one of its starts, linearised and fitted.
 pub(super) struct Line<'l> {
