@@ -1,8 +1,7 @@
 //! Mass properties of bodies that move.
 //!
-//! Where a body's mass comes from its geoms, mass and payload change the geoms' masses, so that they
-//! compose with a study that fits one of them; an engine refuses to change a body's own mass beside
-//! those of its geoms.
+//! Where a body's mass comes from its geoms, mass and payload change the geoms' masses; centre and inertia change
+//! what the geoms make. So all compose with a study that fits the mass of a geom.
 
 use asid_core::effect::{Acting, Acts, Effect, EffectParameter, Site};
 use asid_core::{Capabilities, Plant, Result, Target};
