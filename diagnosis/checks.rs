@@ -4,7 +4,7 @@ use asid_core::{Parameter, Result};
 
 use crate::bench::{Bench, Explanation};
 use crate::data::Logs;
-use crate::fit::cost;
+use crate::fit::{Fit, cost};
 use crate::forces::{Missing, Short};
 use crate::linearise::slope;
 use crate::machine::Machine;
@@ -120,9 +120,14 @@ pub fn units(bench: &Bench, nominal: &[f64]) -> Result<CheckResult> {
     Ok(check("units", ok, detail))
 }
 
-/// Does each of the study's parameters show, and which of their combinations do not?
+/// Does each of the study's parameters show, without effects or with those of the best
+/// explanation, and which of their combinations do not?
 #[must_use]
-pub fn identifiability(parameters: &[Parameter], none: &Explanation) -> Vec<CheckResult> {
+pub fn identifiability(
+    parameters: &[Parameter],
+    none: &Explanation,
+    best: &Explanation,
+) -> Vec<CheckResult> {
     if parameters.is_empty() {
         return vec![check(
             "excitation",
@@ -133,11 +138,17 @@ pub fn identifiability(parameters: &[Parameter], none: &Explanation) -> Vec<Chec
     let fit = &none.fit;
     let p = fit.free.len();
     // In shares of the range.
-    let scale: Vec<f64> = (0..p)
-        .map(|k| slope(&parameters[fit.free[k]], fit.point.theta[fit.free[k]]))
-        .collect();
-    let deviation = |k: usize| fit.covariance[(k, k)].max(0.0).sqrt() / scale[k].abs();
-    let information = |k: usize| fit.jacobian.column(k).norm() * scale[k].abs();
+    let scale = |fit: &Fit, k: usize| {
+        let i = fit.free[k];
+        slope(&parameters[i], fit.point.theta[i]).abs()
+    };
+    let deviation = |k: usize| fit.covariance[(k, k)].max(0.0).sqrt() / scale(fit, k);
+    // Far off the logs a replay may be so chaotic that it has no slope; the best explanation is
+    // nearer.
+    let information = |k: usize| {
+        let of = |fit: &Fit| fit.jacobian.column(k).norm() * scale(fit, k);
+        of(fit).max(of(&best.fit))
+    };
     let silent: Vec<&str> = (0..p)
         .filter(|&k| information(k) * PINNED < 1.0)
         .map(|k| &*parameters[fit.free[k]].name)

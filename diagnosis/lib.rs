@@ -39,4 +39,4 @@ mod telling;
 pub mod trajectory;
 pub mod verdict;
 pub mod whitening;
-mod windows;
+pub mod windows;

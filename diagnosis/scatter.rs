@@ -136,9 +136,9 @@ impl Scatter {
             let rest: Vec<f64> = pairs.map(|(a, b)| INTEGRATOR * (a - 2.0 * b)).collect();
             for (e, horizon) in horizons.iter_mut().enumerate() {
                 let rest = &rest[logs.offset(e)..logs.offset(e + 1)];
-                let far = |x: &f64| !(x.abs() < HORIZON);
+                let near = |x: &f64| x.abs() < HORIZON;
                 if !rough[e] && !trials.is_empty() {
-                    let row = rest.chunks(n).position(|row| row.iter().any(far));
+                    let row = rest.chunks(n).position(|row| !row.iter().all(near));
                     *horizon = row.map(|row| row * n);
                 }
             }

@@ -154,7 +154,7 @@ impl Telling<'_> {
             effects,
             verdict,
             parameters: self.parameters(&explanation),
-            checks: self.checks(none, short.as_ref())?,
+            checks: self.checks(none, &explanation, short.as_ref())?,
             next_experiment: self.next(best)?,
         };
         let rest = short.and_then(|(before, after, _)| least_explained(&before, &after));
@@ -385,6 +385,7 @@ impl Telling<'_> {
     fn checks(
         &self,
         none: &Explanation,
+        best: &Explanation,
         short: Option<&(Short, Short, f64)>,
     ) -> Result<Vec<crate::result::CheckResult>> {
         let bench = self.bench;
@@ -392,7 +393,7 @@ impl Telling<'_> {
             checks::data(&bench.train.logs, &bench.test.logs),
             checks::units(bench, self.nominal)?,
         ];
-        all.extend(checks::identifiability(&bench.parameters, none));
+        all.extend(checks::identifiability(&bench.parameters, none, best));
         all.push(checks::repeatability(bench));
         if let Ok(halved) = bench.machine.halved() {
             all.push(checks::time_step(bench, none, &halved)?);
