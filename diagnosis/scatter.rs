@@ -17,6 +17,9 @@ use crate::whitening::{Scattering, Whitening};
 /// Deviation of the integrator's error in units of what half the time step changes: an
 /// integrator of first order is still as far off again.
 const INTEGRATOR: f64 = 3.0;
+/// Share of the clocks and of what half the time step changes that is each episode's own: another
+/// program's integrator errs otherwise, and not in the same proportion everywhere.
+const OWN: f64 = 0.3;
 /// Share of the gap up to which what is open of the starts is small.
 /// Deviation of the integrator's error, in units of the noise, from which on a prediction tells
 /// nothing: that part of it which is not proportional to the time step.
@@ -124,7 +127,10 @@ impl Scatter {
         let steps = self.steps(bench, record, trials, point)?;
         // Where starts are open they are fitted an episode at a time, and so is all else.
         let together = bench.open.is_empty();
+        let share = |d: &Vec<f64>| d.iter().map(|x| OWN * x).collect();
         if together {
+            let some: Vec<Vec<f64>> = clocks.iter().map(share).collect();
+            spread_out(&mut own, logs, &some);
             shared.extend(clocks);
         } else {
             spread_out(&mut own, logs, &clocks);
@@ -143,7 +149,7 @@ impl Scatter {
                 }
             }
             if together {
-                spread_out(&mut own, logs, &[rest]);
+                spread_out(&mut own, logs, &[rest, share(&whole)]);
                 if whole.iter().all(|x| x.is_finite()) {
                     shared.push(whole);
                 }
