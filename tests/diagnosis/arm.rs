@@ -10,6 +10,8 @@ use std::path::Path;
 use rand::{Rng as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
+use super::world::write_files;
+
 const NOMINAL: &str = r#"<mujoco model="arm"><option timestep="0.002" integrator="implicitfast"/>
   <worldbody><body name="upper">
     <joint name="shoulder" type="hinge" axis="0 1 0" damping="0.1"/>
@@ -112,20 +114,10 @@ fn log(episode: usize) -> String {
     text
 }
 
-/// Writes a study of four training and two test episodes.
+/// Writes a study of the arm.
 pub fn write_study(folder: &Path) {
-    std::fs::write(folder.join("nominal.xml"), NOMINAL).unwrap();
-    for episode in 0..6 {
-        let kind = if episode < 4 { "train" } else { "test" };
-        std::fs::write(folder.join(format!("{kind}_{episode}.csv")), log(episode)).unwrap();
-    }
-    let study = r#"model = "nominal.xml"
-train = ["train_*.csv"]
-test = ["test_*.csv"]
-[[parameter]]
-name = "fore_mass"
+    let mass = r#"name = "fore_mass"
 target = "geom/fore_ball/mass"
-range = [0.2, 1.2]
-"#;
-    std::fs::write(folder.join("study.toml"), study).unwrap();
+range = [0.2, 1.2]"#;
+    write_files(folder, NOMINAL, mass, log);
 }

@@ -127,23 +127,31 @@ pub fn log(truth: Truth, episode: usize) -> String {
     text
 }
 
-/// Writes a study of four training and two test episodes.
-pub fn write_study(folder: &Path, truth: Truth) {
+/// Writes a study of four training and two test episodes of a model, with one parameter.
+pub fn write_files(folder: &Path, model: &str, parameter: &str, log: impl Fn(usize) -> String) {
     std::fs::create_dir_all(folder).unwrap();
-    std::fs::write(folder.join("nominal.xml"), NOMINAL).unwrap();
+    std::fs::write(folder.join("nominal.xml"), model).unwrap();
     for episode in 0..6 {
         let kind = if episode < 4 { "train" } else { "test" };
         let name = format!("{kind}_{episode}.csv");
-        std::fs::write(folder.join(name), log(truth, episode)).unwrap();
+        std::fs::write(folder.join(name), log(episode)).unwrap();
     }
-    let study = r#"model = "nominal.xml"
+    let study = format!(
+        r#"model = "nominal.xml"
 train = ["train_*.csv"]
 test = ["test_*.csv"]
 [[parameter]]
-name = "mass"
+{parameter}
+"#
+    );
+    std::fs::write(folder.join("study.toml"), study).unwrap();
+}
+
+/// Writes a study of the cart.
+pub fn write_study(folder: &Path, truth: Truth) {
+    let mass = r#"name = "mass"
 target = "geom/cart/mass"
 range = [0.4, 3.0]
-unit = "kg"
-"#;
-    std::fs::write(folder.join("study.toml"), study).unwrap();
+unit = "kg""#;
+    write_files(folder, NOMINAL, mass, |episode| log(truth, episode));
 }
