@@ -1,5 +1,7 @@
 //! Exploration: from a task and a prior to a policy.
 
+use std::path::Path;
+
 use crate::error::Result;
 use crate::problem::Problem;
 
@@ -74,4 +76,13 @@ pub trait Explorer: Send + Sync {
         problem: &'a Problem<'a>,
         start: Option<&[f64]>,
     ) -> Result<Explored<'a>>;
+
+    /// Trains what the explorer plays and saves it in `file`, from where the setting
+    /// `explorer.policy` loads it; false where the explorer learns nothing beforehand.
+    ///
+    /// # Errors
+    /// When the engine fails, the learner diverges, or the file cannot be written.
+    fn train(&self, _problem: &Problem<'_>, _file: &Path) -> Result<bool> {
+        Ok(false)
+    }
 }

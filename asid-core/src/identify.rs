@@ -1,7 +1,10 @@
 //! Identification: from real episodes and a simulator to a posterior.
 
+use std::path::Path;
+
 use crate::episode::Episode;
 use crate::error::Result;
+use crate::explore::Explorer;
 use crate::posterior::Posterior;
 use crate::problem::Problem;
 
@@ -38,4 +41,19 @@ pub trait Identifier: Send + Sync {
     /// # Errors
     /// When the engine fails, every simulation diverges, or the user interrupts.
     fn identify(&self, problem: &Problem<'_>, episodes: &[Episode]) -> Result<Identified>;
+
+    /// Learns to identify from episodes of `explorer` at truths drawn from the prior, and saves
+    /// what was learned in `file`, from where the setting `identifier.network` loads it; false
+    /// where the identifier learns nothing beforehand.
+    ///
+    /// # Errors
+    /// When the engine fails, the learner diverges, or the file cannot be written.
+    fn train(
+        &self,
+        _problem: &Problem<'_>,
+        _explorer: &dyn Explorer,
+        _file: &Path,
+    ) -> Result<bool> {
+        Ok(false)
+    }
 }
