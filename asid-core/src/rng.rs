@@ -3,8 +3,12 @@
 //! Every use of chance names its stream, so that adding one use does not shift
 //! the numbers of another, and work split over threads draws the same numbers
 //! as work that is not.
+//!
+//! [`Streams::child`] keeps parts apart that trust each other: its mix can be undone, and its
+//! siblings are reached from their common root. [`Streams::sealed`] keeps apart what must not know of
+//! each other, such as a method and the real world that it is judged by.
 
-use rand::SeedableRng;
+use rand::{RngCore as _, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 /// The generator used throughout.
@@ -42,6 +46,22 @@ impl Streams {
             seed: mix(self.seed ^ hash(name).rotate_left(17)),
         }
     }
+
+    /// Streams that lead neither back to these nor to others that are sealed off these.
+    ///
+    /// The new root is 64 bits of ChaCha's output under a key made of this root and the name. ChaCha is
+    /// a pseudo-random function: from its output the key can only be found by trying keys, and the
+    /// outputs of two keys tell nothing of each other. So whoever holds `sealed("a")` can name any
+    /// stream and any child, and still draws no number of `sealed("b")`. One way is enough: what is
+    /// sealed is given away alone, never with the root. It is no lock against someone who guesses the
+    /// root, which is often a small number; it makes sure that nobody gets there without meaning to.
+    #[must_use]
+    pub fn sealed(&self, name: &str) -> Self {
+        let key = mix(self.seed ^ hash(name).rotate_left(31));
+        Self {
+            seed: Rng::seed_from_u64(key).next_u64(),
+        }
+    }
 }
 
 /// FNV-1a, which unlike the standard library's hasher never changes.
@@ -77,6 +97,42 @@ mod tests {
         for i in 0..all.len() {
             for j in 0..i {
                 assert_ne!(all[i], all[j]);
+            }
+        }
+    }
+
+    /// Names that a method might try are of no use to it: neither a stream, nor a child, nor another
+    /// seal of what it holds draws what the world draws.
+    #[test]
+    fn sealed_streams_do_not_lead_to_each_other() {
+        const NAMES: [&str; 8] = [
+            "world",
+            "method",
+            "truth",
+            "wear",
+            "task start",
+            "exploration start",
+            "perturbation",
+            "",
+        ];
+        for seed in 0..20 {
+            let root = Streams::new(seed);
+            let (method, world) = (root.sealed("method"), root.sealed("world"));
+            assert_eq!(world, root.sealed("world"), "a seed repeats");
+            let first = |s: &Streams, n: &str| s.stream(n).random::<u64>();
+            let hidden: Vec<u64> = NAMES.iter().map(|n| first(&world, n)).collect();
+            let mut reached = vec![method];
+            for _ in 0..2 {
+                let more: Vec<Streams> = reached
+                    .iter()
+                    .flat_map(|s| NAMES.map(|n| [s.child(n), s.sealed(n)]))
+                    .flatten()
+                    .collect();
+                reached.extend(more);
+            }
+            for streams in &reached {
+                assert!(*streams != world && *streams != root);
+                assert!(NAMES.iter().all(|n| !hidden.contains(&first(streams, n))));
             }
         }
     }
