@@ -6,6 +6,7 @@
 //! writes exactly what was simulated.
 
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, OnceLock};
 
 use crate::error::{Error, Result};
 
@@ -13,11 +14,29 @@ use crate::error::{Error, Result};
 const MAX_INCLUDE_DEPTH: usize = 8;
 
 /// One MJCF document with its includes spliced in.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone)]
 pub struct Scene {
     name: String,
     xml: String,
     directory: Option<PathBuf>,
+    /// The parsed document, once it was asked for; clones share it.
+    description: Arc<OnceLock<Arc<mjcf_rs::Model>>>,
+}
+
+impl std::fmt::Debug for Scene {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Scene")
+            .field("name", &self.name)
+            .field("xml", &self.xml)
+            .field("directory", &self.directory)
+            .finish_non_exhaustive()
+    }
+}
+
+impl PartialEq for Scene {
+    fn eq(&self, other: &Self) -> bool {
+        self.name == other.name && self.xml == other.xml && self.directory == other.directory
+    }
 }
 
 impl Scene {
@@ -67,13 +86,18 @@ impl Scene {
             name,
             xml,
             directory,
+            description: Arc::default(),
         })
     }
 
     /// The same scene with another folder for relative asset paths.
     #[must_use]
     pub fn in_directory(self, directory: Option<PathBuf>) -> Self {
-        Self { directory, ..self }
+        Self {
+            directory,
+            description: Arc::default(),
+            ..self
+        }
     }
 
     /// Path or name it was read by.
@@ -95,16 +119,68 @@ impl Scene {
     }
 
     /// The parsed document, with defaults resolved, for what is read from a
-    /// scene without an engine (kinematics, mass properties, names).
+    /// scene without an engine (kinematics, mass properties, names). It is parsed
+    /// once: an arm's controller, which a solver makes for each attempt, costs no parsing.
     ///
     /// # Errors
     /// When the document is not valid MJCF.
-    pub fn description(&self) -> Result<mjcf_rs::Model> {
+    pub fn description(&self) -> Result<Arc<mjcf_rs::Model>> {
+        if let Some(parsed) = self.description.get() {
+            return Ok(Arc::clone(parsed));
+        }
         let base = self.directory.clone().unwrap_or_default();
-        mjcf_rs::Model::from_str(&self.xml, &base).map_err(|e| Error::Scene {
+        let parsed = mjcf_rs::Model::from_str(&self.xml, &base).map_err(|e| Error::Scene {
             scene: self.name.clone(),
             message: one_line(&e.to_string()),
-        })
+        })?;
+        Ok(Arc::clone(
+            self.description.get_or_init(|| Arc::new(parsed)),
+        ))
+    }
+
+    /// The same scene with another document.
+    fn with_xml(&self, xml: String) -> Self {
+        Self {
+            name: self.name.clone(),
+            xml,
+            directory: self.directory.clone(),
+            description: Arc::default(),
+        }
+    }
+
+    /// The same scene with another value of an attribute of the element `<tag name="name">`.
+    ///
+    /// # Errors
+    /// When the document has no such element, or `value` holds a quotation mark.
+    pub fn with_attribute(
+        &self,
+        tag: &str,
+        name: &str,
+        attribute: &str,
+        value: &str,
+    ) -> Result<Self> {
+        let fail = |message: String| Error::Scene {
+            scene: self.name.clone(),
+            message,
+        };
+        if value.contains(['"', '<', '&']) {
+            return Err(fail(format!("`{value}` is no value of an attribute")));
+        }
+        let document = parse(&self.name, &self.xml)?;
+        let node = document
+            .descendants()
+            .find(|n| n.has_tag_name(tag) && n.attribute("name") == Some(name))
+            .ok_or_else(|| fail(format!("has no <{tag}> named `{name}`")))?;
+        let mut xml = self.xml.clone();
+        match node.attribute_node(attribute) {
+            Some(found) => xml.replace_range(found.range_value(), value),
+            None => {
+                // Behind the tag's name.
+                let at = node.range().start + 1 + tag.len();
+                xml.insert_str(at, &format!(" {attribute}=\"{value}\""));
+            }
+        }
+        Ok(self.with_xml(xml))
     }
 
     /// The same scene with another physics time step, seconds.
@@ -129,10 +205,7 @@ impl Scene {
         })?;
         let mut xml = self.xml.clone();
         xml.insert_str(close, &format!("<option timestep=\"{value}\"/>\n"));
-        Ok(Self {
-            xml,
-            ..self.clone()
-        })
+        Ok(self.with_xml(xml))
     }
 }
 
@@ -259,5 +332,37 @@ mod tests {
         .unwrap();
         let model = scene.description().unwrap();
         assert!((model.option.timestep - 0.001).abs() < 1e-12);
+    }
+
+    #[test]
+    fn an_attribute_is_set_where_it_is_and_where_it_is_not() {
+        let xml = r#"<mujoco><worldbody><body name="b" pos="0 0 1"><geom name="b" size="1"/></body></worldbody></mujoco>"#;
+        let scene = Scene::from_xml("s", xml, &[]).unwrap();
+        assert_eq!(scene.description().unwrap().bodies.len(), 2);
+        let other = scene
+            .with_attribute("geom", "b", "size", "0.5")
+            .and_then(|s| s.with_attribute("geom", "b", "mass", "2"))
+            .unwrap();
+        let expected = xml.replace(
+            r#"<geom name="b" size="1"/>"#,
+            r#"<geom mass="2" name="b" size="0.5"/>"#,
+        );
+        assert_eq!(other.xml(), expected);
+        assert_eq!(
+            other.description().unwrap().bodies[1].body.geoms[0].mass,
+            Some(2.0)
+        );
+        assert_ne!(scene, other);
+        assert!(scene.with_attribute("geom", "c", "size", "1").is_err());
+        assert!(scene.with_attribute("geom", "b", "size", "1\"").is_err());
+    }
+
+    #[test]
+    fn a_document_is_parsed_once_for_all_clones() {
+        let scene = Scene::from_xml("s", "<mujoco><worldbody/></mujoco>", &[]).unwrap();
+        let first = scene.description().unwrap();
+        assert!(Arc::ptr_eq(&first, &scene.clone().description().unwrap()));
+        let slower = scene.with_timestep(0.5).unwrap();
+        assert!(!Arc::ptr_eq(&first, &slower.description().unwrap()));
     }
 }

@@ -2,6 +2,7 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
+use std::sync::Arc;
 
 use asid_core::layout::{JointKind, Layout};
 use asid_core::{Error, Result, Scene, Status};
@@ -118,7 +119,7 @@ impl Compiled {
     /// [`Error::Scene`] where the document is not valid or has parts that this
     /// backend cannot simulate.
     pub fn new(scene: &Scene) -> Result<Self> {
-        let mut model = scene.description()?;
+        let mut model = Arc::unwrap_or_clone(scene.description()?);
         refusal::check(scene, &model)?;
         let layout = asid_core::document::layout(scene, &model)?;
         let fail = |message: String| Error::Scene {
