@@ -15,6 +15,7 @@ use rayon::prelude::*;
 
 use crate::compiled::Compiled;
 use crate::parameter::Knob;
+use crate::pool;
 use crate::state::State;
 use crate::world::{StepInput, World};
 
@@ -24,7 +25,7 @@ pub struct Batch {
     worlds: Vec<World>,
     status: Vec<Status>,
     columns: Vec<(Target, Knob)>,
-    pool: Option<ThreadPool>,
+    pool: Option<Arc<ThreadPool>>,
 }
 
 /// States in a snapshot, with the scene that they are of.
@@ -61,12 +62,7 @@ impl Batch {
             n => n,
         };
         let pool = if threads.min(config.size) > 1 {
-            let pool = rayon::ThreadPoolBuilder::new()
-                .num_threads(threads.min(config.size))
-                .thread_name(|i| format!("rapier-{i}"))
-                .build()
-                .map_err(|e| Error::Failed(format!("cannot start {threads} threads: {e}")))?;
-            Some(pool)
+            Some(pool::of(threads)?)
         } else {
             None
         };

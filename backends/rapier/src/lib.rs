@@ -80,6 +80,7 @@ mod document;
 mod drive;
 mod pairs;
 mod parameter;
+mod pool;
 mod refusal;
 mod sensor;
 mod settings;
