@@ -88,11 +88,6 @@ impl Episode {
         }
     }
 
-    /// The latest reading while an episode is being recorded.
-    pub(crate) fn reading_tail(&self, width: usize) -> &[f64] {
-        &self.readings[self.readings.len() - width..]
-    }
-
     /// Where a channel lies in a reading's row.
     #[must_use]
     pub fn channel(&self, name: &str) -> Option<std::ops::Range<usize>> {

@@ -64,7 +64,7 @@ pub use plant::Plant;
 pub use posterior::Posterior;
 pub use problem::Problem;
 pub use progress::Progress;
-pub use real_world::{RealWorld, SimulatedWorld};
+pub use real_world::{RealWorld, SimulatedWorld, TrackerErrors};
 pub use rng::Streams;
 pub use scene::Scene;
 pub use simulator::{BatchConfig, Control, Rollout, Simulator, Snapshot, Status};

@@ -1,5 +1,8 @@
 //! The real world: what answers with one episode, and lets a task be tried once.
 
+mod close_look;
+mod tracker;
+
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use rand_distr::{Distribution, StandardNormal};
@@ -8,16 +11,18 @@ use crate::backend::Model;
 use crate::episode::{ChannelColumns, Episode};
 use crate::error::{Error, Result};
 use crate::explore::Policy;
-use crate::layout::{Layout, Recording};
+use crate::layout::Layout;
 use crate::parameter::Parameter;
 use crate::plugin::blames_a_plugin;
 use crate::problem::{Batch, Problem, substeps};
 use crate::progress::Silent;
 use crate::rng::{Rng, Streams};
 use crate::signal::{Signal, SignalSet};
-use crate::simulator::{Control, Rollout, Simulator, Status};
+use crate::simulator::{Control, Rollout, Status};
 use crate::solve::TaskPolicy;
 use crate::task::{Outcome, Task};
+use close_look::CloseLook;
+pub use tracker::TrackerErrors;
 
 /// An episode as it was, and what only a simulated world can tell of it.
 #[derive(Clone, Debug)]
@@ -63,10 +68,18 @@ pub trait RealWorld {
     fn attempt(&mut self, policy: &mut dyn TaskPolicy) -> Result<Attempt>;
 }
 
-/// The simulation beside the world's own, which is 0.
+/// The simulation that is the world.
+const WORLD: usize = 0;
+
+/// The simulation beside it that is looked at closely.
 const COPY: usize = 1;
 
 /// A simulator with a hidden truth, its own start poses and noisy trackers.
+///
+/// Everything that chance decides in it has a stream of its own: the start pose and the noise of
+/// an exploration (`exploration start`, `exploration noise`), of an attempt (`task start`, `task noise`), wear
+/// (`wear`, one index a play) and what the tracker loses. So the numbers that a method meets do not
+/// depend on what it did before: methods with the same seed meet the same chance.
 pub struct SimulatedWorld<'a> {
     task: &'a dyn Task,
     parameters: &'a [Parameter],
@@ -74,7 +87,9 @@ pub struct SimulatedWorld<'a> {
     signals: SignalSet,
     truth: Vec<f64>,
     streams: Streams,
-    wear: Rng,
+    tracker: TrackerErrors,
+    /// Episodes and attempts played.
+    plays: u64,
     start: Option<Vec<f64>>,
 }
 
@@ -114,9 +129,20 @@ impl<'a> SimulatedWorld<'a> {
             signals,
             truth: truth.to_vec(),
             streams,
-            wear: streams.stream("wear"),
+            tracker: TrackerErrors::default(),
+            plays: 0,
             start: None,
         })
+    }
+
+    /// The same world with a tracker that has systematic errors, in exploration and in attempts.
+    ///
+    /// # Errors
+    /// When the errors make no sense or are not those of the signals that are tracked.
+    pub fn with_tracker(mut self, tracker: TrackerErrors) -> Result<Self> {
+        tracker.check(&self.signals)?;
+        self.tracker = tracker;
+        Ok(self)
     }
 
     /// The same world, whose exploration episode begins with this start pose.
@@ -149,64 +175,26 @@ impl<'a> SimulatedWorld<'a> {
     }
 
     fn wear(&mut self) {
+        let mut chance = self.streams.indexed("wear", self.plays);
+        self.plays += 1;
         self.task
-            .wear(self.parameters, &mut self.truth, &mut self.wear);
+            .wear(self.parameters, &mut self.truth, &mut chance);
     }
 
     fn begin(&mut self, start: &[f64]) -> Result<()> {
         let both = self.truth.repeat(2);
-        self.batch.set_parameters(&[0, COPY], &both)?;
-        self.batch.place(self.task, &[0], start)
+        self.batch.set_parameters(&[WORLD, COPY], &both)?;
+        self.batch.place(self.task, &[WORLD], start)
     }
 
     /// Whether the simulation goes on; one that a plugin's effect ended does not count.
     fn check(&self) -> Result<()> {
-        match &self.batch.simulator.status()[0] {
+        match &self.batch.simulator.status()[WORLD] {
             Status::Diverged { message, .. } if blames_a_plugin(message) => {
                 Err(Error::Failed(message.clone()))
             }
             _ => Ok(()),
         }
-    }
-}
-
-/// Looks for touches between the frames. A copy of the world plays the control step and is read
-/// after every physics step, so that looking leaves the world as it is.
-struct Touch {
-    recording: Recording,
-    frames: usize,
-    substeps: usize,
-    ctrl: Vec<f64>,
-    forces: Vec<f64>,
-}
-
-impl Touch {
-    /// Of these channels, in control steps of so many frames and physics steps a frame.
-    fn new(layout: &Layout, channels: &[String], frames: usize, substeps: usize) -> Result<Self> {
-        let recording = layout.recording(channels)?;
-        Ok(Self {
-            ctrl: vec![0.0; frames * substeps * layout.nu()],
-            forces: vec![0.0; frames * substeps * recording.width()],
-            recording,
-            frames,
-            substeps,
-        })
-    }
-
-    /// Whether a force is seen after any physics step of a control step that the copy plays.
-    fn between(&mut self, simulator: &mut dyn Simulator, ctrl: &[f64]) -> Result<bool> {
-        if self.forces.is_empty() {
-            return Ok(false);
-        }
-        let nu = ctrl.len() / self.frames;
-        let steps = self.frames * self.substeps;
-        for i in 0..steps {
-            self.ctrl[i * nu..][..nu].copy_from_slice(&ctrl[i / self.substeps * nu..][..nu]);
-        }
-        let control = Control::Shared(&self.ctrl);
-        let rollout = Rollout::new(&[COPY], steps, 1, control, &self.recording);
-        simulator.rollout(&rollout, &mut self.forces)?;
-        Ok(self.forces.iter().any(|force| *force > 0.0))
     }
 }
 
@@ -236,27 +224,89 @@ fn draw(coordinates: &[crate::task::Coordinate], rng: &mut Rng) -> Vec<f64> {
     coordinates.iter().map(|c| c.at(rng.random())).collect()
 }
 
+/// What the tracker says, frame by frame.
+struct Tracker<'a> {
+    signals: &'a SignalSet,
+    errors: &'a TrackerErrors,
+    /// Physics steps by which it is late, and those of a frame.
+    late: usize,
+    substeps: usize,
+    /// True readings of the signals after each physics step, the start first; all that a late
+    /// tracker may still report.
+    past: Vec<f64>,
+    frame: usize,
+    noise: Rng,
+    losses: Rng,
+}
+
+impl<'a> Tracker<'a> {
+    fn new(
+        (signals, errors): (&'a SignalSet, &'a TrackerErrors),
+        layout: &Layout,
+        substeps: usize,
+        [noise, losses]: [Rng; 2],
+    ) -> Self {
+        Self {
+            signals,
+            errors,
+            late: (errors.latency / layout.timestep).round() as usize,
+            substeps,
+            past: Vec::new(),
+            frame: 0,
+            noise,
+            losses,
+        }
+    }
+
+    /// Takes the start of an episode, a row that begins with the tracked signals.
+    fn begin(&mut self, start: &[f64]) {
+        self.past.extend_from_slice(&start[..self.signals.width()]);
+    }
+
+    /// Takes what was true after each physics step, rows that begin with the tracked signals.
+    fn look<'r>(&mut self, rows: impl Iterator<Item = &'r [f64]>) {
+        for row in rows {
+            self.past.extend_from_slice(&row[..self.signals.width()]);
+        }
+    }
+
+    /// Turns the next frame's true reading, which begins with the tracked signals, into what
+    /// is read. Returns whether the tracker read anything.
+    fn read(&mut self, row: &mut [f64]) -> bool {
+        let tracked = self.signals.width();
+        let seen = &mut row[..tracked];
+        if self.late > 0 {
+            let shown = (self.frame * self.substeps).saturating_sub(self.late);
+            seen.copy_from_slice(&self.past[shown * tracked..][..tracked]);
+        }
+        self.errors.shift(self.signals, seen);
+        self.signals
+            .add_noise(seen, || StandardNormal.sample(&mut self.noise));
+        let there = self.errors.reads(self.frame, &mut self.losses);
+        self.frame += 1;
+        there
+    }
+}
+
 impl RealWorld for SimulatedWorld<'_> {
     fn explore(&mut self, policy: &mut dyn Policy) -> Result<RealEpisode> {
         let protocol = self.task.exploration();
         let start = self.exploration_start();
         self.begin(&start)?;
         let layout = self.batch.simulator.layout().clone();
-        let mut noise = self.streams.stream("exploration noise");
         let names = protocol.channels();
         let pairs = protocol.contact.iter();
         let mut all = names.clone();
         all.extend(pairs.map(|[a, b]| format!("contact.{a}/{b}")));
         let recording = layout.recording(&all)?;
         let width = layout.recording(&names)?.width();
+        let tracked = self.signals.width();
         let substeps = substeps(&layout, protocol.frame_period)?;
-        let mut touch = Touch::new(
-            &layout,
-            &all[names.len()..],
-            protocol.frames_per_step,
-            substeps,
-        )?;
         let (frames, nu) = (protocol.frames_per_step, layout.nu());
+        let chance = ["exploration noise", "exploration losses"].map(|n| self.streams.stream(n));
+        let mut tracker = Tracker::new((&self.signals, &self.tracker), &layout, substeps, chance);
+        let mut look = CloseLook::new(recording.clone(), COPY, frames, substeps);
+        let looks = tracker.late > 0 || recording.width() > width;
         let mut commander = self.task.commander()?;
         commander.reset();
         policy.reset();
@@ -264,41 +314,50 @@ impl RealWorld for SimulatedWorld<'_> {
         let mut episode = blank(&layout, &names)?;
         let all_width = recording.width();
         let mut row = vec![0.0; all_width];
-        self.batch.simulator.read(&[0], &recording, &mut row)?;
-        let tracked = self.signals.width();
-        let mut observe = |row: &[f64]| {
-            let mut seen = row[..width].to_vec();
-            self.signals
-                .add_noise(&mut seen[..tracked], || StandardNormal.sample(&mut noise));
-            seen
-        };
-        episode.readings.extend(observe(&row));
+        let simulator = &mut *self.batch.simulator;
+        simulator.read(&[WORLD], &recording, &mut row)?;
+        tracker.begin(&row);
+        row.truncate(width);
+        tracker.read(&mut row);
+        episode.readings.extend_from_slice(&row);
+        // The policy goes on with the last reading where one is missing, as a tracker's driver does.
+        let mut latest = row;
         let mut action = vec![0.0; protocol.action.len()];
         let mut ctrl = vec![0.0; frames * nu];
         let mut out = vec![0.0; frames * all_width];
         let mut touched = 0;
         let mut actions = Vec::new();
         for step in 0..protocol.horizon {
-            let latest = episode.reading_tail(width).to_vec();
             policy.act(step, &latest, &mut action)?;
             for (a, c) in action.iter_mut().zip(&protocol.action) {
                 *a = a.clamp(c.range[0], c.range[1]);
             }
             actions.extend_from_slice(&action);
             commander.commands(&action, &mut ctrl);
-            self.batch.simulator.copy_state(&[0], &[COPY])?;
-            let rollout = Rollout::new(&[0], frames, substeps, Control::Shared(&ctrl), &recording);
-            self.batch.simulator.rollout(&rollout, &mut out)?;
+            let simulator = &mut *self.batch.simulator;
+            let mut touches = false;
+            if looks {
+                look.play(simulator, WORLD, &ctrl)?;
+                touches = look.rows().any(|r| r[width..].iter().any(|f| *f > 0.0));
+                tracker.look(look.rows());
+            }
+            let control = Control::Shared(&ctrl);
+            let rollout = Rollout::new(&[WORLD], frames, substeps, control, &recording);
+            simulator.rollout(&rollout, &mut out)?;
             self.check()?;
             episode.ctrl.extend_from_slice(&ctrl);
             for frame in out.chunks_exact(all_width) {
-                episode.readings.extend(observe(frame));
+                touches |= frame[width..].iter().any(|force| *force > 0.0);
+                let mut seen = frame[..width].to_vec();
+                if tracker.read(&mut seen) {
+                    latest.copy_from_slice(&seen);
+                } else {
+                    latest[tracked..].copy_from_slice(&seen[tracked..]);
+                    seen[..tracked].fill(f64::NAN);
+                }
+                episode.readings.extend_from_slice(&seen);
             }
-            let at_a_frame = out
-                .chunks_exact(all_width)
-                .any(|r| r[width..].iter().any(|force| *force > 0.0));
-            let simulator = &mut *self.batch.simulator;
-            touched += usize::from(at_a_frame || touch.between(simulator, &ctrl)?);
+            touched += usize::from(touches);
         }
         self.wear();
         let last = episode.ctrl[episode.ctrl.len() - nu..].to_vec();
@@ -318,17 +377,13 @@ impl RealWorld for SimulatedWorld<'_> {
         let start = draw(&protocol.start, &mut rng);
         self.begin(&start)?;
         let layout = self.batch.simulator.layout().clone();
-        let tracked: Vec<String> = self
-            .task
-            .exploration()
-            .signals
-            .iter()
-            .map(|s| s.sensor.clone())
-            .collect();
+        let signals = self.task.exploration().signals.iter();
+        let tracked: Vec<String> = signals.map(|s| s.sensor.clone()).collect();
+        let tracked = layout.recording(&tracked)?;
+        let simulator = &mut *self.batch.simulator;
         let mut seen = vec![0.0; self.signals.width()];
-        self.batch
-            .simulator
-            .read(&[0], &layout.recording(&tracked)?, &mut seen)?;
+        simulator.read(&[WORLD], &tracked, &mut seen)?;
+        self.tracker.shift(&self.signals, &mut seen);
         self.signals
             .add_noise(&mut seen, || StandardNormal.sample(&mut rng));
         let believed = self.task.locate(&seen);
@@ -340,32 +395,38 @@ impl RealWorld for SimulatedWorld<'_> {
         let mut all = protocol.channels.clone();
         all.extend(names.iter().cloned());
         let recording = layout.recording(&all)?;
-        let (width, own) = (
-            recording.width(),
-            layout.recording(&protocol.channels)?.width(),
-        );
+        let width = recording.width();
+        let own = layout.recording(&protocol.channels)?.width();
         let substeps = substeps(&layout, protocol.frame_period)?;
+        let chance = ["task noise", "task losses"].map(|n| self.streams.stream(n));
+        let mut tracker = Tracker::new((&self.signals, &self.tracker), &layout, substeps, chance);
+        let simulator = &mut *self.batch.simulator;
         let mut out = vec![0.0; (protocol.frames + 1) * width];
         let (first, frames) = out.split_at_mut(width);
-        self.batch.simulator.read(&[0], &recording, first)?;
+        simulator.read(&[WORLD], &recording, first)?;
+        tracker.begin(&first[own..]);
+        if tracker.late > 0 {
+            let mut look = CloseLook::new(tracked, COPY, protocol.frames, substeps);
+            look.play(simulator, WORLD, &ctrl)?;
+            tracker.look(look.rows());
+        }
         let control = Control::Shared(&ctrl);
-        let rollout = Rollout::new(&[0], protocol.frames, substeps, control, &recording);
-        self.batch.simulator.rollout(&rollout, frames)?;
+        let rollout = Rollout::new(&[WORLD], protocol.frames, substeps, control, &recording);
+        simulator.rollout(&rollout, frames)?;
         self.check()?;
-        self.wear();
         let readings: Vec<f64> = frames
             .chunks_exact(width)
             .flat_map(|row| row[..own].to_vec())
             .collect();
         let mut episode = blank(&layout, &names)?;
-        let mut noise = self.streams.stream("task noise");
-        let tracked = self.signals.width();
         for row in out.chunks_exact_mut(width) {
             let seen = &mut row[own..];
-            self.signals
-                .add_noise(&mut seen[..tracked], || StandardNormal.sample(&mut noise));
+            if !tracker.read(seen) {
+                seen[..self.signals.width()].fill(f64::NAN);
+            }
             episode.readings.extend_from_slice(seen);
         }
+        self.wear();
         let nu = layout.nu();
         episode.ctrl = ctrl;
         let last = episode.ctrl[episode.ctrl.len() - nu..].to_vec();

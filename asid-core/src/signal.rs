@@ -110,6 +110,26 @@ impl SignalSet {
             }
         }
     }
+
+    /// Shifts a reading by `offset`, `whitened_len` entries in the sensors' units: numbers are added,
+    /// a rotation vector (rad) turns an orientation about the axes of its object.
+    pub fn add_offset(&self, reading: &mut [f64], offset: &[f64]) {
+        let mut k = 0;
+        for part in &self.parts {
+            let row = &mut reading[part.start..][..part.len];
+            if part.rotation {
+                let turn = nalgebra::Vector3::new(offset[k], offset[k + 1], offset[k + 2]);
+                let turned = unit_quaternion(row) * UnitQuaternion::from_scaled_axis(turn);
+                row.copy_from_slice(&[turned.w, turned.i, turned.j, turned.k]);
+                k += 3;
+            } else {
+                for x in row {
+                    *x += offset[k];
+                    k += 1;
+                }
+            }
+        }
+    }
 }
 
 /// Quaternion from `w x y z`.

@@ -227,6 +227,15 @@ pub trait Task: Send + Sync {
     /// What an episode or an attempt in the real world does to the truth, of which simulators
     /// know nothing: `truth` holds the values of `parameters`.
     fn wear(&self, _parameters: &[Parameter], _truth: &mut [f64], _rng: &mut Rng) {}
+    /// The task's scene with another object of the same kind: what stands for a real set-up whose parts
+    /// are not those of the model. Names, unknowns and actuators are those of [`Task::scene`]. `None`
+    /// where the task has none.
+    ///
+    /// # Errors
+    /// When that scene cannot be made.
+    fn stand_in(&self) -> Result<Option<Scene>> {
+        Ok(None)
+    }
     /// How it is explored.
     fn exploration(&self) -> &ExplorationProtocol;
     /// What is to be achieved.

@@ -12,6 +12,7 @@
 
 mod metric;
 mod placing;
+mod stand_in;
 
 use asid_core::parameter::{Parameter, Scale};
 use asid_core::signal::{Signal, yaw};
@@ -155,6 +156,11 @@ impl Task for RodBalancing {
         [("left", -0.08), ("middle", 0.0), ("right", 0.08)]
             .map(|(name, offset)| Condition::fixed(name, &[("mass_offset", offset)]))
             .into()
+    }
+
+    /// Another rod: shorter, a quarter heavier, rougher below, and with its mass less at one place.
+    fn stand_in(&self) -> Result<Option<Scene>> {
+        stand_in::scene(&self.scene).map(Some)
     }
 
     fn exploration(&self) -> &ExplorationProtocol {

@@ -68,6 +68,10 @@ where
             .check_finite(&given, truth, "a true value after the task's wear");
     }
 
+    fn stand_in(&self) -> Result<Option<Scene>> {
+        self.try_run(|task| task.stand_in())
+    }
+
     fn exploration(&self) -> &ExplorationProtocol {
         self.run(|task| task.exploration())
     }
