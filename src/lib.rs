@@ -10,6 +10,7 @@ pub use asid_core as core;
 pub use asid_diagnosis as diagnosis;
 pub use asid_report as report;
 pub use asid_tasks as tasks;
+pub use asid_worlds as worlds;
 
 #[cfg(feature = "mujoco")]
 pub use asid_mujoco as mujoco;

@@ -65,6 +65,9 @@ pub(super) fn page(report: &RunReport) -> Page {
 fn real_world(report: &RunReport) -> Option<String> {
     let world = &report.real_world;
     let mut parts = Vec::new();
+    if !world.kind.is_empty() {
+        parts.push(world.kind.clone());
+    }
     if !world.engine.is_empty() {
         parts.push(world.engine.clone());
     }

@@ -113,6 +113,8 @@ impl Default for RunReport {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct RealWorld {
+    /// Kind, such as `perturbed`; empty where it is not known.
+    pub kind: String,
     /// Engine, or what else it was: `logs`, `robot`.
     pub engine: String,
     /// Model file, where it is not the task's own scene; empty otherwise.

@@ -10,14 +10,16 @@ use asid_core::{EffectSpec, Error, Parameter, Task, registry};
 use asid_diagnosis::refined_model::RefinedModel;
 use serde::Serialize;
 
-use super::options::{Algorithms, Common, Real, Worlds};
+use super::options::{Algorithms, Common, Worlds};
 use super::plugins::{file_of, used};
 use component::{Component, component};
+pub use real::RealConfig;
 use table::{check_keys, numbers, section, text, wrong};
 pub use table::{read_table, set};
 use unknowns::{ParameterConfig, noise, unknowns};
 
 mod component;
+mod real;
 mod table;
 mod unknowns;
 
@@ -57,32 +59,6 @@ impl Stage {
 
     fn is_run(&self) -> bool {
         *self == Self::Run
-    }
-}
-
-/// The simulated real world.
-#[derive(Clone, Debug, Default, Serialize)]
-pub struct RealConfig {
-    /// Engine.
-    pub backend: String,
-    /// Model file, MJCF or TOML; empty for the task's scene.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub model: Option<PathBuf>,
-    /// Effects that the simulator lacks, as `name@site:parameter=value`.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub effects: Vec<String>,
-    /// True values that were given; the others are drawn from the prior.
-    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
-    pub truth: BTreeMap<String, f64>,
-}
-
-impl RealConfig {
-    /// Whether nothing is said of a real world other than the simulator on this engine.
-    pub fn is_simulator(&self, backend: &str) -> bool {
-        self.backend == backend
-            && self.model.is_none()
-            && self.effects.is_empty()
-            && self.truth.is_empty()
     }
 }
 
@@ -212,47 +188,13 @@ impl Config {
         if let Some(name) = &condition {
             check_condition(&task.conditions(), name)?;
         }
-        let real_table = section(&table, "real")?;
-        check_keys(
-            "real",
-            &real_table,
-            &["backend", "model", "truth", "effects"],
-        )?;
-        let mut truth: BTreeMap<String, f64> =
-            numbers("real.truth", &section(&real_table, "truth")?)?;
-        for given in &real.truth {
-            let (name, value) = given
-                .split_once('=')
-                .ok_or_else(|| wrong("--truth", format!("`{given}` is not NAME=VALUE")))?;
-            let value: f64 = value
-                .trim()
-                .parse()
-                .ok()
-                .filter(|x: &f64| x.is_finite())
-                .ok_or_else(|| {
-                    wrong(
-                        &format!("--truth {name}"),
-                        format!("`{value}` is not a finite number"),
-                    )
-                })?;
-            truth.insert(name.trim().to_owned(), value);
-        }
         let (parameter, parameters) = unknowns(task, &section(&table, "parameter")?)?;
-        for name in truth.keys() {
-            if !parameters.iter().any(|p| &p.name == name) {
-                let known = parameters.iter().map(|p| &*p.name);
-                return Err(Error::unknown("parameter", name, known).into());
-            }
-        }
-        let file = |given: &Option<PathBuf>, table: &toml::Table| -> Result<Option<PathBuf>> {
-            let set = text(table, "model")?.map(PathBuf::from);
-            Ok(given.clone().or(set))
-        };
+        let real = real::resolve(&section(&table, "real")?, real, task, &parameters, &backend)?;
         let (start, assumed) = start(stage, task, &section(&table, "start")?)?;
         let mut config = Self {
             command: stage,
             task: task.name().to_owned(),
-            model: file(&simulator.model, &table)?,
+            model: model_file(&simulator.model, &table)?,
             condition,
             seed: match (common.seed, table.get("seed")) {
                 (Some(seed), _) => seed,
@@ -288,16 +230,7 @@ impl Config {
                 algorithms.solver.as_deref(),
                 ASID.solver,
             )?,
-            real: RealConfig {
-                backend: match (&real.real_backend, text(&real_table, "backend")?) {
-                    (Some(name), _) => name.clone(),
-                    (None, Some(name)) => name,
-                    (None, None) => backend.clone(),
-                },
-                model: file(&real.real_model, &real_table)?,
-                effects: effects(&real_table, real)?,
-                truth,
-            },
+            real,
             noise: noise(task, &section(&table, "noise")?)?,
             backend,
             parameter,
@@ -373,20 +306,10 @@ pub fn texts(table: &toml::Table, key: &str) -> Result<Vec<String>> {
     }
 }
 
-/// Effects of the configuration, then those of the command line, each checked for its form.
-fn effects(table: &toml::Table, real: &Real) -> Result<Vec<String>> {
-    let listed = match table.get("effects") {
-        None => Vec::new(),
-        Some(value) => value
-            .as_array()
-            .and_then(|a| a.iter().map(|v| v.as_str().map(str::to_owned)).collect())
-            .ok_or_else(|| wrong("real.effects", format!("{value} is not a list of texts")))?,
-    };
-    listed
-        .iter()
-        .chain(&real.real_effect)
-        .map(|text| Ok(text.parse::<EffectSpec>()?.to_string()))
-        .collect()
+/// The file of a model: as given, else as a section says.
+fn model_file(given: &Option<PathBuf>, table: &toml::Table) -> Result<Option<PathBuf>> {
+    let set = text(table, "model")?.map(PathBuf::from);
+    Ok(given.clone().or(set))
 }
 
 /// The engine that is used where none is named: the first that is built in, MuJoCo last,

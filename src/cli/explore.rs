@@ -89,7 +89,7 @@ pub fn explore(arguments: &Arguments) -> Result<()> {
     let played = nominal_world(&session, &center)?
         .with_exploration_start(start.clone())
         .explore(&mut *explored.policy)?;
-    let real = if config.real.is_simulator(&config.backend) {
+    let real = if config.real.is_simulator() {
         None
     } else {
         let mut world = session

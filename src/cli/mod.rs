@@ -25,6 +25,7 @@ mod solve;
 mod stage;
 mod trace;
 mod withheld;
+mod world;
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};

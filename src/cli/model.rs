@@ -80,7 +80,7 @@ impl Needs<'_> {
     }
 
     /// Checks that a model has what the task's protocols need.
-    fn check(&self, model: &dyn Model) -> Result<()> {
+    pub fn check(&self, model: &dyn Model) -> Result<()> {
         let (ours, theirs) = (self.layout, model.layout());
         let (exploration, downstream) = (self.task.exploration(), self.task.downstream());
         if ours.actuators.len() != theirs.actuators.len() {

@@ -76,10 +76,15 @@ pub struct Simulator {
 /// The simulated real world.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub struct Real {
+    /// Kind of the real world: matched (the simulator itself), crossed (the other engine),
+    /// perturbed (step, contacts, masses, servos and tracker a little off) or stand-in (another object)
+    /// [default: matched, or custom where a --real-… option says more]
+    #[arg(long, value_name = "KIND")]
+    pub world: Option<String>,
     /// A hidden true value, such as mass_offset=0.06 [default: drawn from the prior by the seed]
     #[arg(long, value_name = "NAME=VALUE")]
     pub truth: Vec<String>,
-    /// Engine of the real world [default: the simulator's]
+    /// Engine of the real world [default: the simulator's; the other one for --world crossed]
     #[arg(long, value_name = "NAME")]
     pub real_backend: Option<String>,
     /// Model of the real world: MJCF, or TOML of a refined model [default: the task's scene]

@@ -7,6 +7,7 @@ use asid_core::{Episode, Result};
 use serde::Serialize;
 
 use super::session::Session;
+use super::world::RealResult;
 
 /// Layout version.
 pub const SCHEMA: u32 = 1;
@@ -111,6 +112,7 @@ pub struct RunResult {
     identifier: String,
     solver: String,
     seed: u64,
+    real: RealResult,
     parameters: Vec<ParameterResult>,
     exploration: ExplorationResult,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -144,6 +146,7 @@ impl RunResult {
             identifier: config.identifier.name.clone(),
             solver: config.solver.name.clone(),
             seed: config.seed,
+            real: RealResult::of(session),
             parameters: outcome
                 .belief
                 .marginals

@@ -4,19 +4,19 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use anyhow::Result;
-use asid_core::effect::EffectSpec;
 use asid_core::registry::{self, BackendEntry, Entry, TaskEntry};
 use asid_core::signal::Signal;
 use asid_core::{
     Backend, Capabilities, Error, Model, Parameter, Problem, SimulatedWorld, Streams, Task,
+    TrackerErrors,
 };
-use asid_diagnosis::refined_model::RefinedModel;
 
 use super::config::{Config, Stage};
 use super::model::{self, Needs};
 use super::options::{Algorithms, Common, Worlds};
 use super::progress::Bars;
 use super::result::CostResult;
+use super::world::{PerturbedResult, World};
 
 /// An open task.
 pub struct Session {
@@ -24,8 +24,8 @@ pub struct Session {
     pub config: Config,
     pub parameters: Vec<Parameter>,
     pub signals: Vec<Signal>,
-    /// The task's scene as it is.
-    scene: Arc<dyn Model>,
+    /// The real world.
+    real: World,
     /// The simulator of the method.
     pub model: Arc<dyn Model>,
     pub engine: String,
@@ -93,11 +93,15 @@ impl Session {
             .iter()
             .filter_map(|s| signals.iter().find(|n| n.sensor == s.sensor).cloned())
             .collect();
-        let session = Self {
+        let mut session = Self {
             task,
             parameters,
             signals,
-            scene,
+            real: World {
+                model: Arc::clone(&scene),
+                tracker: TrackerErrors::default(),
+                perturbed: None,
+            },
             model,
             engine: format!("{} {}", backend.name(), backend.version()),
             capabilities: backend.capabilities(),
@@ -108,6 +112,7 @@ impl Session {
             config,
         };
         asid_core::sensitivity::check_parameters(&session.problem())?;
+        session.real = World::open(&session, &scene, session.world_streams())?;
         Ok(session)
     }
 
@@ -120,11 +125,16 @@ impl Session {
             parameters: &self.parameters,
             signals: &self.signals,
             threads: self.threads,
-            streams: Streams::new(self.config.seed),
+            streams: Streams::new(self.config.seed).sealed("method"),
             progress: &self.progress,
             physics_counter: &self.physics_steps,
             env_counter: &self.env_steps,
         }
+    }
+
+    /// Streams of the real world, which those of the method do not lead to.
+    fn world_streams(&self) -> Streams {
+        Streams::new(self.config.seed).sealed("world")
     }
 
     /// The start pose of a stage that is told it, in the order of its coordinates.
@@ -138,20 +148,19 @@ impl Session {
     /// The hidden truth: as given, and otherwise drawn by the seed from the condition's
     /// range or from the prior.
     pub fn truth(&self) -> Vec<f64> {
-        let mut rng = Streams::new(self.config.seed).stream("truth");
+        let streams = self.world_streams().child("truth");
         let conditions = self.task.conditions();
         let chosen = self.config.condition.as_ref();
         let condition = conditions.iter().find(|c| Some(&c.name) == chosen);
         self.parameters
             .iter()
             .map(|p| {
+                // Each has a stream of its own: an unknown more moves no other.
+                let mut rng = streams.stream(&p.name);
                 let named = condition.and_then(|c| c.truth.iter().find(|(n, _)| *n == p.name));
                 let drawn = match named {
                     // A fixed value to the bit, also on a logarithmic scale.
-                    Some((_, [low, high])) if low == high => {
-                        let _ = p.sample(&mut rng);
-                        *low
-                    }
+                    Some((_, [low, high])) if low == high => *low,
                     Some((_, range)) => Parameter {
                         range: *range,
                         ..p.clone()
@@ -171,45 +180,20 @@ impl Session {
 
     /// The simulated real world with this truth.
     pub fn world(&self, truth: &[f64]) -> Result<SimulatedWorld<'_>> {
-        let real = &self.config.real;
-        let effects = real
-            .effects
-            .iter()
-            .map(|text| text.parse::<EffectSpec>())
-            .collect::<asid_core::Result<Vec<_>>>()?;
-        let same_engine = real.backend == self.config.backend;
-        let model = if same_engine && real.model.is_none() && effects.is_empty() {
-            Arc::clone(&self.scene)
-        } else {
-            let backend = backend(&real.backend)?;
-            require(&*backend, self.task.requires())?;
-            match &real.model {
-                None => model::compile(
-                    &*backend,
-                    &RefinedModel {
-                        effects,
-                        ..model::of_task(&*self.task)
-                    },
-                )?,
-                Some(path) => {
-                    let needs = Needs {
-                        task: &*self.task,
-                        layout: self.scene.layout(),
-                        parameters: &self.parameters,
-                    };
-                    needs.open(&*backend, path, "real world", &effects)?.1
-                }
-            }
-        };
-        let streams = Streams::new(self.config.seed).child("real world");
-        Ok(SimulatedWorld::new(
+        let world = SimulatedWorld::new(
             &*self.task,
-            &*model,
+            &*self.real.model,
             &self.parameters,
             truth,
             &self.signals,
-            streams,
-        )?)
+            self.world_streams(),
+        )?;
+        Ok(world.with_tracker(self.real.tracker.clone())?)
+    }
+
+    /// What is off in the real world, where it is a perturbed one.
+    pub fn perturbed(&self) -> Option<&PerturbedResult> {
+        self.real.perturbed.as_ref()
     }
 
     /// Cost so far.
@@ -232,7 +216,8 @@ pub fn backend(name: &str) -> Result<Box<dyn Backend>> {
     }
 }
 
-fn require(backend: &dyn Backend, needed: Capabilities) -> Result<()> {
+/// Checks that an engine can do what a task needs.
+pub fn require(backend: &dyn Backend, needed: Capabilities) -> Result<()> {
     let lacking = needed - backend.capabilities();
     if lacking.is_empty() {
         return Ok(());

@@ -36,6 +36,7 @@ pub fn run_report(
         solver: config.solver.name.clone(),
         seed: config.seed,
         real_world: r::RealWorld {
+            kind: config.real.world.name().to_owned(),
             engine: config.real.backend.clone(),
             model: config
                 .real
@@ -43,7 +44,7 @@ pub fn run_report(
                 .as_ref()
                 .map(|p| p.display().to_string())
                 .unwrap_or_default(),
-            effects: config.real.effects.clone(),
+            effects: effects(session),
             noise: session
                 .signals
                 .iter()
@@ -98,6 +99,13 @@ pub fn run_report(
         ]),
         ..r::RunReport::default()
     })
+}
+
+/// What the real world has that the simulator lacks: effects that were named, then what was drawn.
+fn effects(session: &Session) -> Vec<String> {
+    let named = session.config.real.effects.iter().cloned();
+    let drawn = session.perturbed().into_iter();
+    named.chain(drawn.flat_map(|p| p.drawn.words())).collect()
 }
 
 /// What made the result.

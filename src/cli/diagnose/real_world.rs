@@ -227,10 +227,7 @@ impl Machine {
         let counted = &before[..before.len().min(n as usize)];
         let mut trials = Vec::new();
         let real = &session.config.real;
-        if real.model.is_some()
-            || !real.effects.is_empty()
-            || real.backend != session.config.backend
-        {
+        if real.world != asid_worlds::Kind::Matched {
             progress.begin("without the effect", n);
             let plain = Worlds {
                 real: Real {

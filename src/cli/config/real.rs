@@ -1,0 +1,152 @@
+//! The simulated real world: of which kind, and what is said of it besides.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+use anyhow::Result;
+use asid_core::{EffectSpec, Error, Parameter, Task};
+use asid_worlds::{Kind, PerturbationRanges};
+use serde::Serialize;
+
+use super::model_file;
+use super::table::{check_keys, numbers, section, text, wrong};
+use crate::cli::options::Real;
+
+/// The simulated real world.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct RealConfig {
+    /// Kind; not written where it follows from the rest.
+    #[serde(skip_serializing_if = "follows")]
+    pub world: Kind,
+    /// Engine.
+    pub backend: String,
+    /// Model file, MJCF or TOML; empty for the task's scene.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub model: Option<PathBuf>,
+    /// Effects that the simulator lacks, as `name@site:parameter=value`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub effects: Vec<String>,
+    /// True values that were given; the others are drawn from the prior.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub truth: BTreeMap<String, f64>,
+    /// How far off a perturbed world may be.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub perturbation: Option<PerturbationRanges>,
+}
+
+/// Whether a kind follows from the engine, the model and the effects.
+#[allow(clippy::trivially_copy_pass_by_ref)] // as serde calls it
+fn follows(kind: &Kind) -> bool {
+    matches!(kind, Kind::Matched | Kind::Custom)
+}
+
+impl RealConfig {
+    /// Whether nothing is said of a real world other than the simulator.
+    pub fn is_simulator(&self) -> bool {
+        self.world == Kind::Matched && self.truth.is_empty()
+    }
+}
+
+/// Resolves the section `real` of the settings, under the options.
+pub fn resolve(
+    table: &toml::Table,
+    options: &Real,
+    task: &dyn Task,
+    parameters: &[Parameter],
+    simulator: &str,
+) -> Result<RealConfig> {
+    const KEYS: [&str; 6] = [
+        "world",
+        "backend",
+        "model",
+        "truth",
+        "effects",
+        "perturbation",
+    ];
+    check_keys("real", table, &KEYS)?;
+    let named = options.real_backend.clone().or(text(table, "backend")?);
+    let mut real = RealConfig {
+        model: model_file(&options.real_model, table)?,
+        effects: effects(table, options)?,
+        truth: truth(table, options, parameters)?,
+        ..RealConfig::default()
+    };
+    let other = named.as_ref().is_some_and(|name| name != simulator);
+    let made = real.model.is_some() || !real.effects.is_empty();
+    real.world = match options.world.clone().or(text(table, "world")?) {
+        Some(name) => name.parse()?,
+        None if other || made => Kind::Custom,
+        None => Kind::Matched,
+    };
+    let kind = real.world;
+    if kind == Kind::Matched && (other || made) {
+        return Err(wrong(
+            "real.world",
+            "a matched world is the simulator itself and has no engine, model or effects of its own; \
+             leave them out, or choose another --world",
+        ));
+    }
+    if kind == Kind::StandIn && real.model.is_some() {
+        return Err(wrong(
+            "real.world",
+            "a stand-in is the task's own other scene; it goes with no --real-model",
+        ));
+    }
+    real.backend = match named {
+        Some(name) if kind == Kind::Crossed && !other => {
+            let message =
+                format!("a crossed world has another engine than the simulator's, `{name}`");
+            return Err(wrong("real.backend", message));
+        }
+        Some(name) => name,
+        None if kind == Kind::Crossed => asid_worlds::other_engine(simulator, task.requires())?,
+        None => simulator.to_owned(),
+    };
+    // Checked also where it is for other runs that share the settings.
+    let ranges = PerturbationRanges::read(&section(table, "perturbation")?)?;
+    real.perturbation = (kind == Kind::Perturbed).then_some(ranges);
+    Ok(real)
+}
+
+/// True values of the configuration and of the command line, which wins.
+fn truth(
+    table: &toml::Table,
+    options: &Real,
+    parameters: &[Parameter],
+) -> Result<BTreeMap<String, f64>> {
+    let mut truth = numbers("real.truth", &section(table, "truth")?)?;
+    for given in &options.truth {
+        let (name, value) = given
+            .split_once('=')
+            .ok_or_else(|| wrong("--truth", format!("`{given}` is not NAME=VALUE")))?;
+        let number = value.trim().parse().ok();
+        let value: f64 = number.filter(|x: &f64| x.is_finite()).ok_or_else(|| {
+            let message = format!("`{value}` is not a finite number");
+            wrong(&format!("--truth {name}"), message)
+        })?;
+        truth.insert(name.trim().to_owned(), value);
+    }
+    for name in truth.keys() {
+        if !parameters.iter().any(|p| &p.name == name) {
+            let known = parameters.iter().map(|p| &*p.name);
+            return Err(Error::unknown("parameter", name, known).into());
+        }
+    }
+    Ok(truth)
+}
+
+/// Effects of the configuration, then those of the command line, each checked for its form.
+fn effects(table: &toml::Table, real: &Real) -> Result<Vec<String>> {
+    let listed = match table.get("effects") {
+        None => Vec::new(),
+        Some(value) => value
+            .as_array()
+            .and_then(|a| a.iter().map(|v| v.as_str().map(str::to_owned)).collect())
+            .ok_or_else(|| wrong("real.effects", format!("{value} is not a list of texts")))?,
+    };
+    listed
+        .iter()
+        .chain(&real.real_effect)
+        .map(|text| Ok(text.parse::<EffectSpec>()?.to_string()))
+        .collect()
+}

@@ -1,0 +1,163 @@
+//! What is off in one perturbed world.
+
+use std::collections::BTreeMap;
+
+use asid_core::rng::Rng;
+use asid_core::{Layout, Plant, Result, Streams};
+use rand::Rng as _;
+use serde::Serialize;
+
+use crate::PerturbationRanges;
+
+/// The values that a world's seed drew. Each has a stream of its own, so that a range that is
+/// changed moves no other value.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Perturbation {
+    /// Physics steps in one of the simulator's.
+    pub steps: usize,
+    /// Factor of the contacts' time constant.
+    pub contact_time: f64,
+    /// Factor of the contacts' damping ratio.
+    pub contact_damping: f64,
+    /// Time constant of the servos' lag, s.
+    pub servo_lag: f64,
+    /// Factor of the mass of each body that lies free, with all that hangs on it.
+    pub mass: BTreeMap<String, f64>,
+    /// The tracker.
+    pub tracker: TrackerPerturbation,
+}
+
+/// What is off in a tracker.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct TrackerPerturbation {
+    /// Age of a reading, s.
+    pub latency: f64,
+    /// Constant error of each signal: numbers and vectors in their unit, a rotation vector (rad) for
+    /// an orientation.
+    pub offset: BTreeMap<String, Vec<f64>>,
+    /// Frames from one reading to the next.
+    pub every: usize,
+    /// Share of readings that are lost.
+    pub dropout: f64,
+}
+
+/// A uniform draw; `low` to the bit where the range is one value.
+fn uniform([low, high]: [f64; 2], rng: &mut Rng) -> f64 {
+    let u: f64 = rng.random();
+    if low == high {
+        low
+    } else {
+        low + u * (high - low)
+    }
+}
+
+/// A draw that is even on a logarithmic scale.
+fn factor(range: [f64; 2], rng: &mut Rng) -> f64 {
+    if range[0] == range[1] {
+        return uniform(range, rng);
+    }
+    uniform(range.map(f64::ln), rng).exp()
+}
+
+/// A vector of this length in a direction that is drawn evenly from the sphere (Archimedes: the height
+/// is uniform).
+fn direction(length: f64, rng: &mut Rng) -> [f64; 3] {
+    let z = rng.random_range(-1.0..1.0_f64);
+    let (sin, cos) = rng.random_range(0.0..std::f64::consts::TAU).sin_cos();
+    let r = (1.0 - z * z).sqrt();
+    [r * cos, r * sin, z].map(|x| length * x)
+}
+
+/// The constant error of a signal of this kind and length.
+fn offset(kind: &str, len: usize, ranges: &PerturbationRanges, rng: &mut Rng) -> Vec<f64> {
+    let (position, rotation) = (ranges.tracker_offset, ranges.tracker_rotation);
+    match (kind, len) {
+        (_, 4) => direction(uniform(rotation, rng), rng).into(),
+        ("framepos" | "subtreecom", _) => direction(uniform(position, rng), rng).into(),
+        ("jointpos", _) => {
+            let sign = if rng.random() { 1.0 } else { -1.0 };
+            vec![sign * uniform(rotation, rng)]
+        }
+        // Speeds and forces are no tracker's.
+        _ => vec![0.0; len],
+    }
+}
+
+impl Perturbation {
+    /// Draws a world from its own streams. `tracked` names the sensors of the tracker.
+    ///
+    /// # Errors
+    /// When the layout has no such sensor.
+    pub fn draw(
+        ranges: &PerturbationRanges,
+        plant: &Plant,
+        layout: &Layout,
+        tracked: &[String],
+        streams: Streams,
+    ) -> Result<Self> {
+        let streams = streams.child("perturbation");
+        let of = |name: &str| streams.stream(name);
+        let free = (1..plant.bodies.len()).filter(|&b| plant.free_joint(b).is_some());
+        let mass = free
+            .map(|b| {
+                let name = plant.layout.bodies[b].clone();
+                let drawn = factor(ranges.mass, &mut of(&format!("mass of {name}")));
+                (name, drawn)
+            })
+            .collect();
+        let offsets = tracked
+            .iter()
+            .map(|name| {
+                let sensor = layout.sensor(name)?;
+                let mut rng = of(&format!("offset of {name}"));
+                let drawn = offset(&sensor.kind, sensor.len, ranges, &mut rng);
+                Ok((name.clone(), drawn))
+            })
+            .collect::<Result<_>>()?;
+        let [low, high] = ranges.tracker_every;
+        Ok(Self {
+            steps: ranges.steps,
+            contact_time: factor(ranges.contact_time, &mut of("contact time")),
+            contact_damping: factor(ranges.contact_damping, &mut of("contact damping")),
+            servo_lag: uniform(ranges.servo_lag, &mut of("servo lag")),
+            mass,
+            tracker: TrackerPerturbation {
+                latency: uniform(ranges.tracker_latency, &mut of("tracker latency")),
+                offset: offsets,
+                every: of("tracker rate").random_range(low..=high),
+                dropout: uniform(ranges.tracker_dropout, &mut of("tracker dropout")),
+            },
+        })
+    }
+
+    /// What is off, in words.
+    #[must_use]
+    pub fn words(&self) -> Vec<String> {
+        let ms = |s: f64| format!("{:.1} ms", 1e3 * s);
+        let largest = |len: usize| {
+            let offsets = self.tracker.offset.iter();
+            let chosen = offsets.filter(|(name, _)| name.ends_with("_quat") == (len == 4));
+            chosen
+                .map(|(_, v)| v.iter().map(|x| x * x).sum::<f64>().sqrt())
+                .fold(0.0, f64::max)
+        };
+        let mut words = vec![
+            format!("{} physics steps in one of the simulator's", self.steps),
+            format!(
+                "contacts' time constant x {:.2}, damping x {:.2}",
+                self.contact_time, self.contact_damping
+            ),
+            format!("servos lag by {}", ms(self.servo_lag)),
+        ];
+        let masses = self.mass.iter();
+        words.extend(masses.map(|(body, f)| format!("mass of {body} x {f:.3}")));
+        words.push(format!(
+            "tracker late by {}, off by up to {:.1} mm and {:.1} mrad, {:.1} % of readings lost",
+            ms(self.tracker.latency),
+            1e3 * largest(3),
+            1e3 * largest(4),
+            100.0 * self.tracker.dropout
+        ));
+        words
+    }
+}
