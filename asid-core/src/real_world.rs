@@ -18,6 +18,7 @@ use crate::signal::{Signal, SignalSet};
 use crate::simulator::{Control, Rollout, Simulator, Status};
 use crate::solve::TaskPolicy;
 use crate::task::{Outcome, Task};
+use crate::tracker::ReadingFrames;
 
 /// An episode as it was, and what only a simulated world can tell of it.
 #[derive(Clone, Debug)]
@@ -29,6 +30,8 @@ pub struct RealEpisode {
     /// Share of control steps in which the machine touched the object, as seen after every
     /// physics step: a touch can be shorter than a frame.
     pub contact_fraction: f64,
+    /// The same share for each of the task's objects by itself.
+    pub touched: Vec<f64>,
     /// True start pose, where it is known.
     pub true_start: Option<Vec<f64>>,
 }
@@ -193,10 +196,16 @@ impl Touch {
         })
     }
 
-    /// Whether a force is seen after any physics step of a control step that the copy plays.
-    fn between(&mut self, simulator: &mut dyn Simulator, ctrl: &[f64]) -> Result<bool> {
+    /// Notes the channels of which a force is seen after any physics step of a control step that
+    /// the copy plays.
+    fn between(
+        &mut self,
+        simulator: &mut dyn Simulator,
+        ctrl: &[f64],
+        touched: &mut [bool],
+    ) -> Result<()> {
         if self.forces.is_empty() {
-            return Ok(false);
+            return Ok(());
         }
         let nu = ctrl.len() / self.frames;
         let steps = self.frames * self.substeps;
@@ -206,7 +215,64 @@ impl Touch {
         let control = Control::Shared(&self.ctrl);
         let rollout = Rollout::new(&[COPY], steps, 1, control, &self.recording);
         simulator.rollout(&rollout, &mut self.forces)?;
-        Ok(self.forces.iter().any(|force| *force > 0.0))
+        self.forces
+            .chunks_exact(touched.len())
+            .for_each(|row| note(row, touched));
+        Ok(())
+    }
+}
+
+/// Notes where there is a force.
+fn note(forces: &[f64], touched: &mut [bool]) {
+    for (touched, force) in touched.iter_mut().zip(forces) {
+        *touched |= *force > 0.0;
+    }
+}
+
+/// Pairs of bodies whose contact is looked for, and which of them count for what.
+struct Pairs {
+    /// Channels of contact force, each once.
+    channels: Vec<String>,
+    /// Channels that count as interaction, then those of each of the task's objects.
+    counted: Vec<Vec<usize>>,
+    /// Control steps in which one of them had a force.
+    steps: Vec<usize>,
+}
+
+impl Pairs {
+    fn of(task: &dyn Task) -> Self {
+        let objects = task.objects().into_iter().map(|o| o.contact);
+        let groups = std::iter::once(task.exploration().contact.clone()).chain(objects);
+        let mut channels: Vec<String> = Vec::new();
+        let mut place = |[a, b]: [String; 2]| {
+            let name = format!("contact.{a}/{b}");
+            let found = channels.iter().position(|c| *c == name);
+            found.unwrap_or_else(|| {
+                channels.push(name);
+                channels.len() - 1
+            })
+        };
+        let counted: Vec<Vec<usize>> = groups
+            .map(|pairs| pairs.into_iter().map(&mut place).collect())
+            .collect();
+        Self {
+            steps: vec![0; counted.len()],
+            counted,
+            channels,
+        }
+    }
+
+    /// Counts a control step with these forces seen, a flag a channel.
+    fn count(&mut self, touched: &[bool]) {
+        for (steps, pairs) in self.steps.iter_mut().zip(&self.counted) {
+            *steps += usize::from(pairs.iter().any(|&i| touched[i]));
+        }
+    }
+
+    /// Shares of `horizon` control steps: of interaction, and of each object's.
+    fn shares(&self, horizon: usize) -> (f64, Vec<f64>) {
+        let mut shares = self.steps.iter().map(|&n| n as f64 / horizon as f64);
+        (shares.next().unwrap_or_default(), shares.collect())
     }
 }
 
@@ -244,9 +310,9 @@ impl RealWorld for SimulatedWorld<'_> {
         let layout = self.batch.simulator.layout().clone();
         let mut noise = self.streams.stream("exploration noise");
         let names = protocol.channels();
-        let pairs = protocol.contact.iter();
+        let mut pairs = Pairs::of(self.task);
         let mut all = names.clone();
-        all.extend(pairs.map(|[a, b]| format!("contact.{a}/{b}")));
+        all.extend(pairs.channels.iter().cloned());
         let recording = layout.recording(&all)?;
         let width = layout.recording(&names)?.width();
         let substeps = substeps(&layout, protocol.frame_period)?;
@@ -266,17 +332,22 @@ impl RealWorld for SimulatedWorld<'_> {
         let mut row = vec![0.0; all_width];
         self.batch.simulator.read(&[0], &recording, &mut row)?;
         let tracked = self.signals.width();
-        let mut observe = |row: &[f64]| {
+        let read = ReadingFrames::of(self.task, protocol.frame_period);
+        // At another rate they are the same readings, some of them missing.
+        let mut observe = |frame: usize, row: &[f64]| {
             let mut seen = row[..width].to_vec();
             self.signals
                 .add_noise(&mut seen[..tracked], || StandardNormal.sample(&mut noise));
+            if !read.has(frame) {
+                seen[..tracked].fill(f64::NAN);
+            }
             seen
         };
-        episode.readings.extend(observe(&row));
+        episode.readings.extend(observe(0, &row));
         let mut action = vec![0.0; protocol.action.len()];
         let mut ctrl = vec![0.0; frames * nu];
         let mut out = vec![0.0; frames * all_width];
-        let mut touched = 0;
+        let mut touched = vec![false; pairs.channels.len()];
         let mut actions = Vec::new();
         for step in 0..protocol.horizon {
             let latest = episode.reading_tail(width).to_vec();
@@ -291,23 +362,28 @@ impl RealWorld for SimulatedWorld<'_> {
             self.batch.simulator.rollout(&rollout, &mut out)?;
             self.check()?;
             episode.ctrl.extend_from_slice(&ctrl);
-            for frame in out.chunks_exact(all_width) {
-                episode.readings.extend(observe(frame));
+            touched.fill(false);
+            for (k, row) in out.chunks_exact(all_width).enumerate() {
+                episode
+                    .readings
+                    .extend(observe(step * frames + k + 1, row));
+                note(&row[width..], &mut touched);
             }
-            let at_a_frame = out
-                .chunks_exact(all_width)
-                .any(|r| r[width..].iter().any(|force| *force > 0.0));
-            let simulator = &mut *self.batch.simulator;
-            touched += usize::from(at_a_frame || touch.between(simulator, &ctrl)?);
+            if !touched.iter().all(|t| *t) {
+                touch.between(&mut *self.batch.simulator, &ctrl, &mut touched)?;
+            }
+            pairs.count(&touched);
         }
         self.wear();
         let last = episode.ctrl[episode.ctrl.len() - nu..].to_vec();
         episode.ctrl.extend(last);
         episode.time = times(protocol.frames(), protocol.frame_period);
+        let (contact_fraction, touched) = pairs.shares(protocol.horizon);
         Ok(RealEpisode {
             episode,
             actions,
-            contact_fraction: touched as f64 / protocol.horizon as f64,
+            contact_fraction,
+            touched,
             true_start: Some(start),
         })
     }
@@ -360,10 +436,14 @@ impl RealWorld for SimulatedWorld<'_> {
         let mut episode = blank(&layout, &names)?;
         let mut noise = self.streams.stream("task noise");
         let tracked = self.signals.width();
-        for row in out.chunks_exact_mut(width) {
+        let read = ReadingFrames::of(self.task, protocol.frame_period);
+        for (frame, row) in out.chunks_exact_mut(width).enumerate() {
             let seen = &mut row[own..];
             self.signals
                 .add_noise(&mut seen[..tracked], || StandardNormal.sample(&mut noise));
+            if !read.has(frame) {
+                seen[..tracked].fill(f64::NAN);
+            }
             episode.readings.extend_from_slice(seen);
         }
         let nu = layout.nu();
