@@ -1,5 +1,6 @@
 //! The tasks of the ASID paper, one folder each: the code and its `scene.xml` side by side.
 
+mod difficulty;
 pub mod laptop_articulation;
 pub mod panda;
 pub mod rod_balancing;

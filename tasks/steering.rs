@@ -25,11 +25,11 @@ pub fn action() -> Vec<Coordinate> {
         .into()
 }
 
-/// How far and where a task lets the hand go.
+/// How fast and where a task lets the hand go.
 #[derive(Clone, Copy, Debug)]
 pub struct Steering {
-    /// Longest way of a control step of 0.1 s, m. The paper's controller reaches 0.075.
-    pub max_step: f64,
+    /// Largest speed, m/s. The published controller reaches 0.75.
+    pub speed: f64,
     /// Where the hand may go along x, m.
     pub x: [f64; 2],
     /// And along y, m.
@@ -78,8 +78,9 @@ impl Commander for Hand {
     fn commands(&mut self, action: &[f64], ctrl: &mut [f64]) {
         let [x, y] = [0, 1].map(|i| action[i].clamp(-LARGEST, LARGEST));
         let way = Vector3::new(x, y, 0.0);
-        let way = way * (self.steering.max_step / way.norm().max(1e-12)).min(1.0);
-        let velocity = way / (FRAMES as f64 * FRAME_PERIOD);
+        let step = FRAMES as f64 * FRAME_PERIOD;
+        let way = way * (self.steering.speed * step / way.norm().max(1e-12)).min(1.0);
+        let velocity = way / step;
         let nu = ctrl.len() / FRAMES;
         for row in ctrl.chunks_exact_mut(nu) {
             let (arm, fingers) = row.split_at_mut(panda::ARM_JOINTS);
@@ -97,7 +98,7 @@ mod tests {
     #[test]
     fn the_hand_stays_in_its_box_and_within_reach() {
         let steering = Steering {
-            max_step: 0.04,
+            speed: 0.4,
             x: [0.3, 0.7],
             y: [-0.4, 0.4],
             reach: 0.74,

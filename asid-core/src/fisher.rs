@@ -25,6 +25,7 @@ use crate::problem::{Batch, Problem, substeps};
 use crate::signal::SignalSet;
 use crate::simulator::{Control, Rollout};
 use crate::task::Commander;
+use crate::tracker::ReadingFrames;
 
 /// Which derivative is taken; see the module.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -135,6 +136,9 @@ pub struct FisherBatch<'a> {
     recording: Recording,
     signals: SignalSet,
     substeps: usize,
+    read: ReadingFrames,
+    /// Control steps taken.
+    at: usize,
     /// Step really taken by each copy pair, prior-scaled: `episodes x entries`.
     steps: Vec<f64>,
     information: Vec<Information>,
@@ -185,6 +189,8 @@ impl<'a> FisherBatch<'a> {
                 .map(|_| problem.task.commander())
                 .collect::<Result<_>>()?,
             substeps: substeps(layout, protocol.frame_period)?,
+            read: ReadingFrames::of(problem.task, protocol.frame_period),
+            at: 0,
             steps: vec![0.0; episodes * entries],
             information: vec![Information::prior(d, nuisance); episodes],
             ctrl: vec![0.0; protocol.frames_per_step * layout.nu()],
@@ -275,6 +281,7 @@ impl<'a> FisherBatch<'a> {
             i.reset();
         }
         self.alive.fill(true);
+        self.at = 0;
         let width = self.width();
         let mut all = vec![0.0; self.sims.len() * width];
         self.batch
@@ -337,7 +344,8 @@ impl<'a> FisherBatch<'a> {
             } else {
                 0
             };
-            for frame in first..frames {
+            let (read, before) = (self.read, self.at * frames);
+            for frame in (first..frames).filter(|f| read.has(before + f + 1)) {
                 self.accumulate(e, copies, frames, frame, &readings);
             }
             reward[e] = self.information[e].reward(self.settings.objective, trace);
@@ -349,6 +357,7 @@ impl<'a> FisherBatch<'a> {
             }
         }
         self.readings = readings;
+        self.at += 1;
         Ok(())
     }
 

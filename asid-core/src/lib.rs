@@ -13,6 +13,7 @@
 
 pub mod backend;
 pub mod cartesian;
+pub mod difficulty;
 pub mod document;
 pub mod effect;
 pub mod environment;
@@ -45,12 +46,15 @@ pub mod simulator;
 pub mod solve;
 pub mod target;
 pub mod task;
+pub mod tracker;
+pub mod visits;
 
 // What public items speak of, so that an author need not match versions.
 pub use mjcf_rs;
 pub use nalgebra;
 
 pub use backend::{Backend, Capabilities, Model};
+pub use difficulty::{Difficulty, Levels};
 pub use effect::{Acting, Effect, EffectSpec};
 pub use environment::{BatchEnvironment, Transition};
 pub use episode::Episode;

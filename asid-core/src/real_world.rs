@@ -1,6 +1,7 @@
 //! The real world: what answers with one episode, and lets a task be tried once.
 
 mod close_look;
+mod pairs;
 mod tracker;
 
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -21,7 +22,9 @@ use crate::signal::{Signal, SignalSet};
 use crate::simulator::{Control, Rollout, Status};
 use crate::solve::TaskPolicy;
 use crate::task::{Outcome, Task};
+use crate::tracker::ReadingFrames;
 use close_look::CloseLook;
+use pairs::{Pairs, note};
 pub use tracker::TrackerErrors;
 
 /// An episode as it was, and what only a simulated world can tell of it.
@@ -34,8 +37,12 @@ pub struct RealEpisode {
     /// Share of control steps in which the machine touched the object, as seen after every
     /// physics step: a touch can be shorter than a frame.
     pub contact_fraction: f64,
+    /// The same share for each of the task's objects by itself.
+    pub touched: Vec<f64>,
     /// True start pose, where it is known.
     pub true_start: Option<Vec<f64>>,
+    /// The readings without the trackers' errors, laid out as the log's, where they are known.
+    pub true_readings: Option<Vec<f64>>,
 }
 
 /// One attempt at the task.
@@ -228,6 +235,7 @@ fn draw(coordinates: &[crate::task::Coordinate], rng: &mut Rng) -> Vec<f64> {
 struct Tracker<'a> {
     signals: &'a SignalSet,
     errors: &'a TrackerErrors,
+    rate: ReadingFrames,
     /// Physics steps by which it is late, and those of a frame.
     late: usize,
     substeps: usize,
@@ -242,6 +250,7 @@ struct Tracker<'a> {
 impl<'a> Tracker<'a> {
     fn new(
         (signals, errors): (&'a SignalSet, &'a TrackerErrors),
+        rate: ReadingFrames,
         layout: &Layout,
         substeps: usize,
         [noise, losses]: [Rng; 2],
@@ -249,6 +258,7 @@ impl<'a> Tracker<'a> {
         Self {
             signals,
             errors,
+            rate,
             late: (errors.latency / layout.timestep).round() as usize,
             substeps,
             past: Vec::new(),
@@ -282,7 +292,7 @@ impl<'a> Tracker<'a> {
         self.errors.shift(self.signals, seen);
         self.signals
             .add_noise(seen, || StandardNormal.sample(&mut self.noise));
-        let there = self.errors.reads(self.frame, &mut self.losses);
+        let there = self.errors.reads(self.frame, &mut self.losses) && self.rate.has(self.frame);
         self.frame += 1;
         there
     }
@@ -295,16 +305,18 @@ impl RealWorld for SimulatedWorld<'_> {
         self.begin(&start)?;
         let layout = self.batch.simulator.layout().clone();
         let names = protocol.channels();
-        let pairs = protocol.contact.iter();
+        let mut pairs = Pairs::of(self.task);
         let mut all = names.clone();
-        all.extend(pairs.map(|[a, b]| format!("contact.{a}/{b}")));
+        all.extend(pairs.channels.iter().cloned());
         let recording = layout.recording(&all)?;
         let width = layout.recording(&names)?.width();
         let tracked = self.signals.width();
         let substeps = substeps(&layout, protocol.frame_period)?;
         let (frames, nu) = (protocol.frames_per_step, layout.nu());
         let chance = ["exploration noise", "exploration losses"].map(|n| self.streams.stream(n));
-        let mut tracker = Tracker::new((&self.signals, &self.tracker), &layout, substeps, chance);
+        let rate = ReadingFrames::of(self.task, protocol.frame_period);
+        let errors = (&self.signals, &self.tracker);
+        let mut tracker = Tracker::new(errors, rate, &layout, substeps, chance);
         let mut look = CloseLook::new(recording.clone(), COPY, frames, substeps);
         let looks = tracker.late > 0 || recording.width() > width;
         let mut commander = self.task.commander()?;
@@ -318,6 +330,7 @@ impl RealWorld for SimulatedWorld<'_> {
         simulator.read(&[WORLD], &recording, &mut row)?;
         tracker.begin(&row);
         row.truncate(width);
+        let mut true_readings = row.clone();
         tracker.read(&mut row);
         episode.readings.extend_from_slice(&row);
         // The policy goes on with the last reading where one is missing, as a tracker's driver does.
@@ -325,7 +338,7 @@ impl RealWorld for SimulatedWorld<'_> {
         let mut action = vec![0.0; protocol.action.len()];
         let mut ctrl = vec![0.0; frames * nu];
         let mut out = vec![0.0; frames * all_width];
-        let mut touched = 0;
+        let mut touched = vec![false; pairs.channels.len()];
         let mut actions = Vec::new();
         for step in 0..protocol.horizon {
             policy.act(step, &latest, &mut action)?;
@@ -335,10 +348,10 @@ impl RealWorld for SimulatedWorld<'_> {
             actions.extend_from_slice(&action);
             commander.commands(&action, &mut ctrl);
             let simulator = &mut *self.batch.simulator;
-            let mut touches = false;
+            touched.fill(false);
             if looks {
                 look.play(simulator, WORLD, &ctrl)?;
-                touches = look.rows().any(|r| r[width..].iter().any(|f| *f > 0.0));
+                look.rows().for_each(|r| note(&r[width..], &mut touched));
                 tracker.look(look.rows());
             }
             let control = Control::Shared(&ctrl);
@@ -347,7 +360,8 @@ impl RealWorld for SimulatedWorld<'_> {
             self.check()?;
             episode.ctrl.extend_from_slice(&ctrl);
             for frame in out.chunks_exact(all_width) {
-                touches |= frame[width..].iter().any(|force| *force > 0.0);
+                note(&frame[width..], &mut touched);
+                true_readings.extend_from_slice(&frame[..width]);
                 let mut seen = frame[..width].to_vec();
                 if tracker.read(&mut seen) {
                     latest.copy_from_slice(&seen);
@@ -357,17 +371,20 @@ impl RealWorld for SimulatedWorld<'_> {
                 }
                 episode.readings.extend_from_slice(&seen);
             }
-            touched += usize::from(touches);
+            pairs.count(&touched);
         }
         self.wear();
         let last = episode.ctrl[episode.ctrl.len() - nu..].to_vec();
         episode.ctrl.extend(last);
         episode.time = times(protocol.frames(), protocol.frame_period);
+        let (contact_fraction, touched) = pairs.shares(protocol.horizon);
         Ok(RealEpisode {
             episode,
             actions,
-            contact_fraction: touched as f64 / protocol.horizon as f64,
+            contact_fraction,
+            touched,
             true_start: Some(start),
+            true_readings: Some(true_readings),
         })
     }
 
@@ -399,7 +416,9 @@ impl RealWorld for SimulatedWorld<'_> {
         let own = layout.recording(&protocol.channels)?.width();
         let substeps = substeps(&layout, protocol.frame_period)?;
         let chance = ["task noise", "task losses"].map(|n| self.streams.stream(n));
-        let mut tracker = Tracker::new((&self.signals, &self.tracker), &layout, substeps, chance);
+        let rate = ReadingFrames::of(self.task, protocol.frame_period);
+        let errors = (&self.signals, &self.tracker);
+        let mut tracker = Tracker::new(errors, rate, &layout, substeps, chance);
         let simulator = &mut *self.batch.simulator;
         let mut out = vec![0.0; (protocol.frames + 1) * width];
         let (first, frames) = out.split_at_mut(width);

@@ -4,7 +4,10 @@
 //! same description, whatever the task, and the arrays they pass around are laid
 //! out by it.
 
+use std::collections::BTreeMap;
+
 use crate::backend::Capabilities;
+use crate::difficulty::Difficulty;
 use crate::error::Result;
 use crate::layout::Layout;
 use crate::parameter::Parameter;
@@ -12,6 +15,7 @@ use crate::registry::Settings;
 use crate::rng::Rng;
 use crate::scene::Scene;
 use crate::signal::Signal;
+use crate::target::Target;
 
 /// A number with a name, a unit and a range: an entry of an action or of a start pose.
 #[derive(Clone, Debug, PartialEq)]
@@ -185,6 +189,21 @@ pub struct TrackedPart {
     pub orientation: String,
 }
 
+/// A thing that is tracked, as pictures and figures know it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct TrackedObject {
+    /// What it is, and its shape in its own frame.
+    pub outline: Outline,
+    /// Sensor of its position, of which the first two entries are its place in the plane, m.
+    pub position: String,
+    /// Sensor of its orientation, where that is tracked.
+    pub orientation: Option<String>,
+    /// Pairs of bodies whose contact counts as the machine touching it.
+    pub contact: Vec<[String; 2]>,
+    /// Its mass in the scene, where one number sets it.
+    pub mass: Option<Target>,
+}
+
 /// Turns exploration actions into commands of the actuators, feed-forward.
 pub trait Commander: Send {
     /// Back to the start of an episode.
@@ -213,6 +232,23 @@ pub trait Task: Send + Sync {
     /// `section` is `explorer`, `identifier` or `solver`, `algorithm` its name.
     fn settings(&self, _section: &str, _algorithm: &str) -> Settings {
         Settings::new()
+    }
+    /// The numbers that say how hard the task is; none where it is as it is.
+    fn difficulty(&self) -> Vec<Difficulty> {
+        Vec::new()
+    }
+    /// The task with some of its difficulties set, by name, the others at their defaults; `None`
+    /// where nothing can be set.
+    ///
+    /// # Errors
+    /// When a name is unknown, a value out of range, or the task cannot be made with it.
+    fn adjusted(&self, _values: &BTreeMap<String, f64>) -> Result<Option<Box<dyn Task>>> {
+        Ok(None)
+    }
+    /// Readings of the trackers a second, the first at the start of an episode; `None` for one at
+    /// every frame. There is one at the end of each control step, so that a policy always has it.
+    fn tracker_rate(&self) -> Option<f64> {
+        None
     }
     /// The named cases of tables.
     fn conditions(&self) -> Vec<Condition>;
@@ -274,6 +310,28 @@ pub trait Task: Send + Sync {
     /// What a picture from above shows.
     fn top_view(&self) -> TopView {
         TopView::default()
+    }
+    /// The things that are tracked, the one that the task is about first. Unless a task says
+    /// otherwise it is one thing: the first signal is its position, the second its orientation.
+    fn objects(&self) -> Vec<TrackedObject> {
+        let protocol = self.exploration();
+        let mut sensors = protocol.signals.iter().map(|s| s.sensor.clone());
+        sensors
+            .next()
+            .map(|position| TrackedObject {
+                outline: self.top_view().object,
+                position,
+                orientation: sensors.next(),
+                contact: protocol.contact.clone(),
+                mass: None,
+            })
+            .into_iter()
+            .collect()
+    }
+    /// Parts of the plane that differ in what they tell, such as patches of a floor: figures count
+    /// where the object goes.
+    fn regions(&self) -> Vec<Outline> {
+        Vec::new()
     }
     /// What a picture from the side shows at the end of an attempt: shapes in the
     /// world, from one row of readings.

@@ -27,7 +27,11 @@ pub(super) fn section(report: &RunReport) -> Option<Section> {
             return None;
         }
         return Some(
-            section.note("No view from above: the run has no real episode with tracked objects."),
+            section.note(if report.explorer.is_empty() {
+                "No view from above: nothing was explored."
+            } else {
+                "No view from above: the run has no real episode with tracked objects."
+            }),
         );
     };
     let names: Vec<&str> = episode
@@ -41,13 +45,14 @@ pub(super) fn section(report: &RunReport) -> Option<Section> {
     } else {
         format!("the {}", names.join(" and the "))
     };
+    let moves: Vec<String> = episode
+        .objects
+        .iter()
+        .map(|o| format!("the {} moved {}", name_of(o), displacement(o)))
+        .collect();
     let lead = format!(
-        "Seen from above: {which}. {} moved {}.",
-        capitalise(&what),
-        episode
-            .objects
-            .first()
-            .map_or_else(|| "nothing".to_owned(), displacement)
+        "Seen from above: {which}. {}.",
+        capitalise(&moves.join("; "))
     );
     let dots = if episode.end_effector.is_some() {
         "; each dot is one control step"
@@ -124,6 +129,15 @@ pub(super) fn outline_of(shape: &Shape) -> Outline {
     }
 }
 
+/// Name of an object, for people.
+fn name_of(track: &ObjectTrack) -> &str {
+    if track.name.is_empty() {
+        "object"
+    } else {
+        &track.name
+    }
+}
+
 /// Outlines of an object at evenly spread times, faint to strong.
 fn ghosts(track: &ObjectTrack, colour: Colour) -> Vec<Outline> {
     let poses: Vec<&[f64; 3]> = track
@@ -145,14 +159,8 @@ fn ghosts(track: &ObjectTrack, colour: Colour) -> Vec<Outline> {
             let pose = poses[(share * (poses.len() - 1) as f64).round() as usize];
             let outline = Outline::polygon(placed(&track.outline, *pose)).colour(colour);
             if i + 1 == count {
-                outline.strength(0.2, 1.0).series_label(span(
-                    if track.name.is_empty() {
-                        "object"
-                    } else {
-                        &track.name
-                    },
-                    &track.time,
-                ))
+                let label = span(name_of(track), &track.time);
+                outline.strength(0.2, 1.0).series_label(label)
             } else {
                 outline.strength(0.03, 0.25 + 0.4 * share)
             }
@@ -183,18 +191,21 @@ fn span(name: &str, time: &[f64]) -> String {
     }
 }
 
-/// `by 0.12 m and turned by 34°`.
+/// `by 0.12 m and turned by 34°`; of a round thing the way alone.
 fn displacement(track: &ObjectTrack) -> String {
     let mut poses = track
         .poses
         .iter()
         .filter(|p| p.iter().all(|c| c.is_finite()));
     match (poses.next(), poses.next_back()) {
-        (Some(a), Some(b)) => format!(
-            "by {} m and turned by {}°",
-            decimals((b[0] - a[0]).hypot(b[1] - a[1]), 2),
-            decimals((b[2] - a[2]).to_degrees(), 0)
-        ),
+        (Some(a), Some(b)) => {
+            let way = decimals((b[0] - a[0]).hypot(b[1] - a[1]), 2);
+            if track.round {
+                return format!("by {way} m");
+            }
+            let turn = decimals((b[2] - a[2]).to_degrees(), 0);
+            format!("by {way} m and turned by {turn}°")
+        }
         _ => "by an unknown distance".to_owned(),
     }
 }

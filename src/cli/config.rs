@@ -19,6 +19,7 @@ pub use table::{read_table, set};
 use unknowns::{ParameterConfig, noise, unknowns};
 
 mod component;
+pub mod difficulty;
 mod real;
 mod table;
 mod unknowns;
@@ -97,6 +98,9 @@ pub struct Config {
     pub solver: Component,
     /// Real world.
     pub real: RealConfig,
+    /// How hard the task is, by name.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub difficulty: BTreeMap<String, f64>,
     /// Noise of each tracked sensor, in its unit.
     pub noise: BTreeMap<String, f64>,
     /// The unknowns, by name.
@@ -104,7 +108,7 @@ pub struct Config {
 }
 
 /// Keys at the top of a configuration.
-const KEYS: [&str; 15] = [
+const KEYS: [&str; 17] = [
     "schema",
     "command",
     "task",
@@ -118,6 +122,8 @@ const KEYS: [&str; 15] = [
     "identifier",
     "solver",
     "real",
+    "preset",
+    "difficulty",
     "noise",
     "parameter",
 ];
@@ -140,7 +146,8 @@ pub const ASID: Defaults = Defaults {
 };
 
 impl Config {
-    /// Resolves the settings of a task for a stage, and the unknowns they make.
+    /// Resolves the settings of a task for a stage, and the unknowns they make. The task is as hard
+    /// as [`difficulty::levels`] says.
     pub fn resolve(
         stage: Stage,
         task: &dyn Task,
@@ -153,6 +160,7 @@ impl Config {
             Some(path) => read_table(path)?,
             None => common.base.clone(),
         };
+        difficulty::forget_noise(task, &mut table)?;
         // A start pose in the settings of one stage means nothing to another.
         if text(&table, "command")?.is_some_and(|c| c != stage.name()) {
             table.remove("start");
@@ -231,6 +239,7 @@ impl Config {
                 ASID.solver,
             )?,
             real,
+            difficulty: difficulty::levels(task, common)?,
             noise: noise(task, &section(&table, "noise")?)?,
             backend,
             parameter,

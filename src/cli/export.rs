@@ -6,6 +6,9 @@ use anyhow::Result;
 use asid_core::Error;
 use asid_core::registry::{TaskEntry, find};
 
+use super::config::difficulty;
+use super::options::Common;
+
 /// Arguments of `export`.
 #[derive(clap::Args)]
 pub struct Arguments {
@@ -14,12 +17,25 @@ pub struct Arguments {
     /// File to write; it must not exist
     #[arg(long, value_name = "FILE.xml")]
     out: PathBuf,
+    /// How hard the task is: default, or published; see its page
+    #[arg(long, value_name = "NAME")]
+    preset: Option<String>,
+    /// One difficulty, such as difficulty.ledge_width=0.02 (repeatable)
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
 }
 
 /// Writes the scene.
 pub fn export(arguments: &Arguments) -> Result<()> {
     use std::io::Write as _;
     let task = (find::<TaskEntry>(&arguments.task)?.make)()?;
+    let common = Common {
+        preset: arguments.preset.clone(),
+        set: arguments.set.clone(),
+        ..Common::default()
+    };
+    let levels = difficulty::levels(&*task, &common)?;
+    let task = difficulty::at(task, &levels)?;
     let failed = |e: std::io::Error| Error::File {
         path: arguments.out.clone(),
         message: match e.kind() {

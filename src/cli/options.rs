@@ -36,6 +36,10 @@ pub struct Common {
     /// One setting, such as explorer.iterations=10 (repeatable)
     #[arg(long, value_name = "KEY=VALUE")]
     pub set: Vec<String>,
+    /// How hard the task is: default, or published, as in the paper where it says so; single values
+    /// by --set difficulty.NAME=VALUE
+    #[arg(long, value_name = "NAME")]
+    pub preset: Option<String>,
     /// Folder for the results [default: the next free one below runs/]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,

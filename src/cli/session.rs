@@ -11,7 +11,7 @@ use asid_core::{
     TrackerErrors,
 };
 
-use super::config::{Config, Stage};
+use super::config::{Config, Stage, difficulty};
 use super::model::{self, Needs};
 use super::options::{Algorithms, Common, Worlds};
 use super::progress::Bars;
@@ -56,7 +56,9 @@ impl Session {
         algorithms: &Algorithms,
         worlds: &Worlds,
     ) -> Result<Self> {
-        let mut task = (registry::find::<TaskEntry>(task)?.make)()?;
+        let task = (registry::find::<TaskEntry>(task)?.make)()?;
+        let levels = difficulty::levels(&*task, common)?;
+        let mut task = difficulty::at(task, &levels)?;
         let (config, parameters) = Config::resolve(stage, &*task, common, algorithms, worlds)?;
         if let Some(condition) = &config.condition
             && let Some(other) = task.under(condition)?

@@ -12,9 +12,6 @@ pub const WIDTH: usize = 14;
 /// Angle that the lid is to be closed to, rad.
 pub const SET_ANGLE: f64 = 0.8;
 
-/// Largest error of a success, rad.
-pub const MAX_ERROR: f64 = 0.05;
-
 /// Smallest motion of the lid that counts as moved, rad.
 pub const MIN_MOTION: f64 = 0.01;
 
@@ -38,8 +35,9 @@ pub fn errors(readings: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-/// What came of an attempt: the error in the last row, and whether the lid moved at all.
-pub fn outcome(readings: &[f64]) -> Outcome {
+/// What came of an attempt: the error in the last row, at most `tolerance` (rad) in a success, and
+/// whether the lid moved at all.
+pub fn outcome(readings: &[f64], tolerance: f64) -> Outcome {
     let (first, last) = (&readings[..WIDTH], &readings[readings.len() - WIDTH..]);
     if last.iter().any(|x| !x.is_finite()) {
         let worst = std::f64::consts::PI;
@@ -53,7 +51,7 @@ pub fn outcome(readings: &[f64]) -> Outcome {
     let moved = (lid_angle(last) - lid_angle(first)).abs() > MIN_MOTION;
     Outcome {
         value,
-        success: moved && value < MAX_ERROR,
+        success: moved && value < tolerance,
         cost: value,
     }
 }
@@ -105,10 +103,10 @@ mod tests {
 
     #[test]
     fn a_lid_at_the_set_angle_counts_only_if_it_was_moved_there() {
-        let at = |from: f64, to: f64| outcome(&[row(0.3, from), row(0.3, to)].concat());
+        let at = |from: f64, to: f64| outcome(&[row(0.3, from), row(0.3, to)].concat(), 0.05);
         assert!(at(1.8, SET_ANGLE + 0.04).success);
         assert!(!at(1.8, SET_ANGLE + 0.06).success);
         assert!(!at(SET_ANGLE, SET_ANGLE + 0.005).success);
-        assert!(!outcome(&[row(0.3, 1.8), vec![f64::NAN; WIDTH]].concat()).success);
+        assert!(!outcome(&[row(0.3, 1.8), vec![f64::NAN; WIDTH]].concat(), 0.05).success);
     }
 }

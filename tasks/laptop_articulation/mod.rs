@@ -12,15 +12,17 @@
 mod closing;
 mod metric;
 
+use std::collections::BTreeMap;
+
 use asid_core::parameter::{Parameter, Scale};
 use asid_core::registry::Settings;
-use asid_core::signal::Signal;
 use asid_core::task::{
     Commander, Condition, Coordinate, DownstreamProtocol, ExplorationProtocol, Outcome, Outline,
     Task, TopView, TrackedPart,
 };
-use asid_core::{Capabilities, Layout, Result, Scene};
+use asid_core::{Capabilities, Difficulty, Layout, Levels, Result, Scene};
 
+use crate::difficulty;
 use crate::panda;
 use crate::steering::{self, Steering};
 
@@ -33,9 +35,15 @@ const HINGE_FRICTION: [f64; 2] = [200.0, 0.3];
 /// Largest distance of the hinge's axis from its nominal height, m.
 const MAX_OFFSET: f64 = 0.02;
 
+/// Largest error of a success unless the difficulty says otherwise, rad.
+const ANGLE_TOLERANCE: f64 = 0.05;
+
+/// Speed of the hand unless the difficulty says otherwise, m/s.
+const HAND_SPEED: f64 = 0.5;
+
 /// The closed gripper is swept over the base, at a height at which it meets the lid.
 const STEERING: Steering = Steering {
-    max_step: 0.05, // 0.5 m/s
+    speed: HAND_SPEED,
     x: [0.25, 0.75],
     y: [-0.5, 0.45],
     reach: 0.76,
@@ -51,6 +59,10 @@ pub fn hinge(hinge_offset: f64) -> [f64; 3] {
 
 /// The task.
 pub struct LaptopArticulation {
+    levels: Levels,
+    angle_tolerance: f64,
+    hand_speed: f64,
+    tracker_rate: f64,
     scene: Scene,
     home: Vec<f64>,
     exploration: ExplorationProtocol,
@@ -69,7 +81,13 @@ impl LaptopArticulation {
     /// # Errors
     /// When the scene that is built in cannot be read.
     pub fn new() -> Result<Self> {
+        Self::at(Levels::new(difficulties()))
+    }
+
+    /// The task at some difficulty.
+    fn at(levels: Levels) -> Result<Self> {
         let (scene, home) = panda::scene("laptop-articulation", include_str!("scene.xml"))?;
+        let angle_tolerance = levels.get("angle_tolerance")?;
         let sensors = ["base_pos", "base_quat", "lid_pos", "lid_quat"];
         let exploration = ExplorationProtocol {
             horizon: 20,
@@ -82,12 +100,7 @@ impl LaptopArticulation {
                 Coordinate::new("yaw", "rad", [0.0, std::f64::consts::PI]),
                 Coordinate::new("lid", "rad", [1.2, 2.5]),
             ],
-            signals: sensors
-                .map(|sensor| Signal {
-                    sensor: sensor.into(),
-                    noise: if sensor.ends_with("pos") { 0.002 } else { 0.01 },
-                })
-                .into(),
+            signals: difficulty::signals(&levels, &sensors)?,
             proprioception: panda::proprioception(),
             contact: ["finger_left", "finger_right", "hand"]
                 .map(|f| [f.into(), "lid".into()])
@@ -96,8 +109,12 @@ impl LaptopArticulation {
         let downstream = DownstreamProtocol {
             metric: "lid_error_rad".into(),
             unit: "rad".into(),
-            rule: "lid moved by over 0.01 rad and within 0.05 rad of 0.8 rad".into(),
-            threshold: Some(metric::MAX_ERROR),
+            rule: format!(
+                "lid moved by over {} rad and within {angle_tolerance} rad of {} rad",
+                metric::MIN_MOTION,
+                metric::SET_ANGLE
+            ),
+            threshold: Some(angle_tolerance),
             frames: closing::frames(),
             frame_period: closing::FRAME_PERIOD,
             action: closing::action(),
@@ -106,12 +123,28 @@ impl LaptopArticulation {
             phases: closing::phases(),
         };
         Ok(Self {
+            angle_tolerance,
+            hand_speed: levels.get("hand_speed")?,
+            tracker_rate: difficulty::rate(&levels)?,
+            levels,
             scene,
             home,
             exploration,
             downstream,
         })
     }
+}
+
+/// What makes the task easier or harder.
+fn difficulties() -> Vec<Difficulty> {
+    let about = "largest error of the lid's angle that is a success";
+    let mut all = vec![
+        Difficulty::new("angle_tolerance", "rad", ANGLE_TOLERANCE, [0.005, 0.3], about),
+        difficulty::hand_speed(HAND_SPEED),
+    ];
+    all.extend(difficulty::tracker());
+    all.push(difficulty::angle_noise());
+    all
 }
 
 impl Task for LaptopArticulation {
@@ -179,6 +212,19 @@ impl Task for LaptopArticulation {
         settings
     }
 
+    fn difficulty(&self) -> Vec<Difficulty> {
+        self.levels.all().to_vec()
+    }
+
+    fn adjusted(&self, values: &BTreeMap<String, f64>) -> Result<Option<Box<dyn Task>>> {
+        let levels = Levels::new(difficulties()).with(values)?;
+        Ok(Some(Box::new(Self::at(levels)?)))
+    }
+
+    fn tracker_rate(&self) -> Option<f64> {
+        Some(self.tracker_rate)
+    }
+
     fn conditions(&self) -> Vec<Condition> {
         [("articulated", 1.0), ("rigid", 0.0)]
             .map(|(name, value)| Condition::fixed(name, &[("articulated", value)]))
@@ -216,7 +262,11 @@ impl Task for LaptopArticulation {
     }
 
     fn commander(&self) -> Result<Box<dyn Commander>> {
-        STEERING.commander(&self.scene, &self.home)
+        let steering = Steering {
+            speed: self.hand_speed,
+            ..STEERING
+        };
+        steering.commander(&self.scene, &self.home)
     }
 
     fn attempt(&self, start: &[f64], action: &[f64]) -> Result<Vec<f64>> {
@@ -228,7 +278,7 @@ impl Task for LaptopArticulation {
     }
 
     fn outcome(&self, readings: &[f64]) -> Outcome {
-        metric::outcome(readings)
+        metric::outcome(readings, self.angle_tolerance)
     }
 
     fn parts(&self) -> Option<[TrackedPart; 2]> {

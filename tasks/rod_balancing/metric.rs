@@ -4,7 +4,7 @@ use asid_core::signal::unit_quaternion;
 use asid_core::task::{Outcome, Outline};
 use nalgebra::Vector3;
 
-use super::{LEDGE, LEDGE_HALF, ROD_HALF};
+use super::{LEDGE, ROD_HALF};
 use crate::rectangle;
 
 /// Largest tilt of a success, degrees.
@@ -42,8 +42,8 @@ pub fn outcome(readings: &[f64]) -> Outcome {
     }
 }
 
-/// Ledge and rod in the plane of x and z.
-pub fn side_view(row: &[f64]) -> Vec<Outline> {
+/// Ledge, of a width in m, and rod in the plane of x and z.
+pub fn side_view(row: &[f64], ledge_width: f64) -> Vec<Outline> {
     let axis = unit_quaternion(&row[3..7]) * Vector3::y();
     let (along, up) = (axis.x.hypot(axis.y).copysign(axis.x), axis.z);
     let (x, z) = (row[0], row[2]);
@@ -52,7 +52,7 @@ pub fn side_view(row: &[f64]) -> Vec<Outline> {
     vec![
         Outline {
             label: "ledge".into(),
-            corners: rectangle([LEDGE[0], LEDGE[2] / 2.0], [LEDGE_HALF[0], LEDGE[2] / 2.0]),
+            corners: rectangle([LEDGE[0], LEDGE[2] / 2.0], [ledge_width / 2.0, LEDGE[2] / 2.0]),
         },
         Outline {
             label: "rod".into(),

@@ -14,20 +14,26 @@ mod metric;
 mod placing;
 mod stand_in;
 
+use std::collections::BTreeMap;
+
 use asid_core::parameter::{Parameter, Scale};
-use asid_core::signal::{Signal, yaw};
+use asid_core::signal::yaw;
 use asid_core::task::{
     Commander, Condition, Coordinate, DownstreamProtocol, ExplorationProtocol, Outcome, Outline,
     Task, TopView,
 };
-use asid_core::{Capabilities, Layout, Result, Scene};
+use asid_core::{Capabilities, Difficulty, Layout, Levels, Result, Scene};
 
+use crate::difficulty;
 use crate::panda;
 use crate::steering::{self, Steering};
 
+/// Speed of the hand unless the difficulty says otherwise, m/s. Faster pushes make the rod hop.
+const HAND_SPEED: f64 = 0.4;
+
 /// The closed gripper pushes the rod about on the table.
 const STEERING: Steering = Steering {
-    max_step: 0.04, // 0.4 m/s
+    speed: HAND_SPEED,
     x: [0.30, 0.70],
     y: [-0.4, 0.4],
     reach: 0.74,
@@ -40,14 +46,21 @@ const ROD_HALF: [f64; 3] = [0.02, 0.15, 0.02];
 /// Middle of the ledge's top, m.
 const LEDGE: [f64; 3] = [0.2, -0.5, 0.15];
 
-/// Half sizes of the ledge across and along, m.
-const LEDGE_HALF: [f64; 2] = [0.02, 0.05];
+/// Half length of the ledge and half its height, m.
+const LEDGE_HALF: [f64; 2] = [0.05, 0.075];
+
+/// Width of the ledge unless the difficulty says otherwise, m.
+const LEDGE_WIDTH: f64 = 0.04;
 
 /// Height of the rod's middle when it lies on the table, m.
 const ROD_REST_HEIGHT: f64 = 0.02;
 
 /// The task.
 pub struct RodBalancing {
+    levels: Levels,
+    ledge_width: f64,
+    hand_speed: f64,
+    tracker_rate: f64,
     scene: Scene,
     home: Vec<f64>,
     exploration: ExplorationProtocol,
@@ -66,7 +79,16 @@ impl RodBalancing {
     /// # Errors
     /// When the scene that is built in cannot be read.
     pub fn new() -> Result<Self> {
+        Self::at(Levels::new(difficulties()))
+    }
+
+    /// The task at some difficulty.
+    fn at(levels: Levels) -> Result<Self> {
         let (scene, home) = panda::scene("rod-balancing", include_str!("scene.xml"))?;
+        let ledge_width = levels.get("ledge_width")?;
+        let [half_length, half_height] = LEDGE_HALF;
+        let size = format!("{:?} {half_length:?} {half_height:?}", 0.5 * ledge_width);
+        let scene = scene.with_attribute("geom", "ledge", "size", &size)?;
         let pi = std::f64::consts::PI;
         let exploration = ExplorationProtocol {
             horizon: 20,
@@ -78,16 +100,7 @@ impl RodBalancing {
                 Coordinate::new("y", "m", [-0.2, 0.2]),
                 Coordinate::new("yaw", "rad", [0.0, pi]),
             ],
-            signals: vec![
-                Signal {
-                    sensor: "rod_pos".into(),
-                    noise: 0.002,
-                },
-                Signal {
-                    sensor: "rod_quat".into(),
-                    noise: 0.01,
-                },
-            ],
+            signals: difficulty::signals(&levels, &["rod_pos", "rod_quat"])?,
             proprioception: panda::proprioception(),
             contact: ["finger_left", "finger_right"]
                 .map(|f| [f.into(), "rod".into()])
@@ -106,12 +119,28 @@ impl RodBalancing {
             phases: placing::phases(),
         };
         Ok(Self {
+            ledge_width,
+            hand_speed: levels.get("hand_speed")?,
+            tracker_rate: difficulty::rate(&levels)?,
+            levels,
             scene,
             home,
             exploration,
             downstream,
         })
     }
+}
+
+/// What makes the task easier or harder.
+fn difficulties() -> Vec<Difficulty> {
+    let about = "width of the ledge that the rod is laid across";
+    let mut all = vec![
+        Difficulty::new("ledge_width", "m", LEDGE_WIDTH, [0.004, 0.1], about),
+        difficulty::hand_speed(HAND_SPEED),
+    ];
+    all.extend(difficulty::tracker());
+    all.push(difficulty::angle_noise());
+    all
 }
 
 impl Task for RodBalancing {
@@ -150,6 +179,19 @@ impl Task for RodBalancing {
             scale: Scale::Linear,
             unit: String::new(),
         }]
+    }
+
+    fn difficulty(&self) -> Vec<Difficulty> {
+        self.levels.all().to_vec()
+    }
+
+    fn adjusted(&self, values: &BTreeMap<String, f64>) -> Result<Option<Box<dyn Task>>> {
+        let levels = Levels::new(difficulties()).with(values)?;
+        Ok(Some(Box::new(Self::at(levels)?)))
+    }
+
+    fn tracker_rate(&self) -> Option<f64> {
+        Some(self.tracker_rate)
     }
 
     fn conditions(&self) -> Vec<Condition> {
@@ -192,7 +234,11 @@ impl Task for RodBalancing {
     }
 
     fn commander(&self) -> Result<Box<dyn Commander>> {
-        STEERING.commander(&self.scene, &self.home)
+        let steering = Steering {
+            speed: self.hand_speed,
+            ..STEERING
+        };
+        steering.commander(&self.scene, &self.home)
     }
 
     fn attempt(&self, start: &[f64], action: &[f64]) -> Result<Vec<f64>> {
@@ -216,13 +262,16 @@ impl Task for RodBalancing {
             },
             fixtures: vec![Outline {
                 label: "ledge".into(),
-                corners: crate::rectangle([LEDGE[0], LEDGE[1]], LEDGE_HALF),
+                corners: crate::rectangle(
+                    [LEDGE[0], LEDGE[1]],
+                    [0.5 * self.ledge_width, LEDGE_HALF[0]],
+                ),
             }],
             bounds: [[0.1, -0.6], [0.8, 0.5]],
         }
     }
 
     fn side_view(&self, readings: &[f64]) -> Vec<Outline> {
-        metric::side_view(readings)
+        metric::side_view(readings, self.ledge_width)
     }
 }

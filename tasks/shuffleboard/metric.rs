@@ -4,9 +4,6 @@ use asid_core::task::Outcome;
 
 use super::{LANE_HALF, Zone};
 
-/// Half length of a zone along the board, m.
-pub const ZONE_HALF: f64 = 0.125;
-
 /// Way in the last frame below which the puck is at rest, m.
 const REST: f64 = 5e-5;
 
@@ -21,8 +18,8 @@ pub fn zone_error(zone: Zone, position: &[f64]) -> f64 {
     (position[0] - zone.middle()).abs()
 }
 
-/// What came of an attempt: where the puck is in the last of the rows of three.
-pub fn outcome(zone: Zone, readings: &[f64]) -> Outcome {
+/// What came of an attempt at a zone of a length in m: where the puck is in the last of the rows of three.
+pub fn outcome(zone: Zone, zone_length: f64, readings: &[f64]) -> Outcome {
     let [before, last] = [6, 3].map(|back| &readings[readings.len().saturating_sub(back)..][..3]);
     if last.iter().chain(before).any(|x| !x.is_finite()) {
         return Outcome {
@@ -37,7 +34,7 @@ pub fn outcome(zone: Zone, readings: &[f64]) -> Outcome {
     let fair = rests && on_board;
     Outcome {
         value,
-        success: fair && value <= ZONE_HALF,
+        success: fair && value <= 0.5 * zone_length,
         cost: value + if fair { 0.0 } else { MISS_COST },
     }
 }
@@ -60,7 +57,7 @@ mod tests {
                 (high + 0.01, false),
             ] {
                 assert_eq!(
-                    outcome(zone, &resting(x, 0.0)).success,
+                    outcome(zone, 0.25, &resting(x, 0.0)).success,
                     scores,
                     "{zone:?} {x}"
                 );
@@ -69,12 +66,19 @@ mod tests {
     }
 
     #[test]
+    fn a_shorter_zone_has_the_same_middle() {
+        for (x, scores) in [(0.8, true), (0.83, true), (0.87, false)] {
+            assert_eq!(outcome(Zone::Near, 0.1, &resting(x, 0.0)).success, scores, "{x}");
+        }
+    }
+
+    #[test]
     fn beside_the_board_in_motion_or_lost_it_does_not_score() {
-        let good = outcome(Zone::Near, &resting(0.8, 0.0));
+        let good = outcome(Zone::Near, 0.25, &resting(0.8, 0.0));
         assert!(good.success && good.value < 1e-12);
         let moving = [0.79, 0.0, 0.0127, 0.8, 0.0, 0.0127];
         for readings in [resting(0.8, 0.12), moving, [f64::NAN; 6]] {
-            let bad = outcome(Zone::Near, &readings);
+            let bad = outcome(Zone::Near, 0.25, &readings);
             assert!(!bad.success && bad.cost > good.cost);
         }
     }

@@ -11,16 +11,19 @@
 mod metric;
 mod striking;
 
+use std::collections::BTreeMap;
+
 use asid_core::parameter::{Parameter, Scale};
 use asid_core::rng::Rng;
-use asid_core::signal::{Signal, yaw};
+use asid_core::signal::yaw;
 use asid_core::task::{
     Commander, Condition, Coordinate, DownstreamProtocol, ExplorationProtocol, Outcome, Outline,
     Task, TopView,
 };
-use asid_core::{Capabilities, Layout, Result, Scene};
+use asid_core::{Capabilities, Difficulty, Layout, Levels, Result, Scene};
 use rand::Rng as _;
 
+use crate::difficulty;
 use crate::panda;
 use crate::steering::{self, Steering};
 
@@ -36,8 +39,14 @@ const LANE: [f64; 2] = [0.67, 0.0];
 /// Half sizes of the board along and across, m.
 const LANE_HALF: [f64; 2] = [0.505, 0.115];
 
-/// Largest rise of the friction in one shot.
+/// Largest rise of the friction in one shot, unless the difficulty says otherwise.
 const WEAR: f64 = 0.06;
+
+/// Length of each zone along the board unless the difficulty says otherwise, m.
+const ZONE_LENGTH: f64 = 0.25;
+
+/// Speed of the hand unless the difficulty says otherwise, m/s.
+const HAND_SPEED: f64 = 0.4;
 
 /// The zone that the puck is to come to rest in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -73,7 +82,7 @@ impl Zone {
 
 /// The closed gripper moves over the near end of the board.
 const STEERING: Steering = Steering {
-    max_step: 0.04, // 0.4 m/s
+    speed: HAND_SPEED,
     x: [0.28, 0.50],
     y: [-0.115, 0.115],
     reach: f64::INFINITY,
@@ -83,6 +92,11 @@ const STEERING: Steering = Steering {
 /// The task.
 pub struct Shuffleboard {
     zone: Zone,
+    levels: Levels,
+    zone_length: f64,
+    wear: f64,
+    hand_speed: f64,
+    tracker_rate: f64,
     scene: Scene,
     home: Vec<f64>,
     exploration: ExplorationProtocol,
@@ -101,23 +115,25 @@ impl Shuffleboard {
     /// # Errors
     /// When the scene that is built in cannot be read.
     pub fn new(zone: Zone) -> Result<Self> {
-        let (scene, home) = panda::scene("shuffleboard", include_str!("scene.xml"))?;
+        Self::at(zone, Levels::new(difficulties()))
+    }
+
+    /// The task at some difficulty.
+    fn at(zone: Zone, levels: Levels) -> Result<Self> {
+        let (mut scene, home) = panda::scene("shuffleboard", include_str!("scene.xml"))?;
+        let zone_length = levels.get("zone_length")?;
+        let size = format!("{:?} {:?} 0.001", 0.5 * zone_length, LANE_HALF[1]);
+        for zone in Zone::ALL {
+            let paint = format!("{}_zone", zone.name());
+            scene = scene.with_attribute("geom", &paint, "size", &size)?;
+        }
         let exploration = ExplorationProtocol {
             horizon: 20,
             frames_per_step: steering::FRAMES,
             frame_period: steering::FRAME_PERIOD,
             action: steering::action(),
             start: start(0.01),
-            signals: vec![
-                Signal {
-                    sensor: "puck_pos".into(),
-                    noise: 0.002,
-                },
-                Signal {
-                    sensor: "puck_quat".into(),
-                    noise: 0.01,
-                },
-            ],
+            signals: difficulty::signals(&levels, &["puck_pos", "puck_quat"])?,
             proprioception: panda::proprioception(),
             contact: ["finger_left", "finger_right"]
                 .map(|f| [f.into(), "puck".into()])
@@ -128,10 +144,10 @@ impl Shuffleboard {
             unit: "m".into(),
             rule: format!(
                 "at rest on the board within {} m of the {} zone's middle",
-                metric::ZONE_HALF,
+                0.5 * zone_length,
                 zone.name()
             ),
-            threshold: Some(metric::ZONE_HALF),
+            threshold: Some(0.5 * zone_length),
             frames: striking::frames(),
             frame_period: striking::FRAME_PERIOD,
             action: vec![Coordinate::new("strength", "", striking::STRENGTH)],
@@ -141,12 +157,31 @@ impl Shuffleboard {
         };
         Ok(Self {
             zone,
+            zone_length,
+            wear: levels.get("wear")?,
+            hand_speed: levels.get("hand_speed")?,
+            tracker_rate: difficulty::rate(&levels)?,
+            levels,
             scene,
             home,
             exploration,
             downstream,
         })
     }
+}
+
+/// What makes the task easier or harder.
+fn difficulties() -> Vec<Difficulty> {
+    let zone = "length of each zone along the board";
+    let wear = "largest rise of the friction in one shot, as a share";
+    let mut all = vec![
+        Difficulty::new("zone_length", "m", ZONE_LENGTH, [0.02, 0.25], zone).published(0.25),
+        Difficulty::new("wear", "", WEAR, [0.0, 0.3], wear),
+        difficulty::hand_speed(HAND_SPEED),
+    ];
+    all.extend(difficulty::tracker());
+    all.push(difficulty::angle_noise());
+    all
 }
 
 /// The puck lies at x = 0.4 m in the middle of the board, give or take `slack`.
@@ -205,6 +240,19 @@ impl Task for Shuffleboard {
         .collect()
     }
 
+    fn difficulty(&self) -> Vec<Difficulty> {
+        self.levels.all().to_vec()
+    }
+
+    fn adjusted(&self, values: &BTreeMap<String, f64>) -> Result<Option<Box<dyn Task>>> {
+        let levels = Levels::new(difficulties()).with(values)?;
+        Ok(Some(Box::new(Self::at(self.zone, levels)?)))
+    }
+
+    fn tracker_rate(&self) -> Option<f64> {
+        Some(self.tracker_rate)
+    }
+
     /// Each sets its zone as the goal; the truth is drawn from the prior.
     fn conditions(&self) -> Vec<Condition> {
         Zone::ALL
@@ -214,12 +262,12 @@ impl Task for Shuffleboard {
 
     fn under(&self, condition: &str) -> Result<Option<Box<dyn Task>>> {
         let zone = Zone::ALL.into_iter().find(|z| z.name() == condition);
-        zone.map(|z| Ok(Box::new(Self::new(z)?) as Box<dyn Task>))
+        zone.map(|z| Ok(Box::new(Self::at(z, self.levels.clone())?) as Box<dyn Task>))
             .transpose()
     }
 
     fn wear(&self, parameters: &[Parameter], truth: &mut [f64], rng: &mut Rng) {
-        let factor = 1.0 + WEAR * rng.random::<f64>();
+        let factor = 1.0 + self.wear * rng.random::<f64>();
         for (p, x) in parameters.iter().zip(truth) {
             if p.name.ends_with("_friction") {
                 *x *= factor;
@@ -264,7 +312,11 @@ impl Task for Shuffleboard {
     }
 
     fn commander(&self) -> Result<Box<dyn Commander>> {
-        STEERING.commander(&self.scene, &self.home)
+        let steering = Steering {
+            speed: self.hand_speed,
+            ..STEERING
+        };
+        steering.commander(&self.scene, &self.home)
     }
 
     fn attempt(&self, start: &[f64], action: &[f64]) -> Result<Vec<f64>> {
@@ -279,10 +331,10 @@ impl Task for Shuffleboard {
     }
 
     fn outcome(&self, readings: &[f64]) -> Outcome {
-        metric::outcome(self.zone, readings)
+        metric::outcome(self.zone, self.zone_length, readings)
     }
 
-    /// A puck that the hand throws at 0.4 m/s, at the least friction.
+    /// A puck that the hand throws, at the least friction.
     fn bounds(&self) -> [[f64; 3]; 2] {
         [[-0.3, -0.9, -0.02], [1.3, 0.9, 0.3]]
     }
@@ -294,7 +346,7 @@ impl Task for Shuffleboard {
         });
         let zone = |z: Zone| Outline {
             label: format!("{} zone", z.name()),
-            corners: crate::rectangle([z.middle(), 0.0], [metric::ZONE_HALF, LANE_HALF[1]]),
+            corners: crate::rectangle([z.middle(), 0.0], [0.5 * self.zone_length, LANE_HALF[1]]),
         };
         TopView {
             object: Outline {

@@ -7,9 +7,6 @@ use super::strike::FRAME_PERIOD;
 /// Entries of a row of readings: the ball's position.
 pub const WIDTH: usize = 3;
 
-/// Largest distance of a success: the goal's radius, m.
-pub const GOAL_RADIUS: f64 = 0.05;
-
 /// A ball that moved by less in the last [`REST_FRAMES`] is at rest, m (10 mm/s).
 const REST_WAY: f64 = 0.001;
 
@@ -27,11 +24,20 @@ pub fn distance(row: &[f64], goal: [f64; 2]) -> f64 {
 /// Cost of the speed of a ball that goes past the line behind the goal, s.
 const OVERSHOOT: f64 = 1.0;
 
+/// Where the ball is to come to rest.
+#[derive(Clone, Copy, Debug)]
+pub struct Goal {
+    /// Its middle, m.
+    pub at: [f64; 2],
+    /// Largest distance of a success, m.
+    pub radius: f64,
+}
+
 /// What came of an attempt: the distance in the last row, if the ball rests there.
 ///
 /// `line` is a y behind the goal. Every ball that is too fast ends before the same wall, so the cost counts
 /// how fast it goes past that line: a search is led back to the goal.
-pub fn outcome(readings: &[f64], goal: [f64; 2], line: Option<f64>) -> Outcome {
+pub fn outcome(readings: &[f64], goal: Goal, line: Option<f64>) -> Outcome {
     let rows = readings.len() / WIDTH;
     let row = |k: usize| &readings[k * WIDTH..][..WIDTH];
     let last = row(rows - 1);
@@ -44,10 +50,10 @@ pub fn outcome(readings: &[f64], goal: [f64; 2], line: Option<f64>) -> Outcome {
     }
     let before = row(rows.saturating_sub(1 + REST_FRAMES));
     let rests = distance(last, [before[0], before[1]]) < REST_WAY;
-    let value = distance(last, goal);
+    let value = distance(last, goal.at);
     Outcome {
         value,
-        success: rests && value <= GOAL_RADIUS,
+        success: rests && value <= goal.radius,
         cost: value + OVERSHOOT * line.map_or(0.0, |y| speed_at(readings, y)),
     }
 }
@@ -67,9 +73,13 @@ fn speed_at(readings: &[f64], y: f64) -> f64 {
 mod tests {
     use super::*;
 
+    fn to(at: [f64; 2]) -> Goal {
+        Goal { at, radius: 0.05 }
+    }
+
     #[test]
     fn a_ball_at_rest_in_the_goal_is_a_success_and_one_that_passes_is_none() {
-        let goal = [0.1, -0.2];
+        let goal = to([0.1, -0.2]);
         let still: Vec<f64> = [0.13, -0.24, 0.03].repeat(40);
         let there = outcome(&still, goal, None);
         assert!(there.success && (there.value - 0.05).abs() < 1e-12);
@@ -89,13 +99,13 @@ mod tests {
             let y = |k: usize| (-way * k as f64).max(-0.5);
             (0..200).flat_map(|k| [0.0, y(k), 0.03]).collect()
         };
-        let tried = |way: f64| outcome(&to_the_wall(way), [0.0, -0.38], Some(-0.46));
+        let tried = |way: f64| outcome(&to_the_wall(way), to([0.0, -0.38]), Some(-0.46));
         let (slow, fast) = (tried(0.004), tried(0.008));
         assert_eq!(slow.value, fast.value);
         assert!((slow.cost - slow.value - 0.4).abs() < 1e-9);
         assert!((fast.cost - fast.value - 0.8).abs() < 1e-9);
         let short: Vec<f64> = [0.0, -0.40, 0.03].repeat(40);
-        let rests = outcome(&short, [0.0, -0.38], Some(-0.46));
+        let rests = outcome(&short, to([0.0, -0.38]), Some(-0.46));
         assert_eq!(rests.cost, rests.value);
     }
 }

@@ -9,15 +9,17 @@ mod friction;
 mod metric;
 mod strike;
 
+use std::collections::BTreeMap;
+
 use asid_core::parameter::Parameter;
 use asid_core::registry::Settings;
-use asid_core::signal::Signal;
 use asid_core::task::{
     Commander, Condition, Coordinate, DownstreamProtocol, ExplorationProtocol, Outcome, Outline,
-    Task, TopView,
+    Task, TopView, TrackedObject,
 };
-use asid_core::{Capabilities, Layout, Result, Scene, Target};
+use asid_core::{Capabilities, Difficulty, Layout, Levels, Result, Scene, Target};
 
+use crate::difficulty;
 use crate::panda;
 use crate::steering::{self, Steering};
 
@@ -31,20 +33,27 @@ const FINGERS: f64 = 0.012;
 
 /// The paddle moves at the height of the ball's middle; a ball fits between it and each wall.
 pub const STEERING: Steering = Steering {
-    max_step: 0.04, // 0.4 m/s
+    speed: HAND_SPEED,
     x: [0.30, 0.70],
     y: [-0.46, 0.26],
     reach: 0.74,
     fingers: FINGERS,
 };
 
-/// Noise of the tracker of the ball, m.
-const NOISE: f64 = 0.002;
+/// Speed of the hand unless the difficulty says otherwise, m/s.
+const HAND_SPEED: f64 = 0.4;
+
+/// Radius of the goal unless the difficulty says otherwise, m.
+const GOAL_RADIUS: f64 = 0.05;
+
+/// Time constant of the contact of ball and paddle unless the difficulty says otherwise, s.
+const CONTACT_TIME: f64 = 0.03;
 
 /// A place in the plane: ranges of x and y, m.
 pub type Area = [[f64; 2]; 2];
 
 /// What is a task's own.
+#[derive(Clone)]
 pub struct Spec {
     /// Name on the command line.
     pub name: &'static str,
@@ -76,6 +85,10 @@ pub struct Spec {
     pub seconds: f64,
     /// Things that stand still, for pictures.
     pub fixtures: Vec<Outline>,
+    /// Parts of the floor whose visits are counted.
+    pub regions: Vec<Outline>,
+    /// Further balls that are tracked, by the names of their bodies.
+    pub distractors: &'static [&'static str],
     /// Numbers of algorithms that suit the task better than their defaults.
     pub settings: &'static [Setting],
 }
@@ -104,6 +117,10 @@ pub enum Number {
 /// A task of the family.
 pub struct Sphere {
     spec: Spec,
+    levels: Levels,
+    goal: metric::Goal,
+    steering: Steering,
+    tracker_rate: f64,
     scene: Scene,
     home: Vec<f64>,
     exploration: ExplorationProtocol,
@@ -116,27 +133,34 @@ impl Sphere {
     /// # Errors
     /// When the scene cannot be read or lacks the arm or a keyframe.
     pub fn new(spec: Spec) -> Result<Self> {
+        Self::at(spec, Levels::new(difficulties()))
+    }
+
+    /// The task at some difficulty.
+    fn at(spec: Spec, levels: Levels) -> Result<Self> {
         let (scene, home) = panda::scene(spec.name, spec.xml)?;
+        let radius = levels.get("goal_radius")?;
+        let contact = format!("{:?} 1", levels.get("contact_time")?);
+        let scene = scene
+            .with_attribute("geom", "goal", "size", &format!("{radius:?} 0.0005"))?
+            .with_attribute("geom", "ball", "solref", &contact)?;
+        let sensors: Vec<String> = balls(&spec).map(position_of).collect();
+        let sensors: Vec<&str> = sensors.iter().map(String::as_str).collect();
         let exploration = ExplorationProtocol {
             horizon: spec.horizon,
             frames_per_step: steering::FRAMES,
             frame_period: steering::FRAME_PERIOD,
             action: steering::action(),
             start: place_in(spec.explored_from),
-            signals: vec![Signal {
-                sensor: "ball_pos".into(),
-                noise: NOISE,
-            }],
+            signals: difficulty::signals(&levels, &sensors)?,
             proprioception: panda::proprioception(),
-            contact: ["finger_left", "finger_right"]
-                .map(|f| [f.into(), "ball".into()])
-                .into(),
+            contact: paddle_on("ball"),
         };
         let downstream = DownstreamProtocol {
             metric: "goal_distance_m".into(),
             unit: "m".into(),
-            rule: "the ball at rest within 0.05 m of the goal's middle".into(),
-            threshold: Some(metric::GOAL_RADIUS),
+            rule: format!("the ball at rest within {radius} m of the goal's middle"),
+            threshold: Some(radius),
             frames: (spec.seconds / strike::FRAME_PERIOD).round() as usize,
             frame_period: strike::FRAME_PERIOD,
             action: vec![
@@ -148,6 +172,16 @@ impl Sphere {
             phases: strike::phases(spec.seconds),
         };
         Ok(Self {
+            goal: metric::Goal {
+                at: spec.goal,
+                radius,
+            },
+            steering: Steering {
+                speed: levels.get("hand_speed")?,
+                ..spec.steering
+            },
+            tracker_rate: difficulty::rate(&levels)?,
+            levels,
             spec,
             scene,
             home,
@@ -155,6 +189,36 @@ impl Sphere {
             downstream,
         })
     }
+}
+
+/// What makes the task easier or harder.
+fn difficulties() -> Vec<Difficulty> {
+    let goal = "radius of the goal";
+    let contact = "time constant of the contact of ball and paddle; a smaller one is stiffer";
+    let mut all = vec![
+        Difficulty::new("goal_radius", "m", GOAL_RADIUS, [0.005, 0.1], goal).published(0.05),
+        difficulty::hand_speed(HAND_SPEED),
+        Difficulty::new("contact_time", "s", CONTACT_TIME, [0.01, 0.06], contact),
+    ];
+    all.extend(difficulty::tracker());
+    all
+}
+
+/// Bodies of all balls, the one that is struck first.
+fn balls(spec: &Spec) -> impl Iterator<Item = &'static str> {
+    std::iter::once("ball").chain(spec.distractors.iter().copied())
+}
+
+/// Sensor of a ball's position.
+fn position_of(ball: &str) -> String {
+    format!("{ball}_pos")
+}
+
+/// Pairs of bodies that touch where the paddle touches a ball.
+fn paddle_on(ball: &str) -> Vec<[String; 2]> {
+    ["finger_left", "finger_right"]
+        .map(|finger| [finger.into(), ball.into()])
+        .into()
 }
 
 /// Coordinates of a place in an area.
@@ -204,6 +268,19 @@ impl Task for Sphere {
             .collect()
     }
 
+    fn difficulty(&self) -> Vec<Difficulty> {
+        self.levels.all().to_vec()
+    }
+
+    fn adjusted(&self, values: &BTreeMap<String, f64>) -> Result<Option<Box<dyn Task>>> {
+        let levels = Levels::new(difficulties()).with(values)?;
+        Ok(Some(Box::new(Self::at(self.spec.clone(), levels)?)))
+    }
+
+    fn tracker_rate(&self) -> Option<f64> {
+        Some(self.tracker_rate)
+    }
+
     fn conditions(&self) -> Vec<Condition> {
         self.spec.conditions.clone()
     }
@@ -227,7 +304,7 @@ impl Task for Sphere {
     }
 
     fn commander(&self) -> Result<Box<dyn Commander>> {
-        self.spec.steering.commander(&self.scene, &self.home)
+        self.steering.commander(&self.scene, &self.home)
     }
 
     fn attempt(&self, start: &[f64], action: &[f64]) -> Result<Vec<f64>> {
@@ -251,14 +328,33 @@ impl Task for Sphere {
     }
 
     fn outcome(&self, readings: &[f64]) -> Outcome {
-        metric::outcome(readings, self.spec.goal, self.spec.line)
+        metric::outcome(readings, self.goal, self.spec.line)
+    }
+
+    fn objects(&self) -> Vec<TrackedObject> {
+        balls(&self.spec)
+            .map(|ball| TrackedObject {
+                outline: Outline {
+                    label: ball.replace('_', " "),
+                    corners: circle([0.0, 0.0], BALL_RADIUS),
+                },
+                position: position_of(ball),
+                orientation: None,
+                contact: paddle_on(ball),
+                mass: format!("geom/{ball}/mass").parse().ok(),
+            })
+            .collect()
+    }
+
+    fn regions(&self) -> Vec<Outline> {
+        self.spec.regions.clone()
     }
 
     fn top_view(&self) -> TopView {
         let mut fixtures = self.spec.fixtures.clone();
         fixtures.push(Outline {
             label: "goal".into(),
-            corners: circle(self.spec.goal, metric::GOAL_RADIUS),
+            corners: circle(self.goal.at, self.goal.radius),
         });
         TopView {
             object: Outline {

@@ -35,6 +35,8 @@ fn spec() -> Spec {
         speed: [0.3, 1.4],
         seconds: 4.5,
         fixtures: walls(),
+        regions: Vec::new(),
+        distractors: &["distractor_1", "distractor_2", "distractor_3"],
         settings: &[],
     }
 }

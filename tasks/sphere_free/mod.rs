@@ -32,6 +32,8 @@ fn spec() -> Spec {
         speed: [0.3, 1.4],
         seconds: 4.5,
         fixtures: Vec::new(),
+        regions: Vec::new(),
+        distractors: &[],
         settings: &[],
     }
 }

@@ -4,7 +4,7 @@
 //! Source: ASID (Memmel et al., ICLR 2024), section 5.1 and its appendix.
 
 use asid_core::parameter::{Parameter, Scale};
-use asid_core::task::Condition;
+use asid_core::task::{Condition, Outline};
 
 use crate::sphere::Number::{self, Real, Whole};
 use crate::sphere::{Area, STEERING, Setting, Spec, Sphere, rectangle, target, walls};
@@ -69,8 +69,13 @@ fn unknown(patch: usize) -> String {
 }
 
 fn spec() -> Spec {
+    let regions: Vec<Outline> = PATCHES
+        .iter()
+        .enumerate()
+        .map(|(i, area)| rectangle(&format!("patch {}", i + 1), *area))
+        .collect();
     let mut fixtures = walls();
-    fixtures.extend(PATCHES.map(|area| rectangle("patch", area)));
+    fixtures.extend(regions.iter().cloned());
     Spec {
         name: NAME,
         about: ABOUT,
@@ -104,6 +109,8 @@ fn spec() -> Spec {
         speed: [0.15, 0.7],
         seconds: 7.0,
         fixtures,
+        regions,
+        distractors: &[],
         settings: &SETTINGS,
     }
 }

@@ -56,6 +56,8 @@ fn spec() -> Spec {
         speed: [0.3, 1.4],
         seconds: 4.5,
         fixtures: walls(),
+        regions: Vec::new(),
+        distractors: &[],
         settings: &[],
     }
 }

@@ -70,6 +70,8 @@ probes!(
     crate::task::DownstreamProtocol,
     crate::task::Outcome,
     crate::task::TopView,
+    crate::task::TrackedObject,
+    crate::Difficulty,
     crate::explore::Explored<'static>,
     crate::identify::Identified,
     crate::solve::Solved<'static>,

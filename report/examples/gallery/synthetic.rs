@@ -203,6 +203,7 @@ fn episode() -> Episode {
         objects: vec![ObjectTrack {
             name: "rod".into(),
             outline: vec![[-a, -b], [a, -b], [a, b], [-a, b]],
+            round: false,
             time: steps().collect(),
             poses: steps().map(|t| pose(t, TRUTH)).collect(),
         }],

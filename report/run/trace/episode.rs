@@ -29,6 +29,8 @@ pub struct ObjectTrack {
     /// Its outline in its own frame, a polygon in m.
     #[serde(deserialize_with = "nullable::rows")]
     pub outline: Vec<[f64; 2]>,
+    /// Whether it has no heading that could be told, as a ball.
+    pub round: bool,
     /// Times of the poses in s.
     #[serde(deserialize_with = "nullable::list")]
     pub time: Vec<f64>,

@@ -1,5 +1,6 @@
 //! The settings of a diagnosis, and the study they lead to.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
@@ -11,7 +12,7 @@ use asid_diagnosis::search::Breadth;
 use asid_diagnosis::study::Study;
 use serde::{Deserialize, Serialize};
 
-use super::super::config;
+use super::super::config::{self, difficulty};
 use super::super::model::{self, Needs};
 use super::super::session::backend;
 use super::Arguments;
@@ -34,6 +35,13 @@ pub struct Config {
     pub backend: String,
     #[serde(default)]
     pub seed: u64,
+    /// How hard the task is, by name.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    difficulty: BTreeMap<String, f64>,
+    /// A preset of it.
+    #[serde(default, skip_serializing)]
+    #[expect(dead_code, reason = "read with the difficulty")]
+    preset: Option<String>,
     /// Runs of a task whose logs are diagnosed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub runs: Option<usize>,
@@ -78,7 +86,7 @@ impl RunLogs {
 }
 
 /// Keys that are a diagnosis' own; where a task is run, the others are that run's.
-const OWN: [&str; 14] = [
+const OWN: [&str; 16] = [
     "study",
     "task",
     "model",
@@ -93,6 +101,8 @@ const OWN: [&str; 14] = [
     "without",
     "plugins",
     "search",
+    "difficulty",
+    "preset",
 ];
 
 /// How widely to search.
@@ -165,6 +175,14 @@ impl Config {
             config.backend.clone_from(name);
         }
         config.seed = common.seed.unwrap_or(config.seed);
+        config.difficulty = match &config.task {
+            Some(name) => difficulty::levels(&*(find::<TaskEntry>(name)?.make)()?, common)?,
+            None => BTreeMap::new(),
+        };
+        if !config.difficulty.is_empty() {
+            let levels = toml::Table::try_from(&config.difficulty)?;
+            of_run.insert("difficulty".into(), levels.into());
+        }
         config.runs = arguments.runs.or(config.runs);
         config.experiments = arguments.experiments.or(config.experiments);
         config.seeds = arguments.seeds.or(config.seeds);
@@ -228,7 +246,7 @@ impl Config {
         match (&self.study, &self.task) {
             (Some(path), _) => Ok(Study::read(path)?),
             (None, Some(name)) => {
-                let task = (find::<TaskEntry>(name)?.make)()?;
+                let task = difficulty::at((find::<TaskEntry>(name)?.make)()?, &self.difficulty)?;
                 let model = match &self.model {
                     None => model::of_task(&*task),
                     Some(path) => {

@@ -4,7 +4,7 @@ use anyhow::Result;
 use asid_core::pipeline::RunOutcome;
 use asid_core::replay::Replay as Replayed;
 use asid_core::signal::yaw;
-use asid_core::task::Outline;
+use asid_core::task::{Outline, TrackedObject};
 use asid_report::run as r;
 
 use super::super::session::Session;
@@ -18,21 +18,37 @@ pub fn shape(outline: &Outline, kind: r::ShapeKind) -> r::Shape {
     }
 }
 
-/// The real episode from above; none where no pose of an object is tracked.
+/// The path of an object; none where its position is not tracked in the plane. One whose
+/// orientation is not tracked keeps its heading.
+fn track(object: &TrackedObject, log: &asid_core::Episode) -> Option<r::ObjectTrack> {
+    let position = log.channel(&object.position).filter(|p| p.len() >= 2)?;
+    let orientation = object.orientation.as_ref().and_then(|o| log.channel(o));
+    let orientation = orientation.filter(|q| q.len() == 4);
+    // Between two readings of a slow tracker there is nothing to draw.
+    let rows = (0..log.rows()).filter(|&i| log.reading(i)[position.start].is_finite());
+    let rows: Vec<usize> = rows.collect();
+    let pose = |row: &[f64]| {
+        let heading = orientation.clone().map_or(0.0, |q| yaw(&row[q]));
+        [row[position.start], row[position.start + 1], heading]
+    };
+    Some(r::ObjectTrack {
+        name: object.outline.label.clone(),
+        outline: object.outline.corners.clone(),
+        round: orientation.is_none(),
+        time: rows.iter().map(|&i| log.time[i]).collect(),
+        poses: rows.iter().map(|&i| pose(log.reading(i))).collect(),
+    })
+}
+
+/// The real episode from above; none where no position of an object is tracked.
 pub fn episode(session: &Session, log: &asid_core::Episode) -> Option<r::Episode> {
     let view = session.task.top_view();
     let protocol = session.task.exploration();
-    let position = session.signals.first().and_then(|s| log.channel(&s.sensor));
-    let position = position.filter(|p| p.len() >= 2)?;
-    let orientation = session
-        .signals
-        .iter()
-        .filter_map(|s| log.channel(&s.sensor))
-        .find(|c| c.len() == 4)?;
-    let pose = |row: &[f64]| {
-        let [x, y] = [row[position.start], row[position.start + 1]];
-        [x, y, yaw(&row[orientation.clone()])]
-    };
+    let objects = session.task.objects();
+    let objects: Vec<r::ObjectTrack> = objects.iter().filter_map(|o| track(o, log)).collect();
+    if objects.is_empty() {
+        return None;
+    }
     let effector = protocol
         .proprioception
         .first()
@@ -40,12 +56,7 @@ pub fn episode(session: &Session, log: &asid_core::Episode) -> Option<r::Episode
         .filter(|range| range.len() >= 2);
     let every = protocol.frames_per_step.max(1);
     Some(r::Episode {
-        objects: vec![r::ObjectTrack {
-            name: view.object.label.clone(),
-            outline: view.object.corners.clone(),
-            time: log.time.clone(),
-            poses: (0..log.rows()).map(|i| pose(log.reading(i))).collect(),
-        }],
+        objects,
         end_effector: effector.map(|range| r::PlanarPath {
             time: log.time.iter().step_by(every).copied().collect(),
             position: (0..log.rows())

@@ -1,9 +1,11 @@
 //! Tasks and what they make.
 
+use std::collections::BTreeMap;
 use std::ops::Deref;
 
 use super::Across;
 use crate::backend::Capabilities;
+use crate::difficulty::{Difficulty, Levels};
 use crate::error::Result;
 use crate::layout::Layout;
 use crate::parameter::Parameter;
@@ -12,7 +14,7 @@ use crate::rng::Rng;
 use crate::scene::Scene;
 use crate::task::{
     Commander, Condition, DownstreamProtocol, ExplorationProtocol, Outcome, Outline, Task, TopView,
-    TrackedPart,
+    TrackedObject, TrackedPart,
 };
 
 impl<T> Task for Across<T>
@@ -52,13 +54,24 @@ where
         self.run(|task| task.conditions())
     }
 
+    fn difficulty(&self) -> Vec<Difficulty> {
+        self.run(|task| task.difficulty())
+    }
+
+    fn adjusted(&self, values: &BTreeMap<String, f64>) -> Result<Option<Box<dyn Task>>> {
+        // A plugin need not check what it is given.
+        Levels::new(self.difficulty()).with(values)?;
+        let task = self.try_run(|task| task.adjusted(values))?;
+        Ok(task.map(|inner| self.another(inner)))
+    }
+
+    fn tracker_rate(&self) -> Option<f64> {
+        self.run(|task| task.tracker_rate())
+    }
+
     fn under(&self, condition: &str) -> Result<Option<Box<dyn Task>>> {
         let task = self.try_run(|task| task.under(condition))?;
-        Ok(task.map(|inner| {
-            let mut across = Across::new(inner, self.border);
-            across.name = self.name;
-            Box::new(across) as Box<dyn Task>
-        }))
+        Ok(task.map(|inner| self.another(inner)))
     }
 
     fn wear(&self, parameters: &[Parameter], truth: &mut [f64], rng: &mut Rng) {
@@ -135,8 +148,25 @@ where
         self.run(|task| task.top_view())
     }
 
+    fn objects(&self) -> Vec<TrackedObject> {
+        self.run(|task| task.objects())
+    }
+
+    fn regions(&self) -> Vec<Outline> {
+        self.run(|task| task.regions())
+    }
+
     fn side_view(&self, readings: &[f64]) -> Vec<Outline> {
         self.run(|task| task.side_view(readings))
+    }
+}
+
+impl<T> Across<T> {
+    /// Another task of the same side, under the same name.
+    fn another(&self, inner: Box<dyn Task>) -> Box<dyn Task> {
+        let mut across = Across::new(inner, self.border);
+        across.name = self.name;
+        Box::new(across)
     }
 }
 
