@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::sampling::SamplingSettings;
 use super::search::{self, Budget};
-use crate::optimise::{Cem, CemSettings};
+use crate::optimise::CemSettings;
 
 /// Settings of identification by CEM.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -61,13 +61,6 @@ impl CemIdentifier {
 
 impl Identifier for CemIdentifier {
     fn identify(&self, problem: &Problem<'_>, episodes: &[Episode]) -> Result<Identified> {
-        let settings = self.cem.clone();
-        search::identify(
-            problem,
-            episodes,
-            self.budget(),
-            &self.sampling,
-            |mean, std, low, high| Cem::new(settings.clone(), mean, std, low, high),
-        )
+        search::identify(problem, episodes, self.budget(), &self.sampling, &self.cem)
     }
 }

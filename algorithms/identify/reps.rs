@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::sampling::SamplingSettings;
 use super::search::{self, Budget};
-use crate::optimise::{Reps, RepsSettings};
+use crate::optimise::RepsSettings;
 
 /// Settings of identification by REPS.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -61,13 +61,6 @@ impl RepsIdentifier {
 
 impl Identifier for RepsIdentifier {
     fn identify(&self, problem: &Problem<'_>, episodes: &[Episode]) -> Result<Identified> {
-        let settings = self.reps.clone();
-        search::identify(
-            problem,
-            episodes,
-            self.budget(),
-            &self.sampling,
-            |mean, std, low, high| Reps::new(settings.clone(), mean, std, low, high),
-        )
+        search::identify(problem, episodes, self.budget(), &self.sampling, &self.reps)
     }
 }

@@ -1,6 +1,6 @@
 //! From a search to a posterior.
 //!
-//! A search (CEM, REPS) says where the likelihood is; how wide it is there is
+//! A search says where the likelihood is; how wide it is there is
 //! another question, and the spread of an elite does not answer it. So rounds of
 //! draws over a region around the search's end follow. Each round fits an
 //! [`Emulator`] to all points inside the region, and the emulator's posterior makes
@@ -113,7 +113,7 @@ impl Samples {
 
     /// Where the likelihood is: a fit to the `count` best points, weighted by rank, so that
     /// it is not carried by the luck of one.
-    fn elite(&self, count: usize, low: &[f64], high: &[f64]) -> Gaussian {
+    fn elite(&self, count: usize, low: &[f64], high: &[f64]) -> Result<Gaussian> {
         let mut order: Vec<usize> = (0..self.losses.len()).collect();
         order.sort_by(|&i, &j| self.losses[i].total_cmp(&self.losses[j]));
         order.truncate(count);
@@ -178,7 +178,7 @@ pub fn posterior(
     }
     let draws = settings.draws_for(n);
     let mut region = samples
-        .elite(2 * n + 4, &low, &high)
+        .elite(2 * n + 4, &low, &high)?
         .widened(settings.widen);
     let mut found: Option<(Emulator, Vec<Vec<f64>>)> = None;
     for _ in 0..settings.rounds.max(1) {
@@ -207,7 +207,7 @@ pub fn posterior(
         .ok_or_else(too_few)?;
         let drawn = emulator.sample(&low, &high, settings.samples.max(2), rng);
         iterations.push(summary(likelihood, &drawn, samples.best_loss()));
-        region = Gaussian::fit(&drawn, &vec![1.0; drawn.len()], &vec![1e-3; n], &low, &high)
+        region = Gaussian::fit(&drawn, &vec![1.0; drawn.len()], &vec![1e-3; n], &low, &high)?
             .widened(settings.widen);
         found = Some((emulator, drawn));
         problem.progress.advance(1);

@@ -2,43 +2,12 @@
 //! the losses, and turn all that was simulated into a posterior.
 
 use asid_core::identify::Identified;
-use asid_core::rng::Rng;
 use asid_core::{Episode, Error, Problem, Result};
 
 use super::Likelihood;
 use super::models;
 use super::sampling::{self, Samples, SamplingSettings};
-use crate::optimise::{Cem, Reps};
-
-/// A search over points by their losses.
-pub trait Search {
-    /// Draws `n` points.
-    fn ask(&self, n: usize, rng: &mut Rng) -> Vec<Vec<f64>>;
-    /// Learns what each cost; a loss is infinite where the simulation diverged.
-    fn tell(&mut self, points: &[Vec<f64>], losses: &[f64]);
-}
-
-impl Search for Cem {
-    fn ask(&self, n: usize, rng: &mut Rng) -> Vec<Vec<f64>> {
-        Self::ask(self, n, rng)
-    }
-
-    fn tell(&mut self, points: &[Vec<f64>], losses: &[f64]) {
-        Self::tell(self, points, losses);
-    }
-}
-
-impl Search for Reps {
-    fn ask(&self, n: usize, rng: &mut Rng) -> Vec<Vec<f64>> {
-        Self::ask(self, n, rng)
-    }
-
-    /// The reward is the log-likelihood.
-    fn tell(&mut self, points: &[Vec<f64>], losses: &[f64]) {
-        let rewards: Vec<f64> = losses.iter().map(|l| -l).collect();
-        Self::tell(self, points, &rewards);
-    }
-}
+use crate::optimise::{Search, UpdateRule};
 
 /// How long a search goes on.
 #[derive(Clone, Copy, Debug)]
@@ -71,20 +40,19 @@ impl Budget {
     }
 }
 
-/// Searches with what `start` makes of the first mean, deviations and bounds, then
-/// samples the posterior.
+/// Searches by a rule from the whole prior on, then samples the posterior.
 ///
 /// Binary unknowns make several models, which are searched one by one and compared; see
 /// [`super::models`].
 ///
 /// # Errors
 /// When the engine fails or nearly every simulation diverged.
-pub fn identify<S: Search>(
+pub fn identify<R: UpdateRule>(
     problem: &Problem<'_>,
     episodes: &[Episode],
     budget: Budget,
     settings: &SamplingSettings,
-    start: impl Fn(&[f64], &[f64], &[f64], &[f64]) -> S,
+    rule: &R,
 ) -> Result<Identified> {
     let size = budget.population.max(settings.draws);
     let mut likelihood = Likelihood::new(problem, episodes, size)?;
@@ -96,7 +64,7 @@ pub fn identify<S: Search>(
         likelihood.hold(&model);
         let (low, high) = likelihood.bounds();
         let n = likelihood.dimension();
-        let mut search = start(&vec![0.0; n], &vec![1.0; n], &low, &high);
+        let mut search = Search::new(rule.clone(), &vec![0.0; n], &vec![1.0; n], &low, &high);
         // The same draws for every model: where the data tell nothing, so does the comparison.
         let mut rng = problem.streams.stream("identify");
         let mut samples = Samples::default();

@@ -2,10 +2,10 @@
 //! the best of its own draws.
 
 use asid_core::Result;
-use asid_core::rng::Rng;
 use serde::{Deserialize, Serialize};
 
-use super::{Gaussian, require};
+use super::search::ranked;
+use super::{Gaussian, Search, UpdateRule, require};
 
 /// How the distribution follows its elite.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -28,6 +28,9 @@ impl Default for CemSettings {
         }
     }
 }
+
+/// A search by the cross-entropy method with independent entries.
+pub type Cem = Search<CemSettings>;
 
 impl CemSettings {
     /// Checks the settings; `key` is where they stand in a configuration.
@@ -62,141 +65,41 @@ impl CemSettings {
     }
 }
 
-/// A search by the cross-entropy method with independent entries.
-#[derive(Clone, Debug)]
-pub struct Cem {
-    settings: CemSettings,
-    mean: Vec<f64>,
-    std: Vec<f64>,
-    min_std: Vec<f64>,
-    low: Vec<f64>,
-    high: Vec<f64>,
-    best: Option<(Vec<f64>, f64)>,
-}
+impl UpdateRule for CemSettings {
+    /// Smallest deviations.
+    type Memory = Vec<f64>;
 
-impl Cem {
-    /// Starts from `mean` and `std`, inside the box `[low, high]`.
-    #[must_use]
-    pub fn new(
-        settings: CemSettings,
-        mean: &[f64],
-        std: &[f64],
-        low: &[f64],
-        high: &[f64],
-    ) -> Self {
-        Self {
-            min_std: std.iter().map(|s| s * settings.min_std_fraction).collect(),
-            settings,
-            mean: mean.to_vec(),
-            std: std.to_vec(),
-            low: low.to_vec(),
-            high: high.to_vec(),
-            best: None,
-        }
+    fn begin(&self, first: &Gaussian) -> Vec<f64> {
+        let std = first.std();
+        std.iter().map(|s| s * self.min_std_fraction).collect()
     }
 
-    /// The present distribution.
-    #[must_use]
-    pub fn distribution(&self) -> Gaussian {
-        Gaussian::diagonal(&self.mean, &self.std, &self.low, &self.high)
-    }
-
-    /// Draws `n` candidates.
-    pub fn ask(&self, n: usize, rng: &mut Rng) -> Vec<Vec<f64>> {
-        let distribution = self.distribution();
-        (0..n).map(|_| distribution.sample(rng)).collect()
-    }
-
-    /// Refits to the best candidates; costs that are not finite rank last.
-    pub fn tell(&mut self, candidates: &[Vec<f64>], costs: &[f64]) {
-        let mut order: Vec<usize> = (0..costs.len()).collect();
-        let rank = |c: f64| if c.is_nan() { f64::INFINITY } else { c };
-        order.sort_by(|&i, &j| rank(costs[i]).total_cmp(&rank(costs[j])));
-        let count = ((costs.len() as f64 * self.settings.elite_fraction).round() as usize)
+    fn update(
+        &self,
+        min_std: &mut Vec<f64>,
+        present: &Gaussian,
+        draws: &[Vec<f64>],
+        costs: &[f64],
+    ) -> Option<Gaussian> {
+        let order = ranked(costs);
+        let count = ((costs.len() as f64 * self.elite_fraction).round() as usize)
             .clamp(2.min(costs.len()), costs.len());
         let elite = &order[..count];
-        if let Some(&first) = elite.first()
-            && costs[first].is_finite()
-            && self.best.as_ref().is_none_or(|(_, c)| costs[first] < *c)
-        {
-            self.best = Some((candidates[first].clone(), costs[first]));
+        if elite.is_empty() {
+            return None;
         }
-        let keep = self.settings.smoothing;
-        for i in 0..self.mean.len() {
-            let mean = elite.iter().map(|&k| candidates[k][i]).sum::<f64>() / count as f64;
+        let keep = self.smoothing;
+        let (mut means, mut stds) = (present.mean().to_vec(), present.std());
+        for i in 0..means.len() {
+            let mean = elite.iter().map(|&k| draws[k][i]).sum::<f64>() / count as f64;
             let variance = elite
                 .iter()
-                .map(|&k| (candidates[k][i] - mean).powi(2))
+                .map(|&k| (draws[k][i] - mean).powi(2))
                 .sum::<f64>()
                 / count as f64;
-            self.mean[i] = keep * self.mean[i] + (1.0 - keep) * mean;
-            self.std[i] =
-                (keep * self.std[i] + (1.0 - keep) * variance.sqrt()).max(self.min_std[i]);
+            means[i] = keep * means[i] + (1.0 - keep) * mean;
+            stds[i] = (keep * stds[i] + (1.0 - keep) * variance.sqrt()).max(min_std[i]);
         }
-    }
-
-    /// Mean of the distribution.
-    #[must_use]
-    pub fn mean(&self) -> &[f64] {
-        &self.mean
-    }
-
-    /// Deviations of the distribution.
-    #[must_use]
-    pub fn std(&self) -> &[f64] {
-        &self.std
-    }
-
-    /// Best candidate so far and its cost.
-    #[must_use]
-    pub fn best(&self) -> Option<(&[f64], f64)> {
-        self.best.as_ref().map(|(x, c)| (&**x, *c))
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use asid_core::Streams;
-
-    #[test]
-    fn it_finds_the_bottom_of_a_bowl() {
-        let settings = CemSettings {
-            elite_fraction: 0.2,
-            ..CemSettings::default()
-        };
-        let mut cem = Cem::new(settings, &[0.0; 3], &[1.0; 3], &[-3.0; 3], &[3.0; 3]);
-        let mut rng = Streams::new(0).stream("cem");
-        let target = [0.7, -1.2, 2.0];
-        for _ in 0..30 {
-            let candidates = cem.ask(100, &mut rng);
-            let costs: Vec<f64> = candidates
-                .iter()
-                .map(|c| c.iter().zip(target).map(|(x, t)| (x - t).powi(2)).sum())
-                .collect();
-            cem.tell(&candidates, &costs);
-        }
-        for (x, t) in cem.mean().iter().zip(target) {
-            assert!((x - t).abs() < 0.01, "{x} {t}");
-        }
-    }
-
-    #[test]
-    fn candidates_without_a_cost_rank_last() {
-        let mut cem = Cem::new(
-            CemSettings {
-                smoothing: 0.0,
-                ..CemSettings::default()
-            },
-            &[0.0],
-            &[1.0],
-            &[-3.0],
-            &[3.0],
-        );
-        cem.tell(
-            &[vec![1.0], vec![2.0], vec![-2.0]],
-            &[f64::NAN, 0.5, f64::INFINITY],
-        );
-        assert_eq!(cem.best(), Some((&[2.0][..], 0.5)));
+        Some(present.with_diagonal(&means, &stds))
     }
 }

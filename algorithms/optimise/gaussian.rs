@@ -1,17 +1,25 @@
 //! A normal distribution with full covariance, cut to a box.
 
 use asid_core::rng::Rng;
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use asid_core::{Error, Result};
+use nalgebra::{Cholesky, DMatrix, DVector};
 use rand_distr::{Distribution, StandardNormal};
 
 /// Draws that fall outside the box are drawn again this often before they are clamped.
 const REDRAWS: usize = 100;
 
+/// First ridge on a covariance that is not positive definite, in mean variances, and how often it is
+/// raised tenfold: the last is a million times the mean variance, where any finite symmetric
+/// matrix is positive definite.
+const RIDGE: f64 = 1e-12;
+const RAISES: usize = 18;
+
 /// `N(mean, covariance)` cut to `[low, high]`.
 #[derive(Clone, Debug)]
 pub struct Gaussian {
     mean: DVector<f64>,
-    factor: Cholesky<f64, Dyn>,
+    /// Lower triangular, `L L^T` is the covariance.
+    factor: DMatrix<f64>,
     low: Vec<f64>,
     high: Vec<f64>,
 }
@@ -19,52 +27,66 @@ pub struct Gaussian {
 impl Gaussian {
     /// A normal distribution; the covariance is made positive definite by raising
     /// its diagonal where it is not.
-    #[must_use]
-    pub fn new(mean: DVector<f64>, covariance: DMatrix<f64>, low: &[f64], high: &[f64]) -> Self {
+    ///
+    /// # Errors
+    /// [`Error::Failed`] where an entry of mean or covariance is no finite number.
+    pub fn new(
+        mean: DVector<f64>,
+        covariance: DMatrix<f64>,
+        low: &[f64],
+        high: &[f64],
+    ) -> Result<Self> {
         let n = mean.len();
-        let scale = (covariance.trace() / n as f64).max(1e-300);
-        let mut ridge = 0.0;
-        let factor = loop {
-            let raised = &covariance + DMatrix::identity(n, n) * ridge;
-            if let Some(factor) = Cholesky::new(raised) {
-                break factor;
-            }
-            ridge = if ridge == 0.0 {
-                1e-12 * scale
-            } else {
-                ridge * 10.0
-            };
+        let fail = || {
+            Error::Failed(
+                "a search distribution has entries that are not finite numbers; its points or their weights \
+                 were not either"
+                    .into(),
+            )
         };
-        Self {
+        if mean.iter().chain(&covariance).any(|x| !x.is_finite()) {
+            return Err(fail());
+        }
+        let scale = (covariance.trace() / n as f64).max(1e-300);
+        let ridges = (0..=RAISES).map(|k| RIDGE * scale * 10_f64.powi(k as i32));
+        let factor = std::iter::once(0.0)
+            .chain(ridges)
+            .find_map(|ridge| Cholesky::new(&covariance + DMatrix::identity(n, n) * ridge))
+            .ok_or_else(fail)?
+            .unpack();
+        Ok(Self {
             mean,
             factor,
+            low: low.to_vec(),
+            high: high.to_vec(),
+        })
+    }
+
+    /// Independent entries with these deviations; one that is no positive number counts for the
+    /// smallest positive number.
+    #[must_use]
+    pub fn diagonal(mean: &[f64], std: &[f64], low: &[f64], high: &[f64]) -> Self {
+        let std = std.iter().map(|s| s.max(f64::MIN_POSITIVE));
+        Self {
+            mean: DVector::from_column_slice(mean),
+            factor: DMatrix::from_diagonal(&DVector::from_iterator(mean.len(), std)),
             low: low.to_vec(),
             high: high.to_vec(),
         }
     }
 
-    /// Independent entries with these deviations.
-    #[must_use]
-    pub fn diagonal(mean: &[f64], std: &[f64], low: &[f64], high: &[f64]) -> Self {
-        let variance = DVector::from_iterator(std.len(), std.iter().map(|s| s * s));
-        Self::new(
-            DVector::from_column_slice(mean),
-            DMatrix::from_diagonal(&variance),
-            low,
-            high,
-        )
-    }
-
     /// Weighted fit with the effective-size correction of the covariance,
     /// `Z = sum d - sum d^2 / sum d`, and the deviations kept above `min_std`.
-    #[must_use]
+    ///
+    /// # Errors
+    /// As [`Gaussian::new`], such as where no point weighs anything.
     pub fn fit(
         samples: &[Vec<f64>],
         weights: &[f64],
         min_std: &[f64],
         low: &[f64],
         high: &[f64],
-    ) -> Self {
+    ) -> Result<Self> {
         let n = low.len();
         let total: f64 = weights.iter().sum();
         let squares: f64 = weights.iter().map(|w| w * w).sum();
@@ -91,6 +113,24 @@ impl Gaussian {
         Self::new(mean, covariance, low, high)
     }
 
+    /// Independent entries with these deviations, in the same box.
+    #[must_use]
+    pub fn with_diagonal(&self, mean: &[f64], std: &[f64]) -> Self {
+        Self::diagonal(mean, std, &self.low, &self.high)
+    }
+
+    /// The box: smallest and largest value of each entry.
+    #[must_use]
+    pub fn bounds(&self) -> (&[f64], &[f64]) {
+        (&self.low, &self.high)
+    }
+
+    /// Covariance before it was cut to the box.
+    #[must_use]
+    pub fn covariance(&self) -> DMatrix<f64> {
+        &self.factor * self.factor.transpose()
+    }
+
     /// The mean before it was cut to the box.
     #[must_use]
     pub fn mean(&self) -> &[f64] {
@@ -100,14 +140,16 @@ impl Gaussian {
     /// The same distribution with its deviations multiplied.
     #[must_use]
     pub fn widened(&self, factor: f64) -> Self {
-        let l = self.factor.l() * factor;
-        Self::new(self.mean.clone(), &l * l.transpose(), &self.low, &self.high)
+        Self {
+            factor: &self.factor * factor,
+            ..self.clone()
+        }
     }
 
     /// Standard deviations before it was cut to the box.
     #[must_use]
     pub fn std(&self) -> Vec<f64> {
-        let l = self.factor.l();
+        let l = &self.factor;
         (0..self.mean.len()).map(|i| l.row(i).norm()).collect()
     }
 
@@ -115,8 +157,8 @@ impl Gaussian {
     #[must_use]
     pub fn standardise(&self, x: &[f64]) -> Vec<f64> {
         let d = DVector::from_column_slice(x) - &self.mean;
-        let l = self.factor.l();
-        l.solve_lower_triangular(&d)
+        self.factor
+            .solve_lower_triangular(&d)
             .unwrap_or(d)
             .as_slice()
             .to_vec()
@@ -125,18 +167,17 @@ impl Gaussian {
     /// The point at these standardised coordinates.
     #[must_use]
     pub fn unstandardise(&self, u: &[f64]) -> Vec<f64> {
-        let x = &self.mean + self.factor.l() * DVector::from_column_slice(u);
+        let x = &self.mean + &self.factor * DVector::from_column_slice(u);
         x.as_slice().to_vec()
     }
 
     /// A draw inside the box.
     pub fn sample(&self, rng: &mut Rng) -> Vec<f64> {
         let n = self.mean.len();
-        let l = self.factor.l();
         let mut x = DVector::zeros(n);
         for _ in 0..REDRAWS {
             let e = DVector::from_fn(n, |_, _| StandardNormal.sample(rng));
-            x = &self.mean + &l * e;
+            x = &self.mean + &self.factor * e;
             if (0..n).all(|i| x[i] >= self.low[i] && x[i] <= self.high[i]) {
                 return x.as_slice().to_vec();
             }
@@ -150,7 +191,7 @@ impl Gaussian {
     #[must_use]
     pub fn log_density(&self, x: &[f64]) -> f64 {
         let d = DVector::from_column_slice(x) - &self.mean;
-        let l = self.factor.l();
+        let l = &self.factor;
         let solved = l.solve_lower_triangular(&d).unwrap_or(d);
         let log_det: f64 = (0..x.len()).map(|i| l[(i, i)].ln()).sum();
         -0.5 * solved.norm_squared()
@@ -181,7 +222,8 @@ mod tests {
             covariance,
             &[-9.0; 2],
             &[9.0; 2],
-        );
+        )
+        .unwrap();
         let mut rng = Streams::new(3).stream("g");
         let samples: Vec<Vec<f64>> = (0..20_000).map(|_| g.sample(&mut rng)).collect();
         let fit = Gaussian::fit(
@@ -190,9 +232,35 @@ mod tests {
             &[0.0; 2],
             &[-9.0; 2],
             &[9.0; 2],
-        );
+        )
+        .unwrap();
         // Standard errors are about 1/sqrt(20000) = 0.007.
         assert!((fit.mean()[0] - 0.3).abs() < 0.03 && (fit.std()[0] - 1.0).abs() < 0.03);
+    }
+
+    #[test]
+    fn what_is_no_number_is_refused() {
+        let of = |mean: f64, variance: f64| {
+            let covariance = DMatrix::from_element(1, 1, variance);
+            Gaussian::new(DVector::from_vec(vec![mean]), covariance, &[0.0], &[1.0])
+        };
+        for (mean, variance) in [(0.0, f64::NAN), (f64::NAN, 1.0), (0.0, f64::INFINITY)] {
+            assert!(of(mean, variance).is_err(), "{mean} {variance}");
+        }
+        // Weights that are all zero have no mean.
+        let points = [vec![0.3], vec![0.4]];
+        assert!(Gaussian::fit(&points, &[0.0; 2], &[0.1], &[0.0], &[1.0]).is_err());
+    }
+
+    #[test]
+    fn a_covariance_that_is_not_positive_is_raised() {
+        // Entries that are alike, and one that is indefinite (eigenvalues 3 and -1).
+        for rows in [[1.0, 1.0, 1.0, 1.0], [1.0, 2.0, 2.0, 1.0]] {
+            let covariance = DMatrix::from_row_slice(2, 2, &rows);
+            let mean = DVector::from_vec(vec![0.0; 2]);
+            let g = Gaussian::new(mean, covariance, &[-9.0; 2], &[9.0; 2]).unwrap();
+            assert!(g.std().iter().all(|s| s.is_finite() && *s >= 1.0));
+        }
     }
 
     #[test]

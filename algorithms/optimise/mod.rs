@@ -1,15 +1,23 @@
-//! Optimisers of a sampled cost: they draw candidates and are told what each cost.
+//! Optimisers of a cost.
+//!
+//! [`Search`] is what `cem`, `reps` and `cma-es` have in common: a normal distribution inside a box, draws
+//! from it, and the best that was seen. How the distribution follows what its draws cost is the
+//! [`UpdateRule`], and all that tells one algorithm from another.
 //!
 //! They know nothing of simulators, so a whole population is one batch call of
 //! the caller's.
 
 pub mod cem;
+pub mod cma_es;
 pub mod gaussian;
 pub mod reps;
+pub mod search;
 
 pub use cem::{Cem, CemSettings};
+pub use cma_es::{CmaEs, CmaEsSettings};
 pub use gaussian::Gaussian;
 pub use reps::{Reps, RepsSettings};
+pub use search::{Search, UpdateRule};
 
 /// Refuses a setting that is out of its domain; `domain` says what it must be.
 ///

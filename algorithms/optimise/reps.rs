@@ -7,10 +7,9 @@
 //! likelihood itself.
 
 use asid_core::Result;
-use asid_core::rng::Rng;
 use serde::{Deserialize, Serialize};
 
-use super::{Gaussian, require};
+use super::{Gaussian, Search, UpdateRule, require};
 
 /// How far one refit may go.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -28,23 +27,6 @@ impl Default for RepsSettings {
             epsilon: 0.5,
             min_eta: 0.0,
         }
-    }
-}
-
-impl RepsSettings {
-    /// Checks the settings; `key` is where they stand in a configuration.
-    ///
-    /// # Errors
-    /// When one is out of its domain.
-    pub fn check(&self, key: &str) -> Result<()> {
-        let Self { epsilon, min_eta } = *self;
-        require(epsilon > 0.0, &format!("{key}.epsilon"), epsilon, "above 0")?;
-        require(
-            min_eta >= 0.0,
-            &format!("{key}.min_eta"),
-            min_eta,
-            "0 or above",
-        )
     }
 }
 
@@ -81,61 +63,56 @@ pub fn temperature(epsilon: f64, rewards: &[f64]) -> f64 {
     ((a + b) / 2.0).exp()
 }
 
-/// A search by relative entropy policy search with full covariance.
-#[derive(Clone, Debug)]
-pub struct Reps {
-    settings: RepsSettings,
-    distribution: Gaussian,
-    min_std: Vec<f64>,
-    low: Vec<f64>,
-    high: Vec<f64>,
+/// A search by relative entropy policy search with full covariance. A cost is a negative reward.
+pub type Reps = Search<RepsSettings>;
+
+/// Deviations never fall below this fraction of their first value: a thousandth of a prior's
+/// deviation is less than any posterior's of the tasks.
+const MIN_STD: f64 = 1e-3;
+
+impl RepsSettings {
+    /// Checks the settings; `key` is where they stand in a configuration.
+    ///
+    /// # Errors
+    /// When one is out of its domain.
+    pub fn check(&self, key: &str) -> Result<()> {
+        let Self { epsilon, min_eta } = *self;
+        require(epsilon > 0.0, &format!("{key}.epsilon"), epsilon, "above 0")?;
+        require(
+            min_eta >= 0.0,
+            &format!("{key}.min_eta"),
+            min_eta,
+            "0 or above",
+        )
+    }
 }
 
-impl Reps {
-    /// Starts from `mean` and `std`, inside the box `[low, high]`.
-    #[must_use]
-    pub fn new(
-        settings: RepsSettings,
-        mean: &[f64],
-        std: &[f64],
-        low: &[f64],
-        high: &[f64],
-    ) -> Self {
-        Self {
-            settings,
-            distribution: Gaussian::diagonal(mean, std, low, high),
-            min_std: std.iter().map(|s| s * 1e-3).collect(),
-            low: low.to_vec(),
-            high: high.to_vec(),
-        }
+impl UpdateRule for RepsSettings {
+    /// Smallest deviations.
+    type Memory = Vec<f64>;
+
+    fn begin(&self, first: &Gaussian) -> Vec<f64> {
+        first.std().iter().map(|s| s * MIN_STD).collect()
     }
 
-    /// The present distribution.
-    #[must_use]
-    pub fn distribution(&self) -> &Gaussian {
-        &self.distribution
-    }
-
-    /// Draws `n` candidates.
-    pub fn ask(&self, n: usize, rng: &mut Rng) -> Vec<Vec<f64>> {
-        (0..n).map(|_| self.distribution.sample(rng)).collect()
-    }
-
-    /// Reweights and refits; returns the temperature. Rewards that are not finite weigh nothing.
-    pub fn tell(&mut self, candidates: &[Vec<f64>], rewards: &[f64]) -> f64 {
-        let usable: Vec<usize> = (0..rewards.len())
-            .filter(|&i| rewards[i].is_finite())
-            .collect();
+    fn update(
+        &self,
+        min_std: &mut Vec<f64>,
+        present: &Gaussian,
+        draws: &[Vec<f64>],
+        costs: &[f64],
+    ) -> Option<Gaussian> {
+        let usable: Vec<usize> = (0..costs.len()).filter(|&i| costs[i].is_finite()).collect();
         if usable.len() < 2 {
-            return f64::INFINITY;
+            return None;
         }
-        let rewards: Vec<f64> = usable.iter().map(|&i| rewards[i]).collect();
-        let samples: Vec<Vec<f64>> = usable.iter().map(|&i| candidates[i].clone()).collect();
-        let eta = temperature(self.settings.epsilon, &rewards).max(self.settings.min_eta);
+        let rewards: Vec<f64> = usable.iter().map(|&i| -costs[i]).collect();
+        let samples: Vec<Vec<f64>> = usable.iter().map(|&i| draws[i].clone()).collect();
+        let eta = temperature(self.epsilon, &rewards).max(self.min_eta);
         let max = rewards.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let weights: Vec<f64> = rewards.iter().map(|j| ((j - max) / eta).exp()).collect();
-        self.distribution = Gaussian::fit(&samples, &weights, &self.min_std, &self.low, &self.high);
-        eta
+        let (low, high) = present.bounds();
+        Gaussian::fit(&samples, &weights, min_std, low, high).ok()
     }
 }
 
@@ -178,11 +155,11 @@ mod tests {
         let mut rng = Streams::new(0).stream("reps");
         for _ in 0..15 {
             let candidates = reps.ask(400, &mut rng);
-            let rewards: Vec<f64> = candidates
+            let costs: Vec<f64> = candidates
                 .iter()
-                .map(|c| -0.5 * ((c[0] - 0.5) / 0.1).powi(2))
+                .map(|c| 0.5 * ((c[0] - 0.5) / 0.1).powi(2))
                 .collect();
-            reps.tell(&candidates, &rewards);
+            reps.tell(&candidates, &costs);
         }
         assert!((reps.distribution().mean()[0] - 0.5).abs() < 0.02);
         assert!(reps.distribution().std()[0] < 0.1);

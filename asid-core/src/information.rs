@@ -92,11 +92,12 @@ impl Information {
 
     /// Adds one reading's `J^T J`; `jacobian` holds one whitened, prior-scaled
     /// column of `rows` entries for each entry, one after the other. Missing
-    /// readings (NaN) carry nothing.
+    /// readings (NaN), and slopes whose square is no number, carry nothing.
     pub fn add(&mut self, jacobian: &[f64], rows: usize) {
         let n = self.total.nrows();
         for k in 0..rows {
-            if (0..n).any(|i| !jacobian[i * rows + k].is_finite()) {
+            let square: f64 = (0..n).map(|i| jacobian[i * rows + k].powi(2)).sum();
+            if !(self.total.trace() + square).is_finite() {
                 continue;
             }
             for i in 0..n {
@@ -149,12 +150,9 @@ impl Information {
             .collect()
     }
 
+    /// `(I + I_0)^-1`; see [`inverse_above_prior`].
     fn covariance(&self) -> DMatrix<f64> {
-        let n = self.total.nrows();
-        self.total
-            .clone()
-            .cholesky()
-            .map_or_else(|| DMatrix::zeros(n, n), |c| c.inverse())
+        inverse_above_prior(&self.total)
     }
 
     fn measure(&self) -> (f64, f64) {
@@ -164,8 +162,53 @@ impl Information {
         }
         let covariance = self.covariance();
         let block = covariance.view((0, 0), (d, d)).into_owned();
-        (block.trace(), -block.determinant().ln())
+        (block.trace(), -log_determinant(block))
     }
+}
+
+/// Inverse of a symmetric matrix that is the identity (the prior) plus what data add, so that no
+/// eigenvalue is below 1.
+///
+/// Where one direction is known a great deal better than another, rounding swallows what is known of
+/// the other: eigenvalues below the largest one's resolution are noise, of either sign, and a
+/// Cholesky factor fails or holds that noise. What cannot be resolved is left as uncertain as the
+/// prior has it, and a matrix with an entry that is no number tells nothing at all.
+#[must_use]
+pub fn inverse_above_prior(total: &DMatrix<f64>) -> DMatrix<f64> {
+    let n = total.nrows();
+    if total.iter().any(|x| !x.is_finite()) {
+        return DMatrix::identity(n, n);
+    }
+    let resolution = n as f64 * f64::EPSILON;
+    if let Some(factor) = total.clone().cholesky() {
+        let pivots = factor.l_dirty().diagonal().map(|p| p * p);
+        // Safely resolved: half of the digits are left.
+        if pivots.min() > resolution.sqrt() * pivots.max() {
+            return factor.inverse();
+        }
+    }
+    let symmetric = (total + total.transpose()) * 0.5;
+    let mut eigen = symmetric.symmetric_eigen();
+    let least = resolution * eigen.eigenvalues.amax();
+    for value in eigen.eigenvalues.iter_mut() {
+        *value = if *value > least {
+            value.max(1.0).recip()
+        } else {
+            1.0
+        };
+    }
+    eigen.recompose()
+}
+
+/// Log determinant of a covariance; by its eigenvalues, floored at the smallest number, where the
+/// product of them is not one.
+fn log_determinant(covariance: DMatrix<f64>) -> f64 {
+    let determinant = covariance.determinant();
+    if determinant.is_normal() && determinant > 0.0 {
+        return determinant.ln();
+    }
+    let values = covariance.symmetric_eigenvalues();
+    values.iter().map(|v| v.max(f64::MIN_POSITIVE).ln()).sum()
 }
 
 #[cfg(test)]
@@ -234,6 +277,41 @@ mod tests {
         let mut information = Information::prior(1, 0);
         information.add(&[100.0], 1);
         assert_eq!(information.reward(Objective::Trace, 0.0), TRACE_CLIP);
+    }
+
+    #[test]
+    fn what_rounding_swallows_is_no_knowledge() {
+        // Two entries seen only by their sum: the difference keeps the prior's variance, so each
+        // has 1/2, however well the sum is known. From 1e8 on the matrix is singular as rounded.
+        for slope in [1e3, 1e7, 1e8, 1e9, 1e12, 1e100, 1e150] {
+            let mut information = Information::prior(2, 0);
+            information.add(&[slope, slope], 1);
+            for std in information.expected_std() {
+                // Short of that its last digits are lost.
+                assert!((std - 0.5_f64.sqrt()).abs() < 0.02, "{slope}: {std}");
+            }
+            assert!(information.log_det().is_finite() && information.log_det() > 0.0);
+        }
+        // Slopes whose square overflows are no slopes.
+        let mut information = Information::prior(2, 0);
+        information.add(&[1e200, 1e200], 1);
+        assert_eq!(information.expected_std(), [1.0, 1.0]);
+    }
+
+    #[test]
+    fn scales_far_apart_are_both_known() {
+        // Independent entries known to 1e-3 and 1e-6 of the prior.
+        let mut information = Information::prior(2, 0);
+        information.add(&[1e3, 0.0, 0.0, 1e6], 2);
+        let std = information.expected_std();
+        assert!((std[0] / 1e-3 - 1.0).abs() < 1e-3, "{std:?}");
+        assert!((std[1] / 1e-6 - 1.0).abs() < 1e-3, "{std:?}");
+    }
+
+    #[test]
+    fn a_matrix_without_numbers_leaves_the_prior() {
+        let total = DMatrix::from_element(2, 2, f64::NAN);
+        assert_eq!(inverse_above_prior(&total), DMatrix::identity(2, 2));
     }
 
     #[test]

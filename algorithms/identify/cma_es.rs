@@ -1,0 +1,71 @@
+//! Identification by covariance matrix adaptation.
+
+use asid_core::identify::{Identified, Identifier};
+use asid_core::registry;
+use asid_core::{Episode, Problem, Result};
+use serde::{Deserialize, Serialize};
+
+use super::sampling::SamplingSettings;
+use super::search::{self, Budget};
+use crate::optimise::CmaEsSettings;
+
+/// Settings of identification by CMA-ES.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct CmaEsIdentifier {
+    /// Refits of the search.
+    pub iterations: usize,
+    /// Simulations a refit.
+    pub population: usize,
+    /// Search distribution.
+    pub cma_es: CmaEsSettings,
+    /// Posterior after the search.
+    pub sampling: SamplingSettings,
+}
+
+impl Default for CmaEsIdentifier {
+    fn default() -> Self {
+        Self {
+            // As many simulations as the other searches, in more and smaller refits: its covariance
+            // is learned over refits, where theirs is that of one.
+            iterations: 16,
+            population: 20,
+            cma_es: CmaEsSettings::default(),
+            sampling: SamplingSettings::default(),
+        }
+    }
+}
+
+asid_core::register!(IdentifierEntry {
+    name: "cma-es",
+    about: "covariance matrix adaptation, then the posterior by emulation of the likelihood",
+    defaults: registry::defaults::<CmaEsIdentifier>,
+    make: |s| {
+        let identifier: CmaEsIdentifier = registry::settings("identifier", s)?;
+        identifier.budget().check()?;
+        identifier.cma_es.check("identifier.cma_es")?;
+        identifier.sampling.check()?;
+        Ok(Box::new(identifier))
+    },
+});
+
+impl CmaEsIdentifier {
+    fn budget(&self) -> Budget {
+        Budget {
+            iterations: self.iterations,
+            population: self.population,
+        }
+    }
+}
+
+impl Identifier for CmaEsIdentifier {
+    fn identify(&self, problem: &Problem<'_>, episodes: &[Episode]) -> Result<Identified> {
+        search::identify(
+            problem,
+            episodes,
+            self.budget(),
+            &self.sampling,
+            &self.cma_es,
+        )
+    }
+}

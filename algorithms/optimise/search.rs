@@ -1,0 +1,199 @@
+//! A search by draws from a normal distribution, whatever its update rule.
+
+use asid_core::rng::Rng;
+
+use super::Gaussian;
+
+/// How a search distribution follows what its draws cost: all that tells one algorithm from another.
+pub trait UpdateRule: Clone {
+    /// What the rule remembers from one refit to the next.
+    type Memory: Clone + std::fmt::Debug;
+
+    /// What is remembered of the first distribution.
+    fn begin(&self, first: &Gaussian) -> Self::Memory;
+
+    /// The next distribution, after draws of `present` with their costs: lower is better, and one
+    /// that is not finite says that the draw failed. `None` where they tell too little to refit.
+    fn update(
+        &self,
+        memory: &mut Self::Memory,
+        present: &Gaussian,
+        draws: &[Vec<f64>],
+        costs: &[f64],
+    ) -> Option<Gaussian>;
+}
+
+/// A search inside a box.
+#[derive(Clone, Debug)]
+pub struct Search<R: UpdateRule> {
+    rule: R,
+    memory: R::Memory,
+    distribution: Gaussian,
+    best: Option<(Vec<f64>, f64)>,
+}
+
+impl<R: UpdateRule> Search<R> {
+    /// Starts from `mean` and `std`, inside the box `[low, high]`.
+    #[must_use]
+    pub fn new(rule: R, mean: &[f64], std: &[f64], low: &[f64], high: &[f64]) -> Self {
+        let distribution = Gaussian::diagonal(mean, std, low, high);
+        Self {
+            memory: rule.begin(&distribution),
+            rule,
+            distribution,
+            best: None,
+        }
+    }
+
+    /// The present distribution.
+    #[must_use]
+    pub fn distribution(&self) -> &Gaussian {
+        &self.distribution
+    }
+
+    /// Draws `n` candidates.
+    pub fn ask(&self, n: usize, rng: &mut Rng) -> Vec<Vec<f64>> {
+        (0..n).map(|_| self.distribution.sample(rng)).collect()
+    }
+
+    /// Refits to candidates with their costs; those that are not finite count for failures.
+    pub fn tell(&mut self, candidates: &[Vec<f64>], costs: &[f64]) {
+        for (candidate, &cost) in candidates.iter().zip(costs) {
+            if cost.is_finite() && self.best.as_ref().is_none_or(|(_, c)| cost < *c) {
+                self.best = Some((candidate.clone(), cost));
+            }
+        }
+        let next = self
+            .rule
+            .update(&mut self.memory, &self.distribution, candidates, costs);
+        if let Some(next) = next {
+            self.distribution = next;
+        }
+    }
+
+    /// Mean of the distribution.
+    #[must_use]
+    pub fn mean(&self) -> &[f64] {
+        self.distribution.mean()
+    }
+
+    /// Deviations of the distribution.
+    #[must_use]
+    pub fn std(&self) -> Vec<f64> {
+        self.distribution.std()
+    }
+
+    /// Best candidate so far and its cost.
+    #[must_use]
+    pub fn best(&self) -> Option<(&[f64], f64)> {
+        self.best.as_ref().map(|(x, c)| (&**x, *c))
+    }
+}
+
+/// Indices of the costs, best first; what is not a number ranks with the failures, last.
+pub(super) fn ranked(costs: &[f64]) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..costs.len()).collect();
+    let rank = |c: f64| if c.is_nan() { f64::INFINITY } else { c };
+    order.sort_by(|&i, &j| rank(costs[i]).total_cmp(&rank(costs[j])));
+    order
+}
+
+#[cfg(test)]
+pub(super) mod known {
+    //! Costs whose minimum is known, and the search that all rules are asked to do.
+
+    use super::*;
+    use asid_core::Streams;
+
+    /// `sum (x_i - t_i)^2`, each term stretched from 1 to `condition`.
+    pub fn ellipsoid(condition: f64, target: &[f64], x: &[f64]) -> f64 {
+        let last = (x.len() - 1).max(1) as f64;
+        let terms = x.iter().zip(target).enumerate();
+        terms
+            .map(|(i, (x, t))| condition.powf(i as f64 / last) * (x - t).powi(2))
+            .sum()
+    }
+
+    /// Rosenbrock's valley, with its minimum of 0 at ones.
+    pub fn rosenbrock(x: &[f64]) -> f64 {
+        let pairs = x.windows(2);
+        pairs
+            .map(|p| 100.0 * (p[1] - p[0] * p[0]).powi(2) + (1.0 - p[0]).powi(2))
+            .sum()
+    }
+
+    /// The search after some refits of `population` draws.
+    pub fn searched<R: UpdateRule>(
+        mut search: Search<R>,
+        (refits, population): (usize, usize),
+        cost: impl Fn(&[f64]) -> f64,
+    ) -> Search<R> {
+        let mut rng = Streams::new(0).stream("search");
+        for _ in 0..refits {
+            let candidates = search.ask(population, &mut rng);
+            let costs: Vec<f64> = candidates.iter().map(|c| cost(c)).collect();
+            search.tell(&candidates, &costs);
+        }
+        search
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::optimise::{CemSettings, CmaEsSettings, RepsSettings};
+
+    const TARGET: [f64; 3] = [0.7, -1.2, 2.0];
+
+    fn finds_the_bottom_of_a_bowl<R: UpdateRule>(rule: R) {
+        let search = Search::new(rule, &[0.0; 3], &[1.0; 3], &[-3.0; 3], &[3.0; 3]);
+        let bowl = |x: &[f64]| known::ellipsoid(1.0, &TARGET, x);
+        let found = known::searched(search, (40, 100), bowl);
+        for (x, t) in found.mean().iter().zip(TARGET) {
+            assert!((x - t).abs() < 0.01, "{x} {t}");
+        }
+        assert!(found.best().unwrap().1 < 1e-3);
+    }
+
+    #[test]
+    fn every_rule_finds_the_bottom_of_a_bowl() {
+        finds_the_bottom_of_a_bowl(CemSettings::default());
+        finds_the_bottom_of_a_bowl(RepsSettings::default());
+        finds_the_bottom_of_a_bowl(CmaEsSettings::default());
+    }
+
+    #[test]
+    fn every_rule_finds_a_bottom_at_the_edge_of_its_box() {
+        fn edge<R: UpdateRule>(rule: R) {
+            let search = Search::new(rule, &[0.0; 2], &[0.5; 2], &[-1.0; 2], &[1.0; 2]);
+            // The minimum without the box lies outside of it, at (2, 0.3).
+            let bowl = |x: &[f64]| known::ellipsoid(1.0, &[2.0, 0.3], x);
+            let found = known::searched(search, (60, 60), bowl);
+            let mean = found.mean();
+            assert!(
+                (mean[0] - 1.0).abs() < 0.02 && (mean[1] - 0.3).abs() < 0.05,
+                "{mean:?}"
+            );
+        }
+        edge(CemSettings::default());
+        edge(RepsSettings::default());
+        edge(CmaEsSettings::default());
+    }
+
+    #[test]
+    fn failures_teach_nothing() {
+        fn fails<R: UpdateRule>(rule: R) {
+            let mut search = Search::new(rule, &[0.0], &[1.0], &[-3.0], &[3.0]);
+            let draws = [vec![1.0], vec![2.0], vec![-2.0]];
+            search.tell(&draws, &[f64::NAN, 0.5, f64::INFINITY]);
+            assert_eq!(search.best(), Some((&[2.0][..], 0.5)));
+            for _ in 0..3 {
+                search.tell(&draws, &[f64::NAN; 3]);
+            }
+            assert!(search.mean()[0].is_finite() && search.std()[0] > 0.0);
+        }
+        fails(CemSettings::default());
+        fails(RepsSettings::default());
+        fails(CmaEsSettings::default());
+    }
+}

@@ -1,0 +1,141 @@
+//! A task whose physics is known in closed form: a cart of unknown mass `m` on a rail without friction is
+//! pushed with a force, so that what it moves is inversely proportional to `m`.
+
+use asid::core::parameter::{Parameter, Scale};
+use asid::core::signal::Signal;
+use asid::core::task::{
+    Commander, Condition, Coordinate, DownstreamProtocol, ExplorationProtocol, Outcome,
+};
+use asid::core::{Capabilities, Layout, Result, Scene, Task};
+
+/// Deviation of a reading of the position, m.
+pub const NOISE: f64 = 1e-3;
+/// Control steps, of one frame each.
+pub const HORIZON: usize = 10;
+/// Length of a frame, s.
+pub const FRAME: f64 = 0.02;
+
+const XML: &str = r#"
+<mujoco>
+  <option timestep="0.002" gravity="0 0 0"/>
+  <worldbody>
+    <body name="cart">
+      <joint name="rail" type="slide" axis="1 0 0"/>
+      <geom name="cart" type="box" size="0.05 0.05 0.05" mass="1"/>
+    </body>
+  </worldbody>
+  <actuator><motor name="push" joint="rail" ctrlrange="-10 10"/></actuator>
+  <sensor><jointpos name="x" joint="rail"/></sensor>
+</mujoco>"#;
+
+/// The task.
+pub struct Cart {
+    scene: Scene,
+    exploration: ExplorationProtocol,
+    downstream: DownstreamProtocol,
+}
+
+impl Cart {
+    pub fn new() -> Self {
+        let force = Coordinate::new("force", "N", [-4.0, 4.0]);
+        let start = vec![Coordinate::new("x", "m", [-0.1, 0.1])];
+        Self {
+            scene: Scene::from_xml("cart", XML, &[]).unwrap(),
+            exploration: ExplorationProtocol {
+                horizon: HORIZON,
+                frames_per_step: 1,
+                frame_period: FRAME,
+                action: vec![force.clone()],
+                start: start.clone(),
+                signals: vec![Signal {
+                    sensor: "x".into(),
+                    noise: NOISE,
+                }],
+                proprioception: Vec::new(),
+                contact: Vec::new(),
+            },
+            downstream: DownstreamProtocol {
+                metric: "x".into(),
+                unit: "m".into(),
+                rule: "none".into(),
+                threshold: None,
+                frames: 1,
+                frame_period: FRAME,
+                action: vec![force],
+                start,
+                channels: vec!["x".into()],
+                phases: Vec::new(),
+            },
+        }
+    }
+
+    /// The mass, uniform or log-uniform on 0.5 to 2 kg.
+    pub fn mass(scale: Scale) -> Parameter {
+        Parameter {
+            name: "mass".into(),
+            targets: vec!["geom/cart/mass".parse().unwrap()],
+            range: [0.5, 2.0],
+            scale,
+            unit: "kg".into(),
+        }
+    }
+}
+
+struct Force;
+
+impl Commander for Force {
+    fn reset(&mut self) {}
+    fn commands(&mut self, action: &[f64], ctrl: &mut [f64]) {
+        ctrl.fill(action[0]);
+    }
+}
+
+impl Task for Cart {
+    fn name(&self) -> &str {
+        "cart"
+    }
+    fn about(&self) -> &str {
+        "weigh a cart by pushing it"
+    }
+    fn scene(&self) -> &Scene {
+        &self.scene
+    }
+    fn requires(&self) -> Capabilities {
+        Capabilities::ACTUATORS
+    }
+    fn parameters(&self) -> Vec<Parameter> {
+        vec![Self::mass(Scale::Log)]
+    }
+    fn conditions(&self) -> Vec<Condition> {
+        Vec::new()
+    }
+    fn exploration(&self) -> &ExplorationProtocol {
+        &self.exploration
+    }
+    fn downstream(&self) -> &DownstreamProtocol {
+        &self.downstream
+    }
+    fn place(&self, layout: &Layout, start: &[f64], qpos: &mut [f64]) -> Result<()> {
+        qpos[layout.joint("rail")?.qpos] = start[0];
+        Ok(())
+    }
+    fn locate(&self, signals: &[f64]) -> Vec<f64> {
+        signals.to_vec()
+    }
+    fn commander(&self) -> Result<Box<dyn Commander>> {
+        Ok(Box::new(Force))
+    }
+    fn attempt(&self, _start: &[f64], action: &[f64]) -> Result<Vec<f64>> {
+        Ok(vec![action[0]])
+    }
+    fn metric(&self, readings: &[f64]) -> Vec<f64> {
+        readings.to_vec()
+    }
+    fn outcome(&self, readings: &[f64]) -> Outcome {
+        Outcome {
+            value: readings[0],
+            success: true,
+            cost: readings[0],
+        }
+    }
+}
