@@ -1,23 +1,31 @@
-//! Lets this crate's tests and examples find libmujoco when they run.
+//! Lets this crate's programs and tests find libmujoco and libtorch when they run.
 //!
-//! `mujoco-rs` links the library in `MUJOCO_DYNAMIC_LINK_DIR`, but link
+//! The crates that link them do so from the folders that two variables name, but link
 //! arguments do not travel to dependent crates; the rpath is set here for this
-//! package and by the root package for the `asid` binary. Without the variable
+//! package and by the root package for the `asid` binary. Without the variables
 //! the loader's own search path decides.
 
 // A build script speaks to cargo through its standard output.
 #![allow(clippy::print_stdout)]
 
 use std::env;
-use std::path::PathBuf;
+use std::path::Path;
 
 fn main() {
     println!("cargo:rerun-if-changed=build.rs");
-    println!("cargo:rerun-if-env-changed=MUJOCO_DYNAMIC_LINK_DIR");
-    let Some(folder) = env::var_os("MUJOCO_DYNAMIC_LINK_DIR") else {
+    rpath("MUJOCO_DYNAMIC_LINK_DIR", "");
+    if env::var_os("CARGO_FEATURE_PEERS").is_some() {
+        rpath("LIBTORCH", "lib");
+    }
+}
+
+/// Adds the folder `below` of what `variable` names to the run-time search path.
+fn rpath(variable: &str, below: &str) {
+    println!("cargo:rerun-if-env-changed={variable}");
+    let Some(value) = env::var_os(variable).filter(|v| !v.is_empty()) else {
         return;
     };
-    if let Ok(folder) = PathBuf::from(folder).canonicalize() {
+    if let Ok(folder) = Path::new(&value).join(below).canonicalize() {
         println!("cargo:rustc-link-arg=-Wl,-rpath,{}", folder.display());
     }
 }

@@ -20,6 +20,8 @@ mod machine;
 #[cfg(feature = "mujoco")]
 mod mujoco;
 mod page;
+#[cfg(feature = "peers")]
+mod peers;
 mod physics;
 mod plugin;
 mod program;
@@ -69,12 +71,18 @@ struct Arguments {
     /// Only this engine
     #[arg(long, value_name = "NAME")]
     engine: Option<String>,
-    /// Where to write the JSON file [default: bench.json in the target folder]
+    /// Where to write the JSON file [default: bench.json or peers.json in the target folder]
     #[arg(long, value_name = "FILE.json")]
     out: Option<PathBuf>,
-    /// A page whose tables between the two `bench` markers are rewritten
+    /// A page whose tables between the two `bench` markers (with --peers: `peers`) are rewritten
     #[arg(long, value_name = "FILE.md")]
     markdown: Option<PathBuf>,
+    /// Measure against Python instead: exploration and identification
+    #[arg(long, requires = "python", conflicts_with_all = ["only", "engine"])]
+    peers: bool,
+    /// Python of the peers' virtual environment; `cargo xtask bench --peers` gives it
+    #[arg(long, value_name = "PROGRAM", requires = "peers")]
+    python: Option<PathBuf>,
 }
 
 impl Arguments {
@@ -89,7 +97,8 @@ impl Arguments {
         }
         let own = std::env::current_exe().context("cannot tell where this program lies")?;
         let target = own.ancestors().nth(2).context("no target folder")?;
-        Ok(target.join("bench.json"))
+        let name = if self.peers { "peers" } else { "bench" };
+        Ok(target.join(name).with_extension("json"))
     }
 }
 
@@ -178,10 +187,11 @@ fn main() -> ExitCode {
 
 /// Measures and writes. A folder that cannot be written to is found out before.
 fn run(arguments: &Arguments) -> Result<()> {
+    let part = if arguments.peers { "peers" } else { "bench" };
     let page = arguments
         .markdown
         .as_deref()
-        .map(page::Page::read)
+        .map(|path| page::Page::read(path, part))
         .transpose()?;
     let out = arguments.out()?;
     let folder = match out.parent() {
@@ -190,6 +200,21 @@ fn run(arguments: &Arguments) -> Result<()> {
     };
     tempfile::tempfile_in(folder)
         .with_context(|| format!("cannot write into {}", folder.display()))?;
+    let (json, text) = match &arguments.python {
+        Some(python) => against(python, arguments.quick)?,
+        None => alone(arguments)?,
+    };
+    print!("{text}");
+    std::fs::write(&out, json + "\n").with_context(|| format!("cannot write {}", out.display()))?;
+    if let (Some(page), Some(path)) = (page, &arguments.markdown) {
+        page.write(path, &text)?;
+    }
+    println!("{}", out.display());
+    Ok(())
+}
+
+/// Measures beside the engines' own loops: the JSON file and the page.
+fn alone(arguments: &Arguments) -> Result<(String, String)> {
     let engines: Vec<String> = match &arguments.engine {
         Some(name) => vec![find::<BackendEntry>(name)?.name.to_owned()],
         None => all::<BackendEntry>()
@@ -198,15 +223,19 @@ fn run(arguments: &Arguments) -> Result<()> {
             .collect(),
     };
     let results = measure(arguments, &engines)?;
-    let text = results.markdown();
-    print!("{text}");
-    let json = serde_json::to_string_pretty(&results)? + "\n";
-    std::fs::write(&out, json).with_context(|| format!("cannot write {}", out.display()))?;
-    if let (Some(page), Some(path)) = (page, &arguments.markdown) {
-        page.write(path, &text)?;
-    }
-    println!("{}", out.display());
-    Ok(())
+    Ok((serde_json::to_string_pretty(&results)?, results.markdown()))
+}
+
+/// Measures against Python: the JSON file and the page.
+#[cfg(feature = "peers")]
+fn against(python: &Path, quick: bool) -> Result<(String, String)> {
+    let results = peers::measure(python, quick)?;
+    Ok((serde_json::to_string_pretty(&results)?, results.markdown()))
+}
+
+#[cfg(not(feature = "peers"))]
+fn against(_: &Path, _: bool) -> Result<(String, String)> {
+    anyhow::bail!("built without the feature `peers`; call `cargo xtask bench --peers`")
 }
 
 fn measure(arguments: &Arguments, engines: &[String]) -> Result<Results> {
@@ -266,9 +295,11 @@ fn measure(arguments: &Arguments, engines: &[String]) -> Result<Results> {
     Ok(results)
 }
 
-/// The command line as it is typed.
+/// The command line as it is typed; the Python is xtask's addition.
 fn command() -> String {
-    let arguments = std::env::args().skip(1);
+    let arguments = std::env::args()
+        .skip(1)
+        .filter(|argument| !argument.starts_with("--python="));
     let words: Vec<String> = ["cargo".into(), "xtask".into(), "bench".into()]
         .into_iter()
         .chain(arguments)

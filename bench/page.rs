@@ -5,8 +5,10 @@ use std::path::Path;
 
 use anyhow::{Context, Result, bail};
 
-const BEGIN: &str = "<!-- bench: begin -->";
-const END: &str = "<!-- bench: end -->";
+/// The lines around the text of `part`.
+fn markers(part: &str) -> [String; 2] {
+    ["begin", "end"].map(|place| format!("<!-- {part}: {place} -->"))
+}
 
 /// A titled table in Markdown, its columns aligned for reading as text.
 pub fn table(title: &str, header: &[&str], rows: &[Vec<String>]) -> String {
@@ -61,27 +63,31 @@ pub fn table(title: &str, header: &[&str], rows: &[Vec<String>]) -> String {
 
 /// A page whose text between the markers can be replaced.
 pub struct Page {
+    markers: [String; 2],
     before: String,
     after: String,
 }
 
 impl Page {
-    /// Reads a page.
+    /// Reads a page with markers of `part`, such as `<!-- bench: begin -->`.
     ///
     /// # Errors
     /// When it cannot be read or lacks a marker.
-    pub fn read(path: &Path) -> Result<Self> {
+    pub fn read(path: &Path, part: &str) -> Result<Self> {
+        let markers = markers(part);
+        let [begin, end] = &markers;
         let text =
             fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
         let Some((before, (_, after))) = text
-            .split_once(BEGIN)
-            .and_then(|(b, rest)| Some((b, rest.split_once(END)?)))
+            .split_once(begin)
+            .and_then(|(b, rest)| Some((b, rest.split_once(end)?)))
         else {
-            bail!("{} has no lines `{BEGIN}` and `{END}`", path.display());
+            bail!("{} has no lines `{begin}` and `{end}`", path.display());
         };
         Ok(Self {
             before: before.to_owned(),
             after: after.to_owned(),
+            markers,
         })
     }
 
@@ -90,8 +96,9 @@ impl Page {
     /// # Errors
     /// When it cannot be written.
     pub fn write(&self, path: &Path, text: &str) -> Result<()> {
+        let [begin, end] = &self.markers;
         let whole = format!(
-            "{}{BEGIN}\n{}\n{END}{}",
+            "{}{begin}\n{}\n{end}{}",
             self.before,
             text.trim_end(),
             self.after
@@ -108,12 +115,14 @@ mod tests {
     fn only_the_text_between_the_markers_changes() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("page.md");
-        fs::write(&path, format!("above\n{BEGIN}\nold\n{END}\nbelow\n")).unwrap();
-        Page::read(&path).unwrap().write(&path, "new\n").unwrap();
-        let text = fs::read_to_string(&path).unwrap();
-        assert_eq!(text, format!("above\n{BEGIN}\nnew\n{END}\nbelow\n"));
-        fs::write(&path, "no markers").unwrap();
-        assert!(Page::read(&path).is_err());
+        let page = |text: &str| {
+            format!("above\n<!-- bench: begin -->\n{text}\n<!-- bench: end -->\nbelow\n")
+        };
+        fs::write(&path, page("old")).unwrap();
+        let read = Page::read(&path, "bench").unwrap();
+        read.write(&path, "new\n").unwrap();
+        assert_eq!(fs::read_to_string(&path).unwrap(), page("new"));
+        assert!(Page::read(&path, "peers").is_err());
     }
 
     #[test]

@@ -10,6 +10,7 @@ mod bench;
 mod library;
 mod lint;
 mod miri;
+mod peers;
 mod setup;
 mod stage;
 mod test;
@@ -28,6 +29,9 @@ Usage: cargo xtask <subcommand>
   miri                         the engine ABI's unsafe code under Miri, where a toolchain has it
   bench [--quick] [--out FILE.json] [--markdown FILE.md]
                                speed beside the engines' own loops, a table and a JSON file
+  bench --peers [--quick] [--out FILE.json] [--markdown FILE.md]
+                               against Stable-Baselines3 and mujoco.sysid in a virtual environment of
+                               its own in the target folder (2.3 GB of packages)
 
 A library that you have already wins: set MUJOCO_DYNAMIC_LINK_DIR to the folder of libmujoco.so,
 LIBTORCH to the folder that holds lib/ and include/, or LIBTORCH_USE_PYTORCH=1.

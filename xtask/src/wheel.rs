@@ -150,7 +150,7 @@ fn sha256(path: &Path) -> Result<String> {
 }
 
 /// The Python that has pip: `python3`, else `python`.
-fn python() -> Result<&'static str> {
+pub fn python() -> Result<&'static str> {
     for name in ["python3", "python"] {
         let answer = Command::new(name)
             .args(["-m", "pip", "--version"])
@@ -168,7 +168,7 @@ fn python() -> Result<&'static str> {
 }
 
 /// One line out of what pip said, and what to do about it.
-fn pip_failure(said: &str) -> String {
+pub fn pip_failure(said: &str) -> String {
     let network = [
         "NewConnectionError",
         "ConnectTimeout",
@@ -189,10 +189,7 @@ fn pip_failure(said: &str) -> String {
         .find(|line| line.starts_with("ERROR:"))
         .or_else(|| said.lines().rfind(|line| !line.trim().is_empty()))
         .unwrap_or("it said nothing");
-    format!(
-        "pip download failed: {}",
-        line.trim_start_matches("ERROR: ")
-    )
+    format!("pip failed: {}", line.trim_start_matches("ERROR: "))
 }
 
 /// The single `.whl` in a folder that pip has just written to.
@@ -283,10 +280,7 @@ mod tests {
     #[test]
     fn what_pip_says_becomes_one_line() {
         let message = pip_failure("WARNING: x\nERROR: No matching distribution found\n");
-        assert_eq!(
-            message,
-            "pip download failed: No matching distribution found"
-        );
+        assert_eq!(message, "pip failed: No matching distribution found");
         let message = pip_failure("ERROR: Could not find x (from versions: none)\n");
         assert!(message.contains("PIP_INDEX_URL"), "{message}");
         let message = pip_failure("... NewConnectionError('...'): failed\nERROR: No matching\n");
