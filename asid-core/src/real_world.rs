@@ -31,6 +31,8 @@ pub struct RealEpisode {
     pub contact_fraction: f64,
     /// True start pose, where it is known.
     pub true_start: Option<Vec<f64>>,
+    /// The readings without the trackers' errors, laid out as the log's, where they are known.
+    pub true_readings: Option<Vec<f64>>,
 }
 
 /// One attempt at the task.
@@ -273,6 +275,7 @@ impl RealWorld for SimulatedWorld<'_> {
             seen
         };
         episode.readings.extend(observe(&row));
+        let mut true_readings = row[..width].to_vec();
         let mut action = vec![0.0; protocol.action.len()];
         let mut ctrl = vec![0.0; frames * nu];
         let mut out = vec![0.0; frames * all_width];
@@ -293,6 +296,7 @@ impl RealWorld for SimulatedWorld<'_> {
             episode.ctrl.extend_from_slice(&ctrl);
             for frame in out.chunks_exact(all_width) {
                 episode.readings.extend(observe(frame));
+                true_readings.extend_from_slice(&frame[..width]);
             }
             let at_a_frame = out
                 .chunks_exact(all_width)
@@ -309,6 +313,7 @@ impl RealWorld for SimulatedWorld<'_> {
             actions,
             contact_fraction: touched as f64 / protocol.horizon as f64,
             true_start: Some(start),
+            true_readings: Some(true_readings),
         })
     }
 

@@ -266,6 +266,11 @@ pub trait Task: Send + Sync {
     fn top_view(&self) -> TopView {
         TopView::default()
     }
+    /// Parts of the plane that differ in what they tell, such as patches of a floor: figures count
+    /// where the object goes.
+    fn regions(&self) -> Vec<Outline> {
+        Vec::new()
+    }
     /// What a picture from the side shows at the end of an attempt: shapes in the
     /// world, from one row of readings.
     fn side_view(&self, _readings: &[f64]) -> Vec<Outline> {
