@@ -35,7 +35,7 @@ pub use tile::Tile;
 
 use crate::markup::escape;
 
-const STYLE: &str = include_str!("page/style.css");
+pub(crate) const STYLE: &str = include_str!("page/style.css");
 const SCRIPT: &str = include_str!("page/copy.js");
 
 /// How a tile or a table cell is meant.

@@ -11,6 +11,7 @@ use asid_core::registry::{ExplorerEntry, IdentifierEntry, SolverEntry, TaskEntry
 use asid_core::task::Condition;
 
 use super::config::{ASID, check_condition};
+use super::figure;
 use super::options::{Algorithms, Common, Worlds};
 use super::output::{OutFolder, write_json, write_text};
 use super::result::Versions;
@@ -18,7 +19,7 @@ use super::session::Session;
 use table::{CompareResult, Run, RunParameter};
 
 mod page;
-mod statistics;
+pub(super) mod statistics;
 mod table;
 
 /// Arguments of `compare`.
@@ -36,6 +37,13 @@ pub struct Arguments {
     /// Runs of each method and condition
     #[arg(long, value_name = "N", default_value_t = 10)]
     seeds: u64,
+    /// Draws a figure of the paper instead: patches, displacement, laptop, distractors or
+    /// generalization; --explorer chooses whose episodes, --episodes how many
+    #[arg(long, value_name = "NAME")]
+    figure: Option<String>,
+    /// Episodes of each explorer in a figure, or of each square of its map
+    #[arg(long, value_name = "N", requires = "figure")]
+    episodes: Option<u64>,
     /// Puts finished comparisons together instead, such as those of several machines
     #[arg(long, value_name = "DIR", num_args = 1..)]
     merge: Vec<PathBuf>,
@@ -87,6 +95,17 @@ const METHODS: [MethodEntry; 4] = [
 
 /// Runs the comparison and writes its folder.
 pub fn compare(arguments: &Arguments) -> Result<()> {
+    if let Some(name) = &arguments.figure {
+        return figure::figure(
+            name,
+            &figure::Request {
+                common: &arguments.common,
+                episodes: arguments.episodes,
+                explorers: arguments.algorithms.explorer.iter().cloned().collect(),
+                quick: false,
+            },
+        );
+    }
     if !arguments.merge.is_empty() {
         return merge(arguments);
     }

@@ -9,6 +9,7 @@ mod doctor;
 mod explore;
 mod export;
 mod failure;
+mod figure;
 mod identify;
 mod list;
 mod model;

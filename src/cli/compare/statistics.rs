@@ -39,3 +39,12 @@ pub fn bootstrap(values: &[f64]) -> [f64; 2] {
     );
     [means[RESAMPLES / 40], means[RESAMPLES - 1 - RESAMPLES / 40]]
 }
+
+/// Wilson's 95 % interval of a share (Wilson 1927).
+pub fn wilson(hits: usize, n: usize) -> [f64; 2] {
+    const Z: f64 = 1.959_963_984_540_054;
+    let (n, p) = (n.max(1) as f64, hits as f64 / n.max(1) as f64);
+    let center = (p + Z * Z / (2.0 * n)) / (1.0 + Z * Z / n);
+    let half = Z / (1.0 + Z * Z / n) * (p * (1.0 - p) / n + Z * Z / (4.0 * n * n)).sqrt();
+    [(center - half).max(0.0), (center + half).min(1.0)]
+}

@@ -1,0 +1,164 @@
+//! Exploration episodes of several explorers, played at the same seeds: what every figure is
+//! made of.
+
+use std::collections::VecDeque;
+use std::io::Write as _;
+use std::sync::Mutex;
+use std::time::Instant;
+
+use anyhow::Result;
+use asid_core::Error;
+use asid_core::real_world::{RealEpisode, RealWorld as _};
+use asid_core::registry::{ExplorerEntry, find};
+
+use crate::cli::options::{Algorithms, Common, Worlds};
+use crate::cli::session::Session;
+
+/// Episodes that are to be played.
+#[derive(Clone, Debug)]
+pub struct Wanted {
+    /// The task.
+    pub task: String,
+    /// Name of the explorer.
+    pub explorer: String,
+    /// Settings, as `--set` takes them.
+    pub set: Vec<String>,
+    /// Effects of the world that the explorer does not know, as `--real-effect` takes them.
+    pub effects: Vec<String>,
+    /// Seed of truth, start and noise.
+    pub seed: u64,
+    /// Start pose; drawn by the seed where it is not given.
+    pub start: Option<Vec<f64>>,
+}
+
+/// An episode that was played.
+pub struct Played {
+    /// What was wanted.
+    pub wanted: Wanted,
+    /// Where the object began.
+    pub start: Vec<f64>,
+    /// Channels of `readings`: name and entries.
+    pub channels: Vec<(String, usize)>,
+    /// True readings, `frames + 1` rows.
+    pub readings: Vec<f64>,
+    /// Share of control steps with contact.
+    pub contact_fraction: f64,
+}
+
+impl Played {
+    /// The true readings of a channel, a row a frame.
+    pub fn channel(&self, name: &str) -> Result<Vec<&[f64]>> {
+        let width: usize = self.channels.iter().map(|c| c.1).sum();
+        let mut start = 0;
+        for (channel, len) in &self.channels {
+            if channel == name {
+                let rows = self.readings.chunks_exact(width);
+                return Ok(rows.map(|r| &r[start..start + len]).collect());
+            }
+            start += len;
+        }
+        let known = self.channels.iter().map(|c| &*c.0);
+        Err(Error::unknown("channel", name, known).into())
+    }
+
+    /// Places of a body in the plane, m, by the sensor of its position.
+    pub fn path(&self, sensor: &str) -> Result<Vec<[f64; 2]>> {
+        Ok(self.channel(sensor)?.iter().map(|r| [r[0], r[1]]).collect())
+    }
+
+    /// Distance between the first and the last place of a body in the plane, m.
+    pub fn displacement(&self, sensor: &str) -> Result<f64> {
+        let path = self.path(sensor)?;
+        let [first, last] = [path[0], path[path.len() - 1]];
+        Ok((last[0] - first[0]).hypot(last[1] - first[1]))
+    }
+}
+
+/// Plays all episodes on as many threads as are asked for; the order is that of `wanted`.
+pub fn play(common: &Common, wanted: Vec<Wanted>) -> Result<Vec<Played>> {
+    let total = wanted.len();
+    let workers = common
+        .threads
+        .or_else(|| std::thread::available_parallelism().ok().map(usize::from))
+        .unwrap_or(1);
+    let queue: Mutex<VecDeque<(usize, Wanted)>> =
+        Mutex::new(wanted.into_iter().enumerate().collect());
+    let done: Mutex<Vec<(usize, Result<Played>)>> = Mutex::new(Vec::with_capacity(total));
+    let clock = Instant::now();
+    std::thread::scope(|scope| {
+        for _ in 0..workers.min(total) {
+            scope.spawn(|| {
+                loop {
+                    let next = queue.lock().ok().and_then(|mut q| q.pop_front());
+                    let Some((index, wanted)) = next else { return };
+                    let about = format!("{}, {}", wanted.task, wanted.explorer);
+                    let played = one(common, wanted);
+                    let failed = played.is_err();
+                    let Ok(mut all) = done.lock() else { return };
+                    all.push((index, played));
+                    if !common.quiet {
+                        let left = clock.elapsed().as_secs_f64() / all.len() as f64
+                            * (total - all.len()) as f64;
+                        let _ = write!(
+                            std::io::stderr(),
+                            "\r{}/{total} episodes, {left:.0} s left ({about})      ",
+                            all.len()
+                        );
+                    }
+                    if failed && let Ok(mut queue) = queue.lock() {
+                        queue.clear();
+                    }
+                }
+            });
+        }
+    });
+    if !common.quiet {
+        let _ = writeln!(std::io::stderr());
+    }
+    let mut all = done.into_inner().unwrap_or_else(|e| e.into_inner());
+    all.sort_by_key(|(index, _)| *index);
+    all.into_iter().map(|(_, played)| played).collect()
+}
+
+/// Plays one episode.
+fn one(common: &Common, wanted: Wanted) -> Result<Played> {
+    let mut own = common.clone();
+    own.seed = Some(wanted.seed);
+    own.threads = Some(1);
+    own.quiet = true;
+    own.set.extend(wanted.set.iter().cloned());
+    let algorithms = Algorithms {
+        explorer: Some(wanted.explorer.clone()),
+        ..Algorithms::default()
+    };
+    let mut worlds = Worlds::default();
+    worlds.real.real_effect.clone_from(&wanted.effects);
+    let session = Session::open(&wanted.task, &own, &algorithms, &worlds)?;
+    let truth = session.truth();
+    let config = &session.config.explorer;
+    let explorer = (find::<ExplorerEntry>(&config.name)?.make)(&config.settings)?;
+    let problem = session.problem();
+    let mut explored = explorer.explore(&problem, None)?;
+    let mut world = session.world(&truth)?;
+    if let Some(start) = &wanted.start {
+        world = world.with_exploration_start(start.clone());
+    }
+    let start = world.exploration_start();
+    let RealEpisode {
+        episode,
+        contact_fraction,
+        true_readings,
+        ..
+    } = world.explore(&mut *explored.policy)?;
+    Ok(Played {
+        start,
+        channels: episode
+            .channels
+            .iter()
+            .map(|c| (c.name.clone(), c.len))
+            .collect(),
+        readings: true_readings.unwrap_or(episode.readings),
+        contact_fraction,
+        wanted,
+    })
+}

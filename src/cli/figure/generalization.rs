@@ -1,0 +1,130 @@
+//! Pushes from start positions and with a mass that no training has seen.
+
+use anyhow::Result;
+use asid_report::plot::Colour;
+
+use super::displacement::HIT;
+use super::episodes::{Played, Wanted, play};
+use super::map::{Grid, frame};
+use super::{Claim, Data, Drawing, Number, Request, share, task};
+
+/// Without walls, so that the ball may lie anywhere.
+const TASK: &str = "sphere-free";
+
+/// Sensor of the ball's position.
+const BALL: &str = "ball_pos";
+
+/// Truths a square, as in the paper.
+const EPISODES: u64 = 5;
+
+/// How far beyond the training box the map reaches, m.
+const BEYOND: f64 = 0.15;
+
+/// Mass of the ball over that of training.
+const MASS: f64 = 3.0;
+
+pub fn draw(request: &Request<'_>) -> Result<Drawing> {
+    let task = task(TASK)?;
+    let explorer = request.explorers(&["fisher-ppo"])[0].clone();
+    let episodes = request
+        .episodes
+        .unwrap_or(if request.quick { 1 } else { EPISODES });
+    let start = &task.exploration().start;
+    let trained = [0, 1].map(|end| [start[0].range[end], start[1].range[end]]);
+    let around = [
+        trained[0].map(|x| x - BEYOND),
+        trained[1].map(|x| x + BEYOND),
+    ];
+    let grid = Grid::over(around, if request.quick { 0.13 } else { 0.05 });
+    let cases = [
+        ("friction within the prior", Vec::new()),
+        (
+            "mass never trained on",
+            vec![format!("mass@ball:factor={MASS}")],
+        ),
+    ];
+    let mut wanted = Vec::new();
+    for (_, effects) in &cases {
+        for square in 0..grid.len() {
+            wanted.extend((0..episodes).map(|k| Wanted {
+                task: TASK.into(),
+                explorer: explorer.clone(),
+                set: Vec::new(),
+                effects: effects.clone(),
+                seed: request.seed() + k,
+                start: Some(grid.middle(square).to_vec()),
+            }));
+        }
+    }
+    let played = play(request.common, wanted)?;
+    let mut drawing = Drawing {
+        title: "Pushes where nothing was trained".into(),
+        lead: format!(
+            "Share of {episodes} truths in which {explorer} pushes the ball by more than {HIT} m on {TASK}, over where \
+             the ball lies; on the right its mass is {MASS} times that of training."
+        ),
+        data: vec![Data {
+            name: "pushes.csv".into(),
+            columns: vec!["case", "seed", "x", "y", "displacement_m"],
+            rows: Vec::new(),
+        }],
+        numbers: Vec::new(),
+        claims: Vec::new(),
+        panels: Vec::new(),
+    };
+    let each = grid.len() * episodes as usize;
+    for ((case, _), of) in cases.iter().zip(played.chunks_exact(each)) {
+        let mut values = vec![0.0; grid.len()];
+        // Inside and outside of the training box: hits and episodes.
+        let mut counts = [[0_usize; 2]; 2];
+        for (square, here) in of.chunks_exact(episodes as usize).enumerate() {
+            let [x, y] = grid.middle(square);
+            let inside = (0..2).all(|i| (trained[0][i]..=trained[1][i]).contains(&[x, y][i]));
+            for episode in here {
+                let moved = episode.displacement(BALL)?;
+                let hit = usize::from(moved > HIT);
+                values[square] += hit as f64 / episodes as f64;
+                counts[usize::from(!inside)][0] += hit;
+                counts[usize::from(!inside)][1] += 1;
+                drawing.data[0].rows.push(row(case, episode, [x, y], moved));
+            }
+        }
+        for (place, [hits, n]) in ["inside", "outside"].iter().zip(counts) {
+            let quantity = format!("{case}, {place} the training box: episodes that push the ball");
+            drawing.numbers.push(share(&explorer, &quantity, hits, n));
+        }
+        let plan = grid.plan(case, &values, 1.0, Colour::Blue).outline(frame(
+            trained,
+            "starts of training",
+            Colour::Purple,
+        ));
+        drawing
+            .panels
+            .push(((*case).into(), plan, "Dark: pushed at every truth.".into()));
+    }
+    drawing.claims = claims(&drawing.numbers);
+    Ok(drawing)
+}
+
+fn row(case: &str, episode: &Played, [x, y]: [f64; 2], moved: f64) -> Vec<String> {
+    let head = [case.to_owned(), episode.wanted.seed.to_string()];
+    let cells = [x, y, moved].map(|v| format!("{v:.4}"));
+    [&head[..], &cells].concat()
+}
+
+fn claims(numbers: &[Number]) -> Vec<Claim> {
+    let [inside, outside, heavy, _] = numbers else {
+        return Vec::new();
+    };
+    vec![Claim {
+        statement: format!(
+            "the ball is pushed in {:.0} % inside of the training box, {:.0} % outside, and {:.0} % inside with another mass",
+            100.0 * inside.value,
+            100.0 * outside.value,
+            100.0 * heavy.value
+        ),
+        paper: "pushes generalise to starts that the arm reaches and to other masses (figure 13)"
+            .into(),
+        holds: inside.value > 0.8 && heavy.value > 0.8 && outside.value > 0.2,
+    }]
+}

@@ -1,0 +1,149 @@
+//! How often exploration moves the lid of a laptop.
+
+use anyhow::Result;
+use asid_core::signal::rotation_difference;
+use asid_report::plot::{Colour, Outline};
+
+use super::episodes::{Played, Wanted, play};
+use super::map::with_fixtures;
+use super::{Claim, Data, Drawing, Request, share, task};
+
+const TASK: &str = "laptop-articulation";
+
+/// A lid that turned by more was moved, rad (ASID, appendix: change of the lid's angle above 1e-2).
+const MOVED: f64 = 0.01;
+
+/// Episodes of an explorer.
+const EPISODES: u64 = 40;
+
+pub fn draw(request: &Request<'_>) -> Result<Drawing> {
+    let task = task(TASK)?;
+    let explorers = request.explorers(&["random", "fisher-cem"]);
+    let episodes = request
+        .episodes
+        .unwrap_or(if request.quick { 4 } else { EPISODES });
+    let wanted = explorers.iter().flat_map(|explorer| {
+        (0..episodes).map(|k| Wanted {
+            task: TASK.into(),
+            explorer: explorer.clone(),
+            // The paper evaluates with a lid that turns.
+            set: vec!["condition=\"articulated\"".into()],
+            effects: Vec::new(),
+            seed: request.seed() + k,
+            start: None,
+        })
+    });
+    let played = play(request.common, wanted.collect())?;
+    let mut drawing = Drawing {
+        title: "How often the lid is moved".into(),
+        lead: format!(
+            "{episodes} exploration episodes of each explorer on {TASK}, whose lid turns. The lid was moved where \
+             it turned against the base by more than {MOVED} rad; dots show where the laptop stood."
+        ),
+        data: vec![Data {
+            name: "lid.csv".into(),
+            columns: vec![
+                "explorer",
+                "seed",
+                "x",
+                "y",
+                "yaw",
+                "lid_turned_rad",
+                "contact_fraction",
+            ],
+            rows: Vec::new(),
+        }],
+        numbers: Vec::new(),
+        claims: Vec::new(),
+        panels: Vec::new(),
+    };
+    for explorer in &explorers {
+        let of: Vec<&Played> = played
+            .iter()
+            .filter(|p| &p.wanted.explorer == explorer)
+            .collect();
+        let (mut moved, mut still) = (Vec::new(), Vec::new());
+        for episode in &of {
+            let turned = lid_turned(episode)?;
+            let place = [episode.start[0], episode.start[1]];
+            if turned > MOVED {
+                moved.push(place);
+            } else {
+                still.push(place);
+            }
+            let numbers = episode
+                .start
+                .iter()
+                .take(3)
+                .chain([&turned, &episode.contact_fraction]);
+            let head = [explorer.clone(), episode.wanted.seed.to_string()];
+            let cells: Vec<String> = numbers.map(|v| format!("{v:.4}")).collect();
+            drawing.data[0].rows.push([&head[..], &cells].concat());
+        }
+        drawing.numbers.push(share(
+            explorer,
+            "episodes in which the lid is moved",
+            moved.len(),
+            of.len(),
+        ));
+        let touched = of.iter().filter(|p| p.contact_fraction > 0.0).count();
+        drawing
+            .numbers
+            .push(share(explorer, "episodes with contact", touched, of.len()));
+        let axis = asid_report::plot::Axis::new;
+        let plan = asid_report::plot::Plan::new(explorer, axis("x", "m"), axis("y", "m"))
+            .outline(
+                Outline::spots(moved)
+                    .colour(Colour::Blue)
+                    .label("lid moved"),
+            )
+            .outline(
+                Outline::spots(still)
+                    .colour(Colour::Vermillion)
+                    .label("not moved"),
+            );
+        let plan = with_fixtures(plan, &*task);
+        drawing
+            .panels
+            .push((explorer.clone(), plan, "A dot an episode.".into()));
+    }
+    drawing.claims = claims(&drawing);
+    Ok(drawing)
+}
+
+/// Largest angle by which the lid turned against the base since the start, rad.
+fn lid_turned(episode: &Played) -> Result<f64> {
+    let (base, lid) = (episode.channel("base_quat")?, episode.channel("lid_quat")?);
+    let relative = |k: usize| {
+        let unit = asid_core::signal::unit_quaternion;
+        let turn = unit(base[k]).inverse() * unit(lid[k]);
+        [turn.w, turn.i, turn.j, turn.k]
+    };
+    let first = relative(0);
+    let angle = |k: usize| {
+        let turn = rotation_difference(&relative(k), &first);
+        turn.iter().map(|x| x * x).sum::<f64>().sqrt()
+    };
+    Ok((0..base.len()).map(angle).fold(0.0, f64::max))
+}
+
+/// At least four of five episodes against at most two of five, as in the paper.
+fn claims(drawing: &Drawing) -> Vec<Claim> {
+    let moved = |name: &str| {
+        let mut numbers = drawing.numbers.iter();
+        numbers.find(|n| n.quantity.ends_with("moved") && n.explorer.starts_with(name))
+    };
+    let (Some(fisher), Some(random)) = (moved("fisher"), moved("random")) else {
+        return Vec::new();
+    };
+    vec![Claim {
+        statement: format!(
+            "{} moves the lid in {:.0} % of episodes, random actions in {:.0} %",
+            fisher.explorer,
+            100.0 * fisher.value,
+            100.0 * random.value
+        ),
+        paper: "80 % against 20 % (section 5.2)".into(),
+        holds: fisher.value >= 0.8 && random.value <= 0.4,
+    }]
+}

@@ -1,0 +1,136 @@
+//! Where the ball goes on three patches of friction: each patch tells of its own friction alone,
+//! so an explorer that knows what it looks for sends the ball over all of them.
+
+use anyhow::Result;
+use asid_core::task::Outline;
+use asid_report::plot::Colour;
+
+use super::episodes::{Played, Wanted, play};
+use super::map::{Grid, with_fixtures};
+use super::{Claim, Data, Drawing, Request, mean, share, task};
+
+const TASK: &str = "sphere-patches";
+
+/// Sensor of the ball's position.
+const BALL: &str = "ball_pos";
+
+/// Side of a square of the map, m: about the ball's diameter (0.06 m).
+const SIDE: f64 = 0.05;
+
+/// Episodes of an explorer; the paper shows its heat maps without a number.
+const EPISODES: u64 = 20;
+
+pub fn draw(request: &Request<'_>) -> Result<Drawing> {
+    let task = task(TASK)?;
+    let explorers = request.explorers(&["random", "maxmi", "fisher-ppo"]);
+    let episodes = request
+        .episodes
+        .unwrap_or(if request.quick { 4 } else { EPISODES });
+    let wanted = explorers.iter().flat_map(|explorer| {
+        (0..episodes).map(|k| Wanted {
+            task: TASK.into(),
+            explorer: explorer.clone(),
+            set: Vec::new(),
+            effects: Vec::new(),
+            seed: request.seed() + k,
+            start: None,
+        })
+    });
+    let played = play(request.common, wanted.collect())?;
+    let grid = Grid::over(task.top_view().bounds, SIDE);
+    let regions = task.regions();
+    let mut drawing = Drawing {
+        title: "Where the ball goes".into(),
+        lead: format!(
+            "{episodes} exploration episodes of each explorer on {TASK}; a square is as dark as the share of \
+             episodes whose ball was in it."
+        ),
+        data: vec![Data {
+            name: "visits.csv".into(),
+            columns: vec!["explorer", "x", "y", "share_of_episodes"],
+            rows: Vec::new(),
+        }],
+        numbers: Vec::new(),
+        claims: Vec::new(),
+        panels: Vec::new(),
+    };
+    for explorer in &explorers {
+        let of: Vec<&Played> = played
+            .iter()
+            .filter(|p| &p.wanted.explorer == explorer)
+            .collect();
+        let mut visits = vec![0.0; grid.len()];
+        let (mut covered, mut everywhere) = (Vec::new(), 0);
+        for episode in &of {
+            let path = episode.path(BALL)?;
+            let mut seen = vec![false; grid.len()];
+            for square in path.iter().filter_map(|p| grid.square(*p)) {
+                seen[square] = true;
+            }
+            for (sum, seen) in visits.iter_mut().zip(&seen) {
+                *sum += f64::from(u8::from(*seen)) / of.len() as f64;
+            }
+            covered.push(seen.iter().filter(|s| **s).count() as f64 * SIDE * SIDE);
+            let visited = |region: &Outline| path.iter().any(|p| inside(region, *p));
+            everywhere += usize::from(regions.iter().all(visited));
+        }
+        for (square, share) in visits.iter().enumerate().filter(|(_, s)| **s > 0.0) {
+            let [x, y] = grid.middle(square);
+            let cells = [x, y, *share].map(|v| format!("{v:.4}"));
+            drawing.data[0]
+                .rows
+                .push([&[explorer.clone()][..], &cells].concat());
+        }
+        drawing
+            .numbers
+            .push(mean(explorer, "area covered in an episode", "m²", &covered));
+        drawing.numbers.push(share(
+            explorer,
+            "episodes that visit every patch",
+            everywhere,
+            of.len(),
+        ));
+        let plan = with_fixtures(grid.plan(explorer, &visits, 1.0, Colour::Blue), &*task);
+        drawing.panels.push((
+            explorer.clone(),
+            plan,
+            "Dark: every episode; white: none.".into(),
+        ));
+    }
+    drawing.claims = claims(&drawing);
+    Ok(drawing)
+}
+
+/// Whether a place is within the corners of a region.
+fn inside(region: &Outline, place: [f64; 2]) -> bool {
+    (0..2).all(|i| {
+        let along = || region.corners.iter().map(|c| c[i]);
+        let (low, high) = (
+            along().fold(f64::INFINITY, f64::min),
+            along().fold(f64::NEG_INFINITY, f64::max),
+        );
+        (low..=high).contains(&place[i])
+    })
+}
+
+/// Fisher exploration covers more than MaxMI, intervals apart.
+fn claims(drawing: &Drawing) -> Vec<Claim> {
+    let covered = |name: &str| {
+        let mut numbers = drawing.numbers.iter();
+        numbers.find(|n| n.unit == "m²" && n.explorer.starts_with(name))
+    };
+    let (Some(fisher), Some(maxmi)) = (covered("fisher"), covered("maxmi")) else {
+        return Vec::new();
+    };
+    vec![Claim {
+        statement: format!(
+            "{} covers {:.3} m² an episode, maxmi {:.3} m²: {:.1} times as much",
+            fisher.explorer,
+            fisher.value,
+            maxmi.value,
+            fisher.value / maxmi.value
+        ),
+        paper: "ASID activates the sphere over a much larger area than MaxMI (figure 4)".into(),
+        holds: fisher.interval95[0] > maxmi.interval95[1],
+    }]
+}
