@@ -183,40 +183,6 @@ impl Scene {
         Ok(self.with_xml(xml))
     }
 
-    /// The same scene with an attribute of a named element set, such as the `size` of a `geom`.
-    ///
-    /// # Errors
-    /// When the scene has no such element.
-    pub fn with_attribute(
-        &self,
-        element: &str,
-        name: &str,
-        attribute: &str,
-        value: &str,
-    ) -> Result<Self> {
-        let document = parse(&self.name, &self.xml)?;
-        // Elements of a default section have no names.
-        let node = document
-            .descendants()
-            .find(|n| n.has_tag_name(element) && n.attribute("name") == Some(name))
-            .ok_or_else(|| Error::Scene {
-                scene: self.name.clone(),
-                message: format!("has no {element} `{name}`"),
-            })?;
-        let mut xml = self.xml.clone();
-        match node.attribute_node(attribute) {
-            Some(old) => xml.replace_range(old.range_value(), value),
-            None => {
-                let at = node.range().start + 1 + element.len();
-                xml.insert_str(at, &format!(" {attribute}=\"{value}\""));
-            }
-        }
-        Ok(Self {
-            xml,
-            ..self.clone()
-        })
-    }
-
     /// The same scene with another physics time step, seconds.
     ///
     /// # Errors
@@ -352,20 +318,6 @@ mod tests {
     fn another_root_is_refused() {
         let error = Scene::from_xml("robot.urdf", "<robot/>", &[]).unwrap_err();
         assert!(error.to_string().contains("<robot>"), "{error}");
-    }
-
-    #[test]
-    fn an_attribute_is_replaced_or_added() {
-        let text = r#"<mujoco><worldbody><body name="a"><geom name="a" size="1 2"/></body></worldbody></mujoco>"#;
-        let scene = Scene::from_xml("s", text, &[]).unwrap();
-        let changed = scene
-            .with_attribute("geom", "a", "size", "3 4")
-            .and_then(|s| s.with_attribute("geom", "a", "solref", "0.03 1"))
-            .unwrap();
-        let geom = r#"<geom solref="0.03 1" name="a" size="3 4"/>"#;
-        assert!(changed.xml().contains(geom), "{}", changed.xml());
-        let error = scene.with_attribute("geom", "b", "size", "1").unwrap_err();
-        assert!(error.to_string().contains("no geom `b`"), "{error}");
     }
 
     #[test]

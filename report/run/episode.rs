@@ -26,13 +26,11 @@ pub(super) fn section(report: &RunReport) -> Option<Section> {
         if !report.stage.is_empty() {
             return None;
         }
-        return Some(
-            section.note(if report.explorer.is_empty() {
-                "No view from above: nothing was explored."
-            } else {
-                "No view from above: the run has no real episode with tracked objects."
-            }),
-        );
+        return Some(section.note(if report.explorer.is_empty() {
+            "No view from above: nothing was explored."
+        } else {
+            "No view from above: the run has no real episode with tracked objects."
+        }));
     };
     let names: Vec<&str> = episode
         .objects

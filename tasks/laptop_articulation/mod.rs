@@ -139,7 +139,13 @@ impl LaptopArticulation {
 fn difficulties() -> Vec<Difficulty> {
     let about = "largest error of the lid's angle that is a success";
     let mut all = vec![
-        Difficulty::new("angle_tolerance", "rad", ANGLE_TOLERANCE, [0.005, 0.3], about),
+        Difficulty::new(
+            "angle_tolerance",
+            "rad",
+            ANGLE_TOLERANCE,
+            [0.005, 0.3],
+            about,
+        ),
         difficulty::hand_speed(HAND_SPEED),
     ];
     all.extend(difficulty::tracker());
