@@ -60,7 +60,7 @@ pub fn perturb(
         add(backend, LAG[0], lags, &mut all_effects, &mut left_out)?;
     }
     let masses = masses(&plant, unknowns, drawn)?;
-    if masses.is_empty() && !drawn.mass.is_empty() {
+    if masses.is_empty() && drawn.mass.values().any(|f| *f != 1.0) {
         left_out.push("mass: what lies free has none that is known".into());
     }
     add(backend, MASS[0], masses, &mut all_effects, &mut left_out)?;
@@ -70,9 +70,14 @@ pub fn perturb(
         Refined::new(backend, model, plant, &all_values, &all_effects)?
     };
     let offsets = signals.iter().map(|s| drawn.tracker.offset.get(&s.sensor));
+    let mut offset: Vec<f64> = offsets.flatten().flatten().copied().collect();
+    if offset.iter().all(|x| *x == 0.0) {
+        // None leaves a reading as it is to the bit.
+        offset.clear();
+    }
     let tracker = TrackerErrors {
         latency: drawn.tracker.latency,
-        offset: offsets.flatten().flatten().copied().collect(),
+        offset,
         every: drawn.tracker.every,
         dropout: drawn.tracker.dropout,
     };

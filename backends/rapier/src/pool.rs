@@ -41,4 +41,26 @@ mod tests {
         assert!(Arc::ptr_eq(&two, &of(2).unwrap()));
         assert!(!Arc::ptr_eq(&two, &of(3).unwrap()));
     }
+
+    /// Printed, as times depend on the machine: `cargo test -p asid-rapier pool -- --nocapture`.
+    #[test]
+    fn a_pool_that_is_there_costs_less_than_a_new_one() {
+        const TIMES: u32 = 50;
+        let time = |work: &mut dyn FnMut()| {
+            let clock = std::time::Instant::now();
+            (0..TIMES).for_each(|_| work());
+            clock.elapsed().as_secs_f64() / f64::from(TIMES)
+        };
+        let new = time(&mut || {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build();
+            pool.unwrap().install(|| ());
+        });
+        let shared = time(&mut || of(2).unwrap().install(|| ()));
+        println!(
+            "two threads: {:.0} µs started, {:.0} µs shared, ratio {:.1}",
+            1e6 * new,
+            1e6 * shared,
+            new / shared
+        );
+    }
 }

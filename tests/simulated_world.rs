@@ -1,0 +1,422 @@
+//! The simulated real world: touches that are shorter than a frame, trackers with systematic errors,
+//! and chance that is the same for every method.
+
+#![allow(clippy::unwrap_used)]
+
+use asid::core::registry::{BackendEntry, TaskEntry, all};
+use asid::core::rng::Streams;
+use asid::core::signal::Signal;
+use asid::core::task::{
+    Commander, Condition, Coordinate, DownstreamProtocol, ExplorationProtocol, Outcome, Task,
+};
+use asid::core::{
+    Capabilities, Layout, Model, Parameter, Policy, RealWorld as _, Result, Scene, SimulatedWorld,
+    TaskPolicy, TrackerErrors,
+};
+use std::sync::Arc;
+
+/// A striker flies at 2 m/s against a ball: they touch for some milliseconds.
+const SCENE: &str = r#"<mujoco><compiler angle="radian"/><option timestep="0.002" gravity="0 0 0"/><worldbody>
+  <body name="striker" pos="0 0 1"><joint name="striker" type="slide" axis="1 0 0"/>
+    <geom name="striker" type="sphere" size="0.02" mass="0.1" solref="0.004 1"/></body>
+  <body name="ball" pos="0.1 0 1"><joint name="ball" type="slide" axis="1 0 0"/>
+    <geom name="ball" type="sphere" size="0.02" mass="0.1" solref="0.004 1"/></body>
+  </worldbody>
+  <actuator><motor name="push" joint="striker"/></actuator>
+  <sensor><framepos name="ball_pos" objtype="xbody" objname="ball"/>
+    <framepos name="striker_pos" objtype="xbody" objname="striker"/>
+    <framequat name="striker_quat" objtype="xbody" objname="striker"/></sensor>
+  <keyframe><key name="home" qpos="0 0" qvel="2 0"/></keyframe></mujoco>"#;
+
+struct Tap {
+    scene: Scene,
+    exploration: ExplorationProtocol,
+    downstream: DownstreamProtocol,
+}
+
+struct Still;
+
+impl Commander for Still {
+    fn reset(&mut self) {}
+    fn commands(&mut self, _: &[f64], ctrl: &mut [f64]) {
+        ctrl.fill(0.0);
+    }
+}
+
+impl Policy for Still {
+    fn reset(&mut self) {}
+    fn act(&mut self, _: usize, _: &[f64], action: &mut [f64]) -> Result<()> {
+        action.fill(0.0);
+        Ok(())
+    }
+    fn export(&self) -> serde_json::Value {
+        serde_json::Value::Null
+    }
+}
+
+impl Task for Tap {
+    fn name(&self) -> &str {
+        "tap"
+    }
+    fn about(&self) -> &str {
+        ""
+    }
+    fn scene(&self) -> &Scene {
+        &self.scene
+    }
+    fn requires(&self) -> Capabilities {
+        Capabilities::CONTACT
+    }
+    fn parameters(&self) -> Vec<Parameter> {
+        Vec::new()
+    }
+    fn conditions(&self) -> Vec<Condition> {
+        Vec::new()
+    }
+    fn exploration(&self) -> &ExplorationProtocol {
+        &self.exploration
+    }
+    fn downstream(&self) -> &DownstreamProtocol {
+        &self.downstream
+    }
+    fn place(&self, layout: &Layout, start: &[f64], qpos: &mut [f64]) -> Result<()> {
+        qpos[layout.joint("striker")?.qpos] = start[0];
+        Ok(())
+    }
+    fn locate(&self, signals: &[f64]) -> Vec<f64> {
+        vec![signals[0]]
+    }
+    fn commander(&self) -> Result<Box<dyn Commander>> {
+        Ok(Box::new(Still))
+    }
+    fn attempt(&self, _: &[f64], _: &[f64]) -> Result<Vec<f64>> {
+        Ok(vec![0.0; self.downstream.frames])
+    }
+    fn metric(&self, _: &[f64]) -> Vec<f64> {
+        Vec::new()
+    }
+    fn outcome(&self, _: &[f64]) -> Outcome {
+        Outcome {
+            value: 0.0,
+            success: false,
+            cost: 0.0,
+        }
+    }
+}
+
+const DOWNSTREAM: fn() -> DownstreamProtocol = || DownstreamProtocol {
+    metric: "nothing".into(),
+    unit: String::new(),
+    rule: String::new(),
+    threshold: None,
+    frames: 10,
+    frame_period: 0.02,
+    action: Vec::new(),
+    start: vec![Coordinate::new("x", "m", [0.0, 0.04])],
+    channels: vec!["striker_pos".into()],
+    phases: Vec::new(),
+};
+
+fn tap() -> Tap {
+    Tap {
+        scene: Scene::from_xml("tap", SCENE, &[]).unwrap(),
+        downstream: DOWNSTREAM(),
+        exploration: ExplorationProtocol {
+            horizon: 2,
+            frames_per_step: 5,
+            frame_period: 0.02,
+            action: vec![Coordinate::new("nothing", "", [0.0, 1.0])],
+            start: vec![Coordinate::new("x", "m", [0.0, 0.04])],
+            signals: vec![Signal {
+                sensor: "ball_pos".into(),
+                noise: 1e-6,
+            }],
+            proprioception: Vec::new(),
+            contact: vec![["striker".into(), "ball".into()]],
+        },
+    }
+}
+
+/// Wherever between two frames, and between two physics steps, the tap falls: a ball that moved was
+/// touched, in one control step of the two.
+#[test]
+fn a_tap_between_two_frames_is_a_touch() {
+    let task = tap();
+    for entry in all::<BackendEntry>() {
+        let backend = (entry.make)().unwrap();
+        let model = backend.load(&task.scene).unwrap();
+        let (mut missed, mut moved) = (0, 0);
+        for k in 0..50 {
+            let streams = Streams::new(k);
+            let signals = &task.exploration.signals;
+            let world = SimulatedWorld::new(&task, &*model, &[], &[], signals, streams).unwrap();
+            let mut world = world.with_exploration_start(vec![k as f64 * 0.0008]);
+            let real = world.explore(&mut Still).unwrap();
+            let rows = real.episode.rows();
+            let way = real.episode.reading(rows - 1)[0] - real.episode.reading(0)[0];
+            assert!(way > 0.05, "{}: the ball went {way} m", entry.name);
+            moved += 1;
+            missed += usize::from(real.contact_fraction == 0.0);
+        }
+        assert_eq!(missed, 0, "{}: of {moved} taps", entry.name);
+    }
+}
+
+/// Nothing is decided.
+struct Nothing;
+
+impl TaskPolicy for Nothing {
+    fn act(&mut self, _: &[f64], _: &mut [f64]) -> Result<()> {
+        Ok(())
+    }
+}
+
+/// The scene where nothing is touched and the tracker sees the striker, which flies at 2 m/s.
+fn flight() -> (Tap, Arc<dyn Model>) {
+    let mut task = tap();
+    task.exploration.signals = ["striker_pos", "striker_quat"]
+        .map(|sensor| Signal {
+            sensor: sensor.into(),
+            noise: 1e-9,
+        })
+        .into();
+    task.exploration.contact.clear();
+    task.scene = task
+        .scene
+        .with_attribute("body", "ball", "pos", "9 0 1")
+        .unwrap();
+    let engine = all::<BackendEntry>()[0];
+    let model = (engine.make)().unwrap().load(&task.scene).unwrap();
+    (task, model)
+}
+
+fn world<'a>(
+    task: &'a Tap,
+    model: &dyn Model,
+    seed: u64,
+    tracker: TrackerErrors,
+) -> SimulatedWorld<'a> {
+    let signals = &task.exploration.signals;
+    let world = SimulatedWorld::new(task, model, &[], &[], signals, Streams::new(seed)).unwrap();
+    let start = vec![0.01];
+    world
+        .with_exploration_start(start)
+        .with_tracker(tracker)
+        .unwrap()
+}
+
+/// What flies at 2 m/s is seen 2 m/s times the latency behind, shifted by the offset, and the turn of the
+/// tracker is the turn of the reading.
+#[test]
+fn a_late_tracker_shows_where_the_object_was() {
+    let (task, model) = flight();
+    let tracker = TrackerErrors {
+        latency: 0.006,
+        offset: vec![0.0, 0.003, 0.0, 0.0, 0.0, 0.02],
+        ..TrackerErrors::default()
+    };
+    let mut late = world(&task, &*model, 0, tracker);
+    let episode = late.explore(&mut Still).unwrap().episode;
+    for k in 0..episode.rows() {
+        let row = episode.reading(k);
+        let seen_at = (k as f64 * 0.02 - 0.006).max(0.0);
+        assert!(
+            (row[0] - (0.01 + 2.0 * seen_at)).abs() < 1e-5,
+            "row {k}: {row:?}"
+        );
+        assert!((row[1] - 0.003).abs() < 1e-6, "row {k}: {row:?}");
+        assert!(
+            (asid::core::signal::yaw(&row[3..7]) - 0.02).abs() < 1e-6,
+            "row {k}: {row:?}"
+        );
+    }
+    // The start pose of the attempt is read by the same tracker, and what is measured of it is true.
+    let attempt = late.attempt(&mut Nothing).unwrap();
+    assert!((0.0..0.04).contains(&attempt.believed_start[0]));
+    let believed = attempt.believed_start[0];
+    let log = attempt.episode;
+    assert!((log.reading(0)[1] - 0.003).abs() < 1e-6);
+    for k in 1..log.rows() {
+        let behind = believed + 2.0 * (k as f64 * 0.02 - 0.006);
+        assert!((log.reading(k)[0] - behind).abs() < 1e-5);
+        let truth = believed + 2.0 * k as f64 * 0.02;
+        assert!((attempt.readings[3 * (k - 1)] - truth).abs() < 1e-5);
+        assert!(attempt.readings[3 * (k - 1) + 1].abs() < 1e-6);
+    }
+}
+
+/// Records what it is shown.
+struct Witness(Vec<Vec<f64>>);
+
+impl Policy for Witness {
+    fn reset(&mut self) {}
+    fn act(&mut self, _: usize, reading: &[f64], action: &mut [f64]) -> Result<()> {
+        self.0.push(reading.to_vec());
+        action.fill(0.0);
+        Ok(())
+    }
+    fn export(&self) -> serde_json::Value {
+        serde_json::Value::Null
+    }
+}
+
+#[test]
+fn readings_are_missing_at_the_trackers_rate_and_the_policy_has_the_last_one() {
+    let (task, model) = flight();
+    let tracker = TrackerErrors {
+        every: 2,
+        ..TrackerErrors::default()
+    };
+    let mut witness = Witness(Vec::new());
+    let mut slow = world(&task, &*model, 0, tracker);
+    let episode = slow.explore(&mut witness).unwrap().episode;
+    for k in 0..episode.rows() {
+        let there = episode.reading(k)[..7].iter().all(|x| x.is_finite());
+        assert_eq!(there, k % 2 == 0, "row {k}");
+    }
+    // Frame 5 is missing: the second action is decided on frame 4.
+    assert_eq!(witness.0[1], episode.reading(4));
+    let lost = TrackerErrors {
+        dropout: 0.3,
+        ..TrackerErrors::default()
+    };
+    let missing: usize = (0..40)
+        .map(|seed| {
+            let mut world = world(&task, &*model, seed, lost.clone());
+            let episode = world.explore(&mut Still).unwrap().episode;
+            assert!(
+                episode.reading(0)[0].is_finite(),
+                "the first reading is lost"
+            );
+            (1..episode.rows())
+                .filter(|&k| episode.reading(k)[0].is_nan())
+                .count()
+        })
+        .sum();
+    // 400 readings, 120 lost in expectation, with a deviation of 9.
+    assert!((93..147).contains(&missing), "{missing}");
+    for wrong in [
+        TrackerErrors {
+            latency: -1.0,
+            ..TrackerErrors::default()
+        },
+        TrackerErrors {
+            offset: vec![0.0],
+            ..TrackerErrors::default()
+        },
+        TrackerErrors {
+            every: 0,
+            ..TrackerErrors::default()
+        },
+    ] {
+        let signals = &task.exploration.signals;
+        let world =
+            SimulatedWorld::new(&task, &*model, &[], &[], signals, Streams::new(0)).unwrap();
+        assert!(world.with_tracker(wrong).is_err());
+    }
+}
+
+/// Common random numbers: a method that explores and one that does not, with trackers that lose
+/// readings or do not, meet the same attempt.
+#[test]
+fn every_method_meets_the_same_chance() {
+    let (mut task, model) = flight();
+    task.exploration
+        .signals
+        .iter_mut()
+        .for_each(|s| s.noise = 1e-3);
+    let plain = TrackerErrors::default();
+    let mut alone = world(&task, &*model, 5, plain.clone());
+    let first = alone.attempt(&mut Nothing).unwrap();
+    let mut after = world(&task, &*model, 5, plain.clone());
+    let episode = after.explore(&mut Still).unwrap().episode;
+    let second = after.attempt(&mut Nothing).unwrap();
+    assert_eq!(first.believed_start, second.believed_start);
+    assert_eq!(first.episode.readings, second.episode.readings);
+    let other = world(&task, &*model, 6, plain.clone())
+        .attempt(&mut Nothing)
+        .unwrap();
+    assert_ne!(first.believed_start, other.believed_start);
+    let lost = TrackerErrors {
+        dropout: 0.5,
+        ..plain
+    };
+    let holes = world(&task, &*model, 5, lost)
+        .explore(&mut Still)
+        .unwrap()
+        .episode;
+    for (a, b) in episode.readings.iter().zip(&holes.readings) {
+        assert!(b.is_nan() || a == b);
+    }
+}
+
+/// Goes for the object.
+struct Chase {
+    /// Where the hand's position begins in a reading.
+    hand: usize,
+}
+
+impl Policy for Chase {
+    fn reset(&mut self) {}
+    fn act(&mut self, _: usize, reading: &[f64], action: &mut [f64]) -> Result<()> {
+        for (i, a) in action.iter_mut().enumerate() {
+            *a = reading[i] - reading[self.hand + i];
+        }
+        Ok(())
+    }
+    fn export(&self) -> serde_json::Value {
+        serde_json::Value::Null
+    }
+}
+
+/// An object that lay still and lies elsewhere in the end was touched, in every task with an arm.
+#[test]
+fn what_moved_was_touched() {
+    for entry in all::<TaskEntry>() {
+        let task = (entry.make)().unwrap();
+        let protocol = task.exploration();
+        if protocol
+            .proprioception
+            .first()
+            .is_none_or(|s| s != "ee_pos")
+        {
+            continue;
+        }
+        for engine in all::<BackendEntry>() {
+            let backend = (engine.make)().unwrap();
+            let model = backend.load(task.scene()).unwrap();
+            let parameters = task.parameters();
+            let truth: Vec<f64> = parameters.iter().map(Parameter::center).collect();
+            let mut moved = 0;
+            for seed in 0..4 {
+                let streams = Streams::new(seed);
+                let signals = &protocol.signals;
+                let mut world =
+                    SimulatedWorld::new(&*task, &*model, &parameters, &truth, signals, streams)
+                        .unwrap();
+                let layout = model.layout();
+                let lengths = signals
+                    .iter()
+                    .map(|s| layout.sensor(&s.sensor).unwrap().len);
+                let mut policy = Chase {
+                    hand: lengths.sum(),
+                };
+                let real = world.explore(&mut policy).unwrap();
+                let [first, last] =
+                    [0, real.episode.rows() - 1].map(|k| real.episode.reading(k)[..2].to_vec());
+                let way = (last[0] - first[0]).hypot(last[1] - first[1]);
+                // Five deviations of the noise, and nothing moves by itself.
+                if way > 0.02 {
+                    moved += 1;
+                    assert!(
+                        real.contact_fraction > 0.0,
+                        "{} on {}, seed {seed}: moved {way} m untouched",
+                        entry.name,
+                        engine.name
+                    );
+                }
+            }
+            println!("{:20} {:8} {moved} of 4 moved", entry.name, engine.name);
+        }
+    }
+}
