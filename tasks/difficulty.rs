@@ -6,10 +6,7 @@ use asid_core::{Difficulty, Error, Levels, Result};
 use crate::steering::{FRAME_PERIOD, FRAMES};
 
 /// Rates of trackers that can be set, Hz: a reading a control step, or one a frame.
-const RATES: [f64; 2] = [
-    1.0 / (FRAMES as f64 * FRAME_PERIOD),
-    1.0 / FRAME_PERIOD,
-];
+const RATES: [f64; 2] = [1.0 / (FRAMES as f64 * FRAME_PERIOD), 1.0 / FRAME_PERIOD];
 
 /// Largest speed of the hand while it explores, m/s. The published controller reaches 0.75 m/s
 /// (0.075 m in a control step of 0.1 s).
@@ -86,6 +83,9 @@ mod tests {
         };
         assert_eq!(at(10.0).unwrap(), 10.0);
         let error = at(25.0).unwrap_err().to_string();
-        assert!(error.contains("10 Hz") && error.contains("50 Hz"), "{error}");
+        assert!(
+            error.contains("10 Hz") && error.contains("50 Hz"),
+            "{error}"
+        );
     }
 }

@@ -169,10 +169,18 @@ mod tests {
     fn a_preset_takes_the_published_values_that_there_are() {
         let all = levels().all;
         let published = Levels::preset(all.clone(), "published").unwrap();
-        assert_eq!(published.values(), [("width", 0.04), ("noise", 0.01)].map(|(n, v)| (n.into(), v)).into());
+        assert_eq!(
+            published.values(),
+            [("width", 0.04), ("noise", 0.01)]
+                .map(|(n, v)| (n.into(), v))
+                .into()
+        );
         assert_eq!(Levels::preset(all.clone(), "default").unwrap(), levels());
         let error = Levels::preset(all, "hard").unwrap_err().to_string();
-        assert!(error.contains("default") && error.contains("published"), "{error}");
+        assert!(
+            error.contains("default") && error.contains("published"),
+            "{error}"
+        );
     }
 
     #[test]
@@ -180,10 +188,16 @@ mod tests {
         let given = |name: &str, value| levels().with(&[(name.to_owned(), value)].into());
         assert_eq!(given("width", 0.02).unwrap().get("width").unwrap(), 0.02);
         let out = given("width", 0.2).unwrap_err().to_string();
-        assert!(out.contains("difficulty.width") && out.contains("0.01 to 0.1 m"), "{out}");
+        assert!(
+            out.contains("difficulty.width") && out.contains("0.01 to 0.1 m"),
+            "{out}"
+        );
         assert!(given("width", f64::NAN).is_err());
         let unknown = given("widht", 0.02).unwrap_err().to_string();
-        assert!(unknown.contains("width") && !unknown.contains('\n'), "{unknown}");
+        assert!(
+            unknown.contains("width") && !unknown.contains('\n'),
+            "{unknown}"
+        );
         let none = Levels::new(Vec::new()).with(&[("width".to_owned(), 1.0)].into());
         assert!(none.unwrap_err().to_string().contains("no difficulty"));
     }

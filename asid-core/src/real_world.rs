@@ -364,9 +364,7 @@ impl RealWorld for SimulatedWorld<'_> {
             episode.ctrl.extend_from_slice(&ctrl);
             touched.fill(false);
             for (k, row) in out.chunks_exact(all_width).enumerate() {
-                episode
-                    .readings
-                    .extend(observe(step * frames + k + 1, row));
+                episode.readings.extend(observe(step * frames + k + 1, row));
                 note(&row[width..], &mut touched);
             }
             if !touched.iter().all(|t| *t) {

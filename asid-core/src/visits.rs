@@ -79,7 +79,12 @@ mod tests {
     fn square(from: f64) -> Outline {
         Outline {
             label: String::new(),
-            corners: vec![[from, 0.0], [from + 1.0, 0.0], [from + 1.0, 1.0], [from, 1.0]],
+            corners: vec![
+                [from, 0.0],
+                [from + 1.0, 0.0],
+                [from + 1.0, 1.0],
+                [from, 1.0],
+            ],
         }
     }
 

@@ -52,7 +52,10 @@ pub fn side_view(row: &[f64], ledge_width: f64) -> Vec<Outline> {
     vec![
         Outline {
             label: "ledge".into(),
-            corners: rectangle([LEDGE[0], LEDGE[2] / 2.0], [ledge_width / 2.0, LEDGE[2] / 2.0]),
+            corners: rectangle(
+                [LEDGE[0], LEDGE[2] / 2.0],
+                [ledge_width / 2.0, LEDGE[2] / 2.0],
+            ),
         },
         Outline {
             label: "rod".into(),

@@ -68,7 +68,11 @@ mod tests {
     #[test]
     fn a_shorter_zone_has_the_same_middle() {
         for (x, scores) in [(0.8, true), (0.83, true), (0.87, false)] {
-            assert_eq!(outcome(Zone::Near, 0.1, &resting(x, 0.0)).success, scores, "{x}");
+            assert_eq!(
+                outcome(Zone::Near, 0.1, &resting(x, 0.0)).success,
+                scores,
+                "{x}"
+            );
         }
     }
 
