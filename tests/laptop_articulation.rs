@@ -1,7 +1,7 @@
 //! The laptop's physics on every engine that is built in: what identification and the task
 //! rely on, without any learning.
 
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::unwrap_used, clippy::print_stdout)] // what each engine gives is printed
 
 #[allow(dead_code)] // not every test needs all of it
 mod task_support;
@@ -10,9 +10,9 @@ use asid::algorithms::identify::articulation::{self, Joint};
 use asid::core::episode::ChannelColumns;
 use asid::core::fisher::FisherSettings;
 use asid::core::pipeline::episode_information;
-use asid::core::registry::{IdentifierEntry, find};
+use asid::core::registry::{ExplorerEntry, IdentifierEntry, find};
 use asid::core::signal::SignalSet;
-use asid::core::{Control, Episode, Problem, Rollout};
+use asid::core::{Control, Episode, Problem, RealWorld, Rollout, SimulatedWorld, Streams};
 use rand::Rng as _;
 
 /// Calls `check` with a problem for each engine.
@@ -190,5 +190,43 @@ fn an_episode_without_contact_leaves_the_question_open() {
         let p = articulated.estimate;
         assert!((0.3..0.7).contains(&p), "{engine}: {p}");
         assert!(offset.std > 0.009, "{engine}: {offset:?}");
+    });
+}
+
+/// Interaction is the hand's contact with the lid. A random explorer's can be counted like any other's:
+/// it meets the lid in some episodes and misses it in most.
+#[test]
+fn interaction_of_random_motion_with_the_lid_can_be_counted() {
+    const EPISODES: u64 = 12;
+    let entry = find::<ExplorerEntry>("random").unwrap();
+    let explorer = (entry.make)(&(entry.defaults)()).unwrap();
+    on_every_engine(|engine, problem| {
+        let mut interacted = 0;
+        for seed in 0..EPISODES {
+            let problem = Problem {
+                streams: Streams::new(seed),
+                ..*problem
+            };
+            let mut explored = explorer.explore(&problem, None).unwrap();
+            let mut world = SimulatedWorld::new(
+                problem.task,
+                problem.model,
+                problem.parameters,
+                &[1.0, 0.0],
+                problem.signals,
+                problem.streams.child("real world"),
+            )
+            .unwrap();
+            let real = world.explore(&mut *explored.policy).unwrap();
+            // Of base and lid by themselves; the lid's is the task's.
+            assert_eq!(real.touched.len(), 2);
+            assert_eq!(real.contact_fraction, real.touched[1]);
+            interacted += u64::from(real.contact_fraction > 0.0);
+        }
+        println!("{engine}: {interacted} of {EPISODES} episodes");
+        assert!(
+            (1..EPISODES).contains(&interacted),
+            "{engine}: {interacted}"
+        );
     });
 }

@@ -1,7 +1,7 @@
 //! The rod task's physics on every engine that is built in: what identification and
 //! the task rely on, without any learning.
 
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::unwrap_used, clippy::print_stdout)] // what each engine gives is printed
 
 #[allow(dead_code)] // not every test needs all of it
 mod task_support;
@@ -9,7 +9,7 @@ mod task_support;
 use asid::algorithms::identify::Likelihood;
 use asid::core::fisher::FisherSettings;
 use asid::core::pipeline::episode_information;
-use asid::core::registry::{ExplorerEntry, IdentifierEntry, find};
+use asid::core::registry::{BackendEntry, ExplorerEntry, IdentifierEntry, all, find};
 use asid::core::{Control, Policy, Problem, RealWorld, Rollout, SimulatedWorld};
 
 /// Calls `check` with a problem for each engine.
@@ -77,6 +77,94 @@ fn a_rod_laid_down_at_its_centre_of_mass_stays_and_35_mm_off_it_falls() {
             }
         }
     });
+}
+
+#[test]
+fn a_narrow_ledge_lets_fall_what_a_wide_one_holds() {
+    let task = task_support::task("rod-balancing");
+    for entry in all::<BackendEntry>() {
+        let backend = (entry.make)().unwrap();
+        for (width, holds) in [(0.06, true), (0.04, true), (0.01, false)] {
+            let set = [("ledge_width".to_owned(), width)].into();
+            let task = task.adjusted(&set).unwrap().unwrap();
+            task_support::on_engine(&*backend, &*task, &task.parameters(), 0, |problem, _| {
+                // Laid down 12 mm off its centre of mass; the grip slips by at most 3 mm.
+                let outcome = &attempts(problem, &[(0.04, 0.03 + 0.012)])[0];
+                assert_eq!(
+                    outcome.success, holds,
+                    "{}, {width}: {outcome:?}",
+                    entry.name
+                );
+            });
+        }
+    }
+}
+
+/// A push along the table tells the friction that slows the rod, where that is sought along.
+#[test]
+fn a_push_tells_the_friction_too() {
+    let task = task_support::task("rod-balancing");
+    let parameters = [task.parameters(), task.optional_parameters()].concat();
+    for entry in all::<BackendEntry>() {
+        let backend = (entry.make)().unwrap();
+        task_support::on_engine(&*backend, &*task, &parameters, 3, |problem, _| {
+            let mut world = world(problem, &[0.05, 0.3], vec![0.55, 0.0, 0.2]);
+            let real = world.explore(&mut Push).unwrap();
+            let told = episode_information(
+                problem,
+                &FisherSettings::default(),
+                &[0.05, 0.3],
+                &[0.55, 0.0, 0.2],
+                &real.actions,
+            )
+            .unwrap();
+            let (prior, after) = (&told.expected_std[0], told.expected_std.last().unwrap());
+            println!(
+                "{}: expected deviations {prior:.4?} to {after:.4?}",
+                entry.name
+            );
+            // The hand stops; how far the rod slides on, and how it turns, depends on the friction.
+            assert!(
+                after[1] < 0.7 * prior[1],
+                "{}: {prior:?} to {after:?}",
+                entry.name
+            );
+        });
+    }
+}
+
+/// Fewer readings tell less, and no less than their number says.
+#[test]
+fn a_slower_and_noisier_tracker_tells_less() {
+    let task = task_support::task("rod-balancing");
+    let std = |set: &[(&str, f64)]| {
+        let set = set.iter().map(|(n, v)| ((*n).to_owned(), *v)).collect();
+        let task = task.adjusted(&set).unwrap().unwrap();
+        let backend = (all::<BackendEntry>()[0].make)().unwrap();
+        let mut out = f64::NAN;
+        task_support::on_engine(&*backend, &*task, &task.parameters(), 3, |problem, _| {
+            let actions = [vec![[0.02, 0.03]; 5], vec![[0.025, 0.0]; 15]]
+                .concat()
+                .concat();
+            let settings = FisherSettings {
+                roughness: false,
+                nuisance: false,
+                ..FisherSettings::default()
+            };
+            let start = [0.55, 0.0, 0.2];
+            let told = episode_information(problem, &settings, &[0.05], &start, &actions);
+            out = told.unwrap().expected_std.last().unwrap()[0];
+        });
+        out
+    };
+    let every = std(&[("tracker_rate", 50.0)]);
+    let fifth = std(&[("tracker_rate", 10.0)]);
+    // A reading every fifth frame: a fifth of the information, if it comes evenly.
+    let ratio = fifth / every;
+    assert!((1.8..2.7).contains(&ratio), "{ratio}");
+    // Five times the noise, a twenty-fifth of the information.
+    let noisy = std(&[("tracker_noise", 0.01), ("tracker_angle_noise", 0.05)]);
+    assert!((noisy / every - 5.0).abs() < 0.1, "{}", noisy / every);
 }
 
 /// Tracking the inertial frame of the rod (MuJoCo's `objtype="body"`) put the centre of mass into

@@ -176,3 +176,23 @@ fn each_condition_has_its_own_zone() {
         .collect();
     assert_eq!(scores, [[true, false], [false, true]]);
 }
+
+/// The difficulty sets what a shot does to the board, under either condition.
+#[test]
+fn a_board_wears_as_much_as_its_difficulty_says() {
+    let task = task_support::task("shuffleboard");
+    for wear in [0.0, 0.2] {
+        let set = [("wear".to_owned(), wear), ("zone_length".to_owned(), 0.1)].into();
+        let task = task.adjusted(&set).unwrap().unwrap();
+        let far = task.under("far").unwrap().unwrap();
+        assert_eq!(far.downstream().threshold, Some(0.05));
+        let mut rng = asid::core::Streams::new(1).stream("wear");
+        let mut largest: f64 = 0.0;
+        for _ in 0..200 {
+            let mut truth = vec![0.02, 1e-3];
+            far.wear(&far.parameters(), &mut truth, &mut rng);
+            largest = largest.max(truth[0] / 0.02 - 1.0);
+        }
+        assert!(largest <= wear && largest >= 0.9 * wear, "{largest}");
+    }
+}

@@ -8,8 +8,13 @@
 #[allow(dead_code)] // not every test needs all of it
 mod task_support;
 
+use asid::core::fisher::FisherSettings;
+use asid::core::pipeline::episode_information;
 use asid::core::registry::{BackendEntry, TaskEntry, all, find};
-use asid::core::{Capabilities, Control, Parameter, Problem, Rollout};
+use asid::core::visits;
+use asid::core::{
+    Capabilities, Control, Parameter, Policy, Problem, RealWorld, Rollout, SimulatedWorld,
+};
 
 const RADIUS: f64 = 0.03;
 const G: f64 = 9.81;
@@ -238,4 +243,139 @@ fn a_softer_ball_leaves_the_paddle_faster() {
             assert!(ends[0] > ends[1] + 0.005, "{engine}: {ends:?}");
         },
     );
+}
+
+/// Moves the hand on a straight line towards where a ball was first seen.
+struct Towards {
+    /// First entry of the ball's position in a reading's row, and of the hand's.
+    ball: usize,
+    hand: usize,
+    aim: Option<[f64; 2]>,
+}
+
+impl Policy for Towards {
+    fn reset(&mut self) {
+        self.aim = None;
+    }
+
+    fn act(&mut self, _step: usize, reading: &[f64], action: &mut [f64]) -> asid::core::Result<()> {
+        let at = |i: usize| [reading[i], reading[i + 1]];
+        let aim = *self.aim.get_or_insert_with(|| at(self.ball));
+        let hand = at(self.hand);
+        for k in 0..2 {
+            action[k] = aim[k] - hand[k];
+        }
+        Ok(())
+    }
+
+    fn export(&self) -> serde_json::Value {
+        serde_json::Value::Null
+    }
+}
+
+/// Each ball is tracked, and touches are told apart: what an explorer went for can be seen.
+#[test]
+fn a_push_at_one_ball_touches_and_moves_it_alone() {
+    on_every_engine(
+        "sphere-distractors",
+        "",
+        Capabilities::empty(),
+        |engine, problem| {
+            let objects = problem.task.objects();
+            assert_eq!(objects.len(), 4);
+            assert_eq!(problem.signals.len(), 4);
+            for pushed in [0, 2] {
+                let mut world = SimulatedWorld::new(
+                    problem.task,
+                    problem.model,
+                    problem.parameters,
+                    &[3e-3],
+                    problem.signals,
+                    problem.streams,
+                )
+                .unwrap()
+                .with_exploration_start(vec![0.6, 0.05]);
+                let mut policy = Towards {
+                    ball: 3 * pushed,
+                    hand: 3 * objects.len(),
+                    aim: None,
+                };
+                let real = world.explore(&mut policy).unwrap();
+                for (i, object) in objects.iter().enumerate() {
+                    let way = visits::displacement(&visits::path(&real.episode, &object.position));
+                    let (touched, label) = (real.touched[i], &object.outline.label);
+                    println!(
+                        "{engine}, at {pushed}: {label} touched {touched:.2}, moved {way:.3} m"
+                    );
+                    assert_eq!(touched > 0.0, i == pushed, "{engine}, {label}: {touched}");
+                    // Unmoved but for the noise of two readings, 2 mm each.
+                    assert_eq!(way > 0.015, i == pushed, "{engine}, {label}: {way}");
+                }
+                assert_eq!(real.contact_fraction > 0.0, pushed == 0);
+            }
+        },
+    );
+}
+
+/// A ball that is struck through the patches in turn covers them; one that stays does not.
+#[test]
+fn visits_of_the_patches_can_be_counted() {
+    let task = (find::<TaskEntry>("sphere-patches").unwrap().make)().unwrap();
+    let regions = task.regions();
+    assert_eq!(regions.len(), 3);
+    let down: Vec<[f64; 2]> = (0..90)
+        .map(|k| [0.5, 0.3 - 0.0085 * f64::from(k)])
+        .collect();
+    let shares = visits::shares(&down, &regions);
+    assert!((shares.iter().sum::<f64>() - 1.0).abs() < 1e-12);
+    assert!(visits::coverage(&shares) > 0.95, "{shares:?}");
+    let still = visits::shares(&[[0.5, 0.2]; 50], &regions);
+    assert_eq!(visits::coverage(&still), 0.0);
+}
+
+/// Expected deviations before and after a push at a ball that lies still, of all unknowns in their middle.
+fn told_by_a_push(problem: &Problem<'_>) -> [Vec<f64>; 2] {
+    let start = [0.5, 0.0];
+    let theta: Vec<f64> = problem.parameters.iter().map(Parameter::center).collect();
+    let mut world = SimulatedWorld::new(
+        problem.task,
+        problem.model,
+        problem.parameters,
+        &theta,
+        problem.signals,
+        problem.streams,
+    )
+    .unwrap()
+    .with_exploration_start(start.to_vec());
+    let mut policy = Towards {
+        ball: 0,
+        hand: 3,
+        aim: None,
+    };
+    let real = world.explore(&mut policy).unwrap();
+    let settings = FisherSettings::default();
+    let told = episode_information(problem, &settings, &theta, &start, &real.actions).unwrap();
+    let last = told.expected_std.last().unwrap().clone();
+    [told.expected_std[0].clone(), last]
+}
+
+/// A ball leaves the paddle as fast as the contact is stiff, so a push tells the stiffness. The floor's
+/// sliding friction tells little: above 0.5 a pushed ball rolls at once. Neither keeps the rolling friction
+/// from being found.
+#[test]
+fn a_push_tells_the_stiffness_and_hardly_the_sliding_friction() {
+    for (unknown, needs, share) in [
+        ("sliding_friction", Capabilities::empty(), 0.8..=1.0),
+        ("stiffness", Capabilities::CONTACT_STIFFNESS, 0.0..=0.8),
+    ] {
+        on_every_engine("sphere-striking", unknown, needs, |engine, problem| {
+            let [prior, after] = told_by_a_push(problem);
+            println!("{engine}, {unknown}: expected deviations {prior:.5?} to {after:.5?}");
+            assert!(after[0] < 0.1 * prior[0], "{engine}, {unknown}: {after:?}");
+            assert!(
+                share.contains(&(after[1] / prior[1])),
+                "{engine}, {unknown}: {after:?}"
+            );
+        });
+    }
 }

@@ -4,20 +4,25 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
+#[allow(dead_code)] // not every test needs all of it
+mod task_support;
+
 use std::sync::atomic::AtomicU64;
 use std::time::Instant;
 
 use asid::core::progress::Silent;
 use asid::core::real_world::RealEpisode;
 use asid::core::registry::{
-    BackendEntry, ExplorerEntry, IdentifierEntry, Settings, SolverEntry, TaskEntry, all,
+    BackendEntry, ExplorerEntry, IdentifierEntry, Settings, SolverEntry, TaskEntry, all, find,
 };
 use asid::core::rng::Rng;
 use asid::core::sensitivity::check_parameters;
 use asid::core::task::Outcome;
+use asid::core::tracker::ReadingFrames;
+use asid::core::visits;
 use asid::core::{
-    Capabilities, Control, Parameter, Policy, Problem, RealWorld, Recording, Rollout,
-    SimulatedWorld, Streams, Task,
+    Capabilities, Control, Episode, Levels, Parameter, Plant, Policy, Problem, RealWorld,
+    Recording, Rollout, SimulatedWorld, Streams, Task,
 };
 use rand::Rng as _;
 
@@ -47,6 +52,108 @@ fn every_task_on_every_engine() {
         }
         for engine in all::<BackendEntry>() {
             on(&*task, &parameters, engine);
+        }
+    }
+}
+
+/// A difficulty changes what it says, in a task that is otherwise the same.
+#[test]
+fn every_difficulty_can_be_set_over_its_range() {
+    for entry in all::<TaskEntry>() {
+        let task = (entry.make)().unwrap();
+        let set = |name: &str, value: f64| task.adjusted(&[(name.to_owned(), value)].into());
+        for d in task.difficulty() {
+            for value in d.range.into_iter().chain([d.default]).chain(d.published) {
+                d.check(value).unwrap();
+                let other = set(&d.name, value).unwrap().unwrap();
+                assert_eq!(other.name(), task.name());
+                assert_eq!(other.difficulty(), task.difficulty());
+                Plant::of(other.scene()).unwrap();
+                for condition in other.conditions() {
+                    // A condition's task is as hard as the one that it is of.
+                    let under = other.under(&condition.name).unwrap();
+                    if let Some(under) = under {
+                        let noise = |t: &dyn Task| t.exploration().signals[0].noise;
+                        assert_eq!(noise(&*under), noise(&*other));
+                        assert_eq!(under.downstream().threshold, other.downstream().threshold);
+                    }
+                }
+            }
+            let beyond = set(&d.name, 2.0 * d.range[1]).err().unwrap().to_string();
+            assert!(beyond.contains(&d.name), "{beyond}");
+        }
+        let defaults = Levels::new(task.difficulty());
+        let same = task.adjusted(&defaults.values()).unwrap();
+        for same in same {
+            assert_eq!(same.scene(), task.scene());
+            assert_eq!(same.exploration(), task.exploration());
+            assert_eq!(same.downstream(), task.downstream());
+        }
+        assert!(
+            task.adjusted(&[("no such".into(), 1.0)].into()).is_err() || defaults.all().is_empty()
+        );
+    }
+}
+
+/// What figures ask of a task is there, and lies where the picture is.
+#[test]
+fn objects_are_tracked_and_regions_lie_apart() {
+    for entry in all::<TaskEntry>() {
+        let task = (entry.make)().unwrap();
+        let plant = Plant::of(task.scene()).unwrap();
+        let protocol = task.exploration();
+        let objects = task.objects();
+        assert!(!objects.is_empty(), "{}", task.name());
+        for object in &objects {
+            let tracked = |name: &String| protocol.signals.iter().any(|s| s.sensor == *name);
+            assert!(tracked(&object.position), "{}", object.position);
+            assert!(object.orientation.as_ref().is_none_or(tracked));
+            for body in object.contact.iter().flatten() {
+                plant.layout.body(body).unwrap();
+            }
+        }
+        let regions = task.regions();
+        for (i, region) in regions.iter().enumerate() {
+            let n = region.corners.len() as f64;
+            let middle = [0, 1].map(|k| region.corners.iter().map(|c| c[k]).sum::<f64>() / n);
+            let within: Vec<f64> = visits::shares(&[middle], &regions);
+            assert_eq!(within.iter().sum::<f64>(), 1.0, "{}", region.label);
+            assert_eq!(within[i], 1.0, "{}", region.label);
+        }
+    }
+}
+
+/// Readings at a tenth of the frames are those of every frame, the others missing.
+#[test]
+fn a_slow_tracker_reads_at_each_control_step_and_not_between() {
+    let task = (find::<TaskEntry>("rod-balancing").unwrap().make)().unwrap();
+    let slow = task.adjusted(&[("tracker_rate".to_owned(), 10.0)].into());
+    let slow = slow.unwrap().unwrap();
+    let backend = (all::<BackendEntry>()[0].make)().unwrap();
+    let play = |task: &dyn Task| {
+        let parameters = task.parameters();
+        let mut episode = Episode::default();
+        task_support::on_engine(&*backend, task, &parameters, 0, |problem, _| {
+            episode = wild_episode(problem, 3).episode;
+        });
+        episode
+    };
+    let (every, some) = (play(&*task), play(&*slow));
+    let frames = ReadingFrames::of(&*slow, 0.02);
+    // Position and orientation of the rod come first.
+    let tracked = 7;
+    for k in 0..every.rows() {
+        let (a, b) = (every.reading(k), some.reading(k));
+        assert_eq!(
+            a[tracked..],
+            b[tracked..],
+            "own sensors read at every frame"
+        );
+        assert_eq!(frames.has(k), k % 5 == 0);
+        if frames.has(k) {
+            assert_eq!(a, b, "row {k}");
+        } else {
+            assert!(b[..tracked].iter().all(|x| x.is_nan()), "row {k}");
         }
     }
 }

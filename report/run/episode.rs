@@ -212,6 +212,30 @@ fn displacement(track: &ObjectTrack) -> String {
 mod tests {
     use super::*;
 
+    /// Domain randomisation and the oracle explore nothing.
+    #[test]
+    fn a_run_without_an_explorer_says_so() {
+        let report = RunReport::default();
+        assert!(report.html().contains("nothing was explored"));
+    }
+
+    #[test]
+    fn a_round_thing_moves_and_does_not_turn() {
+        let ball = ObjectTrack {
+            name: "ball".into(),
+            round: true,
+            time: vec![0.0, 1.0, 2.0],
+            poses: vec![[0.0; 3], [f64::NAN; 3], [0.3, 0.4, 0.0]],
+            ..ObjectTrack::default()
+        };
+        assert_eq!(displacement(&ball), "by 0.50 m");
+        let rod = ObjectTrack {
+            round: false,
+            ..ball
+        };
+        assert_eq!(displacement(&rod), "by 0.50 m and turned by 0°");
+    }
+
     #[test]
     fn an_outline_turns_about_its_own_origin() {
         let corners = placed(&[[1.0, 0.0]], [2.0, 3.0, std::f64::consts::FRAC_PI_2]);

@@ -18,7 +18,7 @@ use asid_core::parameter::{Parameter, Scale};
 use asid_core::registry::Settings;
 use asid_core::task::{
     Commander, Condition, Coordinate, DownstreamProtocol, ExplorationProtocol, Outcome, Outline,
-    Task, TopView, TrackedPart,
+    Task, TopView, TrackedObject, TrackedPart,
 };
 use asid_core::{Capabilities, Difficulty, Layout, Levels, Result, Scene};
 
@@ -102,9 +102,7 @@ impl LaptopArticulation {
             ],
             signals: difficulty::signals(&levels, &sensors)?,
             proprioception: panda::proprioception(),
-            contact: ["finger_left", "finger_right", "hand"]
-                .map(|f| [f.into(), "lid".into()])
-                .into(),
+            contact: hand_on("lid"),
         };
         let downstream = DownstreamProtocol {
             metric: "lid_error_rad".into(),
@@ -133,6 +131,13 @@ impl LaptopArticulation {
             downstream,
         })
     }
+}
+
+/// Pairs of bodies that touch where the hand touches a part.
+fn hand_on(part: &str) -> Vec<[String; 2]> {
+    ["finger_left", "finger_right", "hand"]
+        .map(|body| [body.into(), part.into()])
+        .into()
 }
 
 /// What makes the task easier or harder.
@@ -292,6 +297,23 @@ impl Task for LaptopArticulation {
             position: format!("{part}_pos"),
             orientation: format!("{part}_quat"),
         }))
+    }
+
+    /// The lid is drawn as it is seen when it stands upright.
+    fn objects(&self) -> Vec<TrackedObject> {
+        let [x, y, z] = PLATE_HALF;
+        [("base", y), ("lid", z)]
+            .map(|(part, depth)| TrackedObject {
+                outline: Outline {
+                    label: part.into(),
+                    corners: crate::rectangle([0.0, 0.0], [x, depth]),
+                },
+                position: format!("{part}_pos"),
+                orientation: Some(format!("{part}_quat")),
+                contact: hand_on(part),
+                mass: None,
+            })
+            .into()
     }
 
     fn top_view(&self) -> TopView {

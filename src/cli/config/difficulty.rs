@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use anyhow::Result;
 use asid_core::{Levels, Task};
 
-use super::table::{numbers, read_table, section, set, text};
+use super::table::{numbers, read_table, section, set, text, wrong};
 use crate::cli::options::Common;
 
 /// Values of a task's difficulties, by name: those of the file, unless the command line names a
@@ -48,7 +48,10 @@ pub fn at(task: Box<dyn Task>, levels: &BTreeMap<String, f64>) -> Result<Box<dyn
     if *levels == Levels::new(task.difficulty()).values() {
         return Ok(task);
     }
-    Ok(task.adjusted(levels)?.unwrap_or(task))
+    task.adjusted(levels)?.ok_or_else(|| {
+        let message = "the task names difficulties and cannot be set to any".to_owned();
+        wrong("difficulty", message)
+    })
 }
 
 /// Takes the noise out of a file's settings that only repeats what followed from the file's own
