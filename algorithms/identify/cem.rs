@@ -63,4 +63,7 @@ impl Identifier for CemIdentifier {
     fn identify(&self, problem: &Problem<'_>, episodes: &[Episode]) -> Result<Identified> {
         search::identify(problem, episodes, self.budget(), &self.sampling, &self.cem)
     }
+    fn correlated(&self) -> bool {
+        self.sampling.correlated
+    }
 }

@@ -68,4 +68,7 @@ impl Identifier for CmaEsIdentifier {
             &self.cma_es,
         )
     }
+    fn correlated(&self) -> bool {
+        self.sampling.correlated
+    }
 }

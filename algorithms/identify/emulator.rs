@@ -19,10 +19,11 @@
 //! does not, and the loss is multiplied by the ratio of the two (a temperature).
 //! Nothing here selects points by how well they fit, which would bias it.
 
+use asid_core::precision::{Precision, inflation};
 use asid_core::rng::Rng;
 use nalgebra::{DMatrix, DVector};
 
-use super::precision::Precision;
+use super::walk::Walk;
 use crate::optimise::Gaussian;
 
 /// Ridge on the regression, relative to the number of points.
@@ -75,27 +76,6 @@ fn feature_slope(u: &[f64], k: usize) -> Vec<f64> {
         }
     }
     slope
-}
-
-/// By how much the variance of the unknowns is larger than the weights say: the sandwich formula, at
-/// slopes `b` (readings x entries), for roughness as it shows in `epsilon`.
-fn inflation(
-    precision: &Precision,
-    b: &DMatrix<f64>,
-    epsilon: &DMatrix<f64>,
-    freedom: f64,
-    sought: usize,
-) -> Option<f64> {
-    let n = b.ncols();
-    let bw = precision.weigh(&b.transpose());
-    // Standardised coordinates: what the data do not see keeps the region's width.
-    let h = &bw * b + DMatrix::identity(n, n) * 1e-9;
-    let projected = &bw * epsilon.transpose();
-    let middle = &bw * bw.transpose() + &projected * projected.transpose() / freedom;
-    let inverse = h.cholesky()?.inverse();
-    let sandwich = &inverse * middle * &inverse;
-    let inflated = (0..sought).map(|i| sandwich[(i, i)] / inverse[(i, i)]);
-    Some(inflated.fold(1.0, f64::max))
 }
 
 impl Emulator {
@@ -234,8 +214,6 @@ impl Emulator {
     /// `count` equally weighted points of the posterior, by a Metropolis walk inside the
     /// box and within reach of the region's middle.
     pub fn sample(&self, low: &[f64], high: &[f64], count: usize, rng: &mut Rng) -> Vec<Vec<f64>> {
-        use rand::Rng as _;
-        use rand_distr::{Distribution, StandardNormal};
         let n = self.region.mean().len();
         let inside = |u: &[f64]| {
             let x = self.region.unstandardise(u);
@@ -271,26 +249,13 @@ impl Emulator {
         else {
             return vec![self.region.unstandardise(&u); count];
         };
-        let shape = factor.l() * (2.4 / (n as f64).sqrt());
-        let mut loss = self.temperature * self.loss_at(&u);
-        let (warm_up, thin) = (2000, 10);
-        let mut out = Vec::with_capacity(count);
-        for i in 0..warm_up + count * thin {
-            let z = DVector::from_fn(n, |_, _| StandardNormal.sample(rng));
-            let step = &shape * z;
-            let next: Vec<f64> = (0..n).map(|k| u[k] + step[k]).collect();
-            let chance: f64 = rng.random();
-            if inside(&next) {
-                let next_loss = self.temperature * self.loss_at(&next);
-                if chance.ln() < loss - next_loss {
-                    (u, loss) = (next, next_loss);
-                }
-            }
-            if i >= warm_up && (i - warm_up) % thin == 0 {
-                out.push(self.region.unstandardise(&u));
-            }
-        }
-        out
+        let walk = Walk {
+            shape: factor.l(),
+            inside: &inside,
+            loss: &|u: &[f64]| self.temperature * self.loss_at(u),
+        };
+        let drawn = walk.draws(&u, count, rng);
+        drawn.iter().map(|u| self.region.unstandardise(u)).collect()
     }
 }
 

@@ -128,6 +128,16 @@ impl<'a> Likelihood<'a> {
         self.fixed.iter().filter(|f| f.is_none()).count()
     }
 
+    /// Names of the unknowns that are entries of a point.
+    #[must_use]
+    pub fn names(&self) -> Vec<&'a str> {
+        let unknowns = self.problem.parameters.iter().zip(&self.fixed);
+        unknowns
+            .filter(|(_, fixed)| fixed.is_none())
+            .map(|(p, _)| p.name.as_str())
+            .collect()
+    }
+
     /// Entries of a point.
     #[must_use]
     pub fn dimension(&self) -> usize {

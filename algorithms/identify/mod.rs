@@ -9,12 +9,14 @@ pub mod articulation;
 pub mod cem;
 pub mod cma_es;
 pub mod emulator;
+
+pub mod gauss_newton;
 pub mod likelihood;
 pub mod models;
-pub mod precision;
 pub mod reps;
 pub mod sampling;
 pub mod search;
+pub mod walk;
 
 pub use likelihood::Likelihood;
 pub use sampling::{Samples, SamplingSettings};

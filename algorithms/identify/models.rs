@@ -105,7 +105,9 @@ pub fn average(
             .unwrap_or(0);
         found.swap(0, best);
         found.truncate(1);
-        found[0].0.posterior = Posterior::from_samples(parameters, samples, &weights);
+        let unseen = std::mem::take(&mut found[0].0.posterior.unseen);
+        found[0].0.posterior =
+            Posterior::from_samples(parameters, samples, &weights).with_unseen(unseen);
     }
     found
         .pop()

@@ -63,4 +63,7 @@ impl Identifier for RepsIdentifier {
     fn identify(&self, problem: &Problem<'_>, episodes: &[Episode]) -> Result<Identified> {
         search::identify(problem, episodes, self.budget(), &self.sampling, &self.reps)
     }
+    fn correlated(&self) -> bool {
+        self.sampling.correlated
+    }
 }

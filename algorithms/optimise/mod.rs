@@ -2,19 +2,22 @@
 //!
 //! [`Search`] is what `cem`, `reps` and `cma-es` have in common: a normal distribution inside a box, draws
 //! from it, and the best that was seen. How the distribution follows what its draws cost is the
-//! [`UpdateRule`], and all that tells one algorithm from another.
+//! [`UpdateRule`], and all that tells one algorithm from another. [`gauss_newton`] minimises a sum of
+//! squares whose terms it sees.
 //!
 //! They know nothing of simulators, so a whole population is one batch call of
 //! the caller's.
 
 pub mod cem;
 pub mod cma_es;
+pub mod gauss_newton;
 pub mod gaussian;
 pub mod reps;
 pub mod search;
 
 pub use cem::{Cem, CemSettings};
 pub use cma_es::{CmaEs, CmaEsSettings};
+pub use gauss_newton::GaussNewtonSettings;
 pub use gaussian::Gaussian;
 pub use reps::{Reps, RepsSettings};
 pub use search::{Search, UpdateRule};

@@ -42,6 +42,12 @@ pub trait Identifier: Send + Sync {
     /// When the engine fails, every simulation diverges, or the user interrupts.
     fn identify(&self, problem: &Problem<'_>, episodes: &[Episode]) -> Result<Identified>;
 
+    /// Whether it weighs readings by how the luck of contact runs along an episode, or by its size
+    /// alone: what an episode is expected to tell is computed alike.
+    fn correlated(&self) -> bool {
+        false
+    }
+
     /// Learns to identify from episodes of `explorer` at truths drawn from the prior, and saves
     /// what was learned in `file`, from where the setting `identifier.network` loads it; false
     /// where the identifier learns nothing beforehand.

@@ -3,8 +3,9 @@
 use std::time::Instant;
 
 use crate::error::Result;
+use crate::expected::{ExpectedSettings, expected_deviation};
 use crate::explore::{CurvePoint, Explorer};
-use crate::fisher::{FisherBatch, FisherSettings};
+use crate::fisher::{FisherBatch, FisherSettings, Form};
 use crate::identify::{Identified, Identifier};
 use crate::posterior::Posterior;
 use crate::problem::Problem;
@@ -32,11 +33,32 @@ pub struct EpisodeInformation {
 
 /// Information of an episode with these actions (`horizon x action`) at `theta` and `start`.
 ///
+/// Rewards, `a_optimality`, `log_det` and `trace` are what `settings` say, as an explorer is paid.
+/// Expected deviations are those of [`expected_deviation`] where the settings ask for what identification sees
+/// (trajectory form, start pose estimated along, roughness counted), and follow from the rewards'
+/// information where they do not, and for binary unknowns.
+///
 /// # Errors
 /// When the engine fails.
 pub fn episode_information(
     problem: &Problem<'_>,
     settings: &FisherSettings,
+    theta: &[f64],
+    start: &[f64],
+    actions: &[f64],
+) -> Result<EpisodeInformation> {
+    let expected = ExpectedSettings::default();
+    episode_information_as(problem, settings, &expected, theta, start, actions)
+}
+
+/// [`episode_information`] with the noise model of an identifier.
+///
+/// # Errors
+/// When the engine fails.
+pub fn episode_information_as(
+    problem: &Problem<'_>,
+    settings: &FisherSettings,
+    expected: &ExpectedSettings,
     theta: &[f64],
     start: &[f64],
     actions: &[f64],
@@ -67,6 +89,19 @@ pub fn episode_information(
     out.a_optimality = information.a_optimality();
     out.log_det = information.log_det();
     out.trace = information.trace();
+    let as_identified =
+        settings.form == Form::Trajectory && settings.nuisance && settings.roughness;
+    if as_identified
+        && let Some(deviations) = expected_deviation(problem, expected, theta, start, actions)?
+    {
+        for (row, better) in out.expected_std.iter_mut().zip(deviations) {
+            for (std, x) in row.iter_mut().zip(better) {
+                if x.is_finite() {
+                    *std = x;
+                }
+            }
+        }
+    }
     Ok(out)
 }
 
@@ -168,9 +203,13 @@ pub fn run(
         ),
     };
     let information = match (&real, &identified) {
-        (Some(real), Some(found)) => episode_information(
+        (Some(real), Some(found)) => episode_information_as(
             problem,
             &FisherSettings::default(),
+            &ExpectedSettings {
+                correlated: method.identifier.is_some_and(Identifier::correlated),
+                ..ExpectedSettings::default()
+            },
             &belief.mean(),
             &found.starts[0],
             &real.actions,

@@ -19,6 +19,77 @@ pub struct Marginal {
     pub std: f64,
     /// Central 95 % interval.
     pub interval95: [f64; 2],
+    /// The end of the prior's range at which the posterior piles up, where it does: the true
+    /// value may lie beyond, and then no interval inside the range holds it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub at_edge: Option<Edge>,
+    /// Whether the data do not see it (see [`Posterior::unseen`]): what is believed of it is the
+    /// prior, and the deviation that the data alone leave is infinite.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub unidentified: bool,
+}
+
+/// An end of a prior's range.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Edge {
+    /// The smallest value.
+    Low,
+    /// The largest value.
+    High,
+}
+
+impl Edge {
+    /// Name in results.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Low => "low",
+            Self::High => "high",
+        }
+    }
+}
+
+/// A combination of unknowns that the data do not see.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Direction {
+    /// Name of each unknown that takes part, and its share in prior deviations; the squares of
+    /// all shares sum to 1.
+    pub weights: Vec<(String, f64)>,
+}
+
+/// Outer share of the prior's range that is asked for a pile.
+const OUTER: f64 = 0.1;
+
+/// A pile holds at least this many times what the prior puts into the outer share. A posterior that
+/// falls off from the edge with a deviation of a quarter of the range holds just that; a wider one tells
+/// too little to speak of a pile.
+const PILE: f64 = 3.0;
+
+/// An interval touches the edge if it ends nearer to it than this share of its width. The interval of a
+/// normal distribution cut at its mean ends at 0.014 of its width, an exponential one's at 0.007, one
+/// cut two deviations below its mean at 0.09.
+const TOUCH: f64 = 0.05;
+
+/// At which end of its range a posterior piles up, from positions in the range (0 to 1) with their
+/// weights, which sum to 1. A single value is no distribution and piles up nowhere.
+fn edge(positions: &[f64], weights: &[f64]) -> Option<Edge> {
+    if positions.len() < 2 {
+        return None;
+    }
+    let [low, high] = [0.025, 0.975].map(|q| weighted_quantile(positions, weights, q));
+    let touch = TOUCH * (high - low);
+    let held = |near: &dyn Fn(f64) -> bool| -> f64 {
+        let pairs = positions.iter().zip(weights);
+        pairs.filter(|(u, _)| near(**u)).map(|(_, w)| w).sum()
+    };
+    if low <= touch && held(&|u| u <= OUTER) >= PILE * OUTER {
+        Some(Edge::Low)
+    } else if 1.0 - high <= touch && held(&|u| u >= 1.0 - OUTER) >= PILE * OUTER {
+        Some(Edge::High)
+    } else {
+        None
+    }
 }
 
 /// Weighted samples of the parameters, `n x d`, in their units.
@@ -30,7 +101,15 @@ pub struct Posterior {
     pub samples: Vec<Vec<f64>>,
     /// Weights of the samples; they sum to 1.
     pub weights: Vec<f64>,
+    /// Combinations of unknowns that the data do not see, where the identifier looked for them;
+    /// along these the samples are the prior's.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub unseen: Vec<Direction>,
 }
+
+/// An unknown is unidentified if this share of its own direction (a squared cosine) lies in what the data do
+/// not see. Below it nine tenths of it and more are seen.
+const SHARE: f64 = 0.1;
 
 impl Posterior {
     /// Summarises weighted samples; weights need not be normalised.
@@ -68,6 +147,10 @@ impl Posterior {
                         weighted_quantile(&values, &weights, 0.025),
                         weighted_quantile(&values, &weights, 0.975),
                     ],
+                    at_edge: (!p.is_binary())
+                        .then(|| values.iter().map(|x| p.to_unit(*x)).collect::<Vec<_>>())
+                        .and_then(|positions| edge(&positions, &weights)),
+                    unidentified: false,
                 }
             })
             .collect();
@@ -75,7 +158,20 @@ impl Posterior {
             marginals,
             samples,
             weights,
+            unseen: Vec::new(),
         }
+    }
+
+    /// Says which directions the data do not see, and marks the unknowns that lie in them.
+    #[must_use]
+    pub fn with_unseen(mut self, unseen: Vec<Direction>) -> Self {
+        for marginal in &mut self.marginals {
+            let weights = unseen.iter().flat_map(|d| &d.weights);
+            let own = weights.filter(|(name, _)| *name == marginal.name);
+            marginal.unidentified = own.map(|(_, w)| w * w).sum::<f64>() > SHARE;
+        }
+        self.unseen = unseen;
+        self
     }
 
     /// The prior as `n` equally weighted samples: a stratified draw in each
@@ -183,6 +279,52 @@ mod tests {
             let posterior = Posterior::from_samples(&[parameter()], samples, &weights);
             assert_eq!(posterior.mean(), [1.0]);
         }
+    }
+
+    /// The edge of a posterior whose quantiles are those of `at`, a function of 0 to 1.
+    fn edge_of(at: impl Fn(f64) -> f64) -> Option<Edge> {
+        let n = 2000;
+        let samples = (0..n).map(|i| vec![at((f64::from(i) + 0.5) / f64::from(n))]);
+        let posterior =
+            Posterior::from_samples(&[parameter()], samples.collect(), &vec![1.0; n as usize]);
+        posterior.marginals[0].at_edge
+    }
+
+    #[test]
+    fn a_pile_at_an_edge_is_named() {
+        // Exponential fall-off from either end, by a twentieth of the range.
+        let fall = |q: f64| -0.05 * (1.0 - q).ln();
+        assert_eq!(edge_of(|q| fall(q).min(1.0)), Some(Edge::Low));
+        assert_eq!(edge_of(|q| 1.0 - fall(q).min(1.0)), Some(Edge::High));
+        // All at the edge.
+        assert_eq!(edge_of(|_| 0.0), Some(Edge::Low));
+    }
+
+    #[test]
+    fn a_posterior_inside_and_one_that_knows_nothing_pile_up_nowhere() {
+        // The prior itself, a narrow one close to the edge, and one that knows little.
+        assert_eq!(edge_of(|q| q), None);
+        assert_eq!(edge_of(|q| 0.01 + 0.005 * q), None);
+        assert_eq!(edge_of(|q| q.powf(1.5)), None);
+        // A logistic one, cut nowhere, three of its scales from the edge at the 2.5 % quantile.
+        assert_eq!(
+            edge_of(|q| (0.2 + 0.02 * (q / (1.0 - q)).ln()).max(0.0)),
+            None
+        );
+    }
+
+    #[test]
+    fn what_the_data_do_not_see_is_marked() {
+        let posterior = Posterior::from_samples(&[parameter()], vec![vec![0.5]], &[1.0]);
+        let of = |share: f64| Direction {
+            weights: vec![
+                ("p".into(), share),
+                ("q".into(), (1.0 - share * share).sqrt()),
+            ],
+        };
+        let seen = posterior.clone().with_unseen(vec![of(0.1)]);
+        assert!(!seen.marginals[0].unidentified && seen.unseen.len() == 1);
+        assert!(posterior.with_unseen(vec![of(0.7)]).marginals[0].unidentified);
     }
 
     #[test]

@@ -7,6 +7,7 @@ use std::time::Instant;
 use anyhow::Result;
 use asid_algorithms::identify::articulation::Articulation;
 use asid_core::identify::Identified;
+use asid_core::posterior::Direction;
 use asid_core::registry::{IdentifierEntry, find};
 use asid_core::{Episode, Error, Parameter};
 use asid_report::run::{RealWorld, RunReport};
@@ -16,7 +17,8 @@ use super::config::Stage;
 use super::options::{Algorithms, Common, Simulator, Worlds};
 use super::output::{OutFolder, write_json};
 use super::result::{
-    CostResult, ParameterResult, SCHEMA, Versions, articulation, articulation_line, figure,
+    CostResult, ParameterResult, SCHEMA, Versions, articulation, articulation_line, caveats,
+    parameter_line,
 };
 use super::session::Session;
 use super::{failure, stage, trace};
@@ -62,6 +64,9 @@ struct IdentifyResult {
     identifier: String,
     seed: u64,
     parameters: Vec<ParameterResult>,
+    /// Combinations of unknowns that the logs do not see.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    unseen: Vec<Direction>,
     #[serde(skip_serializing_if = "Option::is_none")]
     articulation: Option<Articulation>,
     /// Root mean square of the residuals at the best fit, in standard deviations of the noise.
@@ -116,6 +121,7 @@ pub fn identify(arguments: &Arguments) -> Result<()> {
             .iter()
             .map(|m| ParameterResult::new(m, None))
             .collect(),
+        unseen: found.posterior.unseen.clone(),
         articulation: articulation(&session, &episodes)?,
         residual: found.residual,
         starts: found
@@ -135,25 +141,21 @@ pub fn identify(arguments: &Arguments) -> Result<()> {
         .posterior
         .marginals
         .iter()
-        .map(|m| {
-            let [low, high] = m.interval95.map(figure);
-            let [estimate, std] = [m.estimate, m.std].map(figure);
-            format!(
-                "{}: {estimate} ± {std} {} (95 %: {low} to {high})",
-                m.name, m.unit
-            )
-        })
+        .map(parameter_line)
         .collect();
     lines.extend(result.articulation.as_ref().map(articulation_line));
     lines.push(format!(
         "residual: {:.2} times the sensors' noise",
         found.residual
     ));
+    let caveats = caveats(&session.parameters, &found.posterior);
+    lines.extend(caveats.iter().cloned());
     let names = copies(arguments.log.len());
     let mut report = report(&session, &episodes, &found, &names, wall_s)?;
     report
         .notes
         .extend(result.articulation.as_ref().map(articulation_line));
+    report.notes.extend(caveats);
     stage::finish(&session, common, &out, &result, &report, &lines, |folder| {
         write_json(&folder.join("posterior.json"), &found.posterior)?;
         for (path, name) in arguments.log.iter().zip(&names) {

@@ -2,8 +2,8 @@
 
 use asid_algorithms::identify::articulation::{Articulation, Joint, of_episodes};
 use asid_core::pipeline::{EpisodeInformation, RunOutcome};
-use asid_core::posterior::Marginal;
-use asid_core::{Episode, Result};
+use asid_core::posterior::{Direction, Edge, Marginal};
+use asid_core::{Episode, Parameter, Posterior, Result};
 use serde::Serialize;
 
 use super::session::Session;
@@ -29,8 +29,15 @@ pub struct ParameterResult {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub truth: Option<f64>,
     pub estimate: f64,
-    pub std: f64,
+    /// Null where the data do not see it: their deviation is infinite, which JSON cannot say.
+    pub std: Option<f64>,
     pub interval95: [f64; 2],
+    /// End of the prior's range that the posterior piles up at.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub at_edge: Option<Edge>,
+    /// The data do not see it: what is said of it is the prior.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub unidentified: bool,
 }
 
 impl ParameterResult {
@@ -40,8 +47,10 @@ impl ParameterResult {
             unit: marginal.unit.clone(),
             truth,
             estimate: marginal.estimate,
-            std: marginal.std,
+            std: (!marginal.unidentified).then_some(marginal.std),
             interval95: marginal.interval95,
+            at_edge: marginal.at_edge,
+            unidentified: marginal.unidentified,
         }
     }
 }
@@ -114,6 +123,8 @@ pub struct RunResult {
     seed: u64,
     real: RealResult,
     parameters: Vec<ParameterResult>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    unseen: Vec<Direction>,
     exploration: ExplorationResult,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub articulation: Option<Articulation>,
@@ -154,6 +165,7 @@ impl RunResult {
                 .zip(truth)
                 .map(|(m, &t)| ParameterResult::new(m, Some(t)))
                 .collect(),
+            unseen: outcome.belief.unseen.clone(),
             exploration: ExplorationResult::new(
                 &outcome.objective,
                 &outcome.information,
@@ -169,6 +181,50 @@ impl RunResult {
             versions: Versions::of(session),
         })
     }
+}
+
+/// `name: 0.31 ± 0.02 m (95 %: 0.27 to 0.35)` of an unknown, for people.
+pub fn parameter_line(m: &Marginal) -> String {
+    let [low, high] = m.interval95.map(figure);
+    let deviation = if m.unidentified {
+        "(not seen by the data)".to_owned()
+    } else {
+        format!("± {} {}", figure(m.std), m.unit)
+    };
+    format!(
+        "{}: {} {deviation} (95 %: {low} to {high})",
+        m.name,
+        figure(m.estimate)
+    )
+}
+
+/// What has to be said of a posterior beside its figures: where it piles up at an end of the
+/// prior's range, and what the data do not see.
+pub fn caveats(parameters: &[Parameter], belief: &Posterior) -> Vec<String> {
+    let edges = parameters.iter().zip(&belief.marginals).filter_map(|(p, m)| {
+        let end = m.at_edge?;
+        let [low, high] = p.range.map(figure);
+        let (unit, space) = (&p.unit, if p.unit.is_empty() { "" } else { " " });
+        Some(format!(
+            "{name} piles up at the {end} end of its range, {low} to {high}{space}{unit}: its true value may lie \
+             beyond, where no interval of this prior reaches; if that is possible, widen it with \
+             --set parameter.{name}.range=[LOW,HIGH]",
+            name = p.name,
+            end = end.name(),
+        ))
+    });
+    let unseen = belief.unseen.iter().map(|direction| {
+        let parts: Vec<String> = direction
+            .weights
+            .iter()
+            .map(|(name, w)| format!("{w:+.2} {name}"))
+            .collect();
+        format!(
+            "the data do not see {} (in prior deviations): along it the posterior is the prior",
+            parts.join(" ")
+        )
+    });
+    edges.chain(unseen).collect()
 }
 
 /// How the task's two tracked parts are joined, from real episodes; `None` where it has no

@@ -9,7 +9,7 @@ use asid_core::registry::{ExplorerEntry, IdentifierEntry, SolverEntry, find};
 
 use super::options::{Algorithms, Common, Worlds};
 use super::output::{OutFolder, write_json, write_text};
-use super::result::{RunResult, articulation_line, figure};
+use super::result::{RunResult, articulation_line, caveats, figure, parameter_line};
 use super::session::Session;
 use super::trace;
 
@@ -44,6 +44,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     report
         .notes
         .extend(result.articulation.as_ref().map(articulation_line));
+    let caveats = caveats(&session.parameters, &outcome.belief);
+    report.notes.extend(caveats.iter().cloned());
     out.write(|folder| {
         write_json(&folder.join("result.json"), &result)?;
         write_text(
@@ -66,13 +68,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         return Ok(());
     }
     for (m, t) in outcome.belief.marginals.iter().zip(&truth) {
-        let [estimate, std, low, high, truth] =
-            [m.estimate, m.std, m.interval95[0], m.interval95[1], *t].map(figure);
-        writeln!(
-            stdout,
-            "{}: {estimate} ± {std} {} (95 %: {low} to {high}), truth {truth}",
-            m.name, m.unit
-        )?;
+        writeln!(stdout, "{}, truth {}", parameter_line(m), figure(*t))?;
     }
     if let Some(found) = &result.articulation {
         writeln!(stdout, "{}", articulation_line(found))?;
@@ -91,6 +87,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             "failure"
         }
     )?;
+    for caveat in &caveats {
+        writeln!(stdout, "{caveat}")?;
+    }
     let cost = session.cost(wall_s);
     writeln!(
         stdout,

@@ -200,7 +200,7 @@ pub fn parameters(
                 log_scale: p.scale == Scale::Log,
                 truth: truth.map(|t| t[i]),
                 estimate: m.estimate,
-                std: m.std,
+                std: if m.unidentified { f64::NAN } else { m.std },
                 interval95: m.interval95,
                 prior: Some(match p.scale {
                     Scale::Linear | Scale::Binary(_) => r::Prior::Uniform { low, high },

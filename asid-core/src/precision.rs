@@ -62,6 +62,28 @@ impl Precision {
     }
 }
 
+/// By how much the variance of the unknowns is larger than the weights say: the sandwich formula, at
+/// slopes `b` (readings x entries), for roughness as it shows in `epsilon`.
+#[must_use]
+pub fn inflation(
+    precision: &Precision,
+    b: &DMatrix<f64>,
+    epsilon: &DMatrix<f64>,
+    freedom: f64,
+    sought: usize,
+) -> Option<f64> {
+    let n = b.ncols();
+    let bw = precision.weigh(&b.transpose());
+    // Standardised coordinates: what the data do not see keeps the region's width.
+    let h = &bw * b + DMatrix::identity(n, n) * 1e-9;
+    let projected = &bw * epsilon.transpose();
+    let middle = &bw * bw.transpose() + &projected * projected.transpose() / freedom;
+    let inverse = h.cholesky()?.inverse();
+    let sandwich = &inverse * middle * &inverse;
+    let inflated = (0..sought).map(|i| sandwich[(i, i)] / inverse[(i, i)]);
+    Some(inflated.fold(1.0, f64::max))
+}
+
 fn scale_columns(x: &mut DMatrix<f64>, by: &DVector<f64>) {
     for (mut column, &factor) in x.column_iter_mut().zip(by) {
         column *= factor;

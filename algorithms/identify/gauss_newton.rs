@@ -1,0 +1,274 @@
+//! Identification by Gauss-Newton: damped least squares from several starts of the prior, slopes by
+//! central differences in batches, and a posterior from the normal matrix.
+//!
+//! What the readings do not see is named. A direction of the unknowns is *unseen* where the readings alone
+//! leave it a deviation of the whole range of the prior (an information below 1/12 in prior deviations,
+//! since the range is the square root of 12 of them wide). Along it the posterior is the prior.
+
+use asid_core::identify::{Identified, Identifier, IterationSummary};
+use asid_core::posterior::Direction;
+use asid_core::registry;
+use asid_core::rng::Rng;
+use asid_core::{Episode, Error, Parameter, Posterior, Problem, Result};
+use nalgebra::{DMatrix, DVector};
+use serde::{Deserialize, Serialize};
+
+use super::Likelihood;
+use super::models;
+use super::sampling::{self, Evidence};
+use super::walk::{self, Walk};
+use crate::optimise::GaussNewtonSettings;
+use crate::optimise::gauss_newton::{Fit, Space, minimise};
+use crate::optimise::require;
+
+/// Information in prior deviations below which a direction is unseen; see the module.
+const UNSEEN: f64 = 1.0 / 12.0;
+
+/// Share of an unknown below which it is left out of a direction's name.
+const NAMED: f64 = 0.1;
+
+/// Settings of identification by Gauss-Newton.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct GaussNewtonIdentifier {
+    /// Search and the fits at its end.
+    pub gauss_newton: GaussNewtonSettings,
+    /// Samples of the posterior that are kept.
+    pub samples: usize,
+}
+
+impl Default for GaussNewtonIdentifier {
+    fn default() -> Self {
+        Self {
+            gauss_newton: GaussNewtonSettings::default(),
+            samples: 1000,
+        }
+    }
+}
+
+asid_core::register!(IdentifierEntry {
+    name: "gauss-newton",
+    about: "damped least squares from several starts, posterior from the normal matrix",
+    defaults: registry::defaults::<GaussNewtonIdentifier>,
+    make: |s| {
+        let identifier: GaussNewtonIdentifier = registry::settings("identifier", s)?;
+        identifier.gauss_newton.check("identifier.gauss_newton")?;
+        let samples = identifier.samples;
+        let key = "identifier.samples";
+        require(samples > 1, key, samples as f64, "at least 2")?;
+        Ok(Box::new(identifier))
+    },
+});
+
+impl Identifier for GaussNewtonIdentifier {
+    fn identify(&self, problem: &Problem<'_>, episodes: &[Episode]) -> Result<Identified> {
+        let starts = problem.task.exploration().start.len() * episodes.len();
+        let settings = &self.gauss_newton;
+        let size = settings.batch(problem.parameters.len() + starts);
+        let mut likelihood = Likelihood::new(problem, episodes, size)?;
+        let models = models::all(problem.parameters)?;
+        let units = (settings.iterations + settings.rounds) * models.len();
+        problem.progress.begin("identify", units as u64);
+        let mut found = Vec::with_capacity(models.len());
+        for model in models {
+            likelihood.hold(&model);
+            found.extend(self.of_model(problem, &mut likelihood, episodes.len())?);
+        }
+        problem.progress.end();
+        if found.is_empty() {
+            let message = "nearly every simulation of the episode diverged";
+            return Err(Error::Failed(message.into()));
+        }
+        models::average(problem.parameters, found, likelihood.present())
+    }
+
+    fn correlated(&self) -> bool {
+        self.gauss_newton.correlated
+    }
+}
+
+impl GaussNewtonIdentifier {
+    /// The fit of one model; `None` where nearly every simulation diverged.
+    fn of_model(
+        &self,
+        problem: &Problem<'_>,
+        likelihood: &mut Likelihood<'_>,
+        episodes: usize,
+    ) -> Result<Option<(Identified, Evidence)>> {
+        let (low, high) = likelihood.bounds();
+        let sought = likelihood.sought();
+        let space = Space {
+            low: &low,
+            high: &high,
+            sought,
+            readings: likelihood.present(),
+        };
+        // The same draws for every model: where the data tell nothing, so does the comparison.
+        let mut rng = problem.streams.stream("identify");
+        let fit = minimise(
+            &self.gauss_newton,
+            &mut |points| likelihood.residuals(points),
+            space,
+            &mut rng,
+            || problem.progress.advance(1),
+        )?;
+        let Some(fit) = fit else { return Ok(None) };
+        let seen = Seen::new(&fit, sought);
+        let drawn = seen.sample(self.samples, &mut rng);
+        let values: Vec<Vec<f64>> = drawn.iter().map(|z| likelihood.parameters(z)).collect();
+        let narrowing = (0..sought).map(|i| walk::deviation(&drawn, i).clamp(1e-9, 1.0).ln());
+        let evidence = Evidence {
+            loss: 0.5 * fit.residual.powi(2) * space.readings as f64,
+            narrowing: narrowing.sum(),
+        };
+        let names: Vec<&str> = likelihood.names();
+        let weights = vec![1.0; drawn.len()];
+        let posterior = Posterior::from_samples(problem.parameters, values, &weights)
+            .with_unseen(seen.unseen(&names));
+        let course = fit.course.iter();
+        let iterations: Vec<IterationSummary> = course
+            .map(|(best, points)| sampling::summary(likelihood, points, *best))
+            .chain([sampling::summary(
+                likelihood,
+                &drawn,
+                fit.course.last().map_or(evidence.loss, |c| c.0),
+            )])
+            .collect();
+        let identified = Identified {
+            posterior,
+            starts: (0..episodes)
+                .map(|k| likelihood.start(&fit.point, k))
+                .collect(),
+            iterations,
+            residual: fit.residual,
+            roughness: fit.roughness,
+        };
+        Ok(Some((identified, evidence)))
+    }
+}
+
+/// What the readings see of the unknowns: information by directions.
+struct Seen {
+    middle: DVector<f64>,
+    at: Vec<f64>,
+    directions: DMatrix<f64>,
+    /// Information along each direction; zero where it is unseen.
+    information: Vec<f64>,
+}
+
+impl Seen {
+    fn new(fit: &Fit, sought: usize) -> Self {
+        let eigen = fit.about(sought).symmetric_eigen();
+        let see = |v: &f64| if *v < UNSEEN { 0.0 } else { *v };
+        Self {
+            middle: DVector::from_column_slice(&fit.free[..sought]),
+            at: fit.point[..sought].to_vec(),
+            information: eigen.eigenvalues.iter().map(see).collect(),
+            directions: eigen.eigenvectors,
+        }
+    }
+
+    /// The directions that no reading sees, by the names of the unknowns.
+    fn unseen(&self, names: &[&str]) -> Vec<Direction> {
+        let unseen = (0..self.information.len()).filter(|&k| self.information[k] == 0.0);
+        unseen
+            .map(|k| {
+                let column = self.directions.column(k);
+                // An axis has no sign: its largest share is positive.
+                let sign = column[column.iamax()].signum();
+                Direction {
+                    weights: names
+                        .iter()
+                        .zip(column.iter())
+                        .filter(|(_, w)| w.abs() >= NAMED)
+                        .map(|(name, w)| ((*name).to_owned(), sign * w))
+                        .collect(),
+                }
+            })
+            .collect()
+    }
+
+    /// Draws of the posterior: normal as the information has it, and inside the prior's range.
+    fn sample(&self, count: usize, rng: &mut Rng) -> Vec<Vec<f64>> {
+        let d = self.at.len();
+        let matrix = &self.directions
+            * DMatrix::from_diagonal(&DVector::from_column_slice(&self.information))
+            * self.directions.transpose();
+        let bound = Parameter::scaled_bound();
+        let inside = |z: &[f64]| z.iter().all(|x| x.abs() <= bound);
+        let loss = |z: &[f64]| {
+            let off = DVector::from_column_slice(z) - &self.middle;
+            0.5 * off.dot(&(&matrix * &off))
+        };
+        let Some(root) =
+            asid_core::information::inverse_above_prior(&(&matrix + DMatrix::identity(d, d)))
+                .cholesky()
+        else {
+            return vec![self.at.clone(); count];
+        };
+        let walk = Walk {
+            shape: root.l(),
+            inside: &inside,
+            loss: &loss,
+        };
+        walk.draws(&self.at, count, rng)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use asid_core::Streams;
+
+    fn seen(point: &[f64], information: &[f64]) -> Seen {
+        let n = point.len();
+        let fit = Fit {
+            point: point.iter().map(|x| x.clamp(-1.7, 1.7)).collect(),
+            free: point.to_vec(),
+            information: DMatrix::from_row_slice(n, n, information),
+            residual: 1.0,
+            roughness: 0.0,
+            course: Vec::new(),
+        };
+        Seen::new(&fit, n)
+    }
+
+    #[test]
+    fn an_unseen_sum_or_difference_is_named() {
+        // 100 about the sum of two unknowns, nothing about their difference.
+        let found = seen(&[0.2, 0.1], &[100.0, 100.0, 100.0, 100.0]);
+        let unseen = found.unseen(&["a", "b"]);
+        assert_eq!(unseen.len(), 1);
+        let [(a, x), (b, y)] = &unseen[0].weights[..] else {
+            unreachable!("{unseen:?}")
+        };
+        assert_eq!([a.as_str(), b.as_str()], ["a", "b"]);
+        let root = 0.5_f64.sqrt();
+        assert!((x.abs() - root).abs() < 1e-9 && (x + y).abs() < 1e-9);
+        // Along it the draws spread over the whole range, across it they do not.
+        let drawn = found.sample(4000, &mut Streams::new(0).stream("t"));
+        let across: Vec<Vec<f64>> = drawn
+            .iter()
+            .map(|z| vec![z[0] + z[1], z[0] - z[1]])
+            .collect();
+        assert!((walk::deviation(&across, 0) - 0.1).abs() < 0.02);
+        assert!(walk::deviation(&across, 1) > 1.5);
+    }
+
+    #[test]
+    fn draws_have_the_deviation_that_the_information_says() {
+        let found = seen(&[0.3], &[400.0]);
+        assert!(found.unseen(&["a"]).is_empty());
+        let drawn = found.sample(4000, &mut Streams::new(1).stream("t"));
+        assert!((walk::deviation(&drawn, 0) / 0.05 - 1.0).abs() < 0.1);
+    }
+
+    #[test]
+    fn a_minimum_outside_of_the_range_piles_up_at_its_edge() {
+        // 5 deviations outside: density falls off by e over a fifth of a deviation.
+        let found = seen(&[1.732 + 0.5], &[100.0]);
+        let drawn = found.sample(4000, &mut Streams::new(2).stream("t"));
+        let mean = drawn.iter().map(|z| 1.732 - z[0]).sum::<f64>() / 4000.0;
+        assert!((mean / 0.0187 - 1.0).abs() < 0.2, "{mean}");
+    }
+}

@@ -1,0 +1,509 @@
+//! Bounded least squares by Gauss-Newton steps with Levenberg-Marquardt's damping, from several starts at
+//! once, for residuals that are known only by evaluating them, and rough.
+//!
+//! An iteration is two batches: the points of central differences around every start, then steps of several
+//! dampings from each, of which the best is taken. Steps of the differences follow the deviations that the
+//! last fit left, so that they shrink with what is known and average what is rough. In the end
+//! a [`LocalFit`] over the region of the posterior gives estimate and information, as an
+//! identification by emulation does, with a straight line for its quadratic.
+
+use asid_core::Result;
+use asid_core::information::inverse_above_prior;
+use asid_core::local_fit::{LocalFit, Told, design, sets};
+use asid_core::rng::Rng;
+use nalgebra::{DMatrix, DVector};
+use serde::{Deserialize, Serialize};
+
+use super::require;
+
+/// Whitened residuals at many points: `None` where the evaluation failed.
+pub type Residuals<'r> = dyn FnMut(&[Vec<f64>]) -> Result<Vec<Option<Vec<f64>>>> + 'r;
+
+/// How a search by Gauss-Newton goes on.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct GaussNewtonSettings {
+    /// Points of the box that are looked at for starts.
+    pub screened: usize,
+    /// Starts: the best of these points. Contact makes valleys beside the right one.
+    pub starts: usize,
+    /// Most iterations from each start.
+    pub iterations: usize,
+    /// First half step of the differences, in units of the entries (prior deviations).
+    pub step: f64,
+    /// First damping, relative to the curvature.
+    pub damping: f64,
+    /// Fits over the region of the posterior, each narrower or wider as the one before says.
+    pub rounds: usize,
+    /// Deviations of that region in units of the posterior's.
+    pub widen: f64,
+    /// Whether readings are weighed by how roughness runs along them, or by its size alone.
+    pub correlated: bool,
+}
+
+impl Default for GaussNewtonSettings {
+    fn default() -> Self {
+        Self {
+            screened: 64,
+            starts: 4,
+            iterations: 10,
+            step: 0.3,
+            damping: 0.1,
+            rounds: 4,
+            widen: 2.0,
+            correlated: false,
+        }
+    }
+}
+
+impl GaussNewtonSettings {
+    /// Checks the settings; `key` is where they stand in a configuration.
+    ///
+    /// # Errors
+    /// When one is out of its domain.
+    pub fn check(&self, key: &str) -> Result<()> {
+        for (name, value) in [
+            ("screened", self.screened),
+            ("starts", self.starts),
+            ("iterations", self.iterations),
+            ("rounds", self.rounds),
+        ] {
+            require(
+                value > 0,
+                &format!("{key}.{name}"),
+                value as f64,
+                "at least 1",
+            )?;
+        }
+        for (name, value) in [
+            ("step", self.step),
+            ("damping", self.damping),
+            ("widen", self.widen),
+        ] {
+            let ok = value > 0.0 && value.is_finite();
+            require(ok, &format!("{key}.{name}"), value, "above 0")?;
+        }
+        Ok(())
+    }
+
+    /// Points that are evaluated in one batch at most, for `n` entries.
+    #[must_use]
+    pub fn batch(&self, n: usize) -> usize {
+        let differences = self.starts * (1 + 2 * n);
+        let region = 1 + 2 * n * sets(n);
+        self.screened
+            .max(differences)
+            .max(self.starts * DAMPINGS.len())
+            .max(region)
+    }
+}
+
+/// Dampings that are tried at once, in units of the present one.
+const DAMPINGS: [f64; 4] = [0.1, 1.0, 10.0, 100.0];
+
+/// Half steps of differences are never below this, in units of the entries: less is rounding where
+/// simulations hold six digits.
+const LEAST_STEP: f64 = 1e-3;
+
+/// A start has arrived once its step is below this share of the differences' steps.
+const ARRIVED: f64 = 0.01;
+
+/// Curvature that damping takes for granted where the residuals do not bend, in units of the entries.
+const FLAT: f64 = 1e-3;
+
+/// How far a step in the last fits may go, in half steps of the region: beyond the straight line says nothing.
+const REACH: f64 = 1.5;
+
+/// What to minimise over.
+#[derive(Clone, Copy, Debug)]
+pub struct Space<'s> {
+    /// Smallest value of each entry.
+    pub low: &'s [f64],
+    /// Largest value of each entry.
+    pub high: &'s [f64],
+    /// Leading entries that are unknowns; the others are estimated along.
+    pub sought: usize,
+    /// Residual entries that are present; the others are zero.
+    pub readings: usize,
+}
+
+/// A minimum and what is known of it.
+#[derive(Clone, Debug)]
+pub struct Fit {
+    /// Point with the smallest weighted sum of squares inside the box.
+    pub point: Vec<f64>,
+    /// The same without the box: where the straight line has it, perhaps outside.
+    pub free: Vec<f64>,
+    /// Information about the entries, without any prior: roughness, its correlation, and what misfit
+    /// remains are in it.
+    pub information: DMatrix<f64>,
+    /// Root mean square of the residuals at the point, by the straight line.
+    pub residual: f64,
+    /// Root mean square of the roughness, in units of the readings' noise.
+    pub roughness: f64,
+    /// Half the smallest sum of squares seen after each iteration, and the points evaluated in it.
+    pub course: Vec<(f64, Vec<Vec<f64>>)>,
+}
+
+impl Fit {
+    /// Information about the `sought` leading entries, the others projected out.
+    #[must_use]
+    pub fn about(&self, sought: usize) -> DMatrix<f64> {
+        let n = self.information.nrows();
+        let block = |i: usize, j: usize, h: usize, w: usize| {
+            self.information.view((i, j), (h, w)).into_owned()
+        };
+        let own = block(0, 0, sought, sought);
+        if n == sought {
+            return own;
+        }
+        let across = block(0, sought, sought, n - sought);
+        let rest = block(sought, sought, n - sought, n - sought)
+            + DMatrix::identity(n - sought, n - sought) * FLAT;
+        let Some(factor) = rest.cholesky() else {
+            return own * 0.0;
+        };
+        let left = own - &across * factor.solve(&across.transpose());
+        (&left + left.transpose()) * 0.5
+    }
+}
+
+/// One of the starts on its way.
+struct Walker {
+    point: Vec<f64>,
+    steps: Vec<f64>,
+    damping: f64,
+    loss: f64,
+    /// Whether it has arrived, or gets no further.
+    done: bool,
+}
+
+/// Minimises the sum of squares; `None` where nearly every evaluation failed.
+///
+/// # Errors
+/// As `residuals`.
+pub fn minimise(
+    settings: &GaussNewtonSettings,
+    residuals: &mut Residuals<'_>,
+    space: Space<'_>,
+    rng: &mut Rng,
+    mut tick: impl FnMut(),
+) -> Result<Option<Fit>> {
+    let Some(mut walkers) = screen(settings, residuals, space, rng)? else {
+        return Ok(None);
+    };
+    let mut course = Vec::new();
+    for _ in 0..settings.iterations {
+        let seen = iterate(settings, residuals, space, &mut walkers)?;
+        let best = walkers.iter().map(|w| w.loss).fold(f64::INFINITY, f64::min);
+        course.push((best, seen));
+        tick();
+    }
+    let Some(best) = walkers
+        .into_iter()
+        .min_by(|a, b| a.loss.total_cmp(&b.loss))
+        .filter(|w| w.loss.is_finite())
+    else {
+        return Ok(None);
+    };
+    settle(settings, residuals, space, best, course, rng, tick)
+}
+
+fn half_squares(row: &[f64]) -> f64 {
+    0.5 * row.iter().map(|x| x * x).sum::<f64>()
+}
+
+/// The best of points spread over the box: its middle, and draws.
+fn screen(
+    settings: &GaussNewtonSettings,
+    residuals: &mut Residuals<'_>,
+    space: Space<'_>,
+    rng: &mut Rng,
+) -> Result<Option<Vec<Walker>>> {
+    use rand::Rng as _;
+    let n = space.low.len();
+    let mut points = vec![vec![0.0; n]];
+    while points.len() < settings.screened {
+        // Entries that are estimated along are sought around zero, one deviation to either side.
+        let point = (0..n).map(|i| {
+            let u: f64 = rng.random();
+            if i < space.sought {
+                space.low[i] + u * (space.high[i] - space.low[i])
+            } else {
+                (2.0 * u - 1.0).clamp(space.low[i], space.high[i])
+            }
+        });
+        points.push(point.collect());
+    }
+    for point in &mut points {
+        clamp(point, space);
+    }
+    let rows = residuals(&points)?;
+    let mut walkers: Vec<Walker> = points
+        .into_iter()
+        .zip(rows)
+        .filter_map(|(point, row)| {
+            Some(Walker {
+                loss: half_squares(&row?),
+                steps: vec![settings.step; n],
+                damping: settings.damping,
+                point,
+                done: false,
+            })
+        })
+        .collect();
+    walkers.sort_by(|a, b| a.loss.total_cmp(&b.loss));
+    walkers.truncate(settings.starts);
+    Ok((!walkers.is_empty()).then_some(walkers))
+}
+
+/// One step of every start that has not arrived; returns what was evaluated.
+fn iterate(
+    settings: &GaussNewtonSettings,
+    residuals: &mut Residuals<'_>,
+    space: Space<'_>,
+    walkers: &mut [Walker],
+) -> Result<Vec<Vec<f64>>> {
+    let n = space.low.len();
+    let mut seen = Vec::new();
+    let moving: Vec<usize> = (0..walkers.len()).filter(|&i| !walkers[i].done).collect();
+    let around: Vec<Vec<Vec<f64>>> = moving
+        .iter()
+        .map(|&i| differences(&walkers[i], space))
+        .collect();
+    seen.extend(around.iter().flatten().cloned());
+    if seen.is_empty() {
+        return Ok(seen);
+    }
+    let rows = residuals(&seen)?;
+    let mut fits = Vec::new();
+    let mut trials: Vec<Vec<f64>> = Vec::new();
+    for ((&i, points), rows) in moving.iter().zip(&around).zip(rows.chunks(1 + 2 * n)) {
+        let walker = &mut walkers[i];
+        let factor = DMatrix::from_diagonal(&DVector::from_column_slice(&walker.steps));
+        let fit = rows[0]
+            .as_ref()
+            .and_then(|row| LocalFit::new(&points[0], row, &factor, &points[1..], &rows[1..]));
+        let Some((fit, told)) = fit.and_then(|f| f.told(false).map(|t| (f, t))) else {
+            walker.done = true;
+            continue;
+        };
+        for by in DAMPINGS {
+            let step = damped(&fit, &told, walker, by * walker.damping, space);
+            let mut point: Vec<f64> = walker.point.iter().zip(&step).map(|(x, s)| x + s).collect();
+            clamp(&mut point, space);
+            trials.push(point);
+        }
+        fits.push((i, fit, told));
+    }
+    if trials.is_empty() {
+        return Ok(seen);
+    }
+    let rows = residuals(&trials)?;
+    for (((i, fit, told), rows), points) in fits
+        .iter()
+        .zip(rows.chunks(DAMPINGS.len()))
+        .zip(trials.chunks(DAMPINGS.len()))
+    {
+        let walker = &mut walkers[*i];
+        // Compared with the same weights: those of the readings around where it stands.
+        let weighted = |row: &[f64]| {
+            let row = DMatrix::from_row_slice(1, row.len(), row);
+            0.5 * told.precision.weigh(&row).component_mul(&row).sum()
+        };
+        let here = weighted(fit.middle().as_slice());
+        let best = (0..points.len())
+            .filter_map(|k| rows[k].as_ref().map(|r| (k, weighted(r), half_squares(r))))
+            .min_by(|a, b| a.1.total_cmp(&b.1));
+        match best {
+            Some((k, loss, plain)) if loss < here => {
+                let far = (0..n)
+                    .map(|j| ((points[k][j] - walker.point[j]) / walker.steps[j]).abs())
+                    .fold(0.0, f64::max);
+                walker.done = far < ARRIVED;
+                walker.damping = (walker.damping * DAMPINGS[k]).clamp(1e-9, 1e9);
+                walker.point.clone_from(&points[k]);
+                walker.loss = plain;
+            }
+            _ => {
+                // No step helps at any damping: as good as the luck of single points allows.
+                walker.damping *= DAMPINGS[DAMPINGS.len() - 1];
+                walker.done = walker.damping > 1e6;
+            }
+        }
+        let prior = DMatrix::identity(n, n);
+        let covariance = inverse_above_prior(&(&told.information + prior));
+        for j in 0..n {
+            walker.steps[j] = covariance[(j, j)].sqrt().clamp(LEAST_STEP, settings.step);
+        }
+    }
+    seen.extend(trials);
+    Ok(seen)
+}
+
+/// The point and its central differences along the axes, inside the box.
+fn differences(walker: &Walker, space: Space<'_>) -> Vec<Vec<f64>> {
+    let mut points = vec![walker.point.clone()];
+    for (j, step) in walker.steps.iter().enumerate() {
+        for sign in [1.0, -1.0] {
+            let mut point = walker.point.clone();
+            point[j] += sign * step;
+            clamp(&mut point, space);
+            points.push(point);
+        }
+    }
+    points
+}
+
+fn clamp(point: &mut [f64], space: Space<'_>) {
+    for (x, (low, high)) in point.iter_mut().zip(space.low.iter().zip(space.high)) {
+        *x = x.clamp(*low, *high);
+    }
+}
+
+/// Gradient of half the weighted sum of squares.
+fn gradient(fit: &LocalFit, told: &Told) -> DVector<f64> {
+    let middle = DMatrix::from_row_slice(1, fit.middle().len(), fit.middle().as_slice());
+    let weighed = told.precision.weigh(&middle);
+    fit.slopes() * weighed.transpose().column(0)
+}
+
+/// A damped step; entries at an end of the box that the gradient pushes outwards stay.
+fn damped(
+    fit: &LocalFit,
+    told: &Told,
+    walker: &Walker,
+    damping: f64,
+    space: Space<'_>,
+) -> Vec<f64> {
+    let g = gradient(fit, told);
+    let held: Vec<bool> = (0..g.len())
+        .map(|i| {
+            (walker.point[i] <= space.low[i] && g[i] > 0.0)
+                || (walker.point[i] >= space.high[i] && g[i] < 0.0)
+        })
+        .collect();
+    solve(&told.curvature, &g, damping, &held)
+}
+
+/// `-(H + damping diag H)^-1 g` over the entries that are not held.
+fn solve(curvature: &DMatrix<f64>, g: &DVector<f64>, damping: f64, held: &[bool]) -> Vec<f64> {
+    let n = g.len();
+    let mut left = curvature.clone();
+    let mut right = -g;
+    for i in 0..n {
+        left[(i, i)] += damping * (curvature[(i, i)] + FLAT) + FLAT * FLAT;
+    }
+    for i in (0..n).filter(|&i| held[i]) {
+        left.row_mut(i).fill(0.0);
+        left.column_mut(i).fill(0.0);
+        left[(i, i)] = 1.0;
+        right[i] = 0.0;
+    }
+    left.cholesky()
+        .map_or_else(|| vec![0.0; n], |f| f.solve(&right).as_slice().to_vec())
+}
+
+/// Fits over the region of the posterior around where a start has arrived.
+fn settle(
+    settings: &GaussNewtonSettings,
+    residuals: &mut Residuals<'_>,
+    space: Space<'_>,
+    from: Walker,
+    mut course: Vec<(f64, Vec<Vec<f64>>)>,
+    rng: &mut Rng,
+    mut tick: impl FnMut(),
+) -> Result<Option<Fit>> {
+    let n = space.low.len();
+    let mut point = from.point;
+    let mut best = from.loss;
+    let mut factor = DMatrix::from_diagonal(&DVector::from_column_slice(&from.steps));
+    let mut found = None;
+    for _ in 0..settings.rounds {
+        let mut points = design(&point, &factor, (space.low, space.high), sets(n), rng);
+        points.insert(0, point.clone());
+        let rows = residuals(&points)?;
+        let losses = rows.iter().flatten().map(|r| half_squares(r));
+        best = losses.fold(best, f64::min);
+        let fit = rows[0]
+            .as_ref()
+            .and_then(|row| LocalFit::new(&points[0], row, &factor, &points[1..], &rows[1..]));
+        course.push((best, points));
+        tick();
+        let Some((fit, told)) = fit.and_then(|f| f.told(settings.correlated).map(|t| (f, t)))
+        else {
+            return Ok(found);
+        };
+        let (next, whole) = moved(&fit, &told, &point, &factor, space);
+        // What is left after the step, by the straight line.
+        let step = DVector::from_fn(n, |i, _| next[i] - point[i]);
+        let left = fit.middle() + fit.slopes().transpose() * step;
+        let row = DMatrix::from_row_slice(1, left.len(), left.as_slice());
+        let weighted = told.precision.weigh(&row).component_mul(&row).sum();
+        let spare = (space.readings as f64 - n as f64).max(1.0);
+        let mismatch = (weighted / spare).max(1.0);
+        let information = told.information / mismatch;
+        point.clone_from(&next);
+        let covariance = inverse_above_prior(&(&information + DMatrix::identity(n, n)));
+        found = Some(Fit {
+            point: next,
+            free: whole,
+            information,
+            residual: (left.norm_squared() / space.readings.max(1) as f64).sqrt(),
+            roughness: fit.roughness(space.readings),
+            course: Vec::new(),
+        });
+        let Some(root) = covariance.cholesky() else {
+            break;
+        };
+        factor = root.l() * (settings.widen * (n as f64).sqrt());
+        for i in 0..n {
+            let (length, most) = (factor.row(i).norm(), 0.5 * (space.high[i] - space.low[i]));
+            if length > most {
+                factor.row_mut(i).scale_mut(most / length);
+            }
+        }
+    }
+    Ok(found.map(|fit| Fit { course, ..fit }))
+}
+
+/// Where the straight line has its minimum: inside the box and within reach, and without either.
+fn moved(
+    fit: &LocalFit,
+    told: &Told,
+    point: &[f64],
+    factor: &DMatrix<f64>,
+    space: Space<'_>,
+) -> (Vec<f64>, Vec<f64>) {
+    let n = point.len();
+    let g = gradient(fit, told);
+    let whole = solve(&told.curvature, &g, 0.0, &vec![false; n]);
+    let free: Vec<f64> = (0..n).map(|i| point[i] + whole[i]).collect();
+    // Entries that would leave the box are held at its end one after the other, and the rest follows.
+    let mut held = vec![false; n];
+    let mut step = whole;
+    for _ in 0..n {
+        let out = (0..n).find(|&i| {
+            !held[i] && {
+                let x = point[i] + step[i];
+                (x < space.low[i] && point[i] <= space.low[i])
+                    || (x > space.high[i] && point[i] >= space.high[i])
+            }
+        });
+        let Some(i) = out else { break };
+        held[i] = true;
+        step = solve(&told.curvature, &g, 0.0, &held);
+    }
+    let in_steps = DVector::from_column_slice(&step);
+    let far = factor
+        .solve_lower_triangular(&in_steps)
+        .map_or(0.0, |w| w.amax());
+    let shorten = (REACH / far.max(1e-300)).min(1.0);
+    let mut next: Vec<f64> = (0..n).map(|i| point[i] + shorten * step[i]).collect();
+    clamp(&mut next, space);
+    (next, free)
+}
+
+#[cfg(test)]
+#[path = "gauss_newton_tests.rs"]
+mod tests;

@@ -1,0 +1,406 @@
+//! A straight line through a rough simulator.
+//!
+//! A central difference over one small step is mostly luck where contact makes trajectories rough. So
+//! several sets of antithetic pairs of points are simulated, each set along axes turned at random. What
+//! the two points of a pair differ by is regressed on the step between them: slopes. What their mean
+//! differs by from the middle is regressed on quadratic terms: the curvature, which is taken out, and what
+//! the middle would be without its own luck. What both regressions leave is the *roughness* of single
+//! simulations, reading by reading, with its correlation along the episode.
+//!
+//! The information about the point comes by the sandwich formula (White 1982): weights `P` of the readings,
+//! by their noise and roughness, give the curvature `H = J^T P J` and the information `H M^-1 H`, `M = J^T P (1 + R)
+//! P J` with the roughness' whole covariance `R`, direction by direction. What the luck in `J` itself adds
+//! to `H`, `2 tr(P R) (U^T U)^-1` for steps `U`, is taken out; in `M` it stays, since an estimate by
+//! these slopes has it. It is the noise model of identification by emulation, so that what an episode is
+//! expected to tell and what it then tells can be compared.
+
+use nalgebra::{DMatrix, DVector};
+use rand_distr::{Distribution, StandardNormal};
+
+use crate::precision::Precision;
+use crate::rng::Rng;
+
+/// Degrees of freedom that the roughness is left at least.
+const FREEDOM: usize = 8;
+
+/// Pairs at least: their slopes have the luck of a regression on 64 draws, an identifier's default.
+const PAIRS: usize = 32;
+
+/// Sets of pairs for `n` entries: enough for the quadratic terms and [`FREEDOM`] more.
+#[must_use]
+pub fn sets(n: usize) -> usize {
+    let features = 1 + n * (n + 1) / 2;
+    (features + FREEDOM).max(PAIRS).div_ceil(n.max(1))
+}
+
+/// Points in antithetic pairs around `middle`, `up` then `down` of each pair: `sets` times `n` pairs along the
+/// columns of `factor` (lower triangular, `n x n`), turned at random but for the first set, and kept inside
+/// the box. Lengths vary from set to set with a mean square of one, so that curvature shows.
+#[must_use]
+pub fn design(
+    middle: &[f64],
+    factor: &DMatrix<f64>,
+    (low, high): (&[f64], &[f64]),
+    sets: usize,
+    rng: &mut Rng,
+) -> Vec<Vec<f64>> {
+    let n = middle.len();
+    let mut points = Vec::with_capacity(2 * n * sets);
+    for set in 0..sets {
+        let axes = if set == 0 {
+            DMatrix::identity(n, n)
+        } else {
+            DMatrix::from_fn(n, n, |_, _| StandardNormal.sample(rng))
+                .qr()
+                .q()
+        };
+        let length = (2.0 * (set as f64 + 0.5) / sets as f64).sqrt();
+        let steps = factor * axes * length;
+        for j in 0..n {
+            for sign in [1.0, -1.0] {
+                let point = (0..n).map(|i| {
+                    let x = middle[i] + sign * steps[(i, j)];
+                    x.clamp(low[i], high[i])
+                });
+                points.push(point.collect());
+            }
+        }
+    }
+    points
+}
+
+/// Slopes, curvature's share taken out, and roughness of residuals around a point.
+#[derive(Clone, Debug)]
+pub struct LocalFit {
+    factor: DMatrix<f64>,
+    /// Slopes, entries x readings, along the columns of the factor.
+    slopes: DMatrix<f64>,
+    /// `(U^T U)^-1`.
+    scatter: DMatrix<f64>,
+    /// Luck of single simulations, rows x readings.
+    luck: DMatrix<f64>,
+    freedom: f64,
+    /// Residuals in the middle, freed of its own luck where there are pairs enough.
+    middle: DVector<f64>,
+}
+
+/// What readings tell about the entries of a point.
+pub struct Told {
+    /// Information, entries x entries, without any prior.
+    pub information: DMatrix<f64>,
+    /// Curvature of half the weighted sum of squares, `H`.
+    pub curvature: DMatrix<f64>,
+    /// Weights of the readings.
+    pub precision: Precision,
+}
+
+impl LocalFit {
+    /// Fits the residuals of a [`design`] with this middle and factor; `middle_row` is the residual in the
+    /// middle. Pairs with a simulation that diverged (`None`) are left out. `None` where the pairs
+    /// that are left do not span the space.
+    #[must_use]
+    pub fn new(
+        middle: &[f64],
+        middle_row: &[f64],
+        factor: &DMatrix<f64>,
+        points: &[Vec<f64>],
+        rows: &[Option<Vec<f64>>],
+    ) -> Option<Self> {
+        let n = factor.nrows();
+        let m = middle_row.len();
+        let (mut steps, mut shifts) = (Vec::new(), Vec::new());
+        let mut kept: Vec<(&[f64], &[f64])> = Vec::new();
+        for (pair, row) in points.chunks_exact(2).zip(rows.chunks_exact(2)) {
+            if let [Some(up), Some(down)] = row {
+                let step = DVector::from_fn(n, |i, _| pair[0][i] - pair[1][i]);
+                steps.push(factor.solve_lower_triangular(&step)?);
+                // The box may cut one of the two short.
+                let shift = DVector::from_fn(n, |i, _| 0.5 * (pair[0][i] + pair[1][i]) - middle[i]);
+                shifts.push(factor.solve_lower_triangular(&shift)?);
+                kept.push((up, down));
+            }
+        }
+        let pairs = kept.len();
+        if pairs < n || n == 0 {
+            return None;
+        }
+        let u = DMatrix::from_fn(pairs, n, |j, i| steps[j][i]);
+        let odd = DMatrix::from_fn(pairs, m, |j, k| kept[j].0[k] - kept[j].1[k]);
+        let scatter = (u.transpose() * &u).cholesky()?.inverse();
+        let slopes = &scatter * (u.transpose() * &odd);
+        let shift = DMatrix::from_fn(pairs, n, |j, i| shifts[j][i]);
+        let even = DMatrix::from_fn(pairs, m, |j, k| {
+            0.5 * (kept[j].0[k] + kept[j].1[k]) - middle_row[k]
+        }) - shift * &slopes;
+        let features = 1 + n * (n + 1) / 2;
+        let (mut luck, mut freedom) = ((&odd - &u * &slopes) * 0.5_f64.sqrt(), (pairs - n) as f64);
+        let mut middle = DVector::from_column_slice(middle_row);
+        if pairs > features {
+            let (offset, left) = without_curvature(&(&u * 0.5), &even)?;
+            middle += offset;
+            luck = stacked(&luck, &(left * 2_f64.sqrt()));
+            freedom += (pairs - features) as f64;
+        } else {
+            // Second differences, whose luck is that of one and a half simulations; they count
+            // curvature for luck.
+            luck = stacked(&luck, &(even * 1.5_f64.sqrt().recip()));
+            freedom += pairs as f64;
+        }
+        Some(Self {
+            factor: factor.clone(),
+            slopes,
+            scatter,
+            luck,
+            freedom,
+            middle,
+        })
+    }
+
+    /// The same of the first `readings` entries of the residuals.
+    #[must_use]
+    pub fn first(&self, readings: usize) -> Self {
+        Self {
+            slopes: self.slopes.columns(0, readings).into_owned(),
+            luck: self.luck.columns(0, readings).into_owned(),
+            middle: self.middle.rows(0, readings).into_owned(),
+            ..self.clone()
+        }
+    }
+
+    /// Residuals in the middle.
+    #[must_use]
+    pub fn middle(&self) -> &DVector<f64> {
+        &self.middle
+    }
+
+    /// Slopes of the residuals, entries x readings.
+    #[must_use]
+    pub fn slopes(&self) -> DMatrix<f64> {
+        // slopes = factor^T d/dx.
+        let lower = self.factor.transpose();
+        lower
+            .solve_upper_triangular(&self.slopes)
+            .unwrap_or_else(|| self.slopes.clone())
+    }
+
+    /// Root mean square of the roughness over `readings` entries, in units of their noise.
+    #[must_use]
+    pub fn roughness(&self, readings: usize) -> f64 {
+        (self.luck.norm_squared() / self.freedom / readings.max(1) as f64).sqrt()
+    }
+
+    /// What the readings tell. They are weighed by their roughness alone, or also by how it runs along
+    /// the episode (`correlated`).
+    #[must_use]
+    pub fn told(&self, correlated: bool) -> Option<Told> {
+        let (precision, curvature, information);
+        if correlated {
+            precision = Precision::correlated(&self.luck, self.freedom);
+            curvature = self.curvature(&precision, &self.luck, self.freedom);
+            // A covariance says nothing of the luck that it was made of: each half is asked of
+            // the other.
+            let share = self.freedom / self.luck.nrows() as f64;
+            let half = |k: usize| {
+                let rows: Vec<usize> = (k..self.luck.nrows()).step_by(2).collect();
+                self.luck.select_rows(&rows)
+            };
+            let halves = [half(0), half(1)];
+            let asked_of = |weighing: &DMatrix<f64>, asked: &DMatrix<f64>| {
+                let by = Precision::correlated(weighing, share * weighing.nrows() as f64);
+                let freedom = share * asked.nrows() as f64;
+                let h = self.curvature(&by, asked, freedom);
+                self.sandwich(&by, &h, asked, freedom)
+            };
+            information =
+                (asked_of(&halves[0], &halves[1])? + asked_of(&halves[1], &halves[0])?) * 0.5;
+        } else {
+            let spread = DVector::from_fn(self.luck.ncols(), |k, _| {
+                self.luck.column(k).norm_squared() / self.freedom
+            });
+            precision = Precision::diagonal(&spread);
+            curvature = self.curvature(&precision, &self.luck, self.freedom);
+            information = self.sandwich(&precision, &curvature, &self.luck, self.freedom)?;
+        }
+        let lower = self.factor.transpose();
+        let outside = |x: DMatrix<f64>| {
+            let half = lower.solve_upper_triangular(&x)?;
+            let whole = lower.solve_upper_triangular(&half.transpose())?;
+            Some((&whole + whole.transpose()) * 0.5)
+        };
+        Some(Told {
+            information: outside(information)?,
+            curvature: outside(curvature)?,
+            precision,
+        })
+    }
+
+    /// `J^T P J` along the columns of the factor, less what luck of this spread in the slopes adds, and not below
+    /// zero in any direction.
+    fn curvature(&self, by: &Precision, luck: &DMatrix<f64>, freedom: f64) -> DMatrix<f64> {
+        let of_luck = by.weigh(luck).component_mul(luck).sum() / freedom;
+        let raw =
+            by.weigh(&self.slopes) * self.slopes.transpose() - &self.scatter * (2.0 * of_luck);
+        let mut eigen = ((&raw + raw.transpose()) * 0.5).symmetric_eigen();
+        eigen.eigenvalues.apply(|v| *v = v.max(0.0));
+        eigen.recompose()
+    }
+
+    /// `H M^-1 H`, where roughness is as it shows in `luck`.
+    fn sandwich(
+        &self,
+        by: &Precision,
+        h: &DMatrix<f64>,
+        luck: &DMatrix<f64>,
+        freedom: f64,
+    ) -> Option<DMatrix<f64>> {
+        let n = h.nrows();
+        let weighed = by.weigh(&self.slopes);
+        let projected = &weighed * luck.transpose();
+        let middle = &weighed * weighed.transpose() + &projected * projected.transpose() / freedom;
+        let ridge = DMatrix::identity(n, n) * (1e-12 * middle.trace() + f64::MIN_POSITIVE);
+        Some(h * (middle + ridge).cholesky()?.solve(h))
+    }
+}
+
+/// What is left of `even` (pairs x readings) after a regression on a constant and the quadratic terms of the
+/// half steps `u`, and the constant.
+fn without_curvature(
+    u: &DMatrix<f64>,
+    even: &DMatrix<f64>,
+) -> Option<(DVector<f64>, DMatrix<f64>)> {
+    let (pairs, n) = u.shape();
+    let mut terms: Vec<DVector<f64>> = vec![DVector::repeat(pairs, 1.0)];
+    for i in 0..n {
+        for j in i..n {
+            terms.push(u.column(i).component_mul(&u.column(j)));
+        }
+    }
+    let phi = DMatrix::from_columns(&terms);
+    let f = phi.ncols();
+    // Clipped points may leave a term without a say: the ridge keeps it small.
+    let ridge = DMatrix::identity(f, f) * (1e-9 * phi.norm_squared() / f as f64);
+    let normal = phi.transpose() * &phi + ridge;
+    let fitted = normal.cholesky()?.solve(&(phi.transpose() * even));
+    Some((fitted.row(0).transpose(), even - phi * fitted))
+}
+
+fn stacked(above: &DMatrix<f64>, below: &DMatrix<f64>) -> DMatrix<f64> {
+    let mut out = DMatrix::zeros(above.nrows() + below.nrows(), above.ncols());
+    out.rows_mut(0, above.nrows()).copy_from(above);
+    out.rows_mut(above.nrows(), below.nrows()).copy_from(below);
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rng::Streams;
+
+    const FREE: [f64; 2] = [9.0; 2];
+
+    /// Fit at `middle` of residuals `f` with luck of this size that lasts `run` readings.
+    fn fitted(
+        middle: [f64; 2],
+        factor: &DMatrix<f64>,
+        rough: f64,
+        run: usize,
+        seed: u64,
+        f: impl Fn(&[f64]) -> Vec<f64>,
+    ) -> LocalFit {
+        let mut rng = Streams::new(seed).stream("design");
+        let points = design(
+            &middle,
+            factor,
+            (&FREE.map(|x| -x), &FREE),
+            sets(2),
+            &mut rng,
+        );
+        let mut luck = Streams::new(seed).stream("luck");
+        let mut rough_row = |x: &[f64]| {
+            let mut row = f(x);
+            let mut now = 0.0;
+            for (k, r) in row.iter_mut().enumerate() {
+                if k % run == 0 {
+                    let z: f64 = StandardNormal.sample(&mut luck);
+                    now = rough * z;
+                }
+                *r += now;
+            }
+            row
+        };
+        let middle_row = rough_row(&middle);
+        let rows: Vec<Option<Vec<f64>>> = points.iter().map(|p| Some(rough_row(p))).collect();
+        LocalFit::new(&middle, &middle_row, factor, &points, &rows).unwrap()
+    }
+
+    fn tilted() -> DMatrix<f64> {
+        DMatrix::from_row_slice(2, 2, &[0.3, 0.0, 0.1, 0.02])
+    }
+
+    #[test]
+    fn a_quadratic_is_fitted_exactly() {
+        let f = |x: &[f64]| vec![2.0 * x[0] - x[1] + x[0] * x[1], x[1] * x[1], x[0]];
+        let fit = fitted([0.5, 1.0], &tilted(), 0.0, 1, 0, f);
+        // Slopes at (0.5, 1): (2 + 1, 0, 1) and (-1 + 0.5, 2, 0).
+        let wanted = DMatrix::from_row_slice(2, 3, &[3.0, 0.0, 1.0, -0.5, 2.0, 0.0]);
+        assert!((fit.slopes() - &wanted).norm() < 1e-9);
+        assert!(fit.roughness(3) < 1e-6);
+        for correlated in [false, true] {
+            let told = fit.told(correlated).unwrap();
+            let error = told.information - &wanted * wanted.transpose();
+            assert!(error.norm() < 1e-6, "{error}");
+        }
+    }
+
+    /// Mean over many fits of the information about the first entry.
+    fn mean_information(rough: f64, run: usize, slope: f64, correlated: bool) -> f64 {
+        let f = |x: &[f64]| {
+            (0..240)
+                .map(|k| if k % 2 == 0 { slope * x[0] } else { x[1] })
+                .collect()
+        };
+        let runs = 40;
+        let factor = DMatrix::from_diagonal_element(2, 2, 1.0);
+        (0..runs)
+            .map(|seed| {
+                let fit = fitted([0.0; 2], &factor, rough, run, seed, f);
+                fit.told(correlated).unwrap().information[(0, 0)]
+            })
+            .sum::<f64>()
+            / f64::from(runs as u32)
+    }
+
+    #[test]
+    fn roughness_takes_its_share_of_the_information() {
+        // 120 readings of slope 1, noise 1 and independent roughness 2: 120 / 5 = 24.
+        let found = mean_information(2.0, 1, 1.0, false);
+        assert!((found / 24.0 - 1.0).abs() < 0.2, "{found}");
+        // Roughness that lasts 40 readings leaves some six independent pieces, of which every other
+        // reading counts: about 240 / 40 / 4 / (1 + 1 / (20 * 4)) = 1.5 where the slope takes part in it.
+        let found = mean_information(2.0, 40, 1.0, false);
+        assert!(found < 3.0, "{found}");
+    }
+
+    #[test]
+    fn luck_in_the_slopes_is_no_information() {
+        // Nothing depends on the first entry: its slopes are luck alone, of variance 2 * 9 / 24 at each of 240
+        // readings (sum of the squared steps: 24), which would count for 240 * 0.75 / 10 = 18. Less that,
+        // there remains the positive half of what it varies by.
+        let found = mean_information(3.0, 1, 0.0, false);
+        assert!(found < 3.0, "{found}");
+    }
+
+    #[test]
+    fn a_design_keeps_to_the_box_and_to_its_middle() {
+        let mut rng = Streams::new(0).stream("design");
+        let points = design(
+            &[0.9, 0.0],
+            &tilted(),
+            (&[-1.0, -0.1], &[1.0, 0.1]),
+            4,
+            &mut rng,
+        );
+        assert_eq!(points.len(), 16);
+        assert!(points.iter().all(|p| p[0] <= 1.0 && p[1].abs() <= 0.1));
+    }
+}
