@@ -1,5 +1,6 @@
 """Fisher-information PPO with Stable-Baselines3: ASID's networks, settings and number of environment steps."""
 
+import os
 import time
 
 import numpy as np
@@ -8,7 +9,8 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.vec_env import VecNormalize
 
-from environment import FisherVecEnv
+from environment import FisherVecEnv, separate
+from simulation import StepSimulations
 
 
 class Returns(BaseCallback):
@@ -31,19 +33,26 @@ class Returns(BaseCallback):
         self.done = []
 
 
+def _cpu_seconds():
+    times = os.times()
+    return times.user + times.system + times.children_user + times.children_system
+
+
 def train(problem, interface, steps, seed):
     """Trains for `steps` environment steps; seconds of the whole loop, and the mean return of each rollout.
 
-    The clock starts where ASID's does: with the scene compiled and the modules imported, before the environments and the
-    networks are made.
+    The clock starts with the environments made, and processes started, which ASID's clock counts.
     """
     ppo = problem.ppo
     torch.set_num_threads(1)
-    begin = time.perf_counter()
     n = problem.environments
-    environment = FisherVecEnv(problem, interface, n, seed)
+    if interface is StepSimulations:
+        environment = separate(problem, n, seed)
+    else:
+        environment = FisherVecEnv(problem, interface, n, seed)
     if ppo["normalise_observation"]:
         environment = VecNormalize(environment, norm_reward=False, clip_obs=10.0, gamma=ppo["gamma"])
+    begin, cpu = time.perf_counter(), _cpu_seconds()
     rate = ppo["learning_rate"]
     learner = PPO(
         "MlpPolicy",
@@ -70,4 +79,7 @@ def train(problem, interface, steps, seed):
     returns = Returns()
     learner.learn(steps, callback=returns)
     seconds = time.perf_counter() - begin
-    return {"seconds": seconds, "environment_steps": learner.num_timesteps, "returns": returns.means}
+    # The time of processes counts once they have ended.
+    environment.close()
+    cpu = _cpu_seconds() - cpu
+    return {"seconds": seconds, "cpu_seconds": cpu, "environment_steps": learner.num_timesteps, "returns": returns.means}
