@@ -3,6 +3,7 @@
 import os
 import time
 
+import gymnasium
 import numpy as np
 import torch
 from stable_baselines3 import PPO
@@ -36,6 +37,22 @@ class Returns(BaseCallback):
 def _cpu_seconds():
     times = os.times()
     return times.user + times.system + times.children_user + times.children_system
+
+
+def warm_up():
+    """A training of nothing: PyTorch imports a part of itself at the first update, which is no training's time."""
+    box = gymnasium.spaces.Box(-1.0, 1.0, (1,), np.float32)
+
+    class Nothing(gymnasium.Env):
+        observation_space, action_space = box, box
+
+        def reset(self, *, seed=None, options=None):
+            return np.zeros(1, np.float32), {}
+
+        def step(self, action):
+            return np.zeros(1, np.float32), 0.0, False, False, {}
+
+    PPO("MlpPolicy", Nothing(), n_steps=8, batch_size=8, n_epochs=1, device="cpu").learn(8)
 
 
 def train(problem, interface, steps, seed):

@@ -130,7 +130,7 @@ pub fn measure(python: &Path, quick: bool) -> Result<Results> {
     let folder = tempfile::tempdir().context("cannot make a temporary folder")?;
     let backend = (find::<BackendEntry>("mujoco")?.make)()?;
     let mut peer = Python::start(python, folder.path())?;
-    let versions: BTreeMap<String, String> = peer.ask(&json!({"do": "versions"}))?;
+    let versions: BTreeMap<String, String> = peer.ask(&json!({"do": "start"}))?;
     let mut named: Vec<(String, String)> = versions.into_iter().collect();
     // Both sides have a MuJoCo, and they must be one version.
     for (name, version) in &mut named {
