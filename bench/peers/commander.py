@@ -85,13 +85,36 @@ class Chain:
         return position, turn, np.concatenate([linear, axes], axis=1)
 
 
+class EngineChain(Chain):
+    """The same for one posture, by MuJoCo itself: what a single environment does."""
+
+    def __init__(self, model, site):
+        super().__init__(model, site)
+        self.model, self.data, self.site = model, mujoco.MjData(model), model.site(site).id
+        self.jacobian = np.zeros((6, model.nv))
+        self.dofs = model.jnt_dofadr[self.joints]
+
+    def forward(self, q):
+        self.data.qpos[self.qpos] = q[0]
+        mujoco.mj_kinematics(self.model, self.data)
+        mujoco.mj_comPos(self.model, self.data)
+        mujoco.mj_jacSite(self.model, self.data, self.jacobian[:3], self.jacobian[3:], self.site)
+        position, turn = self.data.site_xpos[self.site], self.data.site_xmat[self.site].reshape(3, 3)
+        return position[None].copy(), turn[None].copy(), self.jacobian[None, :, self.dofs]
+
+
+def chain_to_hand(problem, n):
+    """The hand's kinematics for `n` postures at once, in the way that is quickest for as many."""
+    return (EngineChain if n == 1 else Chain)(problem.model, "ee")
+
+
 class Commander:
     """Commands of `n` episodes."""
 
     def __init__(self, problem, n):
         model = problem.model
         self.workspace = WORKSPACES[problem.task]
-        self.chain = Chain(model, "ee")
+        self.chain = chain_to_hand(problem, n)
         self.dt, self.frames, self.n = problem.frame_period, problem.frames, n
         self.largest = problem.action[:, 1]
         self.home = problem.home_qpos[self.chain.qpos]

@@ -6,11 +6,12 @@ share of the episode that is over, and the information gathered so far.
 
 import gymnasium
 import numpy as np
-from stable_baselines3.common.vec_env import VecEnv
+from stable_baselines3.common.vec_env import SubprocVecEnv, VecEnv
 
 import rotation
-from commander import Chain
+from commander import chain_to_hand
 from fisher import Episodes
+from simulation import StepSimulations
 
 # Smallest expected deviation that is told apart, prior-scaled.
 SMALLEST_STD = 1e-6
@@ -23,7 +24,7 @@ class FisherVecEnv(VecEnv):
         self.problem = problem
         self.random = np.random.default_rng(seed)
         self.episodes = Episodes(problem, interface, n)
-        self.chain = Chain(problem.model, "ee")
+        self.chain = chain_to_hand(problem, n)
         self.num_envs, self.step_count = n, 0
         self.actions = None
         length = self._reset().shape[1]
@@ -97,3 +98,32 @@ class FisherVecEnv(VecEnv):
 
     def set_attr(self, attr_name, value, indices=None):
         raise NotImplementedError
+
+
+class FisherEnv(gymnasium.Env):
+    """One episode as an environment of Gymnasium, stepped by `mj_step` in Python."""
+
+    def __init__(self, problem, seed):
+        self.inner = FisherVecEnv(problem, StepSimulations, 1, seed)
+        self.observation_space, self.action_space = self.inner.observation_space, self.inner.action_space
+        self.first = None
+
+    def reset(self, *, seed=None, options=None):
+        super().reset(seed=seed)
+        # An episode that ended has begun the next one already.
+        first, self.first = self.first, None
+        return (self.inner.reset()[0] if first is None else first), {}
+
+    def step(self, action):
+        self.inner.step_async(np.asarray(action)[None])
+        observation, reward, done, info = self.inner.step_wait()
+        if done[0]:
+            self.first, last = observation[0], info[0]["terminal_observation"]
+            return last, float(reward[0]), True, False, {}
+        return observation[0], float(reward[0]), False, False, {}
+
+
+def separate(problem, n, seed):
+    """`n` environments of Gymnasium, a process each: how vectorised environments are commonly made."""
+    makers = [lambda i=i: FisherEnv(problem, seed * n + i) for i in range(n)]
+    return SubprocVecEnv(makers, start_method="fork")

@@ -22,8 +22,12 @@ pub struct Row {
     threads: usize,
     environment_steps: u64,
     env_steps_per_s: Vec<f64>,
+    /// CPU time of a step, on all threads, ms.
+    cpu_ms_per_step: Vec<f64>,
     /// ASID's steps a second by this side's, each round.
     asid_by_this: Vec<f64>,
+    /// CPU time of this side by ASID's, each round: other load on the machine bears on it less.
+    cpu_by_asid: Vec<f64>,
     /// Mean return of the episodes before the first and before the last update, nat; absent where it is not told.
     returns: Vec<[Option<f64>; 2]>,
 }
@@ -32,6 +36,7 @@ pub struct Row {
 #[derive(Deserialize)]
 struct Trained {
     seconds: f64,
+    cpu_seconds: f64,
     environment_steps: u64,
     returns: Vec<Option<f64>>,
 }
@@ -42,7 +47,7 @@ struct Trained {
 /// When a side fails, or does another number of steps.
 pub fn rows(peer: &mut Python, described: &Described, effort: &Effort) -> Result<Vec<Row>> {
     let mut sides = vec!["asid".to_owned()];
-    sides.extend(INTERFACES.map(|i| format!("stable-baselines3, mujoco.{i}")));
+    sides.extend(INTERFACES.map(|i| format!("stable-baselines3, `{i}`")));
     let mut trained: Vec<Vec<Trained>> = sides.iter().map(|_| Vec::new()).collect();
     for round in 0..effort.rounds {
         // Who goes first changes, so that no side always meets a machine that is warm.
@@ -81,6 +86,14 @@ pub fn rows(peer: &mut Python, described: &Described, effort: &Effort) -> Result
         .iter()
         .map(|all| all.iter().map(|t| steps as f64 / t.seconds).collect())
         .collect();
+    let cpu: Vec<Vec<f64>> = trained
+        .iter()
+        .map(|all| {
+            all.iter()
+                .map(|t| 1e3 * t.cpu_seconds / steps as f64)
+                .collect()
+        })
+        .collect();
     let ends = |t: &Trained| [t.returns.first(), t.returns.last()].map(|r| r.copied().flatten());
     Ok(sides
         .into_iter()
@@ -90,12 +103,10 @@ pub fn rows(peer: &mut Python, described: &Described, effort: &Effort) -> Result
             side,
             threads: THREADS,
             environment_steps: steps,
-            asid_by_this: if i == 0 {
-                Vec::new()
-            } else {
-                ratios(&speeds[0], &speeds[i])
-            },
+            asid_by_this: ratios(&speeds[0], &speeds[i]),
+            cpu_by_asid: ratios(&cpu[i], &cpu[0]),
             env_steps_per_s: speeds[i].clone(),
+            cpu_ms_per_step: cpu[i].clone(),
             returns: trained[i].iter().map(ends).collect(),
         })
         .collect())
@@ -125,16 +136,18 @@ fn ours(described: &Described, steps: usize, seed: u64) -> Result<Trained> {
     Ok(Trained {
         returns: done?,
         seconds: cost.wall_s,
+        cpu_seconds: cost.cpu_s,
         environment_steps: described.steps.load(Ordering::Relaxed) - before,
     })
 }
 
 /// Columns of [`table`].
-pub const HEADER: [&str; 5] = [
+pub const HEADER: [&str; 6] = [
     "task",
     "side",
     "environment steps/s",
     "asid by this",
+    "CPU time by asid's",
     "return, first to last update",
 ];
 
@@ -158,6 +171,7 @@ pub fn table(rows: &[Row]) -> Vec<Vec<String>> {
                 r.side.clone(),
                 spread(&r.env_steps_per_s, whole),
                 spread(&r.asid_by_this, ratio),
+                spread(&r.cpu_by_asid, ratio),
                 returns,
             ]
         })

@@ -45,7 +45,7 @@ def identify(problem, path, difference):
     log = Log(problem, path)
     model = problem.model
     evaluations = 0
-    begin = time.perf_counter()
+    begin, cpu = time.perf_counter(), time.process_time()
     parameters = _parameters(problem, log)
     control = sysid.TimeSeries(log.times, log.control)
     # The toolbox wants readings of all sensors; `differences` compares those that are tracked.
@@ -79,7 +79,7 @@ def identify(problem, path, difference):
     )
     options = {"output": io.StringIO()} | ({} if difference is None else {"eps": difference})
     found, result = sysid.optimize(parameters, residual, verbose=False, **options)
-    seconds = time.perf_counter() - begin
+    seconds, cpu = time.perf_counter() - begin, time.process_time() - cpu
     vector = found.as_vector()
     final = residual(vector, found)[0]
     _, half = sysid.calculate_intervals(final, np.asarray(result.jac))
@@ -89,7 +89,7 @@ def identify(problem, path, difference):
         low, high = (unknown.from_scaled(vector[i] + s * half[i]) for s in (-1.0, 1.0))
         out.append({"estimate": float(unknown.from_scaled(vector[i])), "interval95": [float(low), float(high)]})
     deviation = float(np.sqrt(np.mean(np.concatenate(final) ** 2)))
-    return {"parameters": out, "seconds": seconds, "simulations": evaluations, "residual": deviation}
+    return {"parameters": out, "seconds": seconds, "cpu_seconds": cpu, "simulations": evaluations, "residual": deviation}
 
 
 def _parameters(problem, log):

@@ -23,8 +23,11 @@ const IDENTIFIERS: [&str; 2] = ["reps", "gauss-newton"];
 /// reading. With contact the path is rough, and a difference by a tiny step is mostly luck.
 const DIFFERENCES: [Option<f64>; 2] = [None, Some(0.1)];
 
-/// Which episode is logged: a short search by this explorer.
+/// Which episode is logged: a search by this explorer.
 const LOGGED_BY: &str = "fisher-cem";
+
+/// Refits of that search: enough to meet the object well, and two seconds instead of six.
+const REFITS: i64 = 2;
 
 /// One method on one task, one entry a log.
 #[derive(Clone, Debug, Serialize)]
@@ -34,13 +37,18 @@ pub struct Row {
     threads: usize,
     unit: String,
     seconds: Vec<f64>,
+    cpu_seconds: Vec<f64>,
     /// Simulations of the episode; absent where they are not counted.
     simulations: Vec<Option<u64>>,
     truth: Vec<f64>,
+    /// Smallest and largest value a priori.
+    range: [f64; 2],
     estimate: Vec<f64>,
     interval95: Vec<[f64; 2]>,
     /// Time of the toolbox with its defaults by this method's, each log.
     sysid_by_this: Vec<f64>,
+    /// The same of CPU time.
+    sysid_cpu_by_this: Vec<f64>,
 }
 
 /// What a method found of one log.
@@ -48,6 +56,7 @@ pub struct Row {
 struct Found {
     parameters: Vec<Estimate>,
     seconds: f64,
+    cpu_seconds: f64,
     simulations: Option<u64>,
 }
 
@@ -110,7 +119,9 @@ pub fn rows(peer: &mut Python, described: &Described, effort: &Effort) -> Result
         truths.push(truth);
     }
     let seconds = |all: &[Found]| -> Vec<f64> { all.iter().map(|f| f.seconds).collect() };
-    let toolbox = seconds(&found[0]);
+    let cpu = |all: &[Found]| -> Vec<f64> { all.iter().map(|f| f.cpu_seconds).collect() };
+    // The toolbox with its defaults comes first.
+    let toolbox = (seconds(&found[0]), cpu(&found[0]));
     Ok(methods
         .iter()
         .zip(&found)
@@ -120,14 +131,14 @@ pub fn rows(peer: &mut Python, described: &Described, effort: &Effort) -> Result
             threads: THREADS,
             unit: described.parameters[0].unit.clone(),
             seconds: seconds(all),
+            cpu_seconds: cpu(all),
             simulations: all.iter().map(|f| f.simulations).collect(),
             truth: truths.clone(),
+            range: described.parameters[0].range,
             estimate: all.iter().map(|f| f.parameters[0].estimate).collect(),
             interval95: all.iter().map(|f| f.parameters[0].interval95).collect(),
-            sysid_by_this: match method {
-                Method::Asid(_) => ratios(&toolbox, &seconds(all)),
-                Method::Sysid(_) => Vec::new(),
-            },
+            sysid_by_this: ratios(&toolbox.0, &seconds(all)),
+            sysid_cpu_by_this: ratios(&toolbox.1, &cpu(all)),
         })
         .collect())
 }
@@ -142,7 +153,10 @@ fn logged(described: &Described, seed: u64) -> Result<(f64, Episode)> {
         .map(|p| p.sample(&mut rng))
         .collect();
     let problem = described.problem(seed);
-    let explorer = (find::<ExplorerEntry>(LOGGED_BY)?.make)(&Settings::new())?;
+    let settings: Settings = [("iterations".to_owned(), REFITS.into())]
+        .into_iter()
+        .collect();
+    let explorer = (find::<ExplorerEntry>(LOGGED_BY)?.make)(&settings)?;
     let mut explored = explorer.explore(&problem, None)?;
     let mut world = SimulatedWorld::new(
         &*described.task,
@@ -174,19 +188,21 @@ fn identified(described: &Described, name: &str, episode: &Episode, seed: u64) -
     Ok(Found {
         parameters: done?.posterior.marginals.iter().map(of).collect(),
         seconds: cost.wall_s,
+        cpu_seconds: cost.cpu_s,
         simulations: Some(steps / each as u64),
     })
 }
 
 /// Columns of [`table`].
-pub const HEADER: [&str; 7] = [
+pub const HEADER: [&str; 8] = [
     "task",
     "method",
     "s",
     "simulations",
-    "error, 1e-3",
+    "error, % of the prior's range",
     "95 % intervals that hold the truth",
     "time of mujoco.sysid by this",
+    "its CPU time by this",
 ];
 
 /// The rows as a table.
@@ -194,7 +210,8 @@ pub fn table(rows: &[Row]) -> Vec<Vec<String>> {
     rows.iter()
         .map(|r| {
             let pairs = r.truth.iter().zip(&r.estimate);
-            let errors: Vec<f64> = pairs.map(|(t, e)| (t - e).abs()).collect();
+            let range = r.range[1] - r.range[0];
+            let errors: Vec<f64> = pairs.map(|(t, e)| 100.0 * (t - e).abs() / range).collect();
             let held = r.truth.iter().zip(&r.interval95);
             let held = held.filter(|(t, [low, high])| (low..=high).contains(t));
             let simulations: Vec<f64> = r.simulations.iter().flatten().map(|&n| n as f64).collect();
@@ -203,13 +220,10 @@ pub fn table(rows: &[Row]) -> Vec<Vec<String>> {
                 r.method.clone(),
                 spread(&r.seconds, |x| format!("{x:.2}")),
                 spread(&simulations, |x| format!("{x:.0}")),
-                format!(
-                    "{} {}",
-                    spread(&errors, |x| format!("{:.3}", 1e3 * x)),
-                    r.unit
-                ),
+                spread(&errors, |x| format!("{x:.2}")),
                 format!("{} of {}", held.count(), r.truth.len()),
                 spread(&r.sysid_by_this, |x| format!("{x:.2}")),
+                spread(&r.sysid_cpu_by_this, |x| format!("{x:.2}")),
             ]
         })
         .collect()

@@ -37,8 +37,9 @@ const TASKS: [&str; 2] = ["rod-balancing", "sphere-striking"];
 /// Threads of either side.
 const THREADS: usize = 2;
 
-/// MuJoCo's interfaces to many simulations.
-const INTERFACES: [&str; 2] = ["rollout", "batch"];
+/// How the Python side steps its simulations: MuJoCo's two interfaces to many simulations under an environment
+/// vectorised by hand, and an environment of Gymnasium with `mj_step` in a process of its own for each episode.
+const INTERFACES: [&str; 3] = ["mujoco.rollout", "mujoco.batch", "mj_step"];
 
 /// How much is measured.
 struct Effort {
@@ -122,14 +123,14 @@ pub fn measure(python: &Path, quick: bool) -> Result<Results> {
     } else {
         Effort {
             rounds: 5,
-            steps: 6400,
+            steps: 5120,
             logs: 8,
         }
     };
     let folder = tempfile::tempdir().context("cannot make a temporary folder")?;
     let backend = (find::<BackendEntry>("mujoco")?.make)()?;
     let mut peer = Python::start(python, folder.path())?;
-    let versions: BTreeMap<String, String> = peer.ask(&json!({"do": "versions"}))?;
+    let versions: BTreeMap<String, String> = peer.ask(&json!({"do": "start"}))?;
     let mut named: Vec<(String, String)> = versions.into_iter().collect();
     // Both sides have a MuJoCo, and they must be one version.
     for (name, version) in &mut named {

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicU64;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use asid_core::fisher::{FisherBatch, FisherSettings};
 use asid_core::parameter::Scale;
 use asid_core::progress::Silent;
@@ -16,11 +16,14 @@ use serde_json::{Value, json};
 use super::THREADS;
 use crate::workload::Episodes;
 
-/// Episodes that the Python side has to play alike.
-const REFERENCES: usize = 4;
+/// Episodes that the Python side has to play alike. Random pushing meets the object in one of some five.
+const REFERENCES: usize = 16;
 
-/// Seed of the reference episodes: with it the hand meets the object in some and not in others.
+/// Seed of the reference episodes.
 const REFERENCE_SEED: u64 = 2;
+
+/// Return, nat, of an episode whose hand met the object; without contact it is below 0.5.
+const MET: f64 = 1.0;
 
 /// The explorer that is compared.
 pub const EXPLORER: &str = "fisher-ppo";
@@ -158,6 +161,10 @@ impl Described {
             batch.step(actions, &mut readings, &mut reward)?;
             positions.push(first(&readings));
             rewards.push(reward.clone());
+        }
+        let returns = |e: usize| rewards.iter().map(|r: &Vec<f64>| r[e]).sum::<f64>();
+        if !(0..n).any(|e| returns(e) > MET) {
+            bail!("no reference episode of {} meets the object", self.name);
         }
         let protocol = self.task.exploration();
         let nu = self.model.layout().nu();

@@ -18,9 +18,12 @@ PACKAGES = ("mujoco", "stable-baselines3", "torch", "numpy", "scipy")
 
 
 def answer(request, problems):
-    """One request: `versions`, `check`, `explore` or `identify`."""
+    """One request: `start`, `check`, `explore` or `identify`."""
     kind = request["do"]
-    if kind == "versions":
+    if kind == "start":
+        from explore import warm_up
+
+        warm_up()
         return {"python": platform.python_version()} | {name: version(name) for name in PACKAGES}
     from problem import Problem
     from simulation import INTERFACES

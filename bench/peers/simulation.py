@@ -1,7 +1,7 @@
 """Many simulations of one scene, each with its own value of the unknowns, stepped by MuJoCo's own threads.
 
 Two of MuJoCo's interfaces do it: `mujoco.rollout` over a list of models, and `mujoco.batch`. Both take all simulations of a
-control step in as few calls as they allow.
+control step in as few calls as they allow. The third is `mj_step` called from Python, for a single environment.
 """
 
 import copy
@@ -77,10 +77,47 @@ class Fields:
         return out
 
 
+def write(models, fields):
+    """Writes the fields of `Fields.of` into one model each."""
+    for name, row, values in fields:
+        for model, value in zip(models, values):
+            getattr(model, name)[row] = value
+
+
+class StepSimulations:
+    """`mujoco.mj_step`: one simulation after the other, a frame a call."""
+
+    name = "mj_step"
+
+    def __init__(self, problem, n):
+        self.problem, self.n = problem, n
+        self.fields = Fields(problem)
+        self.models = [copy.copy(problem.model) for _ in range(n)]
+        self.data = [mujoco.MjData(model) for model in self.models]
+
+    def begin(self, theta, qpos):
+        write(self.models, self.fields.of(theta))
+        for model, data, row in zip(self.models, self.data, qpos):
+            if self.fields.derived:
+                mujoco.mj_setConst(model, data)
+            mujoco.mj_resetData(model, data)
+            data.qpos[:] = row
+
+    def step(self, control):
+        p = self.problem
+        out = np.empty((self.n, p.frames, p.model.nq))
+        for i, (model, data) in enumerate(zip(self.models, self.data)):
+            for frame in range(p.frames):
+                data.ctrl[:] = control[i, frame]
+                mujoco.mj_step(model, data, nstep=p.substeps)
+                out[i, frame] = data.qpos
+        return out
+
+
 class RolloutSimulations:
     """`mujoco.rollout`: a model a simulation, a control step a call."""
 
-    name = "rollout"
+    name = "mujoco.rollout"
 
     def __init__(self, problem, n):
         self.problem, self.n = problem, n
@@ -96,9 +133,7 @@ class RolloutSimulations:
 
     def begin(self, theta, qpos):
         """Starts at unknowns `theta` (n x d) and positions `qpos` (n x nq), at rest."""
-        for name, row, values in self.fields.of(theta):
-            for model, value in zip(self.models, values):
-                getattr(model, name)[row] = value
+        write(self.models, self.fields.of(theta))
         if self.fields.derived:
             for model in self.models:
                 mujoco.mj_setConst(model, self.data[0])
@@ -125,7 +160,7 @@ class RolloutSimulations:
 class BatchSimulations:
     """`mujoco.batch`: expanded model fields, a frame a call."""
 
-    name = "batch"
+    name = "mujoco.batch"
 
     def __init__(self, problem, n):
         from mujoco.batch import Batch
@@ -154,4 +189,4 @@ class BatchSimulations:
         return out
 
 
-INTERFACES = {kind.name: kind for kind in (RolloutSimulations, BatchSimulations)}
+INTERFACES = {kind.name: kind for kind in (RolloutSimulations, BatchSimulations, StepSimulations)}
