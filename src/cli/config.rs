@@ -391,7 +391,7 @@ fn effects(table: &toml::Table, real: &Real) -> Result<Vec<String>> {
 
 /// The engine that is used where none is named: the first that is built in, MuJoCo last,
 /// so that nothing depends on a native library.
-fn default_backend() -> String {
+pub fn default_backend() -> String {
     let all = registry::all::<registry::BackendEntry>();
     let rapier = all.iter().find(|e| e.name == "rapier");
     rapier
