@@ -5,110 +5,381 @@
 #[allow(dead_code)]
 mod cli_support;
 
+use std::path::Path;
+use std::process::Output;
+
 use cli_support::{Workplace, tiny};
 use serde_json::Value;
 
-fn compare(place: &Workplace, condition: &str, seed: &str, out: &str) -> std::process::Output {
-    place.run(&tiny(&[
-        "compare",
-        "rod-balancing",
-        "--method",
-        "dr",
-        "--condition",
-        condition,
-        "--seed",
-        seed,
-        "--seeds",
-        "2",
-        "--quiet",
-        "--out",
-        out,
-    ]))
+/// Files that are the same however a comparison came about.
+const SAME: [&str; 5] = [
+    "result.json",
+    "runs.json",
+    "table.md",
+    "report.html",
+    "config.toml",
+];
+
+fn said(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+/// Compares on rod balancing in a folder.
+fn compare(place: &Workplace, arguments: &[&str], out: &str) -> Output {
+    let common = ["compare", "rod-balancing", "--quiet", "--out", out];
+    place.run(&tiny(&[&common, arguments].concat()))
+}
+
+fn done(place: &Workplace, arguments: &[&str], out: &str) {
+    let output = compare(place, arguments, out);
+    assert!(output.status.success(), "{}", said(&output));
+}
+
+fn result(place: &Workplace, out: &str) -> Value {
+    serde_json::from_str(&place.read(&format!("{out}/result.json"))).unwrap()
+}
+
+fn assert_same(place: &Workplace, a: &str, b: &str) {
+    for file in SAME {
+        let [x, y] = [a, b].map(|folder| place.read(&format!("{folder}/{file}")));
+        assert!(x == y, "{file} of {a} and {b} differ");
+    }
+}
+
+/// One seed of each method, the condition `left`.
+const SMALL: [&str; 4] = ["--condition", "left", "--seeds", "1"];
+
+#[test]
+fn every_method_has_a_row_of_its_own_with_its_parts_settings_and_commit() {
+    let place = Workplace::new();
+    let methods = ["asid", "random", "dr", "oracle", "mine=random+cem+cem"];
+    let named = methods.iter().flat_map(|m| ["--method", m]);
+    let arguments: Vec<&str> = SMALL.into_iter().chain(named).collect();
+    done(&place, &arguments, "a");
+    let result = result(&place, "a");
+    let rows = result["rows"].as_array().unwrap();
+    let parts: Vec<[&str; 4]> = rows
+        .iter()
+        .map(|r| ["method", "explorer", "identifier", "solver"].map(|k| r[k].as_str().unwrap()))
+        .collect();
+    assert_eq!(
+        parts,
+        [
+            ["asid", "fisher-cem", "reps", "cem"],
+            ["random", "random", "reps", "cem"],
+            ["dr", "none", "none", "cem"],
+            ["oracle", "none", "truth", "cem"],
+            ["mine", "random", "cem", "cem"],
+        ]
+    );
+    let mut hashes = Vec::new();
+    for row in rows {
+        for key in [
+            "task", "metric", "std", "iqm", "paper", "commit", "seeds", "median",
+        ] {
+            assert!(row.get(key).is_some(), "{key}");
+        }
+        assert_eq!(row["world"], "matched");
+        assert_eq!(row["n"], 1);
+        let hash = row["settings"].as_str().unwrap();
+        assert!(!hashes.contains(&hash), "each has other settings");
+        hashes.push(hash);
+        // What the hash stands for is there.
+        assert!(
+            place
+                .read(&format!("a/settings/{hash}.toml"))
+                .contains("solver")
+        );
+        // An explored row says what it found, the others have nothing to say.
+        let identified = row["identification"].as_array().unwrap().len();
+        let explores = row["explorer"] != "none";
+        assert_eq!(identified, usize::from(explores), "{}", row["method"]);
+    }
+    assert_eq!(rows[0]["published"]["table"], 1);
+    assert_eq!(rows[2]["paper"], 26.69);
+    let page = place.read("a/report.html");
+    let options = roxmltree::ParsingOptions {
+        allow_dtd: true,
+        ..roxmltree::ParsingOptions::default()
+    };
+    roxmltree::Document::parse_with_options(&page, options).unwrap();
 }
 
 #[test]
-fn a_comparison_sums_up_its_runs_and_merges_with_others() {
+fn an_interrupted_comparison_goes_on_and_ends_with_the_same_bytes_at_any_threads() {
     let place = Workplace::new();
-    for (condition, seed, out) in [("left", "0", "a"), ("left", "2", "b"), ("middle", "0", "c")] {
-        let output = compare(&place, condition, seed, out);
+    let arguments = [
+        "--method",
+        "random",
+        "--method",
+        "dr",
+        "--condition",
+        "left",
+        "--seeds",
+        "3",
+    ];
+    done(
+        &place,
+        &[&arguments[..], &["--threads", "1"]].concat(),
+        "whole",
+    );
+    done(
+        &place,
+        &[&arguments[..], &["--threads", "3"]].concat(),
+        "threads",
+    );
+    assert_same(&place, "whole", "threads");
+
+    // Killed once two cells are there.
+    let common = [
+        "compare",
+        "rod-balancing",
+        "--quiet",
+        "--out",
+        "killed",
+        "--threads",
+        "1",
+    ];
+    let mut child = place
+        .asid(&tiny(&[&common[..], &arguments].concat()))
+        .spawn()
+        .unwrap();
+    let cells = place.path("killed/cells");
+    let count = |folder: &Path| std::fs::read_dir(folder).map_or(0, |entries| entries.count());
+    while count(&cells) < 2 {
         assert!(
-            output.status.success(),
-            "{}",
-            String::from_utf8_lossy(&output.stderr)
+            child.try_wait().unwrap().is_none(),
+            "it ended before it was killed"
+        );
+        std::thread::sleep(std::time::Duration::from_millis(2));
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+    assert!(!place.path("killed/result.json").exists());
+    let first = cells.join("rod-balancing.left.random.matched.rapier.0.json");
+    let before = std::fs::metadata(&first).unwrap().modified().unwrap();
+    // By its own configuration, from the same folder.
+    let again = place.run(&[
+        "compare",
+        "--config",
+        "killed/config.toml",
+        "--out",
+        "killed",
+        "--quiet",
+    ]);
+    assert!(again.status.success(), "{}", said(&again));
+    assert_same(&place, "whole", "killed");
+    let after = std::fs::metadata(&first).unwrap().modified().unwrap();
+    assert_eq!(before, after, "a finished cell is not run again");
+    // Nothing is left to do.
+    done(&place, &arguments, "killed");
+    assert_same(&place, "whole", "killed");
+    let times: Value = serde_json::from_str(&place.read("whole/times.json")).unwrap();
+    assert_eq!(times["cells"].as_array().unwrap().len(), 6);
+}
+
+#[cfg(unix)]
+#[test]
+fn a_signal_ends_a_comparison_with_the_way_to_go_on() {
+    let place = Workplace::new();
+    let arguments = [
+        "--method",
+        "dr",
+        "--condition",
+        "left",
+        "--seeds",
+        "40",
+        "--threads",
+        "1",
+    ];
+    for (signal, line) in [
+        ("TERM", "asid: stopped; "),
+        ("USR1", "runs that have begun are finished"),
+    ] {
+        let common = ["compare", "rod-balancing", "--quiet", "--out", signal];
+        let mut command = place.asid(&tiny(&[&common[..], &arguments].concat()));
+        let child = command
+            .stderr(std::process::Stdio::piped())
+            .spawn()
+            .unwrap();
+        while !place.path(&format!("{signal}/cells")).exists() {
+            std::thread::sleep(std::time::Duration::from_millis(2));
+        }
+        let pid = child.id().to_string();
+        std::process::Command::new("kill")
+            .args([&format!("-{signal}"), &pid])
+            .status()
+            .unwrap();
+        let output = child.wait_with_output().unwrap();
+        let text = said(&output);
+        assert_eq!(output.status.code(), Some(1), "{text}");
+        let goes_on =
+            format!("`asid compare --config {signal}/config.toml --out {signal}` goes on with it");
+        assert!(text.contains(line) && text.contains(&goes_on), "{text}");
+        let names = cli_support::names(&place.path(&format!("{signal}/cells")));
+        assert!(
+            !names.is_empty() && names.iter().all(|n| !n.starts_with('.')),
+            "{names:?}"
+        );
+    }
+}
+
+#[test]
+fn shares_in_one_folder_or_merged_give_the_bytes_of_one_process() {
+    let place = Workplace::new();
+    let arguments = [
+        "--method",
+        "random",
+        "--method",
+        "dr",
+        "--condition",
+        "left",
+        "--seeds",
+        "2",
+    ];
+    done(&place, &arguments, "whole");
+    for share in ["1/2", "2/2"] {
+        let shared = [&arguments[..], &["--shard", share]].concat();
+        done(&place, &shared, "together");
+        done(&place, &shared, &share.replace('/', "-"));
+    }
+    assert_same(&place, "whole", "together");
+    assert!(!place.path("1-2/result.json").exists());
+    let merged = place.run(&["compare", "--merge", "1-2", "2-2", "--out", "merged"]);
+    assert!(merged.status.success(), "{}", said(&merged));
+    assert_same(&place, "whole", "merged");
+    let other = compare(&place, &["--method", "dr", "--shard", "1/2"], "together");
+    assert_eq!(other.status.code(), Some(2));
+    assert!(
+        said(&other).contains("another comparison"),
+        "{}",
+        said(&other)
+    );
+}
+
+#[test]
+fn comparisons_merge_only_where_they_belong_together() {
+    let place = Workplace::new();
+    let dr = ["--method", "dr", "--seeds", "2"];
+    for (seed, condition, out) in [("0", "left", "a"), ("2", "left", "b"), ("0", "middle", "c")] {
+        done(
+            &place,
+            &[&dr[..], &["--condition", condition, "--seed", seed]].concat(),
+            out,
         );
     }
     let merged = place.run(&[
-        "compare", "--merge", "a", "b", "c", "--out", "all", "--json",
+        "compare", "--merge", "a", "b", "c", "a", "--out", "all", "--json",
     ]);
-    assert!(
-        merged.status.success(),
-        "{}",
-        String::from_utf8_lossy(&merged.stderr)
+    assert!(merged.status.success(), "{}", said(&merged));
+    let all: Value = serde_json::from_slice(&merged.stdout).unwrap();
+    let rows = all["rows"].as_array().unwrap();
+    assert_eq!(
+        (rows.len(), &rows[0]["n"], &rows[1]["n"]),
+        (2, &4.into(), &2.into())
     );
-    let result: Value = serde_json::from_slice(&merged.stdout).unwrap();
-    let rows = result["rows"].as_array().unwrap();
-    assert_eq!(rows.len(), 2);
-    let left = &rows[0];
-    assert_eq!(left["condition"], "left");
-    assert_eq!(left["n"], 4);
     // Mean and success rate are those of the values.
-    let values: Vec<f64> = left["values"]
+    let values: Vec<f64> = rows[0]["values"]
         .as_array()
         .unwrap()
         .iter()
         .map(|v| v.as_f64().unwrap())
         .collect();
     let mean = values.iter().sum::<f64>() / 4.0;
-    assert!((left["mean"].as_f64().unwrap() - mean).abs() < 1e-12);
-    let interval = &left["interval95"];
+    assert!((rows[0]["mean"].as_f64().unwrap() - mean).abs() < 1e-12);
+    let interval = &rows[0]["interval95"];
     assert!(interval[0].as_f64() <= Some(mean) && Some(mean) <= interval[1].as_f64());
-    for key in [
-        "task",
-        "method",
-        "backend",
-        "metric",
-        "std",
-        "iqm",
-        "success_rate",
-        "paper",
+
+    done(
+        &place,
+        &[
+            &dr[..],
+            &[
+                "--condition",
+                "right",
+                "--set",
+                "solver.cem.elite_fraction=0.5",
+            ],
+        ]
+        .concat(),
+        "d",
+    );
+    for (change, reason) in [
+        ("\"value\": ", "another outcome"),
+        ("\"git\": \"", "commit"),
+        ("\"engine\": \"", "was made on"),
+        ("\"settings\": \"", "other settings of dr"),
     ] {
-        assert!(left.get(key).is_some(), "{key}");
+        let cell = "a/cells/rod-balancing.left.dr.matched.rapier.0.json";
+        let text = place.read(cell);
+        let other = format!("x-{}", change.trim_matches(['"', ':', ' ']));
+        std::fs::create_dir_all(place.path(&format!("{other}/cells"))).unwrap();
+        std::fs::copy(
+            place.path("a/config.toml"),
+            place.path(&format!("{other}/config.toml")),
+        )
+        .unwrap();
+        place.write(
+            &cell.replacen('a', &other, 1),
+            &text.replacen(change, &format!("{change}1"), 1),
+        );
+        let refused = place.run(&["compare", "--merge", "a", &other, "--out", "twice"]);
+        assert_eq!(refused.status.code(), Some(2));
+        let message = said(&refused);
+        assert!(
+            message.contains(reason) && message.lines().count() == 1,
+            "{message}"
+        );
     }
-    let page = place.read("all/report.html");
-    roxmltree::Document::parse_with_options(
-        &page,
-        roxmltree::ParsingOptions {
-            allow_dtd: true,
-            ..roxmltree::ParsingOptions::default()
-        },
-    )
-    .unwrap();
-    let twice = place.run(&["compare", "--merge", "a", "a", "--out", "twice"]);
-    assert_eq!(twice.status.code(), Some(2));
-    assert!(String::from_utf8_lossy(&twice.stderr).contains("in more than one folder"));
+    let refused = place.run(&["compare", "--merge", "a", "d", "--out", "twice"]);
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(said(&refused).contains("solver.cem"), "{}", said(&refused));
     assert!(!place.path("twice").exists());
+}
+
+#[test]
+fn a_folder_of_other_settings_is_not_mixed_with() {
+    let place = Workplace::new();
+    let dr = ["--method", "dr", "--condition", "left", "--seeds", "1"];
+    done(&place, &dr, "a");
+    let other = compare(
+        &place,
+        &[&dr[..], &["--set", "solver.cem.elite_fraction=0.5"]].concat(),
+        "a",
+    );
+    assert_eq!(other.status.code(), Some(2));
+    let text = said(&other);
+    assert!(
+        text.contains("solver.cem = - there, { elite_fraction = 0.5 } here"),
+        "{text}"
+    );
+    assert!(text.lines().count() == 1, "{text}");
+    // More seeds are more of the same.
+    done(
+        &place,
+        &["--method", "dr", "--condition", "left", "--seeds", "2"],
+        "a",
+    );
+    assert_eq!(result(&place, "a")["rows"][0]["n"], 2);
+    // A folder of something else is never touched.
+    std::fs::create_dir(place.path("run")).unwrap();
+    place.write("run/config.toml", "task = 'rod-balancing'");
+    let taken = compare(&place, &dr, "run");
+    assert_eq!(taken.status.code(), Some(2));
+    assert!(
+        said(&taken).contains("choose another --out"),
+        "{}",
+        said(&taken)
+    );
 }
 
 #[test]
 fn the_oracle_knows_a_truth_that_is_drawn_from_the_whole_prior() {
     let place = Workplace::new();
-    let output = place.run(&tiny(&[
-        "compare",
-        "rod-balancing",
-        "--method",
-        "oracle",
-        "--condition",
-        "prior",
-        "--seeds",
-        "2",
-        "--quiet",
-        "--out",
+    done(
+        &place,
+        &["--method", "oracle", "--condition", "prior", "--seeds", "2"],
         "a",
-    ]));
-    assert!(
-        output.status.success(),
-        "{}",
-        String::from_utf8_lossy(&output.stderr)
     );
     let runs: Value = serde_json::from_str(&place.read("a/runs.json")).unwrap();
     let truths: Vec<f64> = runs
@@ -127,27 +398,61 @@ fn the_oracle_knows_a_truth_that_is_drawn_from_the_whole_prior() {
         })
         .collect();
     assert!(truths[0] != truths[1] && truths.iter().all(|t| t.abs() <= 0.1));
-    assert!(
-        place
-            .read("a/config.toml")
-            .contains("condition = \"prior\"")
-    );
 }
 
 #[test]
-fn unknown_methods_and_conditions_list_the_near_ones() {
+fn what_names_nothing_or_would_misname_a_row_is_refused_in_one_line() {
     let place = Workplace::new();
-    for (flag, name, expected) in [
-        ("--method", "asidd", "asid"),
-        ("--condition", "lefft", "left"),
+    for (arguments, expected) in [
+        (&["--method", "asidd"][..], "asid"),
+        (&["--method", "x=randm+reps+cem"], "random"),
+        (&["--condition", "lefft"], "left"),
+        (
+            &["--explorer", "random"],
+            "--method NAME=explorer+identifier+solver",
+        ),
+        (
+            &["--set", "explorer.name=random"],
+            "--method NAME=explorer+identifier+solver",
+        ),
+        (&["--set", "explorer.iteratoins=3"], "iteratoins"),
+        (&["--table", "4"], "tables 1, 2 and 3"),
+        (&["--shard", "3/2"], "i/n"),
+        (&["--seeds", "0"], "at least 1"),
+        (&["--backend", "rapierr"], "rapier"),
     ] {
-        let output = place.run(&["compare", "rod-balancing", flag, name]);
-        assert_eq!(output.status.code(), Some(2));
-        let text = String::from_utf8_lossy(&output.stderr).into_owned();
+        let output = place.run(&[&["compare", "rod-balancing"], arguments].concat());
+        let text = said(&output);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {text}");
         assert!(
             text.contains(expected) && text.lines().count() == 1,
-            "{text}"
+            "{arguments:?}: {text}"
         );
     }
     assert!(place.names().is_empty());
+}
+
+#[test]
+fn a_quick_look_is_marked_in_every_output_and_has_other_settings() {
+    let place = Workplace::new();
+    let dr = ["--method", "dr", "--condition", "left"];
+    done(
+        &place,
+        &[&dr[..], &["--quick", "--seeds", "1"]].concat(),
+        "quick",
+    );
+    done(&place, &[&dr[..], &["--seeds", "1"]].concat(), "full");
+    assert_eq!(result(&place, "quick")["quick"], true);
+    for file in ["table.md", "report.html"] {
+        assert!(
+            place.read(&format!("quick/{file}")).contains("quick look"),
+            "{file}"
+        );
+        assert!(
+            !place.read(&format!("full/{file}")).contains("quick look"),
+            "{file}"
+        );
+    }
+    let hash = |out: &str| result(&place, out)["rows"][0]["settings"].clone();
+    assert_ne!(hash("quick"), hash("full"));
 }

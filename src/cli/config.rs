@@ -323,7 +323,7 @@ fn model_file(given: &Option<PathBuf>, table: &toml::Table) -> Result<Option<Pat
 
 /// The engine that is used where none is named: the first that is built in, MuJoCo last,
 /// so that nothing depends on a native library.
-fn default_backend() -> String {
+pub fn default_backend() -> String {
     let all = registry::all::<registry::BackendEntry>();
     let rapier = all.iter().find(|e| e.name == "rapier");
     rapier

@@ -92,22 +92,25 @@ pub fn guard(work: impl FnOnce() -> ExitCode) -> ExitCode {
         }));
     }
     std::panic::catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|payload| {
-        if let Some(text) = payload.downcast_ref::<String>()
-            && asid_core::plugin::blames_a_plugin(text)
-        {
-            tell(&one_line(text));
-            return ExitCode::from(FAILED);
-        }
-        let said = PANIC
-            .lock()
-            .ok()
-            .and_then(|mut latest| latest.take())
-            .unwrap_or_else(|| "see above".into());
-        tell(&one_line(&format!(
-            "internal error: {said}; please report it with the command line"
-        )));
+        tell(&one_line(&of_panic(&*payload)));
         ExitCode::from(FAILED)
     })
+}
+
+/// What to say of a panic that was caught: what the plugin is to blame for, else that this
+/// program is.
+pub fn of_panic(payload: &(dyn std::any::Any + Send)) -> String {
+    if let Some(text) = payload.downcast_ref::<String>()
+        && asid_core::plugin::blames_a_plugin(text)
+    {
+        return text.clone();
+    }
+    let said = PANIC
+        .lock()
+        .ok()
+        .and_then(|mut latest| latest.take())
+        .unwrap_or_else(|| "see above".into());
+    format!("internal error: {said}; please report it with the command line")
 }
 
 fn one_line(text: &str) -> String {

@@ -13,21 +13,21 @@ use std::io::Write as _;
 use std::path::Path;
 
 use anyhow::Result;
+use asid_comparison::statistics;
 use asid_core::registry::{TaskEntry, find};
 use asid_core::{Error, Task};
 use asid_report::page::{Cell, Column, Figure, Page, Section, Table, Tone};
 use asid_report::plot::{Panels, Plan};
 use serde::Serialize;
 
-use super::compare::statistics;
 use super::options::Common;
 use super::output::{OutFolder, write_json, write_text};
 use super::result::figure as digits;
 
 /// What a figure is drawn with.
-pub struct Request<'a> {
+pub struct Request {
     /// Options of the command.
-    pub common: &'a Common,
+    pub common: Common,
     /// Episodes of each explorer, or of each square of a map.
     pub episodes: Option<u64>,
     /// Explorers in place of the figure's own.
@@ -36,7 +36,7 @@ pub struct Request<'a> {
     pub quick: bool,
 }
 
-impl Request<'_> {
+impl Request {
     /// The explorers to show: those asked for, else the figure's own.
     fn explorers(&self, own: &[&str]) -> Vec<String> {
         if self.explorers.is_empty() {
@@ -55,7 +55,7 @@ impl Request<'_> {
 struct Entry {
     name: &'static str,
     about: &'static str,
-    draw: fn(&Request<'_>) -> Result<Drawing>,
+    draw: fn(&Request) -> Result<Drawing>,
 }
 
 const FIGURES: [Entry; 5] = [
@@ -152,11 +152,11 @@ struct Versions {
 }
 
 /// Draws a figure and writes its folder.
-pub fn figure(name: &str, request: &Request<'_>) -> Result<()> {
+pub fn figure(name: &str, request: &Request) -> Result<()> {
     let entry = FIGURES.iter().find(|f| f.name == name);
     let entry =
         entry.ok_or_else(|| Error::unknown("figure", name, FIGURES.iter().map(|f| f.name)))?;
-    let common = request.common;
+    let common = &request.common;
     let out = OutFolder::claim(common.out.as_deref(), &format!("figure-{name}"))?;
     let drawing = (entry.draw)(request)?;
     let result = FigureResult {
@@ -301,8 +301,8 @@ fn mean(explorer: &str, quantity: &str, unit: &str, values: &[f64]) -> Number {
         explorer: explorer.to_owned(),
         quantity: quantity.to_owned(),
         unit: unit.to_owned(),
-        value: values.iter().sum::<f64>() / n.max(1) as f64,
-        interval95: statistics::bootstrap(values),
+        value: statistics::mean(values),
+        interval95: statistics::bootstrap(&[values.to_vec()], statistics::mean),
         n,
     }
 }

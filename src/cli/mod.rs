@@ -84,9 +84,9 @@ impl Command {
             Self::Explore(a) => &a.common,
             Self::Identify(a) => &a.common,
             Self::Solve(a) => &a.common,
-            Self::Compare(a) => &a.common,
             Self::Diagnose(a) => &a.common,
             Self::Withheld(a) => &a.common,
+            Self::Compare(a) => return a.config.as_deref(),
             Self::Conformance(a) => return a.config.as_deref(),
             Self::List(_) | Self::Doctor(_) | Self::Export(_) | Self::New(_) | Self::Report(_) => {
                 return None;

@@ -1,60 +1,85 @@
 //! The HTML page of a comparison.
 
-use asid_report::page::{Cell, Column, Figure, Page, Section, Table};
+use asid_comparison::cell::Cell as Run;
+use asid_comparison::grid::Grid;
+use asid_comparison::plan::Plan;
+use asid_comparison::rows::ComparisonResult;
+use asid_comparison::table::{grids, notes};
+use asid_report::page::{Cell, Column, Figure, Page, Section, Table, Tone};
 use asid_report::plot::{Axis, Chart, Colour, Layer};
 
-use super::table::{self, CompareResult, Run};
+/// Places at which the dots of a row's seeds lie side by side.
+const ABREAST: u64 = 10;
 
-/// The page: a picture a task and engine, and the table.
-pub fn html(result: &CompareResult, runs: &[Run], command: &str) -> String {
-    let mut page = Page::new("Methods compared")
-        .kicker("ASID compare")
-        .lead(format!(
-            "{} runs in {} rows; each row sums up the seeds of one method under one condition.",
-            runs.len(),
-            result.rows.len()
-        ));
-    let mut groups: Vec<(String, String)> = Vec::new();
+/// Width of a row's band of dots, in distances of rows.
+const BAND: f64 = 0.3;
+
+/// The page: tables, and pictures for each task, engine and world.
+pub fn html(plan: &Plan, result: &ComparisonResult, runs: &[Run], repeat: &str) -> String {
+    let title = match result.table {
+        Some(table) => format!("Methods compared: Table {table}"),
+        None => "Methods compared".to_owned(),
+    };
+    let mut page = Page::new(&title).kicker("ASID compare").lead(format!(
+        "{} runs in {} rows; each row sums up the seeds of one method under one condition.",
+        runs.len(),
+        result.rows.len()
+    ));
+    if result.quick {
+        page = page.badge("quick look", Tone::Fair);
+    }
+    let notes = notes(result);
+    if !notes.is_empty() {
+        let section = Section::new("What to know");
+        page = page.section(notes.into_iter().fold(section, Section::note));
+    }
+    for grid in grids(plan, result) {
+        page = page.section(Section::new(&grid.title).table(table(&grid)));
+    }
+    let mut groups: Vec<[&str; 3]> = Vec::new();
     for row in &result.rows {
-        let group = (row.task.clone(), row.backend.clone());
+        let group = [&*row.task, &*row.backend, &*row.world];
         if !groups.contains(&group) {
             groups.push(group);
         }
     }
-    for (task, backend) in groups {
+    for group in groups {
+        let [task, backend, world] = group;
+        let title = format!("{task} on {backend}, {world} world");
         page = page.section(
-            Section::new(&format!("{task} on {backend}"))
+            Section::new(&title)
                 .lead("Every dot is one run: one episode of exploration, one try at the task.")
-                .figures(figures(result, runs, &task, &backend)),
+                .figures(figures(result, runs, group)),
         );
     }
-    let columns = table::COLUMNS
-        .iter()
-        .enumerate()
-        .map(|(i, title)| {
-            if i < 4 || i == 5 {
-                Column::text(title)
-            } else {
-                Column::number(title)
-            }
-        })
-        .collect();
-    let table = result.rows.iter().fold(Table::new(columns), |t, r| {
-        t.row(table::cells(r).into_iter().map(Cell::from).collect())
+    page.section(Section::new("Repeat it").command(repeat))
+        .html()
+}
+
+fn table(grid: &Grid) -> Table {
+    let columns = grid.head.iter().map(|h| {
+        if h.number {
+            Column::number(&h.title)
+        } else {
+            Column::text(&h.title)
+        }
     });
-    page.section(Section::new("Table").table(table.caption(
-        "The interval of the mean is a percentile bootstrap over seeds; error, coverage and width are those of the unknown.",
-    )))
-    .section(Section::new("Repeat it").command(command))
-    .html()
+    let table = Table::new(columns.collect()).caption(&*grid.caption);
+    grid.rows.iter().fold(table, |table, row| {
+        let cells = row.iter().map(|e| {
+            let tone = if e.best { Tone::Good } else { Tone::Plain };
+            Cell::toned(&*e.text, tone)
+        });
+        table.row(cells.collect())
+    })
 }
 
 /// The metric, and the error of each unknown, by condition and method.
-fn figures(result: &CompareResult, runs: &[Run], task: &str, backend: &str) -> Vec<Figure> {
+fn figures(result: &ComparisonResult, runs: &[Run], group: [&str; 3]) -> Vec<Figure> {
     let rows: Vec<_> = result
         .rows
         .iter()
-        .filter(|r| r.task == task && r.backend == backend)
+        .filter(|r| [&*r.task, &*r.backend, &*r.world] == group)
         .collect();
     let marks: Vec<(f64, String)> = rows
         .iter()
@@ -63,17 +88,15 @@ fn figures(result: &CompareResult, runs: &[Run], task: &str, backend: &str) -> V
         .collect();
     let place = |run: &Run| {
         rows.iter()
-            .position(|r| r.condition == run.condition && r.method == run.method)
+            .position(|r| r.condition == run.key.condition && r.method == run.key.method)
     };
     let of: Vec<(&Run, f64)> = runs
         .iter()
-        .filter(|r| r.task == task && r.backend == backend)
+        .filter(|r| [&*r.key.task, &*r.key.backend, &*r.key.world] == group)
         // Seeds side by side, so that equal values do not hide each other.
         .filter_map(|r| {
-            Some((
-                r,
-                place(r)? as f64 + 0.3 * ((r.seed % 10) as f64 / 9.0 - 0.5),
-            ))
+            let abreast = (r.key.seed % ABREAST) as f64 / (ABREAST - 1) as f64;
+            Some((r, place(r)? as f64 + BAND * (abreast - 0.5)))
         })
         .collect();
     let metric = rows.first().map_or("", |r| &r.metric);
@@ -116,8 +139,8 @@ fn figures(result: &CompareResult, runs: &[Run], task: &str, backend: &str) -> V
         .layer(Layer::horizontal(0.0).colour(Colour::Muted).dashed())
         .layer(
             Layer::dots(dots(&|r| {
-                r.residual
-                    .map(|_| r.parameters[i].estimate - r.parameters[i].truth)
+                let found = r.parameters.get(i)?;
+                r.residual.map(|_| found.estimate - found.truth)
             }))
             .colour(Colour::Blue),
         );

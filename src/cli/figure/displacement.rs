@@ -18,7 +18,7 @@ pub const HIT: f64 = 0.015;
 /// Displacement that is drawn darkest, m.
 const FULL: f64 = 0.5;
 
-pub fn draw(request: &Request<'_>) -> Result<Drawing> {
+pub fn draw(request: &Request) -> Result<Drawing> {
     let task = task(TASK)?;
     let explorers = request.explorers(&["random", "task-ppo", "fisher-ppo"]);
     let start = &task.exploration().start;
@@ -38,7 +38,7 @@ pub fn draw(request: &Request<'_>) -> Result<Drawing> {
             }));
         }
     }
-    let played = play(request.common, wanted)?;
+    let played = play(&request.common, wanted)?;
     let mut drawing = Drawing {
         title: "How far the ball is pushed".into(),
         lead: format!(

@@ -13,7 +13,7 @@ const TASK: &str = "sphere-distractors";
 /// Episodes of an explorer, as in the paper.
 const EPISODES: u64 = 30;
 
-pub fn draw(request: &Request<'_>) -> Result<Drawing> {
+pub fn draw(request: &Request) -> Result<Drawing> {
     let task = task(TASK)?;
     let explorers = request.explorers(&["random", "max", "fisher-ppo"]);
     let episodes = request
@@ -29,7 +29,7 @@ pub fn draw(request: &Request<'_>) -> Result<Drawing> {
             start: None,
         })
     });
-    let played = play(request.common, wanted.collect())?;
+    let played = play(&request.common, wanted.collect())?;
     // The task's signals: the ball that matters first, then the others.
     let signals = &task.exploration().signals;
     let balls: Vec<&str> = signals

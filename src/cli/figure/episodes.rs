@@ -1,12 +1,13 @@
 //! Exploration episodes of several explorers, played at the same seeds: what every figure is
 //! made of.
 
-use std::collections::VecDeque;
 use std::io::Write as _;
-use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
 use anyhow::Result;
+use asid_comparison::schedule;
 use asid_core::Error;
 use asid_core::real_world::{RealEpisode, RealWorld as _};
 use asid_core::registry::{ExplorerEntry, find};
@@ -76,46 +77,43 @@ impl Played {
 
 /// Plays all episodes on as many threads as are asked for; the order is that of `wanted`.
 pub fn play(common: &Common, wanted: Vec<Wanted>) -> Result<Vec<Played>> {
-    let total = wanted.len();
     let workers = common
         .threads
         .or_else(|| std::thread::available_parallelism().ok().map(usize::from))
         .unwrap_or(1);
-    let queue: Mutex<VecDeque<(usize, Wanted)>> =
-        Mutex::new(wanted.into_iter().enumerate().collect());
+    let total = wanted.len();
     let done: Mutex<Vec<(usize, Result<Played>)>> = Mutex::new(Vec::with_capacity(total));
+    let stop = AtomicBool::new(false);
     let clock = Instant::now();
-    std::thread::scope(|scope| {
-        for _ in 0..workers.min(total) {
-            scope.spawn(|| {
-                loop {
-                    let next = queue.lock().ok().and_then(|mut q| q.pop_front());
-                    let Some((index, wanted)) = next else { return };
-                    let about = format!("{}, {}", wanted.task, wanted.explorer);
-                    let played = one(common, wanted);
-                    let failed = played.is_err();
-                    let Ok(mut all) = done.lock() else { return };
-                    all.push((index, played));
-                    if !common.quiet {
-                        let left = clock.elapsed().as_secs_f64() / all.len() as f64
-                            * (total - all.len()) as f64;
-                        let _ = write!(
-                            std::io::stderr(),
-                            "\r{}/{total} episodes, {left:.0} s left ({about})      ",
-                            all.len()
-                        );
-                    }
-                    if failed && let Ok(mut queue) = queue.lock() {
-                        queue.clear();
-                    }
-                }
-            });
-        }
-    });
+    let pieces: Vec<(usize, Wanted)> = wanted.into_iter().enumerate().collect();
+    schedule::run(
+        &pieces,
+        workers,
+        &stop,
+        |(_, wanted)| one(common, wanted.clone()),
+        |(index, wanted), played| {
+            let defect = |_| Err(Error::Failed("an episode broke off by a defect".into()).into());
+            let played = played.unwrap_or_else(defect);
+            stop.fetch_or(played.is_err(), Ordering::SeqCst);
+            let mut all = done.lock().unwrap_or_else(PoisonError::into_inner);
+            all.push((*index, played));
+            if !common.quiet {
+                let each = clock.elapsed().as_secs_f64() / all.len() as f64;
+                let _ = write!(
+                    std::io::stderr(),
+                    "\r{}/{total} episodes, {:.0} s left ({}, {})      ",
+                    all.len(),
+                    each * (total - all.len()) as f64,
+                    wanted.task,
+                    wanted.explorer
+                );
+            }
+        },
+    )?;
     if !common.quiet {
         let _ = writeln!(std::io::stderr());
     }
-    let mut all = done.into_inner().unwrap_or_else(|e| e.into_inner());
+    let mut all = done.into_inner().unwrap_or_else(PoisonError::into_inner);
     all.sort_by_key(|(index, _)| *index);
     all.into_iter().map(|(_, played)| played).collect()
 }

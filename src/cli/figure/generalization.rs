@@ -23,7 +23,7 @@ const BEYOND: f64 = 0.15;
 /// Mass of the ball over that of training.
 const MASS: f64 = 3.0;
 
-pub fn draw(request: &Request<'_>) -> Result<Drawing> {
+pub fn draw(request: &Request) -> Result<Drawing> {
     let task = task(TASK)?;
     let explorer = request.explorers(&["fisher-ppo"])[0].clone();
     let episodes = request
@@ -56,7 +56,7 @@ pub fn draw(request: &Request<'_>) -> Result<Drawing> {
             }));
         }
     }
-    let played = play(request.common, wanted)?;
+    let played = play(&request.common, wanted)?;
     let mut drawing = Drawing {
         title: "Pushes where nothing was trained".into(),
         lead: format!(

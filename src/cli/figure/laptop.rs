@@ -16,7 +16,7 @@ const MOVED: f64 = 0.01;
 /// Episodes of an explorer.
 const EPISODES: u64 = 40;
 
-pub fn draw(request: &Request<'_>) -> Result<Drawing> {
+pub fn draw(request: &Request) -> Result<Drawing> {
     let task = task(TASK)?;
     let explorers = request.explorers(&["random", "fisher-cem"]);
     let episodes = request
@@ -33,7 +33,7 @@ pub fn draw(request: &Request<'_>) -> Result<Drawing> {
             start: None,
         })
     });
-    let played = play(request.common, wanted.collect())?;
+    let played = play(&request.common, wanted.collect())?;
     let mut drawing = Drawing {
         title: "How often the lid is moved".into(),
         lead: format!(

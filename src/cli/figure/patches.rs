@@ -20,7 +20,7 @@ const SIDE: f64 = 0.05;
 /// Episodes of an explorer; the paper shows its heat maps without a number.
 const EPISODES: u64 = 20;
 
-pub fn draw(request: &Request<'_>) -> Result<Drawing> {
+pub fn draw(request: &Request) -> Result<Drawing> {
     let task = task(TASK)?;
     let explorers = request.explorers(&["random", "maxmi", "fisher-ppo"]);
     let episodes = request
@@ -36,7 +36,7 @@ pub fn draw(request: &Request<'_>) -> Result<Drawing> {
             start: None,
         })
     });
-    let played = play(request.common, wanted.collect())?;
+    let played = play(&request.common, wanted.collect())?;
     let grid = Grid::over(task.top_view().bounds, SIDE);
     let regions = task.regions();
     let mut drawing = Drawing {

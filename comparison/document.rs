@@ -1,0 +1,95 @@
+//! `config.toml` of a comparison: its plan under `[compare]`, and beside it the settings that
+//! every run is given, as a run's own `config.toml` has them.
+
+use std::path::Path;
+
+use asid_core::{Error, Result};
+
+use crate::plan::Plan;
+
+/// Name of the plan's section.
+pub const SECTION: &str = "compare";
+
+/// What is compared, with the settings that were given.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Document {
+    /// What is run.
+    pub plan: Plan,
+    /// Settings of every run; those of an algorithm count for the methods that use it.
+    pub settings: toml::Table,
+}
+
+impl Document {
+    /// As text.
+    ///
+    /// # Errors
+    /// When the plan is no TOML, which a seed beyond 63 bits is not.
+    pub fn text(&self) -> Result<String> {
+        let wrong = |e: toml::ser::Error| Error::Config {
+            key: SECTION.into(),
+            message: e.to_string(),
+        };
+        let mut all = self.settings.clone();
+        let plan = toml::Table::try_from(&self.plan).map_err(wrong)?;
+        all.insert(SECTION.into(), plan.into());
+        toml::to_string_pretty(&all).map_err(wrong)
+    }
+
+    /// Takes the plan out of a configuration; none where it has no `[compare]`.
+    ///
+    /// # Errors
+    /// When the section is no plan.
+    pub fn plan_of(table: &mut toml::Table) -> Result<Option<Plan>> {
+        let Some(section) = table.remove(SECTION) else {
+            return Ok(None);
+        };
+        section
+            .try_into()
+            .map(Some)
+            .map_err(|e: toml::de::Error| Error::Config {
+                key: SECTION.into(),
+                message: e.message().replace('\n', " "),
+            })
+    }
+
+    /// Reads a comparison's file.
+    ///
+    /// # Errors
+    /// When it cannot be read or is that of something else.
+    pub fn read(path: &Path) -> Result<Self> {
+        let wrong = |message: String| Error::File {
+            path: path.to_owned(),
+            message,
+        };
+        let text = std::fs::read_to_string(path)
+            .map_err(|e| wrong(format!("{e}; is this the folder of a comparison?")))?;
+        let mut settings: toml::Table = text
+            .parse()
+            .map_err(|e: toml::de::Error| wrong(e.message().to_owned()))?;
+        let plan = Self::plan_of(&mut settings).map_err(|e| wrong(e.to_string()))?;
+        let plan = plan.ok_or_else(|| wrong("is not the configuration of a comparison".into()))?;
+        Ok(Self { plan, settings })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plan::tests::plan;
+
+    #[test]
+    fn a_comparison_reads_back_from_its_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let settings = "model = 'a.xml'\n[solver]\niterations = 3".parse().unwrap();
+        let document = Document {
+            plan: plan(),
+            settings,
+        };
+        let path = folder.path().join("config.toml");
+        std::fs::write(&path, document.text().unwrap()).unwrap();
+        assert_eq!(Document::read(&path).unwrap(), document);
+        std::fs::write(&path, "task = 'rod-balancing'").unwrap();
+        let message = Document::read(&path).unwrap_err().to_string();
+        assert!(message.contains("not the configuration of a comparison"));
+    }
+}

@@ -1,0 +1,620 @@
+//! Rows: what the runs of one method under one condition come to.
+
+use serde::Serialize;
+
+use crate::cell::{Cell, CellKey, Failure};
+use crate::method::ORACLE;
+use crate::paper::{Published, published};
+use crate::plan::Plan;
+use crate::settings::differences;
+use crate::statistics::{
+    bootstrap, deviation, improvement, improvement_interval, interquartile_mean, mean, median,
+    wilson,
+};
+
+/// How well one unknown was identified over the runs of a row.
+#[derive(Clone, Debug, Serialize)]
+pub struct Identification {
+    /// Name.
+    pub name: String,
+    /// Unit.
+    pub unit: String,
+    /// Median distance of the estimate from the truth.
+    pub median_abs_error: f64,
+    /// Share of 95 % intervals that hold the truth.
+    pub coverage95: f64,
+    /// Median width of the 95 % intervals.
+    pub median_width95: f64,
+    /// Median of the expected posterior standard deviations.
+    pub median_expected_std: Option<f64>,
+}
+
+/// Probability that a run is better than one of the next best method.
+#[derive(Clone, Debug, Serialize)]
+pub struct Improvement {
+    /// The next best method.
+    pub over: String,
+    /// Probability; ties count half.
+    pub probability: f64,
+    /// Its 95 % bootstrap interval.
+    pub interval95: [f64; 2],
+}
+
+/// Whether a row is the best of its column, with an interval apart from the next one's.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Best {
+    /// In the interquartile mean of the metric.
+    pub iqm: bool,
+    /// In the share of successes.
+    pub success: bool,
+}
+
+/// Figures of one or more conditions' runs.
+#[derive(Clone, Debug, Serialize)]
+pub struct Summary {
+    /// Runs.
+    pub n: usize,
+    /// Mean of the metric.
+    pub mean: f64,
+    /// Sample standard deviation.
+    pub std: f64,
+    /// Median.
+    pub median: f64,
+    /// Interquartile mean.
+    pub iqm: f64,
+    /// Bootstrap interval of the mean.
+    pub interval95: [f64; 2],
+    /// Bootstrap interval of the interquartile mean.
+    pub iqm_interval95: [f64; 2],
+    /// Share of successes.
+    pub success_rate: f64,
+    /// Its Wilson interval.
+    pub success_interval95: [f64; 2],
+    /// Against the next best method; none of the last one, of the oracle, and of one alone.
+    pub improvement: Option<Improvement>,
+    /// Whether it is the best of its column.
+    pub best: Best,
+}
+
+/// One row of the table.
+#[derive(Clone, Debug, Serialize)]
+pub struct Row {
+    /// Task.
+    pub task: String,
+    /// Condition.
+    pub condition: String,
+    /// Method.
+    pub method: String,
+    /// Kind of real world.
+    pub world: String,
+    /// Engine of the simulator.
+    pub backend: String,
+    /// Explorer, or `none`.
+    pub explorer: String,
+    /// Identifier, `none`, or `truth`.
+    pub identifier: String,
+    /// Solver.
+    pub solver: String,
+    /// Hash of the settings.
+    pub settings: String,
+    /// Commit.
+    pub commit: String,
+    /// The task's metric; lower is better.
+    pub metric: String,
+    /// The figures.
+    #[serde(flatten)]
+    pub summary: Summary,
+    /// Seeds of the runs.
+    pub seeds: Vec<u64>,
+    /// Values of the metric, by seed.
+    pub values: Vec<f64>,
+    /// The paper's value, as a share where it counts successes.
+    pub paper: Option<f64>,
+    /// Where that value stands in the paper and what it measures.
+    pub published: Option<Published>,
+    /// What makes the row unequal to others of its task, condition, world and engine.
+    pub differs: Vec<String>,
+    /// How well the unknowns were identified; empty without identification.
+    pub identification: Vec<Identification>,
+}
+
+/// A method over all conditions of a task, each condition a stratum.
+#[derive(Clone, Debug, Serialize)]
+pub struct Pooled {
+    /// Task.
+    pub task: String,
+    /// Conditions that are pooled.
+    pub conditions: Vec<String>,
+    /// Method.
+    pub method: String,
+    /// Kind of real world.
+    pub world: String,
+    /// Engine of the simulator.
+    pub backend: String,
+    /// The task's metric.
+    pub metric: String,
+    /// The figures.
+    #[serde(flatten)]
+    pub summary: Summary,
+}
+
+/// A method that could not be run at all on a task.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Omitted {
+    /// Task.
+    pub task: String,
+    /// Method.
+    pub method: String,
+    /// Kind of real world.
+    pub world: String,
+    /// Engine of the simulator.
+    pub backend: String,
+    /// Why.
+    pub reason: String,
+}
+
+/// What is asked of a comparison, and how much of it there is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct Count {
+    /// Cells of the plan.
+    pub planned: usize,
+    /// Cells that are there.
+    pub done: usize,
+}
+
+/// `result.json` of a comparison.
+#[derive(Clone, Debug, Serialize)]
+pub struct ComparisonResult {
+    /// Layout version.
+    pub schema: u32,
+    /// The paper's table that this is; none for a comparison of one's own.
+    pub table: Option<u8>,
+    /// Whether searches were cut short.
+    pub quick: bool,
+    /// How much there is.
+    pub cells: Count,
+    /// A row a task, condition, engine, world and method.
+    pub rows: Vec<Row>,
+    /// A row a task, engine, world and method, where a task has several conditions.
+    pub pooled: Vec<Pooled>,
+    /// Methods that could not be run.
+    pub omitted: Vec<Omitted>,
+    /// Single runs that failed.
+    pub failures: Vec<Failure>,
+    /// What made the cells.
+    pub versions: serde_json::Value,
+}
+
+/// Sums cells up. `cells` and `failures` are in the plan's order; `settings` gives the settings
+/// that a hash stands for.
+#[must_use]
+pub fn summarise(
+    plan: &Plan,
+    cells: &[Cell],
+    failures: &[Failure],
+    settings: &dyn Fn(&str) -> Option<toml::Table>,
+) -> ComparisonResult {
+    let mut rows: Vec<(Row, Vec<&Cell>)> = Vec::new();
+    for cell in cells {
+        match rows
+            .iter_mut()
+            .find(|(_, of)| of[0].key.row_mate(&cell.key))
+        {
+            Some((_, of)) => of.push(cell),
+            None => rows.push((row(cell), vec![cell])),
+        }
+    }
+    for (row, of) in &mut rows {
+        fill(row, of);
+    }
+    let pooled = pool(&rows);
+    let mut rows: Vec<Row> = rows.into_iter().map(|(row, _)| row).collect();
+    rank(&mut rows);
+    tell_differences(&mut rows, settings);
+    let (of_all, single): (Vec<&Failure>, Vec<&Failure>) = failures
+        .iter()
+        .partition(|f| f.of_all && !cells.iter().any(|c| c.key.arm_mate(&f.key)));
+    let mut omitted: Vec<Omitted> = Vec::new();
+    for failure in of_all {
+        let key: &CellKey = &failure.key;
+        let arm = Omitted {
+            task: key.task.clone(),
+            method: key.method.clone(),
+            world: key.world.clone(),
+            backend: key.backend.clone(),
+            reason: failure.reason.clone(),
+        };
+        let same = |o: &Omitted| {
+            (&o.task, &o.method, &o.world, &o.backend)
+                == (&arm.task, &arm.method, &arm.world, &arm.backend)
+        };
+        if !omitted.iter().any(same) {
+            omitted.push(arm);
+        }
+    }
+    ComparisonResult {
+        schema: 1,
+        table: plan.table,
+        quick: plan.quick,
+        cells: Count {
+            planned: plan.cells().len(),
+            done: cells.len(),
+        },
+        rows,
+        pooled,
+        omitted,
+        failures: single.into_iter().cloned().collect(),
+        versions: versions(cells),
+    }
+}
+
+/// Version of this program, engines, and commit; the same for all cells.
+fn versions(cells: &[Cell]) -> serde_json::Value {
+    let mut engines: Vec<&str> = Vec::new();
+    for cell in cells {
+        if !engines.contains(&&*cell.versions.engine) {
+            engines.push(&cell.versions.engine);
+        }
+    }
+    let first = cells.first().map(|c| &c.versions);
+    serde_json::json!({
+        "asid": first.map_or("", |v| &v.asid),
+        "engine": engines.join(", "),
+        "git": first.map_or("", |v| &v.git),
+    })
+}
+
+/// A row without figures.
+fn row(cell: &Cell) -> Row {
+    let key = &cell.key;
+    let published = published(&key.task, &key.condition, &key.method, &key.world);
+    Row {
+        task: key.task.clone(),
+        condition: key.condition.clone(),
+        method: key.method.clone(),
+        world: key.world.clone(),
+        backend: key.backend.clone(),
+        explorer: cell.explorer.clone(),
+        identifier: cell.identifier.clone(),
+        solver: cell.solver.clone(),
+        settings: cell.settings.clone(),
+        commit: cell.versions.git.clone(),
+        metric: cell.metric.clone(),
+        summary: summary(&[&[]]),
+        seeds: Vec::new(),
+        values: Vec::new(),
+        paper: published.map(|p| p.value),
+        published,
+        differs: Vec::new(),
+        identification: Vec::new(),
+    }
+}
+
+fn fill(row: &mut Row, cells: &[&Cell]) {
+    row.summary = summary(&[cells]);
+    row.seeds = cells.iter().map(|c| c.key.seed).collect();
+    row.values = cells.iter().map(|c| c.value).collect();
+    // Without identification there is nothing to say of the unknowns but the prior.
+    if cells[0].residual.is_some() {
+        row.identification = (0..cells[0].parameters.len())
+            .map(|i| identification(cells, i))
+            .collect();
+    }
+}
+
+fn identification(cells: &[&Cell], i: usize) -> Identification {
+    let of = || cells.iter().filter_map(|c| c.parameters.get(i));
+    let held = of().filter(|p| p.interval95[0] <= p.truth && p.truth <= p.interval95[1]);
+    let expected = median(of().filter_map(|p| p.expected_std));
+    let first = &cells[0].parameters[i];
+    Identification {
+        name: first.name.clone(),
+        unit: first.unit.clone(),
+        median_abs_error: median(of().map(|p| (p.estimate - p.truth).abs())),
+        coverage95: held.count() as f64 / cells.len() as f64,
+        median_width95: median(of().map(|p| p.interval95[1] - p.interval95[0])),
+        median_expected_std: expected.is_finite().then_some(expected),
+    }
+}
+
+/// Figures of cells by stratum, not yet compared with others.
+fn summary(strata: &[&[&Cell]]) -> Summary {
+    let values: Vec<Vec<f64>> = strata
+        .iter()
+        .map(|of| of.iter().map(|c| c.value).collect())
+        .collect();
+    let all = values.concat();
+    let successes = strata.concat().iter().filter(|c| c.success).count();
+    let interval = |statistic: fn(&[f64]) -> f64| {
+        if all.is_empty() {
+            [f64::NAN; 2]
+        } else {
+            bootstrap(&values, statistic)
+        }
+    };
+    Summary {
+        n: all.len(),
+        mean: mean(&all),
+        std: deviation(&all),
+        median: median(all.iter().copied()),
+        iqm: interquartile_mean(&all),
+        interval95: interval(mean),
+        iqm_interval95: interval(interquartile_mean),
+        success_rate: successes as f64 / all.len() as f64,
+        success_interval95: wilson(successes, all.len()),
+        improvement: None,
+        best: Best::default(),
+    }
+}
+
+/// A method's figures among those that it is ranked with.
+struct Entry<'a> {
+    method: &'a str,
+    values: Vec<Vec<f64>>,
+    summary: &'a mut Summary,
+}
+
+/// Compares methods with each other. The oracle is no method: it shows what the task allows.
+fn compare(mut entries: Vec<Entry<'_>>) {
+    entries.retain(|e| e.method != ORACLE);
+    // Lower is better; among equals the one that succeeds more often.
+    entries.sort_by(|a, b| {
+        let by_metric = a.summary.iqm.total_cmp(&b.summary.iqm);
+        by_metric.then(b.summary.success_rate.total_cmp(&a.summary.success_rate))
+    });
+    for i in 1..entries.len() {
+        let (better, next) = entries.split_at_mut(i);
+        let (better, next) = (&mut better[i - 1], &next[0]);
+        better.summary.improvement = Some(Improvement {
+            over: next.method.to_owned(),
+            probability: improvement(&better.values, &next.values),
+            interval95: improvement_interval(&better.values, &next.values),
+        });
+    }
+    if let [first, second, ..] = &mut *entries {
+        let apart = first.summary.iqm_interval95[1] < second.summary.iqm_interval95[0];
+        first.summary.best.iqm = apart;
+    }
+    entries.sort_by(|a, b| b.summary.success_rate.total_cmp(&a.summary.success_rate));
+    if let [first, second, ..] = &mut *entries {
+        let apart = first.summary.success_interval95[0] > second.summary.success_interval95[1];
+        first.summary.best.success = apart;
+    }
+}
+
+/// Ranks the methods of each task, condition, world and engine.
+fn rank(rows: &mut [Row]) {
+    let group = |r: &Row| {
+        let names = [&r.task, &r.condition, &r.world, &r.backend];
+        names.map(String::clone)
+    };
+    let mut groups: Vec<[String; 4]> = Vec::new();
+    for row in rows.iter() {
+        if !groups.contains(&group(row)) {
+            groups.push(group(row));
+        }
+    }
+    for wanted in groups {
+        let members = rows.iter_mut().filter(|r| group(r) == wanted);
+        let entries = members.map(|r| Entry {
+            method: &r.method,
+            values: vec![r.values.clone()],
+            summary: &mut r.summary,
+        });
+        compare(entries.collect());
+    }
+}
+
+/// Methods over all conditions of a task, where each has the same ones.
+fn pool(rows: &[(Row, Vec<&Cell>)]) -> Vec<Pooled> {
+    let mut arms: Vec<Vec<&(Row, Vec<&Cell>)>> = Vec::new();
+    for row in rows {
+        let mate = |arm: &&mut Vec<&(Row, Vec<&Cell>)>| arm[0].1[0].key.arm_mate(&row.1[0].key);
+        match arms.iter_mut().find(mate) {
+            Some(arm) => arm.push(row),
+            None => arms.push(vec![row]),
+        }
+    }
+    // Only what holds every condition of its task that was run is comparable.
+    let conditions = |task: &str| {
+        let of = rows.iter().filter(|(r, _)| r.task == task);
+        let names: std::collections::BTreeSet<&str> = of.map(|(r, _)| &*r.condition).collect();
+        names.len()
+    };
+    arms.retain(|arm| arm.len() > 1 && arm.len() == conditions(&arm[0].0.task));
+    let mut pooled: Vec<(Pooled, Vec<Vec<f64>>)> = arms
+        .iter()
+        .map(|arm| {
+            let row = &arm[0].0;
+            let strata: Vec<&[&Cell]> = arm.iter().map(|r| &*r.1).collect();
+            let pooled = Pooled {
+                task: row.task.clone(),
+                conditions: arm.iter().map(|r| r.0.condition.clone()).collect(),
+                method: row.method.clone(),
+                world: row.world.clone(),
+                backend: row.backend.clone(),
+                metric: row.metric.clone(),
+                summary: summary(&strata),
+            };
+            (pooled, arm.iter().map(|r| r.0.values.clone()).collect())
+        })
+        .collect();
+    let group = |p: &Pooled| (p.task.clone(), p.world.clone(), p.backend.clone());
+    let mut groups: Vec<(String, String, String)> = Vec::new();
+    for (p, _) in &pooled {
+        if !groups.contains(&group(p)) {
+            groups.push(group(p));
+        }
+    }
+    for wanted in groups {
+        let members = pooled.iter_mut().filter(|(p, _)| group(p) == wanted);
+        let entries = members.map(|(p, values)| Entry {
+            method: &p.method,
+            values: values.clone(),
+            summary: &mut p.summary,
+        });
+        compare(entries.collect());
+    }
+    pooled.into_iter().map(|(p, _)| p).collect()
+}
+
+/// Says of each row what makes it unequal to the others of its task, condition, world and engine:
+/// runs, and settings of algorithms that they share.
+fn tell_differences(rows: &mut [Row], settings: &dyn Fn(&str) -> Option<toml::Table>) {
+    let tables: Vec<Option<toml::Table>> = rows.iter().map(|r| settings(&r.settings)).collect();
+    let told: Vec<Vec<String>> = (0..rows.len())
+        .map(|i| {
+            let row = &rows[i];
+            let mates: Vec<usize> = (0..rows.len())
+                .filter(|&j| {
+                    let other = &rows[j];
+                    (&row.task, &row.condition, &row.world, &row.backend)
+                        == (&other.task, &other.condition, &other.world, &other.backend)
+                })
+                .collect();
+            let mut told = Vec::new();
+            // The seeds that the most complete row has.
+            let full = mates
+                .iter()
+                .map(|&j| &rows[j].seeds)
+                .max_by_key(|s| s.len());
+            if let Some(full) = full.filter(|full| **full != row.seeds) {
+                told.push(match (row.seeds.len(), full.len()) {
+                    (n, most) if n < most => format!("{n} runs, others {most}"),
+                    _ => "other seeds".to_owned(),
+                });
+            }
+            for section in ["explorer", "identifier", "solver"] {
+                told.extend(other_settings(section, i, &mates, rows, &tables));
+            }
+            told
+        })
+        .collect();
+    for (row, told) in rows.iter_mut().zip(told) {
+        row.differs = told;
+    }
+}
+
+/// Settings of an algorithm that differ from those of the first row that uses it as well.
+fn other_settings(
+    section: &str,
+    i: usize,
+    mates: &[usize],
+    rows: &[Row],
+    tables: &[Option<toml::Table>],
+) -> Vec<String> {
+    let of = |j: usize| tables[j].as_ref()?.get(section)?.as_table();
+    let Some(own) = of(i) else {
+        return Vec::new();
+    };
+    let shares = |j: &&usize| of(**j).is_some_and(|t| t.get("name") == own.get("name"));
+    let Some(&first) = mates.iter().find(shares).filter(|&&j| j != i) else {
+        return Vec::new();
+    };
+    let Some(theirs) = of(first) else {
+        return Vec::new();
+    };
+    let method = &rows[first].method;
+    differences(own, theirs)
+        .into_iter()
+        .map(|(key, x, y)| format!("{section}.{key} = {x}, of {method} {y}"))
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cell::tests::{cell, key};
+    use crate::plan::tests::plan;
+
+    /// Values of a method under a condition, seeds from 0; success below 5.
+    fn cells(condition: &str, method: &str, values: &[f64]) -> Vec<Cell> {
+        let of = values.iter().zip(0..);
+        of.map(|(&v, seed)| cell(key("t", condition, method, seed), v, v < 5.0))
+            .collect()
+    }
+
+    fn summed(cells: &[Cell]) -> ComparisonResult {
+        summarise(&plan(), cells, &[], &|_| None)
+    }
+
+    #[test]
+    fn the_best_is_marked_only_where_its_interval_is_apart() {
+        let result = summed(
+            &[
+                cells("x", "asid", &[0.0; 10]),
+                cells(
+                    "x",
+                    "random",
+                    &[8.0, 9.0, 30.0, 8.5, 9.5, 12.0, 11.0, 14.0, 20.0, 9.0],
+                ),
+                cells("x", "oracle", &[0.0; 10]),
+            ]
+            .concat(),
+        );
+        let [asid, random, oracle] = &*result.rows else {
+            panic!("{}", result.rows.len());
+        };
+        assert!(asid.summary.best.iqm && asid.summary.best.success);
+        assert!(!random.summary.best.iqm && !oracle.summary.best.iqm);
+        let better = asid.summary.improvement.as_ref().unwrap();
+        assert_eq!((&*better.over, better.probability), ("random", 1.0));
+        assert!(random.summary.improvement.is_none() && oracle.summary.improvement.is_none());
+        // Two alike: neither is best.
+        let alike = summed(&[cells("x", "asid", &[0.0; 3]), cells("x", "dr", &[0.0; 3])].concat());
+        assert!(alike.rows.iter().all(|r| r.summary.best == Best::default()));
+    }
+
+    #[test]
+    fn fewer_runs_and_other_budgets_are_said_of_a_row() {
+        let mut all = [
+            cells("x", "asid", &[0.0; 3]),
+            cells("x", "random", &[1.0; 3]),
+            cells("x", "dr", &[9.0; 2]),
+        ]
+        .concat();
+        all[3..6].iter_mut().for_each(|c| c.settings = "1".into());
+        let settings = |hash: &str| {
+            let iterations = if hash == "1" { 3 } else { 4 };
+            let text = format!("[solver]\nname = 'cem'\niterations = {iterations}");
+            text.parse().ok()
+        };
+        let result = summarise(&plan(), &all, &[], &settings);
+        assert!(result.rows[0].differs.is_empty());
+        assert_eq!(result.rows[1].differs, ["solver.iterations = 3, of asid 4"]);
+        assert_eq!(result.rows[2].differs, ["2 runs, others 3"]);
+    }
+
+    #[test]
+    fn conditions_are_pooled_as_strata_where_a_method_has_them_all() {
+        let all = [
+            cells("x", "asid", &[0.0, 0.1]),
+            cells("y", "asid", &[100.0, 100.1]),
+            cells("x", "dr", &[1.0, 1.1]),
+        ]
+        .concat();
+        let result = summed(&all);
+        let [pooled] = &*result.pooled else {
+            panic!("{}", result.pooled.len());
+        };
+        assert_eq!((pooled.summary.n, pooled.conditions.len()), (4, 2));
+        let [low, high] = pooled.summary.interval95;
+        assert!(high - low < 0.2, "{low} {high}");
+    }
+
+    #[test]
+    fn a_method_that_cannot_be_run_is_told_once_with_the_reason() {
+        let why = |seed, of_all| Failure {
+            key: key("t", "x", "maxmi", seed),
+            reason: "no policy".into(),
+            of_all,
+        };
+        let run = cells("x", "dr", &[1.0]);
+        let result = summarise(&plan(), &run, &[why(0, true), why(1, true)], &|_| None);
+        assert_eq!(result.omitted.len(), 1);
+        assert_eq!(result.omitted[0].reason, "no policy");
+        assert!(result.failures.is_empty());
+        let result = summarise(&plan(), &run, &[why(0, false)], &|_| None);
+        assert!(result.omitted.is_empty() && result.failures.len() == 1);
+    }
+}

@@ -1,0 +1,199 @@
+//! The identity of a run's settings.
+//!
+//! The hash is SHA-256 over canonical TOML: keys sorted, defaults filled in, without what may
+//! differ among the runs of a row (seed and condition) and without what the method does not use
+//! (the explorer of one that does not explore). A file that a setting names counts by what it
+//! holds, not by where it lies, so that a comparison has the same hashes in every folder.
+
+use std::path::Path;
+
+use sha2::{Digest, Sha256};
+
+use crate::method::{Method, NONE, TRUTH};
+
+/// Keys at the top that runs of a row differ in.
+const LEFT_OUT: [&str; 3] = ["seed", "condition", "command"];
+
+/// Settings that name a file: section (empty for the top) and key.
+const FILES: [(&str, &str); 4] = [
+    ("", "model"),
+    ("real", "model"),
+    ("explorer", "policy"),
+    ("identifier", "network"),
+];
+
+/// Length of a hash in hexadecimal digits: 64 bits tell all settings apart that a person makes.
+const DIGITS: usize = 16;
+
+/// Resolved settings of a run as what identifies a row's settings.
+#[must_use]
+pub fn canonical(resolved: &toml::Table, method: &Method) -> toml::Table {
+    let mut table = resolved.clone();
+    for key in LEFT_OUT {
+        table.remove(key);
+    }
+    if !method.explores() {
+        table.insert("explorer".into(), named(NONE));
+    }
+    if !method.identifies() {
+        let stands = if method.knows_the_truth() {
+            TRUTH
+        } else {
+            NONE
+        };
+        table.insert("identifier".into(), named(stands));
+    }
+    for (section, key) in FILES {
+        let at = match section {
+            "" => Some(&mut table),
+            section => table.get_mut(section).and_then(toml::Value::as_table_mut),
+        };
+        let Some(toml::Value::String(path)) = at.and_then(|t| t.get_mut(key)) else {
+            continue;
+        };
+        count_contents(path);
+    }
+    if let Some(plugins) = table.get_mut("plugins").and_then(toml::Value::as_array_mut) {
+        for plugin in plugins {
+            if let toml::Value::String(path) = plugin {
+                count_contents(path);
+            }
+        }
+    }
+    table
+}
+
+/// Puts what a file holds in place of its path; one that cannot be read stays.
+fn count_contents(path: &mut String) {
+    let contents = (!path.is_empty()).then(|| of_file(Path::new(path)));
+    if let Some(contents) = contents.flatten() {
+        *path = contents;
+    }
+}
+
+fn named(name: &str) -> toml::Value {
+    let mut section = toml::Table::new();
+    section.insert("name".into(), name.into());
+    section.into()
+}
+
+/// `sha256:…` of a file; none where it cannot be read.
+fn of_file(path: &Path) -> Option<String> {
+    let bytes = std::fs::read(path).ok()?;
+    Some(format!("sha256:{}", digest(&bytes)))
+}
+
+/// Canonical settings as text, and its hash: the first 16 digits of SHA-256.
+#[must_use]
+pub fn hash(canonical: &toml::Table) -> (String, String) {
+    // A table of this crate's keeps its keys sorted.
+    let text = canonical.to_string();
+    (digest(text.as_bytes()), text)
+}
+
+/// The first [`DIGITS`] hexadecimal digits of SHA-256.
+#[must_use]
+pub fn digest(bytes: &[u8]) -> String {
+    let all: String = Sha256::digest(bytes)
+        .iter()
+        .map(|byte| format!("{byte:02x}"))
+        .collect();
+    all[..DIGITS].to_owned()
+}
+
+/// Entries that differ, dotted, with both values; `-` for one that is not there.
+#[must_use]
+pub fn differences(a: &toml::Table, b: &toml::Table) -> Vec<(String, String, String)> {
+    let mut found = Vec::new();
+    compare("", a, b, &mut found);
+    found
+}
+
+fn compare(
+    prefix: &str,
+    a: &toml::Table,
+    b: &toml::Table,
+    found: &mut Vec<(String, String, String)>,
+) {
+    let mut keys: Vec<&String> = a.keys().chain(b.keys()).collect();
+    keys.sort();
+    keys.dedup();
+    let show = |v: Option<&toml::Value>| v.map_or_else(|| "-".to_owned(), ToString::to_string);
+    for key in keys {
+        let path = format!("{prefix}{key}");
+        match (a.get(key), b.get(key)) {
+            (Some(toml::Value::Table(x)), Some(toml::Value::Table(y))) => {
+                compare(&format!("{path}."), x, y, found);
+            }
+            (x, y) if x == y => {}
+            (x, y) => found.push((path, show(x), show(y))),
+        }
+    }
+}
+
+/// The first difference between two settings in one phrase; empty where there is none.
+#[must_use]
+pub fn first_difference(a: &toml::Table, b: &toml::Table) -> String {
+    let all = differences(a, b);
+    all.first()
+        .map(|(key, x, y)| format!("{key} = {x} there, {y} here"))
+        .unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn table(text: &str) -> toml::Table {
+        text.parse().unwrap()
+    }
+
+    #[test]
+    fn seed_condition_order_and_unused_parts_do_not_change_a_hash() {
+        let asid = Method::named("asid").unwrap();
+        let of = |text: &str, m: &Method| hash(&canonical(&table(text), m)).0;
+        let a = "seed = 1\ncondition = 'left'\n[solver]\nname = 'cem'\niterations = 4\n[explorer]\nname = 'x'";
+        let b = "seed = 2\n[explorer]\nname = 'x'\n[solver]\niterations = 4\nname = 'cem'";
+        assert_eq!(of(a, &asid), of(b, &asid));
+        assert_eq!(of(a, &asid).len(), DIGITS);
+        let c = b.replace('4', "5");
+        assert_ne!(of(a, &asid), of(&c, &asid));
+        let dr = Method::named("dr").unwrap();
+        assert_eq!(of(b, &dr), of(&b.replace("'x'", "'y'"), &dr));
+        assert_ne!(of(b, &asid), of(&b.replace("'x'", "'y'"), &asid));
+    }
+
+    #[test]
+    fn a_file_counts_by_what_it_holds() {
+        let folder = tempfile::tempdir().unwrap();
+        let asid = Method::named("asid").unwrap();
+        let at = |name: &str, text: &str| {
+            let path = folder.path().join(name);
+            std::fs::write(&path, text).unwrap();
+            let mut policy = toml::Table::new();
+            policy.insert("policy".into(), path.display().to_string().into());
+            let mut all = toml::Table::new();
+            all.insert("explorer".into(), policy.into());
+            hash(&canonical(&all, &asid)).0
+        };
+        assert_eq!(at("a", "weights"), at("b", "weights"));
+        assert_ne!(at("a", "weights"), at("b", "others"));
+    }
+
+    /// The test vector `abc` of FIPS 180-2, appendix B.1.
+    #[test]
+    fn the_hash_is_that_of_the_standard() {
+        assert_eq!(digest(b"abc"), "ba7816bf8f01cfea");
+    }
+
+    #[test]
+    fn a_difference_names_its_key_and_both_values() {
+        let a = table("[solver]\niterations = 3\n[solver.cem]\nelite = 0.1");
+        let b = table("[solver]\niterations = 10\n[solver.cem]\nelite = 0.1");
+        assert_eq!(
+            first_difference(&a, &b),
+            "solver.iterations = 3 there, 10 here"
+        );
+        assert_eq!(first_difference(&a, &a), "");
+    }
+}

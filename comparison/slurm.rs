@@ -1,0 +1,106 @@
+//! A comparison as a job array of Slurm.
+//!
+//! Each task of the array works on its share, and all write into one folder; the last one to
+//! finish finds every cell there and writes the tables. Some time before the limit Slurm sends
+//! `SIGUSR1`: the program then begins no new cell, finishes those that run, and the task is
+//! queued again for the rest. A task that is killed and queued again goes on where it stood.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+/// What the script says.
+#[derive(Clone, Debug)]
+pub struct Script<'a> {
+    /// The program.
+    pub program: &'a Path,
+    /// The comparison's folder, with its `config.toml`.
+    pub out: &'a Path,
+    /// Tasks of the array.
+    pub jobs: usize,
+    /// Threads of a task.
+    pub threads: usize,
+    /// Further options of sbatch; they win over the script's own.
+    pub options: &'a [String],
+}
+
+/// Seconds before the limit at which a task is told to begin nothing new: more than a run of any
+/// built-in task takes on one thread.
+const GRACE: u32 = 300;
+
+impl Script<'_> {
+    /// The script.
+    #[must_use]
+    pub fn text(&self) -> String {
+        let out = self.out.display();
+        let mut head = String::new();
+        let own = [
+            "--job-name=asid-compare".to_owned(),
+            format!("--array=1-{}", self.jobs),
+            format!("--cpus-per-task={}", self.threads),
+            format!("--output={out}/slurm/%A_%a.log"),
+            "--open-mode=append".to_owned(),
+            "--requeue".to_owned(),
+            format!("--signal=B:USR1@{GRACE}"),
+        ];
+        // Of an option that is given twice sbatch takes the first.
+        let given = |o: &str| o.split('=').next().unwrap_or(o).to_owned();
+        let wins = |o: &String| !self.options.iter().any(|x| given(x) == given(o));
+        for option in self.options.iter().chain(own.iter().filter(|o| wins(o))) {
+            let _ = writeln!(head, "#SBATCH {option}");
+        }
+        format!(
+            r#"#!/bin/bash
+{head}
+# Before the time limit: begin nothing new, finish what runs, and queue the rest again.
+drained=
+trap 'drained=1; kill -USR1 "$child" 2>/dev/null' USR1
+trap 'kill -TERM "$child" 2>/dev/null' TERM INT
+echo "share $SLURM_ARRAY_TASK_ID of {jobs} on $SLURMD_NODENAME"
+{program} compare --config {config} --out {folder} \
+  --shard "$SLURM_ARRAY_TASK_ID/{jobs}" --threads {threads} --quiet &
+child=$!
+# A signal ends `wait` before the program has ended.
+while wait "$child"; status=$?; kill -0 "$child" 2>/dev/null; do :; done
+if [ -n "$drained" ] && [ "$status" -ne 0 ]; then
+  scontrol requeue "${{SLURM_ARRAY_JOB_ID}}_${{SLURM_ARRAY_TASK_ID}}"
+fi
+exit "$status"
+"#,
+            program = quoted(self.program),
+            config = quoted(&self.out.join("config.toml")),
+            folder = quoted(self.out),
+            jobs = self.jobs,
+            threads = self.threads,
+        )
+    }
+}
+
+/// A path as one word of a shell.
+fn quoted(path: &Path) -> String {
+    format!("'{}'", path.display().to_string().replace('\'', r"'\''"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_script_says_what_is_run_and_given_options_win() {
+        let script = Script {
+            program: Path::new("/opt/my asid"),
+            out: Path::new("/data/it's"),
+            jobs: 4,
+            threads: 2,
+            options: &[
+                "--time=01:00:00".to_owned(),
+                "--signal=B:USR1@60".to_owned(),
+            ],
+        };
+        let text = script.text();
+        assert!(text.starts_with("#!/bin/bash\n#SBATCH --time=01:00:00\n"));
+        assert!(text.contains("#SBATCH --array=1-4\n"));
+        assert!(text.contains("--signal=B:USR1@60") && !text.contains("USR1@300"));
+        assert!(text.contains(r"'/opt/my asid' compare --config '/data/it'\''s/config.toml'"));
+        assert!(text.contains("--shard \"$SLURM_ARRAY_TASK_ID/4\" --threads 2"));
+    }
+}

@@ -1,0 +1,430 @@
+//! The tables of a comparison.
+
+use std::fmt::Write as _;
+
+use crate::grid::{Entry, Grid};
+use crate::method::Method;
+use crate::paper::{Measure, measure};
+use crate::plan::Plan;
+use crate::rows::{ComparisonResult, Row, Summary};
+
+/// What the main table's columns mean.
+const MAIN: &str = "Lower is better. IQM: interquartile mean of the metric over seeds with its 95 % bootstrap interval; \
+    success with its 95 % Wilson interval; in bold the best of a condition where its interval is apart from the next method's. \
+    P(better): probability that a run is better than one of the method named, ties counting half. The oracle is told the truth \
+    and is ranked with nobody. ";
+
+/// All tables, most important first.
+#[must_use]
+pub fn grids(plan: &Plan, result: &ComparisonResult) -> Vec<Grid> {
+    let mut grids = Vec::new();
+    if let Some(table) = result.table {
+        grids.extend(as_in_the_paper(plan, result, table));
+    }
+    grids.push(main(plan, result));
+    grids.extend(pooled(result));
+    grids.extend(identification(result));
+    grids.push(methods(result));
+    grids
+}
+
+/// Sentences that belong to every form of a result: what is missing, failed or cut short.
+#[must_use]
+pub fn notes(result: &ComparisonResult) -> Vec<String> {
+    let mut notes = Vec::new();
+    if result.quick {
+        notes.push("A quick look: searches were cut to half and seeds are few.".to_owned());
+    }
+    for o in &result.omitted {
+        notes.push(format!(
+            "Left out: {} on {}, {}, {}: {}",
+            o.method, o.task, o.world, o.backend, o.reason
+        ));
+    }
+    for f in &result.failures {
+        notes.push(format!("Failed: {}: {}", f.key.words(), f.reason));
+    }
+    let gone = result.cells.planned - result.cells.done;
+    if gone > 0 && result.omitted.is_empty() && result.failures.is_empty() {
+        notes.push(format!(
+            "{gone} of {} runs are not there.",
+            result.cells.planned
+        ));
+    }
+    notes
+}
+
+/// The tables and notes as Markdown.
+#[must_use]
+pub fn markdown(plan: &Plan, result: &ComparisonResult) -> String {
+    let mut text = String::new();
+    for note in notes(result) {
+        let _ = writeln!(text, "> {note}");
+    }
+    if !text.is_empty() {
+        text.push('\n');
+    }
+    let tables: Vec<String> = grids(plan, result).iter().map(Grid::markdown).collect();
+    text + &tables.join("\n")
+}
+
+/// A value of the metric with its interval; metrics in metres or radians are small numbers.
+fn valued(x: f64, [low, high]: [f64; 2]) -> String {
+    let digits = if high.abs() < 1.0 { 3 } else { 1 };
+    format!("{x:.digits$} ({low:.digits$} to {high:.digits$})")
+}
+
+fn share(x: f64, [low, high]: [f64; 2]) -> String {
+    format!(
+        "{:.0} % ({:.0} to {:.0})",
+        100.0 * x,
+        100.0 * low,
+        100.0 * high
+    )
+}
+
+fn iqm(s: &Summary) -> Entry {
+    Entry {
+        text: valued(s.iqm, s.iqm_interval95),
+        best: s.best.iqm,
+    }
+}
+
+fn success(s: &Summary) -> Entry {
+    Entry {
+        text: share(s.success_rate, s.success_interval95),
+        best: s.best.success,
+    }
+}
+
+fn better(s: &Summary) -> Entry {
+    let text = s.improvement.as_ref().map_or(String::new(), |i| {
+        let [low, high] = i.interval95;
+        format!(
+            "{:.2} ({low:.2} to {high:.2}) than {}",
+            i.probability, i.over
+        )
+    });
+    text.into()
+}
+
+/// A row a task, engine, condition and method; columns of each world side by side.
+fn main(plan: &Plan, result: &ComparisonResult) -> Grid {
+    let worlds: Vec<&String> = plan
+        .worlds
+        .iter()
+        .filter(|w| result.rows.iter().any(|r| r.world == **w))
+        .collect();
+    let of = |world: &str, what: &str| {
+        if worlds.len() > 1 {
+            format!("{world}: {what}")
+        } else {
+            what.to_owned()
+        }
+    };
+    let caption = match &*worlds {
+        [one] => format!("{MAIN}World: {one}."),
+        _ => MAIN.trim_end().to_owned(),
+    };
+    let mut grid = Grid::new("Outcome", &caption)
+        .text("task")
+        .text("engine")
+        .text("condition")
+        .text("method")
+        .number("n")
+        .text("metric");
+    for world in &worlds {
+        grid = grid
+            .number(&of(world, "IQM (95 %)"))
+            .number(&of(world, "success (95 %)"))
+            .number(&of(world, "P(better)"));
+    }
+    grid = grid.number("paper").text("differs");
+    let mut lines: Vec<Vec<&Row>> = Vec::new();
+    for row in &result.rows {
+        let mate = |l: &&mut Vec<&Row>| {
+            let other = l[0];
+            (&other.task, &other.backend, &other.condition, &other.method)
+                == (&row.task, &row.backend, &row.condition, &row.method)
+        };
+        match lines.iter_mut().find(mate) {
+            Some(line) => line.push(row),
+            None => lines.push(vec![row]),
+        }
+    }
+    for line in lines {
+        let first = line[0];
+        let mut ns: Vec<String> = line.iter().map(|r| r.summary.n.to_string()).collect();
+        ns.dedup();
+        let mut cells: Vec<Entry> = vec![
+            first.task.as_str().into(),
+            first.backend.as_str().into(),
+            first.condition.as_str().into(),
+            first.method.as_str().into(),
+            ns.join(" / ").into(),
+            first.metric.as_str().into(),
+        ];
+        for world in &worlds {
+            match line.iter().find(|r| r.world == **world) {
+                Some(r) => cells.extend([iqm(&r.summary), success(&r.summary), better(&r.summary)]),
+                None => cells.extend([Entry::default(), Entry::default(), Entry::default()]),
+            }
+        }
+        cells.push(paper(first).into());
+        let mut differs: Vec<&str> = line.iter().flat_map(|r| &r.differs).map(|d| &**d).collect();
+        differs.dedup();
+        cells.push(differs.join("; ").into());
+        grid.rows.push(cells);
+    }
+    grid.without_empty_columns();
+    grid
+}
+
+fn paper(row: &Row) -> String {
+    row.published.map_or(String::new(), |p| {
+        format!("{} (Table {})", p.words(), p.table)
+    })
+}
+
+/// Methods over all conditions of a task.
+fn pooled(result: &ComparisonResult) -> Option<Grid> {
+    let mut grid = Grid::new(
+        "Over all conditions",
+        "Conditions pooled; bootstraps resample within each condition, and probabilities are averaged over conditions.",
+    )
+    .text("task")
+    .text("engine")
+    .text("world")
+    .text("method")
+    .number("n")
+    .text("metric")
+    .number("IQM (95 %)")
+    .number("success (95 %)")
+    .number("P(better)");
+    for p in &result.pooled {
+        grid.rows.push(vec![
+            p.task.as_str().into(),
+            p.backend.as_str().into(),
+            p.world.as_str().into(),
+            p.method.as_str().into(),
+            p.summary.n.to_string().into(),
+            p.metric.as_str().into(),
+            iqm(&p.summary),
+            success(&p.summary),
+            better(&p.summary),
+        ]);
+    }
+    grid.without_empty_columns();
+    (!grid.rows.is_empty()).then_some(grid)
+}
+
+/// How well unknowns were identified.
+fn identification(result: &ComparisonResult) -> Option<Grid> {
+    let mut grid = Grid::new(
+        "What was identified",
+        "Coverage: share of 95 % intervals that hold the truth.",
+    )
+    .text("task")
+    .text("engine")
+    .text("condition")
+    .text("world")
+    .text("method")
+    .text("unknown")
+    .number("median error")
+    .number("coverage of 95 %")
+    .number("median width of 95 %");
+    for r in &result.rows {
+        for i in &r.identification {
+            grid.rows.push(vec![
+                r.task.as_str().into(),
+                r.backend.as_str().into(),
+                r.condition.as_str().into(),
+                r.world.as_str().into(),
+                r.method.as_str().into(),
+                i.name.as_str().into(),
+                with_unit(i.median_abs_error, &i.unit).into(),
+                format!("{:.0} %", 100.0 * i.coverage95).into(),
+                with_unit(i.median_width95, &i.unit).into(),
+            ]);
+        }
+    }
+    (!grid.rows.is_empty()).then_some(grid)
+}
+
+/// Four decimals, and two figures where these would not show it.
+fn with_unit(x: f64, unit: &str) -> String {
+    let text = if x != 0.0 && x.abs() < 1e-3 {
+        format!("{x:.1e} {unit}")
+    } else {
+        format!("{x:.4} {unit}")
+    };
+    text.trim_end().to_owned()
+}
+
+/// What stands behind the methods' names.
+fn methods(result: &ComparisonResult) -> Grid {
+    let mut grid = Grid::new(
+        "Methods",
+        "Settings: hash of all that were resolved; `settings/HASH.toml` has them.",
+    )
+    .text("method")
+    .text("explorer")
+    .text("identifier")
+    .text("solver")
+    .text("task")
+    .text("engine")
+    .text("world")
+    .text("settings")
+    .text("commit");
+    for r in &result.rows {
+        let line: Vec<Entry> = [
+            &r.method,
+            &r.explorer,
+            &r.identifier,
+            &r.solver,
+            &r.task,
+            &r.backend,
+            &r.world,
+            &r.settings,
+            &r.commit,
+        ]
+        .map(|t| t.as_str().into())
+        .into();
+        if !grid.rows.contains(&line) {
+            grid.rows.push(line);
+        }
+    }
+    grid
+}
+
+/// One table for each world and engine, laid out as the paper's: a row a method, a column a task
+/// and condition, the paper's value below ours.
+fn as_in_the_paper(plan: &Plan, result: &ComparisonResult, table: u8) -> Vec<Grid> {
+    let mut grids = Vec::new();
+    for world in &plan.worlds {
+        for backend in &plan.backends {
+            let title = format!("Table {table} of the paper, in the {world} world on {backend}");
+            let caption = "Metric: interquartile mean (95 %); success: share (95 %); in brackets the paper's value.";
+            let mut grid = Grid::new(&title, caption).text("method");
+            let mut columns = Vec::new();
+            for task in &plan.task {
+                for condition in &task.conditions {
+                    let of = |r: &&Row| {
+                        (&r.task, &r.condition, &r.world, &r.backend)
+                            == (&task.name, condition, world, backend)
+                    };
+                    let Some(any) = result.rows.iter().find(of) else {
+                        continue;
+                    };
+                    let what = match measure(table, &task.name) {
+                        Measure::Metric => &*any.metric,
+                        Measure::SuccessRate => "success",
+                    };
+                    grid = grid.number(&format!("{}, {condition}: {what}", task.name));
+                    columns.push((task.name.clone(), condition.clone()));
+                }
+            }
+            for method in &plan.methods {
+                let mut line: Vec<Entry> = vec![method.name.as_str().into()];
+                for (task, condition) in &columns {
+                    let of = |r: &&Row| {
+                        (&r.task, &r.condition, &r.method, &r.world, &r.backend)
+                            == (task, condition, &method.name, world, backend)
+                    };
+                    line.push(paper_entry(
+                        result,
+                        table,
+                        method,
+                        task,
+                        result.rows.iter().find(of),
+                    ));
+                }
+                grid.rows.push(line);
+            }
+            if !columns.is_empty() {
+                grids.push(grid);
+            }
+        }
+    }
+    grids
+}
+
+fn paper_entry(
+    result: &ComparisonResult,
+    table: u8,
+    method: &Method,
+    task: &str,
+    row: Option<&Row>,
+) -> Entry {
+    let Some(row) = row else {
+        let left_out = |o: &&crate::rows::Omitted| o.method == method.name && o.task == task;
+        let is = result.omitted.iter().any(|o| left_out(&o));
+        return if is { "left out" } else { "not run" }.into();
+    };
+    let mut entry = match measure(table, task) {
+        Measure::Metric => iqm(&row.summary),
+        Measure::SuccessRate => success(&row.summary),
+    };
+    if let Some(published) = row.published.filter(|p| p.table == table) {
+        entry.text += &format!(" [{}]", published.words());
+    }
+    entry
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cell::tests::{cell, key};
+    use crate::plan::tests::plan;
+    use crate::plan::{MATCHED, PERTURBED, TaskPlan};
+    use crate::rows::summarise;
+
+    fn example() -> (Plan, ComparisonResult) {
+        let mut plan = plan();
+        plan.task = vec![TaskPlan {
+            name: "rod-balancing".into(),
+            conditions: vec!["left".into()],
+        }];
+        plan.check().unwrap();
+        let mut cells = Vec::new();
+        for wanted in plan.cells() {
+            let off = if wanted.world == PERTURBED { 1.0 } else { 0.0 };
+            let value = off + if wanted.method == "dr" { 40.0 } else { 0.5 };
+            let mut of = key("rod-balancing", "left", &wanted.method, wanted.seed);
+            of.world = wanted.world;
+            cells.push(cell(of, value, value < 5.0));
+        }
+        let result = summarise(&plan, &cells, &[], &|_| None);
+        (plan, result)
+    }
+
+    #[test]
+    fn worlds_stand_side_by_side_the_perturbed_one_first_and_the_paper_beside() {
+        let (plan, result) = example();
+        let text = markdown(&plan, &result);
+        let head = text.lines().nth(2).unwrap();
+        let at = |what: &str| head.find(what).unwrap();
+        assert!(at("perturbed: IQM") < at("matched: IQM") && at("matched: IQM") < at("paper"));
+        let line = text.lines().find(|l| l.contains("| asid |")).unwrap();
+        assert!(line.contains("**1.5 (1.5 to 1.5)**") && line.contains("0.00 ± 0.0 (Table 1)"));
+        assert!(line.contains("100 % (44 to 100)"), "{line}");
+        assert!(line.contains("1.00 (1.00 to 1.00) than dr"), "{line}");
+        assert!(!head.contains("differs"));
+        let _ = MATCHED;
+    }
+
+    #[test]
+    fn a_table_of_the_paper_has_methods_as_rows_and_its_values_in_brackets() {
+        let (mut plan, mut result) = example();
+        plan.table = Some(1);
+        result.table = Some(1);
+        result.quick = true;
+        let text = markdown(&plan, &result);
+        assert!(text.starts_with("> A quick look"));
+        assert!(text.contains("## Table 1 of the paper, in the perturbed world on rapier"));
+        assert!(
+            text.contains("| dr | 41.0 (41.0 to 41.0) [26.69 ± 7.0] |"),
+            "{text}"
+        );
+    }
+}

@@ -1,0 +1,201 @@
+//! An arm: one method on one task, in one world, on one engine. Its runs share their settings.
+
+use anyhow::Result;
+use asid_comparison::cell::CellKey;
+use asid_comparison::document::Document;
+use asid_comparison::method::Method;
+use asid_comparison::plan::MATCHED;
+use asid_comparison::preset;
+use asid_comparison::settings::{canonical, hash};
+use asid_core::registry::{self, AlgorithmEntry, Entry, TaskEntry, find};
+use asid_core::{Explorer, Identifier, Task, TaskSolver};
+
+use crate::cli::config::{Config, Stage};
+use crate::cli::options::{Algorithms, Common, Worlds};
+
+/// An arm with its resolved settings.
+#[derive(Clone)]
+pub struct Arm {
+    /// The method.
+    pub method: Method,
+    /// Options of its runs, but for seed and condition.
+    pub common: Common,
+    /// Hash of the settings.
+    pub hash: String,
+    /// The settings that the hash stands for.
+    pub canonical: String,
+}
+
+impl Arm {
+    /// Resolves the settings of a cell's arm; `trained` are settings that name what was trained.
+    ///
+    /// # Errors
+    /// When a setting is wrong.
+    pub fn resolve(
+        document: &Document,
+        method: &Method,
+        key: &CellKey,
+        trained: &[(String, String)],
+    ) -> Result<Self> {
+        let task = (find::<TaskEntry>(&key.task)?.make)()?;
+        let mut common = Common {
+            backend: Some(key.backend.clone()),
+            // Cells are the parallel axis.
+            threads: Some(1),
+            base: of_method(document, &*task, method),
+            quiet: true,
+            ..Common::default()
+        };
+        for (setting, value) in trained {
+            common.set.push(format!("{setting}={value:?}"));
+        }
+        if key.world != MATCHED {
+            common.set.push(format!("real.world={:?}", key.world));
+        }
+        let resolve = |common: &Common| -> Result<Config> {
+            let (algorithms, worlds) = (Algorithms::default(), Worlds::default());
+            Ok(Config::resolve(Stage::Run, &*task, common, &algorithms, &worlds)?.0)
+        };
+        let mut config = resolve(&common)?;
+        if document.plan.quick {
+            let halved = [
+                preset::quick("explorer", &config.explorer.settings),
+                preset::quick("identifier", &config.identifier.settings),
+                preset::quick("solver", &config.solver.settings),
+            ];
+            let used = [method.explores(), method.identifies(), true];
+            for (budgets, _) in halved.into_iter().zip(used).filter(|(_, used)| *used) {
+                let set = budgets.iter().map(|(key, value)| format!("{key}={value}"));
+                common.set.extend(set);
+            }
+            config = resolve(&common)?;
+        }
+        let (hash, canonical) = hash(&canonical(&toml::Table::try_from(&config)?, method));
+        Ok(Self {
+            method: method.clone(),
+            common,
+            hash,
+            canonical,
+        })
+    }
+}
+
+/// The method's parts, with the given settings as far as they have them.
+fn of_method(document: &Document, task: &dyn Task, method: &Method) -> toml::Table {
+    let mut settings = document.settings.clone();
+    let explorer = method.explores().then_some(&*method.explorer);
+    let identifier = method.identifies().then_some(&*method.identifier);
+    keep::<dyn Explorer>(&mut settings, task, "explorer", explorer);
+    keep::<dyn Identifier>(&mut settings, task, "identifier", identifier);
+    keep::<dyn TaskSolver>(&mut settings, task, "solver", Some(&method.solver));
+    let mut put = |section: &str, key: &str, value: &str| {
+        let section = settings
+            .entry(section)
+            .or_insert_with(|| toml::Value::Table(toml::Table::new()));
+        if let Some(section) = section.as_table_mut() {
+            section.entry(key).or_insert(value.into());
+        }
+    };
+    let parts = [
+        ("explorer", explorer),
+        ("identifier", identifier),
+        ("solver", Some(&*method.solver)),
+    ];
+    for (section, part) in parts {
+        if let Some(part) = part {
+            put(section, "name", part);
+        }
+    }
+    // An estimator learns from episodes of the explorer that it works with.
+    if let (Some(identifier), Some(explorer)) = (identifier, explorer)
+        && known::<dyn Identifier>(task, "identifier", identifier)
+            .iter()
+            .any(|k| k == "explorer")
+    {
+        put("identifier", "explorer", explorer);
+    }
+    settings
+}
+
+/// Keeps of a section what concerns the algorithm `part`: all of it where the section names it,
+/// else the settings that it has. What no algorithm of the kind has stays, to be refused.
+fn keep<T: ?Sized + 'static>(
+    settings: &mut toml::Table,
+    task: &dyn Task,
+    section: &str,
+    part: Option<&str>,
+) where
+    AlgorithmEntry<T>: Entry,
+{
+    let Some(given) = settings
+        .get_mut(section)
+        .and_then(toml::Value::as_table_mut)
+    else {
+        return;
+    };
+    let named = given
+        .get("name")
+        .and_then(|n| n.as_str())
+        .map(str::to_owned);
+    match (part, named) {
+        (None, _) => given.clear(),
+        (Some(part), Some(name)) if part != name => given.clear(),
+        (Some(_), Some(_)) => {}
+        (Some(part), None) => {
+            let own = known::<T>(task, section, part);
+            let of_any: Vec<String> = registry::all::<AlgorithmEntry<T>>()
+                .iter()
+                .flat_map(|e| known::<T>(task, section, e.name()))
+                .collect();
+            given.retain(|key, _| own.iter().any(|k| k == key) || of_any.iter().all(|k| k != key));
+        }
+    }
+    if given.is_empty() {
+        settings.remove(section);
+    }
+}
+
+/// Settings that an algorithm has on a task; none where it is not registered.
+fn known<T: ?Sized + 'static>(task: &dyn Task, section: &str, name: &str) -> Vec<String>
+where
+    AlgorithmEntry<T>: Entry,
+{
+    let Ok(entry) = find::<AlgorithmEntry<T>>(name) else {
+        return Vec::new();
+    };
+    let of_task = task.settings(section, name);
+    let defaults = (entry.defaults)();
+    defaults.keys().chain(of_task.keys()).cloned().collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cli::config::ASID;
+
+    #[test]
+    fn the_method_asid_is_what_a_run_does_by_itself() {
+        let asid = Method::named("asid").unwrap();
+        assert_eq!(
+            (&*asid.explorer, &*asid.identifier, &*asid.solver),
+            (ASID.explorer, ASID.identifier, ASID.solver)
+        );
+    }
+
+    #[test]
+    fn a_setting_reaches_the_methods_that_have_it_and_a_wrong_one_is_left_to_be_refused() {
+        let task = (find::<TaskEntry>("rod-balancing").unwrap().make)().unwrap();
+        let of = |text: &str, method: &str| {
+            let mut settings: toml::Table = text.parse().unwrap();
+            let method = Method::named(method).unwrap();
+            let explorer = method.explores().then_some(&*method.explorer);
+            keep::<dyn Explorer>(&mut settings, &*task, "explorer", explorer);
+            settings.contains_key("explorer")
+        };
+        let text = "[explorer]\niterations = 3";
+        assert!(of(text, "asid") && !of(text, "random") && !of(text, "dr"));
+        assert!(of("[explorer]\niteratoins = 3", "random"));
+        let named = "[explorer]\nname = 'random'";
+        assert!(of(named, "random") && !of(named, "asid"));
+    }
+}

@@ -1,0 +1,199 @@
+//! The folder of a comparison: claimed before the work, summed up after it.
+
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+use anyhow::Result;
+use asid_comparison::cell::{Cell, CellKey, Failure};
+use asid_comparison::document::Document;
+use asid_comparison::rows::{ComparisonResult, summarise};
+use asid_comparison::store::{CellTime, Store, write};
+use asid_comparison::table;
+use asid_core::Error;
+use serde::Serialize;
+
+use super::{Arguments, page};
+use crate::cli::output::OutFolder;
+
+/// What repeats a comparison, whatever the command line was that made it.
+const REPEAT: &str = "asid compare --config config.toml";
+
+/// The comparison's folder: the one that is named, new or begun already, or the next free one.
+///
+/// # Errors
+/// When it holds something else or cannot be written.
+pub fn claim(out: Option<&Path>) -> Result<Store> {
+    if let Some(path) = out {
+        let store = Store::new(path);
+        if store.is_begun() {
+            Document::read(&store.config()).map_err(|e| {
+                wrong(
+                    path,
+                    format!("holds something else; choose another --out ({e})"),
+                )
+            })?;
+            return Ok(store);
+        }
+        if only_hidden(path) {
+            return Ok(store);
+        }
+        OutFolder::claim(Some(path), "compare")?;
+        return Ok(store);
+    }
+    loop {
+        let path = OutFolder::claim(None, "compare")?.path();
+        let made = std::fs::create_dir_all(path.parent().unwrap_or(Path::new(".")))
+            .and_then(|()| std::fs::create_dir(&path));
+        match made {
+            Ok(()) => return Ok(Store::new(&path)),
+            // Another process was faster; the next free one then.
+            Err(e) if e.kind() == std::io::ErrorKind::AlreadyExists => {}
+            Err(e) => return Err(wrong(&path, format!("cannot be made: {e}"))),
+        }
+    }
+}
+
+fn wrong(path: &Path, message: String) -> anyhow::Error {
+    Error::File {
+        path: path.to_owned(),
+        message,
+    }
+    .into()
+}
+
+/// Whether another process has just begun to write a comparison into the folder.
+fn only_hidden(path: &Path) -> bool {
+    let Ok(entries) = std::fs::read_dir(path) else {
+        return false;
+    };
+    let mut names = entries.filter_map(|e| Some(e.ok()?.file_name())).peekable();
+    names.peek().is_some() && names.all(|n| n.to_string_lossy().starts_with(".config.toml."))
+}
+
+/// What is there of a plan.
+pub struct Contents {
+    /// Cells, in the plan's order.
+    pub cells: Vec<Cell>,
+    /// Why others are not there, in the plan's order.
+    pub failures: Vec<Failure>,
+    /// Cells of which nothing is known yet.
+    pub missing: usize,
+}
+
+/// Reads what is there of a plan.
+///
+/// # Errors
+/// When a file cannot be read.
+pub fn contents(store: &Store, keys: &[CellKey]) -> Result<Contents> {
+    let (mut cells, mut failures): (Vec<Cell>, Vec<Failure>) = (Vec::new(), Vec::new());
+    let mut open = Vec::new();
+    for key in keys {
+        match (store.cell(key)?, store.failure(key)?) {
+            (Some(cell), _) => cells.push(cell),
+            (None, Some(failure)) => failures.push(failure),
+            (None, None) => open.push(key),
+        }
+    }
+    // Of an arm that cannot be run one cell says so for all.
+    let ruled_out = |key: &CellKey| failures.iter().any(|f| f.of_all && f.key.arm_mate(key));
+    let missing = open.into_iter().filter(|k| !ruled_out(k)).count();
+    Ok(Contents {
+        cells,
+        failures,
+        missing,
+    })
+}
+
+/// Seconds by cell, apart from everything that is the same for every run of a comparison.
+#[derive(Serialize)]
+struct Times {
+    /// Sum over the cells, s.
+    cells_s: f64,
+    /// Sum over what was trained, s.
+    training_s: f64,
+    training: Vec<TrainingTime>,
+    cells: Vec<CellTime>,
+}
+
+/// Seconds that a training took.
+#[derive(Serialize)]
+struct TrainingTime {
+    policy: String,
+    wall_s: f64,
+}
+
+/// Sums up what is there, writes the tables and prints them.
+///
+/// # Errors
+/// When a file cannot be written, or nothing is there.
+pub fn sum_up(
+    arguments: &Arguments,
+    store: &Store,
+    document: &Document,
+    contents: &Contents,
+) -> Result<()> {
+    let plan = &document.plan;
+    let settings = |hash: &str| store.settings(hash);
+    let result = summarise(plan, &contents.cells, &contents.failures, &settings);
+    let markdown = table::markdown(plan, &result);
+    let file = |name: &str| store.root().join(name);
+    write(&file("runs.json"), &json(&contents.cells)?)?;
+    write(&file("table.md"), &format!("{markdown}\n`{REPEAT}`\n"))?;
+    write(&file("times.json"), &json(&times(store, &contents.cells)?)?)?;
+    let html = page::html(plan, &result, &contents.cells, REPEAT);
+    write(&file("report.html"), &html)?;
+    // The result last: where it is, all the rest is.
+    write(&file("result.json"), &json(&result)?)?;
+    print(arguments, &result, &markdown, &file("report.html"))
+}
+
+fn print(
+    arguments: &Arguments,
+    result: &ComparisonResult,
+    markdown: &str,
+    report: &Path,
+) -> Result<()> {
+    let mut stdout = std::io::stdout().lock();
+    if arguments.json {
+        writeln!(stdout, "{}", serde_json::to_string_pretty(result)?)?;
+    } else {
+        writeln!(stdout, "{markdown}\nreport: {}", report.display())?;
+    }
+    Ok(())
+}
+
+fn times(store: &Store, cells: &[Cell]) -> Result<Times> {
+    let of = cells.iter().map(|c| store.time(&c.key));
+    let cells: Vec<CellTime> = of
+        .collect::<asid_core::Result<Vec<_>>>()?
+        .into_iter()
+        .flatten()
+        .collect();
+    let mut training: Vec<TrainingTime> = Vec::new();
+    let folders = std::fs::read_dir(store.policies()).into_iter().flatten();
+    let mut folders: Vec<PathBuf> = folders.filter_map(|e| Some(e.ok()?.path())).collect();
+    folders.sort();
+    for folder in folders {
+        let text = std::fs::read_to_string(folder.join(TRAINED)).ok();
+        if let Some(wall_s) = text.and_then(|t| t.trim().parse().ok()) {
+            let policy = folder.file_name().unwrap_or_default().to_string_lossy();
+            training.push(TrainingTime {
+                policy: policy.into_owned(),
+                wall_s,
+            });
+        }
+    }
+    Ok(Times {
+        cells_s: cells.iter().map(|t| t.wall_s).sum(),
+        training_s: training.iter().map(|t| t.wall_s).sum(),
+        training,
+        cells,
+    })
+}
+
+/// In the folder of what was trained, the seconds that it took.
+pub const TRAINED: &str = "seconds";
+
+fn json(value: &impl Serialize) -> Result<String> {
+    Ok(serde_json::to_string_pretty(value)? + "\n")
+}

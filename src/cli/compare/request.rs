@@ -1,0 +1,347 @@
+//! From the command line and a configuration to a plan and the settings of its runs.
+
+use anyhow::Result;
+use asid_comparison::document::Document;
+use asid_comparison::method::{BY_DEFAULT, Method, NONE};
+use asid_comparison::plan::{MATCHED, Plan, TaskPlan};
+use asid_comparison::preset;
+use asid_core::registry::{
+    self, BackendEntry, Entry, ExplorerEntry, IdentifierEntry, SolverEntry, TaskEntry, find,
+};
+use asid_core::{EffectSpec, Error};
+
+use super::Arguments;
+use crate::cli::config::{PRIOR, check_condition, default_backend, read_table, set};
+use crate::cli::list;
+use crate::cli::plugins::{file_of, used};
+
+/// The engine of the paper's tables where it is built in.
+const OF_TABLES: &str = "mujoco";
+
+fn wrong(key: &str, message: impl Into<String>) -> anyhow::Error {
+    Error::Config {
+        key: key.to_owned(),
+        message: message.into(),
+    }
+    .into()
+}
+
+/// What is asked for: the command line over the configuration over a table of the paper over
+/// the defaults.
+pub fn document(arguments: &Arguments) -> Result<Document> {
+    let mut settings = match &arguments.config {
+        Some(path) => read_table(path)?,
+        None => toml::Table::new(),
+    };
+    let base = Document::plan_of(&mut settings)?;
+    options(arguments, &mut settings)?;
+    let of_run = OfRun::take(&mut settings)?;
+    let base = match arguments.table {
+        Some(table) => Some(of_table(table, arguments, base.as_ref())?),
+        None => base,
+    };
+    let quick = arguments.quick || base.as_ref().is_some_and(|b| b.quick);
+    let list = |given: &[String], base: Option<&Vec<String>>, other: Vec<String>| {
+        let first = (!given.is_empty()).then(|| given.to_vec());
+        first.or(base.cloned()).unwrap_or(other)
+    };
+    let backend = of_run.backend.unwrap_or_else(default_backend);
+    let world = of_run.world.unwrap_or_else(|| MATCHED.to_owned());
+    let mut plan = Plan {
+        table: base.as_ref().and_then(|b| b.table),
+        quick,
+        train: arguments.train || base.as_ref().is_some_and(|b| b.train),
+        methods: methods(&arguments.method, base.as_ref())?,
+        worlds: list(
+            &arguments.world,
+            base.as_ref().map(|b| &b.worlds),
+            vec![world],
+        ),
+        backends: list(
+            &arguments.backend,
+            base.as_ref().map(|b| &b.backends),
+            vec![backend],
+        ),
+        first_seed: arguments
+            .seed
+            .or(base.as_ref().map(|b| b.first_seed))
+            .or(of_run.seed)
+            .unwrap_or(0),
+        seeds: arguments
+            .seeds
+            .or(base.as_ref().map(|b| b.seeds))
+            .unwrap_or_else(|| seeds(quick)),
+        task: tasks(arguments, base.as_ref(), of_run.task, of_run.condition)?,
+    };
+    plan.check()?;
+    let files = plugin_files(&plan);
+    if !files.is_empty() {
+        settings.insert("plugins".into(), files.into());
+    }
+    Ok(Document { plan, settings })
+}
+
+/// Files of the plugins that were named or that parts of the comparison are from.
+fn plugin_files(plan: &Plan) -> Vec<toml::Value> {
+    let mut parts: Vec<_> = plan
+        .task
+        .iter()
+        .map(|t| file_of::<TaskEntry>(&t.name))
+        .collect();
+    parts.extend(plan.backends.iter().map(|b| file_of::<BackendEntry>(b)));
+    for method in &plan.methods {
+        parts.extend([
+            file_of::<ExplorerEntry>(&method.explorer),
+            file_of::<IdentifierEntry>(&method.identifier),
+            file_of::<SolverEntry>(&method.solver),
+        ]);
+    }
+    let files = used(&parts).into_iter();
+    files.map(|f| f.display().to_string().into()).collect()
+}
+
+fn seeds(quick: bool) -> u64 {
+    if quick {
+        preset::QUICK_SEEDS
+    } else {
+        preset::SEEDS
+    }
+}
+
+/// A table of the paper, on the engines of the configuration where it names some.
+fn of_table(table: u8, arguments: &Arguments, config: Option<&Plan>) -> Result<Plan> {
+    let preset = preset::of_table(table)?;
+    let quick = arguments.quick || config.is_some_and(|c| c.quick);
+    let engines = registry::all::<BackendEntry>();
+    let engine = if engines.iter().any(|e| e.name() == OF_TABLES) {
+        OF_TABLES.to_owned()
+    } else {
+        default_backend()
+    };
+    let task = |(name, conditions): &(&str, &[&str])| TaskPlan {
+        name: (*name).to_owned(),
+        conditions: conditions.iter().map(|c| (*c).to_owned()).collect(),
+    };
+    Ok(Plan {
+        table: Some(table),
+        quick,
+        train: config.is_some_and(|c| c.train),
+        methods: preset
+            .methods
+            .iter()
+            .map(|m| Method::named(m))
+            .collect::<asid_core::Result<_>>()?,
+        worlds: vec![preset.world.to_owned()],
+        backends: config.map_or_else(|| vec![engine], |c| c.backends.clone()),
+        first_seed: config.map_or(0, |c| c.first_seed),
+        seeds: config.map_or_else(|| seeds(quick), |c| c.seeds),
+        task: preset.tasks.iter().map(task).collect(),
+    })
+}
+
+/// Puts options that are settings into them, so that they are repeated.
+fn options(arguments: &Arguments, settings: &mut toml::Table) -> Result<()> {
+    for assignment in &arguments.set {
+        let key = assignment.split('=').next().unwrap_or_default().trim();
+        if key.starts_with("plugins") {
+            return Err(wrong("plugins", "is given by --plugin FILE, not by --set"));
+        }
+        if ["explorer.name", "identifier.name", "solver.name"].contains(&key) {
+            let message = "a row is named after its parts: name the method, such as --method \
+                           NAME=explorer+identifier+solver";
+            return Err(wrong(key, message));
+        }
+        set(settings, assignment)?;
+    }
+    if let Some(name) = &arguments.preset {
+        settings.insert("preset".into(), name.as_str().into());
+    }
+    let path = |p: &std::path::Path| toml::Value::String(p.display().to_string());
+    if let Some(model) = &arguments.simulator.model {
+        settings.insert("model".into(), path(model));
+    }
+    let given = &arguments.real;
+    if given.truth.is_empty()
+        && given.real_backend.is_none()
+        && given.real_model.is_none()
+        && given.real_effect.is_empty()
+    {
+        return Ok(());
+    }
+    let real = subtable(settings, "real")?;
+    if let Some(name) = &given.real_backend {
+        real.insert("backend".into(), name.as_str().into());
+    }
+    if let Some(model) = &given.real_model {
+        real.insert("model".into(), path(model));
+    }
+    for text in &given.real_effect {
+        let effect = text.parse::<EffectSpec>()?.to_string();
+        let list = real
+            .entry("effects")
+            .or_insert_with(|| toml::Value::Array(Vec::new()));
+        let list = list
+            .as_array_mut()
+            .ok_or_else(|| wrong("real.effects", "is not a list"))?;
+        list.push(effect.into());
+    }
+    for text in &given.truth {
+        let (name, value) = text
+            .split_once('=')
+            .ok_or_else(|| wrong("--truth", format!("`{text}` is not NAME=VALUE")))?;
+        let value: f64 = value
+            .trim()
+            .parse()
+            .ok()
+            .filter(|x: &f64| x.is_finite())
+            .ok_or_else(|| {
+                wrong(
+                    &format!("--truth {name}"),
+                    format!("`{value}` is not a finite number"),
+                )
+            })?;
+        subtable(real, "truth")?.insert(name.trim().to_owned(), value.into());
+    }
+    Ok(())
+}
+
+fn subtable<'t>(table: &'t mut toml::Table, key: &str) -> Result<&'t mut toml::Table> {
+    table
+        .entry(key)
+        .or_insert_with(|| toml::Value::Table(toml::Table::new()))
+        .as_table_mut()
+        .ok_or_else(|| wrong(key, "is not a section of settings"))
+}
+
+/// Settings of a run that the plan takes over: what varies among the cells.
+#[derive(Default)]
+struct OfRun {
+    task: Option<String>,
+    condition: Option<String>,
+    backend: Option<String>,
+    world: Option<String>,
+    seed: Option<u64>,
+}
+
+impl OfRun {
+    fn take(settings: &mut toml::Table) -> Result<Self> {
+        let text = |table: &mut toml::Table, key: &str| -> Result<Option<String>> {
+            match table.remove(key) {
+                None => Ok(None),
+                Some(toml::Value::String(text)) => Ok(Some(text)),
+                Some(other) => Err(wrong(key, format!("{other} is not a text in quotes"))),
+            }
+        };
+        text(settings, "command")?;
+        let seed = match settings.remove("seed") {
+            None => None,
+            Some(value) => {
+                let whole = value.as_integer().and_then(|s| u64::try_from(s).ok());
+                let wrong = || wrong("seed", format!("{value} is not a whole number from 0 up"));
+                Some(whole.ok_or_else(wrong)?)
+            }
+        };
+        let backend = text(settings, "backend")?;
+        let world = match settings.get_mut("real").and_then(toml::Value::as_table_mut) {
+            None => None,
+            Some(real) => {
+                // A run's file names the engine of its real world though it is the simulator's.
+                if backend.is_some()
+                    && real.get("backend").and_then(|b| b.as_str()) == backend.as_deref()
+                {
+                    real.remove("backend");
+                }
+                text(real, "world")?
+            }
+        };
+        Ok(Self {
+            task: text(settings, "task")?,
+            condition: text(settings, "condition")?,
+            backend,
+            world,
+            seed,
+        })
+    }
+}
+
+/// The tasks with their conditions.
+fn tasks(
+    arguments: &Arguments,
+    base: Option<&Plan>,
+    of_run: Option<String>,
+    condition: Option<String>,
+) -> Result<Vec<TaskPlan>> {
+    if let (Some(of_run), [other, ..]) = (&of_run, &*arguments.tasks)
+        && of_run != other
+    {
+        let message = format!("the configuration is for `{of_run}`, the command for `{other}`");
+        return Err(wrong("task", message));
+    }
+    let names: Vec<String> = match (&*arguments.tasks, base, of_run) {
+        ([], Some(base), _) => base.task.iter().map(|t| t.name.clone()).collect(),
+        ([], None, Some(task)) => vec![task],
+        ([], None, None) => {
+            let all = registry::all::<TaskEntry>();
+            all.iter().map(|t| t.name.to_owned()).collect()
+        }
+        (given, _, _) => given.to_vec(),
+    };
+    names
+        .into_iter()
+        .map(|name| {
+            let all = (find::<TaskEntry>(&name)?.make)()?.conditions();
+            let of_base = base.and_then(|b| b.task.iter().find(|t| t.name == name));
+            let conditions = match (&*arguments.condition, of_base, &condition) {
+                ([], Some(task), _) => task.conditions.clone(),
+                ([], None, Some(one)) => vec![one.clone()],
+                // A task without conditions of its own is run over its prior.
+                ([], None, None) if all.is_empty() => vec![PRIOR.to_owned()],
+                ([], None, None) => all.iter().map(|c| c.name.clone()).collect(),
+                (given, _, _) => given.to_vec(),
+            };
+            for condition in &conditions {
+                check_condition(&all, condition)?;
+            }
+            Ok(TaskPlan { name, conditions })
+        })
+        .collect()
+}
+
+/// The methods; parts of those that are no named method must exist.
+fn methods(given: &[String], base: Option<&Plan>) -> Result<Vec<Method>> {
+    let methods = match (given, base) {
+        ([], Some(base)) => base.methods.clone(),
+        ([], None) => BY_DEFAULT
+            .iter()
+            .map(|m| Method::named(m))
+            .collect::<asid_core::Result<_>>()?,
+        (given, _) => given
+            .iter()
+            .map(|m| Method::parse(m))
+            .collect::<asid_core::Result<_>>()?,
+    };
+    for method in methods.iter().filter(|m| Method::named(&m.name).is_err()) {
+        if let Some(error) = missing_part(method)
+            && matches!(error, Error::UnknownName { .. })
+        {
+            return Err(error.into());
+        }
+    }
+    Ok(methods)
+}
+
+/// Which part of a method this build does not have, and why.
+pub fn missing_part(method: &Method) -> Option<Error> {
+    fn missing<E: Entry>(name: &str) -> Option<Error> {
+        let unknown = (name != NONE).then(|| find::<E>(name).err()).flatten()?;
+        Some(list::missing(E::KIND, name).unwrap_or(unknown))
+    }
+    let identifier = || {
+        let uses = method.identifies();
+        uses.then(|| missing::<IdentifierEntry>(&method.identifier))
+            .flatten()
+    };
+    missing::<ExplorerEntry>(&method.explorer)
+        .or_else(identifier)
+        .or_else(|| missing::<SolverEntry>(&method.solver))
+}

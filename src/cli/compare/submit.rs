@@ -1,0 +1,74 @@
+//! `asid compare --submit slurm`: a comparison as a job array.
+
+use std::io::Write as _;
+use std::process::Command;
+
+use anyhow::Result;
+use asid_comparison::slurm::Script;
+use asid_comparison::store::write;
+use asid_core::Error;
+
+use super::folder::claim;
+use super::request::document;
+use super::{Arguments, work};
+use crate::cli::failure;
+
+/// Most tasks of an array where nothing is said: what a cluster lets one user run at a time.
+const JOBS: usize = 32;
+
+/// Writes the script of a job array into the comparison's folder, and submits it unless it is
+/// only to be seen.
+///
+/// # Errors
+/// When the call is wrong, the folder cannot be written, or sbatch refuses.
+pub fn submit(arguments: &Arguments) -> Result<()> {
+    if arguments.shard.is_some() {
+        return Err(Error::Config {
+            key: "--shard".into(),
+            message: "is chosen by the tasks of the array; leave it out".into(),
+        }
+        .into());
+    }
+    let document = document(arguments)?;
+    work::check(&document)?;
+    let store = claim(arguments.out.as_deref())?;
+    let failed = |what: &str, e: std::io::Error| Error::Failed(format!("{what}: {e}"));
+    write(&store.config(), &document.text()?)?;
+    let root = store
+        .root()
+        .canonicalize()
+        .map_err(|e| failed(&store.root().display().to_string(), e))?;
+    let logs = root.join("slurm");
+    std::fs::create_dir_all(&logs).map_err(|e| failed(&logs.display().to_string(), e))?;
+    let program = std::env::current_exe().map_err(|e| failed("this program's file", e))?;
+    let cells = document.plan.cells().len();
+    let script = Script {
+        program: &program,
+        out: &root,
+        jobs: arguments.jobs.unwrap_or(JOBS).clamp(1, cells),
+        threads: arguments.threads.unwrap_or(1),
+        options: &arguments.sbatch,
+    };
+    let text = script.text();
+    let file = root.join("slurm.sh");
+    write(&file, &text)?;
+    let mut stdout = std::io::stdout().lock();
+    if arguments.print_script {
+        write!(stdout, "{text}")?;
+        return Ok(());
+    }
+    let output = Command::new("sbatch").arg(&file).output().map_err(|e| {
+        let how = format!("sbatch {} submits it where Slurm is", file.display());
+        Error::Failed(format!("cannot start sbatch: {e}; {how}"))
+    })?;
+    let said = String::from_utf8_lossy(&output.stderr);
+    if !output.status.success() {
+        return Err(Error::Failed(format!("sbatch refused: {}", said.trim())).into());
+    }
+    failure::note(&format!(
+        "{cells} runs in {}; the tables are written when the last one is done",
+        root.display()
+    ));
+    write!(stdout, "{}", String::from_utf8_lossy(&output.stdout))?;
+    Ok(())
+}
