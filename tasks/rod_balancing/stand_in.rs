@@ -39,7 +39,6 @@ pub fn scene(scene: &Scene) -> Result<Scene> {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use crate::rod_balancing::RodBalancing;
     use asid_core::{Plant, Task as _};
 
