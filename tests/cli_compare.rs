@@ -433,6 +433,47 @@ fn what_names_nothing_or_would_misname_a_row_is_refused_in_one_line() {
 }
 
 #[test]
+fn a_method_that_cannot_be_run_is_left_out_with_the_reason_and_stops_no_other() {
+    let place = Workplace::new();
+    let listed = String::from_utf8(place.run(&["list", "--json"]).stdout).unwrap();
+    let all: Value = serde_json::from_str(&listed).unwrap();
+    let there = |name: &str| {
+        let rows = all.as_array().or(all["rows"].as_array()).unwrap();
+        rows.iter()
+            .any(|r| r["kind"] == "explorer" && r["name"] == name && r["available"] == true)
+    };
+    let Some(lacking) = ["maxmi", "max"].into_iter().find(|m| !there(m)) else {
+        return;
+    };
+    let left = ["--condition", "left", "--seeds", "2", "--method", lacking];
+    done(&place, &[&left[..], &["--method", "dr"]].concat(), "a");
+    let result = result(&place, "a");
+    assert_eq!(result["rows"].as_array().unwrap().len(), 1);
+    let omitted = &result["omitted"];
+    assert_eq!(omitted.as_array().unwrap().len(), 1);
+    assert_eq!(omitted[0]["method"], lacking);
+    assert!(
+        omitted[0]["reason"]
+            .as_str()
+            .unwrap()
+            .contains("this build is without it")
+    );
+    assert!(
+        place
+            .read("a/table.md")
+            .contains(&format!("> Left out: {lacking} on rod-balancing"))
+    );
+    // Alone there is nothing to compare.
+    let alone = compare(&place, &left, "b");
+    assert_eq!(alone.status.code(), Some(2));
+    assert!(
+        said(&alone).contains("this build is without it"),
+        "{}",
+        said(&alone)
+    );
+}
+
+#[test]
 fn a_quick_look_is_marked_in_every_output_and_has_other_settings() {
     let place = Workplace::new();
     let dr = ["--method", "dr", "--condition", "left"];

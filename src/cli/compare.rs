@@ -19,10 +19,12 @@ mod merge;
 mod page;
 mod progress;
 mod request;
+mod resume;
 mod signals;
 mod submit;
 mod train;
 mod work;
+mod worker;
 
 /// Arguments of `compare`.
 #[derive(clap::Args)]

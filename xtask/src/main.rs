@@ -12,6 +12,7 @@ mod lint;
 mod miri;
 mod peers;
 mod setup;
+mod slurm;
 mod stage;
 mod test;
 mod wheel;
@@ -27,6 +28,7 @@ Usage: cargo xtask <subcommand>
   lint                         formatting, clippy and rustdoc over the workspace, all features
   test                         setup, lint and every test: what CI runs
   miri                         the engine ABI's unsafe code under Miri, where a toolchain has it
+  slurm [--program FILE]       comparisons as job arrays of a real Slurm, where its packages can be had
   bench [--quick] [--out FILE.json] [--markdown FILE.md]
                                speed beside the engines' own loops, a table and a JSON file
   bench --peers [--quick] [--out FILE.json] [--markdown FILE.md]
@@ -59,12 +61,15 @@ fn run(arguments: &[String]) -> Result<bool> {
         "lint" => without_arguments(rest).and_then(|()| lint::run()),
         "test" => without_arguments(rest).and_then(|()| test::run()),
         "miri" => without_arguments(rest).and_then(|()| miri::run()),
+        "slurm" => slurm::run(rest),
         "bench" => bench::run(rest),
         "help" | "--help" | "-h" => {
             println!("{HELP}");
             Ok(true)
         }
-        other => bail!("unknown subcommand `{other}`; known: setup, lint, test, miri, bench, help"),
+        other => bail!(
+            "unknown subcommand `{other}`; known: setup, lint, test, miri, slurm, bench, help"
+        ),
     }
 }
 

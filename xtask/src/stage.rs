@@ -10,10 +10,19 @@ use crate::library::repository;
 /// Features that bring in every engine and the networks.
 pub const ALL_FEATURES: &str = "--features=mujoco,torch,parquet";
 
+/// How a stage ended.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Outcome {
+    Passed,
+    Failed,
+    /// It could not be run here, which is no failure.
+    LeftOut,
+}
+
 /// Stages that have run, in order.
 #[derive(Default)]
 pub struct Stages {
-    done: Vec<(String, bool, Duration)>,
+    done: Vec<(String, Outcome, Duration)>,
 }
 
 impl Stages {
@@ -22,8 +31,20 @@ impl Stages {
         eprintln!("==> {name}");
         let start = Instant::now();
         let passed = work()?;
-        self.done.push((name.to_owned(), passed, start.elapsed()));
+        let outcome = if passed {
+            Outcome::Passed
+        } else {
+            Outcome::Failed
+        };
+        self.done.push((name.to_owned(), outcome, start.elapsed()));
         Ok(passed)
+    }
+
+    /// Notes that a stage could not be run here, and says why.
+    pub fn leave_out(&mut self, name: &str, reason: &str) {
+        eprintln!("==> {name}: left out: {reason}");
+        let entry = (name.to_owned(), Outcome::LeftOut, Duration::ZERO);
+        self.done.push(entry);
     }
 
     /// Runs `cargo <arguments>` in the repository's root as a stage.
@@ -47,15 +68,19 @@ impl Stages {
     }
 
     fn passed(&self) -> bool {
-        self.done.iter().all(|(_, passed, _)| *passed)
+        self.done.iter().all(|(_, o, _)| *o != Outcome::Failed)
     }
 
     fn summary(&self) -> String {
         let mut lines = String::new();
-        let verdict = |passed: bool| if passed { "ok" } else { "FAILED" };
-        for (name, passed, time) in &self.done {
+        let verdict = |outcome: Outcome| match outcome {
+            Outcome::Passed => "ok",
+            Outcome::Failed => "FAILED",
+            Outcome::LeftOut => "left out",
+        };
+        for (name, outcome, time) in &self.done {
             let seconds = time.as_secs_f64();
-            lines += &format!("{:<26}{:<8}{seconds:>7.1} s\n", name, verdict(*passed));
+            lines += &format!("{:<26}{:<8}{seconds:>7.1} s\n", name, verdict(*outcome));
         }
         let total: Duration = self.done.iter().map(|(_, _, time)| *time).sum();
         let seconds = total.as_secs_f64();
@@ -63,7 +88,7 @@ impl Stages {
             + &format!(
                 "{:<26}{:<8}{seconds:>7.1} s\n",
                 "all",
-                verdict(self.passed())
+                if self.passed() { "ok" } else { "FAILED" }
             )
     }
 }
@@ -77,6 +102,7 @@ mod tests {
         let mut stages = Stages::default();
         assert!(!stages.run("first", || Ok(false)).unwrap());
         assert!(stages.run("second", || Ok(true)).unwrap());
+        stages.leave_out("third", "no toolchain");
         let summary = stages.summary();
         let words: Vec<Vec<&str>> = summary
             .lines()
@@ -84,7 +110,11 @@ mod tests {
             .collect();
         assert_eq!(words[0][..2], ["first", "FAILED"]);
         assert_eq!(words[1][..2], ["second", "ok"]);
-        assert_eq!(words[2][..2], ["all", "FAILED"]);
+        assert_eq!(words[2][..3], ["third", "left", "out"]);
+        assert_eq!(words[3][..2], ["all", "FAILED"]);
         assert!(!stages.passed());
+        let mut lacking = Stages::default();
+        lacking.leave_out("third", "no toolchain");
+        assert!(lacking.passed(), "what cannot be run here is no failure");
     }
 }

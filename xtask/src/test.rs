@@ -1,10 +1,10 @@
-//! `cargo xtask test`: set-up, lints, every test, and Miri, with one summary. CI runs this.
+//! `cargo xtask test`: set-up, lints, every test, a real Slurm, and Miri, with one summary. CI runs this.
 
 use anyhow::Result;
 
 use crate::lint::stages_of_lint;
 use crate::stage::{ALL_FEATURES, Stages};
-use crate::{library, miri, setup};
+use crate::{library, miri, setup, slurm};
 
 /// Runs everything; without the native libraries nothing else can be built.
 pub fn run() -> Result<bool> {
@@ -16,6 +16,7 @@ pub fn run() -> Result<bool> {
         &["test", "--workspace", "--no-fail-fast", ALL_FEATURES],
         &[],
     )?;
+    slurm::stage(&mut stages, None)?;
     miri::stage(&mut stages)?;
     Ok(stages.finish())
 }

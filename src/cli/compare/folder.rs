@@ -80,6 +80,18 @@ pub struct Contents {
     pub missing: usize,
 }
 
+impl Contents {
+    /// Whether one failure stands for every cell of its arm.
+    fn rules_out(&self, failure: &Failure) -> bool {
+        failure.of_all && !self.cells.iter().any(|c| c.key.arm_mate(&failure.key))
+    }
+
+    /// Failures of single runs.
+    pub fn single_failures(&self) -> impl Iterator<Item = &Failure> {
+        self.failures.iter().filter(|f| !self.rules_out(f))
+    }
+}
+
 /// Reads what is there of a plan.
 ///
 /// # Errors
@@ -94,14 +106,18 @@ pub fn contents(store: &Store, keys: &[CellKey]) -> Result<Contents> {
             (None, None) => open.push(key),
         }
     }
-    // Of an arm that cannot be run one cell says so for all.
-    let ruled_out = |key: &CellKey| failures.iter().any(|f| f.of_all && f.key.arm_mate(key));
-    let missing = open.into_iter().filter(|k| !ruled_out(k)).count();
-    Ok(Contents {
+    let mut there = Contents {
         cells,
         failures,
-        missing,
-    })
+        missing: 0,
+    };
+    // Of an arm that cannot be run one cell says so for all.
+    let ruled_out = |key: &CellKey| {
+        let mut failures = there.failures.iter();
+        failures.any(|f| f.key.arm_mate(key) && there.rules_out(f))
+    };
+    there.missing = open.into_iter().filter(|k| !ruled_out(k)).count();
+    Ok(there)
 }
 
 /// Seconds by cell, apart from everything that is the same for every run of a comparison.

@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 use asid_comparison::document::Document;
-use asid_comparison::method::{BY_DEFAULT, Method, NONE};
+use asid_comparison::method::{BY_DEFAULT, Method};
 use asid_comparison::plan::{MATCHED, Plan, TaskPlan};
 use asid_comparison::preset;
 use asid_core::registry::{
@@ -321,27 +321,45 @@ fn methods(given: &[String], base: Option<&Plan>) -> Result<Vec<Method>> {
             .collect::<asid_core::Result<_>>()?,
     };
     for method in methods.iter().filter(|m| Method::named(&m.name).is_err()) {
-        if let Some(error) = missing_part(method)
-            && matches!(error, Error::UnknownName { .. })
-        {
+        // What this build could have is told of in the table; what nobody knows is a mistake.
+        if let Some((_, error @ Error::UnknownName { .. })) = lacking(method) {
             return Err(error.into());
         }
     }
     Ok(methods)
 }
 
-/// Which part of a method this build does not have, and why.
+/// Why a method cannot be run in this build.
 pub fn missing_part(method: &Method) -> Option<Error> {
-    fn missing<E: Entry>(name: &str) -> Option<Error> {
-        let unknown = (name != NONE).then(|| find::<E>(name).err()).flatten()?;
-        Some(list::missing(E::KIND, name).unwrap_or(unknown))
+    let (part, error) = lacking(method)?;
+    Some(match error {
+        Error::UnknownName { .. } => Error::Missing {
+            what: part,
+            message: "this build is without it".into(),
+        },
+        other => other,
+    })
+}
+
+/// The first part of a method that is not registered, and what is known of it.
+fn lacking(method: &Method) -> Option<(String, Error)> {
+    fn of<E: Entry>(name: &str) -> Option<(String, Error)> {
+        let unknown = find::<E>(name).err()?;
+        let error = list::missing(E::KIND, name).unwrap_or(unknown);
+        Some((format!("{} `{name}`", E::KIND), error))
     }
-    let identifier = || {
-        let uses = method.identifies();
-        uses.then(|| missing::<IdentifierEntry>(&method.identifier))
-            .flatten()
+    let explorer = || {
+        method
+            .explores()
+            .then(|| of::<ExplorerEntry>(&method.explorer))
     };
-    missing::<ExplorerEntry>(&method.explorer)
-        .or_else(identifier)
-        .or_else(|| missing::<SolverEntry>(&method.solver))
+    let identifier = || {
+        method
+            .identifies()
+            .then(|| of::<IdentifierEntry>(&method.identifier))
+    };
+    explorer()
+        .flatten()
+        .or_else(|| identifier().flatten())
+        .or_else(|| of::<SolverEntry>(&method.solver))
 }

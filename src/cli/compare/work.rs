@@ -1,33 +1,32 @@
-//! The work of a comparison: which cells are missing, and running them.
+//! The work of a comparison, from the command line to the tables.
 
 use std::collections::HashMap;
-use std::sync::{Mutex, PoisonError};
 
 use anyhow::Result;
-use asid_comparison::cell::{Cell, CellKey, Failure};
+use asid_comparison::cell::{CellKey, Failure};
 use asid_comparison::document::Document;
 use asid_comparison::schedule;
-use asid_comparison::settings::first_difference;
 use asid_comparison::store::{Store, write};
 use asid_core::Error;
 
 use super::arm::Arm;
-use super::cell::{COMMIT, VERSION};
 use super::folder::{claim, contents, sum_up};
-use super::progress::Progress;
 use super::request::{document, missing_part};
+use super::resume::{pending, same_comparison};
 use super::signals::{how_to_go_on, watch};
 use super::train::Trainer;
+use super::worker::Worker;
 use super::{Arguments, cell};
-use crate::cli::{failure, session};
+use crate::cli::failure;
 
 /// Task, method, world and engine: what shares its settings.
-type ArmName = [String; 4];
+pub type ArmName = [String; 4];
 
 /// The settings of every arm, or why it cannot be run.
-type Arms = HashMap<ArmName, Result<Arm, String>>;
+pub type Arms = HashMap<ArmName, Result<Arm, String>>;
 
-fn arm_name(key: &CellKey) -> ArmName {
+/// The arm that a cell belongs to.
+pub fn arm_name(key: &CellKey) -> ArmName {
     [&key.task, &key.method, &key.world, &key.backend].map(String::clone)
 }
 
@@ -56,12 +55,7 @@ pub fn work(arguments: &Arguments) -> Result<()> {
         // What was said of fewer cells does not hold any more.
         let _ = std::fs::remove_file(store.root().join("result.json"));
     }
-    let worker = Worker {
-        store: &store,
-        arms: &arms,
-        progress: Progress::new(arguments.quiet, pending.len()),
-        trouble: Mutex::default(),
-    };
+    let worker = Worker::new(&store, &arms, &keys, arguments.quiet, pending.len());
     let threads = match arguments.threads {
         Some(n) => n,
         None => std::thread::available_parallelism().map_or(1, usize::from),
@@ -69,15 +63,8 @@ pub fn work(arguments: &Arguments) -> Result<()> {
     let work = |key: &CellKey| worker.run(key);
     let done = |key: &CellKey, result| worker.done(key, result);
     schedule::run(&pending, threads, &drain, work, done)?;
-    worker.progress.end();
-    let trouble = worker
-        .trouble
-        .into_inner()
-        .unwrap_or_else(PoisonError::into_inner);
-    if let Some(error) = trouble.unwritten {
-        return Err(error);
-    }
-    finish(arguments, &store, &document, &keys, trouble.first)
+    let first = worker.end()?;
+    finish(arguments, &store, &document, &keys, first)
 }
 
 /// Checks a comparison as far as can be told before any work.
@@ -127,84 +114,6 @@ fn train(
     Ok(())
 }
 
-/// What came in the way of a comparison.
-#[derive(Default)]
-struct Trouble {
-    /// Arms of which no cell can be run.
-    ruled_out: Vec<ArmName>,
-    /// The first error of a cell, by the plan's order.
-    first: Option<anyhow::Error>,
-    /// A result that could not be kept.
-    unwritten: Option<anyhow::Error>,
-}
-
-/// Runs cells and keeps what comes of them.
-struct Worker<'w> {
-    store: &'w Store,
-    arms: &'w Arms,
-    progress: Progress,
-    trouble: Mutex<Trouble>,
-}
-
-impl Worker<'_> {
-    fn trouble(&self) -> std::sync::MutexGuard<'_, Trouble> {
-        self.trouble.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    /// A cell and its seconds; none where its arm was ruled out meanwhile.
-    fn run(&self, key: &CellKey) -> Result<Option<(Cell, f64)>> {
-        let name = arm_name(key);
-        let arm = match self.arms.get(&name) {
-            Some(Ok(arm)) => arm,
-            Some(Err(why)) => return Err(missing(why.clone())),
-            None => return Err(Error::Failed("no such arm".into()).into()),
-        };
-        if self.trouble().ruled_out.contains(&name) {
-            return Ok(None);
-        }
-        cell::run(arm, key).map(Some)
-    }
-
-    fn done(&self, key: &CellKey, result: Result<Result<Option<(Cell, f64)>>, schedule::Panic>) {
-        let result =
-            result.unwrap_or_else(|panic| Err(Error::Failed(failure::of_panic(&*panic)).into()));
-        let kept = match result {
-            Ok(None) => Ok(()),
-            Ok(Some((cell, wall_s))) => self.store.keep(&cell, Some(wall_s)),
-            Err(error) => {
-                // A call that is wrong for one cell of an arm is wrong for all of them.
-                let usage = error.downcast_ref::<Error>().is_some_and(Error::is_usage);
-                let failure = Failure {
-                    key: key.clone(),
-                    reason: format!("{error:#}")
-                        .split_whitespace()
-                        .collect::<Vec<_>>()
-                        .join(" "),
-                    of_all: usage,
-                };
-                let mut trouble = self.trouble();
-                if usage {
-                    trouble.ruled_out.push(arm_name(key));
-                }
-                trouble.first.get_or_insert(error);
-                self.store.fail(&failure)
-            }
-        };
-        if let Err(error) = kept {
-            self.trouble().unwritten.get_or_insert(error.into());
-        }
-        self.progress.advance(key);
-    }
-}
-
-fn missing(why: String) -> anyhow::Error {
-    Error::Config {
-        key: "method".into(),
-        message: why,
-    }
-    .into()
-}
-
 /// The settings of every arm, or why it cannot be run in this build.
 fn arms(document: &Document, keys: &[CellKey]) -> Result<Arms> {
     let mut arms = HashMap::new();
@@ -236,97 +145,6 @@ fn probe(keys: &[CellKey], arms: &Arms) -> Result<()> {
             cell::open(arm, key)?;
             probed.push(pair);
         }
-    }
-    Ok(())
-}
-
-/// Cells of this share that are not there; those that are there must belong to this comparison.
-fn pending(
-    arguments: &Arguments,
-    store: &Store,
-    keys: &[CellKey],
-    arms: &Arms,
-) -> Result<Vec<CellKey>> {
-    let mut engines: HashMap<&str, String> = HashMap::new();
-    let mut pending = Vec::new();
-    for (place, key) in keys.iter().enumerate() {
-        match store.cell(key)? {
-            Some(cell) => {
-                if !engines.contains_key(&*key.backend) {
-                    let backend = session::backend(&key.backend)?;
-                    let engine = format!("{} {}", backend.name(), backend.version());
-                    engines.insert(&key.backend, engine);
-                }
-                if let Some(Ok(arm)) = arms.get(&arm_name(key)) {
-                    check_cell(store, &cell, arm, &engines[&*key.backend])?;
-                }
-            }
-            None if arguments.shard.is_none_or(|s| s.holds(place)) => pending.push(key.clone()),
-            None => {}
-        }
-    }
-    Ok(pending)
-}
-
-/// Whether a cell that is there is one that would be run now.
-fn check_cell(store: &Store, cell: &Cell, arm: &Arm, engine: &str) -> Result<()> {
-    let method = (
-        &arm.method.explorer,
-        &arm.method.identifier,
-        &arm.method.solver,
-    );
-    let difference = if (&cell.explorer, &cell.identifier, &cell.solver) != method {
-        format!("as {}+{}+{}", cell.explorer, cell.identifier, cell.solver)
-    } else if cell.settings != arm.hash {
-        let now = arm.canonical.parse::<toml::Table>().ok();
-        match (store.settings(&cell.settings), now) {
-            (Some(then), Some(now)) => {
-                format!("with other settings: {}", first_difference(&then, &now))
-            }
-            _ => format!("with other settings, {}", cell.settings),
-        }
-    } else if (&*cell.versions.git, &*cell.versions.asid) != (COMMIT, VERSION) {
-        format!("by commit {} ({})", cell.versions.git, cell.versions.asid)
-    } else if cell.versions.engine != engine {
-        format!("on {}", cell.versions.engine)
-    } else {
-        return Ok(());
-    };
-    Err(Error::File {
-        path: store.place(&cell.key),
-        message: format!("was made {difference}; choose another --out"),
-    }
-    .into())
-}
-
-/// Whether the folder is new or holds a comparison that this one goes on with.
-fn same_comparison(arguments: &Arguments, store: &Store, document: &Document) -> Result<()> {
-    if !store.is_begun() {
-        return Ok(());
-    }
-    let there = Document::read(&store.config())?;
-    let refuse = |message: String| {
-        Err(Error::File {
-            path: store.root().to_owned(),
-            message: format!("{message}; choose another --out"),
-        }
-        .into())
-    };
-    if there.settings != document.settings {
-        let which = first_difference(&there.settings, &document.settings);
-        return refuse(format!("was made with other settings: {which}"));
-    }
-    for (what, then, now) in [
-        ("--quick", there.plan.quick, document.plan.quick),
-        ("--train", there.plan.train, document.plan.train),
-    ] {
-        if then != now {
-            let with = if then { "with" } else { "without" };
-            return refuse(format!("was made {with} {what}"));
-        }
-    }
-    if arguments.shard.is_some() && there != *document {
-        return refuse("holds another comparison than this share is of".into());
     }
     Ok(())
 }
@@ -366,7 +184,8 @@ fn finish(
         return Err(first.unwrap_or_else(nothing));
     }
     sum_up(arguments, store, document, &there)?;
-    let failed: Vec<&Failure> = there.failures.iter().filter(|f| !f.of_all).collect();
+    // A method that is left out with a reason is no failure; a run is.
+    let failed: Vec<&Failure> = there.single_failures().collect();
     match failed.first() {
         Some(failure) => Err(Error::Failed(format!(
             "{} of {} runs failed, the first of them {}: {}; the same command tries them again",

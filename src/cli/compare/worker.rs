@@ -1,0 +1,128 @@
+//! Runs cells and keeps what comes of them, on any number of threads.
+
+use std::sync::{Mutex, PoisonError};
+
+use anyhow::Result;
+use asid_comparison::cell::{Cell, CellKey, Failure};
+use asid_comparison::schedule;
+use asid_comparison::store::Store;
+use asid_core::Error;
+
+use super::cell;
+use super::progress::Progress;
+use super::work::{ArmName, Arms, arm_name};
+use crate::cli::failure;
+
+/// What came in the way of a comparison.
+#[derive(Default)]
+struct Trouble {
+    /// Arms of which no cell can be run.
+    ruled_out: Vec<ArmName>,
+    /// The first error of a cell.
+    first: Option<anyhow::Error>,
+    /// A result that could not be kept.
+    unwritten: Option<anyhow::Error>,
+}
+
+/// Runs cells and keeps what comes of them.
+pub struct Worker<'w> {
+    store: &'w Store,
+    arms: &'w Arms,
+    /// All cells of the comparison.
+    keys: &'w [CellKey],
+    progress: Progress,
+    trouble: Mutex<Trouble>,
+}
+
+impl<'w> Worker<'w> {
+    /// A worker for so many of the comparison's cells.
+    pub fn new(
+        store: &'w Store,
+        arms: &'w Arms,
+        keys: &'w [CellKey],
+        quiet: bool,
+        pending: usize,
+    ) -> Self {
+        Self {
+            store,
+            arms,
+            keys,
+            progress: Progress::new(quiet, pending),
+            trouble: Mutex::default(),
+        }
+    }
+
+    fn trouble(&self) -> std::sync::MutexGuard<'_, Trouble> {
+        self.trouble.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// A cell and its seconds; none where its arm was ruled out meanwhile.
+    pub fn run(&self, key: &CellKey) -> Result<Option<(Cell, f64)>> {
+        let name = arm_name(key);
+        if self.trouble().ruled_out.contains(&name) {
+            return Ok(None);
+        }
+        match self.arms.get(&name) {
+            Some(Ok(arm)) => cell::run(arm, key).map(Some),
+            Some(Err(why)) => Err(Error::Missing {
+                what: format!("method `{}`", key.method),
+                message: why.clone(),
+            }
+            .into()),
+            None => Err(Error::Failed("no settings were resolved".into()).into()),
+        }
+    }
+
+    /// Keeps what came of a cell.
+    pub fn done(
+        &self,
+        key: &CellKey,
+        result: Result<Result<Option<(Cell, f64)>>, schedule::Panic>,
+    ) {
+        let panicked = |panic: schedule::Panic| Error::Failed(failure::of_panic(&*panic)).into();
+        let kept = match result.unwrap_or_else(|panic| Err(panicked(panic))) {
+            Ok(None) => Ok(()),
+            Ok(Some((cell, wall_s))) => self.store.keep(&cell, Some(wall_s)),
+            Err(error) => self.failed(key, error),
+        };
+        if let Err(error) = kept {
+            self.trouble().unwritten.get_or_insert(error.into());
+        }
+        self.progress.advance(key);
+    }
+
+    /// Notes why a cell failed. A call that is wrong for an arm's first cell is wrong for all.
+    fn failed(&self, key: &CellKey, error: anyhow::Error) -> asid_core::Result<()> {
+        let usage = error.downcast_ref::<Error>().is_some_and(Error::is_usage);
+        let mut mates = self.keys.iter().filter(|k| k.arm_mate(key));
+        let of_all = usage && !mates.any(|k| self.store.place(k).is_file());
+        let reason = match self.arms.get(&arm_name(key)) {
+            Some(Err(why)) => why.clone(),
+            _ => format!("{error:#}"),
+        };
+        let mut trouble = self.trouble();
+        if of_all {
+            trouble.ruled_out.push(arm_name(key));
+        }
+        trouble.first.get_or_insert(error);
+        drop(trouble);
+        self.store.fail(&Failure {
+            key: key.clone(),
+            reason: reason.split_whitespace().collect::<Vec<_>>().join(" "),
+            of_all,
+        })
+    }
+
+    /// Ends the work: the first error of a cell.
+    ///
+    /// # Errors
+    /// When a result could not be kept.
+    pub fn end(self) -> Result<Option<anyhow::Error>> {
+        self.progress.end();
+        let trouble = self
+            .trouble
+            .into_inner()
+            .unwrap_or_else(PoisonError::into_inner);
+        trouble.unwritten.map_or(Ok(trouble.first), Err)
+    }
+}
