@@ -30,7 +30,7 @@ pub fn environment(folder: &Path) -> Result<PathBuf> {
         return Ok(program);
     }
     println!(
-        "{:<8}fetching Python packages into {} (2.3 GB; 5 GB laid out)",
+        "{:<8}fetching Python packages into {} (2.3 GB; 4.2 GB laid out)",
         "peers",
         folder.display()
     );
