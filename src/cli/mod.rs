@@ -24,6 +24,7 @@ mod session;
 mod solve;
 mod stage;
 mod trace;
+mod train;
 mod withheld;
 
 use std::ffi::OsString;
@@ -97,6 +98,7 @@ impl Command {
 /// Runs the command line of this process.
 #[must_use]
 pub fn main() -> ExitCode {
+    asid_learned::set_commit(env!("ASID_GIT"));
     failure::guard(dispatch)
 }
 
