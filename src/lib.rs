@@ -8,6 +8,7 @@
 pub use asid_algorithms as algorithms;
 pub use asid_core as core;
 pub use asid_diagnosis as diagnosis;
+pub use asid_learned as learned;
 pub use asid_report as report;
 pub use asid_tasks as tasks;
 pub use asid_worlds as worlds;

@@ -329,13 +329,51 @@ fn an_engine_left_out_says_how_to_get_it() {
     );
 }
 
+#[test]
+fn a_policy_is_a_file_of_the_explorer_that_plays_it() {
+    let place = Workplace::new();
+    refused_run(
+        &place,
+        &["--explorer", "random", "--policy", "p.safetensors"],
+        &["--policy", "`random` plays no trained policy"],
+    );
+    refused_run(
+        &place,
+        &["--explorer", "maxmi", "--policy", "nowhere.safetensors"],
+        &["nowhere.safetensors"],
+    );
+    place.write("p.safetensors", "no network");
+    refused_run(
+        &place,
+        &["--explorer", "max", "--policy", "p.safetensors"],
+        &["p.safetensors", "no safetensors file"],
+    );
+    refused(
+        &place,
+        &tiny(&[
+            "explore",
+            "rod-balancing",
+            "--explorer",
+            "random",
+            "--train",
+            "p",
+        ]),
+        &["--train", "`random` learns nothing"],
+    );
+}
+
 #[cfg(not(feature = "torch"))]
 #[test]
 fn an_explorer_left_out_says_how_to_get_it() {
     let place = Workplace::new();
     refused_run(
         &place,
-        &["--explorer", "fisher-ppo"],
+        &[
+            "--explorer",
+            "fisher-ppo",
+            "--set",
+            "explorer.policy=\"train\"",
+        ],
         &["fisher-ppo", "cargo xtask setup", "--features torch"],
     );
 }

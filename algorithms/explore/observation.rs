@@ -58,6 +58,23 @@ impl Observer {
     /// # Errors
     /// When the scene lacks a channel of the protocol.
     pub fn new(problem: &Problem<'_>) -> Result<Self> {
+        let mut observer = Self::of_readings(problem)?;
+        observer.unknowns = problem.parameters.len();
+        for parameter in problem.parameters {
+            observer.entries.push(Entry {
+                name: format!("-log expected std of {}, prior-scaled", parameter.name),
+                len: 1,
+            });
+        }
+        Ok(observer)
+    }
+
+    /// An observer without the information gathered so far: what the readings and the clock
+    /// show, and nothing that must be simulated along.
+    ///
+    /// # Errors
+    /// As [`Observer::new`].
+    pub fn of_readings(problem: &Problem<'_>) -> Result<Self> {
         let protocol = problem.task.exploration();
         let names = protocol.channels();
         let recording = problem.model.layout().recording(&names)?;
@@ -99,17 +116,11 @@ impl Observer {
             name: "share of the episode".into(),
             len: 1,
         });
-        for parameter in problem.parameters {
-            entries.push(Entry {
-                name: format!("-log expected std of {}, prior-scaled", parameter.name),
-                len: 1,
-            });
-        }
         Ok(Self {
             parts,
             entries,
             width: recording.width(),
-            unknowns: problem.parameters.len(),
+            unknowns: 0,
         })
     }
 

@@ -12,10 +12,10 @@ use rand::Rng;
 use tch::nn::{Path, VarStore};
 use tch::{Device, Kind, Tensor};
 
-use crate::config::PpoConfig;
-use crate::normaliser::Normaliser;
 use crate::orthogonal::orthogonal;
-use crate::policy::{Layer, Policy};
+use asid_learned::Normaliser;
+use asid_learned::PpoConfig;
+use asid_learned::{Layer, Policy};
 
 /// Actor, critic and the store that owns their parameters.
 pub struct ActorCritic {
@@ -112,12 +112,13 @@ impl ActorCritic {
 }
 
 /// Layers with tanh between them.
-struct Network {
-    layers: Vec<Dense>,
+pub struct Network {
+    pub layers: Vec<Dense>,
 }
 
 impl Network {
-    fn new(path: &Path<'_>, sizes: &[usize], last_gain: f64, rng: &mut impl Rng) -> Self {
+    /// Layers of these sizes, inputs first.
+    pub fn new(path: &Path<'_>, sizes: &[usize], last_gain: f64, rng: &mut impl Rng) -> Self {
         let last = sizes.len() - 2;
         let layers = sizes.windows(2).enumerate().map(|(i, size)| {
             let gain = if i == last { last_gain } else { 2_f64.sqrt() };
@@ -128,7 +129,8 @@ impl Network {
         }
     }
 
-    fn forward(&self, input: &Tensor) -> Tensor {
+    /// Outputs, `n x outputs`, of inputs, `n x inputs`.
+    pub fn forward(&self, input: &Tensor) -> Tensor {
         let mut x = self.layers[0].forward(input);
         for layer in &self.layers[1..] {
             x = layer.forward(&x.tanh());
@@ -138,13 +140,19 @@ impl Network {
 }
 
 /// One layer; `weight` is `outputs x inputs`.
-struct Dense {
+pub struct Dense {
     weight: Tensor,
     bias: Tensor,
 }
 
 impl Dense {
-    fn new(path: &Path<'_>, inputs: usize, outputs: usize, gain: f64, rng: &mut impl Rng) -> Self {
+    pub fn new(
+        path: &Path<'_>,
+        inputs: usize,
+        outputs: usize,
+        gain: f64,
+        rng: &mut impl Rng,
+    ) -> Self {
         let start = Tensor::from_slice(&orthogonal(outputs, inputs, gain, rng));
         let shape = [outputs as i64, inputs as i64];
         Self {
@@ -153,12 +161,12 @@ impl Dense {
         }
     }
 
-    fn forward(&self, input: &Tensor) -> Tensor {
+    pub fn forward(&self, input: &Tensor) -> Tensor {
         input.linear(&self.weight, Some(&self.bias))
     }
 
     /// As plain numbers, with the weights `inputs x outputs`.
-    fn plain(&self) -> Layer {
+    pub fn plain(&self) -> Layer {
         Layer {
             weight: to_vec(&self.weight.transpose(0, 1).contiguous()),
             bias: to_vec(&self.bias),

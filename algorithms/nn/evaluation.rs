@@ -3,7 +3,7 @@
 use asid_core::{BatchEnvironment, Error, Result, Transition};
 use serde::{Deserialize, Serialize};
 
-use crate::policy::Policy;
+use asid_learned::Policy;
 
 /// Returns of episodes under the mean action.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -6,9 +6,10 @@ use asid_core::{BatchEnvironment, Error, Result, Transition};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use crate::policy::Layer;
+use crate::evaluate;
 use crate::ppo::{PpoProgress, learn, train};
-use crate::{Normaliser, Policy, PpoConfig, evaluate};
+use asid_learned::Layer;
+use asid_learned::{Normaliser, Policy, PpoConfig};
 
 fn carry_on(_: &PpoProgress) -> ControlFlow<()> {
     ControlFlow::Continue(())

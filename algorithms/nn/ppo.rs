@@ -24,13 +24,14 @@ use tch::nn::{Adam, Optimizer, OptimizerConfig};
 use tch::{Kind, Tensor};
 
 use crate::actor_critic::{ActorCritic, to_vec};
-use crate::config::PpoConfig;
+use crate::device::device;
 use crate::evaluation::{Evaluation, evaluate, mean_and_std};
 use crate::gae::{Outcome, advantages};
-use crate::normaliser::Normaliser;
-use crate::policy::Policy;
 use crate::rollout::{Collector, Rollout};
 use crate::surrogate::{Shift, clipped_surrogate_loss, shift};
+use asid_learned::Normaliser;
+use asid_learned::Policy;
+use asid_learned::PpoConfig;
 
 /// One point of the learning curve: what one update did.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -46,6 +47,12 @@ pub struct PpoProgress {
     pub return_std: Option<f64>,
     /// Mean standard deviation of the entries of an action.
     pub action_std: f64,
+    /// Mean clipped surrogate loss over the update's minibatches.
+    pub policy_loss: f64,
+    /// Mean squared error of the critic over the update's minibatches, in scaled rewards.
+    pub value_loss: f64,
+    /// Step size of the update.
+    pub learning_rate: f64,
     /// KL(old, new) over this rollout's samples after the update.
     pub approx_kl: f64,
     /// Share of this rollout's samples outside the clipping interval after the update.
@@ -113,7 +120,7 @@ pub(crate) fn learn(
     on_progress: &mut dyn FnMut(&PpoProgress) -> ControlFlow<()>,
 ) -> Result<Learnt> {
     config.validate()?;
-    let device = config.device()?;
+    let device = device(config)?;
     tch::set_num_threads(1);
     let [mut weights, actions, mut order] = streams(seed);
     let (observations, outputs) = (environment.observation_len(), environment.action_len());
@@ -127,14 +134,20 @@ pub(crate) fn learn(
     let steps = config.n_steps.div_ceil(collector.batch_size());
     let mut curve = Vec::new();
     while collector.env_steps < config.total_steps {
+        let mut learning_rate = config.learning_rate;
         if config.anneal_learning_rate {
-            let left = 1.0 - collector.env_steps as f64 / config.total_steps as f64;
-            optimiser.set_lr(config.learning_rate * left);
+            learning_rate *= 1.0 - collector.env_steps as f64 / config.total_steps as f64;
+            optimiser.set_lr(learning_rate);
         }
         let rollout = collector.collect(&networks, steps)?;
         let samples = Samples::new(&rollout, &networks, collector.batch_size(), config);
-        let shift = update(&mut optimiser, &networks, &samples, config, &mut order);
-        let progress = progress(&collector, &rollout, &samples, &networks, shift, config);
+        let (shift, losses) = update(&mut optimiser, &networks, &samples, config, &mut order);
+        let progress = PpoProgress {
+            policy_loss: losses.policy,
+            value_loss: losses.value,
+            learning_rate,
+            ..progress(&collector, &rollout, &samples, &networks, shift, config)
+        };
         if !(progress.approx_kl.is_finite() && progress.entropy.is_finite()) {
             return Err(Error::Failed(format!(
                 "PPO diverged after {} environment steps: lower ppo.learning_rate or ppo.reward_scale",
@@ -225,14 +238,21 @@ impl Samples {
     }
 }
 
-/// Epochs of minibatches over the samples; returns how far the policy moved.
+/// Mean losses of an update.
+#[derive(Clone, Copy, Debug, Default)]
+struct Losses {
+    policy: f64,
+    value: f64,
+}
+
+/// Epochs of minibatches over the samples; returns how far the policy moved, and the losses.
 fn update(
     optimiser: &mut Optimizer,
     networks: &ActorCritic,
     samples: &Samples,
     config: &PpoConfig,
     rng: &mut ChaCha8Rng,
-) -> Shift {
+) -> (Shift, Losses) {
     let len = samples.len();
     let moved = || {
         tch::no_grad(|| {
@@ -241,6 +261,11 @@ fn update(
         })
     };
     let mut order: Vec<i64> = (0..len).collect();
+    let (mut sum, mut minibatches) = (Losses::default(), 0.0_f64);
+    let mean = |sum: Losses, n: f64| Losses {
+        policy: sum.policy / n,
+        value: sum.value / n,
+    };
     for _ in 0..config.epochs {
         order.shuffle(rng);
         let index = Tensor::from_slice(&order).to_device(networks.store.device());
@@ -248,21 +273,24 @@ fn update(
         for start in (0..len).step_by(config.minibatch) {
             let rows = (len - start).min(config.minibatch as i64);
             let part = shuffled.map(|column| column.narrow(0, start, rows));
-            let loss = loss(networks, &part, config);
+            let (loss, parts) = loss(networks, &part, config);
             optimiser.backward_step_clip_norm(&loss, config.max_gradient_norm);
+            sum.policy += parts.policy;
+            sum.value += parts.value;
+            minibatches += 1.0;
         }
         if let Some(target_kl) = config.target_kl {
             let shift = moved();
             if shift.approx_kl > 1.5 * target_kl {
-                return shift;
+                return (shift, mean(sum, minibatches));
             }
         }
     }
-    moved()
+    (moved(), mean(sum, minibatches))
 }
 
-/// Equation 9 of the paper, with its sign turned.
-fn loss(networks: &ActorCritic, part: &Samples, config: &PpoConfig) -> Tensor {
+/// Equation 9 of the paper, with its sign turned, and its two losses.
+fn loss(networks: &ActorCritic, part: &Samples, config: &PpoConfig) -> (Tensor, Losses) {
     let log_prob = networks.log_prob(&part.observation, &part.action);
     let advantage = if config.normalise_advantage && part.len() > 1 {
         let centred: Tensor = &part.advantage - part.advantage.mean(None::<Kind>);
@@ -275,11 +303,15 @@ fn loss(networks: &ActorCritic, part: &Samples, config: &PpoConfig) -> Tensor {
     let value_loss = (networks.value(&part.observation) - &part.target)
         .square()
         .mean(None::<Kind>);
+    let losses = Losses {
+        policy: policy_loss.double_value(&[]),
+        value: value_loss.double_value(&[]),
+    };
     let mut loss = policy_loss + config.value_coefficient * value_loss;
     if config.entropy_coefficient > 0.0 {
         loss -= config.entropy_coefficient * networks.entropy();
     }
-    loss
+    (loss, losses)
 }
 
 /// The point of the curve after an update.
@@ -299,6 +331,9 @@ fn progress(
         mean_return: moments.map(|(mean, _)| mean),
         return_std: moments.map(|(_, std)| std),
         action_std: mean_and_std(&networks.action_std()).0,
+        policy_loss: f64::NAN,
+        value_loss: f64::NAN,
+        learning_rate: f64::NAN,
         approx_kl: shift.approx_kl,
         clip_fraction: shift.clip_fraction,
         entropy: tch::no_grad(|| networks.entropy().double_value(&[])),

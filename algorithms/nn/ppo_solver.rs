@@ -18,10 +18,10 @@ use asid_core::{Error, Posterior, Problem, Result};
 use rand::Rng as _;
 use serde::{Deserialize, Serialize};
 
-use crate::config::PpoConfig;
 use crate::evaluation::mean_and_std;
-use crate::policy::Policy;
 use crate::ppo::{PpoProgress, train};
+use asid_learned::Policy;
+use asid_learned::PpoConfig;
 
 /// Settings of the solver.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

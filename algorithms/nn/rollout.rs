@@ -5,7 +5,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use crate::actor_critic::{ActorCritic, to_vec};
-use crate::normaliser::Normaliser;
+use asid_learned::Normaliser;
 
 /// Samples of one rollout, each array `steps x n` (times the entries of a row).
 #[derive(Default)]

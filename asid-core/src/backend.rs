@@ -82,6 +82,11 @@ pub trait Model: Send + Sync {
     /// Names and places.
     fn layout(&self) -> &Layout;
 
+    /// Name and version of the engine, for files that outlive the run; empty where it does not say.
+    fn engine(&self) -> String {
+        String::new()
+    }
+
     /// Value of a target in the scene as it is.
     ///
     /// # Errors

@@ -161,6 +161,10 @@ impl Model for Refined {
         self.inner.layout()
     }
 
+    fn engine(&self) -> String {
+        self.inner.engine()
+    }
+
     fn nominal(&self, target: &Target) -> Result<f64> {
         if let Some((effect, parameter)) = self.effect_column(target)? {
             return Ok(self.placed[effect].values[parameter]);

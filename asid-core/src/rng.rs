@@ -27,6 +27,12 @@ impl Streams {
         Self { seed }
     }
 
+    /// The seed.
+    #[must_use]
+    pub fn seed(&self) -> u64 {
+        self.seed
+    }
+
     /// The stream of this name.
     #[must_use]
     pub fn stream(&self, name: &str) -> Rng {

@@ -302,6 +302,12 @@ pub trait Task: Send + Sync {
     fn bounds(&self) -> [[f64; 3]; 2] {
         [[-1.5, -1.5, -0.1], [1.5, 1.5, 1.5]]
     }
+    /// What a reading of an exploration episode (tracked signals first) is worth to the task itself:
+    /// larger where the object is nearer to its goal, in the metric's unit; `None` where the task has
+    /// no goal for its object while it is explored.
+    fn goal_reward(&self, _reading: &[f64]) -> Option<f64> {
+        None
+    }
     /// The two tracked parts whose joint is in question, the one that holds first; `None`
     /// where there are no such parts.
     fn parts(&self) -> Option<[TrackedPart; 2]> {

@@ -217,12 +217,15 @@ impl Config {
             plugins: Vec::new(),
             start,
             assumed,
-            explorer: component::<dyn asid_core::Explorer>(
-                task,
-                &table,
-                "explorer",
-                algorithms.explorer.as_deref(),
-                ASID.explorer,
+            explorer: with_policy(
+                component::<dyn asid_core::Explorer>(
+                    task,
+                    &table,
+                    "explorer",
+                    algorithms.explorer.as_deref(),
+                    ASID.explorer,
+                )?,
+                algorithms.policy.as_deref(),
             )?,
             identifier: component::<dyn asid_core::Identifier>(
                 task,
@@ -245,7 +248,19 @@ impl Config {
             parameter,
         };
         config.plugins = config.used_plugins();
+        config.learn_from_explorer(&section(&table, "identifier")?);
         Ok((config, parameters))
+    }
+
+    /// An identifier that learns from an explorer's episodes learns from those of this run's
+    /// explorer, unless it was told another.
+    fn learn_from_explorer(&mut self, given: &toml::Table) {
+        if self.command == Stage::Run
+            && !given.contains_key("explorer")
+            && let Some(setting) = self.identifier.settings.get_mut("explorer")
+        {
+            *setting = self.explorer.name.clone().into();
+        }
     }
 
     /// Files of plugins that were named, or that the settings name parts of.
@@ -272,6 +287,19 @@ impl Config {
         }
         used(&files)
     }
+}
+
+/// The explorer, told the file of `--policy`.
+fn with_policy(mut explorer: Component, policy: Option<&Path>) -> Result<Component> {
+    let Some(file) = policy else {
+        return Ok(explorer);
+    };
+    let Some(setting) = explorer.settings.get_mut("policy") else {
+        let message = format!("the explorer `{}` plays no trained policy", explorer.name);
+        return Err(wrong("--policy", message));
+    };
+    *setting = file.display().to_string().into();
+    Ok(explorer)
 }
 
 /// The condition whose truths are drawn from the whole prior; every task has it.

@@ -78,6 +78,7 @@ impl Arguments {
         let real = &self.worlds.real;
         let Algorithms {
             explorer,
+            policy,
             identifier,
             solver,
         } = &self.algorithms;
@@ -85,6 +86,7 @@ impl Arguments {
             || !real.real_effect.is_empty()
             || real.real_backend.is_some()
             || real.real_model.is_some()
+            || policy.is_some()
             || [explorer, identifier, solver].iter().any(|a| a.is_some())
     }
 

@@ -32,7 +32,7 @@ const LIBRARIES: [Library; 2] = [
     },
     Library {
         name: "libtorch 2.13.0",
-        what_for: "explorer `fisher-ppo`",
+        what_for: "training (explorers fisher-ppo, maxmi, max, task-ppo; estimator), solver `ppo`",
         built_in: cfg!(feature = "torch"),
         variable: "LIBTORCH",
         folder: ".native/libtorch",

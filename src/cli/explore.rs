@@ -5,6 +5,7 @@
 //! to its readings is in `policy.json`, and the commands are what it would do there.
 
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 use std::time::Instant;
 
 use anyhow::Result;
@@ -21,7 +22,7 @@ use super::options::{Algorithms, Common, Worlds};
 use super::output::{OutFolder, write_json};
 use super::result::{CostResult, ExplorationResult, SCHEMA, Versions, figure};
 use super::session::Session;
-use super::{stage, trace};
+use super::{stage, trace, train};
 
 /// Arguments of `explore`.
 #[derive(clap::Args)]
@@ -39,6 +40,14 @@ pub struct Arguments {
     /// How to explore: see `asid list`
     #[arg(long, value_name = "NAME")]
     explorer: Option<String>,
+    /// Trained policy to play [default: the one that ships for the task, else it is trained on the
+    /// spot]
+    #[arg(long, value_name = "FILE")]
+    policy: Option<PathBuf>,
+    /// Trains the explorer's policy, saves it for --policy, and plays nothing; its curves for
+    /// TensorBoard come beside it
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["policy", "out"])]
+    train: Option<PathBuf>,
     #[command(flatten)]
     pub common: Common,
     #[command(flatten)]
@@ -65,6 +74,7 @@ pub fn explore(arguments: &Arguments) -> Result<()> {
     let common = &arguments.common;
     let algorithms = Algorithms {
         explorer: arguments.explorer.clone(),
+        policy: arguments.policy.clone(),
         ..Algorithms::default()
     };
     let session = Session::open_stage(
@@ -74,6 +84,9 @@ pub fn explore(arguments: &Arguments) -> Result<()> {
         &algorithms,
         &arguments.worlds,
     )?;
+    if let Some(file) = &arguments.train {
+        return train::explorer(&session, common, file);
+    }
     let out = OutFolder::claim(
         common.out.as_deref(),
         &format!("{}-explore", arguments.task),

@@ -21,7 +21,7 @@ use super::result::{
     parameter_line,
 };
 use super::session::Session;
-use super::{failure, stage, trace};
+use super::{failure, stage, trace, train};
 
 /// A residual above this many standard deviations of the noise is more than chance and
 /// a noise that was guessed a little low.
@@ -44,8 +44,18 @@ pub struct Arguments {
     /// The task: see `asid list`
     task: String,
     /// Log of a real episode, CSV; several are fitted together
-    #[arg(long, value_name = "FILE", required = true, num_args = 1..)]
+    #[arg(long, value_name = "FILE", required_unless_present = "train", num_args = 1..)]
     log: Vec<PathBuf>,
+    /// Trains the identifier on episodes of --explorer, saves it for the setting `network`, and
+    /// identifies nothing; its curves for TensorBoard come beside it
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["log", "out"])]
+    train: Option<PathBuf>,
+    /// Explorer whose episodes are learned from, or were [default: fisher-ppo]
+    #[arg(long, value_name = "NAME")]
+    explorer: Option<String>,
+    /// Trained policy of that explorer [default: the one that ships for the task]
+    #[arg(long, value_name = "FILE", requires = "train")]
+    policy: Option<PathBuf>,
     /// How to identify: see `asid list`
     #[arg(long, value_name = "NAME")]
     identifier: Option<String>,
@@ -84,15 +94,26 @@ pub fn identify(arguments: &Arguments) -> Result<()> {
     let common = &arguments.common;
     let algorithms = Algorithms {
         identifier: arguments.identifier.clone(),
+        explorer: train::explorer_of(
+            arguments.explorer.as_deref(),
+            arguments.identifier.as_deref(),
+        ),
+        policy: arguments.policy.clone(),
         ..Algorithms::default()
     };
-    let session = Session::open_stage(
+    let mut session = Session::open_stage(
         Stage::Identify,
         &arguments.task,
         common,
         &algorithms,
         &Worlds::from(&arguments.simulator),
     )?;
+    if let Some(name) = &arguments.explorer {
+        train::learned_from(&mut session, name)?;
+    }
+    if let Some(file) = &arguments.train {
+        return train::identifier(&session, common, file);
+    }
     let episodes: Vec<Episode> = arguments
         .log
         .iter()

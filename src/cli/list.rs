@@ -24,13 +24,14 @@ pub struct Arguments {
 const OPTIONAL: [(&str, &str, &str); 3] = [
     ("backend", "mujoco", "mujoco"),
     ("backend", "rapier", "rapier"),
-    ("explorer", "fisher-ppo", "torch"),
+    ("solver", "ppo", "torch"),
 ];
 
 /// Packages whose parts count as built in.
-const OWN: [&str; 6] = [
+const OWN: [&str; 7] = [
     "asid-algorithms",
     "asid-diagnosis",
+    "asid-learned",
     "asid-mujoco",
     "asid-nn",
     "asid-rapier",
@@ -81,8 +82,41 @@ fn origin(origin: Origin) -> String {
 fn about<E: Entry>(entry: &E) -> String {
     match entry.name().split_once("@plugin") {
         Some((own, _)) => format!("{} (its name `{own}` is taken)", entry.about()),
-        None => entry.about().to_owned(),
+        None => format!("{}{}", entry.about(), trained(E::KIND, entry.name())),
     }
+}
+
+/// What ships trained of something that learns, and what its training needs.
+fn trained(kind: &str, name: &str) -> String {
+    use asid_learned::{estimator, learning, shipped};
+    let (files, can_train): (Vec<String>, bool) = match (kind, name) {
+        ("explorer", "fisher-ppo" | "maxmi" | "max" | "task-ppo") => (
+            shipped::tasks(name).iter().map(|&t| t.into()).collect(),
+            learning::can_train(name),
+        ),
+        ("identifier", estimator::NAME) => (
+            shipped::ALL
+                .iter()
+                .filter_map(|s| {
+                    let explorer = s.name.strip_prefix("estimator-")?;
+                    Some(format!("{} explored by {explorer}", s.task))
+                })
+                .collect(),
+            estimator::can_train(),
+        ),
+        _ => return String::new(),
+    };
+    let ships = if files.is_empty() {
+        "none ships trained".to_owned()
+    } else {
+        format!("trained for {}", files.join(", "))
+    };
+    let needs = if can_train {
+        String::new()
+    } else {
+        format!("; to train: {}", reason("torch"))
+    };
+    format!(" ({ships}{needs})")
 }
 
 fn rows<E: Entry>() -> Vec<Row> {

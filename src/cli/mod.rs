@@ -25,6 +25,7 @@ mod session;
 mod solve;
 mod stage;
 mod trace;
+mod train;
 mod withheld;
 mod world;
 
@@ -99,6 +100,7 @@ impl Command {
 /// Runs the command line of this process.
 #[must_use]
 pub fn main() -> ExitCode {
+    asid_learned::set_commit(env!("ASID_GIT"));
     failure::guard(dispatch)
 }
 

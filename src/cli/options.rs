@@ -57,6 +57,10 @@ pub struct Algorithms {
     /// How to explore
     #[arg(long, value_name = "NAME")]
     pub explorer: Option<String>,
+    /// Trained policy that the explorer plays, as `asid explore --train FILE` saves it [default: the
+    /// one that ships for the task, else it is trained on the spot]
+    #[arg(long, value_name = "FILE")]
+    pub policy: Option<PathBuf>,
     /// How to identify
     #[arg(long, value_name = "NAME")]
     pub identifier: Option<String>,

@@ -339,6 +339,10 @@ impl Task for Shuffleboard {
         [[-0.3, -0.9, -0.02], [1.3, 0.9, 0.3]]
     }
 
+    fn goal_reward(&self, reading: &[f64]) -> Option<f64> {
+        Some(-metric::zone_error(self.zone, reading))
+    }
+
     fn top_view(&self) -> TopView {
         let circle = (0..24).map(|i| {
             let (sin, cos) = (f64::from(i) * std::f64::consts::TAU / 24.0).sin_cos();

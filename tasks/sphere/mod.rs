@@ -350,6 +350,10 @@ impl Task for Sphere {
         self.spec.regions.clone()
     }
 
+    fn goal_reward(&self, reading: &[f64]) -> Option<f64> {
+        Some(-metric::distance(reading, self.spec.goal))
+    }
+
     fn top_view(&self) -> TopView {
         let mut fixtures = self.spec.fixtures.clone();
         fixtures.push(Outline {

@@ -60,6 +60,10 @@ impl Model for MujocoModel {
         &self.compiled.layout
     }
 
+    fn engine(&self) -> String {
+        format!("mujoco {}", crate::VERSION)
+    }
+
     fn nominal(&self, target: &Target) -> Result<f64> {
         Ok(Column::resolve(&self.compiled, target)?.nominal)
     }

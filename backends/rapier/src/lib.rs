@@ -133,6 +133,10 @@ impl Model for RapierModel {
         &self.0.layout
     }
 
+    fn engine(&self) -> String {
+        format!("rapier {VERSION}")
+    }
+
     fn nominal(&self, target: &Target) -> Result<f64> {
         Ok(Knob::resolve(target, &self.0)?.get(&self.0.nominal, &self.0))
     }

@@ -1,5 +1,7 @@
 //! Explorers, identifiers, solvers, effects, and what they make.
 
+use std::path::Path;
+
 use crate::effect::{Acting, Acts, Effect, EffectParameter, Site};
 use crate::episode::Episode;
 use crate::error::Result;
@@ -70,6 +72,33 @@ impl Explorer for Across<Box<dyn Explorer>> {
             ..explored
         })
     }
+
+    fn train(&self, problem: &Problem<'_>, file: &Path) -> Result<bool> {
+        let handed = Handed::new(problem, self.border.back());
+        let problem = handed.problem(problem);
+        self.try_run(|explorer| explorer.train(&problem, file))
+    }
+}
+
+impl Explorer for Across<&dyn Explorer> {
+    fn explore<'a>(
+        &'a self,
+        problem: &'a Problem<'a>,
+        start: Option<&[f64]>,
+    ) -> Result<Explored<'a>> {
+        let problem = Handed::kept(problem, self.border.back());
+        let explored = self.border.try_run(|| self.inner.explore(problem, start))?;
+        Ok(Explored {
+            policy: Box::new(Across::new(explored.policy, self.border)),
+            ..explored
+        })
+    }
+
+    fn train(&self, problem: &Problem<'_>, file: &Path) -> Result<bool> {
+        let handed = Handed::new(problem, self.border.back());
+        let problem = handed.problem(problem);
+        self.try_run(|explorer| explorer.train(&problem, file))
+    }
 }
 
 impl Policy for Across<Box<dyn Policy + '_>> {
@@ -104,6 +133,14 @@ impl Identifier for Across<Box<dyn Identifier>> {
             .collect();
         self.border.finite(&[], &values, "the posterior")?;
         Ok(found)
+    }
+
+    fn train(&self, problem: &Problem<'_>, explorer: &dyn Explorer, file: &Path) -> Result<bool> {
+        let back = self.border.back();
+        let handed = Handed::new(problem, back);
+        let problem = handed.problem(problem);
+        let explorer = Across::new(explorer, back);
+        self.try_run(|identifier| identifier.train(&problem, &explorer, file))
     }
 }
 

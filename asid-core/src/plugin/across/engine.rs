@@ -40,6 +40,10 @@ where
         self.run(|model| model.layout())
     }
 
+    fn engine(&self) -> String {
+        self.run(|model| model.engine())
+    }
+
     fn nominal(&self, target: &Target) -> Result<f64> {
         self.try_run(|model| model.nominal(target))
     }

@@ -140,6 +140,10 @@ where
         self.run(|task| task.bounds())
     }
 
+    fn goal_reward(&self, reading: &[f64]) -> Option<f64> {
+        self.run(|task| task.goal_reward(reading))
+    }
+
     fn parts(&self) -> Option<[TrackedPart; 2]> {
         self.run(|task| task.parts())
     }

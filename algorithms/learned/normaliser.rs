@@ -80,6 +80,22 @@ impl Normaliser {
         }
     }
 
+    /// The numbers as a file holds them: how many observations, mean and variance.
+    #[must_use]
+    pub fn moments(&self) -> (f64, &[f64], &[f64]) {
+        (self.count, &self.mean, &self.variance)
+    }
+
+    /// Of the numbers of a file.
+    #[must_use]
+    pub fn from_moments(count: f64, mean: Vec<f64>, variance: Vec<f64>) -> Self {
+        Self {
+            count,
+            mean,
+            variance,
+        }
+    }
+
     /// Whether all numbers are usable; a file may hold anything.
     pub(crate) fn is_sound(&self) -> bool {
         self.mean.len() == self.variance.len()

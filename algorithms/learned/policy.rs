@@ -12,6 +12,8 @@ use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 use serde::{Deserialize, Serialize};
 
+use crate::file::{Tensor, Tensors};
+use crate::network::Layer;
 use crate::normaliser::Normaliser;
 
 /// A Gaussian policy: normaliser, tanh layers, a standard deviation for each action.
@@ -24,22 +26,13 @@ pub struct Policy {
     log_std: Vec<f32>,
 }
 
-/// One layer, `y = x W + b`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(crate) struct Layer {
-    /// `inputs x outputs`, row-major.
-    pub weight: Vec<f32>,
-    /// `outputs`.
-    pub bias: Vec<f32>,
-}
-
 /// Version of the file format.
 const SCHEMA: u32 = 1;
 
 impl Policy {
     /// A policy of layers that fit each other.
-    pub(crate) fn new(normaliser: Normaliser, layers: Vec<Layer>, log_std: Vec<f32>) -> Self {
+    #[must_use]
+    pub fn new(normaliser: Normaliser, layers: Vec<Layer>, log_std: Vec<f32>) -> Self {
         Self {
             schema: SCHEMA,
             normaliser,
@@ -49,8 +42,8 @@ impl Policy {
     }
 
     /// One layer without normaliser: `y = x W + b`.
-    #[cfg(test)]
-    pub(crate) fn linear(inputs: usize, weight: Vec<f32>, bias: Vec<f32>) -> Self {
+    #[must_use]
+    pub fn linear(inputs: usize, weight: Vec<f32>, bias: Vec<f32>) -> Self {
         let log_std = vec![0.0; bias.len()];
         let layers = vec![Layer { weight, bias }];
         Self::new(Normaliser::identity(inputs), layers, log_std)
@@ -69,6 +62,51 @@ impl Policy {
         match policy.fault() {
             None => Ok(policy),
             Some(fault) => Err(wrong(format!("not a usable policy: {fault}"))),
+        }
+    }
+
+    /// The policy as tensors of a file, their names beginning with `prefix`.
+    pub fn to_tensors(&self, prefix: &str, tensors: &mut Tensors) {
+        let (count, mean, variance) = self.normaliser.moments();
+        let single = |values: &[f64]| values.iter().map(|&x| x as f32).collect();
+        for (name, values) in [
+            ("count", &[count][..]),
+            ("mean", mean),
+            ("variance", variance),
+        ] {
+            let name = format!("{prefix}.normaliser.{name}");
+            tensors.insert(name, Tensor::vector(single(values)));
+        }
+        for (i, layer) in self.layers.iter().enumerate() {
+            layer.to_tensors(&format!("{prefix}.{i}"), tensors);
+        }
+        let log_std = Tensor::vector(self.log_std.clone());
+        tensors.insert(format!("{prefix}.log_std"), log_std);
+    }
+
+    /// The policy whose tensors' names begin with `prefix`; the message says what is wrong.
+    ///
+    /// # Errors
+    /// Where a tensor is missing or the numbers are no sound policy.
+    pub fn from_tensors(prefix: &str, tensors: &Tensors) -> Result<Self, String> {
+        let get = |name: &str| -> Result<Vec<f32>, String> {
+            let name = format!("{prefix}.{name}");
+            let tensor = tensors.get(&name);
+            tensor
+                .map(|t| t.values.clone())
+                .ok_or_else(|| format!("has no tensor `{name}`"))
+        };
+        let double = |name: &str| -> Result<Vec<f64>, String> {
+            Ok(get(name)?.into_iter().map(f64::from).collect())
+        };
+        let count = double("normaliser.count")?.first().copied().unwrap_or(0.0);
+        let moments = (double("normaliser.mean")?, double("normaliser.variance")?);
+        let normaliser = Normaliser::from_moments(count, moments.0, moments.1);
+        let layers = Layer::all_from_tensors(prefix, tensors)?;
+        let policy = Self::new(normaliser, layers, get("log_std")?);
+        match policy.fault() {
+            None => Ok(policy),
+            Some(fault) => Err(format!("holds no usable policy: {fault}")),
         }
     }
 
@@ -199,19 +237,6 @@ impl Policy {
             return Some("a number in it is not finite");
         }
         None
-    }
-}
-
-impl Layer {
-    /// `y = x W + b`, row by row of `W` so that the inner loop runs over neighbours.
-    fn forward(&self, x: &[f32], y: &mut Vec<f32>) {
-        y.clear();
-        y.extend_from_slice(&self.bias);
-        for (&x, row) in x.iter().zip(self.weight.chunks_exact(self.bias.len())) {
-            for (y, w) in y.iter_mut().zip(row) {
-                *y += x * w;
-            }
-        }
     }
 }
 

@@ -1,0 +1,191 @@
+//! Episodes of an explorer at truths of the prior: what an estimator learns from.
+
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use asid_core::progress::Silent;
+use asid_core::{Error, Explorer, Problem, Result};
+
+use crate::episodes::EpisodeBatch;
+use crate::history::History;
+
+/// Histories with the truths behind them.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Dataset {
+    /// `n x len`.
+    pub histories: Vec<f64>,
+    /// Prior-scaled, `n x unknowns`.
+    pub truths: Vec<f64>,
+    /// Numbers of a history.
+    pub len: usize,
+    /// Numbers of a history that are entries; the rest are masks.
+    pub entries: usize,
+    /// Marks of a history; entries and masks of a mark stand together.
+    pub marks: usize,
+}
+
+impl Dataset {
+    /// Number of episodes.
+    #[must_use]
+    pub fn episodes(&self) -> usize {
+        self.histories.len() / self.len.max(1)
+    }
+
+    /// The first `n` episodes, and the others.
+    #[must_use]
+    pub fn split(&self, n: usize) -> (Self, Self) {
+        let d = self.truths.len() / self.episodes().max(1);
+        let part = |histories: &[f64], truths: &[f64]| Self {
+            histories: histories.to_vec(),
+            truths: truths.to_vec(),
+            len: self.len,
+            entries: self.entries,
+            marks: self.marks,
+        };
+        let (first, rest) = self.histories.split_at(n * self.len);
+        let (theirs, others) = self.truths.split_at(n * d);
+        (part(first, theirs), part(rest, others))
+    }
+}
+
+/// Plays `episodes` episodes of an explorer, each with chance of its own, over the problem's
+/// threads. Episodes that diverged are left out.
+///
+/// # Errors
+/// When the explorer or the engine fails, or fewer than half of the episodes last.
+pub fn collect(problem: &Problem<'_>, explorer: &dyn Explorer, episodes: usize) -> Result<Dataset> {
+    let history = History::new(problem)?;
+    let threads = match problem.threads {
+        0 => std::thread::available_parallelism().map_or(1, usize::from),
+        n => n,
+    };
+    let next = AtomicUsize::new(0);
+    let rows: Mutex<Vec<(usize, Option<Row>)>> = Mutex::new(Vec::with_capacity(episodes));
+    problem
+        .progress
+        .begin("estimator: episodes", episodes as u64);
+    let work = || -> Result<()> {
+        let own = Problem {
+            threads: 1,
+            progress: &Silent,
+            ..*problem
+        };
+        let mut batch = EpisodeBatch::new(&own, 1, own.streams.stream("estimator"))?;
+        loop {
+            let i = next.fetch_add(1, Ordering::Relaxed);
+            if i >= episodes {
+                return Ok(());
+            }
+            let row = one(&own, explorer, &history, &mut batch, i);
+            if row.is_err() {
+                // The others need not go on.
+                next.store(episodes, Ordering::Relaxed);
+            }
+            let row = row?;
+            problem.progress.advance(1);
+            if let Ok(mut rows) = rows.lock() {
+                rows.push((i, row));
+            }
+        }
+    };
+    let done: Vec<Result<()>> = std::thread::scope(|scope| {
+        let workers: Vec<_> = (0..threads).map(|_| scope.spawn(work)).collect();
+        let join = |w: std::thread::ScopedJoinHandle<'_, Result<()>>| {
+            w.join()
+                .unwrap_or_else(|_| Err(Error::Failed("an episode's thread broke off".into())))
+        };
+        workers.into_iter().map(join).collect()
+    });
+    problem.progress.end();
+    done.into_iter().collect::<Result<Vec<()>>>()?;
+    let mut rows = rows.into_inner().unwrap_or_else(|e| e.into_inner());
+    rows.sort_by_key(|r| r.0);
+    let mut all = Dataset {
+        len: history.len(),
+        entries: history.entries(),
+        marks: history.marks(),
+        ..Dataset::default()
+    };
+    for (numbers, truth) in rows.into_iter().filter_map(|r| r.1) {
+        all.histories.extend(numbers);
+        all.truths.extend(truth);
+    }
+    if all.episodes() * 2 < episodes {
+        let message = format!(
+            "only {} of {episodes} episodes did not diverge",
+            all.episodes()
+        );
+        return Err(Error::Failed(message));
+    }
+    Ok(all)
+}
+
+/// History and prior-scaled truth of an episode.
+type Row = (Vec<f64>, Vec<f64>);
+
+/// Episode `i`; none where it diverged.
+fn one(
+    problem: &Problem<'_>,
+    explorer: &dyn Explorer,
+    history: &History,
+    batch: &mut EpisodeBatch<'_>,
+    i: usize,
+) -> Result<Option<Row>> {
+    let streams = problem.streams.child(&format!("estimator episode {i}"));
+    let own = Problem {
+        streams,
+        ..*problem
+    };
+    batch.reseed(streams.stream("world"));
+    batch.begin()?;
+    let mut explored = explorer.explore(&own, None)?;
+    explored.policy.reset();
+    let protocol = problem.task.exploration();
+    let mut numbers = history.blank();
+    history.write(&mut numbers, 0, batch.reading(0));
+    let mut action = vec![0.0; protocol.action.len()];
+    for step in 0..protocol.horizon {
+        explored.policy.act(step, batch.reading(0), &mut action)?;
+        for (a, c) in action.iter_mut().zip(&protocol.action) {
+            *a = a.clamp(c.range[0], c.range[1]);
+        }
+        batch.step(&action)?;
+        if batch.frames(0).iter().any(|x| !x.is_finite()) {
+            return Ok(None);
+        }
+        history.write(&mut numbers, step + 1, batch.frames(0));
+    }
+    let truth = batch.theta().iter().zip(problem.parameters);
+    let scaled = truth.map(|(x, p)| p.to_scaled(*x)).collect();
+    Ok(Some((numbers, scaled)))
+}
+
+#[cfg(test)]
+mod tests {
+    use asid_core::registry::{ExplorerEntry, find};
+
+    use super::*;
+    use crate::testing::with_problem;
+
+    #[test]
+    fn episodes_do_not_depend_on_the_number_of_threads() {
+        let random = (find::<ExplorerEntry>("random").unwrap().make)(&Default::default()).unwrap();
+        let mut found: Vec<Dataset> = Vec::new();
+        for threads in [1, 3] {
+            with_problem("rod-balancing", |problem| {
+                let problem = Problem {
+                    threads,
+                    ..*problem
+                };
+                found.push(collect(&problem, &*random, 5).unwrap());
+            });
+        }
+        assert_eq!(found[0].episodes(), 5);
+        // NaN is nowhere: nothing is missing in a simulation.
+        assert_eq!(found[0], found[1]);
+        // Every episode has a truth, a start and actions of its own.
+        let rows: Vec<&[f64]> = found[0].histories.chunks_exact(found[0].len).collect();
+        assert!(rows[0][0] != rows[1][0] && found[0].truths[0] != found[0].truths[1]);
+        assert!(rows[0][45..] != rows[1][45..]);
+    }
+}

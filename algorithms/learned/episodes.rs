@@ -1,0 +1,200 @@
+//! A batch of exploration episodes as trackers see them: readings with noise, one simulation an
+//! episode, and nothing but the readings.
+
+use std::sync::atomic::Ordering;
+
+use asid_core::layout::Recording;
+use asid_core::problem::Batch;
+use asid_core::rng::Rng;
+use asid_core::signal::SignalSet;
+use asid_core::simulator::{Control, Rollout};
+use asid_core::task::Commander;
+use asid_core::{Problem, Result};
+use rand::Rng as _;
+use rand_distr::{Distribution, StandardNormal};
+
+/// Episodes that step together.
+pub struct EpisodeBatch<'a> {
+    problem: &'a Problem<'a>,
+    batch: Batch,
+    sims: Vec<usize>,
+    commanders: Vec<Box<dyn Commander>>,
+    recording: Recording,
+    signals: SignalSet,
+    substeps: usize,
+    frames_per_step: usize,
+    control: Vec<f64>,
+    theta: Vec<f64>,
+    /// Frames of the latest control step, `episodes x frames x width`.
+    frames: Vec<f64>,
+    /// The latest reading, `episodes x width`.
+    latest: Vec<f64>,
+    step: usize,
+    rng: Rng,
+}
+
+impl<'a> EpisodeBatch<'a> {
+    /// `episodes` at once; truths, start poses and noise are drawn from `rng`.
+    ///
+    /// # Errors
+    /// When the engine cannot set an unknown.
+    pub fn new(problem: &'a Problem<'a>, episodes: usize, rng: Rng) -> Result<Self> {
+        let protocol = problem.task.exploration();
+        let layout = problem.model.layout();
+        let recording = layout.recording(&protocol.channels())?;
+        let (frames, nu, width) = (protocol.frames_per_step, layout.nu(), recording.width());
+        Ok(Self {
+            batch: problem.batch(episodes)?,
+            sims: (0..episodes).collect(),
+            commanders: (0..episodes)
+                .map(|_| problem.task.commander())
+                .collect::<Result<_>>()?,
+            signals: SignalSet::new(layout, problem.signals)?,
+            substeps: problem.substeps(protocol.frame_period)?,
+            frames_per_step: frames,
+            control: vec![0.0; episodes * frames * nu],
+            theta: Vec::new(),
+            frames: vec![0.0; episodes * frames * width],
+            latest: vec![0.0; episodes * width],
+            step: 0,
+            recording,
+            problem,
+            rng,
+        })
+    }
+
+    /// Number of episodes.
+    #[must_use]
+    pub fn episodes(&self) -> usize {
+        self.sims.len()
+    }
+
+    /// Entries of a reading's row.
+    #[must_use]
+    pub fn width(&self) -> usize {
+        self.recording.width()
+    }
+
+    /// Control steps taken since the episodes began.
+    #[must_use]
+    pub fn steps(&self) -> usize {
+        self.step
+    }
+
+    /// Share of the episodes that is over.
+    #[must_use]
+    pub fn share(&self) -> f64 {
+        self.step as f64 / self.problem.task.exploration().horizon as f64
+    }
+
+    /// The episodes' true values, `episodes x unknowns`, in their units.
+    #[must_use]
+    pub fn theta(&self) -> &[f64] {
+        &self.theta
+    }
+
+    /// The latest reading of an episode, with noise.
+    #[must_use]
+    pub fn reading(&self, episode: usize) -> &[f64] {
+        let width = self.width();
+        &self.latest[episode * width..][..width]
+    }
+
+    /// The frames of an episode's latest control step, `frames x width`, with noise.
+    #[must_use]
+    pub fn frames(&self, episode: usize) -> &[f64] {
+        let len = self.frames_per_step * self.width();
+        &self.frames[episode * len..][..len]
+    }
+
+    /// Goes on with another generator, such as one of the next episode's own.
+    pub fn reseed(&mut self, rng: Rng) {
+        self.rng = rng;
+    }
+
+    /// Begins new episodes at truths of the prior and start poses of the protocol.
+    ///
+    /// # Errors
+    /// When the engine fails.
+    pub fn begin(&mut self) -> Result<()> {
+        let protocol = self.problem.task.exploration();
+        self.theta.clear();
+        let mut starts = Vec::new();
+        for _ in 0..self.episodes() {
+            for p in self.problem.parameters {
+                self.theta.push(p.sample(&mut self.rng));
+            }
+            for c in &protocol.start {
+                starts.push(c.at(self.rng.random()));
+            }
+        }
+        self.batch.set_parameters(&self.sims, &self.theta)?;
+        self.batch.place(self.problem.task, &self.sims, &starts)?;
+        for commander in &mut self.commanders {
+            commander.reset();
+        }
+        self.step = 0;
+        let mut latest = std::mem::take(&mut self.latest);
+        let read = self
+            .batch
+            .simulator
+            .read(&self.sims, &self.recording, &mut latest);
+        self.add_noise(&mut latest);
+        self.latest = latest;
+        read
+    }
+
+    /// One control step: actions `episodes x action`, in the task's units.
+    ///
+    /// # Errors
+    /// When the engine fails as a whole; the readings of an episode that diverged are not finite.
+    pub fn step(&mut self, actions: &[f64]) -> Result<()> {
+        let a = self.problem.task.exploration().action.len();
+        let block = self.control.len() / self.episodes();
+        let rows = self.control.chunks_exact_mut(block);
+        for ((commander, row), action) in self
+            .commanders
+            .iter_mut()
+            .zip(rows)
+            .zip(actions.chunks_exact(a))
+        {
+            commander.commands(action, row);
+        }
+        let before = self.batch.simulator.steps_taken();
+        let rollout = Rollout::new(
+            &self.sims,
+            self.frames_per_step,
+            self.substeps,
+            Control::PerSimulation(&self.control),
+            &self.recording,
+        );
+        let mut frames = std::mem::take(&mut self.frames);
+        let done = self.batch.simulator.rollout(&rollout, &mut frames);
+        self.add_noise(&mut frames);
+        self.frames = frames;
+        done?;
+        self.problem.count_physics(&self.batch, before);
+        let episodes = self.episodes() as u64;
+        self.problem
+            .env_counter
+            .fetch_add(episodes, Ordering::Relaxed);
+        self.step += 1;
+        let width = self.width();
+        for e in 0..self.episodes() {
+            let last = ((e + 1) * self.frames_per_step - 1) * width;
+            self.latest[e * width..][..width].copy_from_slice(&self.frames[last..][..width]);
+        }
+        Ok(())
+    }
+
+    fn add_noise(&mut self, rows: &mut [f64]) {
+        let (width, tracked) = (self.width(), self.signals.width());
+        let Self { signals, rng, .. } = self;
+        for row in rows.chunks_exact_mut(width) {
+            // A row that is not finite stays so, whatever is added.
+            if row.iter().all(|x| x.is_finite()) {
+                signals.add_noise(&mut row[..tracked], || StandardNormal.sample(rng));
+            }
+        }
+    }
+}

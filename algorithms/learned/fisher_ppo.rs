@@ -1,0 +1,361 @@
+//! The Fisher objective with PPO: a policy that reacts to what it sees.
+//!
+//! It is trained once, over start poses and unknowns drawn anew for every episode
+//! (domain randomisation), and then plays any episode without a search. In the real
+//! world the information gathered so far, part of its observation, is that of a
+//! simulation at the middle of the prior which starts where the first reading shows
+//! the object and takes the same actions.
+
+use std::path::Path;
+
+use asid_algorithms::explore::Observer;
+use asid_core::explore::{Explored, Explorer};
+use asid_core::fisher::{FisherBatch, FisherSettings};
+use asid_core::information::Objective;
+use asid_core::registry;
+use asid_core::{Error, Problem, Result};
+use serde::{Deserialize, Serialize};
+
+use crate::file::ObservationEntry;
+use crate::learning::{Cache, LearnedExplorer, obtain, train_to_file};
+use crate::play::{Observe, Playing};
+use crate::ppo_settings::PpoConfig;
+
+/// Settings of the explorer.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct FisherPpo {
+    /// File of a trained policy; empty for what ships, else trained on the spot; `train` to train.
+    pub policy: String,
+    /// Episodes that are simulated at once.
+    pub environments: usize,
+    /// The learner. Discount 1 and a constant scale of rewards keep the return equal
+    /// to the information gained.
+    pub ppo: PpoConfig,
+    /// What is rewarded: by default `d-optimal`, which unlike `a-optimal` still tells a
+    /// good episode from a better one, with a start pose that is known, which needs fewer
+    /// copies (3 instead of 9 on rod balancing).
+    pub fisher: FisherSettings,
+    /// What was trained on the spot; no setting.
+    #[serde(skip)]
+    pub cache: Cache,
+}
+
+impl Default for FisherPpo {
+    fn default() -> Self {
+        Self {
+            policy: String::new(),
+            environments: 64,
+            // One episode of each environment an update.
+            ppo: PpoConfig {
+                total_steps: 200_000,
+                n_steps: 1280,
+                minibatch: 128,
+                learning_rate: 1e-3,
+                anneal_learning_rate: true,
+                gamma: 1.0,
+                initial_log_std: -0.5,
+                evaluation_episodes: 0,
+                ..PpoConfig::default()
+            },
+            fisher: FisherSettings {
+                objective: Objective::DOptimal,
+                nuisance: false,
+                ..FisherSettings::default()
+            },
+            cache: Cache::default(),
+        }
+    }
+}
+
+asid_core::register!(ExplorerEntry {
+    name: FisherPpo::NAME,
+    about: "Fisher information, a policy trained by proximal policy optimisation",
+    defaults: registry::defaults::<FisherPpo>,
+    make: |s| {
+        let explorer: FisherPpo = registry::settings("explorer", s)?;
+        explorer.check()?;
+        Ok(Box::new(explorer))
+    },
+});
+
+impl FisherPpo {
+    /// Checks every setting.
+    ///
+    /// # Errors
+    /// [`Error::Config`] names the first that is out of its domain.
+    pub fn check(&self) -> Result<()> {
+        check_environments(self.environments)?;
+        self.ppo.validate()?;
+        self.fisher.check()
+    }
+}
+
+/// Checks a number of environments.
+pub(crate) fn check_environments(environments: usize) -> Result<()> {
+    if environments > 0 {
+        return Ok(());
+    }
+    Err(Error::Config {
+        key: "explorer.environments".into(),
+        message: "must be at least 1".into(),
+    })
+}
+
+/// The entries of an observer as a file names them.
+#[must_use]
+pub fn entries(observer: &Observer) -> Vec<ObservationEntry> {
+    let entry = |e: &asid_algorithms::explore::observation::Entry| ObservationEntry {
+        name: e.name.clone(),
+        len: e.len,
+    };
+    observer.entries().iter().map(entry).collect()
+}
+
+impl LearnedExplorer for FisherPpo {
+    const NAME: &'static str = "fisher-ppo";
+
+    fn policy(&self) -> &str {
+        &self.policy
+    }
+
+    fn set_policy(&mut self, policy: &str) {
+        policy.clone_into(&mut self.policy);
+    }
+
+    fn observation(&self, problem: &Problem<'_>) -> Result<Vec<ObservationEntry>> {
+        Ok(entries(&Observer::new(problem)?))
+    }
+}
+
+impl Explorer for FisherPpo {
+    fn explore<'a>(
+        &'a self,
+        problem: &'a Problem<'a>,
+        _start: Option<&[f64]>,
+    ) -> Result<Explored<'a>> {
+        let saved = obtain(self, &self.cache, problem)?;
+        let observe = Box::new(Shadowed::new(problem, &self.fisher)?);
+        Playing::explored(saved, observe, self.fisher.describe())
+    }
+
+    fn train(&self, problem: &Problem<'_>, file: &Path) -> Result<bool> {
+        train_to_file(self, problem, file)
+    }
+}
+
+/// Readings, with the information that a simulation which runs along has gathered.
+pub struct Shadowed<'a> {
+    problem: &'a Problem<'a>,
+    observer: Observer,
+    /// The episode as it would be in the middle of the prior.
+    shadow: FisherBatch<'a>,
+    reading: Vec<f64>,
+}
+
+impl<'a> Shadowed<'a> {
+    /// For a policy that was trained with these settings.
+    ///
+    /// # Errors
+    /// As [`FisherBatch::new`].
+    pub fn new(problem: &'a Problem<'a>, settings: &FisherSettings) -> Result<Self> {
+        let shadow = FisherBatch::new(problem, settings, 1)?;
+        Ok(Self {
+            observer: Observer::new(problem)?,
+            reading: vec![0.0; shadow.width()],
+            problem,
+            shadow,
+        })
+    }
+}
+
+impl Observe for Shadowed<'_> {
+    fn observe(&mut self, step: usize, reading: &[f64], observation: &mut [f64]) -> Result<()> {
+        let protocol = self.problem.task.exploration();
+        if step == 0 {
+            let middle: Vec<f64> = self.problem.parameters.iter().map(|p| p.center()).collect();
+            let start = self.problem.task.locate(reading);
+            self.shadow.begin(&middle, &start, &mut self.reading)?;
+        }
+        let share = step as f64 / protocol.horizon as f64;
+        let std = self.shadow.information()[0].expected_std();
+        self.observer.observe(reading, share, &std, observation);
+        Ok(())
+    }
+
+    fn acted(&mut self, action: &[f64]) -> Result<()> {
+        self.shadow.step(action, &mut self.reading, &mut [0.0])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use asid_core::registry::{ExplorerEntry, find};
+    use asid_core::{RealWorld as _, SimulatedWorld, Streams};
+
+    use super::*;
+    use crate::file::{Description, Saved, Tensors};
+    use crate::play::POLICY;
+    use crate::policy::Policy;
+    use crate::testing::with_problem;
+
+    /// A file with this policy for a problem.
+    fn saved(problem: &Problem<'_>, network: &Policy) -> Saved {
+        let mut tensors = Tensors::new();
+        network.to_tensors(POLICY, &mut tensors);
+        let observation = FisherPpo::default().observation(problem).unwrap();
+        Saved {
+            description: Description {
+                observation,
+                ..Description::new("fisher-ppo", problem, serde_json::Value::Null)
+            },
+            tensors,
+        }
+    }
+
+    /// The last entry of the observation, the information gathered, moves the hand along x.
+    fn by_information(problem: &Problem<'_>) -> Policy {
+        let inputs = Observer::new(problem).unwrap().observation_len();
+        let mut weight = vec![0.0; inputs * 2];
+        weight[(inputs - 1) * 2] = 0.1;
+        Policy::linear(inputs, weight, vec![0.0; 2])
+    }
+
+    /// The information gathered so far is an entry of the observation: with other
+    /// readings equal, a policy that looks at nothing else acts by it.
+    #[test]
+    fn a_policy_acts_by_the_information_gathered() {
+        with_problem("rod-balancing", |problem| {
+            let settings = FisherSettings::default();
+            let mut shadowed = Shadowed::new(problem, &settings).unwrap();
+            let network = by_information(problem);
+            let reading = {
+                let mut batch = FisherBatch::new(problem, &settings, 1).unwrap();
+                let mut first = vec![0.0; batch.width()];
+                batch.begin(&[0.0], &[0.55, 0.0, 0.5], &mut first).unwrap();
+                first
+            };
+            let mut observation = vec![0.0; network.observation_len()];
+            let mut first = 0.0;
+            for step in 0..20 {
+                shadowed.observe(step, &reading, &mut observation).unwrap();
+                let told = shadowed.shadow.information()[0].expected_std();
+                let mut action = [0.0; 2];
+                network.act(&observation, &mut action).unwrap();
+                // Weight 0.1 on -log std.
+                let expected = (-0.1 * told[0].ln()).clamp(-1.0, 1.0);
+                assert!((action[0] - expected).abs() < 1e-6, "{action:?} {told:?}");
+                if step == 0 {
+                    first = action[0];
+                }
+                shadowed.acted(&[0.1 * action[0], 0.0]).unwrap();
+            }
+            assert!(first.abs() < 0.2, "the prior alone: {first}");
+        });
+    }
+
+    /// A file is all that is needed: no library of networks is linked here.
+    #[test]
+    fn a_saved_policy_is_played_from_its_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("policy.safetensors");
+        with_problem("rod-balancing", |problem| {
+            let network = by_information(problem);
+            saved(problem, &network).save(&path).unwrap();
+            let explorer = FisherPpo {
+                policy: path.display().to_string(),
+                ..FisherPpo::default()
+            };
+            let mut explored = explorer.explore(problem, None).unwrap();
+            let export = explored.policy.export();
+            assert_eq!(Policy::from_json(&export["network"]).unwrap(), network);
+            let entries = export["observation"].as_array().unwrap();
+            let len: u64 = entries.iter().map(|e| e["len"].as_u64().unwrap()).sum();
+            assert_eq!(len as usize, network.observation_len());
+            assert_eq!(export["action"][0]["range"][1], 0.1);
+            let streams = Streams::new(1);
+            let (task, model) = (problem.task, problem.model);
+            let truth = [0.05];
+            let mut world = SimulatedWorld::new(
+                task,
+                model,
+                problem.parameters,
+                &truth,
+                problem.signals,
+                streams,
+            )
+            .unwrap();
+            let first = world.explore(&mut *explored.policy).unwrap();
+            // A policy can be played again: the second episode is the first.
+            let second = world.explore(&mut *explored.policy).unwrap();
+            assert_eq!(first.actions, second.actions);
+            assert_eq!(first.actions.len(), 20 * 2);
+        });
+    }
+
+    #[test]
+    fn a_policy_of_another_task_or_explorer_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("policy.safetensors");
+        let explorer = FisherPpo {
+            policy: path.display().to_string(),
+            ..FisherPpo::default()
+        };
+        let message = |task: &str| {
+            let mut message = String::new();
+            with_problem(task, |problem| {
+                message = explorer.explore(problem, None).err().unwrap().to_string();
+            });
+            message
+        };
+        assert!(message("rod-balancing").contains("policy.safetensors"));
+        with_problem("rod-balancing", |problem| {
+            let mut file = saved(problem, &by_information(problem));
+            file.save(&path).unwrap();
+            assert!(
+                message("shuffleboard")
+                    .contains("was trained for the task `rod-balancing`, not `shuffleboard`")
+            );
+            file.description.observation.pop();
+            file.save(&path).unwrap();
+            assert!(message("rod-balancing").contains("takes other observations"));
+            file.description.algorithm = "max".into();
+            file.save(&path).unwrap();
+            assert!(message("rod-balancing").contains("was trained by `max`"));
+        });
+    }
+
+    #[test]
+    fn without_policy_and_training_one_line_says_what_to_do() {
+        with_problem("rod-balancing", |problem| {
+            let explorer = FisherPpo {
+                policy: "train".into(),
+                ..FisherPpo::default()
+            };
+            let message = explorer.explore(problem, None).err().unwrap().to_string();
+            for part in [
+                "fisher-ppo",
+                "rod-balancing",
+                "--policy FILE",
+                "cargo xtask setup",
+                "--features torch",
+                "--train FILE",
+            ] {
+                assert!(message.contains(part), "{message}");
+            }
+            assert!(!message.contains('\n'));
+        });
+    }
+
+    #[test]
+    fn wrong_settings_are_named() {
+        let make = find::<ExplorerEntry>("fisher-ppo").unwrap().make;
+        let message = |text: &str| make(&text.parse().unwrap()).err().unwrap().to_string();
+        assert!(message("environments = 0").contains("explorer.environments"));
+        assert!(message("[ppo]\nclip = 0.0").contains("ppo.clip"));
+        assert!(message("[fisher]\ndelta = -1.0").contains("delta"));
+        // What a user sets is put over the explorer's own defaults, not the learner's.
+        let defaults = (find::<ExplorerEntry>("fisher-ppo").unwrap().defaults)();
+        assert_eq!(defaults["ppo"]["gamma"].as_float(), Some(1.0));
+    }
+}

@@ -1,0 +1,240 @@
+//! An episode so far, as numbers of a fixed length for a network.
+//!
+//! The episode is cut at *marks*, the ends of its control steps and its start. Each mark has the
+//! place and the orientation of every tracked part, the end effector, and where it is seen from
+//! each part. What is missing or still to come is NaN and has a mask of 0, so that one network
+//! takes episodes at any time and with any reading left out.
+
+use asid_core::layout::Recording;
+use asid_core::signal::unit_quaternion;
+use asid_core::{Episode, Problem, Result};
+
+/// How entries of a mark come out of a reading's row.
+#[derive(Clone, Debug)]
+enum Part {
+    /// As they are, from this entry on, so many.
+    Plain(usize, usize),
+    /// Two columns of the rotation of the quaternion at this entry.
+    Rotation(usize),
+    /// The end effector at the first entry, less the place at the second.
+    Relative(usize, usize),
+}
+
+impl Part {
+    fn len(&self) -> usize {
+        match self {
+            Self::Plain(_, len) => *len,
+            Self::Rotation(_) => 6,
+            Self::Relative(..) => 3,
+        }
+    }
+
+    fn write(&self, reading: &[f64], out: &mut [f64]) {
+        match *self {
+            Self::Plain(start, len) => out.copy_from_slice(&reading[start..start + len]),
+            Self::Rotation(start) => {
+                let wxyz = &reading[start..start + 4];
+                if wxyz.iter().all(|x| x.is_finite()) {
+                    let rotation = unit_quaternion(wxyz).to_rotation_matrix();
+                    out.copy_from_slice(&rotation.matrix().as_slice()[..6]);
+                } else {
+                    out.fill(f64::NAN);
+                }
+            }
+            Self::Relative(effector, place) => {
+                for (i, o) in out.iter_mut().enumerate() {
+                    *o = reading[effector + i] - reading[place + i];
+                }
+            }
+        }
+    }
+}
+
+/// How episodes of a problem become numbers: entries of all marks, then masks of all marks.
+#[derive(Clone, Debug)]
+pub struct History {
+    parts: Vec<Part>,
+    /// Where each tracked signal begins in a reading's row.
+    tracked: Vec<usize>,
+    /// Entries of a mark.
+    entries: usize,
+    marks: usize,
+    /// Channels of a reading's row, in order.
+    channels: Vec<String>,
+    width: usize,
+    /// Time from mark to mark, s.
+    period: f64,
+}
+
+impl History {
+    /// The history of a problem's exploration episodes.
+    ///
+    /// # Errors
+    /// When the scene lacks a channel of the protocol.
+    pub fn new(problem: &Problem<'_>) -> Result<Self> {
+        let protocol = problem.task.exploration();
+        let channels = protocol.channels();
+        let recording: Recording = problem.model.layout().recording(&channels)?;
+        let tracked = protocol.signals.len();
+        let effector = (tracked..channels.len())
+            .map(|i| recording.range(i))
+            .find(|r| r.len() == 3);
+        let mut parts = Vec::new();
+        for i in 0..tracked {
+            let range = recording.range(i);
+            if range.len() == 4 {
+                parts.push(Part::Rotation(range.start));
+                continue;
+            }
+            parts.push(Part::Plain(range.start, range.len()));
+            if let (3, Some(effector)) = (range.len(), &effector) {
+                parts.push(Part::Relative(effector.start, range.start));
+            }
+        }
+        parts.extend(effector.map(|r| Part::Plain(r.start, 3)));
+        Ok(Self {
+            entries: parts.iter().map(Part::len).sum(),
+            parts,
+            tracked: (0..tracked).map(|i| recording.range(i).start).collect(),
+            marks: protocol.horizon + 1,
+            width: recording.width(),
+            period: protocol.frame_period * protocol.frames_per_step as f64,
+            channels,
+        })
+    }
+
+    /// Entries of all marks, without the masks.
+    #[must_use]
+    pub fn entries(&self) -> usize {
+        self.marks * self.entries
+    }
+
+    /// Masks of all marks.
+    #[must_use]
+    pub fn masks(&self) -> usize {
+        self.marks * self.tracked.len()
+    }
+
+    /// Numbers of a history.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.entries() + self.masks()
+    }
+
+    /// A history has at least the entries of its first mark.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Marks of an episode.
+    #[must_use]
+    pub fn marks(&self) -> usize {
+        self.marks
+    }
+
+    /// The history of which nothing is known yet.
+    #[must_use]
+    pub fn blank(&self) -> Vec<f64> {
+        let mut out = vec![f64::NAN; self.entries()];
+        out.resize(self.len(), 0.0);
+        out
+    }
+
+    /// Writes the entries of a mark: the mean over the rows (`n x width`, NaN where a reading is
+    /// missing) of each entry, over those rows that have it.
+    pub fn write(&self, history: &mut [f64], mark: usize, rows: &[f64]) {
+        let mut sum = vec![0.0; self.entries];
+        let mut count = vec![0.0_f64; self.entries];
+        let mut seen = vec![0.0; self.tracked.len()];
+        let mut entry = vec![0.0; self.entries];
+        for row in rows.chunks_exact(self.width) {
+            let mut at = 0;
+            for part in &self.parts {
+                part.write(row, &mut entry[at..at + part.len()]);
+                at += part.len();
+            }
+            for ((s, n), x) in sum.iter_mut().zip(&mut count).zip(&entry) {
+                if x.is_finite() {
+                    *s += x;
+                    *n += 1.0;
+                }
+            }
+            for (mask, &start) in seen.iter_mut().zip(&self.tracked) {
+                if row[start].is_finite() {
+                    *mask = 1.0;
+                }
+            }
+        }
+        let out = &mut history[mark * self.entries..][..self.entries];
+        for ((o, s), n) in out.iter_mut().zip(&sum).zip(&count) {
+            *o = if *n > 0.0 { s / n } else { f64::NAN };
+        }
+        let masks = self.entries() + mark * self.tracked.len();
+        history[masks..masks + seen.len()].copy_from_slice(&seen);
+    }
+
+    /// Makes the marks from `from` on unknown again.
+    pub fn forget(&self, history: &mut [f64], from: usize) {
+        let (entries, masks) = history.split_at_mut(self.entries());
+        entries[from * self.entries..].fill(f64::NAN);
+        masks[from * self.tracked.len()..].fill(0.0);
+    }
+
+    /// The history of a log, at any rate: a row belongs to the first mark that is not before it.
+    /// Channels that are not in the log are missing, rows past the last mark are left out.
+    #[must_use]
+    pub fn of_episode(&self, problem: &Problem<'_>, episode: &Episode) -> Vec<f64> {
+        /// A row this share of a period after a mark still belongs to it.
+        const SLACK: f64 = 1e-6;
+        let readings = episode.select(problem.model.layout(), &self.channels);
+        let mut rows: Vec<Vec<f64>> = vec![Vec::new(); self.marks];
+        for (row, time) in readings.chunks_exact(self.width).zip(&episode.time) {
+            let mark = ((time - episode.time[0]) / self.period - SLACK)
+                .ceil()
+                .max(0.0);
+            if let Some(rows) = rows.get_mut(mark as usize) {
+                rows.extend_from_slice(row);
+            }
+        }
+        let mut history = self.blank();
+        for (mark, rows) in rows.iter().enumerate() {
+            self.write(&mut history, mark, rows);
+        }
+        history
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::with_problem;
+
+    /// Rod: place (3), effector from it (3), rotation (6), effector (3); two tracked signals.
+    #[test]
+    fn marks_hold_means_of_what_is_there() {
+        with_problem("rod-balancing", |problem| {
+            let history = History::new(problem).unwrap();
+            assert_eq!(history.entries(), 21 * 15);
+            assert_eq!(history.masks(), 21 * 2);
+            let mut numbers = history.blank();
+            let mut row = vec![0.0; history.width];
+            row[..3].copy_from_slice(&[0.5, 0.1, 0.0]);
+            row[3..7].copy_from_slice(&[1.0, 0.0, 0.0, 0.0]);
+            row[7..10].copy_from_slice(&[0.4, 0.0, 0.1]);
+            let mut other = row.clone();
+            other[0] = 0.7;
+            other[3..7].fill(f64::NAN);
+            history.write(&mut numbers, 1, &[row, other].concat());
+            let mark = &numbers[15..30];
+            assert!((mark[0] - 0.6).abs() < 1e-12 && (mark[3] + 0.2).abs() < 1e-12);
+            assert_eq!(mark[6..12], [1.0, 0.0, 0.0, 0.0, 1.0, 0.0]);
+            assert!(numbers[..15].iter().all(|x| x.is_nan()));
+            let masks = &numbers[history.entries()..];
+            assert_eq!(masks[..5], [0.0, 0.0, 1.0, 1.0, 0.0]);
+            history.forget(&mut numbers, 1);
+            assert!(numbers[..history.entries()].iter().all(|x| x.is_nan()));
+            assert!(numbers[history.entries()..].iter().all(|&m| m == 0.0));
+        });
+    }
+}

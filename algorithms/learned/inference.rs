@@ -1,0 +1,422 @@
+//! A learned posterior: a network that takes the history of an episode and gives, for each
+//! unknown, a Gaussian in prior-scaled coordinates, or the probability of a binary one.
+//!
+//! The Gaussian is cut to the prior's box `[-b, b]`, as the posterior under a uniform prior is:
+//!
+//! ```text
+//! q(z) = N(z; m, s^2) / (Phi((b - m) / s) - Phi((-b - m) / s)),   -b <= z <= b
+//! m    = b tanh(o_1),   log s = LOW + (HIGH - LOW) sigmoid(o_2 + OFFSET)
+//! ```
+//!
+//! With a large `s` it is the prior itself, so that a network that has learned nothing claims
+//! nothing. Its logarithm less that of the prior, averaged over episodes, is a lower bound of the
+//! information that the episode has on the unknown (Barber and Agakov 2003).
+
+use asid_core::Parameter;
+use asid_core::rng::Rng;
+use rand::Rng as _;
+use rand_distr::{Distribution, StandardNormal};
+
+use crate::file::{Tensor, Tensors};
+use crate::network::{Layer, Network};
+
+/// Smallest and largest logarithm of the deviation, prior-scaled: 0.001 and 10.
+pub const LOG_STD: [f64; 2] = [-6.907_755_278_982_137, 2.302_585_092_994_046];
+
+/// Added to the second output, so that an untrained network has a deviation of 1.
+pub const OFFSET: f64 = 1.098_612_288_668_109_8;
+
+/// Scaled entries are clipped to plus and minus this many deviations.
+const CLIP: f64 = 10.0;
+
+/// An entry that varies by less than this is a constant, in its unit.
+const CONSTANT: f64 = 1e-9;
+
+/// What is believed of one unknown.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Belief {
+    /// A Gaussian before it is cut to the prior's box, prior-scaled.
+    Gaussian {
+        /// Mean.
+        mean: f64,
+        /// Standard deviation.
+        std: f64,
+    },
+    /// A binary unknown is 1 with these log-odds.
+    Binary {
+        /// Logarithm of the odds.
+        logit: f64,
+    },
+}
+
+/// Distribution function of the standard normal.
+fn phi(x: f64) -> f64 {
+    0.5 * libm::erfc(-x * std::f64::consts::FRAC_1_SQRT_2)
+}
+
+impl Belief {
+    /// Logarithm of the density at a prior-scaled value (of the probability of a binary one), less
+    /// that of the prior, in nats.
+    #[must_use]
+    pub fn log_ratio(self, z: f64) -> f64 {
+        match self {
+            Self::Gaussian { mean, std } => {
+                let b = Parameter::scaled_bound();
+                let inside = phi((b - mean) / std) - phi((-b - mean) / std);
+                let density =
+                    -0.5 * ((z - mean) / std).powi(2) - std.ln() - 0.5 * std::f64::consts::TAU.ln();
+                density - inside.ln() + (2.0 * b).ln()
+            }
+            Self::Binary { logit } => {
+                let towards = if z > 0.0 { logit } else { -logit };
+                -(-towards).exp().ln_1p() + std::f64::consts::LN_2
+            }
+        }
+    }
+
+    /// A draw, prior-scaled.
+    pub fn sample(self, rng: &mut Rng) -> f64 {
+        match self {
+            Self::Gaussian { mean, std } => {
+                let b = Parameter::scaled_bound();
+                // The mean lies in the box, so at least one draw in three does where it is wide.
+                for _ in 0..1000 {
+                    let normal: f64 = StandardNormal.sample(rng);
+                    let z = mean + std * normal;
+                    if z.abs() <= b {
+                        return z;
+                    }
+                }
+                mean.clamp(-b, b)
+            }
+            Self::Binary { logit } => {
+                let one = rng.random::<f64>() < 1.0 / (1.0 + (-logit).exp());
+                if one { 1.0 } else { -1.0 }
+            }
+        }
+    }
+
+    /// Whether a prior-scaled value lies in the central 95 %; of a binary one, whether it is the
+    /// more probable value.
+    #[must_use]
+    pub fn covers(self, z: f64) -> bool {
+        match self {
+            Self::Gaussian { mean, std } => {
+                let b = Parameter::scaled_bound();
+                let [low, at, high] = [-b, z, b].map(|x| phi((x - mean) / std));
+                (0.025..=0.975).contains(&((at - low) / (high - low)))
+            }
+            Self::Binary { logit } => logit * z > 0.0,
+        }
+    }
+
+    /// Mean after the cut, prior-scaled.
+    #[must_use]
+    pub fn mean(self) -> f64 {
+        match self {
+            Self::Gaussian { mean, std } => {
+                let b = Parameter::scaled_bound();
+                let (low, high) = ((-b - mean) / std, (b - mean) / std);
+                let density = |x: f64| (-0.5 * x * x).exp() / std::f64::consts::TAU.sqrt();
+                let cut = mean + std * (density(low) - density(high)) / (phi(high) - phi(low));
+                cut.clamp(-b, b)
+            }
+            Self::Binary { logit } => (0.5 * logit).tanh(),
+        }
+    }
+
+    /// Both, where each knows its own episode: the product of the likelihoods under one prior.
+    #[must_use]
+    pub fn and(self, other: Self) -> Self {
+        match (self, other) {
+            (Self::Gaussian { mean: m, std: s }, Self::Gaussian { mean: n, std: t }) => {
+                let (p, q) = (s.powi(-2), t.powi(-2));
+                Self::Gaussian {
+                    mean: (m * p + n * q) / (p + q),
+                    std: (p + q).powf(-0.5),
+                }
+            }
+            (Self::Binary { logit: a }, Self::Binary { logit: b }) => Self::Binary { logit: a + b },
+            (first, _) => first,
+        }
+    }
+
+    /// With its deviation (or the temperature of its odds) multiplied.
+    #[must_use]
+    pub fn widened(self, factor: f64) -> Self {
+        match self {
+            Self::Gaussian { mean, std } => Self::Gaussian {
+                mean,
+                std: std * factor,
+            },
+            Self::Binary { logit } => Self::Binary {
+                logit: logit / factor,
+            },
+        }
+    }
+}
+
+/// The network with the scales of its inputs and the calibration of its outputs.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Inference {
+    /// Mean of each entry of a history; masks have none.
+    mean: Vec<f32>,
+    /// Its standard deviation.
+    std: Vec<f32>,
+    /// Takes scaled entries and masks, gives two numbers an unknown.
+    network: Network,
+    /// Factor on the deviation of each unknown (temperature of a binary one).
+    calibration: Vec<f32>,
+    /// Which unknowns are binary.
+    binary: Vec<bool>,
+}
+
+impl Inference {
+    /// Mean and deviation of each of the first `entries` numbers of histories, `n x len`.
+    #[must_use]
+    pub fn scales(histories: &[f64], len: usize, entries: usize) -> (Vec<f32>, Vec<f32>) {
+        let mut moments = (Vec::with_capacity(entries), Vec::with_capacity(entries));
+        for i in 0..entries {
+            let column = || histories[i..].iter().step_by(len).filter(|x| x.is_finite());
+            let n = column().count().max(1) as f64;
+            let mean = column().sum::<f64>() / n;
+            let variance = column().map(|x| (x - mean).powi(2)).sum::<f64>() / n;
+            let std = variance.sqrt();
+            moments.0.push(mean as f32);
+            moments
+                .1
+                .push(if std > CONSTANT { std as f32 } else { 1.0 });
+        }
+        moments
+    }
+
+    /// Of a trained network.
+    #[must_use]
+    pub fn new(
+        (mean, std): (Vec<f32>, Vec<f32>),
+        network: Network,
+        parameters: &[Parameter],
+    ) -> Self {
+        Self {
+            mean,
+            std,
+            network,
+            calibration: vec![1.0; parameters.len()],
+            binary: parameters.iter().map(Parameter::is_binary).collect(),
+        }
+    }
+
+    /// What the network takes of a history: entries scaled, 0 where missing, and the masks.
+    pub fn input(&self, history: &[f64], out: &mut Vec<f32>) {
+        out.clear();
+        scale((&self.mean, &self.std), history, out);
+    }
+
+    /// Numbers that the network takes.
+    #[must_use]
+    pub fn inputs(&self) -> usize {
+        self.network.inputs()
+    }
+
+    /// What a history tells of each unknown.
+    #[must_use]
+    pub fn beliefs(&self, history: &[f64]) -> Vec<Belief> {
+        let mut input = Vec::with_capacity(self.inputs());
+        self.input(history, &mut input);
+        let outputs = self.network.forward(&input);
+        let all = outputs.chunks_exact(2).zip(&self.binary);
+        all.zip(&self.calibration)
+            .map(|((o, &binary), &factor)| {
+                belief(f64::from(o[0]), f64::from(o[1]), binary).widened(f64::from(factor))
+            })
+            .collect()
+    }
+
+    /// Chooses the factor of each unknown's deviation that makes held-out truths most likely:
+    /// `histories` is `n x len`, `truths` are prior-scaled, `n x unknowns`.
+    pub fn calibrate(&mut self, histories: &[f64], len: usize, truths: &[f64]) {
+        /// Factors that are tried: `exp(k / 20)`, from 0.14 to 7.4.
+        const TRIES: std::ops::RangeInclusive<i32> = -40..=40;
+        let d = self.binary.len();
+        if histories.len() < len {
+            return;
+        }
+        let all: Vec<Vec<Belief>> = histories
+            .chunks_exact(len)
+            .map(|h| self.beliefs(h))
+            .collect();
+        for i in 0..d {
+            let told = |factor: f64| -> f64 {
+                let rows = all.iter().zip(truths.chunks_exact(d));
+                rows.map(|(b, z)| b[i].widened(factor).log_ratio(z[i]))
+                    .sum()
+            };
+            let factors = TRIES.map(|k| (f64::from(k) / 20.0).exp());
+            let best = factors.max_by(|a, b| told(*a).total_cmp(&told(*b)));
+            self.calibration[i] *= best.unwrap_or(1.0) as f32;
+        }
+    }
+
+    /// The network and its scales as tensors, their names beginning with `prefix`.
+    pub fn to_tensors(&self, prefix: &str, tensors: &mut Tensors) {
+        let named = [
+            ("mean", self.mean.clone()),
+            ("std", self.std.clone()),
+            ("calibration", self.calibration.clone()),
+            (
+                "binary",
+                self.binary
+                    .iter()
+                    .map(|&b| f32::from(u8::from(b)))
+                    .collect(),
+            ),
+        ];
+        for (name, values) in named {
+            tensors.insert(format!("{prefix}.{name}"), Tensor::vector(values));
+        }
+        for (i, layer) in self.network.layers.iter().enumerate() {
+            layer.to_tensors(&format!("{prefix}.{i}"), tensors);
+        }
+    }
+
+    /// What a file holds under `prefix`; the message says what is wrong.
+    ///
+    /// # Errors
+    /// Where tensors are missing or do not fit histories of this shape or these unknowns.
+    pub fn from_tensors(
+        prefix: &str,
+        tensors: &Tensors,
+        entries: usize,
+        masks: usize,
+        parameters: &[Parameter],
+    ) -> Result<Self, String> {
+        let get = |name: &str| -> Result<Vec<f32>, String> {
+            let tensor = tensors.get(&format!("{prefix}.{name}"));
+            tensor
+                .map(|t| t.values.clone())
+                .ok_or_else(|| format!("has no tensor `{prefix}.{name}`"))
+        };
+        let found = Self {
+            mean: get("mean")?,
+            std: get("std")?,
+            network: Network {
+                layers: Layer::all_from_tensors(prefix, tensors)?,
+            },
+            calibration: get("calibration")?,
+            binary: get("binary")?.iter().map(|&b| b != 0.0).collect(),
+        };
+        let d = parameters.len();
+        let fits = [found.mean.len(), found.std.len()] == [entries; 2]
+            && found.network.inputs() == entries + masks
+            && found.network.outputs() == 2 * d
+            && [found.calibration.len(), found.binary.len()] == [d; 2]
+            && found.std.iter().chain(&found.calibration).all(|&x| x > 0.0);
+        if fits {
+            Ok(found)
+        } else {
+            Err(format!(
+                "its `{prefix}` is for other histories: it takes {} numbers of {} unknowns, this problem has {} of {d}",
+                found.network.inputs(),
+                found.network.outputs() / 2,
+                entries + masks
+            ))
+        }
+    }
+}
+
+/// What a network takes of a history, given the scales of its entries.
+pub fn scale((mean, std): (&[f32], &[f32]), history: &[f64], out: &mut Vec<f32>) {
+    let (entries, masks) = history.split_at(mean.len());
+    for ((x, mean), std) in entries.iter().zip(mean).zip(std) {
+        let scaled = (x - f64::from(*mean)) / f64::from(*std);
+        out.push(if scaled.is_finite() {
+            scaled.clamp(-CLIP, CLIP) as f32
+        } else {
+            0.0
+        });
+    }
+    out.extend(masks.iter().map(|&m| m as f32));
+}
+
+/// What two outputs of a network say of an unknown.
+#[must_use]
+pub fn belief(first: f64, second: f64, binary: bool) -> Belief {
+    if binary {
+        return Belief::Binary { logit: first };
+    }
+    let [low, high] = LOG_STD;
+    let share = 1.0 / (1.0 + (-(second + OFFSET)).exp());
+    Belief::Gaussian {
+        mean: Parameter::scaled_bound() * first.tanh(),
+        std: (low + (high - low) * share).exp(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use asid_core::Streams;
+
+    use super::*;
+
+    /// A density integrates to 1; the prior's is 1 / (2 b).
+    #[test]
+    fn a_belief_is_a_density_on_the_priors_box() {
+        let b = Parameter::scaled_bound();
+        for (mean, std) in [(0.0, 10.0), (1.7, 0.2), (-b, 0.05), (0.4, 1.0)] {
+            let belief = Belief::Gaussian { mean, std };
+            let n = 20_000;
+            let (mut total, mut first) = (0.0, 0.0);
+            for i in 0..n {
+                let z = -b + 2.0 * b * (f64::from(i) + 0.5) / f64::from(n);
+                // Density times the width of a cell is exp(log_ratio) / n.
+                let share = belief.log_ratio(z).exp() / f64::from(n);
+                total += share;
+                first += share * z;
+            }
+            assert!((total - 1.0).abs() < 1e-5, "{belief:?}: {total}");
+            assert!((first - belief.mean()).abs() < 1e-5, "{belief:?}: {first}");
+        }
+        let sure = Belief::Binary {
+            logit: 3.0_f64.ln(),
+        };
+        assert!((sure.log_ratio(1.0) - 1.5_f64.ln()).abs() < 1e-12);
+        assert!((sure.log_ratio(-1.0) - 0.5_f64.ln()).abs() < 1e-12);
+        assert!((sure.mean() - 0.5).abs() < 1e-12);
+    }
+
+    /// 20000 draws: the mean is known to 0.007 deviations.
+    #[test]
+    fn draws_have_the_mean() {
+        let mut rng = Streams::new(1).stream("t");
+        for belief in [
+            Belief::Gaussian {
+                mean: 1.5,
+                std: 0.8,
+            },
+            Belief::Binary { logit: -0.7 },
+        ] {
+            let n = 20_000;
+            let sum: f64 = (0..n).map(|_| belief.sample(&mut rng)).sum();
+            assert!((sum / f64::from(n) - belief.mean()).abs() < 0.03);
+        }
+    }
+
+    /// Two measurements of one thing: precisions add, and so do log-odds.
+    #[test]
+    fn beliefs_of_two_episodes_are_multiplied() {
+        let one = Belief::Gaussian {
+            mean: 1.0,
+            std: 0.5,
+        };
+        let other = Belief::Gaussian {
+            mean: 0.0,
+            std: 1.0,
+        };
+        let Belief::Gaussian { mean, std } = one.and(other) else {
+            panic!("a Gaussian");
+        };
+        assert!((mean - 0.8).abs() < 1e-12 && (std - 0.2_f64.sqrt()).abs() < 1e-12);
+        let both = Belief::Binary { logit: 1.0 }.and(Belief::Binary { logit: -3.0 });
+        assert_eq!(both, Belief::Binary { logit: -2.0 });
+    }
+}

@@ -1,0 +1,272 @@
+//! Where what is played comes from: a file, what ships with the program, or a training.
+
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Instant;
+
+use asid_core::explore::CurvePoint;
+use asid_core::registry::{self, Settings};
+use asid_core::{Error, Problem, Result};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+use crate::file::{Description, ObservationEntry, Saved, Tensor, Tensors, write_atomically};
+use crate::shipped;
+use crate::tensorboard::{Scalars, encode};
+
+/// The value of the setting `policy` that trains anew, whatever ships.
+pub const TRAIN: &str = "train";
+
+/// Name of the tensor that holds the learning curve, `points x (x, mean, std)`.
+const CURVE: &str = "curve";
+
+/// What a training gives.
+pub struct Training {
+    /// The networks.
+    pub tensors: Tensors,
+    /// What the policy takes.
+    pub observation: Vec<ObservationEntry>,
+    /// Control steps of simulated episodes.
+    pub steps: u64,
+    /// Figures of the training by name.
+    pub figures: Vec<(&'static str, f64)>,
+    /// Return over the training.
+    pub curve: Vec<CurvePoint>,
+    /// The same and more, for TensorBoard.
+    pub events: Vec<Scalars>,
+}
+
+/// Trains an explorer; crates that can learn submit one through `inventory`.
+pub struct Trainer {
+    /// Name of the explorer.
+    pub algorithm: &'static str,
+    /// Trains with all of the explorer's settings.
+    pub train: fn(&Problem<'_>, &Settings) -> Result<Training>,
+}
+
+inventory::collect!(Trainer);
+
+/// Whether this program can train an explorer.
+#[must_use]
+pub fn can_train(algorithm: &str) -> bool {
+    inventory::iter::<Trainer>().any(|t| t.algorithm == algorithm)
+}
+
+/// An explorer that plays what was learned.
+pub trait LearnedExplorer: Serialize + DeserializeOwned + Default + PartialEq + Clone {
+    /// Name on the command line.
+    const NAME: &'static str;
+    /// The setting `policy`: a file, `train`, or nothing.
+    fn policy(&self) -> &str;
+    /// Sets it.
+    fn set_policy(&mut self, policy: &str);
+    /// What the policy takes on a problem.
+    ///
+    /// # Errors
+    /// When the scene lacks a channel of the protocol.
+    fn observation(&self, problem: &Problem<'_>) -> Result<Vec<ObservationEntry>>;
+}
+
+/// What was trained on the spot, kept for the next episode of the same explorer.
+#[derive(Debug, Default)]
+pub struct Cache(Mutex<Option<Arc<Saved>>>);
+
+impl Clone for Cache {
+    fn clone(&self) -> Self {
+        Self::default()
+    }
+}
+
+impl PartialEq for Cache {
+    /// It is no setting.
+    fn eq(&self, _: &Self) -> bool {
+        true
+    }
+}
+
+impl Cache {
+    pub(crate) fn get(&self) -> Option<Arc<Saved>> {
+        let kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        kept.clone()
+    }
+
+    pub(crate) fn keep(&self, saved: &Arc<Saved>) {
+        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = Some(Arc::clone(saved));
+    }
+}
+
+/// What an explorer plays on a problem: from the file of its setting `policy`; where that is
+/// empty and the settings are the task's own, what ships; else trained here and now.
+///
+/// # Errors
+/// [`Error::Config`] where the file does not fit the problem, [`Error::Missing`] where nothing is
+/// there and this program cannot train.
+pub fn obtain<L: LearnedExplorer>(
+    explorer: &L,
+    cache: &Cache,
+    problem: &Problem<'_>,
+) -> Result<Arc<Saved>> {
+    let observation = explorer.observation(problem)?;
+    let misfit = |saved: &Saved| saved.misfit(L::NAME, problem, &observation);
+    let policy = explorer.policy();
+    if !policy.is_empty() && policy != TRAIN {
+        let saved = Saved::load(Path::new(policy))?;
+        return match misfit(&saved) {
+            None => Ok(Arc::new(saved)),
+            Some(why) => Err(Error::Config {
+                key: "explorer.policy".into(),
+                message: format!("{policy} {why}"),
+            }),
+        };
+    }
+    let mut refused = None;
+    if policy.is_empty() && has_own_settings(explorer, problem)? {
+        match from_program(problem.task.name(), L::NAME)? {
+            Some(saved) => match misfit(&saved) {
+                None => return Ok(Arc::new(saved)),
+                Some(why) => refused = Some(why),
+            },
+            None => refused = Some("is none".to_owned()),
+        }
+    }
+    if let Some(saved) = cache.get().filter(|s| misfit(s).is_none()) {
+        return Ok(saved);
+    }
+    if !can_train(L::NAME) {
+        let why = refused.map_or_else(
+            || "what ships is for the task's own settings".to_owned(),
+            |why| format!("what ships for this task {why}"),
+        );
+        return Err(missing(problem.task.name(), L::NAME, &why));
+    }
+    let saved = Arc::new(train(explorer, problem)?.0);
+    cache.keep(&saved);
+    Ok(saved)
+}
+
+/// What ships for a task under a name, read.
+///
+/// # Errors
+/// When it cannot be read, which is a defect of the program.
+pub fn from_program(task: &str, name: &str) -> Result<Option<Saved>> {
+    let Some(file) = shipped::find(task, name) else {
+        return Ok(None);
+    };
+    Saved::from_bytes(file.bytes)
+        .map(Some)
+        .map_err(|why| Error::Failed(format!("what ships as {task}/{name} {why}")))
+}
+
+/// The learning curve that a file holds.
+#[must_use]
+pub fn curve(saved: &Saved) -> Vec<CurvePoint> {
+    let rows = saved.tensors.get(CURVE).map(|t| t.values.chunks_exact(3));
+    rows.into_iter()
+        .flatten()
+        .map(|row| CurvePoint {
+            x: f64::from(row[0]),
+            mean: f64::from(row[1]),
+            std: f64::from(row[2]),
+        })
+        .collect()
+}
+
+/// Trains an explorer and writes the file, with its curves beside it.
+///
+/// # Errors
+/// [`Error::Missing`] where this program cannot train, those of the training, and
+/// [`Error::File`] where a file cannot be written.
+pub fn train_to_file<L: LearnedExplorer>(
+    explorer: &L,
+    problem: &Problem<'_>,
+    file: &Path,
+) -> Result<bool> {
+    let (saved, events) = train(explorer, problem)?;
+    saved.save(file)?;
+    write_atomically(&events_of(file), &encode(&events))?;
+    Ok(true)
+}
+
+/// Where the curves of a file are: a folder of its own, because TensorBoard takes a folder for a run.
+#[must_use]
+pub fn events_of(file: &Path) -> PathBuf {
+    file.with_extension("tensorboard")
+        .join("events.out.tfevents.0.asid")
+}
+
+/// One training, described.
+fn train<L: LearnedExplorer>(explorer: &L, problem: &Problem<'_>) -> Result<(Saved, Vec<Scalars>)> {
+    let trainer = inventory::iter::<Trainer>().find(|t| t.algorithm == L::NAME);
+    let Some(trainer) = trainer else {
+        return Err(missing(
+            problem.task.name(),
+            L::NAME,
+            "training is asked for",
+        ));
+    };
+    let mut settings = explorer.clone();
+    settings.set_policy("");
+    let text = |e: &dyn std::fmt::Display| Error::Failed(format!("settings: {e}"));
+    let table = Settings::try_from(&settings).map_err(|e| text(&e))?;
+    let clock = Instant::now();
+    let training = (trainer.train)(problem, &table)?;
+    let settings = serde_json::to_value(&settings).map_err(|e| text(&e))?;
+    let mut tensors = training.tensors;
+    let points = training.curve.iter();
+    tensors.insert(
+        CURVE.to_owned(),
+        Tensor {
+            shape: vec![training.curve.len(), 3],
+            values: points
+                .flat_map(|p| [p.x as f32, p.mean as f32, p.std as f32])
+                .collect(),
+        },
+    );
+    let figures = training.figures.into_iter().filter(|f| f.1.is_finite());
+    let saved = Saved {
+        description: Description {
+            observation: training.observation,
+            training_steps: training.steps,
+            seconds: clock.elapsed().as_secs_f64(),
+            figures: figures.map(|(n, x)| (n.to_owned(), x)).collect(),
+            ..Description::new(L::NAME, problem, settings)
+        },
+        tensors,
+    };
+    Ok((saved, training.events))
+}
+
+/// Whether an explorer has the settings that the task gives it by default.
+fn has_own_settings<L: LearnedExplorer>(explorer: &L, problem: &Problem<'_>) -> Result<bool> {
+    let mut table = registry::defaults::<L>();
+    overlay(&mut table, problem.task.settings("explorer", L::NAME));
+    let mut own: L = registry::settings("explorer", &table)?;
+    own.set_policy("");
+    let mut given = explorer.clone();
+    given.set_policy("");
+    Ok(own == given)
+}
+
+/// One table over another.
+fn overlay(into: &mut Settings, from: Settings) {
+    for (key, value) in from {
+        match (into.get_mut(&key), value) {
+            (Some(toml::Value::Table(a)), toml::Value::Table(b)) => overlay(a, b),
+            (_, value) => {
+                into.insert(key, value);
+            }
+        }
+    }
+}
+
+/// That nothing is there to play, and how to get it.
+fn missing(task: &str, name: &str, why: &str) -> Error {
+    Error::Missing {
+        what: format!("a trained policy of `{name}` for `{task}`"),
+        message: format!(
+            "{why}, and this build cannot train; name a file with --policy FILE (setting `policy`), or \
+             `cargo xtask setup`, build with `--features torch`, and train one: \
+             `asid explore {task} --explorer {name} --train FILE`"
+        ),
+    }
+}

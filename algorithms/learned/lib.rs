@@ -1,0 +1,58 @@
+//! What was learned beforehand: files of trained networks, and what plays and evaluates them.
+//!
+//! Learning needs libtorch; what was learned does not. So the explorers and the identifier that
+//! learn are registered here, with their settings, and act on plain numbers; the crate `asid-nn`,
+//! where it is linked, adds a [`Trainer`] for each. A network comes from a file that the user
+//! names, else from those that ship with the program, else it is trained on the spot.
+
+mod collect;
+pub mod episodes;
+pub mod estimator;
+pub mod file;
+pub mod fisher_ppo;
+pub mod history;
+pub mod inference;
+pub mod learning;
+pub mod max;
+pub mod maxmi;
+pub mod network;
+pub mod normaliser;
+pub mod play;
+pub mod policy;
+pub mod ppo_settings;
+pub mod shipped;
+pub mod task_ppo;
+pub mod tensorboard;
+#[cfg(test)]
+mod testing;
+
+use std::sync::OnceLock;
+
+pub use collect::Dataset;
+pub use episodes::EpisodeBatch;
+pub use estimator::{Estimator, EstimatorTrainer};
+pub use file::{Description, Saved, Tensor, Tensors};
+pub use fisher_ppo::FisherPpo;
+pub use history::History;
+pub use inference::{Belief, Inference};
+pub use learning::{LearnedExplorer, Trainer, Training};
+pub use max::Max;
+pub use maxmi::MaxMi;
+pub use network::{Layer, Network};
+pub use normaliser::Normaliser;
+pub use policy::Policy;
+pub use ppo_settings::PpoConfig;
+pub use task_ppo::TaskPpo;
+
+static COMMIT: OnceLock<&'static str> = OnceLock::new();
+
+/// Says of which commit this program is, for files to carry; the first call counts.
+pub fn set_commit(commit: &'static str) {
+    let _ = COMMIT.set(commit);
+}
+
+/// Commit of this program; empty where nothing was said.
+#[must_use]
+pub fn commit() -> &'static str {
+    COMMIT.get().copied().unwrap_or_default()
+}

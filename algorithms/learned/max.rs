@@ -1,0 +1,333 @@
+//! MAX (Shyam et al. 2019, "Model-based active exploration"): an ensemble of probabilistic networks
+//! learns how the world moves, and a policy is trained, inside of the ensemble, to go where its
+//! members disagree. It knows nothing of unknown parameters: it seeks what is new.
+//!
+//! What differs from the publication: the policy is trained by PPO, not SAC; it is retrained after
+//! every round of episodes, not every 25 steps; and the sizes are those of a small machine
+//! (5 networks of 2 x 64 where there are 32 of 4 x 512).
+
+use std::path::Path;
+use std::sync::Arc;
+
+use asid_core::explore::{Explored, Explorer};
+use asid_core::layout::Recording;
+use asid_core::registry;
+use asid_core::signal::unit_quaternion;
+use asid_core::{Error, Problem, Result};
+use serde::{Deserialize, Serialize};
+
+use crate::file::{ObservationEntry, Saved};
+use crate::fisher_ppo::check_environments;
+use crate::learning::{Cache, LearnedExplorer, obtain, train_to_file};
+use crate::play::{Observe, POLICY, Playing};
+use crate::policy::Policy;
+use crate::ppo_settings::PpoConfig;
+
+/// Settings of the explorer.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Max {
+    /// File of a trained policy; empty for what ships, else trained on the spot; `train` to train.
+    pub policy: String,
+    /// The policy of this round, counted from 1, is played; 0 for the last.
+    pub play_round: usize,
+    /// Real (simulated) episodes of a round.
+    pub environments: usize,
+    /// Rounds of fitting the ensemble, training a policy in it, and playing that policy.
+    pub rounds: usize,
+    /// Episodes of random actions before the first round (published: 256 steps).
+    pub warm_up: usize,
+    /// The ensemble.
+    pub ensemble: EnsembleSettings,
+    /// The learner of the policy, its steps those in imagination and of one round.
+    pub ppo: PpoConfig,
+    /// Imagined episodes at once (published: 128 actors).
+    pub imagined: usize,
+    /// What was trained on the spot; no setting.
+    #[serde(skip)]
+    pub cache: Cache,
+}
+
+/// Settings of the ensemble.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct EnsembleSettings {
+    /// Networks (published: 32).
+    pub models: usize,
+    /// Units of the hidden layers, swish between them (published: 512, 512, 512, 512).
+    pub hidden: Vec<usize>,
+    /// Passes over all transitions after each round (published: 50).
+    pub epochs: usize,
+    /// Transitions of a step of Adam (published: 256).
+    pub minibatch: usize,
+    /// Step size of Adam (published: 1e-3).
+    pub learning_rate: f64,
+}
+
+impl Default for EnsembleSettings {
+    fn default() -> Self {
+        Self {
+            models: 5,
+            hidden: vec![64, 64],
+            epochs: 20,
+            minibatch: 256,
+            learning_rate: 1e-3,
+        }
+    }
+}
+
+impl Default for Max {
+    fn default() -> Self {
+        Self {
+            policy: String::new(),
+            play_round: 0,
+            environments: 32,
+            rounds: 12,
+            warm_up: 32,
+            ensemble: EnsembleSettings::default(),
+            ppo: PpoConfig {
+                total_steps: 40_000,
+                n_steps: 2560,
+                minibatch: 256,
+                epochs: 5,
+                learning_rate: 1e-3,
+                anneal_learning_rate: true,
+                initial_log_std: -0.5,
+                evaluation_episodes: 0,
+                ..PpoConfig::default()
+            },
+            imagined: 128,
+            cache: Cache::default(),
+        }
+    }
+}
+
+asid_core::register!(ExplorerEntry {
+    name: Max::NAME,
+    about: "model-based active exploration: goes where learned models disagree (Shyam et al. 2019)",
+    defaults: registry::defaults::<Max>,
+    make: |s| {
+        let explorer: Max = registry::settings("explorer", s)?;
+        explorer.check()?;
+        Ok(Box::new(explorer))
+    },
+});
+
+impl Max {
+    /// Checks every setting.
+    ///
+    /// # Errors
+    /// [`Error::Config`] names the first that is out of its domain.
+    pub fn check(&self) -> Result<()> {
+        check_environments(self.environments)?;
+        self.ppo.validate()?;
+        let e = &self.ensemble;
+        let rules = [
+            ("rounds", self.rounds > 0, "at least 1"),
+            ("warm_up", self.warm_up > 0, "at least 1"),
+            ("imagined", self.imagined > 0, "at least 1"),
+            (
+                "play_round",
+                self.play_round <= self.rounds,
+                "at most `rounds`",
+            ),
+            ("ensemble.models", e.models > 1, "at least 2"),
+            (
+                "ensemble.hidden",
+                !e.hidden.contains(&0),
+                "widths of at least 1",
+            ),
+            ("ensemble.epochs", e.epochs > 0, "at least 1"),
+            ("ensemble.minibatch", e.minibatch > 1, "at least 2"),
+            (
+                "ensemble.learning_rate",
+                e.learning_rate > 0.0 && e.learning_rate.is_finite(),
+                "above 0",
+            ),
+        ];
+        match rules.into_iter().find(|r| !r.1) {
+            None => Ok(()),
+            Some((key, _, rule)) => Err(Error::Config {
+                key: format!("explorer.{key}"),
+                message: format!("must be {rule}"),
+            }),
+        }
+    }
+}
+
+/// Name of a round's policy in a file, rounds counted from 1.
+#[must_use]
+pub fn round_name(round: usize) -> String {
+    format!("round.{round}")
+}
+
+impl LearnedExplorer for Max {
+    const NAME: &'static str = "max";
+
+    fn policy(&self) -> &str {
+        &self.policy
+    }
+
+    fn set_policy(&mut self, policy: &str) {
+        policy.clone_into(&mut self.policy);
+        // Which round is played is no matter of training.
+        self.play_round = 0;
+    }
+
+    fn observation(&self, problem: &Problem<'_>) -> Result<Vec<ObservationEntry>> {
+        Ok(Motion::new(problem)?.entries())
+    }
+}
+
+impl Explorer for Max {
+    fn explore<'a>(
+        &'a self,
+        problem: &'a Problem<'a>,
+        _start: Option<&[f64]>,
+    ) -> Result<Explored<'a>> {
+        let mut saved = obtain(self, &self.cache, problem)?;
+        if self.play_round > 0 {
+            saved = Arc::new(of_round(&saved, self.play_round)?);
+        }
+        let observe = Box::new(Motion::new(problem)?);
+        Playing::explored(saved, observe, "disagreement of learned models".into())
+    }
+
+    fn train(&self, problem: &Problem<'_>, file: &Path) -> Result<bool> {
+        train_to_file(self, problem, file)
+    }
+}
+
+/// The file with the policy of an earlier round.
+fn of_round(saved: &Saved, round: usize) -> Result<Saved> {
+    let policy =
+        Policy::from_tensors(&round_name(round), &saved.tensors).map_err(|why| Error::Config {
+            key: "explorer.play_round".into(),
+            message: format!("round {round}: the file {why}"),
+        })?;
+    let mut saved = saved.clone();
+    policy.to_tensors(POLICY, &mut saved.tensors);
+    Ok(saved)
+}
+
+/// What moves, and how it moved: the state of which the models are learned.
+///
+/// Places and orientations (two columns of the rotation) of tracked parts, the end effector, the
+/// same less what they were a control step ago, since a reading has no velocity; then the share of
+/// the episode that is over.
+pub struct Motion {
+    /// First entry in a reading's row and number; four are an orientation.
+    channels: Vec<(usize, usize)>,
+    names: Vec<String>,
+    horizon: usize,
+    before: Vec<f64>,
+}
+
+impl Motion {
+    /// Of a problem's exploration episodes.
+    ///
+    /// # Errors
+    /// When the scene lacks a channel of the protocol.
+    pub fn new(problem: &Problem<'_>) -> Result<Self> {
+        let protocol = problem.task.exploration();
+        let names = protocol.channels();
+        let recording: Recording = problem.model.layout().recording(&names)?;
+        let tracked = protocol.signals.len();
+        let effector = (tracked..names.len()).find(|&i| recording.range(i).len() == 3);
+        let kept: Vec<usize> = (0..tracked).chain(effector).collect();
+        let channel = |&i: &usize| {
+            let range = recording.range(i);
+            (range.start, range.len())
+        };
+        Ok(Self {
+            channels: kept.iter().map(channel).collect(),
+            names: kept.iter().map(|&i| names[i].clone()).collect(),
+            horizon: protocol.horizon,
+            before: Vec::new(),
+        })
+    }
+
+    /// Entries of a place in state space, without the differences.
+    #[must_use]
+    pub fn places(&self) -> usize {
+        let len = |&(_, len): &(usize, usize)| if len == 4 { 6 } else { len };
+        self.channels.iter().map(len).sum()
+    }
+
+    /// What the entries of an observation are.
+    #[must_use]
+    pub fn entries(&self) -> Vec<ObservationEntry> {
+        let places = self.places();
+        let text = self.names.join(", ");
+        let entry = |name: String, len| ObservationEntry { name, len };
+        vec![
+            entry(text.clone(), places),
+            entry(format!("what a control step changed of {text}"), places),
+            entry("share of the episode".into(), 1),
+        ]
+    }
+}
+
+impl Observe for Motion {
+    fn observe(&mut self, step: usize, reading: &[f64], observation: &mut [f64]) -> Result<()> {
+        let places = self.places();
+        let (now, rest) = observation.split_at_mut(places);
+        let mut at = 0;
+        for &(start, len) in &self.channels {
+            let row = &reading[start..start + len];
+            if len == 4 {
+                let finite = row.iter().all(|x| x.is_finite());
+                let wxyz = if finite { row } else { &[1.0, 0.0, 0.0, 0.0] };
+                let rotation = unit_quaternion(wxyz).to_rotation_matrix();
+                now[at..at + 6].copy_from_slice(&rotation.matrix().as_slice()[..6]);
+                at += 6;
+            } else {
+                now[at..at + len].copy_from_slice(row);
+                at += len;
+            }
+        }
+        if step == 0 || self.before.len() != places {
+            self.before = now.to_vec();
+        }
+        // What is missing stays where it was.
+        for (x, before) in now.iter_mut().zip(&self.before) {
+            if !x.is_finite() {
+                *x = if before.is_finite() { *before } else { 0.0 };
+            }
+        }
+        for ((change, x), before) in rest.iter_mut().zip(&*now).zip(&self.before) {
+            *change = if before.is_finite() { x - before } else { 0.0 };
+        }
+        self.before.copy_from_slice(now);
+        rest[places] = step as f64 / self.horizon as f64;
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::with_problem;
+
+    #[test]
+    fn a_state_has_places_and_their_changes() {
+        with_problem("rod-balancing", |problem| {
+            let mut motion = Motion::new(problem).unwrap();
+            // Place 3, rotation 6, effector 3.
+            assert_eq!(motion.places(), 12);
+            let names = problem.task.exploration().channels();
+            let width = problem.model.layout().recording(&names).unwrap().width();
+            let mut reading = vec![0.0; width];
+            reading[..7].copy_from_slice(&[0.5, 0.1, 0.0, 1.0, 0.0, 0.0, 0.0]);
+            let mut out = vec![f64::NAN; 25];
+            motion.observe(0, &reading, &mut out).unwrap();
+            assert_eq!(out[12..], [0.0; 13]);
+            reading[0] = 0.6;
+            reading[1] = f64::NAN;
+            motion.observe(1, &reading, &mut out).unwrap();
+            assert_eq!(out[..2], [0.6, 0.1]);
+            assert!((out[12] - 0.1).abs() < 1e-12 && out[13] == 0.0);
+            assert!((out[24] - 1.0 / 20.0).abs() < 1e-12);
+        });
+    }
+}

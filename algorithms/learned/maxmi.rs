@@ -1,0 +1,264 @@
+//! MaxMI (Kumar et al. 2019, "Estimating mass distribution of articulated objects using
+//! non-prehensile manipulation"): a predictor of the unknowns from the history, and a policy that
+//! is rewarded for lowering its error, trained in turns.
+//!
+//! The predictor is a learned posterior `q(z | history)` ([`crate::inference`]). The reward of a
+//! control step is what it made the truth more likely,
+//!
+//! ```text
+//! r_h = log q(z | history to h) - log q(z | history to h - 1),
+//! ```
+//!
+//! so that the return is the lower bound of the mutual information of unknown and episode (Barber
+//! and Agakov 2003), up to the constant of the first reading. The policy sees its readings and what
+//! the predictor makes of them; episodes are simulated once, without the copies that Fisher
+//! information needs.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use asid_algorithms::explore::Observer;
+use asid_core::explore::{Explored, Explorer};
+use asid_core::registry;
+use asid_core::{Error, Problem, Result};
+use serde::{Deserialize, Serialize};
+
+use crate::file::ObservationEntry;
+use crate::fisher_ppo::{FisherPpo, check_environments, entries};
+use crate::history::History;
+use crate::inference::{Belief, Inference};
+use crate::learning::{Cache, LearnedExplorer, obtain, train_to_file};
+use crate::play::{Observe, Playing};
+use crate::ppo_settings::PpoConfig;
+
+/// Name of the predictor's tensors in a file.
+pub const PREDICTOR: &str = "predictor";
+
+/// Settings of the predictor.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct PredictorSettings {
+    /// Units of the hidden layers (tanh).
+    pub hidden: Vec<usize>,
+    /// Step size of Adam.
+    pub learning_rate: f64,
+    /// Episodes of a step of Adam, each cut at a random mark.
+    pub minibatch: usize,
+    /// Steps of Adam after each batch of episodes.
+    pub steps: usize,
+    /// Latest episodes that it learns from: the older ones are of policies that are gone.
+    pub memory: usize,
+    /// Episodes of random actions before the policy learns, so that its first reward means something.
+    pub warm_up: usize,
+}
+
+impl Default for PredictorSettings {
+    fn default() -> Self {
+        Self {
+            hidden: vec![128, 128],
+            learning_rate: 1e-3,
+            minibatch: 256,
+            steps: 60,
+            memory: 4096,
+            warm_up: 512,
+        }
+    }
+}
+
+/// Settings of the explorer.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct MaxMi {
+    /// File of a trained policy; empty for what ships, else trained on the spot; `train` to train.
+    pub policy: String,
+    /// Episodes that are simulated at once.
+    pub environments: usize,
+    /// The learner of the policy; as that of `fisher-ppo`, so that they differ by the reward alone.
+    pub ppo: PpoConfig,
+    /// The predictor.
+    pub predictor: PredictorSettings,
+    /// What was trained on the spot; no setting.
+    #[serde(skip)]
+    pub cache: Cache,
+}
+
+impl Default for MaxMi {
+    fn default() -> Self {
+        Self {
+            policy: String::new(),
+            environments: 64,
+            ppo: FisherPpo::default().ppo,
+            predictor: PredictorSettings::default(),
+            cache: Cache::default(),
+        }
+    }
+}
+
+asid_core::register!(ExplorerEntry {
+    name: MaxMi::NAME,
+    about: "mutual information, a policy paid for what a learned predictor gets right (Kumar et al. 2019)",
+    defaults: registry::defaults::<MaxMi>,
+    make: |s| {
+        let explorer: MaxMi = registry::settings("explorer", s)?;
+        explorer.check()?;
+        Ok(Box::new(explorer))
+    },
+});
+
+impl MaxMi {
+    /// Checks every setting.
+    ///
+    /// # Errors
+    /// [`Error::Config`] names the first that is out of its domain.
+    pub fn check(&self) -> Result<()> {
+        check_environments(self.environments)?;
+        self.ppo.validate()?;
+        let p = &self.predictor;
+        let rules = [
+            ("hidden", !p.hidden.contains(&0), "widths of at least 1"),
+            (
+                "learning_rate",
+                p.learning_rate > 0.0 && p.learning_rate.is_finite(),
+                "above 0",
+            ),
+            ("minibatch", p.minibatch > 1, "at least 2"),
+            ("steps", p.steps > 0, "at least 1"),
+            ("memory", p.memory > 1, "at least 2"),
+            ("warm_up", p.warm_up > 1, "at least 2"),
+        ];
+        match rules.into_iter().find(|r| !r.1) {
+            None => Ok(()),
+            Some((key, _, rule)) => Err(Error::Config {
+                key: format!("explorer.predictor.{key}"),
+                message: format!("must be {rule}"),
+            }),
+        }
+    }
+}
+
+impl LearnedExplorer for MaxMi {
+    const NAME: &'static str = "maxmi";
+
+    fn policy(&self) -> &str {
+        &self.policy
+    }
+
+    fn set_policy(&mut self, policy: &str) {
+        policy.clone_into(&mut self.policy);
+    }
+
+    fn observation(&self, problem: &Problem<'_>) -> Result<Vec<ObservationEntry>> {
+        let mut all = entries(&Observer::of_readings(problem)?);
+        for p in problem.parameters {
+            let what = if p.is_binary() {
+                "log-odds"
+            } else {
+                "mean and log std"
+            };
+            all.push(ObservationEntry {
+                name: format!("predicted {what} of {}, prior-scaled", p.name),
+                len: 2,
+            });
+        }
+        Ok(all)
+    }
+}
+
+impl Explorer for MaxMi {
+    fn explore<'a>(
+        &'a self,
+        problem: &'a Problem<'a>,
+        _start: Option<&[f64]>,
+    ) -> Result<Explored<'a>> {
+        let saved = obtain(self, &self.cache, problem)?;
+        let history = History::new(problem)?;
+        let predictor = Inference::from_tensors(
+            PREDICTOR,
+            &saved.tensors,
+            history.entries(),
+            history.masks(),
+            problem.parameters,
+        )
+        .map_err(|why| Error::Config {
+            key: "explorer.policy".into(),
+            message: format!("the file cannot be used here: {why}"),
+        })?;
+        let observe = Box::new(Predicting::new(problem, Arc::new(predictor))?);
+        Playing::explored(
+            saved,
+            observe,
+            "mutual information (learned predictor)".into(),
+        )
+    }
+
+    fn train(&self, problem: &Problem<'_>, file: &Path) -> Result<bool> {
+        train_to_file(self, problem, file)
+    }
+}
+
+/// Readings, with what the predictor makes of them so far.
+pub struct Predicting {
+    observer: Observer,
+    history: History,
+    horizon: usize,
+    numbers: Vec<f64>,
+    predictor: Arc<Inference>,
+    beliefs: Vec<Belief>,
+}
+
+impl Predicting {
+    /// With a predictor of this problem.
+    ///
+    /// # Errors
+    /// When the scene lacks a channel of the protocol.
+    pub fn new(problem: &Problem<'_>, predictor: Arc<Inference>) -> Result<Self> {
+        let history = History::new(problem)?;
+        Ok(Self {
+            observer: Observer::of_readings(problem)?,
+            horizon: problem.task.exploration().horizon,
+            numbers: history.blank(),
+            history,
+            predictor,
+            beliefs: Vec::new(),
+        })
+    }
+
+    /// Goes on with a predictor that has learned more.
+    pub fn set_predictor(&mut self, predictor: Arc<Inference>) {
+        self.predictor = predictor;
+    }
+
+    /// What is believed after the latest reading.
+    #[must_use]
+    pub fn beliefs(&self) -> &[Belief] {
+        &self.beliefs
+    }
+
+    /// The episode so far; see [`History`].
+    #[must_use]
+    pub fn history(&self) -> &[f64] {
+        &self.numbers
+    }
+}
+
+impl Observe for Predicting {
+    fn observe(&mut self, step: usize, reading: &[f64], observation: &mut [f64]) -> Result<()> {
+        if step == 0 {
+            self.history.forget(&mut self.numbers, 0);
+        }
+        self.history.write(&mut self.numbers, step, reading);
+        self.beliefs = self.predictor.beliefs(&self.numbers);
+        let seen = self.observer.observation_len();
+        let share = step as f64 / self.horizon as f64;
+        self.observer
+            .observe(reading, share, &[], &mut observation[..seen]);
+        let told = observation[seen..].chunks_exact_mut(2);
+        for (out, belief) in told.zip(&self.beliefs) {
+            match *belief {
+                Belief::Gaussian { mean, std } => out.copy_from_slice(&[mean, std.ln()]),
+                Belief::Binary { logit } => out.copy_from_slice(&[logit, 0.0]),
+            }
+        }
+        Ok(())
+    }
+}

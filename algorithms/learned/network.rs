@@ -1,0 +1,137 @@
+//! Dense networks as plain numbers: layers `y = x W + b` with one function between them.
+//!
+//! What acts and estimates needs a few small matrix products, so trained networks are kept as
+//! numbers rather than as handles of libtorch: they can be cloned, shared between threads and
+//! used where libtorch is not.
+
+use serde::{Deserialize, Serialize};
+
+use crate::file::{Tensor, Tensors};
+
+/// One layer, `y = x W + b`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Layer {
+    /// `inputs x outputs`, row-major.
+    pub weight: Vec<f32>,
+    /// `outputs`.
+    pub bias: Vec<f32>,
+}
+
+impl Layer {
+    /// Entries that it takes.
+    #[must_use]
+    pub fn inputs(&self) -> usize {
+        self.weight.len() / self.bias.len().max(1)
+    }
+
+    /// `y = x W + b`, row by row of `W` so that the inner loop runs over neighbours.
+    pub fn forward(&self, x: &[f32], y: &mut Vec<f32>) {
+        y.clear();
+        y.extend_from_slice(&self.bias);
+        for (&x, row) in x.iter().zip(self.weight.chunks_exact(self.bias.len())) {
+            for (y, w) in y.iter_mut().zip(row) {
+                *y += x * w;
+            }
+        }
+    }
+
+    /// The layer as two tensors, `PREFIX.weight` and `PREFIX.bias`.
+    pub(crate) fn to_tensors(&self, prefix: &str, tensors: &mut Tensors) {
+        let weight = Tensor {
+            shape: vec![self.inputs(), self.bias.len()],
+            values: self.weight.clone(),
+        };
+        tensors.insert(format!("{prefix}.weight"), weight);
+        let bias = Tensor::vector(self.bias.clone());
+        tensors.insert(format!("{prefix}.bias"), bias);
+    }
+
+    /// The layers `PREFIX.0`, `PREFIX.1` and so on.
+    pub(crate) fn all_from_tensors(prefix: &str, tensors: &Tensors) -> Result<Vec<Self>, String> {
+        let mut layers: Vec<Self> = Vec::new();
+        while let (Some(weight), Some(bias)) = (
+            tensors.get(&format!("{prefix}.{}.weight", layers.len())),
+            tensors.get(&format!("{prefix}.{}.bias", layers.len())),
+        ) {
+            let outputs = bias.values.len();
+            let fits = weight.shape.len() == 2
+                && weight.shape[1] == outputs
+                && layers
+                    .last()
+                    .is_none_or(|l| l.bias.len() == weight.shape[0]);
+            if outputs == 0 || !fits {
+                return Err(format!("the layers of `{prefix}` do not fit each other"));
+            }
+            layers.push(Self {
+                weight: weight.values.clone(),
+                bias: bias.values.clone(),
+            });
+        }
+        if layers.is_empty() {
+            return Err(format!("has no layer `{prefix}.0`"));
+        }
+        Ok(layers)
+    }
+}
+
+/// Layers with tanh between them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Network {
+    /// The layers, first to last, at least one; each takes what the one before gives.
+    pub layers: Vec<Layer>,
+}
+
+impl Network {
+    /// Entries that it takes.
+    #[must_use]
+    pub fn inputs(&self) -> usize {
+        self.layers.first().map_or(0, Layer::inputs)
+    }
+
+    /// Entries that it gives.
+    #[must_use]
+    pub fn outputs(&self) -> usize {
+        self.layers.last().map_or(0, |l| l.bias.len())
+    }
+
+    /// What it gives for one row of inputs.
+    #[must_use]
+    pub fn forward(&self, input: &[f32]) -> Vec<f32> {
+        let (mut x, mut y) = (input.to_vec(), Vec::new());
+        for (i, layer) in self.layers.iter().enumerate() {
+            if i > 0 {
+                x.iter_mut().for_each(|v| *v = v.tanh());
+            }
+            layer.forward(&x, &mut y);
+            std::mem::swap(&mut x, &mut y);
+        }
+        x
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// `y = 2 tanh(x0 - x1) + 0.5`, by hand.
+    #[test]
+    fn layers_compute_the_formula() {
+        let network = Network {
+            layers: vec![
+                Layer {
+                    weight: vec![1.0, -1.0],
+                    bias: vec![0.0],
+                },
+                Layer {
+                    weight: vec![2.0],
+                    bias: vec![0.5],
+                },
+            ],
+        };
+        assert_eq!((network.inputs(), network.outputs()), (2, 1));
+        let expected = 2.0 * (-0.2_f32).tanh() + 0.5;
+        // Single precision.
+        assert!((network.forward(&[0.1, 0.3])[0] - expected).abs() < 1e-6);
+    }
+}

@@ -1,0 +1,120 @@
+//! A policy trained for the task itself, used as an explorer: what a robot that practises its task
+//! happens to find out.
+//!
+//! The reward of a control step is by how much it brought the object nearer to the task's goal
+//! ([`asid_core::Task::goal_reward`]), so that the return is the way made in an episode.
+
+use std::path::Path;
+
+use asid_algorithms::explore::Observer;
+use asid_core::explore::{Explored, Explorer};
+use asid_core::registry;
+use asid_core::{Problem, Result};
+use serde::{Deserialize, Serialize};
+
+use crate::file::ObservationEntry;
+use crate::fisher_ppo::{FisherPpo, check_environments, entries};
+use crate::learning::{Cache, LearnedExplorer, obtain, train_to_file};
+use crate::play::{Observe, Playing};
+use crate::ppo_settings::PpoConfig;
+
+/// Settings of the explorer.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct TaskPpo {
+    /// File of a trained policy; empty for what ships, else trained on the spot; `train` to train.
+    pub policy: String,
+    /// Episodes that are simulated at once.
+    pub environments: usize,
+    /// The learner; as that of `fisher-ppo`, so that they differ by the reward alone. Rewards are
+    /// ways of tenths of a metre, hence the scale.
+    pub ppo: PpoConfig,
+    /// What was trained on the spot; no setting.
+    #[serde(skip)]
+    pub cache: Cache,
+}
+
+impl Default for TaskPpo {
+    fn default() -> Self {
+        Self {
+            policy: String::new(),
+            environments: 64,
+            ppo: PpoConfig {
+                reward_scale: 10.0,
+                ..FisherPpo::default().ppo
+            },
+            cache: Cache::default(),
+        }
+    }
+}
+
+asid_core::register!(ExplorerEntry {
+    name: TaskPpo::NAME,
+    about: "a policy trained for the task, where the task has a goal for its object",
+    defaults: registry::defaults::<TaskPpo>,
+    make: |s| {
+        let explorer: TaskPpo = registry::settings("explorer", s)?;
+        check_environments(explorer.environments)?;
+        explorer.ppo.validate()?;
+        Ok(Box::new(explorer))
+    },
+});
+
+impl LearnedExplorer for TaskPpo {
+    const NAME: &'static str = "task-ppo";
+
+    fn policy(&self) -> &str {
+        &self.policy
+    }
+
+    fn set_policy(&mut self, policy: &str) {
+        policy.clone_into(&mut self.policy);
+    }
+
+    fn observation(&self, problem: &Problem<'_>) -> Result<Vec<ObservationEntry>> {
+        Ok(entries(&Observer::of_readings(problem)?))
+    }
+}
+
+impl Explorer for TaskPpo {
+    fn explore<'a>(
+        &'a self,
+        problem: &'a Problem<'a>,
+        _start: Option<&[f64]>,
+    ) -> Result<Explored<'a>> {
+        let saved = obtain(self, &self.cache, problem)?;
+        let observe = Box::new(Reading::new(problem)?);
+        Playing::explored(saved, observe, "the task's goal".into())
+    }
+
+    fn train(&self, problem: &Problem<'_>, file: &Path) -> Result<bool> {
+        train_to_file(self, problem, file)
+    }
+}
+
+/// Readings and the clock, and nothing else.
+pub struct Reading {
+    observer: Observer,
+    horizon: usize,
+}
+
+impl Reading {
+    /// Of a problem's exploration episodes.
+    ///
+    /// # Errors
+    /// When the scene lacks a channel of the protocol.
+    pub fn new(problem: &Problem<'_>) -> Result<Self> {
+        Ok(Self {
+            observer: Observer::of_readings(problem)?,
+            horizon: problem.task.exploration().horizon,
+        })
+    }
+}
+
+impl Observe for Reading {
+    fn observe(&mut self, step: usize, reading: &[f64], observation: &mut [f64]) -> Result<()> {
+        let share = step as f64 / self.horizon as f64;
+        self.observer.observe(reading, share, &[], observation);
+        Ok(())
+    }
+}
