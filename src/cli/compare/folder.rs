@@ -200,8 +200,8 @@ fn times(store: &Store, cells: &[Cell]) -> Result<Times> {
         }
     }
     Ok(Times {
-        cells_s: cells.iter().map(|t| t.wall_s).sum(),
-        training_s: training.iter().map(|t| t.wall_s).sum(),
+        cells_s: cells.iter().fold(0.0, |sum, t| sum + t.wall_s),
+        training_s: training.iter().fold(0.0, |sum, t| sum + t.wall_s),
         training,
         cells,
     })
