@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used)]
 
+#[allow(dead_code)] // not every test needs all of it
 mod cli_support;
 
 use cli_support::Workplace;
