@@ -33,15 +33,16 @@ impl Default for ExpectedSettings {
     fn default() -> Self {
         Self {
             correlated: false,
-            rounds: 3,
+            rounds: 5,
             widen: 2.0,
         }
     }
 }
 
 /// Half the first step of an unknown, in prior deviations, and of a start coordinate, in deviations of
-/// its range: those of [`crate::fisher`].
-const FIRST: [f64; 2] = [0.3, 0.02];
+/// its range. Smaller than what most episodes leave of the prior: a region that is too narrow widens at
+/// once, one that is too wide holds other contacts, whose roughness keeps it wide for rounds.
+const FIRST: [f64; 2] = [0.1, 0.02];
 
 /// Largest half step of a start coordinate, in deviations of its range.
 const START_REACH: f64 = 0.5;

@@ -1,0 +1,110 @@
+//! Identifiers on a cart of unknown mass, where posterior, expected deviation and what the data cannot
+//! tell are known: `x = x_0 + C / m` with the start co-estimated.
+
+#![allow(clippy::unwrap_used)]
+
+mod cart_support;
+#[allow(dead_code)] // not every test needs all of it
+mod task_support;
+
+use asid::core::expected::{ExpectedSettings, expected_deviation};
+use asid::core::identify::Identified;
+use asid::core::parameter::{Parameter, Scale};
+use asid::core::posterior::Edge;
+use asid::core::registry::{BackendEntry, IdentifierEntry, find};
+use asid::core::{Policy, RealWorld as _, Result, SimulatedWorld, Streams};
+use cart_support::{Cart, HORIZON};
+
+const IDENTIFIERS: [&str; 4] = ["cem", "reps", "cma-es", "gauss-newton"];
+
+/// A constant force.
+struct Push(f64);
+
+impl Policy for Push {
+    fn reset(&mut self) {}
+    fn act(&mut self, _step: usize, _reading: &[f64], action: &mut [f64]) -> Result<()> {
+        action[0] = self.0;
+        Ok(())
+    }
+    fn export(&self) -> serde_json::Value {
+        serde_json::Value::Null
+    }
+}
+
+/// The posterior of an episode under a force, and the deviation that is expected of the mass.
+fn identified(name: &str, force: f64, mass: f64, seed: u64) -> (Identified, f64) {
+    let task = Cart::new();
+    let parameters: [Parameter; 1] = [Cart::mass(Scale::Linear)];
+    let backend = (find::<BackendEntry>("rapier").unwrap().make)().unwrap();
+    let mut out = None;
+    task_support::on_engine(&*backend, &task, &parameters, seed, |problem, model| {
+        let streams = Streams::new(seed).child("world");
+        let signals = problem.signals;
+        let mut world =
+            SimulatedWorld::new(&task, &**model, &parameters, &[mass], signals, streams).unwrap();
+        let real = world.explore(&mut Push(force)).unwrap();
+        let entry = find::<IdentifierEntry>(name).unwrap();
+        let identifier = (entry.make)(&(entry.defaults)()).unwrap();
+        let episodes = std::slice::from_ref(&real.episode);
+        let found = identifier.identify(problem, episodes).unwrap();
+        let settings = ExpectedSettings::default();
+        let theta = found.posterior.mean();
+        let expected =
+            expected_deviation(problem, &settings, &theta, &found.starts[0], &real.actions)
+                .unwrap()
+                .unwrap();
+        assert_eq!(expected.len(), HORIZON + 1);
+        out = Some((found, expected[HORIZON][0]));
+    });
+    out.unwrap()
+}
+
+#[test]
+fn all_identifiers_agree_with_each_other_and_with_what_was_expected() {
+    let mass = 1.1;
+    for name in IDENTIFIERS {
+        let mut held = 0;
+        for seed in 0..4 {
+            let (found, expected) = identified(name, 4.0, mass, seed);
+            let m = &found.posterior.marginals[0];
+            let ratio = expected / m.std;
+            assert!((0.7..1.4).contains(&ratio), "{name}: {ratio}");
+            assert!(
+                (0.6..1.5).contains(&found.residual),
+                "{name}: {}",
+                found.residual
+            );
+            assert!(m.at_edge.is_none() && !m.unidentified, "{name}");
+            held += usize::from((m.estimate - mass).abs() < 3.0 * m.std);
+        }
+        assert_eq!(held, 4, "{name}");
+    }
+}
+
+#[test]
+fn a_truth_outside_of_the_prior_piles_up_at_its_edge() {
+    for name in IDENTIFIERS {
+        for (mass, edge) in [(3.5, Edge::High), (0.3, Edge::Low)] {
+            let (found, _) = identified(name, 4.0, mass, 0);
+            let m = &found.posterior.marginals[0];
+            assert_eq!(m.at_edge, Some(edge), "{name}: {m:?}");
+        }
+    }
+}
+
+#[test]
+fn a_cart_that_is_not_pushed_has_no_mass_that_shows() {
+    let (found, _) = identified("gauss-newton", 0.0, 1.1, 0);
+    let m = &found.posterior.marginals[0];
+    assert!(m.unidentified);
+    assert_eq!(found.posterior.unseen.len(), 1);
+    assert_eq!(
+        found.posterior.unseen[0].weights,
+        [("mass".to_owned(), 1.0)]
+    );
+    // What is believed is the prior: uniform on 0.5 to 2 kg.
+    assert!(
+        (m.estimate - 1.25).abs() < 0.1 && (m.std / 0.433 - 1.0).abs() < 0.1,
+        "{m:?}"
+    );
+}
