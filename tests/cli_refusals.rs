@@ -332,34 +332,32 @@ fn an_engine_left_out_says_how_to_get_it() {
 #[test]
 fn a_policy_is_a_file_of_the_explorer_that_plays_it() {
     let place = Workplace::new();
-    refused_run(
-        &place,
-        &["--explorer", "random", "--policy", "p.safetensors"],
-        &["--policy", "`random` plays no trained policy"],
-    );
-    refused_run(
-        &place,
-        &["--explorer", "maxmi", "--policy", "nowhere.safetensors"],
-        &["nowhere.safetensors"],
-    );
     place.write("p.safetensors", "no network");
-    refused_run(
-        &place,
-        &["--explorer", "max", "--policy", "p.safetensors"],
-        &["p.safetensors", "no safetensors file"],
-    );
-    refused(
-        &place,
-        &tiny(&[
-            "explore",
+    let run = |explorer: &str, file: &str, expected: &[&str]| {
+        let arguments = [
+            "run",
             "rod-balancing",
             "--explorer",
-            "random",
-            "--train",
-            "p",
-        ]),
-        &["--train", "`random` learns nothing"],
-    );
+            explorer,
+            "--policy",
+            file,
+        ];
+        refused(&place, &arguments, expected);
+    };
+    let random = ["--policy", "`random` plays no trained policy"];
+    run("random", "p.safetensors", &random);
+    run("maxmi", "nowhere.safetensors", &["nowhere.safetensors"]);
+    let broken = ["p.safetensors", "no safetensors file"];
+    run("max", "p.safetensors", &broken);
+    let train = [
+        "explore",
+        "rod-balancing",
+        "--explorer",
+        "random",
+        "--train",
+        "p",
+    ];
+    refused(&place, &train, &["--train", "`random` learns nothing"]);
 }
 
 #[cfg(not(feature = "torch"))]

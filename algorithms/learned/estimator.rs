@@ -103,6 +103,7 @@ pub struct Fitted {
 }
 
 /// Fits networks; a crate that can learn submits one through `inventory`.
+#[allow(clippy::type_complexity)] // its arguments are what it is
 pub struct EstimatorTrainer {
     /// Fits to the first dataset, and keeps the epoch that is best on the second.
     pub fit: fn(

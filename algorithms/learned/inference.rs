@@ -12,6 +12,8 @@
 //! nothing. Its logarithm less that of the prior, averaged over episodes, is a lower bound of the
 //! information that the episode has on the unknown (Barber and Agakov 2003).
 
+use std::f64::consts::LN_10;
+
 use asid_core::Parameter;
 use asid_core::rng::Rng;
 use rand::Rng as _;
@@ -21,7 +23,7 @@ use crate::file::{Tensor, Tensors};
 use crate::network::{Layer, Network};
 
 /// Smallest and largest logarithm of the deviation, prior-scaled: 0.001 and 10.
-pub const LOG_STD: [f64; 2] = [-6.907_755_278_982_137, 2.302_585_092_994_046];
+pub const LOG_STD: [f64; 2] = [-3.0 * LN_10, LN_10];
 
 /// Added to the second output, so that an untrained network has a deviation of 1.
 pub const OFFSET: f64 = 1.098_612_288_668_109_8;

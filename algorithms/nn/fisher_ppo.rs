@@ -34,6 +34,7 @@ fn train(problem: &Problem<'_>, settings: &Settings) -> Result<Training> {
 }
 
 #[cfg(test)]
+#[allow(clippy::field_reassign_with_default)] // nested settings read best one by one
 mod tests {
     use asid_core::Explorer as _;
     use asid_learned::learning::{Cache, events_of, obtain};

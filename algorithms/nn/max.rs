@@ -62,6 +62,9 @@ pub struct Round {
     pub steps: usize,
 }
 
+/// Writes the actions of the whole batch for its observations.
+type Act<'a> = &'a mut dyn FnMut(&[f64], &mut [f64]) -> Result<()>;
+
 /// All transitions with the states that imagination begins at.
 struct Experience {
     shape: Shape,
@@ -89,7 +92,7 @@ impl Experience {
         &mut self,
         world: &mut dyn BatchEnvironment,
         episodes: usize,
-        act: &mut dyn FnMut(&[f64], &mut [f64]) -> Result<()>,
+        act: Act<'_>,
     ) -> Result<()> {
         let (n, len) = (world.batch_size(), world.observation_len());
         let state = self.shape.state();

@@ -255,6 +255,7 @@ fn train(problem: &Problem<'_>, settings: &Settings) -> Result<Training> {
 const LATEST: usize = 512;
 
 #[cfg(test)]
+#[allow(clippy::field_reassign_with_default)] // nested settings read best one by one
 mod tests {
     use asid_core::Explorer as _;
     use asid_core::{RealWorld as _, SimulatedWorld, Streams};

@@ -79,6 +79,7 @@ fn train(problem: &Problem<'_>, settings: &Settings) -> Result<Training> {
 }
 
 #[cfg(test)]
+#[allow(clippy::field_reassign_with_default)] // nested settings read best one by one
 mod tests {
     use asid_core::BatchEnvironment as _;
     use asid_core::Transition;
