@@ -10,7 +10,7 @@ use asid_comparison::settings::{canonical, hash};
 use asid_core::registry::{self, AlgorithmEntry, Entry, TaskEntry, find};
 use asid_core::{Explorer, Identifier, Task, TaskSolver};
 
-use crate::cli::config::{Config, Stage};
+use crate::cli::config::{Config, Stage, difficulty};
 use crate::cli::options::{Algorithms, Common, Worlds};
 
 /// An arm with its resolved settings.
@@ -52,6 +52,8 @@ impl Arm {
         if key.world != MATCHED {
             common.set.push(format!("real.world={:?}", key.world));
         }
+        let levels = difficulty::levels(&*task, &common)?;
+        let task = difficulty::at(task, &levels)?;
         let resolve = |common: &Common| -> Result<Config> {
             let (algorithms, worlds) = (Algorithms::default(), Worlds::default());
             Ok(Config::resolve(Stage::Run, &*task, common, &algorithms, &worlds)?.0)
