@@ -42,7 +42,7 @@ impl Walk<'_> {
                     (at, loss) = (next, next_loss);
                 }
             }
-            if i >= WARM_UP && (i - WARM_UP) % THIN == 0 {
+            if i >= WARM_UP && (i - WARM_UP).is_multiple_of(THIN) {
                 out.push(at.clone());
             }
         }
