@@ -21,7 +21,7 @@ use crate::collect::{Dataset, collect};
 use crate::file::{Description, ObservationEntry, Saved, Tensors, write_atomically};
 use crate::history::History;
 use crate::inference::{Belief, Inference};
-use crate::learning::{Cache, TRAIN, events_of, from_program};
+use crate::learning::{Cache, SHIPPED, TRAIN, events_of, from_program, is_file};
 use crate::tensorboard::{Scalars, encode};
 
 /// Name of the identifier.
@@ -35,7 +35,7 @@ const NETWORK: &str = "estimator";
 #[serde(default, deny_unknown_fields)]
 pub struct Estimator {
     /// File of a trained network; empty for what ships for the task and the explorer, else trained
-    /// on the spot; `train` to train.
+    /// on the spot; `train` to train; `shipped` for what ships alone.
     pub network: String,
     /// The explorer whose episodes are learned from; estimators of one explorer's episodes know
     /// nothing of another's.
@@ -275,7 +275,7 @@ impl Estimator {
 
     /// The network from a file, from the program, or trained here and now.
     fn obtain(&self, problem: &Problem<'_>) -> Result<Arc<Saved>> {
-        if !self.network.is_empty() && self.network != TRAIN {
+        if is_file(&self.network) {
             let saved = Saved::load(Path::new(&self.network))?;
             return match self.misfit(problem, &saved)? {
                 None => Ok(Arc::new(saved)),
@@ -286,7 +286,7 @@ impl Estimator {
             };
         }
         let mut why = "training is asked for".to_owned();
-        if self.network.is_empty() {
+        if self.network != TRAIN {
             let name = shipped_name(&self.explorer);
             why = "none ships for this task and explorer".into();
             if let Some(saved) = from_program(problem.task.name(), &name)? {
@@ -301,7 +301,7 @@ impl Estimator {
         {
             return Ok(saved);
         }
-        if !can_train() {
+        if self.network == SHIPPED || !can_train() {
             return Err(self.missing(problem, &why));
         }
         let settings = problem.task.settings("explorer", &self.explorer);
@@ -317,8 +317,8 @@ impl Estimator {
         Error::Missing {
             what: format!("a trained estimator for `{task}` explored by `{explorer}`"),
             message: format!(
-                "{why}, and this build cannot train; name a file with --set identifier.network=FILE, or \
-                 `cargo xtask setup`, build with `--features torch`, and train one: \
+                "{why}; name a file with --set identifier.network=FILE, or train one with a build that can \
+                 (`cargo xtask setup`, `--features torch`): \
                  `asid identify {task} --identifier estimator --explorer {explorer} --train FILE`"
             ),
         }

@@ -17,6 +17,10 @@ use crate::tensorboard::{Scalars, encode};
 /// The value of the setting `policy` that trains anew, whatever ships.
 pub const TRAIN: &str = "train";
 
+/// The value of the setting `policy` that plays what ships and trains nothing: of a comparison,
+/// where every run would train by itself.
+pub const SHIPPED: &str = "shipped";
+
 /// Name of the tensor that holds the learning curve, `points x (x, mean, std)`.
 const CURVE: &str = "curve";
 
@@ -109,7 +113,7 @@ pub fn obtain<L: LearnedExplorer>(
     let observation = explorer.observation(problem)?;
     let misfit = |saved: &Saved| saved.misfit(L::NAME, problem, &observation);
     let policy = explorer.policy();
-    if !policy.is_empty() && policy != TRAIN {
+    if is_file(policy) {
         let saved = Saved::load(Path::new(policy))?;
         return match misfit(&saved) {
             None => Ok(Arc::new(saved)),
@@ -120,7 +124,7 @@ pub fn obtain<L: LearnedExplorer>(
         };
     }
     let mut refused = None;
-    if policy.is_empty() && has_own_settings(explorer, problem)? {
+    if policy != TRAIN && has_own_settings(explorer, problem)? {
         match from_program(problem.task.name(), L::NAME)? {
             Some(saved) => match misfit(&saved) {
                 None => return Ok(Arc::new(saved)),
@@ -132,7 +136,7 @@ pub fn obtain<L: LearnedExplorer>(
     if let Some(saved) = cache.get().filter(|s| misfit(s).is_none()) {
         return Ok(saved);
     }
-    if !can_train(L::NAME) {
+    if policy == SHIPPED || !can_train(L::NAME) {
         let why = refused.map_or_else(
             || "what ships is for the task's own settings".to_owned(),
             |why| format!("what ships for this task {why}"),
@@ -142,6 +146,11 @@ pub fn obtain<L: LearnedExplorer>(
     let saved = Arc::new(train(explorer, problem)?.0);
     cache.keep(&saved);
     Ok(saved)
+}
+
+/// Whether a setting names a file.
+pub(crate) fn is_file(setting: &str) -> bool {
+    !["", TRAIN, SHIPPED].contains(&setting)
 }
 
 /// What ships for a task under a name, read.
@@ -264,9 +273,8 @@ fn missing(task: &str, name: &str, why: &str) -> Error {
     Error::Missing {
         what: format!("a trained policy of `{name}` for `{task}`"),
         message: format!(
-            "{why}, and this build cannot train; name a file with --policy FILE (setting `policy`), or \
-             `cargo xtask setup`, build with `--features torch`, and train one: \
-             `asid explore {task} --explorer {name} --train FILE`"
+            "{why}; name a file with --policy FILE (setting `policy`), or train one with a build that can \
+             (`cargo xtask setup`, `--features torch`): `asid explore {task} --explorer {name} --train FILE`"
         ),
     }
 }

@@ -27,7 +27,8 @@ use crate::ppo_settings::PpoConfig;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Max {
-    /// File of a trained policy; empty for what ships, else trained on the spot; `train` to train.
+    /// File of a trained policy; empty for what ships, else trained on the spot; `train` to train;
+    /// `shipped` for what ships alone.
     pub policy: String,
     /// The policy of this round, counted from 1, is played; 0 for the last.
     pub play_round: usize,

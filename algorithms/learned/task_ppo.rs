@@ -22,7 +22,8 @@ use crate::ppo_settings::PpoConfig;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct TaskPpo {
-    /// File of a trained policy; empty for what ships, else trained on the spot; `train` to train.
+    /// File of a trained policy; empty for what ships, else trained on the spot; `train` to train;
+    /// `shipped` for what ships alone.
     pub policy: String,
     /// Episodes that are simulated at once.
     pub environments: usize,

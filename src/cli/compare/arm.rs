@@ -9,6 +9,7 @@ use asid_comparison::preset;
 use asid_comparison::settings::{canonical, hash};
 use asid_core::registry::{self, AlgorithmEntry, Entry, TaskEntry, find};
 use asid_core::{Explorer, Identifier, Task, TaskSolver};
+use asid_learned::learning::SHIPPED;
 
 use crate::cli::config::{Config, Stage, difficulty};
 use crate::cli::options::{Algorithms, Common, Worlds};
@@ -115,6 +116,21 @@ fn of_method(document: &Document, task: &dyn Task, method: &Method) -> toml::Tab
             .any(|k| k == "explorer")
     {
         put("identifier", "explorer", explorer);
+    }
+    // A run plays what was trained before: where nothing ships, no run trains for itself alone.
+    if let Some(explorer) = explorer
+        && known::<dyn Explorer>(task, "explorer", explorer)
+            .iter()
+            .any(|k| k == "policy")
+    {
+        put("explorer", "policy", SHIPPED);
+    }
+    if let Some(identifier) = identifier
+        && known::<dyn Identifier>(task, "identifier", identifier)
+            .iter()
+            .any(|k| k == "network")
+    {
+        put("identifier", "network", SHIPPED);
     }
     settings
 }

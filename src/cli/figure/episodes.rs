@@ -11,6 +11,7 @@ use asid_comparison::schedule;
 use asid_core::Error;
 use asid_core::real_world::{RealEpisode, RealWorld as _};
 use asid_core::registry::{ExplorerEntry, find};
+use asid_learned::learning::SHIPPED;
 
 use crate::cli::options::{Algorithms, Common, Worlds};
 use crate::cli::session::Session;
@@ -125,6 +126,15 @@ fn one(common: &Common, wanted: Wanted) -> Result<Played> {
     own.threads = Some(1);
     own.quiet = true;
     own.set.extend(wanted.set.iter().cloned());
+    let defaults = (find::<ExplorerEntry>(&wanted.explorer)?.defaults)();
+    let given = own
+        .set
+        .iter()
+        .any(|s| s.trim_start().starts_with("explorer.policy"));
+    // No episode trains for itself alone.
+    if defaults.contains_key("policy") && !given {
+        own.set.push(format!("explorer.policy={SHIPPED:?}"));
+    }
     let algorithms = Algorithms {
         explorer: Some(wanted.explorer.clone()),
         ..Algorithms::default()
