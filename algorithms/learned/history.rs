@@ -2,7 +2,9 @@
 //!
 //! The episode is cut at *marks*, the ends of its control steps and its start. Each mark has the
 //! place and the orientation of every tracked part, the end effector, and where it is seen from
-//! each part. What is missing or still to come is NaN and has a mask of 0, so that one network
+//! each part; the first reading of place, orientation and effector stands as it is, later ones as
+//! what has changed since. An object that was moved a centimetre tells of its physics, the decimetres
+//! between start poses do not, and inputs that are scaled by the latter would hide it. What is missing or still to come is NaN and has a mask of 0, so that one network
 //! takes episodes at any time and with any reading left out.
 
 use asid_core::layout::Recording;
@@ -170,8 +172,24 @@ impl History {
         for ((o, s), n) in out.iter_mut().zip(&sum).zip(&count) {
             *o = if *n > 0.0 { s / n } else { f64::NAN };
         }
+        self.subtract_first(history, mark);
         let masks = self.entries() + mark * self.tracked.len();
         history[masks..masks + seen.len()].copy_from_slice(&seen);
+    }
+
+    /// Makes the entries of a mark what has changed since the first mark that has them.
+    fn subtract_first(&self, history: &mut [f64], mark: usize) {
+        let (before, from) = history.split_at_mut(mark * self.entries);
+        let mut at = 0;
+        for part in &self.parts {
+            if !matches!(part, Part::Relative(..)) {
+                for (i, x) in from.iter_mut().enumerate().skip(at).take(part.len()) {
+                    let earlier = before.iter().skip(i).step_by(self.entries);
+                    *x -= earlier.copied().find(|x| x.is_finite()).unwrap_or(0.0);
+                }
+            }
+            at += part.len();
+        }
     }
 
     /// Makes the marks from `from` on unknown again.
@@ -225,13 +243,20 @@ mod tests {
             let mut other = row.clone();
             other[0] = 0.7;
             other[3..7].fill(f64::NAN);
-            history.write(&mut numbers, 1, &[row, other].concat());
+            history.write(&mut numbers, 1, &[row.clone(), other].concat());
             let mark = &numbers[15..30];
             assert!((mark[0] - 0.6).abs() < 1e-12 && (mark[3] + 0.2).abs() < 1e-12);
             assert_eq!(mark[6..12], [1.0, 0.0, 0.0, 0.0, 1.0, 0.0]);
             assert!(numbers[..15].iter().all(|x| x.is_nan()));
             let masks = &numbers[history.entries()..];
             assert_eq!(masks[..5], [0.0, 0.0, 1.0, 1.0, 0.0]);
+            // The next one holds what has changed, except for where the effector is seen from.
+            let mut later = row.clone();
+            later[0] += 0.15;
+            history.write(&mut numbers, 2, &later);
+            let mark = &numbers[30..45];
+            assert!((mark[0] - 0.05).abs() < 1e-12 && (mark[3] + 0.25).abs() < 1e-12);
+            assert_eq!(mark[6..12], [0.0; 6]);
             history.forget(&mut numbers, 1);
             assert!(numbers[..history.entries()].iter().all(|x| x.is_nan()));
             assert!(numbers[history.entries()..].iter().all(|&m| m == 0.0));

@@ -28,6 +28,7 @@ pub mod ppo;
 pub mod ppo_solver;
 #[cfg(test)]
 mod ppo_solver_tests;
+mod predictor;
 mod rollout;
 pub mod surrogate;
 mod task_ppo;

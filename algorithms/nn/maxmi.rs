@@ -4,7 +4,7 @@
 //! warm-up: episodes of random actions, the predictor learns from them
 //! repeat
 //!     episodes by the policy, each step paid by what the predictor gained    (PPO: rollout)
-//!     the predictor learns from the latest episodes, each cut at a random mark
+//!     the predictor learns from all episodes, each cut at a random mark  (predictor)
 //!     the policy learns                                                      (PPO: update)
 //! ```
 
@@ -18,15 +18,12 @@ use asid_learned::Layer;
 use asid_learned::history::History;
 use asid_learned::inference::Inference;
 use asid_learned::learning::{LearnedExplorer, Trainer, Training};
-use asid_learned::maxmi::{MaxMi, PREDICTOR, Predicting, PredictorSettings};
+use asid_learned::maxmi::{MaxMi, PREDICTOR, Predicting};
 use asid_learned::play::POLICY;
 use asid_learned::{Dataset, Network as Plain, Tensors};
-use rand::{Rng as _, SeedableRng};
-use rand_chacha::ChaCha8Rng;
-use tch::Tensor;
+use rand::Rng as _;
 
-use crate::estimator::keep;
-use crate::posterior_net::{PosteriorNet, Rows};
+use crate::predictor::Predictor;
 use crate::tracked::{Pay, TrackedEnvironment};
 use crate::training::learn_policy;
 
@@ -34,79 +31,12 @@ inventory::submit! {
     Trainer { algorithm: MaxMi::NAME, train }
 }
 
-/// The predictor with the episodes that it learns from.
-struct Predictor<'a> {
-    settings: &'a PredictorSettings,
-    parameters: &'a [Parameter],
-    memory: Dataset,
-    net: Option<PosteriorNet>,
-    rng: ChaCha8Rng,
-}
-
-impl Predictor<'_> {
-    /// Takes an episode in, and lets the oldest go.
-    fn remember(&mut self, history: &[f64], truth: &[f64]) {
-        self.memory.histories.extend_from_slice(history);
-        self.memory.truths.extend_from_slice(truth);
-    }
-
-    fn forget(&mut self) {
-        let over = self.memory.episodes().saturating_sub(self.settings.memory);
-        if over > 0 {
-            self.memory = self.memory.split(over).1;
-        }
-    }
-
-    /// Learns from the memory for some steps of Adam.
-    fn learn(&mut self, steps: usize) -> Result<Arc<Inference>> {
-        let settings = self.settings;
-        self.forget();
-        let rows = match &self.net {
-            Some(net) => net.rows(&self.memory),
-            None => {
-                // The scales of the inputs are those of the first episodes for good: the policy
-                // and the predictor are not to see them move.
-                let rates = (settings.learning_rate, 0.0);
-                let hidden = &settings.hidden;
-                let net =
-                    PosteriorNet::new(&self.memory, self.parameters, hidden, rates, &mut self.rng)?;
-                let rows = net.rows(&self.memory);
-                self.net = Some(net);
-                rows
-            }
-        };
-        let (n, marks) = (self.memory.episodes(), self.memory.marks);
-        let Some(net) = &mut self.net else {
-            return Err(asid_core::Error::Failed("no predictor".into()));
-        };
-        for _ in 0..steps {
-            let size = settings.minibatch.min(n);
-            let picked: Vec<i64> = (0..size)
-                .map(|_| self.rng.random_range(0..n as i64))
-                .collect();
-            let index = Tensor::from_slice(&picked);
-            let some = Rows {
-                input: rows.input.index_select(0, &index),
-                truth: rows.truth.index_select(0, &index),
-            };
-            // Each episode is shown up to a mark of its own.
-            let mut last = 0;
-            let keep = keep(size, marks, &mut self.rng, |rng, mark| {
-                if mark == 0 {
-                    last = rng.random_range(0..marks);
-                }
-                mark <= last
-            });
-            net.step(&some, Some(&keep));
-        }
-        Ok(Arc::new(net.plain()))
-    }
-}
-
 /// Pays for what a control step made the truth more likely.
 struct Gain<'a> {
     problem: &'a Problem<'a>,
     predictor: Predictor<'a>,
+    /// What the predictor claims, calibrated: what pays, and what the policy sees.
+    claims: Arc<Inference>,
     /// `log q - log prior` after the latest reading of each episode, nats.
     told: Vec<f64>,
     /// Of the latest whole episodes, each judged before the predictor learned from it: squared
@@ -152,10 +82,14 @@ impl Pay<Predicting> for Gain<'_> {
         while self.judged.len() > LATEST {
             self.judged.pop_front();
         }
-        let learned = self.predictor.learn(self.predictor.settings.steps)?;
+        if !self.predictor.is_warm() {
+            return Ok(());
+        }
+        let learned = self.predictor.learn()?;
         for sight in sights {
             sight.set_predictor(Arc::clone(&learned));
         }
+        self.claims = learned;
         Ok(())
     }
 }
@@ -189,20 +123,16 @@ fn environment<'a>(
         .map(|_| Predicting::new(problem, Arc::clone(&blank)))
         .collect::<Result<Vec<_>>>()?;
     let seed = problem.streams.stream("maxmi predictor").random();
+    let shape = Dataset {
+        len: history.len(),
+        entries: history.entries(),
+        marks: history.marks(),
+        ..Dataset::default()
+    };
     let pay = Gain {
         problem,
-        predictor: Predictor {
-            settings: &explorer.predictor,
-            parameters: problem.parameters,
-            memory: Dataset {
-                len: history.len(),
-                entries: history.entries(),
-                marks: history.marks(),
-                ..Dataset::default()
-            },
-            net: None,
-            rng: ChaCha8Rng::seed_from_u64(seed),
-        },
+        predictor: Predictor::new(&explorer.predictor, problem.parameters, &shape, seed),
+        claims: blank,
         told: vec![0.0; n],
         judged: VecDeque::new(),
     };
@@ -237,9 +167,7 @@ fn train(problem: &Problem<'_>, settings: &Settings) -> Result<Training> {
         ("predictor_error_over_prior", (sum(0) / sum(1)).sqrt()),
         ("predictor_nats", sum(2) / judged.len() as f64),
     ];
-    if let Some(net) = &environment.pay.predictor.net {
-        net.plain().to_tensors(PREDICTOR, &mut tensors);
-    }
+    environment.pay.claims.to_tensors(PREDICTOR, &mut tensors);
     Ok(Training {
         tensors,
         observation,
@@ -260,7 +188,6 @@ mod tests {
     use asid_core::Explorer as _;
     use asid_core::{RealWorld as _, SimulatedWorld, Streams};
     use asid_learned::Saved;
-    use asid_learned::estimator::score;
     use asid_learned::learning::{Cache, obtain};
 
     use super::*;
@@ -331,76 +258,5 @@ mod tests {
                 assert!((total[e] - gained).abs() < 1e-9, "{total:?}");
             }
         });
-    }
-
-    /// Readings of the unknown with noise that shrinks from mark to mark: the predictor's error on
-    /// new episodes is below half of that of the prior's mean at the end, and the more it has seen
-    /// the less it is.
-    #[test]
-    fn the_predictor_beats_the_priors_mean_by_a_factor() {
-        let prior = Parameter {
-            name: "p".into(),
-            targets: vec!["geom/a/friction/0".parse().unwrap()],
-            range: [0.0, 1.0],
-            scale: asid_core::parameter::Scale::Linear,
-            unit: String::new(),
-        };
-        let parameters = [prior];
-        let settings = PredictorSettings {
-            hidden: vec![32],
-            ..PredictorSettings::default()
-        };
-        let (marks, mut rng) = (5, Streams::new(5).stream("toy"));
-        let mut episode = || {
-            let z = parameters[0].to_scaled(parameters[0].sample(&mut rng));
-            let mut history: Vec<f64> = (0..marks)
-                .map(|k| z + (2.0 - 0.4 * k as f64) * rng.random_range(-1.0..1.0))
-                .collect();
-            history.resize(2 * marks, 1.0);
-            (history, z)
-        };
-        let mut predictor = Predictor {
-            settings: &settings,
-            parameters: &parameters,
-            memory: Dataset {
-                len: 2 * marks,
-                entries: marks,
-                marks,
-                ..Dataset::default()
-            },
-            net: None,
-            rng: ChaCha8Rng::seed_from_u64(1),
-        };
-        let mut inference = None;
-        for _ in 0..20 {
-            for _ in 0..64 {
-                let (history, z) = episode();
-                predictor.remember(&history, &[z]);
-            }
-            inference = Some(predictor.learn(60).unwrap());
-        }
-        let inference = inference.unwrap();
-        let mut errors = Vec::new();
-        let fresh: Vec<_> = (0..500).map(|_| episode()).collect();
-        for shown in [1, 3, 5] {
-            let mut data = Dataset {
-                len: 2 * marks,
-                entries: marks,
-                marks,
-                ..Dataset::default()
-            };
-            for (history, z) in &fresh {
-                let mut history = history.clone();
-                history[shown..marks].fill(f64::NAN);
-                history[marks + shown..].fill(0.0);
-                data.histories.extend(history);
-                data.truths.push(*z);
-            }
-            errors.push(score(&inference, &data, 0, 1).error_over_prior);
-        }
-        assert!(
-            errors[2] < 0.5 && errors.is_sorted_by(|a, b| a > b),
-            "{errors:?}"
-        );
     }
 }

@@ -28,7 +28,7 @@ pub struct PosteriorNet {
     network: Network,
     optimiser: Optimizer,
     /// Owns the parameters.
-    _store: VarStore,
+    store: VarStore,
     scales: (Vec<f32>, Vec<f32>),
     marks: usize,
     parameters: Vec<Parameter>,
@@ -60,7 +60,7 @@ impl PosteriorNet {
         Ok(Self {
             network,
             optimiser,
-            _store: store,
+            store,
             scales: Inference::scales(&data.histories, data.len, data.entries),
             marks: data.marks,
             parameters: parameters.to_vec(),
@@ -80,6 +80,21 @@ impl PosteriorNet {
             input: columns(&input, data.len),
             truth: columns(&truth, self.parameters.len()),
         }
+    }
+
+    /// A copy of all weights, for [`Self::set_weights`].
+    pub fn weights(&self) -> Vec<Tensor> {
+        let all = self.store.trainable_variables();
+        all.iter().map(|t| t.detach().copy()).collect()
+    }
+
+    /// Goes back to weights that it had.
+    pub fn set_weights(&mut self, weights: &[Tensor]) {
+        tch::no_grad(|| {
+            for (mut t, kept) in self.store.trainable_variables().into_iter().zip(weights) {
+                t.copy_(kept);
+            }
+        });
     }
 
     /// Sets the step size.
