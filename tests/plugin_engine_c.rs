@@ -249,6 +249,7 @@ fn a_task_runs_on_an_engine_in_c_as_on_another() {
     build("plugins/mechanism-c", &sources, &library);
     let task = plugin_support::build(&["payload-swing"]).swap_remove(0);
     let mut arguments = vec!["run", "payload-swing", "--seed", "1", "--quiet"];
+    arguments.extend(["--set", "condition=\"light\""]);
     arguments.extend(["--out", "out", "--backend", "mechanism"]);
     // The truth is a world of another engine, so both must be right.
     arguments.extend(["--real-backend", "rapier"]);
@@ -262,8 +263,8 @@ fn a_task_runs_on_an_engine_in_c_as_on_another() {
     assert_eq!(result["versions"]["engine"], "mechanism 1.0");
     let mass = &result["parameters"][0];
     let error = mass["estimate"].as_f64().unwrap() - mass["truth"].as_f64().unwrap();
-    // 0.01 rad of noise leave 1.2 g of deviation; three times that.
-    assert!(error.abs() < 3.6e-3, "{mass}");
+    // 0.01 rad of noise leave 1.4 g of deviation; three times that.
+    assert!(error.abs() < 4.2e-3, "{mass}");
     assert_eq!(result["downstream"]["success"], true, "{result}");
 }
 

@@ -59,9 +59,11 @@ fn the_list_tells_where_everything_comes_from() {
 #[test]
 fn a_loaded_task_runs_like_a_built_in_one_and_its_settings_repeat_the_run() {
     let place = Workplace::new();
+    // A truth of the task's own: at the light end of the prior the peak hangs on the damping.
     let run = ["run", "payload-swing", "--seed", "1", "--quiet", "--out"];
+    let light = ["--set", "condition=\"light\""];
     let plugin = ["--plugin", text(&LIBRARIES[0])];
-    done(place.run(&[&run[..], &["a"], &plugin[..], &QUICK].concat()));
+    done(place.run(&[&run[..], &["a"], &plugin[..], &light, &QUICK].concat()));
     let result: Value = serde_json::from_str(&place.read("a/result.json")).unwrap();
     let mass = &result["parameters"][0];
     let [estimate, truth] = ["estimate", "truth"].map(|key| mass[key].as_f64().unwrap());

@@ -31,34 +31,14 @@ pub struct EpisodeInformation {
     pub trace: f64,
 }
 
-/// Information of an episode with these actions (`horizon x action`) at `theta` and `start`.
-///
-/// Rewards, `a_optimality`, `log_det` and `trace` are what `settings` say, as an explorer is paid.
-/// Expected deviations are those of [`expected_deviation`] where the settings ask for what identification sees
-/// (trajectory form, start pose estimated along, roughness counted), and follow from the rewards'
-/// information where they do not, and for binary unknowns.
+/// Information of an episode with these actions (`horizon x action`) at `theta` and `start`, all of it as
+/// an explorer with these settings is paid.
 ///
 /// # Errors
 /// When the engine fails.
 pub fn episode_information(
     problem: &Problem<'_>,
     settings: &FisherSettings,
-    theta: &[f64],
-    start: &[f64],
-    actions: &[f64],
-) -> Result<EpisodeInformation> {
-    let expected = ExpectedSettings::default();
-    episode_information_as(problem, settings, &expected, theta, start, actions)
-}
-
-/// [`episode_information`] with the noise model of an identifier.
-///
-/// # Errors
-/// When the engine fails.
-pub fn episode_information_as(
-    problem: &Problem<'_>,
-    settings: &FisherSettings,
-    expected: &ExpectedSettings,
     theta: &[f64],
     start: &[f64],
     actions: &[f64],
@@ -89,6 +69,24 @@ pub fn episode_information_as(
     out.a_optimality = information.a_optimality();
     out.log_det = information.log_det();
     out.trace = information.trace();
+    Ok(out)
+}
+
+/// [`episode_information`] whose expected deviations are those of [`expected_deviation`], with the noise
+/// model of an identifier, where the settings ask for what identification sees (trajectory form, start
+/// pose estimated along, roughness counted). Of binary unknowns they follow from the information.
+///
+/// # Errors
+/// When the engine fails.
+pub fn episode_information_as(
+    problem: &Problem<'_>,
+    settings: &FisherSettings,
+    expected: &ExpectedSettings,
+    theta: &[f64],
+    start: &[f64],
+    actions: &[f64],
+) -> Result<EpisodeInformation> {
+    let mut out = episode_information(problem, settings, theta, start, actions)?;
     let as_identified =
         settings.form == Form::Trajectory && settings.nuisance && settings.roughness;
     if as_identified
