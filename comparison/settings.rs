@@ -91,7 +91,7 @@ pub fn hash(canonical: &toml::Table) -> (String, String) {
     (digest(text.as_bytes()), text)
 }
 
-/// The first [`DIGITS`] hexadecimal digits of SHA-256.
+/// The first `DIGITS` hexadecimal digits of SHA-256.
 #[must_use]
 pub fn digest(bytes: &[u8]) -> String {
     let all: String = Sha256::digest(bytes)

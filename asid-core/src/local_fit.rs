@@ -26,7 +26,7 @@ const FREEDOM: usize = 8;
 /// Pairs at least: their slopes have the luck of a regression on 64 draws, an identifier's default.
 const PAIRS: usize = 32;
 
-/// Sets of pairs for `n` entries: enough for the quadratic terms and [`FREEDOM`] more.
+/// Sets of pairs for `n` entries: enough for the quadratic terms and `FREEDOM` more.
 #[must_use]
 pub fn sets(n: usize) -> usize {
     let features = 1 + n * (n + 1) / 2;
