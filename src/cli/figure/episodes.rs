@@ -33,6 +33,28 @@ pub struct Wanted {
     pub start: Option<Vec<f64>>,
 }
 
+/// The same episodes of each explorer: seeds from `first` on, starts drawn by them.
+pub fn of_each(
+    task: &str,
+    explorers: &[String],
+    set: &[&str],
+    first: u64,
+    episodes: u64,
+) -> Vec<Wanted> {
+    let one = |explorer: &String, seed| Wanted {
+        task: task.to_owned(),
+        explorer: explorer.clone(),
+        set: set.iter().map(|&s| s.to_owned()).collect(),
+        effects: Vec::new(),
+        seed,
+        start: None,
+    };
+    explorers
+        .iter()
+        .flat_map(|explorer| (first..first + episodes).map(move |seed| one(explorer, seed)))
+        .collect()
+}
+
 /// An episode that was played.
 pub struct Played {
     /// What was wanted.

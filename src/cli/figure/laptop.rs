@@ -4,7 +4,7 @@ use anyhow::Result;
 use asid_core::signal::rotation_difference;
 use asid_report::plot::{Colour, Outline};
 
-use super::episodes::{Played, Wanted, play};
+use super::episodes::{Played, of_each, play};
 use super::map::with_fixtures;
 use super::{Claim, Data, Drawing, Request, share, task};
 
@@ -22,18 +22,15 @@ pub fn draw(request: &Request) -> Result<Drawing> {
     let episodes = request
         .episodes
         .unwrap_or(if request.quick { 4 } else { EPISODES });
-    let wanted = explorers.iter().flat_map(|explorer| {
-        (0..episodes).map(|k| Wanted {
-            task: TASK.into(),
-            explorer: explorer.clone(),
-            // The paper evaluates with a lid that turns.
-            set: vec!["condition=\"articulated\"".into()],
-            effects: Vec::new(),
-            seed: request.seed() + k,
-            start: None,
-        })
-    });
-    let played = play(&request.common, wanted.collect())?;
+    // The paper evaluates with a lid that turns.
+    let wanted = of_each(
+        TASK,
+        &explorers,
+        &["condition=\"articulated\""],
+        request.seed(),
+        episodes,
+    );
+    let played = play(&request.common, wanted)?;
     let mut drawing = Drawing {
         title: "How often the lid is moved".into(),
         lead: format!(

@@ -5,7 +5,7 @@ use anyhow::Result;
 use asid_core::task::Outline;
 use asid_report::plot::Colour;
 
-use super::episodes::{Played, Wanted, play};
+use super::episodes::{Played, of_each, play};
 use super::map::{Grid, with_fixtures};
 use super::{Claim, Data, Drawing, Request, mean, share, task};
 
@@ -26,17 +26,8 @@ pub fn draw(request: &Request) -> Result<Drawing> {
     let episodes = request
         .episodes
         .unwrap_or(if request.quick { 4 } else { EPISODES });
-    let wanted = explorers.iter().flat_map(|explorer| {
-        (0..episodes).map(|k| Wanted {
-            task: TASK.into(),
-            explorer: explorer.clone(),
-            set: Vec::new(),
-            effects: Vec::new(),
-            seed: request.seed() + k,
-            start: None,
-        })
-    });
-    let played = play(&request.common, wanted.collect())?;
+    let wanted = of_each(TASK, &explorers, &[], request.seed(), episodes);
+    let played = play(&request.common, wanted)?;
     let grid = Grid::over(task.top_view().bounds, SIDE);
     let regions = task.regions();
     let mut drawing = Drawing {
