@@ -1,0 +1,99 @@
+//! Rows of a few cells, by hand.
+
+use super::*;
+use crate::cell::tests::{cell, key};
+use crate::plan::tests::plan;
+
+/// Values of a method under a condition, seeds from 0; success below 5.
+fn cells(condition: &str, method: &str, values: &[f64]) -> Vec<Cell> {
+    let of = values.iter().zip(0..);
+    of.map(|(&v, seed)| cell(key("t", condition, method, seed), v, v < 5.0))
+        .collect()
+}
+
+fn summed(cells: &[Cell]) -> ComparisonResult {
+    summarise(&plan(), cells, &[], &|_| None)
+}
+
+#[test]
+fn the_best_is_marked_only_where_its_interval_is_apart() {
+    let result = summed(
+        &[
+            cells("x", "asid", &[0.0; 10]),
+            cells(
+                "x",
+                "random",
+                &[8.0, 9.0, 30.0, 8.5, 9.5, 12.0, 11.0, 14.0, 20.0, 9.0],
+            ),
+            cells("x", "oracle", &[0.0; 10]),
+        ]
+        .concat(),
+    );
+    let [asid, random, oracle] = &*result.rows else {
+        panic!("{}", result.rows.len());
+    };
+    assert!(asid.summary.best.iqm && asid.summary.best.success);
+    assert!(!random.summary.best.iqm && !oracle.summary.best.iqm);
+    let better = asid.summary.improvement.as_ref().unwrap();
+    assert_eq!((&*better.over, better.probability), ("random", 1.0));
+    assert!(random.summary.improvement.is_none() && oracle.summary.improvement.is_none());
+    // Five runs are too few for their spread to say anything.
+    let few = [cells("x", "asid", &[0.0; 5]), cells("x", "dr", &[9.0; 5])];
+    assert!(!summed(&few.concat()).rows[0].summary.best.iqm);
+    // Two alike: neither is best.
+    let alike = summed(&[cells("x", "asid", &[0.0; 3]), cells("x", "dr", &[0.0; 3])].concat());
+    assert!(alike.rows.iter().all(|r| r.summary.best == Best::default()));
+}
+
+#[test]
+fn fewer_runs_and_other_budgets_are_said_of_a_row() {
+    let mut all = [
+        cells("x", "asid", &[0.0; 3]),
+        cells("x", "random", &[1.0; 3]),
+        cells("x", "dr", &[9.0; 2]),
+    ]
+    .concat();
+    all[3..6].iter_mut().for_each(|c| c.settings = "1".into());
+    let settings = |hash: &str| {
+        let iterations = if hash == "1" { 3 } else { 4 };
+        let text = format!("[solver]\nname = 'cem'\niterations = {iterations}");
+        text.parse().ok()
+    };
+    let result = summarise(&plan(), &all, &[], &settings);
+    assert!(result.rows[0].differs.is_empty());
+    assert_eq!(result.rows[1].differs, ["solver.iterations = 3, of asid 4"]);
+    assert_eq!(result.rows[2].differs, ["2 runs, others 3"]);
+}
+
+#[test]
+fn conditions_are_pooled_as_strata_where_a_method_has_them_all() {
+    let all = [
+        cells("x", "asid", &[0.0, 0.1]),
+        cells("y", "asid", &[100.0, 100.1]),
+        cells("x", "dr", &[1.0, 1.1]),
+    ]
+    .concat();
+    let result = summed(&all);
+    let [pooled] = &*result.pooled else {
+        panic!("{}", result.pooled.len());
+    };
+    assert_eq!((pooled.summary.n, pooled.conditions.len()), (4, 2));
+    let [low, high] = pooled.summary.interval95;
+    assert!(high - low < 0.2, "{low} {high}");
+}
+
+#[test]
+fn a_method_that_cannot_be_run_is_told_once_with_the_reason() {
+    let why = |seed, of_all| Failure {
+        key: key("t", "x", "maxmi", seed),
+        reason: "no policy".into(),
+        of_all,
+    };
+    let run = cells("x", "dr", &[1.0]);
+    let result = summarise(&plan(), &run, &[why(0, true), why(1, true)], &|_| None);
+    assert_eq!(result.omitted.len(), 1);
+    assert_eq!(result.omitted[0].reason, "no policy");
+    assert!(result.failures.is_empty());
+    let result = summarise(&plan(), &run, &[why(0, false)], &|_| None);
+    assert!(result.omitted.is_empty() && result.failures.len() == 1);
+}
