@@ -23,7 +23,8 @@ pub struct ExpectedSettings {
     /// Whether readings are weighed by how roughness runs along the episode, as
     /// `identifier.sampling.correlated` has it, or by its size alone.
     pub correlated: bool,
-    /// Fits, each over the region that the one before found.
+    /// Fits, each over the region that the one before found: on the shuffleboard, where it takes longest, the
+    /// deviation stays within a third of itself from the seventh on.
     pub rounds: usize,
     /// Deviations of a region in units of the posterior's, as an identifier's.
     pub widen: f64,
@@ -33,16 +34,17 @@ impl Default for ExpectedSettings {
     fn default() -> Self {
         Self {
             correlated: false,
-            rounds: 5,
+            rounds: 7,
             widen: 2.0,
         }
     }
 }
 
 /// Half the first step of an unknown, in prior deviations, and of a start coordinate, in deviations of
-/// its range. Smaller than what most episodes leave of the prior: a region that is too narrow widens at
-/// once, one that is too wide holds other contacts, whose roughness keeps it wide for rounds.
-const FIRST: [f64; 2] = [0.1, 0.02];
+/// its range: those of [`crate::fisher`]. Wider than what most episodes leave of the prior, as an
+/// identifier's first region is: in one that is too narrow the simulator may be smooth by chance, and the
+/// regions stay there.
+const FIRST: [f64; 2] = [0.3, 0.02];
 
 /// Largest half step of a start coordinate, in deviations of its range.
 const START_REACH: f64 = 0.5;
@@ -78,10 +80,10 @@ pub fn expected_deviation(
         let Some(found) = episode.fit(&factor, &points)? else {
             return Ok(None);
         };
-        let Some(told) = found.told(settings.correlated) else {
+        let Some(told) = found.emulated(settings.correlated, d) else {
             return Ok(None);
         };
-        let covariance = inverse_above_prior(&(told.information + DMatrix::identity(n, n)));
+        let covariance = inverse_above_prior(&(told + DMatrix::identity(n, n)));
         fit = Some(found);
         let Some(root) = covariance.cholesky() else {
             break;
@@ -108,10 +110,10 @@ pub fn expected_deviation(
             None
         } else {
             fit.first(episode.readings_after(h))
-                .told(settings.correlated)
+                .emulated(settings.correlated, d)
         };
         let prior = DMatrix::identity(n, n);
-        let total = told.map_or_else(|| prior.clone(), |t| t.information + &prior);
+        let total = told.map_or_else(|| prior.clone(), |t| t + &prior);
         out.push(episode.deviations(theta, &inverse_above_prior(&total)));
     }
     Ok(Some(out))

@@ -11,13 +11,14 @@
 //! by their noise and roughness, give the curvature `H = J^T P J` and the information `H M^-1 H`, `M = J^T P (1 + R)
 //! P J` with the roughness' whole covariance `R`, direction by direction. What the luck in `J` itself adds
 //! to `H`, `2 tr(P R) (U^T U)^-1` for steps `U`, is taken out; in `M` it stays, since an estimate by
-//! these slopes has it. It is the noise model of identification by emulation, so that what an episode is
-//! expected to tell and what it then tells can be compared.
+//! these slopes has it ([`LocalFit::told`]). Identification by emulation does without that: it takes slopes for
+//! what they are fitted to be and divides by the largest inflation of an unknown's variance. What an
+//! episode is expected to tell it comes the same way ([`LocalFit::emulated`]), so that both agree.
 
 use nalgebra::{DMatrix, DVector};
 use rand_distr::{Distribution, StandardNormal};
 
-use crate::precision::Precision;
+use crate::precision::{Precision, inflation};
 use crate::rng::Rng;
 
 /// Degrees of freedom that the roughness is left at least.
@@ -197,41 +198,73 @@ impl LocalFit {
         if correlated {
             precision = Precision::correlated(&self.luck, self.freedom);
             curvature = self.curvature(&precision, &self.luck, self.freedom);
-            // A covariance says nothing of the luck that it was made of: each half is asked of
-            // the other.
-            let share = self.freedom / self.luck.nrows() as f64;
-            let half = |k: usize| {
-                let rows: Vec<usize> = (k..self.luck.nrows()).step_by(2).collect();
-                self.luck.select_rows(&rows)
-            };
-            let halves = [half(0), half(1)];
+            let [one, other] = self.halves();
             let asked_of = |weighing: &DMatrix<f64>, asked: &DMatrix<f64>| {
-                let by = Precision::correlated(weighing, share * weighing.nrows() as f64);
-                let freedom = share * asked.nrows() as f64;
-                let h = self.curvature(&by, asked, freedom);
-                self.sandwich(&by, &h, asked, freedom)
+                let by = Precision::correlated(weighing, self.freedom_of(weighing));
+                let h = self.curvature(&by, asked, self.freedom_of(asked));
+                self.sandwich(&by, &h, asked, self.freedom_of(asked))
             };
-            information =
-                (asked_of(&halves[0], &halves[1])? + asked_of(&halves[1], &halves[0])?) * 0.5;
+            information = (asked_of(&one, &other)? + asked_of(&other, &one)?) * 0.5;
         } else {
-            let spread = DVector::from_fn(self.luck.ncols(), |k, _| {
-                self.luck.column(k).norm_squared() / self.freedom
-            });
-            precision = Precision::diagonal(&spread);
+            precision = Precision::diagonal(&self.spread());
             curvature = self.curvature(&precision, &self.luck, self.freedom);
             information = self.sandwich(&precision, &curvature, &self.luck, self.freedom)?;
         }
-        let lower = self.factor.transpose();
-        let outside = |x: DMatrix<f64>| {
-            let half = lower.solve_upper_triangular(&x)?;
-            let whole = lower.solve_upper_triangular(&half.transpose())?;
-            Some((&whole + whole.transpose()) * 0.5)
-        };
         Some(Told {
-            information: outside(information)?,
-            curvature: outside(curvature)?,
+            information: self.outside(&information)?,
+            curvature: self.outside(&curvature)?,
             precision,
         })
+    }
+
+    /// Information, entries x entries, as an identification by emulation sees it; the first `sought` entries
+    /// are the unknowns.
+    #[must_use]
+    pub fn emulated(&self, correlated: bool, sought: usize) -> Option<DMatrix<f64>> {
+        let columns = self.slopes.transpose();
+        let (precision, inflated);
+        if correlated {
+            precision = Precision::correlated(&self.luck, self.freedom);
+            let [one, other] = self.halves();
+            let of = |weighing: &DMatrix<f64>, asked: &DMatrix<f64>| {
+                let by = Precision::correlated(weighing, self.freedom_of(weighing));
+                inflation(&by, &columns, asked, self.freedom_of(asked), sought)
+            };
+            inflated = 0.5 * (of(&one, &other)? + of(&other, &one)?);
+        } else {
+            precision = Precision::diagonal(&self.spread());
+            inflated = inflation(&precision, &columns, &self.luck, self.freedom, sought)?;
+        }
+        self.outside(&(precision.weigh(&self.slopes) * columns / inflated))
+    }
+
+    /// Variance of the roughness of each reading.
+    fn spread(&self) -> DVector<f64> {
+        DVector::from_fn(self.luck.ncols(), |k, _| {
+            self.luck.column(k).norm_squared() / self.freedom
+        })
+    }
+
+    /// Every other row of the luck. A covariance says nothing of the luck that it was made of: each
+    /// half is asked of the other.
+    fn halves(&self) -> [DMatrix<f64>; 2] {
+        [0, 1].map(|k| {
+            let rows: Vec<usize> = (k..self.luck.nrows()).step_by(2).collect();
+            self.luck.select_rows(&rows)
+        })
+    }
+
+    /// Degrees of freedom of some of the luck's rows.
+    fn freedom_of(&self, rows: &DMatrix<f64>) -> f64 {
+        self.freedom * rows.nrows() as f64 / self.luck.nrows() as f64
+    }
+
+    /// A form along the columns of the factor in the entries' own coordinates.
+    fn outside(&self, form: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+        let lower = self.factor.transpose();
+        let half = lower.solve_upper_triangular(form)?;
+        let whole = lower.solve_upper_triangular(&half.transpose())?;
+        Some((&whole + whole.transpose()) * 0.5)
     }
 
     /// `J^T P J` along the columns of the factor, less what luck of this spread in the slopes adds, and not below

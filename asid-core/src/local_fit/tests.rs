@@ -54,6 +54,8 @@ fn a_quadratic_is_fitted_exactly() {
         let told = fit.told(correlated).unwrap();
         let error = told.information - &wanted * wanted.transpose();
         assert!(error.norm() < 1e-6, "{error}");
+        let emulated = fit.emulated(correlated, 2).unwrap();
+        assert!((emulated - &wanted * wanted.transpose()).norm() < 1e-6);
     }
 }
 
