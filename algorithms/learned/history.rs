@@ -8,6 +8,7 @@
 //! takes episodes at any time and with any reading left out.
 
 use asid_core::layout::Recording;
+use asid_core::nalgebra::{Matrix3, Vector3};
 use asid_core::signal::unit_quaternion;
 use asid_core::{Episode, Problem, Result};
 
@@ -190,6 +191,38 @@ impl History {
             }
             at += part.len();
         }
+        self.turn(history, mark);
+    }
+
+    /// Turns what has changed, and where the effector is seen from, into the frame of the first
+    /// orientation of the first part: what an object does when it is pushed does not depend on how
+    /// it lies. Without a first orientation the frame is the world's.
+    fn turn(&self, history: &mut [f64], mark: usize) {
+        let starts = self.parts.iter().scan(0, |at, part| {
+            let start = *at;
+            *at += part.len();
+            Some((part, start))
+        });
+        let starts: Vec<_> = starts.collect();
+        let Some((_, at)) = starts.iter().find(|p| matches!(p.0, Part::Rotation(_))) else {
+            return;
+        };
+        let column = |i: usize| Vector3::from_column_slice(&history[at + 3 * i..][..3]);
+        let x = column(0).normalize();
+        let z = x.cross(&column(1)).normalize();
+        let frame = Matrix3::from_columns(&[x, z.cross(&x), z]).transpose();
+        if frame.iter().any(|x| !x.is_finite()) {
+            return;
+        }
+        for (part, start) in starts {
+            if part.len() % 3 == 0 && (mark > 0 || matches!(part, Part::Relative(..))) {
+                let from = mark * self.entries + start;
+                for vector in history[from..from + part.len()].chunks_exact_mut(3) {
+                    let turned = frame * Vector3::from_column_slice(vector);
+                    vector.copy_from_slice(turned.as_slice());
+                }
+            }
+        }
     }
 
     /// Makes the marks from `from` on unknown again.
@@ -260,6 +293,33 @@ mod tests {
             history.forget(&mut numbers, 1);
             assert!(numbers[..history.entries()].iter().all(|x| x.is_nan()));
             assert!(numbers[history.entries()..].iter().all(|&m| m == 0.0));
+        });
+    }
+
+    /// An episode that is turned about the vertical, its object and its hand alike, has the same
+    /// history after its first mark.
+    #[test]
+    fn a_turned_episode_tells_the_same() {
+        with_problem("rod-balancing", |problem| {
+            let history = History::new(problem).unwrap();
+            let of = |yaw: f64| {
+                let turn = asid_core::nalgebra::Rotation3::from_axis_angle(&Vector3::z_axis(), yaw);
+                let mut numbers = history.blank();
+                for (mark, angle) in [0.4, 0.9].into_iter().enumerate() {
+                    let place = turn * Vector3::new(0.1 * angle, 0.2, 0.0);
+                    let hand = turn * Vector3::new(0.3, angle, 0.1);
+                    let (sin, cos) = (0.5 * (angle + yaw)).sin_cos();
+                    let mut row = vec![0.0; history.width];
+                    row[..3].copy_from_slice(place.as_slice());
+                    row[3..7].copy_from_slice(&[cos, 0.0, 0.0, sin]);
+                    row[7..10].copy_from_slice(hand.as_slice());
+                    history.write(&mut numbers, mark, &row);
+                }
+                numbers[15..30].to_vec()
+            };
+            for (a, b) in of(0.0).iter().zip(of(1.3)) {
+                assert!((a - b).abs() < 1e-12, "{a} {b}");
+            }
         });
     }
 }
