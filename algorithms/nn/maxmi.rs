@@ -18,7 +18,7 @@ use asid_learned::Layer;
 use asid_learned::history::History;
 use asid_learned::inference::Inference;
 use asid_learned::learning::{LearnedExplorer, Trainer, Training};
-use asid_learned::maxmi::{MaxMi, PREDICTOR, Predicting};
+use asid_learned::maxmi::{MaxMi, PREDICTOR, Predicting, PredictorSettings};
 use asid_learned::play::POLICY;
 use asid_learned::{Dataset, Network as Plain, Tensors};
 use rand::Rng as _;
@@ -138,17 +138,39 @@ fn environment<'a>(
     };
     let mut environment =
         TrackedEnvironment::new(problem, sights, observation_len, pay, "maxmi episodes")?;
-    let mut rng = problem.streams.stream("maxmi warm-up");
-    let mut transition = Transition::new(n, observation_len);
-    environment.reset(&mut transition.observation)?;
-    let horizon = problem.task.exploration().horizon;
-    for _ in 0..explorer.predictor.warm_up.div_ceil(n) * horizon {
-        let actions: Vec<f64> = (0..n * environment.action_len())
-            .map(|_| rng.random_range(-1.0..=1.0))
-            .collect();
-        environment.step(&actions, &mut transition)?;
-    }
+    warm_up(problem, &mut environment, &explorer.predictor)?;
     Ok(environment)
+}
+
+/// Episodes of random actions, each held for a random number of control steps.
+fn warm_up(
+    problem: &Problem<'_>,
+    environment: &mut dyn BatchEnvironment,
+    settings: &PredictorSettings,
+) -> Result<()> {
+    let (n, len) = (environment.batch_size(), environment.action_len());
+    let horizon = problem.task.exploration().horizon;
+    let mut rng = problem.streams.stream("maxmi warm-up");
+    let mut transition = Transition::new(n, environment.observation_len());
+    environment.reset(&mut transition.observation)?;
+    let batches = settings.warm_up.div_ceil(n);
+    problem
+        .progress
+        .begin("explore: random episodes", batches as u64);
+    for _ in 0..batches {
+        let mut actions = vec![0.0; n * len];
+        for step in 0..horizon {
+            for action in actions.chunks_exact_mut(len) {
+                if step == 0 || rng.random_range(0.0..settings.hold) < 1.0 {
+                    action.fill_with(|| rng.random_range(-1.0..=1.0));
+                }
+            }
+            environment.step(&actions, &mut transition)?;
+        }
+        problem.progress.advance(1);
+    }
+    problem.progress.end();
+    Ok(())
 }
 
 fn train(problem: &Problem<'_>, settings: &Settings) -> Result<Training> {
