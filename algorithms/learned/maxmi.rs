@@ -63,12 +63,10 @@ pub struct PredictorSettings {
     /// Latest held-out episodes that do so: late ones, because they are like what comes next; 512
     /// know the mean information to about 0.03 nats.
     pub judges: usize,
-    /// Episodes of random actions before the policy learns. A predictor that knows nothing pays
-    /// nothing, and then no policy learns: so many that some hundreds of them move the object.
+    /// First episodes, whose control steps are paid if a tracked part was seen to move. A predictor
+    /// that knows nothing pays nothing, and actions at random seldom touch an object: neither the
+    /// policy nor the predictor would have anything to learn from.
     pub warm_up: usize,
-    /// Control steps that a random action is held for, in the mean. A hand that changes its mind
-    /// at every step stays where it is; one that goes on for half an episode meets the object.
-    pub hold: f64,
 }
 
 impl Default for PredictorSettings {
@@ -79,12 +77,11 @@ impl Default for PredictorSettings {
             weight_decay: 0.3,
             minibatch: 256,
             steps: 40,
-            begin_steps: 600,
+            begin_steps: 3000,
             memory: 16_384,
             held_out: 0.2,
             judges: 512,
             warm_up: 4096,
-            hold: 10.0,
         }
     }
 }
@@ -162,7 +159,6 @@ impl MaxMi {
             ),
             ("judges", p.judges > 0, "at least 1"),
             ("warm_up", p.warm_up > 1, "at least 2"),
-            ("hold", p.hold >= 1.0 && p.hold.is_finite(), "at least 1"),
         ];
         match rules.into_iter().find(|r| !r.1) {
             None => Ok(()),

@@ -1,9 +1,9 @@
 //! Trains the explorer `maxmi`, whose settings and play are in [`asid_learned::maxmi`].
 //!
 //! ```text
-//! warm-up: episodes of random actions, the predictor learns from them
 //! repeat
 //!     episodes by the policy, each step paid by what the predictor gained    (PPO: rollout)
+//!         (the first episodes: each step paid if something was seen to move)
 //!     the predictor learns from all episodes, each cut at a random mark  (predictor)
 //!     the policy learns                                                      (PPO: update)
 //! ```
@@ -11,14 +11,15 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use asid_core::environment::{BatchEnvironment, Transition};
 use asid_core::registry::{self, Settings};
+use asid_core::signal::SignalSet;
 use asid_core::{Parameter, Problem, Result};
 use asid_learned::Layer;
+use asid_learned::PpoConfig;
 use asid_learned::history::History;
 use asid_learned::inference::Inference;
 use asid_learned::learning::{LearnedExplorer, Trainer, Training};
-use asid_learned::maxmi::{MaxMi, PREDICTOR, Predicting, PredictorSettings};
+use asid_learned::maxmi::{MaxMi, PREDICTOR, Predicting};
 use asid_learned::play::POLICY;
 use asid_learned::{Dataset, Network as Plain, Tensors};
 use rand::Rng as _;
@@ -31,9 +32,15 @@ inventory::submit! {
     Trainer { algorithm: MaxMi::NAME, train }
 }
 
-/// Pays for what a control step made the truth more likely.
+/// Pays for what a control step made the truth more likely; as long as there is no predictor, for
+/// what was seen to move.
 struct Gain<'a> {
     problem: &'a Problem<'a>,
+    signals: SignalSet,
+    /// The latest reading of each episode.
+    latest: Vec<Vec<f64>>,
+    /// Whitened difference of two readings.
+    difference: Vec<f64>,
     predictor: Predictor<'a>,
     /// What the predictor claims, calibrated: what pays, and what the policy sees.
     claims: Arc<Inference>,
@@ -56,12 +63,28 @@ impl Gain<'_> {
     }
 }
 
+impl Gain<'_> {
+    /// Whether an episode's tracked readings have changed by more than their noise.
+    fn moved(&mut self, e: usize, reading: &[f64]) -> bool {
+        let width = self.signals.width();
+        let [now, before] = [reading, &self.latest[e]].map(|r| &r[..width]);
+        self.signals.difference(now, before, &mut self.difference);
+        self.difference.iter().any(|d| d.abs() > SEEN)
+    }
+}
+
 impl Pay<Predicting> for Gain<'_> {
-    fn begin(&mut self, e: usize, sight: &Predicting, _: &[f64], theta: &[f64]) {
+    fn begin(&mut self, e: usize, sight: &Predicting, reading: &[f64], theta: &[f64]) {
         self.told[e] = self.told(sight, theta);
+        self.latest[e].copy_from_slice(reading);
     }
 
-    fn reward(&mut self, e: usize, sight: &Predicting, _: &[f64], theta: &[f64]) -> f64 {
+    fn reward(&mut self, e: usize, sight: &Predicting, reading: &[f64], theta: &[f64]) -> f64 {
+        if !self.predictor.is_warm() {
+            let moved = self.moved(e, reading);
+            self.latest[e].copy_from_slice(reading);
+            return f64::from(u8::from(moved));
+        }
         let before = self.told[e];
         self.told[e] = self.told(sight, theta);
         self.told[e] - before
@@ -129,48 +152,23 @@ fn environment<'a>(
         marks: history.marks(),
         ..Dataset::default()
     };
+    let signals = SignalSet::new(problem.model.layout(), problem.signals)?;
+    let row = problem
+        .model
+        .layout()
+        .recording(&problem.task.exploration().channels())?
+        .width();
     let pay = Gain {
         problem,
+        latest: vec![vec![0.0; row]; n],
+        difference: vec![0.0; signals.whitened_len()],
+        signals,
         predictor: Predictor::new(&explorer.predictor, problem.parameters, &shape, seed),
         claims: blank,
         told: vec![0.0; n],
         judged: VecDeque::new(),
     };
-    let mut environment =
-        TrackedEnvironment::new(problem, sights, observation_len, pay, "maxmi episodes")?;
-    warm_up(problem, &mut environment, &explorer.predictor)?;
-    Ok(environment)
-}
-
-/// Episodes of random actions, each held for a random number of control steps.
-fn warm_up(
-    problem: &Problem<'_>,
-    environment: &mut dyn BatchEnvironment,
-    settings: &PredictorSettings,
-) -> Result<()> {
-    let (n, len) = (environment.batch_size(), environment.action_len());
-    let horizon = problem.task.exploration().horizon;
-    let mut rng = problem.streams.stream("maxmi warm-up");
-    let mut transition = Transition::new(n, environment.observation_len());
-    environment.reset(&mut transition.observation)?;
-    let batches = settings.warm_up.div_ceil(n);
-    problem
-        .progress
-        .begin("explore: random episodes", batches as u64);
-    for _ in 0..batches {
-        let mut actions = vec![0.0; n * len];
-        for step in 0..horizon {
-            for action in actions.chunks_exact_mut(len) {
-                if step == 0 || rng.random_range(0.0..settings.hold) < 1.0 {
-                    action.fill_with(|| rng.random_range(-1.0..=1.0));
-                }
-            }
-            environment.step(&actions, &mut transition)?;
-        }
-        problem.progress.advance(1);
-    }
-    problem.progress.end();
-    Ok(())
+    TrackedEnvironment::new(problem, sights, observation_len, pay, "maxmi episodes")
 }
 
 fn train(problem: &Problem<'_>, settings: &Settings) -> Result<Training> {
@@ -179,7 +177,12 @@ fn train(problem: &Problem<'_>, settings: &Settings) -> Result<Training> {
     let len = observation.iter().map(|e| e.len).sum();
     let mut environment = environment(problem, &explorer, len)?;
     let seed = problem.streams.stream("maxmi").random();
-    let learned = learn_policy(problem, &mut environment, &explorer.ppo, seed)?;
+    let warm_up = explorer.predictor.warm_up * problem.task.exploration().horizon;
+    let ppo = PpoConfig {
+        total_steps: warm_up + explorer.ppo.total_steps,
+        ..explorer.ppo.clone()
+    };
+    let learned = learn_policy(problem, &mut environment, &ppo, seed)?;
     let mut tensors = Tensors::new();
     learned.policy.to_tensors(POLICY, &mut tensors);
     let judged = &environment.pay.judged;
@@ -193,13 +196,16 @@ fn train(problem: &Problem<'_>, settings: &Settings) -> Result<Training> {
     Ok(Training {
         tensors,
         observation,
-        steps: learned.curve.last().map_or(0, |p| p.x as u64)
-            + (explorer.predictor.warm_up * problem.task.exploration().horizon) as u64,
+        steps: learned.curve.last().map_or(0, |p| p.x as u64),
         figures,
         curve: learned.curve,
         events: learned.events,
     })
 }
+
+/// Noises of a reading that a difference of two has to exceed for something to have moved: noise alone
+/// does so (a root of two wider) once in 10^5 entries.
+const SEEN: f64 = 6.5;
 
 /// Latest episodes that the predictor's figures are of.
 const LATEST: usize = 512;
@@ -208,6 +214,7 @@ const LATEST: usize = 512;
 #[allow(clippy::field_reassign_with_default)] // nested settings read best one by one
 mod tests {
     use asid_core::Explorer as _;
+    use asid_core::environment::{BatchEnvironment as _, Transition};
     use asid_core::{RealWorld as _, SimulatedWorld, Streams};
     use asid_learned::Saved;
     use asid_learned::learning::{Cache, obtain};
