@@ -52,12 +52,21 @@ pub struct Merged {
     pub stores: Vec<Store>,
 }
 
+/// Whether rows of different commits may stand in one table.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Commits {
+    /// All cells are of one commit.
+    One,
+    /// Those of a row are; rows that differ say so.
+    OneARow,
+}
+
 /// Puts comparisons together.
 ///
 /// # Errors
 /// Where they do not belong together: made by different commits or engines, with different
 /// settings, with one method's name for two methods, or with one cell that came out in two ways.
-pub fn unite(parts: &[Part]) -> Result<Merged> {
+pub fn unite(parts: &[Part], commits: Commits) -> Result<Merged> {
     let Some(first) = parts.first() else {
         return Err(Error::Config {
             key: "--merge".into(),
@@ -84,7 +93,7 @@ pub fn unite(parts: &[Part]) -> Result<Merged> {
             .union(&other.plan)
             .map_err(|e| refuse(format!("does not belong to {}: {e}", name(first))))?;
         for cell in &part.cells {
-            let Some(same) = add(&cells, cell, part).map_err(refuse)? else {
+            let Some(same) = add(&cells, cell, part, commits).map_err(refuse)? else {
                 cells.push((cell.clone(), part));
                 continue;
             };
@@ -118,11 +127,13 @@ fn add<'c>(
     there: &'c [(Cell, &Part)],
     cell: &Cell,
     part: &Part,
+    commits: Commits,
 ) -> Result<Option<&'c Cell>, String> {
     let mut same = None;
     for (other, whose) in there {
         let (ours, theirs) = (&cell.versions, &other.versions);
-        if (&ours.git, &ours.asid) != (&theirs.git, &theirs.asid) {
+        let one = commits == Commits::One || cell.key.arm_mate(&other.key);
+        if one && (&ours.git, &ours.asid) != (&theirs.git, &theirs.asid) {
             return Err(format!(
                 "was made by commit {} ({}), {} by {} ({})",
                 ours.git,
@@ -199,9 +210,27 @@ mod tests {
         let at = |name: &str| folder.path().join(name);
         let a = part(&at("a"), &[5, 6], |_| {});
         let b = part(&at("b"), &[6, 7], |_| {});
-        let merged = unite(&[a.clone(), b]).unwrap();
+        let merged = unite(&[a.clone(), b], Commits::One).unwrap();
         assert_eq!(merged.cells.len(), 3);
         assert_eq!(merged.document, a.document);
+    }
+
+    #[test]
+    fn rows_of_other_commits_are_let_in_where_that_is_asked_for() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        let a = part(&at("a"), &[5], |_| {});
+        let other = |c: &mut Cell| {
+            c.versions.git = "d".into();
+            c.key.method = "dr".into();
+        };
+        let b = part(&at("b"), &[5], other);
+        let merged = unite(&[a.clone(), b], Commits::OneARow).unwrap();
+        assert_eq!(merged.cells.len(), 2);
+        // But not within a row.
+        let b = part(&at("c"), &[6], |c| c.versions.git = "d".into());
+        let said = unite(&[a, b], Commits::OneARow).unwrap_err().to_string();
+        assert!(said.contains("commit d"), "{said}");
     }
 
     #[test]
@@ -211,7 +240,9 @@ mod tests {
         let a = part(&at("a"), &[5], |_| {});
         let refused = |name: &str, seeds: &[u64], change: &dyn Fn(&mut Cell)| {
             let b = part(&at(name), seeds, change);
-            unite(&[a.clone(), b]).unwrap_err().to_string()
+            unite(&[a.clone(), b], Commits::One)
+                .unwrap_err()
+                .to_string()
         };
         let said = refused("value", &[5], &|c| c.value = 9.0);
         assert!(
@@ -229,8 +260,10 @@ mod tests {
         assert!(said.contains("other settings of asid"), "{said}");
         let mut b = part(&at("given"), &[6], |_| {});
         b.document.settings = "[solver]\niterations = 3".parse().unwrap();
-        let said = unite(&[a.clone(), b]).unwrap_err().to_string();
+        let said = unite(&[a.clone(), b], Commits::One)
+            .unwrap_err()
+            .to_string();
         assert!(said.contains("solver"), "{said}");
-        assert!(unite(&[]).is_err());
+        assert!(unite(&[], Commits::One).is_err());
     }
 }

@@ -489,6 +489,13 @@ fn tell_differences(rows: &mut [Row], settings: &dyn Fn(&str) -> Option<toml::Ta
                     _ => "other seeds".to_owned(),
                 });
             }
+            let first = &rows[mates[0]];
+            if row.commit != first.commit {
+                told.push(format!(
+                    "commit {}, of {} {}",
+                    row.commit, first.method, first.commit
+                ));
+            }
             for section in ["explorer", "identifier", "solver"] {
                 told.extend(other_settings(section, i, &mates, rows, &tables));
             }

@@ -93,6 +93,9 @@ pub struct Arguments {
     /// Puts comparisons together instead, such as those of several machines
     #[arg(long, value_name = "DIR", num_args = 1..)]
     merge: Vec<PathBuf>,
+    /// Lets rows of different commits stand in one table, each row of one; rows say their commit
+    #[arg(long, requires = "merge")]
+    across_commits: bool,
     /// Runs side by side, one a thread; results do not depend on it [default: one a core]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = threads)]
     threads: Option<usize>,

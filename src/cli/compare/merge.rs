@@ -1,7 +1,7 @@
 //! `asid compare --merge`: finished comparisons, or shares of one, put together.
 
 use anyhow::Result;
-use asid_comparison::merge::{Merged, Part, unite};
+use asid_comparison::merge::{Commits, Merged, Part, unite};
 use asid_comparison::store::{Store, write};
 use asid_core::Error;
 
@@ -13,7 +13,11 @@ use crate::cli::output::OutFolder;
 pub fn merge(arguments: &Arguments) -> Result<()> {
     let parts = arguments.merge.iter().map(|folder| Part::read(folder));
     let parts = parts.collect::<asid_core::Result<Vec<_>>>()?;
-    let merged = unite(&parts)?;
+    let commits = match arguments.across_commits {
+        true => Commits::OneARow,
+        false => Commits::One,
+    };
+    let merged = unite(&parts, commits)?;
     if merged.cells.is_empty() {
         return Err(Error::Config {
             key: "--merge".into(),
