@@ -43,9 +43,15 @@ pub fn canonical(resolved: &toml::Table, method: &Method) -> toml::Table {
         };
         table.insert("identifier".into(), named(stands));
     }
+    name_contents(&mut table);
+    table
+}
+
+/// Puts what files hold, as a hash, in place of their paths wherever settings name one.
+pub fn name_contents(table: &mut toml::Table) {
     for (section, key) in FILES {
         let at = match section {
-            "" => Some(&mut table),
+            "" => Some(&mut *table),
             section => table.get_mut(section).and_then(toml::Value::as_table_mut),
         };
         let Some(toml::Value::String(path)) = at.and_then(|t| t.get_mut(key)) else {
@@ -60,7 +66,6 @@ pub fn canonical(resolved: &toml::Table, method: &Method) -> toml::Table {
             }
         }
     }
-    table
 }
 
 /// Puts what a file holds in place of its path; one that cannot be read stays.

@@ -10,7 +10,7 @@ use std::time::Instant;
 use anyhow::Result;
 use asid_comparison::cell::CellKey;
 use asid_comparison::plan::MATCHED;
-use asid_comparison::settings::digest;
+use asid_comparison::settings::{digest, name_contents};
 use asid_comparison::store::{Store, unique, write};
 use asid_core::registry::{ExplorerEntry, IdentifierEntry, find};
 use asid_core::{Error, Explorer};
@@ -93,7 +93,8 @@ impl Trainer<'_> {
         Ok(settings)
     }
 
-    /// What decides a training: the settings of these parts, the simulator and the unknowns.
+    /// What decides a training: the settings of these parts, the simulator and the unknowns. Files count by
+    /// what they hold, so that a comparison whose folder was moved trains nothing anew.
     fn own(&self, session: &Session, parts: &[&str]) -> Result<String> {
         let mut table = toml::Table::try_from(&session.config)?;
         for section in [
@@ -108,6 +109,7 @@ impl Trainer<'_> {
                 table.remove(section);
             }
         }
+        name_contents(&mut table);
         Ok(digest(table.to_string().as_bytes()))
     }
 
