@@ -22,6 +22,7 @@ pub mod gae;
 mod learning_tests;
 mod max;
 mod maxmi;
+pub mod motion_model;
 mod orthogonal;
 mod posterior_net;
 pub mod ppo;
@@ -39,5 +40,6 @@ mod training;
 
 pub use asid_learned::{Normaliser, Policy, PpoConfig};
 pub use evaluation::{Evaluation, evaluate};
+pub use motion_model::{Motion, MotionModel};
 pub use ppo::{PpoProgress, Trained, train};
 pub use ppo_solver::PpoSolver;
