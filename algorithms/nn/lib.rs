@@ -33,7 +33,9 @@ mod predictor;
 mod rollout;
 pub mod surrogate;
 mod task_ppo;
+// The problems that the crate of what plays is tested on.
 #[cfg(test)]
+#[path = "../learned/testing.rs"]
 mod testing;
 mod tracked;
 mod training;

@@ -57,8 +57,6 @@ impl OutFolder {
         let mut claimed = Self::claim_but_for(out, stem, Some(kept))?;
         // The name is taken from the first file on.
         claimed.stem = None;
-        let path = claimed.path();
-        std::fs::create_dir_all(path.join(kept)).map_err(|e| failed(&path, &e))?;
         Ok(claimed)
     }
 

@@ -104,7 +104,7 @@ pub fn draw(request: &Request<'_>, kept: &Path) -> Result<Drawing> {
             &format!("{name} as it gets harder"),
             format!(
                 "Success of methods on {name} over {}, {}, all conditions together. Each level is a comparison of \
-                 its own, with the same seeds: `levels/` has them.",
+                 its own in levels/, with the same seeds.",
                 setting.name, setting.about
             ),
         )

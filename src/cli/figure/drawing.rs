@@ -245,8 +245,10 @@ impl Drawing {
         if self.tables.is_empty() {
             page = page.section(Section::new("Numbers").table(self.table_of_numbers()));
         }
-        page.section(Section::new("Beside the paper").table(self.table_of_claims()))
-            .section(Section::new("Repeat it").command(command))
+        if !self.claims.is_empty() {
+            page = page.section(Section::new("Beside the paper").table(self.table_of_claims()));
+        }
+        page.section(Section::new("Repeat it").command(command))
             .html()
     }
 

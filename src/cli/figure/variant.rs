@@ -61,7 +61,7 @@ impl<'t> Variant<'t> {
         let plays = !self.learns()? || self.is_told_a_policy() || there;
         Ok((!plays).then(|| {
             format!(
-                "Left out: {} on {task}, for which nothing that was trained ships; `{}:policy=FILE` plays a file",
+                "Left out: {} on {task}, for which nothing that was trained ships; --explorer {}:policy=FILE plays a file",
                 self.label(),
                 self.name
             )
