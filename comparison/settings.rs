@@ -34,6 +34,8 @@ pub fn canonical(resolved: &toml::Table, method: &Method) -> toml::Table {
     }
     if !method.explores() {
         table.insert("explorer".into(), named(NONE));
+        // Without an episode nothing is expected of one.
+        table.remove("expected");
     }
     if !method.identifies() {
         let stands = if method.knows_the_truth() {

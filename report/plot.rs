@@ -53,6 +53,12 @@ pub trait Plot {
     fn svg(&self, id: &str, width: f64) -> String;
 }
 
+impl<P: Plot + ?Sized> Plot for std::sync::Arc<P> {
+    fn svg(&self, id: &str, width: f64) -> String {
+        (**self).svg(id, width)
+    }
+}
+
 /// A colour by its role in the palette; the page decides the value.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Colour {

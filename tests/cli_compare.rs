@@ -7,6 +7,7 @@ mod cli_support;
 
 use std::path::Path;
 use std::process::Output;
+use std::sync::OnceLock;
 
 use cli_support::{Workplace, tiny};
 use serde_json::Value;
@@ -39,10 +40,16 @@ fn result(place: &Workplace, out: &str) -> Value {
     serde_json::from_str(&place.read(&format!("{out}/result.json"))).unwrap()
 }
 
-fn assert_same(place: &Workplace, a: &str, b: &str) {
-    for file in SAME {
-        let [x, y] = [a, b].map(|folder| place.read(&format!("{folder}/{file}")));
-        assert!(x == y, "{file} of {a} and {b} differ");
+/// Copies a folder with all that is below it.
+fn copy_folder(from: &Path, to: &Path) {
+    std::fs::create_dir_all(to).unwrap();
+    for name in cli_support::names(from) {
+        let (from, to) = (from.join(&name), to.join(&name));
+        if from.is_dir() {
+            copy_folder(&from, &to);
+        } else {
+            std::fs::copy(&from, &to).unwrap();
+        }
     }
 }
 
@@ -105,48 +112,48 @@ fn every_method_has_a_row_of_its_own_with_its_parts_settings_and_commit() {
     roxmltree::Document::parse_with_options(&page, options).unwrap();
 }
 
+/// What the tests of interruptions and of shares are held against: two seeds of a method that explores
+/// and of one that does not.
+const PAIR: [&str; 8] = [
+    "--method",
+    "random",
+    "--method",
+    "dr",
+    "--condition",
+    "left",
+    "--seeds",
+    "2",
+];
+
+/// The undisturbed comparison of [`PAIR`], on one thread, in `whole`.
+fn whole() -> &'static Workplace {
+    static WHOLE: OnceLock<Workplace> = OnceLock::new();
+    WHOLE.get_or_init(|| {
+        let place = Workplace::new();
+        done(&place, &[&PAIR[..], &["--threads", "1"]].concat(), "whole");
+        place
+    })
+}
+
+fn assert_as_whole(place: &Workplace, folder: &str) {
+    for file in SAME {
+        let there = place.read(&format!("{folder}/{file}"));
+        let expected = whole().read(&format!("whole/{file}"));
+        assert!(there == expected, "{file} of {folder} differs");
+    }
+}
+
+/// Killed once a cell is there, and gone on with on three threads.
 #[test]
 fn an_interrupted_comparison_goes_on_and_ends_with_the_same_bytes_at_any_threads() {
     let place = Workplace::new();
-    let arguments = [
-        "--method",
-        "random",
-        "--method",
-        "dr",
-        "--condition",
-        "left",
-        "--seeds",
-        "3",
-    ];
-    done(
-        &place,
-        &[&arguments[..], &["--threads", "1"]].concat(),
-        "whole",
-    );
-    done(
-        &place,
-        &[&arguments[..], &["--threads", "3"]].concat(),
-        "threads",
-    );
-    assert_same(&place, "whole", "threads");
-
-    // Killed once two cells are there.
-    let common = [
-        "compare",
-        "rod-balancing",
-        "--quiet",
-        "--out",
-        "killed",
-        "--threads",
-        "1",
-    ];
+    let common = ["compare", "rod-balancing", "--quiet", "--threads", "1"];
     let mut child = place
-        .asid(&tiny(&[&common[..], &arguments].concat()))
+        .asid(&tiny(&[&common[..], &PAIR, &["--out", "a"]].concat()))
         .spawn()
         .unwrap();
-    let cells = place.path("killed/cells");
-    let count = |folder: &Path| std::fs::read_dir(folder).map_or(0, |entries| entries.count());
-    while count(&cells) < 2 {
+    let first = place.path("a/cells/rod-balancing.left.random.matched.rapier.0.json");
+    while !first.exists() {
         assert!(
             child.try_wait().unwrap().is_none(),
             "it ended before it was killed"
@@ -155,27 +162,20 @@ fn an_interrupted_comparison_goes_on_and_ends_with_the_same_bytes_at_any_threads
     }
     child.kill().unwrap();
     child.wait().unwrap();
-    assert!(!place.path("killed/result.json").exists());
-    let first = cells.join("rod-balancing.left.random.matched.rapier.0.json");
+    assert!(!place.path("a/result.json").exists());
     let before = std::fs::metadata(&first).unwrap().modified().unwrap();
     // By its own configuration, from the same folder.
-    let again = place.run(&[
-        "compare",
-        "--config",
-        "killed/config.toml",
-        "--out",
-        "killed",
-        "--quiet",
-    ]);
+    let again = ["compare", "--config", "a/config.toml", "--out", "a"];
+    let again = place.run(&[&again[..], &["--quiet", "--threads", "3"]].concat());
     assert!(again.status.success(), "{}", said(&again));
-    assert_same(&place, "whole", "killed");
+    assert_as_whole(&place, "a");
     let after = std::fs::metadata(&first).unwrap().modified().unwrap();
     assert_eq!(before, after, "a finished cell is not run again");
     // Nothing is left to do.
-    done(&place, &arguments, "killed");
-    assert_same(&place, "whole", "killed");
-    let times: Value = serde_json::from_str(&place.read("whole/times.json")).unwrap();
-    assert_eq!(times["cells"].as_array().unwrap().len(), 6);
+    done(&place, &PAIR, "a");
+    assert_as_whole(&place, "a");
+    let times: Value = serde_json::from_str(&place.read("a/times.json")).unwrap();
+    assert_eq!(times["cells"].as_array().unwrap().len(), 4);
 }
 
 #[cfg(unix)]
@@ -227,28 +227,18 @@ fn a_signal_ends_a_comparison_with_the_way_to_go_on() {
 #[test]
 fn shares_in_one_folder_or_merged_give_the_bytes_of_one_process() {
     let place = Workplace::new();
-    let arguments = [
-        "--method",
-        "random",
-        "--method",
-        "dr",
-        "--condition",
-        "left",
-        "--seeds",
-        "2",
-    ];
-    done(&place, &arguments, "whole");
-    for share in ["1/2", "2/2"] {
-        let shared = [&arguments[..], &["--shard", share]].concat();
-        done(&place, &shared, "together");
-        done(&place, &shared, &share.replace('/', "-"));
-    }
-    assert_same(&place, "whole", "together");
-    assert!(!place.path("1-2/result.json").exists());
+    done(&place, &[&PAIR[..], &["--shard", "1/2"]].concat(), "all");
+    assert!(!place.path("all/result.json").exists());
+    // The same share on its own, and the other one in both ways.
+    copy_folder(&place.path("all"), &place.path("1-2"));
+    let second = [&PAIR[..], &["--shard", "2/2"]].concat();
+    done(&place, &second, "2-2");
+    done(&place, &second, "all");
+    assert_as_whole(&place, "all");
     let merged = place.run(&["compare", "--merge", "1-2", "2-2", "--out", "merged"]);
     assert!(merged.status.success(), "{}", said(&merged));
-    assert_same(&place, "whole", "merged");
-    let other = compare(&place, &["--method", "dr", "--shard", "1/2"], "together");
+    assert_as_whole(&place, "merged");
+    let other = compare(&place, &["--method", "dr", "--shard", "1/2"], "all");
     assert_eq!(other.status.code(), Some(2));
     assert!(
         said(&other).contains("another comparison"),

@@ -6,18 +6,17 @@
 //! simulation at the middle of the prior which starts where the first reading shows
 //! the object and takes the same actions.
 
-use std::path::Path;
+use std::sync::Arc;
 
 use asid_algorithms::explore::Observer;
-use asid_core::explore::{Explored, Explorer};
+use asid_core::explore::Explored;
 use asid_core::fisher::{FisherBatch, FisherSettings};
 use asid_core::information::Objective;
-use asid_core::registry;
 use asid_core::{Error, Problem, Result};
 use serde::{Deserialize, Serialize};
 
-use crate::file::ObservationEntry;
-use crate::learning::{Cache, LearnedExplorer, obtain, train_to_file};
+use crate::file::{ObservationEntry, Saved};
+use crate::learning::{Cache, LearnedExplorer, learned_explorer};
 use crate::play::{Observe, Playing};
 use crate::ppo_settings::PpoConfig;
 
@@ -69,28 +68,10 @@ impl Default for FisherPpo {
     }
 }
 
-asid_core::register!(ExplorerEntry {
-    name: FisherPpo::NAME,
-    about: "Fisher information, a policy trained by proximal policy optimisation",
-    defaults: registry::defaults::<FisherPpo>,
-    make: |s| {
-        let explorer: FisherPpo = registry::settings("explorer", s)?;
-        explorer.check()?;
-        Ok(Box::new(explorer))
-    },
-});
-
-impl FisherPpo {
-    /// Checks every setting.
-    ///
-    /// # Errors
-    /// [`Error::Config`] names the first that is out of its domain.
-    pub fn check(&self) -> Result<()> {
-        check_environments(self.environments)?;
-        self.ppo.validate()?;
-        self.fisher.check()
-    }
-}
+learned_explorer!(
+    FisherPpo,
+    "Fisher information, a policy trained by proximal policy optimisation"
+);
 
 /// Checks a number of environments.
 pub(crate) fn check_environments(environments: usize) -> Result<()> {
@@ -124,24 +105,23 @@ impl LearnedExplorer for FisherPpo {
         policy.clone_into(&mut self.policy);
     }
 
+    fn check(&self) -> Result<()> {
+        check_environments(self.environments)?;
+        self.ppo.validate()?;
+        self.fisher.check()
+    }
+
     fn observation(&self, problem: &Problem<'_>) -> Result<Vec<ObservationEntry>> {
         Ok(entries(&Observer::new(problem)?))
     }
-}
 
-impl Explorer for FisherPpo {
-    fn explore<'a>(
-        &'a self,
-        problem: &'a Problem<'a>,
-        _start: Option<&[f64]>,
-    ) -> Result<Explored<'a>> {
-        let saved = obtain(self, &self.cache, problem)?;
-        let observe = Box::new(Shadowed::new(problem, &self.fisher)?);
-        Playing::explored(saved, observe, self.fisher.describe())
+    fn cache(&self) -> &Cache {
+        &self.cache
     }
 
-    fn train(&self, problem: &Problem<'_>, file: &Path) -> Result<bool> {
-        train_to_file(self, problem, file)
+    fn play<'a>(&'a self, problem: &'a Problem<'a>, saved: Arc<Saved>) -> Result<Explored<'a>> {
+        let observe = Box::new(Shadowed::new(problem, &self.fisher)?);
+        Playing::explored(saved, observe, self.fisher.describe())
     }
 }
 
@@ -193,6 +173,8 @@ impl Observe for Shadowed<'_> {
 mod tests {
     use asid_core::registry::{ExplorerEntry, find};
     use asid_core::{RealWorld as _, SimulatedWorld, Streams};
+
+    use asid_core::Explorer as _;
 
     use super::*;
     use crate::file::{Description, Saved, Tensors};

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
-use asid_core::explore::CurvePoint;
+use asid_core::explore::{CurvePoint, Explored};
 use asid_core::registry::{self, Settings};
 use asid_core::{Error, Problem, Result};
 use serde::Serialize;
@@ -57,6 +57,8 @@ pub fn can_train(algorithm: &str) -> bool {
 }
 
 /// An explorer that plays what was learned.
+///
+/// `learned_explorer!` makes it an [`asid_core::Explorer`] and registers it.
 pub trait LearnedExplorer: Serialize + DeserializeOwned + Default + PartialEq + Clone {
     /// Name on the command line.
     const NAME: &'static str;
@@ -64,12 +66,60 @@ pub trait LearnedExplorer: Serialize + DeserializeOwned + Default + PartialEq + 
     fn policy(&self) -> &str;
     /// Sets it.
     fn set_policy(&mut self, policy: &str);
+    /// Checks every setting.
+    ///
+    /// # Errors
+    /// [`Error::Config`] names the first that is out of its domain.
+    fn check(&self) -> Result<()>;
     /// What the policy takes on a problem.
     ///
     /// # Errors
     /// When the scene lacks a channel of the protocol.
     fn observation(&self, problem: &Problem<'_>) -> Result<Vec<ObservationEntry>>;
+    /// What was trained on the spot.
+    fn cache(&self) -> &Cache;
+    /// Plays what was learned.
+    ///
+    /// # Errors
+    /// When it does not fit the problem.
+    fn play<'a>(&'a self, problem: &'a Problem<'a>, saved: Arc<Saved>) -> Result<Explored<'a>>;
 }
+
+/// Makes a [`LearnedExplorer`] an explorer, and registers it with what it is.
+macro_rules! learned_explorer {
+    ($explorer:ty, $about:expr) => {
+        asid_core::register!(ExplorerEntry {
+            name: <$explorer as $crate::learning::LearnedExplorer>::NAME,
+            about: $about,
+            defaults: asid_core::registry::defaults::<$explorer>,
+            make: |settings| {
+                let explorer: $explorer = asid_core::registry::settings("explorer", settings)?;
+                $crate::learning::LearnedExplorer::check(&explorer)?;
+                Ok(Box::new(explorer))
+            },
+        });
+
+        impl asid_core::Explorer for $explorer {
+            fn explore<'a>(
+                &'a self,
+                problem: &'a asid_core::Problem<'a>,
+                _start: Option<&[f64]>,
+            ) -> asid_core::Result<asid_core::explore::Explored<'a>> {
+                let saved = $crate::learning::obtain(self, problem)?;
+                $crate::learning::LearnedExplorer::play(self, problem, saved)
+            }
+
+            fn train(
+                &self,
+                problem: &asid_core::Problem<'_>,
+                file: &std::path::Path,
+            ) -> asid_core::Result<bool> {
+                $crate::learning::train_to_file(self, problem, file)
+            }
+        }
+    };
+}
+pub(crate) use learned_explorer;
 
 /// What was trained on the spot, kept for the next episode of the same explorer.
 #[derive(Debug, Default)]
@@ -105,11 +155,8 @@ impl Cache {
 /// # Errors
 /// [`Error::Config`] where the file does not fit the problem, [`Error::Missing`] where nothing is
 /// there and this program cannot train.
-pub fn obtain<L: LearnedExplorer>(
-    explorer: &L,
-    cache: &Cache,
-    problem: &Problem<'_>,
-) -> Result<Arc<Saved>> {
+pub fn obtain<L: LearnedExplorer>(explorer: &L, problem: &Problem<'_>) -> Result<Arc<Saved>> {
+    let cache = explorer.cache();
     let observation = explorer.observation(problem)?;
     let misfit = |saved: &Saved| saved.misfit(L::NAME, problem, &observation);
     let policy = explorer.policy();

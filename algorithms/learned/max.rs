@@ -6,19 +6,17 @@
 //! every round of episodes, not every 25 steps; and the sizes are those of a small machine
 //! (5 networks of 2 x 64 where there are 32 of 4 x 512).
 
-use std::path::Path;
 use std::sync::Arc;
 
-use asid_core::explore::{Explored, Explorer};
+use asid_core::explore::Explored;
 use asid_core::layout::Recording;
-use asid_core::registry;
 use asid_core::signal::unit_quaternion;
 use asid_core::{Error, Problem, Result};
 use serde::{Deserialize, Serialize};
 
 use crate::file::{ObservationEntry, Saved};
 use crate::fisher_ppo::check_environments;
-use crate::learning::{Cache, LearnedExplorer, obtain, train_to_file};
+use crate::learning::{Cache, LearnedExplorer, learned_explorer};
 use crate::play::{Observe, POLICY, Playing};
 use crate::policy::Policy;
 use crate::ppo_settings::PpoConfig;
@@ -103,23 +101,31 @@ impl Default for Max {
     }
 }
 
-asid_core::register!(ExplorerEntry {
-    name: Max::NAME,
-    about: "model-based active exploration: goes where learned models disagree (Shyam et al. 2019)",
-    defaults: registry::defaults::<Max>,
-    make: |s| {
-        let explorer: Max = registry::settings("explorer", s)?;
-        explorer.check()?;
-        Ok(Box::new(explorer))
-    },
-});
+learned_explorer!(
+    Max,
+    "model-based active exploration: goes where learned models disagree (Shyam et al. 2019)"
+);
 
-impl Max {
-    /// Checks every setting.
-    ///
-    /// # Errors
-    /// [`Error::Config`] names the first that is out of its domain.
-    pub fn check(&self) -> Result<()> {
+/// Name of a round's policy in a file, rounds counted from 1.
+#[must_use]
+pub fn round_name(round: usize) -> String {
+    format!("round.{round}")
+}
+
+impl LearnedExplorer for Max {
+    const NAME: &'static str = "max";
+
+    fn policy(&self) -> &str {
+        &self.policy
+    }
+
+    fn set_policy(&mut self, policy: &str) {
+        policy.clone_into(&mut self.policy);
+        // Which round is played is no matter of training.
+        self.play_round = 0;
+    }
+
+    fn check(&self) -> Result<()> {
         check_environments(self.environments)?;
         self.ppo.validate()?;
         let e = &self.ensemble;
@@ -154,48 +160,21 @@ impl Max {
             }),
         }
     }
-}
-
-/// Name of a round's policy in a file, rounds counted from 1.
-#[must_use]
-pub fn round_name(round: usize) -> String {
-    format!("round.{round}")
-}
-
-impl LearnedExplorer for Max {
-    const NAME: &'static str = "max";
-
-    fn policy(&self) -> &str {
-        &self.policy
-    }
-
-    fn set_policy(&mut self, policy: &str) {
-        policy.clone_into(&mut self.policy);
-        // Which round is played is no matter of training.
-        self.play_round = 0;
-    }
 
     fn observation(&self, problem: &Problem<'_>) -> Result<Vec<ObservationEntry>> {
         Ok(Motion::new(problem)?.entries())
     }
-}
 
-impl Explorer for Max {
-    fn explore<'a>(
-        &'a self,
-        problem: &'a Problem<'a>,
-        _start: Option<&[f64]>,
-    ) -> Result<Explored<'a>> {
-        let mut saved = obtain(self, &self.cache, problem)?;
+    fn cache(&self) -> &Cache {
+        &self.cache
+    }
+
+    fn play<'a>(&'a self, problem: &'a Problem<'a>, mut saved: Arc<Saved>) -> Result<Explored<'a>> {
         if self.play_round > 0 {
             saved = Arc::new(of_round(&saved, self.play_round)?);
         }
         let observe = Box::new(Motion::new(problem)?);
         Playing::explored(saved, observe, "disagreement of learned models".into())
-    }
-
-    fn train(&self, problem: &Problem<'_>, file: &Path) -> Result<bool> {
-        train_to_file(self, problem, file)
     }
 }
 

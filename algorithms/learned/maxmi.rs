@@ -14,20 +14,18 @@
 //! the predictor makes of them; episodes are simulated once, without the copies that Fisher
 //! information needs.
 
-use std::path::Path;
 use std::sync::Arc;
 
 use asid_algorithms::explore::Observer;
-use asid_core::explore::{Explored, Explorer};
-use asid_core::registry;
+use asid_core::explore::Explored;
 use asid_core::{Error, Problem, Result};
 use serde::{Deserialize, Serialize};
 
-use crate::file::ObservationEntry;
+use crate::file::{ObservationEntry, Saved};
 use crate::fisher_ppo::{FisherPpo, check_environments, entries};
 use crate::history::History;
 use crate::inference::{Belief, Inference};
-use crate::learning::{Cache, LearnedExplorer, obtain, train_to_file};
+use crate::learning::{Cache, LearnedExplorer, learned_explorer};
 use crate::play::{Observe, Playing};
 use crate::ppo_settings::PpoConfig;
 
@@ -116,23 +114,23 @@ impl Default for MaxMi {
     }
 }
 
-asid_core::register!(ExplorerEntry {
-    name: MaxMi::NAME,
-    about: "mutual information, a policy paid for what a learned predictor gets right (Kumar et al. 2019)",
-    defaults: registry::defaults::<MaxMi>,
-    make: |s| {
-        let explorer: MaxMi = registry::settings("explorer", s)?;
-        explorer.check()?;
-        Ok(Box::new(explorer))
-    },
-});
+learned_explorer!(
+    MaxMi,
+    "mutual information, a policy paid for what a learned predictor gets right (Kumar et al. 2019)"
+);
 
-impl MaxMi {
-    /// Checks every setting.
-    ///
-    /// # Errors
-    /// [`Error::Config`] names the first that is out of its domain.
-    pub fn check(&self) -> Result<()> {
+impl LearnedExplorer for MaxMi {
+    const NAME: &'static str = "maxmi";
+
+    fn policy(&self) -> &str {
+        &self.policy
+    }
+
+    fn set_policy(&mut self, policy: &str) {
+        policy.clone_into(&mut self.policy);
+    }
+
+    fn check(&self) -> Result<()> {
         check_environments(self.environments)?;
         self.ppo.validate()?;
         let p = &self.predictor;
@@ -168,18 +166,6 @@ impl MaxMi {
             }),
         }
     }
-}
-
-impl LearnedExplorer for MaxMi {
-    const NAME: &'static str = "maxmi";
-
-    fn policy(&self) -> &str {
-        &self.policy
-    }
-
-    fn set_policy(&mut self, policy: &str) {
-        policy.clone_into(&mut self.policy);
-    }
 
     fn observation(&self, problem: &Problem<'_>) -> Result<Vec<ObservationEntry>> {
         let mut all = entries(&Observer::of_readings(problem)?);
@@ -196,15 +182,12 @@ impl LearnedExplorer for MaxMi {
         }
         Ok(all)
     }
-}
 
-impl Explorer for MaxMi {
-    fn explore<'a>(
-        &'a self,
-        problem: &'a Problem<'a>,
-        _start: Option<&[f64]>,
-    ) -> Result<Explored<'a>> {
-        let saved = obtain(self, &self.cache, problem)?;
+    fn cache(&self) -> &Cache {
+        &self.cache
+    }
+
+    fn play<'a>(&'a self, problem: &'a Problem<'a>, saved: Arc<Saved>) -> Result<Explored<'a>> {
         let history = History::new(problem)?;
         let predictor = Inference::from_tensors(
             PREDICTOR,
@@ -223,10 +206,6 @@ impl Explorer for MaxMi {
             observe,
             "mutual information (learned predictor)".into(),
         )
-    }
-
-    fn train(&self, problem: &Problem<'_>, file: &Path) -> Result<bool> {
-        train_to_file(self, problem, file)
     }
 }
 

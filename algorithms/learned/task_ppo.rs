@@ -4,17 +4,16 @@
 //! The reward of a control step is by how much it brought the object nearer to the task's goal
 //! ([`asid_core::Task::goal_reward`]), so that the return is the way made in an episode.
 
-use std::path::Path;
+use std::sync::Arc;
 
 use asid_algorithms::explore::Observer;
-use asid_core::explore::{Explored, Explorer};
-use asid_core::registry;
+use asid_core::explore::Explored;
 use asid_core::{Problem, Result};
 use serde::{Deserialize, Serialize};
 
-use crate::file::ObservationEntry;
+use crate::file::{ObservationEntry, Saved};
 use crate::fisher_ppo::{FisherPpo, check_environments, entries};
-use crate::learning::{Cache, LearnedExplorer, obtain, train_to_file};
+use crate::learning::{Cache, LearnedExplorer, learned_explorer};
 use crate::play::{Observe, Playing};
 use crate::ppo_settings::PpoConfig;
 
@@ -49,17 +48,10 @@ impl Default for TaskPpo {
     }
 }
 
-asid_core::register!(ExplorerEntry {
-    name: TaskPpo::NAME,
-    about: "a policy trained for the task, where the task has a goal for its object",
-    defaults: registry::defaults::<TaskPpo>,
-    make: |s| {
-        let explorer: TaskPpo = registry::settings("explorer", s)?;
-        check_environments(explorer.environments)?;
-        explorer.ppo.validate()?;
-        Ok(Box::new(explorer))
-    },
-});
+learned_explorer!(
+    TaskPpo,
+    "a policy trained for the task, where the task has a goal for its object"
+);
 
 impl LearnedExplorer for TaskPpo {
     const NAME: &'static str = "task-ppo";
@@ -72,24 +64,22 @@ impl LearnedExplorer for TaskPpo {
         policy.clone_into(&mut self.policy);
     }
 
+    fn check(&self) -> Result<()> {
+        check_environments(self.environments)?;
+        self.ppo.validate()
+    }
+
     fn observation(&self, problem: &Problem<'_>) -> Result<Vec<ObservationEntry>> {
         Ok(entries(&Observer::of_readings(problem)?))
     }
-}
 
-impl Explorer for TaskPpo {
-    fn explore<'a>(
-        &'a self,
-        problem: &'a Problem<'a>,
-        _start: Option<&[f64]>,
-    ) -> Result<Explored<'a>> {
-        let saved = obtain(self, &self.cache, problem)?;
-        let observe = Box::new(Reading::new(problem)?);
-        Playing::explored(saved, observe, "the task's goal".into())
+    fn cache(&self) -> &Cache {
+        &self.cache
     }
 
-    fn train(&self, problem: &Problem<'_>, file: &Path) -> Result<bool> {
-        train_to_file(self, problem, file)
+    fn play<'a>(&'a self, problem: &'a Problem<'a>, saved: Arc<Saved>) -> Result<Explored<'a>> {
+        let observe = Box::new(Reading::new(problem)?);
+        Playing::explored(saved, observe, "the task's goal".into())
     }
 }
 

@@ -37,7 +37,7 @@ fn train(problem: &Problem<'_>, settings: &Settings) -> Result<Training> {
 #[allow(clippy::field_reassign_with_default)] // nested settings read best one by one
 mod tests {
     use asid_core::Explorer as _;
-    use asid_learned::learning::{Cache, events_of, obtain};
+    use asid_learned::learning::{events_of, obtain};
     use asid_learned::{Policy, Saved};
 
     use super::*;
@@ -60,8 +60,8 @@ mod tests {
         let path = folder.path().join("policy.safetensors");
         with_problem("rod-balancing", |problem| {
             let explorer = tiny();
-            let one = obtain(&explorer, &Cache::default(), problem).unwrap();
-            let other = obtain(&explorer, &Cache::default(), problem).unwrap();
+            let one = obtain(&explorer.clone(), problem).unwrap();
+            let other = obtain(&explorer.clone(), problem).unwrap();
             assert_eq!(one.tensors, other.tensors);
             assert!(explorer.train(problem, &path).unwrap());
             let saved = Saved::load(&path).unwrap();

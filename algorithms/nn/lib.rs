@@ -22,6 +22,7 @@ pub mod gae;
 mod learning_tests;
 mod max;
 mod maxmi;
+pub mod motion_model;
 mod orthogonal;
 mod posterior_net;
 pub mod ppo;
@@ -32,12 +33,15 @@ mod predictor;
 mod rollout;
 pub mod surrogate;
 mod task_ppo;
+// The problems that the crate of what plays is tested on.
 #[cfg(test)]
+#[path = "../learned/testing.rs"]
 mod testing;
 mod tracked;
 mod training;
 
 pub use asid_learned::{Normaliser, Policy, PpoConfig};
 pub use evaluation::{Evaluation, evaluate};
+pub use motion_model::{Motion, MotionModel};
 pub use ppo::{PpoProgress, Trained, train};
 pub use ppo_solver::PpoSolver;

@@ -217,7 +217,7 @@ mod tests {
     use asid_core::environment::{BatchEnvironment as _, Transition};
     use asid_core::{RealWorld as _, SimulatedWorld, Streams};
     use asid_learned::Saved;
-    use asid_learned::learning::{Cache, obtain};
+    use asid_learned::learning::obtain;
 
     use super::*;
     use crate::testing::with_problem;
@@ -243,7 +243,7 @@ mod tests {
         with_problem("rod-balancing", |problem| {
             let explorer = tiny();
             assert!(explorer.train(problem, &path).unwrap());
-            let again = obtain(&explorer, &Cache::default(), problem).unwrap();
+            let again = obtain(&explorer.clone(), problem).unwrap();
             assert_eq!(Saved::load(&path).unwrap().tensors, again.tensors);
             let mut playing = MaxMi::default();
             playing.policy = path.display().to_string();

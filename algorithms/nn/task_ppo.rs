@@ -83,7 +83,7 @@ fn train(problem: &Problem<'_>, settings: &Settings) -> Result<Training> {
 mod tests {
     use asid_core::BatchEnvironment as _;
     use asid_core::Transition;
-    use asid_learned::learning::{Cache, obtain};
+    use asid_learned::learning::obtain;
 
     use super::*;
     use crate::testing::with_problem;
@@ -128,9 +128,7 @@ mod tests {
         with_problem("rod-balancing", |problem| {
             let mut explorer = TaskPpo::default();
             explorer.policy = "train".into();
-            let message = obtain(&explorer, &Cache::default(), problem)
-                .unwrap_err()
-                .to_string();
+            let message = obtain(&explorer, problem).unwrap_err().to_string();
             assert!(message.contains("`rod-balancing` has none"), "{message}");
         });
     }

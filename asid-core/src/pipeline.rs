@@ -74,7 +74,8 @@ pub fn episode_information(
 
 /// [`episode_information`] whose expected deviations are those of [`expected_deviation`], with the noise
 /// model of an identifier, where the settings ask for what identification sees (trajectory form, start
-/// pose estimated along, roughness counted). Of binary unknowns they follow from the information.
+/// pose estimated along, roughness counted) and for at least one fit. Of binary unknowns they follow from the
+/// information.
 ///
 /// # Errors
 /// When the engine fails.
@@ -90,6 +91,7 @@ pub fn episode_information_as(
     let as_identified =
         settings.form == Form::Trajectory && settings.nuisance && settings.roughness;
     if as_identified
+        && expected.rounds > 0
         && let Some(deviations) = expected_deviation(problem, expected, theta, start, actions)?
     {
         for (row, better) in out.expected_std.iter_mut().zip(deviations) {
@@ -153,6 +155,9 @@ pub struct Method<'m> {
     pub solver: &'m dyn TaskSolver,
     /// Values of the unknowns that the solver is told where nothing is identified.
     pub known: Option<&'m [f64]>,
+    /// How the expected deviations are computed; whether readings are weighed together is up to the
+    /// identifier.
+    pub expected: ExpectedSettings,
 }
 
 /// Explore, identify, solve and attempt.
@@ -206,7 +211,7 @@ pub fn run(
             &FisherSettings::default(),
             &ExpectedSettings {
                 correlated: method.identifier.is_some_and(Identifier::correlated),
-                ..ExpectedSettings::default()
+                ..method.expected
             },
             &belief.mean(),
             &found.starts[0],

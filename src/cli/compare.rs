@@ -3,9 +3,11 @@
 //! What a comparison is, what is kept of it and what is said of it is the crate
 //! `asid-comparison`; here its cells are run.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::Result;
+use asid_comparison::method::{BY_DEFAULT, ORACLE};
+use asid_comparison::rows::ComparisonResult;
 use asid_comparison::shard::Shard;
 use asid_core::Error;
 
@@ -16,7 +18,7 @@ mod arm;
 mod cell;
 mod folder;
 mod merge;
-mod page;
+pub mod page;
 mod progress;
 mod request;
 mod resume;
@@ -27,7 +29,7 @@ mod work;
 mod worker;
 
 /// Arguments of `compare`.
-#[derive(clap::Args)]
+#[derive(clap::Args, Clone)]
 pub struct Arguments {
     /// Tasks [default: all]
     tasks: Vec<String>,
@@ -54,16 +56,20 @@ pub struct Arguments {
     /// Makes a table of the paper: its tasks, conditions, methods and world, unless others are named
     #[arg(long, value_name = "1|2|3")]
     table: Option<u8>,
-    /// Draws a figure of the paper instead: patches, displacement, laptop, distractors or
-    /// generalization
+    /// Draws a figure instead: patches, displacement, laptop, distractors, learned-model or
+    /// generalization, as in the paper; explorers or difficulty
     #[arg(long, value_name = "NAME")]
     figure: Option<String>,
     /// Episodes of each explorer in a figure, or of each square of its map
     #[arg(long, value_name = "N", requires = "figure")]
     episodes: Option<u64>,
-    /// Explorer that a figure shows in place of its own (repeatable)
+    /// Explorer that a figure shows in place of its own; settings may follow, as in
+    /// fisher-cem:fisher.objective=trace+fisher.form=one-step (repeatable)
     #[arg(long, value_name = "NAME")]
     explorer: Vec<String>,
+    /// Levels of the figure `difficulty`, such as ledge_width=0.04,0.02,0.01
+    #[arg(long, value_name = "NAME=VALUE,…", requires = "figure")]
+    levels: Option<String>,
     /// A quick look: fewer seeds and searches cut to half, marked so in every output
     #[arg(long)]
     quick: bool,
@@ -127,7 +133,7 @@ pub struct Arguments {
 }
 
 /// The real world of every run, but for its kind.
-#[derive(clap::Args)]
+#[derive(clap::Args, Clone)]
 struct Real {
     /// A hidden true value, such as mass_offset=0.06 [default: that of the condition, else drawn]
     #[arg(long, value_name = "NAME=VALUE")]
@@ -144,7 +150,7 @@ struct Real {
 }
 
 /// Options of `run` that make no sense here: a row's name stands for its parts.
-#[derive(clap::Args)]
+#[derive(clap::Args, Clone)]
 struct Parts {
     #[arg(long, hide = true)]
     identifier: Option<String>,
@@ -154,7 +160,7 @@ struct Parts {
 
 impl Arguments {
     /// What a figure is drawn with.
-    fn figure_request(&self) -> figure::Request {
+    fn figure_request(&self) -> figure::Request<'_> {
         figure::Request {
             common: Common {
                 backend: self.backend.first().cloned(),
@@ -167,9 +173,35 @@ impl Arguments {
                 json: self.json,
                 ..Common::default()
             },
+            tasks: self.tasks.clone(),
             episodes: self.episodes,
             explorers: self.explorer.clone(),
+            levels: self.levels.clone(),
             quick: self.quick,
+            compare: Box::new(|task, setting, folder| self.compare_at(task, setting, folder)),
+        }
+    }
+
+    /// The comparison on a task that these arguments ask for, under one more setting and in a folder of
+    /// its own.
+    fn compare_at(&self, task: &str, setting: &str, folder: &Path) -> Result<ComparisonResult> {
+        let mut own = Self {
+            tasks: vec![task.to_owned()],
+            figure: None,
+            explorer: Vec::new(),
+            out: Some(folder.to_owned()),
+            ..self.clone()
+        };
+        own.set.push(setting.to_owned());
+        if own.method.is_empty() {
+            own.method = BY_DEFAULT.map(str::to_owned).to_vec();
+            own.method.push(ORACLE.to_owned());
+        }
+        let outcome = work::run(&own)?;
+        match (outcome.failed, outcome.summed) {
+            (Some(error), _) => Err(error),
+            (None, Some(summed)) => Ok(summed.result),
+            (None, None) => Err(Error::Failed("a share of a figure is no figure".into()).into()),
         }
     }
 }

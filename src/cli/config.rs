@@ -13,6 +13,7 @@ use serde::Serialize;
 use super::options::{Algorithms, Common, Worlds};
 use super::plugins::{file_of, used};
 use component::{Component, component};
+use expected::ExpectedConfig;
 pub use real::RealConfig;
 use table::{check_keys, numbers, section, text, wrong};
 pub use table::{read_table, set};
@@ -20,6 +21,7 @@ use unknowns::{ParameterConfig, noise, unknowns};
 
 mod component;
 pub mod difficulty;
+mod expected;
 mod real;
 mod table;
 mod unknowns;
@@ -96,6 +98,8 @@ pub struct Config {
     pub identifier: Component,
     /// Solver.
     pub solver: Component,
+    /// How the expected deviations of a run are computed.
+    pub expected: ExpectedConfig,
     /// Real world.
     pub real: RealConfig,
     /// How hard the task is, by name.
@@ -108,7 +112,7 @@ pub struct Config {
 }
 
 /// Keys at the top of a configuration.
-const KEYS: [&str; 17] = [
+const KEYS: [&str; 18] = [
     "schema",
     "command",
     "task",
@@ -121,6 +125,7 @@ const KEYS: [&str; 17] = [
     "explorer",
     "identifier",
     "solver",
+    "expected",
     "real",
     "preset",
     "difficulty",
@@ -241,6 +246,7 @@ impl Config {
                 algorithms.solver.as_deref(),
                 ASID.solver,
             )?,
+            expected: ExpectedConfig::of(&table)?,
             real,
             difficulty: difficulty::levels(task, common)?,
             noise: noise(task, &section(&table, "noise")?)?,

@@ -48,6 +48,19 @@ impl OutFolder {
     /// Checks that a result can be written to `out`, or to the next free folder
     /// `runs/<stem>-<n>` where none is given.
     pub fn claim(out: Option<&Path>, stem: &str) -> Result<Self> {
+        Self::claim_but_for(out, stem, None)
+    }
+
+    /// The same for a result with a folder `kept` of its own that is written while the work goes on, and
+    /// gone on with where it is there already.
+    pub fn claim_with(out: Option<&Path>, stem: &str, kept: &str) -> Result<Self> {
+        let mut claimed = Self::claim_but_for(out, stem, Some(kept))?;
+        // The name is taken from the first file on.
+        claimed.stem = None;
+        Ok(claimed)
+    }
+
+    fn claim_but_for(out: Option<&Path>, stem: &str, kept: Option<&str>) -> Result<Self> {
         let (path, stem) = match out {
             Some(path) => (path.to_owned(), None),
             None => (next_free(stem), Some(stem.to_owned())),
@@ -56,8 +69,9 @@ impl OutFolder {
             return Err(file(Path::new("--out"), "names no folder"));
         }
         if path.is_dir() {
-            let mut entries = std::fs::read_dir(&path).map_err(|e| file(&path, e.to_string()))?;
-            if entries.next().is_some() {
+            let entries = std::fs::read_dir(&path).map_err(|e| file(&path, e.to_string()))?;
+            let mut names = entries.filter_map(|e| Some(e.ok()?.file_name()));
+            if names.any(|n| kept.is_none_or(|kept| n != kept)) {
                 let what = if path.join(RESULT).exists() {
                     "already holds another run"
                 } else {

@@ -118,6 +118,7 @@ pub fn pipeline(session: &Session, truth: &[f64]) -> Result<RunOutcome> {
         identifier: Some(&*identifier),
         solver: &*solver,
         known: None,
+        expected: config.expected.settings(),
     };
     let problem = session.problem();
     let mut world = session.world(truth)?;

@@ -1,5 +1,7 @@
 //! A task whose physics is known in closed form: a cart of unknown mass `m` on a rail without friction is
-//! pushed with a force, so that what it moves is inversely proportional to `m`.
+//! pushed with a force, so that what it moves is inversely proportional to `m`. Downstream it is to be at a
+//! place after a while, under one constant force: `F = 2 m d / t^2`, so that the place is missed by the
+//! share of the way that the mass is off.
 
 use asid::core::parameter::{Parameter, Scale};
 use asid::core::signal::Signal;
@@ -14,6 +16,13 @@ pub const NOISE: f64 = 1e-3;
 pub const HORIZON: usize = 10;
 /// Length of a frame, s.
 pub const FRAME: f64 = 0.02;
+/// Where the cart is to be after [`FRAMES`], m.
+pub const GOAL: f64 = 0.4;
+/// How long it is pushed downstream: 0.8 s, in which the heaviest cart gets from the furthest start to the
+/// goal under 3.1 N.
+pub const FRAMES: usize = 40;
+/// Largest distance from the goal that counts as success, m.
+pub const NEAR: f64 = 0.02;
 
 const XML: &str = r#"
 <mujoco>
@@ -55,11 +64,11 @@ impl Cart {
                 contact: Vec::new(),
             },
             downstream: DownstreamProtocol {
-                metric: "x".into(),
+                metric: "goal_distance_m".into(),
                 unit: "m".into(),
-                rule: "none".into(),
-                threshold: None,
-                frames: 1,
+                rule: "within 2 cm of the goal".into(),
+                threshold: Some(NEAR),
+                frames: FRAMES,
                 frame_period: FRAME,
                 action: vec![force],
                 start,
@@ -125,17 +134,20 @@ impl Task for Cart {
     fn commander(&self) -> Result<Box<dyn Commander>> {
         Ok(Box::new(Force))
     }
-    fn attempt(&self, _start: &[f64], action: &[f64]) -> Result<Vec<f64>> {
-        Ok(vec![action[0]])
+    /// The action is the force that takes the cart to the goal from the middle; from elsewhere it is that
+    /// much more or less.
+    fn attempt(&self, start: &[f64], action: &[f64]) -> Result<Vec<f64>> {
+        Ok(vec![action[0] * (GOAL - start[0]) / GOAL; FRAMES])
     }
     fn metric(&self, readings: &[f64]) -> Vec<f64> {
-        readings.to_vec()
+        readings.iter().map(|x| (x - GOAL).abs()).collect()
     }
     fn outcome(&self, readings: &[f64]) -> Outcome {
+        let value = (readings[readings.len() - 1] - GOAL).abs();
         Outcome {
-            value: readings[0],
-            success: true,
-            cost: readings[0],
+            value,
+            success: value < NEAR,
+            cost: value,
         }
     }
 }

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 /// Settings under which a whole run takes a second or two; their results mean nothing.
-pub const TINY: [&str; 10] = [
+pub const TINY: [&str; 11] = [
     "explorer.iterations=1",
     "explorer.population=4",
     "explorer.prior_samples=1",
@@ -15,6 +15,7 @@ pub const TINY: [&str; 10] = [
     "solver.iterations=1",
     "solver.population=2",
     "solver.belief_samples=1",
+    "expected.rounds=0",
 ];
 
 /// A folder that goes away, in which commands run.

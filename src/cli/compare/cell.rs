@@ -62,6 +62,7 @@ pub fn run(arm: &Arm, key: &CellKey) -> Result<(Cell, f64)> {
         identifier: identifier.as_deref(),
         solver: &*solver,
         known: method.knows_the_truth().then_some(&*truth),
+        expected: config.expected.settings(),
     };
     let outcome = pipeline::run(&problem, parts, &mut world)?;
     let wall_s = clock.elapsed().as_secs_f64();

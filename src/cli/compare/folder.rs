@@ -12,7 +12,7 @@ use asid_comparison::table;
 use asid_core::Error;
 use serde::Serialize;
 
-use super::{Arguments, page};
+use super::page;
 use crate::cli::output::OutFolder;
 
 /// What repeats a comparison, whatever the command line was that made it.
@@ -138,16 +138,36 @@ struct TrainingTime {
     wall_s: f64,
 }
 
-/// Sums up what is there, writes the tables and prints them.
+/// What a comparison came to, summed up in its folder.
+pub struct SummedUp {
+    /// The rows.
+    pub result: ComparisonResult,
+    markdown: String,
+    report: PathBuf,
+}
+
+impl SummedUp {
+    /// Prints the tables, or the result as JSON.
+    ///
+    /// # Errors
+    /// When standard output is closed.
+    pub fn print(&self, json: bool) -> Result<()> {
+        let mut stdout = std::io::stdout().lock();
+        if json {
+            writeln!(stdout, "{}", serde_json::to_string_pretty(&self.result)?)?;
+        } else {
+            let (markdown, report) = (&self.markdown, self.report.display());
+            writeln!(stdout, "{markdown}\nreport: {report}")?;
+        }
+        Ok(())
+    }
+}
+
+/// Sums up what is there and writes the tables.
 ///
 /// # Errors
 /// When a file cannot be written, or nothing is there.
-pub fn sum_up(
-    arguments: &Arguments,
-    store: &Store,
-    document: &Document,
-    contents: &Contents,
-) -> Result<()> {
+pub fn sum_up(store: &Store, document: &Document, contents: &Contents) -> Result<SummedUp> {
     let plan = &document.plan;
     let settings = |hash: &str| store.settings(hash);
     let result = summarise(plan, &contents.cells, &contents.failures, &settings);
@@ -160,22 +180,11 @@ pub fn sum_up(
     write(&file("report.html"), &html)?;
     // The result last: where it is, all the rest is.
     write(&file("result.json"), &json(&result)?)?;
-    print(arguments, &result, &markdown, &file("report.html"))
-}
-
-fn print(
-    arguments: &Arguments,
-    result: &ComparisonResult,
-    markdown: &str,
-    report: &Path,
-) -> Result<()> {
-    let mut stdout = std::io::stdout().lock();
-    if arguments.json {
-        writeln!(stdout, "{}", serde_json::to_string_pretty(result)?)?;
-    } else {
-        writeln!(stdout, "{markdown}\nreport: {}", report.display())?;
-    }
-    Ok(())
+    Ok(SummedUp {
+        result,
+        markdown,
+        report: file("report.html"),
+    })
 }
 
 fn times(store: &Store, cells: &[Cell]) -> Result<Times> {

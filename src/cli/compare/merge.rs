@@ -31,7 +31,7 @@ pub fn merge(arguments: &Arguments) -> Result<()> {
     keep(&store, &merged)?;
     let keys = merged.document.plan.cells();
     let there = contents(&store, &keys)?;
-    sum_up(arguments, &store, &merged.document, &there)
+    sum_up(&store, &merged.document, &there)?.print(arguments.json)
 }
 
 /// Writes the parts of a comparison into its own folder.

@@ -56,7 +56,8 @@ pub fn html(plan: &Plan, result: &ComparisonResult, runs: &[Run], repeat: &str) 
         .html()
 }
 
-fn table(grid: &Grid) -> Table {
+/// A table as the page has it.
+pub fn table(grid: &Grid) -> Table {
     let columns = grid.head.iter().map(|h| {
         if h.number {
             Column::number(&h.title)

@@ -4,8 +4,8 @@
 //! lost. SIGUSR1 ends it without loss: no cell is begun any more, and those that run are finished.
 
 use std::path::Path;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use anyhow::Result;
 use asid_comparison::store::no_writer;
@@ -24,6 +24,15 @@ pub fn how_to_go_on(out: &Path) -> String {
     format!("`asid compare --config {out}/config.toml --out {out}` goes on with it")
 }
 
+/// What is stopped: how it is gone on with, and the word that no cell is to be begun.
+struct Watched {
+    line: String,
+    drain: Arc<AtomicBool>,
+}
+
+/// The comparison that runs; a figure has several, one after the other.
+static WATCHED: Mutex<Option<Watched>> = Mutex::new(None);
+
 /// Watches for signals from now on; the word is set once no cell is to be begun.
 ///
 /// # Errors
@@ -31,24 +40,37 @@ pub fn how_to_go_on(out: &Path) -> String {
 pub fn watch(out: &Path) -> Result<Arc<AtomicBool>> {
     let failed = |e: std::io::Error| Error::Failed(format!("cannot watch for signals: {e}"));
     let drain = Arc::new(AtomicBool::new(false));
+    let watched = Watched {
+        line: format!("stopped; {}", how_to_go_on(out)),
+        drain: Arc::clone(&drain),
+    };
+    let before = current().replace(watched);
+    if before.is_some() {
+        return Ok(drain);
+    }
     let mut signals = Signals::new([SIGINT, SIGTERM, SIGUSR1]).map_err(failed)?;
-    let word = Arc::clone(&drain);
-    let line = format!("stopped; {}", how_to_go_on(out));
     std::thread::Builder::new()
         .name("signals".into())
-        .spawn(move || {
-            for signal in signals.forever() {
-                if signal == SIGUSR1 {
-                    word.store(true, Ordering::SeqCst);
-                    failure::note("told to stop: runs that have begun are finished");
-                } else {
-                    // A file that is being written is finished, and no other one begun.
-                    let _held = no_writer();
-                    failure::note(&line);
-                    signal_hook::low_level::exit(STOPPED);
-                }
-            }
-        })
+        .spawn(move || signals.forever().for_each(stop))
         .map_err(failed)?;
     Ok(drain)
+}
+
+fn current() -> MutexGuard<'static, Option<Watched>> {
+    WATCHED.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Stops what runs, as the signal asks for.
+fn stop(signal: i32) {
+    let current = current();
+    let Some(watched) = &*current else { return };
+    if signal == SIGUSR1 {
+        watched.drain.store(true, Ordering::SeqCst);
+        failure::note("told to stop: runs that have begun are finished");
+    } else {
+        // A file that is being written is finished, and no other one begun.
+        let _held = no_writer();
+        failure::note(&watched.line);
+        signal_hook::low_level::exit(STOPPED);
+    }
 }

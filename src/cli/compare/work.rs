@@ -10,7 +10,7 @@ use asid_comparison::store::{Store, write};
 use asid_core::Error;
 
 use super::arm::Arm;
-use super::folder::{claim, contents, sum_up};
+use super::folder::{SummedUp, claim, contents, sum_up};
 use super::request::{document, missing_part};
 use super::resume::{pending, same_comparison};
 use super::signals::{how_to_go_on, watch};
@@ -30,8 +30,28 @@ pub fn arm_name(key: &CellKey) -> ArmName {
     [&key.task, &key.method, &key.world, &key.backend].map(String::clone)
 }
 
-/// Runs what is missing of the comparison and sums it up once nothing is.
+/// What came of the work: nothing to sum up where only a share was asked for.
+pub struct Outcome {
+    /// The comparison, where it is complete.
+    pub summed: Option<SummedUp>,
+    /// Runs that failed, in one error.
+    pub failed: Option<anyhow::Error>,
+}
+
+/// Runs what is missing of the comparison, sums it up once nothing is, and prints it.
 pub fn work(arguments: &Arguments) -> Result<()> {
+    let Outcome { summed, failed } = run(arguments)?;
+    if let Some(summed) = summed {
+        summed.print(arguments.json)?;
+    }
+    failed.map_or(Ok(()), Err)
+}
+
+/// Runs what is missing of the comparison and sums it up once nothing is.
+///
+/// # Errors
+/// When a setting is wrong, a file cannot be written, or the work was stopped.
+pub fn run(arguments: &Arguments) -> Result<Outcome> {
     let document = document(arguments)?;
     let keys = document.plan.cells();
     let mut arms = arms(&document, &keys)?;
@@ -156,7 +176,7 @@ fn finish(
     document: &Document,
     keys: &[CellKey],
     first: Option<anyhow::Error>,
-) -> Result<()> {
+) -> Result<Outcome> {
     let there = contents(store, keys)?;
     let counted = format!("{} of {} runs are there", there.cells.len(), keys.len());
     if there.missing > 0 {
@@ -177,24 +197,30 @@ fn finish(
              puts folders together",
             store.root().display()
         ));
-        return Ok(());
+        return Ok(Outcome {
+            summed: None,
+            failed: None,
+        });
     }
     if there.cells.is_empty() {
         let nothing = || Error::Failed("no run could be done".into()).into();
         return Err(first.unwrap_or_else(nothing));
     }
-    sum_up(arguments, store, document, &there)?;
+    let summed = sum_up(store, document, &there)?;
     // A method that is left out with a reason is no failure; a run is.
     let failed: Vec<&Failure> = there.single_failures().collect();
-    match failed.first() {
-        Some(failure) => Err(Error::Failed(format!(
+    let error = failed.first().map(|failure| {
+        Error::Failed(format!(
             "{} of {} runs failed, the first of them {}: {}; the same command tries them again",
             failed.len(),
             keys.len(),
             failure.key.words(),
             failure.reason
         ))
-        .into()),
-        None => Ok(()),
-    }
+        .into()
+    });
+    Ok(Outcome {
+        summed: Some(summed),
+        failed: error,
+    })
 }

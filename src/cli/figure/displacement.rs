@@ -3,9 +3,9 @@
 use anyhow::Result;
 use asid_report::plot::{Colour, Outline};
 
-use super::episodes::{Played, Wanted, play};
+use super::episodes::{Wanted, by_explorer, play, playable};
 use super::map::{Grid, frame, with_fixtures};
-use super::{Claim, Data, Drawing, Request, mean, share, task};
+use super::{Claim, Data, Drawing, Panel, Request, mean, share, task};
 
 const TASK: &str = "sphere-striking";
 
@@ -18,9 +18,9 @@ pub const HIT: f64 = 0.015;
 /// Displacement that is drawn darkest, m.
 const FULL: f64 = 0.5;
 
-pub fn draw(request: &Request) -> Result<Drawing> {
+pub fn draw(request: &Request<'_>) -> Result<Drawing> {
     let task = task(TASK)?;
-    let explorers = request.explorers(&["random", "task-ppo", "fisher-ppo"]);
+    let (explorers, notes) = playable(request, TASK, &["random", "task-ppo", "fisher-ppo"])?;
     let start = &task.exploration().start;
     let corners = [0, 1].map(|end| [start[0].range[end], start[1].range[end]]);
     let grid = Grid::over(corners, if request.quick { 0.08 } else { 0.03 });
@@ -40,25 +40,21 @@ pub fn draw(request: &Request) -> Result<Drawing> {
     }
     let played = play(&request.common, wanted)?;
     let mut drawing = Drawing {
-        title: "How far the ball is pushed".into(),
-        lead: format!(
-            "Displacement of the ball after one exploration episode on {TASK}, over where it lay at the start. \
+        data: vec![Data::new(
+            "displacement.csv",
+            &["explorer", "seed", "x", "y", "displacement_m"],
+        )],
+        notes,
+        ..Drawing::new(
+            "How far the ball is pushed",
+            format!(
+                "Displacement of the ball after one exploration episode on {TASK}, over where it lay at the start. \
              Below {HIT} m it was not hit; the darkest square is {FULL} m or more."
-        ),
-        data: vec![Data {
-            name: "displacement.csv".into(),
-            columns: vec!["explorer", "seed", "x", "y", "displacement_m"],
-            rows: Vec::new(),
-        }],
-        numbers: Vec::new(),
-        claims: Vec::new(),
-        panels: Vec::new(),
+            ),
+        )
     };
-    for explorer in &explorers {
-        let of: Vec<&Played> = played
-            .iter()
-            .filter(|p| &p.wanted.explorer == explorer)
-            .collect();
+    for (explorer, of) in by_explorer(&explorers, &played) {
+        let explorer = &*explorer;
         let mut values = vec![0.0; grid.len()];
         let (mut all, mut hits) = (Vec::new(), 0);
         for (k, episode) in of.iter().enumerate() {
@@ -67,7 +63,7 @@ pub fn draw(request: &Request) -> Result<Drawing> {
             hits += usize::from(moved > HIT);
             all.push(moved);
             let cells = [episode.start[0], episode.start[1], moved].map(|v| format!("{v:.4}"));
-            let head = [explorer.clone(), episode.wanted.seed.to_string()];
+            let head = [explorer.to_owned(), episode.wanted.seed.to_string()];
             drawing.data[0].rows.push([&head[..], &cells].concat());
         }
         drawing
@@ -90,7 +86,7 @@ pub fn draw(request: &Request) -> Result<Drawing> {
         );
         drawing
             .panels
-            .push((explorer.clone(), plan, "Dark: pushed far.".into()));
+            .push(Panel::new(explorer, plan, "Dark: pushed far."));
     }
     drawing.claims = claims(&drawing);
     Ok(drawing)

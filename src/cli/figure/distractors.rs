@@ -4,21 +4,19 @@ use anyhow::Result;
 use asid_report::plot::{Axis, Colour, Outline, Plan};
 
 use super::displacement::HIT;
-use super::episodes::{Played, of_each, play};
+use super::episodes::{by_explorer, of_each, play, playable};
 use super::map::with_fixtures;
-use super::{Claim, Data, Drawing, Request, mean, share, task};
+use super::{Claim, Data, Drawing, Panel, Request, mean, share, task};
 
 const TASK: &str = "sphere-distractors";
 
 /// Episodes of an explorer, as in the paper.
 const EPISODES: u64 = 30;
 
-pub fn draw(request: &Request) -> Result<Drawing> {
+pub fn draw(request: &Request<'_>) -> Result<Drawing> {
     let task = task(TASK)?;
-    let explorers = request.explorers(&["random", "max", "fisher-ppo"]);
-    let episodes = request
-        .episodes
-        .unwrap_or(if request.quick { 4 } else { EPISODES });
+    let (explorers, notes) = playable(request, TASK, &["random", "max", "fisher-ppo"])?;
+    let episodes = request.episodes(4, EPISODES);
     let wanted = of_each(TASK, &explorers, &[], request.seed(), episodes);
     let played = play(&request.common, wanted)?;
     // The task's signals: the ball that matters first, then the others.
@@ -29,25 +27,21 @@ pub fn draw(request: &Request) -> Result<Drawing> {
         .filter(|s| s.ends_with("_pos"))
         .collect();
     let mut drawing = Drawing {
-        title: "Which ball is pushed".into(),
-        lead: format!(
-            "{episodes} exploration episodes of each explorer on {TASK}. The friction of the first ball is \
+        data: vec![Data::new(
+            "balls.csv",
+            &["explorer", "seed", "ball", "displacement_m"],
+        )],
+        notes,
+        ..Drawing::new(
+            "Which ball is pushed",
+            format!(
+                "{episodes} exploration episodes of each explorer on {TASK}. The friction of the first ball is \
              unknown; that of the other three is known, and pushing them tells nothing."
-        ),
-        data: vec![Data {
-            name: "balls.csv".into(),
-            columns: vec!["explorer", "seed", "ball", "displacement_m"],
-            rows: Vec::new(),
-        }],
-        numbers: Vec::new(),
-        claims: Vec::new(),
-        panels: Vec::new(),
+            ),
+        )
     };
-    for explorer in &explorers {
-        let of: Vec<&Played> = played
-            .iter()
-            .filter(|p| &p.wanted.explorer == explorer)
-            .collect();
+    for (explorer, of) in by_explorer(&explorers, &played) {
+        let explorer = &*explorer;
         let mut plan = Plan::new(explorer, Axis::new("x", "m"), Axis::new("y", "m"));
         let (mut matters, mut others) = (Vec::new(), Vec::new());
         let mut hits = vec![0; balls.len()];
@@ -57,7 +51,7 @@ pub fn draw(request: &Request) -> Result<Drawing> {
                 let way = episode.displacement(ball)?;
                 hits[b] += usize::from(way > HIT);
                 pushed.push(if way > HIT { way } else { 0.0 });
-                let head = [explorer.clone(), episode.wanted.seed.to_string()];
+                let head = [explorer.to_owned(), episode.wanted.seed.to_string()];
                 let cells = [(*ball).to_owned(), format!("{way:.4}")];
                 drawing.data[0].rows.push([&head[..], &cells].concat());
                 let colour = if b == 0 {
@@ -95,11 +89,8 @@ pub fn draw(request: &Request) -> Result<Drawing> {
             ));
         }
         let caption = "Ways of the balls; red: the one of unknown friction.";
-        drawing.panels.push((
-            explorer.clone(),
-            with_fixtures(plan, &*task),
-            caption.into(),
-        ));
+        let plan = with_fixtures(plan, &*task);
+        drawing.panels.push(Panel::new(explorer, plan, caption));
     }
     drawing.claims = claims(&drawing);
     Ok(drawing)

@@ -7,21 +7,23 @@ use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
 use anyhow::Result;
+use asid_comparison::preset;
 use asid_comparison::schedule;
-use asid_core::Error;
 use asid_core::real_world::{RealEpisode, RealWorld as _};
 use asid_core::registry::{ExplorerEntry, find};
-use asid_learned::learning::SHIPPED;
+use asid_core::{Episode, Error, Policy, SimulatedWorld};
 
+use super::Request;
+use super::variant::Variant;
 use crate::cli::options::{Algorithms, Common, Worlds};
 use crate::cli::session::Session;
 
 /// Episodes that are to be played.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Wanted {
     /// The task.
     pub task: String,
-    /// Name of the explorer.
+    /// The explorer, as [`Variant::of`] reads it.
     pub explorer: String,
     /// Settings, as `--set` takes them.
     pub set: Vec<String>,
@@ -31,6 +33,28 @@ pub struct Wanted {
     pub seed: u64,
     /// Start pose; drawn by the seed where it is not given.
     pub start: Option<Vec<f64>>,
+}
+
+/// The explorers that a figure shows on a task, and why others are left out.
+///
+/// # Errors
+/// When a name is unknown, or nothing is left.
+pub fn playable(
+    request: &Request<'_>,
+    task: &str,
+    own: &[&str],
+) -> Result<(Vec<String>, Vec<String>)> {
+    let (mut kept, mut notes) = (Vec::new(), Vec::new());
+    for explorer in request.explorers(own) {
+        match Variant::of(&explorer).lacks(task)? {
+            Some(why) => notes.push(why),
+            None => kept.push(explorer),
+        }
+    }
+    if kept.is_empty() {
+        return Err(Error::Failed(notes.join("; ")).into());
+    }
+    Ok((kept, notes))
 }
 
 /// The same episodes of each explorer: seeds from `first` on, starts drawn by them.
@@ -45,14 +69,25 @@ pub fn of_each(
         task: task.to_owned(),
         explorer: explorer.clone(),
         set: set.iter().map(|&s| s.to_owned()).collect(),
-        effects: Vec::new(),
         seed,
-        start: None,
+        ..Wanted::default()
     };
     explorers
         .iter()
         .flat_map(|explorer| (first..first + episodes).map(move |seed| one(explorer, seed)))
         .collect()
+}
+
+/// Each explorer by its label, with its episodes.
+pub fn by_explorer<'p>(
+    explorers: &[String],
+    played: &'p [Played],
+) -> Vec<(String, Vec<&'p Played>)> {
+    let of = |explorer: &String| {
+        let own = played.iter().filter(|p| &p.wanted.explorer == explorer);
+        (Variant::of(explorer).label(), own.collect())
+    };
+    explorers.iter().map(of).collect()
 }
 
 /// An episode that was played.
@@ -61,10 +96,12 @@ pub struct Played {
     pub wanted: Wanted,
     /// Where the object began.
     pub start: Vec<f64>,
-    /// Channels of `readings`: name and entries.
-    pub channels: Vec<(String, usize)>,
-    /// True readings, `frames + 1` rows.
+    /// The log, with the trackers' noise.
+    pub log: Episode,
+    /// True readings, `frames + 1` rows as in the log.
     pub readings: Vec<f64>,
+    /// Actions, `horizon x action`.
+    pub actions: Vec<f64>,
     /// Share of control steps with contact.
     pub contact_fraction: f64,
 }
@@ -72,16 +109,17 @@ pub struct Played {
 impl Played {
     /// The true readings of a channel, a row a frame.
     pub fn channel(&self, name: &str) -> Result<Vec<&[f64]>> {
-        let width: usize = self.channels.iter().map(|c| c.1).sum();
+        let channels = &self.log.channels;
+        let width: usize = channels.iter().map(|c| c.len).sum();
         let mut start = 0;
-        for (channel, len) in &self.channels {
-            if channel == name {
+        for channel in channels {
+            if channel.name == name {
                 let rows = self.readings.chunks_exact(width);
-                return Ok(rows.map(|r| &r[start..start + len]).collect());
+                return Ok(rows.map(|r| &r[start..start + channel.len]).collect());
             }
-            start += len;
+            start += channel.len;
         }
-        let known = self.channels.iter().map(|c| &*c.0);
+        let known = channels.iter().map(|c| &*c.name);
         Err(Error::unknown("channel", name, known).into())
     }
 
@@ -100,12 +138,32 @@ impl Played {
 
 /// Plays all episodes on as many threads as are asked for; the order is that of `wanted`.
 pub fn play(common: &Common, wanted: Vec<Wanted>) -> Result<Vec<Played>> {
+    each(common, wanted, |wanted| {
+        let session = open(common, wanted, false)?;
+        let config = &session.config.explorer;
+        let explorer = (find::<ExplorerEntry>(&config.name)?.make)(&config.settings)?;
+        let problem = session.problem();
+        let mut explored = explorer.explore(&problem, None)?;
+        played(&session, wanted, &mut *explored.policy)
+    })
+}
+
+/// Does something with each of the episodes, on as many threads as are asked for, and tells how far it is;
+/// the order is that of `wanted`.
+///
+/// # Errors
+/// The first that one of them ends with; no other is begun then.
+pub fn each<T: Send>(
+    common: &Common,
+    wanted: Vec<Wanted>,
+    work: impl Fn(&Wanted) -> Result<T> + Sync,
+) -> Result<Vec<T>> {
     let workers = common
         .threads
         .or_else(|| std::thread::available_parallelism().ok().map(usize::from))
         .unwrap_or(1);
     let total = wanted.len();
-    let done: Mutex<Vec<(usize, Result<Played>)>> = Mutex::new(Vec::with_capacity(total));
+    let done: Mutex<Vec<(usize, Result<T>)>> = Mutex::new(Vec::with_capacity(total));
     let stop = AtomicBool::new(false);
     let clock = Instant::now();
     let pieces: Vec<(usize, Wanted)> = wanted.into_iter().enumerate().collect();
@@ -113,13 +171,13 @@ pub fn play(common: &Common, wanted: Vec<Wanted>) -> Result<Vec<Played>> {
         &pieces,
         workers,
         &stop,
-        |(_, wanted)| one(common, wanted.clone()),
-        |(index, wanted), played| {
+        |(_, wanted)| work(wanted),
+        |(index, wanted), result| {
             let defect = |_| Err(Error::Failed("an episode broke off by a defect".into()).into());
-            let played = played.unwrap_or_else(defect);
-            stop.fetch_or(played.is_err(), Ordering::SeqCst);
+            let result = result.unwrap_or_else(defect);
+            stop.fetch_or(result.is_err(), Ordering::SeqCst);
             let mut all = done.lock().unwrap_or_else(PoisonError::into_inner);
-            all.push((*index, played));
+            all.push((*index, result));
             if !common.quiet {
                 let each = clock.elapsed().as_secs_f64() / all.len() as f64;
                 let _ = write!(
@@ -128,7 +186,7 @@ pub fn play(common: &Common, wanted: Vec<Wanted>) -> Result<Vec<Played>> {
                     all.len(),
                     each * (total - all.len()) as f64,
                     wanted.task,
-                    wanted.explorer
+                    Variant::of(&wanted.explorer).label()
                 );
             }
         },
@@ -138,57 +196,85 @@ pub fn play(common: &Common, wanted: Vec<Wanted>) -> Result<Vec<Played>> {
     }
     let mut all = done.into_inner().unwrap_or_else(PoisonError::into_inner);
     all.sort_by_key(|(index, _)| *index);
-    all.into_iter().map(|(_, played)| played).collect()
+    all.into_iter().map(|(_, result)| result).collect()
 }
 
-/// Plays one episode.
-fn one(common: &Common, wanted: Wanted) -> Result<Played> {
+/// The session of an episode; with `quick`, searches of explorer and identifier are cut as those of a quick
+/// comparison.
+///
+/// # Errors
+/// When a setting is wrong or something is missing.
+pub fn open(common: &Common, wanted: &Wanted, quick: bool) -> Result<Session> {
+    let variant = Variant::of(&wanted.explorer);
     let mut own = common.clone();
     own.seed = Some(wanted.seed);
+    // Episodes are the parallel axis.
     own.threads = Some(1);
     own.quiet = true;
+    let names_policy = |s: &String| s.trim_start().starts_with("explorer.policy");
+    let given = own.set.iter().any(names_policy);
+    let of_variant = variant.set()?.into_iter();
+    own.set
+        .extend(of_variant.filter(|s| !given || !names_policy(s)));
     own.set.extend(wanted.set.iter().cloned());
-    let defaults = (find::<ExplorerEntry>(&wanted.explorer)?.defaults)();
-    let given = own
-        .set
-        .iter()
-        .any(|s| s.trim_start().starts_with("explorer.policy"));
-    // No episode trains for itself alone.
-    if defaults.contains_key("policy") && !given {
-        own.set.push(format!("explorer.policy={SHIPPED:?}"));
-    }
     let algorithms = Algorithms {
-        explorer: Some(wanted.explorer.clone()),
+        explorer: Some(variant.name.to_owned()),
         ..Algorithms::default()
     };
     let mut worlds = Worlds::default();
     worlds.real.real_effect.clone_from(&wanted.effects);
     let session = Session::open(&wanted.task, &own, &algorithms, &worlds)?;
-    let truth = session.truth();
-    let config = &session.config.explorer;
-    let explorer = (find::<ExplorerEntry>(&config.name)?.make)(&config.settings)?;
-    let problem = session.problem();
-    let mut explored = explorer.explore(&problem, None)?;
-    let mut world = session.world(&truth)?;
+    if !quick {
+        return Ok(session);
+    }
+    let config = &session.config;
+    let halved = [
+        preset::quick("explorer", &config.explorer.settings),
+        preset::quick("identifier", &config.identifier.settings),
+    ];
+    let set = halved.into_iter().flatten();
+    own.set
+        .extend(set.map(|(key, value)| format!("{key}={value}")));
+    let rounds = config.expected.rounds.div_ceil(2);
+    own.set.push(format!("expected.rounds={rounds}"));
+    Session::open(&wanted.task, &own, &algorithms, &worlds)
+}
+
+/// Plays a policy in the real world of a session.
+///
+/// # Errors
+/// When the policy or the world fails.
+pub fn played(session: &Session, wanted: &Wanted, policy: &mut dyn Policy) -> Result<Played> {
+    let world = session.world(&session.truth())?;
+    played_in(world, wanted, policy)
+}
+
+/// Plays a policy in a world, from the start that is wanted.
+///
+/// # Errors
+/// When the policy or the world fails.
+pub fn played_in(
+    mut world: SimulatedWorld<'_>,
+    wanted: &Wanted,
+    policy: &mut dyn Policy,
+) -> Result<Played> {
     if let Some(start) = &wanted.start {
         world = world.with_exploration_start(start.clone());
     }
     let start = world.exploration_start();
     let RealEpisode {
         episode,
+        actions,
         contact_fraction,
         true_readings,
         ..
-    } = world.explore(&mut *explored.policy)?;
+    } = world.explore(policy)?;
     Ok(Played {
         start,
-        channels: episode
-            .channels
-            .iter()
-            .map(|c| (c.name.clone(), c.len))
-            .collect(),
-        readings: true_readings.unwrap_or(episode.readings),
+        readings: true_readings.unwrap_or_else(|| episode.readings.clone()),
+        log: episode,
+        actions,
         contact_fraction,
-        wanted,
+        wanted: wanted.clone(),
     })
 }

@@ -4,9 +4,9 @@ use anyhow::Result;
 use asid_report::plot::Colour;
 
 use super::displacement::HIT;
-use super::episodes::{Played, Wanted, play};
+use super::episodes::{Played, Wanted, play, playable};
 use super::map::{Grid, frame};
-use super::{Claim, Data, Drawing, Number, Request, share, task};
+use super::{Claim, Data, Drawing, Number, Panel, Request, share, task};
 
 /// Without walls, so that the ball may lie anywhere.
 const TASK: &str = "sphere-free";
@@ -23,12 +23,11 @@ const BEYOND: f64 = 0.15;
 /// Mass of the ball over that of training.
 const MASS: f64 = 3.0;
 
-pub fn draw(request: &Request) -> Result<Drawing> {
+pub fn draw(request: &Request<'_>) -> Result<Drawing> {
     let task = task(TASK)?;
-    let explorer = request.explorers(&["fisher-ppo"])[0].clone();
-    let episodes = request
-        .episodes
-        .unwrap_or(if request.quick { 1 } else { EPISODES });
+    let (explorers, notes) = playable(request, TASK, &["fisher-ppo"])?;
+    let explorer = explorers[0].clone();
+    let episodes = request.episodes(1, EPISODES);
     let start = &task.exploration().start;
     let trained = [0, 1].map(|end| [start[0].range[end], start[1].range[end]]);
     let around = [
@@ -58,19 +57,18 @@ pub fn draw(request: &Request) -> Result<Drawing> {
     }
     let played = play(&request.common, wanted)?;
     let mut drawing = Drawing {
-        title: "Pushes where nothing was trained".into(),
-        lead: format!(
-            "Share of {episodes} truths in which {explorer} pushes the ball by more than {HIT} m on {TASK}, over where \
+        data: vec![Data::new(
+            "pushes.csv",
+            &["case", "seed", "x", "y", "displacement_m"],
+        )],
+        notes,
+        ..Drawing::new(
+            "Pushes where nothing was trained",
+            format!(
+                "Share of {episodes} truths in which {explorer} pushes the ball by more than {HIT} m on {TASK}, over where \
              the ball lies; on the right its mass is {MASS} times that of training."
-        ),
-        data: vec![Data {
-            name: "pushes.csv".into(),
-            columns: vec!["case", "seed", "x", "y", "displacement_m"],
-            rows: Vec::new(),
-        }],
-        numbers: Vec::new(),
-        claims: Vec::new(),
-        panels: Vec::new(),
+            ),
+        )
     };
     let each = grid.len() * episodes as usize;
     for ((case, _), of) in cases.iter().zip(played.chunks_exact(each)) {
@@ -100,7 +98,7 @@ pub fn draw(request: &Request) -> Result<Drawing> {
         ));
         drawing
             .panels
-            .push(((*case).into(), plan, "Dark: pushed at every truth.".into()));
+            .push(Panel::new(case, plan, "Dark: pushed at every truth."));
     }
     drawing.claims = claims(&drawing.numbers);
     Ok(drawing)

@@ -4,9 +4,9 @@ use anyhow::Result;
 use asid_core::signal::rotation_difference;
 use asid_report::plot::{Colour, Outline};
 
-use super::episodes::{Played, of_each, play};
+use super::episodes::{Played, by_explorer, of_each, play, playable};
 use super::map::with_fixtures;
-use super::{Claim, Data, Drawing, Request, share, task};
+use super::{Claim, Data, Drawing, Panel, Request, share, task};
 
 const TASK: &str = "laptop-articulation";
 
@@ -16,12 +16,10 @@ const MOVED: f64 = 0.01;
 /// Episodes of an explorer.
 const EPISODES: u64 = 40;
 
-pub fn draw(request: &Request) -> Result<Drawing> {
+pub fn draw(request: &Request<'_>) -> Result<Drawing> {
     let task = task(TASK)?;
-    let explorers = request.explorers(&["random", "fisher-cem"]);
-    let episodes = request
-        .episodes
-        .unwrap_or(if request.quick { 4 } else { EPISODES });
+    let (explorers, notes) = playable(request, TASK, &["random", "fisher-cem"])?;
+    let episodes = request.episodes(4, EPISODES);
     // The paper evaluates with a lid that turns.
     let wanted = of_each(
         TASK,
@@ -32,14 +30,9 @@ pub fn draw(request: &Request) -> Result<Drawing> {
     );
     let played = play(&request.common, wanted)?;
     let mut drawing = Drawing {
-        title: "How often the lid is moved".into(),
-        lead: format!(
-            "{episodes} exploration episodes of each explorer on {TASK}, whose lid turns. The lid was moved where \
-             it turned against the base by more than {MOVED} rad; dots show where the laptop stood."
-        ),
-        data: vec![Data {
-            name: "lid.csv".into(),
-            columns: vec![
+        data: vec![Data::new(
+            "lid.csv",
+            &[
                 "explorer",
                 "seed",
                 "x",
@@ -48,17 +41,18 @@ pub fn draw(request: &Request) -> Result<Drawing> {
                 "lid_turned_rad",
                 "contact_fraction",
             ],
-            rows: Vec::new(),
-        }],
-        numbers: Vec::new(),
-        claims: Vec::new(),
-        panels: Vec::new(),
+        )],
+        notes,
+        ..Drawing::new(
+            "How often the lid is moved",
+            format!(
+                "{episodes} exploration episodes of each explorer on {TASK}, whose lid turns. The lid was moved where \
+             it turned against the base by more than {MOVED} rad; dots show where the laptop stood."
+            ),
+        )
     };
-    for explorer in &explorers {
-        let of: Vec<&Played> = played
-            .iter()
-            .filter(|p| &p.wanted.explorer == explorer)
-            .collect();
+    for (explorer, of) in by_explorer(&explorers, &played) {
+        let explorer = &*explorer;
         let (mut moved, mut still) = (Vec::new(), Vec::new());
         for episode in &of {
             let turned = lid_turned(episode)?;
@@ -73,7 +67,7 @@ pub fn draw(request: &Request) -> Result<Drawing> {
                 .iter()
                 .take(3)
                 .chain([&turned, &episode.contact_fraction]);
-            let head = [explorer.clone(), episode.wanted.seed.to_string()];
+            let head = [explorer.to_owned(), episode.wanted.seed.to_string()];
             let cells: Vec<String> = numbers.map(|v| format!("{v:.4}")).collect();
             drawing.data[0].rows.push([&head[..], &cells].concat());
         }
@@ -102,7 +96,7 @@ pub fn draw(request: &Request) -> Result<Drawing> {
         let plan = with_fixtures(plan, &*task);
         drawing
             .panels
-            .push((explorer.clone(), plan, "A dot an episode.".into()));
+            .push(Panel::new(explorer, plan, "A dot an episode."));
     }
     drawing.claims = claims(&drawing);
     Ok(drawing)

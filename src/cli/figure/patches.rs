@@ -5,9 +5,9 @@ use anyhow::Result;
 use asid_core::task::Outline;
 use asid_report::plot::Colour;
 
-use super::episodes::{Played, of_each, play};
+use super::episodes::{by_explorer, of_each, play, playable};
 use super::map::{Grid, with_fixtures};
-use super::{Claim, Data, Drawing, Request, mean, share, task};
+use super::{Claim, Data, Drawing, Panel, Request, mean, share, task};
 
 const TASK: &str = "sphere-patches";
 
@@ -20,36 +20,30 @@ const SIDE: f64 = 0.05;
 /// Episodes of an explorer; the paper shows its heat maps without a number.
 const EPISODES: u64 = 20;
 
-pub fn draw(request: &Request) -> Result<Drawing> {
+pub fn draw(request: &Request<'_>) -> Result<Drawing> {
     let task = task(TASK)?;
-    let explorers = request.explorers(&["random", "maxmi", "fisher-ppo"]);
-    let episodes = request
-        .episodes
-        .unwrap_or(if request.quick { 4 } else { EPISODES });
+    let (explorers, notes) = playable(request, TASK, &["random", "maxmi", "fisher-ppo"])?;
+    let episodes = request.episodes(4, EPISODES);
     let wanted = of_each(TASK, &explorers, &[], request.seed(), episodes);
     let played = play(&request.common, wanted)?;
     let grid = Grid::over(task.top_view().bounds, SIDE);
     let regions = task.regions();
     let mut drawing = Drawing {
-        title: "Where the ball goes".into(),
-        lead: format!(
-            "{episodes} exploration episodes of each explorer on {TASK}; a square is as dark as the share of \
+        data: vec![Data::new(
+            "visits.csv",
+            &["explorer", "x", "y", "share_of_episodes"],
+        )],
+        notes,
+        ..Drawing::new(
+            "Where the ball goes",
+            format!(
+                "{episodes} exploration episodes of each explorer on {TASK}; a square is as dark as the share of \
              episodes whose ball was in it."
-        ),
-        data: vec![Data {
-            name: "visits.csv".into(),
-            columns: vec!["explorer", "x", "y", "share_of_episodes"],
-            rows: Vec::new(),
-        }],
-        numbers: Vec::new(),
-        claims: Vec::new(),
-        panels: Vec::new(),
+            ),
+        )
     };
-    for explorer in &explorers {
-        let of: Vec<&Played> = played
-            .iter()
-            .filter(|p| &p.wanted.explorer == explorer)
-            .collect();
+    for (explorer, of) in by_explorer(&explorers, &played) {
+        let explorer = &*explorer;
         let mut visits = vec![0.0; grid.len()];
         let (mut covered, mut everywhere) = (Vec::new(), 0);
         for episode in &of {
@@ -70,7 +64,7 @@ pub fn draw(request: &Request) -> Result<Drawing> {
             let cells = [x, y, *share].map(|v| format!("{v:.4}"));
             drawing.data[0]
                 .rows
-                .push([&[explorer.clone()][..], &cells].concat());
+                .push([&[explorer.to_owned()][..], &cells].concat());
         }
         drawing
             .numbers
@@ -82,11 +76,8 @@ pub fn draw(request: &Request) -> Result<Drawing> {
             of.len(),
         ));
         let plan = with_fixtures(grid.plan(explorer, &visits, 1.0, Colour::Blue), &*task);
-        drawing.panels.push((
-            explorer.clone(),
-            plan,
-            "Dark: every episode; white: none.".into(),
-        ));
+        let caption = "Dark: every episode; white: none.";
+        drawing.panels.push(Panel::new(explorer, plan, caption));
     }
     drawing.claims = claims(&drawing);
     Ok(drawing)

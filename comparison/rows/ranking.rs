@@ -1,0 +1,71 @@
+//! Which of several methods is the best, and how surely.
+
+use super::types::{Improvement, Row, Summary};
+use crate::method::ORACLE;
+use crate::statistics::{improvement, improvement_interval};
+
+/// A method's figures among those that it is ranked with.
+pub struct Entry<'a> {
+    /// Its name.
+    pub method: &'a str,
+    /// Values of the metric by stratum.
+    pub values: Vec<Vec<f64>>,
+    /// Its figures, which are completed.
+    pub summary: &'a mut Summary,
+}
+
+/// Runs from which on a bootstrap interval may set a method apart. It cannot reach beyond the values
+/// that were seen, and only from six on do these enclose the median with 95 % (1 - 2 / 2^6 = 97 %).
+pub const FEWEST: usize = 6;
+
+/// Compares methods with each other. The oracle is no method: it shows what the task allows.
+pub fn compare(mut entries: Vec<Entry<'_>>) {
+    entries.retain(|e| e.method != ORACLE);
+    // Lower is better; among equals the one that succeeds more often.
+    entries.sort_by(|a, b| {
+        let by_metric = a.summary.iqm.total_cmp(&b.summary.iqm);
+        by_metric.then(b.summary.success_rate.total_cmp(&a.summary.success_rate))
+    });
+    for i in 1..entries.len() {
+        let (better, next) = entries.split_at_mut(i);
+        let (better, next) = (&mut better[i - 1], &next[0]);
+        better.summary.improvement = Some(Improvement {
+            over: next.method.to_owned(),
+            probability: improvement(&better.values, &next.values),
+            interval95: improvement_interval(&better.values, &next.values),
+        });
+    }
+    if let [first, second, ..] = &mut *entries {
+        let enough = first.summary.n.min(second.summary.n) >= FEWEST;
+        let apart = first.summary.iqm_interval95[1] < second.summary.iqm_interval95[0];
+        first.summary.best.iqm = enough && apart;
+    }
+    entries.sort_by(|a, b| b.summary.success_rate.total_cmp(&a.summary.success_rate));
+    if let [first, second, ..] = &mut *entries {
+        let apart = first.summary.success_interval95[0] > second.summary.success_interval95[1];
+        first.summary.best.success = apart;
+    }
+}
+
+/// Ranks the methods of each task, condition, world and engine.
+pub fn rank(rows: &mut [Row]) {
+    let group = |r: &Row| {
+        let names = [&r.task, &r.condition, &r.world, &r.backend];
+        names.map(String::clone)
+    };
+    let mut groups: Vec<[String; 4]> = Vec::new();
+    for row in rows.iter() {
+        if !groups.contains(&group(row)) {
+            groups.push(group(row));
+        }
+    }
+    for wanted in groups {
+        let members = rows.iter_mut().filter(|r| group(r) == wanted);
+        let entries = members.map(|r| Entry {
+            method: &r.method,
+            values: vec![r.values.clone()],
+            summary: &mut r.summary,
+        });
+        compare(entries.collect());
+    }
+}

@@ -1,0 +1,196 @@
+//! How explorers are shown beside each other: the table, the pictures, and what is claimed.
+
+use asid_comparison::grid::{Entry, Grid};
+use asid_comparison::rows::FEWEST;
+use asid_report::plot::{Axis, Chart, Colour, Layer, Ranked, Ranking, Spacing};
+
+use super::super::{Claim, Number, Panel, median};
+use super::Row;
+
+/// Expected over actual deviation that is asked for, in the median over episodes.
+const CALIBRATED: [f64; 2] = [0.7, 1.4];
+
+/// Deviations below this share of the prior's are drawn there.
+const FLOOR: f64 = 1e-4;
+
+pub fn table(rows: &[Row]) -> Grid {
+    let caption = "Medians over episodes with 95 % bootstrap intervals, in deviations of the prior; the narrowest \
+                   posterior of a task's unknown first, in bold where its interval is apart from the next one's. \
+                   Ratio: expected over actual deviation. Contact: mean share of control steps.";
+    let mut grid = Grid::new("What episodes tell", caption)
+        .text("unknown")
+        .text("explorer")
+        .number("n")
+        .number("posterior")
+        .number("expected")
+        .number("ratio")
+        .number("error")
+        .number("contact");
+    let cell = |n: &Number| {
+        let [low, high] = n.interval95;
+        format!("{} ({} to {})", short(n.value), short(low), short(high))
+    };
+    for (i, row) in rows.iter().enumerate() {
+        let mate = |other: &&Row| (&other.task, &other.unknown) == (&row.task, &row.unknown);
+        let first = i == 0 || !mate(&&rows[i - 1]);
+        let next = rows.get(i + 1).filter(mate);
+        let apart = |n: &Row| row.actual.interval95[1] < n.actual.interval95[0];
+        let best = first && row.pairs.len() >= FEWEST && next.is_some_and(apart);
+        grid.rows.push(vec![
+            format!("{}: {}", row.task, row.unknown).into(),
+            (&*row.explorer).into(),
+            row.pairs.len().to_string().into(),
+            Entry {
+                text: cell(&row.actual),
+                best,
+            },
+            cell(&row.expected).into(),
+            cell(&row.ratio).into(),
+            cell(&row.error).into(),
+            format!("{:.0} %", 100.0 * row.contact.value).into(),
+        ]);
+    }
+    grid
+}
+
+/// Two figures of a number about as large as 1 or smaller.
+fn short(x: f64) -> String {
+    match x.abs() {
+        a if a >= 10.0 || a.is_nan() => format!("{x:.0}"),
+        a if a >= 1.0 => format!("{x:.1}"),
+        a if a >= 0.095 => format!("{x:.2}"),
+        _ => format!("{x:.3}"),
+    }
+}
+
+fn colour(explorer: &str) -> Colour {
+    match explorer {
+        e if e.starts_with("fisher") => Colour::Blue,
+        e if e.starts_with("random") => Colour::Muted,
+        _ => Colour::Vermillion,
+    }
+}
+
+pub fn ranking(of: &[&Row]) -> Panel {
+    let [task, unknown] = [&of[0].task, &of[0].unknown];
+    let title = format!("{task}: {unknown}");
+    let lowest = lowest(of);
+    let axis = Axis::new("posterior over prior deviation", "")
+        .spacing(Spacing::Log)
+        .domain([lowest, 1.15]);
+    let bars = of.iter().map(|row| {
+        let [low, high] = row.actual.interval95;
+        let text = format!(
+            "{} ({} to {})",
+            short(row.actual.value),
+            short(low),
+            short(high)
+        );
+        Ranked::new(&*row.explorer, row.actual.value, text).colour(colour(&row.explorer))
+    });
+    let plot = Ranking::new(&title, axis).base(lowest).rows(bars);
+    Panel::new(
+        &title,
+        plot,
+        "Median over episodes with its 95 % interval; short: much was learned.",
+    )
+}
+
+pub fn against(of: &[&Row]) -> Panel {
+    let title = format!("{}: {}, expected against actual", of[0].task, of[0].unknown);
+    let axis = |label: &str| {
+        Axis::new(label, "")
+            .spacing(Spacing::Log)
+            .domain([lowest(of), 2.0])
+    };
+    let chart = Chart::new(&title, axis("actual deviation"), axis("expected deviation"));
+    let (low, high) = (lowest(of), 2.0);
+    let chart = chart.layer(
+        Layer::line(vec![[low, low], [high, high]])
+            .colour(Colour::Muted)
+            .dashed()
+            .label("as expected"),
+    );
+    let kinds: [(&str, &dyn Fn(&str) -> bool); 3] = [
+        ("random", &|e| e.starts_with("random")),
+        ("Fisher", &|e| e.starts_with("fisher")),
+        ("others", &|e| {
+            !e.starts_with("fisher") && !e.starts_with("random")
+        }),
+    ];
+    let chart = kinds.iter().fold(chart, |chart, (label, holds)| {
+        let own = of.iter().filter(|r| holds(&r.explorer));
+        let dots: Vec<[f64; 2]> = own
+            .clone()
+            .flat_map(|r| &r.pairs)
+            .filter(|p| p.iter().all(|x| x.is_finite()))
+            .map(|[expected, actual]| [actual.max(FLOOR), expected.max(FLOOR)])
+            .collect();
+        match own.clone().next() {
+            Some(first) if !dots.is_empty() => {
+                let layer = Layer::dots(dots).colour(colour(&first.explorer));
+                chart.layer(layer.opacity(0.6).label(*label))
+            }
+            _ => chart,
+        }
+    });
+    Panel::new(
+        &title,
+        chart,
+        "A dot an episode, in deviations of the prior.",
+    )
+}
+
+/// Low end of the axes: a little below what was seen.
+fn lowest(of: &[&Row]) -> f64 {
+    let all = of.iter().flat_map(|r| &r.pairs).flatten();
+    let seen = all.copied().filter(|x| x.is_finite());
+    0.7 * seen.fold(1.0, f64::min).max(FLOOR)
+}
+
+pub fn claims(rows: &[Row]) -> Vec<Claim> {
+    let mut claims = Vec::new();
+    let mut groups: Vec<(&str, &str)> = Vec::new();
+    for row in rows.iter().filter(|r| !r.binary) {
+        if !groups.contains(&(&row.task, &row.unknown)) {
+            groups.push((&row.task, &row.unknown));
+        }
+    }
+    for (task, unknown) in groups {
+        let of = || {
+            rows.iter()
+                .filter(|r| (&*r.task, &*r.unknown) == (task, unknown))
+        };
+        let best = of().find(|r| r.explorer.starts_with("fisher"));
+        let random = of().find(|r| r.explorer == "random");
+        if let (Some(fisher), Some(random)) = (best, random) {
+            claims.push(Claim {
+                statement: format!(
+                    "{task}, {unknown}: {} leaves {} of the prior's deviation, random actions {}",
+                    fisher.explorer,
+                    short(fisher.actual.value),
+                    short(random.actual.value)
+                ),
+                paper: "Fisher exploration tells more than random actions (table 1)".into(),
+                holds: fisher.actual.interval95[1] < random.actual.interval95[0],
+            });
+        }
+        let ratios: Vec<f64> = of()
+            .flat_map(|r| &r.pairs)
+            .map(|[expected, actual]| expected / actual)
+            .filter(|x| x.is_finite())
+            .collect();
+        let ratio = median("all", "", "", &ratios);
+        let [low, high] = CALIBRATED;
+        claims.push(Claim {
+            statement: format!(
+                "{task}, {unknown}: expected over actual deviation {} in the median over {} episodes",
+                short(ratio.value),
+                ratio.n
+            ),
+            paper: format!("says nothing of it; {low} to {high} is asked for here"),
+            holds: (low..=high).contains(&ratio.value),
+        });
+    }
+    claims
+}

@@ -1,0 +1,114 @@
+//! Explorers with settings of their own, as figures name them: `fisher-cem`, or
+//! `fisher-cem:fisher.objective=trace+fisher.form=one-step`.
+
+use anyhow::Result;
+use asid_core::registry::{ExplorerEntry, find};
+use asid_learned::learning::SHIPPED;
+use asid_learned::shipped;
+
+/// An explorer and settings that differ from its own.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Variant<'t> {
+    /// Name of the explorer.
+    pub name: &'t str,
+    /// Settings `key=value`, without `explorer.` before the key.
+    settings: Vec<&'t str>,
+}
+
+impl<'t> Variant<'t> {
+    /// Reads what a figure was told.
+    pub fn of(text: &'t str) -> Self {
+        let (name, settings) = text.split_once(':').unwrap_or((text, ""));
+        Self {
+            name,
+            settings: settings.split('+').filter(|s| !s.is_empty()).collect(),
+        }
+    }
+
+    /// Name for pictures and tables: the explorer and its values, such as `fisher-cem trace one-step`.
+    pub fn label(&self) -> String {
+        let values = self.settings.iter().map(|s| {
+            let value = s.split_once('=').map_or(*s, |(_, value)| value);
+            value.rsplit('/').next().unwrap_or(value).trim_matches('"')
+        });
+        let words: Vec<&str> = std::iter::once(self.name).chain(values).collect();
+        words.join(" ")
+    }
+
+    /// The settings as `--set` takes them. An explorer that learns plays what ships, unless it was told
+    /// a file: no episode trains for itself alone.
+    ///
+    /// # Errors
+    /// When there is no such explorer.
+    pub fn set(&self) -> Result<Vec<String>> {
+        let mut set: Vec<String> = self
+            .settings
+            .iter()
+            .map(|s| format!("explorer.{s}"))
+            .collect();
+        if self.learns()? && !self.is_told_a_policy() {
+            set.push(format!("explorer.policy={SHIPPED:?}"));
+        }
+        Ok(set)
+    }
+
+    /// Why it cannot be played on a task: it learns, nothing ships and it was told no file.
+    ///
+    /// # Errors
+    /// When there is no such explorer.
+    pub fn lacks(&self, task: &str) -> Result<Option<String>> {
+        let there = shipped::find(task, self.name).is_some();
+        let plays = !self.learns()? || self.is_told_a_policy() || there;
+        Ok((!plays).then(|| {
+            format!(
+                "Left out: {} on {task}, for which nothing that was trained ships; --explorer {}:policy=FILE plays a file",
+                self.label(),
+                self.name
+            )
+        }))
+    }
+
+    fn learns(&self) -> Result<bool> {
+        let defaults = (find::<ExplorerEntry>(self.name)?.defaults)();
+        Ok(defaults.contains_key("policy"))
+    }
+
+    fn is_told_a_policy(&self) -> bool {
+        self.settings.iter().any(|s| s.starts_with("policy"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn settings_follow_a_name_and_a_label_has_their_values() {
+        let plain = Variant::of("random");
+        assert_eq!((plain.name, &*plain.label()), ("random", "random"));
+        assert!(plain.set().unwrap().is_empty());
+        let trace = Variant::of("fisher-cem:fisher.objective=trace+fisher.form=one-step");
+        assert_eq!(trace.label(), "fisher-cem trace one-step");
+        assert_eq!(
+            trace.set().unwrap(),
+            [
+                "explorer.fisher.objective=trace",
+                "explorer.fisher.form=one-step"
+            ]
+        );
+        assert_eq!(trace.lacks("rod-balancing").unwrap(), None);
+        assert!(Variant::of("no-such").set().is_err());
+    }
+
+    #[test]
+    fn what_learns_plays_what_ships_or_the_file_that_it_is_told() {
+        let ships = Variant::of("fisher-ppo");
+        assert_eq!(ships.set().unwrap(), ["explorer.policy=\"shipped\""]);
+        assert_eq!(ships.lacks("rod-balancing").unwrap(), None);
+        assert!(ships.lacks("no-such-task").unwrap().is_some());
+        let told = Variant::of("max:policy=a/b.safetensors");
+        assert_eq!(told.label(), "max b.safetensors");
+        assert_eq!(told.lacks("no-such-task").unwrap(), None);
+        assert_eq!(told.set().unwrap(), ["explorer.policy=a/b.safetensors"]);
+    }
+}
