@@ -101,7 +101,8 @@ pub struct Played {
     pub log: Episode,
     /// True readings, `frames + 1` rows as in the log.
     pub readings: Vec<f64>,
-    /// Actions, `horizon x action`.
+    /// Actions, `horizon x action`, which only models of the motion repeat.
+    #[cfg_attr(not(feature = "torch"), expect(dead_code))]
     pub actions: Vec<f64>,
     /// Share of control steps with contact.
     pub contact_fraction: f64,
