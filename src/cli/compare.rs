@@ -14,7 +14,7 @@ use asid_core::Error;
 use super::figure;
 use super::options::{Common, Simulator, threads};
 
-mod arm;
+pub mod arm;
 mod cell;
 mod folder;
 mod merge;

@@ -159,18 +159,22 @@ fn keep<T: ?Sized + 'static>(
         (None, _) => given.clear(),
         (Some(part), Some(name)) if part != name => given.clear(),
         (Some(_), Some(_)) => {}
-        (Some(part), None) => {
-            let own = known::<T>(task, section, part);
-            let of_any: Vec<String> = registry::all::<AlgorithmEntry<T>>()
-                .iter()
-                .flat_map(|e| known::<T>(task, section, e.name()))
-                .collect();
-            given.retain(|key, _| own.iter().any(|k| k == key) || of_any.iter().all(|k| k != key));
-        }
+        (Some(part), None) => given.retain(|key, _| reaches::<T>(task, section, part, key)),
     }
     if given.is_empty() {
         settings.remove(section);
     }
+}
+
+/// Whether a setting is for the algorithm `part` on a task: it has it, or no algorithm of the kind has and
+/// it is to be refused.
+pub fn reaches<T: ?Sized + 'static>(task: &dyn Task, section: &str, part: &str, key: &str) -> bool
+where
+    AlgorithmEntry<T>: Entry,
+{
+    let has = |name: &str| known::<T>(task, section, name).iter().any(|k| k == key);
+    let all = registry::all::<AlgorithmEntry<T>>();
+    has(part) || !all.iter().any(|e| has(e.name()))
 }
 
 /// Settings that an algorithm has on a task; none where it is not registered.

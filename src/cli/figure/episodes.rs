@@ -11,10 +11,11 @@ use asid_comparison::preset;
 use asid_comparison::schedule;
 use asid_core::real_world::{RealEpisode, RealWorld as _};
 use asid_core::registry::{ExplorerEntry, find};
-use asid_core::{Episode, Error, Policy, SimulatedWorld};
+use asid_core::{Episode, Error, Explorer, Policy, SimulatedWorld};
 
 use super::Request;
 use super::variant::Variant;
+use crate::cli::compare::arm::reaches;
 use crate::cli::options::{Algorithms, Common, Worlds};
 use crate::cli::session::Session;
 
@@ -100,7 +101,8 @@ pub struct Played {
     pub log: Episode,
     /// True readings, `frames + 1` rows as in the log.
     pub readings: Vec<f64>,
-    /// Actions, `horizon x action`.
+    /// Actions, `horizon x action`, which only models of the motion repeat.
+    #[cfg_attr(not(feature = "torch"), expect(dead_code))]
     pub actions: Vec<f64>,
     /// Share of control steps with contact.
     pub contact_fraction: f64,
@@ -211,6 +213,13 @@ pub fn open(common: &Common, wanted: &Wanted, quick: bool) -> Result<Session> {
     // Episodes are the parallel axis.
     own.threads = Some(1);
     own.quiet = true;
+    // A setting reaches the explorers that have it.
+    let task = super::task(&wanted.task)?;
+    own.set.retain(|assignment| {
+        let key = assignment.trim_start().strip_prefix("explorer.");
+        let key = key.and_then(|k| k.split(['.', '=']).next());
+        key.is_none_or(|k| reaches::<dyn Explorer>(&*task, "explorer", variant.name, k.trim()))
+    });
     let names_policy = |s: &String| s.trim_start().starts_with("explorer.policy");
     let given = own.set.iter().any(names_policy);
     let of_variant = variant.set()?.into_iter();

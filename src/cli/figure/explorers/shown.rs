@@ -13,6 +13,7 @@ const CALIBRATED: [f64; 2] = [0.7, 1.4];
 /// Deviations below this share of the prior's are drawn there.
 const FLOOR: f64 = 1e-4;
 
+/// The table.
 pub fn table(rows: &[Row]) -> Grid {
     let caption = "Medians over episodes with 95 % bootstrap intervals, in deviations of the prior; the narrowest \
                    posterior of a task's unknown first, in bold where its interval is apart from the next one's. \
@@ -63,14 +64,22 @@ fn short(x: f64) -> String {
     }
 }
 
-fn colour(explorer: &str) -> Colour {
+/// Kinds of explorers with their colours.
+const KINDS: [(&str, Colour); 3] = [
+    ("random", Colour::Muted),
+    ("Fisher", Colour::Blue),
+    ("others", Colour::Vermillion),
+];
+
+fn kind(explorer: &str) -> (&'static str, Colour) {
     match explorer {
-        e if e.starts_with("fisher") => Colour::Blue,
-        e if e.starts_with("random") => Colour::Muted,
-        _ => Colour::Vermillion,
+        e if e.starts_with("random") => KINDS[0],
+        e if e.starts_with("fisher") => KINDS[1],
+        _ => KINDS[2],
     }
 }
 
+/// Posterior deviations of the explorers, of one unknown, as bars.
 pub fn ranking(of: &[&Row]) -> Panel {
     let [task, unknown] = [&of[0].task, &of[0].unknown];
     let title = format!("{task}: {unknown}");
@@ -86,7 +95,7 @@ pub fn ranking(of: &[&Row]) -> Panel {
             short(low),
             short(high)
         );
-        Ranked::new(&*row.explorer, row.actual.value, text).colour(colour(&row.explorer))
+        Ranked::new(&*row.explorer, row.actual.value, text).colour(kind(&row.explorer).1)
     });
     let plot = Ranking::new(&title, axis).base(lowest).rows(bars);
     Panel::new(
@@ -96,6 +105,7 @@ pub fn ranking(of: &[&Row]) -> Panel {
     )
 }
 
+/// Expected against actual deviations of all episodes, of one unknown.
 pub fn against(of: &[&Row]) -> Panel {
     let title = format!("{}: {}, expected against actual", of[0].task, of[0].unknown);
     let axis = |label: &str| {
@@ -111,28 +121,19 @@ pub fn against(of: &[&Row]) -> Panel {
             .dashed()
             .label("as expected"),
     );
-    let kinds: [(&str, &dyn Fn(&str) -> bool); 3] = [
-        ("random", &|e| e.starts_with("random")),
-        ("Fisher", &|e| e.starts_with("fisher")),
-        ("others", &|e| {
-            !e.starts_with("fisher") && !e.starts_with("random")
-        }),
-    ];
-    let chart = kinds.iter().fold(chart, |chart, (label, holds)| {
-        let own = of.iter().filter(|r| holds(&r.explorer));
+    let chart = KINDS.iter().fold(chart, |chart, kind| {
+        let own = of.iter().filter(|r| self::kind(&r.explorer) == *kind);
         let dots: Vec<[f64; 2]> = own
-            .clone()
             .flat_map(|r| &r.pairs)
             .filter(|p| p.iter().all(|x| x.is_finite()))
             .map(|[expected, actual]| [actual.max(FLOOR), expected.max(FLOOR)])
             .collect();
-        match own.clone().next() {
-            Some(first) if !dots.is_empty() => {
-                let layer = Layer::dots(dots).colour(colour(&first.explorer));
-                chart.layer(layer.opacity(0.6).label(*label))
-            }
-            _ => chart,
+        if dots.is_empty() {
+            return chart;
         }
+        let (label, colour) = *kind;
+        let layer = Layer::dots(dots).colour(colour).opacity(0.6);
+        chart.layer(layer.label(label))
     });
     Panel::new(
         &title,
@@ -148,6 +149,7 @@ fn lowest(of: &[&Row]) -> f64 {
     0.7 * seen.fold(1.0, f64::min).max(FLOOR)
 }
 
+/// That Fisher exploration tells more than random actions, and that what is expected of it is found.
 pub fn claims(rows: &[Row]) -> Vec<Claim> {
     let mut claims = Vec::new();
     let mut groups: Vec<(&str, &str)> = Vec::new();

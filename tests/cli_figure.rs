@@ -1,0 +1,204 @@
+//! Figures through the real binary.
+
+#![allow(clippy::unwrap_used)]
+
+#[allow(dead_code)] // not every test needs all of it
+mod cli_support;
+
+use std::process::Output;
+
+use cli_support::{Workplace, tiny};
+use serde_json::Value;
+
+fn figure(place: &Workplace, name: &str, arguments: &[&str], out: &str) -> Output {
+    let common = ["compare", "--figure", name, "--quiet", "--out", out];
+    place.run(&tiny(&[&common, arguments].concat()))
+}
+
+fn said(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+fn result(place: &Workplace, out: &str) -> Value {
+    serde_json::from_str(&place.read(&format!("{out}/result.json"))).unwrap()
+}
+
+/// The page is a document, and the picture another.
+fn drawn(place: &Workplace, out: &str) {
+    let options = roxmltree::ParsingOptions {
+        allow_dtd: true,
+        ..roxmltree::ParsingOptions::default()
+    };
+    for file in ["report.html", "picture.svg"] {
+        let text = place.read(&format!("{out}/{file}"));
+        roxmltree::Document::parse_with_options(&text, options).unwrap();
+    }
+}
+
+/// Without contact nothing is learned: what is expected and what is found are the prior, to within what a
+/// handful of samples tells.
+#[test]
+fn explorers_are_ranked_by_what_identification_makes_of_the_same_episodes() {
+    let place = Workplace::new();
+    let explorers = [
+        "random",
+        "fisher-cem",
+        "fisher-cem:fisher.form=one-step",
+        "max",
+    ];
+    let mut arguments = vec!["rod-balancing", "--episodes", "1"];
+    arguments.extend(explorers.iter().flat_map(|e| ["--explorer", e]));
+    let output = figure(&place, "explorers", &arguments, "a");
+    assert!(output.status.success(), "{}", said(&output));
+    drawn(&place, "a");
+    let rows: Vec<Vec<String>> = place
+        .read("a/episodes.csv")
+        .lines()
+        .map(|line| line.split(',').map(str::to_owned).collect())
+        .collect();
+    let names: Vec<&str> = rows[1..].iter().map(|r| &*r[1]).collect();
+    assert_eq!(names, ["random", "fisher-cem", "fisher-cem one-step"]);
+    // All meet the same truth.
+    assert!(rows[1..].iter().all(|r| r[4] == rows[1][4]));
+    let shipped = result(&place, "a")["notes"].to_string();
+    assert!(
+        shipped.contains("Left out: max on rod-balancing"),
+        "{shipped}"
+    );
+    let random: Vec<f64> = rows[1][6..10].iter().map(|x| x.parse().unwrap()).collect();
+    let [expected, actual, _, contact] = random[..] else {
+        panic!("{random:?}")
+    };
+    assert_eq!(contact, 0.0);
+    assert!((expected - 1.0).abs() < 0.01 && actual > 0.5, "{random:?}");
+    let table = place.read("a/table.md");
+    assert!(
+        table.contains("| rod-balancing: mass_offset | random | 1 |"),
+        "{table}"
+    );
+}
+
+/// Levels are comparisons that are kept: with one of them there already, the figure takes it as it is.
+#[test]
+fn a_curve_of_difficulty_goes_on_with_the_levels_that_are_there() {
+    let place = Workplace::new();
+    let levels = ["rod-balancing", "--levels", "ledge_width=0.06,0.01"];
+    let methods = ["--method", "dr", "--method", "oracle", "--seeds", "1"];
+    let arguments = [&levels[..], &methods, &["--condition", "left"]].concat();
+    let run = |out: &str| {
+        let output = figure(&place, "difficulty", &arguments, out);
+        assert!(output.status.success(), "{}", said(&output));
+    };
+    run("a");
+    drawn(&place, "a");
+    let numbers = result(&place, "a")["numbers"].clone();
+    assert_eq!(numbers.as_array().unwrap().len(), 4);
+    assert_eq!(place.read("a/difficulty.csv").lines().count(), 5);
+    // What is left when it was stopped after the first level.
+    let kept = "b/levels/ledge_width=0.06";
+    std::fs::create_dir_all(place.path("b/levels")).unwrap();
+    std::fs::rename(place.path("a/levels/ledge_width=0.06"), place.path(kept)).unwrap();
+    let cell = format!("{kept}/cells/rod-balancing.left.dr.matched.rapier.0.json");
+    let before = std::fs::metadata(place.path(&cell))
+        .unwrap()
+        .modified()
+        .unwrap();
+    run("b");
+    let after = std::fs::metadata(place.path(&cell))
+        .unwrap()
+        .modified()
+        .unwrap();
+    assert_eq!(before, after);
+    assert_eq!(result(&place, "b")["numbers"], numbers);
+    assert_eq!(
+        place.read("a/difficulty.csv"),
+        place.read("b/difficulty.csv")
+    );
+    // A figure that is drawn is never touched.
+    let again = figure(&place, "difficulty", &arguments, "b");
+    assert_eq!(again.status.code(), Some(2));
+    assert!(
+        said(&again).contains("already holds another run"),
+        "{}",
+        said(&again)
+    );
+}
+
+#[test]
+fn what_cannot_be_drawn_is_refused_in_one_line_and_nothing_is_written() {
+    let place = Workplace::new();
+    for (name, arguments, expected) in [
+        ("curves", &[][..], "learned-model"),
+        ("explorers", &["--explorer", "fisher-cme"], "fisher-cem"),
+        ("explorers", &["--explorer", "random:hold=2"], "hold"),
+        (
+            "distractors",
+            &["--explorer", "task-ppo"],
+            "task-ppo:policy=FILE",
+        ),
+        ("difficulty", &["laptop-articulation"], "angle_tolerance"),
+        (
+            "difficulty",
+            &["rod-balancing", "--levels", "ledge=1"],
+            "ledge_width",
+        ),
+        (
+            "difficulty",
+            &["rod-balancing", "--levels", "ledge_width=9"],
+            "0.004 to 0.1 m",
+        ),
+        ("difficulty", &["rod-balancing", "shuffleboard"], "one task"),
+    ] {
+        let output = figure(&place, name, arguments, "out");
+        let text = said(&output);
+        assert!(!output.status.success(), "{name} {arguments:?}");
+        assert!(
+            text.contains(expected) && text.lines().count() == 1,
+            "{name} {arguments:?}: {text}"
+        );
+    }
+    assert!(place.names().is_empty());
+}
+
+#[cfg(not(feature = "torch"))]
+#[test]
+fn without_libtorch_the_figure_of_learned_models_says_so() {
+    let place = Workplace::new();
+    let output = figure(&place, "learned-model", &[], "a");
+    let text = said(&output);
+    assert_eq!(output.status.code(), Some(1));
+    assert!(
+        text.contains("libtorch") && text.lines().count() == 1,
+        "{text}"
+    );
+    assert!(place.names().is_empty());
+}
+
+/// A ball that nobody touches lies still: the simulator knows it, and of a model that learned from few
+/// episodes the figure tells how far it lets the ball drift.
+#[cfg(feature = "torch")]
+#[test]
+fn learned_models_are_held_against_the_simulator() {
+    let place = Workplace::new();
+    let sources = ["--explorer", "fisher-cem", "--explorer", "random"];
+    let arguments = [&sources[..], &["--episodes", "3"]].concat();
+    let output = figure(&place, "learned-model", &arguments, "a");
+    assert!(output.status.success(), "{}", said(&output));
+    drawn(&place, "a");
+    let result = result(&place, "a");
+    let numbers = result["numbers"].as_array().unwrap();
+    let of = |model: &str, quantity: &str| {
+        let holds = |n: &&Value| n["explorer"] == model && n["quantity"] == quantity;
+        numbers.iter().find(holds).unwrap()["value"]
+            .as_f64()
+            .unwrap()
+    };
+    let error = "left alone outside: error of the ball's place";
+    assert!(of("simulator, fitted", error) < 1e-6);
+    let learned = of("learned from fisher-cem", error);
+    assert!(learned > 1e-4, "{learned}");
+    // The simulator counts as the tracker's noise, 2 mm.
+    let ratio = "left alone outside: error over that of the fitted simulator";
+    let expected = learned / 2e-3;
+    assert!((of("learned from fisher-cem", ratio) / expected - 1.0).abs() < 1e-9);
+}
