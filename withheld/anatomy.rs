@@ -1,0 +1,323 @@
+//! What a machine consists of: the places that a cause can act on, read off its model.
+
+use mujoco_rs::wrappers::mj_model::MjtObjBase;
+
+use crate::document::Element;
+use crate::engine;
+use crate::error::{Error, Result};
+use crate::machine::Machine;
+
+/// Kind of a joint.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum JointKind {
+    /// Turns about an axis.
+    Hinge,
+    /// Moves along an axis.
+    Slide,
+    /// A free body.
+    Free,
+}
+
+/// A joint.
+#[derive(Clone, Debug)]
+pub struct Joint {
+    /// Name.
+    pub name: String,
+    /// Kind.
+    pub kind: JointKind,
+    /// Body that it moves.
+    pub body: String,
+    /// First position.
+    pub qpos: usize,
+    /// First velocity.
+    pub dof: usize,
+    /// Rotor inertia, kg m² or kg.
+    pub armature: f64,
+    /// Viscous friction, N m s/rad or N s/m.
+    pub damping: f64,
+}
+
+/// Law of an actuator.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DriveKind {
+    /// The command is the force.
+    Motor,
+    /// A servo of position.
+    Position,
+    /// A servo of velocity.
+    Velocity,
+    /// A force at a place of a body.
+    Thrust,
+}
+
+/// An actuator.
+#[derive(Clone, Debug)]
+pub struct Drive {
+    /// Name.
+    pub name: String,
+    /// Law.
+    pub kind: DriveKind,
+    /// Joint that it drives alone, as an index of [`Anatomy::joints`]; none for a tendon or a place.
+    pub joint: Option<usize>,
+    /// Gear.
+    pub gear: f64,
+    /// `kp` of a position servo.
+    pub kp: f64,
+    /// `kv` of a servo.
+    pub kv: f64,
+    /// Largest force, where it is limited.
+    pub limit: f64,
+}
+
+/// A sensor.
+#[derive(Clone, Debug)]
+pub struct Sensor {
+    /// Name.
+    pub name: String,
+    /// Tag in the model.
+    pub kind: String,
+    /// First number of its reading.
+    pub address: usize,
+    /// Numbers of its reading.
+    pub len: usize,
+    /// Standard deviation of the noise of each number.
+    pub noise: f64,
+}
+
+impl Sensor {
+    /// Names of its columns in a log.
+    #[must_use]
+    pub fn columns(&self) -> Vec<String> {
+        match self.len {
+            1 => vec![self.name.clone()],
+            n => (0..n).map(|i| format!("{}.{i}", self.name)).collect(),
+        }
+    }
+
+    /// Whether it reads an orientation.
+    #[must_use]
+    pub fn is_orientation(&self) -> bool {
+        self.kind == "framequat"
+    }
+}
+
+/// A machine, taken apart.
+#[derive(Clone, Debug)]
+pub struct Anatomy {
+    /// The machine.
+    pub machine: Machine,
+    /// Its model.
+    pub document: Element,
+    /// Joints, in the model's order.
+    pub joints: Vec<Joint>,
+    /// Actuators.
+    pub drives: Vec<Drive>,
+    /// Sensors.
+    pub sensors: Vec<Sensor>,
+    /// Bodies in order; the first is the world.
+    pub bodies: Vec<String>,
+    /// Geoms in order.
+    pub geoms: Vec<String>,
+    /// Reference position.
+    pub qpos0: Vec<f64>,
+    /// Number of velocities.
+    pub nv: usize,
+    /// Time step of the study's model, s.
+    pub timestep: f64,
+}
+
+fn joint_kind(tag: &str, element: &Element) -> Option<JointKind> {
+    match (tag, element.get("type")) {
+        ("freejoint", _) => Some(JointKind::Free),
+        ("joint", Some("slide")) => Some(JointKind::Slide),
+        ("joint", None | Some("hinge")) => Some(JointKind::Hinge),
+        _ => None,
+    }
+}
+
+impl Anatomy {
+    /// Takes a machine apart.
+    ///
+    /// # Errors
+    /// Where MuJoCo refuses the model, or an element that the machine names is not there.
+    pub fn of(machine: &Machine) -> Result<Self> {
+        let refused = |message: String| Error::Model {
+            machine: machine.name.to_owned(),
+            message,
+        };
+        let document = Element::parse(machine.model).map_err(refused)?;
+        let model = engine::compile(machine.model).map_err(refused)?;
+        let missing = |element: &str, name: &str| Error::Element {
+            machine: machine.name.to_owned(),
+            element: element.to_owned(),
+            name: name.to_owned(),
+        };
+        let find = |kind, element: &str, name: &str| {
+            engine::index(&model, kind, name).ok_or_else(|| missing(element, name))
+        };
+        let mut found: Vec<(&Element, &str)> = Vec::new();
+        document.walk(&mut |e, body| found.push((e, body)));
+        let world = found.iter().position(|(e, _)| e.tag == "worldbody");
+        let world = &found[world.unwrap_or(0)..];
+        let mut joints = Vec::new();
+        let mut bodies = vec!["world".to_owned()];
+        let mut geoms = Vec::new();
+        for (e, body) in world {
+            let name = e.get("name").unwrap_or_default().to_owned();
+            match e.tag.as_str() {
+                "body" => bodies.push(name),
+                "geom" => geoms.push(name),
+                tag if e.get("name").is_some() => {
+                    let Some(kind) = joint_kind(tag, e) else {
+                        continue;
+                    };
+                    // References to joints further down have the same tag and no name.
+                    let id = find(MjtObjBase::mjOBJ_JOINT, "joint", &name)?;
+                    joints.push(Joint {
+                        kind,
+                        body: (*body).to_owned(),
+                        qpos: model.jnt_qposadr()[id] as usize,
+                        dof: model.jnt_dofadr()[id] as usize,
+                        armature: e.number("armature").unwrap_or(0.0),
+                        damping: e.number("damping").unwrap_or(0.0),
+                        name,
+                    });
+                }
+                _ => {}
+            }
+        }
+        let section = |tag: &str| document.find(tag, None).map_or(&[][..], |s| &s.children);
+        let drives = section("actuator").iter().map(|e| drive(e, &joints));
+        let drives = drives.collect::<Vec<_>>();
+        let mut sensors = Vec::new();
+        for e in section("sensor") {
+            let name = e.get("name").unwrap_or_default();
+            let id = find(MjtObjBase::mjOBJ_SENSOR, "sensor", name)?;
+            let noise = machine.noise.iter().find(|(n, _)| *n == name);
+            let noise = noise.ok_or_else(|| missing("noise of the sensor", name))?.1;
+            sensors.push(Sensor {
+                name: name.to_owned(),
+                kind: e.tag.clone(),
+                address: model.sensor_adr()[id] as usize,
+                len: model.sensor_dim()[id] as usize,
+                // A rotation by a small angle turns a quaternion by half of it.
+                noise: if e.tag == "framequat" {
+                    noise / 2.0
+                } else {
+                    noise
+                },
+            });
+        }
+        for command in machine.commands {
+            if !drives.iter().any(|d| d.name == command.actuator) {
+                return Err(missing("actuator", command.actuator));
+            }
+        }
+        let anatomy = Self {
+            machine: *machine,
+            joints,
+            drives,
+            sensors,
+            bodies,
+            geoms,
+            qpos0: model.qpos0().to_vec(),
+            nv: model.nv() as usize,
+            timestep: model.opt().timestep,
+            document: document.clone(),
+        };
+        for start in machine.starts {
+            anatomy.joint(start.joint)?;
+        }
+        for contact in machine.contacts {
+            for geom in contact.movers.iter().chain([&contact.site]) {
+                anatomy.geom(geom)?;
+            }
+        }
+        Ok(anatomy)
+    }
+
+    fn place<T>(&self, all: &[T], element: &str, name: &str, is: impl Fn(&T) -> bool) -> Result<usize> {
+        all.iter().position(is).ok_or_else(|| Error::Element {
+            machine: self.machine.name.to_owned(),
+            element: element.to_owned(),
+            name: name.to_owned(),
+        })
+    }
+
+    /// Index of a joint.
+    ///
+    /// # Errors
+    /// Where there is none of that name; so for the other places.
+    pub fn joint(&self, name: &str) -> Result<usize> {
+        self.place(&self.joints, "joint", name, |j| j.name == name)
+    }
+
+    /// Index of an actuator.
+    ///
+    /// # Errors
+    /// Where there is none of that name.
+    pub fn drive(&self, name: &str) -> Result<usize> {
+        self.place(&self.drives, "actuator", name, |d| d.name == name)
+    }
+
+    /// Index of a sensor.
+    ///
+    /// # Errors
+    /// Where there is none of that name.
+    pub fn sensor(&self, name: &str) -> Result<usize> {
+        self.place(&self.sensors, "sensor", name, |s| s.name == name)
+    }
+
+    /// Index of a body.
+    ///
+    /// # Errors
+    /// Where there is none of that name.
+    pub fn body(&self, name: &str) -> Result<usize> {
+        self.place(&self.bodies, "body", name, |b| b == name)
+    }
+
+    /// Index of a geom.
+    ///
+    /// # Errors
+    /// Where there is none of that name.
+    pub fn geom(&self, name: &str) -> Result<usize> {
+        self.place(&self.geoms, "geom", name, |g| g == name)
+    }
+
+    /// The drive of a joint, where exactly one drives it and nothing else.
+    #[must_use]
+    pub fn drive_of(&self, joint: usize) -> Option<usize> {
+        let mut all = (0..self.drives.len()).filter(|&d| self.drives[d].joint == Some(joint));
+        let first = all.next()?;
+        all.next().is_none().then_some(first)
+    }
+
+    /// Length of a row of readings.
+    #[must_use]
+    pub fn width(&self) -> usize {
+        self.sensors.iter().map(|s| s.len).sum()
+    }
+}
+
+fn drive(e: &Element, joints: &[Joint]) -> Drive {
+    let joint = e.get("joint");
+    let joint = joint.and_then(|name| joints.iter().position(|j| j.name == name));
+    let kind = match e.tag.as_str() {
+        "position" => DriveKind::Position,
+        "velocity" => DriveKind::Velocity,
+        _ if e.get("site").is_some() => DriveKind::Thrust,
+        _ => DriveKind::Motor,
+    };
+    Drive {
+        name: e.get("name").unwrap_or_default().to_owned(),
+        kind,
+        joint,
+        gear: e.number("gear").unwrap_or(1.0),
+        kp: e.number("kp").unwrap_or(1.0),
+        kv: e.number("kv").unwrap_or(f64::from(u8::from(kind == DriveKind::Velocity))),
+        limit: match e.numbers("forcerange")[..] {
+            [_, high] => high,
+            _ => f64::INFINITY,
+        },
+    }
+}
