@@ -129,6 +129,7 @@ pub struct Anatomy {
 fn joint_kind(tag: &str, element: &Element) -> Option<JointKind> {
     match (tag, element.get("type")) {
         ("freejoint", _) => Some(JointKind::Free),
+        ("joint", Some("free")) => Some(JointKind::Free),
         ("joint", Some("slide")) => Some(JointKind::Slide),
         ("joint", None | Some("hinge")) => Some(JointKind::Hinge),
         _ => None,
@@ -236,7 +237,13 @@ impl Anatomy {
         Ok(anatomy)
     }
 
-    fn place<T>(&self, all: &[T], element: &str, name: &str, is: impl Fn(&T) -> bool) -> Result<usize> {
+    fn place<T>(
+        &self,
+        all: &[T],
+        element: &str,
+        name: &str,
+        is: impl Fn(&T) -> bool,
+    ) -> Result<usize> {
         all.iter().position(is).ok_or_else(|| Error::Element {
             machine: self.machine.name.to_owned(),
             element: element.to_owned(),
@@ -314,7 +321,9 @@ fn drive(e: &Element, joints: &[Joint]) -> Drive {
         joint,
         gear: e.number("gear").unwrap_or(1.0),
         kp: e.number("kp").unwrap_or(1.0),
-        kv: e.number("kv").unwrap_or(f64::from(u8::from(kind == DriveKind::Velocity))),
+        kv: e
+            .number("kv")
+            .unwrap_or(f64::from(u8::from(kind == DriveKind::Velocity))),
         limit: match e.numbers("forcerange")[..] {
             [_, high] => high,
             _ => f64::INFINITY,

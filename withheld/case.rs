@@ -79,7 +79,12 @@ impl From<Error> for LeftOut {
 pub fn make(plan: &Plan, seed: u64, number: usize) -> Result<Case> {
     let mut left_out: Vec<String> = Vec::new();
     for attempt in 0..ATTEMPTS {
-        let names = ["case", plan.half.name(), &number.to_string(), &attempt.to_string()];
+        let names = [
+            "case",
+            plan.half.name(),
+            &number.to_string(),
+            &attempt.to_string(),
+        ];
         let mut draw = Draw {
             anatomy: &plan.machines[plan.slots[number].machine],
             slot: plan.slots[number].clone(),
@@ -163,7 +168,11 @@ impl Draw<'_> {
         // The motions of the logs are other ones where the case is to have few, many or fast rows.
         let style = self.style();
         let usual = style == self.usual();
-        let own = if usual { Vec::new() } else { self.motions(style) };
+        let own = if usual {
+            Vec::new()
+        } else {
+            self.motions(style)
+        };
         let bench = if usual {
             bench
         } else {
@@ -187,7 +196,14 @@ impl Draw<'_> {
                 e => format!("test_{}.csv", e - TRAIN),
             };
             let random = &mut self.random;
-            let text = log::text(anatomy, &record, &steps, (episode, motion), &log_style, random);
+            let text = log::text(
+                anatomy,
+                &record,
+                &steps,
+                (episode, motion),
+                &log_style,
+                random,
+            );
             study.insert(name, text);
         }
         let mut label = self.label(&bench, &truth, &causes, &log_style);
@@ -277,7 +293,10 @@ impl Draw<'_> {
                 Kind::Group => all,
                 _ => all.choose(&mut self.random).cloned().into_iter().collect(),
             };
-            if let Some(joint) = joint.clone().filter(|j| slot.same_joint && cause.sites(self.anatomy).contains(j)) {
+            if let Some(joint) = joint
+                .clone()
+                .filter(|j| slot.same_joint && cause.sites(self.anatomy).contains(j))
+            {
                 sites = vec![joint];
             }
             let draw: [f64; 4] = std::array::from_fn(|_| self.random.random());
@@ -412,8 +431,16 @@ impl Draw<'_> {
         };
         let random = &mut self.random;
         let dirty = self.slot.dirty;
-        let colour = if dirty { random.random_range(0.3..0.8) } else { 0.0 };
-        let jitter = if dirty { random.random_range(0.01..0.04) } else { 0.0 };
+        let colour = if dirty {
+            random.random_range(0.3..0.8)
+        } else {
+            0.0
+        };
+        let jitter = if dirty {
+            random.random_range(0.01..0.04)
+        } else {
+            0.0
+        };
         let starts = random.random::<f64>() >= NO_START;
         Ok(log::Style {
             colour,
@@ -493,13 +520,22 @@ impl Draw<'_> {
                     value: w.value,
                 })
                 .collect(),
-            log_faults: self.slot.fault.iter().map(|f| f.name().to_owned()).collect(),
+            log_faults: self
+                .slot
+                .fault
+                .iter()
+                .map(|f| f.name().to_owned())
+                .collect(),
             little_excitation: self.slot.little,
             starts: style.starts,
             timestep: bench.timestep,
             integrator: bench.integrator.to_owned(),
             integration_gap: 0.0,
-            noise: machine.noise.iter().map(|(n, s)| ((*n).to_owned(), *s)).collect(),
+            noise: machine
+                .noise
+                .iter()
+                .map(|(n, s)| ((*n).to_owned(), *s))
+                .collect(),
             left_out: Vec::new(),
             salt: String::new(),
         };
@@ -521,4 +557,3 @@ impl Draw<'_> {
         label
     }
 }
-

@@ -214,7 +214,10 @@ impl Sim {
             *to = (base + std::mem::take(extra)).max(0.0);
         }
         let sliding = model.geom_friction_mut().iter_mut();
-        for ((to, base), factor) in sliding.zip(&self.sliding_base).zip(&mut self.sliding_factor) {
+        for ((to, base), factor) in sliding
+            .zip(&self.sliding_base)
+            .zip(&mut self.sliding_factor)
+        {
             to[0] = base * std::mem::replace(factor, 1.0);
         }
     }

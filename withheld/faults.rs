@@ -127,7 +127,11 @@ impl Wiring {
                     let mut joints = anatomy.joints.iter();
                     joints.any(|j| j.name == joint && j.kind == crate::anatomy::JointKind::Slide)
                 });
-                let factor = if slide { 1000.0 } else { 180.0 / std::f64::consts::PI };
+                let factor = if slide {
+                    1000.0
+                } else {
+                    180.0 / std::f64::consts::PI
+                };
                 one("wiring-unit", sensor, factor)
             }
             WiringKind::Offset => {
@@ -166,7 +170,11 @@ impl Wiring {
     /// How late readings are, s.
     #[must_use]
     pub fn clock(&self) -> f64 {
-        if self.fault == "wiring-clock" { self.value } else { 0.0 }
+        if self.fault == "wiring-clock" {
+            self.value
+        } else {
+            0.0
+        }
     }
 
     /// Does to the readings what the fault does.

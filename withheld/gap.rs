@@ -84,7 +84,12 @@ impl<'a> Bench<'a> {
             let mut values = truth.to_vec();
             values[i] += step;
             let moved = bench.run(&mut bench.world(&values)?)?;
-            for ((to, a), b) in jacobian.column_mut(i).iter_mut().zip(&moved).zip(&bench.clean) {
+            for ((to, a), b) in jacobian
+                .column_mut(i)
+                .iter_mut()
+                .zip(&moved)
+                .zip(&bench.clean)
+            {
                 *to = (a - b) / step;
             }
         }

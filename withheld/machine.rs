@@ -106,3 +106,44 @@ pub struct Machine {
     /// Rows a second.
     pub rate: f64,
 }
+
+/// A parameter that the owner fits.
+#[must_use]
+pub const fn fit(name: &'static str, target: &'static str, low: f64, high: f64) -> Parameter {
+    Parameter {
+        name,
+        target,
+        range: [low, high],
+    }
+}
+
+/// A command about `center`, by at most `amplitude`, in a band of frequencies in Hz.
+#[must_use]
+pub const fn sines(
+    actuator: &'static str,
+    center: f64,
+    amplitude: f64,
+    low: f64,
+    high: f64,
+) -> Command {
+    Command {
+        actuator,
+        center,
+        amplitude,
+        band: [low, high],
+    }
+}
+
+/// Where a joint starts: centers and spreads.
+#[must_use]
+pub const fn start(
+    joint: &'static str,
+    position: &'static [[f64; 2]],
+    velocity: &'static [[f64; 2]],
+) -> Start {
+    Start {
+        joint,
+        position,
+        velocity,
+    }
+}

@@ -69,10 +69,7 @@ impl Made {
 ///
 /// # Errors
 /// Those of what is run.
-pub fn with_threads<T: Send>(
-    threads: usize,
-    run: impl FnOnce() -> Result<T> + Send,
-) -> Result<T> {
+pub fn with_threads<T: Send>(threads: usize, run: impl FnOnce() -> Result<T> + Send) -> Result<T> {
     match rayon::ThreadPoolBuilder::new().num_threads(threads).build() {
         Ok(pool) => pool.install(run),
         Err(_) => run(),

@@ -222,7 +222,11 @@ impl Slot {
         known: &[&'static dyn Cause],
         random: &mut ChaCha8Rng,
     ) {
-        let count = if random.random::<f64>() < TRIPLES { 3 } else { 2 };
+        let count = if random.random::<f64>() < TRIPLES {
+            3
+        } else {
+            2
+        };
         let friction = ["viscous-friction", "coulomb-friction"];
         let has_joints = !crate::cause::scalar_joints(machine).is_empty();
         if has_joints && random.random::<f64>() < COMMONEST {

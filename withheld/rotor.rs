@@ -57,7 +57,8 @@ impl Rotor {
         if let Some(e) = world.document.find_in_mut("actuator", &drive.name) {
             // A motor of no gear: the command goes to the rotor instead.
             e.tag = "motor".into();
-            e.attributes.retain(|(n, _)| !matches!(&**n, "kp" | "kv" | "forcerange" | "dampratio"));
+            e.attributes
+                .retain(|(n, _)| !matches!(&**n, "kp" | "kv" | "forcerange" | "dampratio"));
             e.set("gear", "0");
         }
         world.forces.push(Box::new(Self {

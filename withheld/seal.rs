@@ -60,7 +60,12 @@ pub fn commitment(case: &str, study: &[u8; 32], label: &Label) -> String {
     // of the type: the text is the same on every machine.
     let text = serde_json::to_string(&bare).unwrap_or_default();
     let mut hash = Sha256::new();
-    for part in [label.salt.as_bytes(), case.as_bytes(), study, text.as_bytes()] {
+    for part in [
+        label.salt.as_bytes(),
+        case.as_bytes(),
+        study,
+        text.as_bytes(),
+    ] {
         hash.update((part.len() as u64).to_le_bytes());
         hash.update(part);
     }
@@ -108,7 +113,11 @@ fn files(folder: &Path) -> Result<BTreeMap<String, String>> {
     let paths: Vec<PathBuf> = entries.filter_map(|e| Some(e.ok()?.path())).collect();
     let mut found = BTreeMap::new();
     for path in paths {
-        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let name = path
+            .file_name()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .into_owned();
         let text = std::fs::read_to_string(&path).map_err(|e| failed(&path, &e))?;
         found.insert(name, text);
     }

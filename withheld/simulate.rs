@@ -50,7 +50,10 @@ impl Record {
         }
         let low = place.floor();
         let (i, share) = (low as usize, place - low);
-        let (a, b) = (rows[i * self.width + column], rows[(i + 1) * self.width + column]);
+        let (a, b) = (
+            rows[i * self.width + column],
+            rows[(i + 1) * self.width + column],
+        );
         a + share * (b - a)
     }
 }
@@ -82,7 +85,9 @@ pub fn simulate(anatomy: &Anatomy, world: &mut World, motions: &[Motion]) -> Res
             }
             sim.observe();
             for sensor in &anatomy.sensors {
-                rows.extend_from_slice(&sim.readings()[sensor.address..sensor.address + sensor.len]);
+                rows.extend_from_slice(
+                    &sim.readings()[sensor.address..sensor.address + sensor.len],
+                );
             }
             let row = ((step as f64 / held + 1e-9) as usize).min(motion.rows - 1);
             let sent = &motion.commands[row * nu..(row + 1) * nu];
@@ -170,7 +175,9 @@ impl Tally {
         let root = |sums: &[f64]| sums.iter().map(|s| (s / n).sqrt()).collect::<Vec<_>>();
         let command = self.squares.command.iter().zip(&self.sums);
         let spread = (0..width).map(|column| {
-            let values = episodes.iter().flat_map(|e| e.iter().skip(column).step_by(width));
+            let values = episodes
+                .iter()
+                .flat_map(|e| e.iter().skip(column).step_by(width));
             let mean = values.clone().sum::<f64>() / n;
             (values.map(|v| (v - mean).powi(2)).sum::<f64>() / n).sqrt()
         });

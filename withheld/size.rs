@@ -49,7 +49,9 @@ pub fn solve(
     let mut share = FIRST;
     for _ in 0..RUNS {
         let readings = measure(share)?;
-        let gap = readings.as_deref().map_or(f64::INFINITY, |r| bench.excess(r));
+        let gap = readings
+            .as_deref()
+            .map_or(f64::INFINITY, |r| bench.excess(r));
         if (gap.ln() - goal).abs() < NEAR {
             break;
         }

@@ -212,7 +212,8 @@ fn inertial<'a>(
     let [w, x, y, z] = model.body_iquat()[id];
     let turn = UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z)).to_rotation_matrix();
     let [a, b, c] = model.body_inertia()[id];
-    let mut moments = turn.matrix() * Matrix3::from_diagonal(&[a, b, c].into()) * turn.matrix().transpose();
+    let mut moments =
+        turn.matrix() * Matrix3::from_diagonal(&[a, b, c].into()) * turn.matrix().transpose();
     for edit in edits {
         let factor = edit.mass * (mass * edit.mass + edit.payload) / (mass * edit.mass);
         mass *= factor;
@@ -225,7 +226,14 @@ fn inertial<'a>(
     element.set_numbers("pos", &centre);
     element.set_numbers("mass", &[mass]);
     let m = moments;
-    let full = [m[(0, 0)], m[(1, 1)], m[(2, 2)], m[(0, 1)], m[(0, 2)], m[(1, 2)]];
+    let full = [
+        m[(0, 0)],
+        m[(1, 1)],
+        m[(2, 2)],
+        m[(0, 1)],
+        m[(0, 2)],
+        m[(1, 2)],
+    ];
     element.set_numbers("fullinertia", &full);
     Some(element)
 }

@@ -39,7 +39,11 @@ impl Cause for CoulombFriction {
         let timestep = world.timestep();
         world.dry_joint(place.site, size, timestep);
         let share = (place.between(0, -2.0, 2.0) * SHARE).clamp(-SHARE, SHARE);
-        let offset = if place.draw[1] < 0.5 { 0.0 } else { share * size };
+        let offset = if place.draw[1] < 0.5 {
+            0.0
+        } else {
+            share * size
+        };
         if offset != 0.0 {
             let dof = place.joint().dof;
             world.forces.push(Box::new(Offset {

@@ -38,7 +38,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             rest: 0.0,
         };
         let random = &mut stream(1, &[machine.name]);
-        let motions: Vec<Motion> = (0..9).map(|_| Motion::draw(&anatomy, style, random)).collect();
+        let motions: Vec<Motion> = (0..9)
+            .map(|_| Motion::draw(&anatomy, style, random))
+            .collect();
         let step = anatomy.timestep;
         let clock = Instant::now();
         let bench = match Bench::new(&anatomy, &truth, &motions, step / 2.0, "implicitfast") {

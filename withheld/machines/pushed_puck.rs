@@ -50,7 +50,7 @@ pub const MACHINE: Machine = Machine {
         Command {
             actuator: "s_y",
             center: 0.0,
-            amplitude: 0.02,
+            amplitude: 0.05,
             band: [0.3, 1.0],
         },
     ],
@@ -66,18 +66,16 @@ pub const MACHINE: Machine = Machine {
             velocity: &[],
         },
     ],
-    contacts: &[
-        Contact {
-            site: "board",
-            movers: &["puck"],
-            shows: Shows {
-                sliding: true,
-                torsion: true,
-                rolling: false,
-                impact: false,
-            },
+    contacts: &[Contact {
+        site: "board",
+        movers: &["puck"],
+        shows: Shows {
+            sliding: true,
+            torsion: true,
+            rolling: false,
+            impact: false,
         },
-    ],
+    }],
     seconds: 1.6,
     rate: 100.0,
 };

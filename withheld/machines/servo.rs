@@ -1,6 +1,6 @@
 //! A position servo that swings a payload on a link.
 
-use crate::machine::{Command, Half, Machine, Parameter, Start};
+use crate::machine::{Half, Machine, fit, sines, start};
 
 /// The machine.
 pub const MACHINE: Machine = Machine {
@@ -21,23 +21,10 @@ pub const MACHINE: Machine = Machine {
   <actuator><position name="servo" joint="hinge" kp="8" kv="0.25" forcerange="-2.5 2.5"/></actuator>
   <sensor><jointpos name="angle" joint="hinge"/></sensor>
 </mujoco>"#,
-    parameters: &[Parameter {
-        name: "payload_mass",
-        target: "geom/bob/mass",
-        range: [0.15, 0.7],
-    }],
-    noise: &[("angle", 0.002)],
-    commands: &[Command {
-        actuator: "servo",
-        center: 0.0,
-        amplitude: 0.8,
-        band: [0.2, 1.5],
-    }],
-    starts: &[Start {
-        joint: "hinge",
-        position: &[[0.0, 0.4]],
-        velocity: &[[0.0, 1.0]],
-    }],
+    parameters: &[fit("payload_mass", "geom/bob/mass", 0.15, 0.7)],
+    noise: &[("angle", 0.003)],
+    commands: &[sines("servo", 0.0, 0.8, 0.2, 1.5)],
+    starts: &[start("hinge", &[[0.0, 0.3]], &[[0.0, 0.5]])],
     contacts: &[],
     seconds: 3.0,
     rate: 100.0,
