@@ -5,7 +5,7 @@ use mujoco_rs::wrappers::mj_model::MjtObjBase;
 use crate::document::Element;
 use crate::engine;
 use crate::error::{Error, Result};
-use crate::machine::Machine;
+use crate::machine::{Machine, Shows};
 
 /// Kind of a joint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -297,6 +297,43 @@ impl Anatomy {
         let mut all = (0..self.drives.len()).filter(|&d| self.drives[d].joint == Some(joint));
         let first = all.next()?;
         all.next().is_none().then_some(first)
+    }
+
+    /// Sites of the contacts that show something.
+    #[must_use]
+    pub fn contact_sites(&self, shows: impl Fn(&Shows) -> bool) -> Vec<String> {
+        let contacts = self.machine.contacts.iter();
+        contacts
+            .filter(|c| shows(&c.shows))
+            .map(|c| c.site.to_owned())
+            .collect()
+    }
+
+    /// Geoms of a contact: the site and what touches it.
+    #[must_use]
+    pub fn touching(&self, site: &str) -> Vec<&'static str> {
+        let mut contacts = self.machine.contacts.iter();
+        let contact = contacts.find(|c| c.site == site);
+        contact.map_or_else(Vec::new, |c| [&[c.site], c.movers].concat())
+    }
+
+    /// The same, as indices.
+    #[must_use]
+    pub fn touching_indices(&self, site: &str) -> Vec<usize> {
+        let all = self.touching(site);
+        all.iter().filter_map(|g| self.geom(g).ok()).collect()
+    }
+
+    /// The body that a contact's friction acts on: the first free one, which carries what touches.
+    #[must_use]
+    pub fn mover(&self, site: &str) -> usize {
+        let movers = self.touching(site);
+        let own = movers.iter().skip(1).find_map(|g| self.body(g).ok());
+        let mut joints = self.joints.iter();
+        let free = joints.find(|j| j.kind == JointKind::Free);
+        free.and_then(|j| self.body(&j.body).ok())
+            .or(own)
+            .unwrap_or(0)
     }
 
     /// Length of a row of readings.

@@ -132,6 +132,36 @@ impl<'a> Place<'a> {
         all.fold(0.0, f64::max).max(1e-6)
     }
 
+    /// Spread of the joint's position, rad or m; at least a hundredth.
+    #[must_use]
+    pub fn roam(&self) -> f64 {
+        self.typical.roam[self.joint().qpos].max(0.01)
+    }
+
+    /// Mean and spread of where a body's joints bring it along an axis of the world: those of its free joint, or
+    /// of a reading of its place.
+    #[must_use]
+    pub fn whereabouts(&self, body: usize, axis: usize) -> [f64; 2] {
+        let name = &self.machine.bodies[body];
+        let mut joints = self.machine.joints.iter();
+        match joints.find(|j| j.body == *name && j.kind == JointKind::Free) {
+            Some(j) => [
+                self.typical.mean[j.qpos + axis],
+                self.typical.roam[j.qpos + axis],
+            ],
+            None => [0.0, 0.1],
+        }
+    }
+
+    /// A unit vector of space that the first three draws give.
+    #[must_use]
+    pub fn direction(&self) -> [f64; 3] {
+        let z = 2.0 * self.draw[0] - 1.0;
+        let [x, y] = self.heading(1);
+        let flat = (1.0 - z * z).sqrt();
+        [flat * x, flat * y, z]
+    }
+
     /// Index of the body that the site is, or whose joint it is.
     #[must_use]
     pub fn body(&self) -> usize {

@@ -80,15 +80,20 @@ pub fn draw(machine: &Anatomy, typical: &Typical, random: &mut impl Rng) -> Vec<
             });
         }
     };
-    let any = |random: &mut _| std::array::from_fn(|_| Rng::random::<f64>(random));
+    let jointed = causes::named("geometry").map_or_else(Vec::new, |c| c.sites(machine));
     // Positive draws make sizes with a sign grow.
     let up = [1.0; 4];
     for body in moving_bodies(machine) {
         add("mass", &body, MASS * normal(random), up);
         add("inertia", &body, MASS * normal(random), up);
-        let draws = any(random);
-        add("geometry", &body, LENGTH * normal(random).abs(), draws);
-        add("axis", &body, AXIS * normal(random).abs(), any(random));
+        if !jointed.contains(&body) {
+            continue;
+        }
+        for (deviation, kind) in [(LENGTH, 0.0), (AXIS, 1.0)] {
+            let mut draws: [f64; 4] = std::array::from_fn(|_| random.random());
+            draws[3] = kind;
+            add("geometry", &body, deviation * normal(random).abs(), draws);
+        }
     }
     for joint in machine.joints.iter().filter(|j| j.kind != JointKind::Free) {
         let viscous = FRICTION * joint.damping * normal(random);

@@ -174,6 +174,14 @@ impl Sim {
         }
     }
 
+    /// Adds a torque to a body, in the world's frame, N m.
+    pub fn twist_body(&mut self, body: usize, torque: [f64; 3]) {
+        let wrench = &mut self.data.xfrc_applied_mut()[body];
+        for (w, t) in wrench[3..].iter_mut().zip(torque) {
+            *w += t;
+        }
+    }
+
     /// Angular and linear velocity of a body at its centre of mass, in the world's frame.
     #[must_use]
     pub fn body_velocity(&self, body: usize) -> ([f64; 3], [f64; 3]) {

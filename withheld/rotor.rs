@@ -49,12 +49,20 @@ impl Rotor {
         let Some(actuator) = machine.drive_of(joint) else {
             return;
         };
-        let drive = machine.drives[actuator].clone();
+        let mut drive = machine.drives[actuator].clone();
         let j = &machine.joints[joint];
         let element = world.document.find("joint", Some(&j.name));
         let armature = element.and_then(|e| e.number("armature")).unwrap_or(0.0);
         world.edit_joint(&j.name, "armature", |_| 0.0);
         if let Some(e) = world.document.find_in_mut("actuator", &drive.name) {
+            // Other causes may have changed the drive.
+            drive.kp = e.number("kp").unwrap_or(drive.kp);
+            drive.kv = e.number("kv").unwrap_or(drive.kv);
+            drive.limit = e
+                .numbers("forcerange")
+                .last()
+                .copied()
+                .unwrap_or(drive.limit);
             // A motor of no gear: the command goes to the rotor instead.
             e.tag = "motor".into();
             e.attributes

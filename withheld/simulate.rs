@@ -34,6 +34,10 @@ pub struct Typical {
     pub peak: Vec<f64>,
     /// Spread of each number of the readings.
     pub spread: Vec<f64>,
+    /// Mean of each position.
+    pub mean: Vec<f64>,
+    /// Spread of each position.
+    pub roam: Vec<f64>,
 }
 
 impl Record {
@@ -137,6 +141,7 @@ struct Tally {
 impl Tally {
     fn new(anatomy: &Anatomy) -> Self {
         let (nv, nu) = (anatomy.nv, anatomy.drives.len());
+        let nq = anatomy.qpos0.len();
         Self {
             steps: 0.0,
             sums: vec![0.0; nu],
@@ -147,6 +152,8 @@ impl Tally {
                 peak: vec![0.0; nv],
                 command: vec![0.0; nu],
                 spread: Vec::new(),
+                mean: vec![0.0; nq],
+                roam: vec![0.0; nq],
             },
         }
     }
@@ -162,6 +169,10 @@ impl Tally {
         add(&mut self.squares.drive, sim.drive_forces());
         add(&mut self.squares.weight, sim.bias_forces());
         add(&mut self.squares.command, sent);
+        add(&mut self.squares.roam, sim.qpos());
+        for (sum, value) in self.squares.mean.iter_mut().zip(sim.qpos()) {
+            *sum += value;
+        }
         for (peak, force) in self.squares.peak.iter_mut().zip(sim.drive_forces()) {
             *peak = peak.max(force.abs());
         }
@@ -181,7 +192,12 @@ impl Tally {
             let mean = values.clone().sum::<f64>() / n;
             (values.map(|v| (v - mean).powi(2)).sum::<f64>() / n).sqrt()
         });
+        let mean: Vec<f64> = self.squares.mean.iter().map(|s| s / n).collect();
+        let roam = self.squares.roam.iter().zip(&mean);
+        let roam = roam.map(|(square, mean)| (square / n - mean * mean).max(0.0).sqrt());
         Typical {
+            roam: roam.collect(),
+            mean,
             speed: root(&self.squares.speed),
             drive: root(&self.squares.drive),
             weight: root(&self.squares.weight),

@@ -8,12 +8,12 @@ pub const MACHINE: Machine = Machine {
     about: "a stone slides over a sheet and turns",
     half: Half::Test,
     model: r#"<mujoco model="curling-stone">
-  <option timestep="0.001" integrator="implicitfast" cone="elliptic" impratio="10"/>
+  <option timestep="0.001" integrator="implicitfast" cone="elliptic"/>
   <worldbody>
-    <geom name="sheet" type="plane" size="9 9 0.1" friction="0.08 0.003 0.0001" solref="-8000 -150" condim="4"/>
+    <geom name="sheet" type="plane" size="9 9 0.1" friction="0.08 0.003 0.0001" solref="-3000 -80" condim="4"/>
     <body name="stone" pos="0 0 0.03">
       <freejoint name="stone"/>
-      <geom name="stone" type="cylinder" size="0.09 0.03" mass="1.2" friction="0.08 0.003 0.0001" solref="-8000 -150" condim="4"/>
+      <geom name="stone" type="cylinder" size="0.09 0.03" mass="1.2" friction="0.08 0.003 0.0001" solref="-3000 -80" condim="4"/>
       <geom name="handle" type="capsule" fromto="-0.04 0 0.05 0.04 0 0.05" size="0.008" mass="0.1" contype="0" conaffinity="0"/>
     </body>
   </worldbody>
