@@ -25,9 +25,9 @@ use crate::world::World;
 /// Logs to fit to and logs held out.
 const TRAIN: usize = 6;
 const TEST: usize = 3;
-/// Draws of a case before it is given up, and those after which another cause is tried.
-const ATTEMPTS: u32 = 24;
-const PATIENCE: u32 = 3;
+/// Draws of a case before it is given up, and causes that are tried in one.
+const ATTEMPTS: u32 = 12;
+const TRIES: u32 = 10;
 /// A case is left out where the study's time step alone makes a gap of more than this, in noise floors:
 /// its motion is chaotic, or its model too coarse.
 const INTEGRATION: f64 = 0.5;
@@ -36,13 +36,17 @@ const INTEGRATION: f64 = 0.5;
 const REPEATABLE: [f64; 2] = [0.5, 0.05];
 /// Amplitudes of a machine that hardly moves, as a share of the usual.
 const LITTLE: f64 = 0.04;
+/// Gap of dirt below which causes stand out of this instead, in noise floors: the least factor then gives the
+/// least gap of clean worlds.
+const LEAST_DIRT: f64 = 0.75;
 /// Share of cases whose study gives the noise, and of those whose logs do not give their start.
 const NOISE_GIVEN: f64 = 0.25;
 const NO_START: f64 = 0.2;
 /// Rest before the motion of a log whose encoder rests.
 const REST: f64 = 0.3;
-/// Episodes in which an item of dirt is measured.
+/// Episodes in which an item of dirt is measured, and those in which a world is run again at half its time step.
 const SAMPLE: usize = 2;
+const CHECKED: usize = 3;
 /// Rows a second of a fast log, and rows of a long one.
 const FAST: f64 = 1000.0;
 const LONG: f64 = 100_000.0;
@@ -89,11 +93,9 @@ pub fn make(plan: &Plan, seed: u64, number: usize) -> Result<Case> {
             anatomy: &plan.machines[plan.slots[number].machine],
             slot: plan.slots[number].clone(),
             random: stream(seed, &names),
+            lower: 0,
         };
-        if attempt >= PATIENCE {
-            draw.other_causes();
-        }
-        match draw.case() {
+        match draw.case(&mut left_out) {
             Ok(mut case) => {
                 case.label.left_out = left_out;
                 case.label.salt = hex(&digest(seed, &["salt", plan.half.name(), names[2]]));
@@ -115,6 +117,8 @@ struct Draw<'a> {
     anatomy: &'a Anatomy,
     slot: Slot,
     random: ChaCha8Rng,
+    /// Levels below the planned one.
+    lower: usize,
 }
 
 /// The causes of a case, sized.
@@ -142,7 +146,7 @@ impl Draw<'_> {
             .collect();
     }
 
-    fn case(&mut self) -> Result<Case, LeftOut> {
+    fn case(&mut self, left_out: &mut Vec<String>) -> Result<Case, LeftOut> {
         let anatomy = self.anatomy;
         let truth: Vec<f64> = anatomy
             .machine
@@ -156,15 +160,15 @@ impl Draw<'_> {
         let (timestep, integrator) = self.world_step();
         let motions = self.motions(self.usual());
         let bench = Bench::new(anatomy, &truth, &motions, timestep, integrator)?;
+        // The cheap rule first.
+        let mut integration_gap = self.integration_gap(&bench)?;
         let dirt = if self.slot.dirty {
             dirt::draw(anatomy, &bench.typical, &mut self.random)
         } else {
             Vec::new()
         };
         let dirt_gap = self.gap_of(&bench, &dirt)?;
-        let aim = self.slot.aim();
-        let target = if self.slot.dirty { aim * dirt_gap } else { aim };
-        let causes = self.size(&bench, target)?;
+        let (causes, target) = self.sized_causes(&bench, dirt_gap, left_out)?;
         // The motions of the logs are other ones where the case is to have few, many or fast rows.
         let style = self.style();
         let usual = style == self.usual();
@@ -178,11 +182,13 @@ impl Draw<'_> {
         } else {
             Bench::new(anatomy, &truth, &own, timestep, integrator)?
         };
-        let integration_gap = self.integration_gap(&bench)?;
+        if !usual {
+            integration_gap = self.integration_gap(&bench)?;
+        }
         let mut world = self.world(&bench, &truth, &dirt, &causes, timestep)?;
         let record = simulate(anatomy, &mut world, bench.motions)?;
         let steps = world.steps.clone();
-        let readings = bench.run(&mut world)?;
+        let readings = bench.rows(&record, &steps);
         let excess_gap = bench.refit(&readings)?.excess;
         self.repeatable(&bench, &truth, &dirt, &causes, &readings, excess_gap)?;
         let dirt_labels = self.measure_dirt(&bench, &truth, &dirt)?;
@@ -278,6 +284,38 @@ impl Draw<'_> {
         }
         let readings = bench.run(&mut self.with(bench, items)?)?;
         Ok(bench.refit(&readings)?.excess)
+    }
+
+    /// Causes of the planned size; else at another site, of a smaller size, or other causes.
+    fn sized_causes(
+        &mut self,
+        bench: &Bench<'_>,
+        dirt_gap: f64,
+        left_out: &mut Vec<String>,
+    ) -> Result<(Causes, f64), LeftOut> {
+        let mut last = String::new();
+        for attempt in 0..TRIES {
+            match attempt {
+                0 | 1 => {}
+                2 | 3 => self.lower += 1,
+                _ => {
+                    self.lower = 0;
+                    self.other_causes();
+                }
+            }
+            let aim = self.slot.aim(self.lower);
+            let target = if self.slot.dirty {
+                aim * dirt_gap.max(LEAST_DIRT)
+            } else {
+                aim
+            };
+            match self.size(bench, target) {
+                Err(LeftOut::Rule(reason)) => last = reason,
+                other => return other.map(|causes| (causes, target)),
+            }
+            left_out.push(last.clone());
+        }
+        Err(LeftOut::Rule(last))
     }
 
     /// Draws sites and finds the sizes that give each cause alone its share of the target.
@@ -383,7 +421,10 @@ impl Draw<'_> {
         excess: f64,
     ) -> Result<(), LeftOut> {
         let mut finer = self.world(bench, truth, dirt, causes, bench.timestep / 2.0)?;
-        let change = bench.distance(&bench.run(&mut finer)?, readings);
+        let some = &bench.motions[..CHECKED];
+        let record = simulate(self.anatomy, &mut finer, some)?;
+        let changed = bench.rows(&record, &finer.steps);
+        let change = bench.distance(&changed, &readings[..changed.len()]);
         if change > REPEATABLE[0].max(REPEATABLE[1] * excess) {
             return Err(LeftOut::Rule(format!(
                 "half the time step changes the readings by {change:.2}"
@@ -505,7 +546,7 @@ impl Draw<'_> {
             dirt_gap: 0.0,
             target_gap: 0.0,
             factor: if self.slot.dirty && !causes.items.is_empty() {
-                self.slot.aim()
+                self.slot.aim(self.lower)
             } else {
                 0.0
             },

@@ -115,9 +115,12 @@ impl<'a> Bench<'a> {
         Ok(self.rows(&record, &world.steps))
     }
 
-    fn rows(&self, record: &Record, steps: &[(usize, f64)]) -> Vec<f64> {
+    /// Readings of the first episodes of a record at their rows, in units of the noise.
+    #[must_use]
+    pub fn rows(&self, record: &Record, steps: &[(usize, f64)]) -> Vec<f64> {
         let mut rows = Vec::new();
-        for (episode, motion) in self.motions.iter().enumerate() {
+        let episodes = self.motions.iter().take(record.episodes.len());
+        for (episode, motion) in episodes.enumerate() {
             for row in 0..motion.rows {
                 let time = row as f64 * motion.period;
                 for sensor in &self.anatomy.sensors {

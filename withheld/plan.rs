@@ -18,7 +18,7 @@ use crate::error::Result;
 use crate::faults::{LogFault, WiringKind};
 use crate::machine::Half;
 use crate::machines;
-use crate::random::stream;
+use crate::random::{digest, stream};
 
 /// True excess gaps of causes in clean worlds, in noise floors.
 pub const GAPS: [f64; 4] = [1.5, 3.0, 10.0, 100.0];
@@ -190,7 +190,8 @@ impl Slot {
             Kind::Single => {
                 if let Some((cause, times)) = used.next(&known, random) {
                     self.causes.push(cause);
-                    self.level = times;
+                    // Each cause goes through the levels, from one of its own on.
+                    self.level = times + usize::from(digest(0, &[cause.name()])[0]);
                 }
             }
             Kind::Unknown => {
@@ -251,13 +252,10 @@ impl Slot {
         }
     }
 
-    /// Excess gap or factor that the causes are sized for.
+    /// Excess gap or factor that the causes are sized for, so many levels below the planned one.
     #[must_use]
-    pub fn aim(&self) -> f64 {
-        if self.dirty {
-            FACTORS[self.level % FACTORS.len()]
-        } else {
-            GAPS[self.level % GAPS.len()]
-        }
+    pub fn aim(&self, lower: usize) -> f64 {
+        let levels: &[f64] = if self.dirty { &FACTORS } else { &GAPS };
+        levels[(self.level % levels.len()).saturating_sub(lower)]
     }
 }

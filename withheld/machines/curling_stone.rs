@@ -8,7 +8,7 @@ pub const MACHINE: Machine = Machine {
     about: "a stone slides over a sheet and turns",
     half: Half::Test,
     model: r#"<mujoco model="curling-stone">
-  <option timestep="0.001" integrator="implicitfast" cone="elliptic"/>
+  <option timestep="0.001" integrator="implicitfast"/>
   <worldbody>
     <geom name="sheet" type="plane" size="9 9 0.1" friction="0.08 0.003 0.0001" solref="-3000 -80" condim="4"/>
     <body name="stone" pos="0 0 0.03">

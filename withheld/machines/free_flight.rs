@@ -8,7 +8,7 @@ pub const MACHINE: Machine = Machine {
     about: "a thrown body tumbles through the air",
     half: Half::Test,
     model: r#"<mujoco model="free-flight">
-  <option timestep="0.001" integrator="implicitfast"/>
+  <option timestep="0.0005" integrator="implicitfast"/>
   <worldbody>
     <body name="club" pos="0 0 1">
       <freejoint name="club"/>
@@ -31,9 +31,9 @@ pub const MACHINE: Machine = Machine {
             [0.0, 2.5],
             [0.0, 2.5],
             [4.0, 1.0],
-            [0.0, 6.0],
-            [0.0, 6.0],
-            [0.0, 6.0],
+            [0.0, 4.0],
+            [0.0, 4.0],
+            [0.0, 4.0],
         ],
     )],
     contacts: &[],

@@ -62,6 +62,6 @@ pub const MACHINE: Machine = Machine {
             impact: false,
         },
     }],
-    seconds: 2.0,
+    seconds: 1.4,
     rate: 100.0,
 };
