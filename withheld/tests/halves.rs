@@ -83,7 +83,10 @@ fn the_split_is_by_kind_of_machine_and_as_written_down() {
     assert!(all.len() >= 16);
     let guide = include_str!("../../docs/withheld.md");
     for name in all {
-        assert!(guide.contains(&format!("`{name}`")), "docs/withheld.md lacks {name}");
+        assert!(
+            guide.contains(&format!("`{name}`")),
+            "docs/withheld.md lacks {name}"
+        );
     }
 }
 
@@ -95,7 +98,9 @@ fn each_machine_and_each_cause_has_a_file_of_its_own() {
         let text = std::fs::read_to_string(&file).expect("a file");
         assert!(text.contains(&format!("name: \"{}\"", machine.name)));
     }
-    let count = std::fs::read_dir(here.join("causes")).expect("a folder").count();
+    let count = std::fs::read_dir(here.join("causes"))
+        .expect("a folder")
+        .count();
     assert_eq!(count, causes::ALL.len() + 1, "one file a cause, and mod.rs");
 }
 
@@ -107,7 +112,11 @@ fn the_causes_are_the_catalogue_and_at_least_ten_that_it_lacks() {
     };
     assert_eq!(of(Standing::Catalogue), CATALOGUE.into_iter().collect());
     assert!(of(Standing::Unknown).len() >= 10);
-    assert!(of(Standing::Unknown).iter().all(|n| n.starts_with("unknown:")));
+    assert!(
+        of(Standing::Unknown)
+            .iter()
+            .all(|n| n.starts_with("unknown:"))
+    );
 }
 
 #[test]
@@ -134,7 +143,11 @@ fn each_half_of_600_cases_keeps_its_quotas() -> Result<()> {
         }
         for machine in &plan.machines {
             for cause in possible(machine, |_| true) {
-                assert!(levels.contains_key(cause.name()), "{half:?}: no {}", cause.name());
+                assert!(
+                    levels.contains_key(cause.name()),
+                    "{half:?}: no {}",
+                    cause.name()
+                );
             }
         }
         let aims: BTreeSet<u64> = plan.slots.iter().map(|s| s.aim(0) as u64).collect();

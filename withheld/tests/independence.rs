@@ -57,7 +57,9 @@ fn the_generator_depends_on_no_crate_of_the_workspace() {
 
 #[test]
 fn no_crate_but_the_command_line_and_the_scorer_depends_on_the_generator() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("a root");
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .parent()
+        .expect("a root");
     let mut all = Vec::new();
     manifests(root, &mut all);
     assert!(all.len() > 10);
@@ -66,7 +68,11 @@ fn no_crate_but_the_command_line_and_the_scorer_depends_on_the_generator() {
         let folder = path.parent().expect("a folder");
         let allowed = folder == root || folder.starts_with(root.join("withheld"));
         let uses = dependencies(&text).contains("asid-withheld");
-        assert!(allowed || !uses, "{} depends on asid-withheld", path.display());
+        assert!(
+            allowed || !uses,
+            "{} depends on asid-withheld",
+            path.display()
+        );
     }
 }
 

@@ -69,10 +69,18 @@ fn reveals_nothing(folder: &Path) {
             let name = cause.name().trim_start_matches("unknown:");
             // Words such as `mass` and `geometry` are MJCF's own.
             let own = !name.contains('-');
-            assert!(own || !text.contains(name), "{} says {name}", path.display());
+            assert!(
+                own || !text.contains(name),
+                "{} says {name}",
+                path.display()
+            );
         }
         for label in labels.values() {
-            assert!(!text.contains(&label.salt), "{} holds a salt", path.display());
+            assert!(
+                !text.contains(&label.salt),
+                "{} holds a salt",
+                path.display()
+            );
         }
     }
     let seal: Seal = serde_json::from_slice(&all[Path::new("seal.json")]).expect("a seal");
@@ -89,7 +97,11 @@ fn reveals_nothing(folder: &Path) {
     {
         use std::os::unix::fs::PermissionsExt as _;
         let sealed = std::fs::metadata(folder.join("sealed")).expect("a folder");
-        assert_eq!(sealed.permissions().mode() & 0o077, 0, "others can read the labels");
+        assert_eq!(
+            sealed.permissions().mode() & 0o077,
+            0,
+            "others can read the labels"
+        );
     }
 }
 

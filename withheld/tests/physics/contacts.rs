@@ -4,8 +4,8 @@ use super::rig::{G, PUCK, Setup, near};
 
 /// Friction of the rig's board.
 const MU: f64 = 0.2;
-/// Height of a puck that rests: it sinks in by its weight.
-const HEIGHT: f64 = 0.0295;
+/// Height of a puck that rests: it sinks in by `(1 - d) g / (d k)`, 0.025 mm.
+const HEIGHT: f64 = 0.029_975;
 
 fn slide(cause: &'static str, size: f64, draw: [f64; 4], velocity: [f64; 3]) -> super::rig::Run {
     Setup::new(PUCK, cause, "board", size)
