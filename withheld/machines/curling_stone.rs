@@ -23,7 +23,7 @@ pub const MACHINE: Machine = Machine {
   </sensor>
 </mujoco>"#,
     parameters: &[fit("sheet_friction", "geom/sheet/friction/0", 0.08, 0.2)],
-    noise: &[("stone_pos", 0.003), ("stone_quat", 0.006)],
+    noise: &[("stone_pos", 0.005), ("stone_quat", 0.01)],
     commands: &[],
     starts: &[start(
         "stone",
