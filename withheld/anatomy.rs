@@ -237,6 +237,13 @@ impl Anatomy {
             .unwrap_or(0)
     }
 
+    /// Whether it can go on for as long as one likes: all of it is held by joints, and nothing touches.
+    #[must_use]
+    pub fn is_tireless(&self) -> bool {
+        let free = self.joints.iter().any(|j| j.kind == JointKind::Free);
+        !free && self.machine.contacts.is_empty()
+    }
+
     /// Length of a row of readings.
     #[must_use]
     pub fn width(&self) -> usize {

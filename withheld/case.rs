@@ -31,6 +31,9 @@ const ATTEMPTS: u32 = 12;
 const PATIENCE: u32 = 4;
 /// Amplitudes of a machine that hardly moves, as a share of the usual.
 const LITTLE: f64 = 0.04;
+/// Factors of a machine's rows a second, and range of those of its seconds.
+const RATES: [f64; 5] = [0.5, 1.0, 1.0, 2.0, 2.5];
+const LENGTHS: [f64; 2] = [0.7, 1.3];
 /// Rest before the motion of a log whose encoder rests.
 const REST: f64 = 0.3;
 /// Rows a second of a fast log, and rows of a long one.
@@ -62,14 +65,24 @@ pub fn make(plan: &Plan, seed: u64, number: usize) -> Result<Case> {
         let slot = &plan.slots[number];
         let other = attempt.saturating_sub(PATIENCE) as usize;
         let machine = (slot.machine + other) % plan.machines.len();
+        let mut random = stream(seed, &names);
+        let pace = [
+            RATES[random.random_range(0..RATES.len())],
+            motion::round(random.random_range(LENGTHS[0]..LENGTHS[1]), 1),
+        ];
         let mut draw = Draw {
+            pace,
             anatomy: &plan.machines[machine],
             slot: slot.clone(),
-            random: stream(seed, &names),
+            random,
             lower: 0,
         };
         if other > 0 {
             draw.other_causes();
+        }
+        // What falls, flies or slides away does so within its usual time.
+        if draw.slot.fault == Some(LogFault::Long) && !draw.anatomy.is_tireless() {
+            draw.slot.fault = Some(LogFault::Fast);
         }
         match draw.case(&mut left_out) {
             Ok(mut case) => {
@@ -95,6 +108,8 @@ struct Draw<'a> {
     random: ChaCha8Rng,
     /// Levels below the planned one.
     lower: usize,
+    /// Factors of the machine's rows a second and of its seconds.
+    pace: [f64; 2],
 }
 
 impl Draw<'_> {
@@ -185,8 +200,8 @@ impl Draw<'_> {
 
     fn usual(&self) -> motion::Style {
         motion::Style {
-            seconds: self.anatomy.machine.seconds,
-            rate: self.anatomy.machine.rate,
+            seconds: self.anatomy.machine.seconds * self.pace[1],
+            rate: self.anatomy.machine.rate * self.pace[0],
             vigour: 1.0,
             rest: 0.0,
         }
@@ -198,13 +213,7 @@ impl Draw<'_> {
             Some(LogFault::Fast) => style.rate = FAST,
             Some(LogFault::Long) => {
                 style.rate = FAST;
-                let most = LONG / FAST / (TRAIN + TEST) as f64;
-                // A machine that falls off its table after its usual time would do so here.
-                style.seconds = if self.anatomy.machine.contacts.is_empty() {
-                    most
-                } else {
-                    style.seconds
-                };
+                style.seconds = LONG / FAST / (TRAIN + TEST) as f64;
             }
             Some(LogFault::Encoder) => style.rest = REST,
             _ => {}

@@ -34,11 +34,18 @@ pub const MACHINE: Machine = Machine {
     <jointpos name="q_bend" joint="bend"/>
   </sensor>
 </mujoco>"#,
-    parameters: &[Parameter {
-        name: "fore_mass",
-        target: "geom/fore/mass",
-        range: [0.2, 0.6],
-    }],
+    parameters: &[
+        Parameter {
+            name: "fore_mass",
+            target: "geom/fore/mass",
+            range: [0.2, 0.6],
+        },
+        Parameter {
+            name: "upper_mass",
+            target: "geom/upper/mass",
+            range: [0.35, 1.0],
+        },
+    ],
     noise: &[("q_yaw", 0.003), ("q_lift", 0.003), ("q_bend", 0.003)],
     commands: &[
         Command {

@@ -58,7 +58,10 @@ pub const MACHINE: Machine = Machine {
     <jointpos name="q7" joint="j7"/>
   </sensor>
 </mujoco>"#,
-    parameters: &[fit("flange_mass", "geom/flange/mass", 0.2, 1.5)],
+    parameters: &[
+        fit("flange_mass", "geom/flange/mass", 0.2, 1.5),
+        fit("fore_mass", "geom/fore/mass", 0.5, 1.6),
+    ],
     noise: &[
         ("q1", 0.001),
         ("q2", 0.001),

@@ -40,7 +40,10 @@ pub const MACHINE: Machine = Machine {
     <jointpos name="q_right_elbow" joint="right_elbow"/>
   </sensor>
 </mujoco>"#,
-    parameters: &[fit("left_fore_mass", "geom/left_fore/mass", 0.3, 1.1)],
+    parameters: &[
+        fit("left_fore_mass", "geom/left_fore/mass", 0.3, 1.1),
+        fit("right_fore_mass", "geom/right_fore/mass", 0.3, 1.1),
+    ],
     noise: &[
         ("q_left_shoulder", 0.002),
         ("q_left_elbow", 0.002),

@@ -26,7 +26,10 @@ pub const MACHINE: Machine = Machine {
     <jointpos name="phi" joint="pivot"/>
   </sensor>
 </mujoco>"#,
-    parameters: &[fit("cart_mass", "geom/cart/mass", 0.4, 1.6)],
+    parameters: &[
+        fit("cart_mass", "geom/cart/mass", 0.4, 1.6),
+        fit("pole_mass", "geom/pole/mass", 0.08, 0.3),
+    ],
     noise: &[("x", 0.002), ("dx", 0.02), ("phi", 0.004)],
     commands: &[sines("belt", 0.0, 5.0, 0.3, 2.0)],
     starts: &[
