@@ -65,6 +65,10 @@ pub struct Label {
     pub excess_gap: f64,
     /// Wiring faults.
     pub wiring: Vec<WiringLabel>,
+    /// Correlation of the noise from row to row; 0 is white.
+    pub noise_correlation: f64,
+    /// Deviation of the times of reading from their stamps, as a share of the time between rows.
+    pub jitter: f64,
     /// Faults of the log.
     pub log_faults: Vec<String>,
     /// Whether the machine hardly moves.

@@ -31,10 +31,6 @@ const SPIKES: f64 = 0.004;
 const SPIKE: [f64; 2] = [15.0, 60.0];
 /// Readings of which one is left, in a log with missing readings.
 const ONE_IN: usize = 3;
-/// Correlation of filtered noise from row to row.
-const FILTERED: f64 = 0.95;
-/// Jitter of the stamps in a log with this fault, as a share of the time between rows.
-const JITTERED: f64 = 0.15;
 /// Steps of an encoder at rest: as rough as its sensor's noise was (a uniform error of a step has a
 /// deviation of a step over the root of 12).
 const ENCODER: f64 = 3.464;
@@ -119,14 +115,7 @@ fn readings(
     random: &mut impl Rng,
 ) -> Vec<Vec<f64>> {
     let fault = style.fault;
-    let jitter = match fault {
-        Some(LogFault::Jitter) => JITTERED,
-        _ => style.jitter,
-    };
-    let colour = match fault {
-        Some(LogFault::FilteredNoise) => FILTERED,
-        _ => style.colour,
-    };
+    let (jitter, colour) = (style.jitter, style.colour);
     let late = style.wiring.as_ref().map_or(0.0, Wiring::clock);
     let mut noise = vec![f64::NAN; anatomy.width()];
     let mut rows = Vec::with_capacity(motion.rows);

@@ -16,6 +16,13 @@ use crate::log;
 use crate::plan::Kind;
 use crate::world::World;
 
+/// Correlation of the noise from row to row in dirty worlds, and in logs with filtered noise.
+const COLOUR: [f64; 2] = [0.1, 0.5];
+const FILTERED: f64 = 0.95;
+/// Deviation of the times of reading from their stamps in dirty worlds, and in logs with jittered stamps, as a share of the
+/// time between rows.
+const JITTER: [f64; 2] = [0.01, 0.04];
+const JITTERED: f64 = 0.15;
 /// Share of cases whose study gives the noise, and of those whose logs do not give their start.
 const NOISE_GIVEN: f64 = 0.25;
 const NO_START: f64 = 0.2;
@@ -37,24 +44,23 @@ impl Draw<'_> {
                 })
             }
         };
-        let random = &mut self.random;
-        let dirty = self.slot.dirty;
-        let colour = if dirty {
-            random.random_range(0.3..0.8)
-        } else {
-            0.0
-        };
-        let jitter = if dirty {
-            random.random_range(0.01..0.04)
-        } else {
-            0.0
-        };
+        let (random, fault) = (&mut self.random, self.slot.fault);
+        let mut within = |[low, high]: [f64; 2]| random.random_range(low..high);
+        let (mut colour, mut jitter) = (0.0, 0.0);
+        if self.slot.dirty {
+            (colour, jitter) = (within(COLOUR), within(JITTER));
+        }
+        match fault {
+            Some(LogFault::FilteredNoise) => colour = FILTERED,
+            Some(LogFault::Jitter) => jitter = JITTERED,
+            _ => {}
+        }
         let starts = random.random::<f64>() >= NO_START;
         Ok(log::Style {
             colour,
             jitter,
             starts: starts && self.slot.fault != Some(LogFault::NoStart),
-            fault: self.slot.fault,
+            fault,
             wiring,
         })
     }
@@ -128,6 +134,8 @@ impl Draw<'_> {
                     value: w.value,
                 })
                 .collect(),
+            noise_correlation: style.colour,
+            jitter: style.jitter,
             log_faults: self
                 .slot
                 .fault
