@@ -247,3 +247,36 @@ fn degrees_in_place_of_radians_are_noticed() {
         "{units}"
     );
 }
+
+#[cfg(feature = "mujoco")]
+#[test]
+fn made_cases_are_studies_and_their_labels_lie_apart() {
+    let folder = tempfile::tempdir().unwrap();
+    let set = folder.path().join("set");
+    let arguments = [
+        "withheld",
+        "--make",
+        text(&set),
+        "--seed",
+        "3",
+        "--count",
+        "2",
+        "--half",
+        "test",
+        "--quiet",
+    ];
+    let made = asid(&arguments);
+    let said = String::from_utf8(made.stdout).unwrap();
+    assert!(made.status.success() && said.starts_with("2 cases"), "{said}");
+    for case in ["case-000", "case-001"] {
+        let study = asid::diagnosis::study::Study::read(&set.join("studies").join(case)).unwrap();
+        assert_eq!((study.train.len(), study.test.len()), (6, 3));
+    }
+    let labels = set.join("sealed/labels.json");
+    let read = asid::diagnosis::score::read_labels(&labels).unwrap();
+    assert_eq!(read.len(), 2);
+    // A set is never written into another one, and one call does one thing.
+    assert_eq!(asid(&arguments).status.code(), Some(1));
+    let both = ["withheld", "--make", "a", "--cases", "b"];
+    assert_eq!(asid(&both).status.code(), Some(2));
+}

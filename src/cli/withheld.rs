@@ -27,11 +27,27 @@ use asid_core::Progress as _;
 #[command(after_help = "\
 The folder holds one study a case, and labels.json, which is read once all diagnoses are done. The result has \
 a line a case, the confusion matrix and the figures of docs/diagnosis.md. Cases that the engine cannot simulate are \
-left out, with the reason.")]
+left out, with the reason.
+
+With --make a folder of new cases is written instead: DIR/studies, which is for --cases, and apart from it \
+DIR/sealed/labels.json, which is for --labels.")]
+#[group(id = "work", required = true, args = ["cases", "make"])]
 pub struct Arguments {
     /// Folder of the cases
+    #[arg(long, value_name = "DIR", conflicts_with = "make")]
+    cases: Option<PathBuf>,
+    /// The labels, where they do not lie with the cases [default: labels.json in the folder of the cases]
+    #[arg(long, value_name = "FILE", requires = "cases")]
+    labels: Option<PathBuf>,
+    /// Make new cases in this folder; takes --seed
     #[arg(long, value_name = "DIR")]
-    cases: PathBuf,
+    make: Option<PathBuf>,
+    /// Number of cases to make
+    #[arg(long, value_name = "N", default_value_t = 40, requires = "make")]
+    count: usize,
+    /// Machines to make cases of: training or test
+    #[arg(long, value_name = "HALF", default_value = "training", requires = "make")]
+    half: Half,
     /// Some of the cases only (repeatable)
     #[arg(long, value_name = "NAME")]
     case: Vec<String>,
@@ -43,6 +59,15 @@ pub struct Arguments {
     finer: u32,
     #[command(flatten)]
     pub common: Common,
+}
+
+/// Half of the machines.
+#[derive(Clone, Copy, Debug, clap::ValueEnum)]
+enum Half {
+    /// Settings of a diagnosis may be chosen on it
+    Training,
+    /// Nothing may be chosen on it
+    Test,
 }
 
 /// Folders with a study, sorted.
@@ -74,10 +99,58 @@ fn is_refusal(error: &anyhow::Error) -> bool {
     matches!(error.downcast_ref(), Some(Error::Scene { .. }))
 }
 
-/// Diagnoses all cases and scores them.
-pub fn withheld(arguments: &Arguments) -> Result<()> {
+/// Makes new cases.
+#[cfg(feature = "mujoco")]
+fn make(folder: &Path, arguments: &Arguments) -> Result<()> {
     let common = &arguments.common;
-    let folders = cases(&arguments.cases, &arguments.case)?;
+    let half = match arguments.half {
+        Half::Training => asid_withheld::Half::Training,
+        Half::Test => asid_withheld::Half::Test,
+    };
+    let seed = common.seed.unwrap_or(0);
+    let bars = Bars::new(common.quiet);
+    bars.begin("cases", arguments.count as u64);
+    let done = || bars.advance(1);
+    let make = || asid_withheld::make::make(folder, half, seed, arguments.count, &done);
+    let made = asid_withheld::make::with_threads(common.threads.unwrap_or(0), make)
+        .map_err(|e| Error::Failed(e.to_string()))?;
+    bars.end();
+    let mut stdout = std::io::stdout().lock();
+    if common.json {
+        writeln!(stdout, "{}", serde_json::to_string_pretty(&made)?)?;
+    } else {
+        for line in made.lines() {
+            writeln!(stdout, "{line}")?;
+        }
+    }
+    Ok(())
+}
+
+/// Without MuJoCo there are no worlds.
+#[cfg(not(feature = "mujoco"))]
+fn make(folder: &Path, arguments: &Arguments) -> Result<()> {
+    let message = format!(
+        "{}: {} cases of the {:?} half are worlds in MuJoCo: build with --features mujoco",
+        folder.display(),
+        arguments.count,
+        arguments.half,
+    );
+    Err(Error::Failed(message).into())
+}
+
+/// Makes cases, or diagnoses all cases and scores them.
+pub fn withheld(arguments: &Arguments) -> Result<()> {
+    match (&arguments.cases, &arguments.make) {
+        (Some(cases), _) => score(cases, arguments),
+        (None, Some(folder)) => make(folder, arguments),
+        (None, None) => Ok(()),
+    }
+}
+
+/// Diagnoses all cases of a folder and scores them.
+fn score(folder: &Path, arguments: &Arguments) -> Result<()> {
+    let common = &arguments.common;
+    let folders = cases(folder, &arguments.case)?;
     let engine = common.backend.clone().unwrap_or_else(default_backend);
     let out = common
         .out
@@ -93,9 +166,9 @@ pub fn withheld(arguments: &Arguments) -> Result<()> {
     let mut done = Vec::with_capacity(folders.len());
     let mut left_out = BTreeMap::new();
     bars.begin("cases", folders.len() as u64);
-    for folder in &folders {
+    for case in &folders {
         let clock = Instant::now();
-        let mut study = Study::read(folder)?;
+        let mut study = Study::read(case)?;
         if arguments.finer > 1 {
             let step = asid_core::Plant::of(&study.scene)?.layout.timestep;
             study.scene = study
@@ -122,11 +195,13 @@ pub fn withheld(arguments: &Arguments) -> Result<()> {
     }
     bars.end();
     // Everything is decided; now the labels.
-    let labels = read_labels(&arguments.cases.join("labels.json"))?;
+    let beside = folder.join("labels.json");
+    let file = arguments.labels.as_deref().unwrap_or(&beside);
+    let labels = read_labels(file)?;
     let mut answers = Vec::new();
     for (study, diagnosis, work, seconds) in &done {
         let label: &Label = labels.get(&study.name).ok_or_else(|| Error::File {
-            path: arguments.cases.join("labels.json"),
+            path: file.to_owned(),
             message: format!("has no label of `{}`", study.name),
         })?;
         let class = same_physics(work, &diagnosis.result, label)?;

@@ -1,0 +1,252 @@
+//! What a machine consists of: the places that a cause can act on, read off its model.
+
+mod parts;
+
+pub use parts::{Drive, DriveKind, Joint, JointKind, Sensor};
+
+use mujoco_rs::wrappers::mj_model::MjtObjBase;
+
+use crate::document::Element;
+use crate::engine;
+use crate::error::{Error, Result};
+use crate::machine::{Machine, Shows};
+use parts::{drive, joint_kind};
+
+/// A machine, taken apart.
+#[derive(Clone, Debug)]
+pub struct Anatomy {
+    /// The machine.
+    pub machine: Machine,
+    /// Its model.
+    pub document: Element,
+    /// Joints, in the model's order.
+    pub joints: Vec<Joint>,
+    /// Actuators.
+    pub drives: Vec<Drive>,
+    /// Sensors.
+    pub sensors: Vec<Sensor>,
+    /// Bodies in order; the first is the world.
+    pub bodies: Vec<String>,
+    /// Geoms in order.
+    pub geoms: Vec<String>,
+    /// Reference position.
+    pub qpos0: Vec<f64>,
+    /// Number of velocities.
+    pub nv: usize,
+    /// Time step of the study's model, s.
+    pub timestep: f64,
+}
+
+impl Anatomy {
+    /// Takes a machine apart.
+    ///
+    /// # Errors
+    /// Where MuJoCo refuses the model, or an element that the machine names is not there.
+    pub fn of(machine: &Machine) -> Result<Self> {
+        let refused = |message: String| Error::Model {
+            machine: machine.name.to_owned(),
+            message,
+        };
+        let document = Element::parse(machine.model).map_err(refused)?;
+        let model = engine::compile(machine.model).map_err(refused)?;
+        let missing = |element: &str, name: &str| Error::Element {
+            machine: machine.name.to_owned(),
+            element: element.to_owned(),
+            name: name.to_owned(),
+        };
+        let find = |kind, element: &str, name: &str| {
+            engine::index(&model, kind, name).ok_or_else(|| missing(element, name))
+        };
+        let mut found: Vec<(&Element, &str)> = Vec::new();
+        document.walk(&mut |e, body| found.push((e, body)));
+        let world = found.iter().position(|(e, _)| e.tag == "worldbody");
+        let world = &found[world.unwrap_or(0)..];
+        let mut joints = Vec::new();
+        let mut bodies = vec!["world".to_owned()];
+        let mut geoms = Vec::new();
+        for (e, body) in world {
+            let name = e.get("name").unwrap_or_default().to_owned();
+            match e.tag.as_str() {
+                "body" => bodies.push(name),
+                "geom" => geoms.push(name),
+                tag if e.get("name").is_some() => {
+                    let Some(kind) = joint_kind(tag, e) else {
+                        continue;
+                    };
+                    // References to joints further down have the same tag and no name.
+                    let id = find(MjtObjBase::mjOBJ_JOINT, "joint", &name)?;
+                    joints.push(Joint {
+                        kind,
+                        body: (*body).to_owned(),
+                        qpos: model.jnt_qposadr()[id] as usize,
+                        dof: model.jnt_dofadr()[id] as usize,
+                        armature: e.number("armature").unwrap_or(0.0),
+                        damping: e.number("damping").unwrap_or(0.0),
+                        name,
+                    });
+                }
+                _ => {}
+            }
+        }
+        let section = |tag: &str| document.find(tag, None).map_or(&[][..], |s| &s.children);
+        let drives = section("actuator").iter().map(|e| drive(e, &joints));
+        let drives = drives.collect::<Vec<_>>();
+        let mut sensors = Vec::new();
+        for e in section("sensor") {
+            let name = e.get("name").unwrap_or_default();
+            let id = find(MjtObjBase::mjOBJ_SENSOR, "sensor", name)?;
+            let noise = machine.noise.iter().find(|(n, _)| *n == name);
+            let noise = noise.ok_or_else(|| missing("noise of the sensor", name))?.1;
+            sensors.push(Sensor {
+                name: name.to_owned(),
+                kind: e.tag.clone(),
+                address: model.sensor_adr()[id] as usize,
+                len: model.sensor_dim()[id] as usize,
+                // A rotation by a small angle turns a quaternion by half of it.
+                noise: if e.tag == "framequat" {
+                    noise / 2.0
+                } else {
+                    noise
+                },
+            });
+        }
+        for command in machine.commands {
+            if !drives.iter().any(|d| d.name == command.actuator) {
+                return Err(missing("actuator", command.actuator));
+            }
+        }
+        let anatomy = Self {
+            machine: *machine,
+            joints,
+            drives,
+            sensors,
+            bodies,
+            geoms,
+            qpos0: model.qpos0().to_vec(),
+            nv: model.nv() as usize,
+            timestep: model.opt().timestep,
+            document: document.clone(),
+        };
+        for start in machine.starts {
+            anatomy.joint(start.joint)?;
+        }
+        for contact in machine.contacts {
+            for geom in contact.movers.iter().chain([&contact.site]) {
+                anatomy.geom(geom)?;
+            }
+        }
+        Ok(anatomy)
+    }
+
+    fn place<T>(
+        &self,
+        all: &[T],
+        element: &str,
+        name: &str,
+        is: impl Fn(&T) -> bool,
+    ) -> Result<usize> {
+        all.iter().position(is).ok_or_else(|| Error::Element {
+            machine: self.machine.name.to_owned(),
+            element: element.to_owned(),
+            name: name.to_owned(),
+        })
+    }
+
+    /// Index of a joint.
+    ///
+    /// # Errors
+    /// Where there is none of that name; so for the other places.
+    pub fn joint(&self, name: &str) -> Result<usize> {
+        self.place(&self.joints, "joint", name, |j| j.name == name)
+    }
+
+    /// Index of an actuator.
+    ///
+    /// # Errors
+    /// Where there is none of that name.
+    pub fn drive(&self, name: &str) -> Result<usize> {
+        self.place(&self.drives, "actuator", name, |d| d.name == name)
+    }
+
+    /// Index of a sensor.
+    ///
+    /// # Errors
+    /// Where there is none of that name.
+    pub fn sensor(&self, name: &str) -> Result<usize> {
+        self.place(&self.sensors, "sensor", name, |s| s.name == name)
+    }
+
+    /// Index of a body.
+    ///
+    /// # Errors
+    /// Where there is none of that name.
+    pub fn body(&self, name: &str) -> Result<usize> {
+        self.place(&self.bodies, "body", name, |b| b == name)
+    }
+
+    /// Index of a geom.
+    ///
+    /// # Errors
+    /// Where there is none of that name.
+    pub fn geom(&self, name: &str) -> Result<usize> {
+        self.place(&self.geoms, "geom", name, |g| g == name)
+    }
+
+    /// The drive of a joint, where exactly one drives it and nothing else.
+    #[must_use]
+    pub fn drive_of(&self, joint: usize) -> Option<usize> {
+        let mut all = (0..self.drives.len()).filter(|&d| self.drives[d].joint == Some(joint));
+        let first = all.next()?;
+        all.next().is_none().then_some(first)
+    }
+
+    /// Sites of the contacts that show something.
+    #[must_use]
+    pub fn contact_sites(&self, shows: impl Fn(&Shows) -> bool) -> Vec<String> {
+        let contacts = self.machine.contacts.iter();
+        contacts
+            .filter(|c| shows(&c.shows))
+            .map(|c| c.site.to_owned())
+            .collect()
+    }
+
+    /// Geoms of a contact: the site and what touches it.
+    #[must_use]
+    pub fn touching(&self, site: &str) -> Vec<&'static str> {
+        let mut contacts = self.machine.contacts.iter();
+        let contact = contacts.find(|c| c.site == site);
+        contact.map_or_else(Vec::new, |c| [&[c.site], c.movers].concat())
+    }
+
+    /// The same, as indices.
+    #[must_use]
+    pub fn touching_indices(&self, site: &str) -> Vec<usize> {
+        let all = self.touching(site);
+        all.iter().filter_map(|g| self.geom(g).ok()).collect()
+    }
+
+    /// The body that a contact's friction acts on: the first free one, which carries what touches.
+    #[must_use]
+    pub fn mover(&self, site: &str) -> usize {
+        let movers = self.touching(site);
+        let own = movers.iter().skip(1).find_map(|g| self.body(g).ok());
+        let mut joints = self.joints.iter();
+        let free = joints.find(|j| j.kind == JointKind::Free);
+        free.and_then(|j| self.body(&j.body).ok())
+            .or(own)
+            .unwrap_or(0)
+    }
+
+    /// Whether it can go on for as long as one likes: all of it is held by joints, and nothing touches.
+    #[must_use]
+    pub fn is_tireless(&self) -> bool {
+        let free = self.joints.iter().any(|j| j.kind == JointKind::Free);
+        !free && self.machine.contacts.is_empty()
+    }
+
+    /// Length of a row of readings.
+    #[must_use]
+    pub fn width(&self) -> usize {
+        self.sensors.iter().map(|s| s.len).sum()
+    }
+}

@@ -1,0 +1,134 @@
+//! Joints, actuators and sensors, as the model describes them.
+
+use crate::document::Element;
+
+/// Kind of a joint.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum JointKind {
+    /// Turns about an axis.
+    Hinge,
+    /// Moves along an axis.
+    Slide,
+    /// A free body.
+    Free,
+}
+
+/// A joint.
+#[derive(Clone, Debug)]
+pub struct Joint {
+    /// Name.
+    pub name: String,
+    /// Kind.
+    pub kind: JointKind,
+    /// Body that it moves.
+    pub body: String,
+    /// First position.
+    pub qpos: usize,
+    /// First velocity.
+    pub dof: usize,
+    /// Rotor inertia, kg m² or kg.
+    pub armature: f64,
+    /// Viscous friction, N m s/rad or N s/m.
+    pub damping: f64,
+}
+
+/// Law of an actuator.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DriveKind {
+    /// The command is the force.
+    Motor,
+    /// A servo of position.
+    Position,
+    /// A servo of velocity.
+    Velocity,
+    /// A force at a place of a body.
+    Thrust,
+}
+
+/// An actuator.
+#[derive(Clone, Debug)]
+pub struct Drive {
+    /// Name.
+    pub name: String,
+    /// Law.
+    pub kind: DriveKind,
+    /// Joint that it drives alone, as an index of [`Anatomy::joints`]; none for a tendon or a place.
+    pub joint: Option<usize>,
+    /// Gear.
+    pub gear: f64,
+    /// `kp` of a position servo.
+    pub kp: f64,
+    /// `kv` of a servo.
+    pub kv: f64,
+    /// Largest force, where it is limited.
+    pub limit: f64,
+}
+
+/// A sensor.
+#[derive(Clone, Debug)]
+pub struct Sensor {
+    /// Name.
+    pub name: String,
+    /// Tag in the model.
+    pub kind: String,
+    /// First number of its reading.
+    pub address: usize,
+    /// Numbers of its reading.
+    pub len: usize,
+    /// Standard deviation of the noise of each number.
+    pub noise: f64,
+}
+
+impl Sensor {
+    /// Names of its columns in a log.
+    #[must_use]
+    pub fn columns(&self) -> Vec<String> {
+        match self.len {
+            1 => vec![self.name.clone()],
+            n => (0..n).map(|i| format!("{}.{i}", self.name)).collect(),
+        }
+    }
+
+    /// Whether it reads an orientation.
+    #[must_use]
+    pub fn is_orientation(&self) -> bool {
+        self.kind == "framequat"
+    }
+}
+
+/// Kind of the joint that an element is.
+pub(super) fn joint_kind(tag: &str, element: &Element) -> Option<JointKind> {
+    match (tag, element.get("type")) {
+        ("freejoint", _) => Some(JointKind::Free),
+        ("joint", Some("free")) => Some(JointKind::Free),
+        ("joint", Some("slide")) => Some(JointKind::Slide),
+        ("joint", None | Some("hinge")) => Some(JointKind::Hinge),
+        _ => None,
+    }
+}
+
+/// The actuator that an element is.
+pub(super) fn drive(e: &Element, joints: &[Joint]) -> Drive {
+    let joint = e.get("joint");
+    let joint = joint.and_then(|name| joints.iter().position(|j| j.name == name));
+    let kind = match e.tag.as_str() {
+        "position" => DriveKind::Position,
+        "velocity" => DriveKind::Velocity,
+        _ if e.get("site").is_some() => DriveKind::Thrust,
+        _ => DriveKind::Motor,
+    };
+    Drive {
+        name: e.get("name").unwrap_or_default().to_owned(),
+        kind,
+        joint,
+        gear: e.number("gear").unwrap_or(1.0),
+        kp: e.number("kp").unwrap_or(1.0),
+        kv: e
+            .number("kv")
+            .unwrap_or(f64::from(u8::from(kind == DriveKind::Velocity))),
+        limit: match e.numbers("forcerange")[..] {
+            [_, high] => high,
+            _ => f64::INFINITY,
+        },
+    }
+}

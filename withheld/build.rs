@@ -1,0 +1,23 @@
+//! Lets this crate's tests and examples find libmujoco when they run.
+//!
+//! `mujoco-rs` links the library in `MUJOCO_DYNAMIC_LINK_DIR`, but link
+//! arguments do not travel to dependent crates; the rpath is set here for this
+//! package and by the root package for the `asid` binary. Without the variable
+//! the loader's own search path decides.
+
+// A build script speaks to cargo through its standard output.
+#![allow(clippy::print_stdout)]
+
+use std::env;
+use std::path::PathBuf;
+
+fn main() {
+    println!("cargo:rerun-if-changed=build.rs");
+    println!("cargo:rerun-if-env-changed=MUJOCO_DYNAMIC_LINK_DIR");
+    let Some(folder) = env::var_os("MUJOCO_DYNAMIC_LINK_DIR") else {
+        return;
+    };
+    if let Ok(folder) = PathBuf::from(folder).canonicalize() {
+        println!("cargo:rustc-link-arg=-Wl,-rpath,{}", folder.display());
+    }
+}

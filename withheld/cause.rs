@@ -1,0 +1,268 @@
+//! What a cause is: something that the study's model lacks, at a place, of a size.
+
+use crate::anatomy::{Anatomy, Drive, DriveKind, Joint, JointKind};
+use crate::simulate::Typical;
+use crate::world::World;
+
+/// Where a cause stands with respect to the catalogue of effects.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Standing {
+    /// An effect of the catalogue.
+    Catalogue,
+    /// An effect whose name is agreed on; a diagnosis may not have it yet.
+    Agreed,
+    /// In no catalogue; the name begins with `unknown:`.
+    Unknown,
+}
+
+/// True values of an effect's parameters, by the catalogue's names.
+pub type Values = Vec<(&'static str, f64)>;
+
+/// A cause; one file each.
+pub trait Cause: Sync {
+    /// The effect's name, or `unknown:` and a name.
+    fn name(&self) -> &'static str;
+    /// Where it stands.
+    fn standing(&self) -> Standing {
+        if self.name().starts_with("unknown:") {
+            Standing::Unknown
+        } else {
+            Standing::Catalogue
+        }
+    }
+    /// The elements of a machine that it can act on; an empty name for the whole machine.
+    fn sites(&self, machine: &Anatomy) -> Vec<String>;
+    /// Largest size that is tried, in the unit of the cause's main parameter. Size 0 is off.
+    fn largest(&self, place: &Place<'_>) -> f64;
+    /// Adds the cause to a world.
+    fn act(&self, place: &Place<'_>, size: f64, world: &mut World) -> Values;
+}
+
+/// A cause's place, and what is drawn once for it.
+#[derive(Clone, Copy, Debug)]
+pub struct Place<'a> {
+    /// The machine.
+    pub machine: &'a Anatomy,
+    /// What it typically does without the cause.
+    pub typical: &'a Typical,
+    /// The element.
+    pub site: &'a str,
+    /// Uniform numbers in 0 to 1 for what is not the size: signs, angles, places.
+    pub draw: [f64; 4],
+}
+
+impl<'a> Place<'a> {
+    /// 1 or -1.
+    #[must_use]
+    pub fn sign(&self, which: usize) -> f64 {
+        if self.draw[which] < 0.5 { -1.0 } else { 1.0 }
+    }
+
+    /// A number between two.
+    #[must_use]
+    pub fn between(&self, which: usize, low: f64, high: f64) -> f64 {
+        low + (high - low) * self.draw[which]
+    }
+
+    /// Index of the joint that the site is, or that the site's actuator drives.
+    #[must_use]
+    pub fn joint_index(&self) -> usize {
+        let machine = self.machine;
+        machine
+            .joint(self.site)
+            .ok()
+            .or_else(|| machine.drives[machine.drive(self.site).ok()?].joint)
+            .unwrap_or(0)
+    }
+
+    /// That joint.
+    #[must_use]
+    pub fn joint(&self) -> &'a Joint {
+        &self.machine.joints[self.joint_index()]
+    }
+
+    /// Index of the actuator that the site is, or that drives the site's joint.
+    #[must_use]
+    pub fn drive_index(&self) -> usize {
+        let machine = self.machine;
+        let at = machine.drive(self.site).ok();
+        at.or_else(|| machine.drive_of(self.joint_index()))
+            .unwrap_or(0)
+    }
+
+    /// That actuator.
+    #[must_use]
+    pub fn drive(&self) -> &'a Drive {
+        &self.machine.drives[self.drive_index()]
+    }
+
+    /// Places of the site's sensor in a row of readings.
+    #[must_use]
+    pub fn columns(&self) -> std::ops::Range<usize> {
+        let sensor = self.machine.sensor(self.site);
+        let sensor = &self.machine.sensors[sensor.unwrap_or(0)];
+        sensor.address..sensor.address + sensor.len
+    }
+
+    /// Typical speed of the joint, rad/s or m/s; at least a hundredth.
+    #[must_use]
+    pub fn speed(&self) -> f64 {
+        self.typical.speed[self.joint().dof].max(0.01)
+    }
+
+    /// Typical force at the joint, N m or N: that of its drives, or its weight.
+    #[must_use]
+    pub fn force(&self) -> f64 {
+        let dof = self.joint().dof;
+        self.typical.drive[dof]
+            .max(self.typical.weight[dof])
+            .max(1e-3)
+    }
+
+    /// Typical departure of the actuator's command from its mean.
+    #[must_use]
+    pub fn command(&self) -> f64 {
+        self.typical.command[self.drive_index()].max(1e-6)
+    }
+
+    /// Spread of the sensor's reading.
+    #[must_use]
+    pub fn spread(&self) -> f64 {
+        let all = self.columns().map(|c| self.typical.spread[c]);
+        all.fold(0.0, f64::max).max(1e-6)
+    }
+
+    /// Spread of the joint's position, rad or m; at least a hundredth.
+    #[must_use]
+    pub fn roam(&self) -> f64 {
+        self.typical.roam[self.joint().qpos].max(0.01)
+    }
+
+    /// Mean and spread of where a body's joints bring it along an axis of the world: those of its free joint, or
+    /// of a reading of its place.
+    #[must_use]
+    pub fn whereabouts(&self, body: usize, axis: usize) -> [f64; 2] {
+        let name = &self.machine.bodies[body];
+        let mut joints = self.machine.joints.iter();
+        match joints.find(|j| j.body == *name && j.kind == JointKind::Free) {
+            Some(j) => [
+                self.typical.mean[j.qpos + axis],
+                self.typical.roam[j.qpos + axis],
+            ],
+            None => [0.0, 0.1],
+        }
+    }
+
+    /// A unit vector of space that the first three draws give.
+    #[must_use]
+    pub fn direction(&self) -> [f64; 3] {
+        let z = 2.0 * self.draw[0] - 1.0;
+        let [x, y] = self.heading(1);
+        let flat = (1.0 - z * z).sqrt();
+        [flat * x, flat * y, z]
+    }
+
+    /// Index of the body that the site is, or whose joint it is.
+    #[must_use]
+    pub fn body(&self) -> usize {
+        let machine = self.machine;
+        let own = machine.body(self.site).ok();
+        let of_joint = machine.joint(self.site).ok();
+        own.or_else(|| machine.body(&machine.joints[of_joint?].body).ok())
+            .unwrap_or(0)
+    }
+
+    /// A unit vector of the plane, at an angle that is drawn.
+    #[must_use]
+    pub fn heading(&self, which: usize) -> [f64; 2] {
+        let (sin, cos) = (std::f64::consts::TAU * self.draw[which]).sin_cos();
+        [cos, sin]
+    }
+}
+
+/// Names of the joints that are hinges or slides.
+#[must_use]
+pub fn scalar_joints(machine: &Anatomy) -> Vec<String> {
+    let joints = machine.joints.iter();
+    joints
+        .filter(|j| j.kind != JointKind::Free)
+        .map(|j| j.name.clone())
+        .collect()
+}
+
+/// Names of the hinges.
+#[must_use]
+pub fn hinges(machine: &Anatomy) -> Vec<String> {
+    let joints = machine.joints.iter();
+    joints
+        .filter(|j| j.kind == JointKind::Hinge)
+        .map(|j| j.name.clone())
+        .collect()
+}
+
+/// Names of the joints that one actuator drives.
+#[must_use]
+pub fn driven_joints(machine: &Anatomy) -> Vec<String> {
+    (0..machine.joints.len())
+        .filter(|&j| machine.drive_of(j).is_some())
+        .map(|j| machine.joints[j].name.clone())
+        .collect()
+}
+
+/// Names of the joints between which and the drive there can be something: a servo, or a motor
+/// whose rotor has inertia.
+#[must_use]
+pub fn geared_joints(machine: &Anatomy) -> Vec<String> {
+    (0..machine.joints.len())
+        .filter(|&j| {
+            machine.drive_of(j).is_some_and(|d| {
+                machine.drives[d].kind == DriveKind::Position || machine.joints[j].armature > 0.0
+            })
+        })
+        .map(|j| machine.joints[j].name.clone())
+        .collect()
+}
+
+/// Names of all actuators.
+#[must_use]
+pub fn drives(machine: &Anatomy) -> Vec<String> {
+    machine.drives.iter().map(|d| d.name.clone()).collect()
+}
+
+/// Names of the actuators of a single joint.
+#[must_use]
+pub fn joint_drives(machine: &Anatomy) -> Vec<String> {
+    let drives = machine.drives.iter();
+    drives
+        .filter(|d| d.joint.is_some())
+        .map(|d| d.name.clone())
+        .collect()
+}
+
+/// Names of the sensors that read numbers.
+#[must_use]
+pub fn sensors(machine: &Anatomy) -> Vec<String> {
+    let sensors = machine.sensors.iter();
+    sensors
+        .filter(|s| !s.is_orientation())
+        .map(|s| s.name.clone())
+        .collect()
+}
+
+/// Names of the bodies that have joints of their own.
+#[must_use]
+pub fn moving_bodies(machine: &Anatomy) -> Vec<String> {
+    let mut bodies: Vec<String> = machine.joints.iter().map(|j| j.body.clone()).collect();
+    bodies.dedup();
+    bodies
+}
+
+/// Names of the free bodies.
+#[must_use]
+pub fn free_bodies(machine: &Anatomy) -> Vec<String> {
+    let joints = machine.joints.iter();
+    joints
+        .filter(|j| j.kind == JointKind::Free)
+        .map(|j| j.body.clone())
+        .collect()
+}

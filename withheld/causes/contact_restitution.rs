@@ -1,0 +1,31 @@
+//! `contact-restitution`: a contact is damped otherwise, so that it bounces higher or lower.
+
+use crate::anatomy::Anatomy;
+use crate::cause::{Cause, Place, Values};
+use crate::world::World;
+
+/// The cause.
+pub struct ContactRestitution;
+
+impl Cause for ContactRestitution {
+    fn name(&self) -> &'static str {
+        "contact-restitution"
+    }
+    fn sites(&self, machine: &Anatomy) -> Vec<String> {
+        machine.contact_sites(|shows| shows.impact)
+    }
+    fn largest(&self, _place: &Place<'_>) -> f64 {
+        9.0
+    }
+    fn act(&self, place: &Place<'_>, size: f64, world: &mut World) -> Values {
+        let factor = if place.sign(0) > 0.0 {
+            1.0 + size
+        } else {
+            1.0 / (1.0 + size)
+        };
+        for geom in place.machine.touching(place.site) {
+            world.edit_geom(geom, "solref", 1, |old| factor * old);
+        }
+        vec![("factor", factor)]
+    }
+}

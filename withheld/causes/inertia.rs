@@ -1,0 +1,31 @@
+//! `inertia`: the moments of a body about its centre are larger or smaller, in proportion.
+
+use crate::anatomy::Anatomy;
+use crate::cause::{Cause, Place, Values, moving_bodies};
+use crate::world::{InertiaEdit, World};
+
+/// The cause.
+pub struct Inertia;
+
+impl Cause for Inertia {
+    fn name(&self) -> &'static str {
+        "inertia"
+    }
+    fn sites(&self, machine: &Anatomy) -> Vec<String> {
+        moving_bodies(machine)
+    }
+    fn largest(&self, _place: &Place<'_>) -> f64 {
+        1.9
+    }
+    fn act(&self, place: &Place<'_>, size: f64, world: &mut World) -> Values {
+        let factor = if place.sign(0) > 0.0 {
+            1.0 + size
+        } else {
+            1.0 / (1.0 + size)
+        };
+        let mut edit = InertiaEdit::of(place.site);
+        edit.moments = factor;
+        world.inertias.push(edit);
+        vec![("factor", factor)]
+    }
+}

@@ -1,0 +1,31 @@
+//! `rolling-friction`: the friction of a contact against rolling has another coefficient.
+
+use crate::anatomy::Anatomy;
+use crate::cause::{Cause, Place, Values};
+use crate::world::World;
+
+/// The cause.
+pub struct RollingFriction;
+
+impl Cause for RollingFriction {
+    fn name(&self) -> &'static str {
+        "rolling-friction"
+    }
+    fn sites(&self, machine: &Anatomy) -> Vec<String> {
+        machine.contact_sites(|shows| shows.rolling)
+    }
+    fn largest(&self, _place: &Place<'_>) -> f64 {
+        9.0
+    }
+    fn act(&self, place: &Place<'_>, size: f64, world: &mut World) -> Values {
+        let factor = if place.sign(0) > 0.0 {
+            1.0 + size
+        } else {
+            1.0 / (1.0 + size)
+        };
+        for geom in place.machine.touching(place.site) {
+            world.edit_geom(geom, "friction", 2, |old| factor * old);
+        }
+        vec![("factor", factor)]
+    }
+}

@@ -1,0 +1,31 @@
+//! `torsional-friction`: the friction of a contact against spin has another coefficient.
+
+use crate::anatomy::Anatomy;
+use crate::cause::{Cause, Place, Values};
+use crate::world::World;
+
+/// The cause.
+pub struct TorsionalFriction;
+
+impl Cause for TorsionalFriction {
+    fn name(&self) -> &'static str {
+        "torsional-friction"
+    }
+    fn sites(&self, machine: &Anatomy) -> Vec<String> {
+        machine.contact_sites(|shows| shows.torsion)
+    }
+    fn largest(&self, _place: &Place<'_>) -> f64 {
+        9.0
+    }
+    fn act(&self, place: &Place<'_>, size: f64, world: &mut World) -> Values {
+        let factor = if place.sign(0) > 0.0 {
+            1.0 + size
+        } else {
+            1.0 / (1.0 + size)
+        };
+        for geom in place.machine.touching(place.site) {
+            world.edit_geom(geom, "friction", 1, |old| factor * old);
+        }
+        vec![("factor", factor)]
+    }
+}

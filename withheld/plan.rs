@@ -1,0 +1,261 @@
+//! What each case of a set is to be: quotas, drawn by the seed.
+//!
+//! Cases come in wheels of forty. In each wheel half of the worlds are dirty, eleven are clean and without a
+//! cause, five have a cause of no catalogue; seven logs have a fault, three are wired wrongly and in two the
+//! machine hardly moves. Of the causes that a machine can have the one that was used least comes next, so that a
+//! set of 600 has each of them, at each gap, about as often as its machines allow.
+
+use std::collections::BTreeMap;
+
+use rand::Rng;
+use rand::seq::{IndexedRandom, SliceRandom};
+use rand_chacha::ChaCha8Rng;
+
+use crate::anatomy::Anatomy;
+use crate::cause::{Cause, Standing};
+use crate::causes;
+use crate::error::Result;
+use crate::faults::{LogFault, WiringKind};
+use crate::machine::Half;
+use crate::machines;
+use crate::random::{digest, stream};
+
+/// True excess gaps of causes in clean worlds, in noise floors.
+pub const GAPS: [f64; 4] = [1.5, 3.0, 10.0, 100.0];
+/// How far causes stand out of the dirt, in dirty worlds.
+pub const FACTORS: [f64; 3] = [2.0, 5.0, 20.0];
+
+/// What a case's causes are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Kind {
+    /// None.
+    None,
+    /// One.
+    Single,
+    /// Two or three, of which viscous and dry friction of one joint are the commonest.
+    Several,
+    /// One at all places of a kind.
+    Group,
+    /// One of no catalogue.
+    Unknown,
+}
+
+/// Cases of a wheel: kind, whether dirty, how many.
+const WHEEL: [(Kind, bool, usize); 10] = [
+    (Kind::None, false, 11),
+    (Kind::Single, false, 5),
+    (Kind::Several, false, 1),
+    (Kind::Group, false, 1),
+    (Kind::Unknown, false, 2),
+    (Kind::None, true, 4),
+    (Kind::Single, true, 8),
+    (Kind::Several, true, 3),
+    (Kind::Group, true, 2),
+    (Kind::Unknown, true, 3),
+];
+/// Logs of a wheel with a fault, with wrong wiring, and with too little excitation.
+const FAULTS: usize = 7;
+const WIRINGS: usize = 3;
+const LITTLE: usize = 2;
+/// Share of pairs and triples that are viscous and dry friction of one joint.
+const COMMONEST: f64 = 0.5;
+/// Share of pairs and triples that are triples.
+const TRIPLES: f64 = 0.3;
+
+/// What a case is to be.
+#[derive(Clone)]
+pub struct Slot {
+    /// Machine, as an index of [`Plan::machines`].
+    pub machine: usize,
+    /// Kind of its causes.
+    pub kind: Kind,
+    /// Its causes.
+    pub causes: Vec<&'static dyn Cause>,
+    /// Whether all act at the same joint.
+    pub same_joint: bool,
+    /// Whether everything is a little off.
+    pub dirty: bool,
+    /// Which of [`GAPS`] or [`FACTORS`].
+    pub level: usize,
+    /// A fault of the log.
+    pub fault: Option<LogFault>,
+    /// A fault of wiring.
+    pub wiring: Option<WiringKind>,
+    /// Whether the machine hardly moves.
+    pub little: bool,
+}
+
+/// All cases of a set.
+pub struct Plan {
+    /// Half.
+    pub half: Half,
+    /// Machines, taken apart.
+    pub machines: Vec<Anatomy>,
+    /// Cases.
+    pub slots: Vec<Slot>,
+}
+
+/// How often each cause was used.
+#[derive(Default)]
+struct Used(BTreeMap<&'static str, usize>);
+
+impl Used {
+    /// The cause that was used least, by lot among equals; with how often it was used.
+    fn next(
+        &mut self,
+        of: &[&'static dyn Cause],
+        random: &mut ChaCha8Rng,
+    ) -> Option<(&'static dyn Cause, usize)> {
+        let count = |c: &&'static dyn Cause| self.0.get(c.name()).copied().unwrap_or(0);
+        let least = of.iter().map(count).min()?;
+        let rare: Vec<_> = of.iter().filter(|c| count(c) == least).collect();
+        let one = **rare.choose(random)?;
+        *self.0.entry(one.name()).or_default() += 1;
+        Some((one, least))
+    }
+}
+
+/// Causes that act on a machine.
+#[must_use]
+pub fn possible(machine: &Anatomy, standing: impl Fn(Standing) -> bool) -> Vec<&'static dyn Cause> {
+    let all = causes::ALL.iter().copied();
+    all.filter(|c| standing(c.standing()) && !c.sites(machine).is_empty())
+        .collect()
+}
+
+impl Plan {
+    /// Draws a plan.
+    ///
+    /// # Errors
+    /// Where a machine's model is wrong.
+    pub fn draw(half: Half, seed: u64, count: usize) -> Result<Self> {
+        let machines: Vec<Anatomy> = machines::of(half).map(Anatomy::of).collect::<Result<_>>()?;
+        let random = &mut stream(seed, &["plan", half.name()]);
+        let mut used = Used::default();
+        let mut slots = Vec::with_capacity(count);
+        let mut order: Vec<usize> = Vec::new();
+        let (mut faults, mut wirings): (Vec<LogFault>, Vec<WiringKind>) = (Vec::new(), Vec::new());
+        while slots.len() < count {
+            let mut wheel: Vec<(Kind, bool)> = WHEEL
+                .iter()
+                .flat_map(|&(kind, dirty, n)| std::iter::repeat_n((kind, dirty), n))
+                .collect();
+            wheel.shuffle(random);
+            let mut odd: Vec<usize> = (0..wheel.len()).collect();
+            odd.shuffle(random);
+            for (i, (kind, dirty)) in wheel.into_iter().enumerate() {
+                let machine = deal(&mut order, &(0..machines.len()).collect::<Vec<_>>(), random);
+                let place = odd.iter().position(|&o| o == i).unwrap_or(0);
+                let within = |from: usize, n: usize| (from..from + n).contains(&place);
+                let fault = within(0, FAULTS);
+                let wiring = within(FAULTS, WIRINGS);
+                let mut slot = Slot {
+                    machine,
+                    kind,
+                    causes: Vec::new(),
+                    same_joint: false,
+                    dirty,
+                    level: random.random_range(0..12),
+                    fault: fault.then(|| deal(&mut faults, &LogFault::ALL, random)),
+                    wiring: wiring.then(|| deal(&mut wirings, &WiringKind::ALL, random)),
+                    little: within(FAULTS + WIRINGS, LITTLE),
+                };
+                slot.choose(&machines[machine], &mut used, random);
+                slots.push(slot);
+            }
+        }
+        slots.truncate(count);
+        Ok(Self {
+            half,
+            machines,
+            slots,
+        })
+    }
+}
+
+/// The next of some things in a random order that is drawn anew when all were dealt.
+fn deal<T: Copy>(left: &mut Vec<T>, all: &[T], random: &mut ChaCha8Rng) -> T {
+    if left.is_empty() {
+        left.extend_from_slice(all);
+        left.shuffle(random);
+    }
+    left.pop().unwrap_or(all[0])
+}
+
+impl Slot {
+    fn choose(&mut self, machine: &Anatomy, used: &mut Used, random: &mut ChaCha8Rng) {
+        let known = possible(machine, |s| s != Standing::Unknown);
+        match self.kind {
+            Kind::None => {}
+            Kind::Single => {
+                if let Some((cause, times)) = used.next(&known, random) {
+                    self.causes.push(cause);
+                    // Each cause goes through the levels, from one of its own on.
+                    self.level = times + usize::from(digest(0, &[cause.name()])[0]);
+                }
+            }
+            Kind::Unknown => {
+                let unknown = possible(machine, |s| s == Standing::Unknown);
+                let next = used.next(&unknown, random);
+                self.causes.extend(next.map(|(c, _)| c));
+            }
+            Kind::Group => {
+                let several = known.iter().filter(|c| c.sites(machine).len() > 1);
+                let several: Vec<_> = several.copied().collect();
+                match several.choose(random) {
+                    Some(cause) => self.causes.push(*cause),
+                    None => self.kind = Kind::Single,
+                }
+                if self.kind == Kind::Single {
+                    self.causes.extend(known.choose(random));
+                }
+            }
+            Kind::Several => self.choose_several(machine, &known, random),
+        }
+        if self.causes.is_empty() && self.kind != Kind::None {
+            self.kind = Kind::None;
+        }
+    }
+
+    fn choose_several(
+        &mut self,
+        machine: &Anatomy,
+        known: &[&'static dyn Cause],
+        random: &mut ChaCha8Rng,
+    ) {
+        let count = if random.random::<f64>() < TRIPLES {
+            3
+        } else {
+            2
+        };
+        let friction = ["viscous-friction", "coulomb-friction"];
+        let has_joints = !crate::cause::scalar_joints(machine).is_empty();
+        if has_joints && random.random::<f64>() < COMMONEST {
+            let frictions = known.iter().filter(|c| friction.contains(&c.name()));
+            self.causes.extend(frictions);
+            self.same_joint = true;
+        }
+        let mut others: Vec<_> = known
+            .iter()
+            .filter(|c| !self.causes.iter().any(|d| d.name() == c.name()))
+            .copied()
+            .collect();
+        others.shuffle(random);
+        // Two of what lies between a drive and its joint exclude each other.
+        let between = ["backlash", "joint-compliance"];
+        for cause in others {
+            let clash = between.contains(&cause.name())
+                && self.causes.iter().any(|c| between.contains(&c.name()));
+            if self.causes.len() < count && !clash {
+                self.causes.push(cause);
+            }
+        }
+    }
+
+    /// Excess gap or factor that the causes are sized for, so many levels below the planned one.
+    #[must_use]
+    pub fn aim(&self, lower: usize) -> f64 {
+        let levels: &[f64] = if self.dirty { &FACTORS } else { &GAPS };
+        levels[(self.level % levels.len()).saturating_sub(lower)]
+    }
+}

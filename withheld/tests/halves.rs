@@ -1,0 +1,169 @@
+//! Which machines and causes there are, in which half, and what a plan of 600 cases holds.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use asid_withheld::cause::Standing;
+use asid_withheld::plan::{FACTORS, GAPS, Kind, Plan, possible};
+use asid_withheld::{Half, Result, causes, machines};
+
+/// The split by kind of machine, as it is written down in `docs/withheld.md`.
+const TRAINING: [&str; 9] = [
+    "servo",
+    "belt-slide",
+    "cart-pole",
+    "arm2",
+    "arm6",
+    "bimanual",
+    "gripper",
+    "pushed-puck",
+    "rolling-ball",
+];
+const TEST: [&str; 10] = [
+    "geared-lift",
+    "lid",
+    "arm3",
+    "arm7",
+    "tendon-finger",
+    "wheeled-base",
+    "quadrotor",
+    "hopper",
+    "curling-stone",
+    "free-flight",
+];
+
+/// The catalogue's names, from its guide and not from its code.
+const CATALOGUE: [&str; 38] = [
+    "actuator-delay",
+    "actuator-lag",
+    "actuator-gain",
+    "actuator-bias",
+    "actuator-saturation",
+    "actuator-deadband",
+    "backlash",
+    "joint-compliance",
+    "viscous-friction",
+    "coulomb-friction",
+    "stribeck-friction",
+    "load-friction",
+    "joint-stiffness",
+    "torque-ripple",
+    "armature",
+    "mass",
+    "center-of-mass",
+    "inertia",
+    "payload",
+    "gravity-tilt",
+    "constant-force",
+    "linear-drag",
+    "quadratic-drag",
+    "magnus",
+    "sliding-friction",
+    "torsional-friction",
+    "rolling-friction",
+    "friction-patch",
+    "friction-drift",
+    "friction-anisotropy",
+    "contact-restitution",
+    "contact-stiffness",
+    "sensor-delay",
+    "sensor-filter",
+    "sensor-bias",
+    "sensor-scale",
+    "sensor-drift",
+    "sensor-quantization",
+];
+
+#[test]
+fn the_split_is_by_kind_of_machine_and_as_written_down() {
+    let names = |half| machines::of(half).map(|m| m.name).collect::<Vec<_>>();
+    assert_eq!(names(Half::Training), TRAINING);
+    assert_eq!(names(Half::Test), TEST);
+    let all: BTreeSet<&str> = TRAINING.into_iter().chain(TEST).collect();
+    assert_eq!(all.len(), TRAINING.len() + TEST.len());
+    assert!(all.len() >= 16);
+    let guide = include_str!("../../docs/withheld.md");
+    for name in all {
+        assert!(
+            guide.contains(&format!("`{name}`")),
+            "docs/withheld.md lacks {name}"
+        );
+    }
+}
+
+#[test]
+fn each_machine_and_each_cause_has_a_file_of_its_own() {
+    let here = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
+    for machine in machines::ALL {
+        let file = here.join(format!("machines/{}.rs", machine.name.replace('-', "_")));
+        let text = std::fs::read_to_string(&file).expect("a file");
+        assert!(text.contains(&format!("name: \"{}\"", machine.name)));
+    }
+    let count = std::fs::read_dir(here.join("causes"))
+        .expect("a folder")
+        .count();
+    assert_eq!(count, causes::ALL.len() + 1, "one file a cause, and mod.rs");
+}
+
+#[test]
+fn the_causes_are_the_catalogue_and_at_least_ten_that_it_lacks() {
+    let of = |standing| {
+        let all = causes::ALL.iter().filter(move |c| c.standing() == standing);
+        all.map(|c| c.name()).collect::<BTreeSet<_>>()
+    };
+    assert_eq!(of(Standing::Catalogue), CATALOGUE.into_iter().collect());
+    assert!(of(Standing::Unknown).len() >= 10);
+    assert!(
+        of(Standing::Unknown)
+            .iter()
+            .all(|n| n.starts_with("unknown:"))
+    );
+}
+
+#[test]
+fn each_half_of_600_cases_keeps_its_quotas() -> Result<()> {
+    for half in [Half::Training, Half::Test] {
+        let plan = Plan::draw(half, 1, 600)?;
+        let count = |f: &dyn Fn(&asid_withheld::plan::Slot) -> bool| {
+            plan.slots.iter().filter(|s| f(s)).count()
+        };
+        assert_eq!(count(&|s| s.dirty), 300);
+        assert!(count(&|s| s.kind == Kind::None && !s.dirty) >= 150);
+        assert!(count(&|s| s.kind == Kind::Unknown) >= 60);
+        assert!(count(&|s| s.fault.is_some()) >= 90);
+        assert!(count(&|s| s.wiring.is_some()) >= 40);
+        assert!(count(&|s| s.little) >= 25);
+        assert!(count(&|s| s.kind == Kind::Several) >= 50);
+        assert!(count(&|s| s.kind == Kind::Group) >= 30);
+        // Every cause that a machine of the half can have comes up, and in clean worlds at each gap.
+        let mut levels: BTreeMap<&str, BTreeSet<usize>> = BTreeMap::new();
+        for slot in &plan.slots {
+            for cause in &slot.causes {
+                levels.entry(cause.name()).or_default().insert(slot.level);
+            }
+        }
+        for machine in &plan.machines {
+            for cause in possible(machine, |_| true) {
+                assert!(
+                    levels.contains_key(cause.name()),
+                    "{half:?}: no {}",
+                    cause.name()
+                );
+            }
+        }
+        let aims: BTreeSet<u64> = plan.slots.iter().map(|s| s.aim(0) as u64).collect();
+        assert!(aims.len() >= GAPS.len().max(FACTORS.len()));
+    }
+    Ok(())
+}
+
+#[test]
+fn every_effect_of_the_catalogue_can_be_in_both_halves() -> Result<()> {
+    for half in [Half::Training, Half::Test] {
+        let plan = Plan::draw(half, 0, 1)?;
+        for cause in causes::ALL {
+            let somewhere = plan.machines.iter().any(|m| !cause.sites(m).is_empty());
+            assert!(somewhere, "{half:?}: no machine can have {}", cause.name());
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,143 @@
+//! A set of cases: the same bytes from the same seed, sealed, and nothing of a label beside the studies.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use asid_withheld::causes;
+use asid_withheld::label::Label;
+use asid_withheld::make::{make, with_threads};
+use asid_withheld::seal::{Seal, commitment, digest, verify};
+use asid_withheld::{Half, Result};
+
+/// Cases of the set that is made here.
+const COUNT: usize = 6;
+
+fn made(folder: &Path, seed: u64, threads: usize) -> Result<()> {
+    let work = || make(folder, Half::Training, seed, COUNT, &|| {});
+    let made = with_threads(threads, work)?;
+    assert_eq!(made.cases + made.exhausted.len(), COUNT);
+    Ok(())
+}
+
+/// All files below a folder, by their path in it.
+fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+    let mut found = BTreeMap::new();
+    let mut left = vec![folder.to_owned()];
+    while let Some(path) = left.pop() {
+        for entry in std::fs::read_dir(&path).expect("a folder") {
+            let path = entry.expect("an entry").path();
+            if path.is_dir() {
+                left.push(path);
+            } else {
+                let name = path.strip_prefix(folder).expect("inside").to_owned();
+                found.insert(name, std::fs::read(&path).expect("a file"));
+            }
+        }
+    }
+    found
+}
+
+fn labels(folder: &Path) -> BTreeMap<String, Label> {
+    let text = std::fs::read_to_string(folder.join("sealed/labels.json")).expect("labels");
+    serde_json::from_str(&text).expect("labels")
+}
+
+#[test]
+fn a_set_is_the_same_bytes_from_the_same_seed_and_sealed() -> Result<()> {
+    let folder = tempfile::tempdir().expect("a folder");
+    let [a, b] = ["a", "b"].map(|name| folder.path().join(name));
+    made(&a, 7, 1)?;
+    made(&b, 7, 2)?;
+    assert!(files(&a) == files(&b), "two runs of one seed differ");
+    reveals_nothing(&a);
+    notices_changes(&a)?;
+    // A folder that holds something is never written into.
+    assert!(made(&a, 7, 1).is_err());
+    Ok(())
+}
+
+/// The studies, which are all that a diagnosis is given, name no cause, no salt and no seed, and a
+/// commitment cannot be found by trying labels.
+fn reveals_nothing(folder: &Path) {
+    let studies = folder.join("studies");
+    let labels = labels(folder);
+    let all = files(&studies);
+    assert!(all.keys().all(|p| !p.ends_with("labels.json")));
+    for (path, bytes) in &all {
+        let text = String::from_utf8_lossy(bytes);
+        for cause in causes::ALL {
+            let name = cause.name().trim_start_matches("unknown:");
+            // Words such as `mass` and `geometry` are MJCF's own.
+            let own = !name.contains('-');
+            assert!(
+                own || !text.contains(name),
+                "{} says {name}",
+                path.display()
+            );
+        }
+        for label in labels.values() {
+            assert!(
+                !text.contains(&label.salt),
+                "{} holds a salt",
+                path.display()
+            );
+        }
+    }
+    let seal: Seal = serde_json::from_slice(&all[Path::new("seal.json")]).expect("a seal");
+    for (case, label) in &labels {
+        let study = study(&studies.join(case));
+        assert_eq!(commitment(case, &digest(&study), label), seal.cases[case]);
+        let guess = Label {
+            salt: String::new(),
+            ..label.clone()
+        };
+        assert_ne!(commitment(case, &digest(&study), &guess), seal.cases[case]);
+    }
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt as _;
+        let sealed = std::fs::metadata(folder.join("sealed")).expect("a folder");
+        assert_eq!(
+            sealed.permissions().mode() & 0o077,
+            0,
+            "others can read the labels"
+        );
+    }
+}
+
+fn study(folder: &Path) -> BTreeMap<String, String> {
+    files(folder)
+        .into_iter()
+        .map(|(name, bytes)| {
+            let text = String::from_utf8(bytes).expect("text");
+            (name.display().to_string(), text)
+        })
+        .collect()
+}
+
+/// A label or a study that is changed after the sealing is found.
+fn notices_changes(folder: &Path) -> Result<()> {
+    let (studies, file) = (folder.join("studies"), folder.join("sealed/labels.json"));
+    assert_eq!(verify(&studies, &file)?, Vec::<String>::new());
+    let text = std::fs::read_to_string(&file).expect("labels");
+    let mut changed = labels(folder);
+    let (case, label) = changed.iter_mut().next().expect("a case");
+    label.effects.push("magnus@nothing".into());
+    let case = case.clone();
+    let other = folder.join("changed.json");
+    std::fs::write(&other, serde_json::to_string(&changed).expect("text")).expect("a file");
+    assert!(verify(&studies, &other)?[0].starts_with(&case));
+    changed.remove(&case);
+    std::fs::write(&other, serde_json::to_string(&changed).expect("text")).expect("a file");
+    assert!(verify(&studies, &other)?[0].contains("no label"));
+    std::fs::write(&other, &text).expect("a file");
+    assert!(verify(&studies, &other)?.is_empty());
+    // One digit of one reading.
+    let log = studies.join(&case).join("test_0.csv");
+    let before = std::fs::read_to_string(&log).expect("a log");
+    std::fs::write(&log, before.replacen('7', "8", 1)).expect("a log");
+    assert!(verify(&studies, &file)?[0].starts_with(&case));
+    std::fs::write(&log, before).expect("a log");
+    std::fs::remove_file(other).expect("a file");
+    Ok(())
+}
