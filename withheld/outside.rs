@@ -28,11 +28,19 @@ const SPREAD: [f64; 2] = [0.05, 0.1];
 const SECONDS: f64 = 1.5;
 const RATE: f64 = 100.0;
 
-/// Reads the models of a half, sorted by name; the machines live as long as the program.
+/// What was found in a folder of models.
+pub struct Outside {
+    /// Machines, sorted by the names of their files; they live as long as the program.
+    pub machines: Vec<&'static Machine>,
+    /// Models that cannot be machines: a sentence each, which names the element.
+    pub refused: Vec<String>,
+}
+
+/// Reads the models of a half.
 ///
 /// # Errors
-/// When a file cannot be read, and for a model that cannot be a machine: the message names the element.
-pub fn read(folder: &Path, half: Half) -> Result<Vec<&'static Machine>> {
+/// When a file cannot be read.
+pub fn read(folder: &Path, half: Half) -> Result<Outside> {
     let folder = folder.join(half.name());
     let failed = |path: &Path, message: String| Error::File {
         path: path.to_owned(),
@@ -42,13 +50,15 @@ pub fn read(folder: &Path, half: Half) -> Result<Vec<&'static Machine>> {
     let mut paths: Vec<_> = entries.filter_map(|e| Some(e.ok()?.path())).collect();
     paths.retain(|p| p.extension().is_some_and(|e| e == "xml"));
     paths.sort();
-    paths
-        .iter()
-        .map(|path| {
-            let text = std::fs::read_to_string(path).map_err(|e| failed(path, e.to_string()))?;
-            machine(text, half).map_err(|e| failed(path, e.to_string()))
-        })
-        .collect()
+    let (mut machines, mut refused) = (Vec::new(), Vec::new());
+    for path in &paths {
+        let text = std::fs::read_to_string(path).map_err(|e| failed(path, e.to_string()))?;
+        match machine(text, half) {
+            Ok(one) => machines.push(one),
+            Err(error) => refused.push(failed(path, error.to_string()).to_string()),
+        }
+    }
+    Ok(Outside { machines, refused })
 }
 
 /// A text that lives as long as the program.
@@ -61,12 +71,9 @@ fn keep(text: &str) -> &'static str {
 /// # Errors
 /// Where MuJoCo refuses it, or it has an element that the generator cannot start or read.
 pub fn machine(text: String, half: Half) -> Result<&'static Machine> {
-    let refused = |message: String| Error::Model {
-        machine: "outside".into(),
-        message,
-    };
-    let document = Element::parse(&text).map_err(refused)?;
-    check(&document).map_err(refused)?;
+    let unfit = |why: String| Error::Unfit { why };
+    let document = Element::parse(&text).map_err(unfit)?;
+    check(&document).map_err(unfit)?;
     let sensors = document
         .find("sensor", None)
         .map_or(&[][..], |s| &s.children);

@@ -43,6 +43,7 @@ pub struct Arguments {
     #[arg(long, value_name = "DIR")]
     make: Option<PathBuf>,
     /// Machines that others modelled, beside those of the project: a folder that withheld/models/fetch.py filled
+    #[cfg(feature = "mujoco")]
     #[arg(long, value_name = "DIR", requires = "make")]
     models: Option<PathBuf>,
     /// Number of cases to make
@@ -121,7 +122,13 @@ fn make(folder: &Path, arguments: &Arguments) -> Result<()> {
     let done = || bars.advance(1);
     let make = || {
         let outside = match &arguments.models {
-            Some(models) => asid_withheld::outside::read(models, half)?,
+            Some(models) => {
+                let found = asid_withheld::outside::read(models, half)?;
+                for why in &found.refused {
+                    failure::note(why);
+                }
+                found.machines
+            }
             None => Vec::new(),
         };
         asid_withheld::make::make(folder, half, seed, arguments.count, &outside, &done)

@@ -40,3 +40,18 @@ fn what_cannot_be_a_machine_is_refused_by_the_name_of_its_element() {
         assert!(text.contains(name) && text.contains("`a/b c.d`"), "{text}");
     }
 }
+
+#[test]
+fn a_folder_of_models_gives_its_machines_and_says_what_it_refuses() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let half = folder.path().join("training");
+    std::fs::create_dir(&half).expect("a folder");
+    let good = model(r#"<geom name="g" type="sphere" size="0.1"/>"#);
+    let bad = model(r#"<geom name="hills" type="hfield" hfield="h"/>"#);
+    std::fs::write(half.join("a.xml"), good).expect("a file");
+    std::fs::write(half.join("b.xml"), bad).expect("a file");
+    let found = outside::read(folder.path(), Half::Training).expect("a folder");
+    assert_eq!(found.machines.len(), 1);
+    assert!(found.refused[0].contains("b.xml") && found.refused[0].contains("`hills`"));
+    assert!(outside::read(folder.path(), Half::Test).is_err());
+}
