@@ -267,7 +267,10 @@ fn made_cases_are_studies_and_their_labels_lie_apart() {
     ];
     let made = asid(&arguments);
     let said = String::from_utf8(made.stdout).unwrap();
-    assert!(made.status.success() && said.starts_with("2 cases"), "{said}");
+    assert!(
+        made.status.success() && said.starts_with("2 cases"),
+        "{said}"
+    );
     for case in ["case-000", "case-001"] {
         let study = asid::diagnosis::study::Study::read(&set.join("studies").join(case)).unwrap();
         assert_eq!((study.train.len(), study.test.len()), (6, 3));

@@ -62,13 +62,11 @@ impl Anatomy {
         let world = found.iter().position(|(e, _)| e.tag == "worldbody");
         let world = &found[world.unwrap_or(0)..];
         let mut joints = Vec::new();
-        let mut bodies = vec!["world".to_owned()];
-        let mut geoms = Vec::new();
+        let bodies = engine::names(&model, MjtObjBase::mjOBJ_BODY, model.nbody());
+        let geoms = engine::names(&model, MjtObjBase::mjOBJ_GEOM, model.ngeom());
         for (e, body) in world {
             let name = e.get("name").unwrap_or_default().to_owned();
             match e.tag.as_str() {
-                "body" => bodies.push(name),
-                "geom" => geoms.push(name),
                 tag if e.get("name").is_some() => {
                     let Some(kind) = joint_kind(tag, e) else {
                         continue;

@@ -34,6 +34,8 @@ const LITTLE: f64 = 0.04;
 /// Factors of a machine's rows a second, and range of those of its seconds.
 const RATES: [f64; 5] = [0.5, 1.0, 1.0, 2.0, 2.5];
 const LENGTHS: [f64; 2] = [0.7, 1.3];
+/// Excess gap from which on its signals are told, in noise floors.
+const SPEAKS: f64 = 0.05;
 /// Rest before the motion of a log whose encoder rests.
 const REST: f64 = 0.3;
 /// Rows a second of a fast log, and rows of a long one.
@@ -156,7 +158,8 @@ impl Draw<'_> {
         let record = simulate(anatomy, &mut world, bench.motions)?;
         let steps = world.steps.clone();
         let readings = bench.rows(&record, &steps);
-        let excess_gap = bench.refit(&readings)?.excess;
+        let whole = bench.refit(&readings)?;
+        let excess_gap = whole.excess;
         self.repeatable(&bench, &truth, &dirt, &causes, &readings, excess_gap)?;
         let dirt_labels = self.measure_dirt(&bench, &truth, &dirt)?;
         let log_style = self.log_style(&bench)?;
@@ -184,6 +187,9 @@ impl Draw<'_> {
         label.dirt_gap = dirt_gap;
         label.target_gap = if causes.items.is_empty() { 0.0 } else { target };
         label.excess_gap = excess_gap;
+        if excess_gap > SPEAKS {
+            label.signals = whole.shares(anatomy).into_iter().collect();
+        }
         label.integration_gap = integration_gap;
         Ok(Case { study, label })
     }

@@ -55,6 +55,14 @@ pub fn index(model: &MjModel, kind: MjtObjBase, name: &str) -> Option<usize> {
     model.name_to_id(kind, name)
 }
 
+/// Names of all elements of a kind, in order; empty where one has none.
+#[must_use]
+pub fn names(model: &MjModel, kind: MjtObjBase, count: i64) -> Vec<String> {
+    (0..usize::try_from(count).unwrap_or(0))
+        .map(|i| model.id_to_name(kind, i).unwrap_or_default().to_owned())
+        .collect()
+}
+
 /// A running simulation.
 pub struct Sim {
     data: MjData<Box<MjModel>>,

@@ -13,6 +13,12 @@ pub enum Error {
         /// MuJoCo's message, in one line.
         message: String,
     },
+    /// A model that others wrote cannot be a machine.
+    #[error("cannot be a machine: {why}")]
+    Unfit {
+        /// Which element is in the way, and why.
+        why: String,
+    },
     /// A model has no such element.
     #[error("machine `{machine}` has no {element} `{name}`")]
     Element {

@@ -8,7 +8,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::anatomy::Anatomy;
+use crate::anatomy::{Anatomy, Sensor};
 use crate::error::Result;
 use crate::motion::Motion;
 use crate::simulate::{Record, Typical, simulate};
@@ -48,6 +48,8 @@ pub struct Refit {
     pub values: Vec<f64>,
     /// Excess gap with them.
     pub excess: f64,
+    /// What is left of each reading, in units of the noise.
+    pub residual: Vec<f64>,
 }
 
 impl<'a> Bench<'a> {
@@ -165,6 +167,7 @@ impl<'a> Bench<'a> {
         let mut best = Refit {
             values: self.truth.clone(),
             excess: self.distance(readings, &self.clean),
+            residual: self.difference(readings).as_slice().to_vec(),
         };
         let Some((q, r)) = &self.basis else {
             return Ok(best);
@@ -187,9 +190,13 @@ impl<'a> Bench<'a> {
                 };
                 let excess = self.distance(readings, &model);
                 if excess < best.excess {
-                    best = Refit { values, excess };
                     let pairs = readings.iter().zip(&model);
-                    residual = DVector::from_iterator(readings.len(), pairs.map(|(a, b)| a - b));
+                    best = Refit {
+                        values,
+                        excess,
+                        residual: pairs.map(|(a, b)| a - b).collect(),
+                    };
+                    residual = DVector::from_column_slice(&best.residual);
                     break;
                 }
             }
@@ -198,6 +205,22 @@ impl<'a> Bench<'a> {
             }
         }
         Ok(best)
+    }
+}
+
+impl Refit {
+    /// Share of the squared excess in each column of a log.
+    #[must_use]
+    pub fn shares(&self, anatomy: &Anatomy) -> Vec<(String, f64)> {
+        let columns: Vec<String> = anatomy.sensors.iter().flat_map(Sensor::columns).collect();
+        let mut shares = vec![0.0; columns.len()];
+        for (i, x) in self.residual.iter().enumerate() {
+            shares[i % columns.len()] += x * x;
+        }
+        let sum: f64 = shares.iter().sum();
+        let all = columns.into_iter().zip(shares);
+        all.map(|(name, s)| (name, s / sum.max(f64::MIN_POSITIVE)))
+            .collect()
     }
 }
 

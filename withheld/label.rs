@@ -63,6 +63,8 @@ pub struct Label {
     pub own_gaps: BTreeMap<String, f64>,
     /// Excess gap of the whole world, in the motions of the logs.
     pub excess_gap: f64,
+    /// Share of the squared excess in each column of the logs; empty where there is no excess to speak of.
+    pub signals: BTreeMap<String, f64>,
     /// Wiring faults.
     pub wiring: Vec<WiringLabel>,
     /// Correlation of the noise from row to row; 0 is white.

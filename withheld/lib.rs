@@ -6,6 +6,7 @@
 //! and writes forces and filters by hand, at another time step than the study's model.
 //!
 //! - [`machines`]: one file each, in two halves by kind of machine.
+//! - [`outside`]: machines that others modelled.
 //! - [`causes`]: one file each.
 //! - [`world`], [`simulate`], [`rotor`]: a machine with causes, and its run.
 //! - [`gap`], [`size`]: how far a world is from its model, and how large a cause must be for that.
@@ -28,6 +29,7 @@ pub mod machine;
 pub mod machines;
 pub mod make;
 pub mod motion;
+pub mod outside;
 pub mod plan;
 pub mod random;
 pub mod rotor;

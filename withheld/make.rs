@@ -17,7 +17,7 @@ use serde::Serialize;
 use crate::case;
 use crate::error::{Error, Result};
 use crate::label::Label;
-use crate::machine::Half;
+use crate::machine::{Half, Machine};
 use crate::plan::Plan;
 use crate::seal::{LABELS, SEAL, Seal, commitment, digest};
 
@@ -95,7 +95,8 @@ fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
     write(path, &(text + "\n"))
 }
 
-/// Makes a set of cases in a folder that is not there yet or is empty. `done` is called after each case.
+/// Makes a set of cases in a folder that is not there yet or is empty, of the machines of a half and of those
+/// `outside` of the project. `done` is called after each case.
 ///
 /// # Errors
 /// Where the folder holds something, a file cannot be written or a model is wrong.
@@ -104,6 +105,7 @@ pub fn make(
     half: Half,
     seed: u64,
     count: usize,
+    outside: &[&'static Machine],
     done: &(dyn Fn() + Sync),
 ) -> Result<Made> {
     let studies = folder.join(STUDIES);
@@ -115,7 +117,7 @@ pub fn make(
         std::fs::create_dir_all(path).map_err(|e| failed(path, &e))?;
     }
     close(&sealed)?;
-    let plan = Plan::draw(half, seed, count)?;
+    let plan = Plan::draw(half, seed, count, outside)?;
     let digits = count.saturating_sub(1).to_string().len().max(3);
     let results: Vec<Result<(String, Label, String, f64)>> = (0..count)
         .into_par_iter()

@@ -16,7 +16,7 @@ use crate::cause::{Cause, Standing};
 use crate::causes;
 use crate::error::Result;
 use crate::faults::{LogFault, WiringKind};
-use crate::machine::Half;
+use crate::machine::{Half, Machine};
 use crate::machines;
 use crate::random::{digest, stream};
 
@@ -124,12 +124,13 @@ pub fn possible(machine: &Anatomy, standing: impl Fn(Standing) -> bool) -> Vec<&
 }
 
 impl Plan {
-    /// Draws a plan.
+    /// Draws a plan for the machines of a half and some more.
     ///
     /// # Errors
     /// Where a machine's model is wrong.
-    pub fn draw(half: Half, seed: u64, count: usize) -> Result<Self> {
-        let machines: Vec<Anatomy> = machines::of(half).map(Anatomy::of).collect::<Result<_>>()?;
+    pub fn draw(half: Half, seed: u64, count: usize, outside: &[&'static Machine]) -> Result<Self> {
+        let all = machines::of(half).chain(outside.iter().copied());
+        let machines: Vec<Anatomy> = all.map(Anatomy::of).collect::<Result<_>>()?;
         let random = &mut stream(seed, &["plan", half.name()]);
         let mut used = Used::default();
         let mut slots = Vec::with_capacity(count);

@@ -106,11 +106,13 @@ impl World {
         if let Some(option) = world.document.find_mut("option", None) {
             option.set_numbers("timestep", &[timestep]);
             option.set("integrator", integrator);
-            option.children.retain(|c| c.tag != "flag");
-            let mut flag = Element::new("flag");
+            if !option.children.iter().any(|c| c.tag == "flag") {
+                option.children.push(Element::new("flag"));
+            }
             // A simulation that went bad must be seen, not restarted.
-            flag.set("autoreset", "disable");
-            option.children.push(flag);
+            for flag in option.children.iter_mut().filter(|c| c.tag == "flag") {
+                flag.set("autoreset", "disable");
+            }
         }
         Ok(world)
     }

@@ -42,11 +42,20 @@ pub struct Arguments {
     /// Make new cases in this folder; takes --seed
     #[arg(long, value_name = "DIR")]
     make: Option<PathBuf>,
+    /// Machines that others modelled, beside those of the project: a folder that withheld/models/fetch.py filled
+    #[cfg(feature = "mujoco")]
+    #[arg(long, value_name = "DIR", requires = "make")]
+    models: Option<PathBuf>,
     /// Number of cases to make
     #[arg(long, value_name = "N", default_value_t = 40, requires = "make")]
     count: usize,
     /// Machines to make cases of: training or test
-    #[arg(long, value_name = "HALF", default_value = "training", requires = "make")]
+    #[arg(
+        long,
+        value_name = "HALF",
+        default_value = "training",
+        requires = "make"
+    )]
     half: Half,
     /// Some of the cases only (repeatable)
     #[arg(long, value_name = "NAME")]
@@ -111,7 +120,19 @@ fn make(folder: &Path, arguments: &Arguments) -> Result<()> {
     let bars = Bars::new(common.quiet);
     bars.begin("cases", arguments.count as u64);
     let done = || bars.advance(1);
-    let make = || asid_withheld::make::make(folder, half, seed, arguments.count, &done);
+    let make = || {
+        let outside = match &arguments.models {
+            Some(models) => {
+                let found = asid_withheld::outside::read(models, half)?;
+                for why in &found.refused {
+                    failure::note(why);
+                }
+                found.machines
+            }
+            None => Vec::new(),
+        };
+        asid_withheld::make::make(folder, half, seed, arguments.count, &outside, &done)
+    };
     let made = asid_withheld::make::with_threads(common.threads.unwrap_or(0), make)
         .map_err(|e| Error::Failed(e.to_string()))?;
     bars.end();

@@ -125,6 +125,7 @@ impl Draw<'_> {
             },
             own_gaps: causes.own.clone(),
             excess_gap: 0.0,
+            signals: BTreeMap::new(),
             wiring: style
                 .wiring
                 .iter()

@@ -122,7 +122,7 @@ fn the_causes_are_the_catalogue_and_at_least_ten_that_it_lacks() {
 #[test]
 fn each_half_of_600_cases_keeps_its_quotas() -> Result<()> {
     for half in [Half::Training, Half::Test] {
-        let plan = Plan::draw(half, 1, 600)?;
+        let plan = Plan::draw(half, 1, 600, &[])?;
         let count = |f: &dyn Fn(&asid_withheld::plan::Slot) -> bool| {
             plan.slots.iter().filter(|s| f(s)).count()
         };
@@ -159,7 +159,7 @@ fn each_half_of_600_cases_keeps_its_quotas() -> Result<()> {
 #[test]
 fn every_effect_of_the_catalogue_can_be_in_both_halves() -> Result<()> {
     for half in [Half::Training, Half::Test] {
-        let plan = Plan::draw(half, 0, 1)?;
+        let plan = Plan::draw(half, 0, 1, &[])?;
         for cause in causes::ALL {
             let somewhere = plan.machines.iter().any(|m| !cause.sites(m).is_empty());
             assert!(somewhere, "{half:?}: no machine can have {}", cause.name());

@@ -13,7 +13,7 @@ use asid_withheld::{Half, Result};
 const COUNT: usize = 6;
 
 fn made(folder: &Path, seed: u64, threads: usize) -> Result<()> {
-    let work = || make(folder, Half::Training, seed, COUNT, &|| {});
+    let work = || make(folder, Half::Training, seed, COUNT, &[], &|| {});
     let made = with_threads(threads, work)?;
     assert_eq!(made.cases + made.exhausted.len(), COUNT);
     Ok(())
@@ -50,6 +50,22 @@ fn a_set_is_the_same_bytes_from_the_same_seed_and_sealed() -> Result<()> {
     made(&b, 7, 2)?;
     assert!(files(&a) == files(&b), "two runs of one seed differ");
     reveals_nothing(&a);
+    for (case, label) in labels(&a) {
+        // Shares of a whole, and a target that each cause alone reached.
+        let sum: f64 = label.signals.values().sum();
+        assert!(
+            label.signals.is_empty() || (sum - 1.0).abs() < 1e-9,
+            "{case}"
+        );
+        let share = label.target_gap / (label.own_gaps.len().max(1) as f64).sqrt();
+        for (cause, gap) in &label.own_gaps {
+            assert!(
+                (gap / share).ln().abs() < 0.25,
+                "{case}: {cause} has {gap} of {share}"
+            );
+        }
+        assert_eq!(label.effects.is_empty(), label.kind == "none");
+    }
     notices_changes(&a)?;
     // A folder that holds something is never written into.
     assert!(made(&a, 7, 1).is_err());

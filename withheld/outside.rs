@@ -1,0 +1,159 @@
+//! Machines that others modelled: files in a folder, as `withheld/models/fetch.py` leaves them.
+//!
+//! Nothing is known of such a machine but its model: its noise is the usual one of its sensors, it is driven over a part of
+//! its actuators' range, its owner fits nothing, and none of its contacts is a site. What leaves all bounds or cannot be
+//! repeated is left out by the rules for all cases.
+
+use std::path::Path;
+
+use crate::anatomy::{Anatomy, JointKind};
+use crate::document::Element;
+use crate::error::{Error, Result};
+use crate::machine::{Command, Half, Machine, Start};
+
+/// Noise by sensor: angles and orientations, rad; lengths, m.
+const NOISE: [(&str, f64); 3] = [
+    ("jointpos", 0.003),
+    ("framepos", 0.003),
+    ("framequat", 0.006),
+];
+/// Share of an actuator's range that it is driven over, and the range of one that has none.
+const DRIVEN: f64 = 0.4;
+const RANGE: [f64; 2] = [-1.0, 1.0];
+/// Band of commands, Hz.
+const BAND: [f64; 2] = [0.3, 2.0];
+/// Spread of positions and of velocities at the start, rad or m, and rad/s or m/s.
+const SPREAD: [f64; 2] = [0.05, 0.1];
+/// Length of an episode, s, and rows a second.
+const SECONDS: f64 = 1.5;
+const RATE: f64 = 100.0;
+
+/// What was found in a folder of models.
+pub struct Outside {
+    /// Machines, sorted by the names of their files; they live as long as the program.
+    pub machines: Vec<&'static Machine>,
+    /// Models that cannot be machines: a sentence each, which names the element.
+    pub refused: Vec<String>,
+}
+
+/// Reads the models of a half.
+///
+/// # Errors
+/// When a file cannot be read.
+pub fn read(folder: &Path, half: Half) -> Result<Outside> {
+    let folder = folder.join(half.name());
+    let failed = |path: &Path, message: String| Error::File {
+        path: path.to_owned(),
+        message,
+    };
+    let entries = std::fs::read_dir(&folder).map_err(|e| failed(&folder, e.to_string()))?;
+    let mut paths: Vec<_> = entries.filter_map(|e| Some(e.ok()?.path())).collect();
+    paths.retain(|p| p.extension().is_some_and(|e| e == "xml"));
+    paths.sort();
+    let (mut machines, mut refused) = (Vec::new(), Vec::new());
+    for path in &paths {
+        let text = std::fs::read_to_string(path).map_err(|e| failed(path, e.to_string()))?;
+        match machine(text, half) {
+            Ok(one) => machines.push(one),
+            Err(error) => refused.push(failed(path, error.to_string()).to_string()),
+        }
+    }
+    Ok(Outside { machines, refused })
+}
+
+/// A text that lives as long as the program.
+fn keep(text: &str) -> &'static str {
+    Box::leak(text.to_owned().into_boxed_str())
+}
+
+/// Makes a machine of a model.
+///
+/// # Errors
+/// Where MuJoCo refuses it, or it has an element that the generator cannot start or read.
+pub fn machine(text: String, half: Half) -> Result<&'static Machine> {
+    let unfit = |why: String| Error::Unfit { why };
+    let document = Element::parse(&text).map_err(unfit)?;
+    check(&document).map_err(unfit)?;
+    let sensors = document
+        .find("sensor", None)
+        .map_or(&[][..], |s| &s.children);
+    let noise: Vec<(&'static str, f64)> = sensors
+        .iter()
+        .filter_map(|s| {
+            let (_, noise) = NOISE.iter().find(|(kind, _)| *kind == s.tag)?;
+            Some((keep(s.get("name")?), *noise))
+        })
+        .collect();
+    let bare = Machine {
+        name: keep(document.get("model").unwrap_or("outside")),
+        about: "a model that others wrote",
+        half,
+        model: keep(&text),
+        parameters: &[],
+        noise: noise.leak(),
+        commands: &[],
+        starts: &[],
+        contacts: &[],
+        seconds: SECONDS,
+        rate: RATE,
+    };
+    let anatomy = Anatomy::of(&bare)?;
+    let scalar = anatomy.joints.iter().filter(|j| j.kind != JointKind::Free);
+    let starts: Vec<Start> = scalar
+        .map(|j| Start {
+            joint: keep(&j.name),
+            position: vec![[anatomy.qpos0[j.qpos], SPREAD[0]]].leak(),
+            velocity: vec![[0.0, SPREAD[1]]].leak(),
+        })
+        .collect();
+    let actuators = document
+        .find("actuator", None)
+        .map_or(&[][..], |s| &s.children);
+    let commands: Vec<Command> = actuators
+        .iter()
+        .map(|e| {
+            let [low, high] = match e.numbers("ctrlrange")[..] {
+                [low, high] if low < high => [low, high],
+                _ => RANGE,
+            };
+            Command {
+                actuator: keep(e.get("name").unwrap_or_default()),
+                center: (low + high) / 2.0,
+                amplitude: DRIVEN * (high - low) / 2.0,
+                band: BAND,
+            }
+        })
+        .collect();
+    let made = Machine {
+        starts: starts.leak(),
+        commands: commands.leak(),
+        ..bare
+    };
+    Ok(Box::leak(Box::new(made)))
+}
+
+/// What the generator cannot do, in a sentence that names the element.
+fn check(document: &Element) -> Result<(), String> {
+    let mut wrong = None;
+    document.walk(&mut |e, body| {
+        let name = e.get("name").unwrap_or("without a name");
+        let why = match (e.tag.as_str(), e.get("type")) {
+            ("joint", Some("ball")) => "is a ball joint, whose start the generator cannot write",
+            ("geom", Some("mesh")) => "is a mesh, whose file the generator does not copy",
+            ("geom", Some("hfield")) => "is a height field, whose file the generator does not copy",
+            ("muscle" | "adhesion" | "plugin", _) => "is an actuator with a law of its own",
+            ("flexcomp" | "composite" | "replicate" | "attach", _) => "is made by a macro",
+            _ => return,
+        };
+        wrong.get_or_insert_with(|| format!("<{}> `{name}` in body `{body}` {why}", e.tag));
+    });
+    if document
+        .find("sensor", None)
+        .is_none_or(|s| s.children.is_empty())
+    {
+        wrong.get_or_insert_with(|| {
+            "<sensor> lists no sensor, so that there is nothing to log".into()
+        });
+    }
+    wrong.map_or(Ok(()), Err)
+}
