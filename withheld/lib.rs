@@ -1,7 +1,7 @@
 //! Worlds whose effect is withheld: the measuring stick of the diagnosis.
 //!
-//! A [case](case) is a study (a model, logs, what its owner fits) of a machine that differs from its model by
-//! [causes](causes) that only its [label](label) names. So that nothing of the diagnosis can be inside of the stick,
+//! A [`case`] is a study (a model, logs, what its owner fits) of a machine that differs from its model by
+//! [`causes`] that only its [`label`] names. So that nothing of the diagnosis can be inside of the stick,
 //! this crate shares no code with effects, diagnosis or tasks: it drives MuJoCo itself, edits the model's text,
 //! and writes forces and filters by hand, at another time step than the study's model.
 //!

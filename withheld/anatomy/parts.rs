@@ -52,7 +52,7 @@ pub struct Drive {
     pub name: String,
     /// Law.
     pub kind: DriveKind,
-    /// Joint that it drives alone, as an index of [`Anatomy::joints`]; none for a tendon or a place.
+    /// Joint that it drives alone, as an index of `Anatomy::joints`; none for a tendon or a place.
     pub joint: Option<usize>,
     /// Gear.
     pub gear: f64,
