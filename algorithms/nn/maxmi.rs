@@ -264,7 +264,8 @@ mod tests {
         });
     }
 
-    /// The rewards of an episode add up to what the predictor gained over it.
+    /// As long as there is no predictor, hands that stay where they are earn nothing; once there is
+    /// one, the rewards of an episode add up to what it gained over it.
     #[test]
     fn the_return_is_the_information_gained() {
         with_problem("rod-balancing", |problem| {
@@ -274,9 +275,16 @@ mod tests {
             let mut environment = environment(problem, &explorer, len).unwrap();
             let mut transition = Transition::new(4, len);
             environment.reset(&mut transition.observation).unwrap();
+            let horizon = problem.task.exploration().horizon;
+            // Eight episodes without a predictor, four at a time.
+            for _ in 0..2 * horizon {
+                environment.step(&[0.0; 8], &mut transition).unwrap();
+                assert_eq!(transition.reward, [0.0; 4]);
+            }
+            assert!(environment.pay.predictor.is_warm());
             let first = environment.pay.told.clone();
             let mut total = [0.0; 4];
-            for _ in 0..19 {
+            for _ in 0..horizon - 1 {
                 environment.step(&[0.8; 8], &mut transition).unwrap();
                 for (t, r) in total.iter_mut().zip(&transition.reward) {
                     *t += r;
@@ -285,6 +293,26 @@ mod tests {
             for e in 0..4 {
                 let gained = environment.pay.told[e] - first[e];
                 assert!((total[e] - gained).abs() < 1e-9, "{total:?}");
+            }
+        });
+    }
+
+    /// A reading that is off by six noises has not moved, one that is off by seven has.
+    #[test]
+    fn motion_is_what_noise_does_not_explain() {
+        with_problem("rod-balancing", |problem| {
+            let explorer = tiny();
+            let len = explorer.observation(problem).unwrap();
+            let len = len.iter().map(|e| e.len).sum();
+            let mut environment = environment(problem, &explorer, len).unwrap();
+            let mut transition = Transition::new(4, len);
+            environment.reset(&mut transition.observation).unwrap();
+            let pay = &mut environment.pay;
+            let noise = problem.signals[0].noise;
+            for (noises, moved) in [(6.0, false), (7.0, true)] {
+                let mut reading = pay.latest[0].clone();
+                reading[0] += noises * noise;
+                assert_eq!(pay.moved(0, &reading), moved);
             }
         });
     }
