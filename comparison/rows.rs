@@ -285,7 +285,13 @@ fn other_settings(
     let Some(own) = of(i) else {
         return Vec::new();
     };
-    let shares = |j: &&usize| of(**j).is_some_and(|t| t.get("name") == own.get("name"));
+    // What learned from another explorer's episodes is another algorithm, by the method's own parts.
+    let same = |t: &toml::Table| {
+        ["name", "explorer"]
+            .iter()
+            .all(|key| t.get(*key) == own.get(*key))
+    };
+    let shares = |j: &&usize| of(**j).is_some_and(same);
     let Some(&first) = mates.iter().find(shares).filter(|&&j| j != i) else {
         return Vec::new();
     };

@@ -65,6 +65,30 @@ fn fewer_runs_and_other_budgets_are_said_of_a_row() {
     assert_eq!(result.rows[2].differs, ["2 runs, others 3"]);
 }
 
+/// Estimators of two explorers' episodes are two algorithms; another commit is a difference.
+#[test]
+fn an_estimator_of_another_explorer_is_no_other_setting_and_another_commit_is_one() {
+    let mut all = [
+        cells("x", "asid-estimator", &[0.0; 3]),
+        cells("x", "maxmi", &[1.0; 3]),
+    ]
+    .concat();
+    for cell in &mut all[3..6] {
+        cell.settings = "maxmi".into();
+        cell.versions.git = "d".into();
+    }
+    let settings = |hash: &str| {
+        let explorer = if hash == "maxmi" { hash } else { "fisher-ppo" };
+        let text = format!(
+            "[identifier]\nname = 'estimator'\nexplorer = '{explorer}'\nnetwork = 'of {explorer}'"
+        );
+        text.parse().ok()
+    };
+    let result = summarise(&plan(), &all, &[], &settings);
+    assert!(result.rows[0].differs.is_empty());
+    assert_eq!(result.rows[1].differs, ["commit d, of asid-estimator c"]);
+}
+
 #[test]
 fn conditions_are_pooled_as_strata_where_a_method_has_them_all() {
     let all = [
