@@ -2,7 +2,7 @@
 
 use crate::anatomy::{Anatomy, Drive, DriveKind, Joint, JointKind};
 use crate::simulate::Typical;
-use crate::world::World;
+use crate::world::{ReadingPath, World};
 
 /// Where a cause stands with respect to the catalogue of effects.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -62,6 +62,69 @@ impl<'a> Place<'a> {
     #[must_use]
     pub fn between(&self, which: usize, low: f64, high: f64) -> f64 {
         low + (high - low) * self.draw[which]
+    }
+
+    /// What something is multiplied by: `1 + size` or its inverse, by the first sign.
+    #[must_use]
+    pub fn factor(&self, size: f64) -> f64 {
+        if self.sign(0) > 0.0 {
+            1.0 + size
+        } else {
+            1.0 / (1.0 + size)
+        }
+    }
+
+    /// Multiplies a number of an attribute of all geoms of the site's contact.
+    pub fn scale_contact(
+        &self,
+        size: f64,
+        attribute: &str,
+        index: usize,
+        world: &mut World,
+    ) -> Values {
+        let factor = self.factor(size);
+        for geom in self.machine.touching(self.site) {
+            world.edit_geom(geom, attribute, index, |old| factor * old);
+        }
+        vec![("factor", factor)]
+    }
+
+    /// Multiplies a gain of the site's actuator.
+    pub fn scale_gain(&self, size: f64, gain: &str, world: &mut World) -> Values {
+        let factor = self.factor(size);
+        if let Some(e) = world.document.find_in_mut("actuator", self.site) {
+            let old = e.number(gain).unwrap_or(0.0);
+            e.set_numbers(gain, &[factor * old]);
+        }
+        vec![("factor", factor)]
+    }
+
+    /// Distorts each column of the site's sensor: a number, called `name`, with a drawn sign, a vector
+    /// along a drawn direction, called by its axes.
+    pub fn along_columns(
+        &self,
+        size: f64,
+        name: &'static str,
+        world: &mut World,
+        path: impl Fn(f64) -> Box<dyn ReadingPath>,
+    ) -> Values {
+        let alone = [name];
+        let names: &[&'static str] = if self.columns().len() == 1 {
+            &alone
+        } else {
+            &["x", "y", "z"]
+        };
+        let mut values = Vec::new();
+        for ((column, name), share) in self.columns().zip(names).zip(self.direction()) {
+            let value = if names.len() == 1 {
+                self.sign(0) * size
+            } else {
+                share * size
+            };
+            world.readings.push((column, path(value)));
+            values.push((*name, value));
+        }
+        values
     }
 
     /// Index of the joint that the site is, or that the site's actuator drives.

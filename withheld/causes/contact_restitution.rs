@@ -18,14 +18,6 @@ impl Cause for ContactRestitution {
         9.0
     }
     fn act(&self, place: &Place<'_>, size: f64, world: &mut World) -> Values {
-        let factor = if place.sign(0) > 0.0 {
-            1.0 + size
-        } else {
-            1.0 / (1.0 + size)
-        };
-        for geom in place.machine.touching(place.site) {
-            world.edit_geom(geom, "solref", 1, |old| factor * old);
-        }
-        vec![("factor", factor)]
+        place.scale_contact(size, "solref", 1, world)
     }
 }

@@ -42,11 +42,7 @@ impl Cause for FrictionPatch {
         9.0
     }
     fn act(&self, place: &Place<'_>, size: f64, world: &mut World) -> Values {
-        let ratio = if place.sign(0) > 0.0 {
-            1.0 + size
-        } else {
-            1.0 / (1.0 + size)
-        };
+        let ratio = place.factor(size);
         let axis = usize::from(place.draw[1] > 0.7);
         let body = place.machine.mover(place.site);
         let [mean, spread] = place.whereabouts(body, axis);

@@ -18,11 +18,7 @@ impl Cause for Inertia {
         1.9
     }
     fn act(&self, place: &Place<'_>, size: f64, world: &mut World) -> Values {
-        let factor = if place.sign(0) > 0.0 {
-            1.0 + size
-        } else {
-            1.0 / (1.0 + size)
-        };
+        let factor = place.factor(size);
         let mut edit = InertiaEdit::of(place.site);
         edit.moments = factor;
         world.inertias.push(edit);

@@ -26,22 +26,6 @@ impl Cause for SensorBias {
         5.0 * place.spread()
     }
     fn act(&self, place: &Place<'_>, size: f64, world: &mut World) -> Values {
-        let names: &[&'static str] = if place.columns().len() == 1 {
-            &["bias"]
-        } else {
-            &["x", "y", "z"]
-        };
-        let direction = place.direction();
-        let mut values = Vec::new();
-        for ((column, name), share) in place.columns().zip(names).zip(direction) {
-            let value = if names.len() == 1 {
-                place.sign(0) * size
-            } else {
-                share * size
-            };
-            world.readings.push((column, Box::new(Shift(value))));
-            values.push((*name, value));
-        }
-        values
+        place.along_columns(size, "bias", world, |value| Box::new(Shift(value)))
     }
 }

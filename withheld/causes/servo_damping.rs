@@ -25,15 +25,6 @@ impl Cause for ServoDamping {
         9.0
     }
     fn act(&self, place: &Place<'_>, size: f64, world: &mut World) -> Values {
-        let factor = if place.sign(0) > 0.0 {
-            1.0 + size
-        } else {
-            1.0 / (1.0 + size)
-        };
-        if let Some(e) = world.document.find_in_mut("actuator", place.site) {
-            let old = e.number("kv").unwrap_or(0.0);
-            e.set_numbers("kv", &[factor * old]);
-        }
-        vec![("factor", factor)]
+        place.scale_gain(size, "kv", world)
     }
 }
