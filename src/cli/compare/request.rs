@@ -37,7 +37,13 @@ pub fn document(arguments: &Arguments) -> Result<Document> {
     options(arguments, &mut settings)?;
     let of_run = OfRun::take(&mut settings)?;
     let base = match arguments.table {
-        Some(table) => Some(of_table(table, arguments, base.as_ref())?),
+        Some(table) => {
+            // No table of the paper shows what an episode was expected to tell, and the fits behind
+            // it cost as much as all else in a run.
+            let expected = subtable(&mut settings, "expected")?;
+            expected.entry("rounds").or_insert(0.into());
+            Some(of_table(table, arguments, base.as_ref())?)
+        }
         None => base,
     };
     let quick = arguments.quick || base.as_ref().is_some_and(|b| b.quick);
