@@ -1,9 +1,10 @@
-//! Algorithms of ASID that need no native library: optimisers, exploration by
-//! random actions and by Fisher information, identification and solving.
+//! Algorithms of ASID that need no native library: Fisher information, optimisers,
+//! exploration, identification and solving.
 //!
 //! Nothing here names an engine or a task.
 
 pub mod explore;
+pub mod fisher;
 pub mod identify;
 pub mod optimise;
 pub mod solve;

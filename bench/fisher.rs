@@ -9,7 +9,7 @@
 use std::sync::atomic::AtomicU64;
 
 use anyhow::Result;
-use asid_core::fisher::{FisherBatch, FisherSettings, Form};
+use asid_algorithms::fisher::{FisherBatch, FisherSettings, Form};
 use asid_core::progress::Silent;
 use asid_core::{Backend, Model, Parameter, Problem, Streams, Task};
 use serde::Serialize;

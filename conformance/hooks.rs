@@ -2,10 +2,12 @@
 
 use std::sync::Mutex;
 
-use asid_core::effect::{Acts, Site};
-use asid_core::registry::{self, EffectEntry};
+use asid_core::registry;
 use asid_core::simulator::{StepHook, StepView};
-use asid_core::{Backend, Capabilities, Error, Plant, Result};
+use asid_core::{Backend, Capabilities, Error, Result};
+use asid_effects::EffectEntry;
+use asid_effects::{Acts, Site};
+use asid_mjcf::Plant;
 
 use crate::check::Measure::Figure;
 use crate::check::{Check, Tolerance};

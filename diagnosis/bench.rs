@@ -2,7 +2,8 @@
 //! scatter, and the starts of the episodes.
 
 use asid_core::layout::Layout;
-use asid_core::{EffectSpec, Parameter, Result};
+use asid_core::{Parameter, Result};
+use asid_effects::EffectSpec;
 
 use crate::candidate::Candidate;
 use crate::fit::{Effort, Fit, Unknown, cost, fit};

@@ -1,9 +1,12 @@
 //! Candidates: effects at sites, and where the search for their parameters begins.
 
-use asid_core::effect::{Acts, Effect, EffectParameter, Reference, Start};
 use asid_core::parameter::Scale;
-use asid_core::registry::{EffectEntry, all};
-use asid_core::{EffectSpec, Parameter, Plant, Target};
+use asid_core::registry::all;
+use asid_core::{Parameter, Target};
+use asid_effects::EffectEntry;
+use asid_effects::EffectSpec;
+use asid_effects::{Acts, Effect, EffectParameter, Reference, Start};
+use asid_mjcf::Plant;
 
 use crate::machine::Machine;
 use crate::trajectory::Trajectory;

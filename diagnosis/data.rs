@@ -58,9 +58,9 @@ pub struct Logs {
 }
 
 /// Unit of a sensor of this kind on this machine.
-fn unit_of(plant: &asid_core::Plant, sensor: usize) -> String {
+fn unit_of(plant: &asid_mjcf::Plant, sensor: usize) -> String {
     use asid_core::layout::JointKind;
-    use asid_core::plant::Reads;
+    use asid_mjcf::plant::Reads;
     let s = &plant.layout.sensors[sensor];
     let slide =
         matches!(plant.sensors[sensor], Reads::Joint(j) if plant.joint_kind(j) == JointKind::Slide);
@@ -80,7 +80,7 @@ impl Logs {
     /// # Errors
     /// When the scene has no such sensor.
     pub fn new(
-        plant: &asid_core::Plant,
+        plant: &asid_mjcf::Plant,
         sensors: &[String],
         episodes: Vec<(String, Episode)>,
     ) -> Result<Self> {
@@ -319,7 +319,8 @@ impl Logs {
 
 #[cfg(test)]
 mod tests {
-    use asid_core::{Plant, Scene};
+    use asid_core::Scene;
+    use asid_mjcf::Plant;
 
     use super::*;
 

@@ -1,6 +1,7 @@
 //! A diagnosis from a study to its result.
 
-use asid_core::{EffectSpec, Progress, Result, Streams};
+use asid_core::{Progress, Result, Streams};
+use asid_effects::EffectSpec;
 
 use crate::bench::{Bench, Explanation, Trial};
 use crate::candidate::{Candidate, LeftOut, enumerate};

@@ -5,9 +5,11 @@
 //! joint that explains most of what the window leaves is a linear fit, for which a
 //! replay a joint tells all slopes at once.
 
+use asid_core::Result;
 use asid_core::layout::JointKind;
-use asid_core::registry::{EffectEntry, find};
-use asid_core::{EffectSpec, Result};
+use asid_core::registry::find;
+use asid_effects::EffectEntry;
+use asid_effects::EffectSpec;
 use nalgebra::{DMatrix, DVector};
 
 use crate::bench::{Bench, Trial};

@@ -1,7 +1,6 @@
 //! Diagnosis of the sim-to-real gap: where it lies, which unmodelled effect causes it, and
 //! how far it shrinks once that effect is added.
 //!
-//! - [`effects`] is the catalogue: what a real machine does and its model may lack.
 //! - [`study`] is what the user brings: a model, logs of the real machine, what is fitted already.
 //! - [`predict`] replays the logs in a model, for many parameter values at once; [`fit`]
 //!   is least squares over such replays.
@@ -11,7 +10,6 @@ pub mod candidate;
 pub mod checks;
 pub mod data;
 pub mod diagnose;
-pub mod effects;
 pub mod experiment;
 pub mod fit;
 pub mod forces;
@@ -24,7 +22,6 @@ pub mod nuisance;
 pub mod predict;
 pub mod prepare;
 pub mod record;
-pub mod refined_model;
 pub mod result;
 pub mod roughness;
 pub mod same_physics;

@@ -4,9 +4,9 @@
 //! episode. Shares are of the residual itself, which is what the user sees; conditions are
 //! looked for where the residual *grows*, which is where its cause acts.
 
-use asid_core::Plant;
 use asid_core::layout::JointKind;
-use asid_core::plant::Reads;
+use asid_mjcf::Plant;
+use asid_mjcf::plant::Reads;
 
 use crate::data::Logs;
 use crate::result::Where;

@@ -2,8 +2,10 @@
 
 use std::sync::Arc;
 
-use asid_core::refined::Refined;
-use asid_core::{Backend, EffectSpec, Model, Plant, Result, Scene, Target};
+use asid_core::{Backend, Model, Result, Scene, Target};
+use asid_effects::EffectSpec;
+use asid_effects::refined::Refined;
+use asid_mjcf::Plant;
 
 /// A scene compiled by an engine, what is known of its machine, and what the study's model
 /// file has set and added already.

@@ -180,7 +180,8 @@ mod tests {
 
     #[test]
     fn a_lag_finer_than_the_time_step_is_no_gap() {
-        use asid_core::{Episode, Plant, Scene};
+        use asid_core::{Episode, Scene};
+        use asid_mjcf::Plant;
         let scene = r#"<mujoco><option timestep="0.002"/><worldbody><body>
             <joint name="slide" type="slide"/><geom size="0.1" mass="1"/></body></worldbody>
             <sensor><jointpos name="place" joint="slide"/></sensor></mujoco>"#;

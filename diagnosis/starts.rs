@@ -1,10 +1,11 @@
 //! Where episodes begin: as their logs say, as their first readings show, and what neither tells.
 
+use asid_core::Layout;
 use asid_core::layout::JointKind;
-use asid_core::plant::Reads;
 use asid_core::problem::home;
 use asid_core::signal::{rotation_difference, unit_quaternion};
-use asid_core::{Layout, Plant};
+use asid_mjcf::Plant;
+use asid_mjcf::plant::Reads;
 
 use crate::predict::State;
 use crate::study::Study;

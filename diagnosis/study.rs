@@ -6,12 +6,12 @@ use std::path::{Path, PathBuf};
 use asid_core::episode::InitialState;
 use asid_core::parameter::Scale;
 use asid_core::problem::home;
-use asid_core::{
-    EffectSpec, Episode, Error, Layout, Parameter, Plant, Result, Scene, Target, Task,
-};
+use asid_core::{Episode, Error, Layout, Parameter, Result, Scene, Target, Task};
+use asid_effects::EffectSpec;
+use asid_mjcf::Plant;
 use serde::Deserialize;
 
-use crate::refined_model::RefinedModel;
+use asid_effects::refined_model::RefinedModel;
 
 /// What counts as noise of a task's own sensors, rad or m: the repeatability of the arm, 0.1 mm
 /// (Franka Emika's data sheet). Simulated they have none, and a push that differs by the width of an atom

@@ -5,7 +5,8 @@
 
 use asid_core::layout::Recording;
 use asid_core::replay::ReplayPlan;
-use asid_core::{BatchConfig, Control, Model, Parameter, Plant, Result, Rollout, Simulator};
+use asid_core::{BatchConfig, Control, Model, Parameter, Result, Rollout, Simulator};
+use asid_mjcf::Plant;
 
 use crate::data::Logs;
 use crate::predict::{Point, columns_of};

@@ -124,7 +124,7 @@ fn refines(findings: &Findings, set: &Hypothesis, simpler: &Hypothesis) -> bool 
     let (Some(fine), None) = (differ.next(), differ.next()) else {
         return false;
     };
-    let entry = asid_core::registry::find::<asid_core::registry::EffectEntry>(&fine.name);
+    let entry = asid_core::registry::find::<asid_effects::EffectEntry>(&fine.name);
     let coarse: &[&str] = entry.map_or(&[], |e| (e.make)().refines());
     set.labels.len() == simpler.labels.len()
         && effects(b)
@@ -158,7 +158,7 @@ fn reduces(found: &Found, bench: &Bench) -> bool {
     found.explanation.effects.iter().any(|effect| {
         let unknowns = &found.explanation.unknowns[at..at + effect.values.len()];
         at += effect.values.len();
-        let entry = asid_core::registry::find::<asid_core::registry::EffectEntry>(&effect.name);
+        let entry = asid_core::registry::find::<asid_effects::EffectEntry>(&effect.name);
         let Ok(entry) = entry else { return false };
         let made = (entry.make)();
         made.parameters()

@@ -6,9 +6,10 @@
 //! as much as what it does first. The windows' starts are nuisance parameters, as any that
 //! are not known.
 
+use asid_core::Result;
 use asid_core::layout::JointKind;
-use asid_core::plant::Reads;
-use asid_core::{Plant, Result};
+use asid_mjcf::Plant;
+use asid_mjcf::plant::Reads;
 
 use crate::bench::{Bench, Stage, Trial};
 use crate::data::Logs;

@@ -8,7 +8,10 @@
 pub use asid_algorithms as algorithms;
 pub use asid_core as core;
 pub use asid_diagnosis as diagnosis;
+pub use asid_effects as effects;
 pub use asid_learned as learned;
+pub use asid_mjcf as mjcf;
+pub use asid_plugin as plugin;
 pub use asid_report as report;
 pub use asid_tasks as tasks;
 pub use asid_worlds as worlds;
@@ -21,3 +24,4 @@ pub use asid_nn as nn;
 pub use asid_rapier as rapier;
 
 pub mod cli;
+pub mod pipeline;

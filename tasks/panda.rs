@@ -1,7 +1,7 @@
 //! The arm that every task shares: a Franka Panda with its hand.
 
-use asid_core::kinematics::Chain;
 use asid_core::{Error, Result, Scene};
+use asid_mjcf::kinematics::Chain;
 
 /// The arm's document, included by each scene as `../panda.xml`.
 pub const PANDA_XML: &str = include_str!("panda.xml");

@@ -1,9 +1,9 @@
 //! Exploration's commands, the same for every task with the arm: the hand is moved over the
 //! scene at a fixed height, by displacements in the plane.
 
-use asid_core::cartesian::{CartesianController, CartesianSettings};
 use asid_core::task::{Commander, Coordinate};
 use asid_core::{Result, Scene};
+use asid_mjcf::cartesian::{CartesianController, CartesianSettings};
 use nalgebra::Vector3;
 
 use crate::panda;

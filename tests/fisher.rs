@@ -7,7 +7,7 @@ mod cart_support;
 #[allow(dead_code)] // not every test needs all of it
 mod task_support;
 
-use asid::core::fisher::{FisherBatch, FisherSettings, Form};
+use asid::algorithms::fisher::{FisherBatch, FisherSettings, Form};
 use asid::core::parameter::{Parameter, Scale};
 use asid::core::registry::{BackendEntry, all};
 use cart_support::{Cart, FRAME, HORIZON, NOISE};

@@ -7,12 +7,13 @@ mod cart_support;
 #[allow(dead_code)] // not every test needs all of it
 mod task_support;
 
-use asid::core::expected::{ExpectedSettings, expected_deviation};
+use asid::algorithms::fisher::expected::{ExpectedSettings, expected_deviation};
 use asid::core::identify::Identified;
 use asid::core::parameter::{Parameter, Scale};
 use asid::core::posterior::Edge;
 use asid::core::registry::{BackendEntry, IdentifierEntry, find};
-use asid::core::{Policy, RealWorld as _, Result, SimulatedWorld, Streams};
+use asid::core::{Policy, RealWorld as _, Result, Streams};
+use asid::worlds::SimulatedWorld;
 use cart_support::{Cart, HORIZON};
 
 const IDENTIFIERS: [&str; 4] = ["cem", "reps", "cma-es", "gauss-newton"];

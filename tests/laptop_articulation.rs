@@ -6,13 +6,14 @@
 #[allow(dead_code)] // not every test needs all of it
 mod task_support;
 
+use asid::algorithms::fisher::FisherSettings;
 use asid::algorithms::identify::articulation::{self, Joint};
 use asid::core::episode::ChannelColumns;
-use asid::core::fisher::FisherSettings;
-use asid::core::pipeline::episode_information;
 use asid::core::registry::{ExplorerEntry, IdentifierEntry, find};
 use asid::core::signal::SignalSet;
-use asid::core::{Control, Episode, Problem, RealWorld, Rollout, SimulatedWorld, Streams};
+use asid::core::{Control, Episode, Problem, RealWorld, Rollout, Streams};
+use asid::pipeline::episode_information;
+use asid::worlds::SimulatedWorld;
 use rand::Rng as _;
 
 /// Calls `check` with a problem for each engine.

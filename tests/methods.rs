@@ -8,13 +8,14 @@ mod cart_support;
 #[allow(dead_code)]
 mod task_support;
 
-use asid::core::expected::ExpectedSettings;
+use asid::algorithms::fisher::expected::ExpectedSettings;
 use asid::core::parameter::Scale;
-use asid::core::pipeline::{self, Method};
 use asid::core::registry::{
     BackendEntry, ExplorerEntry, IdentifierEntry, Settings, SolverEntry, find,
 };
-use asid::core::{Parameter, SimulatedWorld, Streams};
+use asid::core::{Parameter, Streams};
+use asid::pipeline::{self, Method};
+use asid::worlds::SimulatedWorld;
 use asid_comparison::method::Method as Named;
 use asid_comparison::statistics::interquartile_mean;
 use cart_support::Cart;

@@ -183,7 +183,7 @@ fn what_was_built_otherwise_is_refused_before_it_is_used() {
     let place = Workplace::new();
     let folder = place.path("");
     let other =
-        "compiler=rustc 1.80.0 (051478957 2024-07-21)\\ntarget=x\\nasid-core=0.0.1\\nsources=0";
+        "compiler=rustc 1.80.0 (051478957 2024-07-21)\\ntarget=x\\nasid=0.0.1\\nsources=0";
     for (name, source, reason) in [
         (
             "compiler",
@@ -203,7 +203,7 @@ fn what_was_built_otherwise_is_refused_before_it_is_used() {
         (
             "magic",
             declaration("NONSENSE", "232", other),
-            "is not that of asid-core",
+            "is not that of asid",
         ),
         (
             "empty",
@@ -241,7 +241,7 @@ fn the_sources_must_be_the_same_too() {
     std::fs::write(place.path("libother.so"), bytes).unwrap();
     let (said, status) = line(&place.run(&["list", "--plugin", "libother.so"]));
     assert!(
-        said.contains("libother.so: was built from asid-core 0.1.0 ("),
+        said.contains("libother.so: was built from asid 0.1.0 ("),
         "{said}"
     );
     assert!(said.contains("rebuild the plugin"), "{said}");

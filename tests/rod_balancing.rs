@@ -6,11 +6,12 @@
 #[allow(dead_code)] // not every test needs all of it
 mod task_support;
 
+use asid::algorithms::fisher::FisherSettings;
 use asid::algorithms::identify::Likelihood;
-use asid::core::fisher::FisherSettings;
-use asid::core::pipeline::episode_information;
 use asid::core::registry::{BackendEntry, ExplorerEntry, IdentifierEntry, all, find};
-use asid::core::{Control, Policy, Problem, RealWorld, Rollout, SimulatedWorld};
+use asid::core::{Control, Policy, Problem, RealWorld, Rollout};
+use asid::pipeline::episode_information;
+use asid::worlds::SimulatedWorld;
 
 /// Calls `check` with a problem for each engine.
 fn on_every_engine(seed: u64, check: impl Fn(&str, &Problem<'_>)) {

@@ -6,7 +6,8 @@
 mod task_support;
 
 use asid::core::registry::{TaskEntry, find};
-use asid::core::{Control, Policy, Problem, RealWorld, Rollout, SimulatedWorld, Task};
+use asid::core::{Control, Policy, Problem, RealWorld, Rollout, Task};
+use asid::worlds::SimulatedWorld;
 
 /// Radius of the puck, m.
 const RADIUS: f64 = 0.0381;

@@ -10,9 +10,9 @@ use asid::core::task::{
     Commander, Condition, Coordinate, DownstreamProtocol, ExplorationProtocol, Outcome, Task,
 };
 use asid::core::{
-    Capabilities, Layout, Model, Parameter, Policy, RealWorld as _, Result, Scene, SimulatedWorld,
-    TaskPolicy, TrackerErrors,
+    Capabilities, Layout, Model, Parameter, Policy, RealWorld as _, Result, Scene, TaskPolicy,
 };
+use asid::worlds::{SimulatedWorld, TrackerErrors};
 use std::sync::Arc;
 
 /// A striker flies at 2 m/s against a ball: they touch for some milliseconds.

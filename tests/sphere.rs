@@ -8,13 +8,12 @@
 #[allow(dead_code)] // not every test needs all of it
 mod task_support;
 
-use asid::core::fisher::FisherSettings;
-use asid::core::pipeline::episode_information;
+use asid::algorithms::fisher::FisherSettings;
 use asid::core::registry::{BackendEntry, TaskEntry, all, find};
 use asid::core::visits;
-use asid::core::{
-    Capabilities, Control, Parameter, Policy, Problem, RealWorld, Rollout, SimulatedWorld,
-};
+use asid::core::{Capabilities, Control, Parameter, Policy, Problem, RealWorld, Rollout};
+use asid::pipeline::episode_information;
+use asid::worlds::SimulatedWorld;
 
 const RADIUS: f64 = 0.03;
 const G: f64 = 9.81;

@@ -10,20 +10,22 @@ mod task_support;
 use std::sync::atomic::AtomicU64;
 use std::time::Instant;
 
+use asid::algorithms::fisher::sensitivity::check_parameters;
 use asid::core::progress::Silent;
 use asid::core::real_world::RealEpisode;
 use asid::core::registry::{
     BackendEntry, ExplorerEntry, IdentifierEntry, Settings, SolverEntry, TaskEntry, all, find,
 };
 use asid::core::rng::Rng;
-use asid::core::sensitivity::check_parameters;
 use asid::core::task::Outcome;
 use asid::core::tracker::ReadingFrames;
 use asid::core::visits;
 use asid::core::{
-    Capabilities, Control, Episode, Levels, Parameter, Plant, Policy, Problem, RealWorld,
-    Recording, Rollout, SimulatedWorld, Streams, Task,
+    Capabilities, Control, Episode, Levels, Parameter, Policy, Problem, RealWorld, Recording,
+    Rollout, Streams, Task,
 };
+use asid::mjcf::Plant;
+use asid::worlds::SimulatedWorld;
 use rand::Rng as _;
 
 /// Actions at which the metric is looked at.

@@ -12,8 +12,9 @@ mod task_support;
 use std::sync::Arc;
 
 use asid::algorithms::explore::{Discriminating, Rival};
-use asid::core::registry::{BackendEntry, EffectEntry, all};
+use asid::core::registry::{BackendEntry, all};
 use asid::core::{Explorer as _, Model, Problem};
+use asid::effects::EffectEntry;
 use cli_support::{Workplace, names, tiny};
 use serde_json::Value;
 

@@ -8,7 +8,8 @@ mod cli_support;
 mod task_support;
 
 use asid::core::registry::{BackendEntry, all};
-use asid::core::{Capabilities, Policy, Problem, RealWorld as _, Result, SimulatedWorld, Streams};
+use asid::core::{Capabilities, Policy, Problem, RealWorld as _, Result, Streams};
+use asid::worlds::SimulatedWorld;
 use asid::worlds::{Perturbation, PerturbationRanges, perturb};
 use cli_support::{Workplace, tiny};
 use rand::Rng as _;
@@ -17,7 +18,7 @@ use task_support::{on_engine, task};
 
 fn draw(ranges: &PerturbationRanges, seed: u64) -> Perturbation {
     let task = task("rod-balancing");
-    let plant = asid::core::Plant::of(task.scene()).unwrap();
+    let plant = asid::mjcf::Plant::of(task.scene()).unwrap();
     let tracked = ["rod_pos".to_owned(), "rod_quat".to_owned()];
     let streams = Streams::new(seed).sealed("world");
     Perturbation::draw(ranges, &plant, &plant.layout, &tracked, streams).unwrap()
@@ -369,8 +370,8 @@ fn beginning_costs_no_parsing() {
     let task = task("rod-balancing");
     let attempt = |scene: &asid::core::Scene| {
         let home = [0.0, 0.25, 0.0, -2.9, 0.0, 3.2, 0.785];
-        let settings = asid::core::cartesian::CartesianSettings::default();
-        asid::core::cartesian::CartesianController::new(scene, "ee", &home, settings).unwrap()
+        let settings = asid::mjcf::cartesian::CartesianSettings::default();
+        asid::mjcf::cartesian::CartesianController::new(scene, "ee", &home, settings).unwrap()
     };
     let time = |work: &mut dyn FnMut()| {
         let clock = std::time::Instant::now();

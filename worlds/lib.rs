@@ -16,9 +16,11 @@ mod kind;
 mod perturbation;
 mod perturbed;
 mod ranges;
+mod simulated;
 
 pub use crossed::other_engine;
 pub use kind::Kind;
 pub use perturbation::{Perturbation, TrackerPerturbation};
 pub use perturbed::{Perturbed, perturb};
 pub use ranges::PerturbationRanges;
+pub use simulated::{SimulatedWorld, TrackerErrors};

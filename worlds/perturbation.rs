@@ -3,7 +3,8 @@
 use std::collections::BTreeMap;
 
 use asid_core::rng::Rng;
-use asid_core::{Layout, Plant, Result, Streams};
+use asid_core::{Layout, Result, Streams};
+use asid_mjcf::Plant;
 use rand::Rng as _;
 use serde::Serialize;
 

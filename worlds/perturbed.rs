@@ -3,12 +3,14 @@
 
 use std::sync::Arc;
 
-use asid_core::effect::EffectSpec;
-use asid_core::real_world::TrackerErrors;
-use asid_core::refined::{Refined, needs};
-use asid_core::registry::{EffectEntry, find};
+use crate::TrackerErrors;
+use asid_core::registry::find;
 use asid_core::signal::Signal;
-use asid_core::{Backend, Capabilities, Model, Parameter, Plant, Result, Scene, Target};
+use asid_core::{Backend, Capabilities, Model, Parameter, Result, Scene, Target};
+use asid_effects::EffectEntry;
+use asid_effects::EffectSpec;
+use asid_effects::refined::{Refined, needs};
+use asid_mjcf::Plant;
 
 use crate::Perturbation;
 

@@ -17,13 +17,14 @@
 use std::error::Error;
 use std::sync::atomic::AtomicU64;
 
-use asid::core::expected::{ExpectedSettings, expected_deviation};
-use asid::core::fisher::{FisherBatch, FisherSettings};
+use asid::algorithms::fisher::expected::{ExpectedSettings, expected_deviation};
+use asid::algorithms::fisher::{FisherBatch, FisherSettings};
 use asid::core::progress::Silent;
 use asid::core::registry::{
     AlgorithmEntry, BackendEntry, Entry, ExplorerEntry, IdentifierEntry, Settings, TaskEntry, find,
 };
-use asid::core::{Problem, RealWorld as _, SimulatedWorld, Streams, Task};
+use asid::core::{Problem, RealWorld as _, Streams, Task};
+use asid::worlds::SimulatedWorld;
 
 type Outcome<T> = Result<T, Box<dyn Error>>;
 

@@ -4,8 +4,8 @@
 //! over and the information gathered so far in it (see [`Observer`]), the return of
 //! the telescoping objectives is a function of the observation.
 
+use crate::fisher::{FisherBatch, FisherSettings};
 use asid_core::environment::{BatchEnvironment, Transition};
-use asid_core::fisher::{FisherBatch, FisherSettings};
 use asid_core::rng::Rng;
 use asid_core::signal::SignalSet;
 use asid_core::{Problem, Result};

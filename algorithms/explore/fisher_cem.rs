@@ -6,8 +6,8 @@
 //! from the prior, and judged by its mean return. Draws differ from iteration to
 //! iteration, so the best of each meet once more at common ones.
 
+use crate::fisher::{FisherBatch, FisherSettings};
 use asid_core::explore::{CurvePoint, Explored, Explorer};
-use asid_core::fisher::{FisherBatch, FisherSettings};
 use asid_core::registry;
 use asid_core::rng::Rng;
 use asid_core::{Error, Posterior, Problem, Result};

@@ -19,7 +19,7 @@
 //! does not, and the loss is multiplied by the ratio of the two (a temperature).
 //! Nothing here selects points by how well they fit, which would bias it.
 
-use asid_core::precision::{Precision, inflation};
+use crate::fisher::precision::{Precision, inflation};
 use asid_core::rng::Rng;
 use nalgebra::{DMatrix, DVector};
 

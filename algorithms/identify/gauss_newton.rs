@@ -201,8 +201,7 @@ impl Seen {
             0.5 * off.dot(&(&matrix * &off))
         };
         let Some(root) =
-            asid_core::information::inverse_above_prior(&(&matrix + DMatrix::identity(d, d)))
-                .cholesky()
+            crate::fisher::inverse_above_prior(&(&matrix + DMatrix::identity(d, d))).cholesky()
         else {
             return vec![self.at.clone(); count];
         };

@@ -478,7 +478,7 @@ mod tests {
         use asid_core::RealWorld as _;
         let random = (find::<ExplorerEntry>("random").unwrap().make)(&Settings::new()).unwrap();
         let mut explored = random.explore(problem, None).unwrap();
-        let mut world = asid_core::SimulatedWorld::new(
+        let mut world = asid_worlds::SimulatedWorld::new(
             problem.task,
             problem.model,
             problem.parameters,

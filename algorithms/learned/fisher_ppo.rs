@@ -9,9 +9,9 @@
 use std::sync::Arc;
 
 use asid_algorithms::explore::Observer;
+use asid_algorithms::fisher::Objective;
+use asid_algorithms::fisher::{FisherBatch, FisherSettings};
 use asid_core::explore::Explored;
-use asid_core::fisher::{FisherBatch, FisherSettings};
-use asid_core::information::Objective;
 use asid_core::{Error, Problem, Result};
 use serde::{Deserialize, Serialize};
 
@@ -172,7 +172,8 @@ impl Observe for Shadowed<'_> {
 #[cfg(test)]
 mod tests {
     use asid_core::registry::{ExplorerEntry, find};
-    use asid_core::{RealWorld as _, SimulatedWorld, Streams};
+    use asid_core::{RealWorld as _, Streams};
+    use asid_worlds::SimulatedWorld;
 
     use asid_core::Explorer as _;
 

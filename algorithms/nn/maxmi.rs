@@ -215,9 +215,10 @@ const LATEST: usize = 512;
 mod tests {
     use asid_core::Explorer as _;
     use asid_core::environment::{BatchEnvironment as _, Transition};
-    use asid_core::{RealWorld as _, SimulatedWorld, Streams};
+    use asid_core::{RealWorld as _, Streams};
     use asid_learned::Saved;
     use asid_learned::learning::obtain;
+    use asid_worlds::SimulatedWorld;
 
     use super::*;
     use crate::testing::with_problem;

@@ -7,9 +7,9 @@
 //! a [`LocalFit`] over the region of the posterior gives estimate and information, as an
 //! identification by emulation does, with a straight line for its quadratic.
 
+use crate::fisher::inverse_above_prior;
+use crate::fisher::local_fit::{LocalFit, Told, design, sets};
 use asid_core::Result;
-use asid_core::information::inverse_above_prior;
-use asid_core::local_fit::{LocalFit, Told, design, sets};
 use asid_core::rng::Rng;
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};

@@ -168,6 +168,15 @@ fn edit_distance(a: &str, b: &str) -> usize {
     row[b.len()]
 }
 
+/// How every text begins that blames a plugin.
+pub const BLAMES_PLUGIN: &str = "plugin ";
+
+/// True for the text of an error or panic that is a plugin's fault and names its file.
+#[must_use]
+pub fn blames_a_plugin(text: &str) -> bool {
+    text.starts_with(BLAMES_PLUGIN)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -6,44 +6,28 @@
 //!   threads, and expressible as a C table.
 //! - What is done: a [`Task`] with [`Parameter`]s; an [`Explorer`] makes a [`Policy`],
 //!   a [`RealWorld`] plays it, an [`Identifier`] fits a [`Posterior`] to the
-//!   [`Episode`], a [`TaskSolver`] makes a [`TaskPolicy`]; [`pipeline`] joins them.
-//! - What is computed: [`information`] and [`fisher`] (what an episode tells), [`signal`]
-//!   (how readings are compared), [`replay`] (a log in a simulator).
-//! - How parts are found: [`registry`], and [`plugin`] for those loaded at run time.
+//!   [`Episode`], a [`TaskSolver`] makes a [`TaskPolicy`].
+//! - How readings are compared: [`signal`]; a log in a simulator: [`replay`].
+//! - How parts are found: [`registry`].
 
 pub mod backend;
-pub mod cartesian;
 pub mod difficulty;
-pub mod document;
-pub mod effect;
 pub mod environment;
 pub mod episode;
 pub mod error;
-pub mod expected;
 pub mod explore;
-pub mod fisher;
 pub mod identify;
-pub mod information;
-pub mod kinematics;
 pub mod layout;
-pub mod local_fit;
 mod log;
-pub mod mass;
 pub mod parameter;
-pub mod pipeline;
-pub mod plant;
-pub mod plugin;
 pub mod posterior;
-pub mod precision;
 pub mod problem;
 pub mod progress;
 pub mod real_world;
-pub mod refined;
 pub mod registry;
 pub mod replay;
 pub mod rng;
 pub mod scene;
-pub mod sensitivity;
 pub mod signal;
 pub mod simulator;
 pub mod solve;
@@ -58,20 +42,17 @@ pub use nalgebra;
 
 pub use backend::{Backend, Capabilities, Model};
 pub use difficulty::{Difficulty, Levels};
-pub use effect::{Acting, Effect, EffectSpec};
 pub use environment::{BatchEnvironment, Transition};
 pub use episode::Episode;
 pub use error::{Error, Result};
 pub use explore::{Explorer, Policy};
 pub use identify::Identifier;
-pub use information::{Information, Objective};
 pub use layout::{Layout, Recording};
 pub use parameter::Parameter;
-pub use plant::Plant;
 pub use posterior::Posterior;
 pub use problem::Problem;
 pub use progress::Progress;
-pub use real_world::{RealWorld, SimulatedWorld, TrackerErrors};
+pub use real_world::RealWorld;
 pub use rng::Streams;
 pub use scene::Scene;
 pub use simulator::{BatchConfig, Control, Rollout, Simulator, Snapshot, Status};

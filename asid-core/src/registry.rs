@@ -1,4 +1,5 @@
-//! Finds backends, tasks, explorers, identifiers, solvers and effects by name.
+//! Finds backends, tasks, explorers, identifiers and solvers by name. Other crates add kinds of
+//! their own, such as effects: a type that is an [`Entry`].
 //!
 //! What is linked in registers itself: one [`register!`](crate::register) in the
 //! author's crate, no list to edit. What is loaded at run time is [`add`]ed. Lists
@@ -7,7 +8,6 @@
 use std::sync::{PoisonError, RwLock};
 
 use crate::backend::Backend;
-use crate::effect::Effect;
 use crate::error::{Error, Result};
 use crate::explore::Explorer;
 use crate::identify::Identifier;
@@ -39,18 +39,6 @@ pub struct TaskEntry {
     pub about: &'static str,
     /// Makes it.
     pub make: Maker<dyn Task>,
-    /// Where it comes from.
-    pub origin: Origin,
-}
-
-/// An effect.
-pub struct EffectEntry {
-    /// Name on the command line.
-    pub name: &'static str,
-    /// One line for `asid list`.
-    pub about: &'static str,
-    /// Makes it.
-    pub make: &'static (dyn Fn() -> Box<dyn Effect> + Sync),
     /// Where it comes from.
     pub origin: Origin,
 }
@@ -97,11 +85,14 @@ pub trait Entry: inventory::Collect + Sync + Sized + 'static {
     fn added() -> &'static RwLock<Vec<&'static Self>>;
 }
 
-macro_rules! entry {
+/// Makes a type with the fields `name`, `about` and `origin` an [`Entry`].
+#[doc(hidden)]
+#[macro_export]
+macro_rules! __entry {
     ($type:ty, $kind:literal) => {
-        inventory::collect!($type);
+        $crate::__inventory::collect!($type);
 
-        impl Entry for $type {
+        impl $crate::registry::Entry for $type {
             const KIND: &'static str = $kind;
             fn name(&self) -> &'static str {
                 self.name
@@ -109,23 +100,23 @@ macro_rules! entry {
             fn about(&self) -> &'static str {
                 self.about
             }
-            fn origin(&self) -> Origin {
+            fn origin(&self) -> $crate::registry::Origin {
                 self.origin
             }
-            fn added() -> &'static RwLock<Vec<&'static Self>> {
-                static ADDED: RwLock<Vec<&'static $type>> = RwLock::new(Vec::new());
+            fn added() -> &'static std::sync::RwLock<Vec<&'static Self>> {
+                static ADDED: std::sync::RwLock<Vec<&'static $type>> =
+                    std::sync::RwLock::new(Vec::new());
                 &ADDED
             }
         }
     };
 }
 
-entry!(BackendEntry, "backend");
-entry!(TaskEntry, "task");
-entry!(EffectEntry, "effect");
-entry!(ExplorerEntry, "explorer");
-entry!(IdentifierEntry, "identifier");
-entry!(SolverEntry, "solver");
+__entry!(BackendEntry, "backend");
+__entry!(TaskEntry, "task");
+__entry!(ExplorerEntry, "explorer");
+__entry!(IdentifierEntry, "identifier");
+__entry!(SolverEntry, "solver");
 
 /// Everything registered under a type of entry, sorted by name.
 #[must_use]
@@ -156,7 +147,10 @@ pub fn add<E: Entry>(own: &str, build: impl FnOnce(&'static str) -> E) -> Result
 }
 
 /// Whether a name can be added.
-pub(crate) fn check_name<E: Entry>(own: &str) -> Result<()> {
+///
+/// # Errors
+/// As those of [`add`].
+pub fn check_name<E: Entry>(own: &str) -> Result<()> {
     let plain = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
     if !own.is_empty() && own.chars().all(plain) {
         return Ok(());

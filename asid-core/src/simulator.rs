@@ -358,36 +358,3 @@ pub trait Simulator: Send {
     /// Physics steps taken by all simulations of the batch since it was made.
     fn steps_taken(&self) -> u64;
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::Scene;
-    use crate::document;
-
-    #[test]
-    fn a_body_has_one_external_force() {
-        let xml = r#"<mujoco><worldbody><body name="a"><freejoint/><geom size="1"/></body>
-            <body name="b"><freejoint/><geom size="1"/></body></worldbody></mujoco>"#;
-        let scene = Scene::from_xml("two", xml, &[]).unwrap();
-        let layout = document::layout(&scene, &scene.description().unwrap()).unwrap();
-        let record = layout.recording::<&str>(&[]).unwrap();
-        let wrench = [1.0; 6];
-        let check = |bodies: [usize; 2]| {
-            let forces = bodies.map(|body| ExternalForce {
-                body,
-                wrench: &wrench,
-            });
-            let rollout = Rollout {
-                forces: &forces,
-                ..Rollout::new(&[0], 1, 1, Control::Shared(&[]), &record)
-            };
-            rollout.check(&layout, 1, 0, &[]).map_err(|e| e.to_string())
-        };
-        assert_eq!(check([1, 2]), Ok(()));
-        assert_eq!(
-            check([2, 2]),
-            Err("external forces name body 2 twice".into())
-        );
-    }
-}

@@ -6,7 +6,8 @@ use anyhow::{Context, Result};
 use asid_core::posterior::Marginal;
 use asid_core::registry::{ExplorerEntry, IdentifierEntry, Settings, find};
 use asid_core::rng::Rng;
-use asid_core::{Episode, RealWorld as _, SimulatedWorld, Streams};
+use asid_core::{Episode, RealWorld as _, Streams};
+use asid_worlds::SimulatedWorld;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicU64;
 
 use anyhow::{Context, Result, bail};
-use asid_core::fisher::{FisherBatch, FisherSettings};
+use asid_algorithms::fisher::{FisherBatch, FisherSettings};
 use asid_core::parameter::Scale;
 use asid_core::progress::Silent;
 use asid_core::registry::{ExplorerEntry, TaskEntry, find};

@@ -6,8 +6,9 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use asid_core::task::{Condition, Coordinate};
-use asid_core::{EffectSpec, Error, Parameter, Task, registry};
-use asid_diagnosis::refined_model::RefinedModel;
+use asid_core::{Error, Parameter, Task, registry};
+use asid_effects::EffectSpec;
+use asid_effects::refined_model::RefinedModel;
 use serde::Serialize;
 
 use super::options::{Algorithms, Common, Worlds};
@@ -271,9 +272,8 @@ impl Config {
 
     /// Files of plugins that were named, or that the settings name parts of.
     fn used_plugins(&self) -> Vec<PathBuf> {
-        use registry::{
-            BackendEntry, EffectEntry, ExplorerEntry, IdentifierEntry, SolverEntry, TaskEntry,
-        };
+        use asid_effects::EffectEntry;
+        use registry::{BackendEntry, ExplorerEntry, IdentifierEntry, SolverEntry, TaskEntry};
         let mut files = vec![
             file_of::<TaskEntry>(&self.task),
             file_of::<BackendEntry>(&self.backend),

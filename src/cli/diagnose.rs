@@ -12,9 +12,9 @@ use anyhow::Result;
 use asid_core::{Backend, Target};
 use asid_diagnosis::diagnose::{Diagnosis, diagnose as diagnose_study};
 use asid_diagnosis::machine::Machine;
-use asid_diagnosis::refined_model::RefinedModel;
 use asid_diagnosis::result::DiagnosisResult;
 use asid_diagnosis::study::Study;
+use asid_effects::refined_model::RefinedModel;
 use asid_report::diagnosis as report;
 use serde::Serialize;
 

@@ -2,8 +2,9 @@
 
 use std::collections::HashSet;
 
-use asid_core::registry::{EffectEntry, find};
+use asid_core::registry::find;
 use asid_diagnosis::result::{DiagnosisResult, DiagnosisTrace, EffectResult, Kind, SignalTrace};
+use asid_effects::EffectEntry;
 use asid_report::diagnosis as r;
 use asid_report::run::NamedText;
 

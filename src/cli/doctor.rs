@@ -4,7 +4,7 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
-use asid_loader::search;
+use asid_plugin::search;
 
 use super::plugins::Refused;
 
@@ -103,7 +103,7 @@ pub fn doctor(_arguments: &Arguments, refused: &[Refused]) -> Result<()> {
             false => writeln!(out, "absent   plugins of {path} ({from}): no such folder")?,
         }
     }
-    for plugin in asid_loader::loaded() {
+    for plugin in asid_plugin::loaded() {
         let names: Vec<String> = plugin
             .parts
             .iter()

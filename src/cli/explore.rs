@@ -8,13 +8,14 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::time::Instant;
 
+use crate::pipeline::episode_information;
 use anyhow::Result;
-use asid_core::fisher::FisherSettings;
-use asid_core::pipeline::episode_information;
+use asid_algorithms::fisher::FisherSettings;
 use asid_core::real_world::RealEpisode;
 use asid_core::registry::{ExplorerEntry, find};
 use asid_core::signal::Signal;
-use asid_core::{Episode, Parameter, RealWorld as _, SimulatedWorld};
+use asid_core::{Episode, Parameter, RealWorld as _};
+use asid_worlds::SimulatedWorld;
 use serde::Serialize;
 
 use super::config::Stage;

@@ -101,7 +101,7 @@ pub fn guard(work: impl FnOnce() -> ExitCode) -> ExitCode {
 /// program is.
 pub fn of_panic(payload: &(dyn std::any::Any + Send)) -> String {
     if let Some(text) = payload.downcast_ref::<String>()
-        && asid_core::plugin::blames_a_plugin(text)
+        && asid_core::error::blames_a_plugin(text)
     {
         return text.clone();
     }

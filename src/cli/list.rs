@@ -5,9 +5,9 @@ use std::io::Write as _;
 use anyhow::Result;
 use asid_core::Error;
 use asid_core::registry::{
-    BackendEntry, EffectEntry, Entry, ExplorerEntry, IdentifierEntry, Origin, SolverEntry,
-    TaskEntry, all,
+    BackendEntry, Entry, ExplorerEntry, IdentifierEntry, Origin, SolverEntry, TaskEntry, all,
 };
+use asid_effects::EffectEntry;
 use serde::Serialize;
 
 use super::plugins::Refused;

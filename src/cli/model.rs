@@ -3,10 +3,11 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use asid_core::effect::EffectSpec;
-use asid_core::refined::Refined;
-use asid_core::{Backend, Error, Layout, Model, Parameter, Plant, Result, Scene, Task};
-use asid_diagnosis::refined_model::RefinedModel;
+use asid_core::{Backend, Error, Layout, Model, Parameter, Result, Scene, Task};
+use asid_effects::EffectSpec;
+use asid_effects::refined::Refined;
+use asid_effects::refined_model::RefinedModel;
+use asid_mjcf::Plant;
 
 /// The scene of a task as it is.
 pub fn of_task(task: &dyn Task) -> RefinedModel {

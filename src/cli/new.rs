@@ -5,9 +5,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use asid_core::Error;
-use asid_core::registry::{
-    self, BackendEntry, EffectEntry, Entry, ExplorerEntry, Origin, TaskEntry,
-};
+use asid_core::registry::{self, BackendEntry, Entry, ExplorerEntry, Origin, TaskEntry};
+use asid_effects::EffectEntry;
 use clap::builder::{PossibleValue, PossibleValuesParser};
 
 /// Arguments of `new`.

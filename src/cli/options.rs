@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use asid_diagnosis::refined_model::RefinedModel;
+use asid_effects::refined_model::RefinedModel;
 
 /// Most threads that may be asked for.
 const MAX_THREADS: usize = 1024;

@@ -5,7 +5,7 @@ use std::sync::{Mutex, PoisonError};
 
 use anyhow::Result;
 use asid_core::registry::{Entry, Origin, find};
-use asid_loader::search;
+use asid_plugin::search;
 
 /// A plugin that was found in a folder and cannot be used.
 #[derive(Clone, Debug)]
@@ -25,7 +25,7 @@ static GIVEN: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 /// When one that is named cannot be used. Those found in folders are handed back.
 pub fn load(named: &[PathBuf]) -> Result<Vec<Refused>> {
     for path in named {
-        let loaded = asid_loader::load(path)?;
+        let loaded = asid_plugin::load(path)?;
         let mut given = GIVEN.lock().unwrap_or_else(PoisonError::into_inner);
         if !given.iter().any(|p| p == loaded.file) {
             given.push(loaded.file.to_owned());
@@ -41,7 +41,7 @@ pub fn load(named: &[PathBuf]) -> Result<Vec<Refused>> {
             Vec::new()
         });
         for path in files {
-            if let Err(error) = asid_loader::load(&path) {
+            if let Err(error) = asid_plugin::load(&path) {
                 let why = error.to_string();
                 refused.push(Refused { path, why });
             }

@@ -1,7 +1,7 @@
 //! `result.json`.
 
+use crate::pipeline::{EpisodeInformation, RunOutcome};
 use asid_algorithms::identify::articulation::{Articulation, Joint, of_episodes};
-use asid_core::pipeline::{EpisodeInformation, RunOutcome};
 use asid_core::posterior::{Direction, Edge, Marginal};
 use asid_core::{Episode, Parameter, Posterior, Result};
 use serde::Serialize;

@@ -3,8 +3,8 @@
 use std::io::Write as _;
 use std::time::Instant;
 
+use crate::pipeline::{self, Method, RunOutcome};
 use anyhow::Result;
-use asid_core::pipeline::{self, Method, RunOutcome};
 use asid_core::registry::{ExplorerEntry, IdentifierEntry, SolverEntry, find};
 
 use super::options::{Algorithms, Common, Worlds};

@@ -6,10 +6,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use anyhow::Result;
 use asid_core::registry::{self, BackendEntry, Entry, TaskEntry};
 use asid_core::signal::Signal;
-use asid_core::{
-    Backend, Capabilities, Error, Model, Parameter, Problem, SimulatedWorld, Streams, Task,
-    TrackerErrors,
-};
+use asid_core::{Backend, Capabilities, Error, Model, Parameter, Problem, Streams, Task};
+use asid_worlds::{SimulatedWorld, TrackerErrors};
 
 use super::config::{Config, Stage, difficulty};
 use super::model::{self, Needs};
@@ -113,7 +111,7 @@ impl Session {
             env_steps: AtomicU64::new(0),
             config,
         };
-        asid_core::sensitivity::check_parameters(&session.problem())?;
+        asid_algorithms::fisher::sensitivity::check_parameters(&session.problem())?;
         session.real = World::open(&session, &scene, session.world_streams())?;
         Ok(session)
     }

@@ -1,9 +1,9 @@
 //! Fills the data that a run's report is made of.
 
+use crate::pipeline::RunOutcome;
 use anyhow::Result;
 use asid_core::explore::CurvePoint;
 use asid_core::parameter::Scale;
-use asid_core::pipeline::RunOutcome;
 use asid_report::run as r;
 
 use super::session::Session;

@@ -191,7 +191,7 @@ fn score(folder: &Path, arguments: &Arguments) -> Result<()> {
         let clock = Instant::now();
         let mut study = Study::read(case)?;
         if arguments.finer > 1 {
-            let step = asid_core::Plant::of(&study.scene)?.layout.timestep;
+            let step = asid_mjcf::Plant::of(&study.scene)?.layout.timestep;
             study.scene = study
                 .scene
                 .with_timestep(step / f64::from(arguments.finer))?;

@@ -3,9 +3,11 @@
 use std::sync::Arc;
 
 use anyhow::Result;
-use asid_core::effect::EffectSpec;
-use asid_core::{Backend, Error, Model, Plant, Streams, TrackerErrors};
-use asid_diagnosis::refined_model::RefinedModel;
+use asid_core::{Backend, Error, Model, Streams};
+use asid_effects::EffectSpec;
+use asid_effects::refined_model::RefinedModel;
+use asid_mjcf::Plant;
+use asid_worlds::TrackerErrors;
 use asid_worlds::{Kind, Perturbation};
 use serde::Serialize;
 

@@ -1,8 +1,8 @@
 //! The task's primitive: go behind the lid, push it towards the base, leave it there.
 
-use asid_core::cartesian::{CartesianController, CartesianSettings};
 use asid_core::task::Coordinate;
 use asid_core::{Result, Scene};
+use asid_mjcf::cartesian::{CartesianController, CartesianSettings};
 use nalgebra::Vector3;
 
 use super::PLATE_HALF;

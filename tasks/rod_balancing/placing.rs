@@ -1,8 +1,8 @@
 //! The task's primitive: pick the rod at a point, lay that point over the ledge, let go.
 
-use asid_core::cartesian::{CartesianController, CartesianSettings};
 use asid_core::task::Coordinate;
 use asid_core::{Result, Scene};
+use asid_mjcf::cartesian::{CartesianController, CartesianSettings};
 use nalgebra::Vector3;
 
 use super::{LEDGE, ROD_HALF};

@@ -40,7 +40,8 @@ pub fn scene(scene: &Scene) -> Result<Scene> {
 #[cfg(test)]
 mod tests {
     use crate::rod_balancing::RodBalancing;
-    use asid_core::{Plant, Task as _};
+    use asid_core::Task as _;
+    use asid_mjcf::Plant;
 
     #[test]
     fn the_rod_is_another_one() {

@@ -1,7 +1,7 @@
 //! The task's primitive: the closed gripper goes behind the puck and strikes it once.
 
-use asid_core::cartesian::{CartesianController, CartesianSettings};
 use asid_core::{Result, Scene};
+use asid_mjcf::cartesian::{CartesianController, CartesianSettings};
 use nalgebra::Vector3;
 
 use super::PUCK_RADIUS;

@@ -1,7 +1,7 @@
 //! The tasks' primitive: go behind the ball, push it to a speed, and stop; the ball rolls on.
 
-use asid_core::cartesian::{CartesianController, CartesianSettings};
 use asid_core::{Result, Scene};
+use asid_mjcf::cartesian::{CartesianController, CartesianSettings};
 use nalgebra::Vector3;
 
 use super::{BALL_RADIUS, FINGERS};

@@ -1,11 +1,13 @@
 //! A scene on each engine, with and without effects.
 
-use asid::core::effect::{Effect, EffectSpec};
-use asid::core::refined::{Refined, needs};
-use asid::core::registry::{BackendEntry, EffectEntry, all};
+use asid::core::registry::{BackendEntry, all};
 use asid::core::{
-    Backend, BatchConfig, Capabilities, Control, Model as _, Plant, Rollout, Scene, Simulator,
+    Backend, BatchConfig, Capabilities, Control, Model as _, Rollout, Scene, Simulator,
 };
+use asid::effects::EffectEntry;
+use asid::effects::refined::{Refined, needs};
+use asid::effects::{Effect, EffectSpec};
+use asid::mjcf::Plant;
 
 /// Engines that can do something.
 pub fn engines(needed: Capabilities) -> Vec<Box<dyn Backend>> {

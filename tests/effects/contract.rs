@@ -1,10 +1,12 @@
 //! What every effect of the catalogue has to keep: off at its null values to the bit, at every site of
 //! machines of several kinds; memory in snapshots; sites that can be attached to.
 
-use asid::core::effect::EffectSpec;
-use asid::core::refined::{Refined, needs};
-use asid::core::registry::{EffectEntry, all};
-use asid::core::{Backend, BatchConfig, Capabilities, Control, Model as _, Plant, Rollout, Target};
+use asid::core::registry::all;
+use asid::core::{Backend, BatchConfig, Capabilities, Control, Model as _, Rollout, Target};
+use asid::effects::EffectEntry;
+use asid::effects::EffectSpec;
+use asid::effects::refined::{Refined, needs};
+use asid::mjcf::Plant;
 
 use super::bench::{engines, scene};
 

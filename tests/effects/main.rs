@@ -12,8 +12,8 @@ mod motor_side;
 mod sensors;
 
 use asid::core::Scene;
-use asid::core::refined::Refined;
 use asid::core::registry::{BackendEntry, all};
+use asid::effects::refined::Refined;
 
 /// Inertia of the rotor, kg m².
 pub const INERTIA: f64 = 0.5;

@@ -170,7 +170,7 @@ fn rotor_and_load_swing_against_each_other() {
 #[test]
 fn without_rotor_inertia_a_motor_is_no_site() {
     let xml = machine(LEVEL, "motor");
-    let spec: asid::core::EffectSpec = "backlash@spin".parse().unwrap();
-    let plant = asid::core::Plant::of(&super::bench::scene(&xml)).unwrap();
+    let spec: asid::effects::EffectSpec = "backlash@spin".parse().unwrap();
+    let plant = asid::mjcf::Plant::of(&super::bench::scene(&xml)).unwrap();
     assert!(spec.find(&plant).is_err());
 }

@@ -136,7 +136,7 @@ fn vectors_have_a_shift_by_entry_and_orientations_none() {
             }
         },
     );
-    let plant = asid::core::Plant::of(&super::bench::scene(FALL)).unwrap();
-    let spec: asid::core::EffectSpec = "sensor-bias@turn".parse().unwrap();
+    let plant = asid::mjcf::Plant::of(&super::bench::scene(FALL)).unwrap();
+    let spec: asid::effects::EffectSpec = "sensor-bias@turn".parse().unwrap();
     assert!(spec.find(&plant).is_err());
 }

@@ -21,12 +21,11 @@ use std::error::Error;
 use std::sync::atomic::AtomicU64;
 use std::time::Instant;
 
-use asid::core::fisher::FisherSettings;
-use asid::core::pipeline::episode_information;
+use asid::algorithms::fisher::FisherSettings;
 use asid::core::registry::{BackendEntry, ExplorerEntry, Settings, TaskEntry, find};
-use asid::core::{
-    Model, Parameter, Problem, Progress, RealWorld as _, SimulatedWorld, Streams, Task,
-};
+use asid::core::{Model, Parameter, Problem, Progress, RealWorld as _, Streams, Task};
+use asid::pipeline::episode_information;
+use asid::worlds::SimulatedWorld;
 use rand::Rng as _;
 
 /// Seed of the episodes, whatever the explorers' own.

@@ -1,8 +1,8 @@
 //! The way down: starts are chosen, and each takes damped steps, all in the same batches.
 
+use crate::fisher::inverse_above_prior;
+use crate::fisher::local_fit::{LocalFit, Told};
 use asid_core::Result;
-use asid_core::information::inverse_above_prior;
-use asid_core::local_fit::{LocalFit, Told};
 use asid_core::rng::Rng;
 use nalgebra::{DMatrix, DVector};
 

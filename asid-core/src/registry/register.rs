@@ -3,8 +3,7 @@
 /// Registers a part under a name, with the package that the statement stands in.
 ///
 /// The entry is one of [`BackendEntry`](crate::registry::BackendEntry),
-/// [`TaskEntry`](crate::registry::TaskEntry),
-/// [`EffectEntry`](crate::registry::EffectEntry), and for algorithms, which have settings,
+/// [`TaskEntry`](crate::registry::TaskEntry), and for algorithms, which have settings,
 /// [`ExplorerEntry`](crate::registry::ExplorerEntry),
 /// [`IdentifierEntry`](crate::registry::IdentifierEntry) and
 /// [`SolverEntry`](crate::registry::SolverEntry).
@@ -17,7 +16,7 @@
 /// #[serde(default, deny_unknown_fields)]
 /// struct Still {}
 ///
-/// asid_core::register!(ExplorerEntry {
+/// crate::register!(ExplorerEntry {
 ///     name: "still",
 ///     about: "stands still",
 ///     defaults: registry::defaults::<Still>,
@@ -26,7 +25,7 @@
 ///
 /// impl Explorer for Still {
 ///     fn explore<'a>(&'a self, _: &'a Problem<'a>, _: Option<&[f64]>) -> Result<Explored<'a>> {
-///         Err(asid_core::Error::Failed("there is nothing to explore".into()))
+///         Err(crate::Error::Failed("there is nothing to explore".into()))
 ///     }
 /// }
 ///
@@ -46,11 +45,20 @@ macro_rules! register {
                 about: $about,
                 $(defaults: &$defaults,)?
                 make: &$make,
-                origin: $crate::registry::Origin::Linked($crate::registry::Package {
-                    name: env!("CARGO_PKG_NAME"),
-                    version: env!("CARGO_PKG_VERSION"),
-                }),
+                origin: $crate::linked_origin!(),
             }
         }
+    };
+}
+
+/// The package that the macro is called in, as the origin of what it registers.
+#[doc(hidden)]
+#[macro_export]
+macro_rules! linked_origin {
+    () => {
+        $crate::registry::Origin::Linked($crate::registry::Package {
+            name: env!("CARGO_PKG_NAME"),
+            version: env!("CARGO_PKG_VERSION"),
+        })
     };
 }

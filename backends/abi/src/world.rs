@@ -12,9 +12,9 @@ mod tree;
 
 use std::ffi::{CString, c_char};
 
-use asid_core::document;
 use asid_core::layout::Layout;
 use asid_core::{Error, Result, Scene};
+use asid_mjcf::document;
 use mjcf_rs::Model;
 
 use crate::table;

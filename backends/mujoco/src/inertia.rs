@@ -5,8 +5,8 @@
 //! its body is rebuilt from its geoms as the document describes them, with the
 //! formulas that all engines share.
 
-use asid_core::mass::{GeomMass, MassProperties};
 use asid_core::{Result, Scene};
+use asid_mjcf::mass::{GeomMass, MassProperties};
 use mujoco_rs::wrappers::mj_model::MjModel;
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 

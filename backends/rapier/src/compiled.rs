@@ -121,7 +121,7 @@ impl Compiled {
     pub fn new(scene: &Scene) -> Result<Self> {
         let mut model = Arc::unwrap_or_clone(scene.description()?);
         refusal::check(scene, &model)?;
-        let layout = asid_core::document::layout(scene, &model)?;
+        let layout = asid_mjcf::document::layout(scene, &model)?;
         let fail = |message: String| Error::Scene {
             scene: scene.name().to_owned(),
             message,
@@ -147,7 +147,7 @@ impl Compiled {
         let start = match layout.keyframes.first() {
             Some(key) => (key.qpos.clone(), key.qvel.clone()),
             None => (
-                asid_core::document::default_qpos(&model, &layout),
+                asid_mjcf::document::default_qpos(&model, &layout),
                 vec![0.0; layout.nv],
             ),
         };

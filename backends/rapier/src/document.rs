@@ -2,8 +2,8 @@
 //! not see because this crate does it itself.
 
 use asid_core::layout::Layout;
-use asid_core::mass::GeomMass;
 use asid_core::{Result, Scene};
+use asid_mjcf::mass::GeomMass;
 use mjcf_rs::Model;
 use mjcf_rs::equality::Equality;
 use rapier3d::dynamics::RigidBodyBuilder;

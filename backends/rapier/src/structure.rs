@@ -6,7 +6,7 @@
 //! built with, and a simulation that takes the state over rebuilds only what
 //! differs from its own; where nothing differs not a bit is touched.
 
-use asid_core::mass::{GeomMass, MassProperties};
+use asid_mjcf::mass::{GeomMass, MassProperties};
 use mjcf_rs::Model;
 use mjcf_rs::body::{Body, InertiaSpec};
 use mjcf_rs::compiler::{Compiler, InertiaFromGeom};

@@ -10,17 +10,18 @@
 //! from the motion. The force is explicit in time: accurate while the joint takes several
 //! steps to cross a width.
 
-use asid_core::effect::{Acting, Acts, Effect, EffectParameter, Site, Start};
 use asid_core::simulator::StepView;
-use asid_core::{Error, Plant, Result};
+use asid_core::{Error, Result};
+use asid_effects::{Acting, Acts, Effect, EffectParameter, Site, Start};
+use asid_mjcf::Plant;
 
-asid_core::register!(EffectEntry {
+asid_effects::register!(EffectEntry {
     name: "magnetic-catch",
     about: "a magnet draws a joint to one place",
     make: || Box::new(MagneticCatch),
 });
 
-asid_core::export_plugin!();
+asid_plugin::export_plugin!();
 
 /// The effect.
 struct MagneticCatch;

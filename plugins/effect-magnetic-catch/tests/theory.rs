@@ -2,8 +2,9 @@
 
 #![allow(clippy::unwrap_used)]
 
-use asid_core::refined::Refined;
-use asid_core::{BatchConfig, Control, EffectSpec, Model as _, Rollout, Scene};
+use asid_core::{BatchConfig, Control, Model as _, Rollout, Scene};
+use asid_effects::EffectSpec;
+use asid_effects::refined::Refined;
 
 // The crate registers the effect by being linked in.
 use magnetic_catch as _;

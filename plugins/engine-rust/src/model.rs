@@ -3,12 +3,11 @@
 use std::sync::Arc;
 
 use asid_core::layout::{Channel, JointKind, Recording};
-use asid_core::mass::{GeomMass, MassProperties};
 use asid_core::mjcf_rs::body::{GeomType, InertiaSpec};
 use asid_core::nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
-use asid_core::{
-    BatchConfig, Error, Layout, Model, Result, Scene, Simulator, Target, document, mjcf_rs,
-};
+use asid_core::{BatchConfig, Error, Layout, Model, Result, Scene, Simulator, Target, mjcf_rs};
+use asid_mjcf::document;
+use asid_mjcf::mass::{GeomMass, MassProperties};
 
 use crate::flight::Body;
 use crate::refusal;

@@ -57,7 +57,7 @@ asid_core::register!(ExplorerEntry {
     },
 });
 
-asid_core::export_plugin!();
+asid_plugin::export_plugin!();
 
 impl Multisine {
     fn check(&self) -> Result<()> {

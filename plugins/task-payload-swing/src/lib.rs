@@ -32,7 +32,7 @@ asid_core::register!(TaskEntry {
     make: || Ok(Box::new(PayloadSwing::new()?)),
 });
 
-asid_core::export_plugin!();
+asid_plugin::export_plugin!();
 
 /// The task.
 pub struct PayloadSwing {

@@ -2,9 +2,9 @@
 
 use std::time::Instant;
 
+use crate::pipeline::{self, Method as Parts};
 use anyhow::Result;
 use asid_comparison::cell::{Cell, CellKey, CellParameter, SCHEMA, Versions};
-use asid_core::pipeline::{self, Method as Parts};
 use asid_core::registry::{ExplorerEntry, IdentifierEntry, SolverEntry, find};
 
 use super::arm::Arm;

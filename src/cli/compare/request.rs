@@ -5,10 +5,11 @@ use asid_comparison::document::Document;
 use asid_comparison::method::{BY_DEFAULT, Method};
 use asid_comparison::plan::{MATCHED, Plan, TaskPlan};
 use asid_comparison::preset;
+use asid_core::Error;
 use asid_core::registry::{
     self, BackendEntry, Entry, ExplorerEntry, IdentifierEntry, SolverEntry, TaskEntry, find,
 };
-use asid_core::{EffectSpec, Error};
+use asid_effects::EffectSpec;
 
 use super::Arguments;
 use crate::cli::config::{PRIOR, check_condition, default_backend, read_table, set};

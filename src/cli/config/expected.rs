@@ -1,7 +1,7 @@
 //! How much work goes into what an episode is expected to tell.
 
 use anyhow::Result;
-use asid_core::expected::ExpectedSettings;
+use asid_algorithms::fisher::expected::ExpectedSettings;
 use serde::Serialize;
 
 use super::component::merge;

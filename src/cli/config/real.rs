@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use anyhow::Result;
-use asid_core::{EffectSpec, Error, Parameter, Task};
+use asid_core::{Error, Parameter, Task};
+use asid_effects::EffectSpec;
 use asid_worlds::{Kind, PerturbationRanges};
 use serde::Serialize;
 

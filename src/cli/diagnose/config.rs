@@ -4,12 +4,13 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
-use asid_core::registry::{self, BackendEntry, EffectEntry, TaskEntry, find};
+use asid_core::registry::{self, BackendEntry, TaskEntry, find};
 use asid_core::{Capabilities, Episode, Error};
 use asid_diagnosis::diagnose::Settings;
-use asid_diagnosis::refined_model::RefinedModel;
 use asid_diagnosis::search::Breadth;
 use asid_diagnosis::study::Study;
+use asid_effects::EffectEntry;
+use asid_effects::refined_model::RefinedModel;
 use serde::{Deserialize, Serialize};
 
 use super::super::config::{self, difficulty};
@@ -279,7 +280,7 @@ const RUNS: usize = 6;
 const SEEDS: u64 = 5;
 
 fn read(files: &[PathBuf], model: &RefinedModel) -> Result<Vec<(String, Episode)>> {
-    let layout = asid_core::Plant::of(&model.scene)?.layout;
+    let layout = asid_mjcf::Plant::of(&model.scene)?.layout;
     let one = |file: &PathBuf| -> Result<(String, Episode)> {
         let episode = Episode::read(Path::new(file), &layout)?;
         Ok((file.display().to_string(), episode))

@@ -6,10 +6,11 @@
 
 use anyhow::Result;
 use asid_algorithms::explore::{Discriminating, Rival};
-use asid_core::{EffectSpec, Episode, Explorer as _, Progress, RealWorld as _};
+use asid_core::{Episode, Explorer as _, Progress, RealWorld as _};
 use asid_diagnosis::diagnose::Work;
-use asid_diagnosis::refined_model::RefinedModel;
 use asid_diagnosis::search::trials;
+use asid_effects::EffectSpec;
+use asid_effects::refined_model::RefinedModel;
 use asid_report::diagnosis::{RealWorld, TaskTrial};
 
 use super::super::model;

@@ -11,7 +11,8 @@ use asid_comparison::preset;
 use asid_comparison::schedule;
 use asid_core::real_world::{RealEpisode, RealWorld as _};
 use asid_core::registry::{ExplorerEntry, find};
-use asid_core::{Episode, Error, Explorer, Policy, SimulatedWorld};
+use asid_core::{Episode, Error, Explorer, Policy};
+use asid_worlds::SimulatedWorld;
 
 use super::Request;
 use super::variant::Variant;

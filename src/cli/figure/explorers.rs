@@ -5,11 +5,11 @@
 
 mod shown;
 
+use crate::pipeline::episode_information_as;
 use anyhow::Result;
+use asid_algorithms::fisher::FisherSettings;
+use asid_algorithms::fisher::expected::ExpectedSettings;
 use asid_core::RealWorld as _;
-use asid_core::expected::ExpectedSettings;
-use asid_core::fisher::FisherSettings;
-use asid_core::pipeline::episode_information_as;
 use asid_core::registry::{ExplorerEntry, IdentifierEntry, find};
 
 use super::episodes::{Wanted, each, of_each, open, playable};

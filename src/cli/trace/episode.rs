@@ -1,7 +1,7 @@
 //! The real episode in the report: its picture from above and its signals with their replays.
 
+use crate::pipeline::RunOutcome;
 use anyhow::Result;
-use asid_core::pipeline::RunOutcome;
 use asid_core::replay::Replay as Replayed;
 use asid_core::signal::yaw;
 use asid_core::task::{Outline, TrackedObject};

@@ -1,6 +1,6 @@
 //! What exploration gathered and what the task came to, in the report.
 
-use asid_core::pipeline::EpisodeInformation;
+use crate::pipeline::EpisodeInformation;
 use asid_core::real_world::Attempt;
 use asid_core::solve::Trial;
 use asid_report::run as r;

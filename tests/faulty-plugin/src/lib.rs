@@ -2,7 +2,6 @@
 //!
 //! The tasks are `payload-swing` with one method that fails.
 
-use asid_core::effect::{Acting, Acts, Effect, EffectParameter, Site};
 use asid_core::explore::{Explored, Explorer, Policy};
 use asid_core::identify::{Identified, Identifier};
 use asid_core::registry::Settings;
@@ -12,11 +11,13 @@ use asid_core::task::{
     Commander, Condition, DownstreamProtocol, ExplorationProtocol, Outcome, Task,
 };
 use asid_core::{
-    Capabilities, Episode, Error, Layout, Parameter, Plant, Posterior, Problem, Result, Scene,
+    Capabilities, Episode, Error, Layout, Parameter, Posterior, Problem, Result, Scene,
 };
+use asid_effects::{Acting, Acts, Effect, EffectParameter, Site};
+use asid_mjcf::Plant;
 use payload_swing::PayloadSwing;
 
-asid_core::export_plugin!();
+asid_plugin::export_plugin!();
 
 /// What fails.
 #[derive(Clone, Copy, PartialEq)]
@@ -247,13 +248,13 @@ impl TaskSolver for PanickingAlgorithm {
 /// An effect whose force fails.
 struct FaultyEffect(fn() -> f64);
 
-asid_core::register!(EffectEntry {
+asid_effects::register!(EffectEntry {
     name: "force-panics",
     about: "fails",
     make: || Box::new(FaultyEffect(|| panic!("no force"))),
 });
 
-asid_core::register!(EffectEntry {
+asid_effects::register!(EffectEntry {
     name: "force-is-nan",
     about: "fails",
     make: || Box::new(FaultyEffect(|| f64::NAN)),

@@ -1,7 +1,7 @@
 //! Bodies, joints, geoms and sites of a document as the header has them.
 
 use asid_core::layout::{JointKind, Layout};
-use asid_core::mass::{GeomMass, MassProperties};
+use asid_mjcf::mass::{GeomMass, MassProperties};
 use mjcf_rs::Model;
 use mjcf_rs::body::{Body, Geom, GeomType, InertiaSpec};
 use mjcf_rs::compiler::{Compiler, InertiaFromGeom};

@@ -3,8 +3,9 @@
 
 use anyhow::Result;
 use asid_core::registry::{IdentifierEntry, find};
-use asid_core::{Policy, SimulatedWorld, Task};
+use asid_core::{Policy, Task};
 use asid_nn::Motion;
+use asid_worlds::SimulatedWorld;
 
 use super::super::Request;
 use super::super::episodes::{Played, Wanted, each, open, played, played_in};

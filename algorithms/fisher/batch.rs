@@ -1,0 +1,414 @@
+//! Episodes with their Fisher information: a batch in which every episode has
+//! copies with one entry (an unknown, or a coordinate of the start pose) a little
+//! up and a little down.
+//!
+//! Two forms of the sensitivity are offered. *One-step*: before each control step
+//! the copies take the episode's state, so that their difference is
+//! `d f_theta(s_h, a_h) / d theta`, the derivative in the paper. *Trajectory*: the
+//! copies go their own way from the start of the episode, so that their difference
+//! is `d s_h / d theta` under the same actions, which counts what a tracked
+//! trajectory reveals when it is replayed as a whole. Start-pose entries make sense in
+//! the trajectory form only.
+//!
+//! The noise `S` is that of the trackers, plus, where [`FisherSettings::roughness`] says
+//! so, the square of what each reading deviates from a straight line over the copies.
+
+use std::str::FromStr;
+
+use serde::{Deserialize, Serialize};
+
+use crate::fisher::{Information, Objective};
+use asid_core::error::{Error, Result};
+use asid_core::layout::Recording;
+use asid_core::parameter::Parameter;
+use asid_core::problem::{Batch, Problem, substeps};
+use asid_core::signal::SignalSet;
+use asid_core::simulator::{Control, Rollout};
+use asid_core::task::Commander;
+use asid_core::tracker::ReadingFrames;
+
+/// Which derivative is taken; see the module.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Form {
+    /// From the episode's state, one control step at a time.
+    OneStep,
+    /// From the start of the episode.
+    #[default]
+    Trajectory,
+}
+
+impl Form {
+    /// Name on the command line.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::OneStep => "one-step",
+            Self::Trajectory => "trajectory",
+        }
+    }
+}
+
+impl FromStr for Form {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        [Self::OneStep, Self::Trajectory]
+            .into_iter()
+            .find(|f| f.name() == text)
+            .ok_or_else(|| Error::unknown("form", text, ["one-step", "trajectory"]))
+    }
+}
+
+/// What is computed of an episode.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct FisherSettings {
+    /// What a step is rewarded for.
+    pub objective: Objective,
+    /// Which derivative.
+    pub form: Form,
+    /// Estimate the start pose along (trajectory form only).
+    pub nuisance: bool,
+    /// Half the difference between the copies, in prior standard deviations.
+    pub delta: f64,
+    /// Count what the copies deviate from a straight line as noise. With contact the
+    /// trajectory is rough: a difference divided by a small step is then mostly luck, and
+    /// an explorer that is paid for it seeks chaos.
+    pub roughness: bool,
+}
+
+impl Default for FisherSettings {
+    fn default() -> Self {
+        Self {
+            objective: Objective::AOptimal,
+            form: Form::Trajectory,
+            nuisance: true,
+            delta: 0.3,
+            roughness: true,
+        }
+    }
+}
+
+impl FisherSettings {
+    /// The objective in words, such as `a-optimal (trajectory form)`.
+    #[must_use]
+    pub fn describe(&self) -> String {
+        let start = if self.nuisance {
+            ", start pose co-estimated"
+        } else {
+            ""
+        };
+        let (objective, form) = (self.objective.name(), self.form.name());
+        format!("{objective} ({form} form{start})")
+    }
+
+    /// Checks that the settings go together.
+    ///
+    /// # Errors
+    /// When `delta` is negative.
+    pub fn check(&self) -> Result<()> {
+        if !(self.delta.is_finite() && self.delta > 0.0 && self.delta <= 1.0) {
+            return Err(Error::Config {
+                key: "explorer.delta".into(),
+                message: format!(
+                    "must be above 0 and at most 1 prior standard deviation, not {}",
+                    self.delta
+                ),
+            });
+        }
+        Ok(())
+    }
+}
+
+/// Step of the start pose in finite differences, in standard deviations of its range.
+const START_DELTA: f64 = 0.02;
+
+/// A batch of episodes with their information.
+pub struct FisherBatch<'a> {
+    problem: &'a Problem<'a>,
+    settings: FisherSettings,
+    batch: Batch,
+    episodes: usize,
+    entries: usize,
+    sims: Vec<usize>,
+    commanders: Vec<Box<dyn Commander>>,
+    recording: Recording,
+    signals: SignalSet,
+    substeps: usize,
+    read: ReadingFrames,
+    /// Control steps taken.
+    at: usize,
+    /// Step really taken by each copy pair, prior-scaled: `episodes x entries`.
+    steps: Vec<f64>,
+    information: Vec<Information>,
+    ctrl: Vec<f64>,
+    control: Vec<f64>,
+    readings: Vec<f64>,
+    jacobian: Vec<f64>,
+    difference: Vec<f64>,
+    below: Vec<f64>,
+    noise: Vec<f64>,
+    copies: (Vec<usize>, Vec<usize>),
+    alive: Vec<bool>,
+}
+
+impl<'a> FisherBatch<'a> {
+    /// `episodes` episodes at once.
+    ///
+    /// # Errors
+    /// When the engine cannot set an unknown or the settings do not go together.
+    pub fn new(
+        problem: &'a Problem<'a>,
+        settings: &FisherSettings,
+        episodes: usize,
+    ) -> Result<Self> {
+        settings.check()?;
+        let protocol = problem.task.exploration();
+        let d = problem.parameters.len();
+        let with_start = settings.nuisance && settings.form == Form::Trajectory;
+        let nuisance = if with_start { protocol.start.len() } else { 0 };
+        let entries = d + nuisance;
+        let copies = 1 + 2 * entries;
+        let batch = problem.batch(episodes * copies)?;
+        let layout = problem.model.layout();
+        let recording = layout.recording(&protocol.channels())?;
+        let signals = SignalSet::new(layout, problem.signals)?;
+        let rows = signals.whitened_len();
+        let from: Vec<usize> = (0..episodes)
+            .flat_map(|e| std::iter::repeat_n(e * copies, copies - 1))
+            .collect();
+        let to: Vec<usize> = (0..episodes * copies).filter(|s| s % copies != 0).collect();
+        let n = episodes * copies;
+        Ok(Self {
+            settings: settings.clone(),
+            episodes,
+            entries,
+            sims: (0..n).collect(),
+            commanders: (0..episodes)
+                .map(|_| problem.task.commander())
+                .collect::<Result<_>>()?,
+            substeps: substeps(layout, protocol.frame_period)?,
+            read: ReadingFrames::of(problem.task, protocol.frame_period),
+            at: 0,
+            steps: vec![0.0; episodes * entries],
+            information: vec![Information::prior(d, nuisance); episodes],
+            ctrl: vec![0.0; protocol.frames_per_step * layout.nu()],
+            control: vec![0.0; n * protocol.frames_per_step * layout.nu()],
+            readings: vec![0.0; n * protocol.frames_per_step * recording.width()],
+            jacobian: vec![0.0; entries * rows],
+            difference: vec![0.0; rows],
+            below: vec![0.0; rows],
+            noise: vec![1.0; rows],
+            copies: (from, to),
+            alive: vec![true; episodes],
+            recording,
+            signals,
+            batch,
+            problem,
+        })
+    }
+
+    /// Number of episodes.
+    #[must_use]
+    pub fn episodes(&self) -> usize {
+        self.episodes
+    }
+
+    /// Entries of a reading's row.
+    #[must_use]
+    pub fn width(&self) -> usize {
+        self.recording.width()
+    }
+
+    /// Information gathered so far by each episode.
+    #[must_use]
+    pub fn information(&self) -> &[Information] {
+        &self.information
+    }
+
+    /// Starts all episodes at `theta` (`episodes x d`) and `starts` (`episodes x
+    /// coordinates`), and writes the first true readings (`episodes x width`).
+    ///
+    /// # Errors
+    /// When the engine fails.
+    pub fn begin(&mut self, theta: &[f64], starts: &[f64], first: &mut [f64]) -> Result<()> {
+        let (d, k) = (
+            self.problem.parameters.len(),
+            self.problem.task.exploration().start.len(),
+        );
+        let mut all_theta = Vec::with_capacity(self.sims.len() * d);
+        let mut all_starts = Vec::with_capacity(self.sims.len() * k);
+        for e in 0..self.episodes {
+            let (t, s) = (&theta[e * d..(e + 1) * d], &starts[e * k..(e + 1) * k]);
+            all_theta.extend_from_slice(t);
+            all_starts.extend_from_slice(s);
+            for entry in 0..self.entries {
+                let mut taken = 0.0;
+                for sign in [1.0, -1.0] {
+                    let (mut t, mut s) = (t.to_vec(), s.to_vec());
+                    if let Some(parameter) = self.problem.parameters.get(entry) {
+                        let bound = Parameter::scaled_bound();
+                        let z = parameter.to_scaled(t[entry]);
+                        // A binary unknown's copies are the two models, one prior
+                        // deviation either side of their mean.
+                        let moved = if parameter.is_binary() {
+                            sign
+                        } else {
+                            (z + sign * self.settings.delta).clamp(-bound, bound)
+                        };
+                        t[entry] = parameter.from_scaled(moved);
+                        taken += sign * moved;
+                    } else {
+                        let i = entry - d;
+                        let unit = self.problem.task.exploration().start[i].std();
+                        s[i] += sign * START_DELTA * unit;
+                        taken += START_DELTA;
+                    }
+                    all_theta.extend(t);
+                    all_starts.extend(s);
+                }
+                self.steps[e * self.entries + entry] = taken;
+            }
+        }
+        self.batch.set_parameters(&self.sims, &all_theta)?;
+        self.batch
+            .place(self.problem.task, &self.sims, &all_starts)?;
+        for c in &mut self.commanders {
+            c.reset();
+        }
+        for i in &mut self.information {
+            i.reset();
+        }
+        self.alive.fill(true);
+        self.at = 0;
+        let width = self.width();
+        let mut all = vec![0.0; self.sims.len() * width];
+        self.batch
+            .simulator
+            .read(&self.sims, &self.recording, &mut all)?;
+        let copies = 1 + 2 * self.entries;
+        for e in 0..self.episodes {
+            first[e * width..(e + 1) * width].copy_from_slice(&all[e * copies * width..][..width]);
+            if self.entries > self.problem.parameters.len() {
+                self.accumulate(e, copies, 1, 0, &all);
+            }
+        }
+        Ok(())
+    }
+
+    /// One control step: actions `episodes x action`, in the task's units; writes the
+    /// last true reading of each episode (`episodes x width`) and its reward. Returns
+    /// through [`FisherBatch::alive`] which episodes still run.
+    ///
+    /// # Errors
+    /// When the engine fails.
+    pub fn step(&mut self, actions: &[f64], last: &mut [f64], reward: &mut [f64]) -> Result<()> {
+        let protocol = self.problem.task.exploration();
+        let a = protocol.action.len();
+        let copies = 1 + 2 * self.entries;
+        let block = self.ctrl.len();
+        for e in 0..self.episodes {
+            self.commanders[e].commands(&actions[e * a..(e + 1) * a], &mut self.ctrl);
+            for c in 0..copies {
+                self.control[(e * copies + c) * block..][..block].copy_from_slice(&self.ctrl);
+            }
+        }
+        if self.settings.form == Form::OneStep && copies > 1 {
+            self.batch
+                .simulator
+                .copy_state(&self.copies.0, &self.copies.1)?;
+        }
+        let frames = protocol.frames_per_step;
+        let before = self.batch.simulator.steps_taken();
+        let rollout = Rollout::new(
+            &self.sims,
+            frames,
+            self.substeps,
+            Control::PerSimulation(&self.control),
+            &self.recording,
+        );
+        self.batch.simulator.rollout(&rollout, &mut self.readings)?;
+        self.problem.count_physics(&self.batch, before);
+        self.problem
+            .env_counter
+            .fetch_add(self.episodes as u64, std::sync::atomic::Ordering::Relaxed);
+        let width = self.width();
+        let readings = std::mem::take(&mut self.readings);
+        for e in 0..self.episodes {
+            let trace = self.information[e].trace();
+            // The one-step derivative is that of the state at the end of the control
+            // step; the trajectory's counts every reading of the log.
+            let first = if self.settings.form == Form::OneStep {
+                frames - 1
+            } else {
+                0
+            };
+            let (read, before) = (self.read, self.at * frames);
+            for frame in (first..frames).filter(|f| read.has(before + f + 1)) {
+                self.accumulate(e, copies, frames, frame, &readings);
+            }
+            reward[e] = self.information[e].reward(self.settings.objective, trace);
+            let row = &readings[(e * copies * frames + frames - 1) * width..][..width];
+            last[e * width..(e + 1) * width].copy_from_slice(row);
+            self.alive[e] = row.iter().all(|x| x.is_finite());
+            if !self.alive[e] {
+                reward[e] = 0.0;
+            }
+        }
+        self.readings = readings;
+        self.at += 1;
+        Ok(())
+    }
+
+    /// Which episodes have not diverged.
+    #[must_use]
+    pub fn alive(&self) -> &[bool] {
+        &self.alive
+    }
+
+    /// Adds the reading of one frame to an episode's information.
+    fn accumulate(
+        &mut self,
+        e: usize,
+        copies: usize,
+        frames: usize,
+        frame: usize,
+        readings: &[f64],
+    ) {
+        let width = self.recording.width();
+        let rows = self.signals.whitened_len();
+        let row =
+            |copy: usize| &readings[((e * copies + copy) * frames + frame) * width..][..width];
+        self.noise.fill(1.0);
+        for entry in 0..self.entries {
+            let (up, down) = (row(1 + 2 * entry), row(2 + 2 * entry));
+            self.signals.difference(up, down, &mut self.difference);
+            let step = self.steps[e * self.entries + entry];
+            for k in 0..rows {
+                self.jacobian[entry * rows + k] = self.difference[k] / step;
+            }
+            let binary = self
+                .problem
+                .parameters
+                .get(entry)
+                .is_some_and(Parameter::is_binary);
+            if self.settings.roughness && !binary {
+                // up + down - 2 middle: nothing on a straight line, luck and curvature otherwise.
+                self.signals.difference(up, row(0), &mut self.difference);
+                self.signals.difference(row(0), down, &mut self.below);
+                for (noise, (a, b)) in self
+                    .noise
+                    .iter_mut()
+                    .zip(self.difference.iter().zip(&self.below))
+                {
+                    *noise += (0.5 * (a - b)).powi(2);
+                }
+            }
+        }
+        for (i, j) in self.jacobian.iter_mut().enumerate() {
+            *j /= self.noise[i % rows].sqrt();
+        }
+        self.information[e].add(&self.jacobian, rows);
+    }
+}

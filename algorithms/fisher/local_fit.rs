@@ -1,0 +1,328 @@
+//! A straight line through a rough simulator.
+//!
+//! A central difference over one small step is mostly luck where contact makes trajectories rough. So
+//! several sets of antithetic pairs of points are simulated, each set along axes turned at random. What
+//! the two points of a pair differ by is regressed on the step between them: slopes. What their mean
+//! differs by from the middle is regressed on quadratic terms: the curvature, which is taken out, and what
+//! the middle would be without its own luck. What both regressions leave is the *roughness* of single
+//! simulations, reading by reading, with its correlation along the episode.
+//!
+//! The information about the point comes by the sandwich formula (White 1982): weights `P` of the readings,
+//! by their noise and roughness, give the curvature `H = J^T P J` and the information `H M^-1 H`, `M = J^T P (1 + R)
+//! P J` with the roughness' whole covariance `R`, direction by direction. What the luck in `J` itself adds
+//! to `H`, `2 tr(P R) (U^T U)^-1` for steps `U`, is taken out; in `M` it stays, since an estimate by
+//! these slopes has it ([`LocalFit::told`]). Identification by emulation does without that: it takes slopes for
+//! what they are fitted to be and divides by the largest inflation of an unknown's variance. What an
+//! episode is expected to tell it comes the same way ([`LocalFit::emulated`]), so that both agree.
+
+use nalgebra::{DMatrix, DVector};
+use rand_distr::{Distribution, StandardNormal};
+
+use crate::fisher::precision::{Precision, inflation};
+use asid_core::rng::Rng;
+
+/// Degrees of freedom that the roughness is left at least.
+const FREEDOM: usize = 8;
+
+/// Pairs at least: their slopes have the luck of a regression on 64 draws, an identifier's default.
+const PAIRS: usize = 32;
+
+/// Sets of pairs for `n` entries: enough for the quadratic terms and `FREEDOM` more.
+#[must_use]
+pub fn sets(n: usize) -> usize {
+    let features = 1 + n * (n + 1) / 2;
+    (features + FREEDOM).max(PAIRS).div_ceil(n.max(1))
+}
+
+/// Points in antithetic pairs around `middle`, `up` then `down` of each pair: `sets` times `n` pairs along the
+/// columns of `factor` (lower triangular, `n x n`), turned at random but for the first set, and kept inside
+/// the box. Lengths vary from set to set with a mean square of one, so that curvature shows.
+#[must_use]
+pub fn design(
+    middle: &[f64],
+    factor: &DMatrix<f64>,
+    (low, high): (&[f64], &[f64]),
+    sets: usize,
+    rng: &mut Rng,
+) -> Vec<Vec<f64>> {
+    let n = middle.len();
+    let mut points = Vec::with_capacity(2 * n * sets);
+    for set in 0..sets {
+        let axes = if set == 0 {
+            DMatrix::identity(n, n)
+        } else {
+            DMatrix::from_fn(n, n, |_, _| StandardNormal.sample(rng))
+                .qr()
+                .q()
+        };
+        let length = (2.0 * (set as f64 + 0.5) / sets as f64).sqrt();
+        let steps = factor * axes * length;
+        for j in 0..n {
+            for sign in [1.0, -1.0] {
+                let point = (0..n).map(|i| {
+                    let x = middle[i] + sign * steps[(i, j)];
+                    x.clamp(low[i], high[i])
+                });
+                points.push(point.collect());
+            }
+        }
+    }
+    points
+}
+
+/// Slopes, curvature's share taken out, and roughness of residuals around a point.
+#[derive(Clone, Debug)]
+pub struct LocalFit {
+    factor: DMatrix<f64>,
+    /// Slopes, entries x readings, along the columns of the factor.
+    slopes: DMatrix<f64>,
+    /// `(U^T U)^-1`.
+    scatter: DMatrix<f64>,
+    /// Luck of single simulations, rows x readings.
+    luck: DMatrix<f64>,
+    freedom: f64,
+    /// Residuals in the middle, freed of its own luck where there are pairs enough.
+    middle: DVector<f64>,
+}
+
+/// What readings tell about the entries of a point.
+pub struct Told {
+    /// Information, entries x entries, without any prior.
+    pub information: DMatrix<f64>,
+    /// Curvature of half the weighted sum of squares, `H`.
+    pub curvature: DMatrix<f64>,
+    /// Weights of the readings.
+    pub precision: Precision,
+}
+
+impl LocalFit {
+    /// Fits the residuals of a [`design`] with this middle and factor; `middle_row` is the residual in the
+    /// middle. Pairs with a simulation that diverged (`None`) are left out. `None` where the pairs
+    /// that are left do not span the space.
+    #[must_use]
+    pub fn new(
+        middle: &[f64],
+        middle_row: &[f64],
+        factor: &DMatrix<f64>,
+        points: &[Vec<f64>],
+        rows: &[Option<Vec<f64>>],
+    ) -> Option<Self> {
+        let n = factor.nrows();
+        let m = middle_row.len();
+        let (mut steps, mut shifts) = (Vec::new(), Vec::new());
+        let mut kept: Vec<(&[f64], &[f64])> = Vec::new();
+        for (pair, row) in points.chunks_exact(2).zip(rows.chunks_exact(2)) {
+            if let [Some(up), Some(down)] = row {
+                let step = DVector::from_fn(n, |i, _| pair[0][i] - pair[1][i]);
+                steps.push(factor.solve_lower_triangular(&step)?);
+                // The box may cut one of the two short.
+                let shift = DVector::from_fn(n, |i, _| 0.5 * (pair[0][i] + pair[1][i]) - middle[i]);
+                shifts.push(factor.solve_lower_triangular(&shift)?);
+                kept.push((up, down));
+            }
+        }
+        let pairs = kept.len();
+        if pairs < n || n == 0 {
+            return None;
+        }
+        let u = DMatrix::from_fn(pairs, n, |j, i| steps[j][i]);
+        let odd = DMatrix::from_fn(pairs, m, |j, k| kept[j].0[k] - kept[j].1[k]);
+        let scatter = (u.transpose() * &u).cholesky()?.inverse();
+        let slopes = &scatter * (u.transpose() * &odd);
+        let shift = DMatrix::from_fn(pairs, n, |j, i| shifts[j][i]);
+        let even = DMatrix::from_fn(pairs, m, |j, k| {
+            0.5 * (kept[j].0[k] + kept[j].1[k]) - middle_row[k]
+        }) - shift * &slopes;
+        let features = 1 + n * (n + 1) / 2;
+        let (mut luck, mut freedom) = ((&odd - &u * &slopes) * 0.5_f64.sqrt(), (pairs - n) as f64);
+        let mut middle = DVector::from_column_slice(middle_row);
+        if pairs > features {
+            let (offset, left) = without_curvature(&(&u * 0.5), &even)?;
+            middle += offset;
+            luck = stacked(&luck, &(left * 2_f64.sqrt()));
+            freedom += (pairs - features) as f64;
+        } else {
+            // Second differences, whose luck is that of one and a half simulations; they count
+            // curvature for luck.
+            luck = stacked(&luck, &(even * 1.5_f64.sqrt().recip()));
+            freedom += pairs as f64;
+        }
+        Some(Self {
+            factor: factor.clone(),
+            slopes,
+            scatter,
+            luck,
+            freedom,
+            middle,
+        })
+    }
+
+    /// The same of the first `readings` entries of the residuals.
+    #[must_use]
+    pub fn first(&self, readings: usize) -> Self {
+        Self {
+            slopes: self.slopes.columns(0, readings).into_owned(),
+            luck: self.luck.columns(0, readings).into_owned(),
+            middle: self.middle.rows(0, readings).into_owned(),
+            ..self.clone()
+        }
+    }
+
+    /// Residuals in the middle.
+    #[must_use]
+    pub fn middle(&self) -> &DVector<f64> {
+        &self.middle
+    }
+
+    /// Slopes of the residuals, entries x readings.
+    #[must_use]
+    pub fn slopes(&self) -> DMatrix<f64> {
+        // slopes = factor^T d/dx.
+        let lower = self.factor.transpose();
+        lower
+            .solve_upper_triangular(&self.slopes)
+            .unwrap_or_else(|| self.slopes.clone())
+    }
+
+    /// Root mean square of the roughness over `readings` entries, in units of their noise.
+    #[must_use]
+    pub fn roughness(&self, readings: usize) -> f64 {
+        (self.luck.norm_squared() / self.freedom / readings.max(1) as f64).sqrt()
+    }
+
+    /// What the readings tell. They are weighed by their roughness alone, or also by how it runs along
+    /// the episode (`correlated`).
+    #[must_use]
+    pub fn told(&self, correlated: bool) -> Option<Told> {
+        let (precision, curvature, information);
+        if correlated {
+            precision = Precision::correlated(&self.luck, self.freedom);
+            curvature = self.curvature(&precision, &self.luck, self.freedom);
+            let [one, other] = self.halves();
+            let asked_of = |weighing: &DMatrix<f64>, asked: &DMatrix<f64>| {
+                let by = Precision::correlated(weighing, self.freedom_of(weighing));
+                let h = self.curvature(&by, asked, self.freedom_of(asked));
+                self.sandwich(&by, &h, asked, self.freedom_of(asked))
+            };
+            information = (asked_of(&one, &other)? + asked_of(&other, &one)?) * 0.5;
+        } else {
+            precision = Precision::diagonal(&self.spread());
+            curvature = self.curvature(&precision, &self.luck, self.freedom);
+            information = self.sandwich(&precision, &curvature, &self.luck, self.freedom)?;
+        }
+        Some(Told {
+            information: self.outside(&information)?,
+            curvature: self.outside(&curvature)?,
+            precision,
+        })
+    }
+
+    /// Information, entries x entries, as an identification by emulation sees it; the first `sought` entries
+    /// are the unknowns.
+    #[must_use]
+    pub fn emulated(&self, correlated: bool, sought: usize) -> Option<DMatrix<f64>> {
+        let columns = self.slopes.transpose();
+        let (precision, inflated);
+        if correlated {
+            precision = Precision::correlated(&self.luck, self.freedom);
+            let [one, other] = self.halves();
+            let of = |weighing: &DMatrix<f64>, asked: &DMatrix<f64>| {
+                let by = Precision::correlated(weighing, self.freedom_of(weighing));
+                inflation(&by, &columns, asked, self.freedom_of(asked), sought)
+            };
+            inflated = 0.5 * (of(&one, &other)? + of(&other, &one)?);
+        } else {
+            precision = Precision::diagonal(&self.spread());
+            inflated = inflation(&precision, &columns, &self.luck, self.freedom, sought)?;
+        }
+        self.outside(&(precision.weigh(&self.slopes) * columns / inflated))
+    }
+
+    /// Variance of the roughness of each reading.
+    fn spread(&self) -> DVector<f64> {
+        DVector::from_fn(self.luck.ncols(), |k, _| {
+            self.luck.column(k).norm_squared() / self.freedom
+        })
+    }
+
+    /// Every other row of the luck. A covariance says nothing of the luck that it was made of: each
+    /// half is asked of the other.
+    fn halves(&self) -> [DMatrix<f64>; 2] {
+        [0, 1].map(|k| {
+            let rows: Vec<usize> = (k..self.luck.nrows()).step_by(2).collect();
+            self.luck.select_rows(&rows)
+        })
+    }
+
+    /// Degrees of freedom of some of the luck's rows.
+    fn freedom_of(&self, rows: &DMatrix<f64>) -> f64 {
+        self.freedom * rows.nrows() as f64 / self.luck.nrows() as f64
+    }
+
+    /// A form along the columns of the factor in the entries' own coordinates.
+    fn outside(&self, form: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+        let lower = self.factor.transpose();
+        let half = lower.solve_upper_triangular(form)?;
+        let whole = lower.solve_upper_triangular(&half.transpose())?;
+        Some((&whole + whole.transpose()) * 0.5)
+    }
+
+    /// `J^T P J` along the columns of the factor, less what luck of this spread in the slopes adds, and not below
+    /// zero in any direction.
+    fn curvature(&self, by: &Precision, luck: &DMatrix<f64>, freedom: f64) -> DMatrix<f64> {
+        let of_luck = by.weigh(luck).component_mul(luck).sum() / freedom;
+        let raw =
+            by.weigh(&self.slopes) * self.slopes.transpose() - &self.scatter * (2.0 * of_luck);
+        let mut eigen = ((&raw + raw.transpose()) * 0.5).symmetric_eigen();
+        eigen.eigenvalues.apply(|v| *v = v.max(0.0));
+        eigen.recompose()
+    }
+
+    /// `H M^-1 H`, where roughness is as it shows in `luck`.
+    fn sandwich(
+        &self,
+        by: &Precision,
+        h: &DMatrix<f64>,
+        luck: &DMatrix<f64>,
+        freedom: f64,
+    ) -> Option<DMatrix<f64>> {
+        let n = h.nrows();
+        let weighed = by.weigh(&self.slopes);
+        let projected = &weighed * luck.transpose();
+        let middle = &weighed * weighed.transpose() + &projected * projected.transpose() / freedom;
+        let ridge = DMatrix::identity(n, n) * (1e-12 * middle.trace() + f64::MIN_POSITIVE);
+        Some(h * (middle + ridge).cholesky()?.solve(h))
+    }
+}
+
+/// What is left of `even` (pairs x readings) after a regression on a constant and the quadratic terms of the
+/// half steps `u`, and the constant.
+fn without_curvature(
+    u: &DMatrix<f64>,
+    even: &DMatrix<f64>,
+) -> Option<(DVector<f64>, DMatrix<f64>)> {
+    let (pairs, n) = u.shape();
+    let mut terms: Vec<DVector<f64>> = vec![DVector::repeat(pairs, 1.0)];
+    for i in 0..n {
+        for j in i..n {
+            terms.push(u.column(i).component_mul(&u.column(j)));
+        }
+    }
+    let phi = DMatrix::from_columns(&terms);
+    let f = phi.ncols();
+    // Clipped points may leave a term without a say: the ridge keeps it small.
+    let ridge = DMatrix::identity(f, f) * (1e-9 * phi.norm_squared() / f as f64);
+    let normal = phi.transpose() * &phi + ridge;
+    let fitted = normal.cholesky()?.solve(&(phi.transpose() * even));
+    Some((fitted.row(0).transpose(), even - phi * fitted))
+}
+
+fn stacked(above: &DMatrix<f64>, below: &DMatrix<f64>) -> DMatrix<f64> {
+    let mut out = DMatrix::zeros(above.nrows() + below.nrows(), above.ncols());
+    out.rows_mut(0, above.nrows()).copy_from(above);
+    out.rows_mut(above.nrows(), below.nrows()).copy_from(below);
+    out
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,15 @@
+//! Fisher information: what an episode tells about the unknowns.
+//!
+//! [`FisherBatch`] plays episodes with their information; [`Information`] adds it up and scores it;
+//! [`expected`] is the deviation that an identification should reach, from fits of the readings over a
+//! region ([`local_fit`], [`precision`]); [`sensitivity`] tells unknowns that change no reading.
+
+mod batch;
+pub mod expected;
+mod information;
+pub mod local_fit;
+pub mod precision;
+pub mod sensitivity;
+
+pub use batch::{FisherBatch, FisherSettings, Form};
+pub use information::{Information, Objective, TRACE_CLIP, inverse_above_prior};

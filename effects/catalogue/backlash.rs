@@ -1,0 +1,52 @@
+//! Play between a drive and its load.
+
+use crate::{Acting, Acts, Effect, EffectParameter, Site, Start};
+use asid_core::{Capabilities, Result, Target};
+use asid_mjcf::Plant;
+
+use super::motor_side::{self, MotorSide};
+use super::{at_least, values};
+
+crate::register!(EffectEntry {
+    name: "backlash",
+    about: "play between a drive and its joint",
+    make: || Box::new(Backlash),
+});
+
+/// The drive acts on a rotor that moves freely by `width` against the joint and pushes it at the ends
+/// of this gap, which are rigid and do not bounce: see [`super::motor_side`]. The rotor has the
+/// joint's `armature` as its inertia and the drive's sensor sits on it; a servo's rotor may have none,
+/// and then follows the servo's law. A torque drive on a joint without `armature` is no site. Under a
+/// load that never changes its sign the joint only stands half a gap off.
+struct Backlash;
+
+impl Effect for Backlash {
+    fn acts(&self) -> Acts {
+        Acts::Force
+    }
+
+    fn parameters(&self) -> &'static [EffectParameter] {
+        const {
+            &[EffectParameter::new("width", "rad or m", [0.0, 1.0], 0.0)
+                .starting(Start::Values(&[0.01, 0.03, 0.1]))]
+        }
+    }
+
+    fn sites(&self, plant: &Plant) -> Vec<String> {
+        motor_side::sites(plant)
+    }
+
+    fn targets(&self, plant: &Plant, site: &str) -> Vec<Target> {
+        motor_side::targets(plant, site)
+    }
+
+    fn needs(&self) -> Capabilities {
+        Capabilities::JOINT_IMPEDANCE | Capabilities::LIVE_PARAMETERS
+    }
+
+    fn attach(&self, site: &Site<'_>) -> Result<Box<dyn Acting>> {
+        let [width] = values(site)?;
+        let width = at_least(site, "width", width, 0.0)?;
+        Ok(Box::new(MotorSide::new(site, 0.0, width)?))
+    }
+}

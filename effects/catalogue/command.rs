@@ -1,0 +1,248 @@
+//! What a drive makes of its command: gain, bias, saturation, dead band.
+
+use crate::{Acting, Acts, Effect, EffectParameter, Reference, Site, Start};
+use asid_core::simulator::StepView;
+use asid_core::{Capabilities, Result, Target};
+use asid_mjcf::Plant;
+use asid_mjcf::plant::{Drive, DriveLaw};
+
+use super::{actuators, at_least, drives, target, values};
+
+crate::register!(EffectEntry {
+    name: "actuator-gain",
+    about: "the command is scaled",
+    make: || Box::new(Affine {
+        parameters: const { &[EffectParameter::new("gain", "1", [0.2, 2.0], 1.0)] },
+        scaled: true,
+    }),
+});
+
+crate::register!(EffectEntry {
+    name: "actuator-bias",
+    about: "the command is shifted",
+    make: || Box::new(Affine {
+        parameters: const {
+            &[EffectParameter::new(
+                "bias",
+                "unit of the command",
+                [-10.0, 10.0],
+                0.0,
+            )]
+        },
+        scaled: false,
+    }),
+});
+
+crate::register!(EffectEntry {
+    name: "actuator-saturation",
+    about: "the force of a drive is limited",
+    make: || Box::new(Saturation),
+});
+
+crate::register!(EffectEntry {
+    name: "actuator-deadband",
+    about: "small commands do nothing",
+    make: || Box::new(Deadband),
+});
+
+/// `gain * command + bias`, with one of the two as its parameter. The command is clamped to its
+/// range before.
+struct Affine {
+    parameters: &'static [EffectParameter],
+    scaled: bool,
+}
+
+struct AffineAt {
+    actuator: usize,
+    range: [f64; 2],
+    gain: f64,
+    bias: f64,
+}
+
+impl Acting for AffineAt {
+    fn before_step(&mut self, view: &mut StepView<'_>) {
+        let command = &mut view.ctrl[self.actuator];
+        *command = self.gain * command.clamp(self.range[0], self.range[1]) + self.bias;
+    }
+}
+
+impl Effect for Affine {
+    fn acts(&self) -> Acts {
+        Acts::Command
+    }
+
+    fn parameters(&self) -> &'static [EffectParameter] {
+        self.parameters
+    }
+
+    fn sites(&self, plant: &Plant) -> Vec<String> {
+        actuators(plant)
+    }
+
+    fn attach(&self, site: &Site<'_>) -> Result<Box<dyn Acting>> {
+        let [value] = values(site)?;
+        let layout = &site.plant.layout;
+        let actuator = layout.actuator(site.name)?;
+        let range = layout.actuators[actuator].ctrl_range;
+        Ok(Box::new(AffineAt {
+            actuator,
+            range: range.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]),
+            gain: if self.scaled { value } else { 1.0 },
+            bias: if self.scaled { 0.0 } else { value },
+        }))
+    }
+}
+
+/// Force (N or N m) beyond which no drive's limit is looked for.
+const UNLIMITED: f64 = 1000.0;
+
+/// The force on the joint, gear included, is held within `±limit`. Where the drive asks for more at
+/// the start of a step, its command is replaced by the one that makes the limit, and as much damping is
+/// taken from the joint as a servo adds: engines integrate both implicitly, so that the force is
+/// the limit for the whole step.
+struct Saturation;
+
+struct SaturationAt {
+    actuator: usize,
+    qpos: usize,
+    dof: usize,
+    damping: usize,
+    drive: Drive,
+    limit: f64,
+}
+
+impl Acting for SaturationAt {
+    fn before_step(&mut self, view: &mut StepView<'_>) {
+        let (q, v) = (view.qpos[self.qpos], view.qvel[self.dof]);
+        let force = self.drive.force(view.ctrl[self.actuator], q, v);
+        if force.abs() <= self.limit {
+            return;
+        }
+        let damping = match self.drive.law {
+            DriveLaw::Motor => 0.0,
+            DriveLaw::Position { kv, .. } | DriveLaw::Velocity { kv } => kv,
+        };
+        let held = self.limit.copysign(force);
+        // Where the engine's own limit of the servo would cut in, its damping is not there to
+        // be made up for.
+        let pulled = held / self.drive.gear - damping * self.drive.gear * v;
+        if self
+            .drive
+            .force_range
+            .is_some_and(|[low, high]| pulled <= low || pulled >= high)
+        {
+            if let Some(command) = self.drive.command_for(held, q, v) {
+                view.ctrl[self.actuator] = command;
+            }
+            return;
+        }
+        if let Some(command) = self.drive.command_for(held, q, 0.0) {
+            view.ctrl[self.actuator] = command;
+            view.parameters[self.damping] -= self.drive.gear * self.drive.gear * damping;
+        }
+    }
+}
+
+impl Effect for Saturation {
+    fn acts(&self) -> Acts {
+        Acts::Command
+    }
+
+    fn parameters(&self) -> &'static [EffectParameter] {
+        const {
+            &[
+                EffectParameter::new("limit", "N or N m", [0.0, UNLIMITED], UNLIMITED)
+                    .starting(Start::Multiples(Reference::Force, &[0.9, 0.7, 0.5])),
+            ]
+        }
+    }
+
+    fn sites(&self, plant: &Plant) -> Vec<String> {
+        drives(plant)
+    }
+
+    fn targets(&self, plant: &Plant, site: &str) -> Vec<Target> {
+        let drive = plant.drive(site);
+        let joint = drive.map(|(_, d)| &plant.layout.joints[d.joint].name);
+        joint
+            .into_iter()
+            .map(|j| target("joint", j, "damping", 0))
+            .collect()
+    }
+
+    fn needs(&self) -> Capabilities {
+        Capabilities::JOINT_IMPEDANCE | Capabilities::LIVE_PARAMETERS
+    }
+
+    fn attach(&self, site: &Site<'_>) -> Result<Box<dyn Acting>> {
+        let [limit] = values(site)?;
+        let (actuator, drive) = site.plant.drive(site.name)?;
+        let joint = &site.plant.layout.joints[drive.joint];
+        Ok(Box::new(SaturationAt {
+            actuator,
+            qpos: joint.qpos,
+            dof: joint.qvel,
+            damping: site.columns[0],
+            drive,
+            limit: at_least(site, "limit", limit, 0.0)?,
+        }))
+    }
+}
+
+/// What the drive answers to is nearer to zero by `width`, and zero within: for a motor (N or N m)
+/// and a velocity servo (rad/s or m/s) the command, for a position servo the difference of
+/// command and position (rad or m before the gear), since no position is small by itself.
+struct Deadband;
+
+struct DeadbandAt {
+    actuator: usize,
+    qpos: usize,
+    drive: Drive,
+    width: f64,
+}
+
+/// `x` nearer to zero by `width`.
+fn shrink(x: f64, width: f64) -> f64 {
+    (x.abs() - width).max(0.0).copysign(x)
+}
+
+impl Acting for DeadbandAt {
+    fn before_step(&mut self, view: &mut StepView<'_>) {
+        let command = &mut view.ctrl[self.actuator];
+        let zero = match self.drive.law {
+            DriveLaw::Position { .. } => self.drive.gear * view.qpos[self.qpos],
+            DriveLaw::Motor | DriveLaw::Velocity { .. } => 0.0,
+        };
+        *command = zero + shrink(*command - zero, self.width);
+    }
+}
+
+impl Effect for Deadband {
+    fn acts(&self) -> Acts {
+        Acts::Command
+    }
+
+    fn parameters(&self) -> &'static [EffectParameter] {
+        const {
+            &[
+                EffectParameter::new("width", "unit of the command", [0.0, 10.0], 0.0)
+                    .starting(Start::Multiples(Reference::Command, &[0.03, 0.1, 0.3])),
+            ]
+        }
+    }
+
+    fn sites(&self, plant: &Plant) -> Vec<String> {
+        drives(plant)
+    }
+
+    fn attach(&self, site: &Site<'_>) -> Result<Box<dyn Acting>> {
+        let [width] = values(site)?;
+        let (actuator, drive) = site.plant.drive(site.name)?;
+        Ok(Box::new(DeadbandAt {
+            actuator,
+            qpos: site.plant.layout.joints[drive.joint].qpos,
+            drive,
+            width: at_least(site, "width", width, 0.0)?,
+        }))
+    }
+}

@@ -1,0 +1,55 @@
+//! Elasticity in series: a drive that pulls its link through a spring.
+
+use crate::{Acting, Acts, Effect, EffectParameter, Site};
+use asid_core::{Capabilities, Result, Target};
+use asid_mjcf::Plant;
+
+use super::motor_side::{self, MotorSide};
+use super::{at_least, values};
+
+crate::register!(EffectEntry {
+    name: "joint-compliance",
+    about: "elasticity in series between a drive and its joint",
+    make: || Box::new(Compliance),
+});
+
+/// The drive acts on a rotor, and a spring of `compliance` joins the rotor to the joint: see
+/// [`super::motor_side`]. The rotor has the joint's `armature` as its inertia and the drive's sensor
+/// sits on it. A torque drive on a joint without `armature` is no site, since a spring then changes
+/// nothing. At a joint there can be this or backlash, not both.
+struct Compliance;
+
+impl Effect for Compliance {
+    fn acts(&self) -> Acts {
+        Acts::Force
+    }
+
+    fn parameters(&self) -> &'static [EffectParameter] {
+        const {
+            &[EffectParameter::new(
+                "compliance",
+                "rad/(N m) or m/N",
+                [0.0, 1.0],
+                0.0,
+            )]
+        }
+    }
+
+    fn sites(&self, plant: &Plant) -> Vec<String> {
+        motor_side::sites(plant)
+    }
+
+    fn targets(&self, plant: &Plant, site: &str) -> Vec<Target> {
+        motor_side::targets(plant, site)
+    }
+
+    fn needs(&self) -> Capabilities {
+        Capabilities::JOINT_IMPEDANCE | Capabilities::LIVE_PARAMETERS
+    }
+
+    fn attach(&self, site: &Site<'_>) -> Result<Box<dyn Acting>> {
+        let [compliance] = values(site)?;
+        let compliance = at_least(site, "compliance", compliance, 0.0)?;
+        Ok(Box::new(MotorSide::new(site, compliance, 0.0)?))
+    }
+}

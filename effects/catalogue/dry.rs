@@ -1,0 +1,50 @@
+//! Dry friction of a hinge or slide, the same in every engine.
+//!
+//! A joint that slides feels the force `F` against its speed. One that is about to stop, or stands, feels
+//! damping of `F / max(|v|, v0)`, which engines integrate implicitly: it comes to rest without chatter
+//! and is held but for a creep below `v0`, and is let go in the step after its speed has passed `v0`. It is
+//! about to stop where its speed is less than what the last step changed it by. (MuJoCo's own
+//! `frictionloss` has by default a time constant of 20 ms, over which a joint that should stand
+//! still glides.)
+
+use crate::Site;
+use asid_core::Result;
+use asid_core::simulator::StepView;
+
+use super::at_least;
+
+/// Speed below which a joint counts as standing where nothing else is said, rad/s or m/s.
+pub const CREEP: f64 = 0.01;
+
+/// Dry friction at a joint whose damping is the first target of the effect.
+pub struct DryFriction {
+    damping: usize,
+    dof: usize,
+    creep: f64,
+    /// Speed before the step before.
+    pub before: Option<f64>,
+}
+
+impl DryFriction {
+    /// At a site that is a joint, with the speed below which it counts as standing.
+    pub fn new(site: &Site<'_>, creep: f64) -> Result<Self> {
+        Ok(Self {
+            damping: site.columns[0],
+            dof: site.plant.layout.joint(site.name)?.qvel,
+            creep: at_least(site, "creep", creep, 1e-9)?,
+            before: None,
+        })
+    }
+
+    /// Resists motion with a force (N or N m) in the coming step.
+    pub fn resist(&mut self, view: &mut StepView<'_>, friction: f64) {
+        let speed = view.qvel[self.dof];
+        let change = speed - self.before.unwrap_or(speed);
+        if speed.abs() > change.abs() + self.creep {
+            view.force[self.dof] -= friction.copysign(speed);
+        } else {
+            view.parameters[self.damping] += friction.max(0.0) / speed.abs().max(self.creep);
+        }
+        self.before = Some(speed);
+    }
+}

@@ -1,0 +1,69 @@
+//! The ground is not level.
+
+use crate::{Acting, Acts, Effect, EffectParameter, Site};
+use asid_core::nalgebra::{Rotation3, Vector3};
+use asid_core::{Result, Target};
+use asid_mjcf::Plant;
+
+use super::{target, values};
+
+crate::register!(EffectEntry {
+    name: "gravity-tilt",
+    about: "the ground is not level",
+    make: || Box::new(Tilt),
+});
+
+/// The machine's base is turned by `pitch` about the y axis of the world and by `roll` about its x
+/// axis, right-handed, so that gravity `(0, 0, -g)` becomes
+/// `g (sin pitch, -cos pitch sin roll, -cos pitch cos roll)`: downhill is +x for a positive pitch and
+/// -y for a positive roll. Whatever gravity the simulation has is turned.
+struct Tilt;
+
+struct TiltAt {
+    columns: [usize; 3],
+    turn: Rotation3<f64>,
+}
+
+impl Acting for TiltAt {
+    fn set(&self, columns: &mut [f64]) {
+        let level = Vector3::from(self.columns.map(|c| columns[c]));
+        let tilted = self.turn * level;
+        for (&column, value) in self.columns.iter().zip(tilted.iter()) {
+            columns[column] = *value;
+        }
+    }
+}
+
+impl Effect for Tilt {
+    fn acts(&self) -> Acts {
+        Acts::Model
+    }
+
+    fn parameters(&self) -> &'static [EffectParameter] {
+        const {
+            &[
+                EffectParameter::new("pitch", "rad", [-0.5, 0.5], 0.0),
+                EffectParameter::new("roll", "rad", [-0.5, 0.5], 0.0),
+            ]
+        }
+    }
+
+    fn sites(&self, plant: &Plant) -> Vec<String> {
+        let falls = plant.gravity.iter().any(|&g| g != 0.0);
+        falls.then(String::new).into_iter().collect()
+    }
+
+    fn targets(&self, _plant: &Plant, _site: &str) -> Vec<Target> {
+        (0..3).map(|i| target("option", "", "gravity", i)).collect()
+    }
+
+    fn attach(&self, site: &Site<'_>) -> Result<Box<dyn Acting>> {
+        let [pitch, roll] = values(site)?;
+        let pitched = Rotation3::from_axis_angle(&Vector3::y_axis(), -pitch);
+        let rolled = Rotation3::from_axis_angle(&Vector3::x_axis(), -roll);
+        Ok(Box::new(TiltAt {
+            columns: [site.columns[0], site.columns[1], site.columns[2]],
+            turn: rolled * pitched,
+        }))
+    }
+}

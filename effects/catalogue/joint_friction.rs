@@ -1,0 +1,314 @@
+//! Friction of hinges and slides.
+//!
+//! Viscous friction is the engine's own damping; dry friction is `dry.rs`. The laws follow
+//! B. Armstrong-Hélouvry, P. Dupont, C. Canudas de Wit, "A survey
+//! of models, analysis tools and compensation methods for the control of machines with friction",
+//! Automatica 30 (1994), and for friction that grows with the load M. Duclusaud et al., "Extended
+//! friction models for the physics simulation of servo actuators", ICRA 2025.
+
+use crate::{Acting, Acts, Effect, EffectParameter, Reference, Site, Start};
+use asid_core::simulator::StepView;
+use asid_core::{Capabilities, Result, Target};
+use asid_mjcf::Plant;
+use asid_mjcf::plant::Drive;
+
+use super::dry::{CREEP, DryFriction};
+use super::{at_least, scalar_joints, target, values};
+
+crate::register!(EffectEntry {
+    name: "viscous-friction",
+    about: "friction of a joint in proportion to its speed",
+    make: || Box::new(Viscous),
+});
+
+crate::register!(EffectEntry {
+    name: "coulomb-friction",
+    about: "dry friction of a joint",
+    make: || Box::new(Coulomb),
+});
+
+crate::register!(EffectEntry {
+    name: "stribeck-friction",
+    about: "dry friction that falls from its breakaway value as the joint speeds up",
+    make: || Box::new(Stribeck),
+});
+
+crate::register!(EffectEntry {
+    name: "load-friction",
+    about: "dry friction that grows with the force of the drive",
+    make: || Box::new(Load),
+});
+
+/// Force `-damping v`: adds to the joint's `damping`.
+struct Viscous;
+
+struct ViscousAt {
+    column: usize,
+    damping: f64,
+}
+
+impl Acting for ViscousAt {
+    fn set(&self, columns: &mut [f64]) {
+        let value = &mut columns[self.column];
+        *value = (*value + self.damping).max(0.0);
+    }
+}
+
+impl Effect for Viscous {
+    fn acts(&self) -> Acts {
+        Acts::Model
+    }
+
+    fn parameters(&self) -> &'static [EffectParameter] {
+        const {
+            &[EffectParameter::new(
+                "damping",
+                "N m s/rad or N s/m",
+                [0.0, 100.0],
+                0.0,
+            )]
+        }
+    }
+
+    fn sites(&self, plant: &Plant) -> Vec<String> {
+        scalar_joints(plant)
+    }
+
+    fn targets(&self, _plant: &Plant, site: &str) -> Vec<Target> {
+        vec![target("joint", site, "damping", 0)]
+    }
+
+    fn needs(&self) -> Capabilities {
+        Capabilities::JOINT_IMPEDANCE
+    }
+
+    fn attach(&self, site: &Site<'_>) -> Result<Box<dyn Acting>> {
+        let [damping] = values(site)?;
+        Ok(Box::new(ViscousAt {
+            column: site.columns[0],
+            damping,
+        }))
+    }
+}
+
+/// Friction `force + offset` against motion in the positive direction, and `force - offset` against
+/// the other: dry friction `force`, and `-offset` is a force that always acts. Below the speed `creep` the
+/// friction is viscous: machines and simulators differ in how hard they stick.
+struct Coulomb;
+
+struct CoulombAt {
+    dry: DryFriction,
+    dof: usize,
+    force: f64,
+    offset: f64,
+}
+
+impl Acting for CoulombAt {
+    fn before_step(&mut self, view: &mut StepView<'_>) {
+        self.dry.resist(view, self.force);
+        view.force[self.dof] -= self.offset;
+    }
+
+    fn restart(&mut self) {
+        self.dry.before = None;
+    }
+
+    fn save(&self, memory: &mut Vec<f64>) {
+        memory.extend(self.dry.before);
+    }
+
+    fn load(&mut self, memory: &[f64]) {
+        self.dry.before = memory.first().copied();
+    }
+}
+
+impl Effect for Coulomb {
+    fn acts(&self) -> Acts {
+        Acts::Force
+    }
+
+    fn parameters(&self) -> &'static [EffectParameter] {
+        const {
+            &[
+                EffectParameter::new("force", "N m or N", [0.0, 50.0], 0.0),
+                EffectParameter::new("offset", "N m or N", [-50.0, 50.0], 0.0)
+                    .starting(Start::Given),
+                EffectParameter::new("creep", "rad/s or m/s", [1e-4, 0.1], CREEP)
+                    .starting(Start::Given),
+            ]
+        }
+    }
+
+    fn sites(&self, plant: &Plant) -> Vec<String> {
+        scalar_joints(plant)
+    }
+
+    fn targets(&self, _plant: &Plant, site: &str) -> Vec<Target> {
+        vec![target("joint", site, "damping", 0)]
+    }
+
+    fn needs(&self) -> Capabilities {
+        Capabilities::JOINT_IMPEDANCE | Capabilities::LIVE_PARAMETERS
+    }
+
+    fn attach(&self, site: &Site<'_>) -> Result<Box<dyn Acting>> {
+        let [force, offset, creep] = values(site)?;
+        Ok(Box::new(CoulombAt {
+            dry: DryFriction::new(site, creep)?,
+            dof: site.plant.layout.joint(site.name)?.qvel,
+            force,
+            offset,
+        }))
+    }
+}
+
+/// Friction `coulomb + breakaway exp(-(v / speed)²)`: `breakaway` is what holds at rest above what
+/// slides, `speed` where most of it is gone.
+struct Stribeck;
+
+struct StribeckAt {
+    dry: DryFriction,
+    dof: usize,
+    breakaway: f64,
+    coulomb: f64,
+    speed: f64,
+}
+
+impl Acting for StribeckAt {
+    fn before_step(&mut self, view: &mut StepView<'_>) {
+        let x = view.qvel[self.dof] / self.speed;
+        let friction = self.coulomb + self.breakaway * (-x * x).exp();
+        self.dry.resist(view, friction);
+    }
+
+    fn restart(&mut self) {
+        self.dry.before = None;
+    }
+
+    fn save(&self, memory: &mut Vec<f64>) {
+        memory.extend(self.dry.before);
+    }
+
+    fn load(&mut self, memory: &[f64]) {
+        self.dry.before = memory.first().copied();
+    }
+}
+
+impl Effect for Stribeck {
+    fn acts(&self) -> Acts {
+        Acts::Force
+    }
+
+    fn refines(&self) -> &'static [&'static str] {
+        &["coulomb-friction"]
+    }
+
+    fn parameters(&self) -> &'static [EffectParameter] {
+        const {
+            &[
+                EffectParameter::new("breakaway", "N m or N", [0.0, 50.0], 0.0),
+                EffectParameter::new("coulomb", "N m or N", [0.0, 50.0], 0.0),
+                EffectParameter::new("speed", "rad/s or m/s", [0.001, 10.0], 0.1)
+                    .starting(Start::Multiples(Reference::Speed, &[0.03, 0.1, 0.3])),
+            ]
+        }
+    }
+
+    fn sites(&self, plant: &Plant) -> Vec<String> {
+        scalar_joints(plant)
+    }
+
+    fn targets(&self, _plant: &Plant, site: &str) -> Vec<Target> {
+        vec![target("joint", site, "damping", 0)]
+    }
+
+    fn needs(&self) -> Capabilities {
+        Capabilities::JOINT_IMPEDANCE | Capabilities::LIVE_PARAMETERS
+    }
+
+    fn attach(&self, site: &Site<'_>) -> Result<Box<dyn Acting>> {
+        let [breakaway, coulomb, speed] = values(site)?;
+        Ok(Box::new(StribeckAt {
+            dry: DryFriction::new(site, CREEP)?,
+            dof: site.plant.layout.joint(site.name)?.qvel,
+            breakaway,
+            coulomb,
+            speed: at_least(site, "speed", speed, 1e-9)?,
+        }))
+    }
+}
+
+/// Friction `coefficient |F|`, `F` the force of the joint's drives at the start of the step, as gears
+/// have that are pressed together by what they carry.
+struct Load;
+
+struct LoadAt {
+    dry: DryFriction,
+    qpos: usize,
+    dof: usize,
+    drives: Vec<(usize, Drive)>,
+    coefficient: f64,
+}
+
+impl Acting for LoadAt {
+    fn before_step(&mut self, view: &mut StepView<'_>) {
+        let (q, v) = (view.qpos[self.qpos], view.qvel[self.dof]);
+        let forces = self.drives.iter();
+        let force: f64 = forces.map(|(i, d)| d.force(view.ctrl[*i], q, v)).sum();
+        self.dry.resist(view, self.coefficient * force.abs());
+    }
+
+    fn restart(&mut self) {
+        self.dry.before = None;
+    }
+
+    fn save(&self, memory: &mut Vec<f64>) {
+        memory.extend(self.dry.before);
+    }
+
+    fn load(&mut self, memory: &[f64]) {
+        self.dry.before = memory.first().copied();
+    }
+}
+
+impl Effect for Load {
+    fn acts(&self) -> Acts {
+        Acts::Force
+    }
+
+    fn parameters(&self) -> &'static [EffectParameter] {
+        const { &[EffectParameter::new("coefficient", "1", [0.0, 0.9], 0.0)] }
+    }
+
+    fn sites(&self, plant: &Plant) -> Vec<String> {
+        let joints = plant.scalar_joints();
+        joints
+            .filter(|&j| plant.drives_of(j).next().is_some())
+            .map(|j| plant.layout.joints[j].name.clone())
+            .collect()
+    }
+
+    fn targets(&self, _plant: &Plant, site: &str) -> Vec<Target> {
+        vec![target("joint", site, "damping", 0)]
+    }
+
+    fn needs(&self) -> Capabilities {
+        Capabilities::JOINT_IMPEDANCE | Capabilities::LIVE_PARAMETERS
+    }
+
+    fn attach(&self, site: &Site<'_>) -> Result<Box<dyn Acting>> {
+        let [coefficient] = values(site)?;
+        let joint = site.plant.layout.joint(site.name)?;
+        let joints = &site.plant.layout.joints;
+        let index = joints.iter().position(|j| j.name == site.name);
+        Ok(Box::new(LoadAt {
+            dry: DryFriction::new(site, CREEP)?,
+            qpos: joint.qpos,
+            dof: joint.qvel,
+            drives: index.map_or_else(Vec::new, |j| {
+                site.plant.drives_of(j).map(|(i, d)| (i, *d)).collect()
+            }),
+            coefficient: at_least(site, "coefficient", coefficient, 0.0)?,
+        }))
+    }
+}

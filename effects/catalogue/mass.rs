@@ -1,0 +1,170 @@
+//! Mass properties of bodies that move.
+//!
+//! Where a body's mass comes from its geoms, mass and payload change the geoms' masses; centre and inertia change
+//! what the geoms make. So all compose with a study that fits the mass of a geom.
+
+use crate::{Acting, Acts, Effect, EffectParameter, Site};
+use asid_core::{Capabilities, Result, Target};
+use asid_mjcf::Plant;
+
+use super::{target, values};
+
+crate::register!(EffectEntry {
+    name: "mass",
+    about: "a mass is larger or smaller",
+    make: || Box::new(MassProperty::Mass),
+});
+
+crate::register!(EffectEntry {
+    name: "center-of-mass",
+    about: "the centre of mass of a body is elsewhere",
+    make: || Box::new(MassProperty::Center),
+});
+
+crate::register!(EffectEntry {
+    name: "inertia",
+    about: "the moments of inertia of a body are larger or smaller",
+    make: || Box::new(MassProperty::Inertia),
+});
+
+crate::register!(EffectEntry {
+    name: "payload",
+    about: "a body carries an extra mass at its centre of mass",
+    make: || Box::new(MassProperty::Payload),
+});
+
+/// What is changed.
+///
+/// - `Mass`: times `factor`, inertia with it; of a geom that has a mass, else of a body.
+/// - `Center`: moved by `x`, `y`, `z` in the body's frame.
+/// - `Inertia`: the three principal moments times `factor`.
+/// - `Payload`: `mass` is added to a body, shared among its geoms in proportion.
+#[derive(Clone, Copy)]
+enum MassProperty {
+    Mass,
+    Center,
+    Inertia,
+    Payload,
+}
+
+struct MassPropertyAt {
+    property: MassProperty,
+    columns: Vec<usize>,
+    values: [f64; 3],
+}
+
+impl Acting for MassPropertyAt {
+    fn set(&self, row: &mut [f64]) {
+        let [first, ..] = self.values;
+        match self.property {
+            MassProperty::Mass | MassProperty::Inertia => {
+                self.columns.iter().for_each(|&c| row[c] *= first);
+            }
+            MassProperty::Center => {
+                for (&column, shift) in self.columns.iter().zip(self.values) {
+                    row[column] += shift;
+                }
+            }
+            MassProperty::Payload => {
+                let whole: f64 = self.columns.iter().map(|&c| row[c]).sum();
+                let factor = 1.0 + first / whole;
+                self.columns.iter().for_each(|&c| row[c] *= factor);
+            }
+        }
+    }
+}
+
+/// Names of the geoms that make a body's mass; empty where it has one of its own.
+fn geoms_of(plant: &Plant, body: usize) -> Vec<String> {
+    let geoms = plant.geoms.iter().zip(&plant.layout.geoms);
+    geoms
+        .filter(|(g, _)| g.body == body && g.has_mass)
+        .map(|(_, name)| name.clone())
+        .collect()
+}
+
+/// Bodies with mass that can move.
+fn moving(plant: &Plant) -> impl Iterator<Item = usize> {
+    (1..plant.bodies.len()).filter(|&b| plant.moves(b) && plant.bodies[b].mass > 0.0)
+}
+
+impl Effect for MassProperty {
+    fn acts(&self) -> Acts {
+        Acts::Model
+    }
+
+    fn parameters(&self) -> &'static [EffectParameter] {
+        match self {
+            Self::Mass => const { &[EffectParameter::new("factor", "1", [0.3, 3.0], 1.0)] },
+            Self::Inertia => const { &[EffectParameter::new("factor", "1", [0.5, 3.0], 1.0)] },
+            Self::Payload => const { &[EffectParameter::new("mass", "kg", [0.0, 5.0], 0.0)] },
+            Self::Center => {
+                const {
+                    &[
+                        EffectParameter::new("x", "m", [-0.2, 0.2], 0.0),
+                        EffectParameter::new("y", "m", [-0.2, 0.2], 0.0),
+                        EffectParameter::new("z", "m", [-0.2, 0.2], 0.0),
+                    ]
+                }
+            }
+        }
+    }
+
+    fn sites(&self, plant: &Plant) -> Vec<String> {
+        let body = |b: usize| plant.layout.bodies[b].clone();
+        match self {
+            Self::Mass => moving(plant)
+                .flat_map(|b| match geoms_of(plant, b) {
+                    geoms if geoms.is_empty() => vec![body(b)],
+                    geoms => geoms,
+                })
+                .collect(),
+            Self::Center | Self::Inertia | Self::Payload => moving(plant).map(body).collect(),
+        }
+    }
+
+    fn targets(&self, plant: &Plant, site: &str) -> Vec<Target> {
+        let is_geom = |name: &str| {
+            let geoms = plant.geoms.iter().zip(&plant.layout.geoms);
+            geoms.into_iter().any(|(g, n)| n == name && g.has_mass)
+        };
+        let weigh = |geoms: &[String]| {
+            let geoms = geoms.iter();
+            geoms.map(|g| target("geom", g, "mass", 0)).collect()
+        };
+        match self {
+            Self::Mass if is_geom(site) => vec![target("geom", site, "mass", 0)],
+            Self::Mass => vec![target("body", site, "mass", 0)],
+            Self::Center => (0..3).map(|i| target("body", site, "ipos", i)).collect(),
+            Self::Inertia => (0..3).map(|i| target("body", site, "inertia", i)).collect(),
+            Self::Payload => {
+                let body = plant.layout.bodies.iter().position(|b| b == site);
+                let geoms = body.map_or_else(Vec::new, |b| geoms_of(plant, b));
+                if geoms.is_empty() {
+                    vec![target("body", site, "mass", 0)]
+                } else {
+                    weigh(&geoms)
+                }
+            }
+        }
+    }
+
+    fn needs(&self) -> Capabilities {
+        Capabilities::MASS_PARAMETERS
+    }
+
+    fn attach(&self, site: &Site<'_>) -> Result<Box<dyn Acting>> {
+        let values = match self {
+            Self::Center => values(site)?,
+            _ => {
+                let [value] = values(site)?;
+                [value, 0.0, 0.0]
+            }
+        };
+        Ok(Box::new(MassPropertyAt {
+            property: *self,
+            columns: site.columns.to_vec(),
+            values,
+        }))
+    }
+}

@@ -1,0 +1,87 @@
+//! The catalogue of effects, one file a family: what a real machine does and its model may lack.
+//!
+//! On the command: [`command`], [`delay`]. Between a drive and its joint: [`backlash`], [`compliance`].
+//! At a joint: [`joint_friction`], [`joint_force`], [`rotor`]. On bodies: [`mass`], [`body_force`],
+//! [`gravity`]. In contacts: [`contact_friction`], [`friction_field`], [`contact_softness`]. On
+//! readings: [`sensor`], [`sensor_dynamics`].
+//!
+//! Where the engine has the same physics (damping and rotor inertia of a joint, friction
+//! and softness of contacts, masses, gravity) an effect changes the engine's own parameter, which is
+//! integrated as stably as the engine can; the rest are forces and commands, step by step. A change of
+//! a parameter scales or adds to the value that the simulation has, so that it composes with a study
+//! that fits the same parameter.
+
+pub mod backlash;
+pub mod body_force;
+pub mod command;
+pub mod compliance;
+pub mod contact_friction;
+pub mod contact_softness;
+pub mod delay;
+mod dry;
+pub mod friction_field;
+pub mod gravity;
+pub mod joint_force;
+pub mod joint_friction;
+pub mod mass;
+mod motor_side;
+mod point;
+pub mod rotor;
+pub mod sensor;
+pub mod sensor_dynamics;
+
+use crate::Site;
+use asid_core::{Error, Result, Target};
+use asid_mjcf::Plant;
+
+/// The values of a site, one a parameter.
+fn values<const N: usize>(site: &Site<'_>) -> Result<[f64; N]> {
+    site.values.try_into().map_err(|_| {
+        let given = site.values.len();
+        Error::Shape(format!("{given} values for an effect's {N} parameters"))
+    })
+}
+
+/// A value, where it is at least `low`.
+fn at_least(site: &Site<'_>, parameter: &str, value: f64, low: f64) -> Result<f64> {
+    if value >= low {
+        return Ok(value);
+    }
+    Err(Error::Config {
+        key: format!("effect at `{}`, {parameter}", site.name),
+        message: format!("{value} is below {low}"),
+    })
+}
+
+/// A target by its parts.
+fn target(element: &str, name: &str, attribute: &str, index: usize) -> Target {
+    Target {
+        element: element.into(),
+        name: name.into(),
+        attribute: attribute.into(),
+        index,
+    }
+}
+
+/// Names of the hinges and slides.
+fn scalar_joints(plant: &Plant) -> Vec<String> {
+    let joints = plant.scalar_joints();
+    joints
+        .map(|j| plant.layout.joints[j].name.clone())
+        .collect()
+}
+
+/// Names of all actuators: their commands can be late or off whatever they drive.
+fn actuators(plant: &Plant) -> Vec<String> {
+    let actuators = plant.layout.actuators.iter();
+    actuators.map(|a| a.name.clone()).collect()
+}
+
+/// Names of the plain drives.
+fn drives(plant: &Plant) -> Vec<String> {
+    let actuators = plant.layout.actuators.iter().zip(&plant.drives);
+    actuators
+        .filter(|(_, drive)| drive.is_some())
+        .map(|(actuator, _)| actuator.name.clone())
+        .collect()
+}

@@ -1,0 +1,190 @@
+//! The contract of an effect: where it acts, on what, with which parameters.
+
+use asid_core::backend::Capabilities;
+use asid_core::error::Result;
+use asid_core::registry::Origin;
+use asid_core::simulator::StepView;
+use asid_core::target::Target;
+use asid_mjcf::plant::Plant;
+
+/// Where an effect acts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Acts {
+    /// On the model's parameters.
+    Model,
+    /// On the command on its way to the drive.
+    Command,
+    /// As a force during the step.
+    Force,
+    /// On the reading on its way from the sensor.
+    Measurement,
+}
+
+/// How a search for a parameter's value begins.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Start {
+    /// At the null value: the parameter acts from there on in proportion.
+    Slope,
+    /// At each of these values.
+    Values(&'static [f64]),
+    /// One of these values and nothing between them, such as a number of teeth.
+    Choice(&'static [f64]),
+    /// At these multiples of what the logs show of something.
+    Multiples(Reference, &'static [f64]),
+    /// At these quantiles (0 to 1) of the places that the body of the site visits; the
+    /// first choice parameter of the effect says along which axis (0, 1, 2).
+    Places(&'static [f64]),
+    /// Not searched for: it stays at its null value unless it is given.
+    Given,
+}
+
+/// What a start value is measured by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Reference {
+    /// The largest command of the actuator, without its mean for a position.
+    Command,
+    /// The largest speed of the joint.
+    Speed,
+    /// The spread of the sensor's readings.
+    Reading,
+    /// The largest force of the drive on the joint.
+    Force,
+}
+
+/// A parameter of an effect.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EffectParameter {
+    /// Name, such as `gain`.
+    pub name: &'static str,
+    /// SI unit.
+    pub unit: &'static str,
+    /// Plausible values.
+    pub range: [f64; 2],
+    /// Value at which the effect is off.
+    pub null: f64,
+    /// How a search for its value begins.
+    pub start: Start,
+}
+
+impl EffectParameter {
+    /// A parameter that acts in proportion from its null value on.
+    #[must_use]
+    pub const fn new(name: &'static str, unit: &'static str, range: [f64; 2], null: f64) -> Self {
+        Self {
+            name,
+            unit,
+            range,
+            null,
+            start: Start::Slope,
+        }
+    }
+
+    /// The same with another start of the search.
+    #[must_use]
+    pub const fn starting(mut self, start: Start) -> Self {
+        self.start = start;
+        self
+    }
+}
+
+/// What an effect is attached to.
+#[derive(Clone, Copy, Debug)]
+pub struct Site<'a> {
+    /// The machine.
+    pub plant: &'a Plant,
+    /// Name of the site; empty for an effect of the whole scene.
+    pub name: &'a str,
+    /// One value a parameter.
+    pub values: &'a [f64],
+    /// Places of the effect's targets among the columns that [`Acting::set`] and
+    /// [`StepView::parameters`] show, in the order of [`Effect::targets`].
+    pub columns: &'a [usize],
+}
+
+/// An effect at work at one site in one simulation.
+///
+/// It may remember what it likes, as long as [`Acting::save`] and [`Acting::load`] carry
+/// all of it: simulations are snapshotted and restored, and their parameters change while
+/// their memory stays.
+pub trait Acting: Send {
+    /// Changes the model's parameters before the simulation runs: a row of all columns.
+    fn set(&self, _columns: &mut [f64]) {}
+    /// Called before each physics step.
+    fn before_step(&mut self, _view: &mut StepView<'_>) {}
+    /// Turns what a sensor would read at a time (s) into what it says; called in the
+    /// order of time, possibly more than once for one time, for the sensor of the site.
+    fn read(&mut self, _time: f64, _reading: &mut [f64]) {}
+    /// Forgets what was: a new episode begins.
+    fn restart(&mut self) {}
+    /// Appends what it remembers.
+    fn save(&self, _memory: &mut Vec<f64>) {}
+    /// Takes over what another one at the same site, maybe with other values, has saved.
+    fn load(&mut self, _memory: &[f64]) {}
+}
+
+/// A physical effect.
+pub trait Effect: Send + Sync {
+    /// Where it acts.
+    fn acts(&self) -> Acts;
+    /// Its parameters.
+    fn parameters(&self) -> &'static [EffectParameter];
+    /// Names of the sites of a machine that it can be attached to; one empty name for an
+    /// effect of the whole scene.
+    fn sites(&self, plant: &Plant) -> Vec<String>;
+    /// Parameters of the model that it changes at a site.
+    fn targets(&self, _plant: &Plant, _site: &str) -> Vec<Target> {
+        Vec::new()
+    }
+    /// Whether [`Acting::before_step`] has something to do.
+    fn steps(&self) -> bool {
+        matches!(self.acts(), Acts::Command | Acts::Force)
+    }
+    /// Names of effects that it is a refinement of: with some of its parameters at their null
+    /// values it is one of them. The simpler one is preferred unless that leaves much more.
+    fn refines(&self) -> &'static [&'static str] {
+        &[]
+    }
+    /// What an engine must be able to do for it, besides setting its targets and, where it
+    /// [steps](Effect::steps), calling hooks.
+    fn needs(&self) -> Capabilities {
+        Capabilities::empty()
+    }
+    /// Attaches it at a site, for one simulation.
+    ///
+    /// # Errors
+    /// When the scene has no such site, or a value makes no sense.
+    fn attach(&self, site: &Site<'_>) -> Result<Box<dyn Acting>>;
+}
+
+/// An effect in the registry.
+pub struct EffectEntry {
+    /// Name on the command line.
+    pub name: &'static str,
+    /// One line for `asid list`.
+    pub about: &'static str,
+    /// Makes it.
+    pub make: &'static (dyn Fn() -> Box<dyn Effect> + Sync),
+    /// Where it comes from.
+    pub origin: Origin,
+}
+
+asid_core::__entry!(EffectEntry, "effect");
+
+/// Registers an effect under a name, with the package that the statement stands in.
+#[macro_export]
+macro_rules! register {
+    (EffectEntry {
+        name: $name:expr,
+        about: $about:expr,
+        make: $make:expr $(,)?
+    }) => {
+        $crate::__inventory::submit! {
+            $crate::EffectEntry {
+                name: $name,
+                about: $about,
+                make: &$make,
+                origin: $crate::__core::linked_origin!(),
+            }
+        }
+    };
+}

@@ -1,0 +1,30 @@
+//! Physical effects that a simulator can be given.
+//!
+//! An effect is attached at a *site* (a joint, an actuator, a sensor, a geom, …)
+//! with values of its parameters. At their null values it does exactly nothing.
+//! It acts in one of four places: on the model's parameters, on the command on
+//! its way to the drive, as a force during the step, or on the reading on its way
+//! from the sensor. What acts is made anew for each simulation ([`Acting`]), so
+//! that it may remember what was, as a delay must, and needs no lock.
+//!
+//! [`refined`] gives a compiled scene its effects; from then on every
+//! algorithm sees an ordinary model, and an effect's parameter is a target like
+//! any other: `effect/actuator-delay@servo/delay`.
+//!
+//! [`catalogue`] has the effects of ASID, one file a family; [`refined_model`] is the file of a model
+//! with effects.
+
+pub mod catalogue;
+mod effect;
+pub mod refined;
+pub mod refined_model;
+mod spec;
+
+pub use effect::{Acting, Acts, Effect, EffectEntry, EffectParameter, Reference, Site, Start};
+pub use refined_model::RefinedModel;
+pub use spec::EffectSpec;
+
+#[doc(hidden)]
+pub use asid_core as __core;
+#[doc(hidden)]
+pub use inventory as __inventory;

@@ -1,0 +1,178 @@
+//! The layout of a scene, as MuJoCo orders it, read from the parsed document: for
+//! engines that have no compiler of their own.
+
+use mjcf_rs::Model;
+use mjcf_rs::body::JointType;
+
+use asid_core::error::{Error, Result};
+use asid_core::layout::{Actuator, Joint, JointKind, Keyframe, Layout, Sensor, sensor_len};
+use asid_core::scene::Scene;
+
+/// Names and places of a parsed scene.
+///
+/// # Errors
+/// When a keyframe's lengths do not fit.
+pub fn layout(scene: &Scene, model: &Model) -> Result<Layout> {
+    let mut bodies = Vec::new();
+    let mut geoms = Vec::new();
+    let mut joints = Vec::new();
+    let (mut nq, mut nv) = (0, 0);
+    for (i, entry) in model.bodies.iter().enumerate() {
+        let fallback = if i == 0 {
+            "world".into()
+        } else {
+            format!("body{i}")
+        };
+        let name = if i == 0 {
+            None
+        } else {
+            entry.body.name.clone()
+        };
+        let body = name.unwrap_or(fallback);
+        for joint in &entry.body.joints {
+            let kind = joint_kind(joint.type_);
+            joints.push(Joint {
+                name: joint
+                    .name
+                    .clone()
+                    .unwrap_or(format!("joint{}", joints.len())),
+                kind,
+                body: body.clone(),
+                qpos: nq,
+                qvel: nv,
+            });
+            nq += kind.qpos_len();
+            nv += kind.qvel_len();
+        }
+        for geom in &entry.body.geoms {
+            geoms.push(geom.name.clone().unwrap_or(format!("geom{}", geoms.len())));
+        }
+        bodies.push(body);
+    }
+    let actuators = model.actuators.iter().enumerate().map(|(i, a)| {
+        let limited = a
+            .ctrl_limited
+            .resolve(model.compiler.autolimits, a.ctrl_range.is_some());
+        Actuator {
+            name: a.name.clone().unwrap_or(format!("actuator{i}")),
+            ctrl_range: a.ctrl_range.filter(|_| limited),
+        }
+    });
+    let actuators: Vec<_> = actuators.collect();
+    let mut address = 0;
+    let sensors = model.sensors.iter().enumerate().map(|(i, s)| {
+        let len = sensor_len(&s.kind);
+        address += len;
+        Sensor {
+            name: s.name.clone().unwrap_or(format!("sensor{i}")),
+            kind: s.kind.clone(),
+            address: address - len,
+            len,
+        }
+    });
+    let sensors = sensors.collect();
+    let mut layout = Layout {
+        timestep: model.option.timestep,
+        nq,
+        nv,
+        bodies,
+        geoms,
+        joints,
+        actuators,
+        sensors,
+        keyframes: Vec::new(),
+    };
+    let default = default_qpos(model, &layout);
+    for (i, key) in model.keyframes.iter().enumerate() {
+        let name = key.name.clone().unwrap_or(format!("key{i}"));
+        let fill = |values: &[f64], default: Vec<f64>, what: &str| {
+            if values.is_empty() {
+                Ok(default)
+            } else if values.len() == default.len() {
+                Ok(values.to_vec())
+            } else {
+                Err(Error::Scene {
+                    scene: scene.name().to_owned(),
+                    message: format!(
+                        "keyframe `{name}` has {} {what} values where {} are needed",
+                        values.len(),
+                        default.len()
+                    ),
+                })
+            }
+        };
+        layout.keyframes.push(Keyframe {
+            qpos: fill(&key.qpos, default.clone(), "qpos")?,
+            qvel: fill(&key.qvel, vec![0.0; nv], "qvel")?,
+            ctrl: fill(&key.ctrl, vec![0.0; layout.actuators.len()], "ctrl")?,
+            name,
+        });
+    }
+    Ok(layout)
+}
+
+/// Kind of a joint of the document.
+#[must_use]
+pub fn joint_kind(kind: JointType) -> JointKind {
+    match kind {
+        JointType::Free => JointKind::Free,
+        JointType::Ball => JointKind::Ball,
+        JointType::Hinge => JointKind::Hinge,
+        JointType::Slide => JointKind::Slide,
+    }
+}
+
+/// MuJoCo's `qpos0`, length `nq`: free bodies where the document has them, balls
+/// unturned, hinges and slides at their `ref`.
+#[must_use]
+pub fn default_qpos(model: &Model, layout: &Layout) -> Vec<f64> {
+    let mut qpos = vec![0.0; layout.nq];
+    let mut next = layout.joints.iter();
+    for entry in &model.bodies {
+        for joint in &entry.body.joints {
+            let Some(place) = next.next() else { break };
+            let q = &mut qpos[place.qpos..place.qpos + place.kind.qpos_len()];
+            match place.kind {
+                JointKind::Free => {
+                    let (p, r) = (entry.body.pose.translation, entry.body.pose.rotation);
+                    q.copy_from_slice(&[p.x, p.y, p.z, r.w, r.x, r.y, r.z]);
+                }
+                JointKind::Ball => q[0] = 1.0,
+                JointKind::Hinge | JointKind::Slide => q[0] = joint.ref_,
+            }
+        }
+    }
+    qpos
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use asid_core::simulator::{Control, ExternalForce, Rollout};
+
+    #[test]
+    fn a_body_has_one_external_force() {
+        let xml = r#"<mujoco><worldbody><body name="a"><freejoint/><geom size="1"/></body>
+            <body name="b"><freejoint/><geom size="1"/></body></worldbody></mujoco>"#;
+        let scene = Scene::from_xml("two", xml, &[]).unwrap();
+        let layout = layout(&scene, &scene.description().unwrap()).unwrap();
+        let record = layout.recording::<&str>(&[]).unwrap();
+        let wrench = [1.0; 6];
+        let check = |bodies: [usize; 2]| {
+            let forces = bodies.map(|body| ExternalForce {
+                body,
+                wrench: &wrench,
+            });
+            let rollout = Rollout {
+                forces: &forces,
+                ..Rollout::new(&[0], 1, 1, Control::Shared(&[]), &record)
+            };
+            rollout.check(&layout, 1, 0, &[]).map_err(|e| e.to_string())
+        };
+        assert_eq!(check([1, 2]), Ok(()));
+        assert_eq!(
+            check([2, 2]),
+            Err("external forces name body 2 twice".into())
+        );
+    }
+}

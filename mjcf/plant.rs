@@ -1,0 +1,330 @@
+//! The machine as its document describes it: what moves what, and what can touch what.
+//!
+//! Effects are attached to a machine and not to an engine, so what they need to
+//! know of it (the law of a servo, the parent of a body, the friction that wins in
+//! a contact) is read from the document, once, for all engines.
+
+mod jacobian;
+mod reading;
+
+use asid_core::error::{Error, Result};
+use asid_core::layout::{JointKind, Layout};
+
+/// How an actuator turns its command into a force.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum DriveLaw {
+    /// The command is the force.
+    Motor,
+    /// A position servo: `kp (command - position) - kv speed`.
+    Position {
+        /// Position gain, N/m or N m/rad.
+        kp: f64,
+        /// Damping, N s/m or N m s/rad.
+        kv: f64,
+    },
+    /// A velocity servo: `kv (command - speed)`.
+    Velocity {
+        /// Gain, N s/m or N m s/rad.
+        kv: f64,
+    },
+}
+
+/// An actuator on a hinge or slide.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Drive {
+    /// Index in [`Layout::joints`].
+    pub joint: usize,
+    /// Its law, before the gear.
+    pub law: DriveLaw,
+    /// Ratio of the joint's force to the actuator's.
+    pub gear: f64,
+    /// Limits of the command.
+    pub ctrl_range: Option<[f64; 2]>,
+    /// Limits of the force, before the gear.
+    pub force_range: Option<[f64; 2]>,
+}
+
+impl Drive {
+    /// Force on the joint (N or N m) for a command, at a position and speed of the joint.
+    #[must_use]
+    pub fn force(&self, command: f64, position: f64, speed: f64) -> f64 {
+        let clamp = |x: f64, range: Option<[f64; 2]>| range.map_or(x, |[a, b]| x.clamp(a, b));
+        let command = clamp(command, self.ctrl_range);
+        let (q, v) = (self.gear * position, self.gear * speed);
+        let force = match self.law {
+            DriveLaw::Motor => command,
+            DriveLaw::Position { kp, kv } => kp * (command - q) - kv * v,
+            DriveLaw::Velocity { kv } => kv * (command - v),
+        };
+        self.gear * clamp(force, self.force_range)
+    }
+
+    /// The command that makes the drive ask for a force on the joint (N or N m), before
+    /// any limit; `None` where no command can.
+    #[must_use]
+    pub fn command_for(&self, force: f64, position: f64, speed: f64) -> Option<f64> {
+        let (q, v) = (self.gear * position, self.gear * speed);
+        let force = force / self.gear;
+        let command = match self.law {
+            DriveLaw::Motor => force,
+            DriveLaw::Position { kp, kv } => q + (force + kv * v) / kp,
+            DriveLaw::Velocity { kv } => v + force / kv,
+        };
+        command.is_finite().then_some(command)
+    }
+
+    /// Whether its command is a position, which it pursues.
+    #[must_use]
+    pub fn is_position_servo(&self) -> bool {
+        matches!(self.law, DriveLaw::Position { .. })
+    }
+}
+
+/// A body.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PlantBody {
+    /// Index of its parent; the world is its own.
+    pub parent: usize,
+    /// Its joints, as indices in [`Layout::joints`].
+    pub joints: std::ops::Range<usize>,
+    /// Mass, kg; 0 where it has none of its own.
+    pub mass: f64,
+    /// Centre of mass in its frame, m.
+    pub center: [f64; 3],
+    /// Topmost body that it is rigidly joined to; 0 where it cannot move.
+    pub weld: usize,
+}
+
+/// A joint of the document.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PlantJoint {
+    /// Index of the body that it moves.
+    pub body: usize,
+    /// Anchor in the body's frame, m.
+    pub anchor: [f64; 3],
+    /// Axis in the body's frame.
+    pub axis: [f64; 3],
+    /// Coordinate at which the body is as declared.
+    pub reference: f64,
+    /// Dry friction, N or N m.
+    pub frictionloss: f64,
+    /// Rotor inertia, kg or kg m².
+    pub armature: f64,
+}
+
+/// A geom of the document.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PlantGeom {
+    /// Index of its body.
+    pub body: usize,
+    /// Sliding, torsional (m) and rolling (m) friction.
+    pub friction: [f64; 3],
+    /// Dimensions of its contacts: 3 sliding, 4 also torsional, 6 also rolling.
+    pub condim: u32,
+    /// Whose friction counts.
+    pub priority: i32,
+    /// Whether its mass is its own, to be changed.
+    pub has_mass: bool,
+}
+
+/// What a sensor reads.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Reads {
+    /// A joint, by index in [`Layout::joints`].
+    Joint(usize),
+    /// A body's frame, by index in [`Layout::bodies`].
+    Body(usize),
+    /// Something else.
+    Other,
+}
+
+/// A machine: the document's tree, its drives, and who can touch whom.
+#[derive(Clone, Debug)]
+pub struct Plant {
+    /// Names and places.
+    pub layout: Layout,
+    /// Gravity, m/s².
+    pub gravity: [f64; 3],
+    /// Bodies, in the layout's order.
+    pub bodies: Vec<PlantBody>,
+    /// Joints, in the layout's order.
+    pub joints: Vec<PlantJoint>,
+    /// Geoms, in the layout's order.
+    pub geoms: Vec<PlantGeom>,
+    /// Actuators, in the layout's order; `None` for one that is no plain drive of a joint.
+    pub drives: Vec<Option<Drive>>,
+    /// Sensors, in the layout's order.
+    pub sensors: Vec<Reads>,
+    /// Pairs of geoms that can touch, each once, the smaller index first.
+    pub contacts: Vec<[usize; 2]>,
+    /// Pose of each body in its parent's frame, as declared.
+    poses: Vec<nalgebra::Isometry3<f64>>,
+}
+
+impl Plant {
+    /// Drives of a joint, as indices of actuators.
+    pub fn drives_of(&self, joint: usize) -> impl Iterator<Item = (usize, &Drive)> {
+        let drives = self.drives.iter().enumerate();
+        drives.filter_map(move |(i, d)| d.as_ref().filter(|d| d.joint == joint).map(|d| (i, d)))
+    }
+
+    /// Indices of the hinges and slides.
+    pub fn scalar_joints(&self) -> impl Iterator<Item = usize> {
+        let joints = self.layout.joints.iter().enumerate();
+        joints
+            .filter(|(_, j)| matches!(j.kind, JointKind::Hinge | JointKind::Slide))
+            .map(|(i, _)| i)
+    }
+
+    /// The free joint of a body, as an index in [`Layout::joints`].
+    #[must_use]
+    pub fn free_joint(&self, body: usize) -> Option<usize> {
+        let joints = self.bodies[body].joints.clone();
+        joints
+            .into_iter()
+            .find(|&j| self.layout.joints[j].kind == JointKind::Free)
+    }
+
+    /// Whether a body can move.
+    #[must_use]
+    pub fn moves(&self, body: usize) -> bool {
+        self.bodies[body].weld != 0
+    }
+
+    /// Geom whose friction counts in a contact of two: the higher priority, else the larger.
+    #[must_use]
+    pub fn dominant(&self, [a, b]: [usize; 2], entry: usize) -> usize {
+        let (x, y) = (&self.geoms[a], &self.geoms[b]);
+        match x.priority.cmp(&y.priority) {
+            std::cmp::Ordering::Greater => a,
+            std::cmp::Ordering::Less => b,
+            std::cmp::Ordering::Equal if x.friction[entry] >= y.friction[entry] => a,
+            std::cmp::Ordering::Equal => b,
+        }
+    }
+
+    /// Index of the actuator of this name with its drive.
+    ///
+    /// # Errors
+    /// When there is none, or it is no plain drive of a joint.
+    pub fn drive(&self, name: &str) -> Result<(usize, Drive)> {
+        let i = self.layout.actuator(name)?;
+        let drive = self.drives[i].ok_or_else(|| {
+            Error::Failed(format!(
+                "actuator `{name}` is no motor, position or velocity servo of a hinge or slide"
+            ))
+        })?;
+        Ok((i, drive))
+    }
+
+    /// Index of the geom of this name.
+    ///
+    /// # Errors
+    /// When there is none; the message lists near names.
+    pub fn geom(&self, name: &str) -> Result<usize> {
+        let names = &self.layout.geoms;
+        names
+            .iter()
+            .position(|g| g == name)
+            .ok_or_else(|| Error::unknown("geom", name, names.iter().map(String::as_str)))
+    }
+
+    /// Kind of a joint, by index.
+    #[must_use]
+    pub fn joint_kind(&self, joint: usize) -> JointKind {
+        self.layout.joints[joint].kind
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use asid_core::scene::Scene;
+
+    const MACHINE: &str = r#"<mujoco><compiler angle="radian"/><worldbody>
+      <geom name="floor" type="plane" size="1 1 1" friction="0.4 0.005 0.0001"/>
+      <body name="a" pos="0 0 0.5"><joint name="turn" axis="0 0 1"/><geom name="a" size="0.1" mass="1"/>
+        <body name="b" pos="0.4 0 0"><joint name="reach" type="slide" axis="1 0 0" frictionloss="2"/>
+          <geom name="b" size="0.1" mass="2" pos="0.1 0 0"/></body></body>
+      <body name="ball" pos="1 0 0.2"><freejoint name="fly"/><geom name="ball" size="0.1" friction="0.6 0 0"/></body>
+      </worldbody>
+      <actuator><motor name="m" joint="turn" gear="3" ctrlrange="-1 2"/>
+        <position name="p" joint="reach" kp="20" kv="2" forcerange="-5 5"/></actuator>
+      <sensor><jointpos name="angle" joint="turn"/><framepos name="at" objtype="xbody" objname="ball"/></sensor></mujoco>"#;
+
+    fn plant() -> Plant {
+        Plant::of(&Scene::from_xml("machine", MACHINE, &[]).unwrap()).unwrap()
+    }
+
+    #[test]
+    fn drives_follow_their_laws() {
+        let plant = plant();
+        let (_, motor) = plant.drive("m").unwrap();
+        assert_eq!(motor.force(5.0, 0.0, 0.0), 6.0);
+        let (_, servo) = plant.drive("p").unwrap();
+        assert!((servo.force(0.1, 0.02, 0.3) - (20.0 * 0.08 - 0.6)).abs() < 1e-12);
+        assert_eq!(servo.force(10.0, 0.0, 0.0), 5.0);
+        let command = servo.command_for(1.3, 0.02, 0.3).unwrap();
+        assert!((servo.force(command, 0.02, 0.3) - 1.3).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_body_touches_neither_its_parent_nor_itself() {
+        let plant = plant();
+        let name = |g: usize| plant.layout.geoms[g].clone();
+        let pairs: Vec<_> = plant.contacts.iter().map(|p| p.map(name)).collect();
+        let expected = [
+            ["floor", "a"],
+            ["floor", "b"],
+            ["floor", "ball"],
+            ["a", "ball"],
+            ["b", "ball"],
+        ];
+        assert_eq!(pairs, expected.map(|p| p.map(String::from)));
+        assert_eq!(plant.dominant([0, 3], 0), 3);
+        assert_eq!(plant.dominant([0, 3], 1), 0);
+    }
+
+    #[test]
+    fn sensors_know_what_they_read() {
+        let plant = plant();
+        assert_eq!(plant.sensors, [Reads::Joint(0), Reads::Body(3)]);
+        assert_eq!(plant.bodies[2].mass, 2.0);
+        assert_eq!(plant.bodies[2].center, [0.1, 0.0, 0.0]);
+    }
+
+    /// The Jacobian times a velocity is the finite difference of the point.
+    #[test]
+    fn the_point_jacobian_is_the_derivative_of_the_point() {
+        let plant = plant();
+        let nv = plant.layout.nv;
+        let mut jacobian = vec![0.0; 6 * nv];
+        let turn = nalgebra::UnitQuaternion::from_euler_angles(0.3, -0.2, 0.9);
+        let qpos = vec![0.4, 0.1, 1.0, 2.0, 3.0, turn.w, turn.i, turn.j, turn.k];
+        let at = [0.05, -0.02, 0.1];
+        for body in [2, 3] {
+            let pose = plant.point_jacobian(&qpos, body, at, &mut jacobian);
+            let tip = pose * nalgebra::Point3::from(at);
+            let h = 1e-6;
+            for dof in 0..nv {
+                let mut moved = qpos.clone();
+                match dof {
+                    0..5 => moved[dof] += h,
+                    _ => {
+                        let axis = nalgebra::Vector3::ith(dof - 5, h);
+                        let q = turn * nalgebra::UnitQuaternion::from_scaled_axis(axis);
+                        moved[5..9].copy_from_slice(&[q.w, q.i, q.j, q.k]);
+                    }
+                }
+                let other = plant.point_jacobian(&moved, body, at, &mut vec![0.0; 6 * nv]);
+                let d = (other * nalgebra::Point3::from(at) - tip) / h;
+                for k in 0..3 {
+                    assert!(
+                        (d[k] - jacobian[k * nv + dof]).abs() < 1e-5,
+                        "{body} {dof} {k}"
+                    );
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,196 @@
+//! Reads a plant from a scene's document.
+
+use mjcf_rs::Model as Document;
+use mjcf_rs::extras::ActuatorKind;
+
+use super::{Drive, DriveLaw, Plant, PlantBody, PlantGeom, PlantJoint, Reads};
+use crate::document;
+use crate::mass::{GeomMass, MassProperties};
+use asid_core::error::Result;
+use asid_core::layout::{JointKind, Layout};
+use asid_core::scene::Scene;
+
+impl Plant {
+    /// Reads a scene.
+    ///
+    /// # Errors
+    /// When the document is not valid MJCF.
+    pub fn of(scene: &Scene) -> Result<Self> {
+        let model = scene.description()?;
+        let layout = document::layout(scene, &model)?;
+        let mut bodies = Vec::with_capacity(model.bodies.len());
+        let (mut joints, mut geoms) = (Vec::new(), Vec::new());
+        for (i, entry) in model.bodies.iter().enumerate() {
+            let body = &entry.body;
+            let first = joints.len();
+            joints.extend(body.joints.iter().map(|j| PlantJoint {
+                body: i,
+                anchor: j.pos,
+                axis: j.axis,
+                reference: j.ref_,
+                frictionloss: j.frictionloss,
+                armature: j.armature,
+            }));
+            geoms.extend(body.geoms.iter().map(|g| PlantGeom {
+                body: i,
+                friction: g.friction,
+                condim: g.condim,
+                priority: g.priority,
+                has_mass: i > 0 && body.inertial.is_none() && GeomMass::of(g).is_some(),
+            }));
+            let (mass, center) = match &body.inertial {
+                Some(inertial) => {
+                    let p = inertial.pose.translation;
+                    (inertial.mass, [p.x, p.y, p.z])
+                }
+                None => {
+                    let masses: Vec<_> = body.geoms.iter().filter_map(GeomMass::of).collect();
+                    let all = MassProperties::of_geoms(&masses);
+                    (all.mass, all.center.into())
+                }
+            };
+            let parent = entry.parent.unwrap_or(0);
+            let weld = match entry.parent {
+                Some(p) if body.joints.is_empty() => {
+                    bodies.get(p).map_or(0, |b: &PlantBody| b.weld)
+                }
+                _ => i,
+            };
+            bodies.push(PlantBody {
+                parent,
+                joints: first..joints.len(),
+                mass: if i == 0 { 0.0 } else { mass },
+                center,
+                weld,
+            });
+        }
+        let drives = model
+            .actuators
+            .iter()
+            .zip(&layout.actuators)
+            .map(|(a, place)| drive(&model, &layout, a, place.ctrl_range))
+            .collect();
+        let sensors = model
+            .sensors
+            .iter()
+            .map(|s| {
+                let name = s.objname.as_deref().unwrap_or_default();
+                let joint = layout.joints.iter().position(|j| j.name == name);
+                let body = layout.bodies.iter().position(|b| b == name);
+                match (s.kind.as_str(), joint, body) {
+                    (kind, Some(j), _) if kind.starts_with("joint") => Reads::Joint(j),
+                    (kind, _, Some(b)) if kind.starts_with("frame") => Reads::Body(b),
+                    _ => Reads::Other,
+                }
+            })
+            .collect();
+        let contacts = contacts(&model, &layout, &bodies, &geoms);
+        let poses = model
+            .bodies
+            .iter()
+            .map(|entry| {
+                let (t, q) = (entry.body.pose.translation, entry.body.pose.rotation);
+                nalgebra::Isometry3::from_parts(
+                    nalgebra::Translation3::new(t.x, t.y, t.z),
+                    nalgebra::UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(
+                        q.w, q.x, q.y, q.z,
+                    )),
+                )
+            })
+            .collect();
+        Ok(Self {
+            layout,
+            gravity: model.option.gravity,
+            bodies,
+            joints,
+            geoms,
+            drives,
+            sensors,
+            contacts,
+            poses,
+        })
+    }
+}
+
+fn drive(
+    model: &Document,
+    layout: &Layout,
+    actuator: &mjcf_rs::extras::Actuator,
+    ctrl_range: Option<[f64; 2]>,
+) -> Option<Drive> {
+    let name = actuator.joint.as_deref()?;
+    let joint = layout.joints.iter().position(|j| j.name == name)?;
+    if !matches!(
+        layout.joints[joint].kind,
+        JointKind::Hinge | JointKind::Slide
+    ) {
+        return None;
+    }
+    let law = match actuator.kind {
+        ActuatorKind::Motor => DriveLaw::Motor,
+        ActuatorKind::Position => DriveLaw::Position {
+            kp: actuator.kp.unwrap_or(1.0),
+            kv: actuator.kv.unwrap_or(0.0),
+        },
+        ActuatorKind::Velocity => DriveLaw::Velocity {
+            kv: actuator.kv.unwrap_or(1.0),
+        },
+        _ => return None,
+    };
+    let limited = actuator
+        .force_limited
+        .resolve(model.compiler.autolimits, actuator.force_range.is_some());
+    Some(Drive {
+        joint,
+        law,
+        gear: actuator.gear[0],
+        ctrl_range,
+        force_range: actuator.force_range.filter(|_| limited),
+    })
+}
+
+/// MuJoCo's rules: contact bits in either direction, no contact between a body and what it
+/// is welded to or its parent (unless that is fixed), excluded and explicit pairs.
+fn contacts(
+    model: &Document,
+    layout: &Layout,
+    bodies: &[PlantBody],
+    geoms: &[PlantGeom],
+) -> Vec<[usize; 2]> {
+    let all: Vec<_> = model.bodies.iter().flat_map(|b| &b.body.geoms).collect();
+    let body = |name: &str| layout.bodies.iter().position(|b| b == name);
+    let excluded: Vec<_> = model
+        .contact
+        .excludes
+        .iter()
+        .map(|e| (body(&e.body1), body(&e.body2)))
+        .collect();
+    let explicit: Vec<_> = model
+        .contact
+        .pairs
+        .iter()
+        .map(|p| {
+            let find = |name: &str| layout.geoms.iter().position(|g| g == name);
+            (find(&p.geom1), find(&p.geom2))
+        })
+        .collect();
+    let mut found = Vec::new();
+    for a in 0..geoms.len() {
+        for b in a + 1..geoms.len() {
+            let (p, q) = (geoms[a].body, geoms[b].body);
+            let (u, v) = (bodies[p].weld, bodies[q].weld);
+            let above = |w: usize| bodies[bodies[w].parent].weld;
+            let family = (u != 0 && v != 0) && (u == above(v) || v == above(u));
+            let bits = all[a].contype & all[b].conaffinity != 0
+                || all[b].contype & all[a].conaffinity != 0;
+            let among = |pairs: &[(Option<usize>, Option<usize>)], x: usize, y: usize| {
+                pairs.contains(&(Some(x), Some(y))) || pairs.contains(&(Some(y), Some(x)))
+            };
+            let meets = bits && u != v && !family && !among(&excluded, p, q);
+            if meets || among(&explicit, a, b) {
+                found.push([a, b]);
+            }
+        }
+    }
+    found
+}

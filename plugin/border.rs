@@ -1,0 +1,129 @@
+//! The border between this program and a plugin, and the calls that cross it.
+
+use std::panic::{panic_any, resume_unwind};
+use std::path::Path;
+
+use super::panics::{self, Caught, Panics};
+use asid_core::error::{BLAMES_PLUGIN, Error, Result, blames_a_plugin};
+
+/// A loaded plugin.
+pub struct Loaded {
+    /// Its file.
+    pub path: &'static Path,
+    /// Panics of its copy of the standard library.
+    pub panics: Panics,
+}
+
+/// Which way a call goes. This code runs in the host either way.
+#[derive(Clone, Copy)]
+pub enum Border {
+    /// Into the plugin: the object is the plugin's.
+    Inward(&'static Loaded),
+    /// Out of the plugin: the object is the host's, the plugin calls it.
+    Outward(&'static Loaded),
+}
+
+impl Border {
+    /// The border as an argument of the call meets it.
+    pub fn back(self) -> Self {
+        match self {
+            Self::Inward(p) => Self::Outward(p),
+            Self::Outward(p) => Self::Inward(p),
+        }
+    }
+
+    /// Makes a call; a panic in it goes on as a panic of the side that called.
+    pub fn run<R>(self, work: impl FnOnce() -> R) -> R {
+        match self.caught(work) {
+            Ok(value) => value,
+            Err(caught) => self.raise(caught),
+        }
+    }
+
+    /// Makes a call that may fail; a panic of the plugin is an error.
+    ///
+    /// # Errors
+    /// Those of the call, which name the plugin where the message alone would not tell
+    /// what to look at, and [`Error::Failed`] where the plugin panicked.
+    pub fn try_run<R>(self, work: impl FnOnce() -> Result<R>) -> Result<R> {
+        match self.caught(work) {
+            Ok(Ok(value)) => Ok(value),
+            Ok(Err(error)) => Err(self.named(error)),
+            Err(Caught {
+                text,
+                passing: false,
+            }) if matches!(self, Self::Inward(_)) => Err(self.fault(&format!("panicked: {text}"))),
+            Err(caught) => self.raise(caught),
+        }
+    }
+
+    /// Drops a value on its own side; a panic in that ends there.
+    pub fn drop<T>(self, value: T) {
+        let _ = self.caught(|| drop(value));
+    }
+
+    /// An error of a plugin that returned what it must not.
+    fn fault(self, what: &str) -> Error {
+        let (Self::Inward(plugin) | Self::Outward(plugin)) = self;
+        Error::Failed(format!("{BLAMES_PLUGIN}{}: {what}", plugin.path.display()))
+    }
+
+    /// Refuses values of a plugin that are not finite, where those it was given are.
+    ///
+    /// # Errors
+    /// [`Error::Failed`] naming the plugin, and `what` the first such value is.
+    pub fn finite(self, given: &[f64], values: &[f64], what: &str) -> Result<()> {
+        let Self::Inward(_) = self else { return Ok(()) };
+        match values.iter().position(|x| !x.is_finite()) {
+            Some(i) if given.iter().all(|x| x.is_finite()) => {
+                Err(self.fault(&format!("{what} is {} (value {i})", values[i])))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// As [`Border::finite`], for calls that return no error.
+    pub fn check_finite(self, given: &[f64], values: &[f64], what: &str) {
+        if let Err(error) = self.finite(given, values, what) {
+            panic_any(error.to_string());
+        }
+    }
+
+    fn named(self, error: Error) -> Error {
+        let Self::Inward(_) = self else { return error };
+        match error {
+            Error::Failed(m) | Error::Shape(m) if !blames_a_plugin(&m) => self.fault(&m),
+            other => other,
+        }
+    }
+
+    /// Runs work within the `catch_unwind` of the side that the object belongs to.
+    fn caught<R>(self, work: impl FnOnce() -> R) -> Result<R, Caught> {
+        let (mut work, mut done) = (Some(work), None);
+        let mut call = || done = work.take().map(|work| work());
+        match self {
+            Self::Inward(plugin) => (plugin.panics.catch)(&mut call)?,
+            Self::Outward(_) => panics::catch(&mut call)?,
+        }
+        done.ok_or_else(|| Caught {
+            text: "a call did not happen".into(),
+            passing: false,
+        })
+    }
+
+    /// Panics on the side that called.
+    fn raise(self, caught: Caught) -> ! {
+        match self {
+            Self::Inward(_) if caught.passing => resume_unwind(Box::new(caught.text)),
+            Self::Inward(_) => panic_any(
+                self.fault(&format!("panicked: {}", caught.text))
+                    .to_string(),
+            ),
+            // SAFETY: the text outlives the call, which copies it. The function unwinds
+            // through this frame into the plugin that called, whose panic it is.
+            Self::Outward(plugin) => unsafe {
+                (plugin.panics.raise)(caught.text.as_ptr(), caught.text.len())
+            },
+        }
+    }
+}

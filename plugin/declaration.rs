@@ -1,0 +1,155 @@
+//! What a plugin exports: one constant, which says what it is before anything of it is used.
+
+use std::ffi::{CStr, c_char};
+use std::mem::offset_of;
+use std::path::Path;
+
+use super::entries::Entries;
+use super::fingerprint::{self, PROBES, Probe};
+use super::panics::{self, Panics};
+use asid_core::error::{Error, Result};
+use asid_core::registry::Package;
+
+/// Name of the exported constant.
+pub const SYMBOL: &str = "asid_rust_plugin";
+
+/// How the constant begins.
+const MAGIC: [u8; 8] = *b"ASIDRUST";
+
+/// What a shared library of Rust is built by and from, and what it hands over.
+///
+/// The first four fields have the same place in every version, and are all that is read
+/// before the fingerprints were compared.
+#[repr(C)]
+pub struct Declaration {
+    magic: [u8; 8],
+    size: usize,
+    fingerprint: *const c_char,
+    exported: extern "C" fn() -> usize,
+    probes: *const Probe,
+    probe_count: usize,
+    panics: Panics,
+    entries: fn() -> Entries,
+}
+
+// SAFETY: the pointers are to constants of the library, which is never closed.
+unsafe impl Sync for Declaration {}
+
+/// The constant. It is in every shared library that holds this crate, once, however many
+/// packages with parts are linked into it.
+#[unsafe(no_mangle)]
+#[allow(non_upper_case_globals)]
+pub static asid_rust_plugin: Declaration = Declaration {
+    magic: MAGIC,
+    size: size_of::<Declaration>(),
+    fingerprint: fingerprint::TEXT.as_ptr().cast(),
+    exported,
+    probes: PROBES.as_ptr(),
+    probe_count: PROBES.len(),
+    panics: panics::OWN,
+    entries: Entries::exported,
+};
+
+/// A package that hands its parts over where it is in a shared library.
+#[doc(hidden)]
+pub struct Exported(pub Package);
+
+inventory::collect!(Exported);
+
+/// Number of packages that hand over parts.
+extern "C" fn exported() -> usize {
+    inventory::iter::<Exported>().count()
+}
+
+impl Declaration {
+    /// Reads the constant of a library, after checking that it can be read; `None` where
+    /// no package in the library hands anything over, as in an engine that is written in Rust.
+    ///
+    /// # Errors
+    /// [`Error::Plugin`] saying what differs from this program, and what to do.
+    ///
+    /// # Safety
+    /// `address` is that of the constant [`SYMBOL`] of a library that stays open: at least
+    /// four words, of which the second tells how many bytes there are, the third is null
+    /// or points to a text ended by a zero, and the fourth is a function.
+    pub(super) unsafe fn read(address: *const Self, path: &Path) -> Result<Option<&'static Self>> {
+        let refuse = |message: String| Error::Plugin {
+            path: path.to_owned(),
+            message,
+        };
+        if address.is_null() || !address.is_aligned() {
+            return Err(refuse(format!("its `{SYMBOL}` is at no valid address")));
+        }
+        // SAFETY: these words are there; `addr_of!` makes no reference to the rest.
+        let (magic, size, text) = unsafe {
+            (
+                (&raw const (*address).magic).read(),
+                (&raw const (*address).size).read(),
+                (&raw const (*address).fingerprint).read(),
+            )
+        };
+        if magic != MAGIC {
+            return Err(refuse(format!("its `{SYMBOL}` is not that of asid")));
+        }
+        let needed = size_of::<Self>();
+        if size < offset_of!(Self, probes) || text.is_null() {
+            return Err(refuse(format!(
+                "its `{SYMBOL}` is cut off: {size} bytes where {needed} are needed; rebuild the plugin"
+            )));
+        }
+        // SAFETY: it is there, and a function of the C ABI in every version.
+        let exported = unsafe { (&raw const (*address).exported).read() };
+        if exported() == 0 {
+            return Ok(None);
+        }
+        // SAFETY: it is a text ended by a zero.
+        let theirs = unsafe { CStr::from_ptr(text) }.to_string_lossy();
+        if let Some(difference) = fingerprint::difference(&theirs) {
+            return Err(refuse(difference));
+        }
+        if size < needed {
+            return Err(refuse(format!(
+                "its `{SYMBOL}` is cut off: {size} bytes where {needed} are needed; rebuild the plugin"
+            )));
+        }
+        // SAFETY: all of it is there, and the same compiler made it from the same sources.
+        let (probes, count) = unsafe { ((*address).probes, (*address).probe_count) };
+        // SAFETY: as above; these are the parts of a constant slice.
+        let probes = unsafe { std::slice::from_raw_parts(probes, count) };
+        if let Some(difference) = fingerprint::other_layout(probes) {
+            return Err(refuse(difference));
+        }
+        // SAFETY: as above, and the library is never closed.
+        Ok(Some(unsafe { &*address }))
+    }
+
+    /// Panics of the plugin's copy of the standard library.
+    pub(super) fn panics(&self) -> Panics {
+        self.panics
+    }
+
+    /// What it registers, its panics being caught by the caller.
+    pub(super) fn entries(&self) -> Entries {
+        (self.entries)()
+    }
+}
+
+/// Hands over what the package registers, where it is in a shared library that
+/// `asid --plugin FILE` loads.
+///
+/// It is written once in a crate. The library is one of the type `cdylib`: of the crate
+/// itself, or of another that links it. In a program it does nothing.
+#[macro_export]
+macro_rules! export_plugin {
+    () => {
+        #[cfg(panic = "abort")]
+        compile_error!("a plugin needs `panic = \"unwind\"` in its profile: its panics are caught");
+
+        $crate::__inventory::submit! {
+            $crate::Exported($crate::Package {
+                name: env!("CARGO_PKG_NAME"),
+                version: env!("CARGO_PKG_VERSION"),
+            })
+        }
+    };
+}

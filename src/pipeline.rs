@@ -1,0 +1,267 @@
+//! The pipeline: explore, identify, solve, and one zero-shot attempt in the real world.
+
+use std::time::Instant;
+
+use asid_algorithms::fisher::expected::{ExpectedSettings, expected_deviation};
+use asid_algorithms::fisher::{FisherBatch, FisherSettings, Form};
+use asid_core::error::Result;
+use asid_core::explore::{CurvePoint, Explorer};
+use asid_core::identify::{Identified, Identifier};
+use asid_core::posterior::Posterior;
+use asid_core::problem::Problem;
+use asid_core::real_world::{Attempt, RealEpisode, RealWorld};
+use asid_core::solve::{TaskSolver, Trial};
+
+/// Samples that stand for the prior where nothing was identified.
+const PRIOR_SAMPLES: usize = 256;
+
+/// What an episode tells about the unknowns, computed in the simulator.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct EpisodeInformation {
+    /// Expected posterior standard deviation of each unknown after each control
+    /// step, in its unit: `horizon + 1` entries, the prior first.
+    pub expected_std: Vec<Vec<f64>>,
+    /// Reward of each control step.
+    pub reward: Vec<f64>,
+    /// `tr (I + I_0)^-1`, prior-scaled.
+    pub a_optimality: f64,
+    /// `log det (I + I_0)`, prior-scaled.
+    pub log_det: f64,
+    /// `tr I`, prior-scaled.
+    pub trace: f64,
+}
+
+/// Information of an episode with these actions (`horizon x action`) at `theta` and `start`, all of it as
+/// an explorer with these settings is paid.
+///
+/// # Errors
+/// When the engine fails.
+pub fn episode_information(
+    problem: &Problem<'_>,
+    settings: &FisherSettings,
+    theta: &[f64],
+    start: &[f64],
+    actions: &[f64],
+) -> Result<EpisodeInformation> {
+    let mut batch = FisherBatch::new(problem, settings, 1)?;
+    let mut reading = vec![0.0; batch.width()];
+    batch.begin(theta, start, &mut reading)?;
+    let unscale = |scaled: Vec<f64>| -> Vec<f64> {
+        scaled
+            .iter()
+            .zip(problem.parameters)
+            .zip(theta)
+            .map(|((s, p), x)| p.unscale_std(*x, *s))
+            .collect()
+    };
+    let mut out = EpisodeInformation {
+        expected_std: vec![unscale(batch.information()[0].expected_std())],
+        ..EpisodeInformation::default()
+    };
+    let mut reward = [0.0];
+    for action in actions.chunks_exact(problem.task.exploration().action.len()) {
+        batch.step(action, &mut reading, &mut reward)?;
+        out.reward.push(reward[0]);
+        out.expected_std
+            .push(unscale(batch.information()[0].expected_std()));
+    }
+    let information = &batch.information()[0];
+    out.a_optimality = information.a_optimality();
+    out.log_det = information.log_det();
+    out.trace = information.trace();
+    Ok(out)
+}
+
+/// [`episode_information`] whose expected deviations are those of [`expected_deviation`], with the noise
+/// model of an identifier, where the settings ask for what identification sees (trajectory form, start
+/// pose estimated along, roughness counted) and for at least one fit. Of binary unknowns they follow from the
+/// information.
+///
+/// # Errors
+/// When the engine fails.
+pub fn episode_information_as(
+    problem: &Problem<'_>,
+    settings: &FisherSettings,
+    expected: &ExpectedSettings,
+    theta: &[f64],
+    start: &[f64],
+    actions: &[f64],
+) -> Result<EpisodeInformation> {
+    let mut out = episode_information(problem, settings, theta, start, actions)?;
+    let as_identified =
+        settings.form == Form::Trajectory && settings.nuisance && settings.roughness;
+    if as_identified
+        && expected.rounds > 0
+        && let Some(deviations) = expected_deviation(problem, expected, theta, start, actions)?
+    {
+        for (row, better) in out.expected_std.iter_mut().zip(deviations) {
+            for (std, x) in row.iter_mut().zip(better) {
+                if x.is_finite() {
+                    *std = x;
+                }
+            }
+        }
+    }
+    Ok(out)
+}
+
+/// Seconds and physics steps of one stage.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StageCost {
+    /// Name of the stage.
+    pub stage: &'static str,
+    /// Wall-clock time, s.
+    pub wall_s: f64,
+    /// Physics steps.
+    pub physics_steps: u64,
+}
+
+/// Everything that came of a run.
+#[derive(Debug)]
+pub struct RunOutcome {
+    /// Return over the search for a policy.
+    pub curve: Vec<CurvePoint>,
+    /// What the curve's `x` counts.
+    pub curve_label: &'static str,
+    /// Name of the objective.
+    pub objective: String,
+    /// The real episode; `None` without exploration.
+    pub real: Option<RealEpisode>,
+    /// The policy, for the robot's side.
+    pub policy: serde_json::Value,
+    /// What the real episode tells, at the estimate.
+    pub information: EpisodeInformation,
+    /// What was identified; `None` without identification.
+    pub identified: Option<Identified>,
+    /// What the solver was given.
+    pub belief: Posterior,
+    /// What the solver tried.
+    pub trials: Vec<Trial>,
+    /// The attempt in the real world.
+    pub attempt: Attempt,
+    /// Cost by stage.
+    pub costs: Vec<StageCost>,
+}
+
+/// The algorithms of a run. Without explorer or identifier the solver gets what is known
+/// otherwise, and the prior where nothing is: domain randomisation.
+#[derive(Clone, Copy)]
+pub struct Method<'m> {
+    /// How to explore.
+    pub explorer: Option<&'m dyn Explorer>,
+    /// How to identify.
+    pub identifier: Option<&'m dyn Identifier>,
+    /// How to solve.
+    pub solver: &'m dyn TaskSolver,
+    /// Values of the unknowns that the solver is told where nothing is identified.
+    pub known: Option<&'m [f64]>,
+    /// How the expected deviations are computed; whether readings are weighed together is up to the
+    /// identifier.
+    pub expected: ExpectedSettings,
+}
+
+/// Explore, identify, solve and attempt.
+///
+/// # Errors
+/// When an algorithm or the world fails.
+pub fn run(
+    problem: &Problem<'_>,
+    method: Method<'_>,
+    world: &mut dyn RealWorld,
+) -> Result<RunOutcome> {
+    let mut costs = Vec::new();
+    let mut clock = Stopwatch::new(problem);
+
+    let mut curve = Vec::new();
+    let (mut curve_label, mut objective) = ("", String::new());
+    let mut policy_record = serde_json::Value::Null;
+    let mut real = None;
+    if let Some(explorer) = method.explorer {
+        let mut explored = explorer.explore(problem, None)?;
+        let episode = world.explore(&mut *explored.policy)?;
+        curve = explored.policy.take_curve();
+        if curve.is_empty() {
+            curve = explored.curve;
+        }
+        (curve_label, objective) = (explored.curve_label, explored.objective);
+        policy_record = explored.policy.export();
+        real = Some(episode);
+        costs.push(clock.lap("explore"));
+    }
+
+    let mut identified = None;
+    if let (Some(identifier), Some(real)) = (method.identifier, &real) {
+        identified = Some(identifier.identify(problem, std::slice::from_ref(&real.episode))?);
+        costs.push(clock.lap("identify"));
+    }
+    let belief = match (&identified, method.known) {
+        (Some(found), _) => found.posterior.clone(),
+        (None, Some(values)) => {
+            Posterior::from_samples(problem.parameters, vec![values.to_vec()], &[1.0])
+        }
+        (None, None) => Posterior::prior(
+            problem.parameters,
+            PRIOR_SAMPLES,
+            &mut problem.streams.stream("prior belief"),
+        ),
+    };
+    let information = match (&real, &identified) {
+        (Some(real), Some(found)) => episode_information_as(
+            problem,
+            &FisherSettings::default(),
+            &ExpectedSettings {
+                correlated: method.identifier.is_some_and(Identifier::correlated),
+                ..method.expected
+            },
+            &belief.mean(),
+            &found.starts[0],
+            &real.actions,
+        )?,
+        _ => EpisodeInformation::default(),
+    };
+
+    let mut solved = method.solver.solve(problem, &belief)?;
+    costs.push(clock.lap("solve"));
+    let attempt = world.attempt(&mut *solved.policy)?;
+    costs.push(clock.lap("attempt"));
+    Ok(RunOutcome {
+        curve,
+        curve_label,
+        objective,
+        real,
+        policy: policy_record,
+        information,
+        identified,
+        belief,
+        trials: solved.trials,
+        attempt,
+        costs,
+    })
+}
+
+struct Stopwatch<'a> {
+    problem: &'a Problem<'a>,
+    at: Instant,
+    steps: u64,
+}
+
+impl<'a> Stopwatch<'a> {
+    fn new(problem: &'a Problem<'a>) -> Self {
+        Self {
+            problem,
+            at: Instant::now(),
+            steps: problem.physics_steps(),
+        }
+    }
+
+    fn lap(&mut self, stage: &'static str) -> StageCost {
+        let steps = self.problem.physics_steps();
+        let cost = StageCost {
+            stage,
+            wall_s: self.at.elapsed().as_secs_f64(),
+            physics_steps: steps - self.steps,
+        };
+        (self.at, self.steps) = (Instant::now(), steps);
+        cost
+    }
+}
