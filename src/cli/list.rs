@@ -30,7 +30,7 @@ const OPTIONAL: [(&str, &str, &str); 3] = [
 /// Packages whose parts count as built in.
 const OWN: [&str; 7] = [
     "asid-algorithms",
-    "asid-diagnosis",
+    "asid-effects",
     "asid-learned",
     "asid-mujoco",
     "asid-nn",
