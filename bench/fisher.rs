@@ -14,8 +14,8 @@ use asid_core::progress::Silent;
 use asid_core::{Backend, Model, Parameter, Problem, Streams, Task};
 use serde::Serialize;
 
-use crate::bare::bare;
 use crate::clock::{Cost, timed};
+use crate::loops::bare;
 use crate::workload::{Episodes, Workload};
 
 /// Episodes of a batch.

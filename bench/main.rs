@@ -16,6 +16,7 @@ use asid_tasks as _;
 mod bare;
 mod clock;
 mod fisher;
+mod loops;
 mod machine;
 #[cfg(feature = "mujoco")]
 mod mujoco;
@@ -25,6 +26,7 @@ mod peers;
 mod physics;
 mod plugin;
 mod program;
+mod rapier;
 mod workload;
 
 use std::path::{Path, PathBuf};

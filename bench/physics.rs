@@ -4,8 +4,9 @@ use anyhow::Result;
 use asid_core::{BatchConfig, Control, Model, Rollout, Simulator, Task};
 use serde::Serialize;
 
-use crate::bare::{Bare, bare};
+use crate::bare::Bare;
 use crate::clock::{Cost, timed};
+use crate::loops::bare;
 use crate::workload::{Episodes, Workload};
 
 /// Batch sizes.

@@ -30,7 +30,12 @@ impl FromStr for EffectSpec {
                 "`{text}`: {message}; an effect is written NAME@SITE:parameter=value,parameter=value"
             ),
         };
-        let (head, tail) = text.split_once(':').unwrap_or((text, ""));
+        // A site may hold colons: the last one that values follow begins the values.
+        let values_follow = |tail: &str| tail.trim().is_empty() || tail.contains('=');
+        let (head, tail) = match text.rsplit_once(':') {
+            Some((head, tail)) if values_follow(tail) => (head, tail),
+            _ => text.split_once(':').unwrap_or((text, "")),
+        };
         let (name, site) = name_and_site(head);
         if name.trim().is_empty() {
             return Err(wrong("the name is missing".into()));
@@ -155,6 +160,8 @@ mod tests {
             "actuator-gain@servo:gain=0.9",
             "gravity-tilt:x=0.01,y=-0.02",
             "backlash@elbow",
+            "backlash@robot/left arm.elbow:gap=0.01",
+            "actuator-gain@robot:servo:gain=0.9",
         ] {
             assert_eq!(text.parse::<EffectSpec>().unwrap().to_string(), text);
         }

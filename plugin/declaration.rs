@@ -4,11 +4,10 @@ use std::ffi::{CStr, c_char};
 use std::mem::offset_of;
 use std::path::Path;
 
-use super::entries::Entries;
+use super::exported::{Entries, exported};
 use super::fingerprint::{self, PROBES, Probe};
 use super::panics::{self, Panics};
 use asid_core::error::{Error, Result};
-use asid_core::registry::Package;
 
 /// Name of the exported constant.
 pub const SYMBOL: &str = "asid_rust_plugin";
@@ -49,17 +48,6 @@ pub static asid_rust_plugin: Declaration = Declaration {
     panics: panics::OWN,
     entries: Entries::exported,
 };
-
-/// A package that hands its parts over where it is in a shared library.
-#[doc(hidden)]
-pub struct Exported(pub Package);
-
-inventory::collect!(Exported);
-
-/// Number of packages that hand over parts.
-extern "C" fn exported() -> usize {
-    inventory::iter::<Exported>().count()
-}
 
 impl Declaration {
     /// Reads the constant of a library, after checking that it can be read; `None` where

@@ -4,66 +4,18 @@ use std::path::Path;
 
 use super::across::Across;
 use super::border::{Border, Loaded};
-use super::declaration::{Declaration, Exported};
+use super::declaration::Declaration;
+use super::exported::Entries;
 use asid_core::backend::Backend;
 use asid_core::error::{Error, Result};
 use asid_core::explore::Explorer;
 use asid_core::identify::Identifier;
 use asid_core::registry::{
-    self, AlgorithmEntry, BackendEntry, Entry, ExplorerEntry, IdentifierEntry, Maker, Origin,
-    Package, SolverEntry, TaskEntry,
+    self, AlgorithmEntry, BackendEntry, Entry, Maker, Origin, Package, TaskEntry,
 };
 use asid_core::solve::TaskSolver;
 use asid_core::task::Task;
 use asid_effects::EffectEntry;
-
-/// Entries of a plugin's own registry.
-pub struct Entries {
-    packages: Vec<Package>,
-    backends: Vec<&'static BackendEntry>,
-    tasks: Vec<&'static TaskEntry>,
-    explorers: Vec<&'static ExplorerEntry>,
-    identifiers: Vec<&'static IdentifierEntry>,
-    solvers: Vec<&'static SolverEntry>,
-    effects: Vec<&'static EffectEntry>,
-}
-
-impl Entries {
-    /// What the packages that are exported register, in the copy of the crate that this
-    /// code is in.
-    pub fn exported() -> Self {
-        fn of<E: Entry>(packages: &[Package]) -> Vec<&'static E> {
-            let ours = |e: &&E| matches!(e.origin(), Origin::Linked(p) if packages.contains(&p));
-            registry::all::<E>().into_iter().filter(ours).collect()
-        }
-        let mut packages: Vec<Package> = inventory::iter::<Exported>().map(|e| e.0).collect();
-        packages.sort_by_key(|p| p.name);
-        let packages = &packages;
-        Self {
-            backends: of(packages),
-            tasks: of(packages),
-            explorers: of(packages),
-            identifiers: of(packages),
-            solvers: of(packages),
-            effects: of(packages),
-            packages: packages.clone(),
-        }
-    }
-
-    /// Whether all names can be used, before the first one is.
-    fn check_names(&self) -> Result<()> {
-        fn check<E: Entry>(entries: &[&'static E]) -> Result<()> {
-            let mut names = entries.iter().map(|e| e.name());
-            names.try_for_each(registry::check_name::<E>)
-        }
-        check(&self.backends)?;
-        check(&self.tasks)?;
-        check(&self.explorers)?;
-        check(&self.identifiers)?;
-        check(&self.solvers)?;
-        check(&self.effects)
-    }
-}
 
 /// What a plugin brought.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -31,6 +31,7 @@ mod across;
 mod border;
 mod declaration;
 mod entries;
+mod exported;
 mod fingerprint;
 mod load;
 mod panics;
@@ -39,7 +40,7 @@ pub mod search;
 #[doc(hidden)]
 pub use asid_core::registry::Package;
 #[doc(hidden)]
-pub use declaration::Exported;
+pub use exported::Exported;
 pub use load::{Loaded, Part, load, loaded};
 
 #[doc(hidden)]

@@ -19,3 +19,4 @@ pub mod number;
 pub mod page;
 pub mod plot;
 pub mod run;
+mod style;

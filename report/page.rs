@@ -34,8 +34,8 @@ pub use table::{Cell, Column, Table};
 pub use tile::Tile;
 
 use crate::markup::escape;
+use crate::style::STYLE;
 
-pub(crate) const STYLE: &str = include_str!("page/style.css");
 const SCRIPT: &str = include_str!("page/copy.js");
 
 /// How a tile or a table cell is meant.

@@ -21,8 +21,12 @@ pub struct EpisodeInformation {
     /// Expected posterior standard deviation of each unknown after each control
     /// step, in its unit: `horizon + 1` entries, the prior first.
     pub expected_std: Vec<Vec<f64>>,
-    /// Reward of each control step.
+    /// Reward of each control step, in the unit [`EpisodeInformation::unit`].
     pub reward: Vec<f64>,
+    /// What rewards are counted in.
+    pub unit: &'static str,
+    /// Form of the derivative by name.
+    pub form: &'static str,
     /// `tr (I + I_0)^-1`, prior-scaled.
     pub a_optimality: f64,
     /// `log det (I + I_0)`, prior-scaled.
@@ -56,6 +60,8 @@ pub fn episode_information(
     };
     let mut out = EpisodeInformation {
         expected_std: vec![unscale(batch.information()[0].expected_std())],
+        unit: settings.objective.unit(),
+        form: settings.form.name(),
         ..EpisodeInformation::default()
     };
     let mut reward = [0.0];

@@ -51,6 +51,12 @@ fn unknown_names_list_the_near_ones() {
         ("--solver", "xyz", "`cem`"),
         ("--truth", "mass_ofset=0.1", "`mass_offset`"),
         ("--sed", "1", "'--seed'"),
+        // A TOML file, which repeats a run, could not hold it.
+        (
+            "--seed",
+            "9223372036854775808",
+            "from 0 to 9223372036854775807",
+        ),
     ] {
         refused_run(&place, &[option, name], &[near]);
     }

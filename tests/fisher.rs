@@ -7,7 +7,9 @@ mod cart_support;
 #[allow(dead_code)] // not every test needs all of it
 mod task_support;
 
+use asid::algorithms::explore::FisherEnvironment;
 use asid::algorithms::fisher::{FisherBatch, FisherSettings, Form};
+use asid::core::environment::{BatchEnvironment, Transition};
 use asid::core::parameter::{Parameter, Scale};
 use asid::core::registry::{BackendEntry, all};
 use cart_support::{Cart, FRAME, HORIZON, NOISE};
@@ -202,4 +204,36 @@ fn curvature_counts_as_noise_where_roughness_is_asked_for() {
             .sum();
         close(engine, episode.trace[HORIZON - 1], wanted, 1e-4);
     });
+}
+
+/// A learner must not go on in an episode that the engine gave up.
+#[test]
+fn a_diverged_episode_ends_and_is_worth_nothing() {
+    let task = Cart::new();
+    let parameters = [Cart::mass(Scale::Linear)];
+    let mut diverged = 0;
+    for entry in all::<BackendEntry>() {
+        let backend = (entry.make)().unwrap();
+        task_support::on_engine(&*backend, &task, &parameters, 0, |problem, _| {
+            let settings = FisherSettings::default();
+            let mut environment = FisherEnvironment::new(problem, &settings, 2).unwrap();
+            let len = environment.observation_len();
+            let mut observation = vec![0.0; 2 * len];
+            // The second cart stands where a double resolves no step: engines give it up.
+            let begun = environment.begin_at(&[2.0, 2.0], &[0.02, 1e30], &mut observation);
+            if begun.is_err() {
+                return;
+            }
+            let mut transition = Transition::new(2, len);
+            environment.step(&[0.5, 0.5], &mut transition).unwrap();
+            let alive = environment.batch().alive().to_vec();
+            assert!(alive[0] && !transition.terminated[0], "{}", entry.name);
+            assert_eq!(transition.terminated[1], !alive[1], "{}", entry.name);
+            if !alive[1] {
+                assert_eq!(transition.reward[1], 0.0);
+                diverged += 1;
+            }
+        });
+    }
+    assert!(diverged > 0, "no engine gives up a cart at 1e30 m");
 }

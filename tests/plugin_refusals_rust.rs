@@ -182,8 +182,7 @@ asid_rust_plugin = {{ "{magic}", {size}, "{fingerprint}", exported, {{ 0 }} }};"
 fn what_was_built_otherwise_is_refused_before_it_is_used() {
     let place = Workplace::new();
     let folder = place.path("");
-    let other =
-        "compiler=rustc 1.80.0 (051478957 2024-07-21)\\ntarget=x\\nasid=0.0.1\\nsources=0";
+    let other = "compiler=rustc 1.80.0 (051478957 2024-07-21)\\ntarget=x\\nasid=0.0.1\\nsources=0";
     for (name, source, reason) in [
         (
             "compiler",

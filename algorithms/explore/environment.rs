@@ -23,6 +23,8 @@ pub struct FisherEnvironment<'a> {
     rng: Rng,
     step: usize,
     readings: Vec<f64>,
+    /// Episodes that diverged and wait for the horizon, when all begin anew.
+    ended: Vec<bool>,
 }
 
 impl<'a> FisherEnvironment<'a> {
@@ -38,6 +40,7 @@ impl<'a> FisherEnvironment<'a> {
         let batch = FisherBatch::new(problem, settings, episodes)?;
         Ok(Self {
             readings: vec![0.0; episodes * batch.width()],
+            ended: vec![false; episodes],
             rng: problem.streams.stream("fisher environment"),
             observer: Observer::new(problem)?,
             signals: SignalSet::new(problem.model.layout(), problem.signals)?,
@@ -58,6 +61,7 @@ impl<'a> FisherEnvironment<'a> {
         observation: &mut [f64],
     ) -> Result<()> {
         self.step = 0;
+        self.ended.fill(false);
         let mut readings = std::mem::take(&mut self.readings);
         let begun = self.batch.begin(theta, starts, &mut readings);
         self.readings = readings;
@@ -143,8 +147,17 @@ impl BatchEnvironment for FisherEnvironment<'_> {
         let mut observation = std::mem::take(&mut transition.final_observation);
         self.observe(&mut observation);
         transition.final_observation = observation;
-        // The horizon is part of the task and the time is observed: its end is an end, not a cut.
-        transition.terminated.fill(over);
+        for (ended, alive) in self.ended.iter_mut().zip(self.batch.alive()) {
+            *ended |= !alive;
+        }
+        // The horizon is part of the task and the time is observed: its end is an end, not a cut. An
+        // episode that diverged ends at once, and is worth nothing until the horizon.
+        for (terminated, ended) in transition.terminated.iter_mut().zip(&self.ended) {
+            *terminated = over || *ended;
+        }
+        for (reward, ended) in transition.reward.iter_mut().zip(&self.ended) {
+            *reward = if *ended { 0.0 } else { *reward };
+        }
         transition.truncated.fill(false);
         if over {
             let mut first = std::mem::take(&mut transition.observation);

@@ -110,7 +110,7 @@ impl FisherSettings {
     pub fn check(&self) -> Result<()> {
         if !(self.delta.is_finite() && self.delta > 0.0 && self.delta <= 1.0) {
             return Err(Error::Config {
-                key: "explorer.delta".into(),
+                key: "explorer.fisher.delta".into(),
                 message: format!(
                     "must be above 0 and at most 1 prior standard deviation, not {}",
                     self.delta

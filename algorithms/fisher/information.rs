@@ -44,6 +44,16 @@ impl Objective {
             Self::DOptimal => "d-optimal",
         }
     }
+
+    /// What its rewards are counted in, for unknowns in prior standard deviations.
+    #[must_use]
+    pub fn unit(self) -> &'static str {
+        match self {
+            Self::Trace => "per prior variance",
+            Self::AOptimal => "prior variance",
+            Self::DOptimal => "log of information",
+        }
+    }
 }
 
 impl FromStr for Objective {

@@ -19,6 +19,7 @@ use nalgebra::{DMatrix, DVector};
 use rand_distr::{Distribution, StandardNormal};
 
 use crate::fisher::precision::{Precision, inflation};
+use crate::fisher::symmetric_eigen;
 use asid_core::rng::Rng;
 
 /// Degrees of freedom that the roughness is left at least.
@@ -197,17 +198,17 @@ impl LocalFit {
         let (precision, curvature, information);
         if correlated {
             precision = Precision::correlated(&self.luck, self.freedom);
-            curvature = self.curvature(&precision, &self.luck, self.freedom);
+            curvature = self.curvature(&precision, &self.luck, self.freedom)?;
             let [one, other] = self.halves();
             let asked_of = |weighing: &DMatrix<f64>, asked: &DMatrix<f64>| {
                 let by = Precision::correlated(weighing, self.freedom_of(weighing));
-                let h = self.curvature(&by, asked, self.freedom_of(asked));
+                let h = self.curvature(&by, asked, self.freedom_of(asked))?;
                 self.sandwich(&by, &h, asked, self.freedom_of(asked))
             };
             information = (asked_of(&one, &other)? + asked_of(&other, &one)?) * 0.5;
         } else {
             precision = Precision::diagonal(&self.spread());
-            curvature = self.curvature(&precision, &self.luck, self.freedom);
+            curvature = self.curvature(&precision, &self.luck, self.freedom)?;
             information = self.sandwich(&precision, &curvature, &self.luck, self.freedom)?;
         }
         Some(Told {
@@ -269,13 +270,13 @@ impl LocalFit {
 
     /// `J^T P J` along the columns of the factor, less what luck of this spread in the slopes adds, and not below
     /// zero in any direction.
-    fn curvature(&self, by: &Precision, luck: &DMatrix<f64>, freedom: f64) -> DMatrix<f64> {
+    fn curvature(&self, by: &Precision, luck: &DMatrix<f64>, freedom: f64) -> Option<DMatrix<f64>> {
         let of_luck = by.weigh(luck).component_mul(luck).sum() / freedom;
         let raw =
             by.weigh(&self.slopes) * self.slopes.transpose() - &self.scatter * (2.0 * of_luck);
-        let mut eigen = ((&raw + raw.transpose()) * 0.5).symmetric_eigen();
+        let mut eigen = symmetric_eigen((&raw + raw.transpose()) * 0.5)?;
         eigen.eigenvalues.apply(|v| *v = v.max(0.0));
-        eigen.recompose()
+        Some(eigen.recompose())
     }
 
     /// `H M^-1 H`, where roughness is as it shows in `luck`.

@@ -5,6 +5,7 @@
 //! region ([`local_fit`], [`precision`]); [`sensitivity`] tells unknowns that change no reading.
 
 mod batch;
+mod eigen;
 pub mod expected;
 mod information;
 pub mod local_fit;
@@ -12,4 +13,5 @@ pub mod precision;
 pub mod sensitivity;
 
 pub use batch::{FisherBatch, FisherSettings, Form};
+pub use eigen::symmetric_eigen;
 pub use information::{Information, Objective, TRACE_CLIP, inverse_above_prior};

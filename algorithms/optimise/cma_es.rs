@@ -12,6 +12,7 @@ use serde::{Deserialize, Serialize};
 
 use super::search::ranked;
 use super::{Gaussian, Search, UpdateRule, require};
+use crate::fisher::symmetric_eigen;
 
 /// How fast the covariance learns.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -154,7 +155,7 @@ impl UpdateRule for CmaEsSettings {
         }
         paths.refits = paths.refits.saturating_add(1);
 
-        let root = inverse_root(&paths.covariance);
+        let root = inverse_root(&paths.covariance)?;
         paths.path_sigma = &paths.path_sigma * (1.0 - s.c_sigma)
             + root * &y * (s.c_sigma * (2.0 - s.c_sigma) * s.mu_eff).sqrt();
         let length = paths.path_sigma.norm();
@@ -188,13 +189,13 @@ impl UpdateRule for CmaEsSettings {
 }
 
 /// `C^-1/2`; directions lost to rounding count as the best that a double resolves.
-fn inverse_root(covariance: &DMatrix<f64>) -> DMatrix<f64> {
-    let mut eigen = covariance.clone().symmetric_eigen();
+fn inverse_root(covariance: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let mut eigen = symmetric_eigen(covariance.clone())?;
     let least = (eigen.eigenvalues.amax() * f64::EPSILON).max(f64::MIN_POSITIVE);
     eigen
         .eigenvalues
         .apply(|v| *v = v.max(least).sqrt().recip());
-    eigen.recompose()
+    Some(eigen.recompose())
 }
 
 #[cfg(test)]

@@ -130,19 +130,17 @@ impl Episode {
     /// # Errors
     /// When the file cannot be written.
     pub fn write_csv(&self, path: &Path) -> Result<()> {
-        let mut text = String::from("time");
-        for a in &self.actuators {
-            text += &format!(",ctrl.{a}");
-        }
+        let mut header = vec!["time".to_owned()];
+        header.extend(self.actuators.iter().map(|a| format!("ctrl.{a}")));
         for c in &self.channels {
             if c.len == 1 {
-                text += &format!(",{}", c.name);
+                header.push(c.name.clone());
             } else {
-                for i in 0..c.len {
-                    text += &format!(",{}.{i}", c.name);
-                }
+                header.extend((0..c.len).map(|i| format!("{}.{i}", c.name)));
             }
         }
+        let header: Vec<String> = header.iter().map(|name| quoted(name)).collect();
+        let mut text = header.join(",");
         text.push('\n');
         let (nu, width) = (self.actuators.len(), self.width());
         for i in 0..self.rows() {
@@ -162,6 +160,15 @@ impl Episode {
             path: path.to_owned(),
             message: e.to_string(),
         })
+    }
+}
+
+/// A cell of text, in quotes where a CSV file needs them (RFC 4180).
+fn quoted(text: &str) -> String {
+    if text.contains(['"', ',', '\n', '\r']) || text.trim() != text {
+        format!("\"{}\"", text.replace('"', "\"\""))
+    } else {
+        text.to_owned()
     }
 }
 
@@ -258,6 +265,45 @@ pub(crate) mod tests {
         for (a, b) in back.readings.iter().zip(&episode.readings) {
             assert!(a == b || (a.is_nan() && b.is_nan()));
         }
+    }
+
+    #[test]
+    fn names_with_commas_and_quotes_read_back() {
+        let mut layout = layout();
+        for (name, odd) in [("servo", "a, \"b\""), ("angle", "l,ed")] {
+            for a in layout.actuators.iter_mut().filter(|a| a.name == name) {
+                a.name = odd.into();
+            }
+            for s in layout.sensors.iter_mut().filter(|s| s.name == name) {
+                s.name = odd.into();
+            }
+        }
+        let actuators = vec![layout.actuators[0].name.clone()];
+        let sensor = layout.sensors.iter().find(|s| s.len == 1).unwrap();
+        let episode = Episode {
+            time: vec![0.0, 0.1],
+            actuators,
+            ctrl: vec![1.0, 2.0],
+            channels: vec![ChannelColumns {
+                name: sensor.name.clone(),
+                len: 1,
+            }],
+            readings: vec![0.5, 0.25],
+            ..Episode::default()
+        };
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("log.csv");
+        episode.write_csv(&path).unwrap();
+        let header = std::fs::read_to_string(&path).unwrap();
+        assert!(
+            header.starts_with("time,\"ctrl.a, \"\"b\"\"\","),
+            "{header}"
+        );
+        let back = Episode::read(&path, &layout);
+        assert_eq!(
+            back.map(|b| b.readings).map_err(|e| e.to_string()),
+            Ok(episode.readings)
+        );
     }
 
     #[test]

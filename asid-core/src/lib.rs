@@ -28,6 +28,7 @@ pub mod registry;
 pub mod replay;
 pub mod rng;
 pub mod scene;
+pub mod settings;
 pub mod signal;
 pub mod simulator;
 pub mod solve;

@@ -17,6 +17,7 @@ use crate::task::Task;
 mod origin;
 mod register;
 
+pub use crate::settings::{Settings, defaults, settings};
 pub use origin::{Origin, Package};
 
 /// A backend.
@@ -45,9 +46,6 @@ pub struct TaskEntry {
 
 /// Makes a thing that implements `T`; a closure, for what is loaded at run time.
 pub type Maker<T> = &'static (dyn Fn() -> Result<Box<T>> + Sync);
-
-/// Settings of an algorithm, as in a configuration file.
-pub type Settings = toml::Table;
 
 /// An algorithm; `T` is the trait it implements.
 pub struct AlgorithmEntry<T: ?Sized + 'static> {
@@ -182,42 +180,6 @@ pub fn find<E: Entry>(name: &str) -> Result<&'static E> {
         .copied()
         .find(|e| e.name() == name)
         .ok_or_else(|| Error::unknown(E::KIND, name, entries.iter().map(|e| e.name())))
-}
-
-/// Reads an algorithm's settings; unknown keys, wrong types and numbers that are
-/// not finite are errors.
-///
-/// # Errors
-/// [`Error::Config`] naming `section` and the key.
-pub fn settings<S: serde::de::DeserializeOwned>(section: &str, table: &Settings) -> Result<S> {
-    check_finite(section, table)?;
-    S::deserialize(toml::Value::Table(table.clone())).map_err(|e| Error::Config {
-        key: section.to_owned(),
-        message: crate::scene::one_line(e.message()),
-    })
-}
-
-fn check_finite(section: &str, table: &Settings) -> Result<()> {
-    for (key, value) in table {
-        let key = format!("{section}.{key}");
-        match value {
-            toml::Value::Table(inner) => check_finite(&key, inner)?,
-            toml::Value::Float(x) if !x.is_finite() => {
-                return Err(Error::Config {
-                    key,
-                    message: format!("{value} is not a finite number"),
-                });
-            }
-            _ => {}
-        }
-    }
-    Ok(())
-}
-
-/// The default settings of an algorithm as a table.
-#[must_use]
-pub fn defaults<S: Default + serde::Serialize>() -> Settings {
-    toml::Table::try_from(S::default()).unwrap_or_default()
 }
 
 #[cfg(test)]

@@ -13,6 +13,10 @@ use crate::error::{Error, Result};
 /// Deepest chain of `<include>` that is followed.
 const MAX_INCLUDE_DEPTH: usize = 8;
 
+/// Most includes of one document that are followed: a few files that include each other several times
+/// over would otherwise fill the memory. MuJoCo's largest models have some dozens.
+const MAX_INCLUDES: usize = 1000;
+
 /// One MJCF document with its includes spliced in.
 #[derive(Clone)]
 pub struct Scene {
@@ -50,7 +54,9 @@ impl Scene {
         let directory = path.parent().map(Path::to_path_buf).unwrap_or_default();
         let name = path.display().to_string();
         let from = directory.clone();
-        let xml = splice(&name, &xml, 0, &|file| read(&from.join(file)))?;
+        let xml = splice(&name, &xml, 0, &mut MAX_INCLUDES.clone(), &|file| {
+            read(&from.join(file))
+        })?;
         Self::checked(name, xml, Some(directory))
     }
 
@@ -60,7 +66,7 @@ impl Scene {
     /// # Errors
     /// As [`Scene::from_file`].
     pub fn from_xml(name: &str, xml: &str, includes: &[(&str, &str)]) -> Result<Self> {
-        let xml = splice(name, xml, 0, &|file| {
+        let xml = splice(name, xml, 0, &mut MAX_INCLUDES.clone(), &|file| {
             includes
                 .iter()
                 .find(|(n, _)| *n == file)
@@ -227,11 +233,13 @@ fn parse<'a>(name: &str, xml: &'a str) -> Result<roxmltree::Document<'a>> {
     })
 }
 
-/// Replaces every `<include file="…"/>` by the children of that file's root.
+/// Replaces every `<include file="…"/>` by the children of that file's root; `left` is how many more
+/// may be followed.
 fn splice(
     name: &str,
     xml: &str,
     depth: usize,
+    left: &mut usize,
     load: &dyn Fn(&str) -> Result<String>,
 ) -> Result<String> {
     if depth > MAX_INCLUDE_DEPTH {
@@ -253,7 +261,11 @@ fn splice(
                 document.text_pos_at(node.range().start).row
             ),
         })?;
-        let text = splice(file, &load(file)?, depth + 1, load)?;
+        *left = left.checked_sub(1).ok_or_else(|| Error::Scene {
+            scene: name.to_owned(),
+            message: format!("more than {MAX_INCLUDES} files are included"),
+        })?;
+        let text = splice(file, &load(file)?, depth + 1, left, load)?;
         let included = parse(file, &text)?;
         let root = included.root_element();
         out.push_str(&xml[copied..node.range().start]);
@@ -289,6 +301,29 @@ mod tests {
         assert_eq!(
             scene.xml(),
             r#"<mujoco><option timestep="0.01"/><worldbody/></mujoco>"#
+        );
+    }
+
+    #[test]
+    fn includes_that_multiply_are_refused() {
+        let files: Vec<(String, String)> = (0..7)
+            .map(|k| {
+                let next = format!("<include file=\"{}.xml\"/>", k + 1).repeat(9);
+                (
+                    format!("{k}.xml"),
+                    format!("<mujocoinclude>{next}</mujocoinclude>"),
+                )
+            })
+            .chain([("7.xml".into(), "<mujocoinclude/>".into())])
+            .collect();
+        let files: Vec<(&str, &str)> = files.iter().map(|(n, t)| (&**n, &**t)).collect();
+        let root = r#"<mujoco><include file="0.xml"/></mujoco>"#;
+        let error = Scene::from_xml("many", root, &files)
+            .unwrap_err()
+            .to_string();
+        assert!(
+            error.contains("more than 1000 files are included"),
+            "{error}"
         );
     }
 

@@ -46,15 +46,7 @@ impl FromStr for Target {
                 "{message}; a target is written element/name/attribute[/index], such as geom/puck/friction/0"
             ),
         };
-        let mut parts: Vec<&str> = text.split('/').collect();
-        if parts.first() == Some(&"option") {
-            parts.insert(1, "");
-        }
-        let (element, name, attribute, index) = match parts[..] {
-            [e, n, a] => (e, n, a, "0"),
-            [e, n, a, i] => (e, n, a, i),
-            _ => return Err(bad("not a target")),
-        };
+        let (element, rest) = text.split_once('/').ok_or_else(|| bad("not a target"))?;
         const ELEMENTS: [&str; 7] = [
             "geom", "body", "joint", "actuator", "equality", "option", "effect",
         ];
@@ -64,6 +56,21 @@ impl FromStr for Target {
                 ELEMENTS.join(", ")
             )));
         }
+        // A name may hold slashes, as those of scenes that dm_control attaches do, so attribute and
+        // index are read from the end: no attribute is a number.
+        let (rest, index) = match rest.rsplit_once('/') {
+            Some((before, last)) if last.bytes().all(|b| b.is_ascii_digit()) => (
+                before,
+                last.parse()
+                    .map_err(|_| bad(&format!("`{last}` is not an index")))?,
+            ),
+            _ => (rest, 0),
+        };
+        let (name, attribute) = match rest.rsplit_once('/') {
+            _ if element == "option" => ("", rest),
+            Some(both) => both,
+            None => return Err(bad("not a target")),
+        };
         if attribute.is_empty() || (name.is_empty() && element != "option") {
             return Err(bad("name or attribute is empty"));
         }
@@ -71,9 +78,7 @@ impl FromStr for Target {
             element: element.to_owned(),
             name: name.to_owned(),
             attribute: attribute.to_owned(),
-            index: index
-                .parse()
-                .map_err(|_| bad(&format!("`{index}` is not an index")))?,
+            index,
         })
     }
 }
@@ -116,6 +121,10 @@ mod tests {
             "geom/puck/friction/0",
             "body/rod/mass/0",
             "option/gravity/2",
+            "joint/robot/arm/elbow/damping/0",
+            "geom/left finger.pad/friction/1",
+            "geom/pad/3/friction/1",
+            "effect/viscous-friction@robot/elbow/coefficient/0",
         ] {
             let target: Target = text.parse().unwrap();
             assert_eq!(target.to_string(), text);
@@ -131,7 +140,8 @@ mod tests {
             "geom/puck",
             "thing/puck/friction",
             "geom//friction",
-            "geom/p/friction/x",
+            "geom/puck/3",
+            "geom/puck/friction/99999999999999999999999",
         ] {
             let error = text.parse::<Target>().unwrap_err().to_string();
             assert!(error.contains("element/name/attribute"), "{error}");

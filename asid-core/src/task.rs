@@ -11,9 +11,9 @@ use crate::difficulty::Difficulty;
 use crate::error::Result;
 use crate::layout::Layout;
 use crate::parameter::Parameter;
-use crate::registry::Settings;
 use crate::rng::Rng;
 use crate::scene::Scene;
+use crate::settings::Settings;
 use crate::signal::Signal;
 use crate::target::Target;
 

@@ -1,7 +1,7 @@
 //! Plots side by side as one SVG file that stands alone: for a page of documentation.
 
 use crate::markup::escape;
-use crate::page::STYLE;
+use crate::style::STYLE;
 
 use super::{FONT_SIZE, NARROW, Plot, coordinate};
 

@@ -51,7 +51,7 @@ pub struct Arguments {
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     seeds: Option<u64>,
     /// Seed of each row's first run; the others count up from it
-    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = super::options::seed)]
     seed: Option<u64>,
     /// Makes a table of the paper: its tasks, conditions, methods and world, unless others are named
     #[arg(long, value_name = "1|2|3")]

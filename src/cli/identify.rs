@@ -171,7 +171,7 @@ pub fn identify(arguments: &Arguments) -> Result<()> {
     ));
     let caveats = caveats(&session.parameters, &found.posterior);
     lines.extend(caveats.iter().cloned());
-    let names = copies(arguments.log.len());
+    let names = copies(&arguments.log);
     let mut report = report(&session, &episodes, &found, &names, wall_s)?;
     report
         .notes
@@ -193,11 +193,18 @@ pub fn identify(arguments: &Arguments) -> Result<()> {
     Ok(())
 }
 
-/// Names of the logs' copies in the folder.
-fn copies(n: usize) -> Vec<String> {
-    match n {
-        1 => vec!["real.csv".into()],
-        n => (1..=n).map(|i| format!("real-{i}.csv")).collect(),
+/// Names of the logs' copies in the folder, of the same format as the logs.
+fn copies(logs: &[PathBuf]) -> Vec<String> {
+    let ending = |path: &PathBuf| match path.extension() {
+        Some(e) if e.eq_ignore_ascii_case("parquet") => "parquet",
+        _ => "csv",
+    };
+    match logs {
+        [one] => vec![format!("real.{}", ending(one))],
+        many => (1..)
+            .zip(many)
+            .map(|(i, path)| format!("real-{i}.{}", ending(path)))
+            .collect(),
     }
 }
 
@@ -283,4 +290,17 @@ fn report(
         report.notes.push(unexplained(found.residual));
     }
     Ok(report)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_parquet_log_is_copied_under_its_own_ending() {
+        let logs = ["a.csv", "b.PARQUET"].map(PathBuf::from);
+        assert_eq!(copies(&logs[..1]), ["real.csv"]);
+        assert_eq!(copies(&logs[1..]), ["real.parquet"]);
+        assert_eq!(copies(&logs), ["real-1.csv", "real-2.parquet"]);
+    }
 }

@@ -15,6 +15,15 @@ pub fn threads(text: &str) -> Result<usize, String> {
         .ok_or_else(|| format!("not a whole number from 1 to {MAX_THREADS}"))
 }
 
+/// A seed: a whole number that a TOML file can hold, so that every run can be repeated by its file.
+pub fn seed(text: &str) -> Result<u64, String> {
+    const LARGEST: u64 = i64::MAX as u64;
+    text.parse()
+        .ok()
+        .filter(|seed| *seed <= LARGEST)
+        .ok_or_else(|| format!("not a whole number from 0 to {LARGEST}"))
+}
+
 /// Options of every subcommand that works.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub struct Common {
@@ -22,7 +31,7 @@ pub struct Common {
     #[arg(long, value_name = "NAME")]
     pub backend: Option<String>,
     /// Seed of all chance
-    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = seed)]
     pub seed: Option<u64>,
     /// Threads; results do not depend on it [default: one a core]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = threads)]

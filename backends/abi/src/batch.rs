@@ -6,9 +6,9 @@ use std::sync::Arc;
 
 use asid_core::{BatchConfig, Capabilities, Error, Result, Status};
 
-use crate::adapter::{ModelHandle, NamedTarget, about, function};
 use crate::engine::Checked;
 use crate::failure::{broken, decode};
+use crate::handle::{ModelHandle, NamedTarget, about, function};
 use crate::table::{self, Code};
 use crate::text;
 

@@ -3,9 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use asid_core::{Backend, Capabilities, Error, Result};
+use asid_core::{Capabilities, Error, Result};
 
-use crate::adapter::LoadedBackend;
 use crate::crash::Action;
 use crate::library::Library;
 use crate::table::{self, ABI_MAJOR, ABI_MINOR, ENTRY};
@@ -192,13 +191,6 @@ impl Engine {
     #[must_use]
     pub fn path(&self) -> &Path {
         &self.inner.path
-    }
-
-    /// The engine as a backend under a name of the host's choice, which differs
-    /// from its own where that is taken.
-    #[must_use]
-    pub fn backend(&self, name: &str) -> Box<dyn Backend> {
-        Box::new(LoadedBackend::new(self.clone(), name))
     }
 
     /// The checked table.

@@ -19,6 +19,7 @@ mod crash;
 mod engine;
 pub mod export;
 mod failure;
+mod handle;
 mod hook;
 mod layout;
 pub mod library;

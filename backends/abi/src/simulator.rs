@@ -14,9 +14,9 @@ use asid_core::layout::{JointKind, Layout, Recording};
 use asid_core::simulator::check_sims;
 use asid_core::{BatchConfig, Capabilities, Error, Result, Rollout, Simulator, Snapshot, Status};
 
-use crate::adapter::ModelHandle;
 use crate::batch::BatchHandle;
 use crate::failure::broken;
+use crate::handle::ModelHandle;
 use crate::snapshot::SavedStates;
 use crate::{readings, rollout, slices};
 

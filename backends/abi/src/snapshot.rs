@@ -3,7 +3,7 @@
 use std::ptr::NonNull;
 use std::sync::Arc;
 
-use crate::adapter::ModelHandle;
+use crate::handle::ModelHandle;
 use crate::table;
 
 /// A snapshot of the engine with the model that it is of.

@@ -14,8 +14,10 @@
 //!   reported as diverged and stands still.
 //! - Nothing is written to the console or to `MUJOCO_LOG.TXT`.
 
+mod compiled;
 mod contact;
 mod ffi;
+mod field;
 mod inertia;
 mod layout;
 mod model;

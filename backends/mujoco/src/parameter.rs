@@ -3,10 +3,11 @@
 use asid_core::Target;
 use asid_core::{Error, Result};
 
+use crate::compiled::Compiled;
 use crate::ffi::{Batch, Expanded};
+use crate::field::Field;
 use crate::inertia::{BodyGeoms, BodyInertia};
-use crate::model::Compiled;
-use crate::target::{Column, Field, Part, parameter};
+use crate::target::{Column, Part, parameter};
 
 /// A body whose mass properties depend on some columns.
 #[derive(Clone, Debug)]

@@ -8,8 +8,8 @@ use asid_core::layout::{JointKind, Layout, Recording};
 use asid_core::simulator::check_sims;
 use asid_core::{BatchConfig, Error, Result, Rollout, Simulator, Snapshot, Status};
 
+use crate::compiled::{Compiled, compile};
 use crate::ffi::{BadNumber, Batch};
-use crate::model::{Compiled, compile};
 use crate::parameter::{Fields, Plan};
 use crate::rollout::{Frames, Job, Stage, has_halves, prepare, read, run};
 use crate::state::{SavedStates, StateLayout};

@@ -10,8 +10,8 @@ use std::sync::Arc;
 use asid_core::Status;
 use mujoco_rs::mujoco_c::mjtState;
 
+use crate::compiled::Compiled;
 use crate::ffi::Batch;
-use crate::model::Compiled;
 
 /// Parts of a state row.
 #[derive(Clone, Debug)]

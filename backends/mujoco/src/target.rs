@@ -4,64 +4,16 @@
 //! entries of which field take its value, or which part of which body's mass
 //! properties it is.
 
-use std::ffi::CStr;
-
 use asid_core::Target;
 use asid_core::layout::{Joint, JointKind};
 use asid_core::{Error, Result};
 use mujoco_rs::mujoco_c::{mjtBias, mjtGain};
 use mujoco_rs::wrappers::mj_model::{MjModel, MjtGeomBase};
 
+use crate::compiled::Compiled;
 use crate::contact::overruled;
+use crate::field::Field;
 use crate::inertia::{BodyGeoms, BodyInertia, Origin, origin};
-use crate::model::Compiled;
-
-/// A field of `mjModel` that parameters change.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-#[allow(missing_docs)]
-pub enum Field {
-    GeomFriction,
-    GeomPos,
-    GeomSolref,
-    BodyMass,
-    BodyIpos,
-    BodyIquat,
-    BodyInertia,
-    DofDamping,
-    DofFrictionloss,
-    DofArmature,
-    JntPos,
-    JntStiffness,
-    ActuatorGainprm,
-    ActuatorBiasprm,
-    ActuatorGear,
-    Gravity,
-}
-
-impl Field {
-    /// MuJoCo's name of it.
-    #[must_use]
-    pub fn name(self) -> &'static CStr {
-        match self {
-            Self::GeomFriction => c"geom_friction",
-            Self::GeomPos => c"geom_pos",
-            Self::GeomSolref => c"geom_solref",
-            Self::BodyMass => c"body_mass",
-            Self::BodyIpos => c"body_ipos",
-            Self::BodyIquat => c"body_iquat",
-            Self::BodyInertia => c"body_inertia",
-            Self::DofDamping => c"dof_damping",
-            Self::DofFrictionloss => c"dof_frictionloss",
-            Self::DofArmature => c"dof_armature",
-            Self::JntPos => c"jnt_pos",
-            Self::JntStiffness => c"jnt_stiffness",
-            Self::ActuatorGainprm => c"actuator_gainprm",
-            Self::ActuatorBiasprm => c"actuator_biasprm",
-            Self::ActuatorGear => c"actuator_gear",
-            Self::Gravity => c"opt.gravity",
-        }
-    }
-}
 
 /// Values that make sense for a parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -16,13 +16,14 @@ use rapier3d::pipeline::PhysicsPipeline;
 
 use crate::compiled::Compiled;
 use crate::pairs::Hooks;
-use crate::parameter::{Knob, Tables};
+use crate::parameter::ParameterSlot;
 use crate::state::State;
+use crate::tables::Tables;
 
 /// A compiled scene whose worlds are stepped in a plain loop.
 pub struct BareScene {
     compiled: Arc<Compiled>,
-    knobs: Vec<Knob>,
+    slots: Vec<ParameterSlot>,
 }
 
 /// One simulation, stepped by whoever holds it.
@@ -40,11 +41,11 @@ impl BareScene {
     /// As loading the scene and resolving the targets.
     pub fn new(scene: &Scene, targets: &[Target]) -> Result<Self> {
         let compiled = Arc::new(Compiled::new(scene)?);
-        let knobs = targets
+        let slots = targets
             .iter()
-            .map(|t| Knob::resolve(t, &compiled))
+            .map(|t| ParameterSlot::resolve(t, &compiled))
             .collect::<Result<_>>()?;
-        Ok(Self { compiled, knobs })
+        Ok(Self { compiled, slots })
     }
 
     /// Names and places.
@@ -59,12 +60,12 @@ impl BareScene {
     /// [`Error::Shape`] where a length does not fit.
     pub fn world(&self, values: &[f64], qpos: &[f64], qvel: &[f64]) -> Result<BareWorld> {
         let layout = &self.compiled.layout;
-        if (values.len(), qpos.len(), qvel.len()) != (self.knobs.len(), layout.nq, layout.nv) {
+        if (values.len(), qpos.len(), qvel.len()) != (self.slots.len(), layout.nq, layout.nv) {
             return Err(Error::Shape("values or state do not fit the scene".into()));
         }
         let mut tables = self.compiled.nominal.clone();
-        for (knob, &value) in self.knobs.iter().zip(values) {
-            knob.set(&mut tables, value);
+        for (slot, &value) in self.slots.iter().zip(values) {
+            slot.set(&mut tables, value);
         }
         let mut state = self.compiled.pristine.clone();
         state.rebuild(&self.compiled, &tables);

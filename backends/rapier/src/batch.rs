@@ -14,7 +14,7 @@ use rayon::ThreadPool;
 use rayon::prelude::*;
 
 use crate::compiled::Compiled;
-use crate::parameter::Knob;
+use crate::parameter::ParameterSlot;
 use crate::pool;
 use crate::state::State;
 use crate::world::{StepInput, World};
@@ -24,7 +24,7 @@ pub struct Batch {
     compiled: Arc<Compiled>,
     worlds: Vec<World>,
     status: Vec<Status>,
-    columns: Vec<(Target, Knob)>,
+    columns: Vec<(Target, ParameterSlot)>,
     pool: Option<Arc<ThreadPool>>,
 }
 
@@ -55,7 +55,7 @@ impl Batch {
     pub fn new(compiled: Arc<Compiled>, config: &BatchConfig) -> Result<Self> {
         let mut columns = Vec::with_capacity(config.targets.len());
         for target in &config.targets {
-            columns.push((target.clone(), Knob::resolve(target, &compiled)?));
+            columns.push((target.clone(), ParameterSlot::resolve(target, &compiled)?));
         }
         let threads = match config.threads {
             0 => std::thread::available_parallelism().map_or(1, usize::from),
@@ -119,9 +119,9 @@ impl Batch {
 
     fn check_changes(&self, changes: &[ParameterChange<'_>]) -> Result<()> {
         for change in changes {
-            let (target, knob) = &self.columns[change.column];
+            let (target, slot) = &self.columns[change.column];
             for &value in change.values {
-                knob.check(target, value)?;
+                slot.check(target, value)?;
             }
         }
         Ok(())
@@ -142,14 +142,14 @@ impl Simulator for Batch {
         let columns = self.columns.len();
         expect(values.len(), sims.len() * columns, "parameters")?;
         for row in values.chunks_exact(columns.max(1)) {
-            for ((target, knob), &value) in self.columns.iter().zip(row) {
-                knob.check(target, value)?;
+            for ((target, slot), &value) in self.columns.iter().zip(row) {
+                slot.check(target, value)?;
             }
         }
         for (row, &sim) in sims.iter().enumerate() {
             let world = &mut self.worlds[sim];
-            for (column, (_, knob)) in self.columns.iter().enumerate() {
-                knob.set(&mut world.tables, values[row * columns + column]);
+            for (column, (_, slot)) in self.columns.iter().enumerate() {
+                slot.set(&mut world.tables, values[row * columns + column]);
             }
             world.state.rebuild(&self.compiled, &world.tables);
         }
@@ -193,7 +193,7 @@ impl Simulator for Batch {
         self.check_changes(rollout.changes)?;
         let (frames, width) = (rollout.frames, rollout.record.width());
         let nu = self.compiled.layout.nu();
-        let knobs: Vec<Knob> = self.columns.iter().map(|(_, knob)| *knob).collect();
+        let slots: Vec<ParameterSlot> = self.columns.iter().map(|(_, slot)| *slot).collect();
         let mut rows: Vec<&mut [f64]> = Vec::with_capacity(rollout.sims.len());
         let mut rest = out;
         for _ in rollout.sims {
@@ -205,9 +205,9 @@ impl Simulator for Batch {
             let mut wrenches = Vec::with_capacity(rollout.forces.len());
             for frame in 0..frames {
                 for change in rollout.changes.iter().filter(|c| c.frame == frame) {
-                    let knob = knobs[change.column];
-                    knob.set(&mut world.tables, change.values[row]);
-                    if knob.is_structural() && world.state.status.is_running() {
+                    let slot = slots[change.column];
+                    slot.set(&mut world.tables, change.values[row]);
+                    if slot.is_structural() && world.state.status.is_running() {
                         world.state.rebuild(compiled, &world.tables);
                     }
                 }
@@ -228,7 +228,7 @@ impl Simulator for Batch {
                         ctrl,
                         wrenches: &wrenches,
                         hook: rollout.hook,
-                        knobs: &knobs,
+                        slots: &slots,
                         row,
                         step: frame * rollout.substeps + substep,
                     };

@@ -10,10 +10,11 @@ use nalgebra::{UnitQuaternion, Vector3};
 use rapier3d::dynamics::{Multibody, RigidBody};
 use rapier3d::math::Rotation;
 
-use crate::compiled::{Compiled, JointSlot, set_inertia};
+use crate::compiled::{Compiled, set_inertia};
 use crate::convert;
-use crate::parameter::Tables;
+use crate::slot::JointSlot;
 use crate::state::State;
+use crate::tables::Tables;
 
 /// Index of the free axis of a hinge or slide in rapier's six coordinates.
 pub fn axis(kind: JointKind) -> usize {

@@ -10,8 +10,8 @@ use rapier3d::dynamics::RigidBodyBuilder;
 use rapier3d::geometry::{Group, InteractionGroups, InteractionTestMode};
 use rapier3d_mjcf::{MjcfBody, MjcfRobot};
 
-use crate::compiled::{ActuatorSlot, Frame};
 use crate::convert;
+use crate::slot::{ActuatorSlot, Frame};
 
 /// Contact bits of each geom; geoms of an explicit pair pass them all, and the
 /// table of pairs decides.

@@ -15,10 +15,11 @@
 use asid_core::layout::JointKind;
 use mjcf_rs::extras::ActuatorKind;
 
-use crate::compiled::{ActuatorSlot, Compiled, JointSlot};
+use crate::compiled::Compiled;
 use crate::coordinates::axis;
-use crate::parameter::{ActuatorValues, Tables};
+use crate::slot::{ActuatorSlot, JointSlot};
 use crate::state::State;
+use crate::tables::{ActuatorValues, Tables};
 
 /// Stiffness that carries a constant force where a joint has no spring: the
 /// rest is put far away. Too soft to matter, stiff enough for single precision.

@@ -72,6 +72,7 @@
 #[doc(hidden)]
 pub mod bare;
 mod batch;
+mod compile;
 mod compiled;
 mod contact;
 mod convert;
@@ -81,12 +82,15 @@ mod drive;
 mod pairs;
 mod parameter;
 mod pool;
+mod reading;
 mod refusal;
 mod sensor;
 mod settings;
 mod slip;
+mod slot;
 mod state;
 mod structure;
+mod tables;
 mod world;
 
 use std::sync::Arc;
@@ -96,7 +100,7 @@ use asid_core::{BatchConfig, Layout, Result, Scene, Simulator, Target};
 
 use crate::batch::Batch;
 use crate::compiled::Compiled;
-use crate::parameter::Knob;
+use crate::parameter::ParameterSlot;
 
 /// Version of the rapier that this crate is built against.
 const VERSION: &str = "0.36";
@@ -138,7 +142,7 @@ impl Model for RapierModel {
     }
 
     fn nominal(&self, target: &Target) -> Result<f64> {
-        Ok(Knob::resolve(target, &self.0)?.get(&self.0.nominal, &self.0))
+        Ok(ParameterSlot::resolve(target, &self.0)?.get(&self.0.nominal, &self.0))
     }
 
     fn simulator(&self, config: &BatchConfig) -> Result<Box<dyn Simulator>> {

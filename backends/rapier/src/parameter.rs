@@ -2,90 +2,14 @@
 
 use asid_core::layout::{JointKind, Layout};
 use asid_core::{Error, Result, Target};
-use mjcf_rs::Model;
 use mjcf_rs::extras::ActuatorKind;
 
 use crate::compiled::Compiled;
-use crate::structure::Structure;
-
-/// Passive forces of a joint, SI units, of each degree of freedom.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct JointValues {
-    /// Damping.
-    pub damping: f64,
-    /// Dry friction.
-    pub frictionloss: f64,
-    /// Spring.
-    pub stiffness: f64,
-    /// Rotor inertia.
-    pub armature: f64,
-}
-
-/// Gains of an actuator.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ActuatorValues {
-    /// Position gain.
-    pub kp: f64,
-    /// Velocity gain.
-    pub kv: f64,
-    /// Ratio.
-    pub gear: f64,
-}
-
-/// All parameters of one simulation.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Tables {
-    /// Friction of each geom: sliding, torsional (m), rolling (m).
-    pub friction: Vec<[f32; 3]>,
-    /// Each joint.
-    pub joints: Vec<JointValues>,
-    /// Each actuator.
-    pub actuators: Vec<ActuatorValues>,
-    /// Gravity, m/s².
-    pub gravity: [f64; 3],
-    /// Masses and places.
-    pub structure: Structure,
-}
-
-impl Tables {
-    /// Values of a parsed document.
-    pub fn new(model: &Model, structure: Structure) -> Self {
-        let bodies = || model.bodies.iter().map(|b| &b.body);
-        Self {
-            friction: bodies()
-                .flat_map(|b| &b.geoms)
-                .map(|g| g.friction.map(|f| f as f32))
-                .collect(),
-            joints: bodies()
-                .flat_map(|b| &b.joints)
-                .map(|j| JointValues {
-                    damping: j.damping,
-                    frictionloss: j.frictionloss,
-                    stiffness: j.stiffness,
-                    armature: j.armature,
-                })
-                .collect(),
-            actuators: model
-                .actuators
-                .iter()
-                .map(|a| ActuatorValues {
-                    kp: a.kp.unwrap_or(1.0),
-                    kv: a.kv.unwrap_or(match a.kind {
-                        ActuatorKind::Velocity => 1.0,
-                        _ => 0.0,
-                    }),
-                    gear: a.gear[0],
-                })
-                .collect(),
-            gravity: model.option.gravity,
-            structure,
-        }
-    }
-}
+use crate::tables::Tables;
 
 /// A target resolved in a scene. Indices are those of the layout.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Knob {
+pub enum ParameterSlot {
     /// `geom/NAME/friction/I`.
     GeomFriction(usize, usize),
     /// `geom/NAME/pos/I`.
@@ -138,7 +62,7 @@ fn find<'a>(
     })
 }
 
-impl Knob {
+impl ParameterSlot {
     /// Resolves a target.
     ///
     /// # Errors
@@ -147,7 +71,7 @@ impl Knob {
     pub fn resolve(target: &Target, compiled: &Compiled) -> Result<Self> {
         let layout: &Layout = &compiled.layout;
         let (attribute, i) = (target.attribute.as_str(), target.index);
-        let knob = match target.element.as_str() {
+        let slot = match target.element.as_str() {
             "option" if attribute == "gravity" => Self::Gravity(i),
             "geom" => {
                 let geom = find(target, "geom", layout.geoms.iter().map(String::as_str))?;
@@ -244,7 +168,7 @@ impl Knob {
             }
             _ => return Err(bad(target, "this engine has no such parameter")),
         };
-        let entries = match knob {
+        let entries = match slot {
             Self::GeomFriction(..)
             | Self::GeomPosition(..)
             | Self::Anchor(..)
@@ -256,7 +180,7 @@ impl Knob {
         if i >= entries {
             return Err(bad(target, format!("index {i} is out of 0..{entries}")));
         }
-        Ok(knob)
+        Ok(slot)
     }
 
     /// Its value.

@@ -14,9 +14,10 @@ use crate::compiled::Compiled;
 use crate::contact::{self, Touching};
 use crate::convert;
 use crate::pairs::Hooks;
-use crate::parameter::{Knob, Tables};
+use crate::parameter::ParameterSlot;
 use crate::settings::MAX_SPEED;
 use crate::state::State;
+use crate::tables::Tables;
 
 /// Position beyond which a simulation counts as diverged, m.
 const MAX_POSITION: f32 = 1e4;
@@ -60,7 +61,7 @@ pub struct StepInput<'a> {
     /// Physics the engine lacks.
     pub hook: Option<&'a dyn StepHook>,
     /// Columns of the batch, which the hook may change for the step.
-    pub knobs: &'a [Knob],
+    pub slots: &'a [ParameterSlot],
     /// Row of the rollout, for the hook.
     pub row: usize,
     /// Physics step since the start of the rollout, for the hook.
@@ -153,9 +154,9 @@ impl World {
                 .coordinates(compiled, &mut self.qpos, &mut self.qvel);
             self.force.fill(0.0);
             self.live.clear();
-            self.live.extend(input.knobs.iter().map(|knob| {
-                if knob.is_live() {
-                    knob.get(&self.tables, compiled)
+            self.live.extend(input.slots.iter().map(|slot| {
+                if slot.is_live() {
+                    slot.get(&self.tables, compiled)
                 } else {
                     0.0
                 }
@@ -172,7 +173,7 @@ impl World {
                     parameters: &mut self.live,
                 },
             );
-            self.swap_live(compiled, input.knobs);
+            self.swap_live(compiled, input.slots);
             hooked = &self.force;
         }
         self.state.refresh_link_velocities(compiled);
@@ -237,17 +238,17 @@ impl World {
             self.state.correct_root(compiled, body, before);
         }
         if input.hook.is_some() {
-            self.swap_live(compiled, input.knobs);
+            self.swap_live(compiled, input.slots);
         }
     }
 
     /// Exchanges the parameters that may change during a rollout with what the hook wants.
-    fn swap_live(&mut self, compiled: &Compiled, knobs: &[Knob]) {
-        for (knob, wanted) in knobs.iter().zip(&mut self.live) {
-            if knob.is_live() {
-                let set = knob.get(&self.tables, compiled);
+    fn swap_live(&mut self, compiled: &Compiled, slots: &[ParameterSlot]) {
+        for (slot, wanted) in slots.iter().zip(&mut self.live) {
+            if slot.is_live() {
+                let set = slot.get(&self.tables, compiled);
                 if *wanted != set {
-                    knob.set(&mut self.tables, *wanted);
+                    slot.set(&mut self.tables, *wanted);
                 }
                 *wanted = set;
             }

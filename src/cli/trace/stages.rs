@@ -20,10 +20,10 @@ pub fn exploration(
     let step = protocol.frames_per_step as f64 * protocol.frame_period;
     Some(r::Exploration {
         objective: objective.to_owned(),
-        form: "trajectory".into(),
+        form: information.form.into(),
         time: (1..=rest.len()).map(|k| k as f64 * step).collect(),
         gained: information.reward.clone(),
-        gained_unit: "prior variance".into(),
+        gained_unit: information.unit.into(),
         expected_std: session
             .parameters
             .iter()

@@ -2,7 +2,7 @@
 
 use std::marker::PhantomData;
 
-use crate::target::Field;
+use crate::field::Field;
 use mujoco_rs::mujoco_c::{
     mj_contactForce, mj_forward, mj_step, mj_step1, mj_step2, mjData, mjModel,
 };

@@ -1,0 +1,29 @@
+//! Eigenvalues of symmetric matrices, refused where an entry is no number.
+
+use nalgebra::{DMatrix, Dyn, SymmetricEigen};
+
+/// Eigenvalues and eigenvectors of a symmetric matrix; `None` where an entry is not finite, with which the
+/// iteration would never end.
+#[must_use]
+pub fn symmetric_eigen(matrix: DMatrix<f64>) -> Option<SymmetricEigen<f64, Dyn>> {
+    matrix
+        .iter()
+        .all(|x| x.is_finite())
+        .then(|| matrix.symmetric_eigen())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_matrix_with_a_nan_has_no_eigenvalues() {
+        let mut matrix = DMatrix::identity(3, 3);
+        assert_eq!(
+            symmetric_eigen(matrix.clone()).unwrap().eigenvalues.sum(),
+            3.0
+        );
+        matrix[(1, 2)] = f64::NAN;
+        assert!(symmetric_eigen(matrix).is_none());
+    }
+}

@@ -1,0 +1,58 @@
+//! What MuJoCo makes of a document.
+
+use asid_core::{Error, Layout, Result, Scene};
+use mujoco_rs::wrappers::mj_editing::{MjSpec, MjsBody};
+use mujoco_rs::wrappers::mj_model::MjModel;
+
+use crate::ffi;
+
+/// What all batches of one compiled scene share.
+pub struct Compiled {
+    /// The document.
+    pub scene: Scene,
+    /// MuJoCo's model of it.
+    pub model: MjModel,
+    /// Names and places.
+    pub layout: Layout,
+}
+
+/// Compiles a scene with MuJoCo.
+///
+/// `simple` allows MuJoCo's shortcuts for bodies whose inertia happens to be
+/// diagonal. A batch that moves centres of mass must do without: the sparsity
+/// of the inertia matrix is fixed when the model is compiled.
+///
+/// # Errors
+/// [`Error::Scene`] with MuJoCo's message in one line.
+pub fn compile(scene: &Scene, simple: bool) -> Result<MjModel> {
+    if scene.xml().contains('\0') {
+        return Err(refused(scene, "the document holds a NUL character"));
+    }
+    let mut spec = MjSpec::from_xml_string(scene.xml()).map_err(|e| refused(scene, &e))?;
+    if let Some(folder) = scene.directory().and_then(|d| d.to_str())
+        && !folder.is_empty()
+    {
+        spec.set_modelfiledir(folder);
+    }
+    if !simple {
+        forbid_simple(spec.world_body_mut());
+    }
+    let mut model = spec.compile().map_err(|e| refused(scene, &e))?;
+    ffi::disable_autoreset(&mut model);
+    Ok(model)
+}
+
+fn forbid_simple(body: &mut MjsBody) {
+    for child in body.body_iter_mut() {
+        child.set_simple(false);
+        forbid_simple(child);
+    }
+}
+
+/// A document that cannot be used, with the reason in one line.
+pub fn refused(scene: &Scene, message: &(impl ToString + ?Sized)) -> Error {
+    Error::Scene {
+        scene: scene.name().to_owned(),
+        message: ffi::one_line(&message.to_string()),
+    }
+}
