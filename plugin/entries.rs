@@ -165,6 +165,7 @@ impl Adder {
             name,
             about: theirs.about,
             defaults: Box::leak(Box::new(move || border.run(|| (theirs.defaults)()))),
+            meanings: Box::leak(Box::new(move || border.run(|| (theirs.meanings)()))),
             make: Box::leak(Box::new(move |settings: &registry::Settings| {
                 Ok(wrap(border.try_run(|| (theirs.make)(settings))?, border))
             })),

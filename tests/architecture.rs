@@ -173,7 +173,10 @@ fn modules(folder: &str) -> BTreeMap<String, Names> {
         }
         let depth = parts.len() - usize::from(last == "mod.rs");
         let text = fs::read_to_string(&file).unwrap();
-        graph.entry(own).or_default().extend(mentioned(&text, depth));
+        graph
+            .entry(own)
+            .or_default()
+            .extend(mentioned(&text, depth));
     }
     let all: Names = graph.keys().cloned().collect();
     for (own, uses) in &mut graph {

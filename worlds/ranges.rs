@@ -1,6 +1,7 @@
 //! How far off a perturbed world may be.
 
 use asid_core::{Error, Result};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Ranges that a perturbed world is drawn from, `[low, high]` each, uniformly; factors evenly on a
@@ -9,7 +10,7 @@ use serde::{Deserialize, Serialize};
 /// They are chosen so that each is what a laboratory with a calibrated arm and a motion-capture system would
 /// have to admit to, and none alone spoils an experiment. Sources are named where there is one; the others are
 /// estimates, and say so.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct PerturbationRanges {
     /// Physics steps of the world in one of the simulator's. Default 2: half the step, as nature is

@@ -11,13 +11,14 @@ use asid_core::explore::{CurvePoint, Explored, Explorer};
 use asid_core::registry;
 use asid_core::rng::Rng;
 use asid_core::{Error, Posterior, Problem, Result};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::open_loop::{OpenLoop, Planned, Planner};
 use crate::optimise::{CemSettings, require};
 
 /// Settings of the planner.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct FisherCem {
     /// Refits of the distribution.
@@ -60,6 +61,7 @@ asid_core::register!(ExplorerEntry {
     name: "fisher-cem",
     about: "Fisher information, open-loop plans by the cross-entropy method",
     defaults: registry::defaults::<FisherCem>,
+    meanings: registry::meanings::<FisherCem>,
     make: |s| {
         let explorer: FisherCem = registry::settings("explorer", s)?;
         explorer.check()?;

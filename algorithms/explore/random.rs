@@ -6,10 +6,11 @@ use asid_core::rng::Rng;
 use asid_core::task::Coordinate;
 use asid_core::{Problem, Result};
 use rand::Rng as _;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// It has nothing to set.
-#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct RandomExplorer {}
 
@@ -17,6 +18,7 @@ asid_core::register!(ExplorerEntry {
     name: "random",
     about: "independent uniform actions",
     defaults: registry::defaults::<RandomExplorer>,
+    meanings: registry::meanings::<RandomExplorer>,
     make: |s| Ok(Box::new(registry::settings::<RandomExplorer>(
         "explorer", s
     )?)),

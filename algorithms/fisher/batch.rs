@@ -15,6 +15,7 @@
 
 use std::str::FromStr;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::fisher::{Information, Objective};
@@ -28,7 +29,7 @@ use asid_core::task::Commander;
 use asid_core::tracker::ReadingFrames;
 
 /// Which derivative is taken; see the module.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Form {
     /// From the episode's state, one control step at a time.
@@ -61,7 +62,7 @@ impl FromStr for Form {
 }
 
 /// What is computed of an episode.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct FisherSettings {
     /// What a step is rewarded for.

@@ -13,12 +13,13 @@
 use std::str::FromStr;
 
 use nalgebra::DMatrix;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use asid_core::error::{Error, Result};
 
 /// What a step is rewarded for.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Objective {
     /// `tr(J_h^T S^-1 J_h)`, clipped, as in the paper's published code.

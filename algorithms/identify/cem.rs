@@ -3,6 +3,7 @@
 use asid_core::identify::{Identified, Identifier};
 use asid_core::registry;
 use asid_core::{Episode, Problem, Result};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::sampling::SamplingSettings;
@@ -10,7 +11,7 @@ use super::search::{self, Budget};
 use crate::optimise::CemSettings;
 
 /// Settings of identification by CEM.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct CemIdentifier {
     /// Refits of the search.
@@ -41,6 +42,7 @@ asid_core::register!(IdentifierEntry {
     name: "cem",
     about: "cross-entropy method, then the posterior by emulation of the likelihood",
     defaults: registry::defaults::<CemIdentifier>,
+    meanings: registry::meanings::<CemIdentifier>,
     make: |s| {
         let identifier: CemIdentifier = registry::settings("identifier", s)?;
         identifier.budget().check()?;

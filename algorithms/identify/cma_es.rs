@@ -3,6 +3,7 @@
 use asid_core::identify::{Identified, Identifier};
 use asid_core::registry;
 use asid_core::{Episode, Problem, Result};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::sampling::SamplingSettings;
@@ -10,7 +11,7 @@ use super::search::{self, Budget};
 use crate::optimise::CmaEsSettings;
 
 /// Settings of identification by CMA-ES.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct CmaEsIdentifier {
     /// Refits of the search.
@@ -40,6 +41,7 @@ asid_core::register!(IdentifierEntry {
     name: "cma-es",
     about: "covariance matrix adaptation, then the posterior by emulation of the likelihood",
     defaults: registry::defaults::<CmaEsIdentifier>,
+    meanings: registry::meanings::<CmaEsIdentifier>,
     make: |s| {
         let identifier: CmaEsIdentifier = registry::settings("identifier", s)?;
         identifier.budget().check()?;

@@ -11,6 +11,7 @@ use asid_core::registry;
 use asid_core::rng::Rng;
 use asid_core::{Episode, Error, Parameter, Posterior, Problem, Result};
 use nalgebra::{DMatrix, DVector};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::Likelihood;
@@ -28,7 +29,7 @@ const UNSEEN: f64 = 1.0 / 12.0;
 const NAMED: f64 = 0.1;
 
 /// Settings of identification by Gauss-Newton.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct GaussNewtonIdentifier {
     /// Search and the fits at its end.
@@ -50,6 +51,7 @@ asid_core::register!(IdentifierEntry {
     name: "gauss-newton",
     about: "damped least squares from several starts, posterior from the normal matrix",
     defaults: registry::defaults::<GaussNewtonIdentifier>,
+    meanings: registry::meanings::<GaussNewtonIdentifier>,
     make: |s| {
         let identifier: GaussNewtonIdentifier = registry::settings("identifier", s)?;
         identifier.gauss_newton.check("identifier.gauss_newton")?;

@@ -3,6 +3,7 @@
 use asid_core::identify::{Identified, Identifier};
 use asid_core::registry;
 use asid_core::{Episode, Problem, Result};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::sampling::SamplingSettings;
@@ -10,7 +11,7 @@ use super::search::{self, Budget};
 use crate::optimise::RepsSettings;
 
 /// Settings of identification by REPS.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct RepsIdentifier {
     /// Refits of the search.
@@ -41,6 +42,7 @@ asid_core::register!(IdentifierEntry {
     name: "reps",
     about: "relative entropy policy search, then the posterior by emulation of the likelihood",
     defaults: registry::defaults::<RepsIdentifier>,
+    meanings: registry::meanings::<RepsIdentifier>,
     make: |s| {
         let identifier: RepsIdentifier = registry::settings("identifier", s)?;
         identifier.budget().check()?;

@@ -10,6 +10,7 @@ use asid_core::identify::{Identified, IterationSummary};
 use asid_core::posterior::weighted_quantile;
 use asid_core::rng::Rng;
 use asid_core::{Error, Posterior, Problem, Result};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::Likelihood;
@@ -17,7 +18,7 @@ use super::emulator::{Emulator, REACH, features_len};
 use crate::optimise::{Gaussian, require};
 
 /// How the posterior is sampled after the search.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct SamplingSettings {
     /// Rounds of draws.

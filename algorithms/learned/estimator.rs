@@ -15,6 +15,7 @@ use asid_core::identify::{Identified, Identifier};
 use asid_core::progress::Progress;
 use asid_core::registry::{self, ExplorerEntry, Settings, find};
 use asid_core::{Episode, Error, Explorer, Parameter, Posterior, Problem, Result};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::collect::{Dataset, collect};
@@ -31,7 +32,7 @@ pub const NAME: &str = "estimator";
 const NETWORK: &str = "estimator";
 
 /// Settings of the identifier.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Estimator {
     /// File of a trained network; empty for what ships for the task and the explorer, else trained
@@ -87,6 +88,7 @@ asid_core::register!(IdentifierEntry {
     name: NAME,
     about: "a network that learned from episodes of the explorer, without a simulation",
     defaults: registry::defaults::<Estimator>,
+    meanings: registry::meanings::<Estimator>,
     make: |s| {
         let estimator: Estimator = registry::settings("identifier", s)?;
         estimator.check()?;

@@ -13,6 +13,7 @@ use asid_algorithms::fisher::Objective;
 use asid_algorithms::fisher::{FisherBatch, FisherSettings};
 use asid_core::explore::Explored;
 use asid_core::{Error, Problem, Result};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::file::{ObservationEntry, Saved};
@@ -21,7 +22,7 @@ use crate::play::{Observe, Playing};
 use crate::ppo_settings::PpoConfig;
 
 /// Settings of the explorer.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct FisherPpo {
     /// File of a trained policy; empty for what ships, else trained on the spot; `train` to train;

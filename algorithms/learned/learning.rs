@@ -92,6 +92,7 @@ macro_rules! learned_explorer {
             name: <$explorer as $crate::learning::LearnedExplorer>::NAME,
             about: $about,
             defaults: asid_core::registry::defaults::<$explorer>,
+            meanings: asid_core::registry::meanings::<$explorer>,
             make: |settings| {
                 let explorer: $explorer = asid_core::registry::settings("explorer", settings)?;
                 $crate::learning::LearnedExplorer::check(&explorer)?;

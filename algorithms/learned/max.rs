@@ -12,6 +12,7 @@ use asid_core::explore::Explored;
 use asid_core::layout::Recording;
 use asid_core::signal::unit_quaternion;
 use asid_core::{Error, Problem, Result};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::file::{ObservationEntry, Saved};
@@ -22,7 +23,7 @@ use crate::policy::Policy;
 use crate::ppo_settings::PpoConfig;
 
 /// Settings of the explorer.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Max {
     /// File of a trained policy; empty for what ships, else trained on the spot; `train` to train;
@@ -48,7 +49,7 @@ pub struct Max {
 }
 
 /// Settings of the ensemble.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct EnsembleSettings {
     /// Networks (published: 32).

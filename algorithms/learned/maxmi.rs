@@ -19,6 +19,7 @@ use std::sync::Arc;
 use asid_algorithms::explore::Observer;
 use asid_core::explore::Explored;
 use asid_core::{Error, Problem, Result};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::file::{ObservationEntry, Saved};
@@ -33,7 +34,7 @@ use crate::ppo_settings::PpoConfig;
 pub const PREDICTOR: &str = "predictor";
 
 /// Settings of the predictor.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct PredictorSettings {
     /// Units of the hidden layers (tanh).
@@ -85,7 +86,7 @@ impl Default for PredictorSettings {
 }
 
 /// Settings of the explorer.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct MaxMi {
     /// File of a trained policy; empty for what ships, else trained on the spot; `train` to train;

@@ -4,10 +4,11 @@
 //! (Raffin et al. 2021, "Stable-Baselines3", JMLR 22(268); class `PPO`).
 
 use asid_core::{Error, Result};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Settings of the learner.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct PpoConfig {
     /// Environment steps to train for, over the whole batch. Training ends with

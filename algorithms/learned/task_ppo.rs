@@ -9,6 +9,7 @@ use std::sync::Arc;
 use asid_algorithms::explore::Observer;
 use asid_core::explore::Explored;
 use asid_core::{Problem, Result};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::file::{ObservationEntry, Saved};
@@ -18,7 +19,7 @@ use crate::play::{Observe, Playing};
 use crate::ppo_settings::PpoConfig;
 
 /// Settings of the explorer.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct TaskPpo {
     /// File of a trained policy; empty for what ships, else trained on the spot; `train` to train;

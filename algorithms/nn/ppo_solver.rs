@@ -16,6 +16,7 @@ use asid_core::solve::{Solved, TaskPolicy, TaskSolver, Trial};
 use asid_core::task::Coordinate;
 use asid_core::{Error, Posterior, Problem, Result};
 use rand::Rng as _;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::evaluation::mean_and_std;
@@ -24,7 +25,7 @@ use asid_learned::Policy;
 use asid_learned::PpoConfig;
 
 /// Settings of the solver.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct PpoSolver {
     /// Attempts that are simulated at once.
@@ -58,6 +59,7 @@ asid_core::register!(SolverEntry {
     name: "ppo",
     about: "policy over the start pose, trained by proximal policy optimisation",
     defaults: registry::defaults::<PpoSolver>,
+    meanings: registry::meanings::<PpoSolver>,
     make: |s| {
         let solver: PpoSolver = registry::settings("solver", s)?;
         if solver.environments < 2 {

@@ -2,13 +2,14 @@
 //! the best of its own draws.
 
 use asid_core::Result;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::search::ranked;
 use super::{Gaussian, Search, UpdateRule, require};
 
 /// How the distribution follows its elite.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct CemSettings {
     /// Share of the draws that are refitted to.

@@ -8,6 +8,7 @@
 
 use asid_core::Result;
 use nalgebra::{DMatrix, DVector};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::search::ranked;
@@ -15,7 +16,7 @@ use super::{Gaussian, Search, UpdateRule, require};
 use crate::fisher::symmetric_eigen;
 
 /// How fast the covariance learns.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct CmaEsSettings {
     /// Factor on the rank-mu update's learning rate (`alpha_cov` in the tutorial; below 2 for noisy costs).

@@ -12,6 +12,7 @@ use crate::fisher::local_fit::{LocalFit, Told, design, sets};
 use asid_core::Result;
 use asid_core::rng::Rng;
 use nalgebra::{DMatrix, DVector};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::require;
@@ -23,7 +24,7 @@ mod descent;
 pub type Residuals<'r> = dyn FnMut(&[Vec<f64>]) -> Result<Vec<Option<Vec<f64>>>> + 'r;
 
 /// How a search by Gauss-Newton goes on.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct GaussNewtonSettings {
     /// Points of the box that are looked at for starts.

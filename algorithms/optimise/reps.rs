@@ -7,12 +7,13 @@
 //! likelihood itself.
 
 use asid_core::Result;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{Gaussian, Search, UpdateRule, require};
 
 /// How far one refit may go.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct RepsSettings {
     /// Bound on the relative entropy of a step.

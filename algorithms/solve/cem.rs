@@ -5,13 +5,14 @@ use asid_core::registry;
 use asid_core::rng::Rng;
 use asid_core::solve::{Solved, TaskPolicy, TaskSolver, Trial};
 use asid_core::{Error, Posterior, Problem, Result};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::Attempts;
 use crate::optimise::{Cem, CemSettings};
 
 /// Settings of the solver.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct CemSolver {
     /// Refits of the distribution.
@@ -42,6 +43,7 @@ asid_core::register!(SolverEntry {
     name: "cem",
     about: "cross-entropy method over the task's action",
     defaults: registry::defaults::<CemSolver>,
+    meanings: registry::meanings::<CemSolver>,
     make: |s| {
         let solver: CemSolver = registry::settings("solver", s)?;
         for (key, value) in [

@@ -17,7 +17,7 @@ use crate::task::Task;
 mod origin;
 mod register;
 
-pub use crate::settings::{Settings, defaults, settings};
+pub use crate::settings::{Meanings, Settings, defaults, meanings, settings, unexplained};
 pub use origin::{Origin, Package};
 
 /// A backend.
@@ -55,6 +55,8 @@ pub struct AlgorithmEntry<T: ?Sized + 'static> {
     pub about: &'static str,
     /// All its settings with their defaults.
     pub defaults: &'static (dyn Fn() -> Settings + Sync),
+    /// What its settings mean, for `asid config`.
+    pub meanings: &'static (dyn Fn() -> Meanings + Sync),
     /// Makes it; settings that are left out take their defaults.
     pub make: &'static (dyn Fn(&Settings) -> Result<Box<T>> + Sync),
     /// Where it comes from.

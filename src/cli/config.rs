@@ -9,6 +9,7 @@ use asid_core::task::{Condition, Coordinate};
 use asid_core::{Error, Parameter, Task, registry};
 use asid_effects::EffectSpec;
 use asid_effects::refined_model::RefinedModel;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::options::{Algorithms, Common, Worlds};
@@ -18,7 +19,8 @@ use expected::ExpectedConfig;
 pub use real::RealConfig;
 use table::{check_keys, numbers, section, text, wrong};
 pub use table::{read_table, set};
-use unknowns::{ParameterConfig, noise, unknowns};
+pub use unknowns::ParameterConfig;
+use unknowns::{noise, unknowns};
 
 mod component;
 pub mod difficulty;
@@ -67,10 +69,11 @@ impl Stage {
 }
 
 /// Everything that decides the result of a command.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Config {
     /// What it was resolved for.
     #[serde(skip_serializing_if = "Stage::is_run")]
+    #[schemars(with = "String")]
     pub command: Stage,
     /// The task's name.
     pub task: String,
@@ -93,11 +96,14 @@ pub struct Config {
     /// Coordinates of the start pose that were not given and took the middle of their range.
     #[serde(skip)]
     pub assumed: Vec<String>,
-    /// Explorer.
+    /// The explorer: which episode is played in the real world.
+    #[schemars(with = "()")]
     pub explorer: Component,
-    /// Identifier.
+    /// The identifier: what the unknowns are, given that episode.
+    #[schemars(with = "()")]
     pub identifier: Component,
-    /// Solver.
+    /// The solver: which action achieves the task.
+    #[schemars(with = "()")]
     pub solver: Component,
     /// How the expected deviations of a run are computed.
     pub expected: ExpectedConfig,

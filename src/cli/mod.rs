@@ -22,6 +22,7 @@ mod report;
 mod result;
 mod run;
 mod session;
+mod settings;
 mod solve;
 mod stage;
 mod trace;
@@ -69,6 +70,8 @@ enum Command {
     Diagnose(diagnose::Arguments),
     /// Diagnoses of cases whose effect is withheld, scored
     Withheld(withheld::Arguments),
+    /// Print every setting of a task with its value and meaning, as a file for --config
+    Config(settings::Arguments),
     /// A task's scene as MJCF
     Export(export::Arguments),
     /// A folder that a plugin starts from
@@ -89,9 +92,12 @@ impl Command {
             Self::Withheld(a) => &a.common,
             Self::Compare(a) => return a.config.as_deref(),
             Self::Conformance(a) => return a.config.as_deref(),
-            Self::List(_) | Self::Doctor(_) | Self::Export(_) | Self::New(_) | Self::Report(_) => {
-                return None;
-            }
+            Self::List(_)
+            | Self::Doctor(_)
+            | Self::Config(_)
+            | Self::Export(_)
+            | Self::New(_)
+            | Self::Report(_) => return None,
         };
         common.config.as_deref()
     }
@@ -157,6 +163,7 @@ fn run_command(cli: &Cli, mut named: Vec<PathBuf>) -> Result<()> {
         Command::Conformance(arguments) => conformance::conformance(arguments),
         Command::Diagnose(arguments) => diagnose::diagnose(arguments),
         Command::Withheld(arguments) => withheld::withheld(arguments),
+        Command::Config(arguments) => settings::print(arguments),
         Command::Export(arguments) => export::export(arguments),
         Command::New(arguments) => new::new(arguments),
         Command::Report(arguments) => report::report(arguments),

@@ -6,7 +6,9 @@
 /// [`TaskEntry`](crate::registry::TaskEntry), and for algorithms, which have settings,
 /// [`ExplorerEntry`](crate::registry::ExplorerEntry),
 /// [`IdentifierEntry`](crate::registry::IdentifierEntry) and
-/// [`SolverEntry`](crate::registry::SolverEntry).
+/// [`SolverEntry`](crate::registry::SolverEntry). `meanings`, which may be left out, tells
+/// `asid config` what the settings mean: [`meanings`](crate::registry::meanings) reads it from their
+/// documentation.
 ///
 /// ```
 /// use asid_core::{Explorer, Problem, Result, explore::Explored, registry};
@@ -36,14 +38,44 @@ macro_rules! register {
     ($entry:ident {
         name: $name:expr,
         about: $about:expr,
-        $(defaults: $defaults:expr,)?
         make: $make:expr $(,)?
     }) => {
         $crate::__inventory::submit! {
             $crate::registry::$entry {
                 name: $name,
                 about: $about,
-                $(defaults: &$defaults,)?
+                make: &$make,
+                origin: $crate::linked_origin!(),
+            }
+        }
+    };
+    ($entry:ident {
+        name: $name:expr,
+        about: $about:expr,
+        defaults: $defaults:expr,
+        make: $make:expr $(,)?
+    }) => {
+        $crate::register!($entry {
+            name: $name,
+            about: $about,
+            defaults: $defaults,
+            meanings: $crate::registry::unexplained,
+            make: $make,
+        });
+    };
+    ($entry:ident {
+        name: $name:expr,
+        about: $about:expr,
+        defaults: $defaults:expr,
+        meanings: $meanings:expr,
+        make: $make:expr $(,)?
+    }) => {
+        $crate::__inventory::submit! {
+            $crate::registry::$entry {
+                name: $name,
+                about: $about,
+                defaults: &$defaults,
+                meanings: &$meanings,
                 make: &$make,
                 origin: $crate::linked_origin!(),
             }

@@ -2,13 +2,14 @@
 
 use anyhow::Result;
 use asid_algorithms::fisher::expected::ExpectedSettings;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::component::merge;
 use super::table::{section, wrong};
 
 /// Settings of the expected deviations that a run reports.
-#[derive(Clone, Copy, Debug, Serialize)]
+#[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
 pub struct ExpectedConfig {
     /// Fits, each some 70 simulated episodes over the region that the one before found. Fewer are
     /// quicker, and expect too much where the simulator is rough: [`ExpectedSettings::rounds`]. With

@@ -7,6 +7,7 @@ use anyhow::Result;
 use asid_core::{Error, Parameter, Task};
 use asid_effects::EffectSpec;
 use asid_worlds::{Kind, PerturbationRanges};
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::model_file;
@@ -14,10 +15,11 @@ use super::table::{check_keys, numbers, section, text, wrong};
 use crate::cli::options::Real;
 
 /// The simulated real world.
-#[derive(Clone, Debug, Default, Serialize)]
+#[derive(Clone, Debug, Default, Serialize, JsonSchema)]
 pub struct RealConfig {
     /// Kind; not written where it follows from the rest.
     #[serde(skip_serializing_if = "follows")]
+    #[schemars(with = "String")]
     pub world: Kind,
     /// Engine.
     pub backend: String,

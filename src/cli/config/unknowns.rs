@@ -5,25 +5,29 @@ use std::collections::BTreeMap;
 use anyhow::Result;
 use asid_core::parameter::{Parameter, Scale};
 use asid_core::{Error, Target, Task};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::table::{numbers, wrong};
 
 /// An unknown as it stands in a configuration.
-#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ParameterConfig {
     /// One target.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "String")]
     pub target: Option<Target>,
     /// Several targets that share the value.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Vec<String>")]
     pub targets: Option<Vec<Target>>,
     /// Smallest and largest value.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub range: Option<[f64; 2]>,
     /// Scale of the prior.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "String")]
     pub scale: Option<Scale>,
     /// Unit.
     #[serde(skip_serializing_if = "Option::is_none")]

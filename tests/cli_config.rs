@@ -1,0 +1,59 @@
+//! `asid config`: what it prints is a configuration, and the whole of one.
+
+#![allow(clippy::unwrap_used)]
+
+#[allow(dead_code)] // not every test needs all of it
+mod cli_support;
+
+use asid::core::registry::{TaskEntry, all};
+use cli_support::Workplace;
+use toml::Table;
+
+/// What `asid config` prints.
+fn printed(place: &Workplace, arguments: &[&str]) -> String {
+    let output = place.run(&[&["config"], arguments].concat());
+    let error = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success(), "{arguments:?}: {error}");
+    String::from_utf8(output.stdout).unwrap()
+}
+
+#[test]
+fn what_is_printed_for_a_task_is_read_back_as_the_same() {
+    let place = Workplace::new();
+    for task in all::<TaskEntry>() {
+        let page = printed(&place, &[task.name]);
+        let settings: Table = page.parse().unwrap();
+        assert_eq!(settings["task"].as_str(), Some(task.name));
+        place.write("settings.toml", &page);
+        let again = printed(&place, &[task.name, "--config", "settings.toml"]);
+        assert_eq!(page, again, "{}", task.name);
+    }
+}
+
+#[test]
+fn settings_stand_under_their_meanings_and_follow_the_options() {
+    let place = Workplace::new();
+    let options = ["--world", "perturbed", "--set", "explorer.iterations=7"];
+    let page = printed(&place, &[&["rod-balancing"], &options[..]].concat());
+    for told in [
+        "# Refits of the distribution.\niterations = 7\n",
+        "One of one-step, trajectory.\nform = ",
+        "[real.perturbation]",
+        "# Time constant of a first-order lag between commands and servos, s.",
+        "width of the ledge",
+    ] {
+        assert!(page.contains(told), "`{told}` is not in\n{page}");
+    }
+}
+
+#[test]
+fn an_unknown_task_is_refused_with_the_near_ones() {
+    let place = Workplace::new();
+    let output = place.run(&["config", "rod-balancin"]);
+    assert_eq!(output.status.code(), Some(2));
+    let error = String::from_utf8(output.stderr).unwrap();
+    assert!(
+        error.contains("`rod-balancing`") && error.lines().count() == 1,
+        "{error}"
+    );
+}
