@@ -4,7 +4,9 @@
 //! the models of the rivals as they were fitted; the expected divergence of their readings,
 //! in units of the noise, says how well one such episode would tell them apart.
 
+use asid_core::registry::find;
 use asid_core::{Episode, Result};
+use asid_effects::{Confusion, EffectEntry};
 
 use crate::bench::{Bench, Explanation, Trial};
 use crate::data::Logs;
@@ -135,55 +137,15 @@ pub fn next(
     Ok(NextExperiment { separates, how })
 }
 
-/// What the literature says of a pair of confounded effects.
+/// What is known of a pair of confounded effects.
 fn hint(one: &Explanation, other: &Explanation) -> String {
-    let has = |e: &Explanation, name: &str| e.effects.iter().any(|s| s.name == name);
-    let pair = |a: &[&str], b: &[&str]| {
-        let any = |e: &Explanation, names: &[&str]| names.iter().any(|n| has(e, n));
-        (any(one, a) && any(other, b)) || (any(one, b) && any(other, a))
+    let of = |a: &Explanation, b: &Explanation| {
+        a.effects.iter().find_map(|effect| {
+            let confusions = (find::<EffectEntry>(&effect.name).ok()?.make)().mistaken_for();
+            let names = |c: &&Confusion| b.effects.iter().any(|e| c.with.contains(&&*e.name));
+            confusions.iter().find(names).map(|c| c.told_apart_by)
+        })
     };
-    let hints: [(&[&str], &[&str], &str); 8] = [
-        (
-            &["actuator-delay", "sensor-delay"],
-            &["actuator-lag", "sensor-filter"],
-            "a chirp tells more: a delay keeps the gain, a lag loses it",
-        ),
-        (
-            &["mass", "payload"],
-            &["actuator-gain"],
-            "hang a known weight on it, or let it fall",
-        ),
-        (
-            &["coulomb-friction"],
-            &["actuator-deadband"],
-            "reversals under way tell more: friction turns with the speed, a dead band does not",
-        ),
-        (
-            &["gravity-tilt"],
-            &["actuator-bias", "sensor-bias", "constant-force"],
-            "turn the set-up by 180 degrees about the vertical, or take other poses",
-        ),
-        (
-            &["viscous-friction"],
-            &["linear-drag", "actuator-gain"],
-            "let it coast with the drive off",
-        ),
-        (
-            &["armature"],
-            &["inertia", "mass", "payload"],
-            "take other poses, or add a known payload",
-        ),
-        (
-            &["backlash"],
-            &["actuator-deadband", "joint-compliance"],
-            "small and large motions, about and away from a steady load",
-        ),
-        (
-            &["friction-patch"],
-            &["friction-anisotropy", "gravity-tilt", "friction-drift"],
-            "the same track in several directions, and again after a half turn",
-        ),
-    ];
-    let found = hints.iter().find(|(a, b, _)| pair(a, b));
-    found.map_or_else(String::new, |(_, _, text)| format!("; {text}"))
+    let found = of(one, other).or_else(|| of(other, one));
+    found.map_or_else(String::new, |text| format!("; {text}"))
 }

@@ -24,7 +24,7 @@ use crate::trajectory::Trajectory;
 use crate::windows::settle;
 
 /// The effect whose parameter is a constant force on a joint.
-const EFFECT: &str = "coulomb-friction";
+const EFFECT: &str = asid_effects::catalogue::joint_friction::COULOMB;
 const FORCE: &str = "offset";
 
 /// What one model lacks at a joint in some of the windows.

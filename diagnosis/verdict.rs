@@ -99,17 +99,11 @@ fn size(bench: &Bench, explanation: &Explanation) -> usize {
         .count()
 }
 
-/// Whether an effect is a force on a body that is held by joints: friction and drives are
-/// what one thinks of first there.
-fn odd(bench: &Bench, label: &str) -> bool {
+/// Whether an effect comes to mind at its site only after others.
+fn is_unusual(bench: &Bench, label: &str) -> bool {
     let (name, site) = label.split_once('@').unwrap_or((label, ""));
-    let plant = &bench.machine.plant;
-    let of_a_body = matches!(
-        name,
-        "constant-force" | "linear-drag" | "quadratic-drag" | "magnus"
-    );
-    let body = plant.layout.body(site);
-    of_a_body && body.is_ok_and(|b| plant.free_joint(b).is_none())
+    let entry = asid_core::registry::find::<asid_effects::EffectEntry>(name);
+    entry.is_ok_and(|e| (e.make)().unusual_at(&bench.machine.plant, site))
 }
 
 /// Whether a set is another one with one effect replaced by a refinement of it.
@@ -132,15 +126,15 @@ fn refines(findings: &Findings, set: &Hypothesis, simpler: &Hypothesis) -> bool 
             .any(|y| coarse.contains(&&*y.name) && y.site == fine.site)
 }
 
-/// Whether a set is another one with one effect replaced by a force on a body that is held by
-/// joints.
+/// Whether a set is another one with one effect replaced by one that is unusual at its
+/// site.
 fn stands_in(bench: &Bench, set: &Hypothesis, other: &Hypothesis) -> bool {
     let differ = |a: &Hypothesis, b: &Hypothesis| -> Vec<String> {
         let own = a.labels.iter().filter(|l| !b.labels.contains(l));
         own.cloned().collect()
     };
     match (&differ(set, other)[..], &differ(other, set)[..]) {
-        ([a], [b]) => odd(bench, a) && !odd(bench, b),
+        ([a], [b]) => is_unusual(bench, a) && !is_unusual(bench, b),
         _ => false,
     }
 }
@@ -210,7 +204,8 @@ pub fn judge(bench: &Bench, findings: &Findings, candidates: usize, scatter: f64
         (lowest / readings).max(1.0) * (1.0 + rho) / (1.0 - rho) + scatter / (2.0 * APART.sqrt());
     // Twice the negative logarithm of the posterior, up to a constant.
     let score = |h: &Hypothesis| {
-        let unusual = 2.0 * UNUSUAL.ln() * h.labels.iter().filter(|l| odd(bench, l)).count() as f64;
+        let unusual =
+            2.0 * UNUSUAL.ln() * h.labels.iter().filter(|l| is_unusual(bench, l)).count() as f64;
         let choice = 2.0 * (candidates.max(1) as f64).ln() * h.labels.len() as f64;
         let further = 2.0 * FURTHER.ln() * h.labels.len().saturating_sub(1) as f64;
         h.cost / temperature + h.size as f64 * readings.ln() + choice + further + unusual

@@ -122,6 +122,15 @@ pub trait Acting: Send {
     fn load(&mut self, _memory: &[f64]) {}
 }
 
+/// Effects that leave much the same in many logs as another one, and what tells them from it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Confusion {
+    /// Names of the effects.
+    pub with: &'static [&'static str],
+    /// The experiment that tells them apart, as advice to who has the machine.
+    pub told_apart_by: &'static str,
+}
+
 /// A physical effect.
 pub trait Effect: Send + Sync {
     /// Where it acts.
@@ -143,6 +152,15 @@ pub trait Effect: Send + Sync {
     /// values it is one of them. The simpler one is preferred unless that leaves much more.
     fn refines(&self) -> &'static [&'static str] {
         &[]
+    }
+    /// Effects that it is easily mistaken for. One side of a pair says so.
+    fn mistaken_for(&self) -> &'static [Confusion] {
+        &[]
+    }
+    /// Whether who knows such machines would think of it at this site only after others, as of a force on a
+    /// body that joints hold, where friction and drives come to mind first.
+    fn unusual_at(&self, _plant: &Plant, _site: &str) -> bool {
+        false
     }
     /// What an engine must be able to do for it, besides setting its targets and, where it
     /// [steps](Effect::steps), calling hooks.

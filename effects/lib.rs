@@ -20,7 +20,9 @@ pub mod refined;
 pub mod refined_model;
 mod spec;
 
-pub use effect::{Acting, Acts, Effect, EffectEntry, EffectParameter, Reference, Site, Start};
+pub use effect::{
+    Acting, Acts, Confusion, Effect, EffectEntry, EffectParameter, Reference, Site, Start,
+};
 pub use refined_model::RefinedModel;
 pub use spec::EffectSpec;
 

@@ -1,6 +1,6 @@
 //! Play between a drive and its load.
 
-use crate::{Acting, Acts, Effect, EffectParameter, Site, Start};
+use crate::{Acting, Acts, Confusion, Effect, EffectParameter, Site, Start};
 use asid_core::{Capabilities, Result, Target};
 use asid_mjcf::Plant;
 
@@ -21,6 +21,13 @@ crate::register!(EffectEntry {
 struct Backlash;
 
 impl Effect for Backlash {
+    fn mistaken_for(&self) -> &'static [Confusion] {
+        &[Confusion {
+            with: &["actuator-deadband", "joint-compliance"],
+            told_apart_by: "small and large motions, about and away from a steady load",
+        }]
+    }
+
     fn acts(&self) -> Acts {
         Acts::Force
     }

@@ -133,6 +133,11 @@ impl Acting for BodyForceAt {
 }
 
 impl Effect for BodyForce {
+    fn unusual_at(&self, plant: &Plant, site: &str) -> bool {
+        let body = plant.layout.body(site);
+        body.is_ok_and(|b| plant.free_joint(b).is_none())
+    }
+
     fn acts(&self) -> Acts {
         Acts::Force
     }

@@ -6,7 +6,7 @@
 
 use std::collections::VecDeque;
 
-use crate::{Acting, Acts, Effect, EffectParameter, Site};
+use crate::{Acting, Acts, Confusion, Effect, EffectParameter, Site};
 use asid_core::Result;
 use asid_core::simulator::StepView;
 use asid_mjcf::Plant;
@@ -20,10 +20,13 @@ crate::register!(EffectEntry {
 });
 
 crate::register!(EffectEntry {
-    name: "actuator-lag",
+    name: LAG,
     about: "the drive follows its command with a first-order lag",
     make: || Box::new(Lag),
 });
+
+/// Name of the lag of a drive.
+pub const LAG: &str = "actuator-lag";
 
 /// Longest delay that is looked for, s.
 const LONGEST: f64 = 0.5;
@@ -68,6 +71,13 @@ impl Acting for DelayAt {
 }
 
 impl Effect for Delay {
+    fn mistaken_for(&self) -> &'static [Confusion] {
+        &[Confusion {
+            with: &["actuator-lag", "sensor-filter"],
+            told_apart_by: "a chirp tells more: a delay keeps the gain, a lag loses it",
+        }]
+    }
+
     fn acts(&self) -> Acts {
         Acts::Command
     }

@@ -4,7 +4,7 @@
 //! ([`super::contact_friction`]); the factor is computed anew before each step, for each body that slides
 //! on the site from its own motion.
 
-use crate::{Acting, Acts, Effect, EffectParameter, Site, Start};
+use crate::{Acting, Acts, Confusion, Effect, EffectParameter, Site, Start};
 use asid_core::nalgebra::Vector3;
 use asid_core::simulator::StepView;
 use asid_core::{Capabilities, Result, Target};
@@ -133,6 +133,16 @@ fn bodies_of_targets(plant: &Plant, site: &str, bodies: &[usize]) -> Vec<Vec<usi
 }
 
 impl Effect for Field {
+    fn mistaken_for(&self) -> &'static [Confusion] {
+        match self {
+            Self::Patch => &[Confusion {
+                with: &["friction-anisotropy", "gravity-tilt", "friction-drift"],
+                told_apart_by: "the same track in several directions, and again after a half turn",
+            }],
+            _ => &[],
+        }
+    }
+
     fn acts(&self) -> Acts {
         Acts::Model
     }

@@ -1,6 +1,6 @@
 //! The ground is not level.
 
-use crate::{Acting, Acts, Effect, EffectParameter, Site};
+use crate::{Acting, Acts, Confusion, Effect, EffectParameter, Site};
 use asid_core::nalgebra::{Rotation3, Vector3};
 use asid_core::{Result, Target};
 use asid_mjcf::Plant;
@@ -35,6 +35,13 @@ impl Acting for TiltAt {
 }
 
 impl Effect for Tilt {
+    fn mistaken_for(&self) -> &'static [Confusion] {
+        &[Confusion {
+            with: &["actuator-bias", "sensor-bias", "constant-force"],
+            told_apart_by: "turn the set-up by 180 degrees about the vertical, or take other poses",
+        }]
+    }
+
     fn acts(&self) -> Acts {
         Acts::Model
     }

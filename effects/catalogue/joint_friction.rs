@@ -6,7 +6,7 @@
 //! Automatica 30 (1994), and for friction that grows with the load M. Duclusaud et al., "Extended
 //! friction models for the physics simulation of servo actuators", ICRA 2025.
 
-use crate::{Acting, Acts, Effect, EffectParameter, Reference, Site, Start};
+use crate::{Acting, Acts, Confusion, Effect, EffectParameter, Reference, Site, Start};
 use asid_core::simulator::StepView;
 use asid_core::{Capabilities, Result, Target};
 use asid_mjcf::Plant;
@@ -15,6 +15,9 @@ use asid_mjcf::plant::Drive;
 use super::dry::{CREEP, DryFriction};
 use super::{at_least, scalar_joints, target, values};
 
+/// Name of dry friction of a joint.
+pub const COULOMB: &str = "coulomb-friction";
+
 crate::register!(EffectEntry {
     name: "viscous-friction",
     about: "friction of a joint in proportion to its speed",
@@ -22,7 +25,7 @@ crate::register!(EffectEntry {
 });
 
 crate::register!(EffectEntry {
-    name: "coulomb-friction",
+    name: COULOMB,
     about: "dry friction of a joint",
     make: || Box::new(Coulomb),
 });
@@ -55,6 +58,13 @@ impl Acting for ViscousAt {
 }
 
 impl Effect for Viscous {
+    fn mistaken_for(&self) -> &'static [Confusion] {
+        &[Confusion {
+            with: &["linear-drag", "actuator-gain"],
+            told_apart_by: "let it coast with the drive off",
+        }]
+    }
+
     fn acts(&self) -> Acts {
         Acts::Model
     }
@@ -123,6 +133,13 @@ impl Acting for CoulombAt {
 }
 
 impl Effect for Coulomb {
+    fn mistaken_for(&self) -> &'static [Confusion] {
+        &[Confusion {
+            with: &["actuator-deadband"],
+            told_apart_by: "reversals under way tell more: friction turns with the speed, a dead band does not",
+        }]
+    }
+
     fn acts(&self) -> Acts {
         Acts::Force
     }

@@ -3,14 +3,14 @@
 //! Where a body's mass comes from its geoms, mass and payload change the geoms' masses; centre and inertia change
 //! what the geoms make. So all compose with a study that fits the mass of a geom.
 
-use crate::{Acting, Acts, Effect, EffectParameter, Site};
+use crate::{Acting, Acts, Confusion, Effect, EffectParameter, Site};
 use asid_core::{Capabilities, Result, Target};
 use asid_mjcf::Plant;
 
 use super::{target, values};
 
 crate::register!(EffectEntry {
-    name: "mass",
+    name: MASS,
     about: "a mass is larger or smaller",
     make: || Box::new(MassProperty::Mass),
 });
@@ -74,6 +74,9 @@ impl Acting for MassPropertyAt {
     }
 }
 
+/// Name of the effect on a mass.
+pub const MASS: &str = "mass";
+
 /// Names of the geoms that make a body's mass; empty where it has one of its own.
 fn geoms_of(plant: &Plant, body: usize) -> Vec<String> {
     let geoms = plant.geoms.iter().zip(&plant.layout.geoms);
@@ -89,6 +92,16 @@ fn moving(plant: &Plant) -> impl Iterator<Item = usize> {
 }
 
 impl Effect for MassProperty {
+    fn mistaken_for(&self) -> &'static [Confusion] {
+        match self {
+            Self::Mass | Self::Payload => &[Confusion {
+                with: &["actuator-gain"],
+                told_apart_by: "hang a known weight on it, or let it fall",
+            }],
+            Self::Center | Self::Inertia => &[],
+        }
+    }
+
     fn acts(&self) -> Acts {
         Acts::Model
     }

@@ -1,6 +1,6 @@
 //! Inertia of what turns with a joint but is no link: rotors, seen through their gears.
 
-use crate::{Acting, Acts, Effect, EffectParameter, Site};
+use crate::{Acting, Acts, Confusion, Effect, EffectParameter, Site};
 use asid_core::{Capabilities, Result, Target};
 use asid_mjcf::Plant;
 
@@ -28,6 +28,13 @@ impl Acting for ArmatureAt {
 }
 
 impl Effect for Armature {
+    fn mistaken_for(&self) -> &'static [Confusion] {
+        &[Confusion {
+            with: &["inertia", "mass", "payload"],
+            told_apart_by: "take other poses, or add a known payload",
+        }]
+    }
+
     fn acts(&self) -> Acts {
         Acts::Model
     }

@@ -5,7 +5,7 @@
 
 use std::collections::VecDeque;
 
-use crate::{Acting, Acts, Effect, EffectParameter, Site};
+use crate::{Acting, Acts, Confusion, Effect, EffectParameter, Site};
 use asid_core::Result;
 use asid_mjcf::Plant;
 
@@ -106,6 +106,13 @@ impl Acting for DelayAt {
 }
 
 impl Effect for Delay {
+    fn mistaken_for(&self) -> &'static [Confusion] {
+        &[Confusion {
+            with: &["actuator-lag", "sensor-filter"],
+            told_apart_by: "a chirp tells more: a delay keeps the gain, a lag loses it",
+        }]
+    }
+
     fn acts(&self) -> Acts {
         Acts::Measurement
     }

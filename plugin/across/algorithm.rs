@@ -10,7 +10,7 @@ use asid_core::posterior::Posterior;
 use asid_core::problem::Problem;
 use asid_core::simulator::StepView;
 use asid_core::solve::{Solved, TaskPolicy, TaskSolver};
-use asid_effects::{Acting, Acts, Effect, EffectParameter, Site};
+use asid_effects::{Acting, Acts, Confusion, Effect, EffectParameter, Site};
 use asid_mjcf::plant::Plant;
 
 use super::super::border::Border;
@@ -186,6 +186,14 @@ impl Effect for Across<Box<dyn Effect>> {
 
     fn refines(&self) -> &'static [&'static str] {
         self.run(|effect| effect.refines())
+    }
+
+    fn mistaken_for(&self) -> &'static [Confusion] {
+        self.run(|effect| effect.mistaken_for())
+    }
+
+    fn unusual_at(&self, plant: &Plant, site: &str) -> bool {
+        self.run(|effect| effect.unusual_at(plant, site))
     }
 
     fn needs(&self) -> Capabilities {

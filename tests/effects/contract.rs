@@ -176,3 +176,29 @@ fn the_catalogue_is_complete() {
     }
     assert_eq!(names.len(), wanted.split_whitespace().count(), "{names:?}");
 }
+
+#[test]
+fn what_an_effect_refines_or_is_mistaken_for_is_in_the_catalogue() {
+    let all = all::<EffectEntry>();
+    for entry in &all {
+        let effect = (entry.make)();
+        let confused = effect.mistaken_for().iter().flat_map(|c| c.with);
+        for name in effect.refines().iter().chain(confused) {
+            assert!(
+                all.iter().any(|e| e.name == *name) && *name != entry.name,
+                "{}: `{name}`",
+                entry.name
+            );
+        }
+    }
+}
+
+#[test]
+fn a_force_on_a_body_is_unusual_where_joints_hold_it() {
+    let plant = Plant::of(&scene(FLOOR)).unwrap();
+    let drag = (asid::core::registry::find::<EffectEntry>("linear-drag")
+        .unwrap()
+        .make)();
+    assert!(drag.unusual_at(&plant, "pusher"));
+    assert!(!drag.unusual_at(&plant, "ball"));
+}

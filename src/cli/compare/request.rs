@@ -7,7 +7,7 @@ use asid_comparison::plan::{MATCHED, Plan, TaskPlan};
 use asid_comparison::preset;
 use asid_core::Error;
 use asid_core::registry::{
-    self, BackendEntry, Entry, ExplorerEntry, IdentifierEntry, SolverEntry, TaskEntry, find,
+    self, BackendEntry, Entry, ExplorerEntry, IdentifierEntry, Origin, SolverEntry, TaskEntry, find,
 };
 use asid_effects::EffectSpec;
 
@@ -15,9 +15,6 @@ use super::Arguments;
 use crate::cli::config::{PRIOR, check_condition, default_backend, read_table, set};
 use crate::cli::list;
 use crate::cli::plugins::{file_of, used};
-
-/// The engine of the paper's tables where it is built in.
-const OF_TABLES: &str = "mujoco";
 
 fn wrong(key: &str, message: impl Into<String>) -> anyhow::Error {
     Error::Config {
@@ -119,12 +116,13 @@ fn seeds(quick: bool) -> u64 {
 fn of_table(table: u8, arguments: &Arguments, config: Option<&Plan>) -> Result<Plan> {
     let preset = preset::of_table(table)?;
     let quick = arguments.quick || config.is_some_and(|c| c.quick);
+    // The engine that can do everything, where there is one.
     let engines = registry::all::<BackendEntry>();
-    let engine = if engines.iter().any(|e| e.name() == OF_TABLES) {
-        OF_TABLES.to_owned()
-    } else {
-        default_backend()
-    };
+    let able = engines.iter().find(|e| {
+        matches!(e.origin(), Origin::Linked(_))
+            && (e.make)().is_ok_and(|engine| engine.capabilities().is_all())
+    });
+    let engine = able.map_or_else(default_backend, |e| e.name().to_owned());
     let task = |(name, conditions): &(&str, &[&str])| TaskPlan {
         name: (*name).to_owned(),
         conditions: conditions.iter().map(|c| (*c).to_owned()).collect(),
