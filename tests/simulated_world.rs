@@ -7,7 +7,7 @@ use asid::core::registry::{BackendEntry, TaskEntry, all};
 use asid::core::rng::Streams;
 use asid::core::signal::Signal;
 use asid::core::task::{
-    Commander, Condition, Coordinate, DownstreamProtocol, ExplorationProtocol, Outcome, Task,
+    Commander, Coordinate, DownstreamProtocol, ExplorationProtocol, Outcome, Task, TaskSpec,
 };
 use asid::core::{
     Capabilities, Layout, Model, Parameter, Policy, RealWorld as _, Result, Scene, TaskPolicy,
@@ -29,9 +29,7 @@ const SCENE: &str = r#"<mujoco><compiler angle="radian"/><option timestep="0.002
   <keyframe><key name="home" qpos="0 0" qvel="2 0"/></keyframe></mujoco>"#;
 
 struct Tap {
-    scene: Scene,
-    exploration: ExplorationProtocol,
-    downstream: DownstreamProtocol,
+    spec: TaskSpec,
 }
 
 struct Still;
@@ -55,46 +53,31 @@ impl Policy for Still {
 }
 
 impl Task for Tap {
-    fn name(&self) -> &str {
-        "tap"
+    fn spec(&self) -> &TaskSpec {
+        &self.spec
     }
-    fn about(&self) -> &str {
-        ""
-    }
-    fn scene(&self) -> &Scene {
-        &self.scene
-    }
-    fn requires(&self) -> Capabilities {
-        Capabilities::CONTACT
-    }
-    fn parameters(&self) -> Vec<Parameter> {
-        Vec::new()
-    }
-    fn conditions(&self) -> Vec<Condition> {
-        Vec::new()
-    }
-    fn exploration(&self) -> &ExplorationProtocol {
-        &self.exploration
-    }
-    fn downstream(&self) -> &DownstreamProtocol {
-        &self.downstream
-    }
+
     fn place(&self, layout: &Layout, start: &[f64], qpos: &mut [f64]) -> Result<()> {
         qpos[layout.joint("striker")?.qpos] = start[0];
         Ok(())
     }
+
     fn locate(&self, signals: &[f64]) -> Vec<f64> {
         vec![signals[0]]
     }
+
     fn commander(&self) -> Result<Box<dyn Commander>> {
         Ok(Box::new(Still))
     }
+
     fn attempt(&self, _: &[f64], _: &[f64]) -> Result<Vec<f64>> {
-        Ok(vec![0.0; self.downstream.frames])
+        Ok(vec![0.0; self.spec.downstream.frames])
     }
+
     fn metric(&self, _: &[f64]) -> Vec<f64> {
         Vec::new()
     }
+
     fn outcome(&self, _: &[f64]) -> Outcome {
         Outcome {
             value: 0.0,
@@ -118,21 +101,24 @@ const DOWNSTREAM: fn() -> DownstreamProtocol = || DownstreamProtocol {
 };
 
 fn tap() -> Tap {
+    let scene = Scene::from_xml("tap", SCENE, &[]).unwrap();
+    let exploration = ExplorationProtocol {
+        horizon: 2,
+        frames_per_step: 5,
+        frame_period: 0.02,
+        action: vec![Coordinate::new("nothing", "", [0.0, 1.0])],
+        start: vec![Coordinate::new("x", "m", [0.0, 0.04])],
+        signals: vec![Signal {
+            sensor: "ball_pos".into(),
+            noise: 1e-6,
+        }],
+        proprioception: Vec::new(),
+        contact: vec![["striker".into(), "ball".into()]],
+    };
     Tap {
-        scene: Scene::from_xml("tap", SCENE, &[]).unwrap(),
-        downstream: DOWNSTREAM(),
-        exploration: ExplorationProtocol {
-            horizon: 2,
-            frames_per_step: 5,
-            frame_period: 0.02,
-            action: vec![Coordinate::new("nothing", "", [0.0, 1.0])],
-            start: vec![Coordinate::new("x", "m", [0.0, 0.04])],
-            signals: vec![Signal {
-                sensor: "ball_pos".into(),
-                noise: 1e-6,
-            }],
-            proprioception: Vec::new(),
-            contact: vec![["striker".into(), "ball".into()]],
+        spec: TaskSpec {
+            requires: Capabilities::CONTACT,
+            ..TaskSpec::new(["tap", ""], scene, exploration, DOWNSTREAM())
         },
     }
 }
@@ -144,11 +130,11 @@ fn a_tap_between_two_frames_is_a_touch() {
     let task = tap();
     for entry in all::<BackendEntry>() {
         let backend = (entry.make)().unwrap();
-        let model = backend.load(&task.scene).unwrap();
+        let model = backend.load(&task.spec.scene).unwrap();
         let (mut missed, mut moved) = (0, 0);
         for k in 0..50 {
             let streams = Streams::new(k);
-            let signals = &task.exploration.signals;
+            let signals = &task.spec.exploration.signals;
             let world = SimulatedWorld::new(&task, &*model, &[], &[], signals, streams).unwrap();
             let mut world = world.with_exploration_start(vec![k as f64 * 0.0008]);
             let real = world.explore(&mut Still).unwrap();
@@ -174,19 +160,20 @@ impl TaskPolicy for Nothing {
 /// The scene where nothing is touched and the tracker sees the striker, which flies at 2 m/s.
 fn flight() -> (Tap, Arc<dyn Model>) {
     let mut task = tap();
-    task.exploration.signals = ["striker_pos", "striker_quat"]
+    task.spec.exploration.signals = ["striker_pos", "striker_quat"]
         .map(|sensor| Signal {
             sensor: sensor.into(),
             noise: 1e-9,
         })
         .into();
-    task.exploration.contact.clear();
-    task.scene = task
+    task.spec.exploration.contact.clear();
+    task.spec.scene = task
+        .spec
         .scene
         .with_attribute("body", "ball", "pos", "9 0 1")
         .unwrap();
     let engine = all::<BackendEntry>()[0];
-    let model = (engine.make)().unwrap().load(&task.scene).unwrap();
+    let model = (engine.make)().unwrap().load(&task.spec.scene).unwrap();
     (task, model)
 }
 
@@ -196,7 +183,7 @@ fn world<'a>(
     seed: u64,
     tracker: TrackerErrors,
 ) -> SimulatedWorld<'a> {
-    let signals = &task.exploration.signals;
+    let signals = &task.spec.exploration.signals;
     let world = SimulatedWorld::new(task, model, &[], &[], signals, Streams::new(seed)).unwrap();
     let start = vec![0.01];
     world
@@ -309,7 +296,7 @@ fn readings_are_missing_at_the_trackers_rate_and_the_policy_has_the_last_one() {
             ..TrackerErrors::default()
         },
     ] {
-        let signals = &task.exploration.signals;
+        let signals = &task.spec.exploration.signals;
         let world =
             SimulatedWorld::new(&task, &*model, &[], &[], signals, Streams::new(0)).unwrap();
         assert!(world.with_tracker(wrong).is_err());
@@ -321,7 +308,8 @@ fn readings_are_missing_at_the_trackers_rate_and_the_policy_has_the_last_one() {
 #[test]
 fn every_method_meets_the_same_chance() {
     let (mut task, model) = flight();
-    task.exploration
+    task.spec
+        .exploration
         .signals
         .iter_mut()
         .for_each(|s| s.noise = 1e-3);

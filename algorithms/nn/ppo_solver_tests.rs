@@ -11,9 +11,9 @@ use asid_core::progress::Silent;
 use asid_core::registry::{BackendEntry, SolverEntry, find};
 use asid_core::signal::Signal;
 use asid_core::task::{
-    Commander, Condition, Coordinate, DownstreamProtocol, ExplorationProtocol, Outcome,
+    Commander, Coordinate, DownstreamProtocol, ExplorationProtocol, Outcome, TaskSpec,
 };
-use asid_core::{Capabilities, Layout, Posterior, Problem, Result, Scene, Streams, Task};
+use asid_core::{Layout, Posterior, Problem, Result, Scene, Streams, Task};
 
 const GOAL: f64 = 0.3;
 const FRAMES: usize = 25;
@@ -31,93 +31,81 @@ const XML: &str = r#"
 </mujoco>"#;
 
 struct Cart {
-    scene: Scene,
-    exploration: ExplorationProtocol,
-    downstream: DownstreamProtocol,
+    spec: TaskSpec,
 }
 
 impl Cart {
     fn new() -> Self {
         let force = Coordinate::new("force", "N", [0.0, 4.0]);
         let start = vec![Coordinate::new("x", "m", [-0.1, 0.1])];
+        let scene = Scene::from_xml("cart", XML, &[]).unwrap();
+        let exploration = ExplorationProtocol {
+            horizon: 1,
+            frames_per_step: 1,
+            frame_period: 0.02,
+            action: vec![force.clone()],
+            start: start.clone(),
+            signals: vec![Signal {
+                sensor: "x".into(),
+                noise: 1e-3,
+            }],
+            proprioception: Vec::new(),
+            contact: Vec::new(),
+        };
+        let downstream = DownstreamProtocol {
+            metric: "squared_distance_m2".into(),
+            unit: "m²".into(),
+            rule: "none".into(),
+            threshold: None,
+            frames: FRAMES,
+            frame_period: 0.02,
+            action: vec![force],
+            start,
+            channels: vec!["x".into()],
+            phases: Vec::new(),
+        };
+        let parameters = vec![Parameter {
+            name: "mass".into(),
+            targets: vec!["geom/cart/mass".parse().unwrap()],
+            range: [0.5, 2.0],
+            scale: Scale::Linear,
+            unit: "kg".into(),
+        }];
         Self {
-            scene: Scene::from_xml("cart", XML, &[]).unwrap(),
-            exploration: ExplorationProtocol {
-                horizon: 1,
-                frames_per_step: 1,
-                frame_period: 0.02,
-                action: vec![force.clone()],
-                start: start.clone(),
-                signals: vec![Signal {
-                    sensor: "x".into(),
-                    noise: 1e-3,
-                }],
-                proprioception: Vec::new(),
-                contact: Vec::new(),
-            },
-            downstream: DownstreamProtocol {
-                metric: "squared_distance_m2".into(),
-                unit: "m²".into(),
-                rule: "none".into(),
-                threshold: None,
-                frames: FRAMES,
-                frame_period: 0.02,
-                action: vec![force],
-                start,
-                channels: vec!["x".into()],
-                phases: Vec::new(),
+            spec: TaskSpec {
+                parameters,
+                ..TaskSpec::new(["cart", ""], scene, exploration, downstream)
             },
         }
     }
 }
 
 impl Task for Cart {
-    fn name(&self) -> &str {
-        "cart"
+    fn spec(&self) -> &TaskSpec {
+        &self.spec
     }
-    fn about(&self) -> &str {
-        ""
-    }
-    fn scene(&self) -> &Scene {
-        &self.scene
-    }
-    fn requires(&self) -> Capabilities {
-        Capabilities::empty()
-    }
-    fn parameters(&self) -> Vec<Parameter> {
-        vec![Parameter {
-            name: "mass".into(),
-            targets: vec!["geom/cart/mass".parse().unwrap()],
-            range: [0.5, 2.0],
-            scale: Scale::Linear,
-            unit: "kg".into(),
-        }]
-    }
-    fn conditions(&self) -> Vec<Condition> {
-        Vec::new()
-    }
-    fn exploration(&self) -> &ExplorationProtocol {
-        &self.exploration
-    }
-    fn downstream(&self) -> &DownstreamProtocol {
-        &self.downstream
-    }
+
     fn place(&self, layout: &Layout, start: &[f64], qpos: &mut [f64]) -> Result<()> {
         qpos[layout.joint("rail")?.qpos] = start[0];
         Ok(())
     }
+
     fn locate(&self, signals: &[f64]) -> Vec<f64> {
         signals.to_vec()
     }
+
     fn commander(&self) -> Result<Box<dyn Commander>> {
         unreachable!("it is not explored")
     }
+
     fn attempt(&self, _start: &[f64], action: &[f64]) -> Result<Vec<f64>> {
         Ok(vec![action[0]; FRAMES])
     }
+
     fn metric(&self, readings: &[f64]) -> Vec<f64> {
         readings.iter().map(|x| (x - GOAL).powi(2)).collect()
     }
+
     fn outcome(&self, readings: &[f64]) -> Outcome {
         let value = (readings[FRAMES - 1] - GOAL).powi(2);
         Outcome {
@@ -140,7 +128,7 @@ fn answers(masses: &[f64], starts: &[f64]) -> (Vec<f64>, usize) {
         model: &*model,
         capabilities: backend.capabilities(),
         parameters: &parameters,
-        signals: &task.exploration.signals,
+        signals: &task.spec.exploration.signals,
         threads: 1,
         streams: Streams::new(0),
         progress: &Silent,

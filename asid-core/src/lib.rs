@@ -59,7 +59,7 @@ pub use scene::Scene;
 pub use simulator::{BatchConfig, Control, Rollout, Simulator, Snapshot, Status};
 pub use solve::{TaskPolicy, TaskSolver};
 pub use target::Target;
-pub use task::Task;
+pub use task::{Task, TaskSpec};
 
 #[doc(hidden)]
 pub use inventory as __inventory;

@@ -212,70 +212,86 @@ pub trait Commander: Send {
     fn commands(&mut self, action: &[f64], ctrl: &mut [f64]);
 }
 
-/// A task as the framework sees it.
-pub trait Task: Send + Sync {
+/// A task as data: everything about it that is no computation.
+#[derive(Clone, Debug)]
+pub struct TaskSpec {
     /// Name on the command line.
-    fn name(&self) -> &str;
+    pub name: String,
     /// One line for `asid list`.
-    fn about(&self) -> &str;
+    pub about: String,
     /// The scene.
-    fn scene(&self) -> &Scene;
+    pub scene: Scene,
     /// What an engine must be able to do.
-    fn requires(&self) -> Capabilities;
+    pub requires: Capabilities,
     /// The unknowns that are identified by default.
-    fn parameters(&self) -> Vec<Parameter>;
+    pub parameters: Vec<Parameter>,
     /// Further unknowns that can be switched on by name.
-    fn optional_parameters(&self) -> Vec<Parameter> {
-        Vec::new()
-    }
-    /// Settings of an algorithm that suit this task better than the algorithm's defaults:
-    /// `section` is `explorer`, `identifier` or `solver`, `algorithm` its name.
-    fn settings(&self, _section: &str, _algorithm: &str) -> Settings {
-        Settings::new()
-    }
+    pub optional_parameters: Vec<Parameter>,
+    /// The named cases of tables.
+    pub conditions: Vec<Condition>,
     /// The numbers that say how hard the task is; none where it is as it is.
-    fn difficulty(&self) -> Vec<Difficulty> {
-        Vec::new()
-    }
-    /// The task with some of its difficulties set, by name, the others at their defaults; `None`
-    /// where nothing can be set.
-    ///
-    /// # Errors
-    /// When a name is unknown, a value out of range, or the task cannot be made with it.
-    fn adjusted(&self, _values: &BTreeMap<String, f64>) -> Result<Option<Box<dyn Task>>> {
-        Ok(None)
-    }
+    pub difficulty: Vec<Difficulty>,
     /// Readings of the trackers a second, the first at the start of an episode; `None` for one at
     /// every frame. There is one at the end of each control step, so that a policy always has it.
-    fn tracker_rate(&self) -> Option<f64> {
-        None
-    }
-    /// The named cases of tables.
-    fn conditions(&self) -> Vec<Condition>;
-    /// The task as it is set in one of its conditions; `None` where the condition is of
-    /// true values alone.
-    ///
-    /// # Errors
-    /// When the condition's task cannot be made.
-    fn under(&self, _condition: &str) -> Result<Option<Box<dyn Task>>> {
-        Ok(None)
-    }
-    /// What an episode or an attempt in the real world does to the truth, of which simulators
-    /// know nothing: `truth` holds the values of `parameters`.
-    fn wear(&self, _parameters: &[Parameter], _truth: &mut [f64], _rng: &mut Rng) {}
-    /// The task's scene with another object of the same kind: what stands for a real set-up whose parts
-    /// are not those of the model. Names, unknowns and actuators are those of [`Task::scene`]. `None`
-    /// where the task has none.
-    ///
-    /// # Errors
-    /// When that scene cannot be made.
-    fn stand_in(&self) -> Result<Option<Scene>> {
-        Ok(None)
-    }
+    pub tracker_rate: Option<f64>,
     /// How it is explored.
-    fn exploration(&self) -> &ExplorationProtocol;
+    pub exploration: ExplorationProtocol,
     /// What is to be achieved.
-    fn downstream(&self) -> &DownstreamProtocol;
+    pub downstream: DownstreamProtocol,
+    /// Corners of the box that every tracked and every own position stays in while the task is
+    /// explored, low then high, m.
+    pub bounds: [[f64; 3]; 2],
+    /// The two tracked parts whose joint is in question, the one that holds first; `None`
+    /// where there are no such parts.
+    pub parts: Option<[TrackedPart; 2]>,
+    /// What a picture from above shows.
+    pub top_view: TopView,
+    /// The things that are tracked, the one that the task is about first. Where none is given it is one
+    /// thing: the first signal is its position, the second its orientation.
+    pub objects: Vec<TrackedObject>,
+    /// Parts of the plane that differ in what they tell, such as patches of a floor: figures count
+    /// where the object goes.
+    pub regions: Vec<Outline>,
+}
+
+impl TaskSpec {
+    /// A task of this name and scene that is explored and solved so; all else is empty, and the box
+    /// of positions reaches 1.5 m from the origin.
+    #[must_use]
+    pub fn new(
+        [name, about]: [&str; 2],
+        scene: Scene,
+        exploration: ExplorationProtocol,
+        downstream: DownstreamProtocol,
+    ) -> Self {
+        Self {
+            name: name.into(),
+            about: about.into(),
+            scene,
+            requires: Capabilities::empty(),
+            parameters: Vec::new(),
+            optional_parameters: Vec::new(),
+            conditions: Vec::new(),
+            difficulty: Vec::new(),
+            tracker_rate: None,
+            exploration,
+            downstream,
+            bounds: [[-1.5, -1.5, -0.1], [1.5, 1.5, 1.5]],
+            parts: None,
+            top_view: TopView::default(),
+            objects: Vec::new(),
+            regions: Vec::new(),
+        }
+    }
+}
+
+/// A task as the framework sees it: its data, and what only code can say.
+///
+/// A task writes the first seven methods, and of the next seven those that it has something to say in. The
+/// others read its [`TaskSpec`] and are not written anew.
+pub trait Task: Send + Sync {
+    /// The task as data.
+    fn spec(&self) -> &TaskSpec;
     /// Writes a start pose into positions (`nq`, the first keyframe on entry).
     ///
     /// # Errors
@@ -297,10 +313,39 @@ pub trait Task: Send + Sync {
     fn metric(&self, readings: &[f64]) -> Vec<f64>;
     /// What came of an attempt.
     fn outcome(&self, readings: &[f64]) -> Outcome;
-    /// Corners of the box that every tracked and every own position stays in while the task is
-    /// explored, low then high, m.
-    fn bounds(&self) -> [[f64; 3]; 2] {
-        [[-1.5, -1.5, -0.1], [1.5, 1.5, 1.5]]
+
+    /// Settings of an algorithm that suit this task better than the algorithm's defaults:
+    /// `section` is `explorer`, `identifier` or `solver`, `algorithm` its name.
+    fn settings(&self, _section: &str, _algorithm: &str) -> Settings {
+        Settings::new()
+    }
+    /// The task with some of its difficulties set, by name, the others at their defaults; `None`
+    /// where nothing can be set.
+    ///
+    /// # Errors
+    /// When a name is unknown, a value out of range, or the task cannot be made with it.
+    fn adjusted(&self, _values: &BTreeMap<String, f64>) -> Result<Option<Box<dyn Task>>> {
+        Ok(None)
+    }
+    /// The task as it is set in one of its conditions; `None` where the condition is of
+    /// true values alone.
+    ///
+    /// # Errors
+    /// When the condition's task cannot be made.
+    fn under(&self, _condition: &str) -> Result<Option<Box<dyn Task>>> {
+        Ok(None)
+    }
+    /// What an episode or an attempt in the real world does to the truth, of which simulators
+    /// know nothing: `truth` holds the values of `parameters`.
+    fn wear(&self, _parameters: &[Parameter], _truth: &mut [f64], _rng: &mut Rng) {}
+    /// The task's scene with another object of the same kind: what stands for a real set-up whose parts
+    /// are not those of the model. Names, unknowns and actuators are those of [`TaskSpec::scene`]. `None`
+    /// where the task has none.
+    ///
+    /// # Errors
+    /// When that scene cannot be made.
+    fn stand_in(&self) -> Result<Option<Scene>> {
+        Ok(None)
     }
     /// What a reading of an exploration episode (tracked signals first) is worth to the task itself:
     /// larger where the object is nearer to its goal, in the metric's unit; `None` where the task has
@@ -308,40 +353,89 @@ pub trait Task: Send + Sync {
     fn goal_reward(&self, _reading: &[f64]) -> Option<f64> {
         None
     }
-    /// The two tracked parts whose joint is in question, the one that holds first; `None`
-    /// where there are no such parts.
-    fn parts(&self) -> Option<[TrackedPart; 2]> {
-        None
-    }
-    /// What a picture from above shows.
-    fn top_view(&self) -> TopView {
-        TopView::default()
-    }
-    /// The things that are tracked, the one that the task is about first. Unless a task says
-    /// otherwise it is one thing: the first signal is its position, the second its orientation.
-    fn objects(&self) -> Vec<TrackedObject> {
-        let protocol = self.exploration();
-        let mut sensors = protocol.signals.iter().map(|s| s.sensor.clone());
-        sensors
-            .next()
-            .map(|position| TrackedObject {
-                outline: self.top_view().object,
-                position,
-                orientation: sensors.next(),
-                contact: protocol.contact.clone(),
-                mass: None,
-            })
-            .into_iter()
-            .collect()
-    }
-    /// Parts of the plane that differ in what they tell, such as patches of a floor: figures count
-    /// where the object goes.
-    fn regions(&self) -> Vec<Outline> {
-        Vec::new()
-    }
     /// What a picture from the side shows at the end of an attempt: shapes in the
     /// world, from one row of readings.
     fn side_view(&self, _readings: &[f64]) -> Vec<Outline> {
         Vec::new()
+    }
+
+    /// [`TaskSpec::name`].
+    fn name(&self) -> &str {
+        &self.spec().name
+    }
+    /// [`TaskSpec::about`].
+    fn about(&self) -> &str {
+        &self.spec().about
+    }
+    /// [`TaskSpec::scene`].
+    fn scene(&self) -> &Scene {
+        &self.spec().scene
+    }
+    /// [`TaskSpec::requires`].
+    fn requires(&self) -> Capabilities {
+        self.spec().requires
+    }
+    /// [`TaskSpec::parameters`].
+    fn parameters(&self) -> Vec<Parameter> {
+        self.spec().parameters.clone()
+    }
+    /// [`TaskSpec::optional_parameters`].
+    fn optional_parameters(&self) -> Vec<Parameter> {
+        self.spec().optional_parameters.clone()
+    }
+    /// [`TaskSpec::conditions`].
+    fn conditions(&self) -> Vec<Condition> {
+        self.spec().conditions.clone()
+    }
+    /// [`TaskSpec::difficulty`].
+    fn difficulty(&self) -> Vec<Difficulty> {
+        self.spec().difficulty.clone()
+    }
+    /// [`TaskSpec::tracker_rate`].
+    fn tracker_rate(&self) -> Option<f64> {
+        self.spec().tracker_rate
+    }
+    /// [`TaskSpec::exploration`].
+    fn exploration(&self) -> &ExplorationProtocol {
+        &self.spec().exploration
+    }
+    /// [`TaskSpec::downstream`].
+    fn downstream(&self) -> &DownstreamProtocol {
+        &self.spec().downstream
+    }
+    /// [`TaskSpec::bounds`].
+    fn bounds(&self) -> [[f64; 3]; 2] {
+        self.spec().bounds
+    }
+    /// [`TaskSpec::parts`].
+    fn parts(&self) -> Option<[TrackedPart; 2]> {
+        self.spec().parts.clone()
+    }
+    /// [`TaskSpec::top_view`].
+    fn top_view(&self) -> TopView {
+        self.spec().top_view.clone()
+    }
+    /// [`TaskSpec::regions`].
+    fn regions(&self) -> Vec<Outline> {
+        self.spec().regions.clone()
+    }
+    /// [`TaskSpec::objects`].
+    fn objects(&self) -> Vec<TrackedObject> {
+        let spec = self.spec();
+        if !spec.objects.is_empty() {
+            return spec.objects.clone();
+        }
+        let mut sensors = spec.exploration.signals.iter().map(|s| s.sensor.clone());
+        sensors
+            .next()
+            .map(|position| TrackedObject {
+                outline: spec.top_view.object.clone(),
+                position,
+                orientation: sensors.next(),
+                contact: spec.exploration.contact.clone(),
+                mass: None,
+            })
+            .into_iter()
+            .collect()
     }
 }

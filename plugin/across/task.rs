@@ -4,58 +4,30 @@ use std::collections::BTreeMap;
 use std::ops::Deref;
 
 use super::Across;
-use asid_core::backend::Capabilities;
-use asid_core::difficulty::{Difficulty, Levels};
+use asid_core::difficulty::Levels;
 use asid_core::error::Result;
 use asid_core::layout::Layout;
 use asid_core::parameter::Parameter;
 use asid_core::registry::Settings;
 use asid_core::rng::Rng;
 use asid_core::scene::Scene;
-use asid_core::task::{
-    Commander, Condition, DownstreamProtocol, ExplorationProtocol, Outcome, Outline, Task, TopView,
-    TrackedObject, TrackedPart,
-};
+use asid_core::task::{Commander, Outcome, Outline, Task, TaskSpec};
 
 impl<T> Task for Across<T>
 where
     T: Deref + Send + Sync,
     T::Target: Task,
 {
+    fn spec(&self) -> &TaskSpec {
+        self.run(|task| task.spec())
+    }
+
     fn name(&self) -> &str {
         self.name.unwrap_or_else(|| self.run(|task| task.name()))
     }
 
-    fn about(&self) -> &str {
-        self.run(|task| task.about())
-    }
-
-    fn scene(&self) -> &Scene {
-        self.run(|task| task.scene())
-    }
-
-    fn requires(&self) -> Capabilities {
-        self.run(|task| task.requires())
-    }
-
-    fn parameters(&self) -> Vec<Parameter> {
-        self.run(|task| task.parameters())
-    }
-
-    fn optional_parameters(&self) -> Vec<Parameter> {
-        self.run(|task| task.optional_parameters())
-    }
-
     fn settings(&self, section: &str, algorithm: &str) -> Settings {
         self.run(|task| task.settings(section, algorithm))
-    }
-
-    fn conditions(&self) -> Vec<Condition> {
-        self.run(|task| task.conditions())
-    }
-
-    fn difficulty(&self) -> Vec<Difficulty> {
-        self.run(|task| task.difficulty())
     }
 
     fn adjusted(&self, values: &BTreeMap<String, f64>) -> Result<Option<Box<dyn Task>>> {
@@ -63,10 +35,6 @@ where
         Levels::new(self.difficulty()).with(values)?;
         let task = self.try_run(|task| task.adjusted(values))?;
         Ok(task.map(|inner| self.another(inner)))
-    }
-
-    fn tracker_rate(&self) -> Option<f64> {
-        self.run(|task| task.tracker_rate())
     }
 
     fn under(&self, condition: &str) -> Result<Option<Box<dyn Task>>> {
@@ -83,14 +51,6 @@ where
 
     fn stand_in(&self) -> Result<Option<Scene>> {
         self.try_run(|task| task.stand_in())
-    }
-
-    fn exploration(&self) -> &ExplorationProtocol {
-        self.run(|task| task.exploration())
-    }
-
-    fn downstream(&self) -> &DownstreamProtocol {
-        self.run(|task| task.downstream())
     }
 
     fn place(&self, layout: &Layout, start: &[f64], qpos: &mut [f64]) -> Result<()> {
@@ -136,28 +96,8 @@ where
         outcome
     }
 
-    fn bounds(&self) -> [[f64; 3]; 2] {
-        self.run(|task| task.bounds())
-    }
-
     fn goal_reward(&self, reading: &[f64]) -> Option<f64> {
         self.run(|task| task.goal_reward(reading))
-    }
-
-    fn parts(&self) -> Option<[TrackedPart; 2]> {
-        self.run(|task| task.parts())
-    }
-
-    fn top_view(&self) -> TopView {
-        self.run(|task| task.top_view())
-    }
-
-    fn objects(&self) -> Vec<TrackedObject> {
-        self.run(|task| task.objects())
-    }
-
-    fn regions(&self) -> Vec<Outline> {
-        self.run(|task| task.regions())
     }
 
     fn side_view(&self, readings: &[f64]) -> Vec<Outline> {

@@ -18,9 +18,9 @@ use asid_core::parameter::{Parameter, Scale};
 use asid_core::registry::Settings;
 use asid_core::task::{
     Commander, Condition, Coordinate, DownstreamProtocol, ExplorationProtocol, Outcome, Outline,
-    Task, TopView, TrackedObject, TrackedPart,
+    Task, TaskSpec, TopView, TrackedObject, TrackedPart,
 };
-use asid_core::{Capabilities, Difficulty, Layout, Levels, Result, Scene};
+use asid_core::{Capabilities, Difficulty, Layout, Levels, Result};
 
 use crate::difficulty;
 use crate::panda;
@@ -59,19 +59,19 @@ pub fn hinge(hinge_offset: f64) -> [f64; 3] {
 
 /// The task.
 pub struct LaptopArticulation {
-    levels: Levels,
+    spec: TaskSpec,
     angle_tolerance: f64,
     hand_speed: f64,
-    tracker_rate: f64,
-    scene: Scene,
     home: Vec<f64>,
-    exploration: ExplorationProtocol,
-    downstream: DownstreamProtocol,
 }
 
+const NAME: &str = "laptop-articulation";
+const ABOUT: &str =
+    "find whether a laptop's lid turns and about which axis, then close it to a set angle";
+
 asid_core::register!(TaskEntry {
-    name: "laptop-articulation",
-    about: "find whether a laptop's lid turns and about which axis, then close it to a set angle",
+    name: NAME,
+    about: ABOUT,
     make: || Ok(Box::new(LaptopArticulation::new()?)),
 });
 
@@ -86,7 +86,7 @@ impl LaptopArticulation {
 
     /// The task at some difficulty.
     fn at(levels: Levels) -> Result<Self> {
-        let (scene, home) = panda::scene("laptop-articulation", include_str!("scene.xml"))?;
+        let (scene, home) = panda::scene(NAME, include_str!("scene.xml"))?;
         let angle_tolerance = levels.get("angle_tolerance")?;
         let sensors = ["base_pos", "base_quat", "lid_pos", "lid_quat"];
         let exploration = ExplorationProtocol {
@@ -120,15 +120,32 @@ impl LaptopArticulation {
             channels: sensors.map(str::to_owned).into(),
             phases: closing::phases(),
         };
+        let spec = TaskSpec {
+            requires: Capabilities::ARTICULATION
+                | Capabilities::CONTACT
+                | Capabilities::ACTUATORS
+                | Capabilities::JOINT_FRICTION
+                | Capabilities::JOINT_IMPEDANCE
+                | Capabilities::MASS_PARAMETERS,
+            parameters: parameters(),
+            conditions: [("articulated", 1.0), ("rigid", 0.0)]
+                .map(|(name, value)| Condition::fixed(name, &[("articulated", value)]))
+                .into(),
+            difficulty: levels.all().to_vec(),
+            tracker_rate: Some(difficulty::rate(&levels)?),
+            parts: Some(["base", "lid"].map(|part| TrackedPart {
+                position: format!("{part}_pos"),
+                orientation: format!("{part}_quat"),
+            })),
+            objects: objects(),
+            top_view: top_view(),
+            ..TaskSpec::new([NAME, ABOUT], scene, exploration, downstream)
+        };
         Ok(Self {
+            spec,
             angle_tolerance,
             hand_speed: levels.get("hand_speed")?,
-            tracker_rate: difficulty::rate(&levels)?,
-            levels,
-            scene,
             home,
-            exploration,
-            downstream,
         })
     }
 }
@@ -138,6 +155,56 @@ fn hand_on(part: &str) -> Vec<[String; 2]> {
     ["finger_left", "finger_right", "hand"]
         .map(|body| [body.into(), part.into()])
         .into()
+}
+
+/// Whether the lid turns, and about which axis.
+fn parameters() -> Vec<Parameter> {
+    vec![
+        Parameter {
+            name: "articulated".into(),
+            targets: crate::targets(["joint/hinge/frictionloss"]),
+            range: [0.0, 1.0],
+            scale: Scale::Binary(HINGE_FRICTION),
+            unit: String::new(),
+        },
+        Parameter {
+            name: "hinge_offset".into(),
+            targets: crate::targets(["joint/hinge/pos/2"]),
+            range: [-MAX_OFFSET, MAX_OFFSET],
+            scale: Scale::Linear,
+            unit: "m".into(),
+        },
+    ]
+}
+
+/// Both parts. The lid is drawn as it is seen when it stands upright.
+fn objects() -> Vec<TrackedObject> {
+    let [x, y, z] = PLATE_HALF;
+    [("base", y), ("lid", z)]
+        .map(|(part, depth)| TrackedObject {
+            outline: Outline {
+                label: part.into(),
+                corners: crate::rectangle([0.0, 0.0], [x, depth]),
+            },
+            position: format!("{part}_pos"),
+            orientation: Some(format!("{part}_quat")),
+            contact: hand_on(part),
+            mass: None,
+        })
+        .into()
+}
+
+/// The base from above.
+fn top_view() -> TopView {
+    let [x, y, _] = PLATE_HALF;
+    TopView {
+        object: Outline {
+            label: "base".into(),
+            corners: vec![[-x, -y], [x, -y], [x, y], [-x, y]],
+        },
+        fixtures: Vec::new(),
+        bounds: [[0.1, -0.6], [1.0, 0.5]],
+    }
 }
 
 /// What makes the task easier or harder.
@@ -159,44 +226,8 @@ fn difficulties() -> Vec<Difficulty> {
 }
 
 impl Task for LaptopArticulation {
-    fn name(&self) -> &str {
-        "laptop-articulation"
-    }
-
-    fn about(&self) -> &str {
-        "find whether a laptop's lid turns and about which axis, then close it to a set angle"
-    }
-
-    fn scene(&self) -> &Scene {
-        &self.scene
-    }
-
-    fn requires(&self) -> Capabilities {
-        Capabilities::ARTICULATION
-            | Capabilities::CONTACT
-            | Capabilities::ACTUATORS
-            | Capabilities::JOINT_FRICTION
-            | Capabilities::JOINT_IMPEDANCE
-            | Capabilities::MASS_PARAMETERS
-    }
-
-    fn parameters(&self) -> Vec<Parameter> {
-        vec![
-            Parameter {
-                name: "articulated".into(),
-                targets: crate::targets(["joint/hinge/frictionloss"]),
-                range: [0.0, 1.0],
-                scale: Scale::Binary(HINGE_FRICTION),
-                unit: String::new(),
-            },
-            Parameter {
-                name: "hinge_offset".into(),
-                targets: crate::targets(["joint/hinge/pos/2"]),
-                range: [-MAX_OFFSET, MAX_OFFSET],
-                scale: Scale::Linear,
-                unit: "m".into(),
-            },
-        ]
+    fn spec(&self) -> &TaskSpec {
+        &self.spec
     }
 
     /// How far a push turns the lid is luck, and where the parts then lie to each other is not:
@@ -223,31 +254,9 @@ impl Task for LaptopArticulation {
         settings
     }
 
-    fn difficulty(&self) -> Vec<Difficulty> {
-        self.levels.all().to_vec()
-    }
-
     fn adjusted(&self, values: &BTreeMap<String, f64>) -> Result<Option<Box<dyn Task>>> {
         let levels = Levels::new(difficulties()).with(values)?;
         Ok(Some(Box::new(Self::at(levels)?)))
-    }
-
-    fn tracker_rate(&self) -> Option<f64> {
-        Some(self.tracker_rate)
-    }
-
-    fn conditions(&self) -> Vec<Condition> {
-        [("articulated", 1.0), ("rigid", 0.0)]
-            .map(|(name, value)| Condition::fixed(name, &[("articulated", value)]))
-            .into()
-    }
-
-    fn exploration(&self) -> &ExplorationProtocol {
-        &self.exploration
-    }
-
-    fn downstream(&self) -> &DownstreamProtocol {
-        &self.downstream
     }
 
     fn place(&self, layout: &Layout, start: &[f64], qpos: &mut [f64]) -> Result<()> {
@@ -277,11 +286,11 @@ impl Task for LaptopArticulation {
             speed: self.hand_speed,
             ..STEERING
         };
-        steering.commander(&self.scene, &self.home)
+        steering.commander(&self.spec.scene, &self.home)
     }
 
     fn attempt(&self, start: &[f64], action: &[f64]) -> Result<Vec<f64>> {
-        closing::commands(&self.scene, &self.home, start, action[0])
+        closing::commands(&self.spec.scene, &self.home, start, action[0])
     }
 
     fn metric(&self, readings: &[f64]) -> Vec<f64> {
@@ -290,42 +299,6 @@ impl Task for LaptopArticulation {
 
     fn outcome(&self, readings: &[f64]) -> Outcome {
         metric::outcome(readings, self.angle_tolerance)
-    }
-
-    fn parts(&self) -> Option<[TrackedPart; 2]> {
-        Some(["base", "lid"].map(|part| TrackedPart {
-            position: format!("{part}_pos"),
-            orientation: format!("{part}_quat"),
-        }))
-    }
-
-    /// The lid is drawn as it is seen when it stands upright.
-    fn objects(&self) -> Vec<TrackedObject> {
-        let [x, y, z] = PLATE_HALF;
-        [("base", y), ("lid", z)]
-            .map(|(part, depth)| TrackedObject {
-                outline: Outline {
-                    label: part.into(),
-                    corners: crate::rectangle([0.0, 0.0], [x, depth]),
-                },
-                position: format!("{part}_pos"),
-                orientation: Some(format!("{part}_quat")),
-                contact: hand_on(part),
-                mass: None,
-            })
-            .into()
-    }
-
-    fn top_view(&self) -> TopView {
-        let [x, y, _] = PLATE_HALF;
-        TopView {
-            object: Outline {
-                label: "base".into(),
-                corners: vec![[-x, -y], [x, -y], [x, y], [-x, y]],
-            },
-            fixtures: Vec::new(),
-            bounds: [[0.1, -0.6], [1.0, 0.5]],
-        }
     }
 
     fn side_view(&self, readings: &[f64]) -> Vec<Outline> {

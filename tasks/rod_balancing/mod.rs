@@ -20,7 +20,7 @@ use asid_core::parameter::{Parameter, Scale};
 use asid_core::signal::yaw;
 use asid_core::task::{
     Commander, Condition, Coordinate, DownstreamProtocol, ExplorationProtocol, Outcome, Outline,
-    Task, TopView,
+    Task, TaskSpec, TopView,
 };
 use asid_core::{Capabilities, Difficulty, Layout, Levels, Result, Scene};
 
@@ -57,19 +57,18 @@ const ROD_REST_HEIGHT: f64 = 0.02;
 
 /// The task.
 pub struct RodBalancing {
-    levels: Levels,
+    spec: TaskSpec,
     ledge_width: f64,
     hand_speed: f64,
-    tracker_rate: f64,
-    scene: Scene,
     home: Vec<f64>,
-    exploration: ExplorationProtocol,
-    downstream: DownstreamProtocol,
 }
 
+const NAME: &str = "rod-balancing";
+const ABOUT: &str = "find a rod's centre of mass by pushing it, then balance it on a ledge";
+
 asid_core::register!(TaskEntry {
-    name: "rod-balancing",
-    about: "find a rod's centre of mass by pushing it, then balance it on a ledge",
+    name: NAME,
+    about: ABOUT,
     make: || Ok(Box::new(RodBalancing::new()?)),
 });
 
@@ -84,7 +83,7 @@ impl RodBalancing {
 
     /// The task at some difficulty.
     fn at(levels: Levels) -> Result<Self> {
-        let (scene, home) = panda::scene("rod-balancing", include_str!("scene.xml"))?;
+        let (scene, home) = panda::scene(NAME, include_str!("scene.xml"))?;
         let ledge_width = levels.get("ledge_width")?;
         let [half_length, half_height] = LEDGE_HALF;
         let size = format!("{:?} {half_length:?} {half_height:?}", 0.5 * ledge_width);
@@ -118,16 +117,63 @@ impl RodBalancing {
             channels: vec!["rod_pos".into(), "rod_quat".into()],
             phases: placing::phases(),
         };
+        let spec = TaskSpec {
+            requires: Capabilities::ARTICULATION | Capabilities::CONTACT | Capabilities::ACTUATORS,
+            parameters: vec![mass_offset()],
+            optional_parameters: vec![friction()],
+            conditions: [("left", -0.08), ("middle", 0.0), ("right", 0.08)]
+                .map(|(name, offset)| Condition::fixed(name, &[("mass_offset", offset)]))
+                .into(),
+            difficulty: levels.all().to_vec(),
+            tracker_rate: Some(difficulty::rate(&levels)?),
+            top_view: top_view(ledge_width),
+            ..TaskSpec::new([NAME, ABOUT], scene, exploration, downstream)
+        };
         Ok(Self {
+            spec,
             ledge_width,
             hand_speed: levels.get("hand_speed")?,
-            tracker_rate: difficulty::rate(&levels)?,
-            levels,
-            scene,
             home,
-            exploration,
-            downstream,
         })
+    }
+}
+
+/// Where the rod carries its mass.
+fn mass_offset() -> Parameter {
+    Parameter {
+        name: "mass_offset".into(),
+        targets: crate::targets(["geom/rod_mass/pos/1"]),
+        range: [-0.1, 0.1],
+        scale: Scale::Linear,
+        unit: "m".into(),
+    }
+}
+
+/// Friction of the rod. The table's own coefficient is the smallest of the range, so that the rod's wins
+/// everywhere in it.
+fn friction() -> Parameter {
+    Parameter {
+        name: "friction".into(),
+        targets: crate::targets(["geom/rod_1/friction/0", "geom/rod_5/friction/0"]),
+        range: [0.2, 0.5],
+        scale: Scale::Linear,
+        unit: String::new(),
+    }
+}
+
+/// Rod and ledge from above.
+fn top_view(ledge_width: f64) -> TopView {
+    let [x, y, _] = ROD_HALF;
+    TopView {
+        object: Outline {
+            label: "rod".into(),
+            corners: vec![[-x, -y], [x, -y], [x, y], [-x, y]],
+        },
+        fixtures: vec![Outline {
+            label: "ledge".into(),
+            corners: crate::rectangle([LEDGE[0], LEDGE[1]], [0.5 * ledge_width, LEDGE_HALF[0]]),
+        }],
+        bounds: [[0.1, -0.6], [0.8, 0.5]],
     }
 }
 
@@ -144,45 +190,8 @@ fn difficulties() -> Vec<Difficulty> {
 }
 
 impl Task for RodBalancing {
-    fn name(&self) -> &str {
-        "rod-balancing"
-    }
-
-    fn about(&self) -> &str {
-        "find a rod's centre of mass by pushing it, then balance it on a ledge"
-    }
-
-    fn scene(&self) -> &Scene {
-        &self.scene
-    }
-
-    fn requires(&self) -> Capabilities {
-        Capabilities::ARTICULATION | Capabilities::CONTACT | Capabilities::ACTUATORS
-    }
-
-    fn parameters(&self) -> Vec<Parameter> {
-        vec![Parameter {
-            name: "mass_offset".into(),
-            targets: crate::targets(["geom/rod_mass/pos/1"]),
-            range: [-0.1, 0.1],
-            scale: Scale::Linear,
-            unit: "m".into(),
-        }]
-    }
-
-    fn optional_parameters(&self) -> Vec<Parameter> {
-        // The table's own coefficient is the smallest of the range, so that the rod's wins everywhere in it.
-        vec![Parameter {
-            name: "friction".into(),
-            targets: crate::targets(["geom/rod_1/friction/0", "geom/rod_5/friction/0"]),
-            range: [0.2, 0.5],
-            scale: Scale::Linear,
-            unit: String::new(),
-        }]
-    }
-
-    fn difficulty(&self) -> Vec<Difficulty> {
-        self.levels.all().to_vec()
+    fn spec(&self) -> &TaskSpec {
+        &self.spec
     }
 
     fn adjusted(&self, values: &BTreeMap<String, f64>) -> Result<Option<Box<dyn Task>>> {
@@ -190,27 +199,9 @@ impl Task for RodBalancing {
         Ok(Some(Box::new(Self::at(levels)?)))
     }
 
-    fn tracker_rate(&self) -> Option<f64> {
-        Some(self.tracker_rate)
-    }
-
-    fn conditions(&self) -> Vec<Condition> {
-        [("left", -0.08), ("middle", 0.0), ("right", 0.08)]
-            .map(|(name, offset)| Condition::fixed(name, &[("mass_offset", offset)]))
-            .into()
-    }
-
     /// Another rod: shorter, a quarter heavier, rougher below, and with its mass less at one place.
     fn stand_in(&self) -> Result<Option<Scene>> {
-        stand_in::scene(&self.scene).map(Some)
-    }
-
-    fn exploration(&self) -> &ExplorationProtocol {
-        &self.exploration
-    }
-
-    fn downstream(&self) -> &DownstreamProtocol {
-        &self.downstream
+        stand_in::scene(&self.spec.scene).map(Some)
     }
 
     fn place(&self, layout: &Layout, start: &[f64], qpos: &mut [f64]) -> Result<()> {
@@ -238,11 +229,11 @@ impl Task for RodBalancing {
             speed: self.hand_speed,
             ..STEERING
         };
-        steering.commander(&self.scene, &self.home)
+        steering.commander(&self.spec.scene, &self.home)
     }
 
     fn attempt(&self, start: &[f64], action: &[f64]) -> Result<Vec<f64>> {
-        placing::commands(&self.scene, &self.home, start, action[0])
+        placing::commands(&self.spec.scene, &self.home, start, action[0])
     }
 
     fn metric(&self, readings: &[f64]) -> Vec<f64> {
@@ -251,24 +242,6 @@ impl Task for RodBalancing {
 
     fn outcome(&self, readings: &[f64]) -> Outcome {
         metric::outcome(readings)
-    }
-
-    fn top_view(&self) -> TopView {
-        let [x, y, _] = ROD_HALF;
-        TopView {
-            object: Outline {
-                label: "rod".into(),
-                corners: vec![[-x, -y], [x, -y], [x, y], [-x, y]],
-            },
-            fixtures: vec![Outline {
-                label: "ledge".into(),
-                corners: crate::rectangle(
-                    [LEDGE[0], LEDGE[1]],
-                    [0.5 * self.ledge_width, LEDGE_HALF[0]],
-                ),
-            }],
-            bounds: [[0.1, -0.6], [0.8, 0.5]],
-        }
     }
 
     fn side_view(&self, readings: &[f64]) -> Vec<Outline> {

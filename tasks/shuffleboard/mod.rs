@@ -18,7 +18,7 @@ use asid_core::rng::Rng;
 use asid_core::signal::yaw;
 use asid_core::task::{
     Commander, Condition, Coordinate, DownstreamProtocol, ExplorationProtocol, Outcome, Outline,
-    Task, TopView,
+    Task, TaskSpec, TopView,
 };
 use asid_core::{Capabilities, Difficulty, Layout, Levels, Result, Scene};
 use rand::Rng as _;
@@ -91,21 +91,21 @@ const STEERING: Steering = Steering {
 
 /// The task.
 pub struct Shuffleboard {
+    spec: TaskSpec,
     zone: Zone,
     levels: Levels,
     zone_length: f64,
     wear: f64,
     hand_speed: f64,
-    tracker_rate: f64,
-    scene: Scene,
     home: Vec<f64>,
-    exploration: ExplorationProtocol,
-    downstream: DownstreamProtocol,
 }
 
+const NAME: &str = "shuffleboard";
+const ABOUT: &str = "find a puck's friction by pushing it, then shoot it into a zone";
+
 asid_core::register!(TaskEntry {
-    name: "shuffleboard",
-    about: "find a puck's friction by pushing it, then shoot it into a zone",
+    name: NAME,
+    about: ABOUT,
     make: || Ok(Box::new(Shuffleboard::new(Zone::Near)?)),
 });
 
@@ -120,7 +120,7 @@ impl Shuffleboard {
 
     /// The task at some difficulty.
     fn at(zone: Zone, levels: Levels) -> Result<Self> {
-        let (mut scene, home) = panda::scene("shuffleboard", include_str!("scene.xml"))?;
+        let (mut scene, home) = panda::scene(NAME, include_str!("scene.xml"))?;
         let zone_length = levels.get("zone_length")?;
         let size = format!("{:?} {:?} 0.001", 0.5 * zone_length, LANE_HALF[1]);
         for zone in Zone::ALL {
@@ -155,18 +155,87 @@ impl Shuffleboard {
             channels: vec!["puck_pos".into()],
             phases: striking::phases(),
         };
+        let spec = TaskSpec {
+            requires: Capabilities::ARTICULATION
+                | Capabilities::CONTACT
+                | Capabilities::ACTUATORS
+                | Capabilities::FREE_BODIES
+                | Capabilities::TORSIONAL_FRICTION,
+            parameters: frictions(),
+            // Each sets its zone as the goal; the truth is drawn from the prior.
+            conditions: Zone::ALL
+                .map(|zone| Condition::drawn(zone.name(), &[]))
+                .into(),
+            difficulty: levels.all().to_vec(),
+            tracker_rate: Some(difficulty::rate(&levels)?),
+            // A puck that the hand throws, at the least friction.
+            bounds: [[-0.3, -0.9, -0.02], [1.3, 0.9, 0.3]],
+            top_view: top_view(zone_length),
+            ..TaskSpec::new([NAME, ABOUT], scene, exploration, downstream)
+        };
         Ok(Self {
+            spec,
             zone,
             zone_length,
             wear: levels.get("wear")?,
             hand_speed: levels.get("hand_speed")?,
-            tracker_rate: difficulty::rate(&levels)?,
             levels,
-            scene,
             home,
-            exploration,
-            downstream,
         })
+    }
+}
+
+/// Friction of the puck on the board.
+fn frictions() -> Vec<Parameter> {
+    [
+        (
+            "sliding_friction",
+            "geom/puck/friction/0",
+            [0.01, 0.035],
+            "",
+        ),
+        (
+            "torsional_friction",
+            "geom/puck/friction/1",
+            [5e-4, 5e-3],
+            "m",
+        ),
+    ]
+    .into_iter()
+    .map(|(name, target, range, unit)| Parameter {
+        name: name.into(),
+        targets: target.parse().into_iter().collect(),
+        range,
+        scale: Scale::Log,
+        unit: unit.into(),
+    })
+    .collect()
+}
+
+/// Puck, board and zones from above.
+fn top_view(zone_length: f64) -> TopView {
+    let circle = (0..24).map(|i| {
+        let (sin, cos) = (f64::from(i) * std::f64::consts::TAU / 24.0).sin_cos();
+        [PUCK_RADIUS * cos, PUCK_RADIUS * sin]
+    });
+    let zone = |z: Zone| Outline {
+        label: format!("{} zone", z.name()),
+        corners: crate::rectangle([z.middle(), 0.0], [0.5 * zone_length, LANE_HALF[1]]),
+    };
+    TopView {
+        object: Outline {
+            label: "puck".into(),
+            corners: circle.collect(),
+        },
+        fixtures: vec![
+            Outline {
+                label: "board".into(),
+                corners: crate::rectangle(LANE, LANE_HALF),
+            },
+            zone(Zone::Near),
+            zone(Zone::Far),
+        ],
+        bounds: [[0.1, -0.25], [1.25, 0.25]],
     }
 }
 
@@ -194,70 +263,13 @@ fn start(slack: f64) -> Vec<Coordinate> {
 }
 
 impl Task for Shuffleboard {
-    fn name(&self) -> &str {
-        "shuffleboard"
-    }
-
-    fn about(&self) -> &str {
-        "find a puck's friction by pushing it, then shoot it into a zone"
-    }
-
-    fn scene(&self) -> &Scene {
-        &self.scene
-    }
-
-    fn requires(&self) -> Capabilities {
-        Capabilities::ARTICULATION
-            | Capabilities::CONTACT
-            | Capabilities::ACTUATORS
-            | Capabilities::FREE_BODIES
-            | Capabilities::TORSIONAL_FRICTION
-    }
-
-    fn parameters(&self) -> Vec<Parameter> {
-        [
-            (
-                "sliding_friction",
-                "geom/puck/friction/0",
-                [0.01, 0.035],
-                "",
-            ),
-            (
-                "torsional_friction",
-                "geom/puck/friction/1",
-                [5e-4, 5e-3],
-                "m",
-            ),
-        ]
-        .into_iter()
-        .map(|(name, target, range, unit)| Parameter {
-            name: name.into(),
-            targets: target.parse().into_iter().collect(),
-            range,
-            scale: Scale::Log,
-            unit: unit.into(),
-        })
-        .collect()
-    }
-
-    fn difficulty(&self) -> Vec<Difficulty> {
-        self.levels.all().to_vec()
+    fn spec(&self) -> &TaskSpec {
+        &self.spec
     }
 
     fn adjusted(&self, values: &BTreeMap<String, f64>) -> Result<Option<Box<dyn Task>>> {
         let levels = Levels::new(difficulties()).with(values)?;
         Ok(Some(Box::new(Self::at(self.zone, levels)?)))
-    }
-
-    fn tracker_rate(&self) -> Option<f64> {
-        Some(self.tracker_rate)
-    }
-
-    /// Each sets its zone as the goal; the truth is drawn from the prior.
-    fn conditions(&self) -> Vec<Condition> {
-        Zone::ALL
-            .map(|zone| Condition::drawn(zone.name(), &[]))
-            .into()
     }
 
     fn under(&self, condition: &str) -> Result<Option<Box<dyn Task>>> {
@@ -278,17 +290,12 @@ impl Task for Shuffleboard {
     /// Another puck: lighter by 15 %, smaller by 1 mm. The board wears in this world as in every other.
     fn stand_in(&self) -> Result<Option<Scene>> {
         let size = format!("{} {PUCK_REST_HEIGHT}", PUCK_RADIUS - 0.001);
-        let puck = self.scene.with_attribute("geom", "puck", "size", &size)?;
+        let puck = self
+            .spec
+            .scene
+            .with_attribute("geom", "puck", "size", &size)?;
         puck.with_attribute("geom", "puck", "mass", "0.034")
             .map(Some)
-    }
-
-    fn exploration(&self) -> &ExplorationProtocol {
-        &self.exploration
-    }
-
-    fn downstream(&self) -> &DownstreamProtocol {
-        &self.downstream
     }
 
     fn place(&self, layout: &Layout, start: &[f64], qpos: &mut [f64]) -> Result<()> {
@@ -316,11 +323,11 @@ impl Task for Shuffleboard {
             speed: self.hand_speed,
             ..STEERING
         };
-        steering.commander(&self.scene, &self.home)
+        steering.commander(&self.spec.scene, &self.home)
     }
 
     fn attempt(&self, start: &[f64], action: &[f64]) -> Result<Vec<f64>> {
-        striking::commands(&self.scene, &self.home, start, action[0])
+        striking::commands(&self.spec.scene, &self.home, start, action[0])
     }
 
     fn metric(&self, readings: &[f64]) -> Vec<f64> {
@@ -334,38 +341,7 @@ impl Task for Shuffleboard {
         metric::outcome(self.zone, self.zone_length, readings)
     }
 
-    /// A puck that the hand throws, at the least friction.
-    fn bounds(&self) -> [[f64; 3]; 2] {
-        [[-0.3, -0.9, -0.02], [1.3, 0.9, 0.3]]
-    }
-
     fn goal_reward(&self, reading: &[f64]) -> Option<f64> {
         Some(-metric::zone_error(self.zone, reading))
-    }
-
-    fn top_view(&self) -> TopView {
-        let circle = (0..24).map(|i| {
-            let (sin, cos) = (f64::from(i) * std::f64::consts::TAU / 24.0).sin_cos();
-            [PUCK_RADIUS * cos, PUCK_RADIUS * sin]
-        });
-        let zone = |z: Zone| Outline {
-            label: format!("{} zone", z.name()),
-            corners: crate::rectangle([z.middle(), 0.0], [0.5 * self.zone_length, LANE_HALF[1]]),
-        };
-        TopView {
-            object: Outline {
-                label: "puck".into(),
-                corners: circle.collect(),
-            },
-            fixtures: vec![
-                Outline {
-                    label: "board".into(),
-                    corners: crate::rectangle(LANE, LANE_HALF),
-                },
-                zone(Zone::Near),
-                zone(Zone::Far),
-            ],
-            bounds: [[0.1, -0.25], [1.25, 0.25]],
-        }
     }
 }

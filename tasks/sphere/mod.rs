@@ -15,9 +15,9 @@ use asid_core::parameter::Parameter;
 use asid_core::registry::Settings;
 use asid_core::task::{
     Commander, Condition, Coordinate, DownstreamProtocol, ExplorationProtocol, Outcome, Outline,
-    Task, TopView, TrackedObject,
+    Task, TaskSpec, TopView, TrackedObject,
 };
-use asid_core::{Capabilities, Difficulty, Layout, Levels, Result, Scene, Target};
+use asid_core::{Capabilities, Difficulty, Layout, Levels, Result, Target};
 
 use crate::difficulty;
 use crate::panda;
@@ -116,15 +116,11 @@ pub enum Number {
 
 /// A task of the family.
 pub struct Sphere {
+    task: TaskSpec,
     spec: Spec,
-    levels: Levels,
     goal: metric::Goal,
     steering: Steering,
-    tracker_rate: f64,
-    scene: Scene,
     home: Vec<f64>,
-    exploration: ExplorationProtocol,
-    downstream: DownstreamProtocol,
 }
 
 impl Sphere {
@@ -171,23 +167,69 @@ impl Sphere {
             channels: vec!["ball_pos".into()],
             phases: strike::phases(spec.seconds),
         };
+        let goal = metric::Goal {
+            at: spec.goal,
+            radius,
+        };
+        let task = TaskSpec {
+            requires: Capabilities::ARTICULATION
+                | Capabilities::CONTACT
+                | Capabilities::ACTUATORS
+                | Capabilities::FREE_BODIES
+                | Capabilities::ROLLING_FRICTION,
+            parameters: spec.parameters.clone(),
+            optional_parameters: spec.optional.clone(),
+            conditions: spec.conditions.clone(),
+            difficulty: levels.all().to_vec(),
+            tracker_rate: Some(difficulty::rate(&levels)?),
+            objects: objects(&spec),
+            regions: spec.regions.clone(),
+            top_view: top_view(&spec, &goal),
+            ..TaskSpec::new([spec.name, spec.about], scene, exploration, downstream)
+        };
         Ok(Self {
-            goal: metric::Goal {
-                at: spec.goal,
-                radius,
-            },
+            task,
+            goal,
             steering: Steering {
                 speed: levels.get("hand_speed")?,
                 ..spec.steering
             },
-            tracker_rate: difficulty::rate(&levels)?,
-            levels,
             spec,
-            scene,
             home,
-            exploration,
-            downstream,
         })
+    }
+}
+
+/// The balls.
+fn objects(spec: &Spec) -> Vec<TrackedObject> {
+    balls(spec)
+        .map(|ball| TrackedObject {
+            outline: Outline {
+                label: ball.replace('_', " "),
+                corners: circle([0.0, 0.0], BALL_RADIUS),
+            },
+            position: position_of(ball),
+            orientation: None,
+            contact: paddle_on(ball),
+            mass: format!("geom/{ball}/mass").parse().ok(),
+        })
+        .collect()
+}
+
+/// Ball, goal and what stands still from above.
+fn top_view(spec: &Spec, goal: &metric::Goal) -> TopView {
+    let mut fixtures = spec.fixtures.clone();
+    fixtures.push(Outline {
+        label: "goal".into(),
+        corners: circle(goal.at, goal.radius),
+    });
+    TopView {
+        object: Outline {
+            label: "ball".into(),
+            corners: circle([0.0, 0.0], BALL_RADIUS),
+        },
+        fixtures,
+        bounds: [[0.15, -0.62], [0.85, 0.42]],
     }
 }
 
@@ -227,32 +269,8 @@ fn place_in([x, y]: Area) -> Vec<Coordinate> {
 }
 
 impl Task for Sphere {
-    fn name(&self) -> &str {
-        self.spec.name
-    }
-
-    fn about(&self) -> &str {
-        self.spec.about
-    }
-
-    fn scene(&self) -> &Scene {
-        &self.scene
-    }
-
-    fn requires(&self) -> Capabilities {
-        Capabilities::ARTICULATION
-            | Capabilities::CONTACT
-            | Capabilities::ACTUATORS
-            | Capabilities::FREE_BODIES
-            | Capabilities::ROLLING_FRICTION
-    }
-
-    fn parameters(&self) -> Vec<Parameter> {
-        self.spec.parameters.clone()
-    }
-
-    fn optional_parameters(&self) -> Vec<Parameter> {
-        self.spec.optional.clone()
+    fn spec(&self) -> &TaskSpec {
+        &self.task
     }
 
     fn settings(&self, section: &str, algorithm: &str) -> Settings {
@@ -268,29 +286,9 @@ impl Task for Sphere {
             .collect()
     }
 
-    fn difficulty(&self) -> Vec<Difficulty> {
-        self.levels.all().to_vec()
-    }
-
     fn adjusted(&self, values: &BTreeMap<String, f64>) -> Result<Option<Box<dyn Task>>> {
         let levels = Levels::new(difficulties()).with(values)?;
         Ok(Some(Box::new(Self::at(self.spec.clone(), levels)?)))
-    }
-
-    fn tracker_rate(&self) -> Option<f64> {
-        Some(self.tracker_rate)
-    }
-
-    fn conditions(&self) -> Vec<Condition> {
-        self.spec.conditions.clone()
-    }
-
-    fn exploration(&self) -> &ExplorationProtocol {
-        &self.exploration
-    }
-
-    fn downstream(&self) -> &DownstreamProtocol {
-        &self.downstream
     }
 
     fn place(&self, layout: &Layout, start: &[f64], qpos: &mut [f64]) -> Result<()> {
@@ -304,7 +302,7 @@ impl Task for Sphere {
     }
 
     fn commander(&self) -> Result<Box<dyn Commander>> {
-        self.steering.commander(&self.scene, &self.home)
+        self.steering.commander(&self.task.scene, &self.home)
     }
 
     fn attempt(&self, start: &[f64], action: &[f64]) -> Result<Vec<f64>> {
@@ -317,7 +315,12 @@ impl Task for Sphere {
             speed: action[0],
             aim: action[1],
         };
-        strike::commands(&self.scene, &self.home, &strike, self.downstream.frames)
+        strike::commands(
+            &self.task.scene,
+            &self.home,
+            &strike,
+            self.task.downstream.frames,
+        )
     }
 
     fn metric(&self, readings: &[f64]) -> Vec<f64> {
@@ -331,43 +334,8 @@ impl Task for Sphere {
         metric::outcome(readings, self.goal, self.spec.line)
     }
 
-    fn objects(&self) -> Vec<TrackedObject> {
-        balls(&self.spec)
-            .map(|ball| TrackedObject {
-                outline: Outline {
-                    label: ball.replace('_', " "),
-                    corners: circle([0.0, 0.0], BALL_RADIUS),
-                },
-                position: position_of(ball),
-                orientation: None,
-                contact: paddle_on(ball),
-                mass: format!("geom/{ball}/mass").parse().ok(),
-            })
-            .collect()
-    }
-
-    fn regions(&self) -> Vec<Outline> {
-        self.spec.regions.clone()
-    }
-
     fn goal_reward(&self, reading: &[f64]) -> Option<f64> {
         Some(-metric::distance(reading, self.spec.goal))
-    }
-
-    fn top_view(&self) -> TopView {
-        let mut fixtures = self.spec.fixtures.clone();
-        fixtures.push(Outline {
-            label: "goal".into(),
-            corners: circle(self.goal.at, self.goal.radius),
-        });
-        TopView {
-            object: Outline {
-                label: "ball".into(),
-                corners: circle([0.0, 0.0], BALL_RADIUS),
-            },
-            fixtures,
-            bounds: [[0.15, -0.62], [0.85, 0.42]],
-        }
     }
 }
 

@@ -6,7 +6,7 @@
 use asid::core::parameter::{Parameter, Scale};
 use asid::core::signal::Signal;
 use asid::core::task::{
-    Commander, Condition, Coordinate, DownstreamProtocol, ExplorationProtocol, Outcome,
+    Commander, Coordinate, DownstreamProtocol, ExplorationProtocol, Outcome, TaskSpec,
 };
 use asid::core::{Capabilities, Layout, Result, Scene, Task};
 
@@ -39,41 +39,45 @@ const XML: &str = r#"
 
 /// The task.
 pub struct Cart {
-    scene: Scene,
-    exploration: ExplorationProtocol,
-    downstream: DownstreamProtocol,
+    spec: TaskSpec,
 }
 
 impl Cart {
     pub fn new() -> Self {
         let force = Coordinate::new("force", "N", [-4.0, 4.0]);
         let start = vec![Coordinate::new("x", "m", [-0.1, 0.1])];
+        let scene = Scene::from_xml("cart", XML, &[]).unwrap();
+        let exploration = ExplorationProtocol {
+            horizon: HORIZON,
+            frames_per_step: 1,
+            frame_period: FRAME,
+            action: vec![force.clone()],
+            start: start.clone(),
+            signals: vec![Signal {
+                sensor: "x".into(),
+                noise: NOISE,
+            }],
+            proprioception: Vec::new(),
+            contact: Vec::new(),
+        };
+        let downstream = DownstreamProtocol {
+            metric: "goal_distance_m".into(),
+            unit: "m".into(),
+            rule: "within 2 cm of the goal".into(),
+            threshold: Some(NEAR),
+            frames: FRAMES,
+            frame_period: FRAME,
+            action: vec![force],
+            start,
+            channels: vec!["x".into()],
+            phases: Vec::new(),
+        };
+        let about = "weigh a cart by pushing it";
         Self {
-            scene: Scene::from_xml("cart", XML, &[]).unwrap(),
-            exploration: ExplorationProtocol {
-                horizon: HORIZON,
-                frames_per_step: 1,
-                frame_period: FRAME,
-                action: vec![force.clone()],
-                start: start.clone(),
-                signals: vec![Signal {
-                    sensor: "x".into(),
-                    noise: NOISE,
-                }],
-                proprioception: Vec::new(),
-                contact: Vec::new(),
-            },
-            downstream: DownstreamProtocol {
-                metric: "goal_distance_m".into(),
-                unit: "m".into(),
-                rule: "within 2 cm of the goal".into(),
-                threshold: Some(NEAR),
-                frames: FRAMES,
-                frame_period: FRAME,
-                action: vec![force],
-                start,
-                channels: vec!["x".into()],
-                phases: Vec::new(),
+            spec: TaskSpec {
+                requires: Capabilities::ACTUATORS,
+                parameters: vec![Self::mass(Scale::Log)],
+                ..TaskSpec::new(["cart", about], scene, exploration, downstream)
             },
         }
     }
@@ -100,48 +104,33 @@ impl Commander for Force {
 }
 
 impl Task for Cart {
-    fn name(&self) -> &str {
-        "cart"
+    fn spec(&self) -> &TaskSpec {
+        &self.spec
     }
-    fn about(&self) -> &str {
-        "weigh a cart by pushing it"
-    }
-    fn scene(&self) -> &Scene {
-        &self.scene
-    }
-    fn requires(&self) -> Capabilities {
-        Capabilities::ACTUATORS
-    }
-    fn parameters(&self) -> Vec<Parameter> {
-        vec![Self::mass(Scale::Log)]
-    }
-    fn conditions(&self) -> Vec<Condition> {
-        Vec::new()
-    }
-    fn exploration(&self) -> &ExplorationProtocol {
-        &self.exploration
-    }
-    fn downstream(&self) -> &DownstreamProtocol {
-        &self.downstream
-    }
+
     fn place(&self, layout: &Layout, start: &[f64], qpos: &mut [f64]) -> Result<()> {
         qpos[layout.joint("rail")?.qpos] = start[0];
         Ok(())
     }
+
     fn locate(&self, signals: &[f64]) -> Vec<f64> {
         signals.to_vec()
     }
+
     fn commander(&self) -> Result<Box<dyn Commander>> {
         Ok(Box::new(Force))
     }
+
     /// The action is the force that takes the cart to the goal from the middle; from elsewhere it is that
     /// much more or less.
     fn attempt(&self, start: &[f64], action: &[f64]) -> Result<Vec<f64>> {
         Ok(vec![action[0] * (GOAL - start[0]) / GOAL; FRAMES])
     }
+
     fn metric(&self, readings: &[f64]) -> Vec<f64> {
         readings.iter().map(|x| (x - GOAL).abs()).collect()
     }
+
     fn outcome(&self, readings: &[f64]) -> Outcome {
         let value = (readings[readings.len() - 1] - GOAL).abs();
         Outcome {

@@ -9,6 +9,7 @@ use asid_core::parameter::{Parameter, Scale};
 use asid_core::signal::Signal;
 use asid_core::task::{
     Commander, Condition, Coordinate, DownstreamProtocol, ExplorationProtocol, Outcome, Task,
+    TaskSpec,
 };
 use asid_core::{Capabilities, Layout, Result, Scene};
 
@@ -36,9 +37,7 @@ asid_plugin::export_plugin!();
 
 /// The task.
 pub struct PayloadSwing {
-    scene: Scene,
-    exploration: ExplorationProtocol,
-    downstream: DownstreamProtocol,
+    spec: TaskSpec,
 }
 
 impl PayloadSwing {
@@ -73,68 +72,48 @@ impl PayloadSwing {
             channels: vec!["angle".into()],
             phases: vec![("pulse".into(), 0.0, FRAMES[0] as f64 * FRAME_PERIOD)],
         };
-        Ok(Self {
-            scene: Scene::from_xml(NAME, include_str!("scene.xml"), &[])?,
-            exploration,
-            downstream,
-        })
+        let scene = Scene::from_xml(NAME, include_str!("scene.xml"), &[])?;
+        let spec = TaskSpec {
+            requires: Capabilities::ARTICULATION
+                | Capabilities::ACTUATORS
+                | Capabilities::JOINT_IMPEDANCE
+                | Capabilities::MASS_PARAMETERS,
+            parameters: unknowns(),
+            conditions: [("light", 0.3, 0.02), ("heavy", 0.9, 0.05)]
+                .map(|(name, mass, damping)| {
+                    Condition::fixed(name, &[("mass", mass), ("damping", damping)])
+                })
+                .into(),
+            ..TaskSpec::new([NAME, ABOUT], scene, exploration, downstream)
+        };
+        Ok(Self { spec })
     }
 }
 
+/// Mass of the payload and damping of the bearing.
+fn unknowns() -> Vec<Parameter> {
+    let unknown = |name: &str, target: &str, range, scale, unit: &str| Parameter {
+        name: name.into(),
+        targets: target.parse().into_iter().collect(),
+        range,
+        scale,
+        unit: unit.into(),
+    };
+    vec![
+        unknown("mass", "geom/payload/mass", [0.2, 1.0], Scale::Linear, "kg"),
+        unknown(
+            "damping",
+            "joint/shoulder/damping",
+            [0.01, 0.1],
+            Scale::Log,
+            "N m s/rad",
+        ),
+    ]
+}
+
 impl Task for PayloadSwing {
-    fn name(&self) -> &str {
-        NAME
-    }
-
-    fn about(&self) -> &str {
-        ABOUT
-    }
-
-    fn scene(&self) -> &Scene {
-        &self.scene
-    }
-
-    fn requires(&self) -> Capabilities {
-        Capabilities::ARTICULATION
-            | Capabilities::ACTUATORS
-            | Capabilities::JOINT_IMPEDANCE
-            | Capabilities::MASS_PARAMETERS
-    }
-
-    fn parameters(&self) -> Vec<Parameter> {
-        let unknown = |name: &str, target: &str, range, scale, unit: &str| Parameter {
-            name: name.into(),
-            targets: target.parse().into_iter().collect(),
-            range,
-            scale,
-            unit: unit.into(),
-        };
-        vec![
-            unknown("mass", "geom/payload/mass", [0.2, 1.0], Scale::Linear, "kg"),
-            unknown(
-                "damping",
-                "joint/shoulder/damping",
-                [0.01, 0.1],
-                Scale::Log,
-                "N m s/rad",
-            ),
-        ]
-    }
-
-    fn conditions(&self) -> Vec<Condition> {
-        [("light", 0.3, 0.02), ("heavy", 0.9, 0.05)]
-            .map(|(name, mass, damping)| {
-                Condition::fixed(name, &[("mass", mass), ("damping", damping)])
-            })
-            .into()
-    }
-
-    fn exploration(&self) -> &ExplorationProtocol {
-        &self.exploration
-    }
-
-    fn downstream(&self) -> &DownstreamProtocol {
-        &self.downstream
+    fn spec(&self) -> &TaskSpec {
+        &self.spec
     }
 
     fn place(&self, layout: &Layout, start: &[f64], qpos: &mut [f64]) -> Result<()> {

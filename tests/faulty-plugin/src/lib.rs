@@ -7,12 +7,8 @@ use asid_core::identify::{Identified, Identifier};
 use asid_core::registry::Settings;
 use asid_core::simulator::StepView;
 use asid_core::solve::{Solved, TaskSolver};
-use asid_core::task::{
-    Commander, Condition, DownstreamProtocol, ExplorationProtocol, Outcome, Task,
-};
-use asid_core::{
-    Capabilities, Episode, Error, Layout, Parameter, Posterior, Problem, Result, Scene,
-};
+use asid_core::task::{Commander, Outcome, Task, TaskSpec};
+use asid_core::{Episode, Error, Layout, Posterior, Problem, Result};
 use asid_effects::{Acting, Acts, Effect, EffectParameter, Site};
 use asid_mjcf::Plant;
 use payload_swing::PayloadSwing;
@@ -65,36 +61,8 @@ asid_core::register!(TaskEntry {
 });
 
 impl Task for Faulty {
-    fn name(&self) -> &str {
-        "faulty"
-    }
-
-    fn about(&self) -> &str {
-        "fails"
-    }
-
-    fn scene(&self) -> &Scene {
-        self.inner.scene()
-    }
-
-    fn requires(&self) -> Capabilities {
-        self.inner.requires()
-    }
-
-    fn parameters(&self) -> Vec<Parameter> {
-        self.inner.parameters()
-    }
-
-    fn conditions(&self) -> Vec<Condition> {
-        self.inner.conditions()
-    }
-
-    fn exploration(&self) -> &ExplorationProtocol {
-        self.inner.exploration()
-    }
-
-    fn downstream(&self) -> &DownstreamProtocol {
-        self.inner.downstream()
+    fn spec(&self) -> &TaskSpec {
+        self.inner.spec()
     }
 
     fn place(&self, layout: &Layout, start: &[f64], qpos: &mut [f64]) -> Result<()> {
