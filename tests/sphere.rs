@@ -10,10 +10,10 @@ mod task_support;
 
 use asid::algorithms::fisher::FisherSettings;
 use asid::core::registry::{BackendEntry, TaskEntry, all, find};
-use asid::core::visits;
 use asid::core::{Capabilities, Control, Parameter, Policy, Problem, RealWorld, Rollout};
 use asid::pipeline::episode_information;
 use asid::worlds::SimulatedWorld;
+use task_support::visits;
 
 const RADIUS: f64 = 0.03;
 const G: f64 = 9.81;

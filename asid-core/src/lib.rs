@@ -35,7 +35,6 @@ pub mod solve;
 pub mod target;
 pub mod task;
 pub mod tracker;
-pub mod visits;
 
 // What public items speak of, so that an author need not match versions.
 pub use mjcf_rs;

@@ -31,7 +31,7 @@ mod worker;
 /// Arguments of `compare`.
 #[derive(clap::Args, Clone)]
 pub struct Arguments {
-    /// Tasks [default: all]
+    /// Compare on these tasks [default: all]
     tasks: Vec<String>,
     /// Method: asid, asid-estimator, maxmi, max, random, dr, oracle (which is told the truth), or any
     /// other as NAME=explorer+identifier+solver (repeatable) [default: asid, random, dr]
@@ -41,51 +41,51 @@ pub struct Arguments {
     /// drawn from the whole prior
     #[arg(long, value_name = "NAME")]
     condition: Vec<String>,
-    /// Kind of the real world, such as matched, crossed or perturbed (repeatable) [default: matched]
+    /// Play in this kind of real world, such as matched, crossed or perturbed (repeatable) [default: matched]
     #[arg(long, value_name = "KIND")]
     world: Vec<String>,
-    /// Engine of the simulator: see `asid list` (repeatable)
+    /// Simulate with this engine: see `asid list` (repeatable)
     #[arg(long, value_name = "NAME")]
     backend: Vec<String>,
-    /// Runs of each row [default: 10; 3 in a quick look]
+    /// Run each row this often [default: 10; 3 in a quick look]
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     seeds: Option<u64>,
-    /// Seed of each row's first run; the others count up from it
+    /// Begin each row with this seed; its other runs count up from it
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = super::options::seed)]
     seed: Option<u64>,
-    /// Makes a table of the paper: its tasks, conditions, methods and world, unless others are named
+    /// Make a table of the paper: its tasks, conditions, methods and world, unless others are named
     #[arg(long, value_name = "1|2|3")]
     table: Option<u8>,
-    /// Draws a figure instead: patches, displacement, laptop, distractors, learned-model or
+    /// Draw a figure instead: patches, displacement, laptop, distractors, learned-model or
     /// generalization, as in the paper; explorers or difficulty
     #[arg(long, value_name = "NAME")]
     figure: Option<String>,
-    /// Episodes of each explorer in a figure, or of each square of its map
+    /// Play this many episodes of each explorer in a figure, or of each square of its map
     #[arg(long, value_name = "N", requires = "figure")]
     episodes: Option<u64>,
     /// Explorer that a figure shows in place of its own; settings may follow, as in
     /// fisher-cem:fisher.objective=trace+fisher.form=one-step (repeatable)
     #[arg(long, value_name = "NAME")]
     explorer: Vec<String>,
-    /// Levels of the figure `difficulty`, such as ledge_width=0.04,0.02,0.01
+    /// Draw the figure `difficulty` at these levels, such as ledge_width=0.04,0.02,0.01
     #[arg(long, value_name = "NAME=VALUE,…", requires = "figure")]
     levels: Option<String>,
-    /// A quick look: fewer seeds and searches cut to half, marked so in every output
+    /// Take a quick look: fewer seeds and searches cut to half, marked so in every output
     #[arg(long)]
     quick: bool,
-    /// Trains the explorers and the estimators that learn, in place of what ships
+    /// Train the explorers and estimators that learn, in place of what ships
     #[arg(long)]
     train: bool,
-    /// Runs only a share of the cells, such as 2/4; shares may write into one folder, or be merged
+    /// Run only a share of the cells, such as 2/4; shares may write into one folder, or be merged
     #[arg(long, value_name = "I/N")]
     shard: Option<Shard>,
-    /// Runs the comparison as a job array of this scheduler, into one folder; the only one is slurm
+    /// Submit the comparison as a job array of this scheduler, into one folder; the only one is slurm
     #[arg(long, value_name = "SCHEDULER", value_parser = ["slurm"])]
     submit: Option<String>,
-    /// Tasks of the job array [default: one a run, at most 32]
+    /// Split the job array into this many tasks [default: one a run, at most 32]
     #[arg(long, value_name = "N", requires = "submit")]
     jobs: Option<usize>,
-    /// An option of sbatch, such as --sbatch=--time=02:00:00 (repeatable)
+    /// Give sbatch an option, such as --sbatch=--time=02:00:00 (repeatable)
     #[arg(
         long,
         value_name = "OPTION",
@@ -93,35 +93,35 @@ pub struct Arguments {
         allow_hyphen_values = true
     )]
     sbatch: Vec<String>,
-    /// Prints the job array's script and submits nothing
+    /// Print the job array's script and submit nothing
     #[arg(long, requires = "submit")]
     print_script: bool,
-    /// Puts comparisons together instead, such as those of several machines
+    /// Put comparisons together instead, such as those of several machines
     #[arg(long, value_name = "DIR", num_args = 1..)]
     merge: Vec<PathBuf>,
-    /// Lets rows of different commits stand in one table, each row of one; rows say their commit
+    /// Let rows of different commits stand in one table, each row of one; rows say their commit
     #[arg(long, requires = "merge")]
     across_commits: bool,
-    /// Runs side by side, one a thread; results do not depend on it [default: one a core]
+    /// Play this many runs side by side, one a thread; results do not depend on it [default: one a core]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = threads)]
     threads: Option<usize>,
-    /// Settings from a file, such as a comparison's or a run's config.toml
+    /// Take settings from a file, such as a comparison's or a run's config.toml
     #[arg(long, value_name = "FILE.toml")]
     pub config: Option<PathBuf>,
-    /// How hard the tasks are, such as published; single values by --set difficulty.NAME=VALUE
+    /// Make the tasks as hard as this preset, such as published; single values by --set difficulty.NAME=VALUE
     #[arg(long, value_name = "NAME")]
     preset: Option<String>,
-    /// One setting, such as solver.iterations=10, for every method that has it (repeatable)
+    /// Set a value, such as solver.iterations=10, for every method that has it (repeatable)
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
     /// Folder for the results; one that holds a part of the comparison is gone on with
     /// [default: the next free one below runs/]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// No progress on standard error
+    /// Show no progress on standard error
     #[arg(long)]
     quiet: bool,
-    /// The result, and nothing else, on standard output
+    /// Print the result as JSON, and nothing else, on standard output
     #[arg(long)]
     json: bool,
     #[command(flatten)]
@@ -135,16 +135,16 @@ pub struct Arguments {
 /// The real world of every run, but for its kind.
 #[derive(clap::Args, Clone)]
 struct Real {
-    /// A hidden true value, such as mass_offset=0.06 [default: that of the condition, else drawn]
+    /// Hide this true value in the real world, such as mass_offset=0.06 [default: that of the condition, else drawn]
     #[arg(long, value_name = "NAME=VALUE")]
     truth: Vec<String>,
-    /// Engine of the real world [default: the simulator's]
+    /// Play the real world with this engine [default: the simulator's]
     #[arg(long, value_name = "NAME")]
     real_backend: Option<String>,
-    /// Model of the real world: MJCF, or TOML of a refined model [default: the task's scene]
+    /// Use this model as the real world: MJCF, or TOML of a refined model [default: the task's scene]
     #[arg(long, value_name = "FILE")]
     real_model: Option<PathBuf>,
-    /// An effect of the real world that the simulator lacks (repeatable)
+    /// Add an effect to the real world that the simulator lacks (repeatable)
     #[arg(long, value_name = "NAME@SITE:PARAMETER=VALUE")]
     real_effect: Vec<String>,
 }

@@ -22,31 +22,31 @@ mod page;
 /// Arguments of `conformance`.
 #[derive(clap::Args)]
 pub struct Arguments {
-    /// An engine (repeatable) [default: those of the plugins that are named, else all]
+    /// Check this engine (repeatable) [default: those of the plugins that are named, else all]
     #[arg(long, value_name = "NAME")]
     backend: Vec<String>,
-    /// Only checks whose name holds this text, such as friction/ (repeatable) [default: all]
+    /// Run only checks whose name holds this text, such as friction/ (repeatable) [default: all]
     #[arg(long, value_name = "TEXT")]
     check: Vec<String>,
-    /// Name the checks, what each needs and where its tolerance comes from, and ask nothing
+    /// List the checks, what each needs and where its tolerance comes from, and run none
     #[arg(long, conflicts_with = "scene")]
     list: bool,
-    /// The MJCF documents that the first engine is given by the checks, instead of their rows
+    /// Print the MJCF documents that the checks give the first engine, instead of their rows
     #[arg(long, requires = "check")]
     scene: bool,
-    /// Checks at a time; figures do not depend on it [default: one a core]
+    /// Run this many checks at a time; results do not depend on it [default: one a core]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = super::options::threads)]
     threads: Option<usize>,
-    /// Engines and checks from a file, such as the config.toml of another call
+    /// Take engines and checks from a file, such as the config.toml of another call
     #[arg(long, value_name = "FILE.toml")]
     pub config: Option<PathBuf>,
-    /// Folder for the results and their report [default: none is written]
+    /// Write the results and their report into this folder [default: none is written]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// No progress on standard error
+    /// Show no progress on standard error
     #[arg(long)]
     quiet: bool,
-    /// The rows, and nothing else, on standard output
+    /// Print the rows as JSON, and nothing else, on standard output
     #[arg(long)]
     json: bool,
 }

@@ -40,28 +40,28 @@ simulator, and the task is run again.
 The folder holds result.json, refined.toml (the model with the effects of the verdict, for a study's \
 `model`), config.toml, copies of the logs, report.html and trace.json.")]
 pub struct Arguments {
-    /// The study: a TOML file, or a folder with study.toml
+    /// Diagnose this study: a TOML file, or a folder with study.toml
     #[arg(required_unless_present_any = ["task", "config"], conflicts_with = "task")]
     study: Option<PathBuf>,
-    /// A built-in task in place of a study
+    /// Diagnose a task in place of a study
     #[arg(long, value_name = "TASK")]
     task: Option<String>,
-    /// Logs of the task to fit to [default: those of its runs]
+    /// Fit to these logs of the task [default: those of its runs]
     #[arg(long, value_name = "FILE", num_args = 1.., requires = "task")]
     train: Vec<PathBuf>,
-    /// Logs of the task held out
+    /// Hold out these logs of the task
     #[arg(long, value_name = "FILE", num_args = 1.., requires = "train")]
     test: Vec<PathBuf>,
-    /// Runs of the task whose logs are diagnosed, a third of them held out [default: 6]
+    /// Run the task this often for logs, of which a third are held out [default: 6]
     #[arg(long, value_name = "N", conflicts_with = "train")]
     runs: Option<usize>,
-    /// Episodes that are then played to tell the rival explanations apart [default: 0]
+    /// Play this many further episodes that tell the rival explanations apart [default: 0]
     #[arg(long, value_name = "N", conflicts_with = "train")]
     experiments: Option<usize>,
-    /// Runs of the task that are counted, without and with the answer [default: 5]
+    /// Run the task this often without and with the answer, to count successes [default: 5]
     #[arg(long, value_name = "N")]
     seeds: Option<u64>,
-    /// An effect of the catalogue that is not to be tried (repeatable)
+    /// Leave out an effect of the catalogue (repeatable)
     #[arg(long, value_name = "EFFECT")]
     without: Vec<String>,
     #[command(flatten)]

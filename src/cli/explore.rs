@@ -38,7 +38,7 @@ real.csv is its log, for `asid identify` and `asid diagnose`.")]
 pub struct Arguments {
     /// The task: see `asid list`
     task: String,
-    /// How to explore: see `asid list`
+    /// Explore by this algorithm: see `asid list`
     #[arg(long, value_name = "NAME")]
     explorer: Option<String>,
     /// Trained policy to play [default: the one that ships for the task, else it is trained on the

@@ -14,13 +14,13 @@ use super::options::Common;
 pub struct Arguments {
     /// The task
     task: String,
-    /// File to write; it must not exist
+    /// Write this file; it must not exist
     #[arg(long, value_name = "FILE.xml")]
     out: PathBuf,
-    /// How hard the task is: default, or published; see its page
+    /// Make the task as hard as this preset: default, or published; see its page
     #[arg(long, value_name = "NAME")]
     preset: Option<String>,
-    /// One difficulty, such as difficulty.ledge_width=0.02 (repeatable)
+    /// Set a difficulty, such as difficulty.ledge_width=0.02 (repeatable)
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
 }

@@ -43,20 +43,20 @@ report.html and trace.json.")]
 pub struct Arguments {
     /// The task: see `asid list`
     task: String,
-    /// Log of a real episode, CSV; several are fitted together
+    /// Fit to this log of a real episode, CSV or Parquet; several are fitted together
     #[arg(long, value_name = "FILE", required_unless_present = "train", num_args = 1..)]
     log: Vec<PathBuf>,
     /// Trains the identifier on episodes of --explorer, saves it for the setting `network`, and
     /// identifies nothing; its curves for TensorBoard come beside it
     #[arg(long, value_name = "FILE", conflicts_with_all = ["log", "out"])]
     train: Option<PathBuf>,
-    /// Explorer whose episodes are learned from, or were [default: fisher-ppo]
+    /// Learn from episodes of this explorer [default: fisher-ppo]
     #[arg(long, value_name = "NAME")]
     explorer: Option<String>,
-    /// Trained policy of that explorer [default: the one that ships for the task]
+    /// Let that explorer play this trained policy [default: the one that ships for the task]
     #[arg(long, value_name = "FILE", requires = "train")]
     policy: Option<PathBuf>,
-    /// How to identify: see `asid list`
+    /// Identify by this algorithm: see `asid list`
     #[arg(long, value_name = "NAME")]
     identifier: Option<String>,
     #[command(flatten)]

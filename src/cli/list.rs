@@ -15,7 +15,7 @@ use super::plugins::Refused;
 /// Arguments of `list`.
 #[derive(clap::Args)]
 pub struct Arguments {
-    /// As JSON
+    /// Print as JSON
     #[arg(long)]
     json: bool,
 }

@@ -37,11 +37,12 @@ use std::process::ExitCode;
 use anyhow::Result;
 use clap::{Parser, Subcommand};
 
-/// Active exploration for system identification: explore, identify, solve.
+/// Design an informative motion of a robot, estimate unknown physical parameters from one episode of it, and
+/// solve the task in the fitted simulator; find what a model lacks beside the logs of a real machine.
 #[derive(Parser)]
 #[command(name = "asid", version, about, arg_required_else_help = true)]
 struct Cli {
-    /// A plugin to load: a shared library (repeatable); see `asid list` for what it brings
+    /// Load a plugin, a shared library (repeatable); `asid list` shows what it brings
     #[arg(long, global = true, value_name = "FILE")]
     plugin: Vec<PathBuf>,
     #[command(subcommand)]
@@ -50,33 +51,33 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Backends, tasks, explorers, identifiers, solvers and effects
+    /// List engines, tasks, explorers, identifiers, solvers and effects
     List(list::Arguments),
-    /// Native libraries: looked for, found, missing, and how to get them
+    /// Check the native libraries: where they are, and how to get what is missing
     Doctor(doctor::Arguments),
     /// Explore, identify, solve and try the task once in the real world
     Run(run::Arguments),
-    /// The exploration policy and its commands, for a robot
+    /// Make an exploration policy and its commands, for a robot
     Explore(explore::Arguments),
-    /// The posterior from logs of the real machine
+    /// Estimate the unknowns from logs of the real machine
     Identify(identify::Arguments),
-    /// The task action for a posterior
+    /// Find the action that achieves the task, for a posterior
     Solve(solve::Arguments),
-    /// Methods head to head, over seeds and conditions
+    /// Compare methods head to head, over tasks, conditions, worlds, engines and seeds
     Compare(compare::Arguments),
-    /// Every check against every engine: theory, and the contract of a backend
+    /// Check engines against theory and against the contract
     Conformance(conformance::Arguments),
-    /// Where the sim-to-real gap lies, which effect causes it, how far it shrinks
+    /// Find where model and logs disagree, which effect causes it, and how far the gap shrinks with it
     Diagnose(diagnose::Arguments),
-    /// Diagnoses of cases whose effect is withheld, scored
+    /// Score diagnoses of cases whose effect is withheld, or make such cases
     Withheld(withheld::Arguments),
     /// Print every setting of a task with its value and meaning, as a file for --config
     Config(settings::Arguments),
-    /// A task's scene as MJCF
+    /// Write a task's scene as MJCF
     Export(export::Arguments),
-    /// A folder that a plugin starts from
+    /// Write a folder that a plugin starts from
     New(new::Arguments),
-    /// (Re)writes the report of a finished run
+    /// Write the report of a finished run anew
     Report(report::Arguments),
 }
 

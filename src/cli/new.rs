@@ -12,10 +12,10 @@ use clap::builder::{PossibleValue, PossibleValuesParser};
 /// Arguments of `new`.
 #[derive(clap::Args)]
 pub struct Arguments {
-    /// What to start
+    /// Start a plugin of this kind
     #[arg(value_parser = PossibleValuesParser::new(KINDS.iter().map(Kind::value)))]
     kind: String,
-    /// Folder to write; it must be empty or not exist. Its name becomes the plugin's
+    /// Write this folder; it must be empty or not exist. Its name becomes the plugin's
     dir: PathBuf,
 }
 

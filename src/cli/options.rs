@@ -27,35 +27,35 @@ pub fn seed(text: &str) -> Result<u64, String> {
 /// Options of every subcommand that works.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub struct Common {
-    /// Engine of the simulator: see `asid list`
+    /// Simulate with this engine: see `asid list`
     #[arg(long, value_name = "NAME")]
     pub backend: Option<String>,
-    /// Seed of all chance
+    /// Draw all chance from this seed
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = seed)]
     pub seed: Option<u64>,
-    /// Threads; results do not depend on it [default: one a core]
+    /// Use this many threads; results do not depend on it [default: one a core]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = threads)]
     pub threads: Option<usize>,
     /// Settings below those of `config`, from elsewhere than the command line.
     #[arg(skip)]
     pub base: toml::Table,
-    /// Settings from a file, such as a run's config.toml
+    /// Take settings from a file, such as a run's config.toml
     #[arg(long, value_name = "FILE.toml")]
     pub config: Option<PathBuf>,
-    /// One setting, such as explorer.iterations=10 (repeatable)
+    /// Set a value, such as explorer.iterations=10; `asid config TASK` lists them (repeatable)
     #[arg(long, value_name = "KEY=VALUE")]
     pub set: Vec<String>,
-    /// How hard the task is: default, or published, as in the paper where it says so; single values
+    /// Make the task as hard as this preset: default, or published, as in the paper where it says so; single values
     /// by --set difficulty.NAME=VALUE
     #[arg(long, value_name = "NAME")]
     pub preset: Option<String>,
-    /// Folder for the results [default: the next free one below runs/]
+    /// Write the results into this folder [default: the next free one below runs/]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// No progress on standard error
+    /// Show no progress on standard error
     #[arg(long)]
     pub quiet: bool,
-    /// The result, and nothing else, on standard output
+    /// Print the result as JSON, and nothing else, on standard output
     #[arg(long)]
     pub json: bool,
 }
@@ -63,17 +63,17 @@ pub struct Common {
 /// Names of the algorithms.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub struct Algorithms {
-    /// How to explore
+    /// Explore by this algorithm: see `asid list`
     #[arg(long, value_name = "NAME")]
     pub explorer: Option<String>,
-    /// Trained policy that the explorer plays, as `asid explore --train FILE` saves it [default: the
+    /// Play this trained policy, as `asid explore --train FILE` saves it [default: the
     /// one that ships for the task, else it is trained on the spot]
     #[arg(long, value_name = "FILE")]
     pub policy: Option<PathBuf>,
-    /// How to identify
+    /// Identify by this algorithm
     #[arg(long, value_name = "NAME")]
     pub identifier: Option<String>,
-    /// How to solve
+    /// Solve by this algorithm
     #[arg(long, value_name = "NAME")]
     pub solver: Option<String>,
 }
@@ -81,7 +81,7 @@ pub struct Algorithms {
 /// The simulator that a method works in.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub struct Simulator {
-    /// Model of the simulator: MJCF, or TOML of a refined model, such as the refined.toml of a
+    /// Simulate this model: MJCF, or TOML of a refined model, such as the refined.toml of a
     /// diagnosis [default: the task's scene]
     #[arg(long, value_name = "FILE")]
     pub model: Option<PathBuf>,
@@ -93,21 +93,21 @@ pub struct Simulator {
 /// The simulated real world.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub struct Real {
-    /// Kind of the real world: matched (the simulator itself), crossed (the other engine),
+    /// Play in this kind of real world: matched (the simulator itself), crossed (the other engine),
     /// perturbed (step, contacts, masses, servos and tracker a little off) or stand-in (another object)
     /// [default: matched, or custom where a --real-… option says more]
     #[arg(long, value_name = "KIND")]
     pub world: Option<String>,
-    /// A hidden true value, such as mass_offset=0.06 [default: drawn from the prior by the seed]
+    /// Hide this true value in the real world, such as mass_offset=0.06 [default: drawn from the prior by the seed]
     #[arg(long, value_name = "NAME=VALUE")]
     pub truth: Vec<String>,
-    /// Engine of the real world [default: the simulator's; the other one for --world crossed]
+    /// Play the real world with this engine [default: the simulator's; the other one for --world crossed]
     #[arg(long, value_name = "NAME")]
     pub real_backend: Option<String>,
-    /// Model of the real world: MJCF, or TOML of a refined model [default: the task's scene]
+    /// Use this model as the real world: MJCF, or TOML of a refined model [default: the task's scene]
     #[arg(long, value_name = "FILE")]
     pub real_model: Option<PathBuf>,
-    /// An effect of the real world that the simulator lacks, such as
+    /// Add an effect to the real world that the simulator lacks, such as
     /// viscous-friction@joint1:damping=2 (repeatable)
     #[arg(long, value_name = "NAME@SITE:PARAMETER=VALUE")]
     pub real_effect: Vec<String>,

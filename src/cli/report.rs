@@ -9,7 +9,7 @@ use asid_report::run::RunReport;
 /// Arguments of `report`.
 #[derive(clap::Args)]
 pub struct Arguments {
-    /// Folder of a run
+    /// The folder of a run
     dir: PathBuf,
 }
 

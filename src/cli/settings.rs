@@ -22,7 +22,7 @@ pub struct Arguments {
     algorithms: Algorithms,
     #[command(flatten)]
     worlds: Worlds,
-    /// Engine of the simulator: see `asid list`
+    /// Simulate with this engine: see `asid list`
     #[arg(long, value_name = "NAME")]
     backend: Option<String>,
     /// Take the difficulty `default`, or `published`, as in the paper where it says so

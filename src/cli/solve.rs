@@ -38,10 +38,10 @@ config.toml, report.html and trace.json.")]
 pub struct Arguments {
     /// The task: see `asid list`
     task: String,
-    /// Folder of `asid identify` or `asid run`; `prior` for the prior (domain randomisation)
+    /// The folder of `asid identify` or `asid run`; `prior` for the prior (domain randomisation)
     #[arg(long, value_name = "DIR")]
     posterior: PathBuf,
-    /// How to solve: see `asid list`
+    /// Solve by this algorithm: see `asid list`
     #[arg(long, value_name = "NAME")]
     solver: Option<String>,
     #[command(flatten)]

@@ -33,10 +33,10 @@ With --make a folder of new cases is written instead: DIR/studies, which is for 
 DIR/sealed/labels.json, which is for --labels.")]
 #[group(id = "work", required = true, args = ["cases", "make"])]
 pub struct Arguments {
-    /// Folder of the cases
+    /// Diagnose the cases in this folder, and score them
     #[arg(long, value_name = "DIR", conflicts_with = "make")]
     cases: Option<PathBuf>,
-    /// The labels, where they do not lie with the cases [default: labels.json in the folder of the cases]
+    /// Read the labels from this file [default: labels.json in the folder of the cases]
     #[arg(long, value_name = "FILE", requires = "cases")]
     labels: Option<PathBuf>,
     /// Make new cases in this folder; takes --seed
@@ -46,10 +46,10 @@ pub struct Arguments {
     #[cfg(feature = "mujoco")]
     #[arg(long, value_name = "DIR", requires = "make")]
     models: Option<PathBuf>,
-    /// Number of cases to make
+    /// Make this many cases
     #[arg(long, value_name = "N", default_value_t = 40, requires = "make")]
     count: usize,
-    /// Machines to make cases of: training or test
+    /// Make cases of the machines of this half: training or test
     #[arg(
         long,
         value_name = "HALF",
@@ -57,13 +57,13 @@ pub struct Arguments {
         requires = "make"
     )]
     half: Half,
-    /// Some of the cases only (repeatable)
+    /// Take only this case (repeatable)
     #[arg(long, value_name = "NAME")]
     case: Vec<String>,
-    /// An effect of the catalogue that is not to be tried (repeatable)
+    /// Leave out an effect of the catalogue (repeatable)
     #[arg(long, value_name = "EFFECT")]
     without: Vec<String>,
-    /// The time step of every model, divided by this
+    /// Divide the time step of every model by this
     #[arg(long, value_name = "N", default_value_t = 1)]
     finer: u32,
     #[command(flatten)]

@@ -1,5 +1,7 @@
 //! Problems of built-in tasks on the engines that are built in.
 
+pub mod visits;
+
 use std::sync::Arc;
 use std::sync::atomic::AtomicU64;
 

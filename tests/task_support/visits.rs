@@ -1,8 +1,8 @@
 //! Where a tracked object went in an episode: its path, how far it came, and how evenly it visited the
 //! parts of the floor.
 
-use crate::episode::Episode;
-use crate::task::Outline;
+use asid::core::episode::Episode;
+use asid::core::task::Outline;
 
 /// Places of an object in the plane, m, one a reading of the sensor of its position; readings that
 /// are missing are passed over. Empty where the log has no such sensor.
@@ -74,7 +74,7 @@ pub fn contains(corners: &[[f64; 2]], [x, y]: [f64; 2]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::episode::ChannelColumns;
+    use asid::core::episode::ChannelColumns;
 
     fn square(from: f64) -> Outline {
         Outline {
