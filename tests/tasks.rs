@@ -19,7 +19,6 @@ use asid::core::registry::{
 use asid::core::rng::Rng;
 use asid::core::task::Outcome;
 use asid::core::tracker::ReadingFrames;
-use asid::core::visits;
 use asid::core::{
     Capabilities, Control, Episode, Levels, Parameter, Policy, Problem, RealWorld, Recording,
     Rollout, Streams, Task,
@@ -27,6 +26,7 @@ use asid::core::{
 use asid::mjcf::Plant;
 use asid::worlds::SimulatedWorld;
 use rand::Rng as _;
+use task_support::visits;
 
 /// Actions at which the metric is looked at.
 const TRIES: usize = 12;

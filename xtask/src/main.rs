@@ -11,6 +11,7 @@ mod library;
 mod lint;
 mod miri;
 mod peers;
+mod same;
 mod setup;
 mod slurm;
 mod stage;
@@ -29,6 +30,8 @@ Usage: cargo xtask <subcommand>
   test                         setup, lint and every test: what CI runs
   miri                         the engine ABI's unsafe code under Miri, where a toolchain has it
   slurm [--program FILE]       comparisons as job arrays of a real Slurm, where its packages can be had
+  same OLD NEW                 whether two builds of asid give the same results: for changes that
+                               are meant to change none
   bench [--quick] [--out FILE.json] [--markdown FILE.md]
                                speed beside the engines' own loops, a table and a JSON file
   bench --peers [--quick] [--out FILE.json] [--markdown FILE.md]
@@ -61,6 +64,7 @@ fn run(arguments: &[String]) -> Result<bool> {
         "lint" => without_arguments(rest).and_then(|()| lint::run()),
         "test" => without_arguments(rest).and_then(|()| test::run()),
         "miri" => without_arguments(rest).and_then(|()| miri::run()),
+        "same" => same::run(rest),
         "slurm" => slurm::run(rest),
         "bench" => bench::run(rest),
         "help" | "--help" | "-h" => {
