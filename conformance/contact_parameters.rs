@@ -53,6 +53,7 @@ pub const CHECKS: &[Check] = &[
     },
 ];
 
+/// Radius of the ball, m.
 const RADIUS: f64 = 0.05;
 
 /// A ball on a plane, settled and then sent off; the friction of the plane counts.

@@ -67,8 +67,9 @@ pub const CHECKS: &[Check] = &[
 /// Gravity beyond reason, m/s²: a body that falls for a step has a speed of 2e13 m/s.
 const HUGE: f64 = -1e16;
 
-/// Frames before and from the one in which the second of three simulations is blown up.
+/// Frames before the one in which the second of three simulations is blown up.
 const GOOD: usize = 10;
+/// Frames from that one on.
 const REST: usize = 30;
 
 /// Rolls three simulations, with gravity beyond reason in the second after a while.

@@ -173,6 +173,7 @@ fn thrown_arm(backend: &dyn Backend) -> Result<f64> {
     Ok(largest([centre(0), centre(1) - 1.0, centre(2)]))
 }
 
+/// Inertia of the pendulum about its axis, kg m²: 1 kg at 0.5 m, and that of its ball.
 const PENDULUM_INERTIA: f64 = 0.25 + 0.4 * 0.02 * 0.02;
 
 /// A bob of 1 kg on half a metre, let go at 1 rad: 10 s of angle and rate.

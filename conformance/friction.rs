@@ -219,6 +219,7 @@ fn grip(backend: &dyn Backend) -> Result<f64> {
     Ok(broken([held[0], !held[1]]))
 }
 
+/// Radius of the ball, m.
 const RADIUS: f64 = 0.05;
 
 /// A ball of 0.3 kg on a plane; `push` is gravity along x.

@@ -184,7 +184,7 @@ impl Chain {
     }
 }
 
-/// Longest chain.
+/// Joints of the longest chain that is followed.
 pub const MAX_LINKS: usize = 32;
 
 #[cfg(test)]

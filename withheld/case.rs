@@ -23,23 +23,27 @@ use crate::seal::hex;
 use crate::simulate::simulate;
 use rules::LeftOut;
 
-/// Logs to fit to and logs held out.
+/// Logs to fit to.
 const TRAIN: usize = 6;
+/// Logs held out.
 const TEST: usize = 3;
-/// Draws of a case before it is given up, and draws after which it gets another machine.
+/// Draws of a case before it is given up.
 const ATTEMPTS: u32 = 12;
+/// Draws after which a case gets another machine.
 const PATIENCE: u32 = 4;
 /// Amplitudes of a machine that hardly moves, as a share of the usual.
 const LITTLE: f64 = 0.04;
-/// Factors of a machine's rows a second, and range of those of its seconds.
+/// Factors of a machine's rows a second.
 const RATES: [f64; 5] = [0.5, 1.0, 1.0, 2.0, 2.5];
+/// Range of the factors of its seconds.
 const LENGTHS: [f64; 2] = [0.7, 1.3];
 /// Excess gap from which on its signals are told, in noise floors.
 const SPEAKS: f64 = 0.05;
 /// Rest before the motion of a log whose encoder rests.
 const REST: f64 = 0.3;
-/// Rows a second of a fast log, and rows of a long one.
+/// Rows a second of a fast log.
 const FAST: f64 = 1000.0;
+/// Rows of a long log.
 const LONG: f64 = 100_000.0;
 
 /// A case, ready to be written.

@@ -26,8 +26,9 @@ pub struct Style {
     pub wiring: Option<Wiring>,
 }
 
-/// Share of rows whose readings are spikes, in a log with this fault, and their size in deviations of the noise.
+/// Share of rows whose readings are spikes, in a log with this fault.
 const SPIKES: f64 = 0.004;
+/// Size of a spike in deviations of the noise.
 const SPIKE: [f64; 2] = [15.0, 60.0];
 /// Readings of which one is left, in a log with missing readings.
 const ONE_IN: usize = 3;

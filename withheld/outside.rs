@@ -17,15 +17,17 @@ const NOISE: [(&str, f64); 3] = [
     ("framepos", 0.003),
     ("framequat", 0.006),
 ];
-/// Share of an actuator's range that it is driven over, and the range of one that has none.
+/// Share of an actuator's range that it is driven over.
 const DRIVEN: f64 = 0.4;
+/// Range of an actuator that has none.
 const RANGE: [f64; 2] = [-1.0, 1.0];
 /// Band of commands, Hz.
 const BAND: [f64; 2] = [0.3, 2.0];
 /// Spread of positions and of velocities at the start, rad or m, and rad/s or m/s.
 const SPREAD: [f64; 2] = [0.05, 0.1];
-/// Length of an episode, s, and rows a second.
+/// Length of an episode, s.
 const SECONDS: f64 = 1.5;
+/// Rows a second.
 const RATE: f64 = 100.0;
 
 /// What was found in a folder of models.

@@ -53,9 +53,11 @@ const WHEEL: [(Kind, bool, usize); 10] = [
     (Kind::Group, true, 2),
     (Kind::Unknown, true, 3),
 ];
-/// Logs of a wheel with a fault, with wrong wiring, and with too little excitation.
+/// Logs of a wheel with a fault.
 const FAULTS: usize = 7;
+/// Logs of a wheel with wrong wiring.
 const WIRINGS: usize = 3;
+/// Logs of a wheel with too little excitation.
 const LITTLE: usize = 2;
 /// Share of pairs and triples that are viscous and dry friction of one joint.
 const COMMONEST: f64 = 0.5;

@@ -4,8 +4,9 @@ use crate::error::{Error, Result};
 use crate::gap::Bench;
 use crate::world::World;
 
-/// How near the logarithm of the gap must come to that of the target while searching, and in the end.
+/// How near the logarithm of the gap comes to that of the target where the search ends.
 const NEAR: f64 = 0.08;
+/// How near it must come for the case to be kept.
 const CLOSE: f64 = 0.25;
 /// Most runs of a search.
 const RUNS: usize = 12;

@@ -16,7 +16,7 @@ const THROWS: usize = 4;
 /// Frames of a throw, in the first round and in those for what it has not shown:
 /// some things are far away.
 const FRAMES: [usize; 2] = [30, 120];
-/// Rounds.
+/// Rounds of throws; each has a new chance to touch what the ones before have missed.
 const ROUNDS: usize = 8;
 /// Largest speed of a throw, m/s or rad/s.
 const SPEED: f64 = 1.0;

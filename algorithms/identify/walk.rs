@@ -5,8 +5,9 @@ use nalgebra::{DMatrix, DVector};
 use rand::Rng as _;
 use rand_distr::{Distribution, StandardNormal};
 
-/// Steps before the first draw is kept, and from one that is kept to the next.
+/// Steps before the first draw is kept.
 const WARM_UP: usize = 2000;
+/// Steps from one draw that is kept to the next: neighbours repeat each other.
 const THIN: usize = 10;
 
 /// Length of a step in deviations of the target over the root of its entries (Gelman, Roberts and

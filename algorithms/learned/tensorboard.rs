@@ -101,6 +101,7 @@ fn masked(data: &[u8]) -> u32 {
 
 /// CRC-32C (Castagnoli; RFC 3720, appendix B.4), bit by bit: event files are small.
 fn crc32c(data: &[u8]) -> u32 {
+    /// The polynomial 0x1EDC6F41 with its bits reversed.
     const REVERSED_POLYNOMIAL: u32 = 0x82f6_3b78;
     let crc = data.iter().fold(u32::MAX, |crc, &byte| {
         (0..8).fold(crc ^ u32::from(byte), |c, _| {

@@ -8,10 +8,10 @@ use rand_distr::{Distribution, StandardNormal};
 /// Draws that fall outside the box are drawn again this often before they are clamped.
 const REDRAWS: usize = 100;
 
-/// First ridge on a covariance that is not positive definite, in mean variances, and how often it is
-/// raised tenfold: the last is a million times the mean variance, where any finite symmetric
-/// matrix is positive definite.
+/// First ridge on a covariance that is not positive definite, in mean variances.
 const RIDGE: f64 = 1e-12;
+/// How often the ridge is raised tenfold: the last is a million times the mean variance, where any
+/// finite symmetric matrix is positive definite.
 const RAISES: usize = 18;
 
 /// `N(mean, covariance)` cut to `[low, high]`.

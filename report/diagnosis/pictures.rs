@@ -9,8 +9,9 @@ use crate::number::{quantity, significant};
 use crate::page::{Figure, Section};
 use crate::plot::{Axis, Chart, Colour, Layer};
 
-/// Pictures in sight, and those in folds.
+/// Pictures that are in sight: what one looks through.
 const UNFOLDED: usize = 6;
+/// Pictures that are folded away: more make the page slow.
 const FOLDED: usize = 48;
 
 /// Room for tick labels, the same for both plots of a figure.

@@ -7,10 +7,15 @@
 use super::{Colour, Dash, FONT_SIZE, coordinate};
 use crate::markup::{escape, fit, text_width};
 
+/// Height of a row of the key, in SVG units.
 const ROW: f64 = 19.0;
+/// Width of the sample of a line or mark, in SVG units.
 const KEY_WIDTH: f64 = 20.0;
+/// From the sample to its name, in SVG units.
 const KEY_GAP: f64 = 6.0;
+/// From one item of the key to the next, in SVG units.
 const ITEM_GAP: f64 = 16.0;
+/// From a label to what it labels, in SVG units.
 const LABEL_GAP: f64 = 9.0;
 
 /// How a legend entry is drawn.

@@ -17,6 +17,7 @@ pub fn threads(text: &str) -> Result<usize, String> {
 
 /// A seed: a whole number that a TOML file can hold, so that every run can be repeated by its file.
 pub fn seed(text: &str) -> Result<u64, String> {
+    /// Largest whole number of TOML.
     const LARGEST: u64 = i64::MAX as u64;
     text.parse()
         .ok()

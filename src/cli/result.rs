@@ -9,7 +9,7 @@ use serde::Serialize;
 use super::session::Session;
 use super::world::RealResult;
 
-/// Layout version.
+/// Layout version of `result.json`.
 pub const SCHEMA: u32 = 1;
 
 /// A value or its deviation for people: four decimals, and two figures where these would not show it.

@@ -29,9 +29,11 @@ const STROKE: f64 = 0.02;
 /// Way over which the hand stops, m.
 const RUN_OUT: f64 = 0.03;
 
-/// Seconds to go behind the puck, to stand there, and from the strike's begin to the end.
+/// How long the hand takes to go behind the puck, s.
 const APPROACH: f64 = 0.4;
+/// How long it stands there, s.
 const STAND: f64 = 0.1;
+/// From the strike's begin to the end of the attempt, s: a puck on the least friction has come to rest.
 const WATCH: f64 = 5.0;
 
 /// Frames of an attempt.

@@ -16,15 +16,17 @@ use crate::log;
 use crate::plan::Kind;
 use crate::world::World;
 
-/// Correlation of the noise from row to row in dirty worlds, and in logs with filtered noise.
+/// Correlation of the noise from row to row in dirty worlds.
 const COLOUR: [f64; 2] = [0.1, 0.5];
+/// That of logs with filtered noise.
 const FILTERED: f64 = 0.95;
-/// Deviation of the times of reading from their stamps in dirty worlds, and in logs with jittered stamps, as a share of the
-/// time between rows.
+/// Deviation of the times of reading from their stamps in dirty worlds, as a share of the time between rows.
 const JITTER: [f64; 2] = [0.01, 0.04];
+/// That of logs with jittered stamps.
 const JITTERED: f64 = 0.15;
-/// Share of cases whose study gives the noise, and of those whose logs do not give their start.
+/// Share of cases whose study gives the noise.
 const NOISE_GIVEN: f64 = 0.25;
+/// Share of cases whose logs do not give their start.
 const NO_START: f64 = 0.2;
 
 impl Draw<'_> {

@@ -8,8 +8,9 @@ use crate::world::{Force, World};
 /// The cause.
 pub struct Gust;
 
-/// Length of a gust, s, and when it may come.
+/// Length of a gust, s.
 const LENGTH: f64 = 0.2;
+/// When it may come, s from the start of a log.
 const WHEN: [f64; 2] = [0.1, 0.7];
 
 struct Push {

@@ -24,6 +24,7 @@ pub fn chosen(patterns: &[String]) -> Result<Vec<&'static Check>> {
 
 /// An error for a text that no check holds: the names that come close, else the families.
 fn unknown(text: &str, all: &[&Check]) -> Error {
+    /// Names that are told at most.
     const MOST: usize = 5;
     let families: Vec<String> = (FAMILIES.iter())
         .map(|(family, _)| format!("{family}/"))

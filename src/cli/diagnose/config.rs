@@ -275,8 +275,9 @@ impl Config {
 /// Logs to fit to and logs held out, with their names.
 pub type Logs = (Vec<(String, Episode)>, Vec<(String, Episode)>);
 
-/// Runs whose logs are diagnosed, and seeds that the task is tried with, where nothing is said.
+/// Runs whose logs are diagnosed where nothing is said: four to fit to, two held out.
 const RUNS: usize = 6;
+/// Seeds that the task is tried with where nothing is said.
 const SEEDS: u64 = 5;
 
 fn read(files: &[PathBuf], model: &RefinedModel) -> Result<Vec<(String, Episode)>> {

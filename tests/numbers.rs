@@ -1,0 +1,109 @@
+//! No number without a reason: every constant of the rooms says what it is.
+
+#![allow(clippy::unwrap_used)]
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Rooms whose numbers are looked at. The C ABI's are those of its header, which explains them.
+const ROOMS: [&str; 14] = [
+    "asid-core",
+    "mjcf",
+    "effects",
+    "plugin",
+    "backends/rapier/src",
+    "backends/mujoco/src",
+    "algorithms",
+    "tasks",
+    "worlds",
+    "comparison",
+    "conformance",
+    "report",
+    "withheld",
+    "src",
+];
+
+/// Words of documentation that a number has at least: what it is, and its unit.
+const FEWEST_WORDS: usize = 3;
+
+/// Types of numbers.
+const TYPES: [&str; 5] = ["f64", "f32", "usize", "u64", "u32"];
+
+fn sources(folder: &Path, files: &mut Vec<PathBuf>) {
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        let name = path.file_name().unwrap().to_str().unwrap();
+        if path.is_dir() {
+            if !["tests", "examples", "target"].contains(&name) {
+                sources(&path, files);
+            }
+        } else if name.ends_with(".rs") && !name.ends_with("tests.rs") {
+            files.push(path);
+        }
+    }
+}
+
+/// Names of the numeric constants of a text that say too little of themselves.
+fn unexplained(text: &str) -> Vec<String> {
+    let code = text.split("#[cfg(test)]\nmod tests").next().unwrap();
+    let lines: Vec<&str> = code.lines().map(str::trim).collect();
+    let mut found = Vec::new();
+    for (i, line) in lines.iter().enumerate() {
+        let public = line
+            .trim_start_matches("pub ")
+            .trim_start_matches("pub(crate) ");
+        let Some((name, rest)) = public
+            .strip_prefix("const ")
+            .and_then(|l| l.split_once(": "))
+        else {
+            continue;
+        };
+        let kind = rest
+            .trim_start_matches('[')
+            .split([' ', ';'])
+            .next()
+            .unwrap();
+        if !TYPES.contains(&kind) {
+            continue;
+        }
+        let above = lines[..i].iter().rev();
+        let about = above.take_while(|l| l.starts_with("///") || l.starts_with("#["));
+        let words = about
+            .filter_map(|l| l.strip_prefix("///"))
+            .flat_map(str::split_whitespace);
+        if words.count() < FEWEST_WORDS {
+            found.push(name.to_owned());
+        }
+    }
+    found
+}
+
+#[test]
+fn every_number_says_what_it_is() {
+    let root = PathBuf::from(env!("CARGO_MANIFEST_DIR"));
+    let mut silent = Vec::new();
+    for room in ROOMS {
+        let mut files = Vec::new();
+        sources(&root.join(room), &mut files);
+        for file in files {
+            let text = fs::read_to_string(&file).unwrap();
+            let place = file.strip_prefix(&root).unwrap().display().to_string();
+            silent.extend(
+                unexplained(&text)
+                    .into_iter()
+                    .map(|n| format!("{place}: {n}")),
+            );
+        }
+    }
+    assert!(
+        silent.is_empty(),
+        "without a word of what they are: {silent:#?}"
+    );
+}
+
+#[test]
+fn a_number_without_a_word_is_seen() {
+    let text = "/// Length of a frame, s.\nconst FRAME: f64 = 0.1;\nconst BARE: usize = 3;\n\
+                /// Two.\npub const SHORT: [f64; 2] = [1.0, 2.0];\nconst NAME: &str = \"x\";";
+    assert_eq!(unexplained(text), ["BARE", "SHORT"]);
+}
