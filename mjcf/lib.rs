@@ -1,7 +1,7 @@
 //! What an MJCF document says of a machine, for code that is no engine.
 //!
 //! [`asid_core::Scene`] is the document. Here it is read: the [layout](document) as MuJoCo orders it,
-//! [masses](mass), the [kinematics](kinematics) of a chain and its [Cartesian control](cartesian), and
+//! [masses](mass), the [`kinematics`] of a chain and its [Cartesian control](cartesian), and
 //! the [`Plant`]: drives, joints, geoms and pairs that may touch, as effects and the diagnosis see them.
 
 pub mod cartesian;
