@@ -18,7 +18,7 @@
 /// #[serde(default, deny_unknown_fields)]
 /// struct Still {}
 ///
-/// crate::register!(ExplorerEntry {
+/// asid_core::register!(ExplorerEntry {
 ///     name: "still",
 ///     about: "stands still",
 ///     defaults: registry::defaults::<Still>,
@@ -27,7 +27,7 @@
 ///
 /// impl Explorer for Still {
 ///     fn explore<'a>(&'a self, _: &'a Problem<'a>, _: Option<&[f64]>) -> Result<Explored<'a>> {
-///         Err(crate::Error::Failed("there is nothing to explore".into()))
+///         Err(asid_core::Error::Failed("there is nothing to explore".into()))
 ///     }
 /// }
 ///
