@@ -1,5 +1,7 @@
 //! Candidates: effects at sites, and where the search for their parameters begins.
 
+use std::sync::Arc;
+
 use asid_core::parameter::Scale;
 use asid_core::registry::all;
 use asid_core::{Parameter, Target};
@@ -12,9 +14,10 @@ use crate::machine::Machine;
 use crate::trajectory::Trajectory;
 
 /// An effect at a site.
+#[derive(Clone)]
 pub struct Candidate {
     /// The effect.
-    pub effect: Box<dyn Effect>,
+    pub effect: Arc<dyn Effect>,
     /// Name and site, all parameters at null.
     pub spec: EffectSpec,
     /// Points to start from, one value a parameter.
@@ -68,7 +71,7 @@ impl Candidate {
                     scale: Scale::Linear,
                     unit: p.unit.into(),
                 };
-                let free = !matches!(p.start, Start::Choice(_) | Start::Given);
+                let free = !matches!(p.start, Start::Choice(_) | Start::Given | Start::Set(..));
                 (parameter, free)
             })
             .collect()
@@ -131,7 +134,7 @@ pub fn enumerate(
             let starts = starts(&*effect, plant, &site, shown);
             let ranges = ranges(&*effect, plant, &site, shown);
             found.push(Candidate {
-                effect,
+                effect: effect.into(),
                 spec,
                 starts,
                 ranges,
@@ -188,6 +191,9 @@ fn starts(effect: &dyn Effect, plant: &Plant, site: &str, shown: &Trajectory) ->
                 let values = match p.start {
                     Start::Slope | Start::Given => vec![p.null],
                     Start::Values(v) | Start::Choice(v) => v.to_vec(),
+                    Start::Set(reference, multiple) => {
+                        vec![multiple * measure(plant, site, reference, shown)]
+                    }
                     Start::Multiples(reference, v) => {
                         let unit = measure(plant, site, reference, shown);
                         v.iter().map(|x| x * unit).collect()

@@ -269,6 +269,12 @@ impl Logs {
         }
     }
 
+    /// Difference `a - b` of two rows of readings (`width` each) in the sensors' units, one number an
+    /// entry; NaN where either is missing.
+    pub fn reading_difference(&self, a: &[f64], b: &[f64], out: &mut [f64]) {
+        self.differences.difference(a, b, out);
+    }
+
     /// Speed of change at each row of predicted readings (`rows x width`) of one episode, in the
     /// sensors' units per second (`rows x entries`).
     #[must_use]

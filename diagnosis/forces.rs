@@ -68,7 +68,7 @@ fn candidate(joint: &str) -> Result<Candidate> {
     Ok(Candidate {
         starts: Vec::new(),
         ranges: parameters.map(|p| p.range).collect(),
-        effect,
+        effect: effect.into(),
         spec,
     })
 }

@@ -13,6 +13,7 @@ pub mod diagnose;
 pub mod experiment;
 pub mod fit;
 pub mod forces;
+pub mod latent_force;
 pub mod linearise;
 pub mod localise;
 pub mod machine;

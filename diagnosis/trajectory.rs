@@ -52,24 +52,11 @@ impl Trajectory {
         threads: usize,
     ) -> Result<Self> {
         let layout = model.layout();
-        let mut pairs: Vec<[usize; 2]> = plant
-            .contacts
-            .iter()
-            .map(|&[a, b]| {
-                let (x, y) = (plant.geoms[a].body, plant.geoms[b].body);
-                [x.min(y), x.max(y)]
-            })
-            .collect();
-        pairs.sort_unstable();
-        pairs.dedup();
+        let pairs = pairs_of(plant);
         let mut names: Vec<String> = Vec::new();
         names.extend(layout.joints.iter().map(|j| format!("qpos.{}", j.name)));
         names.extend(layout.joints.iter().map(|j| format!("qvel.{}", j.name)));
-        names.extend(
-            pairs
-                .iter()
-                .map(|&[a, b]| format!("contact.{}/{}", layout.bodies[a], layout.bodies[b])),
-        );
+        names.extend(pairs.iter().map(|p| contact_channel(layout, *p)));
         let recording = layout.recording(&names)?;
         let width = recording.width();
         let (nq, nv, nu) = (layout.nq, layout.nv, layout.nu());
@@ -111,6 +98,66 @@ impl Trajectory {
                 qvel: part(nq, nv),
                 contact: part(nq + nv, pairs.len()),
                 ctrl: e.episode.ctrl[..plan.rows() * nu].to_vec(),
+            });
+        }
+        Ok(Self {
+            sensors: logs.channels(),
+            readings: spreads(logs),
+            episodes,
+            pairs,
+            touched,
+        })
+    }
+
+    /// Of states that are known (`rows x (nq + nv)`, one an episode), with the contacts that the model has there.
+    ///
+    /// # Errors
+    /// When a value is not physical or the engine fails.
+    pub fn along(
+        model: &dyn Model,
+        plant: &Plant,
+        (parameters, theta): (&[Parameter], &[f64]),
+        logs: &Logs,
+        states: &[Vec<f64>],
+        rows: &[&[usize]],
+    ) -> Result<Self> {
+        let layout = model.layout();
+        let (nq, nv, nu) = (layout.nq, layout.nv, layout.nu());
+        let width = nq + nv;
+        let pairs = pairs_of(plant);
+        let names: Vec<String> = pairs.iter().map(|p| contact_channel(layout, *p)).collect();
+        let recording = layout.recording(&names)?;
+        let mut simulator = model.simulator(&BatchConfig {
+            size: 1,
+            threads: 1,
+            targets: parameters.iter().flat_map(|p| p.targets.clone()).collect(),
+        })?;
+        simulator.set_parameters(&[0], &columns_of(parameters, theta))?;
+        let mut touched = vec![false; pairs.len()];
+        let mut episodes = Vec::with_capacity(states.len());
+        for ((e, states), rows) in logs.episodes.iter().zip(states).zip(rows) {
+            let mut contact = vec![0.0; rows.len() * pairs.len()];
+            if !pairs.is_empty() {
+                let each = states.chunks_exact(width).zip(contact.chunks_exact_mut(pairs.len()));
+                for (state, forces) in each {
+                    simulator.reset(&[0])?;
+                    simulator.set_state(&[0], &state[..nq], &state[nq..])?;
+                    simulator.read(&[0], &recording, forces)?;
+                    for (t, force) in touched.iter_mut().zip(&*forces) {
+                        *t |= *force > 0.0;
+                    }
+                }
+            }
+            let part = |from: usize, len: usize| -> Vec<f64> {
+                let rows = states.chunks_exact(width);
+                rows.flat_map(|r| r[from..from + len].to_vec()).collect()
+            };
+            let ctrl = rows.iter().flat_map(|&k| &e.episode.ctrl[k * nu..(k + 1) * nu]);
+            episodes.push(Path {
+                qpos: part(0, nq),
+                qvel: part(nq, nv),
+                ctrl: ctrl.copied().collect(),
+                contact,
             });
         }
         Ok(Self {
@@ -219,6 +266,26 @@ impl Trajectory {
         let pick = |q: f64| values[((q * (values.len() - 1) as f64).round()) as usize];
         quantiles.iter().map(|&q| pick(q)).collect()
     }
+}
+
+/// Pairs of bodies that can touch.
+fn pairs_of(plant: &Plant) -> Vec<[usize; 2]> {
+    let mut pairs: Vec<[usize; 2]> = plant
+        .contacts
+        .iter()
+        .map(|&[a, b]| {
+            let (x, y) = (plant.geoms[a].body, plant.geoms[b].body);
+            [x.min(y), x.max(y)]
+        })
+        .collect();
+    pairs.sort_unstable();
+    pairs.dedup();
+    pairs
+}
+
+/// Channel of the normal force between two bodies.
+fn contact_channel(layout: &asid_core::Layout, [a, b]: [usize; 2]) -> String {
+    format!("contact.{}/{}", layout.bodies[a], layout.bodies[b])
 }
 
 /// Replays an episode and looks at the contacts after every physics step: a tap is shorter than the

@@ -36,6 +36,8 @@ pub enum Start {
     Places(&'static [f64]),
     /// Not searched for: it stays at its null value unless it is given.
     Given,
+    /// Not searched for: it is this multiple of what the logs show of something, unless it is given.
+    Set(Reference, f64),
 }
 
 /// What a start value is measured by.

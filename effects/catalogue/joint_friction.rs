@@ -42,6 +42,11 @@ crate::register!(EffectEntry {
     make: || Box::new(Load),
 });
 
+/// Speed below which a joint counts as standing: small beside its speeds in the logs.
+const CREEP_PARAMETER: EffectParameter =
+    EffectParameter::new("creep", "rad/s or m/s", [1e-5, 0.1], CREEP)
+        .starting(Start::Set(Reference::Speed, 3e-3));
+
 /// Force `-damping v`: adds to the joint's `damping`.
 struct Viscous;
 
@@ -74,7 +79,7 @@ impl Effect for Viscous {
             &[EffectParameter::new(
                 "damping",
                 "N m s/rad or N s/m",
-                [0.0, 100.0],
+                [0.0, 1000.0],
                 0.0,
             )]
         }
@@ -150,8 +155,7 @@ impl Effect for Coulomb {
                 EffectParameter::new("force", "N m or N", [0.0, 50.0], 0.0),
                 EffectParameter::new("offset", "N m or N", [-50.0, 50.0], 0.0)
                     .starting(Start::Given),
-                EffectParameter::new("creep", "rad/s or m/s", [1e-4, 0.1], CREEP)
-                    .starting(Start::Given),
+                CREEP_PARAMETER,
             ]
         }
     }
@@ -227,6 +231,7 @@ impl Effect for Stribeck {
                 EffectParameter::new("coulomb", "N m or N", [0.0, 50.0], 0.0),
                 EffectParameter::new("speed", "rad/s or m/s", [0.001, 10.0], 0.1)
                     .starting(Start::Multiples(Reference::Speed, &[0.03, 0.1, 0.3])),
+                CREEP_PARAMETER,
             ]
         }
     }
@@ -244,9 +249,9 @@ impl Effect for Stribeck {
     }
 
     fn attach(&self, site: &Site<'_>) -> Result<Box<dyn Acting>> {
-        let [breakaway, coulomb, speed] = values(site)?;
+        let [breakaway, coulomb, speed, creep] = values(site)?;
         Ok(Box::new(StribeckAt {
-            dry: DryFriction::new(site, CREEP)?,
+            dry: DryFriction::new(site, creep)?,
             dof: site.plant.layout.joint(site.name)?.qvel,
             breakaway,
             coulomb,
@@ -294,7 +299,12 @@ impl Effect for Load {
     }
 
     fn parameters(&self) -> &'static [EffectParameter] {
-        const { &[EffectParameter::new("coefficient", "1", [0.0, 0.9], 0.0)] }
+        const {
+            &[
+                EffectParameter::new("coefficient", "1", [0.0, 0.9], 0.0),
+                CREEP_PARAMETER,
+            ]
+        }
     }
 
     fn sites(&self, plant: &Plant) -> Vec<String> {
@@ -314,12 +324,12 @@ impl Effect for Load {
     }
 
     fn attach(&self, site: &Site<'_>) -> Result<Box<dyn Acting>> {
-        let [coefficient] = values(site)?;
+        let [coefficient, creep] = values(site)?;
         let joint = site.plant.layout.joint(site.name)?;
         let joints = &site.plant.layout.joints;
         let index = joints.iter().position(|j| j.name == site.name);
         Ok(Box::new(LoadAt {
-            dry: DryFriction::new(site, CREEP)?,
+            dry: DryFriction::new(site, creep)?,
             qpos: joint.qpos,
             dof: joint.qvel,
             drives: index.map_or_else(Vec::new, |j| {

@@ -1,0 +1,254 @@
+//! A model with some effects, fitted: its values, the noise and the trajectory, with the evidence.
+//!
+//! Everything is linearised anew about the smoothed trajectory until the evidence stands. An effect that is right
+//! makes the missing force small: each round the evidence is compared over common scales of `q`, so that it is seen.
+
+use asid_core::{Parameter, Result};
+use asid_effects::EffectSpec;
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+use super::estimate::{Context, Estimate};
+use super::evidence::{Evidence, evidence};
+use super::smoother::{Regression, regress};
+use super::step_map::{Derivatives, LinearEpisode, Variation};
+use super::unknown::Unknown;
+
+/// Common factors of `q` at which models are compared.
+pub const SCALES: [f64; 6] = [1.0, 0.3, 0.1, 0.03, 0.01, 0.003];
+/// Share of a prior's deviation that a slope is taken over.
+const SLOPE_STEP: f64 = 0.01;
+/// Largest step of a value, in deviations of its prior: a tangent reaches no further.
+const LARGEST_STEP: f64 = 0.7;
+/// Part of a step that is tried where the whole made things worse.
+const SHORTER: f64 = 0.3;
+/// Rounds of EM between two linearisations.
+const EM_ROUNDS: usize = 4;
+/// Evidence that no longer counts as a rise, and rounds without one after which a fit stands.
+const RISE: f64 = 0.5;
+const STILL: usize = 3;
+
+/// A model: the study's parameters and effects, with priors.
+#[derive(Clone, Debug, Default)]
+pub struct Hypothesis {
+    /// Effects at their sites.
+    pub specs: Vec<EffectSpec>,
+    /// The study's parameters, then those of the effects.
+    pub unknowns: Vec<Unknown>,
+}
+
+impl Hypothesis {
+    /// Its parameters, as columns of a batch.
+    #[must_use]
+    pub fn parameters(&self) -> Vec<Parameter> {
+        self.unknowns.iter().map(|u| u.parameter.clone()).collect()
+    }
+
+    /// Places of the values that are fitted.
+    #[must_use]
+    pub fn free(&self) -> Vec<usize> {
+        (0..self.unknowns.len())
+            .filter(|&i| self.unknowns[i].free)
+            .collect()
+    }
+}
+
+/// A fitted model.
+#[derive(Clone, Debug)]
+pub struct Fitted {
+    /// The model.
+    pub hypothesis: Hypothesis,
+    /// All its values.
+    pub theta: Vec<f64>,
+    /// Logarithm of its marginal likelihood, natural.
+    pub evidence: f64,
+    /// Posterior covariance of the fitted values, in their units.
+    pub covariance: DMatrix<f64>,
+    /// Trajectory, force and noise.
+    pub estimate: Estimate,
+}
+
+/// The regression of all walks.
+pub fn regression(
+    context: &Context<'_>,
+    estimate: &Estimate,
+    linear: &[LinearEpisode],
+    scale: f64,
+    m: usize,
+) -> Regression {
+    let starts = context.starts(&estimate.trajectory);
+    let noise = estimate.noise.scaled(scale, &estimate.least_white);
+    let parts: Vec<Regression> = estimate
+        .problems(context, linear, &starts)
+        .map(|p| regress(p, &noise, m))
+        .collect();
+    let mut sum = Regression {
+        log_likelihood: 0.0,
+        gram: DMatrix::zeros(m, m),
+        moment: DVector::zeros(m),
+    };
+    parts.iter().for_each(|p| sum.add(p));
+    sum
+}
+
+/// Moves a linearisation by changes of the values that its columns are for.
+fn shift(linear: &mut [LinearEpisode], changes: &[f64]) {
+    let m = changes.len();
+    if m == 0 {
+        return;
+    }
+    let sum = |row: &[f64]| -> f64 { row.iter().zip(changes).map(|(c, x)| c * x).sum() };
+    for episode in linear {
+        let columns = episode.state_columns.chunks_exact(m);
+        for (d, row) in episode.defect.iter_mut().zip(columns) {
+            *d += sum(row);
+        }
+        let columns = episode.reading_columns.chunks_exact(m);
+        for (r, row) in episode.residual.iter_mut().zip(columns) {
+            *r -= sum(row);
+        }
+    }
+}
+
+/// Fits a model from some values and an estimate on, over at most `rounds` linearisations.
+///
+/// # Errors
+/// When a value is not physical or the engine fails.
+pub fn fit(
+    context: &Context<'_>,
+    hypothesis: &Hypothesis,
+    theta: &[f64],
+    estimate: &Estimate,
+    rounds: usize,
+) -> Result<Fitted> {
+    let unknowns = &hypothesis.unknowns;
+    let free = hypothesis.free();
+    let m = free.len();
+    let nx = 2 * context.plant().layout.nv;
+    let mut map = context.map(&hypothesis.specs, &hypothesis.parameters(), 2 * nx + m + 1)?;
+    let want = Derivatives {
+        state: true,
+        force: false,
+    };
+    let mut theta = theta.to_vec();
+    let mut estimate = estimate.clone();
+    let mut best: Option<Fitted> = None;
+    // Where the best point's own step leads, and how much of it is taken.
+    let mut ahead: Option<(Vec<f64>, Estimate)> = None;
+    let mut part = 1.0;
+    let mut still = 0;
+    for round in 0..rounds.max(1) {
+        let variations: Vec<Variation> = free
+            .iter()
+            .map(|&i| {
+                let u = &unknowns[i];
+                let step = SLOPE_STEP * u.deviation;
+                let up = theta[i] + step <= u.bounds[1];
+                let mut other = theta.clone();
+                other[i] += if up { step } else { -step };
+                Variation {
+                    theta: other,
+                    scale: if up { SLOPE_STEP } else { -SLOPE_STEP },
+                }
+            })
+            .collect();
+        let mut linear = map.linearise(&theta, &estimate.trajectory, want, &[], &variations)?;
+        let places: Vec<usize> = (0..m).collect();
+        let center: Vec<f64> = free
+            .iter()
+            .map(|&i| -unknowns[i].distance(theta[i]))
+            .collect();
+        let bounds: Vec<[f64; 2]> = free
+            .iter()
+            .map(|&i| {
+                let u = &unknowns[i];
+                u.bounds.map(|b| (b - theta[i]) / u.deviation)
+            })
+            .collect();
+        let prior: f64 = center.iter().map(|c| c * c).sum();
+        let mut chosen: Option<(f64, f64, Evidence)> = None;
+        for scale in SCALES {
+            let sum = regression(context, &estimate, &linear, scale, m);
+            let found = evidence(&sum.gram, &sum.moment, &places, &center, &bounds);
+            // Of the present values, not of where a step would lead.
+            let determinant: f64 = found
+                .covariance
+                .clone()
+                .cholesky()
+                .map_or(0.0, |c| c.l_dirty().diagonal().iter().map(|x| x.ln()).sum());
+            let here = sum.log_likelihood - 0.5 * prior + determinant;
+            if chosen.as_ref().is_none_or(|(best, ..)| here > *best) {
+                chosen = Some((here, scale, found));
+            }
+        }
+        let Some((here, scale, found)) = chosen else { break };
+        estimate.noise = estimate.noise.scaled(scale, &estimate.least_white);
+        let covariance = DMatrix::from_fn(m, m, |i, j| {
+            let d = |k: usize| unknowns[free[k]].deviation;
+            found.covariance[(i, j)] * d(i) * d(j)
+        });
+        let rose = best.as_ref().is_none_or(|b| here > b.evidence + RISE);
+        let better = best.as_ref().is_none_or(|b| here > b.evidence);
+        still = if rose { 0 } else { still + 1 };
+        if better {
+            best = Some(Fitted {
+                hypothesis: hypothesis.clone(),
+                theta: theta.clone(),
+                evidence: here,
+                covariance,
+                estimate: estimate.clone(),
+            });
+            part = 1.0;
+        }
+        if still == STILL || round + 1 == rounds {
+            break;
+        }
+        if better {
+            let steps: Vec<f64> = found
+                .coefficients
+                .iter()
+                .map(|c| c.clamp(-LARGEST_STEP, LARGEST_STEP))
+                .collect();
+            for (k, &i) in free.iter().enumerate() {
+                let [low, high] = unknowns[i].bounds;
+                theta[i] = (theta[i] + steps[k] * unknowns[i].deviation).clamp(low, high);
+            }
+            shift(&mut linear, &steps);
+            estimate.improve(context, &linear, EM_ROUNDS);
+            ahead = Some((theta.clone(), estimate.clone()));
+            continue;
+        }
+        // The tangent led astray: less of the way from the best point.
+        let (Some(best), Some((to, there))) = (&best, &ahead) else { break };
+        part *= SHORTER;
+        for (x, (a, b)) in theta.iter_mut().zip(best.theta.iter().zip(to)) {
+            *x = a + part * (b - a);
+        }
+        estimate = best.estimate.towards(context, there, part);
+    }
+    best.ok_or_else(|| asid_core::Error::Failed("no round of the fit was finite".into()))
+}
+
+/// Smooths the logs in a model for the first time: linearises and fits the noise until both stand.
+///
+/// # Errors
+/// When the engine fails.
+pub fn settle_noise(
+    context: &Context<'_>,
+    hypothesis: &Hypothesis,
+    theta: &[f64],
+    estimate: &mut Estimate,
+    (rounds, em_rounds): (usize, usize),
+) -> Result<()> {
+    let nx = 2 * context.plant().layout.nv;
+    let mut map = context.map(&hypothesis.specs, &hypothesis.parameters(), 2 * nx + 1)?;
+    let want = Derivatives {
+        state: true,
+        force: false,
+    };
+    for _ in 0..rounds {
+        let linear = map.linearise(theta, &estimate.trajectory, want, &[], &[])?;
+        estimate.improve(context, &linear, em_rounds);
+    }
+    Ok(())
+}

@@ -1,0 +1,226 @@
+//! A first trajectory from the readings, and what is known of where episodes begin.
+
+use asid_core::layout::JointKind;
+use asid_core::signal::{rotation_difference, unit_quaternion};
+use asid_mjcf::Plant;
+use asid_mjcf::plant::Reads;
+use nalgebra::Vector3;
+
+use crate::data::Logs;
+use crate::predict::State;
+
+use super::smoother::Start;
+use super::tangent::difference;
+use super::walk::Walk;
+
+/// Half the rows that a speed is taken over.
+const HALF_WINDOW: usize = 2;
+/// Deviation of a start that the log gives, relative to the largest value of its coordinate.
+const GIVEN: f64 = 1e-4;
+/// Deviation of a start that the log does not give, relative to the largest value of its coordinate.
+const OPEN: f64 = 2.0;
+
+/// Fills missing values of a series linearly between their neighbours; false where there is none.
+fn fill(time: &[f64], values: &mut [f64]) -> bool {
+    let present: Vec<usize> = (0..values.len())
+        .filter(|&k| values[k].is_finite())
+        .collect();
+    let (Some(&first), Some(&last)) = (present.first(), present.last()) else {
+        return false;
+    };
+    let (start, end) = (values[first], values[last]);
+    values[..first].fill(start);
+    values[last + 1..].fill(end);
+    for pair in present.windows(2) {
+        let (a, b) = (pair[0], pair[1]);
+        for k in a + 1..b {
+            let along = (time[k] - time[a]) / (time[b] - time[a]);
+            values[k] = values[a] + along * (values[b] - values[a]);
+        }
+    }
+    true
+}
+
+/// Trajectories along some walks: `rows x (nq + nv)` each. What sensors of joints and of free bodies read is taken from
+/// them, speeds from differences where no sensor reads them, and the rest from `otherwise`.
+#[must_use]
+pub fn from_readings(
+    plant: &Plant,
+    logs: &Logs,
+    walks: &[Walk],
+    otherwise: &[Vec<f64>],
+) -> Vec<Vec<f64>> {
+    let layout = &plant.layout;
+    let (nq, nv) = (layout.nq, layout.nv);
+    let width = nq + nv;
+    let mut out = otherwise.to_vec();
+    for (walk, states) in walks.iter().zip(&mut out) {
+        let n = walk.len();
+        let mut speed_read = vec![false; nv];
+        let mut place_read = vec![false; nv];
+        let mut at = 0;
+        for sensor in &logs.sensors {
+            let Some(index) = layout.sensors.iter().position(|s| s.name == sensor.name) else {
+                continue;
+            };
+            let len = layout.sensors[index].len;
+            let own = at;
+            at += len;
+            let readings = &logs.episodes[walk.episode].readings;
+            let mut series: Vec<Vec<f64>> = (0..len)
+                .map(|c| {
+                    let row = |&k: &usize| readings[k * logs.width() + own + c];
+                    walk.rows.iter().map(row).collect()
+                })
+                .collect();
+            if !series.iter_mut().all(|s| fill(&walk.time, s)) {
+                continue;
+            }
+            let kind = &*layout.sensors[index].kind;
+            match plant.sensors[index] {
+                Reads::Joint(j) => {
+                    let joint = &layout.joints[j];
+                    if !matches!(joint.kind, JointKind::Hinge | JointKind::Slide) {
+                        continue;
+                    }
+                    let place = match kind {
+                        "jointpos" => {
+                            place_read[joint.qvel] = true;
+                            joint.qpos
+                        }
+                        "jointvel" => {
+                            speed_read[joint.qvel] = true;
+                            nq + joint.qvel
+                        }
+                        _ => continue,
+                    };
+                    for k in 0..n {
+                        states[k * width + place] = series[0][k];
+                    }
+                }
+                Reads::Body(b) => {
+                    let Some(joint) = plant.free_joint(b).map(|j| &layout.joints[j]) else {
+                        continue;
+                    };
+                    let (first, dofs) = match kind {
+                        "framepos" => (joint.qpos, joint.qvel..joint.qvel + 3),
+                        "framequat" => (joint.qpos + 3, joint.qvel + 3..joint.qvel + 6),
+                        _ => continue,
+                    };
+                    place_read[dofs].fill(true);
+                    for k in 0..n {
+                        let values: Vec<f64> = series.iter().map(|s| s[k]).collect();
+                        let row = &mut states[k * width + first..];
+                        if kind == "framequat" {
+                            let q = unit_quaternion(&values);
+                            row[..4].copy_from_slice(&[q.w, q.i, q.j, q.k]);
+                        } else {
+                            row[..3].copy_from_slice(&values);
+                        }
+                    }
+                }
+                Reads::Other => {}
+            }
+        }
+        let places = states.clone();
+        let mut change = vec![0.0; 2 * nv];
+        for k in 0..n {
+            let (a, b) = (
+                k.saturating_sub(HALF_WINDOW),
+                (k + HALF_WINDOW).min(n - 1),
+            );
+            let dt = walk.time[b] - walk.time[a];
+            if dt <= 0.0 {
+                continue;
+            }
+            let state = |k: usize| &places[k * width..(k + 1) * width];
+            difference(layout, state(b), state(a), &mut change);
+            for d in (0..nv).filter(|&d| place_read[d] && !speed_read[d]) {
+                states[k * width + nq + d] = change[d] / dt;
+            }
+        }
+        spin(plant, walk, &place_read, &mut change, states);
+    }
+    out
+}
+
+/// Angular speeds of free bodies from their orientations, about the body's own axes.
+fn spin(plant: &Plant, walk: &Walk, read: &[bool], change: &mut [f64], states: &mut [f64]) {
+    let layout = &plant.layout;
+    let width = layout.nq + layout.nv;
+    let n = walk.len();
+    let places = states.to_vec();
+    for joint in layout.joints.iter().filter(|j| j.kind == JointKind::Free) {
+        if !read[joint.qvel + 3] {
+            continue;
+        }
+        for k in 0..n {
+            let (a, b) = (k.saturating_sub(1), (k + 1).min(n - 1));
+            let dt = walk.time[b] - walk.time[a];
+            if dt <= 0.0 {
+                continue;
+            }
+            let q = |k: usize| &places[k * width + joint.qpos + 3..k * width + joint.qpos + 7];
+            let turn = Vector3::from(rotation_difference(q(b), q(a)));
+            let own = unit_quaternion(q(k)).inverse() * turn / dt;
+            let at = k * width + layout.nq + joint.qvel + 3;
+            states[at..at + 3].copy_from_slice(own.as_slice());
+        }
+    }
+    change.fill(0.0);
+}
+
+/// Largest magnitude of each tangent coordinate along some trajectories: of positions their spread about the first
+/// row's.
+#[must_use]
+pub fn scales(plant: &Plant, trajectory: &[Vec<f64>]) -> Vec<f64> {
+    let layout = &plant.layout;
+    let (nq, nv) = (layout.nq, layout.nv);
+    let width = nq + nv;
+    let mut scale = vec![1e-6_f64; 2 * nv];
+    let mut change = vec![0.0; 2 * nv];
+    for states in trajectory {
+        let first = states[..width].to_vec();
+        for state in states.chunks_exact(width) {
+            difference(layout, state, &first, &mut change);
+            for i in 0..nv {
+                scale[i] = scale[i].max(change[i].abs());
+                scale[nv + i] = scale[nv + i].max(state[nq + i].abs());
+            }
+        }
+    }
+    scale
+}
+
+/// Where a walk begins, as the filter wants it: about the log's own start where `given`, else about the
+/// trajectory's first state. `noise` is the deviation of the reading of each position that a sensor reads directly.
+#[must_use]
+pub fn start(
+    plant: &Plant,
+    given: Option<(&State, &[usize])>,
+    first: &[f64],
+    (scale, noise): (&[f64], &[f64]),
+) -> Start {
+    let layout = &plant.layout;
+    let nx = 2 * layout.nv;
+    let wide = |i: usize| {
+        let position = if i < layout.nv { noise[i] } else { 0.0 };
+        (OPEN * scale[i]).max(10.0 * position).powi(2)
+    };
+    let mut start = Start {
+        mean: vec![0.0; nx],
+        variance: (0..nx).map(wide).collect(),
+    };
+    if let Some((state, open)) = given {
+        let state = [&state.qpos[..], &state.qvel[..]].concat();
+        difference(layout, &state, first, &mut start.mean);
+        for i in 0..nx {
+            if open.contains(&i) {
+                start.mean[i] = 0.0;
+            } else {
+                start.variance[i] = (GIVEN * scale[i]).powi(2);
+            }
+        }
+    }
+    start
+}

@@ -1,0 +1,34 @@
+//! The force that a model lacks, as a hidden state, and which effects make up for it.
+//!
+//! Replays ask whether a model, run open loop from an episode's first row, lands on the log. Here the question is
+//! local: which force is missing *now*? It is a hidden state beside position and speed, estimated by smoothing; effects are
+//! columns of one linear regression on its innovations; the few that lead are put into the model and fitted anew.
+//!
+//! From below: [`tangent`] (states), [`walk`] (rows), [`step_map`] (the model over a row and its derivatives),
+//! [`smoother`], [`initial`] and [`estimate`] (trajectory, force and noise), [`unknown`] and [`fit`] (a model with its values),
+//! [`evidence`], [`columns`], [`screen`], [`search`].
+
+pub mod columns;
+pub mod estimate;
+pub mod evidence;
+pub mod fit;
+pub mod initial;
+pub mod screen;
+pub mod search;
+pub mod smoother;
+pub mod step_map;
+pub mod tangent;
+pub mod unknown;
+pub mod walk;
+
+/// Start of an episode as its log has it.
+#[must_use]
+pub fn given(plant: &asid_mjcf::Plant, episode: &asid_core::Episode) -> crate::predict::State {
+    crate::starts::given_start(plant, episode)
+}
+
+/// Coordinates of the starts that some log leaves open.
+#[must_use]
+pub fn open(layout: &asid_core::Layout, study: &crate::study::Study) -> Vec<usize> {
+    crate::starts::open_coordinates(layout, study)
+}

@@ -1,0 +1,189 @@
+//! Forward selection of effects by evidence, with a look back after each.
+
+use asid_core::{Progress, Result};
+
+use crate::candidate::Candidate;
+
+use super::columns::{Columns, Form};
+use super::estimate::Context;
+use super::fit::{Fitted, Hypothesis, fit};
+use super::screen::{Screened, rank, regressions};
+
+/// How widely to search.
+#[derive(Clone, Copy, Debug)]
+pub struct Breadth {
+    /// Sets that are fitted a little after each screening.
+    pub raced: usize,
+    /// Sets of these that are fitted to the end.
+    pub finished: usize,
+    /// Most sets that are named one upon the other.
+    pub depth: usize,
+    /// Linearisations of a first short fit, and of a whole one.
+    pub rounds: [usize; 2],
+}
+
+impl Default for Breadth {
+    fn default() -> Self {
+        Self {
+            raced: 8,
+            finished: 3,
+            depth: 4,
+            rounds: [3, 15],
+        }
+    }
+}
+
+/// A set of effects, fitted.
+#[derive(Clone, Debug)]
+pub struct Set {
+    /// Candidates, in the order in which they were added.
+    pub candidates: Vec<usize>,
+    /// The model.
+    pub fitted: Fitted,
+    /// How many named things it is: a group counts once.
+    pub names: usize,
+}
+
+/// A round: what was screened and what was fitted upon a base.
+#[derive(Clone, Debug)]
+pub struct Round {
+    /// Candidates of the base.
+    pub base: Vec<usize>,
+    /// Labels and evidences of screening, best first.
+    pub screened: Vec<(Vec<usize>, f64)>,
+    /// Sets that were fitted to the end, best first.
+    pub confirmed: Vec<Set>,
+}
+
+/// What a search found.
+pub struct Outcome {
+    /// Without effects.
+    pub none: Fitted,
+    /// The rounds.
+    pub rounds: Vec<Round>,
+    /// The set that stands; that without effects where nothing earned its place.
+    pub best: Set,
+}
+
+/// The model with some more candidates, and values to begin with.
+fn with(
+    base: &Fitted,
+    columns: &Columns,
+    candidates: &[Candidate],
+    screened: &Screened,
+) -> (Hypothesis, Vec<f64>, Vec<usize>) {
+    let mut hypothesis = base.hypothesis.clone();
+    let mut theta = base.theta.clone();
+    for (&i, c) in base.hypothesis.free().iter().zip(&screened.base) {
+        let u = &base.hypothesis.unknowns[i];
+        theta[i] = (theta[i] + c * u.deviation).clamp(u.bounds[0], u.bounds[1]);
+    }
+    let mut added = Vec::new();
+    for (&f, coefficients) in screened.forms.iter().zip(&screened.coefficients) {
+        let form: &Form = &columns.forms[f];
+        let candidate = &candidates[form.candidate];
+        hypothesis.specs.push(candidate.spec.clone());
+        hypothesis.unknowns.extend(form.unknowns(candidate));
+        theta.extend(form.values(candidate, coefficients));
+        added.push(form.candidate);
+    }
+    (hypothesis, theta, added)
+}
+
+/// Searches upon the model without effects.
+///
+/// # Errors
+/// When the engine fails.
+pub fn search(
+    context: &Context<'_>,
+    none: &Fitted,
+    candidates: &[Candidate],
+    breadth: Breadth,
+    progress: &dyn Progress,
+) -> Result<Outcome> {
+    let threshold = threshold(candidates.len());
+    let mut best = Set {
+        candidates: Vec::new(),
+        fitted: none.clone(),
+        names: 0,
+    };
+    let mut rounds = Vec::new();
+    for _ in 0..breadth.depth {
+        let open: Vec<usize> = (0..candidates.len())
+            .filter(|c| !best.candidates.contains(c))
+            .collect();
+        let round = one_round(context, &best, candidates, &open, breadth, progress)?;
+        let next = round.confirmed.first().cloned();
+        rounds.push(round);
+        let Some(next) = next else { break };
+        if next.fitted.evidence - best.fitted.evidence < threshold {
+            break;
+        }
+        best = next;
+    }
+    Ok(Outcome {
+        none: none.clone(),
+        rounds,
+        best,
+    })
+}
+
+/// Evidence that a further effect must earn: the best of `n` reaches about `ln n` by chance, and a factor of 20 upon it.
+fn threshold(n: usize) -> f64 {
+    (20.0 * n.max(1) as f64).ln()
+}
+
+/// Screens the open candidates upon a set and fits the few that lead.
+fn one_round(
+    context: &Context<'_>,
+    base: &Set,
+    candidates: &[Candidate],
+    open: &[usize],
+    breadth: Breadth,
+    progress: &dyn Progress,
+) -> Result<Round> {
+    progress.begin("screening", 1);
+    let some: Vec<Candidate> = open.iter().map(|&c| candidates[c].clone()).collect();
+    let fitted = &base.fitted;
+    let model = (&fitted.hypothesis, &fitted.theta[..]);
+    let columns = Columns::of(context, model, &fitted.estimate, &some)?;
+    let sums = regressions(context, &fitted.estimate, &columns);
+    let ranked = rank(&sums, &columns, &some);
+    progress.end();
+    let label = |s: &Screened| -> Vec<usize> {
+        s.forms.iter().map(|&f| open[columns.forms[f].candidate]).collect()
+    };
+    let screened: Vec<(Vec<usize>, f64)> = ranked.iter().map(|s| (label(s), s.gain)).collect();
+    progress.begin("confirming", breadth.raced.min(ranked.len()) as u64);
+    let mut racing = Vec::new();
+    for s in ranked.iter().take(breadth.raced).filter(|s| s.gain > 0.0) {
+        let (hypothesis, theta, added) = with(fitted, &columns, &some, s);
+        let short = fit(context, &hypothesis, &theta, &fitted.estimate, breadth.rounds[0])?;
+        racing.push((short, added));
+        progress.advance(1);
+    }
+    racing.sort_by(|a, b| b.0.evidence.total_cmp(&a.0.evidence));
+    let mut confirmed = Vec::new();
+    for (short, added) in racing.into_iter().take(breadth.finished) {
+        let fitted = fit(
+            context,
+            &short.hypothesis,
+            &short.theta,
+            &short.estimate,
+            breadth.rounds[1],
+        )?;
+        let added = added.iter().map(|&c| open[c]);
+        confirmed.push(Set {
+            candidates: base.candidates.iter().copied().chain(added).collect(),
+            fitted,
+            names: base.names + 1,
+        });
+    }
+    progress.end();
+    confirmed.sort_by(|a, b| b.fitted.evidence.total_cmp(&a.fitted.evidence));
+    Ok(Round {
+        base: base.candidates.clone(),
+        screened,
+        confirmed,
+    })
+}
