@@ -1,5 +1,4 @@
 //! Development: what the latent force says of a study.
-use asid_core::progress::Silent;
 use asid_diagnosis::candidate::enumerate;
 use asid_diagnosis::data::Logs;
 use asid_diagnosis::latent_force::estimate::begin;
@@ -61,7 +60,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let shown = Trajectory::along(&*model, &plant, (&study.parameters, &none.theta), &logs, &none.estimate.trajectory, &rows)?;
     let (candidates, left) = enumerate(&machine, &shown, &[]);
     say!("{} candidates, {} left out", candidates.len(), left.len());
-    let outcome = search(&context, &none, &candidates, Breadth::default(), &Silent)?;
+    struct P(Instant);
+    impl asid_core::Progress for P { fn begin(&self, what: &str, n: u64) { eprintln!("[{:.1}] {what} {n}", self.0.elapsed().as_secs_f64()); } fn advance(&self, _: u64) {} fn end(&self) {} }
+    let p = P(t0);
+    let outcome = search(&context, &none, &candidates, Breadth::default(), &p)?;
     let label = |c: &[usize]| if c.len() > 3 { format!("{} x{}", candidates[c[0]].label(), c.len()) } else { c.iter().map(|&i| candidates[i].label()).collect::<Vec<_>>().join("+") };
     for r in &outcome.rounds {
         say!("upon [{}]: screened {}", label(&r.base), r.screened.iter().take(10).map(|(c, g)| format!("{} {:.0}", label(c), g)).collect::<Vec<_>>().join("; "));

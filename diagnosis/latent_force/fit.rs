@@ -91,6 +91,12 @@ pub fn regression(
     sum
 }
 
+/// Half the logarithm of the determinant of the posterior covariance, in units of the prior.
+fn determinant_of(found: &Evidence) -> f64 {
+    let factor = found.covariance.clone().cholesky();
+    factor.map_or(0.0, |c| c.l_dirty().diagonal().iter().map(|x| x.ln()).sum())
+}
+
 /// Moves a linearisation by changes of the values that its columns are for.
 fn shift(linear: &mut [LinearEpisode], changes: &[f64]) {
     let m = changes.len();
@@ -171,12 +177,7 @@ pub fn fit(
             let sum = regression(context, &estimate, &linear, scale, m);
             let found = evidence(&sum.gram, &sum.moment, &places, &center, &bounds);
             // Of the present values, not of where a step would lead.
-            let determinant: f64 = found
-                .covariance
-                .clone()
-                .cholesky()
-                .map_or(0.0, |c| c.l_dirty().diagonal().iter().map(|x| x.ln()).sum());
-            let here = sum.log_likelihood - 0.5 * prior + determinant;
+            let here = sum.log_likelihood - 0.5 * prior + determinant_of(&found);
             if chosen.as_ref().is_none_or(|(best, ..)| here > *best) {
                 chosen = Some((here, scale, found));
             }
@@ -200,7 +201,10 @@ pub fn fit(
             });
             part = 1.0;
         }
-        if still == STILL || round + 1 == rounds {
+        // What the step of the values promises, linearly.
+        let promised = found.gain - determinant_of(&found) + 0.5 * prior;
+        let stands = round > 0 && better && !rose && promised < RISE;
+        if still == STILL || stands || round + 1 == rounds {
             break;
         }
         if better {

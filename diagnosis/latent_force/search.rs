@@ -14,6 +14,8 @@ use super::screen::{Screened, rank, regressions};
 pub struct Breadth {
     /// Sets that are fitted a little after each screening.
     pub raced: usize,
+    /// Share of the leader's evidence that a set needs to be raced.
+    pub share: f64,
     /// Sets of these that are fitted to the end.
     pub finished: usize,
     /// Most sets that are named one upon the other.
@@ -26,6 +28,7 @@ impl Default for Breadth {
     fn default() -> Self {
         Self {
             raced: 8,
+            share: 0.1,
             finished: 3,
             depth: 4,
             rounds: [3, 15],
@@ -156,7 +159,9 @@ fn one_round(
     let screened: Vec<(Vec<usize>, f64)> = ranked.iter().map(|s| (label(s), s.gain)).collect();
     progress.begin("confirming", breadth.raced.min(ranked.len()) as u64);
     let mut racing = Vec::new();
-    for s in ranked.iter().take(breadth.raced).filter(|s| s.gain > 0.0) {
+    let lead = ranked.first().map_or(0.0, |s| s.gain);
+    let least = (breadth.share * lead).max(0.0);
+    for s in ranked.iter().take(breadth.raced).filter(|s| s.gain > least) {
         let (hypothesis, theta, added) = with(fitted, &columns, &some, s);
         let short = fit(context, &hypothesis, &theta, &fitted.estimate, breadth.rounds[0])?;
         racing.push((short, added));

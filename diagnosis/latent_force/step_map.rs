@@ -11,6 +11,7 @@ use asid_core::layout::{Layout, Recording};
 use asid_core::simulator::{StepHook, StepView};
 use asid_core::{BatchConfig, Control, Parameter, Result, Rollout, Simulator};
 use asid_effects::{Acts, EffectSpec};
+use rayon::prelude::*;
 
 use crate::data::Logs;
 use crate::machine::Machine;
@@ -98,11 +99,16 @@ enum Role {
 
 /// The model with some effects on some logs.
 pub struct StepMap<'a> {
+    common: Common<'a>,
+    parts: Vec<Part>,
+}
+
+/// What all parts share.
+struct Common<'a> {
     logs: &'a Logs,
     walks: &'a [Walk],
     layout: Layout,
     parameters: Vec<Parameter>,
-    simulator: Box<dyn Simulator>,
     states: Recording,
     readings: Recording,
     /// Most roles in one pass.
@@ -110,6 +116,22 @@ pub struct StepMap<'a> {
     /// Whether effects on the drive side remember, and whether some act on readings.
     remembers: bool,
     reads: bool,
+}
+
+/// Some of the walks on a core of their own: a row is too little work to share out.
+struct Part {
+    walks: Vec<usize>,
+    simulator: Box<dyn Simulator>,
+}
+
+/// The linearisation point and what is wanted of it.
+#[derive(Clone, Copy)]
+struct Request<'r> {
+    theta: &'r [f64],
+    trajectory: &'r [Vec<f64>],
+    want: Derivatives,
+    push: &'r [f64],
+    variations: &'r [Variation],
 }
 
 impl<'a> StepMap<'a> {
@@ -127,13 +149,24 @@ impl<'a> StepMap<'a> {
     ) -> Result<Self> {
         let model = machine.with(specs)?;
         let layout = model.layout().clone();
-        let episodes = walks.len().max(1);
-        let capacity = roles.clamp(2, (MOST_SIMULATIONS / episodes).max(2));
-        let simulator = model.simulator(&BatchConfig {
-            size: capacity * episodes,
-            threads: machine.threads,
-            targets: parameters.iter().flat_map(|p| p.targets.clone()).collect(),
-        })?;
+        let cores = match machine.threads {
+            0 => std::thread::available_parallelism().map_or(1, usize::from),
+            n => n,
+        };
+        let shares = share_out(walks, cores);
+        let most = shares.iter().map(Vec::len).max().unwrap_or(1).max(1);
+        let capacity = roles.clamp(2, (MOST_SIMULATIONS / cores / most).max(2));
+        let parts = shares
+            .into_iter()
+            .map(|walks| {
+                let simulator = model.simulator(&BatchConfig {
+                    size: capacity * walks.len(),
+                    threads: 1,
+                    targets: parameters.iter().flat_map(|p| p.targets.clone()).collect(),
+                })?;
+                Ok(Part { walks, simulator })
+            })
+            .collect::<Result<_>>()?;
         let joints = || layout.joints.iter();
         let names = joints().map(|j| format!("qpos.{}", j.name));
         let names: Vec<String> = names
@@ -147,27 +180,27 @@ impl<'a> StepMap<'a> {
                 Acts::Model => {}
             }
         }
-        Ok(Self {
+        let common = Common {
             states: layout.recording(&names)?,
             readings: layout.recording(&logs.channels())?,
             logs,
             walks,
             layout,
             parameters: parameters.to_vec(),
-            simulator,
             capacity,
             remembers,
             reads,
-        })
+        };
+        Ok(Self { common, parts })
     }
 
     /// Physics steps so far.
     #[must_use]
     pub fn steps(&self) -> u64 {
-        self.simulator.steps_taken()
+        self.parts.iter().map(|p| p.simulator.steps_taken()).sum()
     }
 
-    /// Linearises about a trajectory (`rows x (nq + nv)`, one an episode) at some parameters; `push` is the
+    /// Linearises about a trajectory (`rows x (nq + nv)`, one a walk) at some parameters; `push` is the
     /// force that slopes in each generalized force are taken over.
     ///
     /// # Errors
@@ -180,31 +213,77 @@ impl<'a> StepMap<'a> {
         push: &[f64],
         variations: &[Variation],
     ) -> Result<Vec<LinearEpisode>> {
-        let nx = 2 * self.layout.nv;
+        let request = Request {
+            theta,
+            trajectory,
+            want,
+            push,
+            variations,
+        };
+        let common = &self.common;
+        let found: Vec<Vec<LinearEpisode>> = self
+            .parts
+            .par_iter_mut()
+            .map(|part| part.linearise(common, request))
+            .collect::<Result<_>>()?;
+        let mut out = vec![LinearEpisode::default(); self.common.walks.len()];
+        for (part, episodes) in self.parts.iter().zip(found) {
+            for (&w, episode) in part.walks.iter().zip(episodes) {
+                out[w] = episode;
+            }
+        }
+        Ok(out)
+    }
+}
+
+/// Shares walks out among cores, the longest first, each to the one that has least.
+fn share_out(walks: &[Walk], cores: usize) -> Vec<Vec<usize>> {
+    let mut order: Vec<usize> = (0..walks.len()).collect();
+    order.sort_by_key(|&w| std::cmp::Reverse(walks[w].len()));
+    let mut shares = vec![(0, Vec::new()); cores.max(1)];
+    for w in order {
+        if let Some(least) = shares.iter_mut().min_by_key(|s| s.0) {
+            least.0 += walks[w].len();
+            least.1.push(w);
+        }
+    }
+    let shares = shares.into_iter().map(|(_, mut walks)| {
+        walks.sort_unstable();
+        walks
+    });
+    shares.filter(|s: &Vec<usize>| !s.is_empty()).collect()
+}
+
+impl Part {
+    fn linearise(&mut self, c: &Common<'_>, request: Request<'_>) -> Result<Vec<LinearEpisode>> {
+        let Request {
+            want, variations, ..
+        } = request;
+        let nv = c.layout.nv;
+        let nx = 2 * nv;
         let mut roles = Vec::new();
         if want.state {
             roles.extend((0..nx).map(Role::State));
-            if self.reads {
+            if c.reads {
                 roles.extend((0..nx).map(Role::Reading));
             }
         }
         if want.force {
-            roles.extend((0..self.layout.nv).map(Role::Force));
+            roles.extend((0..nv).map(Role::Force));
         }
         roles.extend((0..variations.len()).map(Role::Varied));
-        let ns = self.logs.entries.len();
-        let m = variations.len();
+        let (ns, m) = (c.logs.entries.len(), variations.len());
         let mut episodes: Vec<LinearEpisode> = self
             .walks
             .iter()
-            .map(|w| {
-                let (n, steps) = (w.len(), w.len() - 1);
-                let state = usize::from(want.state);
+            .map(|&w| {
+                let n = c.walks[w].len();
+                let (steps, state) = (n - 1, usize::from(want.state));
                 LinearEpisode {
                     rows: n,
                     defect: vec![0.0; steps * nx],
                     a: vec![0.0; state * steps * nx * nx],
-                    b: vec![0.0; usize::from(want.force) * steps * nx * self.layout.nv],
+                    b: vec![0.0; usize::from(want.force) * steps * nx * nv],
                     residual: vec![f64::NAN; n * ns],
                     h: vec![0.0; state * n * ns * nx],
                     state_columns: vec![0.0; steps * nx * m],
@@ -213,10 +292,10 @@ impl<'a> StepMap<'a> {
             })
             .collect();
         if roles.is_empty() {
-            self.pass(theta, trajectory, push, variations, &[], &mut episodes)?;
+            self.pass(c, request, &[], &mut episodes)?;
         }
-        for chunk in roles.chunks(self.capacity - 1) {
-            self.pass(theta, trajectory, push, variations, chunk, &mut episodes)?;
+        for chunk in roles.chunks(c.capacity - 1) {
+            self.pass(c, request, chunk, &mut episodes)?;
         }
         Ok(episodes)
     }
@@ -224,10 +303,8 @@ impl<'a> StepMap<'a> {
     /// One walk along all episodes with some roles beside the nominal one.
     fn pass(
         &mut self,
-        theta: &[f64],
-        trajectory: &[Vec<f64>],
-        push: &[f64],
-        variations: &[Variation],
+        c: &Common<'_>,
+        request: Request<'_>,
         extra: &[Role],
         out: &mut [LinearEpisode],
     ) -> Result<()> {
@@ -239,35 +316,31 @@ impl<'a> StepMap<'a> {
         let mut columns = Vec::new();
         for role in &roles {
             let theta = match role {
-                Role::Varied(i) => &variations[*i].theta,
-                _ => theta,
+                Role::Varied(i) => &request.variations[*i].theta,
+                _ => request.theta,
             };
-            let row = columns_of(&self.parameters, theta);
+            let row = columns_of(&c.parameters, theta);
             (0..n).for_each(|_| columns.extend_from_slice(&row));
         }
         self.simulator.reset(&all)?;
         self.simulator.set_parameters(&all, &columns)?;
-        let longest = self.walks.iter().map(Walk::len).max().unwrap_or(0);
+        let walks: Vec<&Walk> = self.walks.iter().map(|&w| &c.walks[w]).collect();
+        let longest = walks.iter().map(|w| w.len()).max().unwrap_or(0);
         let mut row = RowBuffers::default();
         for k in 0..longest {
-            let here: Vec<usize> = (0..n).filter(|&e| self.walks[e].len() > k).collect();
-            self.place(&roles, &here, k, trajectory, &mut row)?;
-            self.read_row(&roles, &here, k, variations, out, &mut row)?;
+            let here: Vec<usize> = (0..n).filter(|&e| walks[e].len() > k).collect();
+            self.place(c, &roles, (&here, k), request.trajectory, &mut row)?;
+            self.read_row(c, &roles, (&here, k), request.variations, out, &mut row)?;
             let mut ahead: Vec<usize> = here
                 .into_iter()
-                .filter(|&e| self.walks[e].len() > k + 1)
+                .filter(|&e| walks[e].len() > k + 1)
                 .collect();
             while let Some(&first) = ahead.first() {
-                let substeps = self.walks[first].substeps[k];
+                let substeps = walks[first].substeps[k];
                 let (now, later): (Vec<usize>, Vec<usize>) = ahead
                     .iter()
-                    .partition(|&&e| self.walks[e].substeps[k] == substeps);
-                self.step_row(
-                    (&roles, &now, k, substeps),
-                    (trajectory, push, variations),
-                    out,
-                    &mut row,
-                )?;
+                    .partition(|&&e| walks[e].substeps[k] == substeps);
+                self.step_row(c, (&roles, &now, k, substeps), request, out, &mut row)?;
                 ahead = later;
             }
         }
@@ -277,14 +350,14 @@ impl<'a> StepMap<'a> {
     /// Puts all simulations of some episodes at row `k`.
     fn place(
         &mut self,
+        c: &Common<'_>,
         roles: &[Role],
-        here: &[usize],
-        k: usize,
+        (here, k): (&[usize], usize),
         trajectory: &[Vec<f64>],
         row: &mut RowBuffers,
     ) -> Result<()> {
-        let (n, nq, nv) = (self.walks.len(), self.layout.nq, self.layout.nv);
-        if self.remembers && k > 0 {
+        let (n, nq, nv) = (self.walks.len(), c.layout.nq, c.layout.nv);
+        if c.remembers && k > 0 {
             let (mut from, mut to) = (Vec::new(), Vec::new());
             for (v, role) in roles.iter().enumerate() {
                 if matches!(role, Role::State(_) | Role::Force(_)) {
@@ -301,10 +374,11 @@ impl<'a> StepMap<'a> {
         for (v, role) in roles.iter().enumerate() {
             for &e in here {
                 let width = nq + nv;
-                let mut state = trajectory[e][k * width..(k + 1) * width].to_vec();
+                let states = &trajectory[self.walks[e]];
+                let mut state = states[k * width..(k + 1) * width].to_vec();
                 if let Role::State(i) | Role::Reading(i) = *role {
                     change[i] = STATE_STEP;
-                    retract(&self.layout, &mut state, &change);
+                    retract(&c.layout, &mut state, &change);
                     change[i] = 0.0;
                 }
                 row.sims.push(v * n + e);
@@ -329,46 +403,47 @@ impl<'a> StepMap<'a> {
     /// Reads the sensors at row `k`.
     fn read_row(
         &mut self,
+        c: &Common<'_>,
         roles: &[Role],
-        here: &[usize],
-        k: usize,
+        (here, k): (&[usize], usize),
         variations: &[Variation],
         out: &mut [LinearEpisode],
         row: &mut RowBuffers,
     ) -> Result<()> {
-        let (ns, nx) = (self.logs.entries.len(), 2 * self.layout.nv);
-        let width = self.readings.width();
+        let (ns, nx) = (c.logs.entries.len(), 2 * c.layout.nv);
+        let width = c.readings.width();
         row.read.resize(row.sims.len() * width, 0.0);
         self.simulator
-            .read(&row.sims, &self.readings, &mut row.read)?;
+            .read(&row.sims, &c.readings, &mut row.read)?;
         let m = variations.len();
         let mut differ = vec![0.0; ns];
         for (i, &e) in here.iter().enumerate() {
             let nominal = &row.read[i * width..(i + 1) * width];
-            let log_row = self.walks[e].rows[k];
-            let readings = &self.logs.episodes[self.walks[e].episode].readings;
+            let walk = &c.walks[self.walks[e]];
+            let log_row = walk.rows[k];
+            let readings = &c.logs.episodes[walk.episode].readings;
             let logged = &readings[log_row * width..(log_row + 1) * width];
             let residual = &mut out[e].residual[k * ns..(k + 1) * ns];
-            self.logs.reading_difference(logged, nominal, residual);
+            c.logs.reading_difference(logged, nominal, residual);
             for (v, role) in roles.iter().enumerate().skip(1) {
                 let place = v * here.len() + i;
                 let other = &row.read[place * width..(place + 1) * width];
-                self.logs.reading_difference(other, nominal, &mut differ);
+                c.logs.reading_difference(other, nominal, &mut differ);
                 match *role {
-                    Role::State(c) if !self.reads => {
+                    Role::State(i) if !c.reads => {
                         for (s, d) in differ.iter().enumerate() {
-                            out[e].h[(k * ns + s) * nx + c] = d / STATE_STEP;
+                            out[e].h[(k * ns + s) * nx + i] = d / STATE_STEP;
                         }
                     }
-                    Role::Reading(c) => {
+                    Role::Reading(i) => {
                         for (s, d) in differ.iter().enumerate() {
-                            out[e].h[(k * ns + s) * nx + c] = d / STATE_STEP;
+                            out[e].h[(k * ns + s) * nx + i] = d / STATE_STEP;
                         }
                     }
-                    Role::Varied(c) => {
+                    Role::Varied(i) => {
                         for (s, d) in differ.iter().enumerate() {
-                            let value = d / variations[c].scale;
-                            out[e].reading_columns[(k * ns + s) * m + c] =
+                            let value = d / variations[i].scale;
+                            out[e].reading_columns[(k * ns + s) * m + i] =
                                 if value.is_finite() { value } else { 0.0 };
                         }
                     }
@@ -382,20 +457,27 @@ impl<'a> StepMap<'a> {
     /// Steps some episodes from row `k` to the next.
     fn step_row(
         &mut self,
+        c: &Common<'_>,
         (roles, now, k, substeps): (&[Role], &[usize], usize, usize),
-        (trajectory, push, variations): (&[Vec<f64>], &[f64], &[Variation]),
+        request: Request<'_>,
         out: &mut [LinearEpisode],
         row: &mut RowBuffers,
     ) -> Result<()> {
-        let (n, nv, nu) = (self.walks.len(), self.layout.nv, self.layout.nu());
-        let (nx, width) = (2 * nv, self.layout.nq + nv);
+        let Request {
+            trajectory,
+            push,
+            variations,
+            ..
+        } = request;
+        let (n, nv, nu) = (self.walks.len(), c.layout.nv, c.layout.nu());
+        let (nx, width) = (2 * nv, c.layout.nq + nv);
         row.sims.clear();
         row.ctrl.clear();
         row.pushes.clear();
         for (v, role) in roles.iter().enumerate() {
             for &e in now {
                 row.sims.push(v * n + e);
-                let ctrl = &self.walks[e].ctrl[k * nu..(k + 1) * nu];
+                let ctrl = &c.walks[self.walks[e]].ctrl[k * nu..(k + 1) * nu];
                 row.ctrl.extend_from_slice(ctrl);
                 row.pushes.push(match *role {
                     Role::Force(d) => Some((d, push[d])),
@@ -409,7 +491,7 @@ impl<'a> StepMap<'a> {
             1,
             substeps,
             Control::PerSimulation(&row.ctrl),
-            &self.states,
+            &c.states,
         );
         if row.pushes.iter().any(Option::is_some) {
             rollout.hook = Some(&hook);
@@ -420,22 +502,22 @@ impl<'a> StepMap<'a> {
         let mut differ = vec![0.0; nx];
         for (i, &e) in now.iter().enumerate() {
             let nominal = &row.next[i * width..(i + 1) * width];
-            let ahead = &trajectory[e][(k + 1) * width..(k + 2) * width];
+            let ahead = &trajectory[self.walks[e]][(k + 1) * width..(k + 2) * width];
             let defect = &mut out[e].defect[k * nx..(k + 1) * nx];
-            difference(&self.layout, nominal, ahead, defect);
+            difference(&c.layout, nominal, ahead, defect);
             for (v, role) in roles.iter().enumerate().skip(1) {
                 let place = v * now.len() + i;
                 let other = &row.next[place * width..(place + 1) * width];
-                difference(&self.layout, other, nominal, &mut differ);
-                let (matrix, columns, c, scale) = match *role {
-                    Role::State(c) => (&mut out[e].a, nx, c, STATE_STEP),
-                    Role::Force(c) => (&mut out[e].b, nv, c, push[c]),
-                    Role::Varied(c) => (&mut out[e].state_columns, m, c, variations[c].scale),
+                difference(&c.layout, other, nominal, &mut differ);
+                let (matrix, columns, at, scale) = match *role {
+                    Role::State(i) => (&mut out[e].a, nx, i, STATE_STEP),
+                    Role::Force(i) => (&mut out[e].b, nv, i, push[i]),
+                    Role::Varied(i) => (&mut out[e].state_columns, m, i, variations[i].scale),
                     Role::Nominal | Role::Reading(_) => continue,
                 };
                 for (s, d) in differ.iter().enumerate() {
                     let value = d / scale;
-                    matrix[(k * nx + s) * columns + c] =
+                    matrix[(k * nx + s) * columns + at] =
                         if value.is_finite() { value } else { 0.0 };
                 }
             }
