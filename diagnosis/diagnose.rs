@@ -6,6 +6,8 @@ use asid_effects::EffectSpec;
 use crate::bench::{Bench, Explanation, Trial};
 use crate::candidate::{Candidate, LeftOut, enumerate};
 use crate::fit::cost;
+use crate::latent_force;
+use crate::latent_force::pipeline::Diagnosed;
 use crate::machine::Machine;
 use crate::predict::{Point, State};
 use crate::prepare::{Prepared, plain_residuals, prepare};
@@ -68,6 +70,10 @@ pub fn diagnose(
     settings: Settings,
     progress: &dyn Progress,
 ) -> Result<(Diagnosis, Work)> {
+    let machine = match latent_force::pipeline::diagnose(study, machine, &settings.without, progress)? {
+        Ok(found) => return tell(study, by_force(study, found)?, settings, progress),
+        Err(machine) => machine,
+    };
     let streams = Streams::new(settings.seed);
     progress.begin("fitting the study's parameters", 1);
     let Prepared {
@@ -108,6 +114,38 @@ pub fn diagnose(
         judgement,
         nominal,
     };
+    tell(study, work, settings, progress)
+}
+
+/// What a diagnosis by the missing force found, with its noise.
+fn by_force(study: &Study, found: Diagnosed) -> Result<Work> {
+    let Diagnosed {
+        mut bench,
+        candidates,
+        left_out,
+        findings,
+        judgement,
+        nominal,
+    } = found;
+    let findings = final_noise(&mut bench, study, &candidates, findings)?;
+    Ok(Work {
+        none: vec![findings.none.clone()],
+        bench,
+        candidates,
+        left_out,
+        findings,
+        judgement,
+        nominal,
+    })
+}
+
+/// Tells what was found.
+fn tell(
+    study: &Study,
+    work: Work,
+    settings: Settings,
+    progress: &dyn Progress,
+) -> Result<(Diagnosis, Work)> {
     progress.begin("telling", 1);
     let diagnosis = Telling {
         study,

@@ -51,6 +51,12 @@ impl Effort {
         tolerance: 1e-4,
         chord: false,
     };
+    /// Where it stands, with its slopes.
+    pub const LOOK: Self = Self {
+        iterations: 0,
+        tolerance: 1e-3,
+        chord: false,
+    };
     /// A quick look.
     pub const BRIEF: Self = Self {
         iterations: 6,

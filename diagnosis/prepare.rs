@@ -88,11 +88,12 @@ pub fn plain_residuals(
         .collect())
 }
 
-/// Prepares a study on a machine.
+/// The bench of a study with its noise and stages still open, and the values of its parameters in the model
+/// as given.
 ///
 /// # Errors
-/// When a parameter cannot be set or a rollout fails.
-pub fn prepare(study: &Study, machine: Machine, rng: Rng) -> Result<Prepared> {
+/// When a parameter cannot be set.
+pub fn dataset(study: &Study, machine: Machine) -> Result<(Bench, Vec<f64>)> {
     let layout = machine.plant.layout.clone();
     let sensors = logged_sensors(&layout, study);
     let record = |logs: &[(String, asid_core::Episode)]| -> Result<Record> {
@@ -111,7 +112,7 @@ pub fn prepare(study: &Study, machine: Machine, rng: Rng) -> Result<Prepared> {
         .map(|p| Ok(model.nominal(&p.targets[0])?.clamp(p.range[0], p.range[1])))
         .collect::<Result<Vec<_>>>()?;
     let open = open_coordinates(&layout, study);
-    let mut bench = Bench {
+    let bench = Bench {
         machine,
         train,
         parameters: study.parameters.clone(),
@@ -121,6 +122,46 @@ pub fn prepare(study: &Study, machine: Machine, rng: Rng) -> Result<Prepared> {
         test,
         stages: Vec::new(),
     };
+    Ok((bench, nominal))
+}
+
+/// Estimates the noise from the readings alone; what the study gives stays.
+pub fn set_reading_noise(bench: &mut Bench, given: &BTreeMap<String, f64>) {
+    let logs = &bench.train.logs;
+    let n = logs.entries.len();
+    let width = logs.width();
+    let series: Vec<Vec<f64>> = logs
+        .episodes
+        .iter()
+        .map(|e| {
+            let rows = e.plan.rows();
+            let mut out = vec![0.0; rows * n];
+            let first = e.readings[..width].to_vec();
+            for (row, out) in e.readings.chunks_exact(width).zip(out.chunks_exact_mut(n)) {
+                logs.reading_difference(row, &first, out);
+            }
+            out
+        })
+        .collect();
+    let estimated = noise::estimate(logs, &series);
+    let noise: Vec<f64> = logs
+        .sensors
+        .iter()
+        .zip(estimated)
+        .map(|(s, x)| given.get(&s.name).copied().unwrap_or(x))
+        .collect();
+    for record in [&mut bench.train, &mut bench.test, &mut bench.head] {
+        record.logs.set_noise(&noise);
+    }
+}
+
+/// Prepares a study on a machine.
+///
+/// # Errors
+/// When a parameter cannot be set or a rollout fails.
+pub fn prepare(study: &Study, machine: Machine, rng: Rng) -> Result<Prepared> {
+    let (mut bench, nominal) = dataset(study, machine)?;
+    let layout = bench.layout().clone();
     let finer = bench.machine.halved().and_then(|half| {
         let quarter = half.halved()?;
         Ok([half, quarter])

@@ -309,7 +309,7 @@ pub fn judge(bench: &Bench, findings: &Findings, candidates: usize, scatter: f64
 
 impl Judgement {
     /// Most probable first.
-    fn sort(&mut self) {
+    pub(crate) fn sort(&mut self) {
         let mut order: Vec<usize> = (0..self.hypotheses.len()).collect();
         let p = |i: usize| self.hypotheses[i].probability;
         order.sort_by(|&a, &b| p(b).total_cmp(&p(a)));

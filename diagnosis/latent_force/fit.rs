@@ -62,6 +62,8 @@ pub struct Fitted {
     pub theta: Vec<f64>,
     /// Logarithm of its marginal likelihood, natural.
     pub evidence: f64,
+    /// What a further step of the values promises, to first order.
+    pub promised: f64,
     /// Posterior covariance of the fitted values, in their units.
     pub covariance: DMatrix<f64>,
     /// Trajectory, force and noise.
@@ -188,6 +190,7 @@ pub fn fit(
             let d = |k: usize| unknowns[free[k]].deviation;
             found.covariance[(i, j)] * d(i) * d(j)
         });
+        let promised = found.gain - determinant_of(&found) + 0.5 * prior;
         let rose = best.as_ref().is_none_or(|b| here > b.evidence + RISE);
         let better = best.as_ref().is_none_or(|b| here > b.evidence);
         still = if rose { 0 } else { still + 1 };
@@ -196,13 +199,12 @@ pub fn fit(
                 hypothesis: hypothesis.clone(),
                 theta: theta.clone(),
                 evidence: here,
+                promised,
                 covariance,
                 estimate: estimate.clone(),
             });
             part = 1.0;
         }
-        // What the step of the values promises, linearly.
-        let promised = found.gain - determinant_of(&found) + 0.5 * prior;
         let stands = round > 0 && better && !rose && promised < RISE;
         if still == STILL || stands || round + 1 == rounds {
             break;

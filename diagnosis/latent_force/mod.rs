@@ -6,29 +6,19 @@
 //!
 //! From below: [`tangent`] (states), [`walk`] (rows), [`step_map`] (the model over a row and its derivatives),
 //! [`smoother`], [`initial`] and [`estimate`] (trajectory, force and noise), [`unknown`] and [`fit`] (a model with its values),
-//! [`evidence`], [`columns`], [`screen`], [`search`].
+//! [`evidence`], [`columns`], [`screen`], [`search`], [`selection`], [`pipeline`].
 
 pub mod columns;
 pub mod estimate;
 pub mod evidence;
 pub mod fit;
 pub mod initial;
+pub mod pipeline;
 pub mod screen;
 pub mod search;
+pub mod selection;
 pub mod smoother;
 pub mod step_map;
 pub mod tangent;
 pub mod unknown;
 pub mod walk;
-
-/// Start of an episode as its log has it.
-#[must_use]
-pub fn given(plant: &asid_mjcf::Plant, episode: &asid_core::Episode) -> crate::predict::State {
-    crate::starts::given_start(plant, episode)
-}
-
-/// Coordinates of the starts that some log leaves open.
-#[must_use]
-pub fn open(layout: &asid_core::Layout, study: &crate::study::Study) -> Vec<usize> {
-    crate::starts::open_coordinates(layout, study)
-}

@@ -16,6 +16,14 @@ pub struct Breadth {
     pub raced: usize,
     /// Share of the leader's evidence that a set needs to be raced.
     pub share: f64,
+    /// Evidence in screening below which nothing is raced, natural logarithm: the best of a hundred candidates reaches 3 to
+    /// 5 by chance.
+    pub least: f64,
+    /// Share of the leader's gain up to which a set may lie behind it after the short fits, and the evidence up to which it
+    /// may in any case.
+    pub behind: f64,
+    /// See `behind`.
+    pub near: f64,
     /// Sets of these that are fitted to the end.
     pub finished: usize,
     /// Most sets that are named one upon the other.
@@ -29,9 +37,12 @@ impl Default for Breadth {
         Self {
             raced: 8,
             share: 0.1,
+            least: 3.0,
+            behind: 0.5,
+            near: 20.0,
             finished: 3,
             depth: 4,
-            rounds: [3, 15],
+            rounds: [2, 15],
         }
     }
 }
@@ -64,6 +75,8 @@ pub struct Outcome {
     pub none: Fitted,
     /// The rounds.
     pub rounds: Vec<Round>,
+    /// Typical inertial force at each degree of freedom, N or N m.
+    pub inertial: Vec<f64>,
     /// The set that stands; that without effects where nothing earned its place.
     pub best: Set,
 }
@@ -126,6 +139,7 @@ pub fn search(
     }
     Ok(Outcome {
         none: none.clone(),
+        inertial: context.inertial.clone(),
         rounds,
         best,
     })
@@ -160,14 +174,19 @@ fn one_round(
     progress.begin("confirming", breadth.raced.min(ranked.len()) as u64);
     let mut racing = Vec::new();
     let lead = ranked.first().map_or(0.0, |s| s.gain);
-    let least = (breadth.share * lead).max(0.0);
+    let least = (breadth.share * lead).max(breadth.least);
     for s in ranked.iter().take(breadth.raced).filter(|s| s.gain > least) {
         let (hypothesis, theta, added) = with(fitted, &columns, &some, s);
         let short = fit(context, &hypothesis, &theta, &fitted.estimate, breadth.rounds[0])?;
         racing.push((short, added));
         progress.advance(1);
     }
-    racing.sort_by(|a, b| b.0.evidence.total_cmp(&a.0.evidence));
+    let hoped = |f: &Fitted| f.evidence + f.promised;
+    racing.sort_by(|a, b| hoped(&b.0).total_cmp(&hoped(&a.0)));
+    if let Some(best) = racing.first().map(|(f, _)| hoped(f)) {
+        let gained = best - fitted.evidence;
+        racing.retain(|(f, _)| best - hoped(f) <= (breadth.behind * gained).max(breadth.near));
+    }
     let mut confirmed = Vec::new();
     for (short, added) in racing.into_iter().take(breadth.finished) {
         let fitted = fit(

@@ -1,0 +1,223 @@
+//! From a study to what its result is told from, by the missing force.
+
+use asid_core::{Progress, Result};
+
+use crate::bench::{Bench, Explanation, Stage};
+use crate::candidate::{Candidate, LeftOut, enumerate};
+use crate::fit::Effort;
+use crate::machine::Machine;
+use crate::predict::State;
+use crate::prepare::{dataset, set_reading_noise};
+use crate::search::{Findings, Found};
+use crate::starts::given_start;
+use crate::study::Study;
+use crate::trajectory::Trajectory;
+use crate::verdict::Judgement;
+
+use super::estimate::begin;
+use super::fit::{Fitted, Hypothesis, fit, settle_noise};
+use super::search::{Breadth, Outcome, Set, search};
+use super::selection::select;
+use super::unknown::Unknown;
+use super::walk::Walk;
+
+/// Linearisations and rounds of EM of the first smoothing.
+const FIRST: (usize, usize) = (4, 8);
+/// Most linearisations of the fit without effects.
+const ROUNDS: usize = 15;
+/// Most sets besides the verdict's that are replayed.
+const RIVALS: usize = 4;
+
+/// What a diagnosis by the missing force found.
+pub struct Diagnosed {
+    /// Machine and logs.
+    pub bench: Bench,
+    /// Effects at their sites.
+    pub candidates: Vec<Candidate>,
+    /// Those that could not be tried.
+    pub left_out: Vec<LeftOut>,
+    /// Replays of the explanations.
+    pub findings: Findings,
+    /// What is made of them.
+    pub judgement: Judgement,
+    /// Values of the study's parameters in the model as given.
+    pub nominal: Vec<f64>,
+}
+
+/// Whether the method is for a machine: one that touches nothing while it moves.
+fn is_for(plant: &asid_mjcf::Plant) -> bool {
+    plant.contacts.is_empty()
+}
+
+/// Diagnoses a study; gives the machine back where it is one for another method.
+///
+/// # Errors
+/// When a parameter cannot be set or the engine fails.
+pub fn diagnose(
+    study: &Study,
+    machine: Machine,
+    without: &[String],
+    progress: &dyn Progress,
+) -> Result<std::result::Result<Diagnosed, Machine>> {
+    if !is_for(&machine.plant) {
+        return Ok(Err(machine));
+    }
+    progress.begin("smoothing the logs", 1);
+    let (mut bench, nominal) = dataset(study, machine)?;
+    set_reading_noise(&mut bench, &study.noise);
+    let layout = bench.layout().clone();
+    let logs = bench.train.logs.clone();
+    let walks: Vec<Walk> = (0..logs.episodes.len())
+        .map(|e| Walk::new(&logs, e, layout.timestep))
+        .collect();
+    let given: Vec<Option<State>> = study
+        .train
+        .iter()
+        .map(|(_, e)| e.initial.as_ref().map(|_| given_start(&bench.machine.plant, e)))
+        .collect();
+    let home = asid_core::problem::home(&layout);
+    let still = [&home.0[..], &home.1[..]].concat();
+    let otherwise: Vec<Vec<f64>> = walks.iter().map(|w| still.repeat(w.len())).collect();
+    let unknowns = study.parameters.iter().zip(&nominal);
+    let hypothesis = Hypothesis {
+        specs: Vec::new(),
+        unknowns: unknowns.map(|(p, n)| Unknown::of_study(p, *n)).collect(),
+    };
+    let (outcome, candidates, left_out) = {
+        let (context, mut estimate) = begin(
+            &bench.machine,
+            &logs,
+            walks,
+            (given, bench.open.clone()),
+            (&study.parameters, &nominal),
+            &otherwise,
+        )?;
+        settle_noise(&context, &hypothesis, &nominal, &mut estimate, FIRST)?;
+        let first = fit(&context, &hypothesis, &nominal, &estimate, ROUNDS)?;
+        let mut estimate = first.estimate;
+        estimate.free_at_rest(&context);
+        estimate.set_resolution(layout.nv);
+        let none = fit(&context, &hypothesis, &first.theta, &estimate, ROUNDS)?;
+        progress.end();
+        let rows: Vec<&[usize]> = context.walks.iter().map(|w| &w.rows[..]).collect();
+        let shown = Trajectory::along(
+            &*bench.machine.with(&[])?,
+            &bench.machine.plant,
+            (&study.parameters, &none.theta),
+            &logs,
+            &none.estimate.trajectory,
+            &rows,
+        )?;
+        let (candidates, left_out) = enumerate(&bench.machine, &shown, without);
+        let outcome = search(&context, &none, &candidates, Breadth::default(), progress)?;
+        (outcome, candidates, left_out)
+    };
+    progress.begin("replaying", 1);
+    let (findings, sets) = replay(&mut bench, &candidates, &outcome)?;
+    progress.end();
+    let judgement = select(&bench, &outcome, &sets, &findings, &candidates);
+    Ok(Ok(Diagnosed {
+        bench,
+        candidates,
+        left_out,
+        findings,
+        judgement,
+        nominal,
+    }))
+}
+
+/// Starts of the training episodes as a fit smoothed them, where the logs leave them open.
+fn smoothed_starts(bench: &Bench, fitted: &Fitted) -> Vec<State> {
+    let layout = bench.layout();
+    let width = layout.nq + layout.nv;
+    if bench.open.is_empty() {
+        return bench.train.starts.clone();
+    }
+    fitted
+        .estimate
+        .trajectory
+        .iter()
+        .map(|states| State {
+            qpos: states[..layout.nq].to_vec(),
+            qvel: states[layout.nq..width].to_vec(),
+        })
+        .collect()
+}
+
+/// All sets that were fitted, each once, the most evident first.
+fn all_sets(outcome: &Outcome) -> Vec<Set> {
+    let mut sets: Vec<Set> = Vec::new();
+    for set in outcome.rounds.iter().flat_map(|r| &r.confirmed) {
+        let mut members = set.candidates.clone();
+        members.sort_unstable();
+        let same = |s: &&mut Set| {
+            let mut other = s.candidates.clone();
+            other.sort_unstable();
+            other == members
+        };
+        match sets.iter_mut().find(same) {
+            Some(known) if known.fitted.evidence < set.fitted.evidence => *known = set.clone(),
+            Some(_) => {}
+            None => sets.push(set.clone()),
+        }
+    }
+    sets.sort_by(|a, b| b.fitted.evidence.total_cmp(&a.fitted.evidence));
+    sets
+}
+
+/// Replays the model without effects, the set that stands and its nearest rivals, open loop; with the sets behind the
+/// findings.
+fn replay(
+    bench: &mut Bench,
+    candidates: &[Candidate],
+    outcome: &Outcome,
+) -> Result<(Findings, Vec<Set>)> {
+    bench.stages = vec![Stage {
+        record: bench.train.clone(),
+        episodes: (0..bench.train.logs.episodes.len()).collect(),
+        open: bench.fitted.clone(),
+    }];
+    let study = bench.parameters.len();
+    let of = |fitted: &Fitted, members: &[usize], effort: Effort| -> Result<Explanation> {
+        let mut at = study;
+        let chosen: Vec<_> = members
+            .iter()
+            .map(|&c| {
+                let n = candidates[c].parameters().len();
+                let values = fitted.theta[at..at + n].to_vec();
+                at += n;
+                (&candidates[c], values)
+            })
+            .collect();
+        let starts = smoothed_starts(bench, fitted);
+        bench.explain(0, &chosen, &fitted.theta[..study], &starts, effort)
+    };
+    let none = of(&outcome.none, &[], Effort::BRIEF)?;
+    let mut sets = all_sets(outcome);
+    let best = &outcome.best.candidates;
+    let stands = sets.iter().position(|s| s.candidates == *best);
+    if let Some(place) = stands {
+        let set = sets.remove(place);
+        sets.insert(0, set);
+    }
+    sets.truncate(1 + RIVALS);
+    let mut found = Vec::new();
+    for (i, set) in sets.iter().enumerate() {
+        let effort = if i == 0 && stands.is_some() {
+            Effort::BRIEF
+        } else {
+            Effort::LOOK
+        };
+        found.push(Found {
+            candidates: set.candidates.clone(),
+            explanation: of(&set.fitted, &set.candidates, effort)?,
+        });
+    }
+    let findings = Findings {
+        none,
+        short: None,
+        found,
+        screened: Vec::new(),
+    };
+    Ok((findings, sets))
+}

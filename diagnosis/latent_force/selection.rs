@@ -1,0 +1,117 @@
+//! From evidence to probabilities and a verdict.
+
+use crate::bench::Bench;
+use crate::candidate::Candidate;
+use crate::search::Findings;
+use crate::verdict::{Hypothesis as Judged, Judgement};
+
+use super::estimate::Estimate;
+use super::search::{Outcome, Set};
+
+/// Evidence is divided by this before it becomes a probability: the noise model is not the machine's own.
+const TEMPERATURE: f64 = 3.0;
+/// Difference of evidence up to which two sets cannot be told apart: odds of 20 after the temperature.
+const APART: f64 = 9.0;
+/// Midpoint and scale of the logistic in the logarithm of the share of the missing force's power that no named effect
+/// makes up for.
+const UNEXPLAINED: f64 = 0.5;
+const SHARPNESS: f64 = 0.35;
+/// Open-loop gap, in deviations of the noise, at which a missing force without a name counts as a gap, and the scale of
+/// the logistic about it.
+const GAP: f64 = 2.0;
+const GAP_SCALE: f64 = 0.3;
+/// Root mean square of the missing force, relative to the inertial forces, up to which nothing is missing.
+const NOTHING: f64 = 0.01;
+
+/// Power of the missing force, in units of the inertial forces, over all degrees of freedom.
+fn power(estimate: &Estimate, inertial: &[f64]) -> f64 {
+    let total = |j: usize| estimate.noise.q[j] + estimate.noise.white[j] - estimate.least_white[j];
+    (0..inertial.len())
+        .map(|j| total(j).max(0.0) / inertial[j].powi(2))
+        .sum()
+}
+
+/// Judges what a search found; `sets` are those behind the findings, in their order.
+#[must_use]
+pub fn select(
+    bench: &Bench,
+    outcome: &Outcome,
+    sets: &[Set],
+    findings: &Findings,
+    candidates: &[Candidate],
+) -> Judgement {
+    let none = outcome.none.evidence;
+    let price = (candidates.len().max(1) as f64).ln();
+    let score = |evidence: f64, names: usize| (evidence - none) / TEMPERATURE - price * names as f64;
+    let mut all = vec![Judged {
+        found: None,
+        labels: Vec::new(),
+        cost: findings.none.cost(),
+        size: 0,
+        probability: 0.0,
+    }];
+    let mut scores = vec![0.0];
+    for (i, set) in sets.iter().enumerate() {
+        let mut labels: Vec<String> = set.candidates.iter().map(|&c| candidates[c].label()).collect();
+        labels.sort();
+        all.push(Judged {
+            found: Some(i),
+            labels,
+            cost: findings.found[i].explanation.cost(),
+            size: set.fitted.hypothesis.free().len() - bench.parameters.len(),
+            probability: 0.0,
+        });
+        scores.push(score(set.fitted.evidence, set.names));
+    }
+    let chosen = &outcome.best.candidates;
+    let best = 1 + sets
+        .iter()
+        .position(|s| s.candidates == *chosen)
+        .unwrap_or(usize::MAX - 1);
+    let best = if best < all.len() { best } else { 0 };
+    // What parsimony passes over is not more probable than what it picks.
+    for i in 0..all.len() {
+        let odds = scores[i] - scores[best];
+        let passed = all[i].labels.len() > all[best].labels.len();
+        all[i].probability = odds.min(if passed { -price } else { 0.0 }).exp();
+    }
+    let sum: f64 = all.iter().map(|h| h.probability).sum();
+    let inertial = &outcome.inertial;
+    let before = power(&outcome.none.estimate, inertial);
+    let after = power(&outcome.best.fitted.estimate, inertial);
+    let rest = (after / before.max(f64::MIN_POSITIVE)).min(1.0);
+    let sigmoid = |x: f64| 1.0 / (1.0 + (-x).exp());
+    let readings = bench.held_readings().max(1.0);
+    let gap = (findings.none.held_plain / readings).sqrt();
+    let unknown = if best == 0 {
+        let missing = before.sqrt() > NOTHING;
+        let seen = sigmoid((gap - GAP) / GAP_SCALE);
+        if missing { seen.clamp(0.02, 0.999) } else { 0.02 }
+    } else {
+        sigmoid((rest / UNEXPLAINED).ln() / SHARPNESS).clamp(0.001, 0.999)
+    };
+    for h in &mut all {
+        h.probability *= (1.0 - unknown) / sum;
+    }
+    let ambiguous = (0..all.len())
+        .filter(|&i| {
+            let larger = all[best].labels.iter().all(|l| all[i].labels.contains(l));
+            i != best
+                && i != 0
+                && best != 0
+                && !larger
+                && all[i].labels.len() <= all[best].labels.len()
+                && TEMPERATURE * (scores[best] - scores[i]) < APART
+        })
+        .collect();
+    let mut judgement = Judgement {
+        best,
+        ambiguous,
+        unknown,
+        temperature: TEMPERATURE,
+        rest,
+        hypotheses: all,
+    };
+    judgement.sort();
+    judgement
+}
