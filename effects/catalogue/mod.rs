@@ -1,7 +1,7 @@
 //! The catalogue of effects, one file a family: what a real machine does and its model may lack.
 //!
 //! On the command: [`command`], [`delay`]. Between a drive and its joint: [`backlash`], [`compliance`].
-//! At a joint: [`joint_friction`], [`joint_force`], [`rotor`]. On bodies: [`mass`], [`body_force`],
+//! At a joint: [`joint_friction`], [`joint_force`], [`rotor`]. On bodies: [`mass`], [`payload`], [`body_force`],
 //! [`gravity`]. In contacts: [`contact_friction`], [`friction_field`], [`contact_softness`]. On
 //! readings: [`sensor`], [`sensor_dynamics`].
 //!
@@ -25,6 +25,7 @@ pub mod joint_force;
 pub mod joint_friction;
 pub mod mass;
 mod motor_side;
+pub mod payload;
 mod point;
 pub mod rotor;
 pub mod sensor;
