@@ -86,7 +86,7 @@ impl Drive {
 pub(super) fn law(actuator: &Actuator) -> Option<(DriveLaw, f64)> {
     let gain = actuator.gainprm.first().copied().unwrap_or(1.0);
     let bias: [f64; 3] = std::array::from_fn(|i| actuator.biasprm.get(i).copied().unwrap_or(0.0));
-    // Above zero it is a damping ratio, whose gain the engine works out.
+    // Above zero it is a damping ratio: the engine works out the gain, and effects take it from there.
     let damping = (-bias[2]).max(0.0);
     let is = |kind: &Option<String>, name: &str, default: bool| {
         kind.as_deref().map_or(default, |k| k == name)

@@ -123,3 +123,31 @@ fn gains_of_the_document_are_those_of_the_engine() {
         }
     }
 }
+
+/// A `kv` that the engine works out of a damping ratio is that of the effects: `2 ratio sqrt(kp I)`.
+#[test]
+fn effects_know_the_damping_that_a_ratio_makes() {
+    let about: f64 = super::INERTIA + 0.05;
+    let kv = 2.0 * 0.7 * (30.0 * about).sqrt();
+    let ratio =
+        r#"<position name="drive" joint="spin" kp="30" dampratio="0.7" forcerange="-9 9"/>"#;
+    let gain =
+        format!(r#"<position name="drive" joint="spin" kp="30" kv="{kv}" forcerange="-9 9"/>"#);
+    let scene = super::bench::scene(&machine(ratio));
+    for effect in [
+        "actuator-saturation@drive:limit=1",
+        "torque-speed-limit@drive:force=2,speed=3",
+        "load-friction@spin:coefficient=0.3",
+        "backlash@spin:width=0.02",
+        "servo-damping@drive:damping=-1",
+    ] {
+        let engines = engines_for(effect).into_iter();
+        for backend in engines.filter(|b| b.load(&scene).is_ok()) {
+            let [a, b] = [ratio, &gain]
+                .map(|a| Bench::new(&*backend, &machine(a), &[effect]).hold(300, &[0.7]));
+            for (a, b) in a.iter().zip(&b) {
+                near(effect, a[0], b[0], 1e-9);
+            }
+        }
+    }
+}
