@@ -95,7 +95,7 @@ impl Effect for Affine {
 }
 
 /// What a limit of a drive's force needs to know and changes: the joint's damping, and the drive's gains.
-pub fn limit_targets(plant: &Plant, site: &str) -> Vec<Target> {
+pub(super) fn limit_targets(plant: &Plant, site: &str) -> Vec<Target> {
     let Ok((actuator, drive)) = plant.drive(site) else {
         return Vec::new();
     };
@@ -106,7 +106,7 @@ pub fn limit_targets(plant: &Plant, site: &str) -> Vec<Target> {
 }
 
 /// Force (N or N m) beyond which no drive's limit is looked for.
-pub const UNLIMITED: f64 = 1000.0;
+pub(super) const UNLIMITED: f64 = 1000.0;
 
 /// The force on the joint, gear included, is held within `±limit`, from step to step by what the drive asks
 /// for at its start: see [`DriveAt::hold`].

@@ -74,7 +74,7 @@ fn geoms_of(plant: &Plant, body: usize) -> Vec<String> {
 }
 
 /// The masses that make a body's: those of its geoms, or its own.
-pub fn masses_of(plant: &Plant, body: &str) -> Vec<Target> {
+pub(super) fn masses_of(plant: &Plant, body: &str) -> Vec<Target> {
     let index = plant.layout.bodies.iter().position(|b| b == body);
     let geoms = index.map_or_else(Vec::new, |b| geoms_of(plant, b));
     if geoms.is_empty() {
@@ -85,7 +85,7 @@ pub fn masses_of(plant: &Plant, body: &str) -> Vec<Target> {
 }
 
 /// Bodies with mass that can move.
-pub fn moving(plant: &Plant) -> impl Iterator<Item = usize> {
+pub(super) fn moving(plant: &Plant) -> impl Iterator<Item = usize> {
     (1..plant.bodies.len()).filter(|&b| plant.moves(b) && plant.bodies[b].mass > 0.0)
 }
 

@@ -17,7 +17,7 @@ crate::register!(EffectEntry {
 
 crate::register!(EffectEntry {
     name: "supply-drift",
-    about: "the command is scaled by what changes over time",
+    about: "the gain of a drive changes over time",
     make: || Box::new(SupplyDrift),
 });
 

@@ -24,7 +24,7 @@ pub enum DriveLaw {
 /// An actuator on a hinge or slide.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Drive {
-    /// Index in [`Layout::joints`].
+    /// Index in [`Layout::joints`](asid_core::layout::Layout::joints).
     pub joint: usize,
     /// Its law, before the gear.
     pub law: DriveLaw,
