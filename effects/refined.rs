@@ -396,8 +396,17 @@ impl Simulator for RefinedSimulator {
                     values,
                     columns,
                 })?;
-                acting.set(&mut engine[first..]);
                 row.push(Some(acting));
+            }
+            // What the model is comes first: other effects may depend on it, or take it over.
+            for of_model in [true, false] {
+                for (acting, placed) in row.iter().zip(self.placed.iter()) {
+                    if let Some(acting) = acting
+                        && (placed.effect.acts() == Acts::Model) == of_model
+                    {
+                        acting.set(&mut engine[first..]);
+                    }
+                }
             }
             rows.push(row);
         }

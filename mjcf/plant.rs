@@ -4,81 +4,14 @@
 //! know of it (the law of a servo, the parent of a body, the friction that wins in
 //! a contact) is read from the document, once, for all engines.
 
+mod drive;
 mod jacobian;
 mod reading;
 
 use asid_core::error::{Error, Result};
 use asid_core::layout::{JointKind, Layout};
 
-/// How an actuator turns its command into a force.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum DriveLaw {
-    /// The command is the force.
-    Motor,
-    /// A position servo: `kp (command - position) - kv speed`.
-    Position {
-        /// Position gain, N/m or N m/rad.
-        kp: f64,
-        /// Damping, N s/m or N m s/rad.
-        kv: f64,
-    },
-    /// A velocity servo: `kv (command - speed)`.
-    Velocity {
-        /// Gain, N s/m or N m s/rad.
-        kv: f64,
-    },
-}
-
-/// An actuator on a hinge or slide.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Drive {
-    /// Index in [`Layout::joints`].
-    pub joint: usize,
-    /// Its law, before the gear.
-    pub law: DriveLaw,
-    /// Ratio of the joint's force to the actuator's.
-    pub gear: f64,
-    /// Limits of the command.
-    pub ctrl_range: Option<[f64; 2]>,
-    /// Limits of the force, before the gear.
-    pub force_range: Option<[f64; 2]>,
-}
-
-impl Drive {
-    /// Force on the joint (N or N m) for a command, at a position and speed of the joint.
-    #[must_use]
-    pub fn force(&self, command: f64, position: f64, speed: f64) -> f64 {
-        let clamp = |x: f64, range: Option<[f64; 2]>| range.map_or(x, |[a, b]| x.clamp(a, b));
-        let command = clamp(command, self.ctrl_range);
-        let (q, v) = (self.gear * position, self.gear * speed);
-        let force = match self.law {
-            DriveLaw::Motor => command,
-            DriveLaw::Position { kp, kv } => kp * (command - q) - kv * v,
-            DriveLaw::Velocity { kv } => kv * (command - v),
-        };
-        self.gear * clamp(force, self.force_range)
-    }
-
-    /// The command that makes the drive ask for a force on the joint (N or N m), before
-    /// any limit; `None` where no command can.
-    #[must_use]
-    pub fn command_for(&self, force: f64, position: f64, speed: f64) -> Option<f64> {
-        let (q, v) = (self.gear * position, self.gear * speed);
-        let force = force / self.gear;
-        let command = match self.law {
-            DriveLaw::Motor => force,
-            DriveLaw::Position { kp, kv } => q + (force + kv * v) / kp,
-            DriveLaw::Velocity { kv } => v + force / kv,
-        };
-        command.is_finite().then_some(command)
-    }
-
-    /// Whether its command is a position, which it pursues.
-    #[must_use]
-    pub fn is_position_servo(&self) -> bool {
-        matches!(self.law, DriveLaw::Position { .. })
-    }
-}
+pub use drive::{Drive, DriveLaw};
 
 /// A body.
 #[derive(Clone, Debug, PartialEq)]

@@ -22,6 +22,10 @@ use crate::error::{Error, Result};
 /// | `joint/NAME/pos/{0,1,2}` | anchor of a hinge in its body; joint coordinates stay | m |
 /// | `joint/NAME/damping`, `frictionloss`, `stiffness`, `armature` | of each degree of freedom | SI |
 /// | `actuator/NAME/kp`, `kv`, `gear` | gains of a servo, ratio of a drive | SI |
+/// | `body/NAME/pos/{0,1,2}` | place in its parent, of a body that is not free; MuJoCo | m |
+/// | `joint/NAME/axis/{0,1,2}` | axis of a hinge or slide, scaled to length 1; MuJoCo | 1 |
+/// | `joint/NAME/range/{0,1}`, `springref` | limits, and where the spring rests; MuJoCo | rad or m |
+/// | `actuator/NAME/forcerange/{0,1}` | limits of the force, before the gear; MuJoCo | N or N m |
 /// | `option/gravity/{0,1,2}` | gravity | m/s² |
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct Target {

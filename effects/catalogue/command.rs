@@ -6,6 +6,7 @@ use asid_core::{Capabilities, Result, Target};
 use asid_mjcf::Plant;
 use asid_mjcf::plant::{Drive, DriveLaw};
 
+use super::drive::{DriveAt, gains};
 use super::{actuators, at_least, drives, target, values};
 
 crate::register!(EffectEntry {
@@ -93,52 +94,40 @@ impl Effect for Affine {
     }
 }
 
-/// Force (N or N m) beyond which no drive's limit is looked for.
-const UNLIMITED: f64 = 1000.0;
+/// What a limit of a drive's force needs to know and changes: the joint's damping, and the drive's gains.
+pub(super) fn limit_targets(plant: &Plant, site: &str) -> Vec<Target> {
+    let Ok((actuator, drive)) = plant.drive(site) else {
+        return Vec::new();
+    };
+    let joint = &plant.layout.joints[drive.joint].name;
+    let mut targets = vec![target("joint", joint, "damping", 0)];
+    targets.extend(gains(plant, actuator));
+    targets
+}
 
-/// The force on the joint, gear included, is held within `±limit`. Where the drive asks for more at
-/// the start of a step, its command is replaced by the one that makes the limit, and as much damping is
-/// taken from the joint as a servo adds: engines integrate both implicitly, so that the force is
-/// the limit for the whole step.
+/// Force (N or N m) beyond which no drive's limit is looked for.
+pub(super) const UNLIMITED: f64 = 1000.0;
+
+/// The force on the joint, gear included, is held within `±limit`, from step to step by what the drive asks
+/// for at its start: see [`DriveAt::hold`].
 struct Saturation;
 
 struct SaturationAt {
-    actuator: usize,
-    qpos: usize,
-    dof: usize,
+    drive: DriveAt,
     damping: usize,
-    drive: Drive,
     limit: f64,
 }
 
 impl Acting for SaturationAt {
+    fn set(&self, columns: &mut [f64]) {
+        self.drive.set(columns);
+    }
+
     fn before_step(&mut self, view: &mut StepView<'_>) {
-        let (q, v) = (view.qpos[self.qpos], view.qvel[self.dof]);
-        let force = self.drive.force(view.ctrl[self.actuator], q, v);
-        if force.abs() <= self.limit {
-            return;
-        }
-        let damping = match self.drive.law {
-            DriveLaw::Motor => 0.0,
-            DriveLaw::Position { kv, .. } | DriveLaw::Velocity { kv } => kv,
-        };
-        let held = self.limit.copysign(force);
-        // Where the engine's own limit of the servo would cut in, its damping is not there to
-        // be made up for.
-        let pulled = held / self.drive.gear - damping * self.drive.gear * v;
-        if self
-            .drive
-            .force_range
-            .is_some_and(|[low, high]| pulled <= low || pulled >= high)
-        {
-            if let Some(command) = self.drive.command_for(held, q, v) {
-                view.ctrl[self.actuator] = command;
-            }
-            return;
-        }
-        if let Some(command) = self.drive.command_for(held, q, 0.0) {
-            view.ctrl[self.actuator] = command;
-            view.parameters[self.damping] -= self.drive.gear * self.drive.gear * damping;
+        let force = self.drive.force(view);
+        if force.abs() > self.limit {
+            self.drive
+                .hold(view, self.limit.copysign(force), self.damping);
         }
     }
 }
@@ -162,12 +151,7 @@ impl Effect for Saturation {
     }
 
     fn targets(&self, plant: &Plant, site: &str) -> Vec<Target> {
-        let drive = plant.drive(site);
-        let joint = drive.map(|(_, d)| &plant.layout.joints[d.joint].name);
-        joint
-            .into_iter()
-            .map(|j| target("joint", j, "damping", 0))
-            .collect()
+        limit_targets(plant, site)
     }
 
     fn needs(&self) -> Capabilities {
@@ -176,14 +160,9 @@ impl Effect for Saturation {
 
     fn attach(&self, site: &Site<'_>) -> Result<Box<dyn Acting>> {
         let [limit] = values(site)?;
-        let (actuator, drive) = site.plant.drive(site.name)?;
-        let joint = &site.plant.layout.joints[drive.joint];
         Ok(Box::new(SaturationAt {
-            actuator,
-            qpos: joint.qpos,
-            dof: joint.qvel,
+            drive: DriveAt::of_site(site, 1)?,
             damping: site.columns[0],
-            drive,
             limit: at_least(site, "limit", limit, 0.0)?,
         }))
     }

@@ -20,8 +20,9 @@ crate::register!(EffectEntry {
     make: || Box::new(Ripple),
 });
 
-/// Force `-stiffness (q - rest)`. It is explicit in time: stable while the spring's period is above
-/// `pi` time steps.
+/// Force `-(stiffness d + cubic d³)`, `d = q - rest`: the first terms of any spring that pulls alike on both
+/// sides, and with `cubic` one that stiffens, as cables, hoses and rubber do (G. Duffing, "Erzwungene Schwingungen
+/// bei veränderlicher Eigenfrequenz", 1918). It is explicit in time: stable while the period is above `pi` time steps.
 struct Stiffness;
 
 struct StiffnessAt {
@@ -29,11 +30,13 @@ struct StiffnessAt {
     dof: usize,
     stiffness: f64,
     rest: f64,
+    cubic: f64,
 }
 
 impl Acting for StiffnessAt {
     fn before_step(&mut self, view: &mut StepView<'_>) {
-        view.force[self.dof] -= self.stiffness * (view.qpos[self.qpos] - self.rest);
+        let d = view.qpos[self.qpos] - self.rest;
+        view.force[self.dof] -= (self.stiffness + self.cubic * d * d) * d;
     }
 }
 
@@ -48,6 +51,7 @@ impl Effect for Stiffness {
                 EffectParameter::new("stiffness", "N m/rad or N/m", [0.0, 200.0], 0.0),
                 EffectParameter::new("rest", "rad or m", [-3.2, 3.2], 0.0)
                     .starting(Start::Values(&[0.0])),
+                EffectParameter::new("cubic", "N m/rad³ or N/m³", [0.0, 1000.0], 0.0),
             ]
         }
     }
@@ -57,13 +61,14 @@ impl Effect for Stiffness {
     }
 
     fn attach(&self, site: &Site<'_>) -> Result<Box<dyn Acting>> {
-        let [stiffness, rest] = values(site)?;
+        let [stiffness, rest, cubic] = values(site)?;
         let joint = site.plant.layout.joint(site.name)?;
         Ok(Box::new(StiffnessAt {
             qpos: joint.qpos,
             dof: joint.qvel,
             stiffness,
             rest,
+            cubic,
         }))
     }
 }

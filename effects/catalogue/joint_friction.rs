@@ -12,6 +12,7 @@ use asid_core::{Capabilities, Result, Target};
 use asid_mjcf::Plant;
 use asid_mjcf::plant::Drive;
 
+use super::drive::{DriveAt, gains};
 use super::dry::{CREEP, DryFriction};
 use super::{at_least, scalar_joints, target, values};
 
@@ -266,17 +267,17 @@ struct Load;
 
 struct LoadAt {
     dry: DryFriction,
-    qpos: usize,
-    dof: usize,
-    drives: Vec<(usize, Drive)>,
+    drives: Vec<DriveAt>,
     coefficient: f64,
 }
 
 impl Acting for LoadAt {
+    fn set(&self, columns: &mut [f64]) {
+        self.drives.iter().for_each(|d| d.set(columns));
+    }
+
     fn before_step(&mut self, view: &mut StepView<'_>) {
-        let (q, v) = (view.qpos[self.qpos], view.qvel[self.dof]);
-        let forces = self.drives.iter();
-        let force: f64 = forces.map(|(i, d)| d.force(view.ctrl[*i], q, v)).sum();
+        let force: f64 = self.drives.iter().map(|d| d.force(view)).sum();
         self.dry.resist(view, self.coefficient * force.abs());
     }
 
@@ -291,6 +292,15 @@ impl Acting for LoadAt {
     fn load(&mut self, memory: &[f64]) {
         self.dry.before = memory.first().copied();
     }
+}
+
+/// The drives of a joint with the indices of their actuators.
+fn drives_of(plant: &Plant, joint: &str) -> Vec<(usize, Drive)> {
+    let joints = &plant.layout.joints;
+    let index = joints.iter().position(|j| j.name == joint);
+    index.map_or_else(Vec::new, |j| {
+        plant.drives_of(j).map(|(i, d)| (i, *d)).collect()
+    })
 }
 
 impl Effect for Load {
@@ -315,8 +325,11 @@ impl Effect for Load {
             .collect()
     }
 
-    fn targets(&self, _plant: &Plant, site: &str) -> Vec<Target> {
-        vec![target("joint", site, "damping", 0)]
+    fn targets(&self, plant: &Plant, site: &str) -> Vec<Target> {
+        let mut targets = vec![target("joint", site, "damping", 0)];
+        let drives = drives_of(plant, site);
+        targets.extend(drives.iter().flat_map(|(i, _)| gains(plant, *i)));
+        targets
     }
 
     fn needs(&self) -> Capabilities {
@@ -325,16 +338,13 @@ impl Effect for Load {
 
     fn attach(&self, site: &Site<'_>) -> Result<Box<dyn Acting>> {
         let [coefficient, creep] = values(site)?;
-        let joint = site.plant.layout.joint(site.name)?;
-        let joints = &site.plant.layout.joints;
-        let index = joints.iter().position(|j| j.name == site.name);
+        let mut columns = site.columns[1..].iter().copied();
+        let drives = drives_of(site.plant, site.name).into_iter();
         Ok(Box::new(LoadAt {
             dry: DryFriction::new(site, creep)?,
-            qpos: joint.qpos,
-            dof: joint.qvel,
-            drives: index.map_or_else(Vec::new, |j| {
-                site.plant.drives_of(j).map(|(i, d)| (i, *d)).collect()
-            }),
+            drives: drives
+                .map(|(i, drive)| DriveAt::new(site.plant, i, drive, &mut columns))
+                .collect(),
             coefficient: at_least(site, "coefficient", coefficient, 0.0)?,
         }))
     }

@@ -1,6 +1,6 @@
 //! Mass properties of bodies that move.
 //!
-//! Where a body's mass comes from its geoms, mass and payload change the geoms' masses; centre and inertia change
+//! Where a body's mass comes from its geoms, `mass` changes the geoms' masses; centre and inertia change
 //! what the geoms make. So all compose with a study that fits the mass of a geom.
 
 use crate::{Acting, Acts, Confusion, Effect, EffectParameter, Site};
@@ -27,24 +27,16 @@ crate::register!(EffectEntry {
     make: || Box::new(MassProperty::Inertia),
 });
 
-crate::register!(EffectEntry {
-    name: "payload",
-    about: "a body carries an extra mass at its centre of mass",
-    make: || Box::new(MassProperty::Payload),
-});
-
 /// What is changed.
 ///
 /// - `Mass`: times `factor`, inertia with it; of a geom that has a mass, else of a body.
 /// - `Center`: moved by `x`, `y`, `z` in the body's frame.
 /// - `Inertia`: the three principal moments times `factor`.
-/// - `Payload`: `mass` is added to a body, shared among its geoms in proportion.
 #[derive(Clone, Copy)]
 enum MassProperty {
     Mass,
     Center,
     Inertia,
-    Payload,
 }
 
 struct MassPropertyAt {
@@ -65,11 +57,6 @@ impl Acting for MassPropertyAt {
                     row[column] += shift;
                 }
             }
-            MassProperty::Payload => {
-                let whole: f64 = self.columns.iter().map(|&c| row[c]).sum();
-                let factor = 1.0 + first / whole;
-                self.columns.iter().for_each(|&c| row[c] *= factor);
-            }
         }
     }
 }
@@ -86,15 +73,26 @@ fn geoms_of(plant: &Plant, body: usize) -> Vec<String> {
         .collect()
 }
 
+/// The masses that make a body's: those of its geoms, or its own.
+pub(super) fn masses_of(plant: &Plant, body: &str) -> Vec<Target> {
+    let index = plant.layout.bodies.iter().position(|b| b == body);
+    let geoms = index.map_or_else(Vec::new, |b| geoms_of(plant, b));
+    if geoms.is_empty() {
+        return vec![target("body", body, "mass", 0)];
+    }
+    let geoms = geoms.iter();
+    geoms.map(|g| target("geom", g, "mass", 0)).collect()
+}
+
 /// Bodies with mass that can move.
-fn moving(plant: &Plant) -> impl Iterator<Item = usize> {
+pub(super) fn moving(plant: &Plant) -> impl Iterator<Item = usize> {
     (1..plant.bodies.len()).filter(|&b| plant.moves(b) && plant.bodies[b].mass > 0.0)
 }
 
 impl Effect for MassProperty {
     fn mistaken_for(&self) -> &'static [Confusion] {
         match self {
-            Self::Mass | Self::Payload => &[Confusion {
+            Self::Mass => &[Confusion {
                 with: &["actuator-gain"],
                 told_apart_by: "hang a known weight on it, or let it fall",
             }],
@@ -110,7 +108,6 @@ impl Effect for MassProperty {
         match self {
             Self::Mass => const { &[EffectParameter::new("factor", "1", [0.3, 3.0], 1.0)] },
             Self::Inertia => const { &[EffectParameter::new("factor", "1", [0.5, 3.0], 1.0)] },
-            Self::Payload => const { &[EffectParameter::new("mass", "kg", [0.0, 5.0], 0.0)] },
             Self::Center => {
                 const {
                     &[
@@ -132,7 +129,7 @@ impl Effect for MassProperty {
                     geoms => geoms,
                 })
                 .collect(),
-            Self::Center | Self::Inertia | Self::Payload => moving(plant).map(body).collect(),
+            Self::Center | Self::Inertia => moving(plant).map(body).collect(),
         }
     }
 
@@ -141,24 +138,11 @@ impl Effect for MassProperty {
             let geoms = plant.geoms.iter().zip(&plant.layout.geoms);
             geoms.into_iter().any(|(g, n)| n == name && g.has_mass)
         };
-        let weigh = |geoms: &[String]| {
-            let geoms = geoms.iter();
-            geoms.map(|g| target("geom", g, "mass", 0)).collect()
-        };
         match self {
             Self::Mass if is_geom(site) => vec![target("geom", site, "mass", 0)],
             Self::Mass => vec![target("body", site, "mass", 0)],
             Self::Center => (0..3).map(|i| target("body", site, "ipos", i)).collect(),
             Self::Inertia => (0..3).map(|i| target("body", site, "inertia", i)).collect(),
-            Self::Payload => {
-                let body = plant.layout.bodies.iter().position(|b| b == site);
-                let geoms = body.map_or_else(Vec::new, |b| geoms_of(plant, b));
-                if geoms.is_empty() {
-                    vec![target("body", site, "mass", 0)]
-                } else {
-                    weigh(&geoms)
-                }
-            }
         }
     }
 

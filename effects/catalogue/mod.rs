@@ -1,8 +1,8 @@
 //! The catalogue of effects, one file a family: what a real machine does and its model may lack.
 //!
-//! On the command: [`command`], [`delay`]. Between a drive and its joint: [`backlash`], [`compliance`].
-//! At a joint: [`joint_friction`], [`joint_force`], [`rotor`]. On bodies: [`mass`], [`body_force`],
-//! [`gravity`]. In contacts: [`contact_friction`], [`friction_field`], [`contact_softness`]. On
+//! On the command: [`command`], [`delay`], [`hysteresis`], [`supply`]. Of servos: [`servo`]. Between a drive and
+//! its joint: [`backlash`], [`compliance`]. At a joint: [`joint_friction`], [`joint_force`], [`rotor`]. On bodies:
+//! [`mass`], [`payload`], [`body_force`], [`gravity`]. In contacts: [`contact_friction`], [`friction_field`], [`contact_softness`]. On
 //! readings: [`sensor`], [`sensor_dynamics`].
 //!
 //! Where the engine has the same physics (damping and rotor inertia of a joint, friction
@@ -18,17 +18,22 @@ pub mod compliance;
 pub mod contact_friction;
 pub mod contact_softness;
 pub mod delay;
+mod drive;
 mod dry;
 pub mod friction_field;
 pub mod gravity;
+pub mod hysteresis;
 pub mod joint_force;
 pub mod joint_friction;
 pub mod mass;
 mod motor_side;
+pub mod payload;
 mod point;
 pub mod rotor;
 pub mod sensor;
 pub mod sensor_dynamics;
+pub mod servo;
+pub mod supply;
 
 use crate::Site;
 use asid_core::{Error, Result, Target};

@@ -27,6 +27,7 @@ use asid_core::{Result, Target};
 use asid_mjcf::Plant;
 use asid_mjcf::plant::{Drive, DriveLaw};
 
+use super::drive::gains;
 use super::target;
 
 /// Names of the joints that have one drive, whose motor side can be told from the joint.
@@ -54,14 +55,8 @@ pub fn targets(plant: &Plant, site: &str) -> Vec<Target> {
         target("joint", site, "armature", 0),
     ];
     let joint = plant.layout.joints.iter().position(|j| j.name == site);
-    if let Some((i, drive)) = joint.and_then(|j| plant.drives_of(j).next()) {
-        let name = &plant.layout.actuators[i].name;
-        let gains: &[&str] = match drive.law {
-            DriveLaw::Motor => &[],
-            DriveLaw::Position { .. } => &["kp", "kv"],
-            DriveLaw::Velocity { .. } => &["kv"],
-        };
-        targets.extend(gains.iter().map(|gain| target("actuator", name, gain, 0)));
+    if let Some((i, _)) = joint.and_then(|j| plant.drives_of(j).next()) {
+        targets.extend(gains(plant, i));
     }
     targets
 }

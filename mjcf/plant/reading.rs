@@ -1,9 +1,9 @@
 //! Reads a plant from a scene's document.
 
 use mjcf_rs::Model as Document;
-use mjcf_rs::extras::ActuatorKind;
 
-use super::{Drive, DriveLaw, Plant, PlantBody, PlantGeom, PlantJoint, Reads};
+use super::drive::{Drive, law};
+use super::{Plant, PlantBody, PlantGeom, PlantJoint, Reads};
 use crate::document;
 use crate::mass::{GeomMass, MassProperties};
 use asid_core::error::Result;
@@ -126,26 +126,19 @@ fn drive(
     ) {
         return None;
     }
-    let law = match actuator.kind {
-        ActuatorKind::Motor => DriveLaw::Motor,
-        ActuatorKind::Position => DriveLaw::Position {
-            kp: actuator.kp.unwrap_or(1.0),
-            kv: actuator.kv.unwrap_or(0.0),
-        },
-        ActuatorKind::Velocity => DriveLaw::Velocity {
-            kv: actuator.kv.unwrap_or(1.0),
-        },
-        _ => return None,
-    };
+    let (law, gain) = law(actuator)?;
     let limited = actuator
         .force_limited
         .resolve(model.compiler.autolimits, actuator.force_range.is_some());
     Some(Drive {
         joint,
         law,
-        gear: actuator.gear[0],
+        gear: gain * actuator.gear[0],
         ctrl_range,
-        force_range: actuator.force_range.filter(|_| limited),
+        force_range: actuator.force_range.filter(|_| limited).map(|range| {
+            let [a, b] = range.map(|force| force / gain);
+            [a.min(b), a.max(b)]
+        }),
     })
 }
 

@@ -196,3 +196,61 @@ fn inertia_at_its_null_follows_the_mass_of_a_geom() {
         assert_eq!(alone, beside, "{}", backend.name());
     }
 }
+
+/// A payload of `m` at `r` of the centre of mass weighs as `p = m r` says, wherever the mass comes from: the
+/// torque about the hinge is that of the common centre.
+#[test]
+fn a_payload_has_mass_and_first_moments() {
+    let values = "mass=0.4,moment_x=0.05,moment_y=0.02,moment_z=-0.03";
+    // The mass from <inertial>, and from geoms: what the body weighs, where, its moment about its centre.
+    let plate = 0.3 / 3.0 * (0.05_f64.powi(2) + 0.08_f64.powi(2));
+    for (xml, drives, own) in [(CART, 1, 0.02), (PLATE, 0, plate)] {
+        for carried in [values, "mass=0.4", "moment_x=0.05"] {
+            let given = |name: &str| {
+                let part = carried.split(',').find_map(|p| p.strip_prefix(name));
+                part.map_or(0.0, |v| v[1..].parse::<f64>().unwrap())
+            };
+            let mass = 0.3 + given("mass");
+            let (x, z) = (given("moment_x") / mass, -0.1 + given("moment_z") / mass);
+            on_each(xml, &[&format!("payload@flap:{carried}")], |bench| {
+                let mut command = vec![0.0; drives];
+                command.push(0.2);
+                let about = own * mass / 0.3 + mass * (x * x + z * z);
+                let torque = 0.2 + mass * G * x;
+                let w = bench.hold(1, &command)[0][drives];
+                let expected = torque / about * DT;
+                near(&bench.engine, w, expected, 2e-3 * expected.abs());
+            });
+        }
+    }
+}
+
+/// The force of a payload is linear in its mass and first moments: half of all four is half of the torque.
+#[test]
+fn the_weight_of_a_payload_is_linear_in_its_parameters() {
+    let hold = |share: f64| {
+        let mut torques = Vec::new();
+        // A servo of 400 N m/rad shows the torque by how far it gives way.
+        let xml = PLATE.replace(
+            r#"<motor name="turn" joint="hinge"/>"#,
+            r#"<position name="turn" joint="hinge" kp="400" kv="40"/>"#,
+        );
+        let effect = format!(
+            "payload@flap:mass={},moment_x={},moment_z={}",
+            0.4 * share,
+            0.05 * share,
+            0.02 * share
+        );
+        on_each(&xml, &[&effect], |bench| {
+            let rate: f64 = bench.hold(1, &[0.0])[0][0];
+            let rows = bench.hold(3000, &[0.0]);
+            let angle: f64 = rows.iter().map(|r| r[0] * DT).sum::<f64>() + rate * DT;
+            torques.push(400.0 * angle);
+        });
+        torques
+    };
+    for (whole, half) in hold(1.0).into_iter().zip(hold(0.5)) {
+        near("payload", whole, G * 0.05, 1e-2 * G * 0.05);
+        near("payload", half, whole / 2.0, 1e-2 * G * 0.05);
+    }
+}

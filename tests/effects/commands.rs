@@ -114,3 +114,48 @@ fn a_servo_with_a_dead_band_stops_short_of_its_command() {
         near(&bench.engine, angle, 0.4, 1e-3);
     });
 }
+
+/// Torque that arrives after each of some commands, from the change of the speed.
+fn torques(bench: &mut Bench, commands: &[f64]) -> Vec<f64> {
+    let commands: Vec<_> = commands.iter().map(|&c| vec![c]).collect();
+    let mut before = 0.0;
+    let rows = bench.run(1, &commands).into_iter();
+    let torque = |row: Vec<f64>| {
+        let change = row[1] - before;
+        before = row[1];
+        change * INERTIA / DT
+    };
+    rows.map(torque).collect()
+}
+
+#[test]
+fn play_of_a_command_is_the_play_operator() {
+    on_each(ROTOR, &["actuator-hysteresis@drive:width=0.4"], |bench| {
+        // From the middle of the play up, down, and less far up again: an inner loop.
+        let sent = [0.5, 0.6, 0.8, 1.0, 0.9, 0.7, 0.3, 0.0, 0.3, 0.5];
+        let arrives = [0.5, 0.5, 0.6, 0.8, 0.8, 0.8, 0.5, 0.2, 0.2, 0.3];
+        for (found, expected) in torques(bench, &sent).into_iter().zip(arrives) {
+            near(&bench.engine, found, expected, 1e-3 + 0.1 * bench.rounding);
+        }
+    });
+}
+
+/// The area of its loop is what play loses, at any rate: a delay's grows with the rate.
+#[test]
+fn play_of_a_command_loses_the_same_at_any_rate() {
+    let (width, amplitude) = (0.4, 1.0);
+    for rows in [100_usize, 400] {
+        on_each(ROTOR, &["actuator-hysteresis@drive:width=0.4"], |bench| {
+            let sent: Vec<f64> = (0..3 * rows)
+                .map(|k| amplitude * (std::f64::consts::TAU * k as f64 / rows as f64).sin())
+                .collect();
+            let arrives = torques(bench, &sent);
+            let area: f64 = (2 * rows..3 * rows)
+                .map(|k| (arrives[k - 1] + arrives[k]) / 2.0 * (sent[k] - sent[k - 1]))
+                .sum();
+            // A parallelogram as wide as the play and as high as what arrives.
+            let expected = width * 2.0 * (amplitude - width / 2.0);
+            near(&bench.engine, area.abs(), expected, 0.01);
+        });
+    }
+}

@@ -170,7 +170,8 @@ fn the_catalogue_is_complete() {
         sensor-drift sensor-filter sensor-quantization sliding-friction torsional-friction \
         rolling-friction friction-patch friction-drift friction-anisotropy contact-restitution \
         contact-stiffness mass center-of-mass inertia payload gravity-tilt constant-force linear-drag \
-        quadratic-drag magnus";
+        quadratic-drag magnus servo-stiffness servo-damping actuator-hysteresis torque-speed-limit \
+        supply-drift";
     for name in wanted.split_whitespace() {
         assert!(names.contains(&name), "{name}");
     }

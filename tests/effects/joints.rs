@@ -72,6 +72,17 @@ fn coulomb_friction_stops_a_rotor_in_time_and_holds_it() {
     );
 }
 
+/// With an offset alone the force is the same in both directions and at rest: a constant one.
+#[test]
+fn an_offset_of_dry_friction_is_a_force_against_the_positive_direction() {
+    on_each(ROTOR, &["coulomb-friction@spin:offset=0.2"], |bench| {
+        for speed in [1.0, 0.0, -1.0] {
+            let end = bench.state(&[0.0], &[speed]).hold(500, &[0.0])[499][1];
+            near(&bench.engine, end, speed - 0.2 / INERTIA, 2e-3);
+        }
+    });
+}
+
 #[test]
 fn stribeck_friction_breaks_away_high_and_slides_low() {
     let effect = "stribeck-friction@spin:coulomb=0.2,breakaway=0.3,speed=0.05";
@@ -122,6 +133,65 @@ fn a_spring_swings_about_its_rest() {
                     0.2 * omega * DT,
                 );
             }
+        },
+    );
+}
+
+/// A swing in a cubic spring alone (Duffing): of the amplitude `A` its period is `4 K(1/√2) sqrt(I / c) / A`,
+/// `K(1/√2) = 1.8540746773` the complete elliptic integral.
+#[test]
+fn a_spring_that_stiffens_has_the_period_of_its_elliptic_integral() {
+    let (cubic, amplitude): (f64, f64) = (20.0, 0.5);
+    on_each(
+        ROTOR,
+        &["joint-stiffness@spin:rest=0.3,cubic=20"],
+        |bench| {
+            let rows = bench.state(&[0.3 + amplitude], &[0.0]).hold(2000, &[0.0]);
+            // The speed is zero after each half period: interpolated between steps.
+            let mut turns = Vec::new();
+            for (k, pair) in rows.windows(2).enumerate() {
+                let (a, b) = (pair[0][1], pair[1][1]);
+                if a * b < 0.0 {
+                    turns.push((k as f64 + a / (a - b)) * DT);
+                }
+            }
+            let found = 2.0 * (turns[2] - turns[0]) / 2.0;
+            let expected = 4.0 * 1.854_074_677_3 * (INERTIA / cubic).sqrt() / amplitude;
+            // The amplitude, and the period with it, varies by half a step's work.
+            near(&bench.engine, found, expected, 4e-3 * expected);
+            let energy = |row: &[f64]| {
+                0.5 * INERTIA * row[1].powi(2) + 0.25 * cubic * (row[0] - 0.3).powi(4)
+            };
+            let whole = 0.25 * cubic * amplitude.powi(4);
+            for row in &rows {
+                // Half a step's work; what rapier adds on its own grows by up to half a percent a second.
+                let slack = if bench.rounding > 1e-6 {
+                    0.02 * whole
+                } else {
+                    0.0
+                };
+                near(
+                    &bench.engine,
+                    energy(row),
+                    whole,
+                    2.5 * 0.8 * DT / 2.0 + slack,
+                );
+            }
+        },
+    );
+}
+
+/// The cubic term adds to the linear one.
+#[test]
+fn a_spring_with_both_terms_holds_a_known_load() {
+    let damped = ROTOR.replace(r#"name="spin" axis"#, r#"name="spin" damping="4" axis"#);
+    on_each(
+        &damped,
+        &["joint-stiffness@spin:stiffness=8,cubic=20"],
+        |bench| {
+            // 8 x 0.5 + 20 x 0.5³.
+            let angle = bench.hold(10_000, &[6.5])[9999][0];
+            near(&bench.engine, angle, 0.5, 1e-4);
         },
     );
 }

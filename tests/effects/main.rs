@@ -7,9 +7,12 @@ mod bodies;
 mod commands;
 mod contacts;
 mod contract;
+mod general;
 mod joints;
 mod motor_side;
 mod sensors;
+mod servos;
+mod supply;
 
 use asid::core::Scene;
 use asid::core::registry::{BackendEntry, all};

@@ -9,6 +9,7 @@ pub enum Field {
     GeomFriction,
     GeomPos,
     GeomSolref,
+    BodyPos,
     BodyMass,
     BodyIpos,
     BodyIquat,
@@ -18,9 +19,13 @@ pub enum Field {
     DofArmature,
     JntPos,
     JntStiffness,
+    JntAxis,
+    JntRange,
+    QposSpring,
     ActuatorGainprm,
     ActuatorBiasprm,
     ActuatorGear,
+    ActuatorForcerange,
     Gravity,
 }
 
@@ -32,6 +37,7 @@ impl Field {
             Self::GeomFriction => c"geom_friction",
             Self::GeomPos => c"geom_pos",
             Self::GeomSolref => c"geom_solref",
+            Self::BodyPos => c"body_pos",
             Self::BodyMass => c"body_mass",
             Self::BodyIpos => c"body_ipos",
             Self::BodyIquat => c"body_iquat",
@@ -41,9 +47,13 @@ impl Field {
             Self::DofArmature => c"dof_armature",
             Self::JntPos => c"jnt_pos",
             Self::JntStiffness => c"jnt_stiffness",
+            Self::JntAxis => c"jnt_axis",
+            Self::JntRange => c"jnt_range",
+            Self::QposSpring => c"qpos_spring",
             Self::ActuatorGainprm => c"actuator_gainprm",
             Self::ActuatorBiasprm => c"actuator_biasprm",
             Self::ActuatorGear => c"actuator_gear",
+            Self::ActuatorForcerange => c"actuator_forcerange",
             Self::Gravity => c"opt.gravity",
         }
     }

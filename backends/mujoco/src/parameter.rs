@@ -78,11 +78,37 @@ impl BodyPlan {
     }
 }
 
+/// A joint's axis, some of whose parts are columns.
+#[derive(Clone, Debug)]
+struct AxisPlan {
+    joint: usize,
+    nominal: [f64; 3],
+    /// Column and part.
+    parts: Vec<(usize, usize)>,
+}
+
+impl AxisPlan {
+    /// The axis for one simulation's values of all columns, of length 1; `None` where it has no direction.
+    fn axis(&self, values: &[f64]) -> Option<[f64; 3]> {
+        let mut axis = self.nominal;
+        for &(column, part) in &self.parts {
+            axis[part] = values[column];
+        }
+        // What the scene says stays what the engine compiled, to the bit.
+        if axis == self.nominal {
+            return Some(axis);
+        }
+        let length = axis.iter().map(|x| x * x).sum::<f64>().sqrt();
+        (length > 1e-9).then(|| axis.map(|x| x / length))
+    }
+}
+
 /// All parameters of a batch.
 #[derive(Clone, Debug)]
 pub struct Plan {
     columns: Vec<Column>,
     bodies: Vec<BodyPlan>,
+    axes: Vec<AxisPlan>,
 }
 
 impl Plan {
@@ -93,6 +119,7 @@ impl Plan {
     pub fn new(compiled: &Compiled, targets: &[Target]) -> Result<Self> {
         let mut columns = Vec::with_capacity(targets.len());
         let mut bodies: Vec<BodyPlan> = Vec::new();
+        let mut axes: Vec<AxisPlan> = Vec::new();
         for (i, target) in targets.iter().enumerate() {
             if targets[..i].contains(target) {
                 return Err(parameter(target, "is named twice"));
@@ -128,9 +155,23 @@ impl Plan {
                 plan.parts.push((i, part));
                 plan.geoms = plan.geoms.take().or_else(|| column.geoms.clone());
             }
+            if let Some((joint, part)) = column.axis {
+                match axes.iter_mut().find(|a| a.joint == joint) {
+                    Some(axis) => axis.parts.push((i, part)),
+                    None => axes.push(AxisPlan {
+                        joint,
+                        nominal: compiled.model.jnt_axis()[joint],
+                        parts: vec![(i, part)],
+                    }),
+                }
+            }
             columns.push(column);
         }
-        Ok(Self { columns, bodies })
+        Ok(Self {
+            columns,
+            bodies,
+            axes,
+        })
     }
 
     /// Number of columns.
@@ -145,11 +186,11 @@ impl Plan {
         &self.columns
     }
 
-    /// True where a body's centre or axes may move, so that no shortcut for
+    /// True where a body's centre or axes may move, or a joint's axis turn, so that no shortcut for
     /// bodies of diagonal inertia holds.
     #[must_use]
     pub fn moves_mass(&self) -> bool {
-        !self.bodies.is_empty()
+        !(self.bodies.is_empty() && self.axes.is_empty())
     }
 
     /// True where constants of the model follow from a column.
@@ -181,6 +222,9 @@ impl Plan {
                 Field::BodyInertia,
             ]);
         }
+        if !self.axes.is_empty() {
+            wanted.push(Field::JntAxis);
+        }
         wanted.sort_unstable();
         wanted.dedup();
         let mut handles = Vec::with_capacity(wanted.len());
@@ -208,6 +252,15 @@ impl Plan {
                 ));
             }
         }
+        for plan in &self.axes {
+            if plan.axis(values).is_none() {
+                let (column, _) = plan.parts[0];
+                return Err(parameter(
+                    &self.columns[column].target,
+                    "the axis would have no direction",
+                ));
+            }
+        }
         Ok(())
     }
 
@@ -231,6 +284,12 @@ impl Plan {
                 if let Some(handle) = fields.get(field) {
                     batch.field(handle, sim)[entry] = factor * values[i];
                 }
+            }
+        }
+        for plan in &self.axes {
+            if let (Some(handle), Some(axis)) = (fields.get(Field::JntAxis), plan.axis(values)) {
+                let at = 3 * plan.joint;
+                batch.field(handle, sim)[at..at + 3].copy_from_slice(&axis);
             }
         }
         for plan in &self.bodies {

@@ -61,6 +61,8 @@ pub struct Column {
     pub part: Option<(usize, Part)>,
     /// The geoms of that body, where they make its mass properties.
     pub geoms: Option<BodyGeoms>,
+    /// Joint whose axis it is a part of, and which.
+    pub axis: Option<(usize, usize)>,
     /// Whether constants of the model follow from it.
     pub derives: bool,
 }
@@ -160,6 +162,7 @@ impl Resolver<'_> {
             entries,
             part: None,
             geoms: None,
+            axis: None,
             derives: false,
         }
     }
@@ -268,7 +271,13 @@ impl Resolver<'_> {
     fn body(&self) -> Result<Column> {
         let body = self.compiled.layout.body(&self.target.name)?;
         if body == 0 {
-            return Err(parameter(self.target, "the world has no mass properties"));
+            return Err(parameter(
+                self.target,
+                "the world has neither place nor mass properties",
+            ));
+        }
+        if self.target.attribute == "pos" {
+            return self.body_position(body);
         }
         let now = BodyInertia::of(self.model(), body);
         let (nominal, domain, part) = match self.target.attribute.as_str() {
@@ -284,7 +293,7 @@ impl Resolver<'_> {
                 let i = self.index(3)?;
                 (now.inertia[i], Domain::Positive, Part::Moment(i))
             }
-            _ => return Err(self.no_attribute("mass, ipos, inertia")),
+            _ => return Err(self.no_attribute("pos, mass, ipos, inertia")),
         };
         let mut column = self.column(nominal, domain, Vec::new());
         column.part = Some((body, part));
@@ -292,10 +301,34 @@ impl Resolver<'_> {
         Ok(column)
     }
 
+    /// The place of a body in its parent.
+    fn body_position(&self, body: usize) -> Result<Column> {
+        let i = self.index(3)?;
+        let name = &self.compiled.layout.bodies[body];
+        let joints = &self.compiled.layout.joints;
+        if joints
+            .iter()
+            .any(|j| j.body == *name && j.kind == JointKind::Free)
+        {
+            return Err(parameter(
+                self.target,
+                "the place of a free body is its state, and no parameter",
+            ));
+        }
+        let entry = (Field::BodyPos, 3 * body + i, 1.0);
+        let mut column = self.column(self.model().body_pos()[body][i], Domain::Any, vec![entry]);
+        column.derives = true;
+        Ok(column)
+    }
+
     fn joint(&self) -> Result<Column> {
         let joint = self.compiled.layout.joint(&self.target.name)?;
-        if self.target.attribute == "pos" {
-            return self.anchor(joint);
+        match self.target.attribute.as_str() {
+            "pos" => return self.anchor(joint),
+            "axis" => return self.axis(joint),
+            "range" => return self.range(joint),
+            "springref" => return self.spring_reference(joint),
+            _ => {}
         }
         self.index(1)?;
         let dofs = joint.qvel..joint.qvel + joint.kind.qvel_len();
@@ -313,7 +346,11 @@ impl Resolver<'_> {
                     vec![entry],
                 ));
             }
-            _ => return Err(self.no_attribute("pos, damping, frictionloss, stiffness, armature")),
+            _ => {
+                return Err(self.no_attribute(
+                    "pos, axis, range, damping, frictionloss, stiffness, springref, armature",
+                ));
+            }
         };
         let entries = dofs.map(|dof| (field, dof, 1.0)).collect();
         let mut column = self.column(nominal, Domain::NonNegative, entries);
@@ -345,6 +382,65 @@ impl Resolver<'_> {
         Ok(column)
     }
 
+    /// Only a hinge or a slide has some attributes.
+    fn scalar(&self, joint: &Joint) -> Result<usize> {
+        if matches!(joint.kind, JointKind::Hinge | JointKind::Slide) {
+            return Ok(self.joint_id(joint));
+        }
+        Err(parameter(
+            self.target,
+            &format!(
+                "only the `{}` of a hinge or slide can be changed",
+                self.target.attribute
+            ),
+        ))
+    }
+
+    /// A part of an axis, which is scaled to one when all parts are known.
+    fn axis(&self, joint: &Joint) -> Result<Column> {
+        let (id, i) = (self.scalar(joint)?, self.index(3)?);
+        let mut column = self.column(self.model().jnt_axis()[id][i], Domain::Any, Vec::new());
+        column.axis = Some((id, i));
+        column.derives = true;
+        Ok(column)
+    }
+
+    /// An end of a joint's range.
+    fn range(&self, joint: &Joint) -> Result<Column> {
+        let (id, i) = (self.scalar(joint)?, self.index(2)?);
+        if !self.model().jnt_limited()[id] {
+            return Err(parameter(
+                self.target,
+                "it would have no effect: the joint is not limited",
+            ));
+        }
+        let entry = (Field::JntRange, 2 * id + i, 1.0);
+        Ok(self.column(self.model().jnt_range()[id][i], Domain::Any, vec![entry]))
+    }
+
+    /// Where a joint's spring rests.
+    fn spring_reference(&self, joint: &Joint) -> Result<Column> {
+        self.scalar(joint)?;
+        self.index(1)?;
+        let nominal = self.model().qpos_spring()[joint.qpos];
+        let entry = (Field::QposSpring, joint.qpos, 1.0);
+        Ok(self.column(nominal, Domain::Any, vec![entry]))
+    }
+
+    /// An end of the range of an actuator's force.
+    fn force_range(&self, actuator: usize) -> Result<Column> {
+        let i = self.index(2)?;
+        if !self.model().actuator_forcelimited()[actuator] {
+            return Err(parameter(
+                self.target,
+                "it would have no effect: the actuator's force is not limited",
+            ));
+        }
+        let entry = (Field::ActuatorForcerange, 2 * actuator + i, 1.0);
+        let nominal = self.model().actuator_forcerange()[actuator][i];
+        Ok(self.column(nominal, Domain::Any, vec![entry]))
+    }
+
     fn actuator(&self) -> Result<Column> {
         let actuator = self.compiled.layout.actuator(&self.target.name)?;
         let model = self.model();
@@ -367,6 +463,7 @@ impl Resolver<'_> {
                 column.derives = true;
                 Ok(column)
             }
+            "forcerange" => self.force_range(actuator),
             "kp" if position => {
                 self.index(1)?;
                 let entries = vec![
@@ -387,7 +484,7 @@ impl Resolver<'_> {
                 self.target,
                 &format!("the actuator is no servo with a gain `{attribute}` above 0"),
             )),
-            _ => Err(self.no_attribute("kp, kv, gear")),
+            _ => Err(self.no_attribute("kp, kv, gear, forcerange")),
         }
     }
 

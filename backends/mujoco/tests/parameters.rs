@@ -247,6 +247,10 @@ fn bad_targets_say_what_is_wrong() {
     for (target, part) in [
         ("geom/bal/mass", "did you mean `ball`"),
         ("geom/ball/colour", "friction, pos, mass, solref"),
+        ("body/ball/pos/0", "its state"),
+        ("joint/ball/axis/0", "hinge or slide"),
+        ("joint/elbow/range/0", "not limited"),
+        ("actuator/elbow/forcerange/0", "not limited"),
         ("geom/ball/friction/3", "3 entries"),
         ("geom/floor/mass", "the world has no mass"),
         ("body/world/mass", "the world"),

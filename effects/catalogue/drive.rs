@@ -1,0 +1,116 @@
+//! A drive at work: its law with the gains that the simulation has, and how its force is held at a value.
+
+use std::cell::Cell;
+
+use crate::Site;
+use asid_core::simulator::StepView;
+use asid_core::{Result, Target};
+use asid_mjcf::Plant;
+use asid_mjcf::plant::{Drive, DriveLaw};
+
+use super::target;
+
+/// The gains of a drive as targets: `kp` and `kv` of a position servo, `kv` of a velocity servo.
+pub fn gains(plant: &Plant, actuator: usize) -> Vec<Target> {
+    let name = &plant.layout.actuators[actuator].name;
+    let gains: &[&str] = match plant.drives[actuator].map(|d| d.law) {
+        Some(DriveLaw::Position { .. }) => &["kp", "kv"],
+        Some(DriveLaw::Velocity { .. }) => &["kv"],
+        Some(DriveLaw::Motor) | None => &[],
+    };
+    let targets = gains.iter();
+    targets
+        .map(|gain| target("actuator", name, gain, 0))
+        .collect()
+}
+
+/// A law with other gains, in the order of [`gains`].
+pub fn with_gains(law: DriveLaw, gains: impl IntoIterator<Item = f64>) -> DriveLaw {
+    let mut gains = gains.into_iter();
+    let mut next = |old: f64| gains.next().unwrap_or(old);
+    match law {
+        DriveLaw::Motor => DriveLaw::Motor,
+        DriveLaw::Position { kp, kv } => {
+            let kp = next(kp);
+            DriveLaw::Position { kp, kv: next(kv) }
+        }
+        DriveLaw::Velocity { kv } => DriveLaw::Velocity { kv: next(kv) },
+    }
+}
+
+/// A drive in one simulation.
+pub struct DriveAt {
+    /// Index of its actuator.
+    pub actuator: usize,
+    /// Places of its joint in `qpos` and `qvel`.
+    pub qpos: usize,
+    /// The same in `qvel`.
+    pub dof: usize,
+    /// Columns of its gains.
+    columns: Vec<usize>,
+    drive: Cell<Drive>,
+}
+
+impl DriveAt {
+    /// The drive of an actuator, the columns of whose [`gains`] are the next of `columns`.
+    pub fn new(
+        plant: &Plant,
+        actuator: usize,
+        drive: Drive,
+        columns: &mut impl Iterator<Item = usize>,
+    ) -> Self {
+        let joint = &plant.layout.joints[drive.joint];
+        let count = gains(plant, actuator).len();
+        Self {
+            actuator,
+            qpos: joint.qpos,
+            dof: joint.qvel,
+            columns: columns.take(count).collect(),
+            drive: Cell::new(drive),
+        }
+    }
+
+    /// The drive of a site that is an actuator, its gains behind the first `skip` targets of the effect.
+    pub fn of_site(site: &Site<'_>, skip: usize) -> Result<Self> {
+        let (actuator, drive) = site.plant.drive(site.name)?;
+        let mut columns = site.columns[skip..].iter().copied();
+        Ok(Self::new(site.plant, actuator, drive, &mut columns))
+    }
+
+    /// Takes over the gains of the simulation; the document's stay where an effect of the transmission has
+    /// taken the drive from the joint already.
+    pub fn set(&self, columns: &[f64]) {
+        let gains = self.columns.iter().map(|&c| columns[c]);
+        if gains.clone().any(|gain| gain != 0.0) {
+            let mut drive = self.drive.get();
+            drive.law = with_gains(drive.law, gains);
+            self.drive.set(drive);
+        }
+    }
+
+    /// Force on the joint that the command asks for, N or N m, within the drive's own limits.
+    pub fn force(&self, view: &StepView<'_>) -> f64 {
+        let (q, v) = (view.qpos[self.qpos], view.qvel[self.dof]);
+        self.drive.get().force(view.ctrl[self.actuator], q, v)
+    }
+
+    /// Holds the force on the joint (N or N m), less than the drive asks for, for the coming step: the command
+    /// becomes the one that makes it now, and what a servo's damping takes over the step, which engines
+    /// integrate implicitly, is given back by the joint's damping, a column. (An engine that integrates `kp`
+    /// implicitly too, as rapier does, falls short of the force by `kp v dt`.)
+    pub fn hold(&self, view: &mut StepView<'_>, force: f64, damping: usize) {
+        let drive = self.drive.get();
+        let (q, v) = (view.qpos[self.qpos], view.qvel[self.dof]);
+        let Some(command) = drive.command_for(force, q, v) else {
+            return;
+        };
+        view.ctrl[self.actuator] = command;
+        let kv = match drive.law {
+            DriveLaw::Motor => return,
+            DriveLaw::Position { kv, .. } | DriveLaw::Velocity { kv } => kv,
+        };
+        let taken = drive.gear * drive.gear * kv;
+        view.force[self.dof] -= taken * v;
+        view.parameters[damping] -= taken;
+    }
+}

@@ -1,0 +1,89 @@
+//! Play on the command's side: a lever or an encoder that a command has to take along.
+
+use crate::{Acting, Acts, Confusion, Effect, EffectParameter, Reference, Site, Start};
+use asid_core::Result;
+use asid_core::simulator::StepView;
+use asid_mjcf::Plant;
+
+use super::{actuators, at_least, values};
+
+crate::register!(EffectEntry {
+    name: "actuator-hysteresis",
+    about: "the command is followed with play",
+    make: || Box::new(Hysteresis),
+});
+
+/// What arrives stays as it was while the command is within `width / 2` of it, and is taken along beyond: the
+/// play operator (M. Krasnosel'skii, A. Pokrovskii, "Systems with Hysteresis", 1989), and Simulink's Backlash
+/// block. Before the first step the command was the same as in it, and in the middle of the play. The command
+/// is clamped to its range before. Play between a drive and its load is another thing: `backlash`.
+struct Hysteresis;
+
+struct HysteresisAt {
+    actuator: usize,
+    range: [f64; 2],
+    half: f64,
+    /// What arrived last.
+    level: Option<f64>,
+}
+
+impl Acting for HysteresisAt {
+    fn before_step(&mut self, view: &mut StepView<'_>) {
+        let command = &mut view.ctrl[self.actuator];
+        let u = command.clamp(self.range[0], self.range[1]);
+        let level = self.level.unwrap_or(u);
+        *command = level.clamp(u - self.half, u + self.half);
+        self.level = Some(*command);
+    }
+
+    fn restart(&mut self) {
+        self.level = None;
+    }
+
+    fn save(&self, memory: &mut Vec<f64>) {
+        memory.extend(self.level);
+    }
+
+    fn load(&mut self, memory: &[f64]) {
+        self.level = memory.first().copied();
+    }
+}
+
+impl Effect for Hysteresis {
+    fn mistaken_for(&self) -> &'static [Confusion] {
+        &[Confusion {
+            with: &["backlash", "actuator-deadband", "actuator-delay"],
+            told_apart_by: "reverse slowly and fast, under a load: this play loses the same width each time, whatever pushes",
+        }]
+    }
+
+    fn acts(&self) -> Acts {
+        Acts::Command
+    }
+
+    fn parameters(&self) -> &'static [EffectParameter] {
+        const {
+            &[
+                EffectParameter::new("width", "unit of the command", [0.0, 10.0], 0.0)
+                    .starting(Start::Multiples(Reference::Command, &[0.03, 0.1, 0.3])),
+            ]
+        }
+    }
+
+    fn sites(&self, plant: &Plant) -> Vec<String> {
+        actuators(plant)
+    }
+
+    fn attach(&self, site: &Site<'_>) -> Result<Box<dyn Acting>> {
+        let [width] = values(site)?;
+        let layout = &site.plant.layout;
+        let actuator = layout.actuator(site.name)?;
+        let range = layout.actuators[actuator].ctrl_range;
+        Ok(Box::new(HysteresisAt {
+            actuator,
+            range: range.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]),
+            half: at_least(site, "width", width, 0.0)? / 2.0,
+            level: None,
+        }))
+    }
+}

@@ -1,0 +1,160 @@
+//! What a drive loses to speed and to its supply.
+
+use crate::{Acting, Acts, Confusion, Effect, EffectParameter, Reference, Site, Start};
+use asid_core::simulator::StepView;
+use asid_core::{Capabilities, Result, Target};
+use asid_mjcf::Plant;
+
+use super::command::{UNLIMITED, limit_targets};
+use super::drive::DriveAt;
+use super::{actuators, at_least, drives, values};
+
+crate::register!(EffectEntry {
+    name: "torque-speed-limit",
+    about: "the largest force of a drive falls with its speed",
+    make: || Box::new(SpeedLimit),
+});
+
+crate::register!(EffectEntry {
+    name: "supply-drift",
+    about: "the gain of a drive changes over time",
+    make: || Box::new(SupplyDrift),
+});
+
+/// Speed (rad/s or m/s) up to which no fall of the force is looked for.
+const FAST: f64 = 1000.0;
+
+/// The force on the joint, gear included, is held within `±force (1 - |v| / speed)`: `force` at rest, nothing
+/// at `speed`, where a motor's own voltage has reached its supply's (A. Hughes, B. Drury, "Electric Motors
+/// and Drives", ch. 3). As for a saturation, what the drive asks for at the start of a step decides
+/// ([`DriveAt::hold`]); where it drives, the fall is damping, which engines integrate implicitly.
+struct SpeedLimit;
+
+struct SpeedLimitAt {
+    drive: DriveAt,
+    damping: usize,
+    force: f64,
+    speed: f64,
+}
+
+impl Acting for SpeedLimitAt {
+    fn set(&self, columns: &mut [f64]) {
+        self.drive.set(columns);
+    }
+
+    fn before_step(&mut self, view: &mut StepView<'_>) {
+        let v = view.qvel[self.drive.dof];
+        let most = self.force * (1.0 - v.abs() / self.speed).max(0.0);
+        let asked = self.drive.force(view);
+        if asked.abs() <= most {
+            return;
+        }
+        self.drive.hold(view, most.copysign(asked), self.damping);
+        if asked * v > 0.0 && most > 0.0 {
+            let fall = self.force / self.speed;
+            view.force[self.drive.dof] += fall * v;
+            view.parameters[self.damping] += fall;
+        }
+    }
+}
+
+impl Effect for SpeedLimit {
+    fn refines(&self) -> &'static [&'static str] {
+        &["actuator-saturation"]
+    }
+
+    fn mistaken_for(&self) -> &'static [Confusion] {
+        &[Confusion {
+            with: &["viscous-friction", "actuator-gain"],
+            told_apart_by: "coast down with the drive off; move as fast with a smaller force",
+        }]
+    }
+
+    fn acts(&self) -> Acts {
+        Acts::Command
+    }
+
+    fn parameters(&self) -> &'static [EffectParameter] {
+        const {
+            &[
+                EffectParameter::new("force", "N or N m", [0.0, UNLIMITED], UNLIMITED)
+                    .starting(Start::Multiples(Reference::Force, &[1.0, 0.7])),
+                EffectParameter::new("speed", "rad/s or m/s", [0.01, FAST], FAST)
+                    .starting(Start::Multiples(Reference::Speed, &[1.0, 2.0])),
+            ]
+        }
+    }
+
+    fn sites(&self, plant: &Plant) -> Vec<String> {
+        drives(plant)
+    }
+
+    fn targets(&self, plant: &Plant, site: &str) -> Vec<Target> {
+        limit_targets(plant, site)
+    }
+
+    fn needs(&self) -> Capabilities {
+        Capabilities::JOINT_IMPEDANCE | Capabilities::LIVE_PARAMETERS
+    }
+
+    fn attach(&self, site: &Site<'_>) -> Result<Box<dyn Acting>> {
+        let [force, speed] = values(site)?;
+        Ok(Box::new(SpeedLimitAt {
+            drive: DriveAt::of_site(site, 1)?,
+            damping: site.columns[0],
+            force: at_least(site, "force", force, 0.0)?,
+            speed: at_least(site, "speed", speed, 1e-9)?,
+        }))
+    }
+}
+
+/// `(1 + rate t) u`, after the command's range and never below zero times; `t` restarts with each episode.
+/// A battery that empties has a negative rate, a drive that warms up one of either sign.
+struct SupplyDrift;
+
+struct SupplyDriftAt {
+    actuator: usize,
+    range: [f64; 2],
+    rate: f64,
+}
+
+impl Acting for SupplyDriftAt {
+    fn before_step(&mut self, view: &mut StepView<'_>) {
+        let gain = (1.0 + self.rate * view.time).max(0.0);
+        let command = &mut view.ctrl[self.actuator];
+        *command = gain * command.clamp(self.range[0], self.range[1]);
+    }
+}
+
+impl Effect for SupplyDrift {
+    fn mistaken_for(&self) -> &'static [Confusion] {
+        &[Confusion {
+            with: &["actuator-gain", "friction-drift", "sensor-drift"],
+            told_apart_by: "repeat a motion after a rest, and with a fresh supply",
+        }]
+    }
+
+    fn acts(&self) -> Acts {
+        Acts::Command
+    }
+
+    fn parameters(&self) -> &'static [EffectParameter] {
+        const { &[EffectParameter::new("rate", "1/s", [-1.0, 1.0], 0.0)] }
+    }
+
+    fn sites(&self, plant: &Plant) -> Vec<String> {
+        actuators(plant)
+    }
+
+    fn attach(&self, site: &Site<'_>) -> Result<Box<dyn Acting>> {
+        let [rate] = values(site)?;
+        let layout = &site.plant.layout;
+        let actuator = layout.actuator(site.name)?;
+        let range = layout.actuators[actuator].ctrl_range;
+        Ok(Box::new(SupplyDriftAt {
+            actuator,
+            range: range.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]),
+            rate,
+        }))
+    }
+}

@@ -1,0 +1,192 @@
+//! Drives: actuators that turn a command into the force on a hinge or slide by a law that can be written down.
+
+use mjcf_rs::extras::{Actuator, ActuatorKind};
+
+/// How an actuator turns its command into a force.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum DriveLaw {
+    /// The command is the force.
+    Motor,
+    /// A position servo: `kp (command - position) - kv speed`.
+    Position {
+        /// Position gain, N/m or N m/rad.
+        kp: f64,
+        /// Damping, N s/m or N m s/rad.
+        kv: f64,
+    },
+    /// A velocity servo: `kv (command - speed)`.
+    Velocity {
+        /// Gain, N s/m or N m s/rad.
+        kv: f64,
+    },
+}
+
+/// An actuator on a hinge or slide.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Drive {
+    /// Index in [`Layout::joints`](asid_core::layout::Layout::joints).
+    pub joint: usize,
+    /// Its law, before the gear.
+    pub law: DriveLaw,
+    /// Ratio of the joint's force to the actuator's; a motor's gain is in it.
+    pub gear: f64,
+    /// Limits of the command.
+    pub ctrl_range: Option<[f64; 2]>,
+    /// Limits of the force, before the gear.
+    pub force_range: Option<[f64; 2]>,
+}
+
+impl Drive {
+    /// Force on the joint (N or N m) for a command, at a position and speed of the joint.
+    #[must_use]
+    pub fn force(&self, command: f64, position: f64, speed: f64) -> f64 {
+        let clamp = |x: f64, range: Option<[f64; 2]>| range.map_or(x, |[a, b]| x.clamp(a, b));
+        let command = clamp(command, self.ctrl_range);
+        let (q, v) = (self.gear * position, self.gear * speed);
+        let force = match self.law {
+            DriveLaw::Motor => command,
+            DriveLaw::Position { kp, kv } => kp * (command - q) - kv * v,
+            DriveLaw::Velocity { kv } => kv * (command - v),
+        };
+        self.gear * clamp(force, self.force_range)
+    }
+
+    /// The command that makes the drive ask for a force on the joint (N or N m), before
+    /// any limit; `None` where no command can.
+    #[must_use]
+    pub fn command_for(&self, force: f64, position: f64, speed: f64) -> Option<f64> {
+        let (q, v) = (self.gear * position, self.gear * speed);
+        let force = force / self.gear;
+        let command = match self.law {
+            DriveLaw::Motor => force,
+            DriveLaw::Position { kp, kv } => q + (force + kv * v) / kp,
+            DriveLaw::Velocity { kv } => v + force / kv,
+        };
+        command.is_finite().then_some(command)
+    }
+
+    /// Whether its command is a position, which it pursues.
+    #[must_use]
+    pub fn is_position_servo(&self) -> bool {
+        matches!(self.law, DriveLaw::Position { .. })
+    }
+}
+
+/// The law of an actuator, and the factor that its gain is to the gear; `None` for one that is no plain
+/// drive.
+///
+/// MuJoCo has one actuator, of which `<motor>`, `<position>` and `<velocity>` are short forms: its force is
+/// `gain u + b0 + b1 q + b2 v`. A `<general>` one without a state is
+///
+/// - a motor where the bias is none,
+/// - a position servo where `b1 = -gain` and `b0 = 0`, with `kp = gain` and `kv = -b2`,
+/// - a velocity servo where `b2 = -gain` and `b0 = b1 = 0`, with `kv = gain`,
+///
+/// and no plain drive otherwise, as a servo without gain is none. What a short form leaves out, a default class for `<general>` may have set.
+pub(super) fn law(actuator: &Actuator) -> Option<(DriveLaw, f64)> {
+    let gain = actuator.gainprm.first().copied().unwrap_or(1.0);
+    let bias: [f64; 3] = std::array::from_fn(|i| actuator.biasprm.get(i).copied().unwrap_or(0.0));
+    // Above zero it is a damping ratio: the engine works out the gain, and effects take it from there.
+    let damping = (-bias[2]).max(0.0);
+    let is = |kind: &Option<String>, name: &str, default: bool| {
+        kind.as_deref().map_or(default, |k| k == name)
+    };
+    let servo = |kp: f64, kv: f64| (kp > 0.0).then_some((DriveLaw::Position { kp, kv }, 1.0));
+    let speed = |kv: f64| (kv > 0.0).then_some((DriveLaw::Velocity { kv }, 1.0));
+    match actuator.kind {
+        ActuatorKind::Motor => Some((DriveLaw::Motor, 1.0)),
+        ActuatorKind::Position => {
+            servo(actuator.kp.unwrap_or(gain), actuator.kv.unwrap_or(damping))
+        }
+        ActuatorKind::Velocity => speed(actuator.kv.unwrap_or(gain)),
+        ActuatorKind::General => {
+            let plain = is(&actuator.gain_type, "fixed", true)
+                && is(&actuator.dyn_type, "none", true)
+                && gain != 0.0;
+            let affine = is(&actuator.bias_type, "affine", false);
+            if !plain || !(affine || is(&actuator.bias_type, "none", true)) {
+                return None;
+            }
+            match bias {
+                _ if !affine => Some((DriveLaw::Motor, gain)),
+                [0.0, 0.0, 0.0] => Some((DriveLaw::Motor, gain)),
+                [0.0, stiffness, _] if stiffness == -gain => servo(gain, damping),
+                [0.0, 0.0, slope] if slope == -gain => speed(gain),
+                _ => None,
+            }
+        }
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Plant;
+    use asid_core::scene::Scene;
+
+    /// The drive of one actuator on a hinge.
+    fn drive(defaults: &str, actuator: &str) -> Option<Drive> {
+        let xml = format!(
+            r#"<mujoco><default>{defaults}</default><worldbody><body><joint name="j"/><geom size="0.1"/></body></worldbody>
+            <actuator>{actuator}</actuator></mujoco>"#
+        );
+        let scene = Scene::from_xml("drive", &xml, &[]).unwrap();
+        Plant::of(&scene).unwrap().drives[0]
+    }
+
+    #[test]
+    fn general_actuators_are_known_by_their_gains() {
+        let position = |kp, kv| Some(DriveLaw::Position { kp, kv });
+        for (prm, law) in [
+            (
+                r#"gainprm="40" biastype="affine" biasprm="0 -40 -3""#,
+                position(40.0, 3.0),
+            ),
+            (
+                r#"gainprm="40" biastype="affine" biasprm="0 -40""#,
+                position(40.0, 0.0),
+            ),
+            (
+                r#"gainprm="7" biastype="affine" biasprm="0 0 -7""#,
+                Some(DriveLaw::Velocity { kv: 7.0 }),
+            ),
+            (r#"gainprm="7""#, Some(DriveLaw::Motor)),
+            // Without `biastype` the bias does not count.
+            (r#"gainprm="7" biasprm="0 -7 -1""#, Some(DriveLaw::Motor)),
+            (r#"gainprm="40" biastype="affine" biasprm="0 -30 -3""#, None),
+            (r#"gainprm="40" biastype="affine" biasprm="1 -40 -3""#, None),
+            (r#"gainprm="40" gaintype="affine""#, None),
+            (r#"gainprm="40" dyntype="integrator""#, None),
+            (r#"gainprm="0""#, None),
+        ] {
+            let found = drive("", &format!(r#"<general joint="j" {prm}/>"#));
+            assert_eq!(found.map(|d| d.law), law, "{prm}");
+        }
+    }
+
+    #[test]
+    fn classes_give_gains_to_general_actuators_and_to_short_forms() {
+        let class =
+            r#"<general biastype="affine" gainprm="50" biasprm="0 -50 -4" forcerange="-9 9"/>"#;
+        for actuator in [r#"<general joint="j"/>"#, r#"<position joint="j"/>"#] {
+            let found = drive(class, actuator).unwrap();
+            assert_eq!(found.law, DriveLaw::Position { kp: 50.0, kv: 4.0 });
+            assert_eq!(found.force_range, Some([-9.0, 9.0]));
+        }
+    }
+
+    /// The command of a motor with a gain is force before the gain; its limits hold after it.
+    #[test]
+    fn the_gain_of_a_motor_counts_as_gear() {
+        let motor = drive(
+            "",
+            r#"<general joint="j" gainprm="-5" gear="2" forcerange="-10 20"/>"#,
+        );
+        let motor = motor.unwrap();
+        assert_eq!(motor.force(1.0, 0.0, 0.0), -10.0);
+        assert_eq!(motor.force(100.0, 0.0, 0.0), -20.0);
+        assert_eq!(motor.force(-100.0, 0.0, 0.0), 40.0);
+        assert_eq!(motor.command_for(-10.0, 0.0, 0.0), Some(1.0));
+    }
+}

@@ -1,0 +1,153 @@
+//! `<general>` actuators are what their gains make them: effects find them and act as on the short forms.
+
+use super::ROTOR;
+use super::bench::{Bench, engines_for, near};
+use asid::core::registry::{BackendEntry, all};
+use asid::core::{Model as _, Target};
+use asid::effects::EffectEntry;
+use asid::effects::refined::Refined;
+use asid::mjcf::Plant;
+
+fn machine(actuator: &str) -> String {
+    ROTOR
+        .replace(r#"<motor name="drive" joint="spin" gear="1"/>"#, actuator)
+        .replace(
+            r#"gravity="0 0 0""#,
+            r#"gravity="0 0 0" integrator="implicitfast""#,
+        )
+        .replace(r#"name="spin" axis"#, r#"name="spin" armature="0.05" axis"#)
+}
+
+/// Short forms beside the same written out.
+const PAIRS: [[&str; 2]; 3] = [
+    [
+        r#"<position name="drive" joint="spin" kp="30" kv="4" forcerange="-2 2" gear="1.5"/>"#,
+        r#"<general name="drive" joint="spin" gainprm="30" biastype="affine" biasprm="0 -30 -4" forcerange="-2 2" gear="1.5"/>"#,
+    ],
+    [
+        r#"<velocity name="drive" joint="spin" kv="4"/>"#,
+        r#"<general name="drive" joint="spin" gainprm="4" biastype="affine" biasprm="0 0 -4"/>"#,
+    ],
+    [
+        r#"<motor name="drive" joint="spin" gear="3" ctrlrange="-1 1"/>"#,
+        r#"<general name="drive" joint="spin" gainprm="6" gear="0.5" ctrlrange="-1 1"/>"#,
+    ],
+];
+
+/// Engines that take `<general>` actuators.
+fn engines_for_general(effect: &str) -> Vec<Box<dyn asid::core::Backend>> {
+    let scene = super::bench::scene(&machine(PAIRS[0][1]));
+    let engines = engines_for(effect).into_iter();
+    engines.filter(|b| b.load(&scene).is_ok()).collect()
+}
+
+#[test]
+fn general_actuators_have_the_sites_of_their_short_forms() {
+    for forms in PAIRS {
+        let [short, general] = forms.map(|a| Plant::of(&super::bench::scene(&machine(a))).unwrap());
+        assert_eq!(short.drives, general.drives);
+        for entry in all::<EffectEntry>() {
+            let effect = (entry.make)();
+            assert_eq!(
+                effect.sites(&short),
+                effect.sites(&general),
+                "{}",
+                entry.name
+            );
+        }
+    }
+}
+
+#[test]
+fn effects_act_on_general_actuators_as_on_their_short_forms() {
+    for (i, effect) in [
+        (0, "servo-stiffness@drive:factor=0.1"),
+        (0, "servo-damping@drive:damping=2"),
+        (0, "actuator-saturation@drive:limit=1"),
+        (0, "actuator-deadband@drive:width=0.1"),
+        (0, "torque-speed-limit@drive:force=2,speed=3"),
+        (0, "backlash@spin:width=0.02"),
+        (0, "load-friction@spin:coefficient=0.3"),
+        (1, "servo-damping@drive:damping=2"),
+        (1, "actuator-saturation@drive:limit=1"),
+        (1, "joint-compliance@spin:compliance=0.02"),
+        (2, "actuator-saturation@drive:limit=1"),
+        (2, "load-friction@spin:coefficient=0.3"),
+        (2, "backlash@spin:width=0.02"),
+    ] {
+        for backend in engines_for_general(effect) {
+            let [short, general] =
+                PAIRS[i].map(|a| Bench::new(&*backend, &machine(a), &[effect]).hold(300, &[0.7]));
+            for (a, b) in short.iter().zip(&general) {
+                near(effect, b[0], a[0], 1e-9);
+            }
+        }
+    }
+}
+
+/// What the document says of a drive is what the engine made of it, through classes too.
+#[test]
+fn gains_of_the_document_are_those_of_the_engine() {
+    let class = r#"<default><default class="a"><general biastype="affine" gainprm="50" biasprm="0 -50 -4"/></default>
+      <default class="b"><position kp="70" kv="3"/></default></default>"#;
+    for actuator in [
+        r#"<general name="drive" joint="spin" class="a"/>"#,
+        r#"<position name="drive" joint="spin" class="a"/>"#,
+        r#"<position name="drive" joint="spin" class="a" kp="20"/>"#,
+        r#"<position name="drive" joint="spin" class="b"/>"#,
+        r#"<velocity name="drive" joint="spin" kv="9"/>"#,
+        PAIRS[0][1],
+        PAIRS[1][1],
+    ] {
+        let xml = machine(actuator).replace("<worldbody>", &format!("{class}<worldbody>"));
+        let scene = super::bench::scene(&xml);
+        let plant = Plant::of(&scene).unwrap();
+        let (_, drive) = plant.drive("drive").unwrap();
+        use asid::mjcf::plant::DriveLaw;
+        let gains = match drive.law {
+            DriveLaw::Position { kp, kv } => vec![("kp", kp), ("kv", kv)],
+            DriveLaw::Velocity { kv } => vec![("kv", kv)],
+            DriveLaw::Motor => panic!("{actuator}"),
+        };
+        for entry in all::<BackendEntry>() {
+            let backend = (entry.make)().unwrap();
+            // rapier's own reading of classes is its own matter.
+            if backend.name() != "mujoco" {
+                continue;
+            }
+            let model = Refined::load(&*backend, &scene, &[]).unwrap();
+            for (attribute, gain) in &gains {
+                let target: Target = format!("actuator/drive/{attribute}").parse().unwrap();
+                near(actuator, model.nominal(&target).unwrap(), *gain, 1e-12);
+            }
+        }
+    }
+}
+
+/// A `kv` that the engine works out of a damping ratio is that of the effects: `2 ratio sqrt(kp I)`.
+#[test]
+fn effects_know_the_damping_that_a_ratio_makes() {
+    let about: f64 = super::INERTIA + 0.05;
+    let kv = 2.0 * 0.7 * (30.0 * about).sqrt();
+    let ratio =
+        r#"<position name="drive" joint="spin" kp="30" dampratio="0.7" forcerange="-9 9"/>"#;
+    let gain =
+        format!(r#"<position name="drive" joint="spin" kp="30" kv="{kv}" forcerange="-9 9"/>"#);
+    let scene = super::bench::scene(&machine(ratio));
+    for effect in [
+        "actuator-saturation@drive:limit=1",
+        "torque-speed-limit@drive:force=2,speed=3",
+        "load-friction@spin:coefficient=0.3",
+        "backlash@spin:width=0.02",
+        "servo-damping@drive:damping=-1",
+    ] {
+        let engines = engines_for(effect).into_iter();
+        for backend in engines.filter(|b| b.load(&scene).is_ok()) {
+            let [a, b] = [ratio, &gain]
+                .map(|a| Bench::new(&*backend, &machine(a), &[effect]).hold(300, &[0.7]));
+            for (a, b) in a.iter().zip(&b) {
+                near(effect, a[0], b[0], 1e-9);
+            }
+        }
+    }
+}
