@@ -37,8 +37,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     logs.set_noise(&noise);
     let mut walks: Vec<Walk> = (0..logs.episodes.len()).map(|e| Walk::new(&logs, e, layout.timestep)).collect();
     for w in &mut walks { if w.len() > most { *w = w.part(0..most); } }
-    let given = study.train.iter().map(|(_, e)| e.initial.as_ref().map(|_| asid_diagnosis::latent_force::given(&plant, e))).collect();
-    let open = asid_diagnosis::latent_force::open(&layout, &study);
+    let given = study.train.iter().map(|(_, e)| e.initial.as_ref().map(|_| asid_diagnosis::starts::given_start(&plant, e))).collect();
+    let open = asid_diagnosis::starts::open_coordinates(&layout, &study);
     let home = asid_core::problem::home(&layout);
     let otherwise: Vec<Vec<f64>> = walks.iter().map(|w| { let s = [&home.0[..], &home.1[..]].concat(); s.repeat(w.len()) }).collect();
     let model = machine.with(&[])?;

@@ -31,7 +31,7 @@ pub mod score;
 pub mod screen;
 pub mod search;
 pub mod sentence;
-mod starts;
+pub mod starts;
 pub mod study;
 mod telling;
 pub mod trajectory;

@@ -364,6 +364,17 @@ impl Estimate {
             .collect()
     }
 
+    /// Power of the missing force beyond what is too fine to decide, in units of the inertial forces, over all degrees of
+    /// freedom.
+    #[must_use]
+    pub fn missing_power(&self, inertial: &[f64]) -> f64 {
+        let noise = &self.noise;
+        let total = |j: usize| noise.q[j] + noise.white[j] - self.least_white[j];
+        (0..inertial.len())
+            .map(|j| total(j).max(0.0) / inertial[j].powi(2))
+            .sum()
+    }
+
     /// From here on nothing finer than a part of the force that is missing now decides.
     pub fn set_resolution(&mut self, nv: usize) {
         for j in 0..nv {

@@ -12,6 +12,9 @@ use super::screen::{Screened, rank, regressions};
 /// How widely to search.
 #[derive(Clone, Copy, Debug)]
 pub struct Breadth {
+    /// Share of the missing force's power below which a further effect must bring it: one that earns evidence and leaves the
+    /// force as it was mends the noise model and not the machine's.
+    pub shrinks: f64,
     /// Sets that are fitted a little after each screening.
     pub raced: usize,
     /// Share of the leader's evidence that a set needs to be raced.
@@ -35,6 +38,7 @@ pub struct Breadth {
 impl Default for Breadth {
     fn default() -> Self {
         Self {
+            shrinks: 0.9,
             raced: 8,
             share: 0.1,
             least: 3.0,
@@ -132,7 +136,9 @@ pub fn search(
         let next = round.confirmed.first().cloned();
         rounds.push(round);
         let Some(next) = next else { break };
-        if next.fitted.evidence - best.fitted.evidence < threshold {
+        let power = |s: &Set| s.fitted.estimate.missing_power(&context.inertial);
+        let shrinks = power(&next) < breadth.shrinks * power(&best);
+        if next.fitted.evidence - best.fitted.evidence < threshold || !shrinks {
             break;
         }
         best = next;

@@ -5,13 +5,12 @@ use crate::candidate::Candidate;
 use crate::search::Findings;
 use crate::verdict::{Hypothesis as Judged, Judgement};
 
-use super::estimate::Estimate;
 use super::search::{Outcome, Set};
 
 /// Evidence is divided by this before it becomes a probability: the noise model is not the machine's own.
-const TEMPERATURE: f64 = 3.0;
+const TEMPERATURE: f64 = 1.5;
 /// Difference of evidence up to which two sets cannot be told apart: odds of 20 after the temperature.
-const APART: f64 = 9.0;
+const APART: f64 = 4.5;
 /// Midpoint and scale of the logistic in the logarithm of the share of the missing force's power that no named effect
 /// makes up for.
 const UNEXPLAINED: f64 = 0.5;
@@ -22,14 +21,6 @@ const GAP: f64 = 2.0;
 const GAP_SCALE: f64 = 0.3;
 /// Root mean square of the missing force, relative to the inertial forces, up to which nothing is missing.
 const NOTHING: f64 = 0.01;
-
-/// Power of the missing force, in units of the inertial forces, over all degrees of freedom.
-fn power(estimate: &Estimate, inertial: &[f64]) -> f64 {
-    let total = |j: usize| estimate.noise.q[j] + estimate.noise.white[j] - estimate.least_white[j];
-    (0..inertial.len())
-        .map(|j| total(j).max(0.0) / inertial[j].powi(2))
-        .sum()
-}
 
 /// Judges what a search found; `sets` are those behind the findings, in their order.
 #[must_use]
@@ -77,8 +68,8 @@ pub fn select(
     }
     let sum: f64 = all.iter().map(|h| h.probability).sum();
     let inertial = &outcome.inertial;
-    let before = power(&outcome.none.estimate, inertial);
-    let after = power(&outcome.best.fitted.estimate, inertial);
+    let before = outcome.none.estimate.missing_power(inertial);
+    let after = outcome.best.fitted.estimate.missing_power(inertial);
     let rest = (after / before.max(f64::MIN_POSITIVE)).min(1.0);
     let sigmoid = |x: f64| 1.0 / (1.0 + (-x).exp());
     let readings = bench.held_readings().max(1.0);
