@@ -197,8 +197,8 @@ fn replay(
     let best = &outcome.best.candidates;
     let stands = sets.iter().position(|s| s.candidates == *best);
     if let Some(place) = stands {
-        let set = sets.remove(place);
-        sets.insert(0, set);
+        sets.remove(place);
+        sets.insert(0, outcome.best.clone());
     }
     sets.truncate(1 + RIVALS);
     let mut found = Vec::new();
@@ -208,13 +208,6 @@ fn replay(
         } else {
             Effort::LOOK
         };
-        if std::env::var("TIMES").is_ok() {
-            for effort in [Effort::LOOK, Effort::BRIEF] {
-            let t = std::time::Instant::now();
-            let e = of(&set.fitted, &set.candidates, effort)?;
-            eprintln!("{:?} train {:.3} test {:.3} values {:?} -> {:?} {:.2} s", e.labels(), (e.fit.cost / bench.train.readings as f64).sqrt(), (e.held_plain / bench.held_readings()).sqrt(), set.fitted.theta, e.fit.point.theta, t.elapsed().as_secs_f64());
-            }
-        }
         found.push(Found {
             candidates: set.candidates.clone(),
             explanation: of(&set.fitted, &set.candidates, effort)?,

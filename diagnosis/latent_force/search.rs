@@ -1,6 +1,7 @@
 //! Forward selection of effects by evidence, with a look back after each.
 
 use asid_core::{Progress, Result};
+use asid_effects::Start;
 
 use crate::candidate::Candidate;
 
@@ -143,12 +144,54 @@ pub fn search(
         }
         best = next;
     }
+    let best = free_what_is_given(context, candidates, best, breadth, threshold)?;
     Ok(Outcome {
         none: none.clone(),
         inertial: context.inertial.clone(),
         rounds,
         best,
     })
+}
+
+/// Fits what no search tries (an offset of friction between the directions) of the effects that were named, where it
+/// earns its place.
+fn free_what_is_given(
+    context: &Context<'_>,
+    candidates: &[Candidate],
+    best: Set,
+    breadth: Breadth,
+    threshold: f64,
+) -> Result<Set> {
+    let mut best = best;
+    let mut at = best.fitted.hypothesis.unknowns.len();
+    for &c in best.candidates.clone().iter().rev() {
+        let parameters = candidates[c].parameters();
+        at -= parameters.len();
+        for (i, p) in parameters.iter().enumerate() {
+            if p.start != Start::Given {
+                continue;
+            }
+            let mut hypothesis = best.fitted.hypothesis.clone();
+            let unknown = &mut hypothesis.unknowns[at + i];
+            unknown.free = true;
+            // As uncertain as the effect itself is large.
+            let own = &best.fitted.theta[at..at + parameters.len()];
+            let sizes = own.iter().zip(parameters);
+            let size = sizes
+                .filter(|(_, q)| q.unit == p.unit)
+                .map(|(x, q)| (x - q.null).abs())
+                .fold(0.0, f64::max);
+            if size > 0.0 {
+                unknown.deviation = unknown.deviation.min(size);
+            }
+            let (theta, estimate) = (&best.fitted.theta, &best.fitted.estimate);
+            let fitted = fit(context, &hypothesis, theta, estimate, breadth.rounds[1])?;
+            if fitted.evidence - best.fitted.evidence > threshold {
+                best.fitted = fitted;
+            }
+        }
+    }
+    Ok(best)
 }
 
 /// Evidence that a further effect must earn: the best of `n` reaches about `ln n` by chance, and a factor of 20 upon it.

@@ -89,7 +89,9 @@ enum Role {
     Nominal,
     /// A coordinate of the state is moved, for `f` and `h`.
     State(usize),
-    /// A coordinate of the state is moved all along, for `h` alone.
+    /// A coordinate of the state is moved all along, for `h` alone: a position by a constant, a speed by a constant and its
+    /// position by a ramp. A reading that remembers (a delay, a filter) sees the past of a speed as its position; what the
+    /// ramp has reached now is taken off again.
     Reading(usize),
     /// A generalized force acts.
     Force(usize),
@@ -378,8 +380,11 @@ impl Part {
                 let mut state = states[k * width..(k + 1) * width].to_vec();
                 if let Role::State(i) | Role::Reading(i) = *role {
                     change[i] = STATE_STEP;
+                    if let (Role::Reading(_), Some(place)) = (role, i.checked_sub(nv)) {
+                        change[place] = STATE_STEP * c.walks[self.walks[e]].time[k];
+                    }
                     retract(&c.layout, &mut state, &change);
-                    change[i] = 0.0;
+                    change.fill(0.0);
                 }
                 row.sims.push(v * n + e);
                 row.qpos.extend_from_slice(&state[..nq]);
@@ -436,8 +441,11 @@ impl Part {
                         }
                     }
                     Role::Reading(i) => {
+                        let time = walk.time[k];
                         for (s, d) in differ.iter().enumerate() {
-                            out[e].h[(k * ns + s) * nx + i] = d / STATE_STEP;
+                            let row = &mut out[e].h[(k * ns + s) * nx..(k * ns + s + 1) * nx];
+                            let place = i.checked_sub(nx / 2).map_or(0.0, |place| row[place]);
+                            row[i] = d / STATE_STEP - time * place;
                         }
                     }
                     Role::Varied(i) => {
