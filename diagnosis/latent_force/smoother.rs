@@ -631,3 +631,6 @@ pub fn regress(problem: Problem<'_>, noise: &NoiseModel, m: usize) -> Regression
     out.log_likelihood = filter.log_likelihood;
     out
 }
+
+#[cfg(test)]
+mod tests;
