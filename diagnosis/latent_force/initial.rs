@@ -41,6 +41,26 @@ fn fill(time: &[f64], values: &mut [f64]) -> bool {
     true
 }
 
+/// Gives the quaternions of a series (its four components) the sign that is nearer to the one before: `q` and
+/// `-q` are the same orientation, but what lies between them is none.
+fn align_signs(series: &mut [Vec<f64>]) {
+    let rows = series.first().map_or(0, Vec::len);
+    let mut before: Option<Vec<f64>> = None;
+    for k in 0..rows {
+        let mut q: Vec<f64> = series.iter().map(|s| s[k]).collect();
+        if !q.iter().all(|x| x.is_finite()) {
+            continue;
+        }
+        if let Some(before) = before
+            && q.iter().zip(&before).map(|(a, b)| a * b).sum::<f64>() < 0.0
+        {
+            q.iter_mut().for_each(|x| *x = -*x);
+            series.iter_mut().for_each(|s| s[k] = -s[k]);
+        }
+        before = Some(q);
+    }
+}
+
 /// Trajectories along some walks: `rows x (nq + nv)` each. What sensors of joints and of free bodies read is taken from
 /// them, speeds from differences where no sensor reads them, and the rest from `otherwise`.
 #[must_use]
@@ -73,10 +93,13 @@ pub fn from_readings(
                     walk.rows.iter().map(row).collect()
                 })
                 .collect();
+            let kind = &*layout.sensors[index].kind;
+            if kind == "framequat" {
+                align_signs(&mut series);
+            }
             if !series.iter_mut().all(|s| fill(&walk.time, s)) {
                 continue;
             }
-            let kind = &*layout.sensors[index].kind;
             match plant.sensors[index] {
                 Reads::Joint(j) => {
                     let joint = &layout.joints[j];
@@ -125,10 +148,7 @@ pub fn from_readings(
         let places = states.clone();
         let mut change = vec![0.0; 2 * nv];
         for k in 0..n {
-            let (a, b) = (
-                k.saturating_sub(HALF_WINDOW),
-                (k + HALF_WINDOW).min(n - 1),
-            );
+            let (a, b) = (k.saturating_sub(HALF_WINDOW), (k + HALF_WINDOW).min(n - 1));
             let dt = walk.time[b] - walk.time[a];
             if dt <= 0.0 {
                 continue;
@@ -224,3 +244,6 @@ pub fn start(
     }
     start
 }
+
+#[cfg(test)]
+mod tests;

@@ -37,14 +37,16 @@ pub fn regressions(
 }
 
 /// Best evidence of some columns over the scales, with coefficients.
-fn over_scales(
-    sums: &[Regression],
-    columns: &Columns,
-    which: &[usize],
-) -> (f64, Vec<f64>) {
+fn over_scales(sums: &[Regression], columns: &Columns, which: &[usize]) -> (f64, Vec<f64>) {
     let mut best = (f64::NEG_INFINITY, Vec::new());
     for sum in sums {
-        let found = evidence(&sum.gram, &sum.moment, which, &columns.center, &columns.bounds);
+        let found = evidence(
+            &sum.gram,
+            &sum.moment,
+            which,
+            &columns.center,
+            &columns.bounds,
+        );
         let total = sum.log_likelihood + found.gain;
         if total > best.0 {
             best = (total, found.coefficients);
@@ -54,21 +56,21 @@ fn over_scales(
 }
 
 /// Ranks all candidates, and the groups of one effect at all its sites, best first.
-pub fn rank(
-    sums: &[Regression],
-    columns: &Columns,
-    candidates: &[Candidate],
-) -> Vec<Screened> {
+pub fn rank(sums: &[Regression], columns: &Columns, candidates: &[Candidate]) -> Vec<Screened> {
     let base: Vec<usize> = (0..columns.base).collect();
     let (none, _) = over_scales(sums, columns, &base);
     let try_forms = |forms: &[usize]| {
         let mut which = base.clone();
-        forms.iter().for_each(|&f| which.extend(columns.forms[f].columns()));
+        forms
+            .iter()
+            .for_each(|&f| which.extend(columns.forms[f].columns()));
         let (total, coefficients) = over_scales(sums, columns, &which);
         let mut at = base.len();
         let each = forms.iter().map(|&f| {
             let n = columns.forms[f].slopes.len();
-            let own = coefficients.get(at..at + n).map_or_else(Vec::new, <[f64]>::to_vec);
+            let own = coefficients
+                .get(at..at + n)
+                .map_or_else(Vec::new, <[f64]>::to_vec);
             at += n;
             own
         });
@@ -152,3 +154,107 @@ fn project(gram: &DMatrix<f64>, out: &[usize]) -> DMatrix<f64> {
     }
 }
 
+#[cfg(test)]
+mod tests {
+    use nalgebra::DVector;
+
+    use super::super::columns::Form;
+    use super::*;
+
+    /// Isolability of forms of some widths, whose columns `x` follow `base` columns of the model.
+    fn isolability_of(x: &DMatrix<f64>, base: usize, widths: &[usize]) -> DMatrix<f64> {
+        let mut first = base;
+        let forms = widths.iter().map(|&n| {
+            first += n;
+            Form {
+                candidate: 0,
+                begin: Vec::new(),
+                slopes: vec![None; n],
+                first: first - n,
+            }
+        });
+        let columns = Columns {
+            linear: Vec::new(),
+            base,
+            forms: forms.collect(),
+            center: vec![0.0; x.ncols()],
+            bounds: vec![[-1.0, 1.0]; x.ncols()],
+        };
+        let sum = Regression {
+            log_likelihood: 0.0,
+            gram: x.transpose() * x,
+            moment: DVector::zeros(x.ncols()),
+        };
+        let all: Vec<usize> = (0..widths.len()).collect();
+        isolability(&sum, &columns, &all)
+    }
+
+    #[test]
+    fn the_same_direction_cannot_be_told_apart_and_orthogonal_ones_have_nothing_in_common() {
+        let x = DMatrix::from_columns(&[
+            DVector::from_row_slice(&[1.0, 2.0, 0.0, 0.0]),
+            DVector::from_row_slice(&[-3.0, -6.0, 0.0, 0.0]),
+            DVector::from_row_slice(&[0.0, 0.0, 1.0, 0.0]),
+            // 60 degrees from the last.
+            DVector::from_row_slice(&[0.0, 0.0, 0.5, 0.75_f64.sqrt()]),
+        ]);
+        let found = isolability_of(&x, 0, &[1; 4]);
+        let want = [
+            [1.0, 1.0, 0.0, 0.0],
+            [1.0, 1.0, 0.0, 0.0],
+            [0.0, 0.0, 1.0, 0.5],
+            [0.0, 0.0, 0.5, 1.0],
+        ];
+        for (i, row) in want.iter().enumerate() {
+            for (j, want) in row.iter().enumerate() {
+                assert!((found[(i, j)] - want).abs() < 1e-12, "{found}");
+            }
+        }
+    }
+
+    #[test]
+    fn of_planes_it_is_the_cosine_of_the_smallest_angle_between_them() {
+        // The first plane spans x and y, the second a line at 30 degrees above it and one in y + w: the angle
+        // nearest to zero decides. A column that does nothing spans nothing.
+        let (s, c) = 30.0_f64.to_radians().sin_cos();
+        let x = DMatrix::from_columns(&[
+            DVector::from_row_slice(&[1.0, 1.0, 0.0, 0.0]),
+            DVector::from_row_slice(&[1.0, -2.0, 0.0, 0.0]),
+            DVector::from_row_slice(&[c, 0.0, s, 0.0]),
+            DVector::from_row_slice(&[0.0, 1.0, 0.0, 1.0]),
+            DVector::zeros(4),
+        ]);
+        let found = isolability_of(&x, 0, &[2, 2, 1]);
+        assert!((found[(0, 1)] - c).abs() < 1e-12, "{found}");
+        assert!((found[(1, 0)] - c).abs() < 1e-12, "{found}");
+        assert_eq!(found[(0, 2)], 0.0);
+        assert_eq!(found[(2, 2)], 0.0);
+    }
+
+    #[test]
+    fn what_the_present_model_explains_is_projected_out() {
+        // Two candidates share much of what the base can do, and nothing else.
+        let x = DMatrix::from_columns(&[
+            DVector::from_row_slice(&[1e4, 0.0, 0.0]),
+            DVector::from_row_slice(&[5.0, 1.0, 0.0]),
+            DVector::from_row_slice(&[5.0, 0.0, 1.0]),
+        ]);
+        let alone = isolability_of(&x.columns(1, 2).into_owned(), 0, &[1; 2]);
+        assert!((alone[(0, 1)] - 25.0 / 26.0).abs() < 1e-12);
+        let found = isolability_of(&x, 1, &[1; 2]);
+        // A prior deviation of 1 leaves 5^2 / (1 + 1e8) of what is shared.
+        assert!(found[(0, 1)] < 1e-6, "{found}");
+        assert!((found[(1, 1)] - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn projecting_out_is_the_noise_that_uncertain_coefficients_add() {
+        // X' (I + Z Z')^-1 X with Z the columns that are out: their coefficients are N(0, 1).
+        let x = DMatrix::from_fn(5, 4, |i, j| ((3 * i + 7 * j * j + i * j) % 11) as f64 - 5.0);
+        let z = x.columns(0, 2);
+        let covariance = DMatrix::identity(5, 5) + z * z.transpose();
+        let want = x.transpose() * covariance.cholesky().unwrap().solve(&x);
+        let found = project(&(x.transpose() * &x), &[0, 1]);
+        assert!((found - want).amax() < 1e-10);
+    }
+}

@@ -418,8 +418,7 @@ impl Part {
         let (ns, nx) = (c.logs.entries.len(), 2 * c.layout.nv);
         let width = c.readings.width();
         row.read.resize(row.sims.len() * width, 0.0);
-        self.simulator
-            .read(&row.sims, &c.readings, &mut row.read)?;
+        self.simulator.read(&row.sims, &c.readings, &mut row.read)?;
         let m = variations.len();
         let mut differ = vec![0.0; ns];
         for (i, &e) in here.iter().enumerate() {
@@ -544,4 +543,27 @@ struct RowBuffers {
     pushes: Vec<Option<(usize, f64)>>,
     read: Vec<f64>,
     next: Vec<f64>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn walks_are_shared_out_so_that_the_longest_share_is_short() {
+        let walk = |rows: usize| Walk {
+            episode: 0,
+            rows: (0..rows).collect(),
+            time: Vec::new(),
+            substeps: Vec::new(),
+            ctrl: Vec::new(),
+        };
+        let walks: Vec<Walk> = [3, 9, 4, 5, 2].map(walk).into();
+        // 9 and 3 rows against 5, 4 and 2.
+        assert_eq!(share_out(&walks, 2), [vec![0, 1], vec![2, 3, 4]]);
+        // No core without a walk, and every walk once.
+        assert_eq!(share_out(&walks, 8).concat().len(), 5);
+        assert_eq!(share_out(&walks, 8).len(), 5);
+        assert_eq!(share_out(&walks, 0), [vec![0, 1, 2, 3, 4]]);
+    }
 }

@@ -32,7 +32,7 @@ impl Walk {
 
     /// Walks an episode of some logs at a physics time step (s). Times are rounded to whole steps from
     /// the first row on, so that no error adds up; a row that falls on the step of the one before is passed
-    /// over.
+    /// over, but its command holds until the next.
     #[must_use]
     pub fn new(logs: &Logs, episode: usize, timestep: f64) -> Self {
         let log = &logs.episodes[episode];
@@ -46,7 +46,7 @@ impl Walk {
             let last = rows[rows.len() - 1];
             if step(k) > step(last) {
                 substeps.push(step(k) - step(last));
-                ctrl.extend_from_slice(&log.episode.ctrl[last * nu..(last + 1) * nu]);
+                ctrl.extend_from_slice(&log.episode.ctrl[(k - 1) * nu..k * nu]);
                 rows.push(k);
             }
         }
@@ -71,5 +71,86 @@ impl Walk {
             substeps: self.substeps[steps.clone()].to_vec(),
             ctrl: self.ctrl[steps.start * nu..steps.end * nu].to_vec(),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use asid_core::episode::ChannelColumns;
+    use asid_core::{Episode, Scene};
+    use asid_mjcf::Plant;
+
+    use super::*;
+
+    const STEP: f64 = 0.01;
+
+    /// A log of a pushed slide at some times; the command of row `k` is `k`.
+    fn logs(time: &[f64]) -> Logs {
+        let scene = r#"<mujoco><worldbody><body>
+            <joint name="slide" type="slide"/><geom size="0.1" mass="1"/></body></worldbody>
+            <actuator><motor name="push" joint="slide"/></actuator>
+            <sensor><jointpos name="place" joint="slide"/></sensor></mujoco>"#;
+        let plant = Plant::of(&Scene::from_xml("slide", scene, &[]).unwrap()).unwrap();
+        let channel = ChannelColumns {
+            name: "place".into(),
+            len: 1,
+        };
+        let episode = Episode {
+            time: time.to_vec(),
+            actuators: vec!["push".into()],
+            ctrl: (0..time.len()).map(|k| k as f64).collect(),
+            channels: vec![channel],
+            readings: vec![0.0; time.len()],
+            ..Episode::default()
+        };
+        Logs::new(&plant, &["place".to_owned()], vec![("log".into(), episode)]).unwrap()
+    }
+
+    #[test]
+    fn rounding_to_steps_does_not_add_up() {
+        // Rows 1.49 steps apart, from some time on: each lies within half a step of where the walk is.
+        let time: Vec<f64> = (0..200).map(|k| 7.0 + 1.49 * STEP * f64::from(k)).collect();
+        let walk = Walk::new(&logs(&time), 0, STEP);
+        assert_eq!(walk.len(), 200);
+        let mut steps = 0;
+        for k in 0..walk.len() {
+            assert!((walk.time[k] - (time[k] - 7.0)).abs() < 1e-12);
+            assert!((walk.time[k] - STEP * steps as f64).abs() < 0.5001 * STEP);
+            steps += walk.substeps.get(k).unwrap_or(&0);
+        }
+    }
+
+    #[test]
+    fn a_row_on_the_step_of_the_one_before_is_passed_over() {
+        let walk = Walk::new(&logs(&[5.0, 5.0104, 5.013, 5.0296, 5.05]), 0, STEP);
+        assert_eq!(walk.rows, [0, 1, 3, 4]);
+        assert_eq!(walk.substeps, [1, 2, 2]);
+    }
+
+    #[test]
+    fn the_command_of_a_row_that_is_passed_over_holds_until_the_next() {
+        // The third row falls on the step of the second, and its command is the one that acts from there on.
+        let walk = Walk::new(&logs(&[5.0, 5.0104, 5.013, 5.0296, 5.05]), 0, STEP);
+        assert_eq!(walk.ctrl, [0.0, 2.0, 3.0]);
+    }
+
+    #[test]
+    fn a_part_has_the_steps_and_commands_between_its_rows() {
+        let time: Vec<f64> = [0.0, 1.0, 3.0, 6.0, 10.0]
+            .iter()
+            .map(|t| t * STEP)
+            .collect();
+        let walk = Walk::new(&logs(&time), 0, STEP);
+        let part = walk.part(1..4);
+        assert_eq!(part.rows, [1, 2, 3]);
+        assert_eq!(part.time, walk.time[1..4]);
+        assert_eq!(part.substeps, [2, 3]);
+        assert_eq!(part.ctrl, [1.0, 2.0]);
+        assert_eq!(walk.part(0..walk.len()), walk);
+        let last = walk.part(4..5);
+        assert_eq!(
+            (last.len(), last.substeps.len(), last.ctrl.len()),
+            (1, 0, 0)
+        );
     }
 }

@@ -1,0 +1,177 @@
+//! Episodes that the recursions are tested on.
+//!
+//! [`dense`] compares with the same normal distribution written down densely, [`known`] with answers that are
+//! known, [`noise`] tests what the noise model is estimated from, [`digits`] what rounding does.
+
+mod dense;
+mod digits;
+mod known;
+mod noise;
+
+use rand::Rng;
+
+use super::*;
+
+/// Tolerance of two ways to the same number of order one, through a few dozen operations on well-conditioned
+/// matrices.
+const SAME: f64 = 1e-8;
+
+/// An episode that owns what a [`Problem`] borrows.
+#[derive(Clone)]
+struct Case {
+    walk: Walk,
+    linear: LinearEpisode,
+    b: Vec<f64>,
+    start: Start,
+    free: Vec<f64>,
+    noise: NoiseModel,
+    /// Columns of the regression.
+    m: usize,
+}
+
+impl Case {
+    /// A random episode of `rows` unevenly spaced rows, `nv` degrees of freedom, `ns` entries a row and `m` columns. A
+    /// fifth of the readings is missing, and every third row has a free force.
+    fn random(nv: usize, rows: usize, ns: usize, m: usize) -> Self {
+        let mut rng = asid_core::Streams::new(7).stream(&format!("{nv}"));
+        let nx = 2 * nv;
+        let mut draw =
+            |n: usize| -> Vec<f64> { (0..n).map(|_| rng.random_range(-1.0..1.0)).collect() };
+        let positive = |x: Vec<f64>| -> Vec<f64> { x.into_iter().map(|x| 0.6 + 0.5 * x).collect() };
+        let mut residual = draw(rows * ns);
+        residual
+            .iter_mut()
+            .skip(3)
+            .step_by(5)
+            .for_each(|y| *y = f64::NAN);
+        let mut time = vec![0.0];
+        for gap in positive(draw(rows - 1)) {
+            time.push(time[time.len() - 1] + gap);
+        }
+        let mut free = positive(draw(rows * nv));
+        for (k, row) in free.chunks_exact_mut(nv).enumerate() {
+            if k % 3 != 1 {
+                row.fill(0.0);
+            }
+        }
+        Self {
+            walk: Walk {
+                episode: 0,
+                rows: (0..rows).collect(),
+                time,
+                substeps: vec![1; rows - 1],
+                ctrl: Vec::new(),
+            },
+            linear: LinearEpisode {
+                rows,
+                defect: draw((rows - 1) * nx),
+                a: draw((rows - 1) * nx * nx),
+                b: Vec::new(),
+                residual,
+                h: draw(rows * ns * nx),
+                state_columns: draw((rows - 1) * nx * m),
+                reading_columns: draw(rows * ns * m),
+            },
+            b: draw((rows - 1) * nx * nv),
+            start: Start {
+                mean: draw(nx),
+                variance: positive(draw(nx)),
+            },
+            free,
+            noise: NoiseModel {
+                q: positive(draw(nv)),
+                tau: positive(draw(nv)),
+                white: positive(draw(nv)),
+                r: positive(draw(ns)),
+            },
+            m,
+        }
+    }
+
+    /// A mass on a slide, its place read in each row, about a trajectory that stays at rest at 0. One column: a
+    /// force of one unit.
+    fn slide(mass: f64, dt: f64, places: &[f64], noise: NoiseModel) -> Self {
+        let rows = places.len();
+        let row_b = [0.5 * dt * dt / mass, dt / mass];
+        Self {
+            walk: Walk {
+                episode: 0,
+                rows: (0..rows).collect(),
+                time: (0..rows).map(|k| k as f64 * dt).collect(),
+                substeps: vec![1; rows - 1],
+                ctrl: Vec::new(),
+            },
+            linear: LinearEpisode {
+                rows,
+                defect: vec![0.0; 2 * (rows - 1)],
+                a: [1.0, dt, 0.0, 1.0].repeat(rows - 1),
+                b: Vec::new(),
+                residual: places.to_vec(),
+                h: [1.0, 0.0].repeat(rows),
+                state_columns: row_b.repeat(rows - 1),
+                reading_columns: vec![0.0; rows],
+            },
+            b: row_b.repeat(rows - 1),
+            start: Start {
+                mean: vec![0.0; 2],
+                variance: vec![1.0; 2],
+            },
+            free: Vec::new(),
+            noise,
+            m: 1,
+        }
+    }
+
+    fn problem(&self) -> Problem<'_> {
+        Problem {
+            walk: &self.walk,
+            linear: &self.linear,
+            b: &self.b,
+            start: &self.start,
+            free: &self.free,
+        }
+    }
+
+    /// Rows `range` as an episode of their own, which begins about the trajectory.
+    fn part(&self, range: std::ops::Range<usize>) -> Self {
+        let (nv, ns, m) = (self.noise.q.len(), self.noise.r.len(), self.m);
+        let nx = 2 * nv;
+        let rows = |x: &[f64], n: usize| x[range.start * n..range.end * n].to_vec();
+        let steps = |x: &[f64], n: usize| x[range.start * n..(range.end - 1) * n].to_vec();
+        let mut start = self.start.clone();
+        if range.start > 0 {
+            start.mean.fill(0.0);
+        }
+        let linear = &self.linear;
+        Self {
+            walk: self.walk.part(range.clone()),
+            linear: LinearEpisode {
+                rows: range.len(),
+                defect: steps(&linear.defect, nx),
+                a: steps(&linear.a, nx * nx),
+                b: Vec::new(),
+                residual: rows(&linear.residual, ns),
+                h: rows(&linear.h, ns * nx),
+                state_columns: steps(&linear.state_columns, nx * m),
+                reading_columns: rows(&linear.reading_columns, ns * m),
+            },
+            b: steps(&self.b, nx * nv),
+            start,
+            free: rows(&self.free, nv),
+            noise: self.noise.clone(),
+            m,
+        }
+    }
+}
+
+fn assert_same(got: f64, want: f64, what: &str) {
+    assert!(
+        (got - want).abs() < SAME * want.abs().max(1.0),
+        "{what}: {got} instead of {want}"
+    );
+}
+
+/// One degree of freedom with two entries a row, two with three.
+fn cases() -> [Case; 2] {
+    [Case::random(1, 6, 2, 3), Case::random(2, 6, 3, 4)]
+}

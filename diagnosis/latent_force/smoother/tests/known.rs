@@ -1,0 +1,150 @@
+//! Answers that are known without a dense distribution.
+
+use super::super::super::evidence::evidence;
+use super::*;
+
+/// Places of a mass that a constant force pushes from rest, every `dt`.
+fn pushed(force: f64, mass: f64, dt: f64, rows: usize) -> Vec<f64> {
+    let place = |k: usize| 0.5 * force / mass * (k as f64 * dt).powi(2);
+    (0..rows).map(place).collect()
+}
+
+#[test]
+fn a_constant_force_that_the_model_lacks_is_what_is_smoothed() {
+    let (force, mass, dt) = (3.0, 2.0, 0.01);
+    let noise = NoiseModel {
+        q: vec![100.0],
+        tau: vec![1e4],
+        white: vec![0.0],
+        r: vec![1e-12],
+    };
+    let case = Case::slide(mass, dt, &pushed(force, mass, dt, 101), noise);
+    let smoothed = smooth(case.problem(), &case.noise);
+    for k in 0..100 {
+        // A variance of 100 N^2 draws the estimate towards 0, by far less than it is uncertain by.
+        let deviation = smoothed.force_variance[k].sqrt();
+        assert!(deviation < 0.02, "{deviation}");
+        let error = smoothed.force[k] - force;
+        assert!(error.abs() < 0.01 * deviation, "row {k}: {error}");
+        let speed = force / mass * dt * k as f64;
+        assert!((smoothed.change[2 * k + 1] - speed).abs() < 1e-6);
+    }
+}
+
+#[test]
+fn the_coefficient_of_a_constant_force_is_that_force() {
+    let (force, mass, dt, unit) = (3.0, 2.0, 0.01, 10.0);
+    let noise = NoiseModel {
+        q: vec![1e-6],
+        tau: vec![0.1],
+        white: vec![1e-6],
+        r: vec![1e-10],
+    };
+    let mut case = Case::slide(mass, dt, &pushed(force, mass, dt, 101), noise);
+    // A column in units of a prior's deviation of 10 N.
+    case.linear
+        .state_columns
+        .iter_mut()
+        .for_each(|x| *x *= unit);
+    let found = regress(case.problem(), &case.noise, 1);
+    let told = evidence(&found.gram, &found.moment, &[0], &[0.0], &[[-9.0, 9.0]]);
+    // The prior takes its share of the posterior's precision.
+    let share = 1.0 / (1.0 + found.gram[(0, 0)]);
+    assert!(share < 1e-6, "{share}");
+    let coefficient = unit * told.coefficients[0];
+    assert!(
+        (coefficient - force).abs() < 2.0 * share * force,
+        "{coefficient}"
+    );
+    assert!(told.gain > 100.0, "{}", told.gain);
+}
+
+#[test]
+fn without_readings_nothing_is_learnt() {
+    let mut case = Case::random(2, 6, 3, 1);
+    case.linear.residual.fill(f64::NAN);
+    let smoothed = smooth(case.problem(), &case.noise);
+    assert_eq!(smoothed.log_likelihood, 0.0);
+    assert!(smoothed.force.iter().all(|w| *w == 0.0));
+    for row in smoothed.force_variance.chunks_exact(2) {
+        // The force is stationary.
+        assert_same(row[0], case.noise.q[0], "variance");
+        assert_same(row[1], case.noise.q[1], "variance");
+    }
+    for j in 0..2 {
+        let steps = smoothed.sums.steps;
+        assert_same(smoothed.sums.white[j], steps * case.noise.white[j], "white");
+        assert_same(smoothed.sums.force[j][0], steps * case.noise.q[j], "force");
+    }
+}
+
+#[test]
+fn the_regression_is_the_same_over_more_rows_than_are_added_up_at_once() {
+    // The likelihood is quadratic in a coefficient: moving the readings by x moves it by b x - a x^2 / 2.
+    let noise = NoiseModel {
+        q: vec![0.5],
+        tau: vec![0.3],
+        white: vec![0.1],
+        r: vec![0.04],
+    };
+    let rows = 2 * BLOCK + 37;
+    let places: Vec<f64> = (0..rows).map(|k| (0.1 * k as f64).sin()).collect();
+    let mut case = Case::slide(1.0, 0.1, &places, noise);
+    case.linear.state_columns.fill(0.0);
+    case.linear.reading_columns.fill(1.0);
+    let found = regress(case.problem(), &case.noise, 1);
+    let at = |x: f64| {
+        let mut moved = case.clone();
+        moved.linear.residual.iter_mut().for_each(|y| *y -= x);
+        log_likelihood(moved.problem(), &moved.noise)
+    };
+    let (below, here, above) = (at(-1.0), at(0.0), at(1.0));
+    assert_same(found.log_likelihood, here, "log-likelihood");
+    assert_same(found.moment[0], 0.5 * (above - below), "slope");
+    assert_same(found.gram[(0, 0)], 2.0 * here - above - below, "curvature");
+}
+
+#[test]
+fn a_row_that_the_engine_did_not_carry_splits_the_walk_in_two() {
+    for mut case in cases() {
+        let (nv, rows) = (case.noise.q.len(), case.linear.rows);
+        let nx = 2 * nv;
+        case.linear.defect[2 * nx] = f64::NAN;
+        let (first, second) = (case.part(0..3), case.part(3..rows));
+        let whole = smooth(case.problem(), &case.noise);
+        let parts = [&first, &second].map(|c| smooth(c.problem(), &c.noise));
+        let joined = |of: fn(&Smoothed) -> &Vec<f64>| parts.iter().flat_map(of).copied();
+        let arrays: [fn(&Smoothed) -> &Vec<f64>; 4] = [
+            |s| &s.change,
+            |s| &s.change_variance,
+            |s| &s.force,
+            |s| &s.force_variance,
+        ];
+        for array in arrays {
+            assert_eq!(array(&whole).len(), joined(array).count());
+            for (got, want) in array(&whole).iter().zip(joined(array)) {
+                assert_same(*got, want, "smoothed");
+            }
+        }
+        let mut sums = parts[0].sums.clone();
+        sums.add(&parts[1].sums);
+        let numbers = |s: &Sums| -> Vec<f64> {
+            let pairs = s.force.iter().flatten().chain(s.reading.iter().flatten());
+            pairs
+                .chain(&s.white)
+                .chain([&s.steps, &s.seconds])
+                .copied()
+                .collect()
+        };
+        for (got, want) in numbers(&whole.sums).iter().zip(numbers(&sums)) {
+            assert_same(*got, want, "sums");
+        }
+        let mut both = regress(first.problem(), &case.noise, case.m);
+        both.add(&regress(second.problem(), &case.noise, case.m));
+        let found = regress(case.problem(), &case.noise, case.m);
+        assert_same(found.log_likelihood, both.log_likelihood, "log-likelihood");
+        assert_same(whole.log_likelihood, both.log_likelihood, "log-likelihood");
+        assert_same((found.gram - both.gram).amax(), 0.0, "X'X");
+        assert_same((found.moment - both.moment).amax(), 0.0, "X'y");
+    }
+}
