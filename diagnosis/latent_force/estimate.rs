@@ -253,7 +253,7 @@ impl Estimate {
             let mut sums = Sums::default();
             smoothed.iter().for_each(|s| sums.add(&s.sums));
             let likelihood = smoothed.iter().map(|s| s.log_likelihood).sum();
-            if likelihood < before.0 {
+            if !(likelihood >= before.0) {
                 // A lengthened step went too far.
                 self.noise = before.1.clone();
                 length = 1.0;

@@ -24,9 +24,12 @@ const LARGEST_STEP: f64 = 0.7;
 const SHORTER: f64 = 0.3;
 /// Rounds of EM between two linearisations.
 const EM_ROUNDS: usize = 4;
-/// Evidence that no longer counts as a rise, and rounds without one after which a fit stands.
+/// Evidence that no longer counts as a rise.
 const RISE: f64 = 0.5;
-const STILL: usize = 3;
+/// Rounds without a rise that are gone on with (a watchdog: Chamberlain and others 1982), for a narrow valley bends away
+/// from its tangent, and how often a shorter step is tried after that.
+const PATIENCE: usize = 2;
+const FAILURES: usize = 2;
 
 /// A model: the study's parameters and effects, with priors.
 #[derive(Clone, Debug, Default)]
@@ -118,6 +121,13 @@ fn shift(linear: &mut [LinearEpisode], changes: &[f64]) {
     }
 }
 
+/// A point from which steps are taken: what it and its step promise, and where that leads.
+struct Anchor {
+    hoped: f64,
+    from: (Vec<f64>, Estimate),
+    to: (Vec<f64>, Estimate),
+}
+
 /// Fits a model from some values and an estimate on, over at most `rounds` linearisations.
 ///
 /// # Errors
@@ -141,10 +151,9 @@ pub fn fit(
     let mut theta = theta.to_vec();
     let mut estimate = estimate.clone();
     let mut best: Option<Fitted> = None;
-    // Where the best point's own step leads, and how much of it is taken.
-    let mut ahead: Option<(Vec<f64>, Estimate)> = None;
+    let mut anchor: Option<Anchor> = None;
     let mut part = 1.0;
-    let mut still = 0;
+    let (mut waited, mut failed) = (0, 0);
     for round in 0..rounds.max(1) {
         let variations: Vec<Variation> = free
             .iter()
@@ -191,10 +200,12 @@ pub fn fit(
             found.covariance[(i, j)] * d(i) * d(j)
         });
         let promised = found.gain - determinant_of(&found) + 0.5 * prior;
-        let rose = best.as_ref().is_none_or(|b| here > b.evidence + RISE);
-        let better = best.as_ref().is_none_or(|b| here > b.evidence);
-        still = if rose { 0 } else { still + 1 };
-        if better {
+        let hoped = here + promised;
+        if std::env::var("DEBUGH").is_ok() { eprintln!("{:?} round {round} here {here:.1} promised {promised:.1} theta {theta:?} scale {scale} part {part} q {:?} r {:?}", hypothesis.specs.iter().map(EffectSpec::label).collect::<Vec<_>>(), estimate.noise.q, estimate.noise.r); }
+        let rose = best.as_ref().is_none_or(|b| here > b.evidence + RISE)
+            || anchor.as_ref().is_none_or(|a| hoped > a.hoped + RISE);
+        waited = if rose { 0 } else { waited + 1 };
+        if best.as_ref().is_none_or(|b| here > b.evidence) {
             best = Some(Fitted {
                 hypothesis: hypothesis.clone(),
                 theta: theta.clone(),
@@ -203,34 +214,43 @@ pub fn fit(
                 covariance,
                 estimate: estimate.clone(),
             });
-            part = 1.0;
         }
-        let stands = round > 0 && better && !rose && promised < RISE;
-        if still == STILL || stands || round + 1 == rounds {
+        let stands = round > 0 && !rose && promised < RISE;
+        if stands || failed == FAILURES || round + 1 == rounds {
             break;
         }
-        if better {
-            let steps: Vec<f64> = found
-                .coefficients
-                .iter()
-                .map(|c| c.clamp(-LARGEST_STEP, LARGEST_STEP))
-                .collect();
-            for (k, &i) in free.iter().enumerate() {
-                let [low, high] = unknowns[i].bounds;
-                theta[i] = (theta[i] + steps[k] * unknowns[i].deviation).clamp(low, high);
+        if waited > PATIENCE {
+            // The tangents led astray: less of the way.
+            let Some(Anchor { from, to, .. }) = &anchor else { break };
+            part *= SHORTER;
+            failed += 1;
+            waited = 0;
+            for (x, (a, b)) in theta.iter_mut().zip(from.0.iter().zip(&to.0)) {
+                *x = a + part * (b - a);
             }
-            shift(&mut linear, &steps);
-            estimate.improve(context, &linear, EM_ROUNDS);
-            ahead = Some((theta.clone(), estimate.clone()));
+            estimate = from.1.towards(context, &to.1, part);
             continue;
         }
-        // The tangent led astray: less of the way from the best point.
-        let (Some(best), Some((to, there))) = (&best, &ahead) else { break };
-        part *= SHORTER;
-        for (x, (a, b)) in theta.iter_mut().zip(best.theta.iter().zip(to)) {
-            *x = a + part * (b - a);
+        let from = rose.then(|| (theta.clone(), estimate.clone()));
+        let steps: Vec<f64> = found
+            .coefficients
+            .iter()
+            .map(|c| c.clamp(-LARGEST_STEP, LARGEST_STEP))
+            .collect();
+        for (k, &i) in free.iter().enumerate() {
+            let [low, high] = unknowns[i].bounds;
+            theta[i] = (theta[i] + steps[k] * unknowns[i].deviation).clamp(low, high);
         }
-        estimate = best.estimate.towards(context, there, part);
+        shift(&mut linear, &steps);
+        estimate.improve(context, &linear, EM_ROUNDS);
+        if let Some(from) = from {
+            part = 1.0;
+            anchor = Some(Anchor {
+                hoped,
+                from,
+                to: (theta.clone(), estimate.clone()),
+            });
+        }
     }
     best.ok_or_else(|| asid_core::Error::Failed("no round of the fit was finite".into()))
 }
