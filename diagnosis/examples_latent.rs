@@ -60,6 +60,20 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let shown = Trajectory::along(&*model, &plant, (&study.parameters, &none.theta), &logs, &none.estimate.trajectory, &rows)?;
     let (candidates, left) = enumerate(&machine, &shown, &[]);
     say!("{} candidates, {} left out", candidates.len(), left.len());
+    if std::env::var("PROBE").is_ok() {
+        use asid_diagnosis::latent_force::fit::{Hypothesis as H};
+        let c = candidates.iter().find(|c| c.label() == "sensor-delay@phi").unwrap();
+        let mut h: H = none.hypothesis.clone();
+        h.specs.push(c.spec.clone());
+        for (p, free) in c.unknowns() { h.unknowns.push(Unknown { parameter: p, center: 0.0, deviation: 0.03, bounds: [0.0, 0.5], free }); }
+        for tau in [0.0, 0.02, 0.04, 0.0565, 0.07] {
+            let mut theta = none.theta.clone(); theta.push(tau);
+            let mut est = none.estimate.clone();
+            for _ in 0..12 { settle_noise(&context, &h, &theta, &mut est, (1, 2))?; print!("{:.0} ", est.log_likelihood); }
+            println!(" tau {tau} q {:?} r {:?}", est.noise.q, est.noise.r);
+        }
+        return Ok(());
+    }
     struct P(Instant);
     impl asid_core::Progress for P { fn begin(&self, what: &str, n: u64) { eprintln!("[{:.1}] {what} {n}", self.0.elapsed().as_secs_f64()); } fn advance(&self, _: u64) {} fn end(&self) {} }
     let p = P(t0);

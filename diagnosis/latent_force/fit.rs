@@ -24,6 +24,9 @@ const LARGEST_STEP: f64 = 0.7;
 const SHORTER: f64 = 0.3;
 /// Rounds of EM between two linearisations.
 const EM_ROUNDS: usize = 4;
+/// Further smoothings between two steps of the values where readings remember: their slope in the past of the state is
+/// right to first order only.
+const AGAIN: usize = 2;
 /// Evidence that no longer counts as a rise.
 const RISE: f64 = 0.5;
 /// Rounds without a rise that are gone on with (a watchdog: Chamberlain and others 1982), for a narrow valley bends away
@@ -243,6 +246,10 @@ pub fn fit(
         }
         shift(&mut linear, &steps);
         estimate.improve(context, &linear, EM_ROUNDS);
+        for _ in 0..if map.reads() { AGAIN } else { 0 } {
+            let linear = map.linearise(&theta, &estimate.trajectory, want, &[], &[])?;
+            estimate.improve(context, &linear, 1);
+        }
         if let Some(from) = from {
             part = 1.0;
             anchor = Some(Anchor {

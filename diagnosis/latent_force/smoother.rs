@@ -225,7 +225,8 @@ struct Filter<'a> {
     covariance: Vec<f64>,
     transition: Vec<f64>,
     scratch: Vec<f64>,
-    log_likelihood: f64,
+    /// Of each entry: logarithm of the likelihood of its readings, and how many.
+    log_likelihood: Vec<[f64; 2]>,
 }
 
 impl<'a> Filter<'a> {
@@ -243,7 +244,7 @@ impl<'a> Filter<'a> {
             covariance: vec![0.0; nz * nz],
             transition: vec![0.0; nz * nz],
             scratch: vec![0.0; nz * nz],
-            log_likelihood: 0.0,
+            log_likelihood: vec![[0.0; 2]; ns],
         };
         filter.begin();
         filter.mean[..nx].copy_from_slice(&problem.start.mean);
@@ -260,6 +261,16 @@ impl<'a> Filter<'a> {
         for (j, q) in self.noise.q.iter().enumerate() {
             self.covariance[(self.nx + j) * (self.nz + 1)] = *q;
         }
+    }
+
+    /// Logarithm of the likelihood of all readings. One that tells of before the first row counts as the others of its entry
+    /// on average, so that a model in which a sensor is late is compared on as many readings as one in which it is not.
+    fn total(&self) -> f64 {
+        let early = |i: usize| self.problem.linear.early.get(i).copied().unwrap_or(0.0);
+        let entries = self.log_likelihood.iter().enumerate();
+        entries
+            .map(|(i, [sum, n])| sum * (1.0 + early(i) / n.max(1.0)))
+            .sum()
     }
 
     /// Slope of an entry of row `k` in the state.
@@ -283,7 +294,9 @@ impl<'a> Filter<'a> {
             .collect();
         let variance = dot(&gain[..nx], h) + self.noise.r[entry];
         let innovation = reading - dot(&self.mean[..nx], h);
-        self.log_likelihood -= 0.5 * (innovation * innovation / variance + variance.ln());
+        let own = &mut self.log_likelihood[entry];
+        own[0] -= 0.5 * (innovation * innovation / variance + variance.ln());
+        own[1] += 1.0;
         for (m, g) in self.mean.iter_mut().zip(&gain) {
             *m += g * innovation / variance;
         }
@@ -401,7 +414,7 @@ pub fn log_likelihood(problem: Problem<'_>, noise: &NoiseModel) -> f64 {
             filter.predict(k);
         }
     }
-    filter.log_likelihood
+    filter.total()
 }
 
 /// Smooths an episode.
@@ -435,7 +448,7 @@ fn backward(filter: &mut Filter<'_>, steps: &[Step]) -> Smoothed {
     let (nx, nv, nz, ns) = (filter.nx, filter.nv, filter.nz, filter.ns);
     let rows = steps.len();
     let mut out = Smoothed {
-        log_likelihood: filter.log_likelihood,
+        log_likelihood: filter.total(),
         change: vec![0.0; rows * nx],
         change_variance: vec![0.0; rows * nx],
         force: vec![0.0; rows * nv],
@@ -674,7 +687,7 @@ pub fn regress(problem: Problem<'_>, noise: &NoiseModel, m: usize) -> Regression
     let innovations = innovations.rows(0, filled);
     out.gram.gemm(1.0, &block, &block.transpose(), 1.0);
     out.moment.gemv(1.0, &block, &innovations, 1.0);
-    out.log_likelihood = filter.log_likelihood;
+    out.log_likelihood = filter.total();
     out
 }
 

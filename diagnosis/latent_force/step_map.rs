@@ -62,6 +62,8 @@ pub struct LinearEpisode {
     pub residual: Vec<f64>,
     /// Slope of `h` in the state, `rows x ns x nx`.
     pub h: Vec<f64>,
+    /// Readings of each entry that tell of before the first row, where a sensor is late; `ns`, or empty for none.
+    pub early: Vec<f64>,
     /// Change of `f` by each variation, `(rows - 1) x nx x m`.
     pub state_columns: Vec<f64>,
     /// Change of `h` by each variation, `rows x ns x m`.
@@ -93,6 +95,8 @@ enum Role {
     /// position by a ramp. A reading that remembers (a delay, a filter) sees the past of a speed as its position; what the
     /// ramp has reached now is taken off again.
     Reading(usize),
+    /// A speed is moved by a ramp, for how late a sensor of speeds is.
+    Ramp(usize),
     /// A generalized force acts.
     Force(usize),
     /// A variation of the parameters.
@@ -196,6 +200,12 @@ impl<'a> StepMap<'a> {
         Ok(Self { common, parts })
     }
 
+    /// Whether an effect acts on readings, which then may remember.
+    #[must_use]
+    pub fn reads(&self) -> bool {
+        self.common.reads
+    }
+
     /// Physics steps so far.
     #[must_use]
     pub fn steps(&self) -> u64 {
@@ -256,6 +266,80 @@ fn share_out(walks: &[Walk], cores: usize) -> Vec<Vec<usize>> {
     shares.filter(|s: &Vec<usize>| !s.is_empty()).collect()
 }
 
+/// How late each entry's reading in row `k` is, s: against the ramp of a position, or of a speed where it reads no position.
+fn lag(h: &[f64], ramp: &[f64], time: f64) -> f64 {
+    let (place, speed) = h.split_at(h.len() / 2);
+    let square = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>();
+    let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
+    let lag = if square(place) > 0.0 {
+        -product(place, speed) / square(place)
+    } else if square(speed) > 0.0 {
+        time - product(speed, ramp) / square(speed)
+    } else {
+        0.0
+    };
+    if lag.is_finite() { lag.max(0.0) } else { 0.0 }
+}
+
+/// Gives late readings to the rows that they tell of, so that their slopes are of the state there: a slope taken through a
+/// long delay is right for slow motion only, and a smoother that iterates on it diverges.
+fn retime(
+    episode: &mut LinearEpisode,
+    time: &[f64],
+    ramps: &[f64],
+    (ns, nx, m): (usize, usize, usize),
+) {
+    let rows = episode.rows;
+    let nv = nx / 2;
+    let mut early = vec![0.0; ns];
+    for s in 0..ns {
+        let mut lags: Vec<f64> = (1..rows)
+            .map(|k| {
+                let h = &episode.h[(k * ns + s) * nx..(k * ns + s + 1) * nx];
+                let ramp = &ramps[(k * ns + s) * nv..(k * ns + s + 1) * nv];
+                lag(h, ramp, time[k])
+            })
+            .collect();
+        let late = crate::noise::median(&mut lags).unwrap_or(0.0);
+        if rows < 2 || late < 0.5 * (time[1] - time[0]) {
+            continue;
+        }
+        let mut to = 0;
+        let mut taken = vec![false; rows];
+        // Forwards: a row is overwritten only after it was moved.
+        for k in 0..rows {
+            let told = time[k] - late;
+            if told < time[0] {
+                if episode.residual[k * ns + s].is_finite() {
+                    early[s] += 1.0;
+                }
+                continue;
+            }
+            while to + 1 < rows && (time[to + 1] - told).abs() <= (time[to] - told).abs() {
+                to += 1;
+            }
+            let shift = time[k] - time[to];
+            episode.residual[to * ns + s] = episode.residual[k * ns + s];
+            for i in 0..nx {
+                episode.h[(to * ns + s) * nx + i] = episode.h[(k * ns + s) * nx + i];
+            }
+            for i in 0..nv {
+                let place = episode.h[(to * ns + s) * nx + i];
+                episode.h[(to * ns + s) * nx + nv + i] += shift * place;
+            }
+            for i in 0..m {
+                episode.reading_columns[(to * ns + s) * m + i] =
+                    episode.reading_columns[(k * ns + s) * m + i];
+            }
+            taken[to] = true;
+        }
+        for k in (0..rows).filter(|&k| !taken[k]) {
+            episode.residual[k * ns + s] = f64::NAN;
+        }
+    }
+    episode.early = early;
+}
+
 impl Part {
     fn linearise(&mut self, c: &Common<'_>, request: Request<'_>) -> Result<Vec<LinearEpisode>> {
         let Request {
@@ -268,6 +352,7 @@ impl Part {
             roles.extend((0..nx).map(Role::State));
             if c.reads {
                 roles.extend((0..nx).map(Role::Reading));
+                roles.extend((0..nv).map(Role::Ramp));
             }
         }
         if want.force {
@@ -288,16 +373,27 @@ impl Part {
                     b: vec![0.0; usize::from(want.force) * steps * nx * nv],
                     residual: vec![f64::NAN; n * ns],
                     h: vec![0.0; state * n * ns * nx],
+                    early: Vec::new(),
                     state_columns: vec![0.0; steps * nx * m],
                     reading_columns: vec![0.0; n * ns * m],
                 }
             })
             .collect();
         if roles.is_empty() {
-            self.pass(c, request, &[], &mut episodes)?;
+            self.pass(c, request, &[], &mut episodes, &mut [])?;
         }
+        let late = usize::from(want.state && c.reads);
+        let mut ramps: Vec<Vec<f64>> = episodes
+            .iter()
+            .map(|e| vec![0.0; late * e.rows * ns * nv])
+            .collect();
         for chunk in roles.chunks(c.capacity - 1) {
-            self.pass(c, request, chunk, &mut episodes)?;
+            self.pass(c, request, chunk, &mut episodes, &mut ramps)?;
+        }
+        if late == 1 {
+            for ((episode, ramps), &w) in episodes.iter_mut().zip(&ramps).zip(&self.walks) {
+                retime(episode, &c.walks[w].time, ramps, (ns, nx, m));
+            }
         }
         Ok(episodes)
     }
@@ -309,6 +405,7 @@ impl Part {
         request: Request<'_>,
         extra: &[Role],
         out: &mut [LinearEpisode],
+        ramps: &mut [Vec<f64>],
     ) -> Result<()> {
         let roles: Vec<Role> = std::iter::once(Role::Nominal)
             .chain(extra.iter().copied())
@@ -332,7 +429,7 @@ impl Part {
         for k in 0..longest {
             let here: Vec<usize> = (0..n).filter(|&e| walks[e].len() > k).collect();
             self.place(c, &roles, (&here, k), request.trajectory, &mut row)?;
-            self.read_row(c, &roles, (&here, k), request.variations, out, &mut row)?;
+            self.read_row(c, &roles, (&here, k), request.variations, (out, ramps), &mut row)?;
             let mut ahead: Vec<usize> = here
                 .into_iter()
                 .filter(|&e| walks[e].len() > k + 1)
@@ -378,6 +475,11 @@ impl Part {
                 let width = nq + nv;
                 let states = &trajectory[self.walks[e]];
                 let mut state = states[k * width..(k + 1) * width].to_vec();
+                if let Role::Ramp(i) = *role {
+                    change[nv + i] = STATE_STEP * c.walks[self.walks[e]].time[k];
+                    retract(&c.layout, &mut state, &change);
+                    change.fill(0.0);
+                }
                 if let Role::State(i) | Role::Reading(i) = *role {
                     change[i] = STATE_STEP;
                     if let (Role::Reading(_), Some(place)) = (role, i.checked_sub(nv)) {
@@ -412,7 +514,7 @@ impl Part {
         roles: &[Role],
         (here, k): (&[usize], usize),
         variations: &[Variation],
-        out: &mut [LinearEpisode],
+        (out, ramps): (&mut [LinearEpisode], &mut [Vec<f64>]),
         row: &mut RowBuffers,
     ) -> Result<()> {
         let (ns, nx) = (c.logs.entries.len(), 2 * c.layout.nv);
@@ -445,6 +547,11 @@ impl Part {
                             let row = &mut out[e].h[(k * ns + s) * nx..(k * ns + s + 1) * nx];
                             let place = i.checked_sub(nx / 2).map_or(0.0, |place| row[place]);
                             row[i] = d / STATE_STEP - time * place;
+                        }
+                    }
+                    Role::Ramp(i) => {
+                        for (s, d) in differ.iter().enumerate() {
+                            ramps[e][(k * ns + s) * (nx / 2) + i] = d / STATE_STEP;
                         }
                     }
                     Role::Varied(i) => {
@@ -520,7 +627,7 @@ impl Part {
                     Role::State(i) => (&mut out[e].a, nx, i, STATE_STEP),
                     Role::Force(i) => (&mut out[e].b, nv, i, push[i]),
                     Role::Varied(i) => (&mut out[e].state_columns, m, i, variations[i].scale),
-                    Role::Nominal | Role::Reading(_) => continue,
+                    Role::Nominal | Role::Reading(_) | Role::Ramp(_) => continue,
                 };
                 for (s, d) in differ.iter().enumerate() {
                     let value = d / scale;
