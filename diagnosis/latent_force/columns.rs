@@ -6,18 +6,24 @@
 //! those that are missing, and for readings that are off by a part of their spread.
 
 use asid_core::{Parameter, Result};
-use asid_effects::{Acts, EffectSpec, Start};
-use nalgebra::{DMatrix, DVector};
+use asid_effects::{EffectSpec, Start};
+use asid_mjcf::Plant;
+use nalgebra::DMatrix;
 
 use crate::candidate::Candidate;
 
 use super::estimate::{Context, Estimate};
 use super::fit::Hypothesis;
-use super::step_map::{Derivatives, LinearEpisode, Variation};
+use super::step_map::{Derivatives, LinearEpisode, Variation, retime_columns};
+use super::trace::{is_traceable, trace};
 use super::unknown::Unknown;
 
 /// Share of a parameter's range over which its size is first felt for.
 const TRIAL: f64 = 1e-5;
+/// Inertial force of a degree of freedom that does not move, N or N m.
+const SILENT: f64 = 1e-8;
+/// Share of a deviation of the prior that slopes of the present model are taken over.
+const BASE_SHARE: f64 = 0.01;
 /// Share of a deviation of the prior that slopes are taken over: a plausible size, so that a law that saturates is seen
 /// as it acts.
 const SHARE: f64 = 0.2;
@@ -122,17 +128,14 @@ pub struct Columns {
     pub bounds: Vec<[f64; 2]>,
 }
 
-/// Solves for the generalized force that makes a change of speeds in row `k`.
-fn force_of(b: &[f64], nv: usize, k: usize, change: impl Fn(usize) -> f64) -> Option<DVector<f64>> {
-    let nx = 2 * nv;
-    let slopes = DMatrix::from_fn(nv, nv, |i, j| b[(k * nx + nv + i) * nv + j]);
-    slopes.lu().solve(&DVector::from_fn(nv, |i, _| change(i)))
-}
-
 /// A context of some short parts of the logs, evenly spread, with the trajectory there.
-fn parts<'c>(context: &'c Context<'_>, estimate: &Estimate) -> (Context<'c>, Vec<Vec<f64>>, Vec<Vec<f64>>) {
+fn parts<'c>(
+    context: &'c Context<'_>,
+    estimate: &Estimate,
+    slopes_of: &[(Vec<f64>, Vec<f64>)],
+) -> (Context<'c>, Vec<Vec<f64>>, Vec<(Vec<f64>, Vec<f64>)>) {
     let layout = &context.plant().layout;
-    let (nv, width) = (layout.nv, layout.nq + layout.nv);
+    let (nv, nu, width) = (layout.nv, layout.nu(), layout.nq + layout.nv);
     let rows: usize = context.walks.iter().map(|w| w.len()).sum();
     let every = (rows / PARTS).max(PART);
     let (mut walks, mut states, mut slopes) = (Vec::new(), Vec::new(), Vec::new());
@@ -141,8 +144,9 @@ fn parts<'c>(context: &'c Context<'_>, estimate: &Estimate) -> (Context<'c>, Vec
         while first + 2 <= walk.len() {
             let range = first..(first + PART).min(walk.len());
             states.push(estimate.trajectory[w][range.start * width..range.end * width].to_vec());
-            let b = range.start * 2 * nv * nv..(range.end - 1) * 2 * nv * nv;
-            slopes.push(estimate.b[w][b].to_vec());
+            let own = |x: &[f64], n: usize| x[range.start * n..(range.end - 1) * n].to_vec();
+            let (b, g) = &slopes_of[w];
+            slopes.push((own(b, 2 * nv * nv), own(g, 2 * nv * nu)));
             walks.push(walk.part(range));
             first += every;
         }
@@ -161,7 +165,8 @@ fn parts<'c>(context: &'c Context<'_>, estimate: &Estimate) -> (Context<'c>, Vec
     (context, states, slopes)
 }
 
-/// The present model with all candidates at their nulls: effects, parameters and values.
+/// The present model with all candidates that need the engine at their nulls: effects, parameters and values.
+#[derive(Clone)]
 struct All<'c> {
     specs: Vec<EffectSpec>,
     parameters: Vec<Parameter>,
@@ -172,7 +177,7 @@ struct All<'c> {
 }
 
 impl<'c> All<'c> {
-    fn new(base: &Hypothesis, theta: &[f64], candidates: &'c [Candidate]) -> Self {
+    fn new(plant: &Plant, base: &Hypothesis, theta: &[f64], candidates: &'c [Candidate]) -> Self {
         let mut all = Self {
             specs: base.specs.clone(),
             parameters: base.parameters(),
@@ -182,6 +187,9 @@ impl<'c> All<'c> {
         };
         for c in candidates {
             all.first.push(all.theta.len());
+            if is_traceable(plant, c) {
+                continue;
+            }
             all.specs.push(c.spec.clone());
             all.parameters.extend(c.unknowns().into_iter().map(|(p, _)| p));
             all.theta.extend(c.parameters().iter().map(|p| p.null));
@@ -196,87 +204,211 @@ impl<'c> All<'c> {
         theta[first..first + values.len()].copy_from_slice(values);
         theta
     }
+}
 
-    /// Values of a candidate with one parameter moved by `step`, towards the inside of its range.
-    fn moved(&self, candidate: usize, begin: &[f64], parameter: usize, step: f64) -> (Vec<f64>, f64) {
-        let [_, high] = self.candidates[candidate].ranges[parameter];
+/// A column that is wanted: a candidate with some values, and what its change is divided by.
+struct Wanted {
+    candidate: usize,
+    values: Vec<f64>,
+    scale: f64,
+}
+
+impl Wanted {
+    /// The slope of a candidate in a parameter about some values, over a step towards the inside of its range.
+    fn slope(candidates: &[Candidate], c: usize, begin: &[f64], parameter: usize, step: f64) -> Self {
+        let [_, high] = candidates[c].ranges[parameter];
         let mut values = begin.to_vec();
         let step = if values[parameter] + step <= high { step } else { -step };
         values[parameter] += step;
-        (self.with(candidate, &values), step)
+        Self {
+            candidate: c,
+            values,
+            scale: step,
+        }
     }
 }
 
-/// Deviations of priors from what a trial step of each parameter does: `(candidate, start, parameter)` to deviation;
-/// 0 where it does nothing.
+/// Columns of the present model with some candidates: those that need the engine from it, the others traced.
+struct Source<'s> {
+    all: All<'s>,
+    /// Slopes in forces and commands, one a walk.
+    slopes: &'s [(Vec<f64>, Vec<f64>)],
+    /// How late readings are in the present model.
+    late: &'s [Vec<f64>],
+}
+
+impl Source<'_> {
+    /// The columns wanted, `(rows - 1) x nx x m` and `rows x ns x m`, one pair a walk.
+    fn columns(
+        &self,
+        context: &Context<'_>,
+        states: &[Vec<f64>],
+        wanted: &[Wanted],
+    ) -> Result<Vec<(Vec<f64>, Vec<f64>)>> {
+        let plant = context.plant();
+        let (nv, nu, m) = (plant.layout.nv, plant.layout.nu(), wanted.len());
+        let (nx, ns) = (2 * nv, context.logs.entries.len());
+        let traced = |w: &Wanted| is_traceable(plant, &self.all.candidates[w.candidate]);
+        let by_engine: Vec<usize> = (0..m).filter(|&i| !traced(&wanted[i])).collect();
+        let variations: Vec<Variation> = by_engine
+            .iter()
+            .map(|&i| Variation {
+                theta: self.all.with(wanted[i].candidate, &wanted[i].values),
+                scale: wanted[i].scale,
+            })
+            .collect();
+        let mut out: Vec<(Vec<f64>, Vec<f64>)> = context
+            .walks
+            .iter()
+            .map(|w| {
+                let n = w.len();
+                (vec![0.0; (n - 1) * nx * m], vec![0.0; n * ns * m])
+            })
+            .collect();
+        if !variations.is_empty() {
+            let own = variations.len();
+            let mut map = context.map(&self.all.specs, &self.all.parameters, own + 1)?;
+            let found = map.linearise(
+                &self.all.theta,
+                states,
+                Derivatives::default(),
+                &[],
+                &variations,
+            )?;
+            for (w, mut linear) in found.into_iter().enumerate() {
+                if let Some(late) = self.late.get(w).filter(|l| !l.is_empty()) {
+                    let time = &context.walks[w].time;
+                    retime_columns(&mut linear.reading_columns, time, late, own);
+                }
+                let spread = |from: &[f64], to: &mut [f64]| {
+                    for (row, target) in from.chunks_exact(own).zip(to.chunks_exact_mut(m)) {
+                        row.iter().zip(&by_engine).for_each(|(x, &i)| target[i] = *x);
+                    }
+                };
+                spread(&linear.state_columns, &mut out[w].0);
+                spread(&linear.reading_columns, &mut out[w].1);
+            }
+        }
+        for (w, walk) in context.walks.iter().enumerate() {
+            let (b, g) = &self.slopes[w];
+            for (i, wanted) in wanted.iter().enumerate().filter(|(_, w)| traced(w)) {
+                let candidate = &self.all.candidates[wanted.candidate];
+                let found = trace(plant, candidate, &wanted.values, walk, &states[w])?;
+                for k in 0..walk.len() - 1 {
+                    let force = &found.force[k * nv..(k + 1) * nv];
+                    let command = &found.command[k * nu..(k + 1) * nu];
+                    if force.iter().chain(command).all(|x| *x == 0.0) {
+                        continue;
+                    }
+                    for s in 0..nx {
+                        let b = &b[(k * nx + s) * nv..(k * nx + s + 1) * nv];
+                        let g = &g[(k * nx + s) * nu..(k * nx + s + 1) * nu];
+                        let sum: f64 = b.iter().zip(force).map(|(x, y)| x * y).sum::<f64>()
+                            + g.iter().zip(command).map(|(x, y)| x * y).sum::<f64>();
+                        out[w].0[(k * nx + s) * m + i] = sum / wanted.scale;
+                    }
+                }
+            }
+        }
+        Ok(out)
+    }
+}
+
+/// Deviations of priors from what a trial step of each parameter does, for `(candidate, start, parameter)`; 0 where it does
+/// nothing.
 fn sizes(
     context: &Context<'_>,
     estimate: &Estimate,
-    all: &All<'_>,
+    source: &Source<'_>,
     trials: &[(usize, Vec<f64>, usize)],
 ) -> Result<Vec<f64>> {
     let nv = context.plant().layout.nv;
-    let ns = context.logs.entries.len();
-    let (short, states, slopes) = parts(context, estimate);
-    let mut steps = Vec::with_capacity(trials.len());
-    let variations: Vec<Variation> = trials
+    let (nx, ns) = (2 * nv, context.logs.entries.len());
+    let (short, states, slopes) = parts(context, estimate, source.slopes);
+    let candidates = source.all.candidates;
+    let wanted: Vec<Wanted> = trials
         .iter()
         .map(|(c, begin, p)| {
-            let [low, high] = all.candidates[*c].ranges[*p];
-            let (theta, step) = all.moved(*c, begin, *p, TRIAL * (high - low));
-            steps.push(step);
-            Variation { theta, scale: step }
+            let [low, high] = candidates[*c].ranges[*p];
+            Wanted::slope(candidates, *c, begin, *p, TRIAL * (high - low))
         })
         .collect();
-    let m = variations.len();
-    let mut map = short.map(&all.specs, &all.parameters, m + 1)?;
-    let linear = map.linearise(&all.theta, &states, Derivatives::default(), &[], &variations)?;
+    let m = wanted.len();
+    let source = Source {
+        all: source.all.clone(),
+        slopes: &slopes,
+        late: &[],
+    };
+    let columns = source.columns(&short, &states, &wanted)?;
+    // A joint that neither moves nor lacks a force says nothing of sizes.
     let missing: Vec<f64> = estimate
         .force_quantile(nv, QUANTILE)
         .iter()
         .zip(&context.inertial)
-        .map(|(w, inertial)| w.max(LEAST_MISSING * inertial))
+        .map(|(w, inertial)| {
+            if *inertial > SILENT {
+                w.max(LEAST_MISSING * inertial)
+            } else {
+                f64::INFINITY
+            }
+        })
         .collect();
     let spread = spreads(context);
-    let mut out = Vec::with_capacity(m);
-    for (i, (c, _, p)) in trials.iter().enumerate() {
-        let mut sums = vec![0.0; nv];
-        let mut readings = 0.0;
-        let (mut rows, mut count) = (0.0, 0.0);
-        for (episode, b) in linear.iter().zip(&slopes) {
-            for k in 0..episode.rows - 1 {
-                let at = |s: usize| episode.state_columns[(k * 2 * nv + s) * m + i];
-                if let Some(force) = force_of(b, nv, k, |d| at(nv + d)) {
-                    for (sum, f) in sums.iter_mut().zip(force.iter()) {
+    let mut sums = vec![vec![0.0; nv]; m];
+    let mut readings = vec![0.0; m];
+    let (mut rows, mut count) = (0.0, 0.0);
+    for ((walk, (states, read)), (b, _)) in short.walks.iter().zip(&columns).zip(&slopes) {
+        for k in 0..walk.len() - 1 {
+            let matrix = DMatrix::from_fn(nv, nv, |i, j| b[(k * nx + nv + i) * nv + j]);
+            let factor = matrix.lu();
+            let change = DMatrix::from_fn(nv, m, |d, i| states[(k * nx + nv + d) * m + i]);
+            if let Some(force) = factor.solve(&change) {
+                for (i, sums) in sums.iter_mut().enumerate() {
+                    for (sum, f) in sums.iter_mut().zip(force.column(i).iter()) {
                         *sum += f * f;
                     }
                 }
-                rows += 1.0;
             }
-            for k in 0..episode.rows {
-                for s in 0..ns {
-                    let change = episode.reading_columns[(k * ns + s) * m + i];
-                    readings += (change / spread[s]).powi(2);
-                    count += 1.0;
+            rows += 1.0;
+        }
+        for k in 0..walk.len() {
+            for (s, spread) in spread.iter().enumerate() {
+                for (i, sum) in readings.iter_mut().enumerate() {
+                    *sum += (read[(k * ns + s) * m + i] / spread).powi(2);
                 }
             }
+            count += 1.0;
         }
-        let active = sums.iter().filter(|s| **s > 0.0).count().max(1) as f64;
-        let ratio: f64 = sums
-            .iter()
-            .zip(&missing)
-            .map(|(s, f)| s / rows / (f * f))
-            .sum();
-        let by_force = (active / ratio).sqrt();
-        let by_reading = READING_SHARE * (count / ns as f64 / readings).sqrt();
-        let [low, high] = all.candidates[*c].ranges[*p];
-        let size = by_force.min(by_reading).min(0.5 * (high - low));
-        let acts = sums.iter().any(|s| *s > 0.0) || readings > 0.0;
-        let null = all.candidates[*c].effect.acts();
-        let _ = matches!(null, Acts::Measurement);
-        out.push(if acts && size.is_finite() { size } else { 0.0 });
     }
-    Ok(out)
+    Ok((0..m)
+        .map(|i| {
+            let acting = sums[i].iter().zip(&missing).filter(|(s, f)| **s > 0.0 && f.is_finite());
+            let active = acting.count().max(1) as f64;
+            let ratio: f64 = sums[i]
+                .iter()
+                .zip(&missing)
+                .map(|(s, f)| s / rows / (f * f))
+                .sum();
+            let by_force = (active / ratio).sqrt();
+            let by_reading = READING_SHARE * (count / readings[i]).sqrt();
+            let (c, _, p) = &trials[i];
+            let [low, high] = candidates[*c].ranges[*p];
+            let size = by_force.min(by_reading).min(0.5 * (high - low));
+            let acts = ratio > 0.0 || readings[i] > 0.0;
+            if acts && size.is_finite() { size } else { 0.0 }
+        })
+        .collect())
+}
+
+/// Two row-major matrices of `n` and `m` columns side by side.
+fn beside(a: &[f64], n: usize, b: &[f64], m: usize) -> Vec<f64> {
+    let rows = if n > 0 { a.len() / n } else { b.len() / m.max(1) };
+    let mut out = Vec::with_capacity(rows * (n + m));
+    for k in 0..rows {
+        out.extend_from_slice(&a[k * n..(k + 1) * n]);
+        out.extend_from_slice(&b[k * m..(k + 1) * m]);
+    }
+    out
 }
 
 /// Spread of the readings of each entry.
@@ -320,7 +452,46 @@ impl Columns {
         estimate: &Estimate,
         candidates: &[Candidate],
     ) -> Result<Self> {
-        let all = All::new(base, theta, candidates);
+        let plant = context.plant();
+        let all = All::new(plant, base, theta, candidates);
+        let free = base.free();
+        let (mut center, mut bounds) = (Vec::new(), Vec::new());
+        let variations: Vec<Variation> = free
+            .iter()
+            .map(|&i| {
+                let u = &base.unknowns[i];
+                let up = theta[i] + BASE_SHARE * u.deviation <= u.bounds[1];
+                let share = if up { BASE_SHARE } else { -BASE_SHARE };
+                let mut other = theta.to_vec();
+                other[i] += share * u.deviation;
+                center.push(-u.distance(theta[i]));
+                bounds.push(u.bounds.map(|b| (b - theta[i]) / u.deviation));
+                Variation {
+                    theta: other,
+                    scale: share,
+                }
+            })
+            .collect();
+        let nx = 2 * plant.layout.nv;
+        let roles = 3 * nx + plant.layout.nu() + free.len() + 1;
+        let mut map = context.map(&base.specs, &base.parameters(), roles)?;
+        let want = Derivatives {
+            state: true,
+            command: true,
+            ..Derivatives::default()
+        };
+        let mut linear = map.linearise(theta, &estimate.trajectory, want, &[], &variations)?;
+        let slopes: Vec<(Vec<f64>, Vec<f64>)> = linear
+            .iter_mut()
+            .zip(&estimate.b)
+            .map(|(l, b)| (b.clone(), std::mem::take(&mut l.g)))
+            .collect();
+        let late: Vec<Vec<f64>> = linear.iter().map(|l| l.late.clone()).collect();
+        let source = Source {
+            all,
+            slopes: &slopes,
+            late: &late,
+        };
         // Every start of a candidate, with the slopes at it.
         let mut trials = Vec::new();
         for (c, candidate) in candidates.iter().enumerate() {
@@ -328,31 +499,18 @@ impl Columns {
                 trials.extend(candidate.slopes().into_iter().map(|p| (c, begin.clone(), p)));
             }
         }
-        let sizes = sizes(context, estimate, &all, &trials)?;
-        let (mut variations, mut center, mut bounds) = (Vec::new(), Vec::new(), Vec::new());
-        let free = base.free();
-        for &i in &free {
-            let u = &base.unknowns[i];
-            let up = theta[i] + 0.01 * u.deviation <= u.bounds[1];
-            let share = if up { 0.01 } else { -0.01 };
-            let mut other = all.theta.clone();
-            other[i] += share * u.deviation;
-            variations.push(Variation {
-                theta: other,
-                scale: share,
-            });
-            center.push(-u.distance(theta[i]));
-            bounds.push(u.bounds.map(|b| (b - theta[i]) / u.deviation));
-        }
+        let sizes = sizes(context, estimate, &source, &trials)?;
+        let mut wanted = Vec::new();
         let mut forms = Vec::new();
         let mut next = 0;
         for (c, candidate) in candidates.iter().enumerate() {
             for begin in &candidate.starts {
-                let first = variations.len();
+                let first = free.len() + wanted.len();
                 let mut slopes = Vec::new();
                 if candidate.slopes().is_empty() {
-                    variations.push(Variation {
-                        theta: all.with(c, begin),
+                    wanted.push(Wanted {
+                        candidate: c,
+                        values: begin.clone(),
                         scale: 1.0,
                     });
                     center.push(0.0);
@@ -365,11 +523,9 @@ impl Columns {
                     if size <= 0.0 {
                         continue;
                     }
-                    let (theta, step) = all.moved(c, begin, p, SHARE * size);
-                    variations.push(Variation {
-                        theta,
-                        scale: step / size,
-                    });
+                    let mut slope = Wanted::slope(candidates, c, begin, p, SHARE * size);
+                    slope.scale /= size;
+                    wanted.push(slope);
                     let null = candidate.parameters()[p].null;
                     let [low, high] = candidate.ranges[p];
                     center.push(0.0);
@@ -389,16 +545,15 @@ impl Columns {
                 }
             }
         }
-        let nx = 2 * context.plant().layout.nv;
-        let mut map = context.map(&all.specs, &all.parameters, variations.len() + 2 * nx + 1)?;
-        let want = Derivatives {
-            state: true,
-            force: false,
-        };
-        let linear = map.linearise(&all.theta, &estimate.trajectory, want, &[], &variations)?;
+        let found = source.columns(context, &estimate.trajectory, &wanted)?;
+        let (base, more) = (free.len(), wanted.len());
+        for (linear, (state, reading)) in linear.iter_mut().zip(&found) {
+            linear.state_columns = beside(&linear.state_columns, base, state, more);
+            linear.reading_columns = beside(&linear.reading_columns, base, reading, more);
+        }
         Ok(Self {
             linear,
-            base: free.len(),
+            base,
             forms,
             center,
             bounds,

@@ -169,7 +169,7 @@ pub fn begin<'a>(
     let mut map = context.map(&[], parameters, nv + 1)?;
     let want = Derivatives {
         force: true,
-        state: false,
+        ..Derivatives::default()
     };
     let push = vec![FIRST_PUSH; nv];
     let linear = map.linearise(theta, &trajectory, want, &push, &[])?;

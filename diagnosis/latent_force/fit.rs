@@ -24,6 +24,10 @@ const LARGEST_STEP: f64 = 0.7;
 const SHORTER: f64 = 0.3;
 /// Rounds of EM between two linearisations.
 const EM_ROUNDS: usize = 4;
+/// Linearisations that slopes in the state are kept for, and how far a value may move meanwhile, in deviations of its
+/// prior.
+const KEPT: usize = 3;
+const KEPT_MOVE: f64 = 0.3;
 /// Further smoothings between two steps of the values where readings remember: their slope in the past of the state is
 /// right to first order only.
 const AGAIN: usize = 2;
@@ -149,11 +153,12 @@ pub fn fit(
     let mut map = context.map(&hypothesis.specs, &hypothesis.parameters(), 2 * nx + m + 1)?;
     let want = Derivatives {
         state: true,
-        force: false,
+        ..Derivatives::default()
     };
     let mut theta = theta.to_vec();
     let mut estimate = estimate.clone();
     let mut best: Option<Fitted> = None;
+    let mut slopes = Slopes::default();
     let mut anchor: Option<Anchor> = None;
     let mut part = 1.0;
     let (mut waited, mut failed) = (0, 0);
@@ -172,7 +177,13 @@ pub fn fit(
                 }
             })
             .collect();
-        let mut linear = map.linearise(&theta, &estimate.trajectory, want, &[], &variations)?;
+        let fresh = map.reads() || slopes.is_old(&theta, unknowns);
+        let wanted = Derivatives {
+            state: fresh,
+            ..want
+        };
+        let mut linear = map.linearise(&theta, &estimate.trajectory, wanted, &[], &variations)?;
+        slopes.exchange(&mut linear, fresh.then_some(&theta[..]));
         let places: Vec<usize> = (0..m).collect();
         let center: Vec<f64> = free
             .iter()
@@ -232,6 +243,7 @@ pub fn fit(
                 *x = a + part * (b - a);
             }
             estimate = from.1.towards(context, &to.1, part);
+            slopes.keep(&linear);
             continue;
         }
         let from = rose.then(|| (theta.clone(), estimate.clone()));
@@ -246,6 +258,7 @@ pub fn fit(
         }
         shift(&mut linear, &steps);
         estimate.improve(context, &linear, EM_ROUNDS);
+        slopes.keep(&linear);
         for _ in 0..if map.reads() { AGAIN } else { 0 } {
             let linear = map.linearise(&theta, &estimate.trajectory, want, &[], &[])?;
             estimate.improve(context, &linear, 1);
@@ -260,6 +273,49 @@ pub fn fit(
         }
     }
     best.ok_or_else(|| asid_core::Error::Failed("no round of the fit was finite".into()))
+}
+
+/// Slopes in the state that are kept while they hardly change: they cost most of a linearisation, and what is found does
+/// not depend on them, only how fast (a chord method).
+#[derive(Default)]
+struct Slopes {
+    a: Vec<Vec<f64>>,
+    h: Vec<Vec<f64>>,
+    /// The values that they were taken at.
+    theta: Vec<f64>,
+    /// Linearisations that have used them.
+    used: usize,
+}
+
+impl Slopes {
+    /// Whether they are due anew.
+    fn is_old(&self, theta: &[f64], unknowns: &[Unknown]) -> bool {
+        let moved = |((a, b), u): ((&f64, &f64), &Unknown)| (a - b).abs() / u.deviation;
+        let pairs = self.theta.iter().zip(theta).zip(unknowns);
+        let furthest = pairs.map(moved).fold(0.0, f64::max);
+        self.a.is_empty() || self.used >= KEPT || furthest > KEPT_MOVE
+    }
+
+    /// Takes fresh slopes over, or gives a linearisation the kept ones.
+    fn exchange(&mut self, linear: &mut [LinearEpisode], fresh: Option<&[f64]>) {
+        if let Some(theta) = fresh {
+            self.theta = theta.to_vec();
+            self.used = 0;
+            self.a.clear();
+            return;
+        }
+        self.used += 1;
+        for ((l, a), h) in linear.iter_mut().zip(&mut self.a).zip(&mut self.h) {
+            l.a = std::mem::take(a);
+            l.h = std::mem::take(h);
+        }
+    }
+
+    /// Keeps those of a linearisation.
+    fn keep(&mut self, linear: &[LinearEpisode]) {
+        self.a = linear.iter().map(|l| l.a.clone()).collect();
+        self.h = linear.iter().map(|l| l.h.clone()).collect();
+    }
 }
 
 /// Smooths the logs in a model for the first time: linearises and fits the noise until both stand.
@@ -277,11 +333,19 @@ pub fn settle_noise(
     let mut map = context.map(&hypothesis.specs, &hypothesis.parameters(), 2 * nx + 1)?;
     let want = Derivatives {
         state: true,
-        force: false,
+        ..Derivatives::default()
     };
+    let mut slopes = Slopes::default();
     for _ in 0..rounds {
-        let linear = map.linearise(theta, &estimate.trajectory, want, &[], &[])?;
+        let fresh = map.reads() || slopes.is_old(theta, &hypothesis.unknowns);
+        let wanted = Derivatives {
+            state: fresh,
+            ..want
+        };
+        let mut linear = map.linearise(theta, &estimate.trajectory, wanted, &[], &[])?;
+        slopes.exchange(&mut linear, fresh.then_some(theta));
         estimate.improve(context, &linear, em_rounds);
+        slopes.keep(&linear);
     }
     Ok(())
 }

@@ -6,7 +6,7 @@
 //!
 //! From below: [`tangent`] (states), [`walk`] (rows), [`step_map`] (the model over a row and its derivatives),
 //! [`smoother`], [`initial`] and [`estimate`] (trajectory, force and noise), [`unknown`] and [`fit`] (a model with its values),
-//! [`evidence`], [`columns`], [`screen`], [`search`], [`selection`], [`pipeline`].
+//! [`evidence`], [`trace`], [`columns`], [`screen`], [`search`], [`selection`], [`pipeline`].
 
 pub mod columns;
 pub mod estimate;
@@ -20,5 +20,6 @@ pub mod selection;
 pub mod smoother;
 pub mod step_map;
 pub mod tangent;
+pub mod trace;
 pub mod unknown;
 pub mod walk;

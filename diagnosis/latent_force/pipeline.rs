@@ -25,6 +25,9 @@ use super::walk::Walk;
 const FIRST: (usize, usize) = (4, 8);
 /// Most linearisations of the fit without effects.
 const ROUNDS: usize = 15;
+/// Physics steps of one walk along all logs, at most, and rows of a log that are walked in any case.
+const BUDGET: f64 = 20_000.0;
+const FEWEST: usize = 100;
 /// Most sets besides the verdict's that are replayed.
 const RIVALS: usize = 4;
 
@@ -67,9 +70,11 @@ pub fn diagnose(
     set_reading_noise(&mut bench, &study.noise);
     let layout = bench.layout().clone();
     let logs = bench.train.logs.clone();
-    let walks: Vec<Walk> = (0..logs.episodes.len())
-        .map(|e| Walk::new(&logs, e, layout.timestep))
-        .collect();
+    let walks = within_budget(
+        (0..logs.episodes.len())
+            .map(|e| Walk::new(&logs, e, layout.timestep))
+            .collect(),
+    );
     let given: Vec<Option<State>> = study
         .train
         .iter()
@@ -124,6 +129,20 @@ pub fn diagnose(
         judgement,
         nominal,
     }))
+}
+
+/// The first rows of each walk, as many as the budget of physics steps allows: a screening takes all of them once a column.
+fn within_budget(walks: Vec<Walk>) -> Vec<Walk> {
+    let steps: usize = walks.iter().flat_map(|w| &w.substeps).sum();
+    let share = BUDGET / steps.max(1) as f64;
+    if share >= 1.0 {
+        return walks;
+    }
+    let part = |w: &Walk| {
+        let rows = (share * w.len() as f64).round() as usize;
+        w.part(0..rows.max(FEWEST).min(w.len()))
+    };
+    walks.iter().map(part).collect()
 }
 
 /// Starts of the training episodes as a fit smoothed them, where the logs leave them open.

@@ -13,8 +13,9 @@ use super::screen::{Screened, rank, regressions};
 /// How widely to search.
 #[derive(Clone, Copy, Debug)]
 pub struct Breadth {
-    /// Share of the missing force's power below which a further effect must bring it: one that earns evidence and leaves the
-    /// force as it was mends the noise model and not the machine's.
+    /// Share of the power of all that is missing without effects that a further effect must make up for: one that earns
+    /// evidence and leaves the force as it was mends the noise model, and one that makes up for little is among the many
+    /// small things by which any machine differs from its model. 0.04 is a fifth of the force.
     pub shrinks: f64,
     /// Sets that are fitted a little after each screening.
     pub raced: usize,
@@ -39,7 +40,7 @@ pub struct Breadth {
 impl Default for Breadth {
     fn default() -> Self {
         Self {
-            shrinks: 0.9,
+            shrinks: 0.04,
             raced: 8,
             share: 0.1,
             least: 3.0,
@@ -128,17 +129,22 @@ pub fn search(
         fitted: none.clone(),
         names: 0,
     };
+    let at_first = none.estimate.missing_power(&context.inertial);
     let mut rounds = Vec::new();
     for _ in 0..breadth.depth {
+        let left = best.fitted.estimate.missing_power(&context.inertial);
+        if left < breadth.shrinks * at_first {
+            break;
+        }
         let open: Vec<usize> = (0..candidates.len())
-            .filter(|c| !best.candidates.contains(c))
+            .filter(|&c| !best.candidates.contains(&c) && is_due(candidates, &best, c))
             .collect();
         let round = one_round(context, &best, candidates, &open, breadth, progress)?;
         let next = round.confirmed.first().cloned();
         rounds.push(round);
         let Some(next) = next else { break };
         let power = |s: &Set| s.fitted.estimate.missing_power(&context.inertial);
-        let shrinks = power(&next) < breadth.shrinks * power(&best);
+        let shrinks = power(&best) - power(&next) > breadth.shrinks * at_first;
         if next.fitted.evidence - best.fitted.evidence < threshold || !shrinks {
             break;
         }
@@ -194,6 +200,38 @@ fn free_what_is_given(
     Ok(best)
 }
 
+/// The candidate that another one refines: the simpler law at the same site.
+fn refined_by(candidates: &[Candidate], finer: usize) -> Option<usize> {
+    let fine = &candidates[finer];
+    let simpler = fine.effect.refines();
+    candidates
+        .iter()
+        .position(|c| c.spec.site == fine.spec.site && simpler.contains(&&*c.spec.name))
+}
+
+/// Whether a candidate's turn has come: a refinement's once the simpler law is named.
+fn is_due(candidates: &[Candidate], set: &Set, candidate: usize) -> bool {
+    refined_by(candidates, candidate).is_none_or(|simpler| set.candidates.contains(&simpler))
+}
+
+/// A set without one of its candidates, its other values as they are.
+fn without(set: &Set, candidates: &[Candidate], out: usize) -> Set {
+    let mut set = set.clone();
+    let Some(place) = set.candidates.iter().position(|&c| c == out) else {
+        return set;
+    };
+    let lengths = |c: &[usize]| -> usize { c.iter().map(|&c| candidates[c].parameters().len()).sum() };
+    let fitted = &mut set.fitted;
+    let study = fitted.theta.len() - lengths(&set.candidates);
+    let first = study + lengths(&set.candidates[..place]);
+    let range = first..first + candidates[out].parameters().len();
+    fitted.theta.drain(range.clone());
+    fitted.hypothesis.unknowns.drain(range);
+    fitted.hypothesis.specs.remove(place);
+    set.candidates.remove(place);
+    set
+}
+
 /// Evidence that a further effect must earn: the best of `n` reaches about `ln n` by chance, and a factor of 20 upon it.
 fn threshold(n: usize) -> f64 {
     (20.0 * n.max(1) as f64).ln()
@@ -226,31 +264,51 @@ fn one_round(
     let least = (breadth.share * lead).max(breadth.least);
     for s in ranked.iter().take(breadth.raced).filter(|s| s.gain > least) {
         let (hypothesis, theta, added) = with(fitted, &columns, &some, s);
-        let short = fit(context, &hypothesis, &theta, &fitted.estimate, breadth.rounds[0])?;
-        racing.push((short, added));
+        let mut members = base.candidates.clone();
+        members.extend(added.iter().map(|&c| open[c]));
+        let mut set = Set {
+            candidates: members,
+            fitted: Fitted {
+                hypothesis,
+                theta,
+                ..fitted.clone()
+            },
+            names: base.names + 1,
+        };
+        for &c in &added {
+            if let Some(simpler) = refined_by(candidates, open[c]) {
+                set = without(&set, candidates, simpler);
+                set.names = base.names;
+            }
+        }
+        let start = &set.fitted;
+        set.fitted = fit(
+            context,
+            &start.hypothesis,
+            &start.theta,
+            &start.estimate,
+            breadth.rounds[0],
+        )?;
+        racing.push(set);
         progress.advance(1);
     }
-    let hoped = |f: &Fitted| f.evidence + f.promised;
-    racing.sort_by(|a, b| hoped(&b.0).total_cmp(&hoped(&a.0)));
-    if let Some(best) = racing.first().map(|(f, _)| hoped(f)) {
-        let gained = best - fitted.evidence;
-        racing.retain(|(f, _)| best - hoped(f) <= (breadth.behind * gained).max(breadth.near));
+    let hoped = |s: &Set| s.fitted.evidence + s.fitted.promised;
+    racing.sort_by(|a, b| hoped(b).total_cmp(&hoped(a)));
+    if let Some(best) = racing.first().map(hoped) {
+        let behind = (breadth.behind * (best - fitted.evidence)).max(breadth.near);
+        racing.retain(|s| best - hoped(s) <= behind);
     }
     let mut confirmed = Vec::new();
-    for (short, added) in racing.into_iter().take(breadth.finished) {
-        let fitted = fit(
+    for mut set in racing.into_iter().take(breadth.finished) {
+        let short = &set.fitted;
+        set.fitted = fit(
             context,
             &short.hypothesis,
             &short.theta,
             &short.estimate,
             breadth.rounds[1],
         )?;
-        let added = added.iter().map(|&c| open[c]);
-        confirmed.push(Set {
-            candidates: base.candidates.iter().copied().chain(added).collect(),
-            fitted,
-            names: base.names + 1,
-        });
+        confirmed.push(set);
     }
     progress.end();
     confirmed.sort_by(|a, b| b.fitted.evidence.total_cmp(&a.fitted.evidence));

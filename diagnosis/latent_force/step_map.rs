@@ -42,6 +42,8 @@ pub struct Variation {
 pub struct Derivatives {
     /// Slopes in the state.
     pub state: bool,
+    /// Slopes in the commands.
+    pub command: bool,
     /// Slopes in generalized forces, with the size of each force (N or N m) that differences are taken over.
     pub force: bool,
 }
@@ -58,12 +60,16 @@ pub struct LinearEpisode {
     pub a: Vec<f64>,
     /// Slope of `f` in a generalized force held over the row, `(rows - 1) x nx x nv`.
     pub b: Vec<f64>,
+    /// Slope of `f` in the commands, `(rows - 1) x nx x nu`.
+    pub g: Vec<f64>,
     /// `y_k - h(x_k)`, `rows x ns`; NaN where a reading is missing.
     pub residual: Vec<f64>,
     /// Slope of `h` in the state, `rows x ns x nx`.
     pub h: Vec<f64>,
     /// Readings of each entry that tell of before the first row, where a sensor is late; `ns`, or empty for none.
     pub early: Vec<f64>,
+    /// How late the readings of each entry are, s; `ns`, or empty for none.
+    pub late: Vec<f64>,
     /// Change of `f` by each variation, `(rows - 1) x nx x m`.
     pub state_columns: Vec<f64>,
     /// Change of `h` by each variation, `rows x ns x m`.
@@ -99,6 +105,8 @@ enum Role {
     Ramp(usize),
     /// A generalized force acts.
     Force(usize),
+    /// A command is moved.
+    Command(usize),
     /// A variation of the parameters.
     Varied(usize),
 }
@@ -291,7 +299,6 @@ fn retime(
 ) {
     let rows = episode.rows;
     let nv = nx / 2;
-    let mut early = vec![0.0; ns];
     for s in 0..ns {
         let mut lags: Vec<f64> = (1..rows)
             .map(|k| {
@@ -301,23 +308,22 @@ fn retime(
             })
             .collect();
         let late = crate::noise::median(&mut lags).unwrap_or(0.0);
-        if rows < 2 || late < 0.5 * (time[1] - time[0]) {
-            continue;
-        }
-        let mut to = 0;
+        let counts = rows > 1 && late >= 0.5 * (time[1] - time[0]);
+        episode.late.push(if counts { late } else { 0.0 });
+    }
+    let late = episode.late.clone();
+    episode.early = vec![0.0; ns];
+    for (s, &late) in late.iter().enumerate().filter(|(_, l)| **l > 0.0) {
+        let rows_told = told(time, late);
         let mut taken = vec![false; rows];
         // Forwards: a row is overwritten only after it was moved.
-        for k in 0..rows {
-            let told = time[k] - late;
-            if told < time[0] {
+        for (k, to) in rows_told.into_iter().enumerate() {
+            let Some(to) = to else {
                 if episode.residual[k * ns + s].is_finite() {
-                    early[s] += 1.0;
+                    episode.early[s] += 1.0;
                 }
                 continue;
-            }
-            while to + 1 < rows && (time[to + 1] - told).abs() <= (time[to] - told).abs() {
-                to += 1;
-            }
+            };
             let shift = time[k] - time[to];
             episode.residual[to * ns + s] = episode.residual[k * ns + s];
             for i in 0..nx {
@@ -327,17 +333,44 @@ fn retime(
                 let place = episode.h[(to * ns + s) * nx + i];
                 episode.h[(to * ns + s) * nx + nv + i] += shift * place;
             }
-            for i in 0..m {
-                episode.reading_columns[(to * ns + s) * m + i] =
-                    episode.reading_columns[(k * ns + s) * m + i];
-            }
             taken[to] = true;
         }
         for k in (0..rows).filter(|&k| !taken[k]) {
             episode.residual[k * ns + s] = f64::NAN;
         }
     }
-    episode.early = early;
+    retime_columns(&mut episode.reading_columns, time, &late, m);
+}
+
+/// For each row, the row that a reading taken then tells of where it is `late` (s); `None` before the first.
+fn told(time: &[f64], late: f64) -> Vec<Option<usize>> {
+    let mut to = 0;
+    time.iter()
+        .map(|t| {
+            let told = t - late;
+            if told < time[0] {
+                return None;
+            }
+            while to + 1 < time.len() && (time[to + 1] - told).abs() <= (time[to] - told).abs() {
+                to += 1;
+            }
+            Some(to)
+        })
+        .collect()
+}
+
+/// Gives columns of late readings (`rows x ns x m`) to the rows that they tell of.
+pub fn retime_columns(columns: &mut [f64], time: &[f64], late: &[f64], m: usize) {
+    let ns = late.len();
+    for (s, &late) in late.iter().enumerate().filter(|(_, l)| **l > 0.0) {
+        for (k, to) in told(time, late).into_iter().enumerate() {
+            if let Some(to) = to {
+                for i in 0..m {
+                    columns[(to * ns + s) * m + i] = columns[(k * ns + s) * m + i];
+                }
+            }
+        }
+    }
 }
 
 impl Part {
@@ -358,6 +391,9 @@ impl Part {
         if want.force {
             roles.extend((0..nv).map(Role::Force));
         }
+        if want.command {
+            roles.extend((0..c.layout.nu()).map(Role::Command));
+        }
         roles.extend((0..variations.len()).map(Role::Varied));
         let (ns, m) = (c.logs.entries.len(), variations.len());
         let mut episodes: Vec<LinearEpisode> = self
@@ -373,7 +409,9 @@ impl Part {
                     b: vec![0.0; usize::from(want.force) * steps * nx * nv],
                     residual: vec![f64::NAN; n * ns],
                     h: vec![0.0; state * n * ns * nx],
+                    g: vec![0.0; usize::from(want.command) * steps * nx * c.layout.nu()],
                     early: Vec::new(),
+                    late: Vec::new(),
                     state_columns: vec![0.0; steps * nx * m],
                     reading_columns: vec![0.0; n * ns * m],
                 }
@@ -459,7 +497,7 @@ impl Part {
         if c.remembers && k > 0 {
             let (mut from, mut to) = (Vec::new(), Vec::new());
             for (v, role) in roles.iter().enumerate() {
-                if matches!(role, Role::State(_) | Role::Force(_)) {
+                if matches!(role, Role::State(_) | Role::Force(_) | Role::Command(_)) {
                     from.extend(here);
                     to.extend(here.iter().map(|e| v * n + e));
                 }
@@ -593,6 +631,10 @@ impl Part {
                 row.sims.push(v * n + e);
                 let ctrl = &c.walks[self.walks[e]].ctrl[k * nu..(k + 1) * nu];
                 row.ctrl.extend_from_slice(ctrl);
+                if let Role::Command(i) = *role {
+                    let own = row.ctrl.len() - nu + i;
+                    row.ctrl[own] += STATE_STEP;
+                }
                 row.pushes.push(match *role {
                     Role::Force(d) => Some((d, push[d])),
                     _ => None,
@@ -626,6 +668,7 @@ impl Part {
                 let (matrix, columns, at, scale) = match *role {
                     Role::State(i) => (&mut out[e].a, nx, i, STATE_STEP),
                     Role::Force(i) => (&mut out[e].b, nv, i, push[i]),
+                    Role::Command(i) => (&mut out[e].g, nu, i, STATE_STEP),
                     Role::Varied(i) => (&mut out[e].state_columns, m, i, variations[i].scale),
                     Role::Nominal | Role::Reading(_) | Role::Ramp(_) => continue,
                 };

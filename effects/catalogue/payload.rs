@@ -43,10 +43,6 @@ impl Acting for PayloadAt {
 }
 
 impl Effect for Payload {
-    fn refines(&self) -> &'static [&'static str] {
-        &["center-of-mass"]
-    }
-
     fn mistaken_for(&self) -> &'static [Confusion] {
         &[Confusion {
             with: &["actuator-gain"],
