@@ -70,10 +70,11 @@ pub fn diagnose(
     settings: Settings,
     progress: &dyn Progress,
 ) -> Result<(Diagnosis, Work)> {
-    let machine = match latent_force::pipeline::diagnose(study, machine, &settings.without, progress)? {
-        Ok(found) => return tell(study, by_force(study, found)?, settings, progress),
-        Err(machine) => machine,
-    };
+    let machine =
+        match latent_force::pipeline::diagnose(study, machine, &settings.without, progress)? {
+            Ok(found) => return tell(study, by_force(study, found)?, settings, progress),
+            Err(machine) => machine,
+        };
     let streams = Streams::new(settings.seed);
     progress.begin("fitting the study's parameters", 1);
     let Prepared {

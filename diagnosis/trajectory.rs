@@ -138,7 +138,9 @@ impl Trajectory {
         for ((e, states), rows) in logs.episodes.iter().zip(states).zip(rows) {
             let mut contact = vec![0.0; rows.len() * pairs.len()];
             if !pairs.is_empty() {
-                let each = states.chunks_exact(width).zip(contact.chunks_exact_mut(pairs.len()));
+                let each = states
+                    .chunks_exact(width)
+                    .zip(contact.chunks_exact_mut(pairs.len()));
                 for (state, forces) in each {
                     simulator.reset(&[0])?;
                     simulator.set_state(&[0], &state[..nq], &state[nq..])?;
@@ -152,7 +154,9 @@ impl Trajectory {
                 let rows = states.chunks_exact(width);
                 rows.flat_map(|r| r[from..from + len].to_vec()).collect()
             };
-            let ctrl = rows.iter().flat_map(|&k| &e.episode.ctrl[k * nu..(k + 1) * nu]);
+            let ctrl = rows
+                .iter()
+                .flat_map(|&k| &e.episode.ctrl[k * nu..(k + 1) * nu]);
             episodes.push(Path {
                 qpos: part(0, nq),
                 qvel: part(nq, nv),

@@ -191,7 +191,8 @@ impl<'c> All<'c> {
                 continue;
             }
             all.specs.push(c.spec.clone());
-            all.parameters.extend(c.unknowns().into_iter().map(|(p, _)| p));
+            all.parameters
+                .extend(c.unknowns().into_iter().map(|(p, _)| p));
             all.theta.extend(c.parameters().iter().map(|p| p.null));
         }
         all
@@ -215,10 +216,20 @@ struct Wanted {
 
 impl Wanted {
     /// The slope of a candidate in a parameter about some values, over a step towards the inside of its range.
-    fn slope(candidates: &[Candidate], c: usize, begin: &[f64], parameter: usize, step: f64) -> Self {
+    fn slope(
+        candidates: &[Candidate],
+        c: usize,
+        begin: &[f64],
+        parameter: usize,
+        step: f64,
+    ) -> Self {
         let [_, high] = candidates[c].ranges[parameter];
         let mut values = begin.to_vec();
-        let step = if values[parameter] + step <= high { step } else { -step };
+        let step = if values[parameter] + step <= high {
+            step
+        } else {
+            -step
+        };
         values[parameter] += step;
         Self {
             candidate: c,
@@ -282,7 +293,9 @@ impl Source<'_> {
                 }
                 let spread = |from: &[f64], to: &mut [f64]| {
                     for (row, target) in from.chunks_exact(own).zip(to.chunks_exact_mut(m)) {
-                        row.iter().zip(&by_engine).for_each(|(x, &i)| target[i] = *x);
+                        row.iter()
+                            .zip(&by_engine)
+                            .for_each(|(x, &i)| target[i] = *x);
                     }
                 };
                 spread(&linear.state_columns, &mut out[w].0);
@@ -382,7 +395,10 @@ fn sizes(
     }
     Ok((0..m)
         .map(|i| {
-            let acting = sums[i].iter().zip(&missing).filter(|(s, f)| **s > 0.0 && f.is_finite());
+            let acting = sums[i]
+                .iter()
+                .zip(&missing)
+                .filter(|(s, f)| **s > 0.0 && f.is_finite());
             let active = acting.count().max(1) as f64;
             let ratio: f64 = sums[i]
                 .iter()
@@ -402,7 +418,11 @@ fn sizes(
 
 /// Two row-major matrices of `n` and `m` columns side by side.
 fn beside(a: &[f64], n: usize, b: &[f64], m: usize) -> Vec<f64> {
-    let rows = if n > 0 { a.len() / n } else { b.len() / m.max(1) };
+    let rows = if n > 0 {
+        a.len() / n
+    } else {
+        b.len() / m.max(1)
+    };
     let mut out = Vec::with_capacity(rows * (n + m));
     for k in 0..rows {
         out.extend_from_slice(&a[k * n..(k + 1) * n]);
@@ -434,7 +454,11 @@ fn spreads(context: &Context<'_>) -> Vec<f64> {
             let n = values.len().max(1) as f64;
             let mean = values.iter().sum::<f64>() / n;
             let variance = values.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / n;
-            out.push(if sensor.rotation { 1.0 } else { variance.sqrt().max(sensor.noise) });
+            out.push(if sensor.rotation {
+                1.0
+            } else {
+                variance.sqrt().max(sensor.noise)
+            });
         }
         at += len;
     }
@@ -496,7 +520,12 @@ impl Columns {
         let mut trials = Vec::new();
         for (c, candidate) in candidates.iter().enumerate() {
             for begin in &candidate.starts {
-                trials.extend(candidate.slopes().into_iter().map(|p| (c, begin.clone(), p)));
+                trials.extend(
+                    candidate
+                        .slopes()
+                        .into_iter()
+                        .map(|p| (c, begin.clone(), p)),
+                );
             }
         }
         let sizes = sizes(context, estimate, &source, &trials)?;

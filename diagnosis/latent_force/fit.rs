@@ -207,7 +207,9 @@ pub fn fit(
                 chosen = Some((here, scale, found));
             }
         }
-        let Some((here, scale, found)) = chosen else { break };
+        let Some((here, scale, found)) = chosen else {
+            break;
+        };
         estimate.noise = estimate.noise.scaled(scale, &estimate.least_white);
         let covariance = DMatrix::from_fn(m, m, |i, j| {
             let d = |k: usize| unknowns[free[k]].deviation;
@@ -215,7 +217,18 @@ pub fn fit(
         });
         let promised = found.gain - determinant_of(&found) + 0.5 * prior;
         let hoped = here + promised;
-        if std::env::var("DEBUGH").is_ok() { eprintln!("{:?} round {round} here {here:.1} promised {promised:.1} theta {theta:?} scale {scale} part {part} q {:?} r {:?}", hypothesis.specs.iter().map(EffectSpec::label).collect::<Vec<_>>(), estimate.noise.q, estimate.noise.r); }
+        if std::env::var("DEBUGH").is_ok() {
+            eprintln!(
+                "{:?} round {round} here {here:.1} promised {promised:.1} theta {theta:?} scale {scale} part {part} q {:?} r {:?}",
+                hypothesis
+                    .specs
+                    .iter()
+                    .map(EffectSpec::label)
+                    .collect::<Vec<_>>(),
+                estimate.noise.q,
+                estimate.noise.r
+            );
+        }
         let rose = best.as_ref().is_none_or(|b| here > b.evidence + RISE)
             || anchor.as_ref().is_none_or(|a| hoped > a.hoped + RISE);
         waited = if rose { 0 } else { waited + 1 };
@@ -235,7 +248,9 @@ pub fn fit(
         }
         if waited > PATIENCE {
             // The tangents led astray: less of the way.
-            let Some(Anchor { from, to, .. }) = &anchor else { break };
+            let Some(Anchor { from, to, .. }) = &anchor else {
+                break;
+            };
             part *= SHORTER;
             failed += 1;
             waited = 0;

@@ -47,9 +47,21 @@ pub struct Diagnosed {
     pub nominal: Vec<f64>,
 }
 
-/// Whether the method is for a machine: one that touches nothing while it moves.
-fn is_for(plant: &asid_mjcf::Plant) -> bool {
-    plant.contacts.is_empty()
+/// Share of the rows in which something touches from which on contact lasts: a smoother takes a contact's normal force for
+/// noise, and is for machines that touch things now and then.
+const LASTING: f64 = 0.1;
+
+/// Share of the rows in which something touches.
+fn touching(shown: &Trajectory) -> f64 {
+    let pairs = shown.pairs.len().max(1);
+    let rows = || {
+        shown
+            .episodes
+            .iter()
+            .flat_map(|e| e.contact.chunks_exact(pairs))
+    };
+    let touching = rows().filter(|r| r.iter().any(|f| *f > 0.0)).count();
+    touching as f64 / rows().count().max(1) as f64
 }
 
 /// Diagnoses a study; gives the machine back where it is one for another method.
@@ -62,9 +74,6 @@ pub fn diagnose(
     without: &[String],
     progress: &dyn Progress,
 ) -> Result<std::result::Result<Diagnosed, Machine>> {
-    if !is_for(&machine.plant) {
-        return Ok(Err(machine));
-    }
     progress.begin("smoothing the logs", 1);
     let (mut bench, nominal) = dataset(study, machine)?;
     set_reading_noise(&mut bench, &study.noise);
@@ -78,7 +87,11 @@ pub fn diagnose(
     let given: Vec<Option<State>> = study
         .train
         .iter()
-        .map(|(_, e)| e.initial.as_ref().map(|_| given_start(&bench.machine.plant, e)))
+        .map(|(_, e)| {
+            e.initial
+                .as_ref()
+                .map(|_| given_start(&bench.machine.plant, e))
+        })
         .collect();
     let home = asid_core::problem::home(&layout);
     let still = [&home.0[..], &home.1[..]].concat();
@@ -88,7 +101,7 @@ pub fn diagnose(
         specs: Vec::new(),
         unknowns: unknowns.map(|(p, n)| Unknown::of_study(p, *n)).collect(),
     };
-    let (outcome, candidates, left_out) = {
+    let searched = {
         let (context, mut estimate) = begin(
             &bench.machine,
             &logs,
@@ -97,25 +110,35 @@ pub fn diagnose(
             (&study.parameters, &nominal),
             &otherwise,
         )?;
-        settle_noise(&context, &hypothesis, &nominal, &mut estimate, FIRST)?;
-        let first = fit(&context, &hypothesis, &nominal, &estimate, ROUNDS)?;
-        let mut estimate = first.estimate;
-        estimate.free_at_rest(&context);
-        estimate.set_resolution(layout.nv);
-        let none = fit(&context, &hypothesis, &first.theta, &estimate, ROUNDS)?;
-        progress.end();
+        let model = bench.machine.with(&[])?;
         let rows: Vec<&[usize]> = context.walks.iter().map(|w| &w.rows[..]).collect();
-        let shown = Trajectory::along(
-            &*bench.machine.with(&[])?,
-            &bench.machine.plant,
-            (&study.parameters, &none.theta),
-            &logs,
-            &none.estimate.trajectory,
-            &rows,
-        )?;
-        let (candidates, left_out) = enumerate(&bench.machine, &shown, without);
-        let outcome = search(&context, &none, &candidates, Breadth::default(), progress)?;
-        (outcome, candidates, left_out)
+        let along = |theta: &[f64], states: &[Vec<f64>]| {
+            let values = (&study.parameters[..], theta);
+            Trajectory::along(&*model, &bench.machine.plant, values, &logs, states, &rows)
+        };
+        let touches = !bench.machine.plant.contacts.is_empty();
+        if touches && touching(&along(&nominal, &estimate.trajectory)?) > LASTING {
+            None
+        } else {
+            settle_noise(&context, &hypothesis, &nominal, &mut estimate, FIRST)?;
+            let first = fit(&context, &hypothesis, &nominal, &estimate, ROUNDS)?;
+            let mut estimate = first.estimate;
+            estimate.free_at_rest(&context);
+            if touches {
+                estimate.free_at_impacts(&context);
+            }
+            estimate.set_resolution(layout.nv);
+            let none = fit(&context, &hypothesis, &first.theta, &estimate, ROUNDS)?;
+            progress.end();
+            let shown = along(&none.theta, &none.estimate.trajectory)?;
+            let (candidates, left_out) = enumerate(&bench.machine, &shown, without);
+            let outcome = search(&context, &none, &candidates, Breadth::default(), progress)?;
+            Some((outcome, candidates, left_out))
+        }
+    };
+    let Some((outcome, candidates, left_out)) = searched else {
+        progress.end();
+        return Ok(Err(bench.machine));
     };
     progress.begin("replaying", 1);
     let (findings, sets) = replay(&mut bench, &candidates, &outcome)?;

@@ -220,7 +220,8 @@ fn without(set: &Set, candidates: &[Candidate], out: usize) -> Set {
     let Some(place) = set.candidates.iter().position(|&c| c == out) else {
         return set;
     };
-    let lengths = |c: &[usize]| -> usize { c.iter().map(|&c| candidates[c].parameters().len()).sum() };
+    let lengths =
+        |c: &[usize]| -> usize { c.iter().map(|&c| candidates[c].parameters().len()).sum() };
     let fitted = &mut set.fitted;
     let study = fitted.theta.len() - lengths(&set.candidates);
     let first = study + lengths(&set.candidates[..place]);
@@ -255,7 +256,10 @@ fn one_round(
     let ranked = rank(&sums, &columns, &some);
     progress.end();
     let label = |s: &Screened| -> Vec<usize> {
-        s.forms.iter().map(|&f| open[columns.forms[f].candidate]).collect()
+        s.forms
+            .iter()
+            .map(|&f| open[columns.forms[f].candidate])
+            .collect()
     };
     let screened: Vec<(Vec<usize>, f64)> = ranked.iter().map(|s| (label(s), s.gain)).collect();
     progress.begin("confirming", breadth.raced.min(ranked.len()) as u64);

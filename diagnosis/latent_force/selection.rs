@@ -19,6 +19,8 @@ const SHARPNESS: f64 = 0.35;
 /// the logistic about it.
 const GAP: f64 = 2.0;
 const GAP_SCALE: f64 = 0.3;
+/// Open-loop gap of the model without effects, in deviations of the noise, up to which there is nothing to explain.
+const CLOSED: f64 = 1.1;
 /// Root mean square of the missing force, relative to the inertial forces, up to which nothing is missing.
 const NOTHING: f64 = 0.01;
 
@@ -33,7 +35,8 @@ pub fn select(
 ) -> Judgement {
     let none = outcome.none.evidence;
     let price = (candidates.len().max(1) as f64).ln();
-    let score = |evidence: f64, names: usize| (evidence - none) / TEMPERATURE - price * names as f64;
+    let score =
+        |evidence: f64, names: usize| (evidence - none) / TEMPERATURE - price * names as f64;
     let mut all = vec![Judged {
         found: None,
         labels: Vec::new(),
@@ -43,7 +46,11 @@ pub fn select(
     }];
     let mut scores = vec![0.0];
     for (i, set) in sets.iter().enumerate() {
-        let mut labels: Vec<String> = set.candidates.iter().map(|&c| candidates[c].label()).collect();
+        let mut labels: Vec<String> = set
+            .candidates
+            .iter()
+            .map(|&c| candidates[c].label())
+            .collect();
         labels.sort();
         all.push(Judged {
             found: Some(i),
@@ -59,7 +66,14 @@ pub fn select(
         .iter()
         .position(|s| s.candidates == *chosen)
         .unwrap_or(usize::MAX - 1);
-    let best = if best < all.len() { best } else { 0 };
+    let readings = bench.held_readings().max(1.0);
+    let gap = (findings.none.held_plain / readings).sqrt();
+    let train = (findings.none.fit.cost / bench.train.readings.max(1) as f64).sqrt();
+    let best = if best < all.len() && gap.max(train) > CLOSED {
+        best
+    } else {
+        0
+    };
     // What parsimony passes over is not more probable than what it picks.
     for i in 0..all.len() {
         let odds = scores[i] - scores[best];
@@ -72,12 +86,14 @@ pub fn select(
     let after = outcome.best.fitted.estimate.missing_power(inertial);
     let rest = (after / before.max(f64::MIN_POSITIVE)).min(1.0);
     let sigmoid = |x: f64| 1.0 / (1.0 + (-x).exp());
-    let readings = bench.held_readings().max(1.0);
-    let gap = (findings.none.held_plain / readings).sqrt();
     let unknown = if best == 0 {
         let missing = before.sqrt() > NOTHING;
         let seen = sigmoid((gap - GAP) / GAP_SCALE);
-        if missing { seen.clamp(0.02, 0.999) } else { 0.02 }
+        if missing {
+            seen.clamp(0.02, 0.999)
+        } else {
+            0.02
+        }
     } else {
         sigmoid((rest / UNEXPLAINED).ln() / SHARPNESS).clamp(0.001, 0.999)
     };

@@ -467,7 +467,14 @@ impl Part {
         for k in 0..longest {
             let here: Vec<usize> = (0..n).filter(|&e| walks[e].len() > k).collect();
             self.place(c, &roles, (&here, k), request.trajectory, &mut row)?;
-            self.read_row(c, &roles, (&here, k), request.variations, (out, ramps), &mut row)?;
+            self.read_row(
+                c,
+                &roles,
+                (&here, k),
+                request.variations,
+                (out, ramps),
+                &mut row,
+            )?;
             let mut ahead: Vec<usize> = here
                 .into_iter()
                 .filter(|&e| walks[e].len() > k + 1)

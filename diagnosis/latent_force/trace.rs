@@ -26,8 +26,7 @@ pub struct Traced {
 #[must_use]
 pub fn is_traceable(plant: &Plant, candidate: &Candidate) -> bool {
     let effect = &candidate.effect;
-    matches!(effect.acts(), Acts::Command | Acts::Force)
-        && effect.targets(plant, &candidate.spec.site).is_empty()
+    matches!(effect.acts(), Acts::Force) && effect.targets(plant, &candidate.spec.site).is_empty()
 }
 
 /// Drives a candidate with some values along a walk's states (`rows x (nq + nv)`).
@@ -75,7 +74,10 @@ pub fn trace(
             });
             time += layout.timestep;
             let forces = &mut out.force[k * nv..(k + 1) * nv];
-            forces.iter_mut().zip(&force).for_each(|(o, f)| *o += share * f);
+            forces
+                .iter_mut()
+                .zip(&force)
+                .for_each(|(o, f)| *o += share * f);
             let commands = &mut out.command[k * nu..(k + 1) * nu];
             for (o, (c, u)) in commands.iter_mut().zip(ctrl.iter().zip(logged)) {
                 *o += share * (c - u);
