@@ -19,7 +19,7 @@ pub const SCALES: [f64; 6] = [1.0, 0.3, 0.1, 0.03, 0.01, 0.003];
 /// Share of a prior's deviation that a slope is taken over.
 const SLOPE_STEP: f64 = 0.01;
 /// Largest step of a value, in deviations of its prior: a tangent reaches no further.
-const LARGEST_STEP: f64 = 0.7;
+const LARGEST_STEP: f64 = 1.0;
 /// Part of a step that is tried where the whole made things worse.
 const SHORTER: f64 = 0.3;
 /// Rounds of EM between two linearisations.

@@ -10,6 +10,9 @@ use super::evidence::evidence;
 use super::fit::{SCALES, regression};
 use super::smoother::Regression;
 
+/// Evidence by which a group must beat the best of its members.
+const GROUP: f64 = 3.0;
+
 /// Candidates that may be missing together, with the evidence for them upon the present model.
 #[derive(Clone, Debug)]
 pub struct Screened {
@@ -101,8 +104,18 @@ pub fn rank(sums: &[Regression], columns: &Columns, candidates: &[Candidate]) ->
             .filter(|(c, _)| candidates[*c].spec.name == name)
             .filter_map(|(_, s)| s.map(|s| s.forms[0]))
             .collect();
-        if members.len() > 1 {
-            all.push(try_forms(&members));
+        if members.len() < 2 {
+            continue;
+        }
+        // A group that is one of its members with idle ones is not tried apart.
+        let alone = singles
+            .iter()
+            .filter(|s| members.contains(&s.forms[0]))
+            .map(|s| s.gain)
+            .fold(f64::NEG_INFINITY, f64::max);
+        let group = try_forms(&members);
+        if group.gain > alone + GROUP {
+            all.push(group);
         }
     }
     all.retain(|s| s.gain.is_finite());

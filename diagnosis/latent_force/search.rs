@@ -24,8 +24,8 @@ pub struct Breadth {
     /// Evidence in screening below which nothing is raced, natural logarithm: the best of a hundred candidates reaches 3 to
     /// 5 by chance.
     pub least: f64,
-    /// Share of the leader's gain up to which a set may lie behind it after the short fits, and the evidence up to which it
-    /// may in any case.
+    /// Share of the gain that the best has reached up to which a set may lie behind it after the short fits, and the evidence
+    /// up to which it may in any case.
     pub behind: f64,
     /// See `behind`.
     pub near: f64,
@@ -48,10 +48,13 @@ impl Default for Breadth {
             near: 20.0,
             finished: 3,
             depth: 4,
-            rounds: [2, 15],
+            rounds: [3, 15],
         }
     }
 }
+
+/// Prior odds against an effect at a site where it comes to mind only after others.
+const UNUSUAL: f64 = 10.0;
 
 /// A set of effects, fitted.
 #[derive(Clone, Debug)]
@@ -140,6 +143,21 @@ pub fn search(
             .filter(|&c| !best.candidates.contains(&c) && is_due(candidates, &best, c))
             .collect();
         let round = one_round(context, &best, candidates, &open, breadth, progress)?;
+        if std::env::var("LATENT").is_ok() {
+            let label = |c: &[usize]| c.iter().map(|&c| candidates[c].label()).collect::<Vec<_>>().join("+");
+            for (c, g) in round.screened.iter().take(8) {
+                eprintln!("   screened {} {g:.1}", label(c));
+            }
+            for s in &round.confirmed {
+                eprintln!(
+                    "confirmed {} {:.1} power {:.4} theta {:?}",
+                    label(&s.candidates),
+                    s.fitted.evidence - none.evidence,
+                    s.fitted.estimate.missing_power(&context.inertial) / at_first,
+                    s.fitted.theta
+                );
+            }
+        }
         let next = round.confirmed.first().cloned();
         rounds.push(round);
         let Some(next) = next else { break };
@@ -296,12 +314,13 @@ fn one_round(
         racing.push(set);
         progress.advance(1);
     }
+    // What a set promises counts for it, but only what one has reached counts against the others.
     let hoped = |s: &Set| s.fitted.evidence + s.fitted.promised;
     racing.sort_by(|a, b| hoped(b).total_cmp(&hoped(a)));
-    if let Some(best) = racing.first().map(hoped) {
-        let behind = (breadth.behind * (best - fitted.evidence)).max(breadth.near);
-        racing.retain(|s| best - hoped(s) <= behind);
-    }
+    let reached = racing.iter().map(|s| s.fitted.evidence);
+    let best = reached.fold(fitted.evidence, f64::max);
+    let behind = (breadth.behind * (best - fitted.evidence)).max(breadth.near);
+    racing.retain(|s| best - hoped(s) <= behind);
     let mut confirmed = Vec::new();
     for mut set in racing.into_iter().take(breadth.finished) {
         let short = &set.fitted;
@@ -315,7 +334,16 @@ fn one_round(
         confirmed.push(set);
     }
     progress.end();
-    confirmed.sort_by(|a, b| b.fitted.evidence.total_cmp(&a.fitted.evidence));
+    let plant = context.plant();
+    let unusual = |c: &usize| {
+        let c = &candidates[*c];
+        c.effect.unusual_at(plant, &c.spec.site)
+    };
+    let worth = |s: &Set| {
+        let count = s.candidates.iter().filter(|c| unusual(c)).count();
+        s.fitted.evidence - UNUSUAL.ln() * count as f64
+    };
+    confirmed.sort_by(|a, b| worth(b).total_cmp(&worth(a)));
     Ok(Round {
         base: base.candidates.clone(),
         screened,

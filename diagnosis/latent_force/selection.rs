@@ -11,8 +11,8 @@ use super::search::{Outcome, Set};
 const TEMPERATURE: f64 = 1.5;
 /// Difference of evidence up to which two sets cannot be told apart: odds of 20 after the temperature.
 const APART: f64 = 4.5;
-/// Midpoint and scale of the logistic in the logarithm of the share of the missing force's power that no named effect
-/// makes up for.
+/// Midpoint and scale of the logistic in the logarithm of the share of the missing force's power, or of the gap's, that no
+/// named effect makes up for.
 const UNEXPLAINED: f64 = 0.5;
 const SHARPNESS: f64 = 0.35;
 /// Open-loop gap, in deviations of the noise, at which a missing force without a name counts as a gap, and the scale of
@@ -84,7 +84,11 @@ pub fn select(
     let inertial = &outcome.inertial;
     let before = outcome.none.estimate.missing_power(inertial);
     let after = outcome.best.fitted.estimate.missing_power(inertial);
-    let rest = (after / before.max(f64::MIN_POSITIVE)).min(1.0);
+    let named = all[best].found.map(|i| &findings.found[i].explanation);
+    let excess = |cost: f64| (cost / bench.train.readings.max(1) as f64 - 1.0).max(0.0);
+    let open_loop = named.map_or(1.0, |e| excess(e.fit.cost) / excess(findings.none.fit.cost));
+    // What is named may make up for most of the gap and leave much of what is missing from row to row, or the other way round.
+    let rest = (after / before.max(f64::MIN_POSITIVE)).min(open_loop).clamp(0.0, 1.0);
     let sigmoid = |x: f64| 1.0 / (1.0 + (-x).exp());
     let unknown = if best == 0 {
         let missing = before.sqrt() > NOTHING;
