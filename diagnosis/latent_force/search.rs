@@ -251,6 +251,56 @@ fn without(set: &Set, candidates: &[Candidate], out: usize) -> Set {
     set
 }
 
+/// Deviations from null up to which a value counts as nothing, and the evidence that a set may lose when it is left out.
+const IDLE: f64 = 2.0;
+const IDLE_LOSS: f64 = 1.0;
+
+/// A set without the members that do nothing in it: those of a group that are as the model has them, and those that a later
+/// effect has taken the place of.
+fn pruned(
+    context: &Context<'_>,
+    candidates: &[Candidate],
+    set: Set,
+    breadth: Breadth,
+) -> Result<Set> {
+    let fitted = &set.fitted;
+    let free = fitted.hypothesis.free();
+    let parameters = |c: usize| candidates[c].parameters().len();
+    let mut at = fitted.theta.len() - set.candidates.iter().map(|&c| parameters(c)).sum::<usize>();
+    let mut idle = Vec::new();
+    for &c in &set.candidates {
+        let range = at..at + parameters(c);
+        at = range.end;
+        let strength = |i: usize| {
+            let p = &candidates[c].parameters()[i - range.start];
+            let k = free.iter().position(|&f| f == i)?;
+            let deviation = fitted.covariance[(k, k)].max(0.0).sqrt();
+            (p.start == Start::Slope).then(|| (fitted.theta[i] - p.null).abs() / deviation)
+        };
+        let strengths: Vec<f64> = range.clone().filter_map(strength).collect();
+        if !strengths.is_empty() && strengths.iter().all(|s| *s < IDLE) {
+            idle.push(c);
+        }
+    }
+    if idle.is_empty() || idle.len() == set.candidates.len() {
+        return Ok(set);
+    }
+    let mut smaller = set.clone();
+    for c in idle {
+        smaller = without(&smaller, candidates, c);
+    }
+    let start = &smaller.fitted;
+    smaller.fitted = fit(
+        context,
+        &start.hypothesis,
+        &start.theta,
+        &start.estimate,
+        breadth.rounds[1],
+    )?;
+    let kept = smaller.fitted.evidence > set.fitted.evidence - IDLE_LOSS;
+    Ok(if kept { smaller } else { set })
+}
+
 /// Evidence that a further effect must earn: the best of `n` reaches about `ln n` by chance, and a factor of 20 upon it.
 fn threshold(n: usize) -> f64 {
     (20.0 * n.max(1) as f64).ln()
@@ -314,6 +364,12 @@ fn one_round(
         racing.push(set);
         progress.advance(1);
     }
+    if std::env::var("LATENT").is_ok() {
+        for s in &racing {
+            let l = s.candidates.iter().map(|&c| candidates[c].label()).collect::<Vec<_>>().join("+");
+            eprintln!("   raced {l} {:.1} promised {:.1} {:?}", s.fitted.evidence - fitted.evidence, s.fitted.promised, s.fitted.theta);
+        }
+    }
     // What a set promises counts for it, but only what one has reached counts against the others.
     let hoped = |s: &Set| s.fitted.evidence + s.fitted.promised;
     racing.sort_by(|a, b| hoped(b).total_cmp(&hoped(a)));
@@ -331,7 +387,7 @@ fn one_round(
             &short.estimate,
             breadth.rounds[1],
         )?;
-        confirmed.push(set);
+        confirmed.push(pruned(context, candidates, set, breadth)?);
     }
     progress.end();
     let plant = context.plant();
