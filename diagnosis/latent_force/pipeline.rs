@@ -25,9 +25,10 @@ use super::walk::Walk;
 const FIRST: (usize, usize) = (4, 8);
 /// Most linearisations of the fit without effects.
 const ROUNDS: usize = 15;
-/// Physics steps of one walk along all logs, at most, and rows of a log that are walked in any case.
-const BUDGET: f64 = 20_000.0;
-const FEWEST: usize = 100;
+/// Physics steps of one walk along all logs times degrees of freedom, at most, and rows of a log that are walked in any
+/// case: a walk is taken once a coordinate and once a candidate, and both grow with the degrees of freedom.
+const BUDGET: f64 = 72_000.0;
+const FEWEST: usize = 150;
 /// Most sets besides the verdict's that are replayed.
 const RIVALS: usize = 4;
 
@@ -83,6 +84,7 @@ pub fn diagnose(
         (0..logs.episodes.len())
             .map(|e| Walk::new(&logs, e, layout.timestep))
             .collect(),
+        layout.nv,
     );
     let given: Vec<Option<State>> = study
         .train
@@ -155,9 +157,9 @@ pub fn diagnose(
 }
 
 /// The first rows of each walk, as many as the budget of physics steps allows: a screening takes all of them once a column.
-fn within_budget(walks: Vec<Walk>) -> Vec<Walk> {
+fn within_budget(walks: Vec<Walk>, nv: usize) -> Vec<Walk> {
     let steps: usize = walks.iter().flat_map(|w| &w.substeps).sum();
-    let share = BUDGET / steps.max(1) as f64;
+    let share = BUDGET / (steps.max(1) * nv.max(1)) as f64;
     if share >= 1.0 {
         return walks;
     }

@@ -144,7 +144,12 @@ pub fn search(
             .collect();
         let round = one_round(context, &best, candidates, &open, breadth, progress)?;
         if std::env::var("LATENT").is_ok() {
-            let label = |c: &[usize]| c.iter().map(|&c| candidates[c].label()).collect::<Vec<_>>().join("+");
+            let label = |c: &[usize]| {
+                c.iter()
+                    .map(|&c| candidates[c].label())
+                    .collect::<Vec<_>>()
+                    .join("+")
+            };
             for (c, g) in round.screened.iter().take(8) {
                 eprintln!("   screened {} {g:.1}", label(c));
             }
@@ -366,8 +371,18 @@ fn one_round(
     }
     if std::env::var("LATENT").is_ok() {
         for s in &racing {
-            let l = s.candidates.iter().map(|&c| candidates[c].label()).collect::<Vec<_>>().join("+");
-            eprintln!("   raced {l} {:.1} promised {:.1} {:?}", s.fitted.evidence - fitted.evidence, s.fitted.promised, s.fitted.theta);
+            let l = s
+                .candidates
+                .iter()
+                .map(|&c| candidates[c].label())
+                .collect::<Vec<_>>()
+                .join("+");
+            eprintln!(
+                "   raced {l} {:.1} promised {:.1} {:?}",
+                s.fitted.evidence - fitted.evidence,
+                s.fitted.promised,
+                s.fitted.theta
+            );
         }
     }
     // What a set promises counts for it, but only what one has reached counts against the others.

@@ -88,7 +88,9 @@ pub fn select(
     let excess = |cost: f64| (cost / bench.train.readings.max(1) as f64 - 1.0).max(0.0);
     let open_loop = named.map_or(1.0, |e| excess(e.fit.cost) / excess(findings.none.fit.cost));
     // What is named may make up for most of the gap and leave much of what is missing from row to row, or the other way round.
-    let rest = (after / before.max(f64::MIN_POSITIVE)).min(open_loop).clamp(0.0, 1.0);
+    let rest = (after / before.max(f64::MIN_POSITIVE))
+        .min(open_loop)
+        .clamp(0.0, 1.0);
     let sigmoid = |x: f64| 1.0 / (1.0 + (-x).exp());
     let unknown = if best == 0 {
         let missing = before.sqrt() > NOTHING;
