@@ -2,6 +2,9 @@
 //! how far it shrinks once that effect is added.
 //!
 //! - [`study`] is what the user brings: a model, logs of the real machine, what is fitted already.
+//! - [`latent_force`] asks which force is missing at each moment, and which effects make up for it: for machines that
+//!   touch things now and then at most.
+//! - [`search`] asks whether whole replays land on the logs: for machines in lasting contact.
 //! - [`predict`] replays the logs in a model, for many parameter values at once; [`fit`]
 //!   is least squares over such replays.
 
@@ -31,7 +34,7 @@ pub mod score;
 pub mod screen;
 pub mod search;
 pub mod sentence;
-pub mod starts;
+mod starts;
 pub mod study;
 mod telling;
 pub mod trajectory;

@@ -149,7 +149,7 @@ fn open_places(kind: JointKind, places: &[f64]) -> Vec<usize> {
 }
 
 /// Coordinates of the starts (`nv` positions, then `nv` velocities) that some log leaves open.
-pub fn open_coordinates(layout: &Layout, study: &Study) -> Vec<usize> {
+pub(crate) fn open_coordinates(layout: &Layout, study: &Study) -> Vec<usize> {
     let nv = layout.nv;
     let mut open = vec![false; 2 * nv];
     for (_, episode) in study.train.iter().chain(&study.test) {

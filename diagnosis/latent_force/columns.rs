@@ -132,10 +132,10 @@ pub struct Columns {
 fn parts<'c>(
     context: &'c Context<'_>,
     estimate: &Estimate,
-    slopes_of: &[(Vec<f64>, Vec<f64>)],
-) -> (Context<'c>, Vec<Vec<f64>>, Vec<(Vec<f64>, Vec<f64>)>) {
+    slopes_of: &[Vec<f64>],
+) -> (Context<'c>, Vec<Vec<f64>>, Vec<Vec<f64>>) {
     let layout = &context.plant().layout;
-    let (nv, nu, width) = (layout.nv, layout.nu(), layout.nq + layout.nv);
+    let (nv, width) = (layout.nv, layout.nq + layout.nv);
     let rows: usize = context.walks.iter().map(|w| w.len()).sum();
     let every = (rows / PARTS).max(PART);
     let (mut walks, mut states, mut slopes) = (Vec::new(), Vec::new(), Vec::new());
@@ -144,9 +144,8 @@ fn parts<'c>(
         while first + 2 <= walk.len() {
             let range = first..(first + PART).min(walk.len());
             states.push(estimate.trajectory[w][range.start * width..range.end * width].to_vec());
-            let own = |x: &[f64], n: usize| x[range.start * n..(range.end - 1) * n].to_vec();
-            let (b, g) = &slopes_of[w];
-            slopes.push((own(b, 2 * nv * nv), own(g, 2 * nv * nu)));
+            let own = range.start * 2 * nv * nv..(range.end - 1) * 2 * nv * nv;
+            slopes.push(slopes_of[w][own].to_vec());
             walks.push(walk.part(range));
             first += every;
         }
@@ -242,8 +241,8 @@ impl Wanted {
 /// Columns of the present model with some candidates: those that need the engine from it, the others traced.
 struct Source<'s> {
     all: All<'s>,
-    /// Slopes in forces and commands, one a walk.
-    slopes: &'s [(Vec<f64>, Vec<f64>)],
+    /// Slopes in forces, one a walk.
+    slopes: &'s [Vec<f64>],
     /// How late readings are in the present model.
     late: &'s [Vec<f64>],
 }
@@ -257,7 +256,7 @@ impl Source<'_> {
         wanted: &[Wanted],
     ) -> Result<Vec<(Vec<f64>, Vec<f64>)>> {
         let plant = context.plant();
-        let (nv, nu, m) = (plant.layout.nv, plant.layout.nu(), wanted.len());
+        let (nv, m) = (plant.layout.nv, wanted.len());
         let (nx, ns) = (2 * nv, context.logs.entries.len());
         let traced = |w: &Wanted| is_traceable(plant, &self.all.candidates[w.candidate]);
         let by_engine: Vec<usize> = (0..m).filter(|&i| !traced(&wanted[i])).collect();
@@ -303,21 +302,17 @@ impl Source<'_> {
             }
         }
         for (w, walk) in context.walks.iter().enumerate() {
-            let (b, g) = &self.slopes[w];
+            let b = &self.slopes[w];
             for (i, wanted) in wanted.iter().enumerate().filter(|(_, w)| traced(w)) {
                 let candidate = &self.all.candidates[wanted.candidate];
-                let found = trace(plant, candidate, &wanted.values, walk, &states[w])?;
-                for k in 0..walk.len() - 1 {
-                    let force = &found.force[k * nv..(k + 1) * nv];
-                    let command = &found.command[k * nu..(k + 1) * nu];
-                    if force.iter().chain(command).all(|x| *x == 0.0) {
+                let forces = trace(plant, candidate, &wanted.values, walk, &states[w])?;
+                for (k, force) in forces.chunks_exact(nv).enumerate() {
+                    if force.iter().all(|x| *x == 0.0) {
                         continue;
                     }
                     for s in 0..nx {
                         let b = &b[(k * nx + s) * nv..(k * nx + s + 1) * nv];
-                        let g = &g[(k * nx + s) * nu..(k * nx + s + 1) * nu];
-                        let sum: f64 = b.iter().zip(force).map(|(x, y)| x * y).sum::<f64>()
-                            + g.iter().zip(command).map(|(x, y)| x * y).sum::<f64>();
+                        let sum: f64 = b.iter().zip(force).map(|(x, y)| x * y).sum();
                         out[w].0[(k * nx + s) * m + i] = sum / wanted.scale;
                     }
                 }
@@ -370,7 +365,7 @@ fn sizes(
     let mut sums = vec![vec![0.0; nv]; m];
     let mut readings = vec![0.0; m];
     let (mut rows, mut count) = (0.0, 0.0);
-    for ((walk, (states, read)), (b, _)) in short.walks.iter().zip(&columns).zip(&slopes) {
+    for ((walk, (states, read)), b) in short.walks.iter().zip(&columns).zip(&slopes) {
         for k in 0..walk.len() - 1 {
             let matrix = DMatrix::from_fn(nv, nv, |i, j| b[(k * nx + nv + i) * nv + j]);
             let factor = matrix.lu();
@@ -418,11 +413,7 @@ fn sizes(
 
 /// Two row-major matrices of `n` and `m` columns side by side.
 fn beside(a: &[f64], n: usize, b: &[f64], m: usize) -> Vec<f64> {
-    let rows = if n > 0 {
-        a.len() / n
-    } else {
-        b.len() / m.max(1)
-    };
+    let rows = a.len().checked_div(n).unwrap_or(b.len() / m.max(1));
     let mut out = Vec::with_capacity(rows * (n + m));
     for k in 0..rows {
         out.extend_from_slice(&a[k * n..(k + 1) * n]);
@@ -497,23 +488,17 @@ impl Columns {
             })
             .collect();
         let nx = 2 * plant.layout.nv;
-        let roles = 3 * nx + plant.layout.nu() + free.len() + 1;
+        let roles = 3 * nx + free.len() + 1;
         let mut map = context.map(&base.specs, &base.parameters(), roles)?;
         let want = Derivatives {
             state: true,
-            command: true,
             ..Derivatives::default()
         };
         let mut linear = map.linearise(theta, &estimate.trajectory, want, &[], &variations)?;
-        let slopes: Vec<(Vec<f64>, Vec<f64>)> = linear
-            .iter_mut()
-            .zip(&estimate.b)
-            .map(|(l, b)| (b.clone(), std::mem::take(&mut l.g)))
-            .collect();
         let late: Vec<Vec<f64>> = linear.iter().map(|l| l.late.clone()).collect();
         let source = Source {
             all,
-            slopes: &slopes,
+            slopes: &estimate.b,
             late: &late,
         };
         // Every start of a candidate, with the slopes at it.

@@ -182,7 +182,6 @@ pub fn begin<'a>(
     let mut sums = vec![(0.0, 0.0); nv];
     for ((walk, states), b) in context.walks.iter().zip(&trajectory).zip(&b) {
         for k in 0..walk.len() - 1 {
-            let dt = walk.time[k + 1] - walk.time[k];
             for (d, sum) in sums.iter_mut().enumerate() {
                 let gained = b[(k * 2 * nv + nv + d) * nv + d];
                 let speed = |k: usize| states[k * width + layout.nq + d];
@@ -190,7 +189,6 @@ pub fn begin<'a>(
                     sum.0 += ((speed(k + 1) - speed(k)) / gained).abs();
                     sum.1 += 1.0;
                 }
-                let _ = dt;
             }
         }
     }
@@ -256,8 +254,8 @@ impl Estimate {
                 .collect();
             let mut sums = Sums::default();
             smoothed.iter().for_each(|s| sums.add(&s.sums));
-            let likelihood = smoothed.iter().map(|s| s.log_likelihood).sum();
-            if !(likelihood >= before.0) {
+            let likelihood: f64 = smoothed.iter().map(|s| s.log_likelihood).sum();
+            if likelihood.is_nan() || likelihood < before.0 {
                 // A lengthened step went too far.
                 self.noise = before.1.clone();
                 length = 1.0;

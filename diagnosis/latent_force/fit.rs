@@ -217,18 +217,6 @@ pub fn fit(
         });
         let promised = found.gain - determinant_of(&found) + 0.5 * prior;
         let hoped = here + promised;
-        if std::env::var("DEBUGH").is_ok() {
-            eprintln!(
-                "{:?} round {round} here {here:.1} promised {promised:.1} theta {theta:?} scale {scale} part {part} q {:?} r {:?}",
-                hypothesis
-                    .specs
-                    .iter()
-                    .map(EffectSpec::label)
-                    .collect::<Vec<_>>(),
-                estimate.noise.q,
-                estimate.noise.r
-            );
-        }
         let rose = best.as_ref().is_none_or(|b| here > b.evidence + RISE)
             || anchor.as_ref().is_none_or(|a| hoped > a.hoped + RISE);
         waited = if rose { 0 } else { waited + 1 };

@@ -143,26 +143,6 @@ pub fn search(
             .filter(|&c| !best.candidates.contains(&c) && is_due(candidates, &best, c))
             .collect();
         let round = one_round(context, &best, candidates, &open, breadth, progress)?;
-        if std::env::var("LATENT").is_ok() {
-            let label = |c: &[usize]| {
-                c.iter()
-                    .map(|&c| candidates[c].label())
-                    .collect::<Vec<_>>()
-                    .join("+")
-            };
-            for (c, g) in round.screened.iter().take(8) {
-                eprintln!("   screened {} {g:.1}", label(c));
-            }
-            for s in &round.confirmed {
-                eprintln!(
-                    "confirmed {} {:.1} power {:.4} theta {:?}",
-                    label(&s.candidates),
-                    s.fitted.evidence - none.evidence,
-                    s.fitted.estimate.missing_power(&context.inertial) / at_first,
-                    s.fitted.theta
-                );
-            }
-        }
         let next = round.confirmed.first().cloned();
         rounds.push(round);
         let Some(next) = next else { break };
@@ -368,22 +348,6 @@ fn one_round(
         )?;
         racing.push(set);
         progress.advance(1);
-    }
-    if std::env::var("LATENT").is_ok() {
-        for s in &racing {
-            let l = s
-                .candidates
-                .iter()
-                .map(|&c| candidates[c].label())
-                .collect::<Vec<_>>()
-                .join("+");
-            eprintln!(
-                "   raced {l} {:.1} promised {:.1} {:?}",
-                s.fitted.evidence - fitted.evidence,
-                s.fitted.promised,
-                s.fitted.theta
-            );
-        }
     }
     // What a set promises counts for it, but only what one has reached counts against the others.
     let hoped = |s: &Set| s.fitted.evidence + s.fitted.promised;

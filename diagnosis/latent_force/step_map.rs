@@ -42,8 +42,6 @@ pub struct Variation {
 pub struct Derivatives {
     /// Slopes in the state.
     pub state: bool,
-    /// Slopes in the commands.
-    pub command: bool,
     /// Slopes in generalized forces, with the size of each force (N or N m) that differences are taken over.
     pub force: bool,
 }
@@ -60,8 +58,6 @@ pub struct LinearEpisode {
     pub a: Vec<f64>,
     /// Slope of `f` in a generalized force held over the row, `(rows - 1) x nx x nv`.
     pub b: Vec<f64>,
-    /// Slope of `f` in the commands, `(rows - 1) x nx x nu`.
-    pub g: Vec<f64>,
     /// `y_k - h(x_k)`, `rows x ns`; NaN where a reading is missing.
     pub residual: Vec<f64>,
     /// Slope of `h` in the state, `rows x ns x nx`.
@@ -105,8 +101,6 @@ enum Role {
     Ramp(usize),
     /// A generalized force acts.
     Force(usize),
-    /// A command is moved.
-    Command(usize),
     /// A variation of the parameters.
     Varied(usize),
 }
@@ -391,9 +385,6 @@ impl Part {
         if want.force {
             roles.extend((0..nv).map(Role::Force));
         }
-        if want.command {
-            roles.extend((0..c.layout.nu()).map(Role::Command));
-        }
         roles.extend((0..variations.len()).map(Role::Varied));
         let (ns, m) = (c.logs.entries.len(), variations.len());
         let mut episodes: Vec<LinearEpisode> = self
@@ -409,7 +400,6 @@ impl Part {
                     b: vec![0.0; usize::from(want.force) * steps * nx * nv],
                     residual: vec![f64::NAN; n * ns],
                     h: vec![0.0; state * n * ns * nx],
-                    g: vec![0.0; usize::from(want.command) * steps * nx * c.layout.nu()],
                     early: Vec::new(),
                     late: Vec::new(),
                     state_columns: vec![0.0; steps * nx * m],
@@ -504,7 +494,7 @@ impl Part {
         if c.remembers && k > 0 {
             let (mut from, mut to) = (Vec::new(), Vec::new());
             for (v, role) in roles.iter().enumerate() {
-                if matches!(role, Role::State(_) | Role::Force(_) | Role::Command(_)) {
+                if matches!(role, Role::State(_) | Role::Force(_)) {
                     from.extend(here);
                     to.extend(here.iter().map(|e| v * n + e));
                 }
@@ -638,10 +628,6 @@ impl Part {
                 row.sims.push(v * n + e);
                 let ctrl = &c.walks[self.walks[e]].ctrl[k * nu..(k + 1) * nu];
                 row.ctrl.extend_from_slice(ctrl);
-                if let Role::Command(i) = *role {
-                    let own = row.ctrl.len() - nu + i;
-                    row.ctrl[own] += STATE_STEP;
-                }
                 row.pushes.push(match *role {
                     Role::Force(d) => Some((d, push[d])),
                     _ => None,
@@ -675,7 +661,6 @@ impl Part {
                 let (matrix, columns, at, scale) = match *role {
                     Role::State(i) => (&mut out[e].a, nx, i, STATE_STEP),
                     Role::Force(i) => (&mut out[e].b, nv, i, push[i]),
-                    Role::Command(i) => (&mut out[e].g, nu, i, STATE_STEP),
                     Role::Varied(i) => (&mut out[e].state_columns, m, i, variations[i].scale),
                     Role::Nominal | Role::Reading(_) | Role::Ramp(_) => continue,
                 };

@@ -1,8 +1,8 @@
-//! Effects that need no engine to become columns: what they add to forces and commands along a trajectory.
+//! Effects that need no engine to become columns: forces along a trajectory.
 //!
-//! An effect on the command path, or one that only adds forces, is driven along the smoothed states and the logged
-//! commands, physics step by physics step, so that what it remembers is right; its column follows by the slopes of the model in forces and
-//! commands.
+//! An effect that only adds forces is driven along the smoothed states and the logged commands, physics step by physics step,
+//! so that what it remembers is right; its column follows by the slopes of the model in forces. (Commands are no such case:
+//! a drive at its limit has no slope.)
 
 use asid_core::Result;
 use asid_core::simulator::StepView;
@@ -13,23 +13,15 @@ use crate::candidate::Candidate;
 
 use super::walk::Walk;
 
-/// What an effect adds in each row of one walk.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Traced {
-    /// Generalized forces, mean over the row, `(rows - 1) x nv`.
-    pub force: Vec<f64>,
-    /// Changes of the commands, mean over the row, `(rows - 1) x nu`.
-    pub command: Vec<f64>,
-}
-
-/// Whether a candidate acts through forces and commands alone.
+/// Whether a candidate acts through forces alone.
 #[must_use]
 pub fn is_traceable(plant: &Plant, candidate: &Candidate) -> bool {
     let effect = &candidate.effect;
     matches!(effect.acts(), Acts::Force) && effect.targets(plant, &candidate.spec.site).is_empty()
 }
 
-/// Drives a candidate with some values along a walk's states (`rows x (nq + nv)`).
+/// Generalized forces that a candidate with some values adds along a walk's states (`rows x (nq + nv)`), mean over each row,
+/// `(rows - 1) x nv`.
 ///
 /// # Errors
 /// When a value makes no sense.
@@ -39,7 +31,7 @@ pub fn trace(
     values: &[f64],
     walk: &Walk,
     states: &[f64],
-) -> Result<Traced> {
+) -> Result<Vec<f64>> {
     let layout = &plant.layout;
     let (nq, nv, nu) = (layout.nq, layout.nv, layout.nu());
     let mut acting = candidate.effect.attach(&Site {
@@ -50,10 +42,7 @@ pub fn trace(
     })?;
     acting.restart();
     let steps = walk.len() - 1;
-    let mut out = Traced {
-        force: vec![0.0; steps * nv],
-        command: vec![0.0; steps * nu],
-    };
+    let mut out = vec![0.0; steps * nv];
     let mut ctrl = vec![0.0; nu];
     let mut force = vec![0.0; nv];
     let mut time = 0.0;
@@ -73,14 +62,9 @@ pub fn trace(
                 parameters: &mut [],
             });
             time += layout.timestep;
-            let forces = &mut out.force[k * nv..(k + 1) * nv];
-            forces
-                .iter_mut()
-                .zip(&force)
-                .for_each(|(o, f)| *o += share * f);
-            let commands = &mut out.command[k * nu..(k + 1) * nu];
-            for (o, (c, u)) in commands.iter_mut().zip(ctrl.iter().zip(logged)) {
-                *o += share * (c - u);
+            let forces = &mut out[k * nv..(k + 1) * nv];
+            for (o, f) in forces.iter_mut().zip(&force) {
+                *o += share * f;
             }
         }
     }

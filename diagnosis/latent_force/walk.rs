@@ -137,10 +137,23 @@ mod tests {
     }
 
     #[test]
-    fn the_command_of_a_row_that_is_passed_over_holds_until_the_next() {
-        // The third row falls on the step of the second, and its command is the one that acts from there on.
+    fn the_command_between_two_rows_is_the_mean_of_those_sent() {
+        // The third row falls on the step of the second: command 1 for 2.6 ms, then 2 for 16.6 ms.
         let walk = Walk::new(&logs(&[5.0, 5.0104, 5.013, 5.0296, 5.05]), 0, STEP);
-        assert_eq!(walk.ctrl, [0.0, 2.0, 3.0]);
+        let mean = (2.6 + 2.0 * 16.6) / 19.2;
+        for (got, want) in walk.ctrl.iter().zip([0.0, mean, 3.0]) {
+            assert!((got - want).abs() < 1e-9, "{:?}", walk.ctrl);
+        }
+    }
+
+    #[test]
+    fn rows_of_a_fast_log_are_taken_together() {
+        // 1 kHz at a step of 1 ms.
+        let time: Vec<f64> = (0..41).map(|k| 1e-3 * f64::from(k)).collect();
+        let walk = Walk::new(&logs(&time), 0, 1e-3);
+        assert_eq!(walk.substeps, [4; 10]);
+        assert_eq!(walk.rows[..3], [0, 4, 8]);
+        assert!((walk.ctrl[1] - 5.5).abs() < 1e-9);
     }
 
     #[test]

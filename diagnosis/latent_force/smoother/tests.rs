@@ -71,6 +71,7 @@ impl Case {
                 h: draw(rows * ns * nx),
                 state_columns: draw((rows - 1) * nx * m),
                 reading_columns: draw(rows * ns * m),
+                ..LinearEpisode::default()
             },
             b: draw((rows - 1) * nx * nv),
             start: Start {
@@ -110,6 +111,7 @@ impl Case {
                 h: [1.0, 0.0].repeat(rows),
                 state_columns: row_b.repeat(rows - 1),
                 reading_columns: vec![0.0; rows],
+                ..LinearEpisode::default()
             },
             b: row_b.repeat(rows - 1),
             start: Start {
@@ -154,6 +156,7 @@ impl Case {
                 h: rows(&linear.h, ns * nx),
                 state_columns: steps(&linear.state_columns, nx * m),
                 reading_columns: rows(&linear.reading_columns, ns * m),
+                ..LinearEpisode::default()
             },
             b: steps(&self.b, nx * nv),
             start,
