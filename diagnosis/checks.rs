@@ -10,7 +10,7 @@ use crate::linearise::slope;
 use crate::machine::Machine;
 use crate::predict::{Point, Predictor};
 use crate::prepare::plain_residuals;
-use crate::result::CheckResult;
+use crate::result::{CheckResult, MissingForce};
 
 fn check(name: &str, ok: bool, detail: String) -> CheckResult {
     CheckResult {
@@ -277,6 +277,26 @@ pub fn windows(before: &Short, after: &Short, seconds: f64) -> Vec<CheckResult> 
         all.push(check("forces", true, forces));
     }
     all
+}
+
+/// What force the model lacks at each degree of freedom, before and with the verdict's effects; none where it was not
+/// estimated.
+#[must_use]
+pub fn missing_force(missing: &[MissingForce]) -> Option<CheckResult> {
+    let one = |m: &MissingForce| {
+        format!(
+            "{} {:.3} {} ({:.3} with the best explanation)",
+            m.dof, m.identified, m.unit, m.refined
+        )
+    };
+    let all: Vec<String> = missing.iter().map(one).collect();
+    (!all.is_empty()).then(|| {
+        let detail = format!(
+            "the model lacks a force, standard deviation, of {}",
+            all.join("; of ")
+        );
+        check("forces", true, detail)
+    })
 }
 
 /// Does the gap depend on the time step? `halved` is the same machine with half of it.

@@ -137,6 +137,21 @@ pub struct NextExperiment {
     pub how: String,
 }
 
+/// The generalized force that the model lacks at a degree of freedom: its deviation over the training logs.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct MissingForce {
+    /// Joint; with the axis (`.x`, `.rx`, …) where it has several.
+    pub dof: String,
+    /// `N` or `N m`.
+    pub unit: String,
+    /// After fitting the study's parameters.
+    pub identified: f64,
+    /// With the verdict's effects.
+    pub refined: f64,
+    /// Time over which it stays much the same, s.
+    pub correlation_time: f64,
+}
+
 /// `result.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DiagnosisResult {
@@ -163,6 +178,9 @@ pub struct DiagnosisResult {
     pub checks: Vec<CheckResult>,
     /// What to do next.
     pub next_experiment: NextExperiment,
+    /// The force that is missing at each degree of freedom; empty where contact lasts, and it is not estimated.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub missing_force: Vec<MissingForce>,
 }
 
 /// One signal of one held-out episode: the real reading and three simulations, with gaps

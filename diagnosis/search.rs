@@ -13,6 +13,7 @@ use asid_core::{Error, Progress, Result};
 use crate::bench::{Bench, Explanation, Trial};
 use crate::candidate::Candidate;
 use crate::fit::Effort;
+use crate::result::MissingForce;
 use crate::scatter::Scatter;
 use crate::screen::{Base, Screened, propose, take, worthwhile};
 
@@ -61,6 +62,8 @@ pub struct Findings {
     pub short: Option<f64>,
     /// Sets of effects that were followed to the last stage, lowest cost first.
     pub found: Vec<Found>,
+    /// The force that is missing at each degree of freedom, where it was estimated.
+    pub missing: Vec<MissingForce>,
     /// Candidates with the cost that screening on the first stage reached, best first.
     pub screened: Vec<Screened>,
 }
@@ -145,6 +148,7 @@ impl Search<'_> {
                 .is_windows(self.bench)
                 .then(|| excess(none[0].fit.cost / self.bench.readings(0))),
             found: all,
+            missing: Vec::new(),
             screened,
         })
     }

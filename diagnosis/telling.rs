@@ -12,8 +12,8 @@ use crate::localise::localise;
 use crate::predict::Point;
 use crate::record::Record;
 use crate::result::{
-    DiagnosisResult, EffectResult, Gap, HypothesisResult, Kind, NextExperiment, ParameterResult,
-    SignalGap, Verdict,
+    DiagnosisResult, EffectResult, Gap, HypothesisResult, Kind, MissingForce, NextExperiment,
+    ParameterResult, SignalGap, Verdict,
 };
 use crate::search::{Findings, Found, trials};
 use crate::study::Study;
@@ -55,6 +55,21 @@ fn least_explained(before: &Short, after: &Short) -> Option<String> {
         format!(
             "at {}, {:.2} of the {:.2} {} that the model lacks over short windows are left",
             a.joint, b.force, a.force, a.unit
+        )
+    })
+}
+
+/// The same where the force was estimated moment by moment.
+fn least_made_up(missing: &[MissingForce]) -> Option<String> {
+    let share = |m: &MissingForce| m.refined / m.identified;
+    let worst = missing
+        .iter()
+        .filter(|m| share(m).is_finite())
+        .max_by(|a, b| share(a).total_cmp(&share(b)))?;
+    (share(worst) > UNEXPLAINED).then(|| {
+        format!(
+            "at {}, {:.2} of the {:.2} {} that the model lacks are left",
+            worst.dof, worst.refined, worst.identified, worst.unit
         )
     })
 }
@@ -156,8 +171,11 @@ impl Telling<'_> {
             parameters: self.parameters(&explanation),
             checks: self.checks(none, &explanation, short.as_ref())?,
             next_experiment: self.next(best)?,
+            missing_force: self.findings.missing.clone(),
         };
-        let rest = short.and_then(|(before, after, _)| least_explained(&before, &after));
+        let rest = short
+            .and_then(|(before, after, _)| least_explained(&before, &after))
+            .or_else(|| least_made_up(&result.missing_force));
         result.sentence = crate::sentence::sentence(&result, &labels, rest.as_deref());
         let trace = self.trace(&nominal, &identified, &refined)?;
         let study = self.bench.parameters.len();
@@ -370,6 +388,9 @@ impl Telling<'_> {
     ) -> Result<Option<(Short, Short, f64)>> {
         let bench = self.bench;
         let plant = &bench.machine.plant;
+        if !self.findings.missing.is_empty() {
+            return Ok(None);
+        }
         let Some(rows) = windows::rows(plant, &bench.train.logs, &bench.open) else {
             return Ok(None);
         };
@@ -401,6 +422,7 @@ impl Telling<'_> {
         if let Some((before, after, seconds)) = short {
             all.extend(checks::windows(before, after, *seconds));
         }
+        all.extend(checks::missing_force(&self.findings.missing));
         Ok(all)
     }
 

@@ -1,6 +1,7 @@
 //! From a study to what its result is told from, by the missing force.
 
-use asid_core::{Progress, Result};
+use asid_core::layout::JointKind;
+use asid_core::{Layout, Progress, Result};
 
 use crate::bench::{Bench, Explanation, Stage};
 use crate::candidate::{Candidate, LeftOut, enumerate};
@@ -8,13 +9,14 @@ use crate::fit::Effort;
 use crate::machine::Machine;
 use crate::predict::State;
 use crate::prepare::{dataset, set_reading_noise};
+use crate::result::MissingForce;
 use crate::search::{Findings, Found};
 use crate::starts::given_start;
 use crate::study::Study;
 use crate::trajectory::Trajectory;
 use crate::verdict::Judgement;
 
-use super::estimate::begin;
+use super::estimate::{Estimate, begin};
 use super::fit::{Fitted, Hypothesis, fit, settle_noise};
 use super::search::{Breadth, Outcome, Set, search};
 use super::selection::select;
@@ -188,6 +190,38 @@ fn smoothed_starts(bench: &Bench, fitted: &Fitted) -> Vec<State> {
         .collect()
 }
 
+/// What is missing at each degree of freedom, without effects and with those that stand.
+fn missing_forces(layout: &Layout, outcome: &Outcome) -> Vec<MissingForce> {
+    let (before, after) = (&outcome.none.estimate, &outcome.best.fitted.estimate);
+    let deviation = |e: &Estimate, d: usize| (e.noise.q[d] + e.noise.white[d]).sqrt();
+    let dofs = layout.joints.iter().flat_map(|joint| {
+        let axes: &[(&str, &str)] = match joint.kind {
+            JointKind::Slide => &[("", "N")],
+            JointKind::Hinge => &[("", "N m")],
+            JointKind::Ball => &[(".rx", "N m"), (".ry", "N m"), (".rz", "N m")],
+            JointKind::Free => &[
+                (".x", "N"),
+                (".y", "N"),
+                (".z", "N"),
+                (".rx", "N m"),
+                (".ry", "N m"),
+                (".rz", "N m"),
+            ],
+        };
+        axes.iter()
+            .map(|(axis, unit)| (format!("{}{axis}", joint.name), *unit))
+    });
+    dofs.enumerate()
+        .map(|(d, (dof, unit))| MissingForce {
+            dof,
+            unit: unit.to_owned(),
+            identified: deviation(before, d),
+            refined: deviation(after, d),
+            correlation_time: before.noise.tau[d],
+        })
+        .collect()
+}
+
 /// All sets that were fitted, each once, the most evident first.
 fn all_sets(outcome: &Outcome) -> Vec<Set> {
     let mut sets: Vec<Set> = Vec::new();
@@ -261,6 +295,7 @@ fn replay(
         none,
         short: None,
         found,
+        missing: missing_forces(bench.layout(), outcome),
         screened: Vec::new(),
     };
     Ok((findings, sets))
