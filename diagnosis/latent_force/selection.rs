@@ -2,7 +2,7 @@
 
 use crate::bench::Bench;
 use crate::candidate::Candidate;
-use crate::search::Findings;
+use crate::search::{Findings, NEGLIGIBLE, excess};
 use crate::verdict::{Hypothesis as Judged, Judgement};
 
 use super::search::{Outcome, Set};
@@ -19,8 +19,6 @@ const SHARPNESS: f64 = 0.35;
 /// the logistic about it.
 const GAP: f64 = 2.0;
 const GAP_SCALE: f64 = 0.3;
-/// Open-loop gap of the model without effects, in deviations of the noise, up to which there is nothing to explain.
-const CLOSED: f64 = 1.1;
 /// Root mean square of the missing force, relative to the inertial forces, up to which nothing is missing.
 const NOTHING: f64 = 0.01;
 
@@ -69,7 +67,7 @@ pub fn select(
     let readings = bench.held_readings().max(1.0);
     let gap = (findings.none.held_plain / readings).sqrt();
     let train = (findings.none.fit.cost / bench.train.readings.max(1) as f64).sqrt();
-    let best = if best < all.len() && gap.max(train) > CLOSED {
+    let best = if best < all.len() && excess(gap.max(train).powi(2)) > NEGLIGIBLE {
         best
     } else {
         0
@@ -85,8 +83,8 @@ pub fn select(
     let before = outcome.none.estimate.missing_power(inertial);
     let after = outcome.best.fitted.estimate.missing_power(inertial);
     let named = all[best].found.map(|i| &findings.found[i].explanation);
-    let excess = |cost: f64| (cost / bench.train.readings.max(1) as f64 - 1.0).max(0.0);
-    let open_loop = named.map_or(1.0, |e| excess(e.fit.cost) / excess(findings.none.fit.cost));
+    let beyond = |cost: f64| excess(cost / bench.train.readings.max(1) as f64).powi(2);
+    let open_loop = named.map_or(1.0, |e| beyond(e.fit.cost) / beyond(findings.none.fit.cost));
     // What is named may make up for most of the gap and leave much of what is missing from row to row, or the other way round.
     let rest = (after / before.max(f64::MIN_POSITIVE))
         .min(open_loop)
