@@ -10,6 +10,7 @@ mod noise;
 
 use rand::Rng;
 
+use super::regress::BLOCK;
 use super::*;
 
 /// Tolerance of two ways to the same number of order one, through a few dozen operations on well-conditioned

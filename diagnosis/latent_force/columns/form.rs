@@ -1,0 +1,79 @@
+//! One way to take a candidate, and what it is as unknowns of a fit.
+
+use asid_effects::Start;
+
+use crate::candidate::Candidate;
+use crate::latent_force::unknown::Unknown;
+
+/// One way to take a candidate: some values to begin with, and the columns that stand for it.
+#[derive(Clone, Debug)]
+pub struct Form {
+    /// The candidate.
+    pub candidate: usize,
+    /// Values of its parameters to begin with.
+    pub begin: Vec<f64>,
+    /// For each column: the parameter that it is a slope in, with the deviation of its prior; `None` for a secant.
+    pub slopes: Vec<Option<(usize, f64)>>,
+    /// The first of its columns.
+    pub first: usize,
+}
+
+impl Form {
+    /// Places of its columns.
+    #[must_use]
+    pub fn columns(&self) -> std::ops::Range<usize> {
+        self.first..self.first + self.slopes.len()
+    }
+
+    /// Values of the candidate's parameters at some coefficients of the columns.
+    #[must_use]
+    pub fn values(&self, candidate: &Candidate, coefficients: &[f64]) -> Vec<f64> {
+        let mut values = self.begin.clone();
+        for (slope, c) in self.slopes.iter().zip(coefficients) {
+            match slope {
+                Some((i, deviation)) => values[*i] += c * deviation,
+                None => {
+                    for (v, p) in values.iter_mut().zip(candidate.parameters()) {
+                        if !matches!(p.start, Start::Choice(_) | Start::Given | Start::Set(..)) {
+                            *v = p.null + c * (*v - p.null);
+                        }
+                    }
+                }
+            }
+        }
+        for (v, range) in values.iter_mut().zip(&candidate.ranges) {
+            *v = v.clamp(range[0], range[1]);
+        }
+        values
+    }
+
+    /// What its parameters are as unknowns of a fit.
+    #[must_use]
+    pub fn unknowns(&self, candidate: &Candidate) -> Vec<Unknown> {
+        candidate
+            .unknowns()
+            .into_iter()
+            .enumerate()
+            .map(|(i, (parameter, free))| {
+                let p = &candidate.parameters()[i];
+                let slope = self.slopes.iter().flatten().find(|(k, _)| *k == i);
+                let [low, high] = candidate.ranges[i];
+                // A parameter that is no slope is as uncertain as it is large.
+                let width = (high - low) / 12.0_f64.sqrt();
+                let size = (self.begin[i] - p.null).abs();
+                let other = if size > 0.0 { size.min(width) } else { width };
+                Unknown {
+                    parameter,
+                    center: if slope.is_some() || size > 0.0 && p.null == low {
+                        p.null
+                    } else {
+                        self.begin[i]
+                    },
+                    deviation: slope.map_or(other, |(_, d)| *d),
+                    bounds: [low, high],
+                    free,
+                }
+            })
+            .collect()
+    }
+}

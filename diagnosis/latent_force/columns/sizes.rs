@@ -1,0 +1,181 @@
+//! Sizes of priors: an effect may make up for forces as large as those that are missing, and for readings that are off by a
+//! part of their spread.
+
+use asid_core::Result;
+use nalgebra::DMatrix;
+
+use super::source::{Source, Wanted};
+use crate::latent_force::estimate::{Context, Estimate};
+
+/// Share of a parameter's range over which its size is first felt for.
+const TRIAL: f64 = 1e-5;
+/// Inertial force of a degree of freedom that does not move, N or N m.
+const SILENT: f64 = 1e-8;
+/// Share of the inertial forces that is missing at least, for the size of priors.
+const LEAST_MISSING: f64 = 0.1;
+/// Quantile of the missing force that counts as its size.
+const QUANTILE: f64 = 0.99;
+/// Share of a reading's spread that an effect on it may make up for.
+const READING_SHARE: f64 = 0.1;
+/// Rows of the parts that sizes are felt for on, and how many parts.
+const PART: usize = 6;
+const PARTS: usize = 24;
+
+/// A context of some short parts of the logs, evenly spread, with the trajectory there.
+pub(super) fn parts<'c>(
+    context: &'c Context<'_>,
+    estimate: &Estimate,
+    slopes_of: &[Vec<f64>],
+) -> (Context<'c>, Vec<Vec<f64>>, Vec<Vec<f64>>) {
+    let layout = &context.plant().layout;
+    let (nv, width) = (layout.nv, layout.nq + layout.nv);
+    let rows: usize = context.walks.iter().map(|w| w.len()).sum();
+    let every = (rows / PARTS).max(PART);
+    let (mut walks, mut states, mut slopes) = (Vec::new(), Vec::new(), Vec::new());
+    for (w, walk) in context.walks.iter().enumerate() {
+        let mut first = 0;
+        while first + 2 <= walk.len() {
+            let range = first..(first + PART).min(walk.len());
+            states.push(estimate.trajectory[w][range.start * width..range.end * width].to_vec());
+            let own = range.start * 2 * nv * nv..(range.end - 1) * 2 * nv * nv;
+            slopes.push(slopes_of[w][own].to_vec());
+            walks.push(walk.part(range));
+            first += every;
+        }
+    }
+    let context = Context {
+        machine: context.machine,
+        logs: context.logs,
+        given: vec![None; walks.len()],
+        open: context.open.clone(),
+        scale: context.scale.clone(),
+        position_noise: context.position_noise.clone(),
+        reading_variance: context.reading_variance.clone(),
+        inertial: context.inertial.clone(),
+        walks,
+    };
+    (context, states, slopes)
+}
+
+/// Deviations of priors from what a trial step of each parameter does, for `(candidate, start, parameter)`; 0 where it does
+/// nothing.
+pub(super) fn sizes(
+    context: &Context<'_>,
+    estimate: &Estimate,
+    source: &Source<'_>,
+    trials: &[(usize, Vec<f64>, usize)],
+) -> Result<Vec<f64>> {
+    let nv = context.plant().layout.nv;
+    let (nx, ns) = (2 * nv, context.logs.entries.len());
+    let (short, states, slopes) = parts(context, estimate, source.slopes);
+    let candidates = source.all.candidates;
+    let wanted: Vec<Wanted> = trials
+        .iter()
+        .map(|(c, begin, p)| {
+            let [low, high] = candidates[*c].ranges[*p];
+            Wanted::slope(candidates, *c, begin, *p, TRIAL * (high - low))
+        })
+        .collect();
+    let m = wanted.len();
+    let source = Source {
+        all: source.all.clone(),
+        slopes: &slopes,
+        late: &[],
+    };
+    let columns = source.columns(&short, &states, &wanted)?;
+    // A joint that neither moves nor lacks a force says nothing of sizes.
+    let missing: Vec<f64> = estimate
+        .force_quantile(nv, QUANTILE)
+        .iter()
+        .zip(&context.inertial)
+        .map(|(w, inertial)| {
+            if *inertial > SILENT {
+                w.max(LEAST_MISSING * inertial)
+            } else {
+                f64::INFINITY
+            }
+        })
+        .collect();
+    let spread = spreads(context);
+    let mut sums = vec![vec![0.0; nv]; m];
+    let mut readings = vec![0.0; m];
+    let (mut rows, mut count) = (0.0, 0.0);
+    for ((walk, (states, read)), b) in short.walks.iter().zip(&columns).zip(&slopes) {
+        for k in 0..walk.len() - 1 {
+            let matrix = DMatrix::from_fn(nv, nv, |i, j| b[(k * nx + nv + i) * nv + j]);
+            let factor = matrix.lu();
+            let change = DMatrix::from_fn(nv, m, |d, i| states[(k * nx + nv + d) * m + i]);
+            if let Some(force) = factor.solve(&change) {
+                for (i, sums) in sums.iter_mut().enumerate() {
+                    for (sum, f) in sums.iter_mut().zip(force.column(i).iter()) {
+                        *sum += f * f;
+                    }
+                }
+            }
+            rows += 1.0;
+        }
+        for k in 0..walk.len() {
+            for (s, spread) in spread.iter().enumerate() {
+                for (i, sum) in readings.iter_mut().enumerate() {
+                    *sum += (read[(k * ns + s) * m + i] / spread).powi(2);
+                }
+            }
+            count += 1.0;
+        }
+    }
+    Ok((0..m)
+        .map(|i| {
+            let acting = sums[i]
+                .iter()
+                .zip(&missing)
+                .filter(|(s, f)| **s > 0.0 && f.is_finite());
+            let active = acting.count().max(1) as f64;
+            let ratio: f64 = sums[i]
+                .iter()
+                .zip(&missing)
+                .map(|(s, f)| s / rows / (f * f))
+                .sum();
+            let by_force = (active / ratio).sqrt();
+            let by_reading = READING_SHARE * (count / readings[i]).sqrt();
+            let (c, _, p) = &trials[i];
+            let [low, high] = candidates[*c].ranges[*p];
+            let size = by_force.min(by_reading).min(0.5 * (high - low));
+            let acts = ratio > 0.0 || readings[i] > 0.0;
+            if acts && size.is_finite() { size } else { 0.0 }
+        })
+        .collect())
+}
+
+/// Spread of the readings of each entry.
+pub(super) fn spreads(context: &Context<'_>) -> Vec<f64> {
+    let logs = context.logs;
+    let mut out = Vec::with_capacity(logs.entries.len());
+    let width = logs.width();
+    let mut at = 0;
+    for sensor in &logs.sensors {
+        let own = logs
+            .entries
+            .iter()
+            .filter(|e| logs.sensors[e.sensor].name == sensor.name)
+            .count();
+        let len = if sensor.rotation { 4 } else { own };
+        for c in 0..own {
+            let values: Vec<f64> = logs
+                .episodes
+                .iter()
+                .flat_map(|e| e.readings.iter().skip(at + c).step_by(width).copied())
+                .filter(|x| x.is_finite())
+                .collect();
+            let n = values.len().max(1) as f64;
+            let mean = values.iter().sum::<f64>() / n;
+            let variance = values.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / n;
+            out.push(if sensor.rotation {
+                1.0
+            } else {
+                variance.sqrt().max(sensor.noise)
+            });
+        }
+        at += len;
+    }
+    out
+}

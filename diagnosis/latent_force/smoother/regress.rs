@@ -1,0 +1,92 @@
+//! The filter with columns: a linear regression in whitened innovations.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::filter::Filter;
+use super::{NoiseModel, Problem, Regression};
+
+/// Innovations that are collected before they are added up.
+pub(super) const BLOCK: usize = 128;
+
+/// Filters an episode with its columns.
+#[must_use]
+pub fn regress(problem: Problem<'_>, noise: &NoiseModel, m: usize) -> Regression {
+    let mut filter = Filter::new(problem, noise);
+    let (nx, nz, ns) = (filter.nx, filter.nz, filter.ns);
+    let mut out = Regression {
+        log_likelihood: 0.0,
+        gram: DMatrix::zeros(m, m),
+        moment: DVector::zeros(m),
+    };
+    // Sensitivity of the state to each column, `nz x m`.
+    let mut sensitivity = vec![0.0; nz * m];
+    let mut next = vec![0.0; nz * m];
+    let mut block = DMatrix::<f64>::zeros(m, BLOCK);
+    let mut innovations = DVector::<f64>::zeros(BLOCK);
+    let mut filled = 0;
+    let mut column = vec![0.0; m];
+    for k in 0..problem.linear.rows {
+        for entry in 0..ns {
+            let Some(taken) = filter.take(k, entry) else {
+                continue;
+            };
+            let own = (k * ns + entry) * m;
+            column.copy_from_slice(&problem.linear.reading_columns[own..own + m]);
+            let h = filter.slope(k, entry);
+            for (i, &h) in h.iter().enumerate().filter(|(_, h)| **h != 0.0) {
+                let row = &sensitivity[i * m..(i + 1) * m];
+                column.iter_mut().zip(row).for_each(|(c, s)| *c += h * s);
+            }
+            let deviation = taken.variance.sqrt();
+            for (x, c) in block.column_mut(filled).iter_mut().zip(&column) {
+                *x = c / deviation;
+            }
+            innovations[filled] = taken.innovation / deviation;
+            filled += 1;
+            if filled == BLOCK {
+                out.gram.gemm(1.0, &block, &block.transpose(), 1.0);
+                out.moment.gemv(1.0, &block, &innovations, 1.0);
+                filled = 0;
+            }
+            for (i, g) in taken.gain.iter().enumerate() {
+                let gain = g / taken.variance;
+                let row = &mut sensitivity[i * m..(i + 1) * m];
+                row.iter_mut()
+                    .zip(&column)
+                    .for_each(|(s, c)| *s -= gain * c);
+            }
+        }
+        if k + 1 == problem.linear.rows {
+            break;
+        }
+        let carries = filter.carries(k);
+        filter.predict(k);
+        if !carries {
+            sensitivity.fill(0.0);
+            continue;
+        }
+        next.fill(0.0);
+        for i in 0..nz {
+            let target = &mut next[i * m..(i + 1) * m];
+            for l in 0..nz {
+                let f = filter.transition[i * nz + l];
+                if f != 0.0 {
+                    let row = &sensitivity[l * m..(l + 1) * m];
+                    target.iter_mut().zip(row).for_each(|(t, s)| *t += f * s);
+                }
+            }
+            if i < nx {
+                let at = (k * nx + i) * m;
+                let own = &problem.linear.state_columns[at..at + m];
+                target.iter_mut().zip(own).for_each(|(t, c)| *t += c);
+            }
+        }
+        std::mem::swap(&mut sensitivity, &mut next);
+    }
+    let block = block.columns(0, filled);
+    let innovations = innovations.rows(0, filled);
+    out.gram.gemm(1.0, &block, &block.transpose(), 1.0);
+    out.moment.gemv(1.0, &block, &innovations, 1.0);
+    out.log_likelihood = filter.total();
+    out
+}
