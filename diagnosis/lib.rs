@@ -3,8 +3,8 @@
 //!
 //! - [`study`] is what the user brings: a model, logs of the real machine, what is fitted already.
 //! - [`latent_force`] asks which force is missing at each moment, and which effects make up for it: for machines that
-//!   touch things now and then at most.
-//! - [`search`] asks whether whole replays land on the logs: for machines in lasting contact.
+//!   touch nothing in their logs.
+//! - [`search`] asks whether whole replays land on the logs: for those that do.
 //! - [`predict`] replays the logs in a model, for many parameter values at once; [`fit`]
 //!   is least squares over such replays.
 

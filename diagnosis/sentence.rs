@@ -44,10 +44,14 @@ pub fn sentence(result: &DiagnosisResult, labels: &[String], rest: Option<&str>)
     };
     let body = match result.verdict.kind {
         Kind::None => {
-            let scatter = if result.gap.identified > 1.2 {
-                ", all of it within what the simulation itself cannot repeat: see the check `repeatability`"
-            } else {
-                ""
+            let scatter = match (result.gap.identified > 1.2, result.missing_force.is_empty()) {
+                (true, true) => {
+                    ", all of it within what the simulation itself cannot repeat: see the check `repeatability`"
+                }
+                (true, false) => {
+                    ", no more than another program's version of the same physics leaves"
+                }
+                _ => "",
             };
             format!(
                 "No gap is left beyond the sensors' noise and what nobody can repeat, once the study's parameters are fitted (gap {:.2} on the logs held out{scatter}).",
@@ -76,6 +80,9 @@ pub fn sentence(result: &DiagnosisResult, labels: &[String], rest: Option<&str>)
             labels.join(" with "),
             closed(),
             rest.map_or_else(String::new, |r| format!(": {r}"))
+        ),
+        Kind::Unknown if labels.is_empty() && !result.missing_force.is_empty() => format!(
+            "{place}nothing in the catalogue explains it, nor a part of it that would count (see the check `forces`)."
         ),
         Kind::Unknown if labels.is_empty() => format!(
             "{place}nothing in the catalogue explains it, and no part of it that long replays tell (see the check `repeatability`)."

@@ -415,7 +415,9 @@ impl Telling<'_> {
             checks::units(bench, self.nominal)?,
         ];
         all.extend(checks::identifiability(&bench.parameters, none, best));
-        all.push(checks::repeatability(bench));
+        if self.findings.missing.is_empty() {
+            all.push(checks::repeatability(bench));
+        }
         if let Ok(halved) = bench.machine.halved() {
             all.push(checks::time_step(bench, none, &halved)?);
         }

@@ -43,10 +43,6 @@ const FIRST_PUSH: f64 = 1e-4;
 const REST_DEVIATIONS: f64 = 3.0;
 const REST_SHARE: f64 = 0.02;
 
-/// Change of a speed over a row from which on it is an impact, in medians of all rows, and the part of it that is free.
-const IMPACT: f64 = 8.0;
-const IMPACT_SHARE: f64 = 0.05;
-
 /// What is being explained: logs of a machine, walked row by row.
 pub struct Context<'a> {
     /// The machine.
@@ -433,35 +429,6 @@ impl Estimate {
             }
         }
         self.free = free;
-    }
-
-    /// Lets a row in which speeds jump have a force that makes up a part of the jump, in every model alike: an impact that lies
-    /// a little otherwise between two rows is no effect.
-    pub fn free_at_impacts(&mut self, context: &Context<'_>) {
-        let nv = context.plant().layout.nv;
-        for d in 0..nv {
-            let jump = |w: usize, k: usize| {
-                let next = self.speed(context, w, k + 1, d);
-                (next - self.speed(context, w, k, d)).abs()
-            };
-            let rows = |w: usize| 0..context.walks[w].len() - 1;
-            let walks = 0..context.walks.len();
-            let all = walks.clone().flat_map(|w| rows(w).map(move |k| jump(w, k)));
-            let typical = crate::noise::median(&mut all.collect::<Vec<f64>>()).unwrap_or(0.0);
-            let mut found = Vec::new();
-            for w in walks {
-                for k in rows(w).filter(|&k| jump(w, k) > IMPACT * typical) {
-                    let slope = self.b[w][(k * 2 * nv + nv + d) * nv + d];
-                    found.push((w, k, (IMPACT_SHARE * jump(w, k) / slope).powi(2)));
-                }
-            }
-            for (w, k, variance) in found.into_iter().filter(|f| f.2.is_finite()) {
-                if self.free[w].is_empty() {
-                    self.free[w] = vec![0.0; context.walks[w].len() * nv];
-                }
-                self.free[w][k * nv + d] += variance;
-            }
-        }
     }
 
     /// Quantile of the magnitude of the missing force at each degree of freedom.

@@ -31,6 +31,9 @@ const ROUNDS: usize = 15;
 /// case: a walk is taken once a coordinate and once a candidate, and both grow with the degrees of freedom.
 const BUDGET: f64 = 72_000.0;
 const FEWEST: usize = 150;
+/// Physics steps of a replay of all logs times coordinates of the starts that they leave open up to which starts are fitted
+/// once more with the values; beyond it they stay as smoothed.
+const REPLAYED: usize = 500_000;
 /// Most sets besides the verdict's that are replayed.
 const RIVALS: usize = 4;
 
@@ -50,21 +53,10 @@ pub struct Diagnosed {
     pub nominal: Vec<f64>,
 }
 
-/// Share of the rows in which something touches from which on contact lasts: a smoother takes a contact's normal force for
-/// noise, and is for machines that touch things now and then.
-const LASTING: f64 = 0.1;
-
-/// Share of the rows in which something touches.
-fn touching(shown: &Trajectory) -> f64 {
-    let pairs = shown.pairs.len().max(1);
-    let rows = || {
-        shown
-            .episodes
-            .iter()
-            .flat_map(|e| e.contact.chunks_exact(pairs))
-    };
-    let touching = rows().filter(|r| r.iter().any(|f| *f > 0.0)).count();
-    touching as f64 / rows().count().max(1) as f64
+/// Whether anything touches in some row: there the method is not for the machine, whose contact forces would pass for noise.
+fn touches(shown: &Trajectory) -> bool {
+    let mut episodes = shown.episodes.iter();
+    episodes.any(|e| e.contact.iter().any(|f| *f > 0.0))
 }
 
 /// Diagnoses a study; gives the machine back where it is one for another method.
@@ -120,17 +112,13 @@ pub fn diagnose(
             let values = (&study.parameters[..], theta);
             Trajectory::along(&*model, &bench.machine.plant, values, &logs, states, &rows)
         };
-        let touches = !bench.machine.plant.contacts.is_empty();
-        if touches && touching(&along(&nominal, &estimate.trajectory)?) > LASTING {
+        if touches(&along(&nominal, &estimate.trajectory)?) {
             None
         } else {
             settle_noise(&context, &hypothesis, &nominal, &mut estimate, FIRST)?;
             let first = fit(&context, &hypothesis, &nominal, &estimate, ROUNDS)?;
             let mut estimate = first.estimate;
             estimate.free_at_rest(&context);
-            if touches {
-                estimate.free_at_impacts(&context);
-            }
             estimate.set_resolution(layout.nv);
             let none = fit(&context, &hypothesis, &first.theta, &estimate, ROUNDS)?;
             progress.end();
@@ -250,10 +238,16 @@ fn replay(
     candidates: &[Candidate],
     outcome: &Outcome,
 ) -> Result<(Findings, Vec<Set>)> {
+    let episodes = &bench.train.logs.episodes;
+    let steps: usize = episodes.iter().map(|e| e.plan.physics_steps()).sum();
     bench.stages = vec![Stage {
         record: bench.train.clone(),
-        episodes: (0..bench.train.logs.episodes.len()).collect(),
-        open: bench.fitted.clone(),
+        episodes: (0..episodes.len()).collect(),
+        open: if steps * bench.fitted.len() > REPLAYED {
+            Vec::new()
+        } else {
+            bench.fitted.clone()
+        },
     }];
     let study = bench.parameters.len();
     let of = |fitted: &Fitted, members: &[usize], effort: Effort| -> Result<Explanation> {
