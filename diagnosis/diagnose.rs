@@ -4,10 +4,9 @@ use asid_core::{Progress, Result, Streams};
 use asid_effects::EffectSpec;
 
 use crate::bench::{Bench, Explanation, Trial};
-use crate::candidate::{Candidate, LeftOut, enumerate};
+use crate::candidate::{Candidate, enumerate};
 use crate::fit::cost;
 use crate::latent_force;
-use crate::latent_force::pipeline::Diagnosed;
 use crate::machine::Machine;
 use crate::predict::{Point, State};
 use crate::prepare::{Prepared, plain_residuals, prepare};
@@ -17,7 +16,9 @@ use crate::search::{Breadth, Findings, Search, trials};
 use crate::study::Study;
 use crate::telling::Telling;
 use crate::trajectory::Trajectory;
-use crate::verdict::{Judgement, judge};
+use crate::verdict::judge;
+
+pub use crate::work::Work;
 
 /// Settings of a diagnosis.
 #[derive(Clone, Debug, Default)]
@@ -28,24 +29,6 @@ pub struct Settings {
     pub breadth: Breadth,
     /// Effects of the catalogue that are left out, by name.
     pub without: Vec<String>,
-}
-
-/// What a diagnosis has worked with, for what comes after it.
-pub struct Work {
-    /// Machine and logs.
-    pub bench: Bench,
-    /// Effects at their sites.
-    pub candidates: Vec<Candidate>,
-    /// Those that could not be tried.
-    pub left_out: Vec<LeftOut>,
-    /// What the search found.
-    pub findings: Findings,
-    /// Fits without any effect, one a stage.
-    pub none: Vec<Explanation>,
-    /// What was made of it.
-    pub judgement: Judgement,
-    /// Values of the study's parameters in the model as given.
-    pub nominal: Vec<f64>,
 }
 
 /// A finished diagnosis.
@@ -72,7 +55,12 @@ pub fn diagnose(
 ) -> Result<(Diagnosis, Work)> {
     let machine =
         match latent_force::pipeline::diagnose(study, machine, &settings.without, progress)? {
-            Ok(found) => return tell(study, by_force(study, found)?, settings, progress),
+            Ok(mut work) => {
+                work.findings =
+                    final_noise(&mut work.bench, study, &work.candidates, work.findings)?;
+                work.none = vec![work.findings.none.clone()];
+                return tell(study, work, settings, progress);
+            }
             Err(machine) => machine,
         };
     let streams = Streams::new(settings.seed);
@@ -116,28 +104,6 @@ pub fn diagnose(
         nominal,
     };
     tell(study, work, settings, progress)
-}
-
-/// What a diagnosis by the missing force found, with its noise.
-fn by_force(study: &Study, found: Diagnosed) -> Result<Work> {
-    let Diagnosed {
-        mut bench,
-        candidates,
-        left_out,
-        findings,
-        judgement,
-        nominal,
-    } = found;
-    let findings = final_noise(&mut bench, study, &candidates, findings)?;
-    Ok(Work {
-        none: vec![findings.none.clone()],
-        bench,
-        candidates,
-        left_out,
-        findings,
-        judgement,
-        nominal,
-    })
 }
 
 /// Tells what was found.

@@ -41,3 +41,4 @@ pub mod trajectory;
 pub mod verdict;
 pub mod whitening;
 pub mod windows;
+mod work;

@@ -4,7 +4,7 @@ use asid_core::layout::JointKind;
 use asid_core::{Layout, Progress, Result};
 
 use crate::bench::{Bench, Explanation, Stage};
-use crate::candidate::{Candidate, LeftOut, enumerate};
+use crate::candidate::{Candidate, enumerate};
 use crate::fit::Effort;
 use crate::machine::Machine;
 use crate::predict::State;
@@ -14,7 +14,7 @@ use crate::search::{Findings, Found};
 use crate::starts::given_start;
 use crate::study::Study;
 use crate::trajectory::Trajectory;
-use crate::verdict::Judgement;
+use crate::work::Work;
 
 use super::estimate::{Estimate, begin};
 use super::fit::{Fitted, Hypothesis, fit, settle_noise};
@@ -37,22 +37,6 @@ const REPLAYED: usize = 500_000;
 /// Most sets besides the verdict's that are replayed.
 const RIVALS: usize = 4;
 
-/// What a diagnosis by the missing force found.
-pub struct Diagnosed {
-    /// Machine and logs.
-    pub bench: Bench,
-    /// Effects at their sites.
-    pub candidates: Vec<Candidate>,
-    /// Those that could not be tried.
-    pub left_out: Vec<LeftOut>,
-    /// Replays of the explanations.
-    pub findings: Findings,
-    /// What is made of them.
-    pub judgement: Judgement,
-    /// Values of the study's parameters in the model as given.
-    pub nominal: Vec<f64>,
-}
-
 /// Whether anything touches in some row: there the method is not for the machine, whose contact forces would pass for noise.
 fn touches(shown: &Trajectory) -> bool {
     let mut episodes = shown.episodes.iter();
@@ -68,7 +52,7 @@ pub fn diagnose(
     machine: Machine,
     without: &[String],
     progress: &dyn Progress,
-) -> Result<std::result::Result<Diagnosed, Machine>> {
+) -> Result<std::result::Result<Work, Machine>> {
     progress.begin("smoothing the logs", 1);
     let (mut bench, nominal) = dataset(study, machine)?;
     set_reading_noise(&mut bench, &study.noise);
@@ -136,7 +120,8 @@ pub fn diagnose(
     let (findings, sets) = replay(&mut bench, &candidates, &outcome)?;
     progress.end();
     let judgement = select(&bench, &outcome, &sets, &findings, &candidates);
-    Ok(Ok(Diagnosed {
+    Ok(Ok(Work {
+        none: vec![findings.none.clone()],
         bench,
         candidates,
         left_out,

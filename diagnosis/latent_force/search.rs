@@ -67,6 +67,21 @@ pub struct Set {
     pub names: usize,
 }
 
+impl Set {
+    /// Fits it on from where it stands, over at most `rounds` linearisations.
+    fn fit(&mut self, context: &Context<'_>, rounds: usize) -> Result<()> {
+        let from = &self.fitted;
+        self.fitted = fit(
+            context,
+            &from.hypothesis,
+            &from.theta,
+            &from.estimate,
+            rounds,
+        )?;
+        Ok(())
+    }
+}
+
 /// A round: what was screened and what was fitted upon a base.
 #[derive(Clone, Debug)]
 pub struct Round {
@@ -274,14 +289,7 @@ fn pruned(
     for c in idle {
         smaller = without(&smaller, candidates, c);
     }
-    let start = &smaller.fitted;
-    smaller.fitted = fit(
-        context,
-        &start.hypothesis,
-        &start.theta,
-        &start.estimate,
-        breadth.rounds[1],
-    )?;
+    smaller.fit(context, breadth.rounds[1])?;
     let kept = smaller.fitted.evidence > set.fitted.evidence - IDLE_LOSS;
     Ok(if kept { smaller } else { set })
 }
@@ -338,14 +346,7 @@ fn one_round(
                 set.names = base.names;
             }
         }
-        let start = &set.fitted;
-        set.fitted = fit(
-            context,
-            &start.hypothesis,
-            &start.theta,
-            &start.estimate,
-            breadth.rounds[0],
-        )?;
+        set.fit(context, breadth.rounds[0])?;
         racing.push(set);
         progress.advance(1);
     }
@@ -358,14 +359,7 @@ fn one_round(
     racing.retain(|s| best - hoped(s) <= behind);
     let mut confirmed = Vec::new();
     for mut set in racing.into_iter().take(breadth.finished) {
-        let short = &set.fitted;
-        set.fitted = fit(
-            context,
-            &short.hypothesis,
-            &short.theta,
-            &short.estimate,
-            breadth.rounds[1],
-        )?;
+        set.fit(context, breadth.rounds[1])?;
         confirmed.push(pruned(context, candidates, set, breadth)?);
     }
     progress.end();

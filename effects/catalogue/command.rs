@@ -196,18 +196,18 @@ impl Acting for DeadbandAt {
     }
 }
 
+/// Width of what a command may change by without effect.
+pub(super) const WIDTH: EffectParameter =
+    EffectParameter::new("width", "unit of the command", [0.0, 10.0], 0.0)
+        .starting(Start::Multiples(Reference::Command, &[0.03, 0.1, 0.3]));
+
 impl Effect for Deadband {
     fn acts(&self) -> Acts {
         Acts::Command
     }
 
     fn parameters(&self) -> &'static [EffectParameter] {
-        const {
-            &[
-                EffectParameter::new("width", "unit of the command", [0.0, 10.0], 0.0)
-                    .starting(Start::Multiples(Reference::Command, &[0.03, 0.1, 0.3])),
-            ]
-        }
+        const { &[WIDTH] }
     }
 
     fn sites(&self, plant: &Plant) -> Vec<String> {

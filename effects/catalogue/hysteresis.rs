@@ -1,10 +1,11 @@
 //! Play on the command's side: a lever or an encoder that a command has to take along.
 
-use crate::{Acting, Acts, Confusion, Effect, EffectParameter, Reference, Site, Start};
+use crate::{Acting, Acts, Confusion, Effect, EffectParameter, Site};
 use asid_core::Result;
 use asid_core::simulator::StepView;
 use asid_mjcf::Plant;
 
+use super::command::WIDTH;
 use super::{actuators, at_least, values};
 
 crate::register!(EffectEntry {
@@ -62,12 +63,7 @@ impl Effect for Hysteresis {
     }
 
     fn parameters(&self) -> &'static [EffectParameter] {
-        const {
-            &[
-                EffectParameter::new("width", "unit of the command", [0.0, 10.0], 0.0)
-                    .starting(Start::Multiples(Reference::Command, &[0.03, 0.1, 0.3])),
-            ]
-        }
+        const { &[WIDTH] }
     }
 
     fn sites(&self, plant: &Plant) -> Vec<String> {

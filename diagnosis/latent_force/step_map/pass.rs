@@ -1,0 +1,379 @@
+//! One walk along the rows: every simulation is set to the trajectory at each row, read, and stepped to the next.
+
+use asid_core::simulator::{StepHook, StepView};
+use asid_core::{Control, Result, Rollout, Simulator};
+
+use crate::latent_force::tangent::{difference, retract};
+use crate::latent_force::walk::Walk;
+use crate::predict::columns_of;
+
+use super::late::retime;
+use super::{Common, LinearEpisode, Request, Variation};
+
+/// Change of a coordinate of the state that derivatives are taken over, rad, m, rad/s or m/s: forward
+/// differences of smooth dynamics in double precision are right to about six digits.
+const STATE_STEP: f64 = 1e-6;
+
+/// A generalized force on some rows of a rollout.
+struct Push<'a> {
+    /// For each row of the rollout, the degree of freedom and the force.
+    rows: &'a [Option<(usize, f64)>],
+}
+
+impl StepHook for Push<'_> {
+    fn before_step(&self, row: usize, _step: usize, view: &mut StepView<'_>) {
+        if let Some((dof, force)) = self.rows[row] {
+            view.force[dof] += force;
+        }
+    }
+}
+
+/// What one simulation an episode is for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Role {
+    /// The model as it is.
+    Nominal,
+    /// A coordinate of the state is moved, for `f` and `h`.
+    State(usize),
+    /// A coordinate of the state is moved all along, for `h` alone: a position by a constant, a speed by a constant and its
+    /// position by a ramp. A reading that remembers (a delay, a filter) sees the past of a speed as its position; what the
+    /// ramp has reached now is taken off again.
+    Reading(usize),
+    /// A speed is moved by a ramp, for how late a sensor of speeds is.
+    Ramp(usize),
+    /// A generalized force acts.
+    Force(usize),
+    /// A variation of the parameters.
+    Varied(usize),
+}
+
+/// Some of the walks on a core of their own: a row is too little work to share out.
+pub(super) struct Part {
+    pub(super) walks: Vec<usize>,
+    pub(super) simulator: Box<dyn Simulator>,
+}
+
+impl Part {
+    /// Linearises its walks.
+    pub(super) fn linearise(
+        &mut self,
+        c: &Common<'_>,
+        request: Request<'_>,
+    ) -> Result<Vec<LinearEpisode>> {
+        let Request {
+            want, variations, ..
+        } = request;
+        let nv = c.layout.nv;
+        let nx = 2 * nv;
+        let mut roles = Vec::new();
+        if want.state {
+            roles.extend((0..nx).map(Role::State));
+            if c.reads {
+                roles.extend((0..nx).map(Role::Reading));
+                roles.extend((0..nv).map(Role::Ramp));
+            }
+        }
+        if want.force {
+            roles.extend((0..nv).map(Role::Force));
+        }
+        roles.extend((0..variations.len()).map(Role::Varied));
+        let (ns, m) = (c.logs.entries.len(), variations.len());
+        let mut episodes: Vec<LinearEpisode> = self
+            .walks
+            .iter()
+            .map(|&w| {
+                let n = c.walks[w].len();
+                let (steps, state) = (n - 1, usize::from(want.state));
+                LinearEpisode {
+                    rows: n,
+                    defect: vec![0.0; steps * nx],
+                    a: vec![0.0; state * steps * nx * nx],
+                    b: vec![0.0; usize::from(want.force) * steps * nx * nv],
+                    residual: vec![f64::NAN; n * ns],
+                    h: vec![0.0; state * n * ns * nx],
+                    early: Vec::new(),
+                    late: Vec::new(),
+                    state_columns: vec![0.0; steps * nx * m],
+                    reading_columns: vec![0.0; n * ns * m],
+                }
+            })
+            .collect();
+        if roles.is_empty() {
+            self.pass(c, request, &[], &mut episodes, &mut [])?;
+        }
+        let late = usize::from(want.state && c.reads);
+        let mut ramps: Vec<Vec<f64>> = episodes
+            .iter()
+            .map(|e| vec![0.0; late * e.rows * ns * nv])
+            .collect();
+        for chunk in roles.chunks(c.capacity - 1) {
+            self.pass(c, request, chunk, &mut episodes, &mut ramps)?;
+        }
+        if late == 1 {
+            for ((episode, ramps), &w) in episodes.iter_mut().zip(&ramps).zip(&self.walks) {
+                retime(episode, &c.walks[w].time, ramps, (ns, nx, m));
+            }
+        }
+        Ok(episodes)
+    }
+
+    /// One walk along all episodes with some roles beside the nominal one.
+    fn pass(
+        &mut self,
+        c: &Common<'_>,
+        request: Request<'_>,
+        extra: &[Role],
+        out: &mut [LinearEpisode],
+        ramps: &mut [Vec<f64>],
+    ) -> Result<()> {
+        let roles: Vec<Role> = std::iter::once(Role::Nominal)
+            .chain(extra.iter().copied())
+            .collect();
+        let n = self.walks.len();
+        let all: Vec<usize> = (0..roles.len() * n).collect();
+        let mut columns = Vec::new();
+        for role in &roles {
+            let theta = match role {
+                Role::Varied(i) => &request.variations[*i].theta,
+                _ => request.theta,
+            };
+            let row = columns_of(&c.parameters, theta);
+            (0..n).for_each(|_| columns.extend_from_slice(&row));
+        }
+        self.simulator.reset(&all)?;
+        self.simulator.set_parameters(&all, &columns)?;
+        let walks: Vec<&Walk> = self.walks.iter().map(|&w| &c.walks[w]).collect();
+        let longest = walks.iter().map(|w| w.len()).max().unwrap_or(0);
+        let mut row = RowBuffers::default();
+        for k in 0..longest {
+            let here: Vec<usize> = (0..n).filter(|&e| walks[e].len() > k).collect();
+            self.place(c, &roles, (&here, k), request.trajectory, &mut row)?;
+            self.read_row(
+                c,
+                &roles,
+                (&here, k),
+                request.variations,
+                (out, ramps),
+                &mut row,
+            )?;
+            let mut ahead: Vec<usize> = here
+                .into_iter()
+                .filter(|&e| walks[e].len() > k + 1)
+                .collect();
+            while let Some(&first) = ahead.first() {
+                let substeps = walks[first].substeps[k];
+                let (now, later): (Vec<usize>, Vec<usize>) = ahead
+                    .iter()
+                    .partition(|&&e| walks[e].substeps[k] == substeps);
+                self.step_row(c, (&roles, &now, k, substeps), request, out, &mut row)?;
+                ahead = later;
+            }
+        }
+        Ok(())
+    }
+
+    /// Puts all simulations of some episodes at row `k`.
+    fn place(
+        &mut self,
+        c: &Common<'_>,
+        roles: &[Role],
+        (here, k): (&[usize], usize),
+        trajectory: &[Vec<f64>],
+        row: &mut RowBuffers,
+    ) -> Result<()> {
+        let (n, nq, nv) = (self.walks.len(), c.layout.nq, c.layout.nv);
+        if c.remembers && k > 0 {
+            let (mut from, mut to) = (Vec::new(), Vec::new());
+            for (v, role) in roles.iter().enumerate() {
+                if matches!(role, Role::State(_) | Role::Force(_)) {
+                    from.extend(here);
+                    to.extend(here.iter().map(|e| v * n + e));
+                }
+            }
+            self.simulator.copy_state(&from, &to)?;
+        }
+        row.sims.clear();
+        row.qpos.clear();
+        row.qvel.clear();
+        let mut change = vec![0.0; 2 * nv];
+        for (v, role) in roles.iter().enumerate() {
+            for &e in here {
+                let width = nq + nv;
+                let states = &trajectory[self.walks[e]];
+                let mut state = states[k * width..(k + 1) * width].to_vec();
+                if let Role::Ramp(i) = *role {
+                    change[nv + i] = STATE_STEP * c.walks[self.walks[e]].time[k];
+                    retract(&c.layout, &mut state, &change);
+                    change.fill(0.0);
+                }
+                if let Role::State(i) | Role::Reading(i) = *role {
+                    change[i] = STATE_STEP;
+                    if let (Role::Reading(_), Some(place)) = (role, i.checked_sub(nv)) {
+                        change[place] = STATE_STEP * c.walks[self.walks[e]].time[k];
+                    }
+                    retract(&c.layout, &mut state, &change);
+                    change.fill(0.0);
+                }
+                row.sims.push(v * n + e);
+                row.qpos.extend_from_slice(&state[..nq]);
+                row.qvel.extend_from_slice(&state[nq..]);
+            }
+        }
+        // A simulation that failed at the row before begins anew.
+        let status = self.simulator.status();
+        let failed: Vec<usize> = row
+            .sims
+            .iter()
+            .copied()
+            .filter(|&s| !status[s].is_running())
+            .collect();
+        if !failed.is_empty() {
+            self.simulator.reset(&failed)?;
+        }
+        self.simulator.set_state(&row.sims, &row.qpos, &row.qvel)
+    }
+
+    /// Reads the sensors at row `k`.
+    fn read_row(
+        &mut self,
+        c: &Common<'_>,
+        roles: &[Role],
+        (here, k): (&[usize], usize),
+        variations: &[Variation],
+        (out, ramps): (&mut [LinearEpisode], &mut [Vec<f64>]),
+        row: &mut RowBuffers,
+    ) -> Result<()> {
+        let (ns, nx) = (c.logs.entries.len(), 2 * c.layout.nv);
+        let width = c.readings.width();
+        row.read.resize(row.sims.len() * width, 0.0);
+        self.simulator.read(&row.sims, &c.readings, &mut row.read)?;
+        let m = variations.len();
+        let mut differ = vec![0.0; ns];
+        for (i, &e) in here.iter().enumerate() {
+            let nominal = &row.read[i * width..(i + 1) * width];
+            let walk = &c.walks[self.walks[e]];
+            let log_row = walk.rows[k];
+            let readings = &c.logs.episodes[walk.episode].readings;
+            let logged = &readings[log_row * width..(log_row + 1) * width];
+            let residual = &mut out[e].residual[k * ns..(k + 1) * ns];
+            c.logs.reading_difference(logged, nominal, residual);
+            for (v, role) in roles.iter().enumerate().skip(1) {
+                let place = v * here.len() + i;
+                let other = &row.read[place * width..(place + 1) * width];
+                c.logs.reading_difference(other, nominal, &mut differ);
+                match *role {
+                    Role::State(i) if !c.reads => {
+                        for (s, d) in differ.iter().enumerate() {
+                            out[e].h[(k * ns + s) * nx + i] = d / STATE_STEP;
+                        }
+                    }
+                    Role::Reading(i) => {
+                        let time = walk.time[k];
+                        for (s, d) in differ.iter().enumerate() {
+                            let row = &mut out[e].h[(k * ns + s) * nx..(k * ns + s + 1) * nx];
+                            let place = i.checked_sub(nx / 2).map_or(0.0, |place| row[place]);
+                            row[i] = d / STATE_STEP - time * place;
+                        }
+                    }
+                    Role::Ramp(i) => {
+                        for (s, d) in differ.iter().enumerate() {
+                            ramps[e][(k * ns + s) * (nx / 2) + i] = d / STATE_STEP;
+                        }
+                    }
+                    Role::Varied(i) => {
+                        for (s, d) in differ.iter().enumerate() {
+                            let value = d / variations[i].scale;
+                            out[e].reading_columns[(k * ns + s) * m + i] =
+                                if value.is_finite() { value } else { 0.0 };
+                        }
+                    }
+                    _ => {}
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Steps some episodes from row `k` to the next.
+    fn step_row(
+        &mut self,
+        c: &Common<'_>,
+        (roles, now, k, substeps): (&[Role], &[usize], usize, usize),
+        request: Request<'_>,
+        out: &mut [LinearEpisode],
+        row: &mut RowBuffers,
+    ) -> Result<()> {
+        let Request {
+            trajectory,
+            push,
+            variations,
+            ..
+        } = request;
+        let (n, nv, nu) = (self.walks.len(), c.layout.nv, c.layout.nu());
+        let (nx, width) = (2 * nv, c.layout.nq + nv);
+        row.sims.clear();
+        row.ctrl.clear();
+        row.pushes.clear();
+        for (v, role) in roles.iter().enumerate() {
+            for &e in now {
+                row.sims.push(v * n + e);
+                let ctrl = &c.walks[self.walks[e]].ctrl[k * nu..(k + 1) * nu];
+                row.ctrl.extend_from_slice(ctrl);
+                row.pushes.push(match *role {
+                    Role::Force(d) => Some((d, push[d])),
+                    _ => None,
+                });
+            }
+        }
+        let hook = Push { rows: &row.pushes };
+        let mut rollout = Rollout::new(
+            &row.sims,
+            1,
+            substeps,
+            Control::PerSimulation(&row.ctrl),
+            &c.states,
+        );
+        if row.pushes.iter().any(Option::is_some) {
+            rollout.hook = Some(&hook);
+        }
+        row.next.resize(row.sims.len() * width, 0.0);
+        self.simulator.rollout(&rollout, &mut row.next)?;
+        let m = variations.len();
+        let mut differ = vec![0.0; nx];
+        for (i, &e) in now.iter().enumerate() {
+            let nominal = &row.next[i * width..(i + 1) * width];
+            let ahead = &trajectory[self.walks[e]][(k + 1) * width..(k + 2) * width];
+            let defect = &mut out[e].defect[k * nx..(k + 1) * nx];
+            difference(&c.layout, nominal, ahead, defect);
+            for (v, role) in roles.iter().enumerate().skip(1) {
+                let place = v * now.len() + i;
+                let other = &row.next[place * width..(place + 1) * width];
+                difference(&c.layout, other, nominal, &mut differ);
+                let (matrix, columns, at, scale) = match *role {
+                    Role::State(i) => (&mut out[e].a, nx, i, STATE_STEP),
+                    Role::Force(i) => (&mut out[e].b, nv, i, push[i]),
+                    Role::Varied(i) => (&mut out[e].state_columns, m, i, variations[i].scale),
+                    Role::Nominal | Role::Reading(_) | Role::Ramp(_) => continue,
+                };
+                for (s, d) in differ.iter().enumerate() {
+                    let value = d / scale;
+                    matrix[(k * nx + s) * columns + at] =
+                        if value.is_finite() { value } else { 0.0 };
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Arrays of one row, kept between rows.
+#[derive(Default)]
+struct RowBuffers {
+    sims: Vec<usize>,
+    qpos: Vec<f64>,
+    qvel: Vec<f64>,
+    ctrl: Vec<f64>,
+    pushes: Vec<Option<(usize, f64)>>,
+    read: Vec<f64>,
+    next: Vec<f64>,
+}
