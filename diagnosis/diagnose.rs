@@ -53,56 +53,9 @@ pub fn diagnose(
     settings: Settings,
     progress: &dyn Progress,
 ) -> Result<(Diagnosis, Work)> {
-    let machine =
-        match latent_force::pipeline::diagnose(study, machine, &settings.without, progress)? {
-            Ok(mut work) => {
-                work.findings =
-                    final_noise(&mut work.bench, study, &work.candidates, work.findings)?;
-                work.none = vec![work.findings.none.clone()];
-                return tell(study, work, settings, progress);
-            }
-            Err(machine) => machine,
-        };
-    let streams = Streams::new(settings.seed);
-    progress.begin("fitting the study's parameters", 1);
-    let Prepared {
-        mut bench,
-        none,
-        nominal,
-        mut scatter,
-    } = prepare(study, machine, streams.stream("scatter"))?;
-    progress.end();
-    let last = &none[none.len() - 1];
-    let model = bench.machine.with(&[])?;
-    let shown = Trajectory::of(
-        &*model,
-        &bench.machine.plant,
-        &bench.parameters,
-        &bench.train.logs,
-        &last.fit.point,
-        bench.machine.threads,
-    )?;
-    let (candidates, left_out) = enumerate(&bench.machine, &shown, &settings.without);
-    let findings = Search {
-        bench: &mut bench,
-        scatter: &mut scatter,
-        candidates: &candidates,
-        breadth: settings.breadth,
-        progress,
-    }
-    .run(&none)?;
-    let findings = final_noise(&mut bench, study, &candidates, findings)?;
-    let scatter = cost_scatter(&bench, &findings.none)?;
-    let judgement = judge(&bench, &findings, candidates.len(), scatter);
-    let work = Work {
-        bench,
-        candidates,
-        left_out,
-        findings,
-        none,
-        judgement,
-        nominal,
-    };
+    let mut work = latent_force::pipeline::diagnose(study, machine, &settings.without, progress)?;
+    work.findings = final_noise(&mut work.bench, study, &work.candidates, work.findings)?;
+    work.none = vec![work.findings.none.clone()];
     tell(study, work, settings, progress)
 }
 
@@ -179,33 +132,4 @@ fn rescore(bench: &Bench, trials: &[Trial<'_>], of: &mut Explanation) -> Result<
     of.fit.residuals = residuals.pop().unwrap_or_default();
     of.fit.cost = cost(&of.fit.residuals);
     bench.hold_out(trials, of)
-}
-
-/// Deviation of the sum of squares over all logs that next to nothing at the starts makes.
-fn cost_scatter(bench: &Bench, none: &Explanation) -> Result<f64> {
-    if !bench.is_rough() {
-        return Ok(0.0);
-    }
-    let of = |record: &Record, starts: &[State]| -> Result<f64> {
-        let mut predictor = bench.predictor(&[], record)?;
-        let point = |k: i32| {
-            let mut point = Point {
-                theta: none.fit.point.theta.clone(),
-                starts: starts.to_vec(),
-            };
-            for start in &mut point.starts {
-                start.shift(bench.layout(), 0, f64::from(k) * crate::linearise::PROBE);
-            }
-            point
-        };
-        let points: Vec<Point> = (1..=8).map(point).collect();
-        let residuals = predictor.residuals(&points)?;
-        let costs: Vec<f64> = residuals.iter().map(|r| cost(r)).collect();
-        let n = costs.len() as f64;
-        let mean = costs.iter().sum::<f64>() / n;
-        Ok(costs.iter().map(|c| (c - mean).powi(2)).sum::<f64>() / (n - 1.0))
-    };
-    let train = of(&bench.train, &none.fit.point.starts)?;
-    let test = of(&bench.test, &none.held_starts)?;
-    Ok((train + test).sqrt())
 }

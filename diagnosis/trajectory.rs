@@ -109,7 +109,8 @@ impl Trajectory {
         })
     }
 
-    /// Of states that are known (`rows x (nq + nv)`, one an episode), with the contacts that the model has there.
+    /// Of states that are known (`rows x (nq + nv)` each, with the episode and its rows), and the contacts that the model has
+    /// there.
     ///
     /// # Errors
     /// When a value is not physical or the engine fails.
@@ -119,7 +120,7 @@ impl Trajectory {
         (parameters, theta): (&[Parameter], &[f64]),
         logs: &Logs,
         states: &[Vec<f64>],
-        rows: &[&[usize]],
+        rows: &[(usize, &[usize])],
     ) -> Result<Self> {
         let layout = model.layout();
         let (nq, nv, nu) = (layout.nq, layout.nv, layout.nu());
@@ -135,7 +136,8 @@ impl Trajectory {
         simulator.set_parameters(&[0], &columns_of(parameters, theta))?;
         let mut touched = vec![false; pairs.len()];
         let mut episodes = Vec::with_capacity(states.len());
-        for ((e, states), rows) in logs.episodes.iter().zip(states).zip(rows) {
+        for (states, &(episode, rows)) in states.iter().zip(rows) {
+            let e = &logs.episodes[episode];
             let mut contact = vec![0.0; rows.len() * pairs.len()];
             if !pairs.is_empty() {
                 let each = states

@@ -67,8 +67,7 @@ impl Columns {
         estimate: &Estimate,
         candidates: &[Candidate],
     ) -> Result<Self> {
-        let plant = context.plant();
-        let all = All::new(plant, base, theta, candidates);
+        let all = All::new(context, base, theta, candidates);
         let free = base.free();
         let (mut center, mut bounds) = (Vec::new(), Vec::new());
         let variations: Vec<Variation> = free
@@ -87,14 +86,14 @@ impl Columns {
                 }
             })
             .collect();
-        let nx = 2 * plant.layout.nv;
+        let nx = 2 * context.plant().layout.nv;
         let roles = 3 * nx + free.len() + 1;
         let mut map = context.map(&base.specs, &base.parameters(), roles)?;
         let want = Derivatives {
             state: true,
             ..Derivatives::default()
         };
-        let mut linear = map.linearise(theta, &estimate.trajectory, want, &[], &variations)?;
+        let mut linear = map.linearise(theta, &estimate.trajectory, want, &context.start_steps(), &variations)?;
         let late: Vec<Vec<f64>> = linear.iter().map(|l| l.late.clone()).collect();
         let source = Source {
             all,

@@ -13,12 +13,16 @@ use crate::data::Logs;
 use crate::machine::Machine;
 use crate::predict::State;
 
-use super::initial::{from_readings, scales, start};
+use super::initial::{from_readings, position_noise, start, open_by_reading, start_of_segment};
 use super::smoother::{NoiseModel, Problem, Smoothed, Start, Sums, smooth};
 use super::step_map::{Derivatives, LinearEpisode, StepMap};
-use super::tangent::retract;
+use super::tangent::{difference, retract};
 use super::walk::Walk;
 
+/// Mean square of what is left of readings, beyond their noise and in units of it, that counts as nothing: a gap of 1.05.
+pub const LEAST_LEFT: f64 = 0.1;
+/// Change of a segment's start that slopes are taken over, as a share of what its readings leave open.
+const START_SHARE: f64 = 0.02;
 /// Multiple of a step of EM in the logarithm of a variance: between 1 and 2 EM still rises (Lange 1995).
 const LENGTHENED: f64 = 1.7;
 /// Largest change of the logarithm of a variance in a round.
@@ -53,6 +57,8 @@ pub struct Context<'a> {
     pub walks: Vec<Walk>,
     /// The starts that logs give, one a walk; `None` where a walk begins within a log.
     pub given: Vec<Option<State>>,
+    /// Where segments begin by their readings, `nq + nv`, one a walk.
+    pub read: Vec<Vec<f64>>,
     /// Coordinates of the starts that logs leave open.
     pub open: Vec<usize>,
     /// Largest magnitude of each tangent coordinate.
@@ -63,6 +69,28 @@ pub struct Context<'a> {
     pub reading_variance: Vec<f64>,
     /// Typical inertial force at each degree of freedom, N or N m.
     pub inertial: Vec<f64>,
+}
+
+/// What a model lacks.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Missing {
+    /// Power of the missing force where it is smoothed, beyond what is too fine to decide, in units of the inertial forces,
+    /// over all degrees of freedom.
+    pub force: f64,
+    /// Mean square of what segments leave of their readings beyond the noise, in units of it.
+    pub readings: f64,
+    /// Share of the rows that are in segments.
+    pub share: f64,
+}
+
+impl Missing {
+    /// Relative to what another model lacks, of force and of readings by their shares of the rows.
+    #[must_use]
+    pub fn relative_to(self, other: Self) -> f64 {
+        let force = self.force / other.force.max(f64::MIN_POSITIVE);
+        let readings = self.readings / other.readings.max(LEAST_LEFT);
+        (1.0 - self.share) * force + self.share * readings
+    }
 }
 
 /// Trajectory, force and noise.
@@ -78,6 +106,8 @@ pub struct Estimate {
     pub free: Vec<Vec<f64>>,
     /// Least variance of the white part of each force.
     pub least_white: Vec<f64>,
+    /// Of each segment: variance of what is left of its readings, relative to that of the readings; 1 for other walks.
+    pub excess: Vec<f64>,
     /// The last smoothing, about the trajectory before it.
     pub smoothed: Vec<Smoothed>,
     /// Its log-likelihood.
@@ -105,17 +135,29 @@ impl Context<'_> {
         StepMap::new(self.machine, specs, parameters, rows, roles)
     }
 
+    /// Changes of the start of a segment that slopes are taken over: a part of what its first readings leave open, so that
+    /// points of contact that come and go even out.
+    #[must_use]
+    pub fn start_steps(&self) -> Vec<f64> {
+        let scales = (&self.scale[..], &self.position_noise[..]);
+        let open = (0..self.scale.len()).map(|i| open_by_reading(i, scales));
+        open.map(|d| START_SHARE * d).collect()
+    }
+
     /// Where the walks begin, about a trajectory.
     #[must_use]
     pub fn starts(&self, trajectory: &[Vec<f64>]) -> Vec<Start> {
         let width = self.plant().layout.nq + self.plant().layout.nv;
-        self.given
-            .iter()
-            .zip(trajectory)
-            .map(|(given, states)| {
+        let scales = (&self.scale[..], &self.position_noise[..]);
+        let each = self.given.iter().zip(&self.walks).zip(&self.read);
+        each.zip(trajectory)
+            .map(|(((given, walk), read), states)| {
+                let first = &states[..width];
                 let given = given.as_ref().map(|s| (s, &self.open[..]));
-                let scales = (&self.scale[..], &self.position_noise[..]);
-                start(self.plant(), given, &states[..width], scales)
+                if given.is_none() && walk.segment.is_some() {
+                    return start_of_segment(self.plant(), read, first, scales);
+                }
+                start(self.plant(), given, first, scales)
             })
             .collect()
     }
@@ -128,45 +170,50 @@ fn row_seconds(walks: &[Walk]) -> f64 {
     seconds / rows.max(1) as f64
 }
 
-/// A context for some walks, and a first estimate of the model at `theta`, not yet smoothed. What no
-/// sensor reads of the state is taken from `otherwise`.
+/// What the logs of a study are taken as.
+pub struct Taken {
+    /// Rows.
+    pub walks: Vec<Walk>,
+    /// The starts that logs give, one a walk; `None` where a walk begins within a log.
+    pub given: Vec<Option<State>>,
+    /// Coordinates of the starts that logs leave open.
+    pub open: Vec<usize>,
+    /// States where no sensor reads them, `rows x (nq + nv)`, one a walk.
+    pub otherwise: Vec<Vec<f64>>,
+    /// Largest magnitude of each tangent coordinate.
+    pub scale: Vec<f64>,
+}
+
+/// A context for some walks, and a first estimate of the model at `theta`, not yet smoothed.
 ///
 /// # Errors
 /// When the engine fails.
 pub fn begin<'a>(
     machine: &'a Machine,
     logs: &'a Logs,
-    walks: Vec<Walk>,
-    (given, open): (Vec<Option<State>>, Vec<usize>),
+    taken: Taken,
     (parameters, theta): (&[Parameter], &[f64]),
-    otherwise: &[Vec<f64>],
 ) -> Result<(Context<'a>, Estimate)> {
     let plant = &machine.plant;
     let layout = &plant.layout;
     let (nv, width) = (layout.nv, layout.nq + layout.nv);
-    let trajectory = from_readings(plant, logs, &walks, otherwise);
+    let mut trajectory = from_readings(plant, logs, &taken.walks, &taken.otherwise);
+    let read = trajectory.iter().map(|s| s[..width].to_vec());
     let noise = logs.entry_noise();
-    let mut position_noise = vec![0.0; nv];
-    for sensor in &logs.sensors {
-        let place = layout.sensors.iter().position(|s| s.name == sensor.name);
-        if let Some(asid_mjcf::plant::Reads::Joint(j)) = place.map(|p| plant.sensors[p])
-            && place.is_some_and(|p| layout.sensors[p].kind == "jointpos")
-        {
-            position_noise[layout.joints[j].qvel] = sensor.noise;
-        }
-    }
     let mut context = Context {
         machine,
         logs,
-        given,
-        open,
-        scale: scales(plant, &trajectory),
-        position_noise,
+        given: taken.given,
+        read: read.collect(),
+        open: taken.open,
+        scale: taken.scale,
+        position_noise: position_noise(plant, logs),
         reading_variance: noise.iter().map(|n| n * n).collect(),
         inertial: vec![0.0; nv],
-        walks,
+        walks: taken.walks,
     };
     let mut map = context.map(&[], parameters, nv + 1)?;
+    map.roll(theta, &mut trajectory, &context.reading_variance)?;
     let want = Derivatives {
         force: true,
         ..Derivatives::default()
@@ -205,6 +252,7 @@ pub fn begin<'a>(
             r: context.reading_variance.clone(),
         },
         free: vec![Vec::new(); trajectory.len()],
+        excess: vec![1.0; trajectory.len()],
         least_white: vec![0.0; nv],
         smoothed: Vec::new(),
         log_likelihood: f64::NEG_INFINITY,
@@ -238,6 +286,65 @@ impl Estimate {
             })
     }
 
+    /// The noise of a walk, that of forces and of what segments leave scaled.
+    #[must_use]
+    pub fn noise_along(&self, context: &Context<'_>, walk: usize, scale: f64) -> NoiseModel {
+        if context.walks[walk].segment.is_none() {
+            return self.noise.scaled(scale, &self.least_white);
+        }
+        let excess = (scale * self.excess[walk]).max(1.0);
+        let none = vec![0.0; self.noise.q.len()];
+        NoiseModel {
+            q: none.clone(),
+            white: none,
+            r: self.noise.r.iter().map(|r| r * excess).collect(),
+            tau: self.noise.tau.clone(),
+        }
+    }
+
+    /// Scales the variances of the missing force and of what segments leave.
+    pub fn rescale(&mut self, scale: f64) {
+        self.noise = self.noise.scaled(scale, &self.least_white);
+        self.excess
+            .iter_mut()
+            .for_each(|x| *x = (scale * *x).max(1.0));
+    }
+
+    /// Replays the segments from their starts, which have just been moved from those `before`: each takes the step, of those
+    /// offered and none, that leaves least of its readings.
+    ///
+    /// # Errors
+    /// When the engine fails.
+    pub fn roll(&mut self, map: &mut StepMap<'_>, theta: &[f64], before: &[Vec<f64>]) -> Result<()> {
+        if !map.has_segments() {
+            return Ok(());
+        }
+        let layout = map.layout().clone();
+        let width = layout.nq + layout.nv;
+        let mut left = map.roll(theta, &mut self.trajectory, &self.noise.r)?;
+        let offered = self.smoothed.iter().map(|s| s.damped.len()).max().unwrap_or(0);
+        for i in 0..=offered {
+            let mut other = before.to_vec();
+            for (states, smoothed) in other.iter_mut().zip(&self.smoothed) {
+                if let Some(change) = smoothed.damped.get(i) {
+                    retract(&layout, &mut states[..width], change);
+                }
+            }
+            let of_other = map.roll(theta, &mut other, &self.noise.r)?;
+            for (w, states) in other.into_iter().enumerate() {
+                if of_other[w] < left[w] {
+                    left[w] = of_other[w];
+                    self.trajectory[w] = states;
+                }
+            }
+        }
+        if std::env::var("ASID_DBG").is_ok() {
+            let q = |v: &[f64]| { let mut v = v.to_vec(); v.sort_by(f64::total_cmp); let n = v.len(); format!("{:.0} {:.0} {:.0} {:.0} {:.0}", v[n/10], v[n/4], v[n/2], v[3*n/4], v[9*n/10]) };
+            eprintln!("{:.1} roll theta {theta:.4?} n {} left [{}] excess [{}]", std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap().as_secs_f64()%1000.0, left.len(), q(&left), q(&self.excess));
+        }
+        Ok(())
+    }
+
     /// Smooths about the present trajectory, fits the noise over some rounds, and moves the trajectory.
     pub fn improve(&mut self, context: &Context<'_>, linear: &[LinearEpisode], rounds: usize) {
         let starts = context.starts(&self.trajectory);
@@ -246,10 +353,14 @@ impl Estimate {
         for round in 0..rounds.max(1) {
             let smoothed: Vec<Smoothed> = self
                 .problems(context, linear, &starts)
-                .map(|p| smooth(p, &self.noise))
+                .enumerate()
+                .map(|(w, p)| smooth(p, &self.noise_along(context, w, 1.0)))
                 .collect();
             let mut sums = Sums::default();
-            smoothed.iter().for_each(|s| sums.add(&s.sums));
+            let along = context.walks.iter().zip(&smoothed);
+            along
+                .filter(|(w, _)| w.segment.is_none())
+                .for_each(|(_, s)| sums.add(&s.sums));
             let likelihood: f64 = smoothed.iter().map(|s| s.log_likelihood).sum();
             if likelihood.is_nan() || likelihood < before.0 {
                 // A lengthened step went too far.
@@ -262,12 +373,16 @@ impl Estimate {
             before = (likelihood, self.noise.clone());
             if round + 1 < rounds {
                 self.update_noise(context, &sums, length);
+                self.update_excess(context);
             }
         }
         let layout = &context.plant().layout;
         let (nx, width) = (2 * layout.nv, layout.nq + layout.nv);
-        for (states, smoothed) in self.trajectory.iter_mut().zip(&self.smoothed) {
-            let changes = smoothed.change.chunks_exact(nx);
+        let pairs = self.trajectory.iter_mut().zip(&self.smoothed);
+        for ((states, smoothed), walk) in pairs.zip(&context.walks) {
+            // A segment is replayed from its start.
+            let rows = if walk.segment.is_some() { 1 } else { walk.len() };
+            let changes = smoothed.change.chunks_exact(nx).take(rows);
             for (state, change) in states.chunks_exact_mut(width).zip(changes) {
                 if change.iter().all(|x| x.is_finite()) {
                     retract(layout, state, change);
@@ -283,7 +398,16 @@ impl Estimate {
         let (nx, width) = (2 * layout.nv, layout.nq + layout.nv);
         let mut out = there.clone();
         let mut change = vec![0.0; nx];
-        for (states, smoothed) in out.trajectory.iter_mut().zip(&there.smoothed) {
+        let pairs = out.trajectory.iter_mut().zip(&there.smoothed);
+        for (w, ((states, smoothed), walk)) in pairs.zip(&context.walks).enumerate() {
+            if walk.segment.is_some() {
+                let from = &self.trajectory[w][..width];
+                difference(layout, &states[..width], from, &mut change);
+                change.iter_mut().for_each(|c| *c *= part);
+                states[..width].copy_from_slice(from);
+                retract(layout, &mut states[..width], &change);
+                continue;
+            }
             let changes = smoothed.change.chunks_exact(nx);
             for (state, whole) in states.chunks_exact_mut(width).zip(changes) {
                 if whole.iter().all(|x| x.is_finite()) {
@@ -309,6 +433,22 @@ impl Estimate {
         out
     }
 
+    fn update_excess(&mut self, context: &Context<'_>) {
+        let each = self.excess.iter_mut().zip(&self.smoothed);
+        for ((excess, smoothed), walk) in each.zip(&context.walks) {
+            if walk.segment.is_none() {
+                continue;
+            }
+            let (mut squares, mut n) = (0.0, 0.0);
+            for ([sum, count], r) in smoothed.sums.reading.iter().zip(&self.noise.r) {
+                squares += sum / r;
+                n += count;
+            }
+            let value: f64 = squares / f64::max(n, 1.0);
+            *excess = if value.is_finite() { value.max(1.0) } else { *excess };
+        }
+    }
+
     fn update_noise(&mut self, context: &Context<'_>, sums: &Sums, length: f64) {
         let moved = |old: f64, new: f64, least: f64| {
             let change = (new / old).ln().clamp(-LARGEST_CHANGE, LARGEST_CHANGE);
@@ -319,7 +459,10 @@ impl Estimate {
                 old
             }
         };
-        let dt = sums.seconds / sums.steps.max(1.0);
+        if sums.steps == 0.0 {
+            return;
+        }
+        let dt = sums.seconds / sums.steps;
         for (j, [later, earlier, product]) in sums.force.iter().enumerate() {
             let rho = (product / earlier).clamp(1e-6, LARGEST_CORRELATION);
             if !rho.is_finite() {
@@ -372,24 +515,42 @@ impl Estimate {
             .collect()
     }
 
-    /// Power of the missing force beyond what is too fine to decide, in units of the inertial forces, over all degrees of
-    /// freedom.
+    /// What the model lacks.
     #[must_use]
-    pub fn missing_power(&self, inertial: &[f64]) -> f64 {
+    pub fn missing(&self, context: &Context<'_>) -> Missing {
         let noise = &self.noise;
-        let total = |j: usize| noise.q[j] + noise.white[j] - self.least_white[j];
-        (0..inertial.len())
-            .map(|j| total(j).max(0.0) / inertial[j].powi(2))
-            .sum()
+        let power = |j: usize| {
+            let beyond = noise.q[j] + noise.white[j] - self.least_white[j];
+            beyond.max(0.0) / context.inertial[j].powi(2)
+        };
+        let (mut squares, mut n, mut in_segments, mut rows) = (0.0, 0.0, 0, 0);
+        for (walk, smoothed) in context.walks.iter().zip(&self.smoothed) {
+            rows += walk.len();
+            if walk.segment.is_some() {
+                in_segments += walk.len();
+                for ([sum, count], r) in smoothed.sums.reading.iter().zip(&noise.r) {
+                    squares += sum / r;
+                    n += count;
+                }
+            }
+        }
+        let share = in_segments as f64 / rows.max(1) as f64;
+        Missing {
+            force: if share < 1.0 {
+                (0..context.inertial.len()).map(power).sum()
+            } else {
+                0.0
+            },
+            readings: (squares / f64::max(n, 1.0) - 1.0).max(0.0),
+            share,
+        }
     }
 
     /// From here on nothing finer than a part of the force that is missing now decides.
-    pub fn set_resolution(&mut self, nv: usize) {
+    pub fn set_resolution(&mut self, context: &Context<'_>) {
+        let nv = context.plant().layout.nv;
         for j in 0..nv {
-            let all = || {
-                let smoothed = self.smoothed.iter();
-                smoothed.flat_map(|s| s.force.iter().skip(j).step_by(nv))
-            };
+            let all = || self.forces(context, j);
             let n = all().count().max(1) as f64;
             let mean_square = all().map(|w| w * w).sum::<f64>() / n;
             self.least_white[j] = LEAST_WHITE * LEAST_WHITE * mean_square;
@@ -406,13 +567,13 @@ impl Estimate {
         let mut free: Vec<Vec<f64>> = context
             .walks
             .iter()
-            .map(|w| vec![0.0; w.len() * nv])
+            .map(|w| vec![0.0; if w.segment.is_some() { 0 } else { w.len() * nv }])
             .collect();
         for joint in context.plant().scalar_joints() {
             let d = layout.joints[joint].qvel;
             let mut against = Vec::new();
             for (w, smoothed) in self.smoothed.iter().enumerate() {
-                for k in 0..context.walks[w].len() {
+                for k in 0..free[w].len() / nv {
                     let speed = self.speed(context, w, k, d);
                     if speed.abs() > rest[d] {
                         against.push(-smoothed.force[k * nv + d] * speed.signum());
@@ -421,7 +582,7 @@ impl Estimate {
             }
             let friction = crate::noise::median(&mut against).unwrap_or(0.0).max(0.0);
             for (w, free) in free.iter_mut().enumerate() {
-                for k in 0..context.walks[w].len() {
+                for k in 0..free.len() / nv {
                     if self.speed(context, w, k, d).abs() <= rest[d] {
                         free[k * nv + d] = friction * friction;
                     }
@@ -431,17 +592,21 @@ impl Estimate {
         self.free = free;
     }
 
+    /// The missing force at a degree of freedom, along all walks that are smoothed.
+    fn forces<'s>(&'s self, context: &'s Context<'_>, dof: usize) -> impl Iterator<Item = f64> + 's {
+        let nv = context.plant().layout.nv;
+        let pairs = self.smoothed.iter().zip(&context.walks);
+        pairs
+            .filter(|(_, w)| w.segment.is_none())
+            .flat_map(move |(s, _)| s.force.iter().skip(dof).step_by(nv).copied())
+    }
+
     /// Quantile of the magnitude of the missing force at each degree of freedom.
     #[must_use]
-    pub fn force_quantile(&self, nv: usize, quantile: f64) -> Vec<f64> {
-        (0..nv)
+    pub fn force_quantile(&self, context: &Context<'_>, quantile: f64) -> Vec<f64> {
+        (0..context.plant().layout.nv)
             .map(|d| {
-                let mut all: Vec<f64> = self
-                    .smoothed
-                    .iter()
-                    .flat_map(|s| s.force.iter().skip(d).step_by(nv))
-                    .map(|x| x.abs())
-                    .collect();
+                let mut all: Vec<f64> = self.forces(context, d).map(f64::abs).collect();
                 if all.is_empty() {
                     return 0.0;
                 }

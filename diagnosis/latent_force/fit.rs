@@ -89,10 +89,10 @@ pub fn regression(
     m: usize,
 ) -> Regression {
     let starts = context.starts(&estimate.trajectory);
-    let noise = estimate.noise.scaled(scale, &estimate.least_white);
     let parts: Vec<Regression> = estimate
         .problems(context, linear, &starts)
-        .map(|p| regress(p, &noise, m))
+        .enumerate()
+        .map(|(w, p)| regress(p, &estimate.noise_along(context, w, scale), m))
         .collect();
     let mut sum = Regression {
         log_likelihood: 0.0,
@@ -155,6 +155,7 @@ pub fn fit(
         state: true,
         ..Derivatives::default()
     };
+    let steps = context.start_steps();
     let mut theta = theta.to_vec();
     let mut estimate = estimate.clone();
     let mut best: Option<Fitted> = None;
@@ -182,7 +183,7 @@ pub fn fit(
             state: fresh,
             ..want
         };
-        let mut linear = map.linearise(&theta, &estimate.trajectory, wanted, &[], &variations)?;
+        let mut linear = map.linearise(&theta, &estimate.trajectory, wanted, &steps, &variations)?;
         slopes.exchange(&mut linear, fresh.then_some(&theta[..]));
         let places: Vec<usize> = (0..m).collect();
         let center: Vec<f64> = free
@@ -210,13 +211,16 @@ pub fn fit(
         let Some((here, scale, found)) = chosen else {
             break;
         };
-        estimate.noise = estimate.noise.scaled(scale, &estimate.least_white);
+        estimate.rescale(scale);
         let covariance = DMatrix::from_fn(m, m, |i, j| {
             let d = |k: usize| unknowns[free[k]].deviation;
             found.covariance[(i, j)] * d(i) * d(j)
         });
         let promised = found.gain - determinant_of(&found) + 0.5 * prior;
         let hoped = here + promised;
+        if std::env::var("ASID_DBG").is_ok() {
+            eprintln!("  fit {:?} round {round} scale {scale} evidence {here:.1} promised {promised:.1} theta {theta:.4?}", hypothesis.specs.iter().map(|s| s.label()).collect::<Vec<_>>());
+        }
         let rose = best.as_ref().is_none_or(|b| here > b.evidence + RISE)
             || anchor.as_ref().is_none_or(|a| hoped > a.hoped + RISE);
         waited = if rose { 0 } else { waited + 1 };
@@ -246,25 +250,31 @@ pub fn fit(
                 *x = a + part * (b - a);
             }
             estimate = from.1.towards(context, &to.1, part);
+            let before = estimate.trajectory.clone();
+            estimate.roll(&mut map, &theta, &before)?;
             slopes.keep(&linear);
             continue;
         }
         let from = rose.then(|| (theta.clone(), estimate.clone()));
-        let steps: Vec<f64> = found
+        let moves: Vec<f64> = found
             .coefficients
             .iter()
             .map(|c| c.clamp(-LARGEST_STEP, LARGEST_STEP))
             .collect();
         for (k, &i) in free.iter().enumerate() {
             let [low, high] = unknowns[i].bounds;
-            theta[i] = (theta[i] + steps[k] * unknowns[i].deviation).clamp(low, high);
+            theta[i] = (theta[i] + moves[k] * unknowns[i].deviation).clamp(low, high);
         }
-        shift(&mut linear, &steps);
+        shift(&mut linear, &moves);
+        let before = estimate.trajectory.clone();
         estimate.improve(context, &linear, EM_ROUNDS);
+        estimate.roll(&mut map, &theta, &before)?;
         slopes.keep(&linear);
         for _ in 0..if map.reads() { AGAIN } else { 0 } {
-            let linear = map.linearise(&theta, &estimate.trajectory, want, &[], &[])?;
+            let linear = map.linearise(&theta, &estimate.trajectory, want, &steps, &[])?;
+            let before = estimate.trajectory.clone();
             estimate.improve(context, &linear, 1);
+            estimate.roll(&mut map, &theta, &before)?;
         }
         if let Some(from) = from {
             part = 1.0;
@@ -339,15 +349,18 @@ pub fn settle_noise(
         ..Derivatives::default()
     };
     let mut slopes = Slopes::default();
+    let steps = context.start_steps();
     for _ in 0..rounds {
         let fresh = map.reads() || slopes.is_old(theta, &hypothesis.unknowns);
         let wanted = Derivatives {
             state: fresh,
             ..want
         };
-        let mut linear = map.linearise(theta, &estimate.trajectory, wanted, &[], &[])?;
+        let mut linear = map.linearise(theta, &estimate.trajectory, wanted, &steps, &[])?;
         slopes.exchange(&mut linear, fresh.then_some(theta));
+        let before = estimate.trajectory.clone();
         estimate.improve(context, &linear, em_rounds);
+        estimate.roll(&mut map, theta, &before)?;
         slopes.keep(&linear);
     }
     Ok(())

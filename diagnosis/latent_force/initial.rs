@@ -20,6 +20,11 @@ const GIVEN: f64 = 1e-4;
 /// Deviation of a start that the log does not give, relative to the largest value of its coordinate.
 const OPEN: f64 = 2.0;
 
+/// Deviation of where a segment begins, in deviations of the reading of its position, and the time over which that makes the
+/// deviation of its speed, s: half the window that a speed is taken over at 100 Hz, so that a bounce within it is allowed for.
+const READ: f64 = 5.0;
+const READ_TIME: f64 = 0.02;
+
 /// Fills missing values of a series linearly between their neighbours; false where there is none.
 fn fill(time: &[f64], values: &mut [f64]) -> bool {
     let present: Vec<usize> = (0..values.len())
@@ -212,6 +217,29 @@ pub fn scales(plant: &Plant, trajectory: &[Vec<f64>]) -> Vec<f64> {
     scale
 }
 
+/// Deviation of the reading of each position that a sensor reads directly, else 0; `nv`.
+#[must_use]
+pub fn position_noise(plant: &Plant, logs: &Logs) -> Vec<f64> {
+    let layout = &plant.layout;
+    let mut noise = vec![0.0; layout.nv];
+    for sensor in &logs.sensors {
+        let Some(index) = layout.sensors.iter().position(|s| s.name == sensor.name) else {
+            continue;
+        };
+        let dofs = match (plant.sensors[index], &*layout.sensors[index].kind) {
+            (Reads::Joint(j), "jointpos") => layout.joints[j].qvel..layout.joints[j].qvel + 1,
+            (Reads::Body(b), kind) => match plant.free_joint(b).map(|j| layout.joints[j].qvel) {
+                Some(first) if kind == "framepos" => first..first + 3,
+                Some(first) if kind == "framequat" => first + 3..first + 6,
+                _ => continue,
+            },
+            _ => continue,
+        };
+        noise[dofs].fill(sensor.noise);
+    }
+    noise
+}
+
 /// Where a walk begins, as the filter wants it: about the log's own start where `given`, else about the
 /// trajectory's first state. `noise` is the deviation of the reading of each position that a sensor reads directly.
 #[must_use]
@@ -242,6 +270,31 @@ pub fn start(
             }
         }
     }
+    start
+}
+
+/// What the readings about a row leave open of a tangent coordinate there: positions by a few deviations of their reading,
+/// speeds by what that is over the window in which they are taken; where no sensor reads it, as large as the coordinate gets.
+#[must_use]
+pub fn open_by_reading(i: usize, (scale, noise): (&[f64], &[f64])) -> f64 {
+    let nv = noise.len();
+    let least = GIVEN * scale[i];
+    match noise[i % nv] {
+        0.0 => OPEN * scale[i],
+        noise if i < nv => (READ * noise).max(least),
+        noise => (READ * noise / READ_TIME).max(least),
+    }
+}
+
+/// Where a segment begins about its trajectory's first state: at its readings, as open as these leave it.
+#[must_use]
+pub fn start_of_segment(plant: &Plant, read: &[f64], first: &[f64], scales: (&[f64], &[f64])) -> Start {
+    let nx = 2 * plant.layout.nv;
+    let mut start = Start {
+        mean: vec![0.0; nx],
+        variance: (0..nx).map(|i| open_by_reading(i, scales).powi(2)).collect(),
+    };
+    difference(&plant.layout, read, first, &mut start.mean);
     start
 }
 

@@ -4,7 +4,7 @@
 //! local: which force is missing *now*? It is a hidden state beside position and speed, estimated by smoothing; effects are
 //! columns of one linear regression on its innovations; the few that lead are put into the model and fitted anew.
 //!
-//! From below: [`tangent`] (states), [`walk`] (rows), [`step_map`] (the model over a row and its derivatives),
+//! From below: [`tangent`] (states), [`walk`] (rows), [`segments`] (where bodies touch), [`step_map`] (the model over a row and its derivatives),
 //! [`smoother`], [`initial`] and [`estimate`] (trajectory, force and noise), [`unknown`] and [`fit`] (a model with its values),
 //! [`evidence`], [`trace`], [`columns`], [`screen`], [`search`], [`selection`], [`pipeline`].
 
@@ -16,6 +16,7 @@ pub mod initial;
 pub mod pipeline;
 pub mod screen;
 pub mod search;
+pub mod segments;
 pub mod selection;
 pub mod smoother;
 pub mod step_map;

@@ -16,9 +16,11 @@ use crate::study::Study;
 use crate::trajectory::Trajectory;
 use crate::work::Work;
 
-use super::estimate::{Estimate, begin};
+use super::estimate::{Estimate, Taken, begin};
 use super::fit::{Fitted, Hypothesis, fit, settle_noise};
+use super::initial::{from_readings, scales};
 use super::search::{Breadth, Outcome, Set, search};
+use super::segments::cut;
 use super::selection::select;
 use super::unknown::Unknown;
 use super::walk::Walk;
@@ -37,13 +39,7 @@ const REPLAYED: usize = 500_000;
 /// Most sets besides the verdict's that are replayed.
 const RIVALS: usize = 4;
 
-/// Whether anything touches in some row: there the method is not for the machine, whose contact forces would pass for noise.
-fn touches(shown: &Trajectory) -> bool {
-    let mut episodes = shown.episodes.iter();
-    episodes.any(|e| e.contact.iter().any(|f| *f > 0.0))
-}
-
-/// Diagnoses a study; gives the machine back where it is one for another method.
+/// Diagnoses a study.
 ///
 /// # Errors
 /// When a parameter cannot be set or the engine fails.
@@ -52,75 +48,44 @@ pub fn diagnose(
     machine: Machine,
     without: &[String],
     progress: &dyn Progress,
-) -> Result<std::result::Result<Work, Machine>> {
+) -> Result<Work> {
     progress.begin("smoothing the logs", 1);
     let (mut bench, nominal) = dataset(study, machine)?;
     set_reading_noise(&mut bench, &study.noise);
-    let layout = bench.layout().clone();
     let logs = bench.train.logs.clone();
-    let walks = within_budget(
-        (0..logs.episodes.len())
-            .map(|e| Walk::new(&logs, e, layout.timestep))
-            .collect(),
-        layout.nv,
-    );
-    let given: Vec<Option<State>> = study
-        .train
-        .iter()
-        .map(|(_, e)| {
-            e.initial
-                .as_ref()
-                .map(|_| given_start(&bench.machine.plant, e))
-        })
-        .collect();
-    let home = asid_core::problem::home(&layout);
-    let still = [&home.0[..], &home.1[..]].concat();
-    let otherwise: Vec<Vec<f64>> = walks.iter().map(|w| still.repeat(w.len())).collect();
     let unknowns = study.parameters.iter().zip(&nominal);
     let hypothesis = Hypothesis {
         specs: Vec::new(),
         unknowns: unknowns.map(|(p, n)| Unknown::of_study(p, *n)).collect(),
     };
-    let searched = {
-        let (context, mut estimate) = begin(
-            &bench.machine,
-            &logs,
-            walks,
-            (given, bench.open.clone()),
-            (&study.parameters, &nominal),
-            &otherwise,
-        )?;
-        let model = bench.machine.with(&[])?;
-        let rows: Vec<&[usize]> = context.walks.iter().map(|w| &w.rows[..]).collect();
-        let along = |theta: &[f64], states: &[Vec<f64>]| {
-            let values = (&study.parameters[..], theta);
-            Trajectory::along(&*model, &bench.machine.plant, values, &logs, states, &rows)
-        };
-        if touches(&along(&nominal, &estimate.trajectory)?) {
-            None
-        } else {
-            settle_noise(&context, &hypothesis, &nominal, &mut estimate, FIRST)?;
-            let first = fit(&context, &hypothesis, &nominal, &estimate, ROUNDS)?;
-            let mut estimate = first.estimate;
-            estimate.free_at_rest(&context);
-            estimate.set_resolution(layout.nv);
-            let none = fit(&context, &hypothesis, &first.theta, &estimate, ROUNDS)?;
-            progress.end();
-            let shown = along(&none.theta, &none.estimate.trajectory)?;
-            let (candidates, left_out) = enumerate(&bench.machine, &shown, without);
-            let outcome = search(&context, &none, &candidates, Breadth::default(), progress)?;
-            Some((outcome, candidates, left_out))
+    let (outcome, candidates, left_out, firsts) = {
+        let taken = take(study, &bench, &nominal)?;
+        let parameters = (&study.parameters[..], &nominal[..]);
+        let (context, mut estimate) = begin(&bench.machine, &logs, taken, parameters)?;
+        settle_noise(&context, &hypothesis, &nominal, &mut estimate, FIRST)?;
+        let mut none = fit(&context, &hypothesis, &nominal, &estimate, ROUNDS)?;
+        if none.estimate.missing(&context).share < 1.0 {
+            none.estimate.free_at_rest(&context);
+            none.estimate.set_resolution(&context);
+            none = fit(&context, &hypothesis, &none.theta, &none.estimate, ROUNDS)?;
         }
-    };
-    let Some((outcome, candidates, left_out)) = searched else {
         progress.end();
-        return Ok(Err(bench.machine));
+        let shown = along(
+            &bench,
+            &context.walks,
+            &none.theta,
+            &none.estimate.trajectory,
+        )?;
+        let (candidates, left_out) = enumerate(&bench.machine, &shown, without);
+        let outcome = search(&context, &none, &candidates, Breadth::default(), progress)?;
+        let firsts = (0..context.walks.len()).filter(|&w| context.walks[w].rows[0] == 0);
+        (outcome, candidates, left_out, firsts.collect::<Vec<_>>())
     };
     progress.begin("replaying", 1);
-    let (findings, sets) = replay(&mut bench, &candidates, &outcome)?;
+    let (findings, sets) = replay(&mut bench, &candidates, &outcome, &firsts)?;
     progress.end();
     let judgement = select(&bench, &outcome, &sets, &findings, &candidates);
-    Ok(Ok(Work {
+    Ok(Work {
         none: vec![findings.none.clone()],
         bench,
         candidates,
@@ -128,7 +93,57 @@ pub fn diagnose(
         findings,
         judgement,
         nominal,
-    }))
+    })
+}
+
+/// What the model does along some states.
+fn along(
+    bench: &Bench,
+    walks: &[Walk],
+    theta: &[f64],
+    states: &[Vec<f64>],
+) -> Result<Trajectory> {
+    let model = bench.machine.with(&[])?;
+    let plant = &bench.machine.plant;
+    let values = (&bench.parameters[..], theta);
+    let rows: Vec<(usize, &[usize])> = walks.iter().map(|w| (w.episode, &w.rows[..])).collect();
+    Trajectory::along(&*model, plant, values, &bench.train.logs, states, &rows)
+}
+
+/// Takes the training logs within the budget, in segments where something touches.
+fn take(study: &Study, bench: &Bench, nominal: &[f64]) -> Result<Taken> {
+    let layout = bench.layout();
+    let plant = &bench.machine.plant;
+    let logs = &bench.train.logs;
+    let whole = |e| Walk::new(logs, e, layout.timestep);
+    let whole = within_budget((0..logs.episodes.len()).map(whole).collect(), layout.nv);
+    let home = asid_core::problem::home(layout);
+    let still = [&home.0[..], &home.1[..]].concat();
+    let at_home = |walks: &[Walk]| -> Vec<Vec<f64>> {
+        walks.iter().map(|w| still.repeat(w.len())).collect()
+    };
+    let first = from_readings(plant, logs, &whole, &at_home(&whole));
+    let shown = along(bench, &whole, nominal, &first)?;
+    let pairs = shown.pairs.len();
+    let mut walks = Vec::new();
+    for (walk, path) in whole.iter().zip(&shown.episodes) {
+        let touches: Vec<bool> = (0..walk.len())
+            .map(|k| path.contact[k * pairs..(k + 1) * pairs].iter().any(|f| *f > 0.0))
+            .collect();
+        walks.extend(cut(walk, &touches));
+    }
+    let given = |w: &Walk| {
+        let episode = &study.train[w.episode].1;
+        let known = w.rows[0] == 0 && episode.initial.is_some();
+        known.then(|| given_start(plant, episode))
+    };
+    Ok(Taken {
+        given: walks.iter().map(given).collect(),
+        open: bench.open.clone(),
+        otherwise: at_home(&walks),
+        scale: scales(plant, &first),
+        walks,
+    })
 }
 
 /// The first rows of each walk, as many as the budget of physics steps allows: a screening takes all of them once a column.
@@ -145,26 +160,27 @@ fn within_budget(walks: Vec<Walk>, nv: usize) -> Vec<Walk> {
     walks.iter().map(part).collect()
 }
 
-/// Starts of the training episodes as a fit smoothed them, where the logs leave them open.
-fn smoothed_starts(bench: &Bench, fitted: &Fitted) -> Vec<State> {
+/// Starts of the training episodes as a fit smoothed them, where the logs leave them open; `firsts` are the walks that begin
+/// an episode.
+fn smoothed_starts(bench: &Bench, fitted: &Fitted, firsts: &[usize]) -> Vec<State> {
     let layout = bench.layout();
     let width = layout.nq + layout.nv;
     if bench.open.is_empty() {
         return bench.train.starts.clone();
     }
-    fitted
-        .estimate
-        .trajectory
-        .iter()
-        .map(|states| State {
-            qpos: states[..layout.nq].to_vec(),
-            qvel: states[layout.nq..width].to_vec(),
-        })
-        .collect()
+    let state = |states: &Vec<f64>| State {
+        qpos: states[..layout.nq].to_vec(),
+        qvel: states[layout.nq..width].to_vec(),
+    };
+    let trajectory = &fitted.estimate.trajectory;
+    firsts.iter().map(|&w| state(&trajectory[w])).collect()
 }
 
-/// What is missing at each degree of freedom, without effects and with those that stand.
+/// What is missing at each degree of freedom, without effects and with those that stand; empty where all is segments.
 fn missing_forces(layout: &Layout, outcome: &Outcome) -> Vec<MissingForce> {
+    if outcome.missing[0].share >= 1.0 {
+        return Vec::new();
+    }
     let (before, after) = (&outcome.none.estimate, &outcome.best.fitted.estimate);
     let deviation = |e: &Estimate, d: usize| (e.noise.q[d] + e.noise.white[d]).sqrt();
     let dofs = layout.joints.iter().flat_map(|joint| {
@@ -222,6 +238,7 @@ fn replay(
     bench: &mut Bench,
     candidates: &[Candidate],
     outcome: &Outcome,
+    firsts: &[usize],
 ) -> Result<(Findings, Vec<Set>)> {
     let episodes = &bench.train.logs.episodes;
     let steps: usize = episodes.iter().map(|e| e.plan.physics_steps()).sum();
@@ -246,7 +263,7 @@ fn replay(
                 (&candidates[c], values)
             })
             .collect();
-        let starts = smoothed_starts(bench, fitted);
+        let starts = smoothed_starts(bench, fitted, firsts);
         bench.explain(0, &chosen, &fitted.theta[..study], &starts, effort)
     };
     let none = of(&outcome.none, &[], Effort::BRIEF)?;

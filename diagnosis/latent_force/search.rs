@@ -6,7 +6,7 @@ use asid_effects::Start;
 use crate::candidate::Candidate;
 
 use super::columns::{Columns, Form};
-use super::estimate::Context;
+use super::estimate::{Context, Missing};
 use super::fit::{Fitted, Hypothesis, fit};
 use super::screen::{Screened, rank, regressions};
 
@@ -99,8 +99,8 @@ pub struct Outcome {
     pub none: Fitted,
     /// The rounds.
     pub rounds: Vec<Round>,
-    /// Typical inertial force at each degree of freedom, N or N m.
-    pub inertial: Vec<f64>,
+    /// What is missing without effects, and with those that stand.
+    pub missing: [Missing; 2],
     /// The set that stands; that without effects where nothing earned its place.
     pub best: Set,
 }
@@ -147,11 +147,11 @@ pub fn search(
         fitted: none.clone(),
         names: 0,
     };
-    let at_first = none.estimate.missing_power(&context.inertial);
+    let at_first = none.estimate.missing(context);
+    let left = |s: &Set| s.fitted.estimate.missing(context).relative_to(at_first);
     let mut rounds = Vec::new();
     for _ in 0..breadth.depth {
-        let left = best.fitted.estimate.missing_power(&context.inertial);
-        if left < breadth.shrinks * at_first {
+        if left(&best) < breadth.shrinks {
             break;
         }
         let open: Vec<usize> = (0..candidates.len())
@@ -161,17 +161,17 @@ pub fn search(
         let next = round.confirmed.first().cloned();
         rounds.push(round);
         let Some(next) = next else { break };
-        let power = |s: &Set| s.fitted.estimate.missing_power(&context.inertial);
-        let shrinks = power(&best) - power(&next) > breadth.shrinks * at_first;
+        let shrinks = left(&best) - left(&next) > breadth.shrinks;
         if next.fitted.evidence - best.fitted.evidence < threshold || !shrinks {
             break;
         }
         best = next;
     }
     let best = free_what_is_given(context, candidates, best, breadth, threshold)?;
+    let of = |f: &Fitted| f.estimate.missing(context);
     Ok(Outcome {
         none: none.clone(),
-        inertial: context.inertial.clone(),
+        missing: [of(none), of(&best.fitted)],
         rounds,
         best,
     })
@@ -323,6 +323,9 @@ fn one_round(
             .collect()
     };
     let screened: Vec<(Vec<usize>, f64)> = ranked.iter().map(|s| (label(s), s.gain)).collect();
+    if std::env::var("ASID_DBG").is_ok() {
+        for s in ranked.iter().take(8) { eprintln!("screened {:?} {:.1}", label(s).iter().map(|&c| candidates[c].label()).collect::<Vec<_>>(), s.gain); }
+    }
     progress.begin("confirming", breadth.raced.min(ranked.len()) as u64);
     let mut racing = Vec::new();
     let lead = ranked.first().map_or(0.0, |s| s.gain);

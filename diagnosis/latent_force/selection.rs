@@ -5,6 +5,7 @@ use crate::candidate::Candidate;
 use crate::search::{Findings, NEGLIGIBLE, excess};
 use crate::verdict::{Hypothesis as Judged, Judgement};
 
+use super::estimate::LEAST_LEFT;
 use super::search::{Outcome, Set};
 
 /// Evidence is divided by this before it becomes a probability: the noise model is not the machine's own.
@@ -79,19 +80,15 @@ pub fn select(
         all[i].probability = odds.min(if passed { -price } else { 0.0 }).exp();
     }
     let sum: f64 = all.iter().map(|h| h.probability).sum();
-    let inertial = &outcome.inertial;
-    let before = outcome.none.estimate.missing_power(inertial);
-    let after = outcome.best.fitted.estimate.missing_power(inertial);
+    let [before, after] = outcome.missing;
     let named = all[best].found.map(|i| &findings.found[i].explanation);
     let beyond = |cost: f64| excess(cost / bench.train.readings.max(1) as f64).powi(2);
     let open_loop = named.map_or(1.0, |e| beyond(e.fit.cost) / beyond(findings.none.fit.cost));
     // What is named may make up for most of the gap and leave much of what is missing from row to row, or the other way round.
-    let rest = (after / before.max(f64::MIN_POSITIVE))
-        .min(open_loop)
-        .clamp(0.0, 1.0);
+    let rest = after.relative_to(before).min(open_loop).clamp(0.0, 1.0);
     let sigmoid = |x: f64| 1.0 / (1.0 + (-x).exp());
     let unknown = if best == 0 {
-        let missing = before.sqrt() > NOTHING;
+        let missing = before.force.sqrt() > NOTHING || before.readings > LEAST_LEFT;
         let seen = sigmoid((gap - GAP) / GAP_SCALE);
         if missing {
             seen.clamp(0.02, 0.999)

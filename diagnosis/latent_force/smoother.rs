@@ -20,6 +20,7 @@
 mod adjoint;
 mod filter;
 mod regress;
+mod segment;
 
 use nalgebra::{DMatrix, DVector};
 
@@ -28,7 +29,6 @@ use super::walk::Walk;
 
 use adjoint::backward;
 use filter::{Filter, Step};
-pub use regress::regress;
 
 /// Covariances of the latent force and of the readings.
 #[derive(Clone, Debug, PartialEq)]
@@ -125,6 +125,8 @@ pub struct Smoothed {
     pub log_likelihood: f64,
     /// Change of the trajectory, `rows x nx`.
     pub change: Vec<f64>,
+    /// Of a segment: shorter changes of its start, each `nx`, where the whole goes too far.
+    pub damped: Vec<Vec<f64>>,
     /// Its variances, `rows x nx`.
     pub change_variance: Vec<f64>,
     /// Missing force, `rows x nv`.
@@ -169,9 +171,22 @@ pub fn log_likelihood(problem: Problem<'_>, noise: &NoiseModel) -> f64 {
     filter.total()
 }
 
+/// The linear regression of an episode with its columns.
+#[must_use]
+pub fn regress(problem: Problem<'_>, noise: &NoiseModel, m: usize) -> Regression {
+    if problem.walk.segment.is_some() {
+        segment::regress(problem, noise, m)
+    } else {
+        regress::regress(problem, noise, m)
+    }
+}
+
 /// Smooths an episode.
 #[must_use]
 pub fn smooth(problem: Problem<'_>, noise: &NoiseModel) -> Smoothed {
+    if problem.walk.segment.is_some() {
+        return segment::smooth(problem, noise);
+    }
     let mut filter = Filter::new(problem, noise);
     let rows = problem.linear.rows;
     let mut steps: Vec<Step> = Vec::with_capacity(rows);

@@ -9,6 +9,7 @@
 
 mod late;
 mod pass;
+mod roll;
 
 use asid_core::layout::{Layout, Recording};
 use asid_core::{BatchConfig, Parameter, Result};
@@ -59,7 +60,7 @@ pub struct LinearEpisode {
     pub b: Vec<f64>,
     /// `y_k - h(x_k)`, `rows x ns`; NaN where a reading is missing.
     pub residual: Vec<f64>,
-    /// Slope of `h` in the state, `rows x ns x nx`.
+    /// Slope of `h` in the state, `rows x ns x nx`; of a segment the slope in its start.
     pub h: Vec<f64>,
     /// Readings of each entry that tell of before the first row, where a sensor is late; `ns`, or empty for none.
     pub early: Vec<f64>,
@@ -67,7 +68,7 @@ pub struct LinearEpisode {
     pub late: Vec<f64>,
     /// Change of `f` by each variation, `(rows - 1) x nx x m`.
     pub state_columns: Vec<f64>,
-    /// Change of `h` by each variation, `rows x ns x m`.
+    /// Change of `h` by each variation, `rows x ns x m`; of a segment that of its whole replay.
     pub reading_columns: Vec<f64>,
 }
 
@@ -90,6 +91,14 @@ struct Common<'a> {
     /// Whether effects on the drive side remember, and whether some act on readings.
     remembers: bool,
     reads: bool,
+}
+
+impl Common<'_> {
+    /// Whether a walk is replayed from its first row, and its derivatives are those of the replay: a segment, but where the
+    /// slopes in forces are wanted, which are those of rows.
+    fn rolls(&self, walk: usize, want: Derivatives) -> bool {
+        self.walks[walk].segment.is_some() && !want.force
+    }
 }
 
 /// The linearisation point and what is wanted of it.
@@ -168,14 +177,26 @@ impl<'a> StepMap<'a> {
         self.common.reads
     }
 
+    /// Whether some walks are segments.
+    #[must_use]
+    pub fn has_segments(&self) -> bool {
+        self.common.walks.iter().any(|w| w.segment.is_some())
+    }
+
+    /// The machine's layout.
+    #[must_use]
+    pub fn layout(&self) -> &Layout {
+        &self.common.layout
+    }
+
     /// Physics steps so far.
     #[must_use]
     pub fn steps(&self) -> u64 {
         self.parts.iter().map(|p| p.simulator.steps_taken()).sum()
     }
 
-    /// Linearises about a trajectory (`rows x (nq + nv)`, one a walk) at some parameters; `push` is the
-    /// force that slopes in each generalized force are taken over.
+    /// Linearises about a trajectory (`rows x (nq + nv)`, one a walk) at some parameters. `push` is what slopes are taken over:
+    /// in each generalized force, or in each coordinate of the starts of segments.
     ///
     /// # Errors
     /// When a value is not physical or the engine fails.
@@ -204,6 +225,42 @@ impl<'a> StepMap<'a> {
         for (part, episodes) in self.parts.iter().zip(found) {
             for (&w, episode) in part.walks.iter().zip(episodes) {
                 out[w] = episode;
+            }
+        }
+        Ok(out)
+    }
+
+    /// Replays all segments from the first rows of their trajectories, which become those of the replays. With the sum of
+    /// squares of what is left of the readings that count, each divided by its `variance` (one an entry); 0 for other walks,
+    /// infinite where the engine failed.
+    ///
+    /// # Errors
+    /// As [`StepMap::linearise`].
+    pub fn roll(
+        &mut self,
+        theta: &[f64],
+        trajectory: &mut [Vec<f64>],
+        variance: &[f64],
+    ) -> Result<Vec<f64>> {
+        let common = &self.common;
+        let mut shares: Vec<Vec<Vec<f64>>> = Vec::with_capacity(self.parts.len());
+        for part in &self.parts {
+            let own = part.walks.iter().map(|&w| std::mem::take(&mut trajectory[w]));
+            shares.push(own.collect());
+        }
+        let left: Vec<Result<Vec<f64>>> = self
+            .parts
+            .par_iter_mut()
+            .zip(&mut shares)
+            .map(|(part, states)| part.roll(common, (theta, variance), states))
+            .collect();
+        let mut out = vec![0.0; self.common.walks.len()];
+        for ((part, states), left) in self.parts.iter().zip(shares).zip(left) {
+            for (&w, states) in part.walks.iter().zip(states) {
+                trajectory[w] = states;
+            }
+            for (&w, left) in part.walks.iter().zip(left?) {
+                out[w] = left;
             }
         }
         Ok(out)
@@ -240,6 +297,7 @@ mod tests {
             time: Vec::new(),
             substeps: Vec::new(),
             ctrl: Vec::new(),
+            segment: None,
         };
         let walks: Vec<Walk> = [3, 9, 4, 5, 2].map(walk).into();
         // 9 and 3 rows against 5, 4 and 2.

@@ -19,6 +19,9 @@ pub struct Walk {
     pub substeps: Vec<usize>,
     /// Commands held from each row to the next, `(rows - 1) x nu`.
     pub ctrl: Vec<f64>,
+    /// Of a short segment that is replayed from its first row: how many rows at its beginning do not count. `None` for rows
+    /// along which a force may be missing.
+    pub segment: Option<usize>,
 }
 
 impl Walk {
@@ -65,6 +68,7 @@ impl Walk {
             rows,
             substeps,
             ctrl,
+            segment: None,
         }
     }
 
@@ -79,6 +83,7 @@ impl Walk {
             time: self.time[range].to_vec(),
             substeps: self.substeps[steps.clone()].to_vec(),
             ctrl: self.ctrl[steps.start * nu..steps.end * nu].to_vec(),
+            segment: None,
         }
     }
 }

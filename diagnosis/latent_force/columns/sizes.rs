@@ -47,6 +47,7 @@ pub(super) fn parts<'c>(
         machine: context.machine,
         logs: context.logs,
         given: vec![None; walks.len()],
+        read: vec![Vec::new(); walks.len()],
         open: context.open.clone(),
         scale: context.scale.clone(),
         position_noise: context.position_noise.clone(),
@@ -85,7 +86,7 @@ pub(super) fn sizes(
     let columns = source.columns(&short, &states, &wanted)?;
     // A joint that neither moves nor lacks a force says nothing of sizes.
     let missing: Vec<f64> = estimate
-        .force_quantile(nv, QUANTILE)
+        .force_quantile(context, QUANTILE)
         .iter()
         .zip(&context.inertial)
         .map(|(w, inertial)| {

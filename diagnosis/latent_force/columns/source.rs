@@ -2,7 +2,6 @@
 
 use asid_core::{Parameter, Result};
 use asid_effects::EffectSpec;
-use asid_mjcf::Plant;
 
 use crate::candidate::Candidate;
 use crate::latent_force::estimate::Context;
@@ -19,11 +18,12 @@ pub(super) struct All<'c> {
     pub(super) candidates: &'c [Candidate],
     /// First parameter of each candidate.
     pub(super) first: Vec<usize>,
+    traces: bool,
 }
 
 impl<'c> All<'c> {
     pub(super) fn new(
-        plant: &Plant,
+        context: &Context<'_>,
         base: &Hypothesis,
         theta: &[f64],
         candidates: &'c [Candidate],
@@ -34,10 +34,11 @@ impl<'c> All<'c> {
             theta: theta.to_vec(),
             candidates,
             first: Vec::with_capacity(candidates.len()),
+            traces: context.walks.iter().all(|w| w.segment.is_none()),
         };
         for c in candidates {
             all.first.push(all.theta.len());
-            if is_traceable(plant, c) {
+            if all.is_traced(context, c) {
                 continue;
             }
             all.specs.push(c.spec.clone());
@@ -46,6 +47,11 @@ impl<'c> All<'c> {
             all.theta.extend(c.parameters().iter().map(|p| p.null));
         }
         all
+    }
+
+    /// Whether a candidate needs no engine: it acts through forces alone, and no walk is a replay.
+    fn is_traced(&self, context: &Context<'_>, candidate: &Candidate) -> bool {
+        self.traces && is_traceable(context.plant(), candidate)
     }
 
     /// All values with those of one candidate.
@@ -109,7 +115,7 @@ impl Source<'_> {
         let plant = context.plant();
         let (nv, m) = (plant.layout.nv, wanted.len());
         let (nx, ns) = (2 * nv, context.logs.entries.len());
-        let traced = |w: &Wanted| is_traceable(plant, &self.all.candidates[w.candidate]);
+        let traced = |w: &Wanted| self.all.is_traced(context, &self.all.candidates[w.candidate]);
         let by_engine: Vec<usize> = (0..m).filter(|&i| !traced(&wanted[i])).collect();
         let variations: Vec<Variation> = by_engine
             .iter()
@@ -148,6 +154,7 @@ impl Source<'_> {
                             .for_each(|(x, &i)| target[i] = *x);
                     }
                 };
+                // Of a segment there are none: its columns are those of its readings.
                 spread(&linear.state_columns, &mut out[w].0);
                 spread(&linear.reading_columns, &mut out[w].1);
             }

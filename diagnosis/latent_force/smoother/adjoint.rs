@@ -12,6 +12,7 @@ pub(super) fn backward(filter: &mut Filter<'_>, steps: &[Step]) -> Smoothed {
     let mut out = Smoothed {
         log_likelihood: filter.total(),
         change: vec![0.0; rows * nx],
+        damped: Vec::new(),
         change_variance: vec![0.0; rows * nx],
         force: vec![0.0; rows * nv],
         force_variance: vec![0.0; rows * nv],

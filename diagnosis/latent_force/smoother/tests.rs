@@ -62,6 +62,7 @@ impl Case {
                 time,
                 substeps: vec![1; rows - 1],
                 ctrl: Vec::new(),
+                segment: None,
             },
             linear: LinearEpisode {
                 rows,
@@ -102,6 +103,7 @@ impl Case {
                 time: (0..rows).map(|k| k as f64 * dt).collect(),
                 substeps: vec![1; rows - 1],
                 ctrl: Vec::new(),
+                segment: None,
             },
             linear: LinearEpisode {
                 rows,

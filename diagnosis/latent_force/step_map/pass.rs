@@ -83,17 +83,18 @@ impl Part {
             .iter()
             .map(|&w| {
                 let n = c.walks[w].len();
-                let (steps, state) = (n - 1, usize::from(want.state));
+                let segment = c.rolls(w, want);
+                let (steps, state) = (n - 1, usize::from(want.state && !segment));
                 LinearEpisode {
                     rows: n,
                     defect: vec![0.0; steps * nx],
                     a: vec![0.0; state * steps * nx * nx],
                     b: vec![0.0; usize::from(want.force) * steps * nx * nv],
                     residual: vec![f64::NAN; n * ns],
-                    h: vec![0.0; state * n * ns * nx],
+                    h: vec![0.0; usize::from(want.state) * n * ns * nx],
                     early: Vec::new(),
                     late: Vec::new(),
-                    state_columns: vec![0.0; steps * nx * m],
+                    state_columns: vec![0.0; usize::from(!segment) * steps * nx * m],
                     reading_columns: vec![0.0; n * ns * m],
                 }
             })
@@ -111,6 +112,9 @@ impl Part {
         }
         if late == 1 {
             for ((episode, ramps), &w) in episodes.iter_mut().zip(&ramps).zip(&self.walks) {
+                if c.rolls(w, want) {
+                    continue;
+                }
                 retime(episode, &c.walks[w].time, ramps, (ns, nx, m));
             }
         }
@@ -147,15 +151,8 @@ impl Part {
         let mut row = RowBuffers::default();
         for k in 0..longest {
             let here: Vec<usize> = (0..n).filter(|&e| walks[e].len() > k).collect();
-            self.place(c, &roles, (&here, k), request.trajectory, &mut row)?;
-            self.read_row(
-                c,
-                &roles,
-                (&here, k),
-                request.variations,
-                (out, ramps),
-                &mut row,
-            )?;
+            self.place(c, &roles, (&here, k), request, &mut row)?;
+            self.read_row(c, &roles, (&here, k), request, (out, ramps), &mut row)?;
             let mut ahead: Vec<usize> = here
                 .into_iter()
                 .filter(|&e| walks[e].len() > k + 1)
@@ -172,16 +169,22 @@ impl Part {
         Ok(())
     }
 
-    /// Puts all simulations of some episodes at row `k`.
+    /// Puts all simulations of some episodes at row `k`; those of segments go on by themselves from the first row on.
     fn place(
         &mut self,
         c: &Common<'_>,
         roles: &[Role],
         (here, k): (&[usize], usize),
-        trajectory: &[Vec<f64>],
+        request: Request<'_>,
         row: &mut RowBuffers,
     ) -> Result<()> {
         let (n, nq, nv) = (self.walks.len(), c.layout.nq, c.layout.nv);
+        let placed: Vec<usize> = here
+            .iter()
+            .copied()
+            .filter(|&e| k == 0 || !c.rolls(self.walks[e], request.want))
+            .collect();
+        let here = &placed[..];
         if c.remembers && k > 0 {
             let (mut from, mut to) = (Vec::new(), Vec::new());
             for (v, role) in roles.iter().enumerate() {
@@ -199,14 +202,19 @@ impl Part {
         for (v, role) in roles.iter().enumerate() {
             for &e in here {
                 let width = nq + nv;
-                let states = &trajectory[self.walks[e]];
+                let segment = c.rolls(self.walks[e], request.want);
+                let states = &request.trajectory[self.walks[e]];
                 let mut state = states[k * width..(k + 1) * width].to_vec();
                 if let Role::Ramp(i) = *role {
                     change[nv + i] = STATE_STEP * c.walks[self.walks[e]].time[k];
                     retract(&c.layout, &mut state, &change);
                     change.fill(0.0);
                 }
-                if let Role::State(i) | Role::Reading(i) = *role {
+                if let (Role::State(i), true) = (*role, segment) {
+                    change[i] = request.push[i];
+                    retract(&c.layout, &mut state, &change);
+                    change.fill(0.0);
+                } else if let Role::State(i) | Role::Reading(i) = *role {
                     change[i] = STATE_STEP;
                     if let (Role::Reading(_), Some(place)) = (role, i.checked_sub(nv)) {
                         change[place] = STATE_STEP * c.walks[self.walks[e]].time[k];
@@ -239,11 +247,16 @@ impl Part {
         c: &Common<'_>,
         roles: &[Role],
         (here, k): (&[usize], usize),
-        variations: &[Variation],
+        request: Request<'_>,
         (out, ramps): (&mut [LinearEpisode], &mut [Vec<f64>]),
         row: &mut RowBuffers,
     ) -> Result<()> {
-        let (ns, nx) = (c.logs.entries.len(), 2 * c.layout.nv);
+        let variations = request.variations;
+        let (n, ns, nx) = (self.walks.len(), c.logs.entries.len(), 2 * c.layout.nv);
+        row.sims.clear();
+        for v in 0..roles.len() {
+            row.sims.extend(here.iter().map(|e| v * n + e));
+        }
         let width = c.readings.width();
         row.read.resize(row.sims.len() * width, 0.0);
         self.simulator.read(&row.sims, &c.readings, &mut row.read)?;
@@ -257,11 +270,23 @@ impl Part {
             let logged = &readings[log_row * width..(log_row + 1) * width];
             let residual = &mut out[e].residual[k * ns..(k + 1) * ns];
             c.logs.reading_difference(logged, nominal, residual);
+            if walk.segment.is_some_and(|lead| k < lead) {
+                residual.fill(f64::NAN);
+            }
             for (v, role) in roles.iter().enumerate().skip(1) {
                 let place = v * here.len() + i;
                 let other = &row.read[place * width..(place + 1) * width];
                 c.logs.reading_difference(other, nominal, &mut differ);
+                let segment = c.rolls(self.walks[e], request.want);
                 match *role {
+                    Role::State(i) if segment => {
+                        for (s, d) in differ.iter().enumerate() {
+                            let value = d / request.push[i];
+                            out[e].h[(k * ns + s) * nx + i] =
+                                if value.is_finite() { value } else { 0.0 };
+                        }
+                    }
+                    Role::Reading(_) | Role::Ramp(_) if segment => {}
                     Role::State(i) if !c.reads => {
                         for (s, d) in differ.iter().enumerate() {
                             out[e].h[(k * ns + s) * nx + i] = d / STATE_STEP;
@@ -345,6 +370,9 @@ impl Part {
             let ahead = &trajectory[self.walks[e]][(k + 1) * width..(k + 2) * width];
             let defect = &mut out[e].defect[k * nx..(k + 1) * nx];
             difference(&c.layout, nominal, ahead, defect);
+            if c.rolls(self.walks[e], request.want) {
+                continue;
+            }
             for (v, role) in roles.iter().enumerate().skip(1) {
                 let place = v * now.len() + i;
                 let other = &row.next[place * width..(place + 1) * width];

@@ -1,0 +1,150 @@
+//! Where bodies touch, a log is taken in short segments.
+//!
+//! A missing force of any size and direction is no model of a lasting contact: pressed together by it, two bodies rub by any
+//! force. Over a quarter of a second a model that is nearly right is right without such a force. So a stretch with contact is cut
+//! into short segments, each a replay from a start of its own (multiple shooting, Bock and Plitt 1984), and what a
+//! segment leaves of its readings is a variance of its own. Elsewhere the missing force is smoothed.
+//!
+//! A segment begins some rows before its readings count. Over these rows the contact settles, and what the start may be off in a
+//! direction that a contact blocks dies away as it does in the machine; and what effects remember is there.
+
+use super::walk::Walk;
+
+/// Duration of a segment, s: a few times a contact's time constant (0.02 s by default in MuJoCo), short enough that a few per
+/// cent of a force move a body by about what sensors tell: 1 m/s^2 makes 30 mm, a hundredth of it 0.3 mm.
+const DURATION: f64 = 0.25;
+/// Time for which a segment runs before its readings count, s: five time constants of a contact.
+const LEAD: f64 = 0.1;
+/// Time about a row with contact that counts as with it, s: readings are noisy, and a bounce is shorter than a row.
+const ABOUT: f64 = 0.1;
+/// Fewest rows of a segment that count.
+const FEWEST: usize = 4;
+
+/// Cuts a walk: where something touches (one flag a row) into segments, the rest as it is.
+#[must_use]
+pub fn cut(walk: &Walk, touches: &[bool]) -> Vec<Walk> {
+    let n = walk.len();
+    if !touches.contains(&true) {
+        return vec![walk.clone()];
+    }
+    let mut near = vec![false; n];
+    for k in (0..n).filter(|&k| touches[k]) {
+        let time = walk.time[k];
+        let first = walk.time.partition_point(|t| *t < time - ABOUT);
+        let last = walk.time.partition_point(|t| *t <= time + ABOUT);
+        near[first..last].fill(true);
+    }
+    let runs = merged(walk, runs_of(&near));
+    let mut out = Vec::new();
+    for (range, touching) in runs {
+        if touching {
+            segments(walk, range, &mut out);
+        } else {
+            out.push(walk.part(range));
+        }
+    }
+    out
+}
+
+type Run = (std::ops::Range<usize>, bool);
+
+fn runs_of(flags: &[bool]) -> Vec<Run> {
+    let mut runs: Vec<Run> = Vec::new();
+    for (k, &flag) in flags.iter().enumerate() {
+        match runs.last_mut() {
+            Some((range, last)) if *last == flag => range.end = k + 1,
+            _ => runs.push((k..k + 1, flag)),
+        }
+    }
+    runs
+}
+
+/// Runs without contact that are no longer than two segments become part of those with it.
+fn merged(walk: &Walk, runs: Vec<Run>) -> Vec<Run> {
+    let mut out: Vec<Run> = Vec::new();
+    for (range, touching) in runs {
+        let seconds = walk.time[range.end - 1] - walk.time[range.start];
+        let touching = touching || seconds < 2.0 * DURATION;
+        match out.last_mut() {
+            Some((before, last)) if *last == touching => before.end = range.end,
+            _ => out.push((range, touching)),
+        }
+    }
+    out
+}
+
+/// Cuts some rows into segments of about the same duration.
+fn segments(walk: &Walk, range: std::ops::Range<usize>, out: &mut Vec<Walk>) {
+    let rows = range.len();
+    let seconds = walk.time[range.end - 1] - walk.time[range.start];
+    let pieces = (seconds / DURATION).round() as usize;
+    let pieces = pieces.clamp(1, (rows / FEWEST).max(1));
+    for i in 0..pieces {
+        let first = range.start + i * rows / pieces;
+        let end = range.start + (i + 1) * rows / pieces;
+        let begin = walk.time[first] - LEAD;
+        let lead = walk.time[..first].partition_point(|t| *t < begin - 1e-9);
+        if end - lead < 2 {
+            continue;
+        }
+        let mut part = walk.part(lead..end);
+        part.segment = Some(first - lead);
+        out.push(part);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 100 Hz.
+    fn walk(rows: usize) -> Walk {
+        Walk {
+            episode: 0,
+            rows: (0..rows).collect(),
+            time: (0..rows).map(|k| 0.01 * k as f64).collect(),
+            substeps: vec![5; rows - 1],
+            ctrl: Vec::new(),
+            segment: None,
+        }
+    }
+
+    /// The rows of a walk that count.
+    fn counted(walk: &Walk) -> std::ops::Range<usize> {
+        let rows = &walk.rows[walk.segment.unwrap_or(0)..];
+        rows[0]..rows[rows.len() - 1] + 1
+    }
+
+    #[test]
+    fn without_contact_a_walk_stays_whole() {
+        let walk = walk(300);
+        assert_eq!(cut(&walk, &[false; 300]), [walk]);
+    }
+
+    #[test]
+    fn every_row_counts_once() {
+        let walk = walk(400);
+        let touches: Vec<bool> = (0..400).map(|k| (150..230).contains(&k)).collect();
+        let parts = cut(&walk, &touches);
+        let mut next = 0;
+        for part in &parts {
+            assert_eq!(counted(part).start, next);
+            next = counted(part).end;
+        }
+        assert_eq!(next, 400);
+        // A tenth of a second about the contact: rows 140 to 239 in four segments.
+        assert_eq!(parts.len(), 6);
+        assert_eq!(counted(&parts[1]), 140..165);
+        assert_eq!(parts[1].segment, Some(10));
+        assert_eq!(parts[0].segment, None);
+        assert_eq!(parts[5].segment, None);
+    }
+
+    #[test]
+    fn a_log_that_begins_with_contact_has_no_lead() {
+        let walk = walk(100);
+        let parts = cut(&walk, &[true; 100]);
+        assert_eq!(parts[0].segment, Some(0));
+        assert_eq!(parts.len(), 4);
+    }
+}

@@ -1,0 +1,165 @@
+//! A segment: no force is missing along it, and only its start is open.
+//!
+//! Its slopes are those of its whole replay, for a contact's slopes over one row are those of points that come and go: every
+//! reading is linear in the change of the start and in the columns, and the filter is a least-squares problem in
+//! `nx` unknowns with a prior.
+
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+
+use super::{NoiseModel, Problem, Regression, Smoothed, Sums};
+
+/// Shares of the diagonal by which the normal equations are lengthened for the shorter steps of a start that are offered.
+const DAMPINGS: [f64; 2] = [1.0, 100.0];
+
+/// The readings of a segment in units of their deviations, and what they are linear in.
+struct Rows {
+    /// Entry of each reading.
+    entry: Vec<usize>,
+    /// Readings.
+    left: DVector<f64>,
+    /// Slopes in the change of the start, `readings x nx`.
+    start: DMatrix<f64>,
+    /// Slopes in the columns, `readings x m`.
+    columns: DMatrix<f64>,
+    /// Sum of the logarithms of the readings' deviations.
+    log_deviation: f64,
+}
+
+impl Rows {
+    fn of(problem: Problem<'_>, noise: &NoiseModel, m: usize) -> Self {
+        let linear = problem.linear;
+        let (nx, ns) = (problem.start.mean.len(), noise.r.len());
+        let (mut entry, mut left) = (Vec::new(), Vec::new());
+        let (mut start, mut columns) = (Vec::new(), Vec::new());
+        let mut log_deviation = 0.0;
+        for k in 0..linear.rows {
+            for i in 0..ns {
+                let at = k * ns + i;
+                let reading = linear.residual[at];
+                if !reading.is_finite() {
+                    continue;
+                }
+                let deviation = noise.r[i].sqrt();
+                let own = &linear.h[at * nx..(at + 1) * nx];
+                start.extend(own.iter().map(|x| x / deviation));
+                let own = &linear.reading_columns[at * m..(at + 1) * m];
+                columns.extend(own.iter().map(|x| x / deviation));
+                left.push(reading / deviation);
+                log_deviation += deviation.ln();
+                entry.push(i);
+            }
+        }
+        let n = entry.len();
+        Self {
+            entry,
+            left: DVector::from_vec(left),
+            start: DMatrix::from_row_slice(n, nx, &start),
+            columns: DMatrix::from_row_slice(n, m, &columns),
+            log_deviation,
+        }
+    }
+
+    /// Normal equations of the start, in units of its prior's deviations: slopes, factor and right side. The diagonal is
+    /// lengthened by a share `damping` of itself (Marquardt 1963).
+    fn normal(
+        &self,
+        problem: Problem<'_>,
+        damping: f64,
+    ) -> (DMatrix<f64>, Option<Cholesky<f64, Dyn>>, DVector<f64>) {
+        let start = problem.start;
+        let nx = start.mean.len();
+        let deviation: Vec<f64> = start.variance.iter().map(|v| v.sqrt()).collect();
+        let mut scaled = self.start.clone();
+        for (mut column, d) in scaled.column_iter_mut().zip(&deviation) {
+            column *= *d;
+        }
+        let mut gram = scaled.transpose() * &scaled + DMatrix::identity(nx, nx);
+        (0..nx).for_each(|i| gram[(i, i)] *= 1.0 + damping);
+        let prior = start.mean.iter().zip(&deviation).map(|(m, d)| m / d);
+        let right = scaled.transpose() * &self.left + DVector::from_iterator(nx, prior);
+        (scaled, gram.cholesky(), right)
+    }
+}
+
+/// Smooths a segment: the change of its start alone. There is no missing force.
+pub(super) fn smooth(problem: Problem<'_>, noise: &NoiseModel) -> Smoothed {
+    let rows = Rows::of(problem, noise, 0);
+    let start = problem.start;
+    let (nv, nx, ns) = (noise.q.len(), start.mean.len(), noise.r.len());
+    let (scaled, factor, right) = rows.normal(problem, 0.0);
+    let n = problem.linear.rows;
+    let mut out = Smoothed {
+        log_likelihood: f64::NAN,
+        change: vec![0.0; n * nx],
+        damped: Vec::new(),
+        change_variance: vec![0.0; n * nx],
+        force: vec![0.0; n * nv],
+        force_variance: vec![0.0; n * nv],
+        sums: Sums {
+            reading: vec![[0.0; 2]; ns],
+            ..Sums::default()
+        },
+    };
+    let Some(factor) = factor else {
+        return out;
+    };
+    let change = factor.solve(&right);
+    for (i, v) in start.variance.iter().enumerate() {
+        out.change[i] = change[i] * v.sqrt();
+    }
+    let left = &rows.left - &scaled * &change;
+    // Variance of each prediction: the squared length of `L^-1 x`.
+    let lower = factor.l();
+    let spread = lower.solve_lower_triangular(&scaled.transpose());
+    for (k, &entry) in rows.entry.iter().enumerate() {
+        let variance = spread.as_ref().map_or(0.0, |s| s.column(k).norm_squared());
+        let sums = &mut out.sums.reading[entry];
+        sums[0] += (left[k] * left[k] + variance) * noise.r[entry];
+        sums[1] += 1.0;
+    }
+    out.log_likelihood = log_likelihood(&rows, problem, &factor, &right);
+    for damping in DAMPINGS {
+        if let (_, Some(factor), right) = rows.normal(problem, damping) {
+            let change = factor.solve(&right);
+            let deviations = start.variance.iter().map(|v| v.sqrt());
+            let change = change.iter().zip(deviations).map(|(c, d)| c * d);
+            out.damped.push(change.collect());
+        }
+    }
+    out
+}
+
+fn log_likelihood(
+    rows: &Rows,
+    problem: Problem<'_>,
+    factor: &Cholesky<f64, Dyn>,
+    right: &DVector<f64>,
+) -> f64 {
+    let start = problem.start;
+    let prior: f64 = start.mean.iter().zip(&start.variance).map(|(m, v)| m * m / v).sum();
+    let squares = rows.left.norm_squared() + prior - right.dot(&factor.solve(right));
+    let determinant: f64 = factor.l_dirty().diagonal().iter().map(|x| x.ln()).sum();
+    -0.5 * squares - determinant - rows.log_deviation
+}
+
+/// The regression of a segment, its start projected out.
+pub(super) fn regress(problem: Problem<'_>, noise: &NoiseModel, m: usize) -> Regression {
+    let rows = Rows::of(problem, noise, m);
+    let (scaled, factor, right) = rows.normal(problem, 0.0);
+    let gram = rows.columns.transpose() * &rows.columns;
+    let moment = rows.columns.transpose() * &rows.left;
+    let Some(factor) = factor else {
+        return Regression {
+            log_likelihood: f64::NAN,
+            gram,
+            moment,
+        };
+    };
+    let cross = scaled.transpose() * &rows.columns;
+    let solved = factor.solve(&cross);
+    Regression {
+        log_likelihood: log_likelihood(&rows, problem, &factor, &right),
+        gram: gram - cross.transpose() * &solved,
+        moment: moment - solved.transpose() * right,
+    }
+}

@@ -1,0 +1,84 @@
+//! Replays of short segments from their first rows.
+
+use asid_core::{Control, Result, Rollout};
+
+use crate::latent_force::walk::Walk;
+use crate::predict::columns_of;
+
+use super::Common;
+use super::pass::Part;
+
+impl Part {
+    /// Replays its segments from the first rows of the trajectories, which become those of the replays. With the sum of
+    /// squares of the readings that count, each divided by its variance; infinite where the engine failed.
+    pub(super) fn roll(
+        &mut self,
+        c: &Common<'_>,
+        (theta, variance): (&[f64], &[f64]),
+        states: &mut [Vec<f64>],
+    ) -> Result<Vec<f64>> {
+        let (nq, nu) = (c.layout.nq, c.layout.nu());
+        let width = nq + c.layout.nv;
+        let walks: Vec<&Walk> = self.walks.iter().map(|&w| &c.walks[w]).collect();
+        let all: Vec<usize> = (0..walks.len())
+            .filter(|&e| walks[e].segment.is_some())
+            .collect();
+        let mut left = vec![0.0; walks.len()];
+        if all.is_empty() {
+            return Ok(left);
+        }
+        let row = columns_of(&c.parameters, theta);
+        self.simulator.reset(&all)?;
+        self.simulator
+            .set_parameters(&all, &row.repeat(all.len()))?;
+        let first: Vec<&[f64]> = all.iter().map(|&e| &states[e][..width]).collect();
+        let qpos: Vec<f64> = first.iter().flat_map(|s| s[..nq].to_vec()).collect();
+        let qvel: Vec<f64> = first.iter().flat_map(|s| s[nq..].to_vec()).collect();
+        self.simulator.set_state(&all, &qpos, &qvel)?;
+        let (entries, readings) = (c.logs.entries.len(), c.readings.width());
+        let mut read = Vec::new();
+        let mut differ = vec![0.0; entries];
+        let mut next = Vec::new();
+        let longest = all.iter().map(|&e| walks[e].len()).max().unwrap_or(0);
+        for k in 0..longest {
+            let here: Vec<usize> = all.iter().copied().filter(|&e| walks[e].len() > k).collect();
+            read.resize(here.len() * readings, 0.0);
+            self.simulator.read(&here, &c.readings, &mut read)?;
+            for (&e, read) in here.iter().zip(read.chunks_exact(readings)) {
+                if walks[e].segment.is_some_and(|lead| k < lead) {
+                    continue;
+                }
+                let logged = &c.logs.episodes[walks[e].episode].readings;
+                let at = walks[e].rows[k] * readings;
+                c.logs
+                    .reading_difference(&logged[at..at + readings], read, &mut differ);
+                let present = differ.iter().zip(variance).filter(|(d, _)| !d.is_nan());
+                left[e] += present.map(|(d, v)| d * d / v).sum::<f64>();
+            }
+            let mut ahead: Vec<usize> = here.into_iter().filter(|&e| walks[e].len() > k + 1).collect();
+            while let Some(&first) = ahead.first() {
+                let substeps = walks[first].substeps[k];
+                let (now, later): (Vec<usize>, Vec<usize>) =
+                    ahead.iter().partition(|&&e| walks[e].substeps[k] == substeps);
+                let ctrl: Vec<f64> = now
+                    .iter()
+                    .flat_map(|&e| walks[e].ctrl[k * nu..(k + 1) * nu].to_vec())
+                    .collect();
+                let control = Control::PerSimulation(&ctrl);
+                let rollout = Rollout::new(&now, 1, substeps, control, &c.states);
+                next.resize(now.len() * width, 0.0);
+                self.simulator.rollout(&rollout, &mut next)?;
+                let status = self.simulator.status();
+                for (&e, next) in now.iter().zip(next.chunks_exact(width)) {
+                    if status[e].is_running() && next.iter().all(|x| x.is_finite()) {
+                        states[e][(k + 1) * width..(k + 2) * width].copy_from_slice(next);
+                    } else {
+                        left[e] = f64::INFINITY;
+                    }
+                }
+                ahead = later;
+            }
+        }
+        Ok(left)
+    }
+}
