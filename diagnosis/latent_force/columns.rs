@@ -18,7 +18,7 @@ use super::fit::Hypothesis;
 use super::step_map::{Derivatives, LinearEpisode, Variation};
 
 pub use form::Form;
-use sizes::sizes;
+use sizes::{REPLAY_TRIAL, sizes, sizes_by_replay};
 use source::{All, Source, Wanted};
 
 /// Share of a deviation of the prior that slopes of the present model are taken over.
@@ -54,6 +54,36 @@ fn beside(a: &[f64], n: usize, b: &[f64], m: usize) -> Vec<f64> {
         out.extend_from_slice(&b[k * m..(k + 1) * m]);
     }
     out
+}
+
+/// Gives the slopes of a form other deviations of their priors, relative to those that they have.
+fn resize(
+    form: &mut Form,
+    candidates: &[Candidate],
+    (factors, base): (&[f64], usize),
+    found: &mut [(Vec<f64>, Vec<f64>)],
+    bounds: &mut [[f64; 2]],
+) {
+    let m = factors.len();
+    let columns = form.columns();
+    for (column, slope) in columns.zip(&mut form.slopes) {
+        let Some((p, size)) = slope else { continue };
+        let candidate = &candidates[form.candidate];
+        let [low, high] = candidate.ranges[*p];
+        let null = candidate.parameters()[*p].null;
+        let most = 0.5 * (high - low) / *size;
+        let factor = factors[column - base].min(most);
+        *size *= factor;
+        bounds[column] = [
+            ((low - null) / *size).max(-MOST),
+            ((high - null) / *size).min(MOST),
+        ];
+        for (states, readings) in found.iter_mut() {
+            for all in [states, readings] {
+                all.iter_mut().skip(column - base).step_by(m).for_each(|x| *x *= factor);
+            }
+        }
+    }
 }
 
 impl Columns {
@@ -112,7 +142,16 @@ impl Columns {
                 );
             }
         }
-        let sizes = sizes(context, estimate, &source, &trials)?;
+        let replayed = context.has_segments();
+        let sizes = if replayed {
+            let range = |&(c, _, p): &(usize, Vec<f64>, usize)| {
+                let [low, high]: [f64; 2] = candidates[c].ranges[p];
+                high - low
+            };
+            trials.iter().map(|t| REPLAY_TRIAL / SHARE * range(t)).collect()
+        } else {
+            sizes(context, estimate, &source, &trials)?
+        };
         let mut wanted = Vec::new();
         let mut forms = Vec::new();
         let mut next = 0;
@@ -158,8 +197,14 @@ impl Columns {
                 }
             }
         }
-        let found = source.columns(context, &estimate.trajectory, &wanted)?;
+        let mut found = source.columns(context, &estimate.trajectory, &wanted)?;
         let (base, more) = (free.len(), wanted.len());
+        if replayed {
+            let sizes = sizes_by_replay(context, estimate, &found, more);
+            for form in &mut forms {
+                resize(form, candidates, (&sizes, base), &mut found, &mut bounds);
+            }
+        }
         for (linear, (state, reading)) in linear.iter_mut().zip(&found) {
             linear.state_columns = beside(&linear.state_columns, base, state, more);
             linear.reading_columns = beside(&linear.reading_columns, base, reading, more);

@@ -4,6 +4,7 @@
 //! Stoffer 1982): `q` and `tau` from the force and its products over a row, `r` from what is left of
 //! the readings. Between linearisations a few rounds are taken, lengthened, for EM is slow where a variance is small.
 
+use asid_core::layout::{JointKind, Layout};
 use asid_core::{Parameter, Result};
 use asid_effects::EffectSpec;
 use asid_mjcf::Plant;
@@ -21,6 +22,8 @@ use super::walk::Walk;
 
 /// Mean square of what is left of readings, beyond their noise and in units of it, that counts as nothing: a gap of 1.05.
 pub const LEAST_LEFT: f64 = 0.1;
+/// What a step of a segment's start may leave of its readings, relative to what its slopes promised.
+const KEPT_PROMISE: f64 = 1.1;
 /// Change of a segment's start that slopes are taken over, as a share of what its readings leave open.
 const START_SHARE: f64 = 0.02;
 /// Multiple of a step of EM in the logarithm of a variance: between 1 and 2 EM still rises (Lange 1995).
@@ -121,6 +124,12 @@ impl Context<'_> {
         &self.machine.plant
     }
 
+    /// Whether some walks are segments.
+    #[must_use]
+    pub fn has_segments(&self) -> bool {
+        self.walks.iter().any(|w| w.segment.is_some())
+    }
+
     /// A step map of the machine with more effects; `roles` as [`StepMap::new`].
     ///
     /// # Errors
@@ -184,6 +193,33 @@ pub struct Taken {
     pub scale: Vec<f64>,
 }
 
+/// Raises the largest speeds that a unit of each force has made over a row to those of some more rows, `rows x nx x nv`.
+pub(super) fn raise_free(free: &mut [f64], b: &[f64], rows: usize) {
+    let nv = free.len();
+    for k in 0..rows {
+        for (d, free) in free.iter_mut().enumerate() {
+            *free = free.max(b[(k * 2 * nv + nv + d) * nv + d]);
+        }
+    }
+}
+
+/// Gives all directions of a free body the largest of its forces, and all its turns the largest of its torques: along the one
+/// that a contact blocks it hardly moves, and what acts along it is no smaller.
+fn level_blocks(layout: &Layout, forces: &mut [f64]) {
+    for joint in &layout.joints {
+        let first = joint.qvel;
+        let blocks: &[std::ops::Range<usize>] = match joint.kind {
+            JointKind::Free => &[first..first + 3, first + 3..first + 6],
+            JointKind::Ball => &[first..first + 3],
+            JointKind::Hinge | JointKind::Slide => &[],
+        };
+        for block in blocks {
+            let largest = forces[block.clone()].iter().copied().fold(0.0, f64::max);
+            forces[block.clone()].fill(largest);
+        }
+    }
+}
+
 /// A context for some walks, and a first estimate of the model at `theta`, not yet smoothed.
 ///
 /// # Errors
@@ -213,7 +249,8 @@ pub fn begin<'a>(
         walks: taken.walks,
     };
     let mut map = context.map(&[], parameters, nv + 1)?;
-    map.roll(theta, &mut trajectory, &context.reading_variance)?;
+    let all = vec![true; trajectory.len()];
+    map.roll(theta, (&mut trajectory, &all), &context.reading_variance)?;
     let want = Derivatives {
         force: true,
         ..Derivatives::default()
@@ -221,12 +258,17 @@ pub fn begin<'a>(
     let push = vec![FIRST_PUSH; nv];
     let linear = map.linearise(theta, &trajectory, want, &push, &[])?;
     let b: Vec<Vec<f64>> = linear.into_iter().map(|l| l.b).collect();
-    // Inertia by the speed that a force makes, times the acceleration seen.
+    // Inertia by the speed that a force makes, where no contact takes it up, times the acceleration seen.
+    let mut free = vec![0.0; nv];
+    for (walk, b) in context.walks.iter().zip(&b) {
+        raise_free(&mut free, b, walk.len() - 1);
+    }
     let mut sums = vec![(0.0, 0.0); nv];
     for ((walk, states), b) in context.walks.iter().zip(&trajectory).zip(&b) {
         for k in 0..walk.len() - 1 {
             for (d, sum) in sums.iter_mut().enumerate() {
-                let gained = b[(k * 2 * nv + nv + d) * nv + d];
+                let own = b[(k * 2 * nv + nv + d) * nv + d];
+                let gained = if walk.segment.is_some() { free[d] } else { own };
                 let speed = |k: usize| states[k * width + layout.nq + d];
                 if gained > 0.0 {
                     sum.0 += ((speed(k + 1) - speed(k)) / gained).abs();
@@ -239,6 +281,9 @@ pub fn begin<'a>(
         .iter()
         .map(|(force, n)| (force / f64::max(*n, 1.0)).max(1e-9))
         .collect();
+    if context.has_segments() {
+        level_blocks(layout, &mut context.inertial);
+    }
     let tau = -row_seconds(&context.walks) / FIRST_CORRELATION.ln();
     let estimate = Estimate {
         noise: NoiseModel {
@@ -321,7 +366,13 @@ impl Estimate {
         }
         let layout = map.layout().clone();
         let width = layout.nq + layout.nv;
-        let mut left = map.roll(theta, &mut self.trajectory, &self.noise.r)?;
+        let all: Vec<bool> = vec![true; self.trajectory.len()];
+        let mut left = map.roll(theta, (&mut self.trajectory, &all), &self.noise.r)?;
+        // Where the step left what it promised, no shorter one is tried.
+        let worse: Vec<bool> = left.iter().zip(&self.smoothed).map(|(left, s)| {
+            let promised = s.sums.reading.iter().zip(&self.noise.r).map(|([sum, _], r)| sum / r);
+            *left > KEPT_PROMISE * promised.sum::<f64>()
+        }).collect();
         let offered = self.smoothed.iter().map(|s| s.damped.len()).max().unwrap_or(0);
         for i in 0..=offered {
             let mut other = before.to_vec();
@@ -330,9 +381,9 @@ impl Estimate {
                     retract(&layout, &mut states[..width], change);
                 }
             }
-            let of_other = map.roll(theta, &mut other, &self.noise.r)?;
+            let of_other = map.roll(theta, (&mut other, &worse), &self.noise.r)?;
             for (w, states) in other.into_iter().enumerate() {
-                if of_other[w] < left[w] {
+                if worse[w] && of_other[w] < left[w] {
                     left[w] = of_other[w];
                     self.trajectory[w] = states;
                 }

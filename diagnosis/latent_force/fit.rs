@@ -178,7 +178,7 @@ pub fn fit(
                 }
             })
             .collect();
-        let fresh = map.reads() || slopes.is_old(&theta, unknowns);
+        let fresh = map.reads() && !map.is_all_segments() || slopes.is_old(&theta, unknowns);
         let wanted = Derivatives {
             state: fresh,
             ..want
@@ -270,7 +270,8 @@ pub fn fit(
         estimate.improve(context, &linear, EM_ROUNDS);
         estimate.roll(&mut map, &theta, &before)?;
         slopes.keep(&linear);
-        for _ in 0..if map.reads() { AGAIN } else { 0 } {
+        let again = map.reads() && !map.is_all_segments();
+        for _ in 0..if again { AGAIN } else { 0 } {
             let linear = map.linearise(&theta, &estimate.trajectory, want, &steps, &[])?;
             let before = estimate.trajectory.clone();
             estimate.improve(context, &linear, 1);
@@ -351,7 +352,7 @@ pub fn settle_noise(
     let mut slopes = Slopes::default();
     let steps = context.start_steps();
     for _ in 0..rounds {
-        let fresh = map.reads() || slopes.is_old(theta, &hypothesis.unknowns);
+        let fresh = map.reads() && !map.is_all_segments() || slopes.is_old(theta, &hypothesis.unknowns);
         let wanted = Derivatives {
             state: fresh,
             ..want

@@ -183,6 +183,12 @@ impl<'a> StepMap<'a> {
         self.common.walks.iter().any(|w| w.segment.is_some())
     }
 
+    /// Whether all walks are.
+    #[must_use]
+    pub fn is_all_segments(&self) -> bool {
+        self.common.walks.iter().all(|w| w.segment.is_some())
+    }
+
     /// The machine's layout.
     #[must_use]
     pub fn layout(&self) -> &Layout {
@@ -230,7 +236,7 @@ impl<'a> StepMap<'a> {
         Ok(out)
     }
 
-    /// Replays all segments from the first rows of their trajectories, which become those of the replays. With the sum of
+    /// Replays some of the segments from the first rows of their trajectories, which become those of the replays. With the sum of
     /// squares of what is left of the readings that count, each divided by its `variance` (one an entry); 0 for other walks,
     /// infinite where the engine failed.
     ///
@@ -239,7 +245,7 @@ impl<'a> StepMap<'a> {
     pub fn roll(
         &mut self,
         theta: &[f64],
-        trajectory: &mut [Vec<f64>],
+        (trajectory, which): (&mut [Vec<f64>], &[bool]),
         variance: &[f64],
     ) -> Result<Vec<f64>> {
         let common = &self.common;
@@ -252,7 +258,7 @@ impl<'a> StepMap<'a> {
             .parts
             .par_iter_mut()
             .zip(&mut shares)
-            .map(|(part, states)| part.roll(common, (theta, variance), states))
+            .map(|(part, states)| part.roll(common, (theta, variance), (states, which)))
             .collect();
         let mut out = vec![0.0; self.common.walks.len()];
         for ((part, states), left) in self.parts.iter().zip(shares).zip(left) {

@@ -9,6 +9,12 @@ use crate::latent_force::estimate::{Context, Estimate};
 
 /// Share of a parameter's range over which its size is first felt for.
 const TRIAL: f64 = 1e-5;
+/// Multiple of what segments leave of their readings that a deviation of a prior does to them, starts not moved: an
+/// acceleration moves them 5 times as much as it does once the start is fitted to it, and an effect may be seen in few of them.
+const REPLAY_MULTIPLE: f64 = 10.0;
+/// Share of a parameter's range that slopes along replays are taken over: over less, what points of contact that come and go
+/// do hides it.
+pub(super) const REPLAY_TRIAL: f64 = 0.03;
 /// Inertial force of a degree of freedom that does not move, N or N m.
 const SILENT: f64 = 1e-8;
 /// Share of the inertial forces that is missing at least, for the size of priors.
@@ -104,9 +110,8 @@ pub(super) fn sizes(
     for ((walk, (states, read)), b) in short.walks.iter().zip(&columns).zip(&slopes) {
         for k in 0..walk.len() - 1 {
             let matrix = DMatrix::from_fn(nv, nv, |i, j| b[(k * nx + nv + i) * nv + j]);
-            let factor = matrix.lu();
             let change = DMatrix::from_fn(nv, m, |d, i| states[(k * nx + nv + d) * m + i]);
-            if let Some(force) = factor.solve(&change) {
+            if let Some(force) = matrix.lu().solve(&change) {
                 for (i, sums) in sums.iter_mut().enumerate() {
                     for (sum, f) in sums.iter_mut().zip(force.column(i).iter()) {
                         *sum += f * f;
@@ -179,4 +184,31 @@ pub(super) fn spreads(context: &Context<'_>) -> Vec<f64> {
         at += len;
     }
     out
+}
+
+/// Deviations of priors where walks are segments, from what a unit of each parameter does to their readings along their
+/// replays, `rows x ns x m` a walk: a few times what is left of them, for the open starts take up most of it.
+pub(super) fn sizes_by_replay(
+    context: &Context<'_>,
+    estimate: &Estimate,
+    columns: &[(Vec<f64>, Vec<f64>)],
+    m: usize,
+) -> Vec<f64> {
+    let ns = context.logs.entries.len();
+    let mut squares = vec![0.0; m];
+    let mut n = 0.0;
+    for (walk, (_, read)) in context.walks.iter().zip(columns) {
+        let lead = walk.segment.unwrap_or(0);
+        for k in lead..walk.len() {
+            for (s, r) in estimate.noise.r.iter().enumerate() {
+                for (i, sum) in squares.iter_mut().enumerate() {
+                    *sum += read[(k * ns + s) * m + i].powi(2) / r;
+                }
+                n += 1.0;
+            }
+        }
+    }
+    let left = 1.0 + estimate.missing(context).readings;
+    let size = |s: f64| REPLAY_MULTIPLE * (left * n / s).sqrt();
+    squares.into_iter().map(size).collect()
 }

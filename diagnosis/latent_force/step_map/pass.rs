@@ -68,7 +68,7 @@ impl Part {
         let mut roles = Vec::new();
         if want.state {
             roles.extend((0..nx).map(Role::State));
-            if c.reads {
+            if c.reads && !self.walks.iter().all(|&w| c.rolls(w, want)) {
                 roles.extend((0..nx).map(Role::Reading));
                 roles.extend((0..nv).map(Role::Ramp));
             }

@@ -9,19 +9,19 @@ use super::Common;
 use super::pass::Part;
 
 impl Part {
-    /// Replays its segments from the first rows of the trajectories, which become those of the replays. With the sum of
+    /// Replays some of its segments from the first rows of the trajectories, which become those of the replays. With the sum of
     /// squares of the readings that count, each divided by its variance; infinite where the engine failed.
     pub(super) fn roll(
         &mut self,
         c: &Common<'_>,
         (theta, variance): (&[f64], &[f64]),
-        states: &mut [Vec<f64>],
+        (states, which): (&mut [Vec<f64>], &[bool]),
     ) -> Result<Vec<f64>> {
         let (nq, nu) = (c.layout.nq, c.layout.nu());
         let width = nq + c.layout.nv;
         let walks: Vec<&Walk> = self.walks.iter().map(|&w| &c.walks[w]).collect();
         let all: Vec<usize> = (0..walks.len())
-            .filter(|&e| walks[e].segment.is_some())
+            .filter(|&e| walks[e].segment.is_some() && which[self.walks[e]])
             .collect();
         let mut left = vec![0.0; walks.len()];
         if all.is_empty() {
