@@ -1,0 +1,349 @@
+//! The search for the motion that tells the most and keeps all limits.
+//!
+//! A candidate is played at the middle of the unknowns, a little up and down in each (what it tells), and at the ends of their
+//! ranges (whether it keeps the limits there too). The cross-entropy method makes the objective small among the
+//! candidates that keep all limits; those that do not rank behind them, by how much they break. The answer is played
+//! once more at corners of the ranges, with the limits looked at after every physics step, and is made smaller until none is broken.
+
+use asid_algorithms::fisher::Objective;
+use asid_algorithms::optimise::cem::{Cem, CemSettings};
+use asid_core::error::{Error, Result};
+use asid_core::rng::Rng;
+use asid_core::{Parameter, Progress, Streams};
+use rand::Rng as _;
+
+use crate::limits::Excess;
+use crate::motion::{Family, Shape};
+use crate::play::{Played, Player};
+use crate::tells::{Told, differences, of_plays};
+
+/// How a motion is found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Method {
+    /// Fisher information by the cross-entropy method over splines.
+    FisherCem,
+    /// Spline heights that are drawn.
+    Random,
+    /// A multisine with Schroeder's phases.
+    Multisine,
+    /// A Fourier series whose coefficients are drawn.
+    Fourier,
+}
+
+impl Method {
+    /// All, with their names on the command line.
+    pub const ALL: [(&'static str, Self); 4] = [
+        ("fisher-cem", Self::FisherCem),
+        ("random", Self::Random),
+        ("multisine", Self::Multisine),
+        ("fourier", Self::Fourier),
+    ];
+
+    /// The method of a name.
+    ///
+    /// # Errors
+    /// When there is none.
+    pub fn named(name: &str) -> Result<Self> {
+        let found = Self::ALL.iter().find(|(n, _)| *n == name);
+        found.map(|(_, m)| *m).ok_or_else(|| {
+            Error::unknown(
+                "explorer of any machine",
+                name,
+                Self::ALL.iter().map(|(n, _)| *n),
+            )
+        })
+    }
+
+    /// Name on the command line.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        let found = Self::ALL.iter().find(|(_, m)| *m == self);
+        found.map_or("", |(n, _)| n)
+    }
+
+    /// The curve that it moves.
+    #[must_use]
+    pub fn shape(self, settings: &DesignSettings) -> Shape {
+        match self {
+            Self::FisherCem | Self::Random => Shape::Spline(settings.knots),
+            Self::Multisine | Self::Fourier => Shape::Fourier(settings.harmonics),
+        }
+    }
+}
+
+/// How widely the search goes.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct DesignSettings {
+    /// Heights of a spline an actuator: more follow faster motions, and need a longer search.
+    pub knots: usize,
+    /// Harmonics of a Fourier series an actuator: five in the field's usual excitations (Swevers 1997).
+    pub harmonics: usize,
+    /// Rounds of the search at most.
+    pub iterations: usize,
+    /// Candidates a round.
+    pub population: usize,
+    /// Physics steps of the whole search at most, which bounds its time: rounds are left out, of which 8 are kept. Two cores
+    /// take some 3e5 steps of an arm a second.
+    pub physics_steps: f64,
+}
+
+impl Default for DesignSettings {
+    fn default() -> Self {
+        Self {
+            knots: 8,
+            harmonics: 5,
+            iterations: 40,
+            population: 40,
+            physics_steps: 1.5e7,
+        }
+    }
+}
+
+/// Rounds of the search at least.
+const FEWEST_ROUNDS: usize = 8;
+
+/// First deviation of the search in each coefficient, about its best draw; coefficients reach from -1 to 1.
+const SPREAD: f64 = 0.3;
+
+/// Factors by which a motion is made smaller to keep limits.
+const SHRINK: f64 = 0.85;
+
+/// Times that it is made smaller at most: down to a thousandth.
+const SHRINKS: usize = 43;
+
+/// Scales that the first draws are tried at.
+const SCALES: [f64; 4] = [1.0, 0.6, 0.35, 0.2];
+
+/// Corners of the ranges that the answer is played at, at most.
+const CORNERS: usize = 16;
+
+/// A cost beyond any of a motion that keeps the limits.
+const BROKEN: f64 = 1e6;
+
+/// A motion that was found.
+#[derive(Clone, Debug)]
+pub struct Designed {
+    /// Commands, `frames x nu`.
+    pub commands: Vec<f64>,
+    /// What it tells.
+    pub told: Told,
+    /// Its play at the middle of the unknowns.
+    pub played: Played,
+    /// By how much limits are passed at the worst of all points; nothing where they are kept.
+    pub excess: Excess,
+    /// Factor that its largest motion was made smaller by.
+    pub scale: f64,
+    /// Best cost after each round.
+    pub course: Vec<f64>,
+}
+
+/// What a search works on.
+pub struct Designer<'p, 'a> {
+    /// Plays motions.
+    pub player: &'p mut Player<'a>,
+    /// Motions.
+    pub family: Family,
+    /// Unknowns, then nuisance entries.
+    pub parameters: &'p [Parameter],
+    /// Number of unknowns.
+    pub sought: usize,
+    /// Values about which is searched.
+    pub values: Vec<f64>,
+    /// What is known beside the prior, such as from logs.
+    pub known: Told,
+    /// What is made small.
+    pub objective: Objective,
+    /// Physics steps of a frame.
+    pub substeps: usize,
+}
+
+impl Designer<'_, '_> {
+    /// Finds a motion.
+    ///
+    /// # Errors
+    /// When nothing can move, or the engine fails.
+    pub fn design(
+        &mut self,
+        method: Method,
+        settings: &DesignSettings,
+        streams: Streams,
+        progress: &dyn Progress,
+    ) -> Result<Designed> {
+        if self.family.is_empty() {
+            return Err(Error::Config {
+                key: "actuator".into(),
+                message: "no actuator has a range to move in: give its joint or command one, such as --limit-position \
+                          JOINT:LOW:HIGH"
+                    .into(),
+            });
+        }
+        let mut rng = streams.stream("design");
+        let (coefficients, course) = match method {
+            Method::FisherCem => self.search(settings, &mut rng, progress)?,
+            Method::Multisine => (self.family.multisine(), Vec::new()),
+            Method::Random | Method::Fourier => (self.family.random(&mut rng), Vec::new()),
+        };
+        self.finish(&coefficients, course, &mut rng)
+    }
+
+    /// The cross-entropy search; the best coefficients, and the best cost after each round.
+    fn search(
+        &mut self,
+        settings: &DesignSettings,
+        rng: &mut Rng,
+        progress: &dyn Progress,
+    ) -> Result<(Vec<f64>, Vec<f64>)> {
+        let n = self.family.len();
+        let plays = (1 + 4 * self.parameters.len()) * settings.population;
+        let steps = (plays * self.family.all_frames() * self.substeps) as f64;
+        let rounds = ((settings.physics_steps / steps) as usize)
+            .clamp(FEWEST_ROUNDS, settings.iterations.max(FEWEST_ROUNDS));
+        progress.begin("explore", rounds as u64 + 1);
+        // Draws at several sizes: the best that keeps the limits is the middle of the search.
+        let mut draws = vec![vec![0.0; n]];
+        while draws.len() < settings.population {
+            let draw = self.family.random(rng);
+            let scale = SCALES[draws.len() % SCALES.len()];
+            draws.push(draw.iter().map(|c| c * scale).collect());
+        }
+        let costs = self.costs(&draws)?;
+        let first = (0..draws.len())
+            .min_by(|&i, &j| costs[i].total_cmp(&costs[j]))
+            .unwrap_or(0);
+        progress.advance(1);
+        let rule = CemSettings {
+            elite_fraction: 0.2,
+            ..CemSettings::default()
+        };
+        let mut search = Cem::new(
+            rule,
+            &draws[first],
+            &vec![SPREAD; n],
+            &vec![-1.0; n],
+            &vec![1.0; n],
+        );
+        let mut course = vec![costs[first]];
+        let mut best = (draws[first].clone(), costs[first]);
+        for _ in 0..rounds {
+            let mut candidates = search.ask(settings.population - 1, rng);
+            candidates.push(best.0.clone());
+            let costs = self.costs(&candidates)?;
+            search.tell(&candidates, &costs);
+            let k = (0..costs.len())
+                .min_by(|&i, &j| costs[i].total_cmp(&costs[j]))
+                .unwrap_or(0);
+            if costs[k] < best.1 {
+                best = (candidates[k].clone(), costs[k]);
+            }
+            course.push(best.1);
+            progress.note(&format!("explore, {:.3}", best.1));
+            progress.advance(1);
+        }
+        progress.end();
+        Ok((best.0, course))
+    }
+
+    /// Costs of some candidates.
+    fn costs(&mut self, candidates: &[Vec<f64>]) -> Result<Vec<f64>> {
+        let (near, widths) = differences(self.parameters, &self.values);
+        let points = [&near[..], &self.ends()].concat();
+        let commands: Vec<Vec<f64>> = candidates
+            .iter()
+            .map(|c| self.family.commands(c, 1.0))
+            .collect();
+        let jobs: Vec<(&[f64], &[f64])> = commands
+            .iter()
+            .flat_map(|c| points.iter().map(move |p| (&c[..], &p[..])))
+            .collect();
+        let plays = self.player.play(&jobs, self.substeps)?;
+        Ok(plays
+            .chunks_exact(points.len())
+            .map(|plays| {
+                let mut excess = Excess::default();
+                plays.iter().for_each(|p| excess.join(&p.excess));
+                if excess.is_none() {
+                    let told = of_plays(self.player, &plays[..near.len()], &widths, self.sought);
+                    told.and(1.0, &self.known).cost(self.objective)
+                } else {
+                    BROKEN * (1.0 + excess.total)
+                }
+            })
+            .collect())
+    }
+
+    /// The middle with each entry at either end of its range.
+    fn ends(&self) -> Vec<Vec<f64>> {
+        let mut points = Vec::with_capacity(2 * self.parameters.len());
+        for (i, parameter) in self.parameters.iter().enumerate() {
+            for end in parameter.range {
+                let mut point = self.values.clone();
+                point[i] = end;
+                points.push(point);
+            }
+        }
+        points
+    }
+
+    /// Corners of the ranges: all of them where they are few, else draws.
+    fn corners(&self, rng: &mut Rng) -> Vec<Vec<f64>> {
+        let n = self.parameters.len();
+        let few = n < usize::BITS as usize && 1 << n <= CORNERS;
+        let count = if few { 1 << n } else { CORNERS };
+        (0..count)
+            .map(|k| {
+                let upper =
+                    |i: usize, rng: &mut Rng| if few { k >> i & 1 == 1 } else { rng.random() };
+                (0..n)
+                    .map(|i| self.parameters[i].range[usize::from(upper(i, rng))])
+                    .collect()
+            })
+            .collect()
+    }
+
+    /// Plays the answer with every step looked at, smaller and smaller until nothing is broken.
+    fn finish(
+        &mut self,
+        coefficients: &[f64],
+        course: Vec<f64>,
+        rng: &mut Rng,
+    ) -> Result<Designed> {
+        let points = [vec![self.values.clone()], self.ends(), self.corners(rng)].concat();
+        let nu = self.family.base.len();
+        let mut scale = 1.0;
+        let mut excess = Excess::default();
+        for _ in 0..SHRINKS {
+            let commands = self.family.commands(coefficients, scale);
+            // One row a physics step.
+            let fine: Vec<f64> = commands
+                .chunks_exact(nu)
+                .flat_map(|row| row.repeat(self.substeps))
+                .collect();
+            let jobs: Vec<(&[f64], &[f64])> = points.iter().map(|p| (&fine[..], &p[..])).collect();
+            excess = Excess::default();
+            self.player
+                .play(&jobs, 1)?
+                .iter()
+                .for_each(|p| excess.join(&p.excess));
+            if excess.is_none() {
+                break;
+            }
+            scale *= SHRINK;
+        }
+        let commands = self.family.commands(coefficients, scale);
+        let (near, widths) = differences(self.parameters, &self.values);
+        let jobs: Vec<(&[f64], &[f64])> = near.iter().map(|p| (&commands[..], &p[..])).collect();
+        let plays = self.player.play(&jobs, self.substeps)?;
+        Ok(Designed {
+            told: of_plays(self.player, &plays, &widths, self.sought),
+            played: plays
+                .into_iter()
+                .next()
+                .ok_or_else(|| Error::Failed("nothing was played".into()))?,
+            commands,
+            excess,
+            scale,
+            course,
+        })
+    }
+}
