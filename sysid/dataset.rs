@@ -119,9 +119,11 @@ impl Dataset {
 }
 
 /// The noise of a sensor from the rough part of its readings: third differences take out what is smooth, and have
-/// `sqrt(20)` times the deviation of white noise; their median magnitude is blind to a few impacts.
+/// `sqrt(20)` times the deviation of white noise; their median magnitude is blind to a few impacts. Readings that come
+/// in steps have at least the deviation of a step, `step / sqrt(12)`.
 fn noise_of(sensor: &str, logs: &[(String, Episode)]) -> f64 {
     let mut rough = Vec::new();
+    let mut step = f64::INFINITY;
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
     for (_, episode) in logs {
         let Some(range) = episode.channel(sensor) else {
@@ -134,6 +136,8 @@ fn noise_of(sensor: &str, logs: &[(String, Episode)]) -> f64 {
             for x in series.iter().filter(|x| x.is_finite()) {
                 (low, high) = (low.min(*x), high.max(*x));
             }
+            let steps = series.windows(2).map(|w| (w[1] - w[0]).abs());
+            step = steps.filter(|d| *d > 0.0).fold(step, f64::min);
             let third = series
                 .windows(4)
                 .map(|w| (w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0]).abs());
@@ -144,7 +148,12 @@ fn noise_of(sensor: &str, logs: &[(String, Episode)]) -> f64 {
     let median = rough.get(rough.len() / 2).copied().unwrap_or(0.0);
     let least = (LEAST_NOISE * (high - low)).max(f64::MIN_POSITIVE.sqrt());
     let least = if least.is_finite() { least } else { 1.0 };
-    (NORMAL * median / 20.0_f64.sqrt()).max(least)
+    let step = if step.is_finite() {
+        step / 12.0_f64.sqrt()
+    } else {
+        0.0
+    };
+    (NORMAL * median / 20.0_f64.sqrt()).max(least).max(step)
 }
 
 /// Replays episodes at many values of the parameters at once.
@@ -215,5 +224,44 @@ impl Replayer {
             }
         }
         Ok(all)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use asid_core::Streams;
+    use asid_core::episode::ChannelColumns;
+    use rand::Rng as _;
+
+    fn log(readings: Vec<f64>) -> (String, Episode) {
+        let episode = Episode {
+            time: (0..readings.len()).map(|k| 0.01 * k as f64).collect(),
+            channels: vec![ChannelColumns {
+                name: "q".into(),
+                len: 1,
+            }],
+            readings,
+            ..Episode::default()
+        };
+        ("log".into(), episode)
+    }
+
+    #[test]
+    fn noise_is_told_from_motion() {
+        let mut rng = Streams::new(1).stream("t");
+        let mut normal = || (0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0;
+        let readings = (0..4000).map(|k| (0.03 * f64::from(k)).sin() + 0.01 * normal());
+        let found = noise_of("q", &[log(readings.collect())]);
+        // The median of 4000 magnitudes is good to 2 %; neighbours overlap.
+        assert!((found / 0.01 - 1.0).abs() < 0.1, "{found}");
+    }
+
+    #[test]
+    fn readings_in_steps_are_as_noisy_as_a_step() {
+        // It stands still most of the time, so that most differences are zero.
+        let readings = (0..1000).map(|k| 0.5 * f64::from(k / 100));
+        let found = noise_of("q", &[log(readings.collect())]);
+        assert!((found - 0.5 / 12.0_f64.sqrt()).abs() < 1e-12, "{found}");
     }
 }

@@ -285,6 +285,16 @@ impl Designer<'_, '_> {
         points
     }
 
+    /// The entries in which a point differs from the middle.
+    fn words(&self, point: &[f64]) -> String {
+        let entries = self.parameters.iter().zip(point).zip(&self.values);
+        let moved = entries.filter(|((_, x), middle)| x != middle);
+        let words: Vec<String> = moved
+            .map(|((p, x), _)| format!("{} = {x}", p.name))
+            .collect();
+        words.join(", ")
+    }
+
     /// Corners of the ranges: all of them where they are few, else draws.
     fn corners(&self, rng: &mut Rng) -> Vec<Vec<f64>> {
         let n = self.parameters.len();
@@ -321,10 +331,9 @@ impl Designer<'_, '_> {
                 .collect();
             let jobs: Vec<(&[f64], &[f64])> = points.iter().map(|p| (&fine[..], &p[..])).collect();
             excess = Excess::default();
-            self.player
-                .play(&jobs, 1)?
-                .iter()
-                .for_each(|p| excess.join(&p.excess));
+            for (played, point) in self.player.play(&jobs, 1)?.iter().zip(&points) {
+                excess.join(&played.excess.at(|| self.words(point)));
+            }
             if excess.is_none() {
                 break;
             }

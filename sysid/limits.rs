@@ -240,6 +240,19 @@ impl Excess {
         }
     }
 
+    /// The same, with where it is so.
+    #[must_use]
+    pub fn at(&self, place: impl FnOnce() -> String) -> Self {
+        let mut excess = self.clone();
+        if let Some((what, _)) = &mut excess.worst {
+            let place = place();
+            if !place.is_empty() {
+                *what += &format!(" at {place}");
+            }
+        }
+        excess
+    }
+
     /// Whether all limits are kept.
     #[must_use]
     pub fn is_none(&self) -> bool {

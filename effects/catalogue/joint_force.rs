@@ -69,6 +69,11 @@ impl Effect for Stiffness {
             rest,
             cubic,
         });
+        if cubic != 0.0 {
+            return Ok(Native::Nearly(
+                "has a cubic part, written as the polynomial that MuJoCo's `stiffness` takes in its newer versions".into(),
+            ));
+        }
         Ok(Native::Whole)
     }
 

@@ -2,7 +2,8 @@
 //!
 //! The joint that the drive acts on keeps its name and is now the rotor's; behind it, in the same body and about the
 //! same axis, stands a joint of the link against the rotor: free within a `range` as wide as the gap, or held by a
-//! spring. What belongs to the sum of the two (damping, dry friction, the joint's own range, what its
+//! spring. What the catalogue's backward Euler takes out of the motion is damping here: a spring `K` over a time step
+//! `dt` damps by `K dt`, and so does a position servo's `kp` at the rotor. What belongs to the sum of the two (damping, dry friction, the joint's own range, what its
 //! sensors read) moves to a fixed tendon over both.
 
 use asid_core::error::Result;
@@ -15,9 +16,6 @@ use crate::plant::DriveLaw;
 
 /// Time constant of the ends of a gap, in time steps: the shortest that MuJoCo takes (`refsafe`).
 const END_TIME: f64 = 2.0;
-
-/// Damping ratio of a spring in series: the catalogue's has none of its own, but dies out under backward Euler.
-const DAMPING_RATIO: f64 = 0.05;
 
 impl Writer<'_, '_> {
     pub(super) fn write_transmissions(&mut self) -> Result<()> {
@@ -49,23 +47,23 @@ impl Writer<'_, '_> {
         let get = |w: &Self, attribute: &str| w.value(&target("joint", &name, attribute, 0));
         let (damping, friction) = (get(self, "damping")?, get(self, "frictionloss")?);
         let friction = friction + self.native.joints.get(&i).map_or(0.0, |j| j.friction);
+        let value = |w: &Self, gain: &str| w.value(&target("actuator", &label, gain, 0));
+        let (kp, kv) = match drive.law {
+            DriveLaw::Position { .. } => (value(self, "kp")?, value(self, "kv")?),
+            DriveLaw::Velocity { .. } => (0.0, value(self, "kv")?),
+            DriveLaw::Motor => (0.0, 0.0),
+        };
         let mut inertia = get(self, "armature")?;
         if inertia <= 0.0 {
             // A rotor without inertia follows its servo's law; this much it lags a step behind it.
-            let value = |w: &Self, gain: &str| w.value(&target("actuator", &label, gain, 0));
-            let (kp, kv) = match drive.law {
-                DriveLaw::Position { .. } => (value(self, "kp")?, value(self, "kv")?),
-                DriveLaw::Velocity { .. } => (0.0, value(self, "kv")?),
-                DriveLaw::Motor => (0.0, 0.0),
-            };
             inertia = drive.gear * drive.gear * timestep * (kv + kp * timestep);
             self.leave_out(format!(
                 "joint `{name}` has no rotor inertia: {inertia:.3e} is written in its place, which lags the servo by a step"
             ));
         }
-        for (attribute, value) in [("damping", "0"), ("frictionloss", "0")] {
-            self.markup.set(node, attribute, value);
-        }
+        self.markup
+            .set_numbers(node, "damping", &[drive.gear * drive.gear * kp * timestep]);
+        self.markup.set(node, "frictionloss", "0");
         self.markup.set_numbers(node, "armature", &[inertia]);
         self.markup.set(node, "name", name.clone());
         let unit = match joint.kind {
@@ -80,7 +78,7 @@ impl Writer<'_, '_> {
         };
         let hold = if series.compliance > 0.0 {
             let stiffness = 1.0 / series.compliance;
-            let damping = 2.0 * DAMPING_RATIO * (stiffness * inertia).sqrt();
+            let damping = stiffness * timestep;
             format!(
                 "limited=\"false\" stiffness=\"{stiffness}\" springref=\"0\" damping=\"{damping}\""
             )

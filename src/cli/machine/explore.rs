@@ -36,6 +36,8 @@ pub struct UnknownResult {
     pub unit: String,
     /// The value about which the motion was designed.
     pub value: f64,
+    /// What shares are taken of: the value, or the middle of the range where it is zero.
+    pub reference: f64,
     /// Standard deviations: of the prior, by the logs so far, by this motion, by both.
     pub prior: f64,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -291,6 +293,15 @@ fn settle(
     Ok(())
 }
 
+/// What a deviation is measured by: the value, or the middle of the range where the value is zero.
+fn reference(parameter: &Parameter, value: f64) -> f64 {
+    if value == 0.0 {
+        parameter.center().abs()
+    } else {
+        value.abs()
+    }
+}
+
 /// What is known of the unknowns, before and after.
 fn unknown_results(
     unknowns: &[Parameter],
@@ -309,7 +320,7 @@ fn unknown_results(
         .enumerate()
         .map(|(i, p)| {
             let unit = |scaled: f64| p.unscale_std(values[i], scaled);
-            let wanted = precision * values[i].abs();
+            let wanted = precision * reference(p, values[i]);
             let enough = |n: usize| unit(motion.and(n as f64, known).deviations()[i]) <= wanted;
             let repeats = if wanted > 0.0 && enough(MOST_REPEATS) {
                 // Information only grows: halving finds the fewest.
@@ -330,6 +341,7 @@ fn unknown_results(
                 name: p.name.clone(),
                 unit: p.unit.clone(),
                 value: values[i],
+                reference: reference(p, values[i]),
                 prior: unit(1.0),
                 logs: logs.map(|_| unit(so_far[i])),
                 motion: unit(alone[i]),
@@ -400,7 +412,7 @@ fn relative(deviation: f64, value: f64) -> String {
 pub fn lines(result: &ExploreResult) -> Vec<String> {
     let mut all = Vec::new();
     for u in &result.unknowns {
-        let to = |deviation: f64| relative(deviation, u.value);
+        let to = |deviation: f64| relative(deviation, u.reference);
         let mut line = match u.logs {
             Some(logs) => format!(
                 "{}: your logs so far tell it to {}; this motion to {}, with them to {}",

@@ -135,7 +135,12 @@ impl Subject {
     /// A plain document on the engine of another subject.
     fn of_scene(scene: Scene, like: &Self) -> Result<Self> {
         let model = like.backend.load(&scene)?;
-        let mut plant = Plant::of(&scene)?;
+        // The reader of documents knows no polynomials; the tree is that of the source unless joints were added.
+        let mut plant = match Plant::of(&scene) {
+            Ok(plant) => plant,
+            Err(_) if model.layout().nq == like.plant.layout.nq => like.plant.clone(),
+            Err(error) => return Err(error.into()),
+        };
         plant.layout = model.layout().clone();
         Ok(Self {
             name: like.name.clone(),

@@ -33,8 +33,20 @@ struct Config {
     backend: Option<String>,
     #[serde(default)]
     seed: u64,
-    #[serde(default)]
+    #[serde(default = "smooth")]
     gauss_newton: GaussNewtonSettings,
+}
+
+/// A search for machines whose replays are smooth in the unknowns, as they are where nothing bounces: from fewer
+/// points, and with fewer fits over the region of the posterior, than a task with contacts needs.
+fn smooth() -> GaussNewtonSettings {
+    GaussNewtonSettings {
+        screened: 32,
+        starts: 2,
+        iterations: 8,
+        rounds: 2,
+        ..GaussNewtonSettings::default()
+    }
 }
 
 /// Gaps in units of the noise.

@@ -37,7 +37,7 @@ pub fn page(
             unit(figure(u.motion), &u.unit),
             unit(figure(u.prior), &u.unit)
         );
-        page = page.tile(Tile::new(&u.name, &share(u.motion, u.value)).note(note));
+        page = page.tile(Tile::new(&u.name, &share(u.motion, u.reference)).note(note));
     }
     page.section(told(result))
         .section(commands(result, subject, found))
