@@ -112,8 +112,14 @@ const SHRINK: f64 = 0.85;
 /// Times that it is made smaller at most: down to a thousandth.
 const SHRINKS: usize = 43;
 
-/// Scales that the first draws are tried at.
-const SCALES: [f64; 4] = [1.0, 0.6, 0.35, 0.2];
+/// Smallest size of the first draws: a machine that hardly damps comes to rest from small motions only.
+const SMALLEST: f64 = 1e-3;
+
+/// Sizes in which each round tries the best motion so far.
+const SIZES: [f64; 4] = [1.0, 0.9, 1.15, 1.4];
+
+/// How much larger the answer is played to see which limit it would break first.
+const LARGER: f64 = 1.25;
 
 /// Corners of the ranges that the answer is played at, at most.
 const CORNERS: usize = 16;
@@ -132,6 +138,8 @@ pub struct Designed {
     pub played: Played,
     /// By how much limits are passed at the worst of all points; nothing where they are kept.
     pub excess: Excess,
+    /// The limit that a motion larger by a quarter would break.
+    pub next_limit: Option<String>,
     /// Factor that its largest motion was made smaller by.
     pub scale: f64,
     /// Best cost after each round.
@@ -200,17 +208,20 @@ impl Designer<'_, '_> {
         let rounds = ((settings.physics_steps / steps) as usize)
             .clamp(FEWEST_ROUNDS, settings.iterations.max(FEWEST_ROUNDS));
         progress.begin("explore", rounds as u64 + 1);
-        // Draws at several sizes: the best that keeps the limits is the middle of the search.
+        // Draws at sizes from the whole down to a thousandth: the best that keeps the limits is the middle of the search.
         let mut draws = vec![vec![0.0; n]];
+        let mut sizes = vec![SMALLEST];
         while draws.len() < settings.population {
-            let draw = self.family.random(rng);
-            let scale = SCALES[draws.len() % SCALES.len()];
-            draws.push(draw.iter().map(|c| c * scale).collect());
+            let along = (draws.len() - 1) as f64 / (settings.population - 2).max(1) as f64;
+            let size = SMALLEST.powf(along);
+            draws.push(self.family.random(rng).iter().map(|c| c * size).collect());
+            sizes.push(size);
         }
         let costs = self.costs(&draws)?;
         let first = (0..draws.len())
             .min_by(|&i, &j| costs[i].total_cmp(&costs[j]))
             .unwrap_or(0);
+        let spread = SPREAD * sizes[first];
         progress.advance(1);
         let rule = CemSettings {
             elite_fraction: 0.2,
@@ -219,15 +230,20 @@ impl Designer<'_, '_> {
         let mut search = Cem::new(
             rule,
             &draws[first],
-            &vec![SPREAD; n],
+            &vec![spread; n],
             &vec![-1.0; n],
             &vec![1.0; n],
         );
         let mut course = vec![costs[first]];
         let mut best = (draws[first].clone(), costs[first]);
         for _ in 0..rounds {
-            let mut candidates = search.ask(settings.population - 1, rng);
-            candidates.push(best.0.clone());
+            // The best so far, also larger and smaller: limits bind the size before the shape.
+            let mut candidates: Vec<Vec<f64>> = SIZES
+                .iter()
+                .map(|size| best.0.iter().map(|c| (c * size).clamp(-1.0, 1.0)).collect())
+                .collect();
+            let drawn = settings.population.saturating_sub(SIZES.len()).max(2);
+            candidates.extend(search.ask(drawn, rng));
             let costs = self.costs(&candidates)?;
             search.tell(&candidates, &costs);
             let k = (0..costs.len())
@@ -311,6 +327,24 @@ impl Designer<'_, '_> {
             .collect()
     }
 
+    /// By how much a motion passes limits at some points, with every physics step looked at.
+    fn excess_at(
+        &mut self,
+        coefficients: &[f64],
+        scale: f64,
+        points: &[Vec<f64>],
+    ) -> Result<Excess> {
+        let commands = self.family.commands(coefficients, scale);
+        let rows = commands.chunks_exact(self.family.base.len());
+        let fine: Vec<f64> = rows.flat_map(|row| row.repeat(self.substeps)).collect();
+        let jobs: Vec<(&[f64], &[f64])> = points.iter().map(|p| (&fine[..], &p[..])).collect();
+        let mut excess = Excess::default();
+        for (played, point) in self.player.play(&jobs, 1)?.iter().zip(points) {
+            excess.join(&played.excess.at(|| self.words(point)));
+        }
+        Ok(excess)
+    }
+
     /// Plays the answer with every step looked at, smaller and smaller until nothing is broken.
     fn finish(
         &mut self,
@@ -319,26 +353,16 @@ impl Designer<'_, '_> {
         rng: &mut Rng,
     ) -> Result<Designed> {
         let points = [vec![self.values.clone()], self.ends(), self.corners(rng)].concat();
-        let nu = self.family.base.len();
         let mut scale = 1.0;
         let mut excess = Excess::default();
         for _ in 0..SHRINKS {
-            let commands = self.family.commands(coefficients, scale);
-            // One row a physics step.
-            let fine: Vec<f64> = commands
-                .chunks_exact(nu)
-                .flat_map(|row| row.repeat(self.substeps))
-                .collect();
-            let jobs: Vec<(&[f64], &[f64])> = points.iter().map(|p| (&fine[..], &p[..])).collect();
-            excess = Excess::default();
-            for (played, point) in self.player.play(&jobs, 1)?.iter().zip(&points) {
-                excess.join(&played.excess.at(|| self.words(point)));
-            }
+            excess = self.excess_at(coefficients, scale, &points)?;
             if excess.is_none() {
                 break;
             }
             scale *= SHRINK;
         }
+        let larger = self.excess_at(coefficients, LARGER * scale, &points)?;
         let commands = self.family.commands(coefficients, scale);
         let (near, widths) = differences(self.parameters, &self.values);
         let jobs: Vec<(&[f64], &[f64])> = near.iter().map(|p| (&commands[..], &p[..])).collect();
@@ -350,6 +374,7 @@ impl Designer<'_, '_> {
                 .next()
                 .ok_or_else(|| Error::Failed("nothing was played".into()))?,
             commands,
+            next_limit: larger.worst.map(|(what, _)| what),
             excess,
             scale,
             course,

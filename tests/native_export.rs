@@ -230,3 +230,45 @@ fn the_rest_of_the_document_stays() {
     );
     assert_eq!(xml, changed);
 }
+
+/// A tetrahedron as a mesh.
+const TETRAHEDRON: &str =
+    "v 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nv 0 0 0.1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
+
+#[test]
+fn meshes_and_includes_are_found_from_another_folder() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    for name in ["robot/assets", "robot/parts", "out/deep"] {
+        std::fs::create_dir_all(at(name)).unwrap();
+    }
+    std::fs::write(at("robot/assets/tip.obj"), TETRAHEDRON).unwrap();
+    let arm = r#"<mujocoinclude><body name="arm"><joint name="turn" axis="0 1 0" damping="0.1"/>
+      <geom name="tip" type="mesh" mesh="tip" mass="0.3"/></body></mujocoinclude>"#;
+    std::fs::write(at("robot/parts/arm.xml"), arm).unwrap();
+    let robot = r#"<mujoco><compiler meshdir="assets"/><asset><mesh name="tip" file="tip.obj"/></asset>
+      <worldbody><include file="parts/arm.xml"/></worldbody><sensor><jointpos name="q" joint="turn"/></sensor></mujoco>"#;
+    std::fs::write(at("robot/robot.xml"), robot).unwrap();
+    let model = RefinedModel {
+        scene: Scene::from_file(&at("robot/robot.xml")).unwrap(),
+        parameters: vec![("joint/turn/damping".parse().unwrap(), 0.02)],
+        effects: vec!["gravity-tilt:pitch=0.1".parse().unwrap()],
+    };
+    let backend = engine();
+    let written = plain(&*backend, &model, &at("out/deep")).unwrap();
+    std::fs::write(at("out/deep/model.xml"), &written.xml).unwrap();
+    let scene = Scene::from_file(&at("out/deep/model.xml")).unwrap();
+    let compiled = backend.load(&scene).unwrap();
+    assert_eq!(
+        compiled
+            .nominal(&"joint/turn/damping".parse().unwrap())
+            .unwrap(),
+        0.02
+    );
+    // Nothing ties it to this machine: the folders may move together.
+    assert!(
+        !written.xml.contains(folder.path().to_str().unwrap()),
+        "{}",
+        written.xml
+    );
+}

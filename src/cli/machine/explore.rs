@@ -71,6 +71,8 @@ pub struct ExploreResult {
     pub precision: f64,
     /// Factor by which the motion was made smaller to keep all limits.
     pub scale: f64,
+    /// The limit that a motion larger by a quarter would break.
+    pub next_limit: Option<String>,
     /// What is broken where nothing could be kept; null where all limits hold.
     pub broken: Option<String>,
     pub noise: BTreeMap<String, f64>,
@@ -170,6 +172,7 @@ pub fn explore(path: &Path, common: &Common, given: &super::motion_config::Optio
         unseen: found.told.and(1.0, &known).unseen(&names),
         precision: config.precision,
         scale: found.scale,
+        next_limit: found.next_limit.clone(),
         broken,
         noise: signals
             .iter()
@@ -274,7 +277,7 @@ fn settle(
     if left > config.rest_speed {
         notes.push(format!(
             "under its first commands the machine does not come to rest within {} s (speed {left:.3} left): the motion \
-             begins in the first state itself",
+             begins in the first state itself, which is taken as known exactly",
             config.settle
         ));
         player.skip_settling();
@@ -451,7 +454,14 @@ pub fn lines(result: &ExploreResult) -> Vec<String> {
     }
     all.extend(result.notes.iter().cloned());
     all.push(match &result.broken {
-        None => "all limits hold, at the ends and corners of the unknowns' ranges too".to_owned(),
+        None => {
+            let mut line =
+                "all limits hold, at the ends and corners of the unknowns' ranges too".to_owned();
+            if let Some(next) = &result.next_limit {
+                line += &format!("; a motion larger by a quarter would break: {next}");
+            }
+            line
+        }
         Some(what) => format!("LIMITS BROKEN: {what}"),
     });
     all.push(format!(
