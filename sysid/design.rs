@@ -84,7 +84,7 @@ pub struct DesignSettings {
     /// Candidates a round.
     pub population: usize,
     /// Physics steps of the whole search at most, which bounds its time: rounds are left out, of which 8 are kept. Two cores
-    /// take some 3e5 steps of an arm a second.
+    /// take some 1.5e5 steps of an arm of six joints a second.
     pub physics_steps: f64,
 }
 
@@ -95,7 +95,7 @@ impl Default for DesignSettings {
             harmonics: 5,
             iterations: 40,
             population: 40,
-            physics_steps: 1.5e7,
+            physics_steps: 1e7,
         }
     }
 }

@@ -187,13 +187,15 @@ fn a_motion_keeps_its_limits_and_tells_what_it_says() {
         "--seconds",
         "2",
         "--unknown",
+        "geom/cart/mass:0.4:3",
+        "--unknown",
         "joint/rail/damping:0.5:4",
     ];
     let design = |explorer: &str, out: &str| {
         let arguments = [
             &[
                 "explore",
-                "cart",
+                "cart/nominal.xml",
                 "--quiet",
                 "--out",
                 out,
@@ -250,7 +252,7 @@ fn a_motion_keeps_its_limits_and_tells_what_it_says() {
     let arguments = [
         &[
             "explore",
-            "cart",
+            "cart/nominal.xml",
             "--quiet",
             "--out",
             "again",
@@ -275,10 +277,12 @@ fn the_expected_deviation_is_the_actual_one() {
     let arguments = [
         &[
             "explore",
-            "cart",
+            "cart/nominal.xml",
             "--quiet",
             "--out",
             "motion",
+            "--unknown",
+            "geom/cart/mass:0.4:3",
             "--seconds",
             "2",
         ][..],

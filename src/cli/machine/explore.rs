@@ -10,6 +10,7 @@ use asid_algorithms::fisher::Objective;
 use asid_core::posterior::Direction;
 use asid_core::signal::Signal;
 use asid_core::{Episode, Parameter, Streams};
+use asid_report::number::significant;
 use asid_sysid::dataset::Dataset;
 use asid_sysid::design::{Designed, Designer, Method};
 use asid_sysid::limits::Limits;
@@ -402,12 +403,13 @@ fn predicted(subject: &Subject, found: &Designed, signals: &[Signal], period: f6
     episode
 }
 
-/// A deviation relative to a value, in words.
-fn relative(deviation: f64, value: f64) -> String {
-    if value == 0.0 {
+/// A deviation as a share of what it is measured by, in words.
+pub fn relative(deviation: f64, reference: f64) -> String {
+    if reference == 0.0 {
         figure(deviation)
     } else {
-        format!("{:.2} %", 100.0 * deviation / value.abs())
+        let percent = 100.0 * deviation / reference.abs();
+        format!("{} %", significant(percent, 2))
     }
 }
 

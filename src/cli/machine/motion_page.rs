@@ -6,7 +6,7 @@ use asid_sysid::design::Designed;
 use asid_sysid::limits::Limits;
 
 use super::Subject;
-use super::explore::{ExploreResult, lines};
+use super::explore::{ExploreResult, lines, relative};
 use crate::cli::result::figure;
 use crate::cli::run::command_line;
 
@@ -37,7 +37,7 @@ pub fn page(
             unit(figure(u.motion), &u.unit),
             unit(figure(u.prior), &u.unit)
         );
-        page = page.tile(Tile::new(&u.name, &share(u.motion, u.reference)).note(note));
+        page = page.tile(Tile::new(&u.name, &relative(u.motion, u.reference)).note(note));
     }
     page.section(told(result))
         .section(commands(result, subject, found))
@@ -51,15 +51,6 @@ fn unit(text: String, unit: &str) -> String {
         text
     } else {
         format!("{text} {unit}")
-    }
-}
-
-/// A deviation as a share of the value.
-fn share(deviation: f64, value: f64) -> String {
-    if value == 0.0 {
-        figure(deviation)
-    } else {
-        format!("{:.2} %", 100.0 * deviation / value.abs())
     }
 }
 
