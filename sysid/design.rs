@@ -91,7 +91,7 @@ pub struct DesignSettings {
 impl Default for DesignSettings {
     fn default() -> Self {
         Self {
-            knots: 8,
+            knots: 12,
             harmonics: 5,
             iterations: 40,
             population: 40,
@@ -120,6 +120,9 @@ const SIZES: [f64; 4] = [1.0, 0.9, 1.15, 1.4];
 
 /// How much larger the answer is played to see which limit it would break first.
 const LARGER: f64 = 1.25;
+
+/// Unknowns of whose ranges a search looks at all corners, at most: eight plays a candidate, where the ends are six.
+const FEW: usize = 3;
 
 /// Corners of the ranges that the answer is played at, at most.
 const CORNERS: usize = 16;
@@ -263,7 +266,7 @@ impl Designer<'_, '_> {
     /// Costs of some candidates.
     fn costs(&mut self, candidates: &[Vec<f64>]) -> Result<Vec<f64>> {
         let (near, widths) = differences(self.parameters, &self.values);
-        let points = [&near[..], &self.ends()].concat();
+        let points = [&near[..], &self.far()].concat();
         let commands: Vec<Vec<f64>> = candidates
             .iter()
             .map(|c| self.family.commands(c, 1.0))
@@ -286,6 +289,20 @@ impl Designer<'_, '_> {
                 }
             })
             .collect())
+    }
+
+    /// Points far from the middle at which a search looks at the limits: all corners of the ranges where these are few,
+    /// else the ends of each range.
+    fn far(&self) -> Vec<Vec<f64>> {
+        let n = self.parameters.len();
+        if n > FEW {
+            return self.ends();
+        }
+        let corner = |k: usize| {
+            let entries = self.parameters.iter().enumerate();
+            entries.map(|(i, p)| p.range[k >> i & 1]).collect()
+        };
+        (0..1 << n).map(corner).collect()
     }
 
     /// The middle with each entry at either end of its range.

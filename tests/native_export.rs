@@ -50,7 +50,11 @@ fn run(model: &dyn Model, qvel: &[f64]) -> Vec<f64> {
     let names: Vec<&str> = layout.sensors.iter().map(|s| &*s.name).collect();
     let record = layout.recording(&names).unwrap();
     let frames = 500;
-    let command = |k: usize, a: usize| 0.9 * (0.02 * k as f64 + a as f64).cos();
+    // The servo begins where its joint stands, so that nothing between them is stretched.
+    let command = |k: usize, a: usize| match a {
+        0 => 0.9 * (0.02 * k as f64).cos(),
+        _ => 0.9 * (0.02 * k as f64).sin() - 0.4,
+    };
     let control: Vec<f64> = (0..frames * layout.nu())
         .map(|i| command(i / layout.nu(), i % layout.nu()))
         .collect();
