@@ -5,6 +5,7 @@ use asid_core::error::Result;
 use asid_core::registry::Origin;
 use asid_core::simulator::StepView;
 use asid_core::target::Target;
+use asid_mjcf::native::NativeModel;
 use asid_mjcf::plant::Plant;
 
 /// Where an effect acts.
@@ -133,6 +134,17 @@ pub struct Confusion {
     pub told_apart_by: &'static str,
 }
 
+/// How well a plain document says an effect.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Native {
+    /// All of it.
+    Whole,
+    /// Not quite: a sentence on what differs.
+    Nearly(String),
+    /// Not at all: a sentence on why, which follows on its name.
+    LeftOut(String),
+}
+
 /// A physical effect.
 pub trait Effect: Send + Sync {
     /// Where it acts.
@@ -168,6 +180,19 @@ pub trait Effect: Send + Sync {
     /// [steps](Effect::steps), calling hooks.
     fn needs(&self) -> Capabilities {
         Capabilities::empty()
+    }
+    /// Writes it at a site with MJCF's own elements, and tells how well they say it. An effect that only changes
+    /// values of its targets has nothing to do here: the values are written.
+    ///
+    /// # Errors
+    /// When the scene has no such site, or a value makes no sense.
+    fn native(&self, _site: &Site<'_>, _document: &mut NativeModel<'_>) -> Result<Native> {
+        if self.acts() == Acts::Model && !self.steps() {
+            return Ok(Native::Whole);
+        }
+        Ok(Native::LeftOut(
+            "has no counterpart among MJCF's elements".into(),
+        ))
     }
     /// Attaches it at a site, for one simulation.
     ///

@@ -12,16 +12,17 @@
 //! any other: `effect/actuator-delay@servo/delay`.
 //!
 //! [`catalogue`] has the effects of ASID, one file a family; [`refined_model`] is the file of a model
-//! with effects.
+//! with effects. [`native`] writes such a model as a plain MJCF document.
 
 pub mod catalogue;
 mod effect;
+pub mod native;
 pub mod refined;
 pub mod refined_model;
 mod spec;
 
 pub use effect::{
-    Acting, Acts, Confusion, Effect, EffectEntry, EffectParameter, Reference, Site, Start,
+    Acting, Acts, Confusion, Effect, EffectEntry, EffectParameter, Native, Reference, Site, Start,
 };
 pub use refined_model::RefinedModel;
 pub use spec::EffectSpec;

@@ -149,6 +149,20 @@ impl GaussNewtonIdentifier {
     }
 }
 
+/// The posterior of a fit whose leading entries are these parameters in prior deviations, by `count` draws.
+#[must_use]
+pub fn posterior_of(fit: &Fit, parameters: &[Parameter], count: usize, rng: &mut Rng) -> Posterior {
+    let seen = Seen::new(fit, parameters.len());
+    let names: Vec<&str> = parameters.iter().map(|p| p.name.as_str()).collect();
+    let value = |z: &Vec<f64>| -> Vec<f64> {
+        let pairs = parameters.iter().zip(z);
+        pairs.map(|(p, z)| p.from_scaled(*z)).collect()
+    };
+    let drawn: Vec<Vec<f64>> = seen.sample(count, rng).iter().map(value).collect();
+    let weights = vec![1.0; drawn.len()];
+    Posterior::from_samples(parameters, drawn, &weights).with_unseen(seen.unseen(&names))
+}
+
 /// What the readings see of the unknowns: information by directions.
 struct Seen {
     middle: DVector<f64>,

@@ -1,8 +1,9 @@
 //! Play between a drive and its load.
 
-use crate::{Acting, Acts, Confusion, Effect, EffectParameter, Site, Start};
+use crate::{Acting, Acts, Confusion, Effect, EffectParameter, Native, Site, Start};
 use asid_core::{Capabilities, Result, Target};
 use asid_mjcf::Plant;
+use asid_mjcf::native::{NativeModel, Series};
 
 use super::motor_side::{self, MotorSide};
 use super::{at_least, values};
@@ -49,6 +50,24 @@ impl Effect for Backlash {
 
     fn needs(&self) -> Capabilities {
         Capabilities::JOINT_IMPEDANCE | Capabilities::LIVE_PARAMETERS
+    }
+
+    fn native(&self, site: &Site<'_>, document: &mut NativeModel<'_>) -> Result<Native> {
+        let [width] = values(site)?;
+        let joint = document.joint(site.name)?;
+        if joint.series.is_some() {
+            return Ok(Native::LeftOut(
+                "stands beside another transmission of the same joint".into(),
+            ));
+        }
+        joint.series = Some(Series {
+            gap: width,
+            compliance: 0.0,
+        });
+        Ok(Native::Nearly(format!(
+            "is a second joint `{}_link` behind the drive's, so that qpos has one place more",
+            site.name
+        )))
     }
 
     fn attach(&self, site: &Site<'_>) -> Result<Box<dyn Acting>> {

@@ -1,10 +1,11 @@
 //! Forces on moving bodies: a constant one, and those of the air.
 
-use crate::{Acting, Acts, Effect, EffectParameter, Site};
+use crate::{Acting, Acts, Effect, EffectParameter, Native, Site};
 use asid_core::Result;
 use asid_core::nalgebra::Vector3;
 use asid_core::simulator::StepView;
 use asid_mjcf::Plant;
+use asid_mjcf::native::NativeModel;
 
 use super::point::{BodyPoint, Motion};
 use super::{at_least, values};
@@ -110,6 +111,9 @@ impl Law {
     }
 }
 
+/// Sine of the angle up to which a force counts as along gravity: rounding of numbers in a file.
+const PARALLEL: f64 = 1e-9;
+
 /// One of the laws, at bodies that can move.
 struct BodyForce {
     parameters: &'static [EffectParameter],
@@ -151,6 +155,25 @@ impl Effect for BodyForce {
             .filter(|&b| !self.free || plant.free_joint(b).is_some())
             .map(|b| plant.layout.bodies[b].clone())
             .collect()
+    }
+
+    fn native(&self, site: &Site<'_>, document: &mut NativeModel<'_>) -> Result<Native> {
+        let (&[x, y, z], gravity) = (site.values, Vector3::from(site.plant.gravity)) else {
+            return Ok(Native::LeftOut(
+                "has no counterpart at one body: MJCF's fluid acts on all bodies".into(),
+            ));
+        };
+        let force = Vector3::new(x, y, z);
+        let across = force.cross(&gravity).norm();
+        if gravity.norm() == 0.0 || across > PARALLEL * force.norm() * gravity.norm() {
+            return Ok(Native::LeftOut(
+                "is not along gravity: MJCF has no constant force but the share of a weight that is carried".into(),
+            ));
+        }
+        let body = site.plant.layout.body(site.name)?;
+        let weight = gravity * site.plant.bodies[body].mass;
+        document.carry(site.name, -force.dot(&weight) / weight.norm_squared())?;
+        Ok(Native::Whole)
     }
 
     fn attach(&self, site: &Site<'_>) -> Result<Box<dyn Acting>> {

@@ -1,9 +1,10 @@
 //! What a drive makes of its command: gain, bias, saturation, dead band.
 
-use crate::{Acting, Acts, Effect, EffectParameter, Reference, Site, Start};
+use crate::{Acting, Acts, Effect, EffectParameter, Native, Reference, Site, Start};
 use asid_core::simulator::StepView;
 use asid_core::{Capabilities, Result, Target};
 use asid_mjcf::Plant;
+use asid_mjcf::native::NativeModel;
 use asid_mjcf::plant::{Drive, DriveLaw};
 
 use super::drive::{DriveAt, gains};
@@ -78,6 +79,19 @@ impl Effect for Affine {
 
     fn sites(&self, plant: &Plant) -> Vec<String> {
         actuators(plant)
+    }
+
+    fn native(&self, site: &Site<'_>, document: &mut NativeModel<'_>) -> Result<Native> {
+        let [value] = values(site)?;
+        let actuator = document.actuator(site.name)?;
+        if self.scaled {
+            // What comes later scales what was added before.
+            actuator.gain *= value;
+            actuator.bias *= value;
+        } else {
+            actuator.bias += value;
+        }
+        Ok(Native::Whole)
     }
 
     fn attach(&self, site: &Site<'_>) -> Result<Box<dyn Acting>> {
@@ -156,6 +170,13 @@ impl Effect for Saturation {
 
     fn needs(&self) -> Capabilities {
         Capabilities::JOINT_IMPEDANCE | Capabilities::LIVE_PARAMETERS
+    }
+
+    fn native(&self, site: &Site<'_>, document: &mut NativeModel<'_>) -> Result<Native> {
+        let [limit] = values(site)?;
+        let actuator = document.actuator(site.name)?;
+        actuator.limit = Some(actuator.limit.map_or(limit, |other| other.min(limit)));
+        Ok(Native::Whole)
     }
 
     fn attach(&self, site: &Site<'_>) -> Result<Box<dyn Acting>> {

@@ -6,10 +6,11 @@
 
 use std::collections::VecDeque;
 
-use crate::{Acting, Acts, Confusion, Effect, EffectParameter, Site};
+use crate::{Acting, Acts, Confusion, Effect, EffectParameter, Native, Site};
 use asid_core::Result;
 use asid_core::simulator::StepView;
 use asid_mjcf::Plant;
+use asid_mjcf::native::NativeModel;
 
 use super::{actuators, at_least, values};
 
@@ -90,6 +91,15 @@ impl Effect for Delay {
         actuators(plant)
     }
 
+    fn native(&self, site: &Site<'_>, document: &mut NativeModel<'_>) -> Result<Native> {
+        let [delay] = values(site)?;
+        document.actuator(site.name)?.delay += delay;
+        Ok(Native::Nearly(
+            "begins with a history of zero commands in other programs; mj_initCtrlHistory sets it"
+                .into(),
+        ))
+    }
+
     fn attach(&self, site: &Site<'_>) -> Result<Box<dyn Acting>> {
         let [delay] = values(site)?;
         let delay = at_least(site, "delay", delay, 0.0)?;
@@ -151,6 +161,20 @@ impl Effect for Lag {
 
     fn sites(&self, plant: &Plant) -> Vec<String> {
         actuators(plant)
+    }
+
+    fn native(&self, site: &Site<'_>, document: &mut NativeModel<'_>) -> Result<Native> {
+        let [time] = values(site)?;
+        let actuator = document.actuator(site.name)?;
+        if actuator.lag > 0.0 {
+            return Ok(Native::LeftOut(
+                "is a second lag, and MJCF has one an actuator".into(),
+            ));
+        }
+        actuator.lag = time;
+        Ok(Native::Nearly(
+            "is a filter whose activation begins at zero in other programs: set it to the first command".into(),
+        ))
     }
 
     fn attach(&self, site: &Site<'_>) -> Result<Box<dyn Acting>> {

@@ -1,10 +1,11 @@
 //! Forces that depend on where a joint stands: a spring in parallel, cogging.
 
-use crate::{Acting, Acts, Effect, EffectParameter, Site, Start};
+use crate::{Acting, Acts, Effect, EffectParameter, Native, Site, Start};
 use asid_core::Result;
 use asid_core::layout::JointKind;
 use asid_core::simulator::StepView;
 use asid_mjcf::Plant;
+use asid_mjcf::native::{NativeModel, Spring};
 
 use super::{scalar_joints, values};
 
@@ -59,6 +60,21 @@ impl Effect for Stiffness {
 
     fn sites(&self, plant: &Plant) -> Vec<String> {
         scalar_joints(plant)
+    }
+
+    fn native(&self, site: &Site<'_>, document: &mut NativeModel<'_>) -> Result<Native> {
+        let [stiffness, rest, cubic] = values(site)?;
+        document.joint(site.name)?.springs.push(Spring {
+            stiffness,
+            rest,
+            cubic,
+        });
+        if cubic != 0.0 {
+            return Ok(Native::Nearly(
+                "has a cubic part, written as the polynomial that MuJoCo's `stiffness` takes in its newer versions".into(),
+            ));
+        }
+        Ok(Native::Whole)
     }
 
     fn attach(&self, site: &Site<'_>) -> Result<Box<dyn Acting>> {

@@ -6,10 +6,11 @@
 //! Automatica 30 (1994), and for friction that grows with the load M. Duclusaud et al., "Extended
 //! friction models for the physics simulation of servo actuators", ICRA 2025.
 
-use crate::{Acting, Acts, Confusion, Effect, EffectParameter, Reference, Site, Start};
+use crate::{Acting, Acts, Confusion, Effect, EffectParameter, Native, Reference, Site, Start};
 use asid_core::simulator::StepView;
 use asid_core::{Capabilities, Result, Target};
 use asid_mjcf::Plant;
+use asid_mjcf::native::NativeModel;
 use asid_mjcf::plant::Drive;
 
 use super::drive::{DriveAt, gains};
@@ -173,6 +174,20 @@ impl Effect for Coulomb {
         Capabilities::JOINT_IMPEDANCE | Capabilities::LIVE_PARAMETERS
     }
 
+    fn native(&self, site: &Site<'_>, document: &mut NativeModel<'_>) -> Result<Native> {
+        let [force, offset, _] = values(site)?;
+        document.joint(site.name)?.friction += force;
+        Ok(if offset == 0.0 {
+            Native::Nearly(
+                "is MuJoCo's frictionloss, which lets a joint at rest creep in its own way".into(),
+            )
+        } else {
+            Native::Nearly(format!(
+                "is MuJoCo's frictionloss; its constant part of {offset} has no counterpart at a joint"
+            ))
+        })
+    }
+
     fn attach(&self, site: &Site<'_>) -> Result<Box<dyn Acting>> {
         let [force, offset, creep] = values(site)?;
         Ok(Box::new(CoulombAt {
@@ -247,6 +262,15 @@ impl Effect for Stribeck {
 
     fn needs(&self) -> Capabilities {
         Capabilities::JOINT_IMPEDANCE | Capabilities::LIVE_PARAMETERS
+    }
+
+    fn native(&self, site: &Site<'_>, document: &mut NativeModel<'_>) -> Result<Native> {
+        let [breakaway, coulomb, _, _] = values(site)?;
+        document.joint(site.name)?.friction += coulomb;
+        Ok(Native::Nearly(format!(
+            "is written as dry friction of {coulomb}: MJCF's does not fall with speed, and the {breakaway} more that hold \
+             at rest are left out"
+        )))
     }
 
     fn attach(&self, site: &Site<'_>) -> Result<Box<dyn Acting>> {

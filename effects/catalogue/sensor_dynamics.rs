@@ -5,9 +5,10 @@
 
 use std::collections::VecDeque;
 
-use crate::{Acting, Acts, Confusion, Effect, EffectParameter, Site};
+use crate::{Acting, Acts, Confusion, Effect, EffectParameter, Native, Site};
 use asid_core::Result;
 use asid_mjcf::Plant;
+use asid_mjcf::native::NativeModel;
 
 use super::sensor::sensors;
 use super::{at_least, values};
@@ -123,6 +124,14 @@ impl Effect for Delay {
 
     fn sites(&self, plant: &Plant) -> Vec<String> {
         sensors(plant)
+    }
+
+    fn native(&self, site: &Site<'_>, document: &mut NativeModel<'_>) -> Result<Native> {
+        let [delay] = values(site)?;
+        document.delay_sensor(site.name, delay)?;
+        Ok(Native::Nearly(
+            "begins with a history of zero readings; mj_initSensorHistory sets it".into(),
+        ))
     }
 
     fn attach(&self, site: &Site<'_>) -> Result<Box<dyn Acting>> {

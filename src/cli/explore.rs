@@ -23,7 +23,7 @@ use super::options::{Algorithms, Common, Worlds};
 use super::output::{OutFolder, write_json};
 use super::result::{CostResult, ExplorationResult, SCHEMA, Versions, figure};
 use super::session::Session;
-use super::{stage, trace, train};
+use super::{machine, stage, trace, train};
 
 /// Arguments of `explore`.
 #[derive(clap::Args)]
@@ -34,10 +34,14 @@ what is not given takes the middle of its range.
 The folder holds commands.csv (time in s and the command of each actuator), predicted.csv (the log \
 that the simulator expects), policy.json, result.json, config.toml, report.html and trace.json. With a \
 --truth or another option of the real world the episode is also played there, from the same start pose: \
-real.csv is its log, for `asid identify` and `asid diagnose`.")]
+real.csv is its log, for `asid identify` and `asid diagnose`.
+
+Of any machine (a study, or --model FILE with --unknown) the motion is designed that tells the most about the unknowns \
+and keeps the limits; explorers are fisher-cem, random, multisine and fourier. docs/any-machine.md has the whole way.")]
 pub struct Arguments {
-    /// The task: see `asid list`
-    task: String,
+    /// The task (see `asid list`), or a study: a folder or a TOML file
+    #[arg(required_unless_present = "model")]
+    task: Option<String>,
     /// Explore by this algorithm: see `asid list`
     #[arg(long, value_name = "NAME")]
     explorer: Option<String>,
@@ -53,6 +57,8 @@ pub struct Arguments {
     pub common: Common,
     #[command(flatten)]
     worlds: Worlds,
+    #[command(flatten)]
+    motion: machine::motion_config::Options,
 }
 
 /// `result.json` of `explore`.
@@ -73,25 +79,20 @@ struct ExploreResult {
 pub fn explore(arguments: &Arguments) -> Result<()> {
     let clock = Instant::now();
     let common = &arguments.common;
+    let Some(task) = any_machine(arguments)? else {
+        return Ok(());
+    };
     let algorithms = Algorithms {
         explorer: arguments.explorer.clone(),
         policy: arguments.policy.clone(),
         ..Algorithms::default()
     };
-    let session = Session::open_stage(
-        Stage::Explore,
-        &arguments.task,
-        common,
-        &algorithms,
-        &arguments.worlds,
-    )?;
+    let session =
+        Session::open_stage(Stage::Explore, task, common, &algorithms, &arguments.worlds)?;
     if let Some(file) = &arguments.train {
         return train::explorer(&session, common, file);
     }
-    let out = OutFolder::claim(
-        common.out.as_deref(),
-        &format!("{}-explore", arguments.task),
-    )?;
+    let out = OutFolder::claim(common.out.as_deref(), &format!("{task}-explore"))?;
     stage::check_start(&session);
     let config = &session.config;
     let start = session.start();
@@ -191,6 +192,35 @@ pub fn explore(arguments: &Arguments) -> Result<()> {
         }
         Ok(())
     })
+}
+
+/// The task; of any machine the motion is designed here, and there is none.
+fn any_machine(arguments: &Arguments) -> Result<Option<&str>> {
+    let wrong = |key: &str, message: &str| asid_core::Error::Config {
+        key: key.into(),
+        message: message.into(),
+    };
+    let path = match (&arguments.task, &arguments.worlds.simulator.model) {
+        (Some(task), _) => machine::path_of(task)?,
+        (None, model) => model.as_deref(),
+    };
+    let Some(path) = path else {
+        if arguments.motion.any() {
+            let message =
+                "goes with a study or --model: a task has unknowns, limits and lengths of its own";
+            return Err(wrong("--unknown", message).into());
+        }
+        return Ok(arguments.task.as_deref());
+    };
+    if arguments.policy.is_some() || arguments.train.is_some() {
+        return Err(wrong("--policy", "goes with a task").into());
+    }
+    let mut common = arguments.common.clone();
+    if let Some(explorer) = &arguments.explorer {
+        common.set.push(format!("explorer=\"{explorer}\""));
+    }
+    machine::explore::explore(path, &common, &arguments.motion)?;
+    Ok(None)
 }
 
 /// The simulator at these values, whose trackers are perfect.

@@ -1,22 +1,33 @@
-//! `asid export`: a task's scene as one MJCF document.
+//! `asid export`: a task's scene, or a refined model of any machine, as one MJCF document.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use asid_core::Error;
 use asid_core::registry::{TaskEntry, find};
 
 use super::config::difficulty;
+use super::machine;
 use super::options::Common;
 
 /// Arguments of `export`.
 #[derive(clap::Args)]
+#[command(after_help = "\
+A study, or a refined model as `asid diagnose` and `asid identify` write it, becomes a plain MJCF document: values \
+are written, effects become MJCF's own elements, and one sentence tells of each that has none. Meshes are found \
+where they are. The logs of a study are replayed in both models, and both gaps are printed.")]
 pub struct Arguments {
-    /// The task
+    /// The task, or a study (a folder or TOML file), a refined model (TOML) or an MJCF file
     task: String,
     /// Write this file; it must not exist
-    #[arg(long, value_name = "FILE.xml")]
+    #[arg(long, visible_alias = "mjcf", value_name = "FILE.xml")]
     out: PathBuf,
+    /// Compile and replay with this engine, for a study or model: see `asid list`
+    #[arg(long, value_name = "NAME")]
+    backend: Option<String>,
+    /// Print what was written as JSON, and nothing else, on standard output
+    #[arg(long)]
+    json: bool,
     /// Make the task as hard as this preset: default, or published; see its page
     #[arg(long, value_name = "NAME")]
     preset: Option<String>,
@@ -27,7 +38,14 @@ pub struct Arguments {
 
 /// Writes the scene.
 pub fn export(arguments: &Arguments) -> Result<()> {
-    use std::io::Write as _;
+    if let Some(path) = machine::path_of(&arguments.task)? {
+        return machine::export::export(&machine::export::Request {
+            path,
+            out: &arguments.out,
+            backend: arguments.backend.as_deref(),
+            json: arguments.json,
+        });
+    }
     let task = (find::<TaskEntry>(&arguments.task)?.make)()?;
     let common = Common {
         preset: arguments.preset.clone(),
@@ -36,15 +54,20 @@ pub fn export(arguments: &Arguments) -> Result<()> {
     };
     let levels = difficulty::levels(&*task, &common)?;
     let task = difficulty::at(task, &levels)?;
+    create(&arguments.out, task.scene().xml())
+}
+
+/// Writes a file that must not exist.
+pub fn create(path: &Path, text: &str) -> Result<()> {
+    use std::io::Write as _;
     let failed = |e: std::io::Error| Error::File {
-        path: arguments.out.clone(),
+        path: path.to_owned(),
         message: match e.kind() {
             std::io::ErrorKind::AlreadyExists => "exists already; choose another name".into(),
             _ => format!("cannot be written: {e}"),
         },
     };
-    let mut file = std::fs::File::create_new(&arguments.out).map_err(failed)?;
-    file.write_all(task.scene().xml().as_bytes())
-        .map_err(failed)?;
+    let mut file = std::fs::File::create_new(path).map_err(failed)?;
+    file.write_all(text.as_bytes()).map_err(failed)?;
     Ok(())
 }

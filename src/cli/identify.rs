@@ -21,7 +21,7 @@ use super::result::{
     parameter_line,
 };
 use super::session::Session;
-use super::{failure, stage, trace, train};
+use super::{failure, machine, stage, trace, train};
 
 /// A residual above this many standard deviations of the noise is more than chance and
 /// a noise that was guessed a little low.
@@ -39,12 +39,15 @@ from that time on; and columns named after the scene's sensors, vectors as NAME.
 keyframe has it; where the object begins is estimated.
 
 The folder holds posterior.json (for `asid solve`), result.json, config.toml, a copy of the logs, \
-report.html and trace.json.")]
+report.html and trace.json.
+
+A study (a folder with study.toml, or the file) names its logs itself: its parameters are fitted to those to train, \
+and the gap is measured on those held out. Its folder holds refined.toml, the model with the fitted values.")]
 pub struct Arguments {
-    /// The task: see `asid list`
+    /// The task (see `asid list`), or a study: a folder or a TOML file
     task: String,
     /// Fit to this log of a real episode, CSV or Parquet; several are fitted together
-    #[arg(long, value_name = "FILE", required_unless_present = "train", num_args = 1..)]
+    #[arg(long, value_name = "FILE", num_args = 1..)]
     log: Vec<PathBuf>,
     /// Trains the identifier on episodes of --explorer, saves it for the setting `network`, and
     /// identifies nothing; its curves for TensorBoard come beside it
@@ -92,6 +95,22 @@ struct IdentifyResult {
 pub fn identify(arguments: &Arguments) -> Result<()> {
     let clock = Instant::now();
     let common = &arguments.common;
+    if let Some(path) = machine::path_of(&arguments.task)? {
+        if !arguments.log.is_empty() || arguments.train.is_some() || arguments.identifier.is_some()
+        {
+            return Err(wrong(
+                "--log",
+                "a study names its logs itself and is fitted by gauss-newton: --log, --train and --identifier go with a task",
+            ));
+        }
+        return machine::identify::identify(path, common);
+    }
+    if arguments.log.is_empty() && arguments.train.is_none() {
+        return Err(wrong(
+            "--log",
+            "is missing: a task is identified from --log FILE…",
+        ));
+    }
     let algorithms = Algorithms {
         identifier: arguments.identifier.clone(),
         explorer: train::explorer_of(
@@ -191,6 +210,14 @@ pub fn identify(arguments: &Arguments) -> Result<()> {
         failure::warn(&unexplained(found.residual));
     }
     Ok(())
+}
+
+fn wrong(key: &str, message: &str) -> anyhow::Error {
+    Error::Config {
+        key: key.into(),
+        message: message.into(),
+    }
+    .into()
 }
 
 /// Names of the logs' copies in the folder, of the same format as the logs.

@@ -12,6 +12,7 @@ mod failure;
 mod figure;
 mod identify;
 mod list;
+mod machine;
 mod model;
 mod new;
 mod options;
@@ -57,9 +58,9 @@ enum Command {
     Doctor(doctor::Arguments),
     /// Explore, identify, solve and try the task once in the real world
     Run(run::Arguments),
-    /// Make an exploration policy and its commands, for a robot
+    /// Make the commands of a motion that tells the most, for a task or for any machine
     Explore(explore::Arguments),
-    /// Estimate the unknowns from logs of the real machine
+    /// Estimate the unknowns of a task or of any machine from logs of the real one
     Identify(identify::Arguments),
     /// Find the action that achieves the task, for a posterior
     Solve(solve::Arguments),
@@ -73,7 +74,7 @@ enum Command {
     Withheld(withheld::Arguments),
     /// Print every setting of a task with its value and meaning, as a file for --config
     Config(settings::Arguments),
-    /// Write a task's scene as MJCF
+    /// Write a task's scene, or a refined model, as plain MJCF
     Export(export::Arguments),
     /// Write a folder that a plugin starts from
     New(new::Arguments),

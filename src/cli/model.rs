@@ -25,7 +25,7 @@ pub fn compile(backend: &dyn Backend, source: &RefinedModel) -> Result<Arc<dyn M
 }
 
 /// Gives a compiled scene the values and effects of a file, and some more effects.
-fn refine(
+pub fn refine(
     backend: &dyn Backend,
     model: Arc<dyn Model>,
     scene: &Scene,

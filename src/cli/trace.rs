@@ -175,9 +175,18 @@ pub fn parameters(
     belief: &asid_core::Posterior,
     iterations: Option<&[asid_core::identify::IterationSummary]>,
 ) -> Vec<r::ParameterReport> {
+    parameters_of(&session.parameters, truth, belief, iterations)
+}
+
+/// The same for unknowns of any machine.
+pub fn parameters_of(
+    parameters: &[asid_core::Parameter],
+    truth: Option<&[f64]>,
+    belief: &asid_core::Posterior,
+    iterations: Option<&[asid_core::identify::IterationSummary]>,
+) -> Vec<r::ParameterReport> {
     let keep = belief.samples.len().div_ceil(SAMPLES).max(1);
-    session
-        .parameters
+    parameters
         .iter()
         .zip(&belief.marginals)
         .enumerate()

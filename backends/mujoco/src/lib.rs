@@ -18,6 +18,7 @@ mod compiled;
 mod contact;
 mod ffi;
 mod field;
+mod history;
 mod inertia;
 mod layout;
 mod model;

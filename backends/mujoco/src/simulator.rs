@@ -6,10 +6,11 @@ use std::sync::Arc;
 
 use asid_core::layout::{JointKind, Layout, Recording};
 use asid_core::simulator::check_sims;
-use asid_core::{BatchConfig, Error, Result, Rollout, Simulator, Snapshot, Status};
+use asid_core::{BatchConfig, Control, Error, Result, Rollout, Simulator, Snapshot, Status};
 
 use crate::compiled::{Compiled, compile};
 use crate::ffi::{BadNumber, Batch};
+use crate::history::CommandMemory;
 use crate::parameter::{Fields, Plan};
 use crate::rollout::{Frames, Job, Stage, has_halves, prepare, read, run};
 use crate::state::{SavedStates, StateLayout};
@@ -30,6 +31,9 @@ pub struct MujocoSimulator {
     /// Present values of the parameters, `n x columns`.
     values: Vec<f64>,
     status: Vec<Status>,
+    /// Which episodes have begun but not run: actuators with a memory then settle on the first command.
+    begun: Vec<bool>,
+    memory: CommandMemory,
     /// First entry of `qpos` of each quaternion.
     quaternions: Vec<usize>,
     /// Address and length of each sensor.
@@ -88,6 +92,8 @@ impl MujocoSimulator {
         }
         batch.reset(&all, !layout.keyframes.is_empty());
         let fresh = batch.state(0).to_vec();
+        let [act, history, _] = states.memory.each_ref().map(|part| part.start);
+        let memory = CommandMemory::of(&compiled.model, act, history, &fresh);
         let values = std::iter::repeat_with(|| plan.nominal())
             .take(size)
             .flatten()
@@ -101,6 +107,8 @@ impl MujocoSimulator {
             fields,
             values,
             status: vec![Status::Running; size],
+            begun: vec![true; size],
+            memory,
             quaternions,
             steps: 0,
             plan,
@@ -241,6 +249,7 @@ impl Simulator for MujocoSimulator {
             self.batch.state(sim).copy_from_slice(&self.fresh);
             self.batch.clear_warnings(sim);
             self.status[sim] = Status::Running;
+            self.begun[sim] = true;
         }
         Ok(())
     }
@@ -277,6 +286,7 @@ impl Simulator for MujocoSimulator {
             for part in &self.states.memory {
                 row[part.clone()].copy_from_slice(&self.fresh[part.clone()]);
             }
+            self.begun[sim] = true;
         }
         Ok(())
     }
@@ -311,6 +321,14 @@ impl Simulator for MujocoSimulator {
             if !self.status[sim].is_running() {
                 mine.fill(f64::NAN);
                 continue;
+            }
+            if std::mem::take(&mut self.begun[sim]) && rollout.frames > 0 && !self.memory.is_empty()
+            {
+                let first = match rollout.control {
+                    Control::Shared(all) => &all[..nu],
+                    Control::PerSimulation(all) => &all[row * rollout.frames * nu..][..nu],
+                };
+                self.memory.hold(self.batch.state(sim), first);
             }
             sims.push(sim);
             jobs.push(Job {
@@ -411,6 +429,7 @@ impl Simulator for MujocoSimulator {
             compiled: self.compiled.clone(),
             rows,
             status: sims.iter().map(|&s| self.status[s].clone()).collect(),
+            begun: sims.iter().map(|&s| self.begun[s]).collect(),
         };
         Ok(Snapshot::new(saved, sims.len()))
     }
@@ -434,6 +453,7 @@ impl Simulator for MujocoSimulator {
             self.batch.state(sim).copy_from_slice(state);
             self.batch.clear_warnings(sim);
             self.status[sim] = saved.status[row].clone();
+            self.begun[sim] = saved.begun[row];
         }
         Ok(())
     }
@@ -454,6 +474,7 @@ impl Simulator for MujocoSimulator {
             self.batch.copy_state(source, sim);
             self.batch.clear_warnings(sim);
             self.status[sim] = self.status[source].clone();
+            self.begun[sim] = self.begun[source];
         }
         Ok(())
     }

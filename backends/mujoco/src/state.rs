@@ -52,4 +52,6 @@ pub struct SavedStates {
     pub rows: Vec<f64>,
     /// Status of each row.
     pub status: Vec<Status>,
+    /// Whether each row's episode has begun but not run.
+    pub begun: Vec<bool>,
 }

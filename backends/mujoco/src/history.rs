@@ -1,0 +1,72 @@
+//! What an actuator remembers when an episode begins.
+//!
+//! Before the first row of a log the command was the same as in it, so an actuator with a delay has a history of
+//! that command, and one with a first-order filter has settled on it. MuJoCo itself begins both at zero.
+
+use mujoco_rs::mujoco_c::mjtDyn;
+use mujoco_rs::wrappers::mj_model::MjModel;
+
+/// One number of a state row that takes a command.
+#[derive(Clone, Copy, Debug)]
+struct Place {
+    /// Entry of the row.
+    entry: usize,
+    actuator: usize,
+    /// Limits of the command.
+    range: Option<[f64; 2]>,
+}
+
+/// Where the state row of a simulation remembers commands.
+#[derive(Clone, Debug, Default)]
+pub struct CommandMemory {
+    places: Vec<Place>,
+}
+
+impl CommandMemory {
+    /// Finds the places; activations begin at `act` and histories at `history` of a row. An activation that the
+    /// first keyframe sets (`fresh` is the row right after a reset) stays as it is.
+    pub fn of(model: &MjModel, act: usize, history: usize, fresh: &[f64]) -> Self {
+        let mut places = Vec::new();
+        for actuator in 0..model.nu() as usize {
+            let range = model.actuator_ctrllimited()[actuator]
+                .then(|| model.actuator_ctrlrange()[actuator]);
+            let mut put = |entry: usize| {
+                places.push(Place {
+                    entry,
+                    actuator,
+                    range,
+                });
+            };
+            let filter = matches!(
+                model.actuator_dyntype()[actuator],
+                mjtDyn::mjDYN_FILTER | mjtDyn::mjDYN_FILTEREXACT
+            );
+            if let (true, Ok(at)) = (filter, usize::try_from(model.actuator_actadr()[actuator]))
+                && fresh[act + at] == 0.0
+            {
+                put(act + at);
+            }
+            // A buffer holds two numbers of its own, the times of its samples, then the samples.
+            if let Ok(at) = usize::try_from(model.actuator_historyadr()[actuator]) {
+                let samples = model.actuator_history()[actuator][0] as usize;
+                (0..samples).for_each(|k| put(history + at + 2 + samples + k));
+            }
+        }
+        Self { places }
+    }
+
+    /// Fills a row in as if a command had been held for long.
+    pub fn hold(&self, row: &mut [f64], command: &[f64]) {
+        for place in &self.places {
+            let value = command[place.actuator];
+            row[place.entry] = place
+                .range
+                .map_or(value, |[low, high]| value.clamp(low, high));
+        }
+    }
+
+    /// Whether nothing is remembered.
+    pub fn is_empty(&self) -> bool {
+        self.places.is_empty()
+    }
+}

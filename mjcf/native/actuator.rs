@@ -1,0 +1,158 @@
+//! Actuators: gains, bias, delay, lag, and the limit of the force.
+//!
+//! MuJoCo has one actuator, of which `<motor>`, `<position>` and `<velocity>` are short forms: force
+//! `g w + b0 + b1 q + b2 v`, `w` the command after its range, its delay and its filter. A command that is scaled and
+//! shifted, `gain u + bias`, is then `g gain` and `b0 + g bias`. A short form that says all of it stays; else it becomes
+//! `<general>`.
+
+use asid_core::error::Result;
+use roxmltree::Node;
+
+use super::elements::HISTORY_MARGIN;
+use super::{NativeActuator, Writer, target};
+use crate::plant::DriveLaw;
+
+/// Attributes of short forms that `<general>` does not have.
+const SHORT: [&str; 5] = ["kp", "kv", "dampratio", "timeconst", "inheritrange"];
+
+impl Writer<'_, '_> {
+    pub(super) fn write_actuators(&mut self) -> Result<()> {
+        for i in 0..self.native.plant.layout.actuators.len() {
+            let name = self.native.plant.layout.actuators[i].name.clone();
+            let node = self.elements.actuators[i];
+            if let Some(gear) = self.entries("actuator", &name, "gear", 1)? {
+                let rest = node
+                    .attribute("gear")
+                    .unwrap_or_default()
+                    .split_whitespace();
+                let rest: Vec<f64> = rest.skip(1).filter_map(|x| x.parse().ok()).collect();
+                self.markup
+                    .set_numbers(node, "gear", &[gear, rest].concat());
+            }
+            if let Some(range) = self.entries("actuator", &name, "forcerange", 2)? {
+                self.markup.set_numbers(node, "forcerange", &range);
+            }
+            self.write_gains(i, &name, node)?;
+        }
+        Ok(())
+    }
+
+    fn write_gains(&mut self, i: usize, name: &str, node: Node<'_, '_>) -> Result<()> {
+        let asked = self.native.actuators.get(&i).cloned().unwrap_or_default();
+        let drive = self.native.plant.drives[i];
+        let kp = self.entries("actuator", name, "kp", 1)?.map(|v| v[0]);
+        let kv = self.entries("actuator", name, "kv", 1)?.map(|v| v[0]);
+        if asked == NativeActuator::default() && kp.is_none() && kv.is_none() {
+            return Ok(());
+        }
+        let Some(drive) = drive else {
+            if asked.delay > 0.0 {
+                self.write_delay(node, asked.delay);
+            }
+            if (asked.gain, asked.bias, asked.lag, asked.limit) != (1.0, 0.0, 0.0, None) {
+                self.leave_out(format!(
+                    "actuator `{name}` is no plain motor or servo: its gain, bias, lag and limit are not written"
+                ));
+            }
+            return Ok(());
+        };
+        let gear = self.value(&target("actuator", name, "gear", 0))?;
+        let declared = self.model.nominal(&target("actuator", name, "gear", 0))?;
+        // Gain of the actuator and the bias' slopes in position and speed.
+        let (gain, slopes) = match drive.law {
+            DriveLaw::Motor => (drive.gear / declared, None),
+            DriveLaw::Position { .. } => {
+                let kp = self.value(&target("actuator", name, "kp", 0))?;
+                // An engine has no `kv` of a servo that has none.
+                let kv = match kv {
+                    Some(kv) => kv,
+                    None => self.model.nominal(&target("actuator", name, "kv", 0))?,
+                };
+                (kp, Some([-kp, -kv]))
+            }
+            DriveLaw::Velocity { .. } => {
+                let kv = self.value(&target("actuator", name, "kv", 0))?;
+                (kv, Some([0.0, -kv]))
+            }
+        };
+        let tag = node.tag_name().name();
+        let plain =
+            asked.gain == 1.0 && asked.bias == 0.0 && (asked.lag == 0.0 || tag == "position");
+        match (tag, plain) {
+            ("position", true) => {
+                let [stiffness, damping] = slopes.unwrap_or_default();
+                self.markup.set_numbers(node, "kp", &[-stiffness]);
+                if kv.is_some() {
+                    self.markup.remove(node, "dampratio");
+                    self.markup.set_numbers(node, "kv", &[-damping]);
+                }
+                if asked.lag > 0.0 {
+                    self.markup.set_numbers(node, "timeconst", &[asked.lag]);
+                }
+            }
+            ("velocity", true) => self.markup.set_numbers(node, "kv", &[gain]),
+            ("motor", true) => {}
+            _ => self.write_general(i, node, gain, slopes, &asked),
+        }
+        if asked.delay > 0.0 {
+            self.write_delay(node, asked.delay);
+        }
+        if let Some(limit) = asked.limit {
+            self.write_limit(
+                node,
+                limit / gear.abs(),
+                drive.force_range.filter(|_| {
+                    // Limits of a motor with a gain are kept before it.
+                    !matches!(drive.law, DriveLaw::Motor) || drive.gear == declared
+                }),
+            );
+        }
+        Ok(())
+    }
+
+    /// The long form with all numbers said.
+    fn write_general(
+        &mut self,
+        i: usize,
+        node: Node<'_, '_>,
+        gain: f64,
+        slopes: Option<[f64; 2]>,
+        asked: &NativeActuator,
+    ) {
+        for attribute in SHORT {
+            self.markup.remove(node, attribute);
+        }
+        self.markup.rename(node, "general");
+        self.markup.set(node, "gaintype", "fixed");
+        self.markup
+            .set_numbers(node, "gainprm", &[gain * asked.gain]);
+        let [position, speed] = slopes.unwrap_or_default();
+        self.markup.set(node, "biastype", "affine");
+        self.markup
+            .set_numbers(node, "biasprm", &[gain * asked.bias, position, speed]);
+        if asked.lag > 0.0 {
+            self.markup.set(node, "dyntype", "filterexact");
+            self.markup.set_numbers(node, "dynprm", &[asked.lag]);
+        } else {
+            self.markup.set(node, "dyntype", "none");
+        }
+        if let Some(range) = self.native.plant.layout.actuators[i].ctrl_range {
+            self.markup.set_numbers(node, "ctrlrange", &range);
+        }
+    }
+
+    fn write_delay(&mut self, node: Node<'_, '_>, delay: f64) {
+        let samples = (delay / self.native.plant.layout.timestep).ceil() + HISTORY_MARGIN;
+        self.markup.set_numbers(node, "delay", &[delay]);
+        self.markup.set_numbers(node, "nsample", &[samples]);
+        self.markup.set(node, "interp", "linear");
+    }
+
+    /// The narrower of the limits that a drive has and one before the gear.
+    fn write_limit(&mut self, node: Node<'_, '_>, limit: f64, has: Option<[f64; 2]>) {
+        let [low, high] = has.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
+        let range = [low.max(-limit), high.min(limit)];
+        self.markup.set_numbers(node, "forcerange", &range);
+        self.markup.set(node, "forcelimited", "true");
+    }
+}

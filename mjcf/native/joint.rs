@@ -1,0 +1,118 @@
+//! Joints: damping, dry friction, rotor inertia, springs, limits, axes and anchors.
+
+use asid_core::error::Result;
+use asid_core::layout::JointKind;
+use roxmltree::Node;
+
+use super::{NativeJoint, Spring, Writer, target};
+
+/// Time constant of the constraint that holds a joint with dry friction, in time steps: the shortest that MuJoCo
+/// takes (`refsafe`). At its default of 20 ms a joint that should stand still glides.
+const FRICTION_TIME: f64 = 2.0;
+
+impl Writer<'_, '_> {
+    pub(super) fn write_joints(&mut self) -> Result<()> {
+        for i in 0..self.native.plant.layout.joints.len() {
+            let joint = self.native.plant.layout.joints[i].clone();
+            let node = self.elements.joints[i];
+            for attribute in ["damping", "stiffness", "armature"] {
+                if let Some(values) = self.entries("joint", &joint.name, attribute, 1)? {
+                    // Behind the first there may be coefficients of higher order.
+                    let said = node.attribute(attribute).unwrap_or_default();
+                    let rest = said.split_whitespace().skip(1);
+                    let rest: Vec<f64> = rest.filter_map(|x| x.parse().ok()).collect();
+                    self.markup
+                        .set_numbers(node, attribute, &[values, rest].concat());
+                }
+            }
+            for attribute in ["pos", "axis"] {
+                if let Some(values) = self.entries("joint", &joint.name, attribute, 3)? {
+                    self.markup.set_numbers(node, attribute, &values);
+                }
+            }
+            let unit = match joint.kind {
+                JointKind::Hinge => self.elements.angle_unit(),
+                _ => 1.0,
+            };
+            for (attribute, len) in [("range", 2), ("springref", 1)] {
+                if let Some(values) = self.entries("joint", &joint.name, attribute, len)? {
+                    let values: Vec<f64> = values.iter().map(|x| x * unit).collect();
+                    self.markup.set_numbers(node, attribute, &values);
+                }
+            }
+            let asked = self.native.joints.get(&i).cloned().unwrap_or_default();
+            self.write_friction(&joint.name, node, &asked)?;
+            if !asked.springs.is_empty() {
+                self.write_springs(&joint.name, node, &asked.springs, unit)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn write_friction(
+        &mut self,
+        name: &str,
+        node: Node<'_, '_>,
+        asked: &NativeJoint,
+    ) -> Result<()> {
+        let own = self.entries("joint", name, "frictionloss", 1)?;
+        if own.is_none() && asked.friction == 0.0 {
+            return Ok(());
+        }
+        let now = self.value(&target("joint", name, "frictionloss", 0))?;
+        self.markup
+            .set_numbers(node, "frictionloss", &[now + asked.friction]);
+        if asked.friction > 0.0 && !node.has_attribute("solreffriction") {
+            let time = FRICTION_TIME * self.native.plant.layout.timestep;
+            self.markup
+                .set_numbers(node, "solreffriction", &[time, 1.0]);
+        }
+        Ok(())
+    }
+
+    /// One spring of several in parallel: stiffnesses add, and it rests at their weighted mean.
+    fn write_springs(
+        &mut self,
+        name: &str,
+        node: Node<'_, '_>,
+        springs: &[Spring],
+        unit: f64,
+    ) -> Result<()> {
+        let stiffness = self.value(&target("joint", name, "stiffness", 0))?;
+        let rest = self.value(&target("joint", name, "springref", 0))?;
+        let own = Spring {
+            stiffness,
+            rest,
+            cubic: 0.0,
+        };
+        let all: Vec<Spring> = [&[own], springs].concat();
+        let total: f64 = all.iter().map(|s| s.stiffness).sum();
+        let pull: f64 = all.iter().map(|s| s.stiffness * s.rest).sum();
+        let cubic: Vec<&Spring> = all.iter().filter(|s| s.cubic != 0.0).collect();
+        let rest = match (&cubic[..], total > 0.0) {
+            ([], true) => pull / total,
+            ([], false) => rest,
+            ([one], _) => one.rest,
+            _ => springs[0].rest,
+        };
+        let agree = all
+            .iter()
+            .all(|s| s.rest == rest || (s.stiffness == 0.0 && s.cubic == 0.0));
+        if !cubic.is_empty() && !agree {
+            self.leave_out(format!(
+                "joint `{name}` has springs that rest in different places, one of them stiffening: MJCF has one \
+                 spring a joint, and they are not written"
+            ));
+            return Ok(());
+        }
+        let cubic: f64 = cubic.iter().map(|s| s.cubic).sum();
+        let numbers = if cubic == 0.0 {
+            vec![total]
+        } else {
+            vec![total, 0.0, cubic]
+        };
+        self.markup.set_numbers(node, "stiffness", &numbers);
+        self.markup.set_numbers(node, "springref", &[rest * unit]);
+        Ok(())
+    }
+}

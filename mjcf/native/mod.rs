@@ -1,0 +1,322 @@
+//! Values and effects written back into a plain MJCF document.
+//!
+//! A [`NativeModel`] collects what a document is to say: values of targets, and what effects ask of actuators, joints,
+//! bodies and sensors. [`NativeModel::write`] writes it with MJCF's own elements and attributes, so that any program that
+//! loads MJCF simulates it. Elements are changed in place ([`crate::markup`]); what cannot be said is told
+//! in one sentence each, and left out.
+
+mod actuator;
+mod assets;
+mod elements;
+mod joint;
+mod mass;
+mod transmission;
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use asid_core::error::{Error, Result};
+use asid_core::{Model, Scene, Target};
+use roxmltree::{Document, Node};
+
+use crate::Plant;
+use crate::markup::Markup;
+use elements::Elements;
+
+/// What an actuator does with its command, beside its gains.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NativeActuator {
+    /// Factor of the command, after the command's range.
+    pub gain: f64,
+    /// Added to the command, in its unit.
+    pub bias: f64,
+    /// Pure delay of the command, s.
+    pub delay: f64,
+    /// Time constant of a first-order lag, s.
+    pub lag: f64,
+    /// Largest force on the joint (N or N m), gear included.
+    pub limit: Option<f64>,
+}
+
+impl Default for NativeActuator {
+    fn default() -> Self {
+        Self {
+            gain: 1.0,
+            bias: 0.0,
+            delay: 0.0,
+            lag: 0.0,
+            limit: None,
+        }
+    }
+}
+
+/// A spring in parallel with a joint: force `-(stiffness d + cubic d³)`, `d = q - rest`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Spring {
+    /// N m/rad or N/m.
+    pub stiffness: f64,
+    /// Where it pulls nowhere, rad or m.
+    pub rest: f64,
+    /// N m/rad³ or N/m³.
+    pub cubic: f64,
+}
+
+/// What lies between a drive and its joint.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Series {
+    /// Play, rad or m from end to end.
+    pub gap: f64,
+    /// Compliance, rad/(N m) or m/N.
+    pub compliance: f64,
+}
+
+/// What a joint has beside its own attributes.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct NativeJoint {
+    /// Dry friction to add, N or N m.
+    pub friction: f64,
+    /// Springs to add.
+    pub springs: Vec<Spring>,
+    /// Between it and its drive.
+    pub series: Option<Series>,
+}
+
+/// What a document is to say.
+#[derive(Clone, Debug)]
+pub struct NativeModel<'p> {
+    /// The machine.
+    pub plant: &'p Plant,
+    /// Values of the document's targets.
+    pub values: Vec<(Target, f64)>,
+    actuators: BTreeMap<usize, NativeActuator>,
+    joints: BTreeMap<usize, NativeJoint>,
+    /// Share of a body's weight that is carried, to add.
+    gravity_compensation: BTreeMap<usize, f64>,
+    /// Delays of sensors, s.
+    sensor_delays: BTreeMap<usize, f64>,
+}
+
+/// A document that was written.
+#[derive(Clone, Debug)]
+pub struct Written {
+    /// The document.
+    pub xml: String,
+    /// What it does not say, a sentence each.
+    pub left_out: Vec<String>,
+}
+
+impl<'p> NativeModel<'p> {
+    /// The machine as it is.
+    #[must_use]
+    pub fn new(plant: &'p Plant) -> Self {
+        Self {
+            plant,
+            values: Vec::new(),
+            actuators: BTreeMap::new(),
+            joints: BTreeMap::new(),
+            gravity_compensation: BTreeMap::new(),
+            sensor_delays: BTreeMap::new(),
+        }
+    }
+
+    /// What an actuator is to do.
+    ///
+    /// # Errors
+    /// When there is no such actuator.
+    pub fn actuator(&mut self, name: &str) -> Result<&mut NativeActuator> {
+        let index = self.plant.layout.actuator(name)?;
+        Ok(self.actuators.entry(index).or_default())
+    }
+
+    /// What a joint is to have.
+    ///
+    /// # Errors
+    /// When there is no such joint.
+    pub fn joint(&mut self, name: &str) -> Result<&mut NativeJoint> {
+        self.plant.layout.joint(name)?;
+        let joints = &self.plant.layout.joints;
+        let index = joints.iter().position(|j| j.name == name).unwrap_or(0);
+        Ok(self.joints.entry(index).or_default())
+    }
+
+    /// Adds to the share of a body's weight that is carried (`gravcomp`).
+    ///
+    /// # Errors
+    /// When there is no such body.
+    pub fn carry(&mut self, body: &str, share: f64) -> Result<()> {
+        let index = self.plant.layout.body(body)?;
+        *self.gravity_compensation.entry(index).or_default() += share;
+        Ok(())
+    }
+
+    /// Delays a sensor's reading, s.
+    ///
+    /// # Errors
+    /// When there is no such sensor.
+    pub fn delay_sensor(&mut self, name: &str, delay: f64) -> Result<()> {
+        self.plant.layout.sensor(name)?;
+        let sensors = &self.plant.layout.sensors;
+        let index = sensors.iter().position(|s| s.name == name).unwrap_or(0);
+        *self.sensor_delays.entry(index).or_default() += delay;
+        Ok(())
+    }
+
+    /// Writes the document for a folder, from which its assets are found where they are. `model` is the compiled
+    /// scene without values or effects.
+    ///
+    /// # Errors
+    /// When the document holds elements that others are made from (`replicate`, `composite`, `attach`), or a value is
+    /// of nothing in it.
+    pub fn write(&self, scene: &Scene, model: &dyn Model, folder: &Path) -> Result<Written> {
+        let parse = |e: roxmltree::Error| Error::Scene {
+            scene: scene.name().to_owned(),
+            message: e.to_string(),
+        };
+        let document = Document::parse(scene.xml()).map_err(parse)?;
+        let elements = Elements::find(scene, &document, &self.plant.layout)?;
+        let mut writer = Writer {
+            native: self,
+            model,
+            scene,
+            elements,
+            markup: Markup::new(&document),
+            left_out: Vec::new(),
+        };
+        writer.write_bodies()?;
+        writer.write_geoms()?;
+        writer.write_joints()?;
+        writer.write_actuators()?;
+        writer.write_sensors();
+        writer.write_gravity()?;
+        writer.write_assets(folder);
+        writer.write_transmissions()?;
+        Ok(Written {
+            xml: writer.markup.text(),
+            left_out: writer.left_out,
+        })
+    }
+}
+
+/// A document being written.
+struct Writer<'w, 'd> {
+    native: &'w NativeModel<'w>,
+    model: &'w dyn Model,
+    scene: &'w Scene,
+    elements: Elements<'d>,
+    markup: Markup<'d>,
+    left_out: Vec<String>,
+}
+
+/// A target by its parts.
+fn target(element: &str, name: &str, attribute: &str, index: usize) -> Target {
+    Target {
+        element: element.into(),
+        name: name.into(),
+        attribute: attribute.into(),
+        index,
+    }
+}
+
+impl Writer<'_, '_> {
+    /// The value that is asked for, where one is and it is not what the document says.
+    fn changed(&self, target: &Target) -> Result<Option<f64>> {
+        let found = self.native.values.iter().find(|(t, _)| t == target);
+        match found {
+            Some((_, value)) if *value != self.model.nominal(target)? => Ok(Some(*value)),
+            _ => Ok(None),
+        }
+    }
+
+    /// The value that a target will have.
+    fn value(&self, target: &Target) -> Result<f64> {
+        match self.changed(target)? {
+            Some(value) => Ok(value),
+            None => self.model.nominal(target),
+        }
+    }
+
+    /// The entries of an attribute where one of them is to change.
+    fn entries(
+        &self,
+        element: &str,
+        name: &str,
+        attribute: &str,
+        len: usize,
+    ) -> Result<Option<Vec<f64>>> {
+        let targets: Vec<Target> = (0..len)
+            .map(|i| target(element, name, attribute, i))
+            .collect();
+        let asked = targets
+            .iter()
+            .any(|t| self.native.values.iter().any(|(other, _)| other == t));
+        if !asked {
+            return Ok(None);
+        }
+        let mut any = false;
+        for t in &targets {
+            any |= self.changed(t)?.is_some();
+        }
+        if !any {
+            return Ok(None);
+        }
+        targets
+            .iter()
+            .map(|t| self.value(t))
+            .collect::<Result<_>>()
+            .map(Some)
+    }
+
+    /// Says what the document does not.
+    fn leave_out(&mut self, sentence: String) {
+        self.left_out.push(sentence);
+    }
+
+    fn write_geoms(&mut self) -> Result<()> {
+        for i in 0..self.native.plant.layout.geoms.len() {
+            let name = self.native.plant.layout.geoms[i].clone();
+            let node = self.elements.geoms[i];
+            for (attribute, len) in [("friction", 3), ("solref", 2), ("mass", 1), ("pos", 3)] {
+                let Some(values) = self.entries("geom", &name, attribute, len)? else {
+                    continue;
+                };
+                let has = |n: Node<'_, '_>| n.has_attribute("fromto");
+                if attribute == "pos" && (has(node) || self.elements.default_has("geom", "fromto"))
+                {
+                    self.leave_out(format!(
+                        "geom `{name}` lies between two points (`fromto`): its new place {values:?} is not written"
+                    ));
+                    continue;
+                }
+                self.markup.set_numbers(node, attribute, &values);
+            }
+        }
+        Ok(())
+    }
+
+    fn write_sensors(&mut self) {
+        let timestep = self.native.plant.layout.timestep;
+        for (&i, &delay) in &self.native.sensor_delays {
+            let node = self.elements.sensors[i];
+            self.markup.set_numbers(node, "delay", &[delay]);
+            let samples = (delay / timestep).ceil() + elements::HISTORY_MARGIN;
+            self.markup.set_numbers(node, "nsample", &[samples]);
+            self.markup.set(node, "interp", "cubic");
+        }
+    }
+
+    fn write_gravity(&mut self) -> Result<()> {
+        let Some(gravity) = self.entries("option", "", "gravity", 3)? else {
+            return Ok(());
+        };
+        match self.elements.options.last().copied() {
+            Some(node) => self.markup.set_numbers(node, "gravity", &gravity),
+            None => {
+                let text = crate::markup::numbers(&gravity);
+                let root = self.elements.root;
+                self.markup
+                    .append(root, &format!("  <option gravity=\"{text}\"/>\n"));
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,34 @@
+//! Commands on any machine: a study, or a model file, in the place of a task.
+
+pub mod explore;
+pub mod export;
+pub mod identify;
+pub mod motion_config;
+mod motion_page;
+mod sensors;
+mod subject;
+
+use std::path::Path;
+
+use anyhow::Result;
+use asid_core::registry::{TaskEntry, find};
+
+pub use subject::Subject;
+
+/// The path that an argument names, where it is no registered task.
+///
+/// # Errors
+/// When it is neither: the message is that of an unknown task, with names that come close.
+pub fn path_of(argument: &str) -> Result<Option<&Path>> {
+    let unknown = match find::<TaskEntry>(argument) {
+        Ok(_) => return Ok(None),
+        Err(unknown) => unknown,
+    };
+    let path = Path::new(argument);
+    // What looks like a path is one, so that a file that is missing is told as such.
+    let looks = argument.contains(['/', '\\']) || path.extension().is_some();
+    if looks || path.exists() {
+        return Ok(Some(path));
+    }
+    Err(unknown.into())
+}

@@ -1,0 +1,474 @@
+//! `asid explore STUDY`: the motion of any machine that tells the most, as a command file.
+
+use std::collections::BTreeMap;
+use std::io::Write as _;
+use std::path::Path;
+use std::time::Instant;
+
+use anyhow::Result;
+use asid_algorithms::fisher::Objective;
+use asid_core::posterior::Direction;
+use asid_core::signal::Signal;
+use asid_core::{Episode, Parameter, Streams};
+use asid_report::number::significant;
+use asid_sysid::dataset::Dataset;
+use asid_sysid::design::{Designed, Designer, Method};
+use asid_sysid::limits::Limits;
+use asid_sysid::motion::Family;
+use asid_sysid::play::{Player, substeps};
+use asid_sysid::tells::{Told, of_logs};
+use serde::Serialize;
+
+use super::motion_config::Config;
+use super::{Subject, motion_page, sensors};
+use crate::cli::failure;
+use crate::cli::options::Common;
+use crate::cli::output::{OutFolder, write_json, write_text};
+use crate::cli::progress::Bars;
+use crate::cli::result::{CostResult, SCHEMA, figure};
+
+/// Most repeats that are counted: who would play more looks for another motion.
+const MOST_REPEATS: usize = 1000;
+
+/// What is known of an unknown, in its unit.
+#[derive(Clone, Debug, Serialize)]
+pub struct UnknownResult {
+    pub name: String,
+    pub unit: String,
+    /// The value about which the motion was designed.
+    pub value: f64,
+    /// What shares are taken of: the value, or the middle of the range where it is zero.
+    pub reference: f64,
+    /// Standard deviations: of the prior, by the logs so far, by this motion, by both.
+    pub prior: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub logs: Option<f64>,
+    pub motion: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub both: Option<f64>,
+    /// Plays of the motion until it is known to the precision asked for, with the logs; null where no number of them
+    /// suffices.
+    pub repeats: Option<usize>,
+}
+
+/// `result.json`.
+#[derive(Serialize)]
+pub struct ExploreResult {
+    pub schema: u32,
+    pub machine: String,
+    pub backend: String,
+    pub engine: String,
+    pub explorer: &'static str,
+    pub objective: &'static str,
+    pub seed: u64,
+    pub seconds: f64,
+    pub period: f64,
+    pub unknowns: Vec<UnknownResult>,
+    pub nuisance: Vec<String>,
+    /// Combinations that neither logs nor motion see.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub unseen: Vec<Direction>,
+    /// Precision, relative to the value, that the repeats are counted for.
+    pub precision: f64,
+    /// Factor by which the motion was made smaller to keep all limits.
+    pub scale: f64,
+    /// The limit that a motion larger by a quarter would break.
+    pub next_limit: Option<String>,
+    /// What is broken where nothing could be kept; null where all limits hold.
+    pub broken: Option<String>,
+    pub noise: BTreeMap<String, f64>,
+    pub notes: Vec<String>,
+    pub cost: CostResult,
+}
+
+/// Designs a motion and writes it.
+pub fn explore(path: &Path, common: &Common, given: &super::motion_config::Options) -> Result<()> {
+    let clock = Instant::now();
+    let config = Config::resolve(path, common, given)?;
+    let mut notes = Vec::new();
+    let subject =
+        sensors::with_sensors(Subject::open(path, config.backend.as_deref())?, &mut notes)?;
+    let parameters = config.parameters(&subject)?;
+    let sought = config.sought(&subject);
+    let (unknowns, nuisance) = parameters.split_at(sought);
+    let out = OutFolder::claim(common.out.as_deref(), &format!("{}-explore", subject.name))?;
+    let threads = common.threads.unwrap_or(0);
+    let plant = &subject.plant;
+    let limits = Limits::new(plant, &|j| range_of(&subject, j), &config.limits()?)?;
+    let data = match &subject.study {
+        Some(study) => Some(Dataset::new(plant, &study.train, &study.noise)?),
+        None => None,
+    };
+    let signals = sensors::signals(&subject, data.as_ref(), &config.noise, &mut notes)?;
+    let base = base_commands(&subject);
+    let frame = substeps(plant, config.period)?;
+    let period = frame as f64 * plant.layout.timestep;
+    let mut player = Player::new(
+        &*subject.model,
+        plant,
+        limits,
+        &parameters,
+        &signals,
+        (&base, config.settle),
+        threads,
+    )?;
+    let values = config.values(&subject, &parameters)?;
+    settle(&mut player, &values, &config, &mut notes)?;
+    let known = match &data {
+        Some(data) => of_logs(
+            &*subject.model,
+            &parameters,
+            (&values, sought),
+            data,
+            threads,
+        )?,
+        None => Told::nothing(sought, parameters.len()),
+    };
+    let method = Method::named(&config.explorer)?;
+    let objective: Objective = config.objective.parse()?;
+    let frames = ((config.seconds / period).round() as usize).max(2);
+    let rest = (config.rest_seconds / period).round() as usize;
+    let family = Family {
+        shape: method.shape(&config.design),
+        amplitude: amplitudes(&subject, player.limits(), &base),
+        range: player.limits().command.clone(),
+        base: base.clone(),
+        frames,
+        rest,
+        period,
+    };
+    let progress = Bars::new(common.quiet);
+    let mut designer = Designer {
+        player: &mut player,
+        family,
+        parameters: &parameters,
+        sought,
+        values: values.clone(),
+        known: known.clone(),
+        objective,
+        substeps: frame,
+    };
+    let found = designer.design(method, &config.design, Streams::new(config.seed), &progress)?;
+    let broken = found.excess.worst.as_ref().map(|(what, _)| what.clone());
+    let rows = unknown_results(
+        unknowns,
+        &values,
+        data.as_ref().map(|_| &known),
+        &found.told,
+        config.precision,
+    );
+    let names: Vec<String> = unknowns.iter().map(|p| p.name.clone()).collect();
+    let result = ExploreResult {
+        schema: SCHEMA,
+        machine: subject.name.clone(),
+        backend: subject.backend.name().to_owned(),
+        engine: subject.engine(),
+        explorer: method.name(),
+        objective: objective.name(),
+        seed: config.seed,
+        seconds: (frames + rest) as f64 * period,
+        period,
+        unknowns: rows,
+        nuisance: nuisance.iter().map(|p| p.name.clone()).collect(),
+        unseen: found.told.and(1.0, &known).unseen(&names),
+        precision: config.precision,
+        scale: found.scale,
+        next_limit: found.next_limit.clone(),
+        broken,
+        noise: signals
+            .iter()
+            .map(|s| (s.sensor.clone(), s.noise))
+            .collect(),
+        notes,
+        cost: CostResult {
+            wall_s: clock.elapsed().as_secs_f64(),
+            physics_steps: player.steps(),
+            env_steps: 0,
+        },
+    };
+    let page = motion_page::page(&result, &subject, &found, player.limits());
+    out.write(|folder| {
+        write_json(&folder.join("result.json"), &result)?;
+        write_text(&folder.join("config.toml"), &toml::to_string(&config)?)?;
+        commands(&subject, &found, period).write_csv(&folder.join("commands.csv"))?;
+        predicted(&subject, &found, &signals, period).write_csv(&folder.join("predicted.csv"))?;
+        write_text(&folder.join("report.html"), &page)?;
+        if !subject.source.scene.xml().contains("file=") {
+            write_text(&folder.join("model.xml"), subject.source.scene.xml())?;
+        }
+        Ok(())
+    })?;
+    let mut stdout = std::io::stdout().lock();
+    if common.json {
+        writeln!(stdout, "{}", serde_json::to_string_pretty(&result)?)?;
+    } else {
+        for line in lines(&result) {
+            writeln!(stdout, "{line}")?;
+        }
+        writeln!(stdout, "results: {}", out.path().display())?;
+    }
+    drop(stdout);
+    if let Some(what) = &result.broken {
+        failure::warn(&format!(
+            "no motion of this kind keeps all limits, not even the smallest: {what}; do not play it, and look at the limits \
+             and at the posture that it begins in"
+        ));
+    }
+    Ok(())
+}
+
+/// The range of a joint, by index, where the model has one.
+fn range_of(subject: &Subject, joint: usize) -> Option<[f64; 2]> {
+    let name = &subject.plant.layout.joints[joint].name;
+    let end = |index: usize| {
+        let target = format!("joint/{name}/range/{index}").parse().ok()?;
+        subject.model.nominal(&target).ok()
+    };
+    Some([end(0)?, end(1)?]).filter(|[low, high]| low < high)
+}
+
+/// Commands under which the machine rests: the first keyframe's, else those of servos that hold the first state.
+fn base_commands(subject: &Subject) -> Vec<f64> {
+    let layout = &subject.plant.layout;
+    if let Some(key) = layout.keyframes.first() {
+        return key.ctrl.clone();
+    }
+    let (qpos, _) = asid_core::problem::home(layout);
+    let drives = subject.plant.drives.iter();
+    drives
+        .map(|drive| match drive {
+            Some(d) if d.is_position_servo() => d.gear * qpos[layout.joints[d.joint].qpos],
+            _ => 0.0,
+        })
+        .collect()
+}
+
+/// How far each command may go from its base: half of what limits leave, whichever side is wider.
+fn amplitudes(subject: &Subject, limits: &Limits, base: &[f64]) -> Vec<f64> {
+    let reach = |range: Option<[f64; 2]>, base: f64| {
+        range.map_or(f64::INFINITY, |[low, high]| {
+            (high - base).max(base - low).max(0.0)
+        })
+    };
+    let each = base.iter().enumerate().map(|(a, &base)| {
+        let mut width = reach(limits.command[a], base);
+        if let Some(drive) = subject.plant.drives[a] {
+            let joint = &subject.plant.layout.joints[drive.joint];
+            let limit = limits.joints.iter().find(|l| l.name == joint.name);
+            if drive.is_position_servo() {
+                let range = limit.and_then(|l| l.position);
+                width = width.min(reach(range.map(|r| r.map(|x| x * drive.gear)), base));
+            } else if let Some(force) = limits.drives.iter().find(|d| d.actuator == a) {
+                width = width.min(force.force / drive.gear.abs());
+            }
+        }
+        if width.is_finite() { width } else { 0.0 }
+    });
+    each.collect()
+}
+
+/// Lets the machine come to rest before a motion, where it does.
+fn settle(
+    player: &mut Player<'_>,
+    values: &[f64],
+    config: &Config,
+    notes: &mut Vec<String>,
+) -> Result<()> {
+    let left = player.unrest(&[values.to_vec()])?;
+    if left > config.rest_speed {
+        notes.push(format!(
+            "under its first commands the machine does not come to rest within {} s (speed {left:.3} left): the motion \
+             begins in the first state itself, which is taken as known exactly",
+            config.settle
+        ));
+        player.skip_settling();
+    }
+    let touching = player.allow_present_contacts(values)?;
+    if !touching.is_empty() {
+        let pairs: Vec<String> = touching
+            .iter()
+            .map(|[a, b]| format!("{a} and {b}"))
+            .collect();
+        notes.push(format!(
+            "at rest there touch already, and may: {}",
+            pairs.join(", ")
+        ));
+    }
+    Ok(())
+}
+
+/// What a deviation is measured by: the value, or the middle of the range where the value is zero.
+fn reference(parameter: &Parameter, value: f64) -> f64 {
+    if value == 0.0 {
+        parameter.center().abs()
+    } else {
+        value.abs()
+    }
+}
+
+/// What is known of the unknowns, before and after.
+fn unknown_results(
+    unknowns: &[Parameter],
+    values: &[f64],
+    logs: Option<&Told>,
+    motion: &Told,
+    precision: f64,
+) -> Vec<UnknownResult> {
+    let nothing = Told::nothing(motion.sought, motion.matrix.nrows());
+    let known = logs.unwrap_or(&nothing);
+    let alone = motion.deviations();
+    let so_far = known.deviations();
+    let both = motion.and(1.0, known).deviations();
+    unknowns
+        .iter()
+        .enumerate()
+        .map(|(i, p)| {
+            let unit = |scaled: f64| p.unscale_std(values[i], scaled);
+            let wanted = precision * reference(p, values[i]);
+            let enough = |n: usize| unit(motion.and(n as f64, known).deviations()[i]) <= wanted;
+            let repeats = if wanted > 0.0 && enough(MOST_REPEATS) {
+                // Information only grows: halving finds the fewest.
+                let (mut low, mut high) = (0, MOST_REPEATS);
+                while low < high {
+                    let middle = usize::midpoint(low, high);
+                    if enough(middle) {
+                        high = middle
+                    } else {
+                        low = middle + 1
+                    }
+                }
+                Some(low)
+            } else {
+                None
+            };
+            UnknownResult {
+                name: p.name.clone(),
+                unit: p.unit.clone(),
+                value: values[i],
+                reference: reference(p, values[i]),
+                prior: unit(1.0),
+                logs: logs.map(|_| unit(so_far[i])),
+                motion: unit(alone[i]),
+                both: logs.map(|_| unit(both[i])),
+                repeats,
+            }
+        })
+        .collect()
+}
+
+/// Times of `rows` frames, s, rounded to the nanosecond.
+fn times(rows: usize, period: f64) -> Vec<f64> {
+    (0..rows)
+        .map(|k| (k as f64 * period * 1e9).round() / 1e9)
+        .collect()
+}
+
+/// The commands as a log, the last one held.
+fn commands(subject: &Subject, found: &Designed, period: f64) -> Episode {
+    let actuators: Vec<String> = subject
+        .plant
+        .layout
+        .actuators
+        .iter()
+        .map(|a| a.name.clone())
+        .collect();
+    let nu = actuators.len();
+    let mut ctrl = found.commands.clone();
+    ctrl.extend_from_slice(&found.commands[found.commands.len() - nu..]);
+    Episode {
+        time: times(ctrl.len() / nu, period),
+        actuators,
+        ctrl,
+        ..Episode::default()
+    }
+}
+
+/// The log that the simulator expects, without noise; its first row is the first that was recorded.
+fn predicted(subject: &Subject, found: &Designed, signals: &[Signal], period: f64) -> Episode {
+    let mut episode = commands(subject, found, period);
+    let layout = &subject.plant.layout;
+    let channels = signals.iter().filter_map(|s| layout.sensor(&s.sensor).ok());
+    episode.channels = channels
+        .map(|s| asid_core::episode::ChannelColumns {
+            name: s.name.clone(),
+            len: s.len,
+        })
+        .collect();
+    let width = episode.width();
+    let missing = vec![f64::NAN; width];
+    episode.readings = [missing, found.played.readings.clone()].concat();
+    episode
+        .readings
+        .resize(episode.time.len() * width, f64::NAN);
+    episode
+}
+
+/// A deviation as a share of what it is measured by, in words.
+pub fn relative(deviation: f64, reference: f64) -> String {
+    if reference == 0.0 {
+        figure(deviation)
+    } else {
+        let percent = 100.0 * deviation / reference.abs();
+        format!("{} %", significant(percent, 2))
+    }
+}
+
+/// The answer on the terminal.
+pub fn lines(result: &ExploreResult) -> Vec<String> {
+    let mut all = Vec::new();
+    for u in &result.unknowns {
+        let to = |deviation: f64| relative(deviation, u.reference);
+        let mut line = match u.logs {
+            Some(logs) => format!(
+                "{}: your logs so far tell it to {}; this motion to {}, with them to {}",
+                u.name,
+                to(logs),
+                to(u.motion),
+                to(u.both.unwrap_or(u.motion))
+            ),
+            None => format!(
+                "{}: this motion tells it to {} (the prior has {})",
+                u.name,
+                to(u.motion),
+                to(u.prior)
+            ),
+        };
+        line += &match u.repeats {
+            Some(0) => format!("; the logs suffice for {:.1} %", 100.0 * result.precision),
+            Some(n) => format!("; {n} plays for {:.1} %", 100.0 * result.precision),
+            None => format!(
+                "; no number of plays makes it {:.1} %",
+                100.0 * result.precision
+            ),
+        };
+        all.push(line);
+    }
+    for direction in &result.unseen {
+        let parts: Vec<String> = direction
+            .weights
+            .iter()
+            .map(|(n, w)| format!("{w:+.2} {n}"))
+            .collect();
+        all.push(format!(
+            "stays unseen (in prior deviations): {}",
+            parts.join(" ")
+        ));
+    }
+    all.extend(result.notes.iter().cloned());
+    all.push(match &result.broken {
+        None => {
+            let mut line =
+                "all limits hold, at the ends and corners of the unknowns' ranges too".to_owned();
+            if let Some(next) = &result.next_limit {
+                line += &format!("; a motion larger by a quarter would break: {next}");
+            }
+            line
+        }
+        Some(what) => format!("LIMITS BROKEN: {what}"),
+    });
+    all.push(format!(
+        "{} by {}, {:.1} s of motion, found in {:.0} s",
+        result.objective, result.explorer, result.seconds, result.cost.wall_s
+    ));
+    all
+}

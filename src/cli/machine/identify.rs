@@ -1,0 +1,292 @@
+//! `asid identify STUDY`: the parameters of a study from its logs.
+
+use std::io::Write as _;
+use std::path::Path;
+use std::time::Instant;
+
+use anyhow::Result;
+use asid_algorithms::optimise::GaussNewtonSettings;
+use asid_core::posterior::Direction;
+use asid_core::{Error, Parameter, Streams, Target};
+use asid_effects::RefinedModel;
+use asid_report::run::{NamedText, RealWorld, RunReport};
+use asid_sysid::dataset::Dataset;
+use asid_sysid::fit::{Identified, fit};
+use asid_sysid::gap::gap;
+use serde::{Deserialize, Serialize};
+
+use super::Subject;
+use crate::cli::config::{read_table, set};
+use crate::cli::failure;
+use crate::cli::options::Common;
+use crate::cli::output::{OutFolder, write_json, write_text};
+use crate::cli::progress::Bars;
+use crate::cli::result::{CostResult, ParameterResult, SCHEMA, caveats, parameter_line};
+use crate::cli::{run, trace};
+
+/// `config.toml`.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Config {
+    study: String,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    backend: Option<String>,
+    #[serde(default)]
+    seed: u64,
+    #[serde(default = "smooth")]
+    gauss_newton: GaussNewtonSettings,
+}
+
+/// A search for machines whose replays are smooth in the unknowns, as they are where nothing bounces: from fewer
+/// points, and with fewer fits over the region of the posterior, than a task with contacts needs.
+fn smooth() -> GaussNewtonSettings {
+    GaussNewtonSettings {
+        screened: 32,
+        starts: 2,
+        iterations: 8,
+        rounds: 2,
+        ..GaussNewtonSettings::default()
+    }
+}
+
+/// Gaps in units of the noise.
+#[derive(Serialize)]
+struct GapResult {
+    /// With the model as given, on logs held out.
+    nominal: f64,
+    /// With the parameters fitted, on logs held out.
+    identified: f64,
+    /// The same on the logs that were fitted.
+    nominal_fitted: f64,
+    identified_fitted: f64,
+}
+
+#[derive(Serialize)]
+struct Versions {
+    asid: &'static str,
+    engine: String,
+    git: &'static str,
+}
+
+/// `result.json`.
+#[derive(Serialize)]
+struct IdentifyResult {
+    schema: u32,
+    study: String,
+    backend: String,
+    identifier: &'static str,
+    seed: u64,
+    parameters: Vec<ParameterResult>,
+    /// Combinations of unknowns that the logs do not see.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    unseen: Vec<Direction>,
+    residual: f64,
+    gap: GapResult,
+    logs: Vec<String>,
+    held_out: Vec<String>,
+    cost: CostResult,
+    versions: Versions,
+}
+
+/// The settings: a file, then single values, then options.
+fn resolve(path: &Path, common: &Common) -> Result<Config> {
+    let mut table = match &common.config {
+        Some(path) => read_table(path)?,
+        None => toml::Table::new(),
+    };
+    for setting in &common.set {
+        set(&mut table, setting)?;
+    }
+    table.insert("study".into(), path.display().to_string().into());
+    let mut config: Config = table
+        .try_into()
+        .map_err(|e: toml::de::Error| Error::Config {
+            key: "config".into(),
+            message: e.message().replace('\n', " "),
+        })?;
+    config.backend = common.backend.clone().or(config.backend);
+    config.seed = common.seed.unwrap_or(config.seed);
+    config.gauss_newton.check("gauss_newton")?;
+    Ok(config)
+}
+
+/// Fits and writes the result.
+pub fn identify(path: &Path, common: &Common) -> Result<()> {
+    let clock = Instant::now();
+    let config = resolve(path, common)?;
+    let subject = Subject::open(path, config.backend.as_deref())?;
+    let study = subject.needs_study()?;
+    let out = OutFolder::claim(common.out.as_deref(), &format!("{}-identify", study.name))?;
+    let threads = common.threads.unwrap_or(0);
+    let progress = Bars::new(common.quiet);
+    let data = |logs| Dataset::new(&subject.plant, logs, &study.noise);
+    let (train, test) = (data(&study.train)?, data(&study.test)?);
+    let found = fit(
+        &*subject.model,
+        &study.parameters,
+        &train,
+        (&config.gauss_newton, Streams::new(config.seed)),
+        threads,
+        &progress,
+    )?;
+    let measure = |parameters: &[Parameter], values: &[f64], data: &Dataset| {
+        gap(&*subject.model, parameters, values, data, threads).map(|g| g.value)
+    };
+    let gap = GapResult {
+        nominal: measure(&[], &[], &test)?,
+        identified: measure(&study.parameters, &found.values, &test)?,
+        nominal_fitted: measure(&[], &[], &train)?,
+        identified_fitted: measure(&study.parameters, &found.values, &train)?,
+    };
+    let wall_s = clock.elapsed().as_secs_f64();
+    let names =
+        |logs: &[(String, asid_core::Episode)]| logs.iter().map(|(n, _)| n.clone()).collect();
+    let result = IdentifyResult {
+        schema: SCHEMA,
+        study: study.name.clone(),
+        backend: subject.backend.name().to_owned(),
+        identifier: "gauss-newton",
+        seed: config.seed,
+        parameters: found
+            .posterior
+            .marginals
+            .iter()
+            .map(|m| ParameterResult::new(m, None))
+            .collect(),
+        unseen: found.posterior.unseen.clone(),
+        residual: found.residual,
+        gap,
+        logs: names(&study.train),
+        held_out: names(&study.test),
+        cost: CostResult {
+            wall_s,
+            physics_steps: found.physics_steps,
+            env_steps: 0,
+        },
+        versions: Versions {
+            asid: env!("CARGO_PKG_VERSION"),
+            engine: subject.engine(),
+            git: env!("ASID_GIT"),
+        },
+    };
+    let caveats = caveats(&study.parameters, &found.posterior);
+    let mut lines: Vec<String> = found
+        .posterior
+        .marginals
+        .iter()
+        .map(parameter_line)
+        .collect();
+    let sentence = format!(
+        "gap on logs held out, in units of the noise: {:.2} as given, {:.2} identified",
+        result.gap.nominal, result.gap.identified
+    );
+    lines.push(sentence.clone());
+    lines.extend(caveats.iter().cloned());
+    let mut report = report(&subject, &study.parameters, &found, &config, wall_s);
+    report.answer = sentence;
+    report.notes = caveats;
+    out.write(|folder| {
+        write_json(&folder.join("result.json"), &result)?;
+        write_text(&folder.join("config.toml"), &toml::to_string(&config)?)?;
+        write_json(&folder.join("posterior.json"), &found.posterior)?;
+        write_text(
+            &folder.join("refined.toml"),
+            &refined(&subject, &study.parameters, &found)?,
+        )?;
+        for (kind, logs) in [("train", &study.train), ("test", &study.test)] {
+            for (i, (_, episode)) in logs.iter().enumerate() {
+                episode.write_csv(&folder.join(format!("{kind}-{}.csv", i + 1)))?;
+            }
+        }
+        report.write(folder)?;
+        Ok(())
+    })?;
+    let mut stdout = std::io::stdout().lock();
+    if common.json {
+        writeln!(stdout, "{}", serde_json::to_string_pretty(&result)?)?;
+    } else {
+        for line in lines {
+            writeln!(stdout, "{line}")?;
+        }
+        writeln!(stdout, "results: {}", out.path().display())?;
+    }
+    drop(stdout);
+    if result.gap.identified > result.gap.nominal {
+        failure::warn(
+            "the fitted model replays the logs held out worse than the model as given: something else differs; \
+             `asid diagnose` looks for what",
+        );
+    }
+    Ok(())
+}
+
+/// The model with the fitted values.
+fn refined(subject: &Subject, parameters: &[Parameter], found: &Identified) -> Result<String> {
+    let mut values: Vec<(Target, f64)> = subject.source.parameters.clone();
+    for (parameter, value) in parameters.iter().zip(&found.values) {
+        for target in &parameter.targets {
+            values.retain(|(t, _)| t != target);
+            values.push((target.clone(), parameter.setting(*value)));
+        }
+    }
+    let file = std::path::PathBuf::from(subject.source.scene.name());
+    let file = file.canonicalize().unwrap_or(file);
+    // A value of an effect belongs to the effect.
+    let mut effects = subject.source.effects.clone();
+    values.retain(|(target, value)| {
+        let own = effects
+            .iter_mut()
+            .find(|e| target.element == "effect" && e.label() == target.name);
+        let Some(effect) = own else { return true };
+        effect.values.retain(|(name, _)| *name != target.attribute);
+        effect.values.push((target.attribute.clone(), *value));
+        false
+    });
+    Ok(RefinedModel::text(&file, &values, &effects)?)
+}
+
+/// The page.
+fn report(
+    subject: &Subject,
+    parameters: &[Parameter],
+    found: &Identified,
+    config: &Config,
+    wall_s: f64,
+) -> RunReport {
+    RunReport {
+        stage: "identify".into(),
+        task: subject.name.clone(),
+        backend: subject.backend.name().to_owned(),
+        identifier: "gauss-newton".into(),
+        seed: config.seed,
+        real_world: RealWorld {
+            engine: "logs".into(),
+            ..RealWorld::default()
+        },
+        parameters: trace::parameters_of(parameters, None, &found.posterior, None),
+        wall_s,
+        physics_steps: found.physics_steps,
+        versions: vec![
+            NamedText {
+                name: "asid".into(),
+                value: env!("CARGO_PKG_VERSION").into(),
+            },
+            NamedText {
+                name: "engine".into(),
+                value: subject.engine(),
+            },
+        ],
+        command: run::command_line(),
+        files: trace::files(&[
+            ("result.json", "the figures"),
+            (
+                "refined.toml",
+                "the model with the fitted values, for a study's `model` and `asid export`",
+            ),
+            ("posterior.json", "the posterior"),
+            ("config.toml", "all settings, for `--config`"),
+            ("trace.json", "the data of this report"),
+        ]),
+        ..RunReport::default()
+    }
+}

@@ -1,0 +1,108 @@
+//! What a command on any machine is about: a study, or a model without logs.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use anyhow::Result;
+use asid_core::{Backend, Error, Model};
+use asid_diagnosis::study::Study;
+use asid_effects::RefinedModel;
+use asid_mjcf::Plant;
+
+use super::super::diagnose::default_backend;
+use super::super::model::refine;
+use super::super::session::backend;
+
+/// A machine on an engine.
+pub struct Subject {
+    /// Name for folders and pages.
+    pub name: String,
+    /// File of the model, as it was given.
+    pub file: PathBuf,
+    /// The model with its values and effects.
+    pub source: RefinedModel,
+    /// Logs and unknowns, where there is a study.
+    pub study: Option<Study>,
+    /// The engine.
+    pub backend: Box<dyn Backend>,
+    /// The model compiled, with values and effects.
+    pub model: Arc<dyn Model>,
+    /// The machine, with the layout that the engine gives it.
+    pub plant: Plant,
+}
+
+impl Subject {
+    /// Opens a study (a folder, or a TOML file with `train`), a refined model (any other TOML file) or an MJCF file.
+    pub fn open(path: &Path, engine: Option<&str>) -> Result<Self> {
+        let study = is_study(path)?.then(|| Study::read(path)).transpose()?;
+        let (name, file, source) = match &study {
+            Some(study) => (
+                study.name.clone(),
+                study.model.clone(),
+                RefinedModel {
+                    scene: study.scene.clone(),
+                    parameters: study.fixed.clone(),
+                    effects: study.effects.clone(),
+                },
+            ),
+            None => {
+                let stem = path.file_stem().map(|s| s.to_string_lossy().into_owned());
+                (
+                    stem.unwrap_or_else(|| "model".into()),
+                    path.to_owned(),
+                    RefinedModel::open(path)?,
+                )
+            }
+        };
+        let backend = backend(&engine.map_or_else(default_backend, str::to_owned))?;
+        let compiled = backend.load(&source.scene)?;
+        let mut plant = Plant::of(&source.scene)?;
+        plant.layout = compiled.layout().clone();
+        let model = refine(&*backend, compiled, &source.scene, &source, &[])?;
+        Ok(Self {
+            name,
+            file,
+            source,
+            study,
+            backend,
+            model,
+            plant,
+        })
+    }
+
+    /// The study, where the command needs logs.
+    pub fn needs_study(&self) -> Result<&Study> {
+        self.study.as_ref().ok_or_else(|| {
+            Error::File {
+                path: self.file.clone(),
+                message: "is a model without logs: a study is needed, a TOML file with `model` and `train`, or a folder \
+                          with study.toml"
+                    .into(),
+            }
+            .into()
+        })
+    }
+
+    /// `name version` of the engine.
+    pub fn engine(&self) -> String {
+        format!("{} {}", self.backend.name(), self.backend.version())
+    }
+}
+
+/// Whether a path names a study and no model.
+fn is_study(path: &Path) -> Result<bool> {
+    if path.is_dir() {
+        return Ok(true);
+    }
+    if path.extension().is_none_or(|e| e != "toml") {
+        return Ok(false);
+    }
+    // What cannot be read or parsed is told of by the reader of studies.
+    let Ok(text) = std::fs::read_to_string(path) else {
+        return Ok(true);
+    };
+    let table: Result<toml::Table, _> = text.parse();
+    Ok(table.map_or(true, |t| {
+        t.contains_key("train") || !t.contains_key("model")
+    }))
+}

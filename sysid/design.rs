@@ -1,0 +1,400 @@
+//! The search for the motion that tells the most and keeps all limits.
+//!
+//! A candidate is played at the middle of the unknowns, a little up and down in each (what it tells), and at the ends of their
+//! ranges (whether it keeps the limits there too). The cross-entropy method makes the objective small among the
+//! candidates that keep all limits; those that do not rank behind them, by how much they break. The answer is played
+//! once more at corners of the ranges, with the limits looked at after every physics step, and is made smaller until none is broken.
+
+use asid_algorithms::fisher::Objective;
+use asid_algorithms::optimise::cem::{Cem, CemSettings};
+use asid_core::error::{Error, Result};
+use asid_core::rng::Rng;
+use asid_core::{Parameter, Progress, Streams};
+use rand::Rng as _;
+
+use crate::limits::Excess;
+use crate::motion::{Family, Shape};
+use crate::play::{Played, Player};
+use crate::tells::{Told, differences, of_plays};
+
+/// How a motion is found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Method {
+    /// Fisher information by the cross-entropy method over splines.
+    FisherCem,
+    /// Spline heights that are drawn.
+    Random,
+    /// A multisine with Schroeder's phases.
+    Multisine,
+    /// A Fourier series whose coefficients are drawn.
+    Fourier,
+}
+
+impl Method {
+    /// All, with their names on the command line.
+    pub const ALL: [(&'static str, Self); 4] = [
+        ("fisher-cem", Self::FisherCem),
+        ("random", Self::Random),
+        ("multisine", Self::Multisine),
+        ("fourier", Self::Fourier),
+    ];
+
+    /// The method of a name.
+    ///
+    /// # Errors
+    /// When there is none.
+    pub fn named(name: &str) -> Result<Self> {
+        let found = Self::ALL.iter().find(|(n, _)| *n == name);
+        found.map(|(_, m)| *m).ok_or_else(|| {
+            Error::unknown(
+                "explorer of any machine",
+                name,
+                Self::ALL.iter().map(|(n, _)| *n),
+            )
+        })
+    }
+
+    /// Name on the command line.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        let found = Self::ALL.iter().find(|(_, m)| *m == self);
+        found.map_or("", |(n, _)| n)
+    }
+
+    /// The curve that it moves.
+    #[must_use]
+    pub fn shape(self, settings: &DesignSettings) -> Shape {
+        match self {
+            Self::FisherCem | Self::Random => Shape::Spline(settings.knots),
+            Self::Multisine | Self::Fourier => Shape::Fourier(settings.harmonics),
+        }
+    }
+}
+
+/// How widely the search goes.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct DesignSettings {
+    /// Heights of a spline an actuator: more follow faster motions, and need a longer search.
+    pub knots: usize,
+    /// Harmonics of a Fourier series an actuator: five in the field's usual excitations (Swevers 1997).
+    pub harmonics: usize,
+    /// Rounds of the search at most.
+    pub iterations: usize,
+    /// Candidates a round.
+    pub population: usize,
+    /// Physics steps of the whole search at most, which bounds its time: rounds are left out, of which 8 are kept. Two cores
+    /// take some 1.5e5 steps of an arm of six joints a second.
+    pub physics_steps: f64,
+}
+
+impl Default for DesignSettings {
+    fn default() -> Self {
+        Self {
+            knots: 12,
+            harmonics: 5,
+            iterations: 40,
+            population: 40,
+            physics_steps: 1e7,
+        }
+    }
+}
+
+/// Rounds of the search at least.
+const FEWEST_ROUNDS: usize = 8;
+
+/// First deviation of the search in each coefficient, about its best draw; coefficients reach from -1 to 1.
+const SPREAD: f64 = 0.3;
+
+/// Factors by which a motion is made smaller to keep limits.
+const SHRINK: f64 = 0.85;
+
+/// Times that it is made smaller at most: down to a thousandth.
+const SHRINKS: usize = 43;
+
+/// Smallest size of the first draws: a machine that hardly damps comes to rest from small motions only.
+const SMALLEST: f64 = 1e-3;
+
+/// Sizes in which each round tries the best motion so far.
+const SIZES: [f64; 4] = [1.0, 0.9, 1.15, 1.4];
+
+/// How much larger the answer is played to see which limit it would break first.
+const LARGER: f64 = 1.25;
+
+/// Unknowns of whose ranges a search looks at all corners, at most: eight plays a candidate, where the ends are six.
+const FEW: usize = 3;
+
+/// Corners of the ranges that the answer is played at, at most.
+const CORNERS: usize = 16;
+
+/// A cost beyond any of a motion that keeps the limits.
+const BROKEN: f64 = 1e6;
+
+/// A motion that was found.
+#[derive(Clone, Debug)]
+pub struct Designed {
+    /// Commands, `frames x nu`.
+    pub commands: Vec<f64>,
+    /// What it tells.
+    pub told: Told,
+    /// Its play at the middle of the unknowns.
+    pub played: Played,
+    /// By how much limits are passed at the worst of all points; nothing where they are kept.
+    pub excess: Excess,
+    /// The limit that a motion larger by a quarter would break.
+    pub next_limit: Option<String>,
+    /// Factor that its largest motion was made smaller by.
+    pub scale: f64,
+    /// Best cost after each round.
+    pub course: Vec<f64>,
+}
+
+/// What a search works on.
+pub struct Designer<'p, 'a> {
+    /// Plays motions.
+    pub player: &'p mut Player<'a>,
+    /// Motions.
+    pub family: Family,
+    /// Unknowns, then nuisance entries.
+    pub parameters: &'p [Parameter],
+    /// Number of unknowns.
+    pub sought: usize,
+    /// Values about which is searched.
+    pub values: Vec<f64>,
+    /// What is known beside the prior, such as from logs.
+    pub known: Told,
+    /// What is made small.
+    pub objective: Objective,
+    /// Physics steps of a frame.
+    pub substeps: usize,
+}
+
+impl Designer<'_, '_> {
+    /// Finds a motion.
+    ///
+    /// # Errors
+    /// When nothing can move, or the engine fails.
+    pub fn design(
+        &mut self,
+        method: Method,
+        settings: &DesignSettings,
+        streams: Streams,
+        progress: &dyn Progress,
+    ) -> Result<Designed> {
+        if self.family.is_empty() {
+            return Err(Error::Config {
+                key: "actuator".into(),
+                message: "no actuator has a range to move in: give its joint or command one, such as --limit-position \
+                          JOINT:LOW:HIGH"
+                    .into(),
+            });
+        }
+        let mut rng = streams.stream("design");
+        let (coefficients, course) = match method {
+            Method::FisherCem => self.search(settings, &mut rng, progress)?,
+            Method::Multisine => (self.family.multisine(), Vec::new()),
+            Method::Random | Method::Fourier => (self.family.random(&mut rng), Vec::new()),
+        };
+        self.finish(&coefficients, course, &mut rng)
+    }
+
+    /// The cross-entropy search; the best coefficients, and the best cost after each round.
+    fn search(
+        &mut self,
+        settings: &DesignSettings,
+        rng: &mut Rng,
+        progress: &dyn Progress,
+    ) -> Result<(Vec<f64>, Vec<f64>)> {
+        let n = self.family.len();
+        let plays = (1 + 4 * self.parameters.len()) * settings.population;
+        let steps = (plays * self.family.all_frames() * self.substeps) as f64;
+        let rounds = ((settings.physics_steps / steps) as usize)
+            .clamp(FEWEST_ROUNDS, settings.iterations.max(FEWEST_ROUNDS));
+        progress.begin("explore", rounds as u64 + 1);
+        // Draws at sizes from the whole down to a thousandth: the best that keeps the limits is the middle of the search.
+        let mut draws = vec![vec![0.0; n]];
+        let mut sizes = vec![SMALLEST];
+        while draws.len() < settings.population {
+            let along = (draws.len() - 1) as f64 / (settings.population - 2).max(1) as f64;
+            let size = SMALLEST.powf(along);
+            draws.push(self.family.random(rng).iter().map(|c| c * size).collect());
+            sizes.push(size);
+        }
+        let costs = self.costs(&draws)?;
+        let first = (0..draws.len())
+            .min_by(|&i, &j| costs[i].total_cmp(&costs[j]))
+            .unwrap_or(0);
+        let spread = SPREAD * sizes[first];
+        progress.advance(1);
+        let rule = CemSettings {
+            elite_fraction: 0.2,
+            ..CemSettings::default()
+        };
+        let mut search = Cem::new(
+            rule,
+            &draws[first],
+            &vec![spread; n],
+            &vec![-1.0; n],
+            &vec![1.0; n],
+        );
+        let mut course = vec![costs[first]];
+        let mut best = (draws[first].clone(), costs[first]);
+        for _ in 0..rounds {
+            // The best so far, also larger and smaller: limits bind the size before the shape.
+            let mut candidates: Vec<Vec<f64>> = SIZES
+                .iter()
+                .map(|size| best.0.iter().map(|c| (c * size).clamp(-1.0, 1.0)).collect())
+                .collect();
+            let drawn = settings.population.saturating_sub(SIZES.len()).max(2);
+            candidates.extend(search.ask(drawn, rng));
+            let costs = self.costs(&candidates)?;
+            search.tell(&candidates, &costs);
+            let k = (0..costs.len())
+                .min_by(|&i, &j| costs[i].total_cmp(&costs[j]))
+                .unwrap_or(0);
+            if costs[k] < best.1 {
+                best = (candidates[k].clone(), costs[k]);
+            }
+            course.push(best.1);
+            progress.note(&format!("explore, {:.3}", best.1));
+            progress.advance(1);
+        }
+        progress.end();
+        Ok((best.0, course))
+    }
+
+    /// Costs of some candidates.
+    fn costs(&mut self, candidates: &[Vec<f64>]) -> Result<Vec<f64>> {
+        let (near, widths) = differences(self.parameters, &self.values);
+        let points = [&near[..], &self.far()].concat();
+        let commands: Vec<Vec<f64>> = candidates
+            .iter()
+            .map(|c| self.family.commands(c, 1.0))
+            .collect();
+        let jobs: Vec<(&[f64], &[f64])> = commands
+            .iter()
+            .flat_map(|c| points.iter().map(move |p| (&c[..], &p[..])))
+            .collect();
+        let plays = self.player.play(&jobs, self.substeps)?;
+        Ok(plays
+            .chunks_exact(points.len())
+            .map(|plays| {
+                let mut excess = Excess::default();
+                plays.iter().for_each(|p| excess.join(&p.excess));
+                if excess.is_none() {
+                    let told = of_plays(self.player, &plays[..near.len()], &widths, self.sought);
+                    told.and(1.0, &self.known).cost(self.objective)
+                } else {
+                    BROKEN * (1.0 + excess.total)
+                }
+            })
+            .collect())
+    }
+
+    /// Points far from the middle at which a search looks at the limits: all corners of the ranges where these are few,
+    /// else the ends of each range.
+    fn far(&self) -> Vec<Vec<f64>> {
+        let n = self.parameters.len();
+        if n > FEW {
+            return self.ends();
+        }
+        let corner = |k: usize| {
+            let entries = self.parameters.iter().enumerate();
+            entries.map(|(i, p)| p.range[k >> i & 1]).collect()
+        };
+        (0..1 << n).map(corner).collect()
+    }
+
+    /// The middle with each entry at either end of its range.
+    fn ends(&self) -> Vec<Vec<f64>> {
+        let mut points = Vec::with_capacity(2 * self.parameters.len());
+        for (i, parameter) in self.parameters.iter().enumerate() {
+            for end in parameter.range {
+                let mut point = self.values.clone();
+                point[i] = end;
+                points.push(point);
+            }
+        }
+        points
+    }
+
+    /// The entries in which a point differs from the middle.
+    fn words(&self, point: &[f64]) -> String {
+        let entries = self.parameters.iter().zip(point).zip(&self.values);
+        let moved = entries.filter(|((_, x), middle)| x != middle);
+        let words: Vec<String> = moved
+            .map(|((p, x), _)| format!("{} = {x}", p.name))
+            .collect();
+        words.join(", ")
+    }
+
+    /// Corners of the ranges: all of them where they are few, else draws.
+    fn corners(&self, rng: &mut Rng) -> Vec<Vec<f64>> {
+        let n = self.parameters.len();
+        let few = n < usize::BITS as usize && 1 << n <= CORNERS;
+        let count = if few { 1 << n } else { CORNERS };
+        (0..count)
+            .map(|k| {
+                let upper =
+                    |i: usize, rng: &mut Rng| if few { k >> i & 1 == 1 } else { rng.random() };
+                (0..n)
+                    .map(|i| self.parameters[i].range[usize::from(upper(i, rng))])
+                    .collect()
+            })
+            .collect()
+    }
+
+    /// By how much a motion passes limits at some points, with every physics step looked at.
+    fn excess_at(
+        &mut self,
+        coefficients: &[f64],
+        scale: f64,
+        points: &[Vec<f64>],
+    ) -> Result<Excess> {
+        let commands = self.family.commands(coefficients, scale);
+        let rows = commands.chunks_exact(self.family.base.len());
+        let fine: Vec<f64> = rows.flat_map(|row| row.repeat(self.substeps)).collect();
+        let jobs: Vec<(&[f64], &[f64])> = points.iter().map(|p| (&fine[..], &p[..])).collect();
+        let mut excess = Excess::default();
+        for (played, point) in self.player.play(&jobs, 1)?.iter().zip(points) {
+            excess.join(&played.excess.at(|| self.words(point)));
+        }
+        Ok(excess)
+    }
+
+    /// Plays the answer with every step looked at, smaller and smaller until nothing is broken.
+    fn finish(
+        &mut self,
+        coefficients: &[f64],
+        course: Vec<f64>,
+        rng: &mut Rng,
+    ) -> Result<Designed> {
+        let points = [vec![self.values.clone()], self.ends(), self.corners(rng)].concat();
+        let mut scale = 1.0;
+        let mut excess = Excess::default();
+        for _ in 0..SHRINKS {
+            excess = self.excess_at(coefficients, scale, &points)?;
+            if excess.is_none() {
+                break;
+            }
+            scale *= SHRINK;
+        }
+        let larger = self.excess_at(coefficients, LARGER * scale, &points)?;
+        let commands = self.family.commands(coefficients, scale);
+        let (near, widths) = differences(self.parameters, &self.values);
+        let jobs: Vec<(&[f64], &[f64])> = near.iter().map(|p| (&commands[..], &p[..])).collect();
+        let plays = self.player.play(&jobs, self.substeps)?;
+        Ok(Designed {
+            told: of_plays(self.player, &plays, &widths, self.sought),
+            played: plays
+                .into_iter()
+                .next()
+                .ok_or_else(|| Error::Failed("nothing was played".into()))?,
+            commands,
+            next_limit: larger.worst.map(|(what, _)| what),
+            excess,
+            scale,
+            course,
+        })
+    }
+}

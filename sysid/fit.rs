@@ -1,0 +1,210 @@
+//! The parameters of a study fitted to its logs: output-error identification over open-loop replays.
+//!
+//! Residuals of replays are minimised by Gauss-Newton steps from several starts
+//! ([`asid_algorithms::optimise::gauss_newton`]). Initial states that a log leaves open are marginalised: with their
+//! slopes `S` and a wide prior, residuals have the covariance `1 + S S^T`, and are whitened by
+//! its root, `r - U (1 - (1 + σ²)^-1/2) U^T r` with `S = U σ V^T`. As the prior widens that is variable projection
+//! (G. Golub, V. Pereyra, SIAM J. Numer. Anal. 10, 1973). The slopes are taken anew where the fit has arrived.
+
+use asid_algorithms::identify::gauss_newton::posterior_of;
+use asid_algorithms::optimise::gauss_newton::{Fit, GaussNewtonSettings, Space, minimise};
+use asid_core::episode::InitialState;
+use asid_core::error::{Error, Result};
+use asid_core::{Model, Parameter, Posterior, Progress, Streams};
+use nalgebra::{DMatrix, DVector};
+
+use crate::dataset::{Dataset, Replayer, Trial};
+use crate::gap::{fit_start, start_slopes};
+
+/// Times that open starts and their slopes are found anew.
+const ROUNDS: usize = 3;
+
+/// Simulations of a batch at most: enough for all cores of a large machine, few enough for memory.
+const BATCH: usize = 256;
+
+/// Half width of the box of a later round, in prior deviations beside the last round's point.
+const NEAR: f64 = 0.7;
+
+/// Draws of the posterior: its quantiles are then good to 2 % of its width.
+const DRAWS: usize = 4000;
+
+/// What a fit found.
+pub struct Identified {
+    /// Values and what is known of them.
+    pub posterior: Posterior,
+    /// The best values, in the parameters' units.
+    pub values: Vec<f64>,
+    /// Root mean square of the residuals there, in units of the noise.
+    pub residual: f64,
+    /// Information about the parameters from the logs alone, in prior deviations.
+    pub information: DMatrix<f64>,
+    /// Physics steps of all replays.
+    pub physics_steps: u64,
+}
+
+/// Whitens residuals of an episode for what its start leaves open.
+pub(crate) struct Marginal {
+    /// Where the episode begins.
+    pub(crate) start: InitialState,
+    basis: DMatrix<f64>,
+    shrink: Vec<f64>,
+}
+
+impl Marginal {
+    pub(crate) fn apply(&self, residuals: &[f64]) -> Vec<f64> {
+        let r = DVector::from_iterator(
+            residuals.len(),
+            residuals
+                .iter()
+                .map(|x| if x.is_finite() { *x } else { 0.0 }),
+        );
+        if self.shrink.is_empty() {
+            return r.as_slice().to_vec();
+        }
+        let mut along = self.basis.transpose() * &r;
+        along
+            .iter_mut()
+            .zip(&self.shrink)
+            .for_each(|(a, s)| *a *= s);
+        (r - &self.basis * along).as_slice().to_vec()
+    }
+}
+
+/// Fits the parameters.
+///
+/// # Errors
+/// When there is nothing to fit, nearly all replays diverge, or the engine fails.
+pub fn fit(
+    model: &dyn Model,
+    parameters: &[Parameter],
+    data: &Dataset,
+    (settings, streams): (&GaussNewtonSettings, Streams),
+    threads: usize,
+    progress: &dyn Progress,
+) -> Result<Identified> {
+    if parameters.is_empty() {
+        return Err(Error::Config {
+            key: "parameter".into(),
+            message: "there is nothing to fit: name what is unknown in [[parameter]] of the study"
+                .into(),
+        });
+    }
+    let layout = model.layout();
+    let open = data.trials.iter().map(|t| t.open.len()).max().unwrap_or(0);
+    let size = settings
+        .batch(parameters.len())
+        .max(1 + 2 * open)
+        .min(BATCH);
+    let mut replayer = Replayer::new(model, parameters, size, threads)?;
+    let bound = Parameter::scaled_bound();
+    let mut box_ = (
+        vec![-bound; parameters.len()],
+        vec![bound; parameters.len()],
+    );
+    let mut z = vec![0.0; parameters.len()];
+    let mut rng = streams.stream("identify");
+    let rounds = if open == 0 { 1 } else { ROUNDS };
+    progress.begin(
+        "identify",
+        (rounds * (settings.iterations + settings.rounds)) as u64,
+    );
+    let mut found: Option<Fit> = None;
+    for _ in 0..rounds {
+        let theta = values(parameters, &z);
+        let marginals = data
+            .trials
+            .iter()
+            .map(|trial| marginal(&mut replayer, layout, data, trial, &theta))
+            .collect::<Result<Vec<_>>>()?;
+        let present: usize = data.trials.iter().map(present).sum();
+        let space = Space {
+            low: &box_.0,
+            high: &box_.1,
+            sought: parameters.len(),
+            readings: present.saturating_sub(data.trials.iter().map(|t| t.open.len()).sum()),
+        };
+        let mut residuals = |points: &[Vec<f64>]| -> Result<Vec<Option<Vec<f64>>>> {
+            let thetas: Vec<Vec<f64>> = points.iter().map(|z| values(parameters, z)).collect();
+            let mut all: Vec<Option<Vec<f64>>> = vec![Some(Vec::new()); points.len()];
+            for (trial, marginal) in data.trials.iter().zip(&marginals) {
+                let points: Vec<(&[f64], &InitialState)> =
+                    thetas.iter().map(|t| (&t[..], &marginal.start)).collect();
+                let rows = replayer.residuals(data, trial, &points)?;
+                for (to, row) in all.iter_mut().zip(rows) {
+                    match (to.as_mut(), row) {
+                        (Some(to), Some(row)) => to.extend(marginal.apply(&row)),
+                        _ => *to = None,
+                    }
+                }
+            }
+            Ok(all)
+        };
+        let fitted = minimise(settings, &mut residuals, space, &mut rng, || {
+            progress.advance(1)
+        })?;
+        let Some(fitted) = fitted else { break };
+        z.clone_from(&fitted.point);
+        for (i, x) in z.iter().enumerate() {
+            box_.0[i] = (x - NEAR).max(-bound);
+            box_.1[i] = (x + NEAR).min(bound);
+        }
+        found = Some(fitted);
+    }
+    progress.end();
+    let Some(found) = found else {
+        return Err(Error::Failed(
+            "nearly every replay of the logs diverged; check the model, its time step and the first state".into(),
+        ));
+    };
+    Ok(Identified {
+        posterior: posterior_of(&found, parameters, DRAWS, &mut rng),
+        values: values(parameters, &found.point),
+        residual: found.residual,
+        information: found.about(parameters.len()),
+        physics_steps: replayer.steps(),
+    })
+}
+
+fn values(parameters: &[Parameter], z: &[f64]) -> Vec<f64> {
+    parameters
+        .iter()
+        .zip(z)
+        .map(|(p, z)| p.from_scaled(*z))
+        .collect()
+}
+
+fn present(trial: &Trial) -> usize {
+    trial.readings.iter().filter(|x| x.is_finite()).count()
+}
+
+pub(crate) fn marginal(
+    replayer: &mut Replayer,
+    layout: &asid_core::Layout,
+    data: &Dataset,
+    trial: &Trial,
+    theta: &[f64],
+) -> Result<Marginal> {
+    let rows = trial.episode.rows();
+    let start = fit_start(replayer, layout, data, trial, theta, rows)?;
+    let none = |start| Marginal {
+        start,
+        basis: DMatrix::zeros(0, 0),
+        shrink: Vec::new(),
+    };
+    if trial.open.is_empty() {
+        return Ok(none(start));
+    }
+    let slopes = start_slopes(replayer, layout, data, trial, theta, &start)?;
+    let Some(basis) = slopes.map(|s| s.matrix.svd(true, false)) else {
+        return Ok(none(start));
+    };
+    let shrink = basis
+        .singular_values
+        .iter()
+        .map(|s| 1.0 - (1.0 + s * s).sqrt().recip());
+    Ok(Marginal {
+        start,
+        shrink: shrink.collect(),
+        basis: basis.u.unwrap_or_else(|| DMatrix::zeros(0, 0)),
+    })
+}

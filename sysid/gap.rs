@@ -1,0 +1,206 @@
+//! The gap of a model on logs: the root mean square of open-loop residuals, in units of the sensors' noise.
+//!
+//! A replay begins where the log says. What the log leaves open of it is fitted to the first tenth of the episode, which
+//! then does not count.
+
+use asid_core::episode::InitialState;
+use asid_core::error::Result;
+use asid_core::{Layout, Model, Parameter};
+use nalgebra::{DMatrix, DVector};
+
+use crate::dataset::{Dataset, Replayer, Trial};
+use crate::start::moved;
+
+/// Share of an episode that an open start is fitted to.
+const WARM_UP: f64 = 0.1;
+
+/// Rows that it is fitted to at least: fewer tell no speed.
+const WARM_UP_ROWS: usize = 6;
+
+/// Half steps of differences in a start: positions (rad or m) and velocities (rad/s or m/s), where trajectories
+/// are straight to 1e-4 and rounding is below 1e-8.
+const STEPS: [f64; 2] = [1e-4, 1e-3];
+
+/// Standard deviation of an open coordinate beside what the first readings say, rad or m, rad/s or m/s: so wide
+/// that it only keeps what no reading sees.
+const PRIOR: f64 = 1.0;
+
+/// Gauss-Newton steps of a start; a start is near from the first readings.
+const ITERATIONS: usize = 4;
+
+/// Lengths that a step of a start is tried with.
+const LENGTHS: [f64; 4] = [1.0, 0.5, 0.2, 0.05];
+
+/// Sensitivities of the residuals of an episode to its open start coordinates.
+pub struct StartSlopes {
+    /// `rows * entries x open`, zero where a reading is missing.
+    pub matrix: DMatrix<f64>,
+    /// Residuals at the start.
+    pub residuals: Vec<f64>,
+}
+
+/// Central differences in the open coordinates; `None` where a simulation diverged.
+///
+/// # Errors
+/// As [`Replayer::residuals`].
+pub fn start_slopes(
+    replayer: &mut Replayer,
+    layout: &Layout,
+    data: &Dataset,
+    trial: &Trial,
+    theta: &[f64],
+    start: &InitialState,
+) -> Result<Option<StartSlopes>> {
+    let step = |c: usize| STEPS[usize::from(c >= layout.nv)];
+    let mut states = vec![start.clone()];
+    for &c in &trial.open {
+        states.push(moved(layout, start, c, step(c)));
+        states.push(moved(layout, start, c, -step(c)));
+    }
+    let points: Vec<(&[f64], &InitialState)> = states.iter().map(|s| (theta, s)).collect();
+    let found = replayer.residuals(data, trial, &points)?;
+    let Some(rows): Option<Vec<Vec<f64>>> = found.into_iter().collect() else {
+        return Ok(None);
+    };
+    let matrix = DMatrix::from_fn(rows[0].len(), trial.open.len(), |r, k| {
+        let slope = (rows[2 * k + 1][r] - rows[2 * k + 2][r]) / (2.0 * step(trial.open[k]));
+        if slope.is_finite() { slope } else { 0.0 }
+    });
+    Ok(Some(StartSlopes {
+        matrix,
+        residuals: rows.into_iter().next().unwrap_or_default(),
+    }))
+}
+
+/// Sum of squares of what is there.
+fn squares(residuals: &[f64]) -> f64 {
+    residuals
+        .iter()
+        .filter(|x| x.is_finite())
+        .map(|x| x * x)
+        .sum()
+}
+
+/// The start of an episode that fits its first `rows` rows best.
+///
+/// # Errors
+/// As [`Replayer::residuals`].
+pub fn fit_start(
+    replayer: &mut Replayer,
+    layout: &Layout,
+    data: &Dataset,
+    trial: &Trial,
+    theta: &[f64],
+    rows: usize,
+) -> Result<InitialState> {
+    let mut start = trial.start.clone();
+    if trial.open.is_empty() {
+        return Ok(start);
+    }
+    let length = rows * data.entries();
+    for _ in 0..ITERATIONS {
+        let Some(slopes) = start_slopes(replayer, layout, data, trial, theta, &start)? else {
+            return Ok(start);
+        };
+        let s = slopes.matrix.rows(0, length);
+        let r = DVector::from_iterator(
+            length,
+            slopes.residuals[..length]
+                .iter()
+                .map(|x| if x.is_finite() { *x } else { 0.0 }),
+        );
+        let n = trial.open.len();
+        let normal = s.transpose() * s + DMatrix::identity(n, n) / (PRIOR * PRIOR);
+        let Some(factor) = normal.cholesky() else {
+            return Ok(start);
+        };
+        let step = factor.solve(&(-(s.transpose() * &r)));
+        let tried: Vec<InitialState> = LENGTHS
+            .iter()
+            .map(|length| {
+                let moves = trial.open.iter().zip(step.iter());
+                moves.fold(start.clone(), |state, (&c, by)| {
+                    moved(layout, &state, c, length * by)
+                })
+            })
+            .collect();
+        let points: Vec<(&[f64], &InitialState)> = tried.iter().map(|s| (theta, s)).collect();
+        let found = replayer.residuals(data, trial, &points)?;
+        let costs = found
+            .iter()
+            .map(|r| r.as_ref().map_or(f64::INFINITY, |r| squares(&r[..length])));
+        let best = costs.enumerate().min_by(|a, b| a.1.total_cmp(&b.1));
+        let before = squares(&slopes.residuals[..length]);
+        match best {
+            Some((k, cost)) if cost < before => {
+                start = tried[k].clone();
+                if cost > before * (1.0 - 1e-6) {
+                    break;
+                }
+            }
+            _ => break,
+        }
+    }
+    Ok(start)
+}
+
+/// Rows of an episode that its open start is fitted to; none where nothing is open.
+#[must_use]
+pub fn warm_up(trial: &Trial) -> usize {
+    if trial.open.is_empty() {
+        return 0;
+    }
+    let rows = trial.episode.rows();
+    ((WARM_UP * rows as f64).ceil() as usize)
+        .max(WARM_UP_ROWS)
+        .min(rows)
+}
+
+/// The gap of a model on some logs, with the residuals of each episode that count (`rows x entries`).
+#[derive(Clone, Debug)]
+pub struct Gap {
+    /// Root mean square over all readings that count; infinite where a replay diverged.
+    pub value: f64,
+    /// One an episode; empty where it diverged.
+    pub residuals: Vec<Vec<f64>>,
+}
+
+/// The gap at values of parameters.
+///
+/// # Errors
+/// When a value is not physical or the engine fails.
+pub fn gap(
+    model: &dyn Model,
+    parameters: &[Parameter],
+    theta: &[f64],
+    data: &Dataset,
+    threads: usize,
+) -> Result<Gap> {
+    let layout = model.layout();
+    let size = data
+        .trials
+        .iter()
+        .map(|t| 1 + 2 * t.open.len())
+        .max()
+        .unwrap_or(1);
+    let mut replayer = Replayer::new(model, parameters, size.max(LENGTHS.len()), threads)?;
+    let (mut sum, mut count, mut all) = (0.0, 0usize, Vec::new());
+    for trial in &data.trials {
+        let first = warm_up(trial);
+        let start = fit_start(&mut replayer, layout, data, trial, theta, first)?;
+        let found = replayer.residuals(data, trial, &[(theta, &start)])?;
+        let Some(Some(residuals)) = found.into_iter().next() else {
+            all.push(Vec::new());
+            sum = f64::INFINITY;
+            continue;
+        };
+        let counted = residuals[(first * data.entries()).min(residuals.len())..].to_vec();
+        sum += squares(&counted);
+        count += counted.iter().filter(|x| x.is_finite()).count();
+        all.push(counted);
+    }
+    Ok(Gap {
+        value: (sum / count.max(1) as f64).sqrt(),
+        residuals: all,
+    })
+}

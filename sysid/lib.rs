@@ -1,0 +1,36 @@
+//! System identification of any machine that has a model: no task, no code.
+//!
+//! A machine is its MJCF document, its unknowns are targets with ranges, its experience is logs. Two things are done
+//! with them:
+//!
+//! - [`fit`]: the unknowns are fitted to logs by least squares over open-loop replays, with the initial states of the
+//!   episodes marginalised ([`dataset`], [`start`]), and the gap on logs held out is measured ([`gap`]).
+//! - [`design`]: the motion is searched that tells the most about the unknowns ([`tells`]) and keeps all
+//!   [`limits`]; it is a [`motion`] of a few numbers, simulated in batches by [`play`].
+
+pub mod dataset;
+pub mod design;
+pub mod fit;
+pub mod gap;
+pub mod limits;
+pub mod motion;
+pub mod play;
+pub mod start;
+pub mod tells;
+
+use asid_core::{Parameter, Target};
+
+/// Targets of all parameters, in the order of a batch's columns.
+#[must_use]
+pub fn targets(parameters: &[Parameter]) -> Vec<Target> {
+    parameters.iter().flat_map(|p| p.targets.clone()).collect()
+}
+
+/// The columns of one simulation at values of the parameters, in their units.
+#[must_use]
+pub fn columns(parameters: &[Parameter], values: &[f64]) -> Vec<f64> {
+    let pairs = parameters.iter().zip(values);
+    pairs
+        .flat_map(|(p, &x)| std::iter::repeat_n(p.setting(x), p.targets.len()))
+        .collect()
+}

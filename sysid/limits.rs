@@ -1,0 +1,264 @@
+//! What a motion must keep on a real machine.
+//!
+//! Every limit is looked at in simulation, along whole trajectories: positions, speeds, forces of drives, places of bodies, contacts, and
+//! whether the machine comes to rest. A limit counts by how far it is passed in units of its own width, so that a
+//! search sees which of two motions that break something breaks it less.
+
+use std::collections::BTreeMap;
+
+use asid_core::error::{Error, Result};
+use asid_core::layout::JointKind;
+use asid_mjcf::Plant;
+
+/// Share of a joint's range that is kept free at either end: where a real machine's end stop may be.
+const END_MARGIN: f64 = 0.02;
+
+/// Share of the command's range that is kept free likewise.
+const COMMAND_MARGIN: f64 = 0.0;
+
+/// Speed (rad/s or m/s) below which a joint is at rest where nothing else is said: an arm's encoder of 12 bits at 100 Hz
+/// reads no less.
+pub const REST: f64 = 0.15;
+
+/// Limits as a user gives them, by name.
+#[derive(Clone, Debug, Default)]
+pub struct LimitRequest {
+    /// Positions of joints, rad or m.
+    pub position: BTreeMap<String, [f64; 2]>,
+    /// Speeds of joints, rad/s or m/s; under an empty name that of all others.
+    pub speed: BTreeMap<String, f64>,
+    /// Forces of drives on their joints, N or N m, by actuator; under an empty name that of all others.
+    pub force: BTreeMap<String, f64>,
+    /// Boxes that the frames of bodies stay in: low and high corner, m, in the world's frame.
+    pub boxes: BTreeMap<String, [[f64; 3]; 2]>,
+    /// Pairs of bodies that may touch.
+    pub touch: Vec<[String; 2]>,
+    /// Speed at the end, rad/s or m/s; `None` where the machine need not come to rest.
+    pub rest: Option<f64>,
+}
+
+/// A limit of a hinge or slide.
+#[derive(Clone, Debug, PartialEq)]
+pub struct JointLimit {
+    /// Name.
+    pub name: String,
+    /// Place in `qpos`.
+    pub qpos: usize,
+    /// Place in `qvel`.
+    pub dof: usize,
+    /// Range of positions, rad or m.
+    pub position: Option<[f64; 2]>,
+    /// Largest speed, rad/s or m/s.
+    pub speed: Option<f64>,
+}
+
+/// A limit of a drive.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DriveLimit {
+    /// Index of the actuator.
+    pub actuator: usize,
+    /// Largest force on the joint, N or N m.
+    pub force: f64,
+}
+
+/// A box that a body's frame stays in.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BodyBox {
+    /// Name.
+    pub name: String,
+    /// Index of the body.
+    pub body: usize,
+    /// Low and high corner, m.
+    pub corners: [[f64; 3]; 2],
+}
+
+/// Limits of a machine.
+#[derive(Clone, Debug)]
+pub struct Limits {
+    /// Hinges and slides.
+    pub joints: Vec<JointLimit>,
+    /// Drives with a limit.
+    pub drives: Vec<DriveLimit>,
+    /// Range of each actuator's command.
+    pub command: Vec<Option<[f64; 2]>>,
+    /// Boxes.
+    pub boxes: Vec<BodyBox>,
+    /// Pairs of bodies that must not touch.
+    pub apart: Vec<[usize; 2]>,
+    /// Speed at the end, rad/s or m/s.
+    pub rest: Option<f64>,
+}
+
+impl Limits {
+    /// Limits of a machine: those asked for, and the ranges that its model has.
+    ///
+    /// # Errors
+    /// When a name is unknown, or a range is upside down.
+    pub fn new(
+        plant: &Plant,
+        ranges: &dyn Fn(usize) -> Option<[f64; 2]>,
+        request: &LimitRequest,
+    ) -> Result<Self> {
+        let layout = &plant.layout;
+        for name in request
+            .position
+            .keys()
+            .chain(request.speed.keys())
+            .filter(|n| !n.is_empty())
+        {
+            layout.joint(name)?;
+        }
+        for name in request.force.keys().filter(|n| !n.is_empty()) {
+            plant.drive(name)?;
+        }
+        for (name, [low, high]) in &request.position {
+            if low >= high {
+                return Err(wrong(format!(
+                    "position of `{name}`: {low} is not below {high}"
+                )));
+            }
+        }
+        let joints = layout
+            .joints
+            .iter()
+            .enumerate()
+            .filter(|(_, j)| matches!(j.kind, JointKind::Hinge | JointKind::Slide))
+            .map(|(i, joint)| {
+                let shrink = |[low, high]: [f64; 2]| {
+                    let margin = END_MARGIN * (high - low);
+                    [low + margin, high - margin]
+                };
+                let given = request.position.get(&joint.name).copied();
+                let speed = request.speed.get(&joint.name).or(request.speed.get(""));
+                JointLimit {
+                    name: joint.name.clone(),
+                    qpos: joint.qpos,
+                    dof: joint.qvel,
+                    position: given.or_else(|| ranges(i).map(shrink)),
+                    speed: speed.copied(),
+                }
+            })
+            .collect();
+        let drives = layout.actuators.iter().enumerate().filter_map(|(i, a)| {
+            plant.drives[i]?;
+            let force = request.force.get(&a.name).or(request.force.get(""))?;
+            Some(DriveLimit {
+                actuator: i,
+                force: *force,
+            })
+        });
+        let boxes = request
+            .boxes
+            .iter()
+            .map(|(name, corners)| {
+                if (0..3).any(|k| corners[0][k] >= corners[1][k]) {
+                    return Err(wrong(format!(
+                        "box of `{name}`: its low corner is not below its high one"
+                    )));
+                }
+                Ok(BodyBox {
+                    name: name.clone(),
+                    body: layout.body(name)?,
+                    corners: *corners,
+                })
+            })
+            .collect::<Result<_>>()?;
+        let mut may_touch = Vec::new();
+        for pair in &request.touch {
+            may_touch.push([layout.body(&pair[0])?, layout.body(&pair[1])?]);
+        }
+        let command = layout.actuators.iter().map(|a| {
+            a.ctrl_range.map(|[low, high]| {
+                let margin = COMMAND_MARGIN * (high - low);
+                [low + margin, high - margin]
+            })
+        });
+        Ok(Self {
+            joints,
+            drives: drives.collect(),
+            command: command.collect(),
+            boxes,
+            apart: pairs_apart(plant, &may_touch),
+            rest: request.rest,
+        })
+    }
+}
+
+/// Pairs of bodies that can touch, each once, but for those that may.
+fn pairs_apart(plant: &Plant, may_touch: &[[usize; 2]]) -> Vec<[usize; 2]> {
+    let mut pairs: Vec<[usize; 2]> = plant
+        .contacts
+        .iter()
+        .map(|pair| {
+            let mut bodies = pair.map(|g| plant.geoms[g].body);
+            bodies.sort_unstable();
+            bodies
+        })
+        .collect();
+    pairs.sort_unstable();
+    pairs.dedup();
+    let same = |a: &[usize; 2], b: &[usize; 2]| a == b || (a[0] == b[1] && a[1] == b[0]);
+    pairs.retain(|p| !may_touch.iter().any(|m| same(m, p)));
+    pairs
+}
+
+fn wrong(message: String) -> Error {
+    Error::Config {
+        key: "limits".into(),
+        message,
+    }
+}
+
+/// By how much limits are passed, in units of their own width; all zero where all are kept.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Excess {
+    /// Sum over frames and limits, a frame's share of the motion each.
+    pub total: f64,
+    /// The worst: what it is, and by how much.
+    pub worst: Option<(String, f64)>,
+}
+
+impl Excess {
+    /// Takes in an excess in units of a limit's width, at one of `frames` frames.
+    pub fn add(&mut self, excess: f64, frames: usize, what: impl FnOnce() -> String) {
+        if excess.is_nan() || excess > 0.0 {
+            let excess = if excess.is_nan() { DIVERGED } else { excess };
+            self.total += excess / frames.max(1) as f64;
+            if self.worst.as_ref().is_none_or(|(_, w)| excess > *w) {
+                self.worst = Some((what(), excess));
+            }
+        }
+    }
+
+    /// Takes in another trajectory's.
+    pub fn join(&mut self, other: &Self) {
+        self.total += other.total;
+        if let Some((what, excess)) = &other.worst
+            && self.worst.as_ref().is_none_or(|(_, w)| excess > w)
+        {
+            self.worst = Some((what.clone(), *excess));
+        }
+    }
+
+    /// The same, with where it is so.
+    #[must_use]
+    pub fn at(&self, place: impl FnOnce() -> String) -> Self {
+        let mut excess = self.clone();
+        if let Some((what, _)) = &mut excess.worst {
+            let place = place();
+            if !place.is_empty() {
+                *what += &format!(" at {place}");
+            }
+        }
+        excess
+    }
+
+    /// Whether all limits are kept.
+    #[must_use]
+    pub fn is_none(&self) -> bool {
+        self.worst.is_none()
+    }
+}
+
+/// What a simulation that diverged counts, in widths of a limit: more than any that merely breaks one.
+pub const DIVERGED: f64 = 1e3;

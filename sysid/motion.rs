@@ -1,0 +1,206 @@
+//! Motions of a few numbers: commands over time that begin and end where the machine rests.
+//!
+//! The command of an actuator is `base + amplitude · s(t)`, with `s` a smooth curve within `[-1, 1]` that is zero, with
+//! its slope, at the begin and the end. The curve is
+//!
+//! - a cubic B-spline of some knots ([`Shape::Spline`]), or
+//! - a finite Fourier series under a window ([`Shape::Fourier`]; J. Swevers et al., "Optimal robot excitation and
+//!   identification", IEEE Trans. Robotics and Automation 13, 1997).
+//!
+//! The coefficients, each within `[-1, 1]`, are what a search moves.
+
+use asid_core::rng::Rng;
+use rand::Rng as _;
+
+/// How a curve is made of coefficients.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Shape {
+    /// Heights of this many cubic B-splines, evenly over the motion.
+    Spline(usize),
+    /// Cosine and sine parts of this many harmonics of the motion's length.
+    Fourier(usize),
+}
+
+/// Share of a Fourier motion over which it is faded in, and out.
+const FADE: f64 = 0.15;
+
+/// A family of motions.
+#[derive(Clone, Debug)]
+pub struct Family {
+    /// The curve.
+    pub shape: Shape,
+    /// Command of each actuator at rest.
+    pub base: Vec<f64>,
+    /// Largest distance from it; 0 for an actuator that stays.
+    pub amplitude: Vec<f64>,
+    /// Range of each command.
+    pub range: Vec<Option<[f64; 2]>>,
+    /// Frames of the motion, without the rest at its end.
+    pub frames: usize,
+    /// Frames at its end in which the commands rest.
+    pub rest: usize,
+    /// Period of a frame, s.
+    pub period: f64,
+}
+
+impl Family {
+    /// Coefficients of one actuator.
+    fn each(&self) -> usize {
+        match self.shape {
+            Shape::Spline(knots) => knots,
+            Shape::Fourier(harmonics) => 2 * harmonics,
+        }
+    }
+
+    /// Actuators that move.
+    fn moving(&self) -> Vec<usize> {
+        (0..self.base.len())
+            .filter(|&a| self.amplitude[a] > 0.0)
+            .collect()
+    }
+
+    /// Number of coefficients.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.each() * self.moving().len()
+    }
+
+    /// True where nothing moves.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Frames with the rest.
+    #[must_use]
+    pub fn all_frames(&self) -> usize {
+        self.frames + self.rest
+    }
+
+    /// Commands, `all_frames x nu`, scaled by `scale`.
+    #[must_use]
+    pub fn commands(&self, coefficients: &[f64], scale: f64) -> Vec<f64> {
+        let nu = self.base.len();
+        let mut out = self.base.repeat(self.all_frames());
+        for (own, a) in coefficients
+            .chunks_exact(self.each().max(1))
+            .zip(self.moving())
+        {
+            for k in 0..self.frames {
+                let s = self.curve(own, k as f64 / self.frames as f64);
+                let value = self.base[a] + scale * self.amplitude[a] * s;
+                out[k * nu + a] = self.range[a].map_or(value, |[low, high]| value.clamp(low, high));
+            }
+        }
+        out
+    }
+
+    /// The curve at a share of the motion, within `[-1, 1]`.
+    fn curve(&self, coefficients: &[f64], at: f64) -> f64 {
+        match self.shape {
+            Shape::Spline(knots) => {
+                // Splines whose support lies within the motion: the curve and its slope vanish at the ends.
+                let x = at * (knots + 3) as f64;
+                let sum: f64 = coefficients
+                    .iter()
+                    .enumerate()
+                    .map(|(k, c)| c * cubic(x - k as f64))
+                    .sum();
+                // Where neighbours add up a curve of ones has the height one.
+                sum.clamp(-1.0, 1.0)
+            }
+            Shape::Fourier(harmonics) => {
+                let sum: f64 = (0..harmonics)
+                    .map(|k| {
+                        let turn = std::f64::consts::TAU * (k + 1) as f64 * at;
+                        coefficients[2 * k] * turn.cos() + coefficients[2 * k + 1] * turn.sin()
+                    })
+                    .sum();
+                let edge = (at.min(1.0 - at) / FADE).clamp(0.0, 1.0);
+                let window = edge * edge * (3.0 - 2.0 * edge);
+                (window * sum / (harmonics as f64).sqrt()).clamp(-1.0, 1.0)
+            }
+        }
+    }
+
+    /// Coefficients that are drawn.
+    pub fn random(&self, rng: &mut Rng) -> Vec<f64> {
+        (0..self.len())
+            .map(|_| rng.random_range(-1.0..1.0))
+            .collect()
+    }
+
+    /// A multisine of equal amplitudes with Schroeder's phases, which keep its peaks low, another order of harmonics for
+    /// each actuator (M. Schroeder, IEEE Trans. Information Theory 16, 1970). For a Fourier family.
+    #[must_use]
+    pub fn multisine(&self) -> Vec<f64> {
+        let harmonics = self.each() / 2;
+        let mut all = Vec::with_capacity(self.len());
+        for i in 0..self.moving().len() {
+            for k in 0..harmonics {
+                let order = ((k + i) % harmonics.max(1) + 1) as f64;
+                let phase = -std::f64::consts::PI * order * (order - 1.0) / harmonics as f64;
+                all.extend([phase.cos(), phase.sin()]);
+            }
+        }
+        all
+    }
+}
+
+/// The cubic B-spline with support `[0, 4]`, scaled so that it peaks at one.
+fn cubic(x: f64) -> f64 {
+    let part = |x: f64| x.max(0.0).powi(3);
+    let value =
+        part(x) - 4.0 * part(x - 1.0) + 6.0 * part(x - 2.0) - 4.0 * part(x - 3.0) + part(x - 4.0);
+    if (0.0..=4.0).contains(&x) {
+        value / 4.0
+    } else {
+        0.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use asid_core::Streams;
+
+    fn family(shape: Shape) -> Family {
+        Family {
+            shape,
+            base: vec![0.5, 2.0],
+            amplitude: vec![1.0, 0.0],
+            range: vec![Some([-0.2, 1.4]), None],
+            frames: 200,
+            rest: 10,
+            period: 0.01,
+        }
+    }
+
+    #[test]
+    fn a_spline_is_smooth_and_peaks_at_one() {
+        assert!((cubic(2.0) - 1.0).abs() < 1e-12);
+        assert!(cubic(0.0).abs() < 1e-12 && cubic(4.0).abs() < 1e-12);
+        // Continuous slope at a knot.
+        let slope = |x: f64| (cubic(x + 1e-6) - cubic(x - 1e-6)) / 2e-6;
+        assert!((slope(1.0 - 1e-5) - slope(1.0 + 1e-5)).abs() < 1e-3);
+    }
+
+    #[test]
+    fn motions_begin_and_end_at_rest_and_keep_the_range() {
+        let mut rng = Streams::new(1).stream("t");
+        for shape in [Shape::Spline(8), Shape::Fourier(5)] {
+            let family = family(shape);
+            let commands = family.commands(&family.random(&mut rng), 1.0);
+            assert_eq!(commands.len(), 2 * 210);
+            for row in commands.chunks_exact(2) {
+                assert!((-0.2..=1.4).contains(&row[0]));
+                assert_eq!(row[1], 2.0);
+            }
+            let at = |k: usize| commands[2 * k];
+            // The slope at either end vanishes with the square of the time.
+            assert!((at(0) - 0.5).abs() < 1e-9 && (at(1) - 0.5).abs() < 2e-2);
+            assert!((at(199) - 0.5).abs() < 2e-2);
+            assert!((200..210).all(|k| at(k) == 0.5));
+        }
+    }
+}

@@ -1,0 +1,162 @@
+//! Where an episode begins: as its log says, as its first readings show, else as the scene has it.
+
+use asid_core::Episode;
+use asid_core::episode::InitialState;
+use asid_core::layout::{JointKind, Layout};
+use asid_core::problem::home;
+use asid_core::signal::unit_quaternion;
+use asid_mjcf::Plant;
+use asid_mjcf::plant::Reads;
+use nalgebra::{UnitQuaternion, Vector3};
+
+/// Rows over which a first velocity is taken: enough to outweigh the noise of two readings, few enough that a
+/// motion does not turn.
+const ROWS: usize = 6;
+
+/// The start of an episode, and its coordinates (`nv` positions, then `nv` velocities) that the log leaves open.
+#[must_use]
+pub fn start_of(plant: &Plant, episode: &Episode) -> (InitialState, Vec<usize>) {
+    let layout = &plant.layout;
+    let (qpos, qvel) = home(layout);
+    let mut state = InitialState { qpos, qvel };
+    first_readings(plant, episode, &mut state);
+    let mut open: Vec<usize> = (0..2 * layout.nv).collect();
+    if let Some(given) = &episode.initial {
+        let fill = |to: &mut [f64], from: &[f64]| {
+            for (x, y) in to.iter_mut().zip(from).filter(|(_, y)| y.is_finite()) {
+                *x = *y;
+            }
+        };
+        fill(&mut state.qpos, &given.qpos);
+        fill(&mut state.qvel, &given.qvel);
+        open = open_coordinates(layout, given);
+    }
+    for joint in &layout.joints {
+        if let Some(at) = quaternion(joint) {
+            let turn = unit_quaternion(&state.qpos[at..at + 4]);
+            state.qpos[at..at + 4].copy_from_slice(&[turn.w, turn.i, turn.j, turn.k]);
+        }
+    }
+    (state, open)
+}
+
+/// Where the quaternion of a joint begins in `qpos`.
+fn quaternion(joint: &asid_core::layout::Joint) -> Option<usize> {
+    match joint.kind {
+        JointKind::Free => Some(joint.qpos + 3),
+        JointKind::Ball => Some(joint.qpos),
+        JointKind::Hinge | JointKind::Slide => None,
+    }
+}
+
+/// Coordinates that a state leaves open. A quaternion with a missing component leaves its whole turn open.
+fn open_coordinates(layout: &Layout, given: &InitialState) -> Vec<usize> {
+    let mut open = Vec::new();
+    for joint in &layout.joints {
+        let missing = |i: usize| !given.qpos[i].is_finite();
+        let places = match joint.kind {
+            JointKind::Free => 3,
+            JointKind::Ball => 0,
+            JointKind::Hinge | JointKind::Slide => 1,
+        };
+        open.extend(
+            (0..places)
+                .filter(|&k| missing(joint.qpos + k))
+                .map(|k| joint.qvel + k),
+        );
+        if let Some(at) = quaternion(joint)
+            && (at..at + 4).any(missing)
+        {
+            open.extend((0..3).map(|k| joint.qvel + places + k));
+        }
+    }
+    let velocities = given.qvel.iter().enumerate();
+    open.extend(
+        velocities
+            .filter(|(_, x)| !x.is_finite())
+            .map(|(i, _)| layout.nv + i),
+    );
+    open
+}
+
+/// Sets what sensors of joints and of free bodies show in the first rows.
+fn first_readings(plant: &Plant, episode: &Episode, state: &mut InitialState) {
+    let layout = &plant.layout;
+    for (i, sensor) in layout.sensors.iter().enumerate() {
+        let Some(range) = episode.channel(&sensor.name) else {
+            continue;
+        };
+        let whole = |k: &usize| {
+            episode.reading(*k)[range.clone()]
+                .iter()
+                .all(|x| x.is_finite())
+        };
+        let rows: Vec<usize> = (0..episode.rows()).filter(whole).take(ROWS).collect();
+        let (Some(&first), Some(&last)) = (rows.first(), rows.last()) else {
+            continue;
+        };
+        let at = |k: usize| &episode.reading(k)[range.clone()];
+        let seconds = (episode.time[last] - episode.time[first]).max(f64::MIN_POSITIVE);
+        let rate = |k: usize| (at(last)[k] - at(first)[k]) / seconds;
+        match (plant.sensors[i], &*sensor.kind) {
+            (Reads::Joint(j), "jointpos") => {
+                state.qpos[layout.joints[j].qpos] = at(first)[0];
+                state.qvel[layout.joints[j].qvel] = rate(0);
+            }
+            (Reads::Body(b), kind @ ("framepos" | "framequat")) => {
+                let Some(joint) = plant.free_joint(b).map(|j| &layout.joints[j]) else {
+                    continue;
+                };
+                if kind == "framepos" {
+                    state.qpos[joint.qpos..joint.qpos + 3].copy_from_slice(at(first));
+                    (0..3).for_each(|k| state.qvel[joint.qvel + k] = rate(k));
+                } else {
+                    state.qpos[joint.qpos + 3..joint.qpos + 7].copy_from_slice(at(first));
+                }
+            }
+            _ => {}
+        }
+    }
+    // A speed that is measured is better than a difference.
+    for (i, sensor) in layout.sensors.iter().enumerate() {
+        if let (Reads::Joint(j), "jointvel") = (plant.sensors[i], &*sensor.kind)
+            && let Some(range) = episode.channel(&sensor.name)
+            && let Some(speed) = (0..episode.rows())
+                .map(|k| episode.reading(k)[range.start])
+                .find(|x| x.is_finite())
+        {
+            state.qvel[layout.joints[j].qvel] = speed;
+        }
+    }
+}
+
+/// The state moved along a coordinate: of the `nv` positions (`< nv`), then of the `nv` velocities. Orientations turn
+/// about the body's own axes.
+#[must_use]
+pub fn moved(layout: &Layout, state: &InitialState, coordinate: usize, by: f64) -> InitialState {
+    let mut state = state.clone();
+    if coordinate >= layout.nv {
+        state.qvel[coordinate - layout.nv] += by;
+        return state;
+    }
+    let holds =
+        |j: &&asid_core::layout::Joint| (j.qvel..j.qvel + j.kind.qvel_len()).contains(&coordinate);
+    let Some(joint) = layout.joints.iter().find(holds) else {
+        return state;
+    };
+    let local = coordinate - joint.qvel;
+    let axis = match joint.kind {
+        JointKind::Hinge | JointKind::Slide => None,
+        JointKind::Free => local.checked_sub(3),
+        JointKind::Ball => Some(local),
+    };
+    match (axis, quaternion(joint)) {
+        (Some(axis), Some(at)) => {
+            let old = unit_quaternion(&state.qpos[at..at + 4]);
+            let new = old * UnitQuaternion::from_scaled_axis(Vector3::ith(axis, by));
+            state.qpos[at..at + 4].copy_from_slice(&[new.w, new.i, new.j, new.k]);
+        }
+        _ => state.qpos[joint.qpos + local] += by,
+    }
+    state
+}

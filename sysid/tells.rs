@@ -1,0 +1,256 @@
+//! What readings tell about the unknowns: Fisher information, in units of the prior.
+//!
+//! For Gaussian noise the information of an episode is `I = Σ J^T S^-1 J` over its readings, `J` their derivative in the
+//! unknowns along the whole trajectory (the perturbed machine is played from the begin under the same commands). Here `J`
+//! is whitened by the noise and taken in prior deviations of the unknowns, so that the prior's own information is the identity.
+//! Nuisance entries stand behind the unknowns: they are estimated along, and projected out by taking the unknowns' block of
+//! the inverse.
+
+use asid_algorithms::fisher::{Objective, inverse_above_prior};
+use asid_core::episode::InitialState;
+use asid_core::error::Result;
+use asid_core::posterior::Direction;
+use asid_core::{Model, Parameter};
+use nalgebra::DMatrix;
+
+use crate::dataset::{Dataset, Replayer};
+use crate::fit::marginal;
+use crate::play::{Played, Player};
+
+/// Half step of the differences, in prior deviations: straight for smooth machines, and far above rounding.
+const STEP: f64 = 0.02;
+
+/// Information along a direction below which the readings do not see it: less than a uniform prior's own, whose variance
+/// is a twelfth of its range squared.
+const UNSEEN: f64 = 1.0 / 12.0;
+
+/// Share of a direction that an unknown has to be named in it.
+const NAMED: f64 = 0.2;
+
+/// Information about unknowns and nuisance entries, without the prior.
+#[derive(Clone, Debug)]
+pub struct Told {
+    /// `n x n`, the unknowns first.
+    pub matrix: DMatrix<f64>,
+    /// Number of unknowns that are sought.
+    pub sought: usize,
+}
+
+impl Told {
+    /// Nothing about `sought` unknowns of `n` entries.
+    #[must_use]
+    pub fn nothing(sought: usize, n: usize) -> Self {
+        Self {
+            matrix: DMatrix::zeros(n, n),
+            sought,
+        }
+    }
+
+    /// Adds whitened derivatives, one column an entry. Readings that are missing tell nothing.
+    pub fn add(&mut self, columns: &[Vec<f64>]) {
+        let n = columns.len();
+        let rows = columns.first().map_or(0, Vec::len);
+        for k in 0..rows {
+            if columns.iter().any(|c| !c[k].is_finite()) {
+                continue;
+            }
+            for i in 0..n {
+                for j in 0..n {
+                    self.matrix[(i, j)] += columns[i][k] * columns[j][k];
+                }
+            }
+        }
+    }
+
+    /// This, `times` times, and another one.
+    #[must_use]
+    pub fn and(&self, times: f64, other: &Self) -> Self {
+        Self {
+            matrix: &self.matrix * times + &other.matrix,
+            sought: self.sought,
+        }
+    }
+
+    /// Covariance of the unknowns that are sought, with the prior, in prior deviations.
+    #[must_use]
+    pub fn covariance(&self) -> DMatrix<f64> {
+        let n = self.matrix.nrows();
+        let all = inverse_above_prior(&(&self.matrix + DMatrix::identity(n, n)));
+        all.view((0, 0), (self.sought, self.sought)).into_owned()
+    }
+
+    /// Expected standard deviation of each unknown, in prior deviations.
+    #[must_use]
+    pub fn deviations(&self) -> Vec<f64> {
+        let covariance = self.covariance();
+        (0..self.sought)
+            .map(|i| covariance[(i, i)].max(0.0).sqrt())
+            .collect()
+    }
+
+    /// What a search makes small: the trace of the covariance, the log of its determinant, or the negative trace of the
+    /// information.
+    #[must_use]
+    pub fn cost(&self, objective: Objective) -> f64 {
+        match objective {
+            Objective::AOptimal => self.covariance().trace(),
+            Objective::DOptimal => {
+                let eigen = self.covariance().symmetric_eigen();
+                eigen
+                    .eigenvalues
+                    .iter()
+                    .map(|v| v.max(f64::MIN_POSITIVE).ln())
+                    .sum()
+            }
+            Objective::Trace => -(0..self.sought).map(|i| self.matrix[(i, i)]).sum::<f64>(),
+        }
+    }
+
+    /// Combinations of unknowns that the readings do not see, by name.
+    #[must_use]
+    pub fn unseen(&self, names: &[String]) -> Vec<Direction> {
+        let covariance = self.covariance();
+        let eigen = covariance.symmetric_eigen();
+        let mut found = Vec::new();
+        for (k, variance) in eigen.eigenvalues.iter().enumerate() {
+            // The prior's own information is one.
+            if 1.0 / variance.max(f64::MIN_POSITIVE) - 1.0 >= UNSEEN {
+                continue;
+            }
+            let column = eigen.eigenvectors.column(k);
+            let sign = column[column.iamax()].signum();
+            let weights = names
+                .iter()
+                .zip(column.iter())
+                .filter(|(_, w)| w.abs() >= NAMED);
+            found.push(Direction {
+                weights: weights.map(|(n, w)| (n.clone(), sign * w)).collect(),
+            });
+        }
+        found
+    }
+}
+
+/// The points of central differences about `values`: the middle, then up and down in each entry; and the distances
+/// between up and down, in prior deviations.
+#[must_use]
+pub fn differences(parameters: &[Parameter], values: &[f64]) -> (Vec<Vec<f64>>, Vec<f64>) {
+    let bound = Parameter::scaled_bound();
+    let mut points = vec![values.to_vec()];
+    let mut widths = Vec::with_capacity(parameters.len());
+    for (i, parameter) in parameters.iter().enumerate() {
+        let z = parameter.to_scaled(values[i]);
+        let ends = [(z + STEP).min(bound), (z - STEP).max(-bound)];
+        widths.push(ends[0] - ends[1]);
+        for end in ends {
+            let mut point = values.to_vec();
+            point[i] = parameter.from_scaled(end);
+            points.push(point);
+        }
+    }
+    (points, widths)
+}
+
+/// What a motion tells, from its plays at the points of [`differences`].
+#[must_use]
+pub fn of_plays(player: &Player<'_>, plays: &[Played], widths: &[f64], sought: usize) -> Told {
+    let mut told = Told::nothing(sought, widths.len());
+    if plays.iter().any(|p| p.readings.is_empty()) {
+        return told;
+    }
+    let (width, entries) = (player.width(), player.differences.whitened_len());
+    let columns: Vec<Vec<f64>> = widths
+        .iter()
+        .enumerate()
+        .map(|(i, h)| {
+            let (up, down) = (&plays[1 + 2 * i].readings, &plays[2 + 2 * i].readings);
+            let mut out = vec![0.0; up.len() / width.max(1) * entries];
+            let rows = up.chunks_exact(width).zip(down.chunks_exact(width));
+            for ((up, down), row) in rows.zip(out.chunks_exact_mut(entries)) {
+                player.differences.difference(up, down, row);
+                row.iter_mut().for_each(|x| *x /= h);
+            }
+            out
+        })
+        .collect();
+    told.add(&columns);
+    told
+}
+
+/// What logs tell, with the starts that they leave open marginalised.
+///
+/// # Errors
+/// When a value is not physical or the engine fails.
+pub fn of_logs(
+    model: &dyn Model,
+    parameters: &[Parameter],
+    (values, sought): (&[f64], usize),
+    data: &Dataset,
+    threads: usize,
+) -> Result<Told> {
+    let layout = model.layout();
+    let open = data.trials.iter().map(|t| t.open.len()).max().unwrap_or(0);
+    let (points, widths) = differences(parameters, values);
+    let mut replayer = Replayer::new(model, parameters, points.len().max(1 + 2 * open), threads)?;
+    let mut told = Told::nothing(sought, parameters.len());
+    for trial in &data.trials {
+        let marginal = marginal(&mut replayer, layout, data, trial, values)?;
+        let jobs: Vec<(&[f64], &InitialState)> =
+            points.iter().map(|p| (&p[..], &marginal.start)).collect();
+        let found = replayer.residuals(data, trial, &jobs)?;
+        let rows: Option<Vec<Vec<f64>>> = found
+            .into_iter()
+            .map(|r| r.map(|r| marginal.apply(&r)))
+            .collect();
+        let Some(rows) = rows else { continue };
+        let columns: Vec<Vec<f64>> = widths
+            .iter()
+            .enumerate()
+            .map(|(i, h)| {
+                let pairs = rows[1 + 2 * i].iter().zip(&rows[2 + 2 * i]);
+                pairs.map(|(up, down)| (down - up) / h).collect()
+            })
+            .collect();
+        told.add(&columns);
+    }
+    Ok(told)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn told(sought: usize, matrix: &[f64]) -> Told {
+        let n = (matrix.len() as f64).sqrt() as usize;
+        Told {
+            matrix: DMatrix::from_row_slice(n, n, matrix),
+            sought,
+        }
+    }
+
+    #[test]
+    fn nuisance_is_projected_out() {
+        // An unknown that looks like the nuisance: only its difference from it tells, by Schur's complement.
+        let found = told(1, &[100.0, 100.0, 100.0, 100.0]);
+        let expected = 1.0 / (101.0 - 100.0 * 100.0 / 101.0);
+        assert!((found.covariance()[(0, 0)] - expected).abs() < 1e-9);
+        assert!((told(1, &[100.0]).deviations()[0] - (1.0_f64 / 101.0).sqrt()).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_sum_that_is_seen_leaves_the_difference_unseen() {
+        let names = ["a", "b"].map(String::from);
+        let unseen = told(2, &[50.0, 50.0, 50.0, 50.0]).unseen(&names);
+        assert_eq!(unseen.len(), 1);
+        let weights: Vec<f64> = unseen[0].weights.iter().map(|w| w.1).collect();
+        assert!((weights[0] + weights[1]).abs() < 1e-9);
+        assert!(told(2, &[50.0, 0.0, 0.0, 50.0]).unseen(&names).is_empty());
+    }
+
+    #[test]
+    fn repeats_add_information() {
+        let once = told(1, &[3.0]);
+        let nothing = Told::nothing(1, 1);
+        assert!((once.and(5.0, &nothing).deviations()[0] - 0.25).abs() < 1e-12);
+    }
+}
