@@ -41,4 +41,5 @@ pub mod trajectory;
 pub mod verdict;
 pub mod whitening;
 pub mod windows;
+pub mod wiring;
 mod work;

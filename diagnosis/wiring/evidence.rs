@@ -1,0 +1,78 @@
+//! Evidence for a view of the columns against the one given.
+//!
+//! A wrong view is nonsense to the model: it predicts the other way, another joint, or a motion 57 times too large. An effect that
+//! the model lacks leaves a prediction that is a little off. Both shrink when something is fitted, so that significance
+//! against the noise says nothing here: what counts is by which factor misses shrink, in units of the motion that is to be
+//! predicted. The scale of that factor is set where wiring is right: on the training half of `asid withheld`, whose worlds
+//! have every effect of the catalogue up to a hundred floors of the noise.
+
+use super::windows::Misses;
+
+/// When a fault of wiring is named.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// Misses below this share of the motion are those of a right wiring, and shrinking them further is no evidence. Larger: fewer
+    /// faults are found, and fewer effects are taken for them.
+    pub good: f64,
+    /// Share of the motion that a column misses from which on its wiring is in question. Smaller: more is tried.
+    pub suspect: f64,
+    /// Logarithm of the factor by which misses shrink, summed over columns, at which a fault is as likely as not.
+    pub even: f64,
+    /// The change of that logarithm that multiplies the odds by e.
+    pub scale: f64,
+    /// Additional logarithm for a clock, which delays of drives and sensors resemble.
+    pub clock: f64,
+    /// Additional logarithm for commands: their faults are rarer than those of sensors.
+    pub command: f64,
+    /// Smallest offset that is wiring, in deviations of the column: smaller ones are the effect `sensor-bias`.
+    pub offset: f64,
+    /// Smallest delay that is a clock's, s: smaller ones are effects.
+    pub delay: f64,
+    /// Probability from which on a fault is named.
+    pub named: f64,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            good: 0.3,
+            suspect: 0.25,
+            even: 0.8,
+            scale: 0.1,
+            clock: 0.0,
+            command: 0.5,
+            offset: 0.4,
+            delay: 0.02,
+            named: 0.5,
+        }
+    }
+}
+
+impl Settings {
+    /// Logarithm of the factor by which misses shrink from one view to another, summed over columns: in windows from states
+    /// read off the log, and from given starts.
+    #[must_use]
+    pub fn shrinkage(&self, from: &Misses, to: &Misses) -> f64 {
+        let of = |from: &[f64], to: &[f64]| -> f64 {
+            let pairs = from.iter().zip(to);
+            let ratio = |(a, b): (&f64, &f64)| ((a + self.good) / (b + self.good)).ln();
+            pairs.map(ratio).sum()
+        };
+        of(&from.miss, &to.miss) + of(&from.start_miss, &to.start_miss)
+    }
+
+    /// Probability of a fault that shrinks misses by a factor with this logarithm, beyond `more`.
+    #[must_use]
+    pub fn probability(&self, shrinkage: f64, more: f64) -> f64 {
+        1.0 / (1.0 + (-(shrinkage - self.even - more) / self.scale).exp())
+    }
+
+    /// Columns whose wiring is in question.
+    #[must_use]
+    pub fn suspects(&self, misses: &Misses) -> Vec<bool> {
+        let pairs = misses.miss.iter().zip(&misses.start_miss);
+        pairs
+            .map(|(a, b)| *a > self.suspect || *b > self.suspect)
+            .collect()
+    }
+}
