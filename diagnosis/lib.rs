@@ -23,6 +23,7 @@ pub mod machine;
 pub mod noise;
 mod normal;
 pub mod nuisance;
+pub mod outliers;
 pub mod predict;
 pub mod prepare;
 pub mod record;

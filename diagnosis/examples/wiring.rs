@@ -118,7 +118,14 @@ fn look(
         .collect();
     let verdict = if right { "ok" } else { "MISS" };
     let put = spoilt.map_or_else(String::new, |s| format!("{} {:?} {:.4}", s.fault, s.columns, s.size));
-    println!("{verdict} {seconds:.2}s {what} | {put} -> {}", found.join("; "));
+    let nearest = mended.nearest.map_or_else(String::new, |n| {
+        format!("nearest {} {:?} {:.2}", n.fault, n.columns, n.shrinkage)
+    });
+    println!(
+        "{verdict} {seconds:.2}s {what} | {put} -> {} {:.2?} {nearest}",
+        found.join("; "),
+        mended.shrinkage
+    );
     Ok(())
 }
 

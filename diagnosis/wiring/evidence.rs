@@ -14,8 +14,11 @@ pub struct Settings {
     /// Misses below this share of the motion are those of a right wiring, and shrinking them further is no evidence. Larger: fewer
     /// faults are found, and fewer effects are taken for them.
     pub good: f64,
-    /// Share of the motion that a column misses from which on its wiring is in question. Smaller: more is tried.
+    /// Share of the motion that a column misses from which on its zero and its clock are in question. Smaller: more is tried.
     pub suspect: f64,
+    /// Share of the motion that a column misses from which on its sign, unit and name are in question: a wrong one misses
+    /// about twice the motion. Smaller: more is tried.
+    pub nonsense: f64,
     /// Logarithm of the factor by which misses shrink, summed over columns, at which a fault is as likely as not.
     pub even: f64,
     /// The change of that logarithm that multiplies the odds by e.
@@ -37,6 +40,7 @@ impl Default for Settings {
         Self {
             good: 0.3,
             suspect: 0.25,
+            nonsense: 0.5,
             even: 0.8,
             scale: 0.1,
             clock: 0.0,
@@ -53,12 +57,15 @@ impl Settings {
     /// read off the log, and from given starts.
     #[must_use]
     pub fn shrinkage(&self, from: &Misses, to: &Misses) -> f64 {
-        let of = |from: &[f64], to: &[f64]| -> f64 {
-            let pairs = from.iter().zip(to);
-            let ratio = |(a, b): (&f64, &f64)| ((a + self.good) / (b + self.good)).ln();
-            pairs.map(ratio).sum()
-        };
-        of(&from.miss, &to.miss) + of(&from.start_miss, &to.start_miss)
+        self.logarithm(&from.miss, &to.miss) + self.logarithm(&from.start_miss, &to.start_miss)
+    }
+
+    /// Logarithm of the factor by which some misses shrink, summed over columns.
+    #[must_use]
+    pub fn logarithm(&self, from: &[f64], to: &[f64]) -> f64 {
+        let pairs = from.iter().zip(to);
+        let ratio = |(a, b): (&f64, &f64)| ((a + self.good) / (b + self.good)).ln();
+        pairs.map(ratio).sum()
     }
 
     /// Probability of a fault that shrinks misses by a factor with this logarithm, beyond `more`.
@@ -67,12 +74,10 @@ impl Settings {
         1.0 / (1.0 + (-(shrinkage - self.even - more) / self.scale).exp())
     }
 
-    /// Columns whose wiring is in question.
+    /// Columns that miss more than a share of the motion.
     #[must_use]
-    pub fn suspects(&self, misses: &Misses) -> Vec<bool> {
+    pub fn missed(misses: &Misses, share: f64) -> Vec<bool> {
         let pairs = misses.miss.iter().zip(&misses.start_miss);
-        pairs
-            .map(|(a, b)| *a > self.suspect || *b > self.suspect)
-            .collect()
+        pairs.map(|(a, b)| a.max(*b) > share).collect()
     }
 }

@@ -12,7 +12,7 @@ pub const LATEST: f64 = 0.2;
 /// Step of the delays that are tried, s.
 const DELAY_STEP: f64 = 0.02;
 /// Earliest: stamps of commands may be late as well, s.
-const EARLIEST: f64 = -0.06;
+pub const EARLIEST: f64 = -0.06;
 
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 
@@ -56,6 +56,8 @@ pub struct Quantity {
     pub command: bool,
     /// Place in a row of readings or commands.
     pub place: usize,
+    /// Joint that it reads or drives, where it is one's.
+    pub joint: Option<usize>,
     /// What it is, so that columns of the same kind can be swapped.
     pub kind: String,
     /// Units that it may be recorded in, with the factor that brings each to the model's unit.
@@ -129,6 +131,10 @@ pub fn quantities(plant: &Plant, sensors: &[String]) -> Vec<Quantity> {
                 whole: name.clone(),
                 command: false,
                 place: place + i,
+                joint: match plant.sensors[index] {
+                    Reads::Joint(j) => Some(j),
+                    _ => None,
+                },
                 kind,
                 units: if sensor.len == 4 { Vec::new() } else { units(si) },
             });
@@ -148,6 +154,7 @@ pub fn quantities(plant: &Plant, sensors: &[String]) -> Vec<Quantity> {
             name,
             command: true,
             place: a,
+            joint: plant.drives[a].map(|d| d.joint),
             kind: format!("command {}", si.unwrap_or_default()),
             units: si.map_or_else(Vec::new, units),
         });
@@ -177,7 +184,7 @@ pub fn with(view: &View, quantity: &Quantity, of: ColumnView) -> View {
     view
 }
 
-/// Hypotheses about single columns and pairs of them, of which one at least is among `suspects`; clocks apart.
+/// Hypotheses about signs, units and names of columns of which one at least is among `suspects`.
 #[must_use]
 pub fn of_columns(all: &[Quantity], view: &View, suspects: &[bool]) -> Vec<Hypothesis> {
     let mut found = Vec::new();
@@ -192,11 +199,19 @@ pub fn of_columns(all: &[Quantity], view: &View, suspects: &[bool]) -> Vec<Hypot
                 });
             };
             one(Fault::Sign, own.times(-1.0));
-            for (_, factor) in &a.units {
-                one(Fault::Unit, own.times(*factor));
+            // The entries of a vector are in one unit.
+            let vector: Vec<usize> = (0..all.len()).filter(|&j| all[j].whole == a.whole).collect();
+            for (_, factor) in a.units.iter().filter(|_| vector[0] == i) {
+                let scaled = vector.iter().fold(view.clone(), |view, &j| {
+                    let own = view_of(&view, &all[j]);
+                    with(&view, &all[j], own.times(*factor))
+                });
+                found.push(Hypothesis {
+                    fault: Fault::Unit,
+                    quantities: vector.clone(),
+                    view: scaled,
+                });
             }
-            // Its size is fitted.
-            one(Fault::Offset, own);
         }
         for (j, b) in all.iter().enumerate().skip(i + 1) {
             if a.kind == b.kind && (suspects[i] || suspects[j]) {

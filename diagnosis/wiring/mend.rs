@@ -10,9 +10,9 @@ use crate::study::Study;
 use super::evidence::Settings;
 use super::hypotheses::{Fault, Quantity, quantities, view_of};
 use super::record::Recorded;
-use super::search::search;
+use super::search::{Outcome, Search};
 use super::view::{View, mapping};
-use super::windows::Windows;
+use super::windows::{FEW, WINDOWS, Windows};
 
 /// A study after its wiring was looked at.
 pub struct Mended {
@@ -20,6 +20,21 @@ pub struct Mended {
     pub study: Study,
     /// What was found.
     pub wiring: Vec<WiringResult>,
+    /// By which factor, as a logarithm, each shrinks what predictions miss, summed over columns.
+    pub shrinkage: Vec<f64>,
+    /// The fault nearest to being named.
+    pub nearest: Option<Nearest>,
+}
+
+/// A fault that is not named.
+#[derive(Clone, Debug)]
+pub struct Nearest {
+    /// Kind.
+    pub fault: &'static str,
+    /// Columns.
+    pub columns: Vec<String>,
+    /// As [`Mended::shrinkage`].
+    pub shrinkage: f64,
 }
 
 /// Sensors that some of the logs read, in the scene's order.
@@ -42,6 +57,8 @@ pub fn mend(study: &Study, machine: &Machine, settings: &Settings) -> Result<Men
     let unchanged = || Mended {
         study: study.clone(),
         wiring: Vec::new(),
+        shrinkage: Vec::new(),
+        nearest: None,
     };
     let layout = &machine.plant.layout;
     let sensors = logged(study, machine);
@@ -50,13 +67,29 @@ pub fn mend(study: &Study, machine: &Machine, settings: &Settings) -> Result<Men
         .iter()
         .map(|(_, e)| Recorded::of(layout, &sensors, e))
         .collect::<Result<Vec<_>>>()?;
-    let Some(mut windows) = Windows::new(machine, &record, &sensors)? else {
+    let windows = |count| Windows::new(machine, &record, &sensors, count);
+    let (Some(few), Some(many)) = (windows(FEW)?, windows(WINDOWS)?) else {
         return Ok(unchanged());
     };
     let all = quantities(&machine.plant, &sensors);
-    let (found, view) = search(&mut windows, &record, &all, settings, layout.nu())?;
+    let search = Search {
+        few,
+        all: many,
+        record: &record,
+        quantities: &all,
+        settings,
+    };
+    let Outcome { found, view, next } = search.run()?;
+    let nearest = next.map(|n| Nearest {
+        fault: n.fault.name(),
+        columns: n.quantities.iter().map(|&q| all[q].name.clone()).collect(),
+        shrinkage: n.shrinkage,
+    });
     if found.is_empty() {
-        return Ok(unchanged());
+        return Ok(Mended {
+            nearest,
+            ..unchanged()
+        });
     }
     let mappings = mappings(&all, &view);
     let remapped = |logs: &[(String, Episode)]| -> Result<Vec<(String, Episode)>> {
@@ -89,6 +122,8 @@ pub fn mend(study: &Study, machine: &Machine, settings: &Settings) -> Result<Men
     Ok(Mended {
         study: mended,
         wiring,
+        shrinkage: found.iter().map(|f| f.shrinkage).collect(),
+        nearest,
     })
 }
 

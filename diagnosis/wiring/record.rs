@@ -68,6 +68,15 @@ impl Series {
         Some((fit[0], fit[1] / scale))
     }
 
+    /// Readings of some series as one, whose times mean nothing.
+    pub fn joined<'s>(all: impl Iterator<Item = &'s Self>) -> Self {
+        let value = all.flat_map(|s| s.value.iter().copied()).collect();
+        Self {
+            time: Vec::new(),
+            value,
+        }
+    }
+
     /// Deviation about the mean.
     #[must_use]
     pub fn spread(&self) -> f64 {

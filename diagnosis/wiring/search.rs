@@ -1,16 +1,20 @@
 //! Which faults of wiring make the log's columns sense to the model.
+//!
+//! Hypotheses are looked at with few windows first, and those that lead with all.
 
 use asid_core::Result;
 
 use super::evidence::Settings;
 use super::hypotheses::{self, Fault, Hypothesis, Quantity, view_of, with};
-use super::record::Recorded;
+use super::record::{Recorded, Series};
 use super::size;
 use super::view::View;
 use super::windows::{Misses, Windows};
 
 /// Faults that are looked for one after the other: beyond so many a log is better looked at by its owner.
 const MOST: usize = 4;
+/// Hypotheses of a round that are evaluated with all windows.
+const LEADING: usize = 3;
 /// Share of a column's deviation that the slope in its offset is taken over.
 const OFFSET_PROBE: f64 = 0.05;
 /// Longest step of an offset, in the column's deviation.
@@ -20,114 +24,160 @@ const DELAY_PROBE: f64 = 2e-3;
 /// Longest step of a delay, s: that of the first scan.
 const DELAY_STEP: f64 = 0.02;
 
-/// A fault that was found.
+/// A fault, with what speaks for it.
 #[derive(Clone, Debug)]
 pub struct Found {
     /// Kind.
     pub fault: Fault,
     /// Quantities concerned, as indices.
     pub quantities: Vec<usize>,
-    /// Logarithm of the factor by which misses shrink.
+    /// Logarithm of the factor by which misses shrink, summed over columns.
     pub shrinkage: f64,
     /// Probability.
     pub probability: f64,
 }
 
+/// What a search found.
+#[derive(Clone, Debug)]
+pub struct Outcome {
+    /// Faults, in the order in which they were found.
+    pub found: Vec<Found>,
+    /// How the columns are read with all of them mended.
+    pub view: View,
+    /// The nearest fault that is not named.
+    pub next: Option<Found>,
+}
+
 /// One hypothesis, evaluated.
 struct Tried {
     hypothesis: Hypothesis,
-    misses: Misses,
     shrinkage: f64,
     probability: f64,
 }
 
-/// Looks for faults one after the other, each the best of its round; with the view that they make together.
-///
-/// # Errors
-/// When the engine fails.
-pub fn search(
-    windows: &mut Windows<'_>,
-    record: &[Recorded],
-    quantities: &[Quantity],
-    settings: &Settings,
-    commands: usize,
-) -> Result<(Vec<Found>, View)> {
-    let readings = quantities.len() - commands;
-    let mut view = View::as_given(readings, commands);
-    let mut misses = windows.misses(&view)?;
-    let mut found: Vec<Found> = Vec::new();
-    while found.len() < MOST {
-        let round = Round {
-            record,
-            quantities,
-            settings,
-            view: &view,
-            misses: &misses,
-        };
-        let Some(best) = round.best(windows)? else {
-            break;
-        };
-        if best.probability < settings.named {
-            break;
+impl Tried {
+    fn found(&self) -> Found {
+        Found {
+            fault: self.hypothesis.fault,
+            quantities: self.hypothesis.quantities.clone(),
+            shrinkage: self.shrinkage,
+            probability: self.probability,
         }
-        found.push(Found {
-            fault: best.hypothesis.fault,
-            quantities: best.hypothesis.quantities,
-            shrinkage: best.shrinkage,
-            probability: best.probability,
-        });
-        (view, misses) = (best.hypothesis.view, best.misses);
     }
-    Ok((found, view))
 }
 
-/// A round of the search: what is taken for right so far.
-struct Round<'a> {
-    record: &'a [Recorded],
-    quantities: &'a [Quantity],
-    settings: &'a Settings,
-    view: &'a View,
-    misses: &'a Misses,
+/// Logs and what is looked for in them.
+pub struct Search<'a> {
+    /// Few windows.
+    pub few: Windows<'a>,
+    /// All windows.
+    pub all: Windows<'a>,
+    /// The logs.
+    pub record: &'a [Recorded],
+    /// Their columns.
+    pub quantities: &'a [Quantity],
+    /// When a fault is named.
+    pub settings: &'a Settings,
 }
 
-impl Round<'_> {
-    /// The hypothesis that shrinks misses most.
-    fn best(&self, windows: &mut Windows<'_>) -> Result<Option<Tried>> {
-        let suspects = self.suspects();
-        let mut best: Option<Tried> = None;
-        let mut take = |tried: Tried| {
-            if best.as_ref().is_none_or(|b| tried.probability > b.probability) {
-                best = Some(tried);
-            }
+impl Search<'_> {
+    /// Looks for faults one after the other, each the best of its round.
+    ///
+    /// # Errors
+    /// When the engine fails.
+    pub fn run(mut self) -> Result<Outcome> {
+        let commands = self.quantities.iter().filter(|q| q.command).count();
+        let view = View::as_given(self.quantities.len() - commands, commands);
+        let mut outcome = Outcome {
+            found: Vec::new(),
+            view,
+            next: None,
         };
-        for hypothesis in hypotheses::of_columns(self.quantities, self.view, &suspects) {
-            if hypothesis.fault == Fault::Offset {
-                if let Some(tried) = self.offset(windows, hypothesis.quantities[0])? {
-                    take(tried);
-                }
+        while outcome.found.len() < MOST {
+            let Some(best) = self.best(&outcome)? else {
+                break;
+            };
+            if best.probability < self.settings.named {
+                outcome.next = Some(best.found());
+                break;
+            }
+            outcome.found.push(best.found());
+            outcome.view = best.hypothesis.view;
+        }
+        Ok(outcome)
+    }
+
+    /// The hypothesis of a round that shrinks misses most.
+    fn best(&mut self, so_far: &Outcome) -> Result<Option<Tried>> {
+        let view = &so_far.view;
+        let given = self.all.misses(view)?;
+        let suspects = self.suspects(&given, self.settings.suspect);
+        if !suspects.iter().any(|s| *s) {
+            return Ok(None);
+        }
+        let few = self.few.misses(view)?;
+        let mut tried: Vec<Tried> = Vec::new();
+        let nonsense = self.suspects(&given, self.settings.nonsense);
+        for hypothesis in hypotheses::of_columns(self.quantities, view, &nonsense) {
+            if self.is_refuted(&few, &hypothesis.view)? {
                 continue;
             }
-            let misses = windows.misses(&hypothesis.view)?;
-            take(self.judged(hypothesis, misses));
+            let misses = self.few.misses(&hypothesis.view)?;
+            tried.push(self.judged(hypothesis, &few, &misses));
         }
-        if !self.view.commands.is_empty() && suspects.iter().any(|s| *s)
-            && let Some(tried) = self.clock(windows)?
-        {
-            take(tried);
+        for index in (0..self.quantities.len()).filter(|&i| suspects[i]) {
+            tried.extend(self.offset(view, index, &few)?);
         }
-        Ok(best)
+        let is_clock = |f: &Found| f.fault == Fault::Clock;
+        if !view.commands.is_empty() && !so_far.found.iter().any(is_clock) {
+            tried.extend(self.clock(view, &few)?);
+        }
+        tried.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+        tried.truncate(LEADING);
+        let mut best: Option<Tried> = None;
+        for one in tried {
+            let misses = self.all.misses(&one.hypothesis.view)?;
+            let one = self.judged(one.hypothesis, &given, &misses);
+            if best.as_ref().is_none_or(|b| one.shrinkage > b.shrinkage) {
+                best = Some(one);
+            }
+        }
+        match best {
+            Some(best) if best.probability >= self.settings.named => {
+                self.refined(view, best, &given).map(Some)
+            }
+            other => Ok(other),
+        }
     }
 
-    /// Quantities whose wiring is in question: columns that are missed, and all commands where one is.
-    fn suspects(&self) -> Vec<bool> {
-        let missed = self.settings.suspects(self.misses);
+    /// Quantities whose wiring is in question: columns that miss more than a share of the motion, and commands of the joints
+    /// that they read.
+    fn suspects(&self, misses: &Misses, share: f64) -> Vec<bool> {
+        let missed = Settings::missed(misses, share);
         let any = missed.iter().any(|m| *m);
-        let of = |q: &Quantity| if q.command { any } else { missed[q.place] };
+        let drives = |joint: usize| {
+            let readings = self.quantities.iter().filter(|q| !q.command);
+            let mut own = readings.filter(|q| q.joint == Some(joint)).peekable();
+            // A joint that nothing reads shows in what others do.
+            (own.peek().is_none() && any) || own.any(|q| missed[q.place])
+        };
+        let of = |q: &Quantity| match (q.command, q.joint) {
+            (false, _) => missed[q.place],
+            (true, Some(joint)) => drives(joint),
+            (true, None) => any,
+        };
         self.quantities.iter().map(of).collect()
     }
 
-    fn judged(&self, hypothesis: Hypothesis, misses: Misses) -> Tried {
-        let shrinkage = self.settings.shrinkage(self.misses, &misses);
+    /// Whether the starts that logs give speak against a view.
+    fn is_refuted(&mut self, given: &Misses, view: &View) -> Result<bool> {
+        let misses = self.few.start_misses(view)?;
+        let shrinkage = self.settings.logarithm(&given.start_miss, &misses);
+        Ok(shrinkage < -self.settings.scale)
+    }
+
+    fn judged(&self, hypothesis: Hypothesis, given: &Misses, misses: &Misses) -> Tried {
+        let shrinkage = self.settings.shrinkage(given, misses);
         let command = hypothesis.quantities.iter().any(|&q| self.quantities[q].command);
         let more = match hypothesis.fault {
             Fault::Clock => self.settings.clock,
@@ -137,27 +187,28 @@ impl Round<'_> {
         Tried {
             probability: self.settings.probability(shrinkage, more),
             hypothesis,
-            misses,
             shrinkage,
         }
     }
 
+    /// Deviation of a column over all logs, in the quantity's unit.
+    fn spread(&self, view: &View, quantity: &Quantity) -> f64 {
+        let own = view_of(view, quantity);
+        let all = self.record.iter().map(|r| &r.readings[own.from]);
+        own.factor.abs() * Series::joined(all).spread()
+    }
+
     /// Another zero of a column, of the size that shrinks misses most; `None` where it is small.
-    fn offset(&self, windows: &mut Windows<'_>, index: usize) -> Result<Option<Tried>> {
+    fn offset(&mut self, view: &View, index: usize, given: &Misses) -> Result<Option<Tried>> {
         let quantity = &self.quantities[index];
-        if quantity.command {
+        // The zero of a frame in space is no column's, and where bodies touch any shift of it changes what they do.
+        if quantity.command || quantity.name != quantity.whole {
             return Ok(None);
         }
-        let own = view_of(self.view, quantity);
-        let spreads = self.record.iter().map(|r| r.readings[own.from].spread());
-        let spread = own.factor.abs() * spreads.sum::<f64>() / self.record.len() as f64;
-        let at = |size: f64| {
-            let mut shifted = own;
-            shifted.offset += size;
-            with(self.view, quantity, shifted)
-        };
+        let spread = self.spread(view, quantity);
+        let at = |size: f64| shifted(view, quantity, size);
         let steps = (OFFSET_PROBE * spread, OFFSET_STEP * spread);
-        let (size, misses) = size::fit(windows, &at, 0.0, steps)?;
+        let (size, misses) = size::fit(&mut self.few, &at, 0.0, steps)?;
         if size.abs() < self.settings.offset * spread {
             return Ok(None);
         }
@@ -166,16 +217,16 @@ impl Round<'_> {
             quantities: vec![index],
             view: at(size),
         };
-        Ok(Some(self.judged(hypothesis, misses)))
+        Ok(Some(self.judged(hypothesis, given, &misses)))
     }
 
     /// Readings that are all late by the time that shrinks misses most; `None` where it is small.
-    fn clock(&self, windows: &mut Windows<'_>) -> Result<Option<Tried>> {
-        let at = |delay: f64| hypotheses::delayed(self.view, delay);
+    fn clock(&mut self, view: &View, given: &Misses) -> Result<Option<Tried>> {
+        let at = |delay: f64| hypotheses::delayed(view, delay);
         let mut best = (0.0, 0.0);
         for delay in hypotheses::delays() {
-            let misses = windows.misses(&at(delay))?;
-            let shrinkage = self.settings.shrinkage(self.misses, &misses);
+            let misses = self.few.misses(&at(delay))?;
+            let shrinkage = self.settings.shrinkage(given, &misses);
             if shrinkage > best.1 {
                 best = (delay, shrinkage);
             }
@@ -183,8 +234,8 @@ impl Round<'_> {
         if best.1 <= 0.0 {
             return Ok(None);
         }
-        let (delay, misses) = size::fit(windows, &at, best.0, (DELAY_PROBE, DELAY_STEP))?;
-        if delay.abs() < self.settings.delay {
+        let (delay, misses) = size::fit(&mut self.few, &at, best.0, (DELAY_PROBE, DELAY_STEP))?;
+        if !self.is_a_clocks(delay) {
             return Ok(None);
         }
         let readings = self.quantities.iter().enumerate();
@@ -193,6 +244,44 @@ impl Round<'_> {
             quantities: readings.filter(|(_, q)| !q.command).map(|(i, _)| i).collect(),
             view: at(delay),
         };
-        Ok(Some(self.judged(hypothesis, misses)))
+        Ok(Some(self.judged(hypothesis, given, &misses)))
     }
+
+    fn is_a_clocks(&self, delay: f64) -> bool {
+        let within = (hypotheses::EARLIEST..=hypotheses::LATEST).contains(&delay);
+        within && delay.abs() >= self.settings.delay
+    }
+
+    /// The same fault with its size fitted to all windows.
+    fn refined(&mut self, view: &View, found: Tried, given: &Misses) -> Result<Tried> {
+        let hypothesis = found.hypothesis.clone();
+        let index = hypothesis.quantities[0];
+        let quantity = &self.quantities[index];
+        let (view, misses) = match hypothesis.fault {
+            Fault::Offset => {
+                let spread = self.spread(view, quantity);
+                let start = view_of(&hypothesis.view, quantity).offset - view_of(view, quantity).offset;
+                let at = |size: f64| shifted(view, quantity, size);
+                let steps = (OFFSET_PROBE * spread, OFFSET_STEP * spread);
+                let (size, misses) = size::fit(&mut self.all, &at, start, steps)?;
+                (at(size), misses)
+            }
+            Fault::Clock => {
+                let start = view_of(&hypothesis.view, quantity).delay - view_of(view, quantity).delay;
+                let at = |delay: f64| hypotheses::delayed(view, delay);
+                let (delay, misses) =
+                    size::fit(&mut self.all, &at, start, (DELAY_PROBE, DELAY_STEP))?;
+                (at(delay), misses)
+            }
+            _ => return Ok(found),
+        };
+        Ok(self.judged(Hypothesis { view, ..hypothesis }, given, &misses))
+    }
+}
+
+/// A view with the zero of one quantity moved.
+fn shifted(view: &View, quantity: &Quantity, by: f64) -> View {
+    let mut own = view_of(view, quantity);
+    own.offset += by;
+    with(view, quantity, own)
 }

@@ -16,10 +16,17 @@ use asid_mjcf::plant::Reads;
 use crate::machine::Machine;
 
 use super::record::Recorded;
-use super::view::View;
+use super::view::{ColumnView, View};
 
-/// Windows over all episodes.
-const WINDOWS: usize = 48;
+/// Windows over all episodes: so many give the mean of a miss to a seventh.
+pub const WINDOWS: usize = 48;
+/// Windows over all episodes with which hypotheses are first looked at.
+pub const FEW: usize = 12;
+/// Physics steps of one evaluation at most, times degrees of freedom: beyond it there are fewer windows, so that some hundred
+/// evaluations take about a second.
+const BUDGET: usize = 60_000;
+/// Fewest windows.
+const FEWEST: usize = 6;
 /// Durations of windows that are tried, the shortest first, s.
 const DURATIONS: [f64; 4] = [0.1, 0.2, 0.4, 0.8];
 /// Deviations of the prediction's noise by which a quantity has to leave its straight line for a window to be long enough.
@@ -61,7 +68,10 @@ pub struct Windows<'a> {
     record: &'a [Recorded],
     simulator: Box<dyn Simulator>,
     recording: Recording,
+    /// Those from states read off the log, then those at given starts.
     windows: Vec<Window>,
+    /// Views of the commands and what they predict from given starts, which no view of the readings changes.
+    from_starts: Option<(Vec<ColumnView>, Vec<f64>)>,
     /// Names of the sensors, and where each begins in a row of readings.
     sensors: Vec<(usize, usize)>,
     duration: f64,
@@ -71,7 +81,7 @@ pub struct Windows<'a> {
 }
 
 impl<'a> Windows<'a> {
-    /// Places windows in logs; `None` where they are too short for any.
+    /// Places about `count` windows in logs; `None` where they are too short for any.
     ///
     /// # Errors
     /// When the engine refuses a batch.
@@ -79,6 +89,7 @@ impl<'a> Windows<'a> {
         machine: &'a Machine,
         record: &'a [Recorded],
         sensors: &[String],
+        count: usize,
     ) -> Result<Option<Self>> {
         let plant = &*machine.plant;
         let layout = &plant.layout;
@@ -99,7 +110,9 @@ impl<'a> Windows<'a> {
         let substeps = (frame / layout.timestep).round().max(1.0) as usize;
         let frames = (duration / (substeps as f64 * layout.timestep)).round().max(1.0) as usize;
         let duration = frames as f64 * substeps as f64 * layout.timestep;
-        let windows = place(record, duration);
+        let steps = frames * substeps * layout.nv.max(1);
+        let count = count.min((BUDGET * count / WINDOWS / steps).max(FEWEST));
+        let windows = place(record, duration, count);
         if windows.is_empty() {
             return Ok(None);
         }
@@ -114,6 +127,7 @@ impl<'a> Windows<'a> {
             simulator,
             recording,
             windows,
+            from_starts: None,
             sensors: places,
             duration,
             frames,
@@ -206,16 +220,23 @@ impl<'a> Windows<'a> {
         (qpos, qvel)
     }
 
-    /// Predicts all windows under a view.
-    ///
-    /// # Errors
-    /// When the engine fails.
-    pub fn misses(&mut self, view: &View) -> Result<Misses> {
-        let (n, nu, width) = (self.windows.len(), view.commands.len(), self.width);
+    /// Number of windows that do not begin at given starts.
+    fn free(&self) -> usize {
+        self.windows.partition_point(|w| !w.given)
+    }
+
+    /// Readings that the model predicts in some windows under a view, `windows x (frames + 1) x width`.
+    fn predict(&mut self, view: &View, range: std::ops::Range<usize>) -> Result<Vec<f64>> {
+        let (nu, width) = (view.commands.len(), self.width);
         let frame = self.duration / self.frames as f64;
+        let sims: Vec<usize> = range.collect();
+        let n = sims.len();
+        if n == 0 {
+            return Ok(Vec::new());
+        }
         let (mut qpos, mut qvel) = (Vec::new(), Vec::new());
         let mut control = Vec::with_capacity(n * self.frames * nu);
-        for &window in &self.windows {
+        for window in sims.iter().map(|&w| self.windows[w]) {
             let (q, v) = self.state(view, window);
             qpos.extend(q);
             qvel.extend(v);
@@ -225,12 +246,12 @@ impl<'a> Windows<'a> {
                 control.extend(record.commands(view, from, from + frame));
             }
         }
-        let sims: Vec<usize> = (0..n).collect();
         self.simulator.reset(&sims)?;
         self.simulator.set_state(&sims, &qpos, &qvel)?;
         let mut first = vec![0.0; n * width];
         self.simulator.read(&sims, &self.recording, &mut first)?;
-        let mut later = vec![0.0; n * self.frames * width];
+        let later = self.frames * width;
+        let mut told = vec![0.0; n * later];
         let rollout = Rollout::new(
             &sims,
             self.frames,
@@ -238,16 +259,60 @@ impl<'a> Windows<'a> {
             Control::PerSimulation(&control),
             &self.recording,
         );
-        self.simulator.rollout(&rollout, &mut later)?;
-        let rows = self.frames + 1;
-        let mut residual = vec![f64::NAN; n * rows * width];
-        for (w, window) in self.windows.iter().enumerate() {
+        self.simulator.rollout(&rollout, &mut told)?;
+        let pairs = first.chunks_exact(width).zip(told.chunks_exact(later));
+        Ok(pairs.flat_map(|(a, b)| a.iter().chain(b)).copied().collect())
+    }
+
+    /// What the model predicts from given starts.
+    fn predict_from_starts(&mut self, view: &View) -> Result<Vec<f64>> {
+        if let Some((commands, told)) = &self.from_starts
+            && *commands == view.commands
+        {
+            return Ok(told.clone());
+        }
+        let told = self.predict(view, self.free()..self.windows.len())?;
+        self.from_starts = Some((view.commands.clone(), told.clone()));
+        Ok(told)
+    }
+
+    /// Predicts all windows under a view.
+    ///
+    /// # Errors
+    /// When the engine fails.
+    pub fn misses(&mut self, view: &View) -> Result<Misses> {
+        let mut told = self.predict(view, 0..self.free())?;
+        told.extend(self.predict_from_starts(view)?);
+        let residual = self.residuals(view, &told, 0);
+        Ok(self.summed_up(view, residual))
+    }
+
+    /// Mean magnitude of each quantity's residual in windows at given starts, in motions; 0 where there are none. Costs no
+    /// simulation where only readings are viewed another way.
+    ///
+    /// # Errors
+    /// When the engine fails.
+    pub fn start_misses(&mut self, view: &View) -> Result<Vec<f64>> {
+        let told = self.predict_from_starts(view)?;
+        let free = self.free();
+        let own = self.residuals(view, &told, free);
+        let missing = free * (self.frames + 1) * self.width;
+        let residual = [vec![f64::NAN; missing], own].concat();
+        Ok(self.summed_up(view, residual).start_miss)
+    }
+
+    /// `reading - prediction` in the windows from one on.
+    fn residuals(&self, view: &View, told: &[f64], first: usize) -> Vec<f64> {
+        let (rows, width) = (self.frames + 1, self.width);
+        let frame = self.duration / self.frames as f64;
+        let mut residual = vec![f64::NAN; told.len()];
+        for (i, window) in self.windows[first..].iter().enumerate() {
             let record = &self.record[window.episode];
             for k in 0..rows {
                 let time = window.start + k as f64 * frame;
-                let told = match k {
-                    0 => &first[w * width..(w + 1) * width],
-                    _ => &later[(w * self.frames + k - 1) * width..][..width],
+                let row = (i * rows + k) * width;
+                let Some(told) = told.get(row..row + width) else {
+                    continue;
                 };
                 let mut read: Vec<f64> = view
                     .readings
@@ -255,8 +320,8 @@ impl<'a> Windows<'a> {
                     .map(|v| record.reading(*v, time, 0.5 * self.duration))
                     .collect();
                 self.nearer_signs(&mut read, told);
-                let row = &mut residual[(w * rows + k) * width..][..width];
-                for ((miss, read), told) in row.iter_mut().zip(read).zip(told) {
+                let out = &mut residual[row..row + width];
+                for ((miss, read), told) in out.iter_mut().zip(read).zip(told) {
                     if read.is_finite() {
                         *miss = if told.is_finite() {
                             read - told
@@ -267,7 +332,7 @@ impl<'a> Windows<'a> {
                 }
             }
         }
-        Ok(self.summed_up(view, residual))
+        residual
     }
 
     /// The two signs of a quaternion are one orientation: the nearer one is compared.
@@ -409,8 +474,8 @@ fn duration(record: &[Recorded], width: usize, longest: f64) -> f64 {
 }
 
 /// Windows spread evenly over the episodes, and one at each start that a log gives.
-fn place(record: &[Recorded], duration: f64) -> Vec<Window> {
-    let each = WINDOWS.div_ceil(record.len().max(1));
+fn place(record: &[Recorded], duration: f64, count: usize) -> Vec<Window> {
+    let each = count.div_ceil(record.len().max(1));
     let mut windows = Vec::new();
     for (episode, r) in record.iter().enumerate() {
         let room = r.seconds() - duration;
@@ -424,7 +489,9 @@ fn place(record: &[Recorded], duration: f64) -> Vec<Window> {
             start: room * (k as f64 + 0.5) / each as f64,
             given: false,
         }));
-        if r.start.is_some() {
+    }
+    for (episode, r) in record.iter().enumerate() {
+        if r.start.is_some() && r.seconds() > duration {
             windows.push(Window {
                 episode,
                 start: 0.0,
