@@ -76,6 +76,8 @@ pub struct Study {
     pub columns: Vec<ColumnMapping>,
     /// What was passed over or mended as logs were read: file and notes.
     pub notes: Vec<(String, LogNotes)>,
+    /// Whether the columns are known to mean what their names say: logs of a task's own runs.
+    pub wired: bool,
 }
 
 impl Study {
@@ -175,6 +177,7 @@ impl Study {
             noise: document.noise,
             columns: document.column,
             notes,
+            wired: false,
         }
         .with_test()
     }
@@ -220,6 +223,7 @@ impl Study {
                 .collect(),
             columns: Vec::new(),
             notes: Vec::new(),
+            wired: true,
             scene,
         }
         .with_test()

@@ -25,8 +25,11 @@ pub struct Settings {
     pub scale: f64,
     /// Additional logarithm for a clock, which delays of drives and sensors resemble.
     pub clock: f64,
-    /// Additional logarithm for commands: their faults are rarer than those of sensors.
-    pub command: f64,
+    /// Additional logarithm for commands and for units that hardly any log is in: their faults are rarer than the others.
+    pub rare: f64,
+    /// Logarithm of the factor by which late readings have to beat late commands on a machine with one drive to be a clock's, and
+    /// by which late commands have to beat them on one with several not to be.
+    pub drive: f64,
     /// Smallest offset that is wiring, in deviations of the column: smaller ones are the effect `sensor-bias`.
     pub offset: f64,
     /// Smallest delay that is a clock's, s: smaller ones are effects.
@@ -44,7 +47,8 @@ impl Default for Settings {
             even: 0.8,
             scale: 0.1,
             clock: 0.0,
-            command: 0.5,
+            rare: 0.5,
+            drive: 0.1,
             offset: 0.4,
             delay: 0.02,
             named: 0.5,

@@ -71,11 +71,13 @@ pub struct Hypothesis {
     pub fault: Fault,
     /// Indices of the quantities concerned.
     pub quantities: Vec<usize>,
+    /// Whether hardly any log is so.
+    pub rare: bool,
     /// How the columns are read.
     pub view: View,
 }
 
-/// Units that a quantity with some SI unit may be recorded in, with their factors; without a name where no unit has the factor.
+/// Units that a quantity with some SI unit may be recorded in, the usual one first, with their factors; without a name where no unit has the factor.
 fn units(si: &str) -> Vec<(&'static str, f64)> {
     match si {
         // A reading of radians may have been brought to radians a second time.
@@ -195,13 +197,14 @@ pub fn of_columns(all: &[Quantity], view: &View, suspects: &[bool]) -> Vec<Hypot
                 found.push(Hypothesis {
                     fault,
                     quantities: vec![i],
+                    rare: false,
                     view: with(view, a, of),
                 });
             };
             one(Fault::Sign, own.times(-1.0));
             // The entries of a vector are in one unit.
             let vector: Vec<usize> = (0..all.len()).filter(|&j| all[j].whole == a.whole).collect();
-            for (_, factor) in a.units.iter().filter(|_| vector[0] == i) {
+            for (k, (_, factor)) in a.units.iter().enumerate().filter(|_| vector[0] == i) {
                 let scaled = vector.iter().fold(view.clone(), |view, &j| {
                     let own = view_of(&view, &all[j]);
                     with(&view, &all[j], own.times(*factor))
@@ -209,6 +212,8 @@ pub fn of_columns(all: &[Quantity], view: &View, suspects: &[bool]) -> Vec<Hypot
                 found.push(Hypothesis {
                     fault: Fault::Unit,
                     quantities: vector.clone(),
+                    // The usual one comes first.
+                    rare: k > 0,
                     view: scaled,
                 });
             }
@@ -220,6 +225,7 @@ pub fn of_columns(all: &[Quantity], view: &View, suspects: &[bool]) -> Vec<Hypot
                 found.push(Hypothesis {
                     fault: Fault::Swapped,
                     quantities: vec![i, j],
+                    rare: false,
                     view: with(&swapped, b, from_a),
                 });
             }
@@ -233,6 +239,14 @@ pub fn of_columns(all: &[Quantity], view: &View, suspects: &[bool]) -> Vec<Hypot
 pub fn delayed(view: &View, delay: f64) -> View {
     let mut view = view.clone();
     view.readings.iter_mut().for_each(|v| v.delay += delay);
+    view
+}
+
+/// The view with all commands acting later by some time.
+#[must_use]
+pub fn commanded_later(view: &View, delay: f64) -> View {
+    let mut view = view.clone();
+    view.commands.iter_mut().for_each(|v| v.delay += delay);
     view
 }
 

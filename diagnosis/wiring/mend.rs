@@ -67,7 +67,7 @@ pub fn mend(study: &Study, machine: &Machine, settings: &Settings) -> Result<Men
         .iter()
         .map(|(_, e)| Recorded::of(layout, &sensors, e))
         .collect::<Result<Vec<_>>>()?;
-    let windows = |count| Windows::new(machine, &record, &sensors, count);
+    let windows = |count| Windows::new(machine, &record, (&sensors, &study.parameters), count);
     let (Some(few), Some(many)) = (windows(FEW)?, windows(WINDOWS)?) else {
         return Ok(unchanged());
     };
@@ -108,7 +108,7 @@ pub fn mend(study: &Study, machine: &Machine, settings: &Settings) -> Result<Men
             };
             let lines: Vec<String> = mappings
                 .iter()
-                .filter(|m| columns.contains(&m.name))
+                .filter(|m| columns.iter().any(|c| concerns(m, c)))
                 .map(|m| study.composed(m).lines())
                 .collect();
             WiringResult {
@@ -125,6 +125,16 @@ pub fn mend(study: &Study, machine: &Machine, settings: &Settings) -> Result<Men
         shrinkage: found.iter().map(|f| f.shrinkage).collect(),
         nearest,
     })
+}
+
+/// Whether a mapping is of a column, or of an entry of it, or of the vector that it is an entry of.
+fn concerns(mapping: &ColumnMapping, column: &str) -> bool {
+    let entry = |of: &str, vector: &str| {
+        of.strip_prefix(vector)
+            .and_then(|rest| rest.strip_prefix('.'))
+            .is_some_and(|i| i.parse::<usize>().is_ok())
+    };
+    mapping.name == column || entry(&mapping.name, column) || entry(column, &mapping.name)
 }
 
 /// Mappings of a view: one a quantity that it changes, or one a vector whose entries are all changed alike.

@@ -10,6 +10,9 @@ use super::view::{ColumnView, View};
 /// Fewest readings of a local fit: one more than a parabola has coefficients.
 const FEWEST: usize = 4;
 
+/// Time within which a reading is that of a row, s: rounding.
+const ON_ROW: f64 = 1e-9;
+
 /// One column of a log where it was read.
 #[derive(Clone, Debug, Default)]
 pub struct Series {
@@ -23,13 +26,12 @@ impl Series {
     /// The reading at a time, on a line between its neighbours; NaN where these are farther apart than `widest` (s).
     #[must_use]
     pub fn at(&self, time: f64, widest: f64) -> f64 {
-        let after = self.time.partition_point(|t| *t < time);
-        if after == 0 || after == self.time.len() {
-            let end = after.saturating_sub(usize::from(after > 0));
-            return match self.time.get(end) {
-                Some(t) if (t - time).abs() < 1e-9 => self.value[end],
-                _ => f64::NAN,
-            };
+        let after = self.time.partition_point(|t| *t < time - ON_ROW);
+        match self.time.get(after) {
+            Some(t) if *t <= time + ON_ROW => return self.value[after],
+            None => return f64::NAN,
+            Some(_) if after == 0 => return f64::NAN,
+            Some(_) => {}
         }
         let (a, b) = (self.time[after - 1], self.time[after]);
         if b - a > widest {
@@ -114,7 +116,7 @@ pub struct Recorded {
     /// Integrals of the commands up to each row, `rows x nu`.
     integral: Vec<f64>,
     nu: usize,
-    /// State at the first row, where the log has it.
+    /// State at the first row, where the log has all of it.
     pub start: Option<InitialState>,
 }
 
@@ -161,7 +163,7 @@ impl Recorded {
             ctrl: episode.ctrl.clone(),
             integral,
             nu,
-            start: episode.initial.clone(),
+            start: episode.initial.clone().filter(InitialState::is_complete),
         })
     }
 

@@ -7,7 +7,7 @@ use asid_core::Result;
 use super::evidence::Settings;
 use super::hypotheses::{self, Fault, Hypothesis, Quantity, view_of, with};
 use super::record::{Recorded, Series};
-use super::size;
+use super::size::{self, Fit};
 use super::view::View;
 use super::windows::{Misses, Windows};
 
@@ -142,6 +142,7 @@ impl Search<'_> {
                 best = Some(one);
             }
         }
+        // What is not named keeps its first size.
         match best {
             Some(best) if best.probability >= self.settings.named => {
                 self.refined(view, best, &given).map(Some)
@@ -181,7 +182,7 @@ impl Search<'_> {
         let command = hypothesis.quantities.iter().any(|&q| self.quantities[q].command);
         let more = match hypothesis.fault {
             Fault::Clock => self.settings.clock,
-            _ if command => self.settings.command,
+            _ if command || hypothesis.rare => self.settings.rare,
             _ => 0.0,
         };
         Tried {
@@ -207,14 +208,22 @@ impl Search<'_> {
         }
         let spread = self.spread(view, quantity);
         let at = |size: f64| shifted(view, quantity, size);
-        let steps = (OFFSET_PROBE * spread, OFFSET_STEP * spread);
-        let (size, misses) = size::fit(&mut self.few, &at, 0.0, steps)?;
+        // A start that the log gives tells it at once, and without the model's own faults.
+        let told = self.few.start_shift(view, quantity.place)?;
+        let size = match told {
+            Some(size) => size,
+            None => {
+                size::fit(&mut self.few, &at, offset_fit(spread, 0.0))?.0
+            }
+        };
         if size.abs() < self.settings.offset * spread {
             return Ok(None);
         }
+        let misses = self.few.misses(&at(size))?;
         let hypothesis = Hypothesis {
             fault: Fault::Offset,
             quantities: vec![index],
+            rare: false,
             view: at(size),
         };
         Ok(Some(self.judged(hypothesis, given, &misses)))
@@ -234,7 +243,7 @@ impl Search<'_> {
         if best.1 <= 0.0 {
             return Ok(None);
         }
-        let (delay, misses) = size::fit(&mut self.few, &at, best.0, (DELAY_PROBE, DELAY_STEP))?;
+        let (delay, misses) = size::fit(&mut self.few, &at, delay_fit(best.0, false))?;
         if !self.is_a_clocks(delay) {
             return Ok(None);
         }
@@ -242,6 +251,7 @@ impl Search<'_> {
         let hypothesis = Hypothesis {
             fault: Fault::Clock,
             quantities: readings.filter(|(_, q)| !q.command).map(|(i, _)| i).collect(),
+            rare: false,
             view: at(delay),
         };
         Ok(Some(self.judged(hypothesis, given, &misses)))
@@ -252,30 +262,78 @@ impl Search<'_> {
         within && delay.abs() >= self.settings.delay
     }
 
+    /// A clock with its delay fitted to all windows, and the study's parameters beside it; improbable where a delay of all
+    /// commands says as much: then it is the drives' own. Of a machine with one drive nothing but a start in motion can tell
+    /// the two apart; of one with several, all drives are seldom late alike.
+    fn clock_or_drive(&mut self, view: &View, found: Tried, given: &Misses) -> Result<Tried> {
+        let quantity = &self.quantities[found.hypothesis.quantities[0]];
+        let start = view_of(&found.hypothesis.view, quantity).delay - view_of(view, quantity).delay;
+        let nominal = self.all.theta().to_vec();
+        let late_readings = |delay: f64| hypotheses::delayed(view, delay);
+        let late_commands = |delay: f64| hypotheses::commanded_later(view, delay);
+        let (delay, clock) = size::fit(&mut self.all, &late_readings, delay_fit(start, true))?;
+        self.all.set_theta(&nominal);
+        let (_, drive) = size::fit(&mut self.all, &late_commands, delay_fit(start, true))?;
+        self.all.set_theta(&nominal);
+        let handicap = if view.commands.len() == 1 {
+            self.settings.drive
+        } else {
+            -self.settings.drive
+        };
+        let beats = self.settings.shrinkage(&drive, &clock);
+        let hypothesis = Hypothesis {
+            view: late_readings(delay),
+            ..found.hypothesis
+        };
+        let mut judged = self.judged(hypothesis, given, &clock);
+        if beats < handicap {
+            judged.probability = judged.probability.min(self.settings.named / 2.0);
+        }
+        Ok(judged)
+    }
+
     /// The same fault with its size fitted to all windows.
     fn refined(&mut self, view: &View, found: Tried, given: &Misses) -> Result<Tried> {
         let hypothesis = found.hypothesis.clone();
         let index = hypothesis.quantities[0];
         let quantity = &self.quantities[index];
         let (view, misses) = match hypothesis.fault {
+            // Given starts have told it.
+            Fault::Offset if self.all.start_shift(view, quantity.place)?.is_some() => {
+                return Ok(found);
+            }
             Fault::Offset => {
                 let spread = self.spread(view, quantity);
-                let start = view_of(&hypothesis.view, quantity).offset - view_of(view, quantity).offset;
+                let start =
+                    view_of(&hypothesis.view, quantity).offset - view_of(view, quantity).offset;
                 let at = |size: f64| shifted(view, quantity, size);
-                let steps = (OFFSET_PROBE * spread, OFFSET_STEP * spread);
-                let (size, misses) = size::fit(&mut self.all, &at, start, steps)?;
+                let (size, misses) = size::fit(&mut self.all, &at, offset_fit(spread, start))?;
                 (at(size), misses)
             }
-            Fault::Clock => {
-                let start = view_of(&hypothesis.view, quantity).delay - view_of(view, quantity).delay;
-                let at = |delay: f64| hypotheses::delayed(view, delay);
-                let (delay, misses) =
-                    size::fit(&mut self.all, &at, start, (DELAY_PROBE, DELAY_STEP))?;
-                (at(delay), misses)
-            }
+            Fault::Clock => return self.clock_or_drive(view, found, given),
             _ => return Ok(found),
         };
         Ok(self.judged(Hypothesis { view, ..hypothesis }, given, &misses))
+    }
+}
+
+/// How an offset is fitted to a column with some deviation.
+fn offset_fit(spread: f64, start: f64) -> Fit {
+    Fit {
+        start,
+        probe: OFFSET_PROBE * spread,
+        longest: OFFSET_STEP * spread,
+        parameters: false,
+    }
+}
+
+/// How a delay is fitted.
+fn delay_fit(start: f64, parameters: bool) -> Fit {
+    Fit {
+        start,
+        probe: DELAY_PROBE,
+        longest: DELAY_STEP,
+        parameters,
     }
 }
 

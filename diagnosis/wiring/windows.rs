@@ -6,10 +6,10 @@
 //! and how far the quantity leaves the straight line on which it began, which is what a prediction is to tell. Windows at
 //! the first row begin a second time at the state that the log gives there, where it does: this compares readings with it.
 
-use asid_core::layout::{JointKind, Recording};
+use asid_core::layout::Recording;
 use asid_core::problem::home;
 use asid_core::signal::{rotation_difference, unit_quaternion};
-use asid_core::{BatchConfig, Control, Layout, Result, Rollout, Simulator};
+use asid_core::{BatchConfig, Control, Parameter, Result, Rollout, Simulator};
 use asid_mjcf::Plant;
 use asid_mjcf::plant::Reads;
 
@@ -35,8 +35,9 @@ const SHOWS: f64 = 8.0;
 const FRAMES: f64 = 24.0;
 /// Share of an episode that a window takes at most.
 const SHARE: f64 = 0.3;
-/// Share of a window about its start within which readings tell the state there.
-const LOCAL: f64 = 0.25;
+/// Share of a window before and after its start within which readings tell the state there. Larger: less noise of the state,
+/// and more of the motion's bend in it.
+const LOCAL: f64 = 0.125;
 /// A prediction that is off by more than so many motions tells no more than that it is wrong.
 const FARTHEST: f64 = 10.0;
 
@@ -70,8 +71,11 @@ pub struct Windows<'a> {
     recording: Recording,
     /// Those from states read off the log, then those at given starts.
     windows: Vec<Window>,
-    /// Views of the commands and what they predict from given starts, which no view of the readings changes.
-    from_starts: Option<(Vec<ColumnView>, Vec<f64>)>,
+    /// Views of the commands, parameters, and what they predict from given starts, which no view of the readings changes.
+    from_starts: Option<(Vec<ColumnView>, Vec<f64>, Vec<f64>)>,
+    parameters: &'a [Parameter],
+    /// Values of the parameters.
+    theta: Vec<f64>,
     /// Names of the sensors, and where each begins in a row of readings.
     sensors: Vec<(usize, usize)>,
     duration: f64,
@@ -88,7 +92,7 @@ impl<'a> Windows<'a> {
     pub fn new(
         machine: &'a Machine,
         record: &'a [Recorded],
-        sensors: &[String],
+        (sensors, parameters): (&[String], &'a [Parameter]),
         count: usize,
     ) -> Result<Option<Self>> {
         let plant = &*machine.plant;
@@ -116,10 +120,15 @@ impl<'a> Windows<'a> {
         if windows.is_empty() {
             return Ok(None);
         }
-        let simulator = machine.with(&[])?.simulator(&BatchConfig {
+        let model = machine.with(&[])?;
+        let theta = parameters
+            .iter()
+            .map(|p| Ok(model.nominal(&p.targets[0])?.clamp(p.range[0], p.range[1])))
+            .collect::<Result<_>>()?;
+        let simulator = model.simulator(&BatchConfig {
             size: windows.len(),
             threads: machine.threads,
-            targets: Vec::new(),
+            targets: parameters.iter().flat_map(|p| p.targets.clone()).collect(),
         })?;
         Ok(Some(Self {
             plant,
@@ -128,6 +137,8 @@ impl<'a> Windows<'a> {
             recording,
             windows,
             from_starts: None,
+            parameters,
+            theta,
             sensors: places,
             duration,
             frames,
@@ -136,16 +147,44 @@ impl<'a> Windows<'a> {
         }))
     }
 
-    /// Whether some episode gives its start.
+    /// Ranges of the study's parameters.
     #[must_use]
-    pub fn has_given_starts(&self) -> bool {
-        self.windows.iter().any(|w| w.given)
+    pub fn ranges(&self) -> Vec<[f64; 2]> {
+        self.parameters.iter().map(|p| p.range).collect()
+    }
+
+    /// Values of the study's parameters: at first those of the model as given.
+    #[must_use]
+    pub fn theta(&self) -> &[f64] {
+        &self.theta
+    }
+
+    /// Sets the values of the study's parameters.
+    pub fn set_theta(&mut self, theta: &[f64]) {
+        self.theta = theta.to_vec();
+    }
+
+    /// What would have to be added to a quantity so that it reads what the given starts say: the median over the episodes
+    /// that give theirs.
+    ///
+    /// # Errors
+    /// When the engine fails.
+    pub fn start_shift(&mut self, view: &View, entry: usize) -> Result<Option<f64>> {
+        let told = self.predict_from_starts(view)?;
+        let residual = self.residuals(view, &told, self.free());
+        let window = (self.frames + 1) * self.width;
+        let firsts = residual.chunks_exact(window).map(|w| -w[entry]);
+        let mut firsts: Vec<f64> = firsts.filter(|x| x.is_finite()).collect();
+        Ok(crate::noise::median(&mut firsts))
     }
 
     /// State at the start of a window under a view.
     fn state(&self, view: &View, window: Window) -> (Vec<f64>, Vec<f64>) {
         let layout = &self.plant.layout;
         let record = &self.record[window.episode];
+        if let (true, Some(start)) = (window.given, &record.start) {
+            return (start.qpos.clone(), start.qvel.clone());
+        }
         let (mut qpos, mut qvel) = home(layout);
         let half = LOCAL * self.duration;
         let local = |entry: usize| record.local(view.readings[entry], window.start, half);
@@ -206,17 +245,6 @@ impl<'a> Windows<'a> {
                 qvel[layout.joints[j].qvel] = v;
             }
         }
-        if window.given
-            && let Some(start) = &record.start
-        {
-            let fill = |to: &mut [f64], from: &[f64]| {
-                let pairs = to.iter_mut().zip(from).filter(|(_, x)| x.is_finite());
-                pairs.for_each(|(to, x)| *to = *x);
-            };
-            fill(&mut qpos, &start.qpos);
-            fill(&mut qvel, &start.qvel);
-            normalize(layout, &mut qpos);
-        }
         (qpos, qvel)
     }
 
@@ -247,6 +275,10 @@ impl<'a> Windows<'a> {
             }
         }
         self.simulator.reset(&sims)?;
+        let columns: Vec<f64> = (self.parameters.iter().zip(&self.theta))
+            .flat_map(|(p, &x)| std::iter::repeat_n(p.setting(x), p.targets.len()))
+            .collect();
+        self.simulator.set_parameters(&sims, &columns.repeat(n))?;
         self.simulator.set_state(&sims, &qpos, &qvel)?;
         let mut first = vec![0.0; n * width];
         self.simulator.read(&sims, &self.recording, &mut first)?;
@@ -266,13 +298,14 @@ impl<'a> Windows<'a> {
 
     /// What the model predicts from given starts.
     fn predict_from_starts(&mut self, view: &View) -> Result<Vec<f64>> {
-        if let Some((commands, told)) = &self.from_starts
+        if let Some((commands, theta, told)) = &self.from_starts
             && *commands == view.commands
+            && *theta == self.theta
         {
             return Ok(told.clone());
         }
         let told = self.predict(view, self.free()..self.windows.len())?;
-        self.from_starts = Some((view.commands.clone(), told.clone()));
+        self.from_starts = Some((view.commands.clone(), self.theta.clone(), told.clone()));
         Ok(told)
     }
 
@@ -418,19 +451,6 @@ fn rms(values: impl Iterator<Item = f64>) -> Option<f64> {
 
 fn mean(values: &[f64]) -> Option<f64> {
     (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
-}
-
-/// Brings the quaternions of a state to unit length.
-fn normalize(layout: &Layout, qpos: &mut [f64]) {
-    for joint in &layout.joints {
-        let first = match joint.kind {
-            JointKind::Free => joint.qpos + 3,
-            JointKind::Ball => joint.qpos,
-            JointKind::Hinge | JointKind::Slide => continue,
-        };
-        let turn = unit_quaternion(&qpos[first..first + 4]);
-        qpos[first..first + 4].copy_from_slice(&[turn.w, turn.i, turn.j, turn.k]);
-    }
 }
 
 /// The shortest duration over which most quantities leave their straight lines by more than a prediction's noise.
