@@ -92,7 +92,10 @@ impl Intake {
     }
 
     fn outlier_check(&self) -> Option<CheckResult> {
-        let each = self.left_out.iter().map(|l| format!("{} of `{}`", l.count, l.sensor));
+        let each = self
+            .left_out
+            .iter()
+            .map(|l| format!("{} of `{}`", l.count, l.sensor));
         let each: Vec<String> = each.collect();
         (!each.is_empty()).then(|| CheckResult {
             check: "outliers".into(),

@@ -283,7 +283,9 @@ mod tests {
     fn coloured(correlation: f64, rows: usize) -> Vec<f64> {
         let mut state = 12345_u64;
         let mut uniform = || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1);
             (state >> 11) as f64 / (1_u64 << 53) as f64
         };
         let mut last = 0.0;
@@ -297,8 +299,10 @@ mod tests {
     }
 
     fn noise_of(values: impl Iterator<Item = f64>) -> Noise {
-        let series: Vec<(usize, f64, f64)> =
-            values.enumerate().map(|(k, x)| (k, 0.01 * k as f64, x)).collect();
+        let series: Vec<(usize, f64, f64)> = values
+            .enumerate()
+            .map(|(k, x)| (k, 0.01 * k as f64, x))
+            .collect();
         let mut differences: [Vec<f64>; 3] = Default::default();
         for (stride, found) in STRIDES.iter().zip(&mut differences) {
             third_differences(&series, *stride, found);
@@ -309,7 +313,13 @@ mod tests {
     #[test]
     fn filtered_noise_has_its_own_deviation() {
         // With a tenth for the scatter of an estimate whose correlation is estimated beside it, more where it is strong.
-        for (correlation, tolerance) in [(0.0, 0.05), (0.3, 0.1), (0.5, 0.1), (0.8, 0.15), (0.9, 0.25)] {
+        for (correlation, tolerance) in [
+            (0.0, 0.05),
+            (0.3, 0.1),
+            (0.5, 0.1),
+            (0.8, 0.15),
+            (0.9, 0.25),
+        ] {
             let noise = noise_of(coloured(correlation, 20_000).into_iter());
             assert!(
                 (noise.deviation - 1.0).abs() < tolerance,
@@ -322,7 +332,12 @@ mod tests {
     fn a_smooth_residual_is_no_noise() {
         // White noise of deviation 1 on a swing a hundred times as large.
         let swing = |k: usize| 100.0 * (0.01 * k as f64).sin();
-        let noise = noise_of(coloured(0.0, 5000).into_iter().enumerate().map(|(k, x)| x + swing(k)));
+        let noise = noise_of(
+            coloured(0.0, 5000)
+                .into_iter()
+                .enumerate()
+                .map(|(k, x)| x + swing(k)),
+        );
         assert!((noise.deviation - 1.0).abs() < 0.08, "{noise:?}");
         assert_eq!(noise.correlation, 0.0);
     }

@@ -61,7 +61,9 @@ fn distances(time: &[f64], column: impl Iterator<Item = f64>) -> Vec<Distances> 
                 row: w[2].0,
                 before: from_line(p(2), p(0), p(1)),
                 after: from_line(p(2), p(4), p(3)),
-                alone: [1, 3].iter().all(|&i| bend(i) * own.signum() < -BENDS * own.abs()),
+                alone: [1, 3]
+                    .iter()
+                    .all(|&i| bend(i) * own.signum() < -BENDS * own.abs()),
             }
         })
         .collect()
@@ -142,7 +144,9 @@ mod tests {
         let scene = r#"<mujoco><worldbody><body>
             <joint name="slide" type="slide"/><geom size="0.1" mass="1"/></body></worldbody>
             <sensor><jointpos name="place" joint="slide"/></sensor></mujoco>"#;
-        Plant::of(&Scene::from_xml("slide", scene, &[]).unwrap()).unwrap().layout
+        Plant::of(&Scene::from_xml("slide", scene, &[]).unwrap())
+            .unwrap()
+            .layout
     }
 
     fn episode(readings: Vec<f64>) -> Episode {
@@ -159,9 +163,14 @@ mod tests {
 
     /// Noise of deviation 1 without a pattern that a line would follow.
     fn noise(k: usize) -> f64 {
-        let hash = (k as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15).rotate_left(31);
+        let hash = (k as u64)
+            .wrapping_mul(0x9E37_79B9_7F4A_7C15)
+            .rotate_left(31);
         let hash = hash.wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        (0..12).map(|i| ((hash.rotate_left(5 * i) & 0xFFFF) as f64) / 65536.0).sum::<f64>() - 6.0
+        (0..12)
+            .map(|i| ((hash.rotate_left(5 * i) & 0xFFFF) as f64) / 65536.0)
+            .sum::<f64>()
+            - 6.0
     }
 
     #[test]

@@ -215,7 +215,11 @@ fn an_ordinary_log_is_read_and_what_was_done_is_said() {
         let log = std::fs::read_to_string(&path).unwrap();
         let rows = log.lines().enumerate().map(|(i, line)| {
             let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
-            cells.push(if i == 0 { "battery".into() } else { "12.1 V".into() });
+            cells.push(if i == 0 {
+                "battery".into()
+            } else {
+                "12.1 V".into()
+            });
             if i > 0 {
                 let number = |cell: &str| cell.parse::<f64>().unwrap();
                 cells[0] = format!("{:.0}", 3.7e9 + 1e6 * number(&cells[0]));
@@ -234,7 +238,14 @@ fn an_ordinary_log_is_read_and_what_was_done_is_said() {
     let written = std::fs::read_to_string(&toml).unwrap();
     let diagnosed = |name: &str| -> Value {
         let out = folder.path().join(name);
-        let out = asid(&["diagnose", text(&study), "--quiet", "--json", "--out", text(&out)]);
+        let out = asid(&[
+            "diagnose",
+            text(&study),
+            "--quiet",
+            "--json",
+            "--out",
+            text(&out),
+        ]);
         serde_json::from_slice(&out.stdout)
             .unwrap_or_else(|_| panic!("{}", String::from_utf8_lossy(&out.stderr)))
     };
@@ -250,9 +261,16 @@ fn an_ordinary_log_is_read_and_what_was_done_is_said() {
     std::fs::write(&toml, format!("{written}{mapping}")).unwrap();
     let result = diagnosed("b");
     let (ok, said) = check(&result, "log");
-    assert!(ok && said.contains("`battery`") && said.contains("stamps are in us"), "{said}");
+    assert!(
+        ok && said.contains("`battery`") && said.contains("stamps are in us"),
+        "{said}"
+    );
     assert!(check(&result, "outliers").1.contains("6 of `dx`"));
-    assert_eq!(result["wiring"][0]["fault"], "wiring-sign", "{}", result["wiring"]);
+    assert_eq!(
+        result["wiring"][0]["fault"], "wiring-sign",
+        "{}",
+        result["wiring"]
+    );
     assert_eq!(result["verdict"]["kind"], "none", "{}", result["sentence"]);
     // The lines it gives are the lines that mend it.
     let mend = result["wiring"][0]["mend"].as_str().unwrap();

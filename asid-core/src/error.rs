@@ -121,7 +121,9 @@ impl Error {
     #[must_use]
     pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<String> {
         let lower = |s: &str| s.to_lowercase();
-        let distances = known.into_iter().map(|k| (edit_distance(&lower(name), &lower(k)), k));
+        let distances = known
+            .into_iter()
+            .map(|k| (edit_distance(&lower(name), &lower(k)), k));
         let near = distances.filter(|(d, k)| 3 * d <= k.len().max(name.len()));
         near.min().map(|(_, k)| k.to_owned())
     }

@@ -51,7 +51,10 @@ impl Episode {
         for channel in &self.channels {
             for i in 0..channel.len {
                 let source = Source::of(mappings, &channel.name, (channel.len > 1).then_some(i));
-                let from = places.iter().position(|p| *p == source.column).unwrap_or(at);
+                let from = places
+                    .iter()
+                    .position(|p| *p == source.column)
+                    .unwrap_or(at);
                 for k in 0..self.rows() {
                     let x = self.readings[k * width + from];
                     episode.readings[k * width + at] = source.factor * x + source.offset;
@@ -210,10 +213,13 @@ impl<'a> Reader<'a> {
             if channels.iter().any(|c| c.name == s.name) {
                 continue;
             }
-            let stems = notes.passed_over.iter().map(|name| match name.strip_suffix(".0") {
-                Some(stem) if s.len > 1 => stem,
-                _ => name,
-            });
+            let stems = notes
+                .passed_over
+                .iter()
+                .map(|name| match name.strip_suffix(".0") {
+                    Some(stem) if s.len > 1 => stem,
+                    _ => name,
+                });
             if let Some(near) = Error::nearest(&s.name, stems) {
                 notes.misspelt.push((near, s.name.clone()));
             }
@@ -276,7 +282,9 @@ impl<'a> Reader<'a> {
             episode.ctrl.push(c.factor * number(c.place)? + c.offset);
         }
         for c in &self.readings {
-            episode.readings.push(c.factor * number(c.place)? + c.offset);
+            episode
+                .readings
+                .push(c.factor * number(c.place)? + c.offset);
         }
         Ok(())
     }
@@ -289,7 +297,9 @@ impl<'a> Reader<'a> {
         if self.notes.doubled + self.notes.reordered > 0 {
             let (nu, width) = (episode.actuators.len(), episode.width());
             let gather = |values: &[f64], width: usize| -> Vec<f64> {
-                let rows = rows.iter().flat_map(|&k| &values[k * width..(k + 1) * width]);
+                let rows = rows
+                    .iter()
+                    .flat_map(|&k| &values[k * width..(k + 1) * width]);
                 rows.copied().collect()
             };
             episode.time = gather(&episode.time, 1);

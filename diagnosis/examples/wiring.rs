@@ -45,8 +45,14 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         (Some("--spoil"), Some(seed)) => Some(seed.parse()?),
         _ => None,
     };
-    let labels = [folder.join("sealed/labels.json"), folder.join("labels.json")];
-    let labels = labels.iter().find(|p| p.is_file()).ok_or("no labels.json")?;
+    let labels = [
+        folder.join("sealed/labels.json"),
+        folder.join("labels.json"),
+    ];
+    let labels = labels
+        .iter()
+        .find(|p| p.is_file())
+        .ok_or("no labels.json")?;
     let labels: BTreeMap<String, Value> = serde_json::from_str(&std::fs::read_to_string(labels)?)?;
     let mut tallies: BTreeMap<String, Tally> = BTreeMap::new();
     for (case, label) in &labels {
@@ -55,11 +61,15 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             continue;
         };
         let study = Study::read(at)?;
-        let backend: Box<dyn asid::core::Backend> = (asid::core::registry::find::<
-            asid::core::registry::BackendEntry,
-        >("mujoco")?
-        .make)()?;
-        let machine = Machine::new(backend.into(), &study.scene, &study.fixed, &study.effects, 0)?;
+        let backend: Box<dyn asid::core::Backend> =
+            (asid::core::registry::find::<asid::core::registry::BackendEntry>("mujoco")?.make)()?;
+        let machine = Machine::new(
+            backend.into(),
+            &study.scene,
+            &study.fixed,
+            &study.effects,
+            0,
+        )?;
         let wired = label["wiring"].as_array().and_then(|w| w.first());
         let spoilt = wired.map(|w| Spoilt {
             fault: w["fault"].as_str().unwrap_or_default().into(),
@@ -79,7 +89,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         }
     }
     for (fault, t) in tallies {
-        println!("{fault}: {} cases, {} right, {} wrong", t.cases, t.found, t.wrong);
+        println!(
+            "{fault}: {} cases, {} right, {} wrong",
+            t.cases, t.found, t.wrong
+        );
     }
     Ok(())
 }
@@ -114,10 +127,20 @@ fn look(
     let found: Vec<String> = mended
         .wiring
         .iter()
-        .map(|w| format!("{} {:?} {:.3} [{}]", w.fault, w.columns, w.probability, w.mend.replace('\n', " ")))
+        .map(|w| {
+            format!(
+                "{} {:?} {:.3} [{}]",
+                w.fault,
+                w.columns,
+                w.probability,
+                w.mend.replace('\n', " ")
+            )
+        })
         .collect();
     let verdict = if right { "ok" } else { "MISS" };
-    let put = spoilt.map_or_else(String::new, |s| format!("{} {:?} {:.4}", s.fault, s.columns, s.size));
+    let put = spoilt.map_or_else(String::new, |s| {
+        format!("{} {:?} {:.4}", s.fault, s.columns, s.size)
+    });
     let nearest = mended.nearest.map_or_else(String::new, |n| {
         format!("nearest {} {:?} {:.2}", n.fault, n.columns, n.shrinkage)
     });
@@ -138,27 +161,49 @@ fn spoil(
 ) -> Result<Vec<(Study, Spoilt)>, Box<dyn std::error::Error>> {
     let layout = &machine.plant.layout;
     let mut random = Streams::new(seed).stream(&format!("spoil {case}"));
-    let sensors: Vec<String> = study.train[0].1.channels.iter().map(|c| c.name.clone()).collect();
+    let sensors: Vec<String> = study.train[0]
+        .1
+        .channels
+        .iter()
+        .map(|c| c.name.clone())
+        .collect();
     let all = hypotheses::quantities(&machine.plant, &sensors);
-    let scalars: Vec<_> = all.iter().filter(|q| !q.command && q.name == q.whole).collect();
+    let scalars: Vec<_> = all
+        .iter()
+        .filter(|q| !q.command && q.name == q.whole)
+        .collect();
     let mut spoilt = Vec::new();
-    let mut put = |fault: &str, mappings: Vec<ColumnMapping>, size: f64| -> Result<(), asid::core::Error> {
-        let columns = mappings.iter().map(|m| m.name.clone()).collect();
-        let mut study = study.clone();
-        for (_, episode) in study.train.iter_mut().chain(&mut study.test) {
-            *episode = remapped(episode, layout, &mappings)?;
-        }
-        let fault = fault.to_owned();
-        spoilt.push((study, Spoilt { fault, columns, size }));
-        Ok(())
-    };
+    let mut put =
+        |fault: &str, mappings: Vec<ColumnMapping>, size: f64| -> Result<(), asid::core::Error> {
+            let columns = mappings.iter().map(|m| m.name.clone()).collect();
+            let mut study = study.clone();
+            for (_, episode) in study.train.iter_mut().chain(&mut study.test) {
+                *episode = remapped(episode, layout, &mappings)?;
+            }
+            let fault = fault.to_owned();
+            spoilt.push((
+                study,
+                Spoilt {
+                    fault,
+                    columns,
+                    size,
+                },
+            ));
+            Ok(())
+        };
     if let Some(q) = scalars.choose(&mut random) {
-        let mapping = ColumnMapping { sign: -1.0, ..ColumnMapping::of(&q.name) };
+        let mapping = ColumnMapping {
+            sign: -1.0,
+            ..ColumnMapping::of(&q.name)
+        };
         put("wiring-sign", vec![mapping], -1.0)?;
     }
     if let Some(q) = scalars.choose(&mut random) {
         let scale = 1.0 / q.units.first().map_or(1.0, |u| u.1);
-        let mapping = ColumnMapping { scale, ..ColumnMapping::of(&q.name) };
+        let mapping = ColumnMapping {
+            scale,
+            ..ColumnMapping::of(&q.name)
+        };
         put("wiring-unit", vec![mapping], scale)?;
     }
     if let Some(q) = scalars.choose(&mut random) {
@@ -172,29 +217,46 @@ fn spoil(
         let mean = values.iter().sum::<f64>() / n;
         let spread = (values.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / n).sqrt();
         let offset = random.random_range(OFFSET) * spread;
-        let mapping = ColumnMapping { offset, ..ColumnMapping::of(&q.name) };
+        let mapping = ColumnMapping {
+            offset,
+            ..ColumnMapping::of(&q.name)
+        };
         put("wiring-offset", vec![mapping], offset)?;
     }
     if let Some(a) = scalars.choose(&mut random) {
-        let others: Vec<_> = scalars.iter().filter(|b| b.name != a.name && b.kind == a.kind).collect();
+        let others: Vec<_> = scalars
+            .iter()
+            .filter(|b| b.name != a.name && b.kind == a.kind)
+            .collect();
         if let Some(b) = others.choose(&mut random) {
             let from = |name: &str, from: &str| ColumnMapping {
                 from: Some(from.to_owned()),
                 ..ColumnMapping::of(name)
             };
-            put("wiring-swapped", vec![from(&a.name, &b.name), from(&b.name, &a.name)], 0.0)?;
+            put(
+                "wiring-swapped",
+                vec![from(&a.name, &b.name), from(&b.name, &a.name)],
+                0.0,
+            )?;
         }
     }
     if layout.nu() > 0 {
         let delay = random.random_range(CLOCK);
-        let late = |name: &String| ColumnMapping { delay: -delay, ..ColumnMapping::of(name) };
+        let late = |name: &String| ColumnMapping {
+            delay: -delay,
+            ..ColumnMapping::of(name)
+        };
         put("wiring-clock", sensors.iter().map(late).collect(), delay)?;
     }
     Ok(spoilt)
 }
 
 /// The log with a fault; readings of before the first row are those of the first.
-fn remapped(episode: &Episode, layout: &Layout, mappings: &[ColumnMapping]) -> Result<Episode, asid::core::Error> {
+fn remapped(
+    episode: &Episode,
+    layout: &Layout,
+    mappings: &[ColumnMapping],
+) -> Result<Episode, asid::core::Error> {
     let mut spoilt = episode.remapped(layout, mappings)?;
     let width = spoilt.width();
     let late = mappings.iter().map(|m| -m.delay).fold(0.0, f64::max);

@@ -81,7 +81,11 @@ pub struct Hypothesis {
 fn units(si: &str) -> Vec<(&'static str, f64)> {
     match si {
         // A reading of radians may have been brought to radians a second time.
-        "rad" => vec![("deg", DEGREE), ("", 1.0 / DEGREE), ("rev", std::f64::consts::TAU)],
+        "rad" => vec![
+            ("deg", DEGREE),
+            ("", 1.0 / DEGREE),
+            ("rev", std::f64::consts::TAU),
+        ],
         "rad/s" => vec![
             ("deg/s", DEGREE),
             ("", 1.0 / DEGREE),
@@ -138,7 +142,11 @@ pub fn quantities(plant: &Plant, sensors: &[String]) -> Vec<Quantity> {
                     _ => None,
                 },
                 kind,
-                units: if sensor.len == 4 { Vec::new() } else { units(si) },
+                units: if sensor.len == 4 {
+                    Vec::new()
+                } else {
+                    units(si)
+                },
             });
         }
         place += sensor.len;
@@ -203,7 +211,9 @@ pub fn of_columns(all: &[Quantity], view: &View, suspects: &[bool]) -> Vec<Hypot
             };
             one(Fault::Sign, own.times(-1.0));
             // The entries of a vector are in one unit.
-            let vector: Vec<usize> = (0..all.len()).filter(|&j| all[j].whole == a.whole).collect();
+            let vector: Vec<usize> = (0..all.len())
+                .filter(|&j| all[j].whole == a.whole)
+                .collect();
             for (k, (_, factor)) in a.units.iter().enumerate().filter(|_| vector[0] == i) {
                 let scaled = vector.iter().fold(view.clone(), |view, &j| {
                     let own = view_of(&view, &all[j]);

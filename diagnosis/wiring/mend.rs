@@ -41,12 +41,16 @@ pub struct Nearest {
 fn logged(study: &Study, machine: &Machine) -> Vec<String> {
     let reads = |name: &str| {
         study.train.iter().any(|(_, e)| {
-            e.channel(name)
-                .is_some_and(|r| (0..e.rows()).any(|k| e.reading(k)[r.clone()].iter().any(|x| x.is_finite())))
+            e.channel(name).is_some_and(|r| {
+                (0..e.rows()).any(|k| e.reading(k)[r.clone()].iter().any(|x| x.is_finite()))
+            })
         })
     };
     let sensors = machine.plant.layout.sensors.iter();
-    sensors.filter(|s| reads(&s.name)).map(|s| s.name.clone()).collect()
+    sensors
+        .filter(|s| reads(&s.name))
+        .map(|s| s.name.clone())
+        .collect()
 }
 
 /// Looks at the wiring of a study's logs, and reads them by what it found.
@@ -93,7 +97,8 @@ pub fn mend(study: &Study, machine: &Machine, settings: &Settings) -> Result<Men
     }
     let mappings = mappings(&all, &view);
     let remapped = |logs: &[(String, Episode)]| -> Result<Vec<(String, Episode)>> {
-        let one = |(name, e): &(String, Episode)| Ok((name.clone(), e.remapped(layout, &mappings)?));
+        let one =
+            |(name, e): &(String, Episode)| Ok((name.clone(), e.remapped(layout, &mappings)?));
         logs.iter().map(one).collect()
     };
     let mut mended = study.clone();
@@ -156,7 +161,9 @@ fn mappings(all: &[Quantity], view: &View) -> Vec<ColumnMapping> {
             ..m.clone()
         };
         let alike = entries.len() == vector.len()
-            && entries.iter().all(|m| m.from.is_none() && whole(m) == whole(&entries[0]));
+            && entries
+                .iter()
+                .all(|m| m.from.is_none() && whole(m) == whole(&entries[0]));
         if alike {
             found.push(whole(&entries[0]));
         } else {

@@ -179,7 +179,10 @@ impl Search<'_> {
 
     fn judged(&self, hypothesis: Hypothesis, given: &Misses, misses: &Misses) -> Tried {
         let shrinkage = self.settings.shrinkage(given, misses);
-        let command = hypothesis.quantities.iter().any(|&q| self.quantities[q].command);
+        let command = hypothesis
+            .quantities
+            .iter()
+            .any(|&q| self.quantities[q].command);
         let more = match hypothesis.fault {
             Fault::Clock => self.settings.clock,
             _ if command || hypothesis.rare => self.settings.rare,
@@ -212,9 +215,7 @@ impl Search<'_> {
         let told = self.few.start_shift(view, quantity.place)?;
         let size = match told {
             Some(size) => size,
-            None => {
-                size::fit(&mut self.few, &at, offset_fit(spread, 0.0))?.0
-            }
+            None => size::fit(&mut self.few, &at, offset_fit(spread, 0.0))?.0,
         };
         if size.abs() < self.settings.offset * spread {
             return Ok(None);
@@ -250,7 +251,10 @@ impl Search<'_> {
         let readings = self.quantities.iter().enumerate();
         let hypothesis = Hypothesis {
             fault: Fault::Clock,
-            quantities: readings.filter(|(_, q)| !q.command).map(|(i, _)| i).collect(),
+            quantities: readings
+                .filter(|(_, q)| !q.command)
+                .map(|(i, _)| i)
+                .collect(),
             rare: false,
             view: at(delay),
         };
@@ -275,11 +279,7 @@ impl Search<'_> {
         self.all.set_theta(&nominal);
         let (_, drive) = size::fit(&mut self.all, &late_commands, delay_fit(start, true))?;
         self.all.set_theta(&nominal);
-        let handicap = if view.commands.len() == 1 {
-            self.settings.drive
-        } else {
-            -self.settings.drive
-        };
+        let handicap = self.settings.drive[usize::from(view.commands.len() > 1)];
         let beats = self.settings.shrinkage(&drive, &clock);
         let hypothesis = Hypothesis {
             view: late_readings(delay),

@@ -37,7 +37,7 @@ const FRAMES: f64 = 24.0;
 const SHARE: f64 = 0.3;
 /// Share of a window before and after its start within which readings tell the state there. Larger: less noise of the state,
 /// and more of the motion's bend in it.
-const LOCAL: f64 = 0.125;
+const LOCAL: f64 = 0.25;
 /// A prediction that is off by more than so many motions tells no more than that it is wrong.
 const FARTHEST: f64 = 10.0;
 
@@ -112,7 +112,9 @@ impl<'a> Windows<'a> {
             .fold(0.0, f64::max);
         let frame = row_time.max(duration / FRAMES).min(duration);
         let substeps = (frame / layout.timestep).round().max(1.0) as usize;
-        let frames = (duration / (substeps as f64 * layout.timestep)).round().max(1.0) as usize;
+        let frames = (duration / (substeps as f64 * layout.timestep))
+            .round()
+            .max(1.0) as usize;
         let duration = frames as f64 * substeps as f64 * layout.timestep;
         let steps = frames * substeps * layout.nv.max(1);
         let count = count.min((BUDGET * count / WINDOWS / steps).max(FEWEST));
@@ -221,7 +223,12 @@ impl<'a> Windows<'a> {
                     let here = at(window.start);
                     let (before, after) =
                         (at((window.start - half).max(0.0)), at(window.start + half));
-                    if here.iter().chain(&before).chain(&after).all(|x| x.is_finite()) {
+                    if here
+                        .iter()
+                        .chain(&before)
+                        .chain(&after)
+                        .all(|x| x.is_finite())
+                    {
                         let turn = unit_quaternion(&here);
                         let q = layout.joints[j].qpos + 3;
                         qpos[q..q + 4].copy_from_slice(&[turn.w, turn.i, turn.j, turn.k]);
@@ -293,7 +300,10 @@ impl<'a> Windows<'a> {
         );
         self.simulator.rollout(&rollout, &mut told)?;
         let pairs = first.chunks_exact(width).zip(told.chunks_exact(later));
-        Ok(pairs.flat_map(|(a, b)| a.iter().chain(b)).copied().collect())
+        Ok(pairs
+            .flat_map(|(a, b)| a.iter().chain(b))
+            .copied()
+            .collect())
     }
 
     /// What the model predicts from given starts.

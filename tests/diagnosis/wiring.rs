@@ -52,7 +52,12 @@ fn is_mended(fault: &str, columns: &[&str], mappings: &[ColumnMapping], within: 
     for starts in [true, false] {
         let right = study(starts);
         let found = mended(&spoilt(&right, mappings));
-        assert_eq!(found.wiring.len(), 1, "{fault}, starts {starts}: {:?}", found.wiring);
+        assert_eq!(
+            found.wiring.len(),
+            1,
+            "{fault}, starts {starts}: {:?}",
+            found.wiring
+        );
         assert_eq!(found.wiring[0].fault, fault);
         let mut named = found.wiring[0].columns.clone();
         named.sort();
@@ -72,46 +77,83 @@ fn of(name: &str) -> ColumnMapping {
 fn right_wiring_stays_though_a_drive_has_lost_a_quarter() {
     for starts in [true, false] {
         let found = mended(&study(starts));
-        assert!(found.wiring.is_empty(), "starts {starts}: {:?}", found.wiring);
+        assert!(
+            found.wiring.is_empty(),
+            "starts {starts}: {:?}",
+            found.wiring
+        );
     }
 }
 
 #[test]
 fn wiring_sign() {
-    let turned = ColumnMapping { sign: -1.0, ..of("q_elbow") };
+    let turned = ColumnMapping {
+        sign: -1.0,
+        ..of("q_elbow")
+    };
     is_mended("wiring-sign", &["q_elbow"], &[turned], 1e-9);
 }
 
 #[test]
 fn wiring_unit() {
-    let degrees = ColumnMapping { scale: 180.0 / std::f64::consts::PI, ..of("q_shoulder") };
+    let degrees = ColumnMapping {
+        scale: 180.0 / std::f64::consts::PI,
+        ..of("q_shoulder")
+    };
     is_mended("wiring-unit", &["q_shoulder"], &[degrees], 1e-9);
 }
 
 #[test]
 fn wiring_swapped() {
-    let from = |name: &str, from: &str| ColumnMapping { from: Some(from.into()), ..of(name) };
+    let from = |name: &str, from: &str| ColumnMapping {
+        from: Some(from.into()),
+        ..of(name)
+    };
     let swapped = [from("q_shoulder", "q_elbow"), from("q_elbow", "q_shoulder")];
     is_mended("wiring-swapped", &["q_elbow", "q_shoulder"], &swapped, 1e-9);
 }
 
 #[test]
 fn wiring_offset() {
-    // A radian, of angles whose deviation is about one.
-    let shifted = ColumnMapping { offset: 1.0, ..of("q_shoulder") };
-    is_mended("wiring-offset", &["q_shoulder"], &[shifted], 0.1);
+    // By its own deviation; less than 0.4 of it is an effect.
+    let study = study(true);
+    let readings = || {
+        study
+            .train
+            .iter()
+            .flat_map(|(_, e)| e.readings.iter().step_by(2))
+    };
+    let n = readings().count() as f64;
+    let mean = readings().sum::<f64>() / n;
+    let deviation = (readings().map(|x| (x - mean).powi(2)).sum::<f64>() / n).sqrt();
+    let shifted = |share: f64| ColumnMapping {
+        offset: share * deviation,
+        ..of("q_shoulder")
+    };
+    is_mended("wiring-offset", &["q_shoulder"], &[shifted(1.0)], 0.1);
+    let found = mended(&spoilt(&study, &[shifted(0.2)]));
+    assert!(found.wiring.is_empty(), "{:?}", found.wiring);
 }
 
 #[test]
 fn the_mending_lines_are_those_of_the_study_file() {
-    let turned = ColumnMapping { sign: -1.0, ..of("q_elbow") };
+    let turned = ColumnMapping {
+        sign: -1.0,
+        ..of("q_elbow")
+    };
     let found = mended(&spoilt(&study(true), &[turned]));
     assert_eq!(
         found.wiring[0].mend,
         "[[column]]\nname = \"q_elbow\"\nsign = -1.0"
     );
     // Where the study maps the column already, the line stands for both.
-    let mut mapped = spoilt(&study(true), &[ColumnMapping { sign: -1.0, ..of("q_elbow") }]);
+    let mut mapped = spoilt(
+        &study(true),
+        &[ColumnMapping {
+            sign: -1.0,
+            ..of("q_elbow")
+        }],
+    );
     mapped.columns = vec![ColumnMapping {
         from: Some("joint_2".into()),
         unit: Some("deg".into()),

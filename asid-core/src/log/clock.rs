@@ -157,13 +157,19 @@ mod tests {
         let mut time: Vec<f64> = (0..40).map(|k| 0.01 * f64::from(k)).collect();
         time.extend(time.clone());
         let error = order(&time, &mut LogNotes::default()).unwrap_err();
-        assert!(error.contains("row 42") && error.contains("of its own"), "{error}");
+        assert!(
+            error.contains("row 42") && error.contains("of its own"),
+            "{error}"
+        );
     }
 
     #[test]
     fn a_log_of_years_is_refused_in_one_line() {
         let error = check_duration(&[0.0, 0.01, 1.7e9], 0.001).unwrap_err();
-        assert!(error.contains("row 4") && error.lines().count() == 1, "{error}");
+        assert!(
+            error.contains("row 4") && error.lines().count() == 1,
+            "{error}"
+        );
         assert!(check_duration(&[0.0, 100.0], 0.001).is_ok());
     }
 }

@@ -69,7 +69,9 @@ fn between(time: &[f64], at: f64, present: &dyn Fn(usize) -> bool) -> Option<(us
     if after == 0 || after == time.len() {
         return None;
     }
-    let a = (after.saturating_sub(SPAN)..after).rev().find(|&k| present(k))?;
+    let a = (after.saturating_sub(SPAN)..after)
+        .rev()
+        .find(|&k| present(k))?;
     let b = (after..time.len().min(a + SPAN + 1)).find(|&k| present(k))?;
     Some((a, b, (at - time[a]) / (time[b] - time[a])))
 }

@@ -259,7 +259,10 @@ mod tests {
             (ColumnMapping { scale: 0.0, ..base }, "other than 0"),
         ] {
             let error = mapping.check(&layout()).unwrap_err().to_string();
-            assert!(error.contains(said) && error.lines().count() == 1, "{error}");
+            assert!(
+                error.contains(said) && error.lines().count() == 1,
+                "{error}"
+            );
         }
     }
 
@@ -277,7 +280,13 @@ mod tests {
             },
         ];
         let source = |i| Source::of(&mappings, "tip", Some(i));
-        assert_eq!((source(0).column.as_str(), source(0).factor), ("mocap.0", 1e-3));
-        assert_eq!((source(2).column.as_str(), source(2).factor), ("laser", 1.0));
+        assert_eq!(
+            (source(0).column.as_str(), source(0).factor),
+            ("mocap.0", 1e-3)
+        );
+        assert_eq!(
+            (source(2).column.as_str(), source(2).factor),
+            ("laser", 1.0)
+        );
     }
 }

@@ -35,7 +35,9 @@ impl LogNotes {
             ));
         }
         if let Some(unit) = self.time_unit {
-            all.push(format!("stamps are in {unit}: brought to seconds from the first"));
+            all.push(format!(
+                "stamps are in {unit}: brought to seconds from the first"
+            ));
         }
         for (count, what) in [
             (self.doubled, "rows with the stamp of another left out"),

@@ -33,10 +33,17 @@ const PLAIN: &str = "time,ctrl.servo,angle,tip.0,tip.1,tip.2";
 
 fn assert_same(a: &Episode, b: &Episode) {
     assert_eq!(a.channels, b.channels);
-    for (x, y) in [(&a.time, &b.time), (&a.ctrl, &b.ctrl), (&a.readings, &b.readings)] {
+    for (x, y) in [
+        (&a.time, &b.time),
+        (&a.ctrl, &b.ctrl),
+        (&a.readings, &b.readings),
+    ] {
         assert_eq!(x.len(), y.len());
         for (x, y) in x.iter().zip(y) {
-            assert!((x - y).abs() < 1e-9 || (x.is_nan() && y.is_nan()), "{x} {y}");
+            assert!(
+                (x - y).abs() < 1e-9 || (x.is_nan() && y.is_nan()),
+                "{x} {y}"
+            );
         }
     }
 }
@@ -128,7 +135,8 @@ fn a_mapping_of_an_episode_is_the_mapping_of_its_file() {
 
 #[test]
 fn columns_that_the_model_does_not_know_are_listed_and_a_misspelt_one_named() {
-    let text = "time,ctrl.servo,Angle,battery,tip.0,tip.1,tip.2\n0,1,2,12.1,0,0,0\n0.1,1,2,oops,0,0,0\n";
+    let text =
+        "time,ctrl.servo,Angle,battery,tip.0,tip.1,tip.2\n0,1,2,12.1,0,0,0\n0.1,1,2,oops,0,0,0\n";
     let (episode, notes) = read_text(text, &[]).unwrap();
     assert_eq!(episode.channels.len(), 1);
     assert_eq!(notes.passed_over, ["Angle", "battery"]);
