@@ -27,6 +27,8 @@ pub struct Settings {
     pub scale: f64,
     /// Additional logarithm for a clock, which delays of drives and sensors resemble.
     pub clock: f64,
+    /// The same for readings that come before what they tell of: only stamps of commands that are late make them.
+    pub early: f64,
     /// Additional logarithm for commands and for units that hardly any log is in: their faults are rarer than the others.
     pub rare: f64,
     /// Logarithm of the factor by which late readings have to beat late commands to be a clock's: on a machine with one drive, whose
@@ -49,6 +51,7 @@ impl Default for Settings {
             even: 0.65,
             scale: 0.08,
             clock: 0.1,
+            early: 1.5,
             rare: 0.5,
             drive: [0.1, -0.5],
             offset: 0.4,

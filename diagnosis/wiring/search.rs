@@ -184,6 +184,9 @@ impl Search<'_> {
             .iter()
             .any(|&q| self.quantities[q].command);
         let more = match hypothesis.fault {
+            Fault::Clock if hypothesis.view.readings.iter().any(|v| v.delay < 0.0) => {
+                self.settings.early
+            }
             Fault::Clock => self.settings.clock,
             _ if command || hypothesis.rare => self.settings.rare,
             _ => 0.0,

@@ -241,7 +241,7 @@ mod tests {
     fn a_mapping_that_makes_no_sense_is_refused_in_one_line() {
         let base = ColumnMapping::of("angle");
         for (mapping, said) in [
-            (ColumnMapping::of("angel"), "did you mean `angle`"),
+            (ColumnMapping::of("angel"), "known: `angle`"),
             (
                 ColumnMapping {
                     unit: Some("parsec".into()),
