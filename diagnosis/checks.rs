@@ -54,6 +54,30 @@ pub fn data(train: &Logs, test: &Logs) -> CheckResult {
     )
 }
 
+/// Correlation of noise from one reading to the next from which on it is said: below it an estimate from a few hundred rows
+/// scatters about 0.
+const COLOURED: f64 = 0.2;
+
+/// Whether each sensor's noise is white: where it was filtered, its deviation is larger than neighbouring readings show.
+#[must_use]
+pub fn whiteness(logs: &Logs, residuals: &[Vec<f64>]) -> CheckResult {
+    let noise = crate::noise::describe(logs, residuals);
+    let each = logs.sensors.iter().zip(noise);
+    let coloured: Vec<String> = each
+        .filter(|(_, n)| n.correlation > COLOURED)
+        .map(|(s, n)| format!("`{}` by {:.2}", s.name, n.correlation))
+        .collect();
+    let detail = if coloured.is_empty() {
+        "no correlation from reading to reading is seen: it is taken for white".into()
+    } else {
+        format!(
+            "the noise is correlated from reading to reading, which its deviation takes into account: of {}",
+            coloured.join(", of ")
+        )
+    };
+    check("noise", true, detail)
+}
+
 /// Readings in another unit: their slope over the predictions is one of the usual factors.
 ///
 /// # Errors

@@ -6,6 +6,7 @@ use asid_effects::EffectSpec;
 use crate::bench::{Bench, Explanation, Trial};
 use crate::candidate::{Candidate, enumerate};
 use crate::fit::cost;
+use crate::intake::Intake;
 use crate::latent_force;
 use crate::machine::Machine;
 use crate::predict::{Point, State};
@@ -43,11 +44,29 @@ pub struct Diagnosis {
     pub values: Vec<f64>,
 }
 
-/// Diagnoses a study on a machine.
+/// Diagnoses a study on a machine, with outliers left out of its logs and its wiring mended.
 ///
 /// # Errors
 /// When a parameter cannot be set or a rollout fails.
 pub fn diagnose(
+    study: &Study,
+    machine: Machine,
+    settings: Settings,
+    progress: &dyn Progress,
+) -> Result<(Diagnosis, Work)> {
+    progress.begin("looking at the logs", 1);
+    let intake = Intake::of(study, &machine)?;
+    progress.end();
+    let (mut diagnosis, work) = diagnose_physics(&intake.study, machine, settings, progress)?;
+    let (bench, point) = (&work.bench, &work.findings.none.fit.point);
+    let residuals = plain_residuals(bench, &bench.train, &[], point)?;
+    let whiteness = crate::checks::whiteness(&bench.train.logs, &residuals);
+    intake.tell(&mut diagnosis.result, whiteness);
+    Ok((diagnosis, work))
+}
+
+/// Diagnoses a study whose logs are in order.
+fn diagnose_physics(
     study: &Study,
     machine: Machine,
     settings: Settings,

@@ -2,6 +2,7 @@
 //! how far it shrinks once that effect is added.
 //!
 //! - [`study`] is what the user brings: a model, logs of the real machine, what is fitted already.
+//! - [`intake`] looks at its logs before any physics: outliers, and [`wiring`].
 //! - [`latent_force`] asks which force is missing at each moment, and which effects make up for it: for machines that
 //!   touch nothing in their logs.
 //! - [`search`] asks whether whole replays land on the logs: for those that do.
@@ -16,6 +17,7 @@ pub mod diagnose;
 pub mod experiment;
 pub mod fit;
 pub mod forces;
+pub mod intake;
 pub mod latent_force;
 pub mod linearise;
 pub mod localise;
@@ -23,6 +25,7 @@ pub mod machine;
 pub mod noise;
 mod normal;
 pub mod nuisance;
+pub mod outliers;
 pub mod predict;
 pub mod prepare;
 pub mod record;
@@ -41,4 +44,5 @@ pub mod trajectory;
 pub mod verdict;
 pub mod whitening;
 pub mod windows;
+pub mod wiring;
 mod work;

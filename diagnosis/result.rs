@@ -128,6 +128,19 @@ pub struct CheckResult {
     pub detail: String,
 }
 
+/// A fault of wiring: columns of the logs that do not mean what their names say.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct WiringResult {
+    /// `wiring-swapped`, `wiring-sign`, `wiring-unit`, `wiring-offset` or `wiring-clock`.
+    pub fault: String,
+    /// Sensors or `ctrl.<actuator>` concerned.
+    pub columns: Vec<String>,
+    /// Probability against the wiring as given.
+    pub probability: f64,
+    /// Lines for the study file.
+    pub mend: String,
+}
+
 /// The experiment that would tell rivals apart.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct NextExperiment {
@@ -178,6 +191,9 @@ pub struct DiagnosisResult {
     pub checks: Vec<CheckResult>,
     /// What to do next.
     pub next_experiment: NextExperiment,
+    /// Faults of wiring; everything else is said of the study after their mending.
+    #[serde(default)]
+    pub wiring: Vec<WiringResult>,
     /// The force that is missing at each degree of freedom; empty where contact lasts, and it is not estimated.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub missing_force: Vec<MissingForce>,

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use asid_core::episode::InitialState;
+use asid_core::log::{ColumnMapping, LogNotes};
 use asid_core::parameter::Scale;
 use asid_core::problem::home;
 use asid_core::{Episode, Error, Layout, Parameter, Result, Scene, Target, Task};
@@ -30,6 +31,8 @@ struct Document {
     parameter: Vec<StudyParameter>,
     #[serde(default)]
     noise: BTreeMap<String, f64>,
+    #[serde(default)]
+    column: Vec<ColumnMapping>,
 }
 
 /// A parameter, as written.
@@ -69,6 +72,12 @@ pub struct Study {
     pub test: Vec<(String, Episode)>,
     /// Noise by sensor, where it is given.
     pub noise: BTreeMap<String, f64>,
+    /// What the columns of the logs mean, where they do not mean what their names say.
+    pub columns: Vec<ColumnMapping>,
+    /// What was passed over or mended as logs were read: file and notes.
+    pub notes: Vec<(String, LogNotes)>,
+    /// Whether the columns are known to mean what their names say: logs of a task's own runs.
+    pub wired: bool,
 }
 
 impl Study {
@@ -121,15 +130,31 @@ impl Study {
                 )));
             }
         }
-        let train =
-            logs(&folder, &document.train, &plant.layout, "train").map_err(|e| match e {
+        for (i, mapping) in document.column.iter().enumerate() {
+            mapping.check(&plant.layout).map_err(|e| match e {
                 Error::Config { message, .. } => fail(message),
                 other => other,
             })?;
-        let test = logs(&folder, &document.test, &plant.layout, "test").map_err(|e| match e {
-            Error::Config { message, .. } => fail(message),
-            other => other,
-        })?;
+            let before = &document.column[..i];
+            if before.iter().any(|m| m.name == mapping.name) {
+                return Err(fail(format!("two [[column]] are named `{}`", mapping.name)));
+            }
+        }
+        let mut notes = Vec::new();
+        let mut read = |patterns: &[String], key: &str| -> Result<Vec<(String, Episode)>> {
+            let columns = (&plant.layout, &document.column[..]);
+            let read = logs(&folder, patterns, columns, key).map_err(|e| match e {
+                Error::Config { message, .. } => fail(message),
+                other => other,
+            })?;
+            let each = read.into_iter().map(|(name, episode, noted)| {
+                notes.push((name.clone(), noted));
+                (name, episode)
+            });
+            Ok(each.collect())
+        };
+        let train = read(&document.train, "train")?;
+        let test = read(&document.test, "test")?;
         if let Some((name, _)) = test.iter().find(|(n, _)| train.iter().any(|(m, _)| m == n)) {
             return Err(fail(format!(
                 "{name} is among `train` and among `test`: what is held out must not be fitted"
@@ -150,6 +175,9 @@ impl Study {
             train,
             test,
             noise: document.noise,
+            columns: document.column,
+            notes,
+            wired: false,
         }
         .with_test()
     }
@@ -193,9 +221,39 @@ impl Study {
                 .map(|sensor| (sensor.clone(), PROPRIOCEPTION))
                 .chain(trackers.map(|s| (s.sensor.clone(), s.noise)))
                 .collect(),
+            columns: Vec::new(),
+            notes: Vec::new(),
+            wired: true,
             scene,
         }
         .with_test()
+    }
+
+    /// A further mapping, of logs as this study reads them, as one of the files themselves: what replaces the study's own of
+    /// that name.
+    #[must_use]
+    pub fn composed(&self, further: &ColumnMapping) -> ColumnMapping {
+        let source = further.from.as_deref().unwrap_or(&further.name);
+        let Some(own) = self.columns.iter().find(|m| m.name == source) else {
+            return further.clone();
+        };
+        let mut whole = further.clone();
+        whole.from = own.from.clone().or_else(|| further.from.clone());
+        whole.sign = own.sign * further.sign;
+        whole.offset = further.factor() * own.offset + further.offset;
+        whole.delay = own.delay + further.delay;
+        match (&own.unit, &further.unit) {
+            (unit, None) | (None, unit) => {
+                whole.unit.clone_from(unit);
+                whole.scale = own.scale * further.scale;
+            }
+            // Two units make a factor.
+            _ => {
+                whole.unit = None;
+                whole.scale = (own.factor() * further.factor()).abs();
+            }
+        }
+        whole
     }
 
     /// Holds out whole episodes where the study names no test logs: a third of them, the last.
@@ -269,9 +327,9 @@ fn parameter(written: &StudyParameter) -> Result<Parameter, String> {
 fn logs(
     folder: &Path,
     patterns: &[String],
-    layout: &Layout,
+    (layout, columns): (&Layout, &[ColumnMapping]),
     key: &str,
-) -> Result<Vec<(String, Episode)>> {
+) -> Result<Vec<(String, Episode, LogNotes)>> {
     let mut files: Vec<PathBuf> = Vec::new();
     for pattern in patterns {
         let found = matching(folder, pattern)?;
@@ -297,8 +355,8 @@ fn logs(
         .iter()
         .map(|file| {
             let name = file.strip_prefix(folder).unwrap_or(file);
-            let episode = Episode::read(file, layout)?;
-            Ok((name.display().to_string(), episode))
+            let (episode, notes) = asid_core::log::read(file, layout, columns)?;
+            Ok((name.display().to_string(), episode, notes))
         })
         .collect()
 }

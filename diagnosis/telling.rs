@@ -172,6 +172,7 @@ impl Telling<'_> {
             checks: self.checks(none, &explanation, short.as_ref())?,
             next_experiment: self.next(best)?,
             missing_force: self.findings.missing.clone(),
+            wiring: Vec::new(),
         };
         let rest = short
             .and_then(|(before, after, _)| least_explained(&before, &after))

@@ -22,11 +22,12 @@ mod pictures;
 mod places;
 mod real_world;
 mod trace;
+mod wiring;
 mod words;
 
 pub use data::{
     Check, Diagnosis, Effect, EffectValue, Gap, Hypothesis, Kind, Parameter, Place, SignalGap,
-    Verdict,
+    Verdict, Wiring,
 };
 pub use real_world::{RealWorld, TaskTrial};
 pub use trace::{Map, Rung, SignalTrace};
@@ -36,6 +37,7 @@ pub use trace::{Map, Rung, SignalTrace};
 pub fn page(diagnosis: &Diagnosis) -> String {
     let d = diagnosis;
     let sections = [
+        wiring::section(d),
         Some(ladder::section(d)),
         real_world::section(d),
         Some(pictures::section(d)),

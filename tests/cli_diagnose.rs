@@ -157,11 +157,11 @@ fn bad_studies_and_logs_are_refused_in_one_line() {
     let toml = study.join("study.toml");
     let written = std::fs::read_to_string(&toml).unwrap();
     let with_log = |text: String| std::fs::write(&log, text).unwrap();
-    let cases: [Spoilt<'_>; 7] = [
+    let cases: [Spoilt<'_>; 6] = [
         (
-            "unknown column",
-            Box::new(|| with_log(good.replace(",dx,", ",ddx,"))),
-            "column `ddx`",
+            "no sensor",
+            Box::new(|| with_log(good.replace(",x,dx,", ",place,speed,"))),
+            "no column of a sensor",
         ),
         (
             "text",
@@ -170,13 +170,8 @@ fn bad_studies_and_logs_are_refused_in_one_line() {
         ),
         (
             "time back",
-            Box::new(|| with_log(good.replace("\n0.020,", "\n0.005,"))),
-            "row 4: time 0.005",
-        ),
-        (
-            "no coordinate",
-            Box::new(|| with_log(good.replace("qpos.rail", "qpos.rial"))),
-            "column `qpos.rial`",
+            Box::new(|| with_log(good.replace("\n1.020,", "\n0.005,"))),
+            "row 104: the time goes back",
         ),
         (
             "one row",
@@ -204,6 +199,85 @@ fn bad_studies_and_logs_are_refused_in_one_line() {
     }
     let (said, status) = refusal(&["diagnose", text(&folder.path().join("nowhere"))]);
     assert!(said.contains("no such file") && status == Some(2), "{said}");
+}
+
+#[test]
+fn an_ordinary_log_is_read_and_what_was_done_is_said() {
+    let folder = tempfile::tempdir().unwrap();
+    let study = folder.path().join("study");
+    write_study(&study, Truth::None);
+    // Stamps in microseconds since boot, a column of no sensor, the position misspelt, the position counted the other way, and a spike.
+    for entry in std::fs::read_dir(&study).unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_none_or(|e| e != "csv") {
+            continue;
+        }
+        let log = std::fs::read_to_string(&path).unwrap();
+        let rows = log.lines().enumerate().map(|(i, line)| {
+            let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+            cells.push(if i == 0 {
+                "battery".into()
+            } else {
+                "12.1 V".into()
+            });
+            if i > 0 {
+                let number = |cell: &str| cell.parse::<f64>().unwrap();
+                cells[0] = format!("{:.0}", 3.7e9 + 1e6 * number(&cells[0]));
+                cells[2] = (-number(&cells[2])).to_string();
+                if i == 50 {
+                    cells[3] = "40".into();
+                }
+            }
+            cells.join(",") + "\n"
+        });
+        let text: String = rows.collect();
+        std::fs::write(&path, text.replacen(",dx,", ",DX,", 1)).unwrap();
+    }
+    let mapping = "[[column]]\nname = \"dx\"\nfrom = \"DX\"\n";
+    let toml = study.join("study.toml");
+    let written = std::fs::read_to_string(&toml).unwrap();
+    let diagnosed = |name: &str| -> Value {
+        let out = folder.path().join(name);
+        let out = asid(&[
+            "diagnose",
+            text(&study),
+            "--quiet",
+            "--json",
+            "--out",
+            text(&out),
+        ]);
+        serde_json::from_slice(&out.stdout)
+            .unwrap_or_else(|_| panic!("{}", String::from_utf8_lossy(&out.stderr)))
+    };
+    let check = |result: &Value, name: &str| -> (bool, String) {
+        let checks = result["checks"].as_array().unwrap();
+        let found = checks.iter().find(|c| c["check"] == name);
+        let found = found.unwrap_or_else(|| panic!("no check `{name}`"));
+        let detail = found["detail"].as_str().unwrap().to_owned();
+        (found["ok"].as_bool().unwrap(), detail)
+    };
+    let (ok, said) = check(&diagnosed("a"), "log");
+    assert!(!ok && said.contains("`DX` looks like `dx`"), "{said}");
+    std::fs::write(&toml, format!("{written}{mapping}")).unwrap();
+    let result = diagnosed("b");
+    let (ok, said) = check(&result, "log");
+    assert!(
+        ok && said.contains("`battery`") && said.contains("stamps are in us"),
+        "{said}"
+    );
+    assert!(check(&result, "outliers").1.contains("6 of `dx`"));
+    assert_eq!(
+        result["wiring"][0]["fault"], "wiring-sign",
+        "{}",
+        result["wiring"]
+    );
+    assert_eq!(result["verdict"]["kind"], "none", "{}", result["sentence"]);
+    // The lines it gives are the lines that mend it.
+    let mend = result["wiring"][0]["mend"].as_str().unwrap();
+    std::fs::write(&toml, format!("{written}{mapping}{mend}\n")).unwrap();
+    let result = diagnosed("c");
+    assert_eq!(result["wiring"], serde_json::json!([]));
+    assert_eq!(result["verdict"]["kind"], "none", "{}", result["sentence"]);
 }
 
 #[test]

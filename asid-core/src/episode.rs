@@ -313,14 +313,14 @@ pub(crate) mod tests {
             ("time,angle\n0,1\n", "`ctrl.servo`"),
             ("time,ctrl.servo,angel\n0,1,2\n1,1,2\n", "`angel`"),
             ("time,ctrl.servo,tip.0,tip.1\n0,1,2,3\n", "`tip.2`"),
-            ("time,ctrl.servo,angle\n0,1,2\n0,1,2\n", "row 3: time 0"),
+            ("time,ctrl.servo,angle\n0,1,2\n0,1,2\n", "1 rows"),
             (
                 "time,ctrl.servo,angle\n0,1,2\n1,1,abc\n",
                 "row 3, column `angle`: `abc`",
             ),
             (
-                "time,ctrl.servo,angle\n0,1,2\n1,,2\n",
-                "row 3, column `ctrl.servo`",
+                "time,ctrl.servo,angle\n0,,2\n1,,2\n",
+                "column `ctrl.servo`: every command is missing",
             ),
             ("time,ctrl.servo,angle\n0,1,2\n", "1 rows"),
             ("time,ctrl.servo,angle\n0,1,\n1,1,\n", "every reading"),

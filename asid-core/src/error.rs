@@ -116,6 +116,25 @@ impl Error {
             near: near_names(name, known),
         }
     }
+
+    /// The name among `known` that is at most a third of its letters away, and nearest; letters in another order are one edit.
+    #[must_use]
+    pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<String> {
+        let name = name.to_lowercase();
+        let letters = |s: &str| {
+            let mut letters: Vec<char> = s.chars().collect();
+            letters.sort_unstable();
+            letters
+        };
+        let distances = known.into_iter().map(|k| {
+            let other = k.to_lowercase();
+            let edits = edit_distance(&name, &other);
+            let reordered = edits == 2 && letters(&name) == letters(&other);
+            (if reordered { 1 } else { edits }, k)
+        });
+        let near = distances.filter(|(d, k)| 3 * d <= k.len().max(name.len()));
+        near.min().map(|(_, k)| k.to_owned())
+    }
 }
 
 fn suggestion(near: &[String]) -> String {

@@ -18,7 +18,7 @@ pub mod error;
 pub mod explore;
 pub mod identify;
 pub mod layout;
-mod log;
+pub mod log;
 pub mod parameter;
 pub mod posterior;
 pub mod problem;

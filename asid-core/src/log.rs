@@ -1,10 +1,15 @@
 //! Reads logs: one file an episode, CSV or (with the feature `parquet`) Parquet, with the same columns.
 //!
-//! A log is checked as it is read: whatever is wrong is told with its file, row and column.
+//! A log is checked as it is read: whatever is wrong is told with its file, row and column, and what is ordinary
+//! (other columns, other units of time, doubled stamps, commands at a lower rate) is mended and noted.
 //! The first row of data is row 2, as a spreadsheet of the CSV file counts it; a Parquet file's
 //! rows are counted the same way.
 
+mod clock;
 mod csv;
+mod delay;
+mod mapping;
+mod notes;
 #[cfg(feature = "parquet")]
 mod parquet;
 
@@ -14,33 +19,112 @@ use crate::episode::{ChannelColumns, Episode, InitialState};
 use crate::error::{Error, Result};
 use crate::layout::Layout;
 
+pub use mapping::ColumnMapping;
+use mapping::Source;
+pub use notes::LogNotes;
+
 impl Episode {
     /// Reads a log of a scene with this layout; a name that ends in `.parquet` is a Parquet
-    /// file, any other CSV. Columns may come in any order and sensors may be missing; columns
-    /// `qpos.*` and `qvel.*` hold the state at the first row.
+    /// file, any other CSV. Columns may come in any order, sensors may be missing, and columns that the scene does
+    /// not know are passed over; columns `qpos.*` and `qvel.*` hold the state at the first row.
     ///
     /// # Errors
     /// When the file cannot be read or a row or column is wrong; the message names both.
     pub fn read(path: &Path, layout: &Layout) -> Result<Self> {
-        let ending = path.extension().map(|e| e.to_ascii_lowercase());
-        let read = |path: &Path| {
-            match ending.as_deref().and_then(|e| e.to_str()) {
-            #[cfg(feature = "parquet")]
-            Some("parquet") => parquet::read(path, layout),
-            #[cfg(not(feature = "parquet"))]
-            Some("parquet") => Err(
-                "is a Parquet file, which this build cannot read: build with `--features parquet`, \
-                 or convert it to CSV"
-                    .to_owned(),
-            ),
-            _ => csv::read(path, layout),
-        }
-        };
-        read(path).map_err(|message| Error::Log {
-            path: path.to_owned(),
-            message,
-        })
+        read(path, layout, &[]).map(|(episode, _)| episode)
     }
+
+    /// The same log as another wiring of its columns would have given it: factor, offset and delay of the mappings
+    /// are applied to the quantities as they were read, and `from` names the quantity that a column holds.
+    ///
+    /// # Errors
+    /// When a mapping names what the scene does not have.
+    pub fn remapped(&self, layout: &Layout, mappings: &[ColumnMapping]) -> Result<Self> {
+        mappings.iter().try_for_each(|m| m.check(layout))?;
+        let mut episode = self.clone();
+        let width = self.width();
+        let mut late = Vec::with_capacity(width);
+        let places: Vec<String> = (self.channels.iter())
+            .flat_map(|c| (0..c.len).map(|i| entry_name(&c.name, c.len, i)))
+            .collect();
+        let mut at = 0;
+        for channel in &self.channels {
+            for i in 0..channel.len {
+                let source = Source::of(mappings, &channel.name, (channel.len > 1).then_some(i));
+                let from = places
+                    .iter()
+                    .position(|p| *p == source.column)
+                    .unwrap_or(at);
+                for k in 0..self.rows() {
+                    let x = self.readings[k * width + from];
+                    episode.readings[k * width + at] = source.factor * x + source.offset;
+                }
+                late.push(source.delay);
+                at += 1;
+            }
+        }
+        let nu = self.actuators.len();
+        let mut commands = Vec::with_capacity(nu);
+        for (a, name) in self.actuators.iter().enumerate() {
+            let source = Source::of(mappings, &format!("ctrl.{name}"), None);
+            let held = |n: &String| format!("ctrl.{n}") == source.column;
+            let from = self.actuators.iter().position(held).unwrap_or(a);
+            for k in 0..self.rows() {
+                let x = self.ctrl[k * nu + from];
+                episode.ctrl[k * nu + a] = source.factor * x + source.offset;
+            }
+            commands.push(source.delay);
+        }
+        delay::readings(&mut episode, layout, &late);
+        delay::commands(&mut episode, &commands);
+        Ok(episode)
+    }
+}
+
+/// Name of an entry of a sensor, as its column has it.
+fn entry_name(sensor: &str, len: usize, entry: usize) -> String {
+    if len == 1 {
+        sensor.to_owned()
+    } else {
+        format!("{sensor}.{entry}")
+    }
+}
+
+/// Reads a log whose columns mean what `mappings` say, as [`Episode::read`] does; with what was passed over or mended.
+///
+/// # Errors
+/// When the file cannot be read, or a row, a column or a mapping is wrong; the message names it.
+pub fn read(
+    path: &Path,
+    layout: &Layout,
+    mappings: &[ColumnMapping],
+) -> Result<(Episode, LogNotes)> {
+    mappings.iter().try_for_each(|m| m.check(layout))?;
+    let ending = path.extension().map(|e| e.to_ascii_lowercase());
+    let read = |path: &Path| match ending.as_deref().and_then(|e| e.to_str()) {
+        #[cfg(feature = "parquet")]
+        Some("parquet") => parquet::read(path, layout, mappings),
+        #[cfg(not(feature = "parquet"))]
+        Some("parquet") => Err(
+            "is a Parquet file, which this build cannot read: build with `--features parquet`, \
+                 or convert it to CSV"
+                .to_owned(),
+        ),
+        _ => csv::read(path, layout, mappings),
+    };
+    read(path).map_err(|message| Error::Log {
+        path: path.to_owned(),
+        message,
+    })
+}
+
+/// A column of the log, and how a quantity is read from it.
+#[derive(Clone, Copy, Debug)]
+struct Column {
+    place: usize,
+    factor: f64,
+    offset: f64,
+    delay: f64,
 }
 
 /// A log that is being read, row by row.
@@ -48,71 +132,107 @@ struct Reader<'a> {
     layout: &'a Layout,
     header: Vec<String>,
     time: usize,
-    ctrl: Vec<usize>,
-    readings: Vec<usize>,
+    /// Factor of the stamps, where the study states their unit.
+    time_factor: Option<f64>,
+    ctrl: Vec<Column>,
+    readings: Vec<Column>,
     /// Column, whether it is a velocity, and its place in `qpos` or `qvel`.
     state: Vec<(usize, bool, usize)>,
     episode: Episode,
+    notes: LogNotes,
 }
 
 impl<'a> Reader<'a> {
     /// Finds what each column holds.
-    fn new(layout: &'a Layout, header: Vec<String>) -> Result<Self, String> {
+    fn new(
+        layout: &'a Layout,
+        mappings: &[ColumnMapping],
+        header: Vec<String>,
+    ) -> Result<Self, String> {
         let column = |name: &str| header.iter().position(|h| h == name);
-        let time = column("time").ok_or("has no column `time`")?;
+        let find = |name: &str, entry: Option<usize>| -> (Option<Column>, String) {
+            let source = Source::of(mappings, name, entry);
+            let found = column(&source.column).map(|place| Column {
+                place,
+                factor: source.factor,
+                offset: source.offset,
+                delay: source.delay,
+            });
+            (found, source.column)
+        };
+        let stamps = Source::of(mappings, "time", None).column;
+        let time = column(&stamps).ok_or_else(|| format!("has no column `{stamps}`"))?;
+        let stated = mappings.iter().find(|m| m.name == "time");
+        let time_factor = stated
+            .filter(|m| m.unit.is_some() || m.scale != 1.0)
+            .map(ColumnMapping::factor);
         let mut ctrl = Vec::with_capacity(layout.nu());
         for a in &layout.actuators {
-            let name = format!("ctrl.{}", a.name);
-            let missing = || format!("has no column `{name}`, the command of an actuator");
-            ctrl.push(column(&name).ok_or_else(missing)?);
+            let (found, name) = find(&format!("ctrl.{}", a.name), None);
+            let missing = || {
+                let near = near_column(&header, &name);
+                format!("has no column `{name}`, the command of an actuator{near}")
+            };
+            ctrl.push(found.ok_or_else(missing)?);
         }
         let mut channels = Vec::new();
         let mut readings = Vec::new();
         for s in &layout.sensors {
-            let names: Vec<String> = if s.len == 1 {
-                vec![s.name.clone()]
-            } else {
-                (0..s.len).map(|i| format!("{}.{i}", s.name)).collect()
-            };
-            let found: Vec<usize> = names.iter().filter_map(|n| column(n)).collect();
-            if found.is_empty() {
+            let entry = |i: usize| (s.len > 1).then_some(i);
+            let found: Vec<_> = (0..s.len).map(|i| find(&s.name, entry(i))).collect();
+            let mapped = mappings.iter().any(|m| m.name == s.name);
+            if found.iter().all(|(c, _)| c.is_none()) && !mapped {
                 continue;
             }
-            if found.len() < names.len() {
-                let missing = names.iter().find(|n| column(n).is_none());
+            if let Some((_, missing)) = found.iter().find(|(c, _)| c.is_none()) {
                 return Err(format!(
-                    "sensor `{}` has {} entries but column `{}` is missing",
-                    s.name,
-                    s.len,
-                    missing.map_or("", String::as_str)
+                    "sensor `{}` has {} entries but column `{missing}` is missing",
+                    s.name, s.len,
                 ));
             }
             channels.push(ChannelColumns {
                 name: s.name.clone(),
                 len: s.len,
             });
-            readings.extend(found);
+            readings.extend(found.into_iter().filter_map(|(c, _)| c));
         }
-        let state = state_columns(layout, &header)?;
-        for (i, name) in header.iter().enumerate() {
-            let known = i == time
-                || ctrl.contains(&i)
-                || readings.contains(&i)
-                || state.iter().any(|(c, _, _)| *c == i);
-            if !known {
-                let known = layout.sensors.iter().map(|s| &*s.name);
-                return Err(format!(
-                    "column `{name}` is no sensor or actuator of the scene; {}",
-                    Error::unknown("sensor", name, known)
-                ));
+        let state = state_columns(layout, &header);
+        let known = |i: usize| {
+            i == time
+                || ctrl.iter().chain(&readings).any(|c| c.place == i)
+                || state.iter().any(|(c, _, _)| *c == i)
+        };
+        let mut notes = LogNotes {
+            passed_over: (0..header.len())
+                .filter(|&i| !known(i))
+                .map(|i| header[i].clone())
+                .collect(),
+            ..LogNotes::default()
+        };
+        for s in &layout.sensors {
+            if channels.iter().any(|c| c.name == s.name) {
+                continue;
+            }
+            let stems = notes
+                .passed_over
+                .iter()
+                .map(|name| match name.strip_suffix(".0") {
+                    Some(stem) if s.len > 1 => stem,
+                    _ => name,
+                });
+            if let Some(near) = Error::nearest(&s.name, stems) {
+                notes.misspelt.push((near, s.name.clone()));
             }
         }
         if channels.is_empty() {
-            return Err("has no column of a sensor of the scene".into());
+            let near = notes.misspelt.first();
+            let near = near.map_or_else(String::new, |(a, b)| format!("; is `{a}` its `{b}`?"));
+            return Err(format!("has no column of a sensor of the scene{near}"));
         }
         Ok(Self {
             layout,
             time,
+            time_factor,
             ctrl,
             readings,
             state,
@@ -121,6 +241,7 @@ impl<'a> Reader<'a> {
                 channels,
                 ..Episode::default()
             },
+            notes,
             header,
         })
     }
@@ -141,11 +262,6 @@ impl<'a> Reader<'a> {
         if time.is_nan() {
             return Err(format!("row {row}: the time is missing"));
         }
-        if let Some(&last) = episode.time.last()
-            && time <= last
-        {
-            return Err(format!("row {row}: time {time} does not come after {last}"));
-        }
         if episode.time.is_empty() && !self.state.is_empty() {
             let mut state = InitialState {
                 qpos: vec![f64::NAN; self.layout.nq],
@@ -162,39 +278,83 @@ impl<'a> Reader<'a> {
             episode.initial = Some(state);
         }
         episode.time.push(time);
-        for &c in &self.ctrl {
-            let x = number(c)?;
-            if x.is_nan() {
-                let name = &header[c];
-                return Err(format!("row {row}, column `{name}`: a command is missing"));
-            }
-            episode.ctrl.push(x);
+        for c in &self.ctrl {
+            episode.ctrl.push(c.factor * number(c.place)? + c.offset);
         }
-        for &c in &self.readings {
-            episode.readings.push(number(c)?);
+        for c in &self.readings {
+            episode
+                .readings
+                .push(c.factor * number(c.place)? + c.offset);
         }
         Ok(())
     }
 
-    /// The episode.
-    fn finish(self) -> Result<Episode, String> {
-        let episode = self.episode;
+    /// The episode: stamps in seconds, rows in order, commands held, late columns moved.
+    fn finish(mut self) -> Result<(Episode, LogNotes), String> {
+        let episode = &mut self.episode;
+        clock::to_seconds(&mut episode.time, self.time_factor, &mut self.notes);
+        let rows = clock::order(&episode.time, &mut self.notes)?;
+        if self.notes.doubled + self.notes.reordered > 0 {
+            let (nu, width) = (episode.actuators.len(), episode.width());
+            let gather = |values: &[f64], width: usize| -> Vec<f64> {
+                let rows = rows
+                    .iter()
+                    .flat_map(|&k| &values[k * width..(k + 1) * width]);
+                rows.copied().collect()
+            };
+            episode.time = gather(&episode.time, 1);
+            episode.ctrl = gather(&episode.ctrl, nu);
+            episode.readings = gather(&episode.readings, width);
+        }
         if episode.rows() < 2 {
             return Err(format!(
-                "has {} rows of data; at least 2 are needed",
+                "has {} rows of data at different times; at least 2 are needed",
                 episode.rows()
             ));
         }
+        clock::check_duration(&episode.time, self.layout.timestep)?;
         if episode.readings.iter().all(|x| x.is_nan()) {
             return Err("every reading is missing".into());
         }
-        Ok(episode)
+        for (a, column) in self.ctrl.iter().enumerate() {
+            let held = hold(&mut episode.ctrl, self.ctrl.len(), a).ok_or_else(|| {
+                let name = &self.header[column.place];
+                format!("column `{name}`: every command is missing")
+            })?;
+            self.notes.held += held;
+        }
+        let delays = |columns: &[Column]| columns.iter().map(|c| c.delay).collect::<Vec<_>>();
+        delay::readings(episode, self.layout, &delays(&self.readings));
+        delay::commands(episode, &delays(&self.ctrl));
+        Ok((self.episode, self.notes))
     }
+}
+
+/// Holds the commands of one actuator where they are missing, before the first as it; how many were, `None` where all are.
+fn hold(ctrl: &mut [f64], nu: usize, actuator: usize) -> Option<usize> {
+    let column = || (actuator..ctrl.len()).step_by(nu);
+    let mut last = ctrl[column().find(|&i| ctrl[i].is_finite())?];
+    let mut held = 0;
+    for i in column() {
+        if ctrl[i].is_finite() {
+            last = ctrl[i];
+        } else {
+            ctrl[i] = last;
+            held += 1;
+        }
+    }
+    Some(held)
+}
+
+/// A column that is nearly this one, in words.
+fn near_column(header: &[String], name: &str) -> String {
+    let near = Error::nearest(name, header.iter().map(|h| &**h));
+    near.map_or_else(String::new, |near| format!("; is it `{near}`?"))
 }
 
 /// Columns of the state at the first row: column, whether it is a velocity, and its place in
 /// `qpos` or `qvel`.
-fn state_columns(layout: &Layout, header: &[String]) -> Result<Vec<(usize, bool, usize)>, String> {
+fn state_columns(layout: &Layout, header: &[String]) -> Vec<(usize, bool, usize)> {
     let mut found = Vec::new();
     for (i, name) in header.iter().enumerate() {
         let (rest, velocity) = match (name.strip_prefix("qpos."), name.strip_prefix("qvel.")) {
@@ -216,9 +376,10 @@ fn state_columns(layout: &Layout, header: &[String]) -> Result<Vec<(usize, bool,
                 }
             }
         });
-        let place = place
-            .ok_or_else(|| format!("column `{name}` is no coordinate of a joint of the scene"))?;
-        found.push((i, velocity, place));
+        found.extend(place.map(|place| (i, velocity, place)));
     }
-    Ok(found)
+    found
 }
+
+#[cfg(test)]
+mod tests;

@@ -389,10 +389,6 @@ impl Estimate {
                 }
             }
         }
-        if std::env::var("ASID_DBG").is_ok() {
-            let q = |v: &[f64]| { let mut v = v.to_vec(); v.sort_by(f64::total_cmp); let n = v.len(); format!("{:.0} {:.0} {:.0} {:.0} {:.0}", v[n/10], v[n/4], v[n/2], v[3*n/4], v[9*n/10]) };
-            eprintln!("{:.1} roll theta {theta:.4?} n {} left [{}] excess [{}]", std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap().as_secs_f64()%1000.0, left.len(), q(&left), q(&self.excess));
-        }
         Ok(())
     }
 

@@ -218,9 +218,6 @@ pub fn fit(
         });
         let promised = found.gain - determinant_of(&found) + 0.5 * prior;
         let hoped = here + promised;
-        if std::env::var("ASID_DBG").is_ok() {
-            eprintln!("  fit {:?} round {round} scale {scale} evidence {here:.1} promised {promised:.1} theta {theta:.4?}", hypothesis.specs.iter().map(|s| s.label()).collect::<Vec<_>>());
-        }
         let rose = best.as_ref().is_none_or(|b| here > b.evidence + RISE)
             || anchor.as_ref().is_none_or(|a| hoped > a.hoped + RISE);
         waited = if rose { 0 } else { waited + 1 };

@@ -323,9 +323,6 @@ fn one_round(
             .collect()
     };
     let screened: Vec<(Vec<usize>, f64)> = ranked.iter().map(|s| (label(s), s.gain)).collect();
-    if std::env::var("ASID_DBG").is_ok() {
-        for s in ranked.iter().take(8) { eprintln!("screened {:?} {:.1}", label(s).iter().map(|&c| candidates[c].label()).collect::<Vec<_>>(), s.gain); }
-    }
     progress.begin("confirming", breadth.raced.min(ranked.len()) as u64);
     let mut racing = Vec::new();
     let lead = ranked.first().map_or(0.0, |s| s.gain);
@@ -357,12 +354,15 @@ fn one_round(
     let hoped = |s: &Set| s.fitted.evidence + s.fitted.promised;
     racing.sort_by(|a, b| hoped(b).total_cmp(&hoped(a)));
     let reached = racing.iter().map(|s| s.fitted.evidence);
-    let best = reached.fold(fitted.evidence, f64::max);
-    let behind = (breadth.behind * (best - fitted.evidence)).max(breadth.near);
-    racing.retain(|s| best - hoped(s) <= behind);
-    let mut confirmed = Vec::new();
+    let mut best = reached.fold(fitted.evidence, f64::max);
+    let mut confirmed: Vec<Set> = Vec::new();
     for mut set in racing.into_iter().take(breadth.finished) {
+        let behind = (breadth.behind * (best - fitted.evidence)).max(breadth.near);
+        if best - hoped(&set) > behind {
+            continue;
+        }
         set.fit(context, breadth.rounds[1])?;
+        best = best.max(set.fitted.evidence);
         confirmed.push(pruned(context, candidates, set, breadth)?);
     }
     progress.end();

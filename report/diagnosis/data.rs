@@ -31,6 +31,8 @@ pub struct Diagnosis {
     pub parameters: Vec<Parameter>,
     /// Checks of the study and its logs.
     pub checks: Vec<Check>,
+    /// Faults of wiring; everything else is said of the study after their mending.
+    pub wiring: Vec<Wiring>,
     /// What the next experiment would tell apart.
     pub separates: Vec<String>,
     /// How; empty where there is none to propose.
@@ -233,6 +235,19 @@ pub struct Parameter {
     /// 95 % interval.
     #[serde(deserialize_with = "nullable::array")]
     pub interval95: [f64; 2],
+}
+
+/// Columns of the logs that do not mean what their names say.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Wiring {
+    /// Kind of fault.
+    pub fault: String,
+    /// Columns concerned.
+    pub columns: Vec<String>,
+    /// Probability against the wiring as given.
+    pub probability: f64,
+    /// Lines for the study file.
+    pub mend: String,
 }
 
 /// A check before the diagnosis.

@@ -300,6 +300,11 @@ fn lines(result: &DiagnosisResult, engine: &str, seconds: f64) -> Vec<String> {
     let mut all = Vec::new();
     let mut line = |text: &str| all.push(text.to_owned());
     line(&result.sentence);
+    let mut mends: Vec<&str> = result.wiring.iter().map(|w| &*w.mend).collect();
+    mends.dedup();
+    for text in mends.iter().flat_map(|m| m.lines()) {
+        line(&format!("  {text}"));
+    }
     let gap = &result.gap;
     line(&format!(
         "gap on logs held out, in units of the noise: {:.2} as given, {:.2} identified, {:.2} refined",

@@ -103,6 +103,14 @@ pub fn diagnosis(result: &DiagnosisResult, trace: &DiagnosisTrace, meta: Meta) -
                 detail: c.detail.clone(),
             })
             .collect(),
+        wiring: (result.wiring.iter())
+            .map(|w| r::Wiring {
+                fault: w.fault.clone(),
+                columns: w.columns.clone(),
+                probability: w.probability,
+                mend: w.mend.clone(),
+            })
+            .collect(),
         separates: result.next_experiment.separates.clone(),
         next_experiment: result.next_experiment.how.clone(),
         held_out: if meta.held_out > 0 {

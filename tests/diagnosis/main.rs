@@ -6,6 +6,7 @@
 mod arm;
 #[path = "../diagnosis_support/mod.rs"]
 mod diagnosis_support;
+mod wiring;
 mod world;
 
 use std::collections::BTreeMap;

@@ -1,0 +1,175 @@
+//! The clock of a log: the unit of its stamps, and rows that are doubled or out of order.
+
+use super::notes::LogNotes;
+
+/// Rows slower than this are no record of a machine's motion, s: such stamps are in a finer unit.
+const SLOWEST: f64 = 0.7;
+/// The same for a unit finer than the second, s. Lower, for stamps of a fast log in the next finer unit look like those of a
+/// slow log in this one: 500 us against 500 ms.
+const SLOWEST_FINE: f64 = 0.3;
+/// Stamps beyond this count from 1970, s: the year 2001.
+const EPOCH: f64 = 1e9;
+/// Rows that are this many row times too early are taken for late arrivals and put in order; farther back the clock was set.
+const LATE_ARRIVAL: f64 = 10.0;
+/// Most physics steps of one log: beyond it a single replay lasts minutes, and the stamps are wrong.
+const MOST_STEPS: f64 = 2e7;
+
+/// Units of stamps from the coarsest on: name, and their length in s.
+const STAMPS: [(&str, f64); 4] = [("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)];
+
+/// Median time between rows, of the steps that go forward; `None` where there is none.
+fn row_time(stamps: &[f64]) -> Option<f64> {
+    let mut steps: Vec<f64> = stamps.windows(2).map(|w| w[1] - w[0]).collect();
+    steps.retain(|dt| *dt > 0.0);
+    let middle = steps.len() / 2;
+    (!steps.is_empty()).then(|| *steps.select_nth_unstable_by(middle, f64::total_cmp).1)
+}
+
+/// Unit of some stamps: by their date where they count from 1970, else the coarsest in which rows come as fast as a
+/// machine is sampled.
+fn unit(stamps: &[f64]) -> (&'static str, f64) {
+    let first = stamps.first().copied().unwrap_or(0.0);
+    // A date of this century lies within a factor of ten above the year 2001 in its unit.
+    let dated = STAMPS
+        .iter()
+        .find(|(_, length)| (EPOCH..10.0 * EPOCH).contains(&(first * length)));
+    // Small stamps are no date in any coarse unit; a nanosecond count since boot may look like one in us.
+    let fits = |(name, length): &(&str, f64)| {
+        let slowest = if *name == "s" { SLOWEST } else { SLOWEST_FINE };
+        row_time(stamps).is_none_or(|dt| dt * length < slowest)
+    };
+    let dated = dated.filter(|d| fits(d));
+    let by_rate = STAMPS.iter().find(|u| fits(u));
+    *dated.or(by_rate).unwrap_or(&STAMPS[0])
+}
+
+/// Brings stamps to seconds; `given` is the factor that the study states. Stamps in another unit than the second, and dates,
+/// begin at 0.
+pub(super) fn to_seconds(stamps: &mut [f64], given: Option<f64>, notes: &mut LogNotes) {
+    let (name, length) = match given {
+        Some(length) => ("s", length),
+        None => unit(stamps),
+    };
+    if name != "s" {
+        notes.time_unit = Some(name);
+    }
+    let first = stamps.first().copied().unwrap_or(0.0);
+    let start = if length == 1.0 && first.abs() < EPOCH {
+        0.0
+    } else {
+        first
+    };
+    stamps.iter_mut().for_each(|t| *t = (*t - start) * length);
+}
+
+/// Order of the rows in time: doubled stamps once, the last of them; late arrivals where they belong.
+pub(super) fn order(time: &[f64], notes: &mut LogNotes) -> Result<Vec<usize>, String> {
+    let usual = row_time(time).unwrap_or(0.0);
+    let mut latest = f64::NEG_INFINITY;
+    for (row, &t) in time.iter().enumerate() {
+        if t < latest - LATE_ARRIVAL * usual {
+            return Err(format!(
+                "row {}: the time goes back from {latest} to {t} s: give each episode a file of its own",
+                row + 2
+            ));
+        }
+        notes.reordered += usize::from(t < latest);
+        latest = latest.max(t);
+    }
+    let mut rows: Vec<usize> = (0..time.len()).collect();
+    rows.sort_by(|&a, &b| time[a].total_cmp(&time[b]));
+    let all = rows.len();
+    // Of rows with one stamp the last stays.
+    let mut kept: Vec<usize> = Vec::with_capacity(all);
+    for row in rows {
+        match kept.last_mut() {
+            Some(last) if time[*last] == time[row] => *last = row,
+            _ => kept.push(row),
+        }
+    }
+    notes.doubled = all - kept.len();
+    Ok(kept)
+}
+
+/// Refuses a log that no simulator replays within minutes.
+pub(super) fn check_duration(time: &[f64], timestep: f64) -> Result<(), String> {
+    let (Some(first), Some(last)) = (time.first(), time.last()) else {
+        return Ok(());
+    };
+    let seconds = last - first;
+    if timestep > 0.0 && seconds / timestep > MOST_STEPS {
+        let gap = time.windows(2).enumerate();
+        let widest = gap.max_by(|(_, a), (_, b)| (a[1] - a[0]).total_cmp(&(b[1] - b[0])));
+        let row = widest.map_or(2, |(i, _)| i + 3);
+        return Err(format!(
+            "lasts {seconds:.0} s, {:.1e} time steps of the model: are its stamps in seconds? \
+             The longest step in time leads to row {row}. `[[column]] name = \"time\"` with `unit` states another unit",
+            seconds / timestep
+        ));
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Stamps of `n` rows at some rate, from a start, in a unit of some length.
+    fn stamps(start: f64, rate: f64, length: f64) -> Vec<f64> {
+        (0..50)
+            .map(|k| ((start + f64::from(k) / rate) / length).round())
+            .collect()
+    }
+
+    #[test]
+    fn stamps_in_ms_us_and_ns_are_recognised_at_the_rates_of_machines() {
+        for (name, length) in &STAMPS[1..] {
+            for rate in [10.0, 50.0, 100.0, 1000.0] {
+                for start in [0.0, 37.5, 1.7e9] {
+                    // Whole ns of today are beyond what a double resolves at 1 kHz only by parts of a percent.
+                    let told = unit(&stamps(start, rate, *length));
+                    assert_eq!(told.0, *name, "{rate} Hz from {start} s");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn stamps_in_seconds_stay() {
+        for rate in [2.0, 10.0, 1000.0] {
+            for start in [0.0, 1000.0, 1.7e9] {
+                let time: Vec<f64> = (0..50).map(|k| start + f64::from(k) / rate).collect();
+                assert_eq!(unit(&time).0, "s", "{rate} Hz from {start} s");
+            }
+        }
+    }
+
+    #[test]
+    fn late_arrivals_are_put_in_order_and_doubled_stamps_once() {
+        let mut notes = LogNotes::default();
+        let rows = order(&[0.0, 0.1, 0.3, 0.2, 0.4, 0.4], &mut notes).unwrap();
+        assert_eq!(rows, [0, 1, 3, 2, 5]);
+        assert_eq!((notes.reordered, notes.doubled), (1, 1));
+    }
+
+    #[test]
+    fn a_clock_that_starts_anew_is_refused() {
+        let mut time: Vec<f64> = (0..40).map(|k| 0.01 * f64::from(k)).collect();
+        time.extend(time.clone());
+        let error = order(&time, &mut LogNotes::default()).unwrap_err();
+        assert!(
+            error.contains("row 42") && error.contains("of its own"),
+            "{error}"
+        );
+    }
+
+    #[test]
+    fn a_log_of_years_is_refused_in_one_line() {
+        let error = check_duration(&[0.0, 0.01, 1.7e9], 0.001).unwrap_err();
+        assert!(
+            error.contains("row 4") && error.lines().count() == 1,
+            "{error}"
+        );
+        assert!(check_duration(&[0.0, 100.0], 0.001).is_ok());
+    }
+}

@@ -1,0 +1,292 @@
+//! What a log's columns mean, where they do not mean what their names say: `[[column]]` in a study.
+//!
+//! A log of another stack has names, units, signs and zeros of its own. A mapping states them once, and every
+//! reader applies it, so that logs are used as they were recorded.
+
+use serde::{Deserialize, Serialize};
+
+use crate::error::{Error, Result};
+use crate::layout::Layout;
+
+/// Units by name, with the factor that brings them to SI (NIST SP 811, appendix B).
+const UNITS: [(&str, f64); 24] = [
+    ("rad", 1.0),
+    ("mrad", 1e-3),
+    ("deg", std::f64::consts::PI / 180.0),
+    ("rev", std::f64::consts::TAU),
+    ("rad/s", 1.0),
+    ("deg/s", std::f64::consts::PI / 180.0),
+    ("rpm", std::f64::consts::TAU / 60.0),
+    ("m", 1.0),
+    ("cm", 1e-2),
+    ("mm", 1e-3),
+    ("m/s", 1.0),
+    ("cm/s", 1e-2),
+    ("mm/s", 1e-3),
+    ("m/s^2", 1.0),
+    ("g", 9.806_65),
+    ("N", 1.0),
+    ("mN", 1e-3),
+    ("N m", 1.0),
+    ("mN m", 1e-3),
+    ("s", 1.0),
+    ("ms", 1e-3),
+    ("us", 1e-6),
+    ("ns", 1e-9),
+    ("%", 1e-2),
+];
+
+/// One `[[column]]`: the quantity `name` of the model is
+/// `sign * scale * (column in SI units) + offset`, `delay` seconds before the row's time.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ColumnMapping {
+    /// A sensor, an entry of one (`sensor.0`), `ctrl.<actuator>`, or `time`.
+    pub name: String,
+    /// The log's column; of a whole vector the part before `.0`. Without it, `name`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub from: Option<String>,
+    /// Unit of the column, such as `deg` or `mm`. Without it, the SI unit.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub unit: Option<String>,
+    /// 1, or -1 where the column counts the other way.
+    #[serde(default = "one", skip_serializing_if = "is_one")]
+    pub sign: f64,
+    /// Factor besides unit and sign; not 0.
+    #[serde(default = "one", skip_serializing_if = "is_one")]
+    pub scale: f64,
+    /// Added after sign, unit and scale, in the SI unit of the quantity.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub offset: f64,
+    /// How much older than its stamp a reading is, s; of a command, how much later it acts.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub delay: f64,
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes references")]
+fn is_one(x: &f64) -> bool {
+    *x == 1.0
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes references")]
+fn is_zero(x: &f64) -> bool {
+    *x == 0.0
+}
+
+impl ColumnMapping {
+    /// A mapping that changes nothing.
+    #[must_use]
+    pub fn of(name: &str) -> Self {
+        Self {
+            name: name.to_owned(),
+            from: None,
+            unit: None,
+            sign: 1.0,
+            scale: 1.0,
+            offset: 0.0,
+            delay: 0.0,
+        }
+    }
+
+    /// Factor of the column, with sign and unit; 1 for a unit that is not known.
+    #[must_use]
+    pub fn factor(&self) -> f64 {
+        let unit = self.unit.as_deref().and_then(unit_factor).unwrap_or(1.0);
+        self.sign * self.scale * unit
+    }
+
+    /// The lines of a study file.
+    #[must_use]
+    pub fn lines(&self) -> String {
+        let body = toml::to_string(self).unwrap_or_default();
+        format!("[[column]]\n{}", body.trim_end())
+    }
+
+    /// Refuses what makes no sense for a model with this layout.
+    ///
+    /// # Errors
+    /// When the name is none of the model's, or a value is out of its domain; the message is one line.
+    pub fn check(&self, layout: &Layout) -> Result<()> {
+        let fail = |message: String| Error::Config {
+            key: "column".into(),
+            message: format!("[[column]] `{}`: {message}", self.name),
+        };
+        let known = names(layout);
+        if self.name != "time" && !known.contains(&self.name) {
+            let near = Error::unknown("column", &self.name, known.iter().map(|n| &**n));
+            return Err(fail(format!(
+                "`name` is a sensor, ctrl.<actuator> or time; {near}"
+            )));
+        }
+        if let Some(unit) = &self.unit
+            && unit_factor(unit).is_none()
+        {
+            let units: Vec<&str> = UNITS.iter().map(|(n, _)| *n).collect();
+            return Err(fail(format!(
+                "unit `{unit}` is not known; known: {}; or give `scale`",
+                units.join(", ")
+            )));
+        }
+        if self.sign.abs() != 1.0 {
+            return Err(fail(format!("sign = {}: it is 1 or -1", self.sign)));
+        }
+        if !self.scale.is_finite() || self.scale == 0.0 {
+            return Err(fail(format!(
+                "scale = {}: it is a number other than 0",
+                self.scale
+            )));
+        }
+        if !self.offset.is_finite() || !self.delay.is_finite() {
+            return Err(fail("offset and delay are finite numbers".into()));
+        }
+        if self.name == "time" && (self.sign != 1.0 || self.delay != 0.0 || self.offset != 0.0) {
+            return Err(fail("time takes `from`, `unit` and `scale` only".into()));
+        }
+        Ok(())
+    }
+}
+
+/// Factor that brings a unit to SI.
+fn unit_factor(unit: &str) -> Option<f64> {
+    let found = UNITS.iter().find(|(name, _)| *name == unit);
+    found.map(|(_, factor)| *factor)
+}
+
+/// What a mapping may name: sensors, their entries, commands.
+fn names(layout: &Layout) -> Vec<String> {
+    let mut all = Vec::new();
+    for s in &layout.sensors {
+        all.push(s.name.clone());
+        if s.len > 1 {
+            all.extend((0..s.len).map(|i| format!("{}.{i}", s.name)));
+        }
+    }
+    all.extend(layout.actuators.iter().map(|a| format!("ctrl.{}", a.name)));
+    all
+}
+
+/// Where the quantity `name` (entry `entry` of a vector) is in a log, and how its column is read.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Source {
+    /// Name of the log's column.
+    pub column: String,
+    /// Factor to SI.
+    pub factor: f64,
+    /// Added after the factor.
+    pub offset: f64,
+    /// How late it is, s.
+    pub delay: f64,
+}
+
+impl Source {
+    /// Of a quantity under some mappings: that of the entry before that of the whole vector.
+    pub(super) fn of(mappings: &[ColumnMapping], name: &str, entry: Option<usize>) -> Self {
+        let own = match entry {
+            Some(i) => format!("{name}.{i}"),
+            None => name.to_owned(),
+        };
+        if let Some(m) = mappings.iter().find(|m| m.name == own) {
+            return Self::new(m, m.from.clone().unwrap_or(own));
+        }
+        match (mappings.iter().find(|m| m.name == name), entry) {
+            (Some(m), Some(i)) => {
+                let from = m.from.as_deref().unwrap_or(name);
+                Self::new(m, format!("{from}.{i}"))
+            }
+            _ => Self {
+                column: own,
+                factor: 1.0,
+                offset: 0.0,
+                delay: 0.0,
+            },
+        }
+    }
+
+    fn new(mapping: &ColumnMapping, column: String) -> Self {
+        Self {
+            column,
+            factor: mapping.factor(),
+            offset: mapping.offset,
+            delay: mapping.delay,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::episode::tests::layout;
+
+    #[test]
+    fn the_lines_of_a_mapping_read_back_as_the_mapping() {
+        #[derive(Deserialize)]
+        struct Study {
+            column: Vec<ColumnMapping>,
+        }
+        let mapping = ColumnMapping {
+            unit: Some("deg".into()),
+            sign: -1.0,
+            offset: 0.25,
+            ..ColumnMapping::of("angle")
+        };
+        let read: Study = toml::from_str(&mapping.lines()).unwrap();
+        assert_eq!(read.column, [mapping]);
+    }
+
+    #[test]
+    fn a_mapping_that_makes_no_sense_is_refused_in_one_line() {
+        let base = ColumnMapping::of("angle");
+        for (mapping, said) in [
+            (ColumnMapping::of("angel"), "known: `angle`"),
+            (
+                ColumnMapping {
+                    unit: Some("parsec".into()),
+                    ..base.clone()
+                },
+                "unit `parsec`",
+            ),
+            (
+                ColumnMapping {
+                    sign: 2.0,
+                    ..base.clone()
+                },
+                "1 or -1",
+            ),
+            (ColumnMapping { scale: 0.0, ..base }, "other than 0"),
+        ] {
+            let error = mapping.check(&layout()).unwrap_err().to_string();
+            assert!(
+                error.contains(said) && error.lines().count() == 1,
+                "{error}"
+            );
+        }
+    }
+
+    #[test]
+    fn an_entry_has_its_own_mapping_before_that_of_its_vector() {
+        let mappings = [
+            ColumnMapping {
+                from: Some("mocap".into()),
+                unit: Some("mm".into()),
+                ..ColumnMapping::of("tip")
+            },
+            ColumnMapping {
+                from: Some("laser".into()),
+                ..ColumnMapping::of("tip.2")
+            },
+        ];
+        let source = |i| Source::of(&mappings, "tip", Some(i));
+        assert_eq!(
+            (source(0).column.as_str(), source(0).factor),
+            ("mocap.0", 1e-3)
+        );
+        assert_eq!(
+            (source(2).column.as_str(), source(2).factor),
+            ("laser", 1.0)
+        );
+    }
+}

@@ -1,0 +1,271 @@
+//! What may be wrong with the wiring: the ways of reading the columns that are compared with the one given.
+
+use asid_core::layout::JointKind;
+use asid_mjcf::Plant;
+use asid_mjcf::plant::Reads;
+
+use super::view::{ColumnView, View};
+
+/// Latest readings that are looked for against commands, s: a control stack with buffers of the network. Later ones are
+/// found at this edge.
+pub const LATEST: f64 = 0.2;
+/// Step of the delays that are tried, s.
+const DELAY_STEP: f64 = 0.02;
+/// Earliest: stamps of commands may be late as well, s.
+pub const EARLIEST: f64 = -0.06;
+
+const DEGREE: f64 = std::f64::consts::PI / 180.0;
+
+/// Kinds of wiring faults, by the names of the result.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fault {
+    /// Two columns are swapped.
+    Swapped,
+    /// A column counts the other way.
+    Sign,
+    /// A column is in another unit.
+    Unit,
+    /// A column has another zero.
+    Offset,
+    /// Commands and readings are stamped by clocks that differ.
+    Clock,
+}
+
+impl Fault {
+    /// Name in the result.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Swapped => "wiring-swapped",
+            Self::Sign => "wiring-sign",
+            Self::Unit => "wiring-unit",
+            Self::Offset => "wiring-offset",
+            Self::Clock => "wiring-clock",
+        }
+    }
+}
+
+/// One column of readings or commands.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Quantity {
+    /// Name of the sensor or `ctrl.<actuator>`, with `.i` for an entry of a vector.
+    pub name: String,
+    /// Name without the entry.
+    pub whole: String,
+    /// Whether it is a command.
+    pub command: bool,
+    /// Place in a row of readings or commands.
+    pub place: usize,
+    /// Joint that it reads or drives, where it is one's.
+    pub joint: Option<usize>,
+    /// What it is, so that columns of the same kind can be swapped.
+    pub kind: String,
+    /// Units that it may be recorded in, with the factor that brings each to the model's unit.
+    pub units: Vec<(&'static str, f64)>,
+}
+
+/// A hypothesis: a view and what it says is wrong.
+#[derive(Clone, Debug)]
+pub struct Hypothesis {
+    /// Kind of fault.
+    pub fault: Fault,
+    /// Indices of the quantities concerned.
+    pub quantities: Vec<usize>,
+    /// Whether hardly any log is so.
+    pub rare: bool,
+    /// How the columns are read.
+    pub view: View,
+}
+
+/// Units that a quantity with some SI unit may be recorded in, the usual one first, with their factors; without a name where no unit has the factor.
+fn units(si: &str) -> Vec<(&'static str, f64)> {
+    match si {
+        // A reading of radians may have been brought to radians a second time.
+        "rad" => vec![
+            ("deg", DEGREE),
+            ("", 1.0 / DEGREE),
+            ("rev", std::f64::consts::TAU),
+        ],
+        "rad/s" => vec![
+            ("deg/s", DEGREE),
+            ("", 1.0 / DEGREE),
+            ("rpm", std::f64::consts::TAU / 60.0),
+        ],
+        "m" => vec![("mm", 1e-3), ("cm", 1e-2)],
+        "m/s" => vec![("mm/s", 1e-3), ("cm/s", 1e-2)],
+        "m/s²" => vec![("g", 9.806_65)],
+        "N" => vec![("mN", 1e-3)],
+        "N m" => vec![("mN m", 1e-3)],
+        _ => Vec::new(),
+    }
+}
+
+/// Quantities of a row of readings of some sensors, and of a row of commands.
+#[must_use]
+pub fn quantities(plant: &Plant, sensors: &[String]) -> Vec<Quantity> {
+    let layout = &plant.layout;
+    let mut all = Vec::new();
+    let mut place = 0;
+    for name in sensors {
+        let Some(index) = layout.sensors.iter().position(|s| s.name == *name) else {
+            continue;
+        };
+        let sensor = &layout.sensors[index];
+        let slide = matches!(plant.sensors[index], Reads::Joint(j)
+            if layout.joints[j].kind == JointKind::Slide);
+        let si = match (&*sensor.kind, slide) {
+            ("jointpos", true) => "m",
+            ("jointpos", false) => "rad",
+            ("jointvel", true) => "m/s",
+            ("jointvel", false) => "rad/s",
+            _ => sensor.unit(),
+        };
+        for i in 0..sensor.len {
+            let entry = if sensor.len == 1 {
+                name.clone()
+            } else {
+                format!("{name}.{i}")
+            };
+            // Entries of one vector may be swapped among each other, those of two vectors seldom are.
+            let kind = if sensor.len == 1 {
+                format!("{} {si}", sensor.kind)
+            } else {
+                format!("{} of {name}", sensor.kind)
+            };
+            all.push(Quantity {
+                name: entry,
+                whole: name.clone(),
+                command: false,
+                place: place + i,
+                joint: match plant.sensors[index] {
+                    Reads::Joint(j) => Some(j),
+                    _ => None,
+                },
+                kind,
+                units: if sensor.len == 4 {
+                    Vec::new()
+                } else {
+                    units(si)
+                },
+            });
+        }
+        place += sensor.len;
+    }
+    for (a, actuator) in layout.actuators.iter().enumerate() {
+        let si = plant.drives[a].filter(|d| d.is_position_servo()).map(|d| {
+            match layout.joints[d.joint].kind {
+                JointKind::Slide => "m",
+                _ => "rad",
+            }
+        });
+        let name = format!("ctrl.{}", actuator.name);
+        all.push(Quantity {
+            whole: name.clone(),
+            name,
+            command: true,
+            place: a,
+            joint: plant.drives[a].map(|d| d.joint),
+            kind: format!("command {}", si.unwrap_or_default()),
+            units: si.map_or_else(Vec::new, units),
+        });
+    }
+    all
+}
+
+/// View of a quantity within a view of all.
+#[must_use]
+pub fn view_of(view: &View, quantity: &Quantity) -> ColumnView {
+    if quantity.command {
+        view.commands[quantity.place]
+    } else {
+        view.readings[quantity.place]
+    }
+}
+
+/// The same view with another of one quantity.
+#[must_use]
+pub fn with(view: &View, quantity: &Quantity, of: ColumnView) -> View {
+    let mut view = view.clone();
+    if quantity.command {
+        view.commands[quantity.place] = of;
+    } else {
+        view.readings[quantity.place] = of;
+    }
+    view
+}
+
+/// Hypotheses about signs, units and names of columns of which one at least is among `suspects`.
+#[must_use]
+pub fn of_columns(all: &[Quantity], view: &View, suspects: &[bool]) -> Vec<Hypothesis> {
+    let mut found = Vec::new();
+    for (i, a) in all.iter().enumerate() {
+        let own = view_of(view, a);
+        if suspects[i] {
+            let mut one = |fault, of| {
+                found.push(Hypothesis {
+                    fault,
+                    quantities: vec![i],
+                    rare: false,
+                    view: with(view, a, of),
+                });
+            };
+            one(Fault::Sign, own.times(-1.0));
+            // The entries of a vector are in one unit.
+            let vector: Vec<usize> = (0..all.len())
+                .filter(|&j| all[j].whole == a.whole)
+                .collect();
+            for (k, (_, factor)) in a.units.iter().enumerate().filter(|_| vector[0] == i) {
+                let scaled = vector.iter().fold(view.clone(), |view, &j| {
+                    let own = view_of(&view, &all[j]);
+                    with(&view, &all[j], own.times(*factor))
+                });
+                found.push(Hypothesis {
+                    fault: Fault::Unit,
+                    quantities: vector.clone(),
+                    // The usual one comes first.
+                    rare: k > 0,
+                    view: scaled,
+                });
+            }
+        }
+        for (j, b) in all.iter().enumerate().skip(i + 1) {
+            if a.kind == b.kind && (suspects[i] || suspects[j]) {
+                let (from_a, from_b) = (own, view_of(view, b));
+                let swapped = with(view, a, from_b);
+                found.push(Hypothesis {
+                    fault: Fault::Swapped,
+                    quantities: vec![i, j],
+                    rare: false,
+                    view: with(&swapped, b, from_a),
+                });
+            }
+        }
+    }
+    found
+}
+
+/// The view with all readings later by some time.
+#[must_use]
+pub fn delayed(view: &View, delay: f64) -> View {
+    let mut view = view.clone();
+    view.readings.iter_mut().for_each(|v| v.delay += delay);
+    view
+}
+
+/// The view with all commands acting later by some time.
+#[must_use]
+pub fn commanded_later(view: &View, delay: f64) -> View {
+    let mut view = view.clone();
+    view.commands.iter_mut().for_each(|v| v.delay += delay);
+    view
+}
+
+/// Delays of readings against commands that are tried, s.
+#[must_use]
+pub fn delays() -> Vec<f64> {
+    let steps = |to: f64| (to / DELAY_STEP).round() as i32;
+    (steps(EARLIEST)..=steps(LATEST))
+        .filter(|k| *k != 0)
+        .map(|k| f64::from(k) * DELAY_STEP)
+        .collect()
+}

@@ -1,0 +1,174 @@
+//! A study with the wiring that its logs show, and the lines that say so.
+
+use asid_core::log::ColumnMapping;
+use asid_core::{Episode, Result};
+
+use crate::machine::Machine;
+use crate::result::WiringResult;
+use crate::study::Study;
+
+use super::evidence::Settings;
+use super::hypotheses::{Fault, Quantity, quantities, view_of};
+use super::record::Recorded;
+use super::search::{Outcome, Search};
+use super::view::{View, mapping};
+use super::windows::{FEW, WINDOWS, Windows};
+
+/// A study after its wiring was looked at.
+pub struct Mended {
+    /// The study with the mappings applied to its logs.
+    pub study: Study,
+    /// What was found.
+    pub wiring: Vec<WiringResult>,
+    /// By which factor, as a logarithm, each shrinks what predictions miss, summed over columns.
+    pub shrinkage: Vec<f64>,
+    /// The fault nearest to being named.
+    pub nearest: Option<Nearest>,
+}
+
+/// A fault that is not named.
+#[derive(Clone, Debug)]
+pub struct Nearest {
+    /// Kind.
+    pub fault: &'static str,
+    /// Columns.
+    pub columns: Vec<String>,
+    /// As [`Mended::shrinkage`].
+    pub shrinkage: f64,
+}
+
+/// Sensors that some of the logs read, in the scene's order.
+fn logged(study: &Study, machine: &Machine) -> Vec<String> {
+    let reads = |name: &str| {
+        study.train.iter().any(|(_, e)| {
+            e.channel(name).is_some_and(|r| {
+                (0..e.rows()).any(|k| e.reading(k)[r.clone()].iter().any(|x| x.is_finite()))
+            })
+        })
+    };
+    let sensors = machine.plant.layout.sensors.iter();
+    sensors
+        .filter(|s| reads(&s.name))
+        .map(|s| s.name.clone())
+        .collect()
+}
+
+/// Looks at the wiring of a study's logs, and reads them by what it found.
+///
+/// # Errors
+/// When the engine fails.
+pub fn mend(study: &Study, machine: &Machine, settings: &Settings) -> Result<Mended> {
+    let unchanged = || Mended {
+        study: study.clone(),
+        wiring: Vec::new(),
+        shrinkage: Vec::new(),
+        nearest: None,
+    };
+    let layout = &machine.plant.layout;
+    let sensors = logged(study, machine);
+    let record = study
+        .train
+        .iter()
+        .map(|(_, e)| Recorded::of(layout, &sensors, e))
+        .collect::<Result<Vec<_>>>()?;
+    let windows = |count| Windows::new(machine, &record, (&sensors, &study.parameters), count);
+    let (Some(few), Some(many)) = (windows(FEW)?, windows(WINDOWS)?) else {
+        return Ok(unchanged());
+    };
+    let all = quantities(&machine.plant, &sensors);
+    let search = Search {
+        few,
+        all: many,
+        record: &record,
+        quantities: &all,
+        settings,
+    };
+    let Outcome { found, view, next } = search.run()?;
+    let nearest = next.map(|n| Nearest {
+        fault: n.fault.name(),
+        columns: n.quantities.iter().map(|&q| all[q].name.clone()).collect(),
+        shrinkage: n.shrinkage,
+    });
+    if found.is_empty() {
+        return Ok(Mended {
+            nearest,
+            ..unchanged()
+        });
+    }
+    let mappings = mappings(&all, &view);
+    let remapped = |logs: &[(String, Episode)]| -> Result<Vec<(String, Episode)>> {
+        let one =
+            |(name, e): &(String, Episode)| Ok((name.clone(), e.remapped(layout, &mappings)?));
+        logs.iter().map(one).collect()
+    };
+    let mut mended = study.clone();
+    mended.train = remapped(&study.train)?;
+    mended.test = remapped(&study.test)?;
+    let wiring = found
+        .iter()
+        .map(|f| {
+            let columns: Vec<String> = match f.fault {
+                Fault::Clock => sensors.clone(),
+                _ => f.quantities.iter().map(|&q| all[q].name.clone()).collect(),
+            };
+            let lines: Vec<String> = mappings
+                .iter()
+                .filter(|m| columns.iter().any(|c| concerns(m, c)))
+                .map(|m| study.composed(m).lines())
+                .collect();
+            WiringResult {
+                fault: f.fault.name().to_owned(),
+                columns,
+                probability: f.probability,
+                mend: lines.join("\n"),
+            }
+        })
+        .collect();
+    Ok(Mended {
+        study: mended,
+        wiring,
+        shrinkage: found.iter().map(|f| f.shrinkage).collect(),
+        nearest,
+    })
+}
+
+/// Whether a mapping is of a column, or of an entry of it, or of the vector that it is an entry of.
+fn concerns(mapping: &ColumnMapping, column: &str) -> bool {
+    let entry = |of: &str, vector: &str| {
+        of.strip_prefix(vector)
+            .and_then(|rest| rest.strip_prefix('.'))
+            .is_some_and(|i| i.parse::<usize>().is_ok())
+    };
+    mapping.name == column || entry(&mapping.name, column) || entry(column, &mapping.name)
+}
+
+/// Mappings of a view: one a quantity that it changes, or one a vector whose entries are all changed alike.
+fn mappings(all: &[Quantity], view: &View) -> Vec<ColumnMapping> {
+    let names = |command: bool| -> Vec<String> {
+        let own = all.iter().filter(|q| q.command == command);
+        own.map(|q| q.name.clone()).collect()
+    };
+    let (readings, commands) = (names(false), names(true));
+    let mut found: Vec<ColumnMapping> = Vec::new();
+    for vector in all.chunk_by(|a, b| a.whole == b.whole && a.command == b.command) {
+        let entries = vector.iter().filter_map(|q| {
+            let columns = if q.command { &commands } else { &readings };
+            mapping(&q.name, q.place, view_of(view, q), columns, &q.units)
+        });
+        let entries: Vec<ColumnMapping> = entries.collect();
+        let whole = |m: &ColumnMapping| ColumnMapping {
+            name: vector[0].whole.clone(),
+            ..m.clone()
+        };
+        let alike = entries.len() == vector.len()
+            && entries
+                .iter()
+                .all(|m| m.from.is_none() && whole(m) == whole(&entries[0]));
+        if alike {
+            found.push(whole(&entries[0]));
+        } else {
+            found.extend(entries);
+        }
+    }
+    found
+}

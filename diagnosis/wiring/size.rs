@@ -1,0 +1,146 @@
+//! Sizes of offsets and delays: Gauss-Newton on the residuals of the windows, with bounded weights.
+//!
+//! A wrong mass answers a command later or earlier, as a wrong clock does. So the study's own parameters may be fitted beside
+//! a size.
+
+use asid_core::Result;
+use nalgebra::{DMatrix, DVector};
+
+use super::view::View;
+use super::windows::{Misses, Windows};
+
+/// Gauss-Newton steps. Misses are nearly linear in an offset over a window; a start several motions away takes some.
+const STEPS: usize = 4;
+/// Motions beyond which a residual counts no more than linearly (Huber's loss): some windows hold contacts.
+const HUBER: f64 = 1.0;
+/// Halvings of a step that does not help.
+const HALVINGS: usize = 3;
+/// Share of a parameter's range that slopes are taken over, and that a step is at most.
+const PARAMETER: (f64, f64) = (0.01, 0.3);
+/// What is added to the diagonal of the normal equations, as a share of it: parameters that do not show stay where they are.
+const RIDGE: f64 = 1e-6;
+/// Loss of a residual where the engine failed, motions squared: beyond that of any finite one.
+const FAILED: f64 = 1e3;
+
+/// What a size is fitted with.
+#[derive(Clone, Copy, Debug)]
+pub struct Fit {
+    /// Where it begins.
+    pub start: f64,
+    /// Difference that slopes are taken over.
+    pub probe: f64,
+    /// Longest step.
+    pub longest: f64,
+    /// Whether the study's parameters are fitted beside it.
+    pub parameters: bool,
+}
+
+/// Sum over residuals of Huber's loss, in motions.
+fn loss(misses: &Misses) -> f64 {
+    let width = misses.motion.len();
+    let each = misses.residual.iter().enumerate().map(|(i, r)| {
+        let x = r.abs() / misses.motion[i % width];
+        match x {
+            x if x.is_nan() => 0.0,
+            x if x <= HUBER => 0.5 * x * x,
+            x if x.is_finite() => HUBER * (x - 0.5 * HUBER),
+            _ => FAILED,
+        }
+    });
+    each.sum()
+}
+
+/// Step of Gauss and Newton from differences over `probes`.
+fn step(here: &Misses, there: &[Misses], probes: &[f64]) -> DVector<f64> {
+    let (n, width) = (probes.len(), here.motion.len());
+    let (mut gradient, mut curvature) = (DVector::zeros(n), DMatrix::zeros(n, n));
+    for (i, a) in here.residual.iter().enumerate() {
+        let scale = here.motion[i % width];
+        let r = a / scale;
+        let slope = |k: usize| (there[k].residual[i] - a) / scale / probes[k];
+        let slopes = DVector::from_fn(n, |k, _| slope(k));
+        if !(r.is_finite() && slopes.iter().all(|s| s.is_finite())) {
+            continue;
+        }
+        let weight = (HUBER / r.abs().max(HUBER)).min(1.0);
+        gradient += weight * r * &slopes;
+        curvature += weight * &slopes * slopes.transpose();
+    }
+    for k in 0..n {
+        curvature[(k, k)] = curvature[(k, k)] * (1.0 + RIDGE) + f64::MIN_POSITIVE;
+    }
+    let solved = curvature.cholesky().map(|c| c.solve(&gradient));
+    solved.map_or_else(|| DVector::zeros(n), |x| -x)
+}
+
+/// The size at which misses are least, with these misses. The windows keep the parameters that go with it.
+///
+/// # Errors
+/// When the engine fails.
+pub fn fit(
+    windows: &mut Windows<'_>,
+    view: &dyn Fn(f64) -> View,
+    with: Fit,
+) -> Result<(f64, Misses)> {
+    let ranges: Vec<[f64; 2]> = if with.parameters {
+        windows.ranges()
+    } else {
+        Vec::new()
+    };
+    let spans = || ranges.iter().map(|r| r[1] - r[0]);
+    let probes: Vec<f64> = std::iter::once(with.probe)
+        .chain(spans().map(|s| PARAMETER.0 * s))
+        .collect();
+    let longest: Vec<f64> = std::iter::once(with.longest)
+        .chain(spans().map(|s| PARAMETER.1 * s))
+        .collect();
+    let mut at = vec![with.start];
+    at.extend(windows.theta().iter().take(ranges.len()));
+    let mut evaluate = |at: &[f64]| -> Result<Misses> {
+        if with.parameters {
+            windows.set_theta(&at[1..]);
+        }
+        windows.misses(&view(at[0]))
+    };
+    let mut misses = evaluate(&at)?;
+    let mut best = loss(&misses);
+    for _ in 0..STEPS {
+        let mut there = Vec::with_capacity(at.len());
+        let mut signed = probes.clone();
+        for k in 0..at.len() {
+            // Away from the far end of its range.
+            if k > 0 && at[k] + probes[k] > ranges[k - 1][1] {
+                signed[k] = -probes[k];
+            }
+            let mut beside = at.clone();
+            beside[k] += signed[k];
+            there.push(evaluate(&beside)?);
+        }
+        let mut by = step(&misses, &there, &signed);
+        let share = (by.iter().zip(&longest))
+            .map(|(b, l)| (l / b.abs().max(f64::MIN_POSITIVE)).min(1.0))
+            .fold(1.0, f64::min);
+        by *= share;
+        let mut moved = false;
+        for _ in 0..HALVINGS {
+            let mut next: Vec<f64> = at.iter().zip(by.iter()).map(|(a, b)| a + b).collect();
+            for (x, range) in next[1..].iter_mut().zip(&ranges) {
+                *x = x.clamp(range[0], range[1]);
+            }
+            let found = evaluate(&next)?;
+            let value = loss(&found);
+            if value < best {
+                (at, misses, best, moved) = (next, found, value, true);
+                break;
+            }
+            by *= 0.5;
+        }
+        if !moved || by.iter().zip(&probes).all(|(b, p)| b.abs() < 0.01 * p) {
+            break;
+        }
+    }
+    if with.parameters {
+        windows.set_theta(&at[1..]);
+    }
+    Ok((at[0], misses))
+}

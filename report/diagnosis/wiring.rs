@@ -1,0 +1,37 @@
+//! Faults of wiring, before everything else: what is wrong with the columns, and the lines that mend it.
+
+use super::data::Diagnosis;
+use super::words::{joined, probability};
+use crate::page::{Column, Section, Table};
+
+pub(super) fn section(d: &Diagnosis) -> Option<Section> {
+    if d.wiring.is_empty() {
+        return None;
+    }
+    let columns = vec![
+        Column::text("fault"),
+        Column::prose("columns"),
+        Column::number("probability"),
+    ];
+    let table = d.wiring.iter().fold(Table::new(columns), |table, w| {
+        table.row(vec![
+            w.fault.clone().into(),
+            joined(&w.columns, "and").into(),
+            probability(w.probability).into(),
+        ])
+    });
+    let section = Section::new("Wiring")
+        .lead(
+            "Columns of the logs that do not mean what their names say. The rest of this page is said with these mended; \
+             the lines below mend them in the study file.",
+        )
+        .table(table);
+    let mut shown: Vec<&str> = Vec::new();
+    Some(d.wiring.iter().fold(section, |section, w| {
+        if shown.contains(&&*w.mend) {
+            return section;
+        }
+        shown.push(&w.mend);
+        section.command(w.mend.clone())
+    }))
+}

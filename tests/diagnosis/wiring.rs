@@ -1,0 +1,167 @@
+//! Wiring faults of a planar arm that lacks a quarter of a drive's gain, integrated by another program: each is found and
+//! mended, with and without the start in the log, and none is seen where there is none.
+
+use asid::core::Episode;
+use asid::core::log::ColumnMapping;
+use asid::diagnosis::machine::Machine;
+use asid::diagnosis::study::Study;
+use asid::diagnosis::wiring::{Mended, Settings, mend};
+
+use super::arm;
+use super::diagnosis_support::engine;
+
+/// The arm's study, with or without the state at the first rows.
+fn study(starts: bool) -> Study {
+    let folder = tempfile::tempdir().unwrap();
+    arm::write_study(folder.path());
+    let mut study = Study::read(folder.path()).unwrap();
+    if !starts {
+        let logs = study.train.iter_mut().chain(&mut study.test);
+        logs.for_each(|(_, e)| e.initial = None);
+    }
+    study
+}
+
+fn machine(study: &Study) -> Machine {
+    Machine::new(engine(), &study.scene, &study.fixed, &study.effects, 0).unwrap()
+}
+
+fn mended(study: &Study) -> Mended {
+    mend(study, &machine(study), &Settings::default()).unwrap()
+}
+
+/// The study with its columns wired by `mappings`.
+fn spoilt(study: &Study, mappings: &[ColumnMapping]) -> Study {
+    let layout = &machine(study).plant.layout.clone();
+    let mut spoilt = study.clone();
+    for (_, episode) in spoilt.train.iter_mut().chain(&mut spoilt.test) {
+        *episode = episode.remapped(layout, mappings).unwrap();
+    }
+    spoilt
+}
+
+/// Largest difference of the readings of two logs where both have one.
+fn distance(a: &Episode, b: &Episode) -> f64 {
+    let pairs = a.readings.iter().zip(&b.readings);
+    let differences = pairs.map(|(x, y)| (x - y).abs());
+    differences.filter(|d| d.is_finite()).fold(0.0, f64::max)
+}
+
+/// A fault is found at its columns, and the mended logs are the right ones within a distance (rad).
+fn is_mended(fault: &str, columns: &[&str], mappings: &[ColumnMapping], within: f64) {
+    for starts in [true, false] {
+        let right = study(starts);
+        let found = mended(&spoilt(&right, mappings));
+        assert_eq!(
+            found.wiring.len(),
+            1,
+            "{fault}, starts {starts}: {:?}",
+            found.wiring
+        );
+        assert_eq!(found.wiring[0].fault, fault);
+        let mut named = found.wiring[0].columns.clone();
+        named.sort();
+        assert_eq!(named, columns, "{fault}, starts {starts}");
+        for ((_, a), (_, b)) in found.study.test.iter().zip(&right.test) {
+            let off = distance(a, b);
+            assert!(off < within, "{fault}, starts {starts}: off by {off} rad");
+        }
+    }
+}
+
+fn of(name: &str) -> ColumnMapping {
+    ColumnMapping::of(name)
+}
+
+#[test]
+fn right_wiring_stays_though_a_drive_has_lost_a_quarter() {
+    for starts in [true, false] {
+        let found = mended(&study(starts));
+        assert!(
+            found.wiring.is_empty(),
+            "starts {starts}: {:?}",
+            found.wiring
+        );
+    }
+}
+
+#[test]
+fn wiring_sign() {
+    let turned = ColumnMapping {
+        sign: -1.0,
+        ..of("q_elbow")
+    };
+    is_mended("wiring-sign", &["q_elbow"], &[turned], 1e-9);
+}
+
+#[test]
+fn wiring_unit() {
+    let degrees = ColumnMapping {
+        scale: 180.0 / std::f64::consts::PI,
+        ..of("q_shoulder")
+    };
+    is_mended("wiring-unit", &["q_shoulder"], &[degrees], 1e-9);
+}
+
+#[test]
+fn wiring_swapped() {
+    let from = |name: &str, from: &str| ColumnMapping {
+        from: Some(from.into()),
+        ..of(name)
+    };
+    let swapped = [from("q_shoulder", "q_elbow"), from("q_elbow", "q_shoulder")];
+    is_mended("wiring-swapped", &["q_elbow", "q_shoulder"], &swapped, 1e-9);
+}
+
+#[test]
+fn wiring_offset() {
+    // By its own deviation; less than 0.4 of it is an effect.
+    let study = study(true);
+    let readings = || {
+        study
+            .train
+            .iter()
+            .flat_map(|(_, e)| e.readings.iter().step_by(2))
+    };
+    let n = readings().count() as f64;
+    let mean = readings().sum::<f64>() / n;
+    let deviation = (readings().map(|x| (x - mean).powi(2)).sum::<f64>() / n).sqrt();
+    let shifted = |share: f64| ColumnMapping {
+        offset: share * deviation,
+        ..of("q_shoulder")
+    };
+    is_mended("wiring-offset", &["q_shoulder"], &[shifted(1.0)], 0.1);
+    let found = mended(&spoilt(&study, &[shifted(0.2)]));
+    assert!(found.wiring.is_empty(), "{:?}", found.wiring);
+}
+
+#[test]
+fn the_mending_lines_are_those_of_the_study_file() {
+    let turned = ColumnMapping {
+        sign: -1.0,
+        ..of("q_elbow")
+    };
+    let found = mended(&spoilt(&study(true), &[turned]));
+    assert_eq!(
+        found.wiring[0].mend,
+        "[[column]]\nname = \"q_elbow\"\nsign = -1.0"
+    );
+    // Where the study maps the column already, the line stands for both.
+    let mut mapped = spoilt(
+        &study(true),
+        &[ColumnMapping {
+            sign: -1.0,
+            ..of("q_elbow")
+        }],
+    );
+    mapped.columns = vec![ColumnMapping {
+        from: Some("joint_2".into()),
+        unit: Some("deg".into()),
+        offset: 0.25,
+        ..of("q_elbow")
+    }];
+    assert_eq!(
+        mended(&mapped).wiring[0].mend,
+        "[[column]]\nname = \"q_elbow\"\nfrom = \"joint_2\"\nunit = \"deg\"\nsign = -1.0\noffset = -0.25"
+    );
+}
