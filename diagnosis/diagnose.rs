@@ -1,23 +1,19 @@
 //! A diagnosis from a study to its result.
 
-use asid_core::{Progress, Result, Streams};
+use asid_core::{Progress, Result};
 use asid_effects::EffectSpec;
 
 use crate::bench::{Bench, Explanation, Trial};
-use crate::candidate::{Candidate, enumerate};
+use crate::candidate::Candidate;
 use crate::fit::cost;
 use crate::intake::Intake;
 use crate::latent_force;
 use crate::machine::Machine;
-use crate::predict::{Point, State};
-use crate::prepare::{Prepared, plain_residuals, prepare};
-use crate::record::Record;
+use crate::prepare::plain_residuals;
 use crate::result::{DiagnosisResult, DiagnosisTrace};
-use crate::search::{Breadth, Findings, Search, trials};
+use crate::search::{Breadth, Findings, trials};
 use crate::study::Study;
 use crate::telling::Telling;
-use crate::trajectory::Trajectory;
-use crate::verdict::judge;
 
 pub use crate::work::Work;
 

@@ -78,6 +78,8 @@ pub struct Fitted {
     pub covariance: DMatrix<f64>,
     /// Trajectory, force and noise.
     pub estimate: Estimate,
+    /// Slopes in the state, with which fits of like models begin.
+    pub slopes: Slopes,
 }
 
 /// The regression of all walks.
@@ -135,7 +137,7 @@ struct Anchor {
     to: (Vec<f64>, Estimate),
 }
 
-/// Fits a model from some values and an estimate on, over at most `rounds` linearisations.
+/// Fits a model from some values, an estimate and the slopes of a like model on, over at most `rounds` linearisations.
 ///
 /// # Errors
 /// When a value is not physical or the engine fails.
@@ -143,7 +145,7 @@ pub fn fit(
     context: &Context<'_>,
     hypothesis: &Hypothesis,
     theta: &[f64],
-    estimate: &Estimate,
+    (estimate, slopes): (&Estimate, &Slopes),
     rounds: usize,
 ) -> Result<Fitted> {
     let unknowns = &hypothesis.unknowns;
@@ -159,7 +161,7 @@ pub fn fit(
     let mut theta = theta.to_vec();
     let mut estimate = estimate.clone();
     let mut best: Option<Fitted> = None;
-    let mut slopes = Slopes::default();
+    let mut slopes = slopes.begun();
     let mut anchor: Option<Anchor> = None;
     let mut part = 1.0;
     let (mut waited, mut failed) = (0, 0);
@@ -229,6 +231,7 @@ pub fn fit(
                 promised,
                 covariance,
                 estimate: estimate.clone(),
+                slopes: Slopes::default(),
             });
         }
         let stands = round > 0 && !rose && promised < RISE;
@@ -249,7 +252,6 @@ pub fn fit(
             estimate = from.1.towards(context, &to.1, part);
             let before = estimate.trajectory.clone();
             estimate.roll(&mut map, &theta, &before)?;
-            slopes.keep(&linear);
             continue;
         }
         let from = rose.then(|| (theta.clone(), estimate.clone()));
@@ -266,7 +268,6 @@ pub fn fit(
         let before = estimate.trajectory.clone();
         estimate.improve(context, &linear, EM_ROUNDS);
         estimate.roll(&mut map, &theta, &before)?;
-        slopes.keep(&linear);
         let again = map.reads() && !map.is_all_segments();
         for _ in 0..if again { AGAIN } else { 0 } {
             let linear = map.linearise(&theta, &estimate.trajectory, want, &steps, &[])?;
@@ -283,13 +284,16 @@ pub fn fit(
             });
         }
     }
-    best.ok_or_else(|| asid_core::Error::Failed("no round of the fit was finite".into()))
+    let mut best =
+        best.ok_or_else(|| asid_core::Error::Failed("no round of the fit was finite".into()))?;
+    best.slopes = slopes;
+    Ok(best)
 }
 
 /// Slopes in the state that are kept while they hardly change: they cost most of a linearisation, and what is found does
 /// not depend on them, only how fast (a chord method).
-#[derive(Default)]
-struct Slopes {
+#[derive(Clone, Debug, Default)]
+pub struct Slopes {
     a: Vec<Vec<f64>>,
     h: Vec<Vec<f64>>,
     /// The values that they were taken at.
@@ -299,12 +303,20 @@ struct Slopes {
 }
 
 impl Slopes {
+    /// The same at the beginning of another fit.
+    fn begun(&self) -> Self {
+        Self {
+            used: 0,
+            ..self.clone()
+        }
+    }
+
     /// Whether they are due anew.
     fn is_old(&self, theta: &[f64], unknowns: &[Unknown]) -> bool {
         let moved = |((a, b), u): ((&f64, &f64), &Unknown)| (a - b).abs() / u.deviation;
         let pairs = self.theta.iter().zip(theta).zip(unknowns);
         let furthest = pairs.map(moved).fold(0.0, f64::max);
-        self.a.is_empty() || self.used >= KEPT || furthest > KEPT_MOVE
+        self.h.is_empty() || self.used >= KEPT || furthest > KEPT_MOVE
     }
 
     /// Takes fresh slopes over, or gives a linearisation the kept ones.
@@ -312,20 +324,15 @@ impl Slopes {
         if let Some(theta) = fresh {
             self.theta = theta.to_vec();
             self.used = 0;
-            self.a.clear();
+            self.a = linear.iter().map(|l| l.a.clone()).collect();
+            self.h = linear.iter().map(|l| l.h.clone()).collect();
             return;
         }
         self.used += 1;
-        for ((l, a), h) in linear.iter_mut().zip(&mut self.a).zip(&mut self.h) {
-            l.a = std::mem::take(a);
-            l.h = std::mem::take(h);
+        for ((l, a), h) in linear.iter_mut().zip(&self.a).zip(&self.h) {
+            l.a.clone_from(a);
+            l.h.clone_from(h);
         }
-    }
-
-    /// Keeps those of a linearisation.
-    fn keep(&mut self, linear: &[LinearEpisode]) {
-        self.a = linear.iter().map(|l| l.a.clone()).collect();
-        self.h = linear.iter().map(|l| l.h.clone()).collect();
     }
 }
 
@@ -359,7 +366,6 @@ pub fn settle_noise(
         let before = estimate.trajectory.clone();
         estimate.improve(context, &linear, em_rounds);
         estimate.roll(&mut map, theta, &before)?;
-        slopes.keep(&linear);
     }
     Ok(())
 }

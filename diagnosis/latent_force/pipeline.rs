@@ -17,7 +17,7 @@ use crate::trajectory::Trajectory;
 use crate::work::Work;
 
 use super::estimate::{Estimate, Taken, begin};
-use super::fit::{Fitted, Hypothesis, fit, settle_noise};
+use super::fit::{Fitted, Hypothesis, Slopes, fit, settle_noise};
 use super::initial::{from_readings, scales};
 use super::search::{Breadth, Outcome, Set, search};
 use super::segments::cut;
@@ -63,11 +63,13 @@ pub fn diagnose(
         let parameters = (&study.parameters[..], &nominal[..]);
         let (context, mut estimate) = begin(&bench.machine, &logs, taken, parameters)?;
         settle_noise(&context, &hypothesis, &nominal, &mut estimate, FIRST)?;
-        let mut none = fit(&context, &hypothesis, &nominal, &estimate, ROUNDS)?;
+        let begin = (&estimate, &Slopes::default());
+        let mut none = fit(&context, &hypothesis, &nominal, begin, ROUNDS)?;
         if none.estimate.missing(&context).share < 1.0 {
             none.estimate.free_at_rest(&context);
             none.estimate.set_resolution(&context);
-            none = fit(&context, &hypothesis, &none.theta, &none.estimate, ROUNDS)?;
+            let from = (&none.estimate, &none.slopes);
+            none = fit(&context, &hypothesis, &none.theta, from, ROUNDS)?;
         }
         progress.end();
         let shown = along(

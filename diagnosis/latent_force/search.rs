@@ -7,7 +7,7 @@ use crate::candidate::Candidate;
 
 use super::columns::{Columns, Form};
 use super::estimate::{Context, Missing};
-use super::fit::{Fitted, Hypothesis, fit};
+use super::fit::{Fitted, Hypothesis, Slopes, fit};
 use super::screen::{Screened, rank, regressions};
 
 /// How widely to search.
@@ -75,7 +75,7 @@ impl Set {
             context,
             &from.hypothesis,
             &from.theta,
-            &from.estimate,
+            (&from.estimate, &from.slopes),
             rounds,
         )?;
         Ok(())
@@ -208,8 +208,9 @@ fn free_what_is_given(
             if size > 0.0 {
                 unknown.deviation = unknown.deviation.min(size);
             }
-            let (theta, estimate) = (&best.fitted.theta, &best.fitted.estimate);
-            let fitted = fit(context, &hypothesis, theta, estimate, breadth.rounds[1])?;
+            let (theta, from) = (&best.fitted.theta, &best.fitted);
+            let from = (&from.estimate, &from.slopes);
+            let fitted = fit(context, &hypothesis, theta, from, breadth.rounds[1])?;
             if fitted.evidence - best.fitted.evidence > threshold {
                 best.fitted = fitted;
             }
@@ -247,6 +248,7 @@ fn without(set: &Set, candidates: &[Candidate], out: usize) -> Set {
     fitted.theta.drain(range.clone());
     fitted.hypothesis.unknowns.drain(range);
     fitted.hypothesis.specs.remove(place);
+    fitted.slopes = Slopes::default();
     set.candidates.remove(place);
     set
 }

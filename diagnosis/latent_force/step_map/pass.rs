@@ -8,7 +8,7 @@ use crate::latent_force::walk::Walk;
 use crate::predict::columns_of;
 
 use super::late::retime;
-use super::{Common, LinearEpisode, Request, Variation};
+use super::{Common, LinearEpisode, Request};
 
 /// Change of a coordinate of the state that derivatives are taken over, rad, m, rad/s or m/s: forward
 /// differences of smooth dynamics in double precision are right to about six digits.
