@@ -6,7 +6,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Rooms whose numbers are looked at. The C ABI's are those of its header, which explains them.
-const ROOMS: [&str; 14] = [
+const ROOMS: [&str; 15] = [
     "asid-core",
     "mjcf",
     "effects",
@@ -20,6 +20,7 @@ const ROOMS: [&str; 14] = [
     "conformance",
     "report",
     "withheld",
+    "scorer",
     "src",
 ];
 
