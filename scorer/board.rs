@@ -180,7 +180,11 @@ fn power(cases: &[&Case]) -> Vec<Power> {
 fn confusion(cases: &[Case]) -> BTreeMap<String, BTreeMap<String, usize>> {
     let mut counts: BTreeMap<String, BTreeMap<String, usize>> = BTreeMap::new();
     for c in cases {
-        let said = if c.standing.is_right() { &c.truth } else { &c.verdict };
+        let said = if c.standing.is_right() {
+            &c.truth
+        } else {
+            &c.verdict
+        };
         let row = counts.entry(c.cause.clone()).or_default();
         *row.entry(plain(said)).or_default() += 1;
     }
@@ -203,9 +207,7 @@ impl Score {
             .map(|c| c.true_probability.max(FLOOR).ln())
             .collect();
         let answered = || counted.iter().filter(|c| c.standing != Standing::NoAnswer);
-        let stated: Vec<(f64, bool)> = answered()
-            .map(|c| (c.probability, c.claims_hold))
-            .collect();
+        let stated: Vec<(f64, bool)> = answered().map(|c| (c.probability, c.claims_hold)).collect();
         let squares: Vec<f64> = stated
             .iter()
             .map(|(p, t)| (p - f64::from(u8::from(*t))).powi(2))
@@ -216,7 +218,9 @@ impl Score {
             Figure::mean(&values)
         };
         let wired = answers.iter().map(|c| &c.wiring);
-        let found = wired.clone().flat_map(|w| (0..w.faults).map(|i| i < w.found));
+        let found = wired
+            .clone()
+            .flat_map(|w| (0..w.faults).map(|i| i < w.found));
         Self {
             schema: 1,
             method: method.to_owned(),
@@ -234,7 +238,11 @@ impl Score {
                     .map(|c| c.standing.is_right()),
             ),
             log_score: Figure::mean(&logs),
-            base_log_score: counted.iter().map(|c| frequency[&*c.cause].ln()).sum::<f64>() / n,
+            base_log_score: counted
+                .iter()
+                .map(|c| frequency[&*c.cause].ln())
+                .sum::<f64>()
+                / n,
             brier: Figure::mean(&squares),
             calibration: Calibration::of(&stated),
             localization_signals: f1(&|c| c.localization.signals),
@@ -248,7 +256,8 @@ impl Score {
             power: power(&counted),
             confusion: confusion(&answers),
             slowest: answers.iter().map(|c| c.seconds).fold(0.0, f64::max),
-            largest_memory_mib: memory.fold(None, |a: Option<f64>, m| Some(a.map_or(m, |a| a.max(m)))),
+            largest_memory_mib: memory
+                .fold(None, |a: Option<f64>, m| Some(a.map_or(m, |a| a.max(m)))),
             left_out,
             answers,
         }

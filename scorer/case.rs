@@ -109,9 +109,8 @@ impl Case {
         if !standing.is_right() && same && !forbidden {
             standing = Standing::SamePhysics;
         }
-        let is_right = |s: &[String]| {
-            judge.of_set(s, answer).is_right() || (standing.is_right() && s == set)
-        };
+        let is_right =
+            |s: &[String]| judge.of_set(s, answer).is_right() || (standing.is_right() && s == set);
         case.probability = answer.verdict.probability;
         case.standing = standing;
         case.claims_hold = judge.claims_hold(answer, standing);
@@ -123,17 +122,19 @@ impl Case {
         let mut hypotheses: Vec<(Vec<String>, f64)> = hypotheses.collect();
         hypotheses.sort_by(|a, b| b.1.total_cmp(&a.1));
         let right = hypotheses.iter().filter(|h| is_right(&h.0));
-        case.true_probability = right.map(|h| h.1).sum::<f64>().clamp(0.0, 1.0);
+        case.true_probability = right.fold(0.0_f64, |sum, h| sum + h.1).min(1.0);
         case.top2 = standing.is_right() || hypotheses.iter().take(2).any(|h| is_right(&h.0));
         let rivals = &answer.verdict.ambiguous_with;
         case.covered = standing.is_right() || rivals.iter().any(|s| is_right(s));
         case.set_size = 1 + rivals.len();
-        case.alarm = label.is_none().then_some(match (standing, &*answer.verdict.kind) {
-            (Standing::Apart, _) => Alarm::Apart,
-            (s, _) if s.is_right() => Alarm::Quiet,
-            (_, "unknown") => Alarm::Unknown,
-            _ => Alarm::Effect,
-        });
+        case.alarm = label
+            .is_none()
+            .then_some(match (standing, &*answer.verdict.kind) {
+                (Standing::Apart, _) => Alarm::Apart,
+                (s, _) if s.is_right() => Alarm::Quiet,
+                (_, "unknown") => Alarm::Unknown,
+                _ => Alarm::Effect,
+            });
         case.localization = Localization::of(label, answer);
         case.effect_values = values::of_effects(label, answer, judge.sites);
         case.parameters = values::of_study(label, answer);

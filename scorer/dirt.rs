@@ -3,8 +3,9 @@
 use std::collections::BTreeMap;
 
 use crate::answer::Answer;
+use crate::catalogue::parameters_of;
 use crate::label::{Label, name_of};
-use crate::sites::{Sites, parameters_of};
+use crate::sites::Sites;
 
 /// Largest ratio of the fitted to the drawn size at which named dirt is right. Dirt is near the noise, and its size is
 /// then known to about as much as itself.
@@ -22,7 +23,10 @@ fn sizes(effect: &str, values: &BTreeMap<String, f64>) -> Sizes {
         let (unit, null) = parameter.map_or(("", 0.0), |p| (p.unit, p.null));
         *squares.entry(unit).or_default() += (value - null).powi(2);
     }
-    squares.into_iter().map(|(unit, s)| (unit, s.sqrt())).collect()
+    squares
+        .into_iter()
+        .map(|(unit, s)| (unit, s.sqrt()))
+        .collect()
 }
 
 /// Whether `effect` (`NAME@SITE`) is in the label's list of dirt, and its fitted size at most twice the drawn one.
@@ -91,7 +95,12 @@ mod tests {
         // Force and offset have one unit: the drawn size is 0.05.
         assert!(listed(0.099) && !listed(0.101));
         let other = named(&[("damping", 0.001)], "viscous-friction");
-        assert!(!is_listed("viscous-friction@axis", &other, &label, &Sites::default()));
+        assert!(!is_listed(
+            "viscous-friction@axis",
+            &other,
+            &label,
+            &Sites::default()
+        ));
     }
 
     #[test]

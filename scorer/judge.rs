@@ -85,7 +85,11 @@ impl Judge<'_> {
     #[must_use]
     pub fn is_out_of_catalogue(&self) -> bool {
         let label = self.label;
-        !label.is_unknown() && label.effects.iter().any(|e| !self.catalogue.contains(name_of(e)))
+        !label.is_unknown()
+            && label
+                .effects
+                .iter()
+                .any(|e| !self.catalogue.contains(name_of(e)))
     }
 
     /// The true set: effects, `none` or `unknown`.

@@ -9,6 +9,8 @@ use std::path::Path;
 use asid_core::{Error, Result};
 use serde::Deserialize;
 
+use crate::catalogue::has_parameter;
+
 /// A little of an effect that the world has besides its causes.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 pub struct Dirt {
@@ -155,8 +157,11 @@ impl Label {
     pub fn value(&self, effect: &str, parameter: &str) -> Option<f64> {
         let whole = self.effect_parameters.get(&format!("{effect}.{parameter}"));
         // A bare name is clear where no other cause could have it.
+        let has = |e: &&String| has_parameter(name_of(e), parameter);
+        let mut owners = self.effects.iter().filter(has);
+        let clear = owners.next().is_some_and(|e| e == effect) && owners.next().is_none();
         let bare = || {
-            (self.effects.len() == 1 && self.effects[0] == effect)
+            clear
                 .then(|| self.effect_parameters.get(parameter))
                 .flatten()
         };
@@ -195,22 +200,25 @@ mod tests {
 
     #[test]
     fn a_label_with_effects_alone_is_whole() {
-        let label: Label = serde_json::from_str(r#"{"effects": ["a@x", "a@y"], "more": 1}"#).unwrap();
+        let label: Label =
+            serde_json::from_str(r#"{"effects": ["a@x", "a@y"], "more": 1}"#).unwrap();
         assert_eq!((label.kind(), &*label.cause()), ("group", "a"));
         assert!(serde_json::from_str::<Label>(r#"{"world": "cart"}"#).is_err());
     }
 
     #[test]
-    fn a_bare_parameter_is_of_the_only_cause() {
+    fn a_bare_parameter_is_of_the_only_cause_that_has_it() {
         let values = BTreeMap::from([("force".to_owned(), 2.0)]);
+        let (dry, tilt) = ("coulomb-friction@x", "gravity-tilt");
         let mut label = Label {
-            effects: vec!["a@x".into()],
+            effects: vec![dry.into(), tilt.into()],
             effect_parameters: values,
             ..Label::default()
         };
-        assert_eq!(label.value("a@x", "force"), Some(2.0));
-        label.effects.push("b@x".into());
-        assert_eq!(label.value("a@x", "force"), None);
+        assert_eq!(label.value(dry, "force"), Some(2.0));
+        assert_eq!(label.value(tilt, "force"), None);
+        label.effects.push("coulomb-friction@y".into());
+        assert_eq!(label.value(dry, "force"), None);
     }
 
     #[test]

@@ -5,7 +5,7 @@
 //! physics it replays itself, with the engines and the catalogue of effects.
 //!
 //! - [`label`] and [`answer`] are the two files.
-//! - [`sites`] and [`dirt`] say when names agree; [`judge`] says whether an answer is right.
+//! - [`catalogue`], [`sites`] and [`dirt`] say when names agree; [`judge`] says whether an answer is right.
 //! - [`physics`] refits the sets that were named, and says which of them are the same physics.
 //! - [`case`] is one case with everything that is scored of it: [`localization`], [`values`], [`wiring`].
 //! - [`baseline`] answers studies in ways that a diagnosis has to be better than.
@@ -15,6 +15,7 @@ pub mod answer;
 pub mod baseline;
 pub mod board;
 pub mod case;
+pub mod catalogue;
 pub mod dirt;
 pub mod judge;
 pub mod label;

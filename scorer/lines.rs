@@ -76,7 +76,8 @@ fn cases(score: &Score) -> Vec<String> {
             c.set_size,
             closed.map_or_else(|| "-".into(), |x| format!("{x:.2}")),
             c.seconds,
-            c.memory_mib.map_or_else(|| "-".into(), |m| format!("{m:.0}")),
+            c.memory_mib
+                .map_or_else(|| "-".into(), |m| format!("{m:.0}")),
         );
         lines.push(line);
     }
@@ -95,9 +96,11 @@ fn row(row: &Row) -> String {
         row.top2.count,
         row.covered.count,
         row.unanswered.count,
-        row.true_probability.map_or_else(|| "-".into(), |p| format!("{:.2}", p.value)),
+        row.true_probability
+            .map_or_else(|| "-".into(), |p| format!("{:.2}", p.value)),
         size(row.set_size),
-        row.closed.map_or_else(|| "-".into(), |c| format!("{:.2}", c.value)),
+        row.closed
+            .map_or_else(|| "-".into(), |c| format!("{:.2}", c.value)),
         size(row.seconds),
     )
 }
@@ -181,10 +184,15 @@ fn summary(s: &Score) -> Vec<String> {
             s.wiring.false_alarms.text()
         ),
     ];
-    let memory = s.largest_memory_mib.map_or_else(String::new, |m| format!(", largest memory {m:.0} MiB"));
+    let memory = s
+        .largest_memory_mib
+        .map_or_else(String::new, |m| format!(", largest memory {m:.0} MiB"));
     lines.push(format!("slowest {:.1} s{memory}", s.slowest));
     for p in &s.power {
-        let to = p.gap.1.map_or_else(|| "on".to_owned(), |high| format!("to {high}"));
+        let to = p
+            .gap
+            .1
+            .map_or_else(|| "on".to_owned(), |high| format!("to {high}"));
         lines.push(format!(
             "excess gap {} {to}: right {}, noticed {}",
             p.gap.0,

@@ -47,7 +47,10 @@ impl Localization {
             sums(answer.places.iter().map(|p| (key(p), p.share)))
         };
         let both = |signal: &str, regime: &str| format!("{signal} / {regime}");
-        let true_regimes = label.places.iter().map(|p| (both(&p.signal, &p.regime), p.share));
+        let true_regimes = label
+            .places
+            .iter()
+            .map(|p| (both(&p.signal, &p.regime), p.share));
         Self {
             signals: f1(&said(&|p| p.signal.clone()), &label.signals),
             regimes: f1(&said(&|p| both(&p.signal, &p.regime)), &sums(true_regimes)),

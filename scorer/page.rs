@@ -31,7 +31,12 @@ pub fn page(scores: &[Score], about: &About) -> String {
         .answer(answer(score))
         .fact("engine", &*about.engine)
         .fact("cases", score.cases.to_string())
-        .fact("limit", about.limit.map_or_else(|| "none".into(), |l| format!("{l} s a case")));
+        .fact(
+            "limit",
+            about
+                .limit
+                .map_or_else(|| "none".into(), |l| format!("{l} s a case")),
+        );
     if let Some(control) = about.control {
         page = page.lead(format!("A control, which must fail: {control}."));
     }
@@ -39,18 +44,20 @@ pub fn page(scores: &[Score], about: &About) -> String {
     if scores.len() > 1 {
         page = page.section(methods(scores));
     }
-    page = page
-        .section(machines(score))
-        .section(power(score))
-        .section(probabilities(score))
-        .section(confusion(score));
+    page = page.section(machines(score));
+    if !score.power.is_empty() {
+        page = page.section(power(score));
+    }
+    page = page.section(probabilities(score)).section(confusion(score));
     for (by, title) in [
         ("world", "Clean and dirty worlds"),
         ("cause", "Causes"),
         ("magnitude", "Magnitudes"),
         ("fault", "Faults of logs and wiring"),
     ] {
-        page = page.section(part(score, by, title));
+        if score.rows.iter().any(|r| r.by == by) {
+            page = page.section(part(score, by, title));
+        }
     }
     page.section(cases(score))
         .section(Section::new("Again").command(&*about.command))
@@ -58,17 +65,33 @@ pub fn page(scores: &[Score], about: &About) -> String {
 }
 
 fn answer(score: &Score) -> String {
-    let interval = score.rows.first().map_or_else(String::new, |r| percent(&r.right));
-    format!("{} of {} cases are right: {interval}.", score.right, score.cases)
+    let interval = score
+        .rows
+        .first()
+        .map_or_else(String::new, |r| percent(&r.right));
+    format!(
+        "{} of {} cases are right: {interval}.",
+        score.right, score.cases
+    )
 }
 
 fn tiles(page: Page, s: &Score) -> Page {
     let mut page = page;
-    let log = s.log_score.map_or_else(|| "-".into(), |l| format!("{:.2}", l.value));
+    let log = s
+        .log_score
+        .map_or_else(|| "-".into(), |l| format!("{:.2}", l.value));
     let closed = s.rows.first().and_then(|r| r.closed);
     for (label, value, note) in [
-        ("among the two most probable", s.top2.to_string(), format!("of {}", s.cases)),
-        ("in the ambiguity set", s.covered.to_string(), format!("of {}", s.cases)),
+        (
+            "among the two most probable",
+            s.top2.to_string(),
+            format!("of {}", s.cases),
+        ),
+        (
+            "in the ambiguity set",
+            s.covered.to_string(),
+            format!("of {}", s.cases),
+        ),
         (
             "false alarms, clean worlds",
             s.clean_alarms.effect.text(),
@@ -80,7 +103,11 @@ fn tiles(page: Page, s: &Score) -> Page {
             format!("{} say unknown, counted apart", s.dirty_alarms.apart.count),
         ),
         ("unknowns found", s.unknowns.text(), String::new()),
-        ("log score", log, format!("base rate {:.2}", s.base_log_score)),
+        (
+            "log score",
+            log,
+            format!("base rate {:.2}", s.base_log_score),
+        ),
         (
             "closed of the possible",
             closed.map_or_else(|| "-".into(), |c| format!("{:.0} %", 100.0 * c.value)),
@@ -89,7 +116,8 @@ fn tiles(page: Page, s: &Score) -> Page {
         (
             "slowest case",
             format!("{:.0} s", s.slowest),
-            s.largest_memory_mib.map_or_else(String::new, |m| format!("at most {m:.0} MiB")),
+            s.largest_memory_mib
+                .map_or_else(String::new, |m| format!("at most {m:.0} MiB")),
         ),
     ] {
         page = page.tile(Tile::new(label, &value).note(note));
@@ -99,7 +127,18 @@ fn tiles(page: Page, s: &Score) -> Page {
 
 fn columns(first: &str) -> Vec<Column> {
     let mut all = vec![Column::text(first)];
-    for title in ["cases", "right", "95 %", "top 2", "covered", "no answer", "true p", "set", "closed", "s"] {
+    for title in [
+        "cases",
+        "right",
+        "95 %",
+        "top 2",
+        "covered",
+        "no answer",
+        "true p",
+        "set",
+        "closed",
+        "s",
+    ] {
         all.push(Column::number(title));
     }
     all
@@ -171,17 +210,15 @@ fn part(score: &Score, key: &str, title: &str) -> Section {
 }
 
 fn power(score: &Score) -> Section {
-    let layers = [
-        ("right", Colour::Blue, 0),
-        ("noticed", Colour::Muted, 1),
-    ];
+    let layers = [("right", Colour::Blue, 0), ("noticed", Colour::Muted, 1)];
     let axis = Axis::new("excess gap of the causes", "noise").spacing(Spacing::Log);
     let mut chart = Chart::new("Power", axis, Axis::new("cases", "%").domain([0.0, 100.0]));
     for (label, colour, which) in layers {
         let share = |p: &crate::board::Power| if which == 0 { p.right } else { p.noticed };
-        let points = score.power.iter().map(|p| {
-            [p.mean_gap, 100.0 * share(p).value().unwrap_or(f64::NAN)]
-        });
+        let points = score
+            .power
+            .iter()
+            .map(|p| [p.mean_gap, 100.0 * share(p).value().unwrap_or(f64::NAN)]);
         let points: Vec<[f64; 2]> = points.collect();
         if which == 0 {
             let whiskers = score.power.iter().map(|p| {
@@ -205,28 +242,57 @@ fn power(score: &Score) -> Section {
 
 fn probabilities(score: &Score) -> Section {
     let c = &score.calibration;
-    let dots = c.bins.iter().map(|b| [b.stated, b.true_share.value().unwrap_or(f64::NAN)]);
+    let dots = c
+        .bins
+        .iter()
+        .map(|b| [b.stated, b.true_share.value().unwrap_or(f64::NAN)]);
     let whiskers = c.bins.iter().map(|b| {
         let [low, high] = b.true_share.interval95.unwrap_or([f64::NAN; 2]);
         [b.stated, low, high]
     });
     let unit = |name: &str| Axis::new(name, "").domain([0.0, 1.0]);
-    let chart = Chart::new("Calibration", unit("stated probability"), unit("share that came true"))
-        .layer(Layer::line(vec![[0.0, 0.0], [1.0, 1.0]]).colour(Colour::Muted).dashed())
-        .layer(Layer::whiskers(whiskers.collect()).colour(Colour::Blue))
-        .layer(Layer::dots(dots.collect()).colour(Colour::Blue));
+    let chart = Chart::new(
+        "Calibration",
+        unit("stated probability"),
+        unit("share that came true"),
+    )
+    .layer(
+        Layer::line(vec![[0.0, 0.0], [1.0, 1.0]])
+            .colour(Colour::Muted)
+            .dashed(),
+    )
+    .layer(Layer::whiskers(whiskers.collect()).colour(Colour::Blue))
+    .layer(Layer::dots(dots.collect()).colour(Colour::Blue));
     let caption = "The event is that everything is so that the verdict claims. On the dashed line answers are calibrated.";
     let facts = vec![
         ("calibration error".to_owned(), format!("{:.3}", c.error)),
         (
             "of a calibrated answer".to_owned(),
-            format!("{:.3}, at most {:.3} in 19 of 20", c.error_of_chance, c.error_of_chance95),
+            format!(
+                "{:.3}, at most {:.3} in 19 of 20",
+                c.error_of_chance, c.error_of_chance95
+            ),
         ),
-        ("log score".to_owned(), figure(score.log_score.as_ref(), 1.0, 2)),
-        ("log score of the base rate".to_owned(), format!("{:.2}", score.base_log_score)),
-        ("Brier score".to_owned(), figure(score.brier.as_ref(), 1.0, 3)),
-        ("F1 of columns".to_owned(), figure(score.localization_signals.as_ref(), 1.0, 2)),
-        ("F1 of columns and regimes".to_owned(), figure(score.localization_regimes.as_ref(), 1.0, 2)),
+        (
+            "log score".to_owned(),
+            figure(score.log_score.as_ref(), 1.0, 2),
+        ),
+        (
+            "log score of the base rate".to_owned(),
+            format!("{:.2}", score.base_log_score),
+        ),
+        (
+            "Brier score".to_owned(),
+            figure(score.brier.as_ref(), 1.0, 3),
+        ),
+        (
+            "F1 of columns".to_owned(),
+            figure(score.localization_signals.as_ref(), 1.0, 2),
+        ),
+        (
+            "F1 of columns and regimes".to_owned(),
+            figure(score.localization_regimes.as_ref(), 1.0, 2),
+        ),
         (
             "effect values".to_owned(),
             format!(
@@ -252,19 +318,38 @@ fn probabilities(score: &Score) -> Section {
             ),
         ),
     ];
+    // A figure of nothing is left out.
+    let facts = facts
+        .into_iter()
+        .filter(|(_, value)| value != "-" && !value.contains("- %"));
     Section::new("Probabilities and values")
-        .figures(vec![Drawing::new("Stated and true", chart.description(caption), caption)])
-        .facts(facts)
+        .figures(vec![Drawing::new(
+            "Stated and true",
+            chart.description(caption),
+            caption,
+        )])
+        .facts(facts.collect())
 }
 
 fn confusion(score: &Score) -> Section {
-    let mut all = Table::new(vec![Column::text("truth"), Column::number("cases"), Column::prose("verdicts")]);
+    let mut all = Table::new(vec![
+        Column::text("truth"),
+        Column::number("cases"),
+        Column::prose("verdicts"),
+    ]);
     for (truth, row) in &score.confusion {
         let mut cells: Vec<(&String, &usize)> = row.iter().collect();
         cells.sort_by(|a, b| b.1.cmp(a.1).then(a.0.cmp(b.0)));
-        let text: Vec<String> = cells.iter().map(|(said, n)| format!("{said} {n}")).collect();
+        let text: Vec<String> = cells
+            .iter()
+            .map(|(said, n)| format!("{said} {n}"))
+            .collect();
         let cases: usize = row.values().sum();
-        all = all.row(vec![truth.as_str().into(), cases.to_string().into(), text.join(", ").into()]);
+        all = all.row(vec![
+            truth.as_str().into(),
+            cases.to_string().into(),
+            text.join(", ").into(),
+        ]);
     }
     Section::new("Truth and verdict")
         .lead("By names without sites. A right answer counts for the truth, however it is named.")
@@ -301,10 +386,13 @@ fn cases(score: &Score) -> Section {
             c.world.as_str().into(),
             Cell::toned(c.standing.word(), tone),
             c.truth.join(" + ").into(),
-            c.failure.clone().unwrap_or_else(|| c.verdict.join(" + ")).into(),
+            c.failure
+                .clone()
+                .unwrap_or_else(|| c.verdict.join(" + "))
+                .into(),
             number(Some(c.probability), 2).into(),
             number(Some(c.true_probability), 2).into(),
-            number(Some(c.cause_gap), 1).into(),
+            number(Some(c.cause_gap).filter(|g| *g > 0.0), 1).into(),
             number(closed, 2).into(),
             number(Some(c.seconds), 1).into(),
             number(c.memory_mib, 0).into(),

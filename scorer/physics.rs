@@ -4,10 +4,10 @@
 //! Nothing here searches. A set of effects that somebody names is put into the study's model and fitted, from the
 //! values that its author gives: the label's for the truth, the diagnosis' own for its verdict.
 
-mod fit;
-mod logs;
-mod model;
-mod start;
+pub(crate) mod fit;
+pub(crate) mod logs;
+pub(crate) mod model;
+pub(crate) mod start;
 mod study;
 
 use std::path::Path;
@@ -18,6 +18,7 @@ use asid_effects::EffectSpec;
 use serde::Serialize;
 
 use crate::answer::Answer;
+use crate::catalogue::parameters_of;
 use crate::judge::Judge;
 use crate::label::{Label, name_of, site_of};
 use crate::sites::Sites;
@@ -120,13 +121,25 @@ struct Named<'a> {
     parameters: Box<dyn Fn(&str) -> Option<f64> + 'a>,
 }
 
-fn truth<'a>(label: &'a Label) -> Named<'a> {
-    let values = |effect: &str| {
-        let prefix = format!("{effect}.");
-        let of = |key: &'a String| key.strip_prefix(&prefix).unwrap_or(key).to_owned();
-        let keys = label.effect_parameters.keys().map(of);
-        keys.filter_map(|name| Some((name.clone(), label.value(effect, &name)?)))
-            .collect()
+/// The true effects. A fit begins at the label's values; where it has none that the catalogue knows, at those of the
+/// answer, if it names the same effect.
+fn truth<'a>(label: &'a Label, answer: &Answer, sites: &Sites) -> Named<'a> {
+    let values = |effect: &String| -> Vec<(String, f64)> {
+        let known = parameters_of(name_of(effect)).unwrap_or_default();
+        let labelled = known
+            .iter()
+            .filter_map(|p| Some((p.name.to_owned(), label.value(effect, p.name)?)));
+        let labelled: Vec<(String, f64)> = labelled.collect();
+        let said = || {
+            answer
+                .effects
+                .iter()
+                .find(|e| sites.same(&e.label(), effect))
+        };
+        match (labelled.is_empty(), said()) {
+            (true, Some(said)) => said.parameters.clone().into_iter().collect(),
+            _ => labelled,
+        }
     };
     let spec = |effect: &String| EffectSpec {
         name: name_of(effect).to_owned(),
@@ -164,7 +177,7 @@ impl Bench<'_> {
         if label.is_unknown() {
             return Err(Error::Failed("the cause is in no catalogue".into()));
         }
-        let (true_world, best) = self.fitted(&truth(label))?;
+        let (true_world, best) = self.fitted(&truth(label, answer, judge.sites))?;
         let mut physics = Physics::default();
         if !label.is_none() {
             physics.gaps = Some(self.gaps(label, answer, (&true_world, &best))?);
@@ -194,7 +207,9 @@ impl Bench<'_> {
 
     /// A set fitted to the training logs: its world, and its values.
     fn fitted(&mut self, named: &Named<'_>) -> Result<(World, Vec<f64>)> {
-        let world = self.engine.world(self.study, &named.effects, &*named.parameters)?;
+        let world = self
+            .engine
+            .world(self.study, &named.effects, &*named.parameters)?;
         let (starts, open) = self.starts(0);
         let mut fit = Fit::new(&self.study.plant.layout, &world, open)?;
         let values = world.unknowns.iter().map(|u| u.start).collect();
@@ -241,14 +256,16 @@ impl Bench<'_> {
     ) -> Result<Gaps> {
         let none = Named {
             effects: Vec::new(),
-            parameters: truth(label).parameters,
+            parameters: Box::new(|name| label.parameters.get(name).copied()),
         };
         let (world, values) = self.fitted(&none)?;
         let identified = self.residuals(&world, &values)?;
         let best = self.residuals(true_world, best)?;
         let said = verdict(answer);
         let refined = if answer.verdict.kind == "effects" {
-            let world = self.engine.world(self.study, &said.effects, &*said.parameters)?;
+            let world = self
+                .engine
+                .world(self.study, &said.effects, &*said.parameters)?;
             let values: Vec<f64> = world.unknowns.iter().map(|u| u.start).collect();
             self.residuals(&world, &values)?
         } else {
@@ -291,7 +308,9 @@ impl Bench<'_> {
     /// Root mean square difference of `targets` and what a set predicts at its best refit to them, on the logs held
     /// out, in units of the noise.
     fn distance(&mut self, named: &Named<'_>, targets: &[Vec<Vec<f64>>; 2]) -> Result<f64> {
-        let world = self.engine.world(self.study, &named.effects, &*named.parameters)?;
+        let world = self
+            .engine
+            .world(self.study, &named.effects, &*named.parameters)?;
         let layout = &self.study.plant.layout;
         let mut values: Vec<f64> = world.unknowns.iter().map(|u| u.start).collect();
         let mut distance = f64::INFINITY;
@@ -302,7 +321,9 @@ impl Bench<'_> {
             if which == 1 {
                 fit = fit.starts_only();
             }
-            let mut logs = self.logs[which].like(layout)?.with_readings(&targets[which]);
+            let mut logs = self.logs[which]
+                .like(layout)?
+                .with_readings(&targets[which]);
             let point = fit.run(&mut logs, Point { values, starts })?;
             let readings = fit.predict(&mut logs, &point)?;
             let residuals = logs.residuals(&readings);

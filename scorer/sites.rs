@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use asid_core::registry::all;
-use asid_effects::{Effect, EffectEntry, EffectParameter};
+use asid_effects::{Effect, EffectEntry};
 use asid_mjcf::Plant;
 
 use crate::label::{name_of, site_of};
@@ -15,13 +15,6 @@ pub struct Sites {
     contacts: Vec<[String; 2]>,
     /// Effects that change a contact and nothing else: their site may be either geom.
     of_contacts: BTreeSet<String>,
-}
-
-/// Parameters of an effect of the catalogue; `None` where it has no such effect.
-#[must_use]
-pub fn parameters_of(name: &str) -> Option<&'static [EffectParameter]> {
-    let entry = all::<EffectEntry>().into_iter().find(|e| e.name == name)?;
-    Some((entry.make)().parameters())
 }
 
 /// Whether an effect at a site changes how the geom's contacts behave, and nothing else.
@@ -45,7 +38,11 @@ impl Sites {
         };
         let effects = all::<EffectEntry>();
         Self {
-            contacts: plant.contacts.iter().map(|&[a, b]| [geom(a), geom(b)]).collect(),
+            contacts: plant
+                .contacts
+                .iter()
+                .map(|&[a, b]| [geom(a), geom(b)])
+                .collect(),
             of_contacts: effects
                 .iter()
                 .filter(|e| contact_effect(e))

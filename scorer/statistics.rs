@@ -208,7 +208,10 @@ mod tests {
         let mean = Figure::mean(&values).unwrap();
         let width = mean.interval95[1] - mean.interval95[0];
         let expected = 2.0 * Z95 * 0.5 / 20.0;
-        assert!(mean.value == 0.5 && (width / expected - 1.0).abs() < 0.15, "{width}");
+        assert!(
+            mean.value == 0.5 && (width / expected - 1.0).abs() < 0.15,
+            "{width}"
+        );
         assert!(Figure::median(&[]).is_none());
     }
 

@@ -3,8 +3,9 @@
 use serde::Serialize;
 
 use crate::answer::Answer;
+use crate::catalogue::parameters_of;
 use crate::label::{Label, name_of};
-use crate::sites::{Sites, parameters_of};
+use crate::sites::Sites;
 
 /// An estimate beside its true value.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -21,7 +22,13 @@ pub struct Estimate {
     pub covered: Option<bool>,
 }
 
-fn estimate(name: String, truth: f64, null: f64, said: f64, interval: Option<[f64; 2]>) -> Estimate {
+fn estimate(
+    name: String,
+    truth: f64,
+    null: f64,
+    said: f64,
+    interval: Option<[f64; 2]>,
+) -> Estimate {
     Estimate {
         name,
         truth,
@@ -45,10 +52,19 @@ pub fn of_effects(label: &Label, answer: &Answer, sites: &Sites) -> Vec<Estimate
         };
         let known = parameters_of(name_of(cause)).unwrap_or_default();
         for (name, &said) in &fitted.parameters {
-            let null = known.iter().find(|p| p.name == name).map_or(0.0, |p| p.null);
+            let null = known
+                .iter()
+                .find(|p| p.name == name)
+                .map_or(0.0, |p| p.null);
             if let Some(truth) = label.value(cause, name).filter(|t| *t != null) {
                 let interval = fitted.intervals95.get(name).copied();
-                found.push(estimate(format!("{cause}.{name}"), truth, null, said, interval));
+                found.push(estimate(
+                    format!("{cause}.{name}"),
+                    truth,
+                    null,
+                    said,
+                    interval,
+                ));
             }
         }
     }

@@ -57,7 +57,10 @@ mod tests {
             probability: p,
         };
         let label = Label {
-            wiring: vec![truth("wiring-swapped", &["a", "b"]), truth("wiring-clock", &["a", "b"])],
+            wiring: vec![
+                truth("wiring-swapped", &["a", "b"]),
+                truth("wiring-clock", &["a", "b"]),
+            ],
             ..Label::default()
         };
         let answer = Answer {
@@ -70,7 +73,14 @@ mod tests {
             ..Answer::default()
         };
         let scored = Wiring::of(&label, Some(&answer));
-        assert_eq!(scored, Wiring { faults: 2, found: 2, false_alarms: 1 });
+        assert_eq!(
+            scored,
+            Wiring {
+                faults: 2,
+                found: 2,
+                false_alarms: 1
+            }
+        );
         assert_eq!(Wiring::of(&label, None).found, 0);
     }
 }

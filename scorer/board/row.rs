@@ -85,7 +85,7 @@ pub(super) fn rows(cases: &[&Case]) -> Vec<Row> {
         ("world", &|c| one(&world(c))),
         ("cause", &|c| one(&c.cause)),
         ("magnitude", &|c| {
-            if ["none", "unknown"].contains(&c.kind) {
+            if ["none", "unknown"].contains(&c.kind) || c.cause_gap <= 0.0 {
                 return Vec::new();
             }
             one(&magnitude(c.cause_gap))
@@ -106,7 +106,9 @@ pub(super) fn rows(cases: &[&Case]) -> Vec<Row> {
         let mut parts: Vec<(String, Vec<&Case>)> = parts.into_iter().collect();
         if by == "magnitude" {
             let least = |p: &(String, Vec<&Case>)| {
-                p.1.iter().map(|c| c.cause_gap).fold(f64::INFINITY, f64::min)
+                p.1.iter()
+                    .map(|c| c.cause_gap)
+                    .fold(f64::INFINITY, f64::min)
             };
             parts.sort_by(|a, b| least(a).total_cmp(&least(b)));
         }

@@ -4,15 +4,15 @@
 //! Huber's weights (Huber 1964), so that a reading that is far off does not decide. A start is shared by nothing: its
 //! columns stand in the rows of its own log, and all logs' starts are shifted in one replay.
 
-use asid_core::Result;
 use asid_core::Layout;
+use asid_core::Result;
 use nalgebra::{DMatrix, DVector};
 
 use super::logs::Logs;
 use super::model::{Point, Replays, World};
 
-/// Most linearisations of a fit: it begins near its end.
-const MOST_ROUNDS: usize = 10;
+/// Most linearisations of a fit: from the values of a label it takes three to six, from where an effect is off some more.
+const MOST_ROUNDS: usize = 20;
 /// Relative decrease of the cost below which a fit has ended.
 const ENDED: f64 = 1e-4;
 /// Residual, in robust deviations, from which on a reading counts by its size and not its square: Huber's 1.345 costs
@@ -121,6 +121,44 @@ impl<'a> Fit<'a> {
         Ok(here)
     }
 
+    /// The sum of squares at a point, and the one that a step within the ranges should lead to by the point's linearisation;
+    /// `None` where the simulation diverges.
+    ///
+    /// # Errors
+    /// When a value is not physical or the engine fails.
+    pub fn promise(&mut self, logs: &mut Logs, here: &Point) -> Result<Option<[f64; 2]>> {
+        let mut points = vec![here.clone()];
+        points.extend(self.neighbours(here));
+        let mut all = self.residuals(logs, &points)?;
+        let Some(at) = all[0].take() else {
+            return Ok(None);
+        };
+        // Plain squares, so that promises from different points can be compared.
+        let scale = f64::INFINITY;
+        let (normal, gradient) = self.normal_equations(here, &at, &all[1..], scale);
+        let mut step = damped_step(&normal, &gradient, 1e-6);
+        for (i, &u) in self.free.iter().enumerate() {
+            let [low, high] = self.ranges[u];
+            step[i] = (here.values[u] + step[i]).clamp(low, high) - here.values[u];
+        }
+        let before = cost(&at, scale);
+        let after = before - 2.0 * gradient.dot(&step) + step.dot(&(&normal * &step));
+        Ok(Some([before, after.clamp(0.0, before)]))
+    }
+
+    /// Sum of squares at a point, and the number of readings; infinite where the simulation diverges.
+    ///
+    /// # Errors
+    /// When a value is not physical or the engine fails.
+    pub fn squares(&mut self, logs: &mut Logs, here: &Point) -> Result<(f64, usize)> {
+        let mut all = self.residuals(logs, std::slice::from_ref(here))?;
+        let Some(at) = all[0].take() else {
+            return Ok((f64::INFINITY, 1));
+        };
+        let present = || at.iter().flatten().filter(|r| r.is_finite());
+        Ok((present().map(|r| r * r).sum(), present().count()))
+    }
+
     /// Step of an unknown from a value: away from a bound that is near.
     fn step(&self, unknown: usize, value: f64) -> f64 {
         let step = self.steps[unknown];
@@ -149,7 +187,10 @@ impl<'a> Fit<'a> {
         let starts = self.open.iter().map(|&c| {
             let mut point = here.clone();
             let step = self.start_step(c);
-            point.starts.iter_mut().for_each(|s| s.shift(self.layout, c, step));
+            point
+                .starts
+                .iter_mut()
+                .for_each(|s| s.shift(self.layout, c, step));
             point
         });
         unknowns.chain(starts).collect()

@@ -50,7 +50,10 @@ fn noise(study: &Study, label: &Label, answer: Option<&Answer>) -> Result<Vec<Si
     sensors
         .filter(|s| logged(&s.name))
         .map(|s| {
-            let known = label.noise.get(&s.name).or_else(|| study.noise.get(&s.name));
+            let known = label
+                .noise
+                .get(&s.name)
+                .or_else(|| study.noise.get(&s.name));
             let noise = known.copied().or_else(|| said.get(&*s.name).copied());
             noise
                 .filter(|n| *n > 0.0)
@@ -86,11 +89,16 @@ fn mend(episode: &mut Episode, fault: &WiringTruth) -> Result<()> {
     Ok(())
 }
 
-/// Rows of each log such that all together take no more than the most steps.
-fn share_of_rows(episodes: &[Episode], timestep: f64) -> f64 {
+/// The first rows of each log, such that a replay of all takes no more than some physics steps.
+#[must_use]
+pub fn within(episodes: &[Episode], timestep: f64, steps: f64) -> Vec<Episode> {
     let length = |e: &Episode| (e.time[e.rows() - 1] - e.time[0]) / timestep;
-    let steps: f64 = episodes.iter().map(length).sum();
-    (MOST_STEPS / steps).min(1.0)
+    let share = (steps / episodes.iter().map(length).sum::<f64>()).min(1.0);
+    let cut = |e: &Episode| {
+        let rows = (share * e.rows() as f64).ceil() as usize;
+        e.part(0..rows.max(FEWEST_ROWS).min(e.rows()))
+    };
+    episodes.iter().map(cut).collect()
 }
 
 impl Logs {
@@ -101,12 +109,7 @@ impl Logs {
     pub fn of(study: &Study, label: &Label, answer: Option<&Answer>) -> Result<[Self; 2]> {
         let signals = noise(study, label, answer)?;
         let make = |episodes: &[Episode]| -> Result<Self> {
-            let share = share_of_rows(episodes, study.plant.layout.timestep);
-            let cut = |e: &Episode| {
-                let rows = (share * e.rows() as f64).ceil() as usize;
-                e.part(0..rows.max(FEWEST_ROWS).min(e.rows()))
-            };
-            let mut cut: Vec<Episode> = episodes.iter().map(cut).collect();
+            let mut cut = within(episodes, study.plant.layout.timestep, MOST_STEPS);
             for episode in &mut cut {
                 label.wiring.iter().try_for_each(|w| mend(episode, w))?;
             }
@@ -115,7 +118,11 @@ impl Logs {
         Ok([make(&study.train)?, make(&study.test)?])
     }
 
-    fn new(layout: &Layout, signals: &[Signal], episodes: Vec<Episode>) -> Result<Self> {
+    /// Some episodes, compared by some signals.
+    ///
+    /// # Errors
+    /// When the scene has no such sensor.
+    pub fn new(layout: &Layout, signals: &[Signal], episodes: Vec<Episode>) -> Result<Self> {
         let sensors: Vec<String> = signals.iter().map(|s| s.sensor.clone()).collect();
         let logs = episodes.into_iter().map(|episode| {
             Ok(Log {
@@ -184,7 +191,10 @@ impl Logs {
         let logs = self.logs.iter().zip(predicted);
         logs.map(|(log, predicted)| {
             let mut out = vec![0.0; log.episode.rows() * n];
-            let rows = log.readings.chunks_exact(width).zip(predicted.chunks_exact(width));
+            let rows = log
+                .readings
+                .chunks_exact(width)
+                .zip(predicted.chunks_exact(width));
             for ((real, said), out) in rows.zip(out.chunks_exact_mut(n)) {
                 self.signals.difference(real, said, out);
             }

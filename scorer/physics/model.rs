@@ -51,6 +51,19 @@ impl Unknown {
     }
 }
 
+impl Unknown {
+    /// Writes a value into the effect that this is an unknown of.
+    pub fn set(&self, effects: &mut [EffectSpec], value: f64) {
+        for target in &self.parameter.targets {
+            let own = effects.iter_mut().find(|e| e.label() == target.name);
+            if let Some(spec) = own {
+                spec.values.retain(|(name, _)| *name != target.attribute);
+                spec.values.push((target.attribute.to_string(), value));
+            }
+        }
+    }
+}
+
 /// A model with effects whose values are unknowns.
 pub struct World {
     model: Arc<dyn Model>,
@@ -168,7 +181,10 @@ impl Replays {
     /// When a value is not physical or the engine fails.
     pub fn readings(&mut self, logs: &mut Logs, points: &[Point]) -> Result<Vec<Vec<Vec<f64>>>> {
         let mut all: Vec<Vec<Vec<f64>>> = vec![Vec::new(); points.len()];
-        for (chunk, out) in points.chunks(self.capacity).zip(all.chunks_mut(self.capacity)) {
+        for (chunk, out) in points
+            .chunks(self.capacity)
+            .zip(all.chunks_mut(self.capacity))
+        {
             let sims: Vec<usize> = (0..chunk.len()).collect();
             let columns: Vec<f64> = chunk.iter().flat_map(|p| self.columns(&p.values)).collect();
             for (l, log) in logs.logs.iter_mut().enumerate() {

@@ -109,7 +109,8 @@ pub fn first_state(plant: &Plant, episode: &Episode) -> State {
     if let Some(given) = &episode.initial {
         let take = |own: &mut Vec<f64>, given: &[f64]| {
             let both = own.iter_mut().zip(given);
-            both.filter(|(_, g)| g.is_finite()).for_each(|(x, g)| *x = *g);
+            both.filter(|(_, g)| g.is_finite())
+                .for_each(|(x, g)| *x = *g);
         };
         take(&mut state.qpos, &given.qpos);
         take(&mut state.qvel, &given.qvel);

@@ -78,7 +78,9 @@ impl Study {
             message,
         };
         if !document.column.is_empty() {
-            return Err(fail("maps columns, which the scorer's replays do not".into()));
+            return Err(fail(
+                "maps columns, which the scorer's replays do not".into(),
+            ));
         }
         let model = RefinedModel::open(&folder.join(&document.model))?;
         let plant = Plant::of(&model.scene)?;
@@ -144,7 +146,10 @@ fn matching(folder: &Path, pattern: &str) -> Result<Vec<PathBuf>> {
             && name.starts_with(before)
             && name.ends_with(after)
     };
-    let mut found: Vec<PathBuf> = entries.filter_map(|e| Some(e.ok()?.path())).filter(fits).collect();
+    let mut found: Vec<PathBuf> = entries
+        .filter_map(|e| Some(e.ok()?.path()))
+        .filter(fits)
+        .collect();
     found.sort();
     Ok(found)
 }

@@ -70,7 +70,12 @@ pub struct Arguments {
     #[arg(long, value_name = "NAME")]
     method: Vec<Method>,
     /// Answer this share of the cases, such as 1/4, and score nothing
-    #[arg(long, value_name = "i/n", requires = "cases", conflicts_with = "only_score")]
+    #[arg(
+        long,
+        value_name = "i/n",
+        requires = "cases",
+        conflicts_with = "only_score"
+    )]
     shard: Option<Shard>,
     /// Answer this many cases side by side [default: one a core, less those that --threads takes]
     #[arg(long, value_name = "N", value_parser = super::options::threads)]
@@ -111,7 +116,10 @@ pub fn withheld(arguments: &Arguments) -> Result<()> {
         .into())
     };
     if arguments.common.config.is_some() {
-        return wrong("--config", "is not taken here: give settings of the diagnosis by --set");
+        return wrong(
+            "--config",
+            "is not taken here: give settings of the diagnosis by --set",
+        );
     }
     if arguments.limit.is_some_and(|l| !(l.is_finite() && l > 0.0)) {
         return wrong("--limit", "is a time above 0, in seconds");

@@ -19,7 +19,12 @@ pub fn cases(folder: &Path, only: &[String]) -> Result<Vec<Case>> {
         message,
     };
     let entries = std::fs::read_dir(folder).map_err(|e| fail(e.to_string()))?;
-    let name = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let name = |path: &Path| {
+        path.file_name()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .into_owned()
+    };
     let mut found: Vec<Case> = entries
         .filter_map(|e| Some(e.ok()?.path()))
         .filter(|p| p.join("study.toml").is_file())
@@ -27,7 +32,10 @@ pub fn cases(folder: &Path, only: &[String]) -> Result<Vec<Case>> {
         .filter(|(name, _)| only.is_empty() || only.contains(name))
         .collect();
     found.sort();
-    if let Some(missing) = only.iter().find(|o| found.iter().all(|(name, _)| name != *o)) {
+    if let Some(missing) = only
+        .iter()
+        .find(|o| found.iter().all(|(name, _)| name != *o))
+    {
         return Err(fail(format!("has no case `{missing}`")).into());
     }
     if found.is_empty() {

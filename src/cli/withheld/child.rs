@@ -69,7 +69,10 @@ pub fn run(command: &mut Command, folder: &Path, limit: Option<f64>) -> Result<E
     let (status, seconds) = loop {
         memory_mib = memory(guard.0.id()).or(memory_mib);
         let seconds = clock.elapsed().as_secs_f64();
-        let status = guard.0.try_wait().map_err(|e| Error::Failed(e.to_string()))?;
+        let status = guard
+            .0
+            .try_wait()
+            .map_err(|e| Error::Failed(e.to_string()))?;
         if status.is_some() || limit.is_some_and(|limit| seconds > limit) {
             break (status, seconds);
         }
@@ -77,7 +80,10 @@ pub fn run(command: &mut Command, folder: &Path, limit: Option<f64>) -> Result<E
     };
     drop(guard);
     let said = said.join().unwrap_or_default();
-    let last = said.lines().rfind(|l| !l.trim().is_empty()).unwrap_or("it said nothing");
+    let last = said
+        .lines()
+        .rfind(|l| !l.trim().is_empty())
+        .unwrap_or("it said nothing");
     let failure = match (status, limit) {
         (Some(status), _) if status.success() => None,
         (Some(status), _) => Some(match status.code() {
@@ -101,7 +107,12 @@ mod tests {
 
     fn shell(script: &str, limit: Option<f64>) -> Ended {
         let folder = tempfile::tempdir().unwrap();
-        run(Command::new("sh").args(["-c", script]), folder.path(), limit).unwrap()
+        run(
+            Command::new("sh").args(["-c", script]),
+            folder.path(),
+            limit,
+        )
+        .unwrap()
     }
 
     #[test]

@@ -30,8 +30,12 @@ impl Control {
     /// What the result has to be, in a sentence.
     pub fn expects(self) -> &'static str {
         match self {
-            Self::Scrambled => "labels are those of other cases: no more may be right than agree by chance",
-            Self::Noise => "logs are noise: `none` and `unknown` are right, and every effect that is named is a false alarm",
+            Self::Scrambled => {
+                "labels are those of other cases: no more may be right than agree by chance"
+            }
+            Self::Noise => {
+                "logs are noise: `none` and `unknown` are right, and every effect that is named is a false alarm"
+            }
             Self::WithoutTruth => {
                 "the true effects are not in the catalogue: `unknown` is right, or the same physics by another name"
             }
@@ -85,7 +89,8 @@ mod tests {
             ..Label::default()
         };
         for n in [2, 3, 17] {
-            let labels: BTreeMap<String, Label> = (0..n).map(|i| (format!("{i:02}"), label(i))).collect();
+            let labels: BTreeMap<String, Label> =
+                (0..n).map(|i| (format!("{i:02}"), label(i))).collect();
             let other = scrambled(labels.clone(), 5);
             assert!(labels.iter().all(|(case, l)| other[case] != *l));
             let worlds: BTreeSet<&str> = other.values().map(|l| &*l.world).collect();

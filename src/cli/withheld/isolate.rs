@@ -39,8 +39,12 @@ pub fn files(study: &Path) -> Result<Vec<PathBuf>> {
     let entries = std::fs::read_dir(study).map_err(|e| failed(study, &e))?;
     for entry in entries {
         let path = entry.map_err(|e| failed(study, &e))?.path();
-        let prose = path.extension().is_some_and(|e| PROSE.iter().any(|p| e == *p));
-        let hidden = path.file_name().is_some_and(|n| n.to_string_lossy().starts_with('.'));
+        let prose = path
+            .extension()
+            .is_some_and(|e| PROSE.iter().any(|p| e == *p));
+        let hidden = path
+            .file_name()
+            .is_some_and(|n| n.to_string_lossy().starts_with('.'));
         if path.is_dir() && !hidden {
             found.extend(files(&path)?);
         } else if !prose && !hidden {
@@ -88,7 +92,10 @@ fn treat(study: &Path, treatment: Treatment) -> Result<()> {
     let file = study.join("study.toml");
     let text = std::fs::read_to_string(&file).map_err(|e| failed(&file, &e))?;
     let document: toml::Table = text.parse().map_err(|e| failed(&file, &e))?;
-    let model = document.get("model").and_then(|m| m.as_str()).unwrap_or_default();
+    let model = document
+        .get("model")
+        .and_then(|m| m.as_str())
+        .unwrap_or_default();
     let model = study.join(model);
     let scene = RefinedModel::open(&model)?.scene;
     let plant = Plant::of(&scene)?;
@@ -102,7 +109,9 @@ fn treat(study: &Path, treatment: Treatment) -> Result<()> {
         std::fs::write(&model, finer.xml()).map_err(|e| failed(&model, &e))?;
     }
     if let Some(seed) = treatment.noise {
-        let logs = files(study)?.into_iter().filter(|f| f.extension().is_some_and(|e| e == "csv"));
+        let logs = files(study)?
+            .into_iter()
+            .filter(|f| f.extension().is_some_and(|e| e == "csv"));
         for (i, log) in logs.enumerate() {
             let mut episode = Episode::read(&log, &plant.layout)?;
             let mut random = Streams::new(seed).indexed("noise for a log", i as u64);
@@ -118,7 +127,13 @@ fn turn_to_noise(episode: &mut Episode, random: &mut impl Rng) {
     let width = episode.width();
     for column in 0..width {
         let present = |x: &f64| x.is_finite();
-        let values: Vec<f64> = episode.readings.iter().skip(column).step_by(width).copied().collect();
+        let values: Vec<f64> = episode
+            .readings
+            .iter()
+            .skip(column)
+            .step_by(width)
+            .copied()
+            .collect();
         let values: Vec<f64> = values.into_iter().filter(present).collect();
         let n = values.len().max(1) as f64;
         let mean = values.iter().sum::<f64>() / n;

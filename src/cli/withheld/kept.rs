@@ -9,7 +9,7 @@ use sha2::{Digest, Sha256};
 
 use super::child::{self, Ended};
 use super::isolate::{self, Treatment, hex};
-use super::method::Asked;
+use super::method::{self, Asked};
 use crate::cli::output::write_json;
 
 /// The file that says that a case is done.
@@ -72,7 +72,7 @@ pub struct Maker<'a> {
 /// Digest of the running program: another build may answer otherwise.
 pub fn program() -> Result<String> {
     let fail = |e: std::io::Error| Error::Failed(format!("this program cannot read itself: {e}"));
-    let bytes = std::env::current_exe().and_then(std::fs::read).map_err(fail)?;
+    let bytes = std::fs::read(method::program()?).map_err(fail)?;
     Ok(hex(&Sha256::digest(bytes)))
 }
 

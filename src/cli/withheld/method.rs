@@ -95,7 +95,10 @@ impl Asked {
             ("--seed", &*numbers[0]),
             ("--threads", &*numbers[1]),
         ];
-        all.extend(more.iter().flat_map(|(k, v)| [(*k).to_owned(), (*v).to_owned()]));
+        all.extend(
+            more.iter()
+                .flat_map(|(k, v)| [(*k).to_owned(), (*v).to_owned()]),
+        );
         for effect in self.without.iter().chain(&self.also_without) {
             all.extend(["--without".to_owned(), effect.clone()]);
         }
@@ -108,17 +111,29 @@ impl Asked {
 
     /// The process, to be run in the folder that holds `study`.
     pub fn command(&self, study: &str, out: &str) -> Result<Command> {
-        let program = std::env::current_exe()
-            .map_err(|e| Error::Failed(format!("this program does not find itself: {e}")))?;
-        let mut command = Command::new(program);
+        let mut command = Command::new(program()?);
         command.args(self.arguments(study, out));
         Ok(command)
     }
 }
 
+/// This program's file. Where the system has a name for what runs, that: the file may have been built anew by now.
+pub fn program() -> Result<PathBuf> {
+    let running = Path::new("/proc/self/exe");
+    if running.exists() {
+        return Ok(running.to_owned());
+    }
+    std::env::current_exe()
+        .map_err(|e| Error::Failed(format!("this program does not find itself: {e}")).into())
+}
+
 /// Answers one study by a baseline: what the process of a case does.
 pub fn answer(study: &Path, arguments: &Arguments) -> Result<()> {
-    let method = arguments.method.first().copied().unwrap_or(Method::Diagnose);
+    let method = arguments
+        .method
+        .first()
+        .copied()
+        .unwrap_or(Method::Diagnose);
     let (Some(baseline), Some(out)) = (method.baseline(), &arguments.common.out) else {
         return Err(Error::Config {
             key: "--answer".into(),
@@ -126,7 +141,11 @@ pub fn answer(study: &Path, arguments: &Arguments) -> Result<()> {
         }
         .into());
     };
-    let name = arguments.common.backend.clone().unwrap_or_else(default_backend);
+    let name = arguments
+        .common
+        .backend
+        .clone()
+        .unwrap_or_else(default_backend);
     let said = baseline::answer(baseline, backend(&name)?.into(), study, &arguments.without)?;
     std::fs::create_dir_all(out).map_err(|e| Error::Failed(format!("{}: {e}", out.display())))?;
     write_json(&out.join("result.json"), &said)

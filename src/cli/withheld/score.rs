@@ -115,7 +115,9 @@ impl<'a> Session<'a> {
         let asked = Asked::new(Method::Diagnose, arguments);
         let backend: Arc<dyn Backend> = backend(&asked.backend)?.into();
         let left_out = refused(&all, &*backend);
-        let taken = all.into_iter().filter(|(name, _)| !left_out.contains_key(name));
+        let taken = all
+            .into_iter()
+            .filter(|(name, _)| !left_out.contains_key(name));
         let threads = common.threads.unwrap_or(1);
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
         Ok(Self {
@@ -190,6 +192,7 @@ impl<'a> Session<'a> {
         let folder = self.answers(method);
         let bars = Bars::new(arguments.common.quiet);
         bars.begin("scores", self.cases.len() as u64);
+        let unanswered = AtomicUsize::new(0);
         let scored = side_by_side(self.jobs, &self.cases, |(name, study)| {
             let found = Kept::at(&folder.join(name), arguments.limit);
             let case = match (labels.get(name), found) {
@@ -200,7 +203,7 @@ impl<'a> Session<'a> {
                 // A folder without a label is passed over.
                 (None, _) => None,
                 (Some(_), None) => {
-                    failure::note(&format!("{name}: has no answer yet, and is passed over"));
+                    unanswered.fetch_add(1, Ordering::Relaxed);
                     None
                 }
             };
@@ -208,6 +211,13 @@ impl<'a> Session<'a> {
             case
         });
         bars.end();
+        let (missing, all) = (unanswered.into_inner(), self.cases.len());
+        if missing > 0 {
+            failure::note(&format!(
+                "{}: {missing} of {all} cases have no answer yet, and are passed over",
+                method.name()
+            ));
+        }
         let scored: Vec<Scored> = scored.into_iter().flatten().collect();
         Ok(Score::of(method.name(), scored, self.left_out.clone()))
     }
@@ -227,7 +237,10 @@ impl<'a> Session<'a> {
             sites: &sites,
             catalogue: &catalogue,
         };
-        let spoilt = self.arguments.control.is_some_and(|c| c != Control::WithoutTruth);
+        let spoilt = self
+            .arguments
+            .control
+            .is_some_and(|c| c != Control::WithoutTruth);
         let physics = match &run.answer {
             Ok(_) if self.arguments.names_only => Physics::skipped("scored by names alone"),
             Ok(_) if spoilt => Physics::skipped("label and logs are not of one world"),
@@ -341,7 +354,9 @@ fn side_by_side<T: Sync, R: Send>(
                     items.get(i).map(|item| (i, item))
                 } {
                     let result = work(item);
-                    done.lock().unwrap_or_else(PoisonError::into_inner).push((i, result));
+                    done.lock()
+                        .unwrap_or_else(PoisonError::into_inner)
+                        .push((i, result));
                 }
             });
         }
