@@ -9,6 +9,7 @@
 //! - [`physics`] refits the sets that were named, and says which of them are the same physics.
 //! - [`case`] is one case with everything that is scored of it: [`localization`], [`values`], [`wiring`].
 //! - [`baseline`] answers studies in ways that a diagnosis has to be better than.
+//! - [`oracle`] is the answer that cannot be wrong: a check of the scorer itself.
 //! - [`board`] is all cases together, with the intervals and calibration of [`statistics`]; [`lines`] and [`page`] show it.
 
 pub mod answer;
@@ -21,6 +22,7 @@ pub mod judge;
 pub mod label;
 pub mod lines;
 pub mod localization;
+pub mod oracle;
 pub mod page;
 pub mod physics;
 pub mod sites;

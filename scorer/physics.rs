@@ -188,9 +188,8 @@ impl Bench<'_> {
             let said = verdict(answer);
             let targets = self.predictions(&true_world, &best)?;
             let distance = self.distance(&said, &targets)?;
-            let larger = said.effects.len() > label.effects.len();
-            // A larger set can always imitate the truth: each of its effects must be needed for it.
-            let same = distance < SAME && (!larger || self.each_is_needed(&said, &targets)?);
+            // A set that holds more than it takes can always imitate the truth: each of its effects must be needed.
+            let same = distance < SAME && self.each_is_needed(&said, &targets)?;
             physics.distance = Some(distance);
             physics.same_as_truth = Some(same);
         }

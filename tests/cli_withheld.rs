@@ -221,12 +221,13 @@ fn calls_that_make_no_sense_are_refused_in_one_line() {
     let folder = tempfile::tempdir().unwrap();
     let cases = folder.path().join("cases");
     write_study(&cases.join("a"), Truth::None);
-    std::fs::write(folder.path().join("full"), "").unwrap();
+    let config = folder.path().join("config.toml");
+    std::fs::write(&config, "seed = 1\n").unwrap();
     for (more, expected) in [
         (vec!["--case", "z"], "no case `z`"),
         (vec!["--limit", "0"], "a time above 0"),
         (vec!["--shard", "3/2"], "i/n"),
-        (vec!["--config", "a.toml"], "--set"),
+        (vec!["--config", text(&config)], "--set"),
         (vec!["--method", "oracle"], "oracle"),
         (vec!["--shard", "1/2", "--only-score"], "cannot be used"),
     ] {

@@ -37,7 +37,9 @@ fn manifests(folder: &Path, found: &mut Vec<PathBuf>) {
 #[test]
 fn the_scorer_knows_neither_the_diagnosis_nor_the_generator() {
     // What its dependencies depend on counts as well.
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("a root");
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .parent()
+        .expect("a root");
     let mut files = Vec::new();
     manifests(root, &mut files);
     let text = |path: &PathBuf| std::fs::read_to_string(path).expect("a manifest");
@@ -57,19 +59,28 @@ fn the_scorer_knows_neither_the_diagnosis_nor_the_generator() {
     }
     assert!(reached.contains("asid-effects"), "{reached:?}");
     for stranger in STRANGERS {
-        assert!(!reached.contains(stranger), "the scorer reaches {stranger}: {reached:?}");
+        assert!(
+            !reached.contains(stranger),
+            "the scorer reaches {stranger}: {reached:?}"
+        );
     }
 }
 
 #[test]
 fn the_command_line_alone_depends_on_the_scorer() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("a root");
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .parent()
+        .expect("a root");
     let mut files = Vec::new();
     manifests(root, &mut files);
     for path in files {
         let text = std::fs::read_to_string(&path).expect("a manifest");
         let allowed = path.parent() == Some(root);
         let uses = dependencies(&text).contains("asid-scorer");
-        assert!(allowed || !uses, "{} depends on asid-scorer", path.display());
+        assert!(
+            allowed || !uses,
+            "{} depends on asid-scorer",
+            path.display()
+        );
     }
 }

@@ -1,12 +1,41 @@
-//! One case in a process of its own: with a time limit, and with its memory watched.
+//! One case in a process of its own: with a time limit, with its memory watched, and ended with this process.
 
 use std::io::Read as _;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use anyhow::Result;
 use asid_core::Error;
+use signal_hook::consts::{SIGINT, SIGTERM};
+
+/// Whether this process was told to stop.
+#[derive(Clone, Debug, Default)]
+pub struct Stop(Arc<AtomicBool>);
+
+impl Stop {
+    /// Watches for SIGINT and SIGTERM from now on.
+    pub fn watch() -> Result<Self> {
+        let stop = Self::default();
+        for signal in [SIGINT, SIGTERM] {
+            signal_hook::flag::register(signal, Arc::clone(&stop.0))
+                .map_err(|e| Error::Failed(format!("cannot watch for signals: {e}")))?;
+        }
+        Ok(stop)
+    }
+
+    /// An error where it was.
+    pub fn check(&self) -> Result<()> {
+        if self.0.load(Ordering::SeqCst) {
+            let line =
+                "stopped: finished cases are kept, and the same call goes on with the others";
+            return Err(Error::Failed(line.into()).into());
+        }
+        Ok(())
+    }
+}
 
 /// How a process ended.
 #[derive(Clone, Debug, PartialEq)]
@@ -42,8 +71,9 @@ fn memory(process: u32) -> Option<f64> {
     Some(kib / 1024.0)
 }
 
-/// Runs a command in a working folder; `limit` is in seconds.
-pub fn run(command: &mut Command, folder: &Path, limit: Option<f64>) -> Result<Ended> {
+/// Runs a command in a working folder; `limit` is in seconds. What was told to stop says nothing of the case.
+pub fn run(command: &mut Command, folder: &Path, limit: Option<f64>, stop: &Stop) -> Result<Ended> {
+    stop.check()?;
     command
         .current_dir(folder)
         // They would name the folder that this call was made in.
@@ -69,6 +99,8 @@ pub fn run(command: &mut Command, folder: &Path, limit: Option<f64>) -> Result<E
     let (status, seconds) = loop {
         memory_mib = memory(guard.0.id()).or(memory_mib);
         let seconds = clock.elapsed().as_secs_f64();
+        // The signal may have reached the process first.
+        stop.check()?;
         let status = guard
             .0
             .try_wait()
@@ -78,6 +110,7 @@ pub fn run(command: &mut Command, folder: &Path, limit: Option<f64>) -> Result<E
         }
         std::thread::sleep(LOOK);
     };
+    stop.check()?;
     drop(guard);
     let said = said.join().unwrap_or_default();
     let last = said
@@ -111,6 +144,7 @@ mod tests {
             Command::new("sh").args(["-c", script]),
             folder.path(),
             limit,
+            &Stop::default(),
         )
         .unwrap()
     }
@@ -123,6 +157,21 @@ mod tests {
         let long = shell("sleep 20", Some(0.2));
         assert!(long.over_limit && long.seconds < 5.0, "{long:?}");
         assert!(long.failure.unwrap().contains("limit of 0.2 s"));
+    }
+
+    #[test]
+    fn a_process_does_not_outlive_the_word_to_stop() {
+        let (folder, stop) = (tempfile::tempdir().unwrap(), Stop::default());
+        let word = stop.clone();
+        let clock = Instant::now();
+        std::thread::spawn(move || {
+            std::thread::sleep(Duration::from_millis(200));
+            word.0.store(true, Ordering::SeqCst);
+        });
+        let mut command = Command::new("sleep");
+        let ended = run(command.arg("20"), folder.path(), None, &stop);
+        assert!(ended.unwrap_err().to_string().contains("stopped"));
+        assert!(clock.elapsed() < Duration::from_secs(10));
     }
 
     #[cfg(target_os = "linux")]

@@ -1,4 +1,4 @@
-//! Controls: a check that cannot fail says nothing, so it is spoilt on purpose and must fail.
+//! Controls: a check that cannot fail says nothing, so it is spoilt on purpose and must fail; and one that must not.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -15,6 +15,8 @@ pub enum Control {
     Noise,
     /// The true effects are not in the catalogue: `unknown` is right, or the same physics by another name
     WithoutTruth,
+    /// The labels themselves answer: all must be right, and the true effects close the gap
+    Oracle,
 }
 
 impl Control {
@@ -24,6 +26,7 @@ impl Control {
             Self::Scrambled => "scrambled",
             Self::Noise => "noise",
             Self::WithoutTruth => "without-truth",
+            Self::Oracle => "oracle",
         }
     }
 
@@ -39,13 +42,16 @@ impl Control {
             Self::WithoutTruth => {
                 "the true effects are not in the catalogue: `unknown` is right, or the same physics by another name"
             }
+            Self::Oracle => {
+                "the labels themselves answer: all of it is right, and clean worlds are closed down to the noise"
+            }
         }
     }
 
     /// The labels that answers are scored by.
     pub fn labels(self, labels: BTreeMap<String, Label>, seed: u64) -> BTreeMap<String, Label> {
         match self {
-            Self::WithoutTruth => labels,
+            Self::WithoutTruth | Self::Oracle => labels,
             Self::Scrambled => scrambled(labels, seed),
             Self::Noise => labels
                 .into_iter()

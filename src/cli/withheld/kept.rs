@@ -7,7 +7,7 @@ use asid_core::Error;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use super::child::{self, Ended};
+use super::child::{self, Ended, Stop};
 use super::isolate::{self, Treatment, hex};
 use super::method::{self, Asked};
 use crate::cli::output::write_json;
@@ -67,6 +67,7 @@ pub struct Maker<'a> {
     pub program: &'a str,
     /// Folder of the cases' folders.
     pub into: &'a Path,
+    pub stop: &'a Stop,
 }
 
 /// Digest of the running program: another build may answer otherwise.
@@ -96,7 +97,7 @@ impl Maker<'_> {
         let place = tempfile::tempdir().map_err(|e| failed(Path::new("a temporary folder"), &e))?;
         isolate::copy(study, &place.path().join("study"), self.treatment)?;
         let mut command = self.asked.command("study", "answer")?;
-        let ended = child::run(&mut command, place.path(), self.limit)?;
+        let ended = child::run(&mut command, place.path(), self.limit, self.stop)?;
         let staging = self.into.join(format!(".{case}-{}", std::process::id()));
         let _ = std::fs::remove_dir_all(&staging);
         std::fs::create_dir_all(&staging).map_err(|e| failed(&staging, &e))?;

@@ -15,6 +15,7 @@ use asid_scorer::board::Score;
 use asid_scorer::case::{Case as Scored, Run};
 use asid_scorer::judge::Judge;
 use asid_scorer::label::{Label, read_labels};
+use asid_scorer::oracle::oracle;
 use asid_scorer::physics::{self, Physics};
 use asid_scorer::sites::Sites;
 use asid_scorer::{lines, page};
@@ -22,6 +23,7 @@ use serde::Serialize;
 
 use super::Arguments;
 use super::cases::{Case, cases, refused};
+use super::child::Stop;
 use super::control::{Control, true_effects};
 use super::isolate::Treatment;
 use super::kept::{self, Kept, Maker};
@@ -64,6 +66,7 @@ struct Session<'a> {
     left_out: BTreeMap<String, String>,
     out: PathBuf,
     jobs: usize,
+    stop: Stop,
 }
 
 /// Answers all cases of a folder and scores them.
@@ -80,7 +83,7 @@ pub fn score(folder: &Path, arguments: &Arguments) -> Result<()> {
         [] => vec![Method::Diagnose],
         methods => methods.to_vec(),
     };
-    if !arguments.only_score {
+    if !arguments.only_score && arguments.control != Some(Control::Oracle) {
         for method in &methods {
             session.answer(*method, early.as_ref())?;
         }
@@ -96,6 +99,7 @@ pub fn score(folder: &Path, arguments: &Arguments) -> Result<()> {
         Some(labels) => labels,
         None => read_labels(file)?,
     };
+    sealed(folder, file)?;
     let seed = arguments.common.seed.unwrap_or(0);
     let labels = match arguments.control {
         Some(control) => control.labels(labels, seed),
@@ -106,6 +110,34 @@ pub fn score(folder: &Path, arguments: &Arguments) -> Result<()> {
         .map(|m| session.score(*m, &labels))
         .collect::<Result<_>>()?;
     session.write(&scores)
+}
+
+/// Checks studies and labels against their seal, where the studies have one.
+#[cfg(feature = "mujoco")]
+fn sealed(studies: &Path, labels: &Path) -> Result<()> {
+    use asid_withheld::seal::{SEAL, verify};
+    if !studies.join(SEAL).is_file() {
+        return Ok(());
+    }
+    let wrong = verify(studies, labels).map_err(|e| Error::Failed(e.to_string()))?;
+    match wrong.first() {
+        None => Ok(()),
+        Some(first) => Err(Error::Failed(format!(
+            "{}: {first}: a broken seal scores nothing ({} in all)",
+            studies.join(SEAL).display(),
+            wrong.len()
+        ))
+        .into()),
+    }
+}
+
+/// The generator, which knows how cases are sealed, is of builds with MuJoCo.
+#[cfg(not(feature = "mujoco"))]
+fn sealed(studies: &Path, _labels: &Path) -> Result<()> {
+    if studies.join("seal.json").is_file() {
+        failure::note("the seal is not checked: that takes a build with --features mujoco");
+    }
+    Ok(())
 }
 
 impl<'a> Session<'a> {
@@ -126,6 +158,7 @@ impl<'a> Session<'a> {
             left_out,
             out: out_folder(common.out.as_deref())?,
             jobs: arguments.jobs.unwrap_or((cores / threads).max(1)),
+            stop: Stop::watch()?,
             arguments,
         })
     }
@@ -173,6 +206,7 @@ impl<'a> Session<'a> {
                 limit: arguments.limit,
                 program: &program,
                 into: &into,
+                stop: &self.stop,
             };
             let was_there = maker.make(name, study)?;
             if !was_there {
@@ -194,8 +228,15 @@ impl<'a> Session<'a> {
         bars.begin("scores", self.cases.len() as u64);
         let unanswered = AtomicUsize::new(0);
         let scored = side_by_side(self.jobs, &self.cases, |(name, study)| {
+            if self.stop.check().is_err() {
+                return None;
+            }
             let found = Kept::at(&folder.join(name), arguments.limit);
+            let oracle = arguments.control == Some(Control::Oracle);
             let case = match (labels.get(name), found) {
+                (Some(label), _) if oracle => {
+                    Some(self.scored(name, study, label, &of_oracle(label)))
+                }
                 (Some(label), Some(kept)) => {
                     let run = run_of(&folder.join(name), &kept);
                     Some(self.scored(name, study, label, &run))
@@ -211,6 +252,7 @@ impl<'a> Session<'a> {
             case
         });
         bars.end();
+        self.stop.check()?;
         let (missing, all) = (unanswered.into_inner(), self.cases.len());
         if missing > 0 {
             failure::note(&format!(
@@ -318,6 +360,15 @@ fn run_of(folder: &Path, kept: &Kept) -> Run {
         },
         seconds: kept.seconds,
         memory_mib: kept.memory_mib,
+    }
+}
+
+/// The answer of who knows the label.
+fn of_oracle(label: &Label) -> Run {
+    Run {
+        answer: Ok(oracle(label)),
+        seconds: 0.0,
+        memory_mib: None,
     }
 }
 
