@@ -7,6 +7,7 @@
 mod candidates;
 mod noise;
 
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -31,7 +32,7 @@ pub enum Baseline {
     IdentifyOnly,
     /// Names the single effect that leaves the smallest residual on the training logs.
     BestResidual,
-    /// Adds effects for as long as the Bayesian information criterion (Schwarz 1978) falls.
+    /// Adds effects, and drops those before, for as long as the Bayesian information criterion (Schwarz 1978) falls.
     Bic,
 }
 
@@ -97,6 +98,11 @@ pub fn answer(
             break;
         }
         best = leader;
+        // What was added before may be needed no more.
+        while let Some(fewer) = work.fewer(&tried[best])? {
+            tried.push(fewer);
+            best = tried.len() - 1;
+        }
     }
     let least = tried[best].bic();
     let weights = tried.iter().enumerate().map(|(i, f)| {
@@ -106,8 +112,18 @@ pub fn answer(
         };
         (f.labels(), weight)
     });
-    let weights = weights.collect();
+    let weights = each_once(weights.collect());
     Ok(said(&study, &tried[best], weights))
+}
+
+/// Each set once, with the largest of its weights: a set may be reached by two ways.
+fn each_once(weights: Vec<(Vec<String>, f64)>) -> Vec<(Vec<String>, f64)> {
+    let mut sets: BTreeMap<Vec<String>, f64> = BTreeMap::new();
+    for (set, weight) in weights {
+        let own = sets.entry(set).or_default();
+        *own = own.max(weight);
+    }
+    sets.into_iter().collect()
 }
 
 /// A set of effects, fitted.
@@ -306,6 +322,21 @@ impl<'a> Work<'a> {
         leading
             .map(|(_, effects)| self.fit(&effects, &from.point))
             .collect()
+    }
+
+    /// The set with one effect less by which the criterion falls most; `None` where it falls by none.
+    fn fewer(&mut self, from: &Fitted) -> Result<Option<Fitted>> {
+        let mut best: Option<Fitted> = None;
+        for left_out in 0..from.effects.len() {
+            let mut effects = from.effects.clone();
+            effects.remove(left_out);
+            let fitted = self.fit(&effects, &from.point)?;
+            let least = best.as_ref().map_or_else(|| from.bic(), Fitted::bic);
+            if fitted.bic() < least {
+                best = Some(fitted);
+            }
+        }
+        Ok(best)
     }
 
     /// What the identified model does along the training logs.

@@ -107,6 +107,9 @@ pub fn examine(
     examined.unwrap_or_else(Physics::skipped)
 }
 
+/// Sizes from which an effect without values is fitted, as shares of the way from where it is off to an end of a range.
+const SIZES: [f64; 3] = [1e-3, 1e-2, 1e-1];
+
 /// A study on an engine, with its logs.
 struct Bench<'a> {
     engine: Engine,
@@ -212,8 +215,42 @@ impl Bench<'_> {
         let (starts, open) = self.starts(0);
         let mut fit = Fit::new(&self.study.plant.layout, &world, open)?;
         let values = world.unknowns.iter().map(|u| u.start).collect();
-        let point = fit.run(&mut self.logs[0], Point { values, starts })?;
+        let mut point = Point { values, starts };
+        for effect in named.effects.iter().filter(|e| e.values.is_empty()) {
+            point = self.first_size(&mut fit, &world, effect, point)?;
+        }
+        let point = fit.run(&mut self.logs[0], point)?;
         Ok((world, point.values))
+    }
+
+    /// Where the fit of an effect begins whose values nobody gives: at the size, of some over three decades of its
+    /// parameters' ranges, that leaves the least, or where it is off.
+    fn first_size(
+        &mut self,
+        fit: &mut Fit<'_>,
+        world: &World,
+        effect: &EffectSpec,
+        off: Point,
+    ) -> Result<Point> {
+        let label = effect.label();
+        let mut best = off.clone();
+        let (mut least, _) = fit.squares(&mut self.logs[0], &off)?;
+        let own = world
+            .unknowns
+            .iter()
+            .enumerate()
+            .filter(|(_, u)| u.is_of(&label));
+        for (i, unknown) in own {
+            for (share, end) in SIZES.iter().flat_map(|s| unknown.range.map(|end| (s, end))) {
+                let mut point = off.clone();
+                point.values[i] += share * (end - off.values[i]);
+                let (squares, _) = fit.squares(&mut self.logs[0], &point)?;
+                if squares < least {
+                    (least, best) = (squares, point);
+                }
+            }
+        }
+        Ok(best)
     }
 
     /// A point for the logs held out: the values given, and starts fitted to the heads where logs leave them open.

@@ -52,6 +52,13 @@ impl Unknown {
 }
 
 impl Unknown {
+    /// Whether it is a value of the effect `NAME@SITE`.
+    #[must_use]
+    pub fn is_of(&self, effect: &str) -> bool {
+        let mut targets = self.parameter.targets.iter();
+        targets.any(|t| t.element == "effect" && t.name == effect)
+    }
+
     /// Writes a value into the effect that this is an unknown of.
     pub fn set(&self, effects: &mut [EffectSpec], value: f64) {
         for target in &self.parameter.targets {

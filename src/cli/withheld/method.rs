@@ -21,7 +21,7 @@ pub enum Method {
     IdentifyOnly,
     /// Name the single effect that leaves the least on the logs it is fitted to
     BestResidual,
-    /// Add effects for as long as the Bayesian information criterion falls
+    /// Add and drop effects for as long as the Bayesian information criterion falls
     Bic,
 }
 
