@@ -24,8 +24,12 @@ const POSITION_STEP: f64 = 1e-5;
 const SPEED_STEP: f64 = 1e-4;
 /// Points that are replayed at once.
 const CAPACITY: usize = 8;
-/// Damping at which a step is given up.
-const STUCK: f64 = 1e8;
+/// Damping at which a step is given up: it is then a ten-thousandth of Gauss and Newton's.
+const STUCK: f64 = 1e4;
+/// Factors of the steps of finite differences, one after the other. Where a simulated impact falls within its time step
+/// changes the speed after it a little, so that predictions are rough in every unknown; small steps then show the
+/// roughness, and larger ones the slope.
+const STRETCHES: [f64; 3] = [1.0, 30.0, 600.0];
 
 /// A fit.
 pub struct Fit<'a> {
@@ -37,6 +41,8 @@ pub struct Fit<'a> {
     free: Vec<usize>,
     /// Coordinates of the starts that are fitted.
     open: Vec<usize>,
+    /// Factor of the steps of finite differences.
+    stretch: f64,
 }
 
 /// Residuals by log, NaN where missing.
@@ -55,6 +61,7 @@ impl<'a> Fit<'a> {
             steps: world.unknowns.iter().map(|u| u.step).collect(),
             free: (0..world.unknowns.len()).collect(),
             open,
+            stretch: 1.0,
         })
     }
 
@@ -91,6 +98,17 @@ impl<'a> Fit<'a> {
         if self.free.is_empty() && self.open.is_empty() {
             return Ok(here);
         }
+        for stretch in STRETCHES {
+            self.stretch = stretch;
+            here = self.descend(logs, here)?;
+        }
+        self.stretch = 1.0;
+        Ok(here)
+    }
+
+    /// Descends with one size of finite differences.
+    fn descend(&mut self, logs: &mut Logs, start: Point) -> Result<Point> {
+        let mut here = start;
         let mut damping = 1e-3;
         for _ in 0..MOST_ROUNDS {
             let mut points = vec![here.clone()];
@@ -159,21 +177,18 @@ impl<'a> Fit<'a> {
         Ok((present().map(|r| r * r).sum(), present().count()))
     }
 
-    /// Step of an unknown from a value: away from a bound that is near.
+    /// Step of an unknown from a value: away from a bound that is near, and no longer than half of the range.
     fn step(&self, unknown: usize, value: f64) -> f64 {
-        let step = self.steps[unknown];
-        if value + step > self.ranges[unknown][1] {
-            -step
-        } else {
-            step
-        }
+        let [low, high] = self.ranges[unknown];
+        let step = (self.stretch * self.steps[unknown]).min(0.5 * (high - low));
+        if value + step > high { -step } else { step }
     }
 
     fn start_step(&self, coordinate: usize) -> f64 {
         if coordinate < self.layout.nv {
-            POSITION_STEP
+            self.stretch * POSITION_STEP
         } else {
-            SPEED_STEP
+            self.stretch * SPEED_STEP
         }
     }
 

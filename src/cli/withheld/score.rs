@@ -34,7 +34,7 @@ use crate::cli::progress::Bars;
 use crate::cli::session::backend;
 
 /// Folder of the kept answers in the folder of the result.
-const CASES: &str = "cases";
+const ANSWERS: &str = "answers";
 
 /// `result.json`.
 #[derive(Serialize)]
@@ -171,7 +171,7 @@ impl<'a> Session<'a> {
             Some(control) => format!("{}-{}", method.name(), control.name()),
             None => method.name().to_owned(),
         };
-        self.out.join(CASES).join(name)
+        self.out.join(ANSWERS).join(name)
     }
 
     /// Answers what is not answered yet.
@@ -344,7 +344,7 @@ impl<'a> Session<'a> {
 
 /// The folder of the result: new, empty, or one that holds answers already.
 fn out_folder(out: Option<&Path>) -> Result<PathBuf> {
-    let there = out.filter(|path| path.join(CASES).is_dir());
+    let there = out.filter(|path| path.join(ANSWERS).is_dir());
     Ok(match there {
         Some(path) => path.to_owned(),
         None => OutFolder::claim(out, "withheld")?.path(),
