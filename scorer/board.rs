@@ -170,7 +170,7 @@ fn power(cases: &[&Case]) -> Vec<Power> {
         all.push(Power {
             gap: (low, high),
             mean_gap: some.iter().map(|c| c.cause_gap).sum::<f64>() / some.len() as f64,
-            noticed: Share::of(some.iter().map(|c| said_something(&c))),
+            noticed: Share::of(some.iter().map(said_something)),
             right: Share::of(some.iter().map(|c| c.standing.is_right())),
         });
     }

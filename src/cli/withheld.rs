@@ -7,10 +7,13 @@ mod cases;
 mod child;
 mod control;
 mod isolate;
+mod jobs;
 mod kept;
 mod make;
 mod method;
 mod score;
+mod seal;
+mod written;
 
 use std::path::PathBuf;
 

@@ -1,10 +1,9 @@
 //! Answers all cases, then reads the labels and scores.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
 
 use anyhow::Result;
 use asid_core::registry::all;
@@ -18,53 +17,31 @@ use asid_scorer::label::{Label, read_labels};
 use asid_scorer::oracle::oracle;
 use asid_scorer::physics::{self, Physics};
 use asid_scorer::sites::Sites;
-use asid_scorer::{lines, page};
-use serde::Serialize;
 
 use super::Arguments;
 use super::cases::{Case, cases, refused};
 use super::child::Stop;
 use super::control::{Control, true_effects};
 use super::isolate::Treatment;
+use super::jobs::side_by_side;
 use super::kept::{self, Kept, Maker};
 use super::method::{Asked, Method};
+use super::seal::sealed;
 use crate::cli::failure;
-use crate::cli::output::{OutFolder, write_json, write_text};
+use crate::cli::output::OutFolder;
 use crate::cli::progress::Bars;
 use crate::cli::session::backend;
 
 /// Folder of the kept answers in the folder of the result.
 const ANSWERS: &str = "answers";
 
-/// `result.json`.
-#[derive(Serialize)]
-struct Output<'a> {
-    #[serde(flatten)]
-    score: &'a Score,
-    /// How the check was spoilt on purpose.
-    control: Option<&'static str>,
-    limit: Option<f64>,
-    seed: u64,
-    without: &'a [String],
-    backend: &'a str,
-    /// Scores of the other methods on the same cases.
-    others: &'a [Score],
-    versions: Versions,
-}
-
-#[derive(Serialize)]
-struct Versions {
-    asid: &'static str,
-    git: &'static str,
-}
-
 /// The call, with what it works on.
-struct Session<'a> {
-    arguments: &'a Arguments,
+pub struct Session<'a> {
+    pub arguments: &'a Arguments,
     cases: Vec<Case>,
-    backend: Arc<dyn Backend>,
+    pub backend: Arc<dyn Backend>,
     left_out: BTreeMap<String, String>,
-    out: PathBuf,
+    pub out: PathBuf,
     jobs: usize,
     stop: Stop,
 }
@@ -110,34 +87,6 @@ pub fn score(folder: &Path, arguments: &Arguments) -> Result<()> {
         .map(|m| session.score(*m, &labels))
         .collect::<Result<_>>()?;
     session.write(&scores)
-}
-
-/// Checks studies and labels against their seal, where the studies have one.
-#[cfg(feature = "mujoco")]
-fn sealed(studies: &Path, labels: &Path) -> Result<()> {
-    use asid_withheld::seal::{SEAL, verify};
-    if !studies.join(SEAL).is_file() {
-        return Ok(());
-    }
-    let wrong = verify(studies, labels).map_err(|e| Error::Failed(e.to_string()))?;
-    match wrong.first() {
-        None => Ok(()),
-        Some(first) => Err(Error::Failed(format!(
-            "{}: {first}: a broken seal scores nothing ({} in all)",
-            studies.join(SEAL).display(),
-            wrong.len()
-        ))
-        .into()),
-    }
-}
-
-/// The generator, which knows how cases are sealed, is of builds with MuJoCo.
-#[cfg(not(feature = "mujoco"))]
-fn sealed(studies: &Path, _labels: &Path) -> Result<()> {
-    if studies.join("seal.json").is_file() {
-        failure::note("the seal is not checked: that takes a build with --features mujoco");
-    }
-    Ok(())
 }
 
 impl<'a> Session<'a> {
@@ -291,55 +240,6 @@ impl<'a> Session<'a> {
         };
         Scored::new(name, run, &judge, physics)
     }
-
-    /// Writes and tells the scores, the first method's first.
-    fn write(&self, scores: &[Score]) -> Result<()> {
-        let arguments = self.arguments;
-        let Some((score, others)) = scores.split_first() else {
-            return Ok(());
-        };
-        let asked = Asked::new(Method::Diagnose, arguments);
-        let output = Output {
-            score,
-            control: arguments.control.map(Control::name),
-            limit: arguments.limit,
-            seed: arguments.common.seed.unwrap_or(0),
-            without: &arguments.without,
-            backend: &asked.backend,
-            others,
-            versions: Versions {
-                asid: env!("CARGO_PKG_VERSION"),
-                git: env!("ASID_GIT"),
-            },
-        };
-        // Cases and controls of one set stand side by side; a score is written anew as a whole.
-        let stem = arguments.control.map_or("", Control::name);
-        let named = |name: &str| match stem {
-            "" => self.out.join(name),
-            stem => self.out.join(format!("{stem}-{name}")),
-        };
-        let about = page::About {
-            command: crate::cli::run::command_line(),
-            engine: format!("{} {}", self.backend.name(), self.backend.version()),
-            control: arguments.control.map(Control::expects),
-            limit: arguments.limit,
-        };
-        write_text(&named("report.html"), &page::page(scores, &about))?;
-        write_json(&named("result.json"), &output)?;
-        let mut stdout = std::io::stdout().lock();
-        if arguments.common.json {
-            writeln!(stdout, "{}", serde_json::to_string_pretty(&output)?)?;
-        } else {
-            for line in lines::lines(scores) {
-                writeln!(stdout, "{line}")?;
-            }
-            if let Some(control) = arguments.control {
-                writeln!(stdout, "control: {}", control.expects())?;
-            }
-            writeln!(stdout, "results: {}", named("report.html").display())?;
-        }
-        Ok(())
-    }
 }
 
 /// The folder of the result: new, empty, or one that holds answers already.
@@ -387,32 +287,4 @@ fn told(name: &str, folder: &Path) -> String {
         None => sentence().unwrap_or_else(|| "answered".into()),
     };
     format!("{name}: {:.1} s: {what}", kept.seconds)
-}
-
-/// Does something to each item, some at a time; what comes of it in the items' order.
-fn side_by_side<T: Sync, R: Send>(
-    jobs: usize,
-    items: &[T],
-    work: impl Fn(&T) -> R + Sync,
-) -> Vec<R> {
-    let next = AtomicUsize::new(0);
-    let done: Mutex<Vec<(usize, R)>> = Mutex::new(Vec::new());
-    std::thread::scope(|scope| {
-        for _ in 0..jobs.min(items.len()) {
-            scope.spawn(|| {
-                while let Some((i, item)) = {
-                    let i = next.fetch_add(1, Ordering::Relaxed);
-                    items.get(i).map(|item| (i, item))
-                } {
-                    let result = work(item);
-                    done.lock()
-                        .unwrap_or_else(PoisonError::into_inner)
-                        .push((i, result));
-                }
-            });
-        }
-    });
-    let mut done = done.into_inner().unwrap_or_else(PoisonError::into_inner);
-    done.sort_by_key(|(i, _)| *i);
-    done.into_iter().map(|(_, result)| result).collect()
 }
