@@ -209,6 +209,12 @@ fn controls_fail_as_they_must() {
         "{}",
         noise["answers"]
     );
+    // Who knows the labels is right, and needs no answers.
+    let alone = folder.path().join("oracle");
+    let done = withheld(&cases, &alone, &["--control", "oracle"]);
+    assert!(done.status.success(), "{}", said(&done));
+    let oracle = json(&alone.join("oracle-result.json"));
+    assert_eq!(oracle["right"], 2);
     // The scores of the cases as they are stay.
     assert_eq!(json(&out.join("result.json"))["right"], 2);
 }

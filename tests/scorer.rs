@@ -166,7 +166,10 @@ fn labels_of_other_cases_score_nothing() {
         &[("coulomb-friction@rail", "force", 1.0)],
         &[("sensor-bias@x", "bias", 0.02)],
     ];
-    let (sites, catalogue) = (asid::scorer::sites::Sites::default(), BTreeSet::new());
+    let names = sets
+        .iter()
+        .flat_map(|s| s.iter().map(|e| name_of(e.0).to_owned()));
+    let (sites, catalogue) = (asid::scorer::sites::Sites::default(), names.collect());
     let score = |shift: usize| {
         let cases = (0..sets.len()).map(|i| {
             let label = label(sets[(i + shift) % sets.len()]);

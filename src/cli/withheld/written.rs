@@ -1,8 +1,10 @@
 //! What is written and told of scores.
 
 use std::io::Write as _;
+use std::path::Path;
 
 use anyhow::Result;
+use asid_core::Error;
 use asid_scorer::board::Score;
 use asid_scorer::{lines, page};
 use serde::Serialize;
@@ -67,8 +69,13 @@ impl Session<'_> {
             control: arguments.control.map(Control::expects),
             limit: arguments.limit,
         };
-        write_text(&named("report.html"), &page::page(scores, &about))?;
-        write_json(&named("result.json"), &output)?;
+        std::fs::create_dir_all(&self.out).map_err(|e| {
+            Error::Failed(format!("{}: cannot be written: {e}", self.out.display()))
+        })?;
+        whole(&named("report.html"), |file| {
+            write_text(file, &page::page(scores, &about))
+        })?;
+        whole(&named("result.json"), |file| write_json(file, &output))?;
         let mut stdout = std::io::stdout().lock();
         if arguments.common.json {
             writeln!(stdout, "{}", serde_json::to_string_pretty(&output)?)?;
@@ -83,4 +90,18 @@ impl Session<'_> {
         }
         Ok(())
     }
+}
+
+/// Writes a file that takes its name when it is whole, in place of one that has it.
+fn whole(file: &Path, write: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
+    let staging = file.with_extension(format!("{}.part", std::process::id()));
+    let done = write(&staging).and_then(|()| {
+        std::fs::rename(&staging, file).map_err(|e| {
+            Error::Failed(format!("{}: cannot be written: {e}", file.display())).into()
+        })
+    });
+    if done.is_err() {
+        let _ = std::fs::remove_file(&staging);
+    }
+    done
 }
