@@ -17,8 +17,8 @@ pub(super) fn machines(score: &Score) -> Section {
     let drawn = Ranking::new("Share right by machine", axis).rows(rows.iter().map(bar));
     Section::new("Machines")
         .lead(
-            "`closed` is the median share of the gap closed, of what the true effects, fitted by the scorer, close. \
-             `true p` is the mean probability given to right sets, `set` the median size of the ambiguity set.",
+            "closed is the median share of the gap closed, of what the true effects, fitted by the scorer, close. \
+             true p is the mean probability given to right sets, set the median size of the ambiguity set.",
         )
         .figures(vec![Drawing::new("Share right by machine", drawn, "Cases of one kind of machine, clean and dirty, with any cause or none.")])
         .table(table("machine", &rows))

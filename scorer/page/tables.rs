@@ -149,6 +149,6 @@ pub(super) fn cases(score: &Score) -> Section {
         ]);
     }
     Section::new("Cases")
-        .lead("`gap` is the excess gap of the causes alone, in units of the noise.")
+        .lead("gap is the excess gap of the causes alone, in units of the noise.")
         .table(all)
 }
