@@ -177,7 +177,8 @@ fn controls_fail_as_they_must() {
     let (cases, out) = (folder.path().join("cases"), folder.path().join("out"));
     write_study(&cases.join("a"), Truth::Coulomb(1.2));
     write_study(&cases.join("b"), Truth::None);
-    let labels = r#"{"a": {"effects": ["coulomb-friction@rail"]}, "b": {"effects": []}}"#;
+    let labels = r#"{"a": {"effects": ["coulomb-friction@rail"], "effect_parameters": {"force": 1.2},
+        "noise": {"x": 5e-4, "dx": 5e-3}}, "b": {"effects": []}}"#;
     std::fs::write(cases.join("labels.json"), labels).unwrap();
     let run = |more: &[&str], file: &str| {
         let done = withheld(&cases, &out, more);
@@ -215,6 +216,11 @@ fn controls_fail_as_they_must() {
     assert!(done.status.success(), "{}", said(&done));
     let oracle = json(&alone.join("oracle-result.json"));
     assert_eq!(oracle["right"], 2);
+    // Noise, and the two deviations that the model's step of 2 ms puts it off.
+    let best = oracle["answers"][0]["physics"]["gaps"]["best"]
+        .as_f64()
+        .unwrap();
+    assert!(best < 2.5, "{best}");
     // The scores of the cases as they are stay.
     assert_eq!(json(&out.join("result.json"))["right"], 2);
 }

@@ -228,10 +228,10 @@ impl<'a> Session<'a> {
             sites: &sites,
             catalogue: &catalogue,
         };
-        let spoilt = self
-            .arguments
-            .control
-            .is_some_and(|c| c != Control::WithoutTruth);
+        let spoilt = matches!(
+            self.arguments.control,
+            Some(Control::Scrambled | Control::Noise)
+        );
         let physics = match &run.answer {
             Ok(_) if self.arguments.names_only => Physics::skipped("scored by names alone"),
             Ok(_) if spoilt => Physics::skipped("label and logs are not of one world"),
