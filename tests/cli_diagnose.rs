@@ -1,4 +1,4 @@
-//! `asid diagnose` and `asid withheld` as the user runs them.
+//! `asid diagnose` as the user runs it.
 
 #![allow(clippy::unwrap_used)]
 
@@ -74,74 +74,6 @@ fn a_fault_is_found_and_its_refined_model_has_none() {
     let result: Value = serde_json::from_slice(&again.stdout).unwrap();
     let nominal = result["gap"]["nominal"].as_f64().unwrap();
     assert!(nominal < 3.0, "gap {nominal} with the refined model");
-}
-
-#[test]
-fn labels_are_read_by_the_scorer_only_and_last() {
-    let folder = tempfile::tempdir().unwrap();
-    let cases = folder.path().join("cases");
-    write_study(&cases.join("case-0"), Truth::SensorBias(0.02));
-    // Without labels every diagnosis is done and told before the scorer asks for them.
-    let arguments = ["withheld", "--cases", text(&cases), "--quiet"];
-    let without = asid(&arguments);
-    let said = String::from_utf8(without.stderr).unwrap();
-    assert_eq!(without.status.code(), Some(2));
-    let lines: Vec<&str> = said.lines().collect();
-    assert!(lines[0].contains("sensor-bias@x explains"), "{said}");
-    assert!(lines[1].contains("labels.json"), "{said}");
-    // Wrong labels change nothing of what is said.
-    let labels = r#"{"case-0": {"world": "cart", "effects": ["actuator-delay@belt"], "parameters": {"mass": 1.3}}}"#;
-    std::fs::write(cases.join("labels.json"), labels).unwrap();
-    let out = folder.path().join("out");
-    let with = asid(&[
-        "withheld",
-        "--cases",
-        text(&cases),
-        "--quiet",
-        "--out",
-        text(&out),
-    ]);
-    let told = String::from_utf8(with.stderr).unwrap();
-    let sentence = |s: &str| s.split(" s: ").nth(1).unwrap_or_default().to_owned();
-    assert_eq!(sentence(told.lines().next().unwrap()), sentence(lines[0]));
-    assert_eq!(json(&out.join("result.json"))["right"], 0);
-}
-
-#[test]
-fn a_case_that_the_engine_cannot_simulate_is_left_out_with_the_reason() {
-    let folder = tempfile::tempdir().unwrap();
-    let (cases, out) = (folder.path().join("cases"), folder.path().join("out"));
-    write_study(&cases.join("ball"), Truth::None);
-    let model = cases.join("ball/nominal.xml");
-    let bouncing =
-        r#"<worldbody><geom name="floor" type="plane" size="1 1 1" solref="-40000 -18"/>"#;
-    let scene = std::fs::read_to_string(&model).unwrap();
-    std::fs::write(&model, scene.replacen("<worldbody>", bouncing, 1)).unwrap();
-    std::fs::write(cases.join("labels.json"), "{}").unwrap();
-    let mut arguments = vec!["withheld", "--cases", text(&cases), "--backend", "rapier"];
-    arguments.extend(["--quiet", "--out", text(&out)]);
-    let done = asid(&arguments);
-    let said = String::from_utf8(done.stdout).unwrap();
-    assert!(
-        done.status.success() && said.contains("ball       left out: "),
-        "{said}"
-    );
-    let result = json(&out.join("result.json"));
-    let why = result["left_out"]["ball"].as_str().unwrap();
-    assert!(
-        why.contains("`floor` on line") && why.contains("0.87 of their speed"),
-        "{why}"
-    );
-    assert_eq!(result["cases"], 0);
-    // Of a single study it is the answer.
-    let (line, code) = refusal(&[
-        "diagnose",
-        text(&cases.join("ball")),
-        "--backend",
-        "rapier",
-        "--quiet",
-    ]);
-    assert!(code == Some(2) && line.contains("cannot bounce"), "{line}");
 }
 
 /// What is spoilt, how, and what is said of it.
@@ -320,40 +252,4 @@ fn degrees_in_place_of_radians_are_noticed() {
         units["detail"].as_str().unwrap().contains("degrees"),
         "{units}"
     );
-}
-
-#[cfg(feature = "mujoco")]
-#[test]
-fn made_cases_are_studies_and_their_labels_lie_apart() {
-    let folder = tempfile::tempdir().unwrap();
-    let set = folder.path().join("set");
-    let arguments = [
-        "withheld",
-        "--make",
-        text(&set),
-        "--seed",
-        "3",
-        "--count",
-        "2",
-        "--half",
-        "test",
-        "--quiet",
-    ];
-    let made = asid(&arguments);
-    let said = String::from_utf8(made.stdout).unwrap();
-    assert!(
-        made.status.success() && said.starts_with("2 cases"),
-        "{said}"
-    );
-    for case in ["case-000", "case-001"] {
-        let study = asid::diagnosis::study::Study::read(&set.join("studies").join(case)).unwrap();
-        assert_eq!((study.train.len(), study.test.len()), (6, 3));
-    }
-    let labels = set.join("sealed/labels.json");
-    let read = asid::diagnosis::score::read_labels(&labels).unwrap();
-    assert_eq!(read.len(), 2);
-    // A set is never written into another one, and one call does one thing.
-    assert_eq!(asid(&arguments).status.code(), Some(1));
-    let both = ["withheld", "--make", "a", "--cases", "b"];
-    assert_eq!(asid(&both).status.code(), Some(2));
 }

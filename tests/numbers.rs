@@ -21,6 +21,7 @@ const ROOMS: [&str; 15] = [
     "report",
     "sysid",
     "withheld",
+    "scorer",
     "src",
 ];
 

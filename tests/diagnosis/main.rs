@@ -9,7 +9,6 @@ mod diagnosis_support;
 mod wiring;
 mod world;
 
-use std::collections::BTreeMap;
 use std::path::Path;
 
 use asid::core::progress::Silent;
@@ -17,7 +16,6 @@ use asid::diagnosis::diagnose::{Diagnosis, Settings, Work, diagnose};
 use asid::diagnosis::forces;
 use asid::diagnosis::machine::Machine;
 use asid::diagnosis::result::Kind;
-use asid::diagnosis::score::{Answer, Label, Score};
 use asid::diagnosis::study::Study;
 use asid::diagnosis::windows;
 use diagnosis_support::engine;
@@ -50,16 +48,8 @@ const CASES: [(Truth, &[&str]); 5] = [
     (Truth::SensorBias(0.02), &["sensor-bias@x"]),
 ];
 
-fn label(effects: &[&str]) -> Label {
-    Label {
-        world: "cart".into(),
-        effects: effects.iter().map(|s| (*s).to_owned()).collect(),
-        parameters: BTreeMap::from([("mass".to_owned(), MASS)]),
-    }
-}
-
 #[test]
-fn faults_are_named_and_closed_and_shuffled_labels_score_nothing() {
+fn faults_are_named_and_closed() {
     let done: Vec<_> = CASES.iter().map(|(truth, _)| run(*truth, &[]).0).collect();
     for (diagnosis, (truth, effects)) in done.iter().zip(CASES) {
         let r = &diagnosis.result;
@@ -81,19 +71,6 @@ fn faults_are_named_and_closed_and_shuffled_labels_score_nothing() {
         let shares: f64 = r.places.iter().map(|w| w.share).sum();
         assert!((shares - 1.0).abs() < 1e-9 || r.places.is_empty());
     }
-    let score = |shift: usize| {
-        let answers = done.iter().enumerate().map(|(i, d)| {
-            let (_, effects) = CASES[(i + shift) % CASES.len()];
-            Answer::new("case", &d.result, &label(effects), false, 0.0)
-        });
-        Score::of(answers.collect(), BTreeMap::new())
-    };
-    assert_eq!(score(0).right, CASES.len());
-    // Every label is another case's: nothing can be right.
-    let shuffled = score(1);
-    assert_eq!(shuffled.right, 0);
-    assert!(shuffled.log_score < shuffled.base_log_score);
-    assert!(shuffled.brier > 0.5, "{}", shuffled.brier);
 }
 
 /// Takes the states at the start out of the logs of a folder.

@@ -1,0 +1,206 @@
+//! A study ready for fits: sets of effects are ranked by linearisations and fitted by replays.
+
+use asid_core::Result;
+use asid_core::replay::Replay;
+use asid_effects::EffectSpec;
+
+use super::candidates::Shown;
+use super::noise;
+use crate::physics::Study;
+use crate::physics::fit::Fit;
+use crate::physics::logs::{Logs, within};
+use crate::physics::model::{Engine, Point, World};
+use crate::physics::start::{State, first_state, open_coordinates};
+
+/// Physics steps of a replay of all logs while candidates are ranked: some hundred of them take a minute on one core.
+const RANKING_STEPS: f64 = 4_000.0;
+/// The same while they are fitted.
+const FITTING_STEPS: f64 = 10_000.0;
+/// Leading candidates that are fitted in each round.
+const FITTED: usize = 4;
+
+/// A set of effects, fitted.
+#[derive(Clone)]
+pub struct Fitted {
+    /// With their values.
+    pub effects: Vec<EffectSpec>,
+    /// All values, the study's parameters first.
+    pub point: Point,
+    /// Sum of squares in units of the noise.
+    pub squares: f64,
+    readings: usize,
+}
+
+impl Fitted {
+    /// `NAME@SITE` of its effects, sorted.
+    pub fn labels(&self) -> Vec<String> {
+        let mut labels: Vec<String> = self.effects.iter().map(EffectSpec::label).collect();
+        labels.sort();
+        labels
+    }
+
+    /// Schwarz's criterion for white normal residuals of unknown deviation.
+    pub fn bic(&self) -> f64 {
+        let n = self.readings as f64;
+        n * (self.squares / n).ln() + self.point.values.len() as f64 * n.ln()
+    }
+}
+
+/// A study, ready for fits.
+pub struct Work<'a> {
+    study: &'a Study,
+    engine: &'a Engine,
+    ranking: Logs,
+    fitting: Logs,
+    open: Vec<usize>,
+}
+
+impl<'a> Work<'a> {
+    /// Reads its logs.
+    pub fn new(study: &'a Study, engine: &'a Engine) -> Result<Self> {
+        let (layout, signals) = (&study.plant.layout, noise::signals(study));
+        let logs = |steps: f64| {
+            Logs::new(
+                layout,
+                &signals,
+                within(&study.train, layout.timestep, steps),
+            )
+        };
+        Ok(Self {
+            ranking: logs(RANKING_STEPS)?,
+            fitting: logs(FITTING_STEPS)?,
+            open: open_coordinates(layout, &study.train),
+            study,
+            engine,
+        })
+    }
+
+    fn starts(&self) -> Vec<State> {
+        let logs = self.fitting.logs.iter();
+        logs.map(|l| first_state(&self.study.plant, &l.episode))
+            .collect()
+    }
+
+    /// The study's parameters in the middle of their ranges, the starts as the logs show them.
+    pub fn middle(&self) -> Point {
+        Point {
+            values: self
+                .study
+                .parameters
+                .iter()
+                .map(|p| p.from_unit(0.5))
+                .collect(),
+            starts: self.starts(),
+        }
+    }
+
+    /// The world of a set, and the values where its fit begins: the study's parameters as in `from`.
+    fn world(&self, effects: &[EffectSpec], from: &Point) -> Result<(World, Vec<f64>)> {
+        let of = |name: &str| {
+            let at = self.study.parameters.iter().position(|p| p.name == name)?;
+            from.values.get(at).copied()
+        };
+        let world = self.engine.world(self.study, effects, &of)?;
+        let values = world.unknowns.iter().map(|u| u.start).collect();
+        Ok((world, values))
+    }
+
+    /// Fits a set from values of the study's parameters and starts.
+    pub fn fit(&mut self, effects: &[EffectSpec], from: &Point) -> Result<Fitted> {
+        let (world, values) = self.world(effects, from)?;
+        let mut fit = Fit::new(&self.study.plant.layout, &world, self.open.clone())?;
+        let starts = from.starts.clone();
+        let point = fit.run(&mut self.fitting, Point { values, starts })?;
+        let (squares, readings) = fit.squares(&mut self.fitting, &point)?;
+        let mut fitted = effects.to_vec();
+        let unknowns = world.unknowns.iter().zip(&point.values);
+        for (unknown, value) in unknowns.skip(self.study.parameters.len()) {
+            unknown.set(&mut fitted, *value);
+        }
+        Ok(Fitted {
+            effects: fitted,
+            point,
+            squares,
+            readings,
+        })
+    }
+
+    /// Fits the sets that lead, of those with one effect more than `from`.
+    pub fn round(&mut self, from: &Fitted, all: &[Vec<EffectSpec>]) -> Result<Vec<Fitted>> {
+        let mut ranked: Vec<(f64, Vec<EffectSpec>)> = Vec::new();
+        let layout = &self.study.plant.layout;
+        for starts in all {
+            let known = |s: &EffectSpec| from.effects.iter().any(|e| e.label() == s.label());
+            if starts.iter().any(known) {
+                continue;
+            }
+            let mut own: Option<(f64, Vec<EffectSpec>)> = None;
+            for start in starts {
+                let effects = [&from.effects[..], std::slice::from_ref(start)].concat();
+                // What the engine cannot give the scene is no candidate.
+                let Ok((world, values)) = self.world(&effects, &from.point) else {
+                    continue;
+                };
+                let mut fit = Fit::new(layout, &world, Vec::new())?;
+                let starts = from.point.starts.clone();
+                let promised = fit.promise(&mut self.ranking, &Point { values, starts });
+                let Ok(Some([_, after])) = promised else {
+                    continue;
+                };
+                if own.as_ref().is_none_or(|o| after < o.0) {
+                    own = Some((after, effects));
+                }
+            }
+            ranked.extend(own);
+        }
+        ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let leading = ranked.into_iter().take(FITTED);
+        leading
+            .map(|(_, effects)| self.fit(&effects, &from.point))
+            .collect()
+    }
+
+    /// The set with one effect less by which the criterion falls most; `None` where it falls by none.
+    pub fn fewer(&mut self, from: &Fitted) -> Result<Option<Fitted>> {
+        let mut best: Option<Fitted> = None;
+        for left_out in 0..from.effects.len() {
+            let mut effects = from.effects.clone();
+            effects.remove(left_out);
+            let fitted = self.fit(&effects, &from.point)?;
+            let least = best.as_ref().map_or_else(|| from.bic(), Fitted::bic);
+            if fitted.bic() < least {
+                best = Some(fitted);
+            }
+        }
+        Ok(best)
+    }
+
+    /// What the identified model does along the training logs.
+    pub fn shown(&mut self, none: &Fitted) -> Result<Shown> {
+        let layout = &self.study.plant.layout;
+        let (world, values) = self.world(&[], &none.point)?;
+        let mut fit = Fit::new(layout, &world, Vec::new())?;
+        let joints = || layout.joints.iter().map(|j| &j.name);
+        let names: Vec<String> = joints()
+            .map(|j| format!("qpos.{j}"))
+            .chain(joints().map(|j| format!("qvel.{j}")))
+            .collect();
+        let mut logs = self.fitting.like(layout)?;
+        for log in &mut logs.logs {
+            log.replay = Replay::new(layout, &log.episode, &names)?;
+        }
+        let starts = none.point.starts.clone();
+        let rows = fit.predict(&mut logs, &Point { values, starts })?;
+        let (nq, width) = (layout.nq, layout.nq + layout.nv);
+        let states = || rows.iter().flat_map(|r| r.chunks_exact(width));
+        Ok(Shown {
+            ctrl: logs
+                .logs
+                .iter()
+                .flat_map(|l| l.episode.ctrl.clone())
+                .collect(),
+            qpos: states().flat_map(|s| s[..nq].to_vec()).collect(),
+            qvel: states().flat_map(|s| s[nq..].to_vec()).collect(),
+        })
+    }
+}

@@ -1,0 +1,17 @@
+//! What the catalogue says of an effect by its name.
+
+use asid_core::registry::all;
+use asid_effects::{EffectEntry, EffectParameter};
+
+/// Parameters of an effect; `None` where the catalogue has no such effect.
+#[must_use]
+pub fn parameters_of(name: &str) -> Option<&'static [EffectParameter]> {
+    let entry = all::<EffectEntry>().into_iter().find(|e| e.name == name)?;
+    Some((entry.make)().parameters())
+}
+
+/// Whether an effect has a parameter.
+#[must_use]
+pub fn has_parameter(effect: &str, parameter: &str) -> bool {
+    parameters_of(effect).is_some_and(|all| all.iter().any(|p| p.name == parameter))
+}

@@ -1,0 +1,212 @@
+//! Logs made ready for replays: mended where the label says that their wiring is wrong, of a bounded length, with the
+//! noise that their readings are divided by.
+
+use std::collections::BTreeMap;
+
+use asid_core::replay::Replay;
+use asid_core::signal::{Signal, SignalSet};
+use asid_core::{Episode, Error, Layout, Result};
+
+use super::study::Study;
+use crate::answer::Answer;
+use crate::label::{Label, WiringTruth};
+
+/// Physics steps of all logs of a kind together: what a fit of some twenty replays does in seconds on one core.
+const MOST_STEPS: f64 = 24_000.0;
+/// Rows that a log keeps at least, where it has as many.
+const FEWEST_ROWS: usize = 12;
+
+/// One log.
+pub struct Log {
+    /// The log.
+    pub episode: Episode,
+    /// How it is replayed.
+    pub replay: Replay,
+    /// Readings, `rows x width`; NaN where missing.
+    pub readings: Vec<f64>,
+}
+
+/// Some logs of one machine.
+pub struct Logs {
+    /// The logs.
+    pub logs: Vec<Log>,
+    /// Names of the sensors compared.
+    pub sensors: Vec<String>,
+    /// Differences of readings in units of the noise.
+    pub signals: SignalSet,
+}
+
+/// Noise of the sensors that the logs have: as the label says, else as the study, else as the diagnosis took it to be.
+fn noise(study: &Study, label: &Label, answer: Option<&Answer>) -> Result<Vec<Signal>> {
+    let said: BTreeMap<&str, f64> = answer
+        .into_iter()
+        .flat_map(|a| a.gap.signals.iter().map(|s| (&*s.signal, s.noise)))
+        .collect();
+    let logged = |name: &str| {
+        let mut all = study.train.iter().chain(&study.test);
+        all.any(|e| e.channel(name).is_some())
+    };
+    let sensors = study.plant.layout.sensors.iter();
+    sensors
+        .filter(|s| logged(&s.name))
+        .map(|s| {
+            let known = label
+                .noise
+                .get(&s.name)
+                .or_else(|| study.noise.get(&s.name));
+            let noise = known.copied().or_else(|| said.get(&*s.name).copied());
+            noise
+                .filter(|n| *n > 0.0)
+                .map(|noise| Signal {
+                    sensor: s.name.clone(),
+                    noise,
+                })
+                .ok_or_else(|| Error::Failed(format!("nobody says what noise `{}` has", s.name)))
+        })
+        .collect()
+}
+
+/// Undoes a fault of wiring in a log.
+fn mend(episode: &mut Episode, fault: &WiringTruth) -> Result<()> {
+    let at: Option<Vec<usize>> = fault
+        .columns
+        .iter()
+        .map(|c| episode.channel(c).map(|range| range.start))
+        .collect();
+    let wrong = || Error::Failed(format!("a fault `{}` cannot be mended", fault.fault));
+    let at = at.ok_or_else(wrong)?;
+    let width = episode.width();
+    let rows = episode.readings.chunks_exact_mut(width);
+    match (&*fault.fault, &at[..]) {
+        ("wiring-swapped", &[a, b]) => rows.for_each(|r| r.swap(a, b)),
+        ("wiring-offset", &[a]) => rows.for_each(|r| r[a] -= fault.value),
+        ("wiring-sign" | "wiring-unit", &[a]) if fault.value != 0.0 => {
+            rows.for_each(|r| r[a] /= fault.value);
+        }
+        // Readings at other times than their commands need another replay.
+        _ => return Err(wrong()),
+    }
+    Ok(())
+}
+
+/// The first rows of each log, such that a replay of all takes no more than some physics steps.
+#[must_use]
+pub fn within(episodes: &[Episode], timestep: f64, steps: f64) -> Vec<Episode> {
+    let length = |e: &Episode| (e.time[e.rows() - 1] - e.time[0]) / timestep;
+    let share = (steps / episodes.iter().map(length).sum::<f64>()).min(1.0);
+    let cut = |e: &Episode| {
+        let rows = (share * e.rows() as f64).ceil() as usize;
+        e.part(0..rows.max(FEWEST_ROWS).min(e.rows()))
+    };
+    episodes.iter().map(cut).collect()
+}
+
+impl Logs {
+    /// The study's logs to fit to, and those held out.
+    ///
+    /// # Errors
+    /// When the noise of a sensor is not known, or the logs cannot be mended.
+    pub fn of(study: &Study, label: &Label, answer: Option<&Answer>) -> Result<[Self; 2]> {
+        let signals = noise(study, label, answer)?;
+        let make = |episodes: &[Episode]| -> Result<Self> {
+            let mut cut = within(episodes, study.plant.layout.timestep, MOST_STEPS);
+            for episode in &mut cut {
+                label.wiring.iter().try_for_each(|w| mend(episode, w))?;
+            }
+            Self::new(&study.plant.layout, &signals, cut)
+        };
+        Ok([make(&study.train)?, make(&study.test)?])
+    }
+
+    /// Some episodes, compared by some signals.
+    ///
+    /// # Errors
+    /// When the scene has no such sensor.
+    pub fn new(layout: &Layout, signals: &[Signal], episodes: Vec<Episode>) -> Result<Self> {
+        let sensors: Vec<String> = signals.iter().map(|s| s.sensor.clone()).collect();
+        let logs = episodes.into_iter().map(|episode| {
+            Ok(Log {
+                readings: episode.select(layout, &sensors),
+                replay: Replay::new(layout, &episode, &sensors)?,
+                episode,
+            })
+        });
+        Ok(Self {
+            logs: logs.collect::<Result<_>>()?,
+            signals: SignalSet::new(layout, signals)?,
+            sensors,
+        })
+    }
+
+    /// The first rows of each log: what a start that no log gives is fitted to.
+    ///
+    /// # Errors
+    /// As [`Logs::of`].
+    pub fn heads(&self, layout: &Layout, share: f64) -> Result<Self> {
+        self.cut(layout, |rows| head_rows(rows, share))
+    }
+
+    /// The same logs again.
+    ///
+    /// # Errors
+    /// As [`Logs::of`].
+    pub fn like(&self, layout: &Layout) -> Result<Self> {
+        self.cut(layout, |rows| rows)
+    }
+
+    fn cut(&self, layout: &Layout, rows: impl Fn(usize) -> usize) -> Result<Self> {
+        let logs = self.logs.iter().map(|log| {
+            let episode = log.episode.part(0..rows(log.episode.rows()));
+            Ok(Log {
+                readings: episode.select(layout, &self.sensors),
+                replay: Replay::new(layout, &episode, &self.sensors)?,
+                episode,
+            })
+        });
+        Ok(Self {
+            logs: logs.collect::<Result<_>>()?,
+            sensors: self.sensors.clone(),
+            signals: self.signals.clone(),
+        })
+    }
+
+    /// The same logs with other readings, one array a log; what is missing stays missing.
+    #[must_use]
+    pub fn with_readings(mut self, readings: &[Vec<f64>]) -> Self {
+        for (log, new) in self.logs.iter_mut().zip(readings) {
+            for (old, new) in log.readings.iter_mut().zip(new) {
+                if old.is_finite() {
+                    *old = *new;
+                }
+            }
+        }
+        self
+    }
+
+    /// Differences of the readings and predicted ones (`rows x width`, one array a log) in units of the noise, one
+    /// after the other; NaN where a reading is missing or a simulation diverged.
+    #[must_use]
+    pub fn residuals(&self, predicted: &[Vec<f64>]) -> Vec<Vec<f64>> {
+        let (width, n) = (self.signals.width(), self.signals.whitened_len());
+        let logs = self.logs.iter().zip(predicted);
+        logs.map(|(log, predicted)| {
+            let mut out = vec![0.0; log.episode.rows() * n];
+            let rows = log
+                .readings
+                .chunks_exact(width)
+                .zip(predicted.chunks_exact(width));
+            for ((real, said), out) in rows.zip(out.chunks_exact_mut(n)) {
+                self.signals.difference(real, said, out);
+            }
+            out
+        })
+        .collect()
+    }
+}
+
+/// Rows of the head of a log with so many rows.
+#[must_use]
+pub fn head_rows(rows: usize, share: f64) -> usize {
+    let share = (share * rows as f64).ceil() as usize;
+    share.max(FEWEST_ROWS).min(rows)
+}

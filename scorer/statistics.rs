@@ -1,0 +1,236 @@
+//! Shares, means and medians with intervals, and how far stated probabilities are from what happens.
+
+use asid_core::rng::Streams;
+use rand::Rng as _;
+use serde::Serialize;
+
+/// Draws of a bootstrap: the ends of a 95 % interval are then good to about a twentieth of its width.
+const DRAWS: usize = 1000;
+/// Seed of all chance in a score: the same results give the same bytes.
+const SEED: u64 = 0x5c0_7e57;
+/// Deviations of a normal variable that 95 % lie within.
+const Z95: f64 = 1.959_963_984_540_054;
+/// Bins of a calibration curve, by width: ten, as in Guo et al. 2017, would hold a case or two each in a set of 75.
+pub const BINS: usize = 5;
+
+/// A share of cases.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Share {
+    /// Cases for which it holds.
+    pub count: usize,
+    /// Cases.
+    pub of: usize,
+    /// 95 % interval (Wilson 1927), which has a width even where none or all hold; null of no case.
+    pub interval95: Option<[f64; 2]>,
+}
+
+impl Share {
+    /// How many of some cases hold.
+    #[must_use]
+    pub fn of(holds: impl IntoIterator<Item = bool>) -> Self {
+        let (mut count, mut of) = (0, 0);
+        for holds in holds {
+            count += usize::from(holds);
+            of += 1;
+        }
+        Self {
+            count,
+            of,
+            interval95: (of > 0).then(|| wilson(count, of)),
+        }
+    }
+
+    /// The share; `None` of no case.
+    #[must_use]
+    pub fn value(&self) -> Option<f64> {
+        (self.of > 0).then(|| self.count as f64 / self.of as f64)
+    }
+
+    /// `7 of 9`.
+    #[must_use]
+    pub fn text(&self) -> String {
+        format!("{} of {}", self.count, self.of)
+    }
+}
+
+/// A figure over cases with its interval.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Figure {
+    /// Mean or median.
+    pub value: f64,
+    /// 95 % interval: percentiles of a bootstrap over cases (Efron 1979).
+    pub interval95: [f64; 2],
+    /// Cases.
+    pub of: usize,
+}
+
+impl Figure {
+    /// Mean; `None` of no case.
+    #[must_use]
+    pub fn mean(values: &[f64]) -> Option<Self> {
+        Self::new(values, |v| v.iter().sum::<f64>() / v.len() as f64)
+    }
+
+    /// Median; `None` of no case.
+    #[must_use]
+    pub fn median(values: &[f64]) -> Option<Self> {
+        Self::new(values, |v| median(v).unwrap_or(f64::NAN))
+    }
+
+    fn new(values: &[f64], of: impl Fn(&mut [f64]) -> f64) -> Option<Self> {
+        if values.is_empty() {
+            return None;
+        }
+        let mut random = Streams::new(SEED).stream("bootstrap");
+        let mut drawn: Vec<f64> = (0..DRAWS)
+            .map(|_| {
+                let mut again: Vec<f64> = (0..values.len())
+                    .map(|_| values[random.random_range(0..values.len())])
+                    .collect();
+                of(&mut again)
+            })
+            .collect();
+        drawn.sort_by(f64::total_cmp);
+        let at = |share: f64| drawn[(share * (DRAWS - 1) as f64).round() as usize];
+        Some(Self {
+            value: of(&mut values.to_vec()),
+            interval95: [at(0.025), at(0.975)],
+            of: values.len(),
+        })
+    }
+}
+
+/// Median, the mean of the two in the middle; sorts the values. `None` of nothing.
+pub fn median(values: &mut [f64]) -> Option<f64> {
+    values.sort_by(f64::total_cmp);
+    let n = values.len();
+    (n > 0).then(|| (values[(n - 1) / 2] + values[n / 2]) / 2.0)
+}
+
+/// Wilson's 95 % interval of a share.
+#[must_use]
+pub fn wilson(count: usize, of: usize) -> [f64; 2] {
+    let (n, p) = (of as f64, count as f64 / of as f64);
+    let z2 = Z95 * Z95;
+    let center = (p + z2 / (2.0 * n)) / (1.0 + z2 / n);
+    let half = Z95 / (1.0 + z2 / n) * (p * (1.0 - p) / n + z2 / (4.0 * n * n)).sqrt();
+    [(center - half).max(0.0), (center + half).min(1.0)]
+}
+
+/// One bin of a calibration curve.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Bin {
+    /// Mean stated probability.
+    pub stated: f64,
+    /// Share that came true.
+    pub true_share: Share,
+}
+
+/// How far stated probabilities are from what happens.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Calibration {
+    /// Bins that hold a case, by stated probability.
+    pub bins: Vec<Bin>,
+    /// Expected calibration error: mean distance of stated probability and true share, over bins weighted by cases.
+    pub error: f64,
+    /// What a perfectly calibrated answer with the same stated probabilities would show in the mean, by simulation: the
+    /// bias of the error at this number of cases.
+    pub error_of_chance: f64,
+    /// What nineteen of twenty such answers would stay below.
+    pub error_of_chance95: f64,
+}
+
+impl Calibration {
+    /// Of pairs of a stated probability and whether it came true.
+    #[must_use]
+    pub fn of(stated: &[(f64, bool)]) -> Self {
+        let mut random = Streams::new(SEED).stream("calibration");
+        let mut chance: Vec<f64> = (0..DRAWS)
+            .map(|_| {
+                let drawn: Vec<(f64, bool)> = stated
+                    .iter()
+                    .map(|&(p, _)| (p, random.random::<f64>() < p))
+                    .collect();
+                error(&drawn)
+            })
+            .collect();
+        chance.sort_by(f64::total_cmp);
+        Self {
+            bins: bins(stated)
+                .into_iter()
+                .filter(|b| !b.is_empty())
+                .map(|b| Bin {
+                    stated: b.iter().map(|x| x.0).sum::<f64>() / b.len() as f64,
+                    true_share: Share::of(b.iter().map(|x| x.1)),
+                })
+                .collect(),
+            error: error(stated),
+            error_of_chance: chance.iter().sum::<f64>() / DRAWS as f64,
+            error_of_chance95: chance[DRAWS * 95 / 100],
+        }
+    }
+}
+
+fn bins(stated: &[(f64, bool)]) -> Vec<Vec<(f64, bool)>> {
+    let mut bins = vec![Vec::new(); BINS];
+    for &(p, came_true) in stated {
+        let bin = (p * BINS as f64) as usize;
+        bins[bin.min(BINS - 1)].push((p, came_true));
+    }
+    bins
+}
+
+fn error(stated: &[(f64, bool)]) -> f64 {
+    let distance = |bin: &Vec<(f64, bool)>| {
+        let sum: f64 = bin.iter().map(|&(p, t)| p - f64::from(u8::from(t))).sum();
+        sum.abs()
+    };
+    bins(stated).iter().map(distance).sum::<f64>() / stated.len().max(1) as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn wilson_is_the_interval_of_the_textbook() {
+        // 0 of 10: [0, z² / (n + z²)] (Wilson 1927).
+        let [low, high] = wilson(0, 10);
+        let z2 = Z95 * Z95;
+        assert!(low == 0.0 && (high - z2 / (10.0 + z2)).abs() < 1e-12);
+        let [low, high] = wilson(5, 10);
+        assert!((low + high - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_bootstrap_of_the_mean_has_the_width_of_its_standard_error() {
+        let values: Vec<f64> = (0..400).map(|i| f64::from(i % 2)).collect();
+        let mean = Figure::mean(&values).unwrap();
+        let width = mean.interval95[1] - mean.interval95[0];
+        let expected = 2.0 * Z95 * 0.5 / 20.0;
+        assert!(
+            mean.value == 0.5 && (width / expected - 1.0).abs() < 0.15,
+            "{width}"
+        );
+        assert!(Figure::median(&[]).is_none());
+    }
+
+    #[test]
+    fn calibrated_answers_show_the_error_of_chance_and_no_more() {
+        let mut random = Streams::new(1).stream("answers");
+        let calibrated: Vec<(f64, bool)> = (0..60)
+            .map(|_| {
+                let p: f64 = random.random();
+                (p, random.random::<f64>() < p)
+            })
+            .collect();
+        let c = Calibration::of(&calibrated);
+        // A few cases show an error though nothing is wrong.
+        assert!(c.error_of_chance > 0.03, "{c:?}");
+        assert!(c.error < c.error_of_chance95, "{c:?}");
+        // Sure and wrong in every second case is an error of a half.
+        let boasting: Vec<(f64, bool)> = (0..60).map(|i| (1.0, i % 2 == 0)).collect();
+        let c = Calibration::of(&boasting);
+        assert!((c.error - 0.5).abs() < 1e-12 && c.error_of_chance < 1e-12);
+    }
+}

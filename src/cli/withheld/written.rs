@@ -1,0 +1,107 @@
+//! What is written and told of scores.
+
+use std::io::Write as _;
+use std::path::Path;
+
+use anyhow::Result;
+use asid_core::Error;
+use asid_scorer::board::Score;
+use asid_scorer::{lines, page};
+use serde::Serialize;
+
+use super::control::Control;
+use super::method::{Asked, Method};
+use super::score::Session;
+use crate::cli::output::{write_json, write_text};
+
+/// `result.json`.
+#[derive(Serialize)]
+struct Output<'a> {
+    #[serde(flatten)]
+    score: &'a Score,
+    /// How the check was spoilt on purpose.
+    control: Option<&'static str>,
+    limit: Option<f64>,
+    seed: u64,
+    without: &'a [String],
+    backend: &'a str,
+    /// Scores of the other methods on the same cases.
+    others: &'a [Score],
+    versions: Versions,
+}
+
+#[derive(Serialize)]
+struct Versions {
+    asid: &'static str,
+    git: &'static str,
+}
+
+impl Session<'_> {
+    /// Writes and tells the scores, the first method's first.
+    pub fn write(&self, scores: &[Score]) -> Result<()> {
+        let arguments = self.arguments;
+        let Some((score, others)) = scores.split_first() else {
+            return Ok(());
+        };
+        let asked = Asked::new(Method::Diagnose, arguments);
+        let output = Output {
+            score,
+            control: arguments.control.map(Control::name),
+            limit: arguments.limit,
+            seed: arguments.common.seed.unwrap_or(0),
+            without: &arguments.without,
+            backend: &asked.backend,
+            others,
+            versions: Versions {
+                asid: env!("CARGO_PKG_VERSION"),
+                git: env!("ASID_GIT"),
+            },
+        };
+        // Cases and controls of one set stand side by side; a score is written anew as a whole.
+        let stem = arguments.control.map_or("", Control::name);
+        let named = |name: &str| match stem {
+            "" => self.out.join(name),
+            stem => self.out.join(format!("{stem}-{name}")),
+        };
+        let about = page::About {
+            command: crate::cli::run::command_line(),
+            engine: format!("{} {}", self.backend.name(), self.backend.version()),
+            control: arguments.control.map(Control::expects),
+            limit: arguments.limit,
+        };
+        std::fs::create_dir_all(&self.out).map_err(|e| {
+            Error::Failed(format!("{}: cannot be written: {e}", self.out.display()))
+        })?;
+        whole(&named("report.html"), |file| {
+            write_text(file, &page::page(scores, &about))
+        })?;
+        whole(&named("result.json"), |file| write_json(file, &output))?;
+        let mut stdout = std::io::stdout().lock();
+        if arguments.common.json {
+            writeln!(stdout, "{}", serde_json::to_string_pretty(&output)?)?;
+        } else {
+            for line in lines::lines(scores) {
+                writeln!(stdout, "{line}")?;
+            }
+            if let Some(control) = arguments.control {
+                writeln!(stdout, "control: {}", control.expects())?;
+            }
+            writeln!(stdout, "results: {}", named("report.html").display())?;
+        }
+        Ok(())
+    }
+}
+
+/// Writes a file that takes its name when it is whole, in place of one that has it.
+fn whole(file: &Path, write: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
+    let staging = file.with_extension(format!("{}.part", std::process::id()));
+    let done = write(&staging).and_then(|()| {
+        std::fs::rename(&staging, file).map_err(|e| {
+            Error::Failed(format!("{}: cannot be written: {e}", file.display())).into()
+        })
+    });
+    if done.is_err() {
+        let _ = std::fs::remove_file(&staging);
+    }
+    done
+}
