@@ -1,21 +1,37 @@
 //! A diagnosis from a study to its result.
 
-use asid_core::{Progress, Result};
+use asid_core::{Progress, Result, Streams};
 use asid_effects::EffectSpec;
 
 use crate::bench::{Bench, Explanation, Trial};
-use crate::candidate::Candidate;
+use crate::candidate::{Candidate, enumerate};
 use crate::fit::cost;
 use crate::intake::Intake;
 use crate::latent_force;
 use crate::machine::Machine;
-use crate::prepare::plain_residuals;
+use crate::predict::{Point, State};
+use crate::prepare::{Prepared, plain_residuals, prepare};
+use crate::record::Record;
 use crate::result::{DiagnosisResult, DiagnosisTrace};
-use crate::search::{Breadth, Findings, trials};
+use crate::search::{Breadth, Findings, Search, trials};
 use crate::study::Study;
 use crate::telling::Telling;
+use crate::trajectory::Trajectory;
+use crate::verdict::judge;
 
 pub use crate::work::Work;
+
+/// How logs are taken in which bodies touch.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Contact {
+    /// By whole replays.
+    #[default]
+    Replays,
+    /// In short segments: right on a tilt, a bounce and a board whose friction differs by place, but still too ready to name
+    /// a further effect beside the right one.
+    Segments,
+}
 
 /// Settings of a diagnosis.
 #[derive(Clone, Debug, Default)]
@@ -26,6 +42,8 @@ pub struct Settings {
     pub breadth: Breadth,
     /// Effects of the catalogue that are left out, by name.
     pub without: Vec<String>,
+    /// How logs are taken in which bodies touch.
+    pub contact: Contact,
 }
 
 /// A finished diagnosis.
@@ -68,9 +86,60 @@ fn diagnose_physics(
     settings: Settings,
     progress: &dyn Progress,
 ) -> Result<(Diagnosis, Work)> {
-    let mut work = latent_force::pipeline::diagnose(study, machine, &settings.without, progress)?;
-    work.findings = final_noise(&mut work.bench, study, &work.candidates, work.findings)?;
-    work.none = vec![work.findings.none.clone()];
+    let by_force = latent_force::pipeline::diagnose(
+        study,
+        machine,
+        (&settings.without, settings.contact),
+        progress,
+    )?;
+    let machine = match by_force {
+        Ok(mut work) => {
+            work.findings = final_noise(&mut work.bench, study, &work.candidates, work.findings)?;
+            work.none = vec![work.findings.none.clone()];
+            return tell(study, work, settings, progress);
+        }
+        Err(machine) => machine,
+    };
+    let streams = Streams::new(settings.seed);
+    progress.begin("fitting the study's parameters", 1);
+    let Prepared {
+        mut bench,
+        none,
+        nominal,
+        mut scatter,
+    } = prepare(study, machine, streams.stream("scatter"))?;
+    progress.end();
+    let last = &none[none.len() - 1];
+    let model = bench.machine.with(&[])?;
+    let shown = Trajectory::of(
+        &*model,
+        &bench.machine.plant,
+        &bench.parameters,
+        &bench.train.logs,
+        &last.fit.point,
+        bench.machine.threads,
+    )?;
+    let (candidates, left_out) = enumerate(&bench.machine, &shown, &settings.without);
+    let findings = Search {
+        bench: &mut bench,
+        scatter: &mut scatter,
+        candidates: &candidates,
+        breadth: settings.breadth,
+        progress,
+    }
+    .run(&none)?;
+    let findings = final_noise(&mut bench, study, &candidates, findings)?;
+    let scatter = cost_scatter(&bench, &findings.none)?;
+    let judgement = judge(&bench, &findings, candidates.len(), scatter);
+    let work = Work {
+        bench,
+        candidates,
+        left_out,
+        findings,
+        none,
+        judgement,
+        nominal,
+    };
     tell(study, work, settings, progress)
 }
 
@@ -147,4 +216,33 @@ fn rescore(bench: &Bench, trials: &[Trial<'_>], of: &mut Explanation) -> Result<
     of.fit.residuals = residuals.pop().unwrap_or_default();
     of.fit.cost = cost(&of.fit.residuals);
     bench.hold_out(trials, of)
+}
+
+/// Deviation of the sum of squares over all logs that next to nothing at the starts makes.
+fn cost_scatter(bench: &Bench, none: &Explanation) -> Result<f64> {
+    if !bench.is_rough() {
+        return Ok(0.0);
+    }
+    let of = |record: &Record, starts: &[State]| -> Result<f64> {
+        let mut predictor = bench.predictor(&[], record)?;
+        let point = |k: i32| {
+            let mut point = Point {
+                theta: none.fit.point.theta.clone(),
+                starts: starts.to_vec(),
+            };
+            for start in &mut point.starts {
+                start.shift(bench.layout(), 0, f64::from(k) * crate::linearise::PROBE);
+            }
+            point
+        };
+        let points: Vec<Point> = (1..=8).map(point).collect();
+        let residuals = predictor.residuals(&points)?;
+        let costs: Vec<f64> = residuals.iter().map(|r| cost(r)).collect();
+        let n = costs.len() as f64;
+        let mean = costs.iter().sum::<f64>() / n;
+        Ok(costs.iter().map(|c| (c - mean).powi(2)).sum::<f64>() / (n - 1.0))
+    };
+    let train = of(&bench.train, &none.fit.point.starts)?;
+    let test = of(&bench.test, &none.held_starts)?;
+    Ok((train + test).sqrt())
 }

@@ -5,6 +5,7 @@ use asid_core::{Layout, Progress, Result};
 
 use crate::bench::{Bench, Explanation, Stage};
 use crate::candidate::{Candidate, enumerate};
+use crate::diagnose::Contact;
 use crate::fit::Effort;
 use crate::machine::Machine;
 use crate::predict::State;
@@ -39,16 +40,16 @@ const REPLAYED: usize = 500_000;
 /// Most sets besides the verdict's that are replayed.
 const RIVALS: usize = 4;
 
-/// Diagnoses a study.
+/// Diagnoses a study; gives the machine back where bodies touch and whole replays are asked for there.
 ///
 /// # Errors
 /// When a parameter cannot be set or the engine fails.
 pub fn diagnose(
     study: &Study,
     machine: Machine,
-    without: &[String],
+    (without, contact): (&[String], Contact),
     progress: &dyn Progress,
-) -> Result<Work> {
+) -> Result<std::result::Result<Work, Machine>> {
     progress.begin("smoothing the logs", 1);
     let (mut bench, nominal) = dataset(study, machine)?;
     set_reading_noise(&mut bench, &study.noise);
@@ -58,8 +59,12 @@ pub fn diagnose(
         specs: Vec::new(),
         unknowns: unknowns.map(|(p, n)| Unknown::of_study(p, *n)).collect(),
     };
+    let taken = take(study, &bench, &nominal)?;
+    if contact == Contact::Replays && taken.walks.iter().any(|w| w.segment.is_some()) {
+        progress.end();
+        return Ok(Err(bench.machine));
+    }
     let (outcome, candidates, left_out, firsts) = {
-        let taken = take(study, &bench, &nominal)?;
         let parameters = (&study.parameters[..], &nominal[..]);
         let (context, mut estimate) = begin(&bench.machine, &logs, taken, parameters)?;
         settle_noise(&context, &hypothesis, &nominal, &mut estimate, FIRST)?;
@@ -87,7 +92,7 @@ pub fn diagnose(
     let (findings, sets) = replay(&mut bench, &candidates, &outcome, &firsts)?;
     progress.end();
     let judgement = select(&bench, &outcome, &sets, &findings, &candidates);
-    Ok(Work {
+    Ok(Ok(Work {
         none: vec![findings.none.clone()],
         bench,
         candidates,
@@ -95,7 +100,7 @@ pub fn diagnose(
         findings,
         judgement,
         nominal,
-    })
+    }))
 }
 
 /// What the model does along some states.

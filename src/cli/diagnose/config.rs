@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Result;
 use asid_core::registry::{self, BackendEntry, TaskEntry, find};
 use asid_core::{Capabilities, Episode, Error};
-use asid_diagnosis::diagnose::Settings;
+use asid_diagnosis::diagnose::{Contact, Settings};
 use asid_diagnosis::search::Breadth;
 use asid_diagnosis::study::Study;
 use asid_effects::EffectEntry;
@@ -115,6 +115,7 @@ struct SearchConfig {
     singles: usize,
     beam: usize,
     depth: usize,
+    contact: Contact,
 }
 
 impl Default for SearchConfig {
@@ -132,6 +133,7 @@ impl Default for SearchConfig {
             singles,
             beam,
             depth,
+            contact: Contact::default(),
         }
     }
 }
@@ -228,6 +230,7 @@ impl Config {
             singles,
             beam,
             depth,
+            contact,
         } = self.search;
         Settings {
             seed: self.seed,
@@ -239,6 +242,7 @@ impl Config {
                 depth,
             },
             without: self.without.clone(),
+            contact,
         }
     }
 
