@@ -80,7 +80,10 @@ fn resize(
         ];
         for (states, readings) in found.iter_mut() {
             for all in [states, readings] {
-                all.iter_mut().skip(column - base).step_by(m).for_each(|x| *x *= factor);
+                all.iter_mut()
+                    .skip(column - base)
+                    .step_by(m)
+                    .for_each(|x| *x *= factor);
             }
         }
     }
@@ -123,7 +126,13 @@ impl Columns {
             state: true,
             ..Derivatives::default()
         };
-        let mut linear = map.linearise(theta, &estimate.trajectory, want, &context.start_steps(), &variations)?;
+        let mut linear = map.linearise(
+            theta,
+            &estimate.trajectory,
+            want,
+            &context.start_steps(),
+            &variations,
+        )?;
         let late: Vec<Vec<f64>> = linear.iter().map(|l| l.late.clone()).collect();
         let source = Source {
             all,
@@ -148,7 +157,10 @@ impl Columns {
                 let [low, high]: [f64; 2] = candidates[c].ranges[p];
                 high - low
             };
-            trials.iter().map(|t| REPLAY_TRIAL / SHARE * range(t)).collect()
+            trials
+                .iter()
+                .map(|t| REPLAY_TRIAL / SHARE * range(t))
+                .collect()
         } else {
             sizes(context, estimate, &source, &trials)?
         };

@@ -14,7 +14,7 @@ use crate::data::Logs;
 use crate::machine::Machine;
 use crate::predict::State;
 
-use super::initial::{from_readings, position_noise, start, open_by_reading, start_of_segment};
+use super::initial::{from_readings, open_by_reading, position_noise, start, start_of_segment};
 use super::smoother::{NoiseModel, Problem, Smoothed, Start, Sums, smooth};
 use super::step_map::{Derivatives, LinearEpisode, StepMap};
 use super::tangent::{difference, retract};
@@ -360,7 +360,12 @@ impl Estimate {
     ///
     /// # Errors
     /// When the engine fails.
-    pub fn roll(&mut self, map: &mut StepMap<'_>, theta: &[f64], before: &[Vec<f64>]) -> Result<()> {
+    pub fn roll(
+        &mut self,
+        map: &mut StepMap<'_>,
+        theta: &[f64],
+        before: &[Vec<f64>],
+    ) -> Result<()> {
         if !map.has_segments() {
             return Ok(());
         }
@@ -369,11 +374,25 @@ impl Estimate {
         let all: Vec<bool> = vec![true; self.trajectory.len()];
         let mut left = map.roll(theta, (&mut self.trajectory, &all), &self.noise.r)?;
         // Where the step left what it promised, no shorter one is tried.
-        let worse: Vec<bool> = left.iter().zip(&self.smoothed).map(|(left, s)| {
-            let promised = s.sums.reading.iter().zip(&self.noise.r).map(|([sum, _], r)| sum / r);
-            *left > KEPT_PROMISE * promised.sum::<f64>()
-        }).collect();
-        let offered = self.smoothed.iter().map(|s| s.damped.len()).max().unwrap_or(0);
+        let worse: Vec<bool> = left
+            .iter()
+            .zip(&self.smoothed)
+            .map(|(left, s)| {
+                let promised = s
+                    .sums
+                    .reading
+                    .iter()
+                    .zip(&self.noise.r)
+                    .map(|([sum, _], r)| sum / r);
+                *left > KEPT_PROMISE * promised.sum::<f64>()
+            })
+            .collect();
+        let offered = self
+            .smoothed
+            .iter()
+            .map(|s| s.damped.len())
+            .max()
+            .unwrap_or(0);
         for i in 0..=offered {
             let mut other = before.to_vec();
             for (states, smoothed) in other.iter_mut().zip(&self.smoothed) {
@@ -428,7 +447,11 @@ impl Estimate {
         let pairs = self.trajectory.iter_mut().zip(&self.smoothed);
         for ((states, smoothed), walk) in pairs.zip(&context.walks) {
             // A segment is replayed from its start.
-            let rows = if walk.segment.is_some() { 1 } else { walk.len() };
+            let rows = if walk.segment.is_some() {
+                1
+            } else {
+                walk.len()
+            };
             let changes = smoothed.change.chunks_exact(nx).take(rows);
             for (state, change) in states.chunks_exact_mut(width).zip(changes) {
                 if change.iter().all(|x| x.is_finite()) {
@@ -492,7 +515,11 @@ impl Estimate {
                 n += count;
             }
             let value: f64 = squares / f64::max(n, 1.0);
-            *excess = if value.is_finite() { value.max(1.0) } else { *excess };
+            *excess = if value.is_finite() {
+                value.max(1.0)
+            } else {
+                *excess
+            };
         }
     }
 
@@ -640,7 +667,11 @@ impl Estimate {
     }
 
     /// The missing force at a degree of freedom, along all walks that are smoothed.
-    fn forces<'s>(&'s self, context: &'s Context<'_>, dof: usize) -> impl Iterator<Item = f64> + 's {
+    fn forces<'s>(
+        &'s self,
+        context: &'s Context<'_>,
+        dof: usize,
+    ) -> impl Iterator<Item = f64> + 's {
         let nv = context.plant().layout.nv;
         let pairs = self.smoothed.iter().zip(&context.walks);
         pairs

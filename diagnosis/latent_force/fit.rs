@@ -185,7 +185,8 @@ pub fn fit(
             state: fresh,
             ..want
         };
-        let mut linear = map.linearise(&theta, &estimate.trajectory, wanted, &steps, &variations)?;
+        let mut linear =
+            map.linearise(&theta, &estimate.trajectory, wanted, &steps, &variations)?;
         slopes.exchange(&mut linear, fresh.then_some(&theta[..]));
         let places: Vec<usize> = (0..m).collect();
         let center: Vec<f64> = free
@@ -356,7 +357,8 @@ pub fn settle_noise(
     let mut slopes = Slopes::default();
     let steps = context.start_steps();
     for _ in 0..rounds {
-        let fresh = map.reads() && !map.is_all_segments() || slopes.is_old(theta, &hypothesis.unknowns);
+        let fresh =
+            map.reads() && !map.is_all_segments() || slopes.is_old(theta, &hypothesis.unknowns);
         let wanted = Derivatives {
             state: fresh,
             ..want

@@ -288,11 +288,18 @@ pub fn open_by_reading(i: usize, (scale, noise): (&[f64], &[f64])) -> f64 {
 
 /// Where a segment begins about its trajectory's first state: at its readings, as open as these leave it.
 #[must_use]
-pub fn start_of_segment(plant: &Plant, read: &[f64], first: &[f64], scales: (&[f64], &[f64])) -> Start {
+pub fn start_of_segment(
+    plant: &Plant,
+    read: &[f64],
+    first: &[f64],
+    scales: (&[f64], &[f64]),
+) -> Start {
     let nx = 2 * plant.layout.nv;
     let mut start = Start {
         mean: vec![0.0; nx],
-        variance: (0..nx).map(|i| open_by_reading(i, scales).powi(2)).collect(),
+        variance: (0..nx)
+            .map(|i| open_by_reading(i, scales).powi(2))
+            .collect(),
     };
     difference(&plant.layout, read, first, &mut start.mean);
     start

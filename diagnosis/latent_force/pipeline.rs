@@ -104,12 +104,7 @@ pub fn diagnose(
 }
 
 /// What the model does along some states.
-fn along(
-    bench: &Bench,
-    walks: &[Walk],
-    theta: &[f64],
-    states: &[Vec<f64>],
-) -> Result<Trajectory> {
+fn along(bench: &Bench, walks: &[Walk], theta: &[f64], states: &[Vec<f64>]) -> Result<Trajectory> {
     let model = bench.machine.with(&[])?;
     let plant = &bench.machine.plant;
     let values = (&bench.parameters[..], theta);
@@ -126,16 +121,19 @@ fn take(study: &Study, bench: &Bench, nominal: &[f64]) -> Result<Taken> {
     let whole = within_budget((0..logs.episodes.len()).map(whole).collect(), layout.nv);
     let home = asid_core::problem::home(layout);
     let still = [&home.0[..], &home.1[..]].concat();
-    let at_home = |walks: &[Walk]| -> Vec<Vec<f64>> {
-        walks.iter().map(|w| still.repeat(w.len())).collect()
-    };
+    let at_home =
+        |walks: &[Walk]| -> Vec<Vec<f64>> { walks.iter().map(|w| still.repeat(w.len())).collect() };
     let first = from_readings(plant, logs, &whole, &at_home(&whole));
     let shown = along(bench, &whole, nominal, &first)?;
     let pairs = shown.pairs.len();
     let mut walks = Vec::new();
     for (walk, path) in whole.iter().zip(&shown.episodes) {
         let touches: Vec<bool> = (0..walk.len())
-            .map(|k| path.contact[k * pairs..(k + 1) * pairs].iter().any(|f| *f > 0.0))
+            .map(|k| {
+                path.contact[k * pairs..(k + 1) * pairs]
+                    .iter()
+                    .any(|f| *f > 0.0)
+            })
             .collect();
         walks.extend(cut(walk, &touches));
     }

@@ -251,7 +251,10 @@ impl<'a> StepMap<'a> {
         let common = &self.common;
         let mut shares: Vec<Vec<Vec<f64>>> = Vec::with_capacity(self.parts.len());
         for part in &self.parts {
-            let own = part.walks.iter().map(|&w| std::mem::take(&mut trajectory[w]));
+            let own = part
+                .walks
+                .iter()
+                .map(|&w| std::mem::take(&mut trajectory[w]));
             shares.push(own.collect());
         }
         let left: Vec<Result<Vec<f64>>> = self

@@ -115,7 +115,10 @@ impl Source<'_> {
         let plant = context.plant();
         let (nv, m) = (plant.layout.nv, wanted.len());
         let (nx, ns) = (2 * nv, context.logs.entries.len());
-        let traced = |w: &Wanted| self.all.is_traced(context, &self.all.candidates[w.candidate]);
+        let traced = |w: &Wanted| {
+            self.all
+                .is_traced(context, &self.all.candidates[w.candidate])
+        };
         let by_engine: Vec<usize> = (0..m).filter(|&i| !traced(&wanted[i])).collect();
         let variations: Vec<Variation> = by_engine
             .iter()

@@ -136,7 +136,12 @@ fn log_likelihood(
     right: &DVector<f64>,
 ) -> f64 {
     let start = problem.start;
-    let prior: f64 = start.mean.iter().zip(&start.variance).map(|(m, v)| m * m / v).sum();
+    let prior: f64 = start
+        .mean
+        .iter()
+        .zip(&start.variance)
+        .map(|(m, v)| m * m / v)
+        .sum();
     let squares = rows.left.norm_squared() + prior - right.dot(&factor.solve(right));
     let determinant: f64 = factor.l_dirty().diagonal().iter().map(|x| x.ln()).sum();
     -0.5 * squares - determinant - rows.log_deviation
@@ -161,5 +166,120 @@ pub(super) fn regress(problem: Problem<'_>, noise: &NoiseModel, m: usize) -> Reg
         log_likelihood: log_likelihood(&rows, problem, &factor, &right),
         gram: gram - cross.transpose() * &solved,
         moment: moment - solved.transpose() * right,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{DMatrix, DVector};
+
+    use super::super::{NoiseModel, Problem, Start};
+    use super::*;
+    use crate::latent_force::step_map::LinearEpisode;
+    use crate::latent_force::walk::Walk;
+
+    const ROWS: usize = 6;
+
+    /// A segment of one degree of freedom: its place read with a deviation of 0.2, an open start, and one column.
+    struct Case {
+        walk: Walk,
+        linear: LinearEpisode,
+        start: Start,
+        noise: NoiseModel,
+    }
+
+    impl Case {
+        fn new() -> Self {
+            let time: Vec<f64> = (0..ROWS).map(|k| 0.1 * k as f64).collect();
+            let mut residual: Vec<f64> = time.iter().map(|t| 0.3 - t + 4.0 * t * t).collect();
+            // The first row is of the lead.
+            residual[0] = f64::NAN;
+            Self {
+                linear: LinearEpisode {
+                    rows: ROWS,
+                    residual,
+                    h: time.iter().flat_map(|t| [1.0, *t]).collect(),
+                    reading_columns: time.iter().map(|t| 0.5 * t * t).collect(),
+                    ..LinearEpisode::default()
+                },
+                walk: Walk {
+                    episode: 0,
+                    rows: (0..ROWS).collect(),
+                    substeps: vec![1; ROWS - 1],
+                    ctrl: Vec::new(),
+                    segment: Some(1),
+                    time,
+                },
+                start: Start {
+                    mean: vec![0.1, -0.2],
+                    variance: vec![0.5, 2.0],
+                },
+                noise: NoiseModel {
+                    q: vec![0.0],
+                    tau: vec![1.0],
+                    white: vec![0.0],
+                    r: vec![0.04],
+                },
+            }
+        }
+
+        fn problem(&self) -> Problem<'_> {
+            Problem {
+                walk: &self.walk,
+                linear: &self.linear,
+                b: &[],
+                start: &self.start,
+                free: &[],
+            }
+        }
+
+        /// Covariance of all readings that count with the start open, what is left at its mean, and the column.
+        fn dense(&self) -> (DMatrix<f64>, DVector<f64>, DVector<f64>) {
+            let n = ROWS - 1;
+            let h = DMatrix::from_row_slice(n, 2, &self.linear.h[2..]);
+            let open = DMatrix::from_diagonal(&DVector::from_row_slice(&self.start.variance));
+            let covariance = &h * open * h.transpose() + DMatrix::identity(n, n) * 0.04;
+            let mean = &h * DVector::from_row_slice(&self.start.mean);
+            let left = DVector::from_row_slice(&self.linear.residual[1..]) - mean;
+            let column = DVector::from_row_slice(&self.linear.reading_columns[1..]);
+            (covariance, left, column)
+        }
+    }
+
+    #[test]
+    fn the_start_is_projected_out_as_from_the_joint_normal_distribution() {
+        let case = Case::new();
+        let (covariance, left, column) = case.dense();
+        let inverse = covariance.clone().try_inverse().unwrap();
+        let found = regress(case.problem(), &case.noise, 1);
+        let want = (column.transpose() * &inverse * &column)[0];
+        assert!((found.gram[(0, 0)] - want).abs() < 1e-10 * want);
+        let want = (column.transpose() * &inverse * &left)[0];
+        assert!((found.moment[0] - want).abs() < 1e-10 * want.abs());
+        let squares = (left.transpose() * &inverse * &left)[0];
+        let want = -0.5 * (squares + covariance.determinant().ln());
+        assert!((found.log_likelihood - want).abs() < 1e-9);
+    }
+
+    #[test]
+    fn its_start_is_the_posterior_mean_and_a_damped_step_is_shorter() {
+        let case = Case::new();
+        let (covariance, left, _) = case.dense();
+        let h = DMatrix::from_row_slice(ROWS - 1, 2, &case.linear.h[2..]);
+        let open = DMatrix::from_diagonal(&DVector::from_row_slice(&case.start.variance));
+        let gain = open * h.transpose() * covariance.try_inverse().unwrap();
+        let want = DVector::from_row_slice(&case.start.mean) + gain * left;
+        let found = smooth(case.problem(), &case.noise);
+        for i in 0..2 {
+            assert!((found.change[i] - want[i]).abs() < 1e-10);
+        }
+        let length = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>();
+        let mut before = length(&found.change[..2]);
+        for damped in &found.damped {
+            assert!(length(damped) < before);
+            before = length(damped);
+        }
+        // What is left, and how uncertain it is, of five readings.
+        assert_eq!(found.sums.reading[0][1], 5.0);
     }
 }

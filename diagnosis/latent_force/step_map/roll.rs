@@ -41,7 +41,11 @@ impl Part {
         let mut next = Vec::new();
         let longest = all.iter().map(|&e| walks[e].len()).max().unwrap_or(0);
         for k in 0..longest {
-            let here: Vec<usize> = all.iter().copied().filter(|&e| walks[e].len() > k).collect();
+            let here: Vec<usize> = all
+                .iter()
+                .copied()
+                .filter(|&e| walks[e].len() > k)
+                .collect();
             read.resize(here.len() * readings, 0.0);
             self.simulator.read(&here, &c.readings, &mut read)?;
             for (&e, read) in here.iter().zip(read.chunks_exact(readings)) {
@@ -55,11 +59,15 @@ impl Part {
                 let present = differ.iter().zip(variance).filter(|(d, _)| !d.is_nan());
                 left[e] += present.map(|(d, v)| d * d / v).sum::<f64>();
             }
-            let mut ahead: Vec<usize> = here.into_iter().filter(|&e| walks[e].len() > k + 1).collect();
+            let mut ahead: Vec<usize> = here
+                .into_iter()
+                .filter(|&e| walks[e].len() > k + 1)
+                .collect();
             while let Some(&first) = ahead.first() {
                 let substeps = walks[first].substeps[k];
-                let (now, later): (Vec<usize>, Vec<usize>) =
-                    ahead.iter().partition(|&&e| walks[e].substeps[k] == substeps);
+                let (now, later): (Vec<usize>, Vec<usize>) = ahead
+                    .iter()
+                    .partition(|&&e| walks[e].substeps[k] == substeps);
                 let ctrl: Vec<f64> = now
                     .iter()
                     .flat_map(|&e| walks[e].ctrl[k * nu..(k + 1) * nu].to_vec())
