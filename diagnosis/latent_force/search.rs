@@ -363,6 +363,8 @@ fn one_round(
         if best - hoped(&set) > behind {
             continue;
         }
+        // To the end by slopes of its own.
+        set.fitted.slopes = Slopes::default();
         set.fit(context, breadth.rounds[1])?;
         best = best.max(set.fitted.evidence);
         confirmed.push(pruned(context, candidates, set, breadth)?);
