@@ -60,6 +60,7 @@ pub fn patch() -> Diagnosis {
     let signals = puck();
     let map = map(&signals);
     Diagnosis {
+        wiring: Vec::new(),
         study: "puck-on-board".into(),
         sentence: "The real board is rougher beyond 0.41 m: sliding friction there is 1.8 times the modelled one, which closes 98 % of the gap."
             .into(),
