@@ -242,9 +242,10 @@ fn bad_logs_name_row_and_column() {
         &format!("time,{}\n0,0,0,0,0,0,0,0,0,0\n", actuators.join(",")),
         &["no column of a sensor"],
     );
+    // A column that the model does not know is passed over.
     identify(
         &format!("{header},rod_spin\n{},1\n", row("0", "0.5")),
-        &["`rod_spin`"],
+        &["1 rows"],
     );
     identify(&format!("{header}\n{}\n", row("0", "0.5")), &["1 rows"]);
     identify(
@@ -253,11 +254,17 @@ fn bad_logs_name_row_and_column() {
     );
     identify(
         &format!("{header}\n{}\n{}\n", row("0.1", "0.5"), row("0.1", "0.5")),
-        &["row 3", "time"],
+        &["1 rows", "different times"],
     );
     identify(
-        &format!("{header}\n{}\n{}\n", row("0", "0.5"), row("1e6", "0.5")),
-        &["seconds"],
+        &format!(
+            "{header}\n{}\n{}\n{}\n{}\n",
+            row("0", "0.5"),
+            row("0.02", "0.5"),
+            row("0.04", "0.5"),
+            row("1e6", "0.5")
+        ),
+        &["time steps"],
     );
     identify(
         &format!("{header}\n{}\n{}\n", row("0", ""), row("0.1", "")),
