@@ -1,6 +1,6 @@
 //! A refined model as a plain MJCF document.
 //!
-//! What an effect is in MJCF it says itself ([`Effect::native`]). One that only changes values of targets is those values,
+//! What an effect is in MJCF it says itself ([`native`](crate::Effect::native)). One that only changes values of targets is those values,
 //! so that effects of plugins go along as well.
 
 use std::path::Path;

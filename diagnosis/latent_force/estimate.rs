@@ -208,14 +208,14 @@ pub(super) fn raise_free(free: &mut [f64], b: &[f64], rows: usize) {
 fn level_blocks(layout: &Layout, forces: &mut [f64]) {
     for joint in &layout.joints {
         let first = joint.qvel;
-        let blocks: &[std::ops::Range<usize>] = match joint.kind {
-            JointKind::Free => &[first..first + 3, first + 3..first + 6],
-            JointKind::Ball => &[first..first + 3],
-            JointKind::Hinge | JointKind::Slide => &[],
+        let blocks = match joint.kind {
+            JointKind::Free => 2,
+            JointKind::Ball => 1,
+            JointKind::Hinge | JointKind::Slide => 0,
         };
-        for block in blocks {
-            let largest = forces[block.clone()].iter().copied().fold(0.0, f64::max);
-            forces[block.clone()].fill(largest);
+        for block in forces[first..].chunks_exact_mut(3).take(blocks) {
+            let largest = block.iter().copied().fold(0.0, f64::max);
+            block.fill(largest);
         }
     }
 }
