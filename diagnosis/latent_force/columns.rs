@@ -13,7 +13,8 @@ use asid_core::Result;
 
 use crate::candidate::Candidate;
 
-use super::estimate::{Context, Estimate};
+use super::context::Context;
+use super::estimate::Estimate;
 use super::fit::Hypothesis;
 use super::step_map::{Derivatives, LinearEpisode, Variation};
 

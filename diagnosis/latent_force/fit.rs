@@ -8,7 +8,8 @@ use asid_effects::EffectSpec;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::estimate::{Context, Estimate};
+use super::context::Context;
+use super::estimate::Estimate;
 use super::evidence::{Evidence, evidence};
 use super::smoother::{Regression, regress};
 use super::step_map::{Derivatives, LinearEpisode, Variation};

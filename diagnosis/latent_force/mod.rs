@@ -5,10 +5,11 @@
 //! columns of one linear regression on its innovations; the few that lead are put into the model and fitted anew.
 //!
 //! From below: [`tangent`] (states), [`walk`] (rows), [`segments`] (where bodies touch), [`step_map`] (the model over a row and its derivatives),
-//! [`smoother`], [`initial`] and [`estimate`] (trajectory, force and noise), [`unknown`] and [`fit`] (a model with its values),
+//! [`smoother`], [`initial`], [`context`] and [`estimate`] (trajectory, force and noise), [`unknown`] and [`fit`] (a model with its values),
 //! [`evidence`], [`trace`], [`columns`], [`screen`], [`search`], [`selection`], [`pipeline`].
 
 pub mod columns;
+pub mod context;
 pub mod estimate;
 pub mod evidence;
 pub mod fit;

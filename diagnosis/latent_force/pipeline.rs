@@ -17,7 +17,8 @@ use crate::study::Study;
 use crate::trajectory::Trajectory;
 use crate::work::Work;
 
-use super::estimate::{Estimate, Taken, begin};
+use super::context::{Taken, begin};
+use super::estimate::Estimate;
 use super::fit::{Fitted, Hypothesis, Slopes, fit, settle_noise};
 use super::initial::{from_readings, scales};
 use super::search::{Breadth, Outcome, Set, search};

@@ -5,7 +5,8 @@ use nalgebra::DMatrix;
 use crate::candidate::Candidate;
 
 use super::columns::Columns;
-use super::estimate::{Context, Estimate};
+use super::context::Context;
+use super::estimate::Estimate;
 use super::evidence::evidence;
 use super::fit::{SCALES, regression};
 use super::smoother::Regression;

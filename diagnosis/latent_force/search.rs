@@ -6,7 +6,8 @@ use asid_effects::Start;
 use crate::candidate::Candidate;
 
 use super::columns::{Columns, Form};
-use super::estimate::{Context, Missing};
+use super::context::Context;
+use super::estimate::Missing;
 use super::fit::{Fitted, Hypothesis, Slopes, fit};
 use super::screen::{Screened, rank, regressions};
 

@@ -88,6 +88,21 @@ impl Walk {
     }
 }
 
+/// Groups the walks of those `here` that go on beyond row `k` by the physics steps from it to the next: an engine steps all
+/// simulations of a call alike.
+#[must_use]
+pub fn by_substeps(walks: &[&Walk], here: Vec<usize>, k: usize) -> Vec<(usize, Vec<usize>)> {
+    let mut groups: Vec<(usize, Vec<usize>)> = Vec::new();
+    for e in here.into_iter().filter(|&e| walks[e].len() > k + 1) {
+        let substeps = walks[e].substeps[k];
+        match groups.iter_mut().find(|(s, _)| *s == substeps) {
+            Some((_, group)) => group.push(e),
+            None => groups.push((substeps, vec![e])),
+        }
+    }
+    groups
+}
+
 #[cfg(test)]
 mod tests {
     use asid_core::episode::ChannelColumns;
@@ -159,6 +174,26 @@ mod tests {
         assert_eq!(walk.substeps, [4; 10]);
         assert_eq!(walk.rows[..3], [0, 4, 8]);
         assert!((walk.ctrl[1] - 5.5).abs() < 1e-9);
+    }
+
+    #[test]
+    fn walks_are_grouped_by_the_steps_of_a_row_and_those_that_end_are_left_out() {
+        let times: [&[f64]; 4] = [
+            &[0.0, 0.01, 0.02],
+            &[0.0, 0.01, 0.04],
+            &[0.0, 0.02],
+            &[0.0, 0.01, 0.02, 0.03],
+        ];
+        let walks = times.map(|t| Walk::new(&logs(t), 0, STEP));
+        let walks: Vec<&Walk> = walks.iter().collect();
+        assert_eq!(
+            by_substeps(&walks, vec![0, 1, 2, 3], 0),
+            [(1, vec![0, 1, 3]), (2, vec![2])]
+        );
+        assert_eq!(
+            by_substeps(&walks, vec![0, 1, 2, 3], 1),
+            [(1, vec![0, 3]), (3, vec![1])]
+        );
     }
 
     #[test]

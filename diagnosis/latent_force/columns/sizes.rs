@@ -5,7 +5,8 @@ use asid_core::Result;
 use nalgebra::DMatrix;
 
 use super::source::{Source, Wanted};
-use crate::latent_force::estimate::{Context, Estimate};
+use crate::latent_force::context::Context;
+use crate::latent_force::estimate::Estimate;
 
 /// Share of a parameter's range over which its size is first felt for.
 const TRIAL: f64 = 1e-5;

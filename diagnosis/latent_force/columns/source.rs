@@ -4,7 +4,7 @@ use asid_core::{Parameter, Result};
 use asid_effects::EffectSpec;
 
 use crate::candidate::Candidate;
-use crate::latent_force::estimate::Context;
+use crate::latent_force::context::Context;
 use crate::latent_force::fit::Hypothesis;
 use crate::latent_force::step_map::{Derivatives, Variation, retime_columns};
 use crate::latent_force::trace::{is_traceable, trace};

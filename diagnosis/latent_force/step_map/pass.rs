@@ -4,7 +4,7 @@ use asid_core::simulator::{StepHook, StepView};
 use asid_core::{Control, Result, Rollout, Simulator};
 
 use crate::latent_force::tangent::{difference, retract};
-use crate::latent_force::walk::Walk;
+use crate::latent_force::walk::{Walk, by_substeps};
 use crate::predict::columns_of;
 
 use super::late::retime;
@@ -153,17 +153,8 @@ impl Part {
             let here: Vec<usize> = (0..n).filter(|&e| walks[e].len() > k).collect();
             self.place(c, &roles, (&here, k), request, &mut row)?;
             self.read_row(c, &roles, (&here, k), request, (out, ramps), &mut row)?;
-            let mut ahead: Vec<usize> = here
-                .into_iter()
-                .filter(|&e| walks[e].len() > k + 1)
-                .collect();
-            while let Some(&first) = ahead.first() {
-                let substeps = walks[first].substeps[k];
-                let (now, later): (Vec<usize>, Vec<usize>) = ahead
-                    .iter()
-                    .partition(|&&e| walks[e].substeps[k] == substeps);
+            for (substeps, now) in by_substeps(&walks, here, k) {
                 self.step_row(c, (&roles, &now, k, substeps), request, out, &mut row)?;
-                ahead = later;
             }
         }
         Ok(())

@@ -2,7 +2,7 @@
 
 use asid_core::{Control, Result, Rollout};
 
-use crate::latent_force::walk::Walk;
+use crate::latent_force::walk::{Walk, by_substeps};
 use crate::predict::columns_of;
 
 use super::Common;
@@ -59,15 +59,7 @@ impl Part {
                 let present = differ.iter().zip(variance).filter(|(d, _)| !d.is_nan());
                 left[e] += present.map(|(d, v)| d * d / v).sum::<f64>();
             }
-            let mut ahead: Vec<usize> = here
-                .into_iter()
-                .filter(|&e| walks[e].len() > k + 1)
-                .collect();
-            while let Some(&first) = ahead.first() {
-                let substeps = walks[first].substeps[k];
-                let (now, later): (Vec<usize>, Vec<usize>) = ahead
-                    .iter()
-                    .partition(|&&e| walks[e].substeps[k] == substeps);
+            for (substeps, now) in by_substeps(&walks, here, k) {
                 let ctrl: Vec<f64> = now
                     .iter()
                     .flat_map(|&e| walks[e].ctrl[k * nu..(k + 1) * nu].to_vec())
@@ -84,7 +76,6 @@ impl Part {
                         left[e] = f64::INFINITY;
                     }
                 }
-                ahead = later;
             }
         }
         Ok(left)

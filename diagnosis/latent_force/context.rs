@@ -1,0 +1,239 @@
+//! What is being explained: logs as walks, and a first estimate of the model along them.
+
+use asid_core::layout::{JointKind, Layout};
+use asid_core::{Parameter, Result};
+use asid_effects::EffectSpec;
+use asid_mjcf::Plant;
+
+use crate::data::Logs;
+use crate::machine::Machine;
+use crate::predict::State;
+
+use super::estimate::Estimate;
+use super::initial::{from_readings, open_by_reading, position_noise, start, start_of_segment};
+use super::smoother::{NoiseModel, Start};
+use super::step_map::{Derivatives, StepMap};
+use super::walk::Walk;
+
+/// Change of a segment's start that slopes are taken over, as a share of what its readings leave open.
+const START_SHARE: f64 = 0.02;
+/// Correlation over a row that the search begins with.
+const FIRST_CORRELATION: f64 = 0.9;
+/// Deviation of the white part of a missing force that the search begins with, relative to the whole.
+const FIRST_WHITE: f64 = 0.1;
+/// Force that slopes are first taken over, N or N m: an inertia of 1e-5 to 1e3 moves by what doubles resolve.
+const FIRST_PUSH: f64 = 1e-4;
+
+/// What is being explained: logs of a machine, walked row by row.
+pub struct Context<'a> {
+    /// The machine.
+    pub machine: &'a Machine,
+    /// The logs.
+    pub logs: &'a Logs,
+    /// Their rows.
+    pub walks: Vec<Walk>,
+    /// The starts that logs give, one a walk; `None` where a walk begins within a log.
+    pub given: Vec<Option<State>>,
+    /// Where segments begin by their readings, `nq + nv`, one a walk.
+    pub read: Vec<Vec<f64>>,
+    /// Coordinates of the starts that logs leave open.
+    pub open: Vec<usize>,
+    /// Largest magnitude of each tangent coordinate.
+    pub scale: Vec<f64>,
+    /// Deviation of the reading of each position that a sensor reads directly, else 0; `nv`.
+    pub position_noise: Vec<f64>,
+    /// Variance of each entry of a reading, as given or first estimated.
+    pub reading_variance: Vec<f64>,
+    /// Typical inertial force at each degree of freedom, N or N m.
+    pub inertial: Vec<f64>,
+}
+
+/// What the logs of a study are taken as.
+pub struct Taken {
+    /// Rows.
+    pub walks: Vec<Walk>,
+    /// The starts that logs give, one a walk; `None` where a walk begins within a log.
+    pub given: Vec<Option<State>>,
+    /// Coordinates of the starts that logs leave open.
+    pub open: Vec<usize>,
+    /// States where no sensor reads them, `rows x (nq + nv)`, one a walk.
+    pub otherwise: Vec<Vec<f64>>,
+    /// Largest magnitude of each tangent coordinate.
+    pub scale: Vec<f64>,
+}
+
+impl Context<'_> {
+    /// The machine's structure.
+    #[must_use]
+    pub fn plant(&self) -> &Plant {
+        &self.machine.plant
+    }
+
+    /// Whether some walks are segments.
+    #[must_use]
+    pub fn has_segments(&self) -> bool {
+        self.walks.iter().any(|w| w.segment.is_some())
+    }
+
+    /// A step map of the machine with more effects; `roles` as [`StepMap::new`].
+    ///
+    /// # Errors
+    /// As [`StepMap::new`].
+    pub fn map(
+        &self,
+        specs: &[EffectSpec],
+        parameters: &[Parameter],
+        roles: usize,
+    ) -> Result<StepMap<'_>> {
+        let rows = (self.logs, &self.walks[..]);
+        StepMap::new(self.machine, specs, parameters, rows, roles)
+    }
+
+    /// Changes of the start of a segment that slopes are taken over: a part of what its first readings leave open, so that
+    /// points of contact that come and go even out.
+    #[must_use]
+    pub fn start_steps(&self) -> Vec<f64> {
+        let scales = (&self.scale[..], &self.position_noise[..]);
+        let open = (0..self.scale.len()).map(|i| open_by_reading(i, scales));
+        open.map(|d| START_SHARE * d).collect()
+    }
+
+    /// Where the walks begin, about a trajectory.
+    #[must_use]
+    pub fn starts(&self, trajectory: &[Vec<f64>]) -> Vec<Start> {
+        let width = self.plant().layout.nq + self.plant().layout.nv;
+        let scales = (&self.scale[..], &self.position_noise[..]);
+        let each = self.given.iter().zip(&self.walks).zip(&self.read);
+        each.zip(trajectory)
+            .map(|(((given, walk), read), states)| {
+                let first = &states[..width];
+                let given = given.as_ref().map(|s| (s, &self.open[..]));
+                if given.is_none() && walk.segment.is_some() {
+                    return start_of_segment(self.plant(), read, first, scales);
+                }
+                start(self.plant(), given, first, scales)
+            })
+            .collect()
+    }
+}
+
+/// Duration of a row, s, as a mean over all walks.
+fn row_seconds(walks: &[Walk]) -> f64 {
+    let seconds: f64 = walks.iter().map(|w| w.time[w.len() - 1]).sum();
+    let rows: usize = walks.iter().map(|w| w.len() - 1).sum();
+    seconds / rows.max(1) as f64
+}
+
+/// Raises the largest speeds that a unit of each force has made over a row to those of some more rows, `rows x nx x nv`.
+pub(super) fn raise_free(free: &mut [f64], b: &[f64], rows: usize) {
+    let nv = free.len();
+    for k in 0..rows {
+        for (d, free) in free.iter_mut().enumerate() {
+            *free = free.max(b[(k * 2 * nv + nv + d) * nv + d]);
+        }
+    }
+}
+
+/// Gives all directions of a free body the largest of its forces, and all its turns the largest of its torques: along the one
+/// that a contact blocks it hardly moves, and what acts along it is no smaller.
+fn level_blocks(layout: &Layout, forces: &mut [f64]) {
+    for joint in &layout.joints {
+        let first = joint.qvel;
+        let blocks = match joint.kind {
+            JointKind::Free => 2,
+            JointKind::Ball => 1,
+            JointKind::Hinge | JointKind::Slide => 0,
+        };
+        for block in forces[first..].chunks_exact_mut(3).take(blocks) {
+            let largest = block.iter().copied().fold(0.0, f64::max);
+            block.fill(largest);
+        }
+    }
+}
+
+/// A context for some walks, and a first estimate of the model at `theta`, not yet smoothed.
+///
+/// # Errors
+/// When the engine fails.
+pub fn begin<'a>(
+    machine: &'a Machine,
+    logs: &'a Logs,
+    taken: Taken,
+    (parameters, theta): (&[Parameter], &[f64]),
+) -> Result<(Context<'a>, Estimate)> {
+    let plant = &machine.plant;
+    let layout = &plant.layout;
+    let (nv, width) = (layout.nv, layout.nq + layout.nv);
+    let mut trajectory = from_readings(plant, logs, &taken.walks, &taken.otherwise);
+    let read = trajectory.iter().map(|s| s[..width].to_vec());
+    let noise = logs.entry_noise();
+    let mut context = Context {
+        machine,
+        logs,
+        given: taken.given,
+        read: read.collect(),
+        open: taken.open,
+        scale: taken.scale,
+        position_noise: position_noise(plant, logs),
+        reading_variance: noise.iter().map(|n| n * n).collect(),
+        inertial: vec![0.0; nv],
+        walks: taken.walks,
+    };
+    let mut map = context.map(&[], parameters, nv + 1)?;
+    let all = vec![true; trajectory.len()];
+    map.roll(theta, (&mut trajectory, &all), &context.reading_variance)?;
+    let want = Derivatives {
+        force: true,
+        ..Derivatives::default()
+    };
+    let push = vec![FIRST_PUSH; nv];
+    let linear = map.linearise(theta, &trajectory, want, &push, &[])?;
+    let b: Vec<Vec<f64>> = linear.into_iter().map(|l| l.b).collect();
+    // Inertia by the speed that a force makes, where no contact takes it up, times the acceleration seen.
+    let mut free = vec![0.0; nv];
+    for (walk, b) in context.walks.iter().zip(&b) {
+        raise_free(&mut free, b, walk.len() - 1);
+    }
+    let mut sums = vec![(0.0, 0.0); nv];
+    for ((walk, states), b) in context.walks.iter().zip(&trajectory).zip(&b) {
+        for k in 0..walk.len() - 1 {
+            for (d, sum) in sums.iter_mut().enumerate() {
+                let own = b[(k * 2 * nv + nv + d) * nv + d];
+                let gained = if walk.segment.is_some() { free[d] } else { own };
+                let speed = |k: usize| states[k * width + layout.nq + d];
+                if gained > 0.0 {
+                    sum.0 += ((speed(k + 1) - speed(k)) / gained).abs();
+                    sum.1 += 1.0;
+                }
+            }
+        }
+    }
+    context.inertial = sums
+        .iter()
+        .map(|(force, n)| (force / f64::max(*n, 1.0)).max(1e-9))
+        .collect();
+    if context.has_segments() {
+        level_blocks(layout, &mut context.inertial);
+    }
+    let tau = -row_seconds(&context.walks) / FIRST_CORRELATION.ln();
+    let estimate = Estimate {
+        noise: NoiseModel {
+            q: context.inertial.iter().map(|f| f * f).collect(),
+            tau: vec![tau; nv],
+            white: context
+                .inertial
+                .iter()
+                .map(|f| (FIRST_WHITE * f).powi(2))
+                .collect(),
+            r: context.reading_variance.clone(),
+        },
+        free: vec![Vec::new(); trajectory.len()],
+        excess: vec![1.0; trajectory.len()],
+        least_white: vec![0.0; nv],
+        smoothed: Vec::new(),
+        log_likelihood: f64::NEG_INFINITY,
+        trajectory,
+        b,
+    };
+    Ok((context, estimate))
+}
