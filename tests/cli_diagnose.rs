@@ -2,27 +2,14 @@
 
 #![allow(clippy::unwrap_used)]
 
+#[path = "cli_support/program.rs"]
+mod program;
 #[path = "diagnosis/world.rs"]
 mod world;
 
-use std::path::Path;
-use std::process::{Command, Output};
-
+use program::{asid, json, text};
 use serde_json::Value;
 use world::{Truth, write_study};
-
-fn asid(arguments: &[&str]) -> Output {
-    let program = env!("CARGO_BIN_EXE_asid");
-    Command::new(program).args(arguments).output().unwrap()
-}
-
-fn text(path: &Path) -> &str {
-    path.to_str().unwrap()
-}
-
-fn json(path: &Path) -> Value {
-    serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
-}
 
 /// One line on standard error, and the exit status.
 fn refusal(arguments: &[&str]) -> (String, Option<i32>) {

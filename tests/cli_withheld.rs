@@ -2,27 +2,16 @@
 
 #![allow(clippy::unwrap_used)]
 
+#[path = "cli_support/program.rs"]
+mod program;
 #[path = "diagnosis/world.rs"]
 mod world;
 
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Output;
 
-use serde_json::Value;
+use program::{asid, json, text};
 use world::{Truth, write_study};
-
-fn asid(arguments: &[&str]) -> Output {
-    let program = env!("CARGO_BIN_EXE_asid");
-    Command::new(program).args(arguments).output().unwrap()
-}
-
-fn text(path: &Path) -> &str {
-    path.to_str().unwrap()
-}
-
-fn json(path: &Path) -> Value {
-    serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
-}
 
 fn said(output: &Output) -> String {
     String::from_utf8(output.stderr.clone()).unwrap()
