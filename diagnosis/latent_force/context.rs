@@ -229,6 +229,8 @@ pub fn begin<'a>(
         },
         free: vec![Vec::new(); trajectory.len()],
         excess: vec![1.0; trajectory.len()],
+        misled: vec![1.0; trajectory.len()],
+        rolls: 0,
         least_white: vec![0.0; nv],
         smoothed: Vec::new(),
         log_likelihood: f64::NEG_INFINITY,

@@ -36,6 +36,11 @@ pub struct Estimate {
     pub least_white: Vec<f64>,
     /// Of each segment: variance of what is left of its readings, relative to that of the readings; 1 for other walks.
     pub excess: Vec<f64>,
+    /// Of each segment: what its last replay left of its readings, relative to what the slopes before it promised, 1 at least.
+    /// Slopes that do not keep their promise tell as little of effects.
+    pub misled: Vec<f64>,
+    /// How often segments were replayed, so that each time others are drawn.
+    pub rolls: u64,
     /// The last smoothing, about the trajectory before it.
     pub smoothed: Vec<Smoothed>,
     /// Its log-likelihood.

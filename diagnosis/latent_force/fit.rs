@@ -253,7 +253,7 @@ pub fn fit(
             }
             estimate = from.1.towards(context, &to.1, part);
             let before = estimate.trajectory.clone();
-            estimate.roll(&mut map, &theta, &before)?;
+            estimate.roll(context, &mut map, &theta, &before)?;
             continue;
         }
         let from = rose.then(|| (theta.clone(), estimate.clone()));
@@ -269,13 +269,13 @@ pub fn fit(
         shift(&mut linear, &moves);
         let before = estimate.trajectory.clone();
         estimate.improve(context, &linear, EM_ROUNDS);
-        estimate.roll(&mut map, &theta, &before)?;
+        estimate.roll(context, &mut map, &theta, &before)?;
         let again = map.reads() && !map.is_all_segments();
         for _ in 0..if again { AGAIN } else { 0 } {
             let linear = map.linearise(&theta, &estimate.trajectory, want, &steps, &[])?;
             let before = estimate.trajectory.clone();
             estimate.improve(context, &linear, 1);
-            estimate.roll(&mut map, &theta, &before)?;
+            estimate.roll(context, &mut map, &theta, &before)?;
         }
         if let Some(from) = from {
             part = 1.0;
@@ -368,7 +368,7 @@ pub fn settle_noise(
         slopes.exchange(&mut linear, fresh.then_some(theta));
         let before = estimate.trajectory.clone();
         estimate.improve(context, &linear, em_rounds);
-        estimate.roll(&mut map, theta, &before)?;
+        estimate.roll(context, &mut map, theta, &before)?;
     }
     Ok(())
 }

@@ -149,6 +149,7 @@ pub fn search(
         names: 0,
     };
     let at_first = none.estimate.missing(context);
+    let mut none = none.clone();
     let left = |s: &Set| s.fitted.estimate.missing(context).relative_to(at_first);
     let mut rounds = Vec::new();
     for _ in 0..breadth.depth {
@@ -162,12 +163,22 @@ pub fn search(
         let next = round.confirmed.first().cloned();
         rounds.push(round);
         let Some(next) = next else { break };
+        if context.has_segments() {
+            let again = from_starts_of(context, &best, &next, breadth)?;
+            if again.fitted.evidence > best.fitted.evidence {
+                best = again;
+                if best.candidates.is_empty() {
+                    none = best.fitted.clone();
+                }
+            }
+        }
         let shrinks = left(&best) - left(&next) > breadth.shrinks;
         if next.fitted.evidence - best.fitted.evidence < threshold || !shrinks {
             break;
         }
         best = next;
     }
+    let none = &none;
     let best = free_what_is_given(context, candidates, best, breadth, threshold)?;
     let of = |f: &Fitted| f.estimate.missing(context);
     Ok(Outcome {
@@ -176,6 +187,21 @@ pub fn search(
         rounds,
         best,
     })
+}
+
+/// A set fitted once more from where another one has put the starts of segments: of the many ways to begin that leave little of
+/// the readings a fit finds one, and what another one owes to a better one is no evidence for its effects.
+fn from_starts_of(
+    context: &Context<'_>,
+    set: &Set,
+    other: &Set,
+    breadth: Breadth,
+) -> Result<Set> {
+    let mut again = set.clone();
+    again.fitted.estimate = other.fitted.estimate.clone();
+    again.fitted.slopes = Slopes::default();
+    again.fit(context, breadth.rounds[1])?;
+    Ok(again)
 }
 
 /// Fits what no search tries (an offset of friction between the directions) of the effects that were named, where it

@@ -127,6 +127,8 @@ pub struct Smoothed {
     pub change: Vec<f64>,
     /// Of a segment: shorter changes of its start, each `nx`, where the whole goes too far.
     pub damped: Vec<Vec<f64>>,
+    /// Of a segment: a root of the posterior covariance of its start, `nx x nx`; empty for other walks.
+    pub root: DMatrix<f64>,
     /// Its variances, `rows x nx`.
     pub change_variance: Vec<f64>,
     /// Missing force, `rows x nv`.

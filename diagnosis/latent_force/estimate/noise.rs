@@ -18,8 +18,9 @@ const LEAST_FORCE: f64 = 1e-5;
 
 impl Estimate {
     pub(super) fn update_excess(&mut self, context: &Context<'_>) {
-        let each = self.excess.iter_mut().zip(&self.smoothed);
-        for ((excess, smoothed), walk) in each.zip(&context.walks) {
+        let each = self.excess.iter_mut().zip(&self.misled);
+        let each = each.zip(&self.smoothed).zip(&context.walks);
+        for (((excess, misled), smoothed), walk) in each {
             if walk.segment.is_none() {
                 continue;
             }
@@ -28,7 +29,7 @@ impl Estimate {
                 squares += sum / r;
                 n += count;
             }
-            let value: f64 = squares / f64::max(n, 1.0);
+            let value: f64 = misled * squares / f64::max(n, 1.0);
             *excess = if value.is_finite() {
                 value.max(1.0)
             } else {

@@ -1,7 +1,13 @@
 //! Replays of segments from starts that have been moved.
 
 use asid_core::Result;
+use asid_core::rng::Streams;
+use nalgebra::DVector;
+use rand::Rng as _;
+use rand_distr::StandardNormal;
 
+use crate::latent_force::context::Context;
+use crate::latent_force::initial::open_by_reading;
 use crate::latent_force::step_map::StepMap;
 use crate::latent_force::tangent::retract;
 
@@ -9,15 +15,23 @@ use super::Estimate;
 
 /// What a step of a segment's start may leave of its readings, relative to what its slopes promised.
 const KEPT_PROMISE: f64 = 1.1;
+/// Starts that are drawn where no step keeps its promise: widths in deviations of the start's posterior, which has the shape of
+/// the valley where the slopes are right, and in deviations of what its readings leave open, for where they are not. A touch that begins a
+/// row earlier or later is another valley, and no slope leads there.
+const BY_POSTERIOR: [f64; 3] = [0.5, 2.0, 8.0];
+const BY_READING: [f64; 3] = [0.03, 0.1, 0.3];
+/// Draws of each width.
+const DRAWS: usize = 4;
 
 impl Estimate {
     /// Replays the segments from their starts, which have just been moved from those `before`: each takes the step, of those
-    /// offered and none, that leaves least of its readings.
+    /// offered and none, that leaves least of its readings; where that is more than was promised, starts about it are drawn.
     ///
     /// # Errors
     /// When the engine fails.
     pub fn roll(
         &mut self,
+        context: &Context<'_>,
         map: &mut StepMap<'_>,
         theta: &[f64],
         before: &[Vec<f64>],
@@ -25,43 +39,75 @@ impl Estimate {
         if !map.has_segments() {
             return Ok(());
         }
-        let layout = map.layout().clone();
-        let width = layout.nq + layout.nv;
         let all: Vec<bool> = vec![true; self.trajectory.len()];
         let mut left = map.roll(theta, (&mut self.trajectory, &all), &self.noise.r)?;
-        // Where the step left what it promised, no shorter one is tried.
-        let worse: Vec<bool> = left
-            .iter()
-            .zip(&self.smoothed)
-            .map(|(left, s)| {
-                let promised = s
-                    .sums
-                    .reading
-                    .iter()
-                    .zip(&self.noise.r)
-                    .map(|([sum, _], r)| sum / r);
-                *left > KEPT_PROMISE * promised.sum::<f64>()
-            })
-            .collect();
-        let offered = self
+        let promised: Vec<f64> = self
             .smoothed
             .iter()
-            .map(|s| s.damped.len())
-            .max()
-            .unwrap_or(0);
-        for i in 0..=offered {
-            let mut other = before.to_vec();
-            for (states, smoothed) in other.iter_mut().zip(&self.smoothed) {
-                if let Some(change) = smoothed.damped.get(i) {
-                    retract(&layout, &mut states[..width], change);
-                }
+            .map(|s| {
+                let sums = s.sums.reading.iter().zip(&self.noise.r);
+                sums.map(|([sum, _], r)| sum / r).sum::<f64>()
+            })
+            .collect();
+        let offered = self.smoothed.iter().map(|s| s.damped.len()).max();
+        for i in 0..=offered.unwrap_or(0) {
+            let step = |s: &Self, w: usize| s.smoothed[w].damped.get(i).cloned();
+            self.offer(map, theta, (before, &promised, &mut left), step)?;
+        }
+        self.rolls += 1;
+        let mut random = Streams::new(self.rolls).stream("starts of segments");
+        let scales = (&context.scale[..], &context.position_noise[..]);
+        for _ in 0..DRAWS {
+            for (posterior, reading) in BY_POSTERIOR.into_iter().zip(BY_READING) {
+                let from = self.trajectory.clone();
+                let nx = context.scale.len();
+                let normal = DVector::from_fn(nx, |_, _| random.sample::<f64, _>(StandardNormal));
+                let wide = DVector::from_fn(nx, |i, _| reading * normal[i] * open_by_reading(i, scales));
+                let along = |s: &Self, w: usize| {
+                    let root = &s.smoothed[w].root;
+                    (root.ncols() == nx).then(|| (posterior * root * &normal).as_slice().to_vec())
+                };
+                self.offer(map, theta, (&from, &promised, &mut left), along)?;
+                let from = self.trajectory.clone();
+                let about = |_: &Self, _: usize| Some(wide.as_slice().to_vec());
+                self.offer(map, theta, (&from, &promised, &mut left), about)?;
             }
-            let of_other = map.roll(theta, (&mut other, &worse), &self.noise.r)?;
-            for (w, states) in other.into_iter().enumerate() {
-                if worse[w] && of_other[w] < left[w] {
-                    left[w] = of_other[w];
-                    self.trajectory[w] = states;
-                }
+        }
+        let each = self.misled.iter_mut().zip(left.iter().zip(&promised));
+        for (misled, (left, promised)) in each {
+            let ratio = left / promised;
+            *misled = if ratio > KEPT_PROMISE { ratio } else { 1.0 };
+        }
+        Ok(())
+    }
+
+    /// Replays the segments that leave more than was promised from other starts, which are those `from` changed; where that
+    /// leaves less, the segment takes it.
+    fn offer(
+        &mut self,
+        map: &mut StepMap<'_>,
+        theta: &[f64],
+        (from, promised, left): (&[Vec<f64>], &[f64], &mut [f64]),
+        change: impl Fn(&Self, usize) -> Option<Vec<f64>>,
+    ) -> Result<()> {
+        let layout = map.layout().clone();
+        let width = layout.nq + layout.nv;
+        let worse = left.iter().zip(promised);
+        let worse: Vec<bool> = worse.map(|(l, p)| *l > KEPT_PROMISE * p).collect();
+        if !worse.contains(&true) {
+            return Ok(());
+        }
+        let mut other = from.to_vec();
+        for w in (0..other.len()).filter(|&w| worse[w]) {
+            if let Some(change) = change(self, w) {
+                retract(&layout, &mut other[w][..width], &change);
+            }
+        }
+        let of_other = map.roll(theta, (&mut other, &worse), &self.noise.r)?;
+        for (w, states) in other.into_iter().enumerate() {
+            if worse[w] && of_other[w] < left[w] {
+                left[w] = of_other[w];
+                self.trajectory[w] = states;
             }
         }
         Ok(())

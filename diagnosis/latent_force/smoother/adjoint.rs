@@ -13,6 +13,7 @@ pub(super) fn backward(filter: &mut Filter<'_>, steps: &[Step]) -> Smoothed {
         log_likelihood: filter.total(),
         change: vec![0.0; rows * nx],
         damped: Vec::new(),
+        root: nalgebra::DMatrix::zeros(0, 0),
         change_variance: vec![0.0; rows * nx],
         force: vec![0.0; rows * nv],
         force_variance: vec![0.0; rows * nv],

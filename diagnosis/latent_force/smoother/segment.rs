@@ -92,6 +92,7 @@ pub(super) fn smooth(problem: Problem<'_>, noise: &NoiseModel) -> Smoothed {
         log_likelihood: f64::NAN,
         change: vec![0.0; n * nx],
         damped: Vec::new(),
+        root: DMatrix::zeros(0, 0),
         change_variance: vec![0.0; n * nx],
         force: vec![0.0; n * nv],
         force_variance: vec![0.0; n * nv],
@@ -118,6 +119,11 @@ pub(super) fn smooth(problem: Problem<'_>, noise: &NoiseModel) -> Smoothed {
         sums[1] += 1.0;
     }
     out.log_likelihood = log_likelihood(&rows, problem, &factor, &right);
+    let deviations = start.variance.iter().map(|v| v.sqrt());
+    let units = DMatrix::from_diagonal(&DVector::from_iterator(nx, deviations));
+    if let Some(inverse) = lower.transpose().try_inverse() {
+        out.root = units * inverse;
+    }
     for damping in DAMPINGS {
         if let (_, Some(factor), right) = rows.normal(problem, damping) {
             let change = factor.solve(&right);
