@@ -22,6 +22,7 @@ pub mod selection;
 pub mod smoother;
 pub mod step_map;
 pub mod tangent;
+mod touching;
 pub mod trace;
 pub mod unknown;
 pub mod walk;

@@ -24,6 +24,7 @@ use super::initial::{from_readings, scales};
 use super::search::{Breadth, Outcome, Set, search};
 use super::segments::cut;
 use super::selection::select;
+use super::touching::touching;
 use super::unknown::Unknown;
 use super::walk::Walk;
 
@@ -126,18 +127,9 @@ fn take(study: &Study, bench: &Bench, nominal: &[f64]) -> Result<Taken> {
         |walks: &[Walk]| -> Vec<Vec<f64>> { walks.iter().map(|w| still.repeat(w.len())).collect() };
     let first = from_readings(plant, logs, &whole, &at_home(&whole));
     let shown = along(bench, &whole, nominal, &first)?;
-    let pairs = shown.pairs.len();
-    let mut walks = Vec::new();
-    for (walk, path) in whole.iter().zip(&shown.episodes) {
-        let touches: Vec<bool> = (0..walk.len())
-            .map(|k| {
-                path.contact[k * pairs..(k + 1) * pairs]
-                    .iter()
-                    .any(|f| *f > 0.0)
-            })
-            .collect();
-        walks.extend(cut(walk, &touches));
-    }
+    let touches = touching(plant, logs, &shown);
+    let each = whole.iter().zip(&touches);
+    let walks: Vec<Walk> = each.flat_map(|(walk, t)| cut(walk, t)).collect();
     let given = |w: &Walk| {
         let episode = &study.train[w.episode].1;
         let known = w.rows[0] == 0 && episode.initial.is_some();

@@ -1,0 +1,143 @@
+//! In which rows bodies touch in a way that the motion depends on.
+//!
+//! Many models have bodies that touch all the time and never move against each other: a thing that lies on a table beside the
+//! arm, a base on its stand. Such a contact holds what is at rest anyway. No row needs to be taken otherwise for it.
+
+use asid_core::layout::JointKind;
+use asid_mjcf::Plant;
+
+use crate::data::Logs;
+use crate::trajectory::Trajectory;
+
+use super::initial::position_noise;
+use super::tangent::difference;
+
+/// Deviation of a coordinate, in deviations of its reading, up to which a joint counts as at rest: noise makes 1, and a noise
+/// that is estimated may be half as large as it is.
+const AT_REST: f64 = 3.0;
+
+/// For each walk of a trajectory, one flag a row: whether two bodies touch there that move against each other in some log.
+#[must_use]
+pub fn touching(plant: &Plant, logs: &Logs, shown: &Trajectory) -> Vec<Vec<bool>> {
+    let rests = joints_at_rest(plant, logs, shown);
+    let matters: Vec<bool> = shown
+        .pairs
+        .iter()
+        .map(|pair| !between(plant, *pair).all(|joint| rests[joint]))
+        .collect();
+    let pairs = shown.pairs.len();
+    let of_path = |contact: &[f64], rows: usize| -> Vec<bool> {
+        let row = |k: usize| contact[k * pairs..(k + 1) * pairs].iter().zip(&matters);
+        (0..rows)
+            .map(|k| row(k).any(|(force, matters)| *matters && *force > 0.0))
+            .collect()
+    };
+    let nq = plant.layout.nq;
+    let paths = shown.episodes.iter();
+    paths
+        .map(|path| of_path(&path.contact, path.qpos.len() / nq))
+        .collect()
+}
+
+/// Whether each joint stays where it is in every log, as far as its readings tell; what no sensor reads may move.
+fn joints_at_rest(plant: &Plant, logs: &Logs, shown: &Trajectory) -> Vec<bool> {
+    let layout = &plant.layout;
+    let (nq, nv) = (layout.nq, layout.nv);
+    let noise = position_noise(plant, logs);
+    let mut squares = vec![0.0; nv];
+    let mut rows = 0.0;
+    let mut change = vec![0.0; 2 * nv];
+    let still = vec![0.0; nv];
+    let first = shown.episodes.first().map_or(&[][..], |e| &e.qpos[..nq]);
+    let mut mean = vec![0.0; nv];
+    let each = |visit: &mut dyn FnMut(&[f64])| {
+        for qpos in shown.episodes.iter().flat_map(|e| e.qpos.chunks_exact(nq)) {
+            let states = [qpos, first].map(|q| [q, &still[..]].concat());
+            difference(layout, &states[0], &states[1], &mut change);
+            visit(&change[..nv]);
+        }
+    };
+    let mut each = each;
+    each(&mut |change| {
+        rows += 1.0;
+        mean.iter_mut().zip(change).for_each(|(m, c)| *m += c);
+    });
+    mean.iter_mut().for_each(|m| *m /= f64::max(rows, 1.0));
+    each(&mut |change| {
+        let each = squares.iter_mut().zip(change.iter().zip(&mean));
+        each.for_each(|(s, (c, m))| *s += (c - m) * (c - m));
+    });
+    let rests = |d: usize| squares[d] <= rows * (AT_REST * noise[d]).powi(2) && noise[d] > 0.0;
+    layout
+        .joints
+        .iter()
+        .map(|joint| {
+            let dofs = match joint.kind {
+                JointKind::Free => 6,
+                JointKind::Ball => 3,
+                JointKind::Hinge | JointKind::Slide => 1,
+            };
+            (joint.qvel..joint.qvel + dofs).all(rests)
+        })
+        .collect()
+}
+
+/// The joints on the way from one body to another.
+fn between(plant: &Plant, [a, b]: [usize; 2]) -> impl Iterator<Item = usize> {
+    let chain = |mut body: usize| {
+        let mut bodies = vec![body];
+        while body != 0 {
+            body = plant.bodies[body].parent;
+            bodies.push(body);
+        }
+        bodies
+    };
+    let (of_a, of_b) = (chain(a), chain(b));
+    let one_sided = |own: &[usize], other: &[usize]| -> Vec<usize> {
+        let own = own.iter().filter(|body| !other.contains(body));
+        own.flat_map(|&body| plant.bodies[body].joints.clone())
+            .collect()
+    };
+    let mut joints = one_sided(&of_a, &of_b);
+    joints.extend(one_sided(&of_b, &of_a));
+    joints.into_iter()
+}
+
+#[cfg(test)]
+mod tests {
+    use asid_mjcf::Scene;
+
+    use super::*;
+
+    #[test]
+    fn the_way_between_two_bodies_leads_over_the_joints_of_both_sides() {
+        let scene = r#"<mujoco><worldbody>
+            <body name="arm"><joint name="shoulder" type="hinge"/><geom name="a" size="0.1" mass="1"/>
+              <body name="hand"><joint name="wrist" type="hinge"/><geom name="h" size="0.1" mass="1"/></body>
+              <body name="tool"><joint name="slide" type="slide"/><geom name="t" size="0.1" mass="1"/></body></body>
+            <body name="box"><freejoint name="box"/><geom name="b" size="0.1" mass="1"/></body>
+          </worldbody></mujoco>"#;
+        let plant = Plant::of(&Scene::from_xml("scene", scene, &[]).unwrap()).unwrap();
+        let joint = |name: &str| {
+            let joints = &plant.layout.joints;
+            joints.iter().position(|j| j.name == name).unwrap()
+        };
+        let body = |name: &str| {
+            let bodies = &plant.layout.bodies;
+            bodies.iter().position(|b| b == name).unwrap()
+        };
+        let way = |a, b| {
+            let mut way: Vec<usize> = between(&plant, [body(a), body(b)]).collect();
+            way.sort_unstable();
+            way
+        };
+        let sorted = |names: &[&str]| {
+            let mut all: Vec<usize> = names.iter().map(|n| joint(n)).collect();
+            all.sort_unstable();
+            all
+        };
+        assert_eq!(way("hand", "tool"), sorted(&["wrist", "slide"]));
+        assert_eq!(way("hand", "box"), sorted(&["shoulder", "wrist", "box"]));
+        assert_eq!(way("arm", "hand"), sorted(&["wrist"]));
+    }
+}
