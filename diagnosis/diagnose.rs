@@ -25,11 +25,12 @@ pub use crate::work::Work;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Contact {
-    /// By whole replays.
+    /// By whole replays where one of each candidate is affordable, else in short segments.
     #[default]
+    Auto,
+    /// By whole replays.
     Replays,
-    /// In short segments: right on a tilt, a bounce and a board whose friction differs by place, but still too ready to name
-    /// a further effect beside the right one.
+    /// In short segments.
     Segments,
 }
 

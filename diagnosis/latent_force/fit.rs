@@ -3,6 +3,8 @@
 //! Everything is linearised anew about the smoothed trajectory until the evidence stands. An effect that is right
 //! makes the missing force small: each round the evidence is compared over common scales of `q`, so that it is seen.
 
+mod slopes;
+
 use asid_core::{Parameter, Result};
 use asid_effects::EffectSpec;
 use nalgebra::{DMatrix, DVector};
@@ -15,6 +17,8 @@ use super::smoother::{Regression, regress};
 use super::step_map::{Derivatives, LinearEpisode, Variation};
 use super::unknown::Unknown;
 
+pub use slopes::Slopes;
+
 /// Common factors of `q` at which models are compared.
 pub const SCALES: [f64; 6] = [1.0, 0.3, 0.1, 0.03, 0.01, 0.003];
 /// Share of a prior's deviation that a slope is taken over.
@@ -25,10 +29,6 @@ const LARGEST_STEP: f64 = 1.0;
 const SHORTER: f64 = 0.3;
 /// Rounds of EM between two linearisations.
 const EM_ROUNDS: usize = 4;
-/// Linearisations that slopes in the state are kept for, and how far a value may move meanwhile, in deviations of its
-/// prior.
-const KEPT: usize = 3;
-const KEPT_MOVE: f64 = 0.3;
 /// Further smoothings between two steps of the values where readings remember: their slope in the past of the state is
 /// right to first order only.
 const AGAIN: usize = 2;
@@ -181,14 +181,12 @@ pub fn fit(
                 }
             })
             .collect();
-        let fresh = map.reads() && !map.is_all_segments() || slopes.is_old(&theta, unknowns);
-        let wanted = Derivatives {
-            state: fresh,
-            ..want
-        };
-        let mut linear =
-            map.linearise(&theta, &estimate.trajectory, wanted, &steps, &variations)?;
-        slopes.exchange(&mut linear, fresh.then_some(&theta[..]));
+        let mut linear = slopes.linearise(
+            (context, &mut map),
+            (&theta, unknowns),
+            &estimate,
+            &variations,
+        )?;
         let places: Vec<usize> = (0..m).collect();
         let center: Vec<f64> = free
             .iter()
@@ -292,52 +290,6 @@ pub fn fit(
     Ok(best)
 }
 
-/// Slopes in the state that are kept while they hardly change: they cost most of a linearisation, and what is found does
-/// not depend on them, only how fast (a chord method).
-#[derive(Clone, Debug, Default)]
-pub struct Slopes {
-    a: Vec<Vec<f64>>,
-    h: Vec<Vec<f64>>,
-    /// The values that they were taken at.
-    theta: Vec<f64>,
-    /// Linearisations that have used them.
-    used: usize,
-}
-
-impl Slopes {
-    /// The same at the beginning of another fit.
-    fn begun(&self) -> Self {
-        Self {
-            used: 0,
-            ..self.clone()
-        }
-    }
-
-    /// Whether they are due anew.
-    fn is_old(&self, theta: &[f64], unknowns: &[Unknown]) -> bool {
-        let moved = |((a, b), u): ((&f64, &f64), &Unknown)| (a - b).abs() / u.deviation;
-        let pairs = self.theta.iter().zip(theta).zip(unknowns);
-        let furthest = pairs.map(moved).fold(0.0, f64::max);
-        self.h.is_empty() || self.used >= KEPT || furthest > KEPT_MOVE
-    }
-
-    /// Takes fresh slopes over, or gives a linearisation the kept ones.
-    fn exchange(&mut self, linear: &mut [LinearEpisode], fresh: Option<&[f64]>) {
-        if let Some(theta) = fresh {
-            self.theta = theta.to_vec();
-            self.used = 0;
-            self.a = linear.iter().map(|l| l.a.clone()).collect();
-            self.h = linear.iter().map(|l| l.h.clone()).collect();
-            return;
-        }
-        self.used += 1;
-        for ((l, a), h) in linear.iter_mut().zip(&self.a).zip(&self.h) {
-            l.a.clone_from(a);
-            l.h.clone_from(h);
-        }
-    }
-}
-
 /// Smooths the logs in a model for the first time: linearises and fits the noise until both stand.
 ///
 /// # Errors
@@ -351,21 +303,14 @@ pub fn settle_noise(
 ) -> Result<()> {
     let nx = 2 * context.plant().layout.nv;
     let mut map = context.map(&hypothesis.specs, &hypothesis.parameters(), 2 * nx + 1)?;
-    let want = Derivatives {
-        state: true,
-        ..Derivatives::default()
-    };
     let mut slopes = Slopes::default();
-    let steps = context.start_steps();
     for _ in 0..rounds {
-        let fresh =
-            map.reads() && !map.is_all_segments() || slopes.is_old(theta, &hypothesis.unknowns);
-        let wanted = Derivatives {
-            state: fresh,
-            ..want
-        };
-        let mut linear = map.linearise(theta, &estimate.trajectory, wanted, &steps, &[])?;
-        slopes.exchange(&mut linear, fresh.then_some(theta));
+        let linear = slopes.linearise(
+            (context, &mut map),
+            (theta, &hypothesis.unknowns),
+            estimate,
+            &[],
+        )?;
         let before = estimate.trajectory.clone();
         estimate.improve(context, &linear, em_rounds);
         estimate.roll(context, &mut map, theta, &before)?;

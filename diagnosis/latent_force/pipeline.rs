@@ -39,6 +39,9 @@ const FEWEST: usize = 150;
 /// Physics steps of a replay of all logs times coordinates of the starts that they leave open up to which starts are fitted
 /// once more with the values; beyond it they stay as smoothed.
 const REPLAYED: usize = 500_000;
+/// Physics steps of a replay of all logs for each candidate up to which machines that touch something go by whole replays: a search
+/// by them takes some twenty such rounds, and a core 10^5 to 3 x 10^5 steps a second.
+const AFFORDABLE: usize = 1_500_000;
 /// Most sets besides the verdict's that are replayed.
 const RIVALS: usize = 4;
 
@@ -61,8 +64,10 @@ pub fn diagnose(
         specs: Vec::new(),
         unknowns: unknowns.map(|(p, n)| Unknown::of_study(p, *n)).collect(),
     };
-    let taken = take(study, &bench, &nominal)?;
-    if contact == Contact::Replays && taken.walks.iter().any(|w| w.segment.is_some()) {
+    let (taken, shown) = take(study, &bench, &nominal)?;
+    let segments = taken.walks.iter().any(|w| w.segment.is_some());
+    let affordable = || cost_of_replays(&bench, &shown, without) < AFFORDABLE;
+    if segments && (contact == Contact::Replays || contact == Contact::Auto && affordable()) {
         progress.end();
         return Ok(Err(bench.machine));
     }
@@ -114,8 +119,15 @@ fn along(bench: &Bench, walks: &[Walk], theta: &[f64], states: &[Vec<f64>]) -> R
     Trajectory::along(&*model, plant, values, &bench.train.logs, states, &rows)
 }
 
-/// Takes the training logs within the budget, in segments where something touches.
-fn take(study: &Study, bench: &Bench, nominal: &[f64]) -> Result<Taken> {
+/// Physics steps of a replay of all training logs for each candidate.
+fn cost_of_replays(bench: &Bench, shown: &Trajectory, without: &[String]) -> usize {
+    let episodes = &bench.train.logs.episodes;
+    let steps: usize = episodes.iter().map(|e| e.plan.physics_steps()).sum();
+    steps * enumerate(&bench.machine, shown, without).0.len()
+}
+
+/// Takes the training logs within the budget, in segments where something touches; with the contacts along them.
+fn take(study: &Study, bench: &Bench, nominal: &[f64]) -> Result<(Taken, Trajectory)> {
     let layout = bench.layout();
     let plant = &bench.machine.plant;
     let logs = &bench.train.logs;
@@ -135,13 +147,14 @@ fn take(study: &Study, bench: &Bench, nominal: &[f64]) -> Result<Taken> {
         let known = w.rows[0] == 0 && episode.initial.is_some();
         known.then(|| given_start(plant, episode))
     };
-    Ok(Taken {
+    let taken = Taken {
         given: walks.iter().map(given).collect(),
         open: bench.open.clone(),
         otherwise: at_home(&walks),
         scale: scales(plant, &first),
         walks,
-    })
+    };
+    Ok((taken, shown))
 }
 
 /// The first rows of each walk, as many as the budget of physics steps allows: a screening takes all of them once a column.

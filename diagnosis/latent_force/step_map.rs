@@ -109,6 +109,15 @@ struct Request<'r> {
     want: Derivatives,
     push: &'r [f64],
     variations: &'r [Variation],
+    /// Walks whose slopes in the state are wanted; empty for all.
+    due: &'r [bool],
+}
+
+impl Request<'_> {
+    /// Whether the slopes of a walk in the state are wanted, where any are.
+    fn due(&self, walk: usize) -> bool {
+        self.due.get(walk).is_none_or(|due| *due)
+    }
 }
 
 impl<'a> StepMap<'a> {
@@ -214,12 +223,29 @@ impl<'a> StepMap<'a> {
         push: &[f64],
         variations: &[Variation],
     ) -> Result<Vec<LinearEpisode>> {
+        self.linearise_due(theta, trajectory, (want, &[]), push, variations)
+    }
+
+    /// The same, with slopes in the state of those walks alone that are due (one flag a walk; empty for all): those of the others are
+    /// zero.
+    ///
+    /// # Errors
+    /// As [`StepMap::linearise`].
+    pub fn linearise_due(
+        &mut self,
+        theta: &[f64],
+        trajectory: &[Vec<f64>],
+        (want, due): (Derivatives, &[bool]),
+        push: &[f64],
+        variations: &[Variation],
+    ) -> Result<Vec<LinearEpisode>> {
         let request = Request {
             theta,
             trajectory,
             want,
             push,
             variations,
+            due,
         };
         let common = &self.common;
         let found: Vec<Vec<LinearEpisode>> = self

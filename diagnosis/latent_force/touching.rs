@@ -19,7 +19,8 @@ const AT_REST: f64 = 3.0;
 /// For each walk of a trajectory, one flag a row: whether two bodies touch there that move against each other in some log.
 #[must_use]
 pub fn touching(plant: &Plant, logs: &Logs, shown: &Trajectory) -> Vec<Vec<bool>> {
-    let rests = joints_at_rest(plant, logs, shown);
+    let episodes: Vec<&[f64]> = shown.episodes.iter().map(|e| &e.qpos[..]).collect();
+    let rests = joints_at_rest(plant, &position_noise(plant, logs), &episodes);
     let matters: Vec<bool> = shown
         .pairs
         .iter()
@@ -39,46 +40,36 @@ pub fn touching(plant: &Plant, logs: &Logs, shown: &Trajectory) -> Vec<Vec<bool>
         .collect()
 }
 
-/// Whether each joint stays where it is in every log, as far as its readings tell; what no sensor reads may move.
-fn joints_at_rest(plant: &Plant, logs: &Logs, shown: &Trajectory) -> Vec<bool> {
+/// Whether each joint stays where it is along some positions (`rows x nq` an episode), as far as readings with such deviations
+/// (one a degree of freedom, 0 for none) tell; what no sensor reads may move.
+fn joints_at_rest(plant: &Plant, noise: &[f64], episodes: &[&[f64]]) -> Vec<bool> {
     let layout = &plant.layout;
     let (nq, nv) = (layout.nq, layout.nv);
-    let noise = position_noise(plant, logs);
-    let mut squares = vec![0.0; nv];
-    let mut rows = 0.0;
-    let mut change = vec![0.0; 2 * nv];
     let still = vec![0.0; nv];
-    let first = shown.episodes.first().map_or(&[][..], |e| &e.qpos[..nq]);
-    let mut mean = vec![0.0; nv];
-    let each = |visit: &mut dyn FnMut(&[f64])| {
-        for qpos in shown.episodes.iter().flat_map(|e| e.qpos.chunks_exact(nq)) {
-            let states = [qpos, first].map(|q| [q, &still[..]].concat());
-            difference(layout, &states[0], &states[1], &mut change);
-            visit(&change[..nv]);
-        }
-    };
-    let mut each = each;
-    each(&mut |change| {
-        rows += 1.0;
-        mean.iter_mut().zip(change).for_each(|(m, c)| *m += c);
-    });
-    mean.iter_mut().for_each(|m| *m /= f64::max(rows, 1.0));
-    each(&mut |change| {
-        let each = squares.iter_mut().zip(change.iter().zip(&mean));
-        each.for_each(|(s, (c, m))| *s += (c - m) * (c - m));
-    });
-    let rests = |d: usize| squares[d] <= rows * (AT_REST * noise[d]).powi(2) && noise[d] > 0.0;
-    layout
-        .joints
+    let rows: Vec<&[f64]> = episodes.iter().flat_map(|e| e.chunks_exact(nq)).collect();
+    let changes: Vec<Vec<f64>> = rows
         .iter()
-        .map(|joint| {
-            let dofs = match joint.kind {
-                JointKind::Free => 6,
-                JointKind::Ball => 3,
-                JointKind::Hinge | JointKind::Slide => 1,
-            };
-            (joint.qvel..joint.qvel + dofs).all(rests)
+        .map(|qpos| {
+            let [now, first] = [qpos, &rows[0]].map(|q| [q, &still[..]].concat());
+            let mut change = vec![0.0; 2 * nv];
+            difference(layout, &now, &first, &mut change);
+            change
         })
+        .collect();
+    let n = rows.len().max(1) as f64;
+    let rests = |d: usize| {
+        let mean = changes.iter().map(|c| c[d]).sum::<f64>() / n;
+        let variance = changes.iter().map(|c| (c[d] - mean).powi(2)).sum::<f64>() / n;
+        noise[d] > 0.0 && variance <= (AT_REST * noise[d]).powi(2)
+    };
+    let dofs = |kind| match kind {
+        JointKind::Free => 6,
+        JointKind::Ball => 3,
+        JointKind::Hinge | JointKind::Slide => 1,
+    };
+    let joints = layout.joints.iter();
+    joints
+        .map(|j| (j.qvel..j.qvel + dofs(j.kind)).all(rests))
         .collect()
 }
 
@@ -105,7 +96,7 @@ fn between(plant: &Plant, [a, b]: [usize; 2]) -> impl Iterator<Item = usize> {
 
 #[cfg(test)]
 mod tests {
-    use asid_mjcf::Scene;
+    use asid_core::Scene;
 
     use super::*;
 
@@ -139,5 +130,23 @@ mod tests {
         assert_eq!(way("hand", "tool"), sorted(&["wrist", "slide"]));
         assert_eq!(way("hand", "box"), sorted(&["shoulder", "wrist", "box"]));
         assert_eq!(way("arm", "hand"), sorted(&["wrist"]));
+    }
+
+    #[test]
+    fn a_joint_rests_whose_readings_scatter_by_no_more_than_their_noise() {
+        let scene = r#"<mujoco><worldbody>
+            <body><joint name="still" type="slide"/><geom size="0.1" mass="1"/></body>
+            <body><joint name="moved" type="slide"/><geom size="0.1" mass="1"/></body>
+            <body><joint name="unseen" type="slide"/><geom size="0.1" mass="1"/></body>
+          </worldbody></mujoco>"#;
+        let plant = Plant::of(&Scene::from_xml("scene", scene, &[]).unwrap()).unwrap();
+        let rows: Vec<f64> = (0..50)
+            .flat_map(|k| {
+                let noise = if k % 2 == 0 { 0.001 } else { -0.001 };
+                [2.0 + noise, 0.001 * f64::from(k), 0.0]
+            })
+            .collect();
+        let found = joints_at_rest(&plant, &[0.001, 0.001, 0.0], &[&rows]);
+        assert_eq!(found, [true, false, false]);
     }
 }

@@ -65,18 +65,24 @@ impl Part {
         } = request;
         let nv = c.layout.nv;
         let nx = 2 * nv;
-        let mut roles = Vec::new();
+        let all = vec![true; self.walks.len()];
+        let due: Vec<bool> = self.walks.iter().map(|&w| request.due(w)).collect();
+        let mut in_state = Vec::new();
         if want.state {
-            roles.extend((0..nx).map(Role::State));
+            in_state.extend((0..nx).map(Role::State));
             if c.reads && !self.walks.iter().all(|&w| c.rolls(w, want)) {
-                roles.extend((0..nx).map(Role::Reading));
-                roles.extend((0..nv).map(Role::Ramp));
+                in_state.extend((0..nx).map(Role::Reading));
+                in_state.extend((0..nv).map(Role::Ramp));
             }
         }
+        let mut others = Vec::new();
         if want.force {
-            roles.extend((0..nv).map(Role::Force));
+            others.extend((0..nv).map(Role::Force));
         }
-        roles.extend((0..variations.len()).map(Role::Varied));
+        others.extend((0..variations.len()).map(Role::Varied));
+        if due == all {
+            in_state.append(&mut others);
+        }
         let (ns, m) = (c.logs.entries.len(), variations.len());
         let mut episodes: Vec<LinearEpisode> = self
             .walks
@@ -99,16 +105,19 @@ impl Part {
                 }
             })
             .collect();
-        if roles.is_empty() {
-            self.pass(c, request, &[], &mut episodes, &mut [])?;
-        }
         let late = usize::from(want.state && c.reads);
         let mut ramps: Vec<Vec<f64>> = episodes
             .iter()
             .map(|e| vec![0.0; late * e.rows * ns * nv])
             .collect();
-        for chunk in roles.chunks(c.capacity - 1) {
-            self.pass(c, request, chunk, &mut episodes, &mut ramps)?;
+        for (roles, which) in [(&in_state, &due), (&others, &all)] {
+            let roles = if which.contains(&true) { &roles[..] } else { &[] };
+            for chunk in roles.chunks(c.capacity - 1) {
+                self.pass(c, request, (chunk, which), &mut episodes, &mut ramps)?;
+            }
+        }
+        if others.is_empty() && (due != all || in_state.is_empty()) {
+            self.pass(c, request, (&[], &all), &mut episodes, &mut ramps)?;
         }
         if late == 1 {
             for ((episode, ramps), &w) in episodes.iter_mut().zip(&ramps).zip(&self.walks) {
@@ -121,12 +130,12 @@ impl Part {
         Ok(episodes)
     }
 
-    /// One walk along all episodes with some roles beside the nominal one.
+    /// One walk along some of the episodes with some roles beside the nominal one.
     fn pass(
         &mut self,
         c: &Common<'_>,
         request: Request<'_>,
-        extra: &[Role],
+        (extra, which): (&[Role], &[bool]),
         out: &mut [LinearEpisode],
         ramps: &mut [Vec<f64>],
     ) -> Result<()> {
@@ -150,7 +159,8 @@ impl Part {
         let longest = walks.iter().map(|w| w.len()).max().unwrap_or(0);
         let mut row = RowBuffers::default();
         for k in 0..longest {
-            let here: Vec<usize> = (0..n).filter(|&e| walks[e].len() > k).collect();
+            let reach = |&e: &usize| which[e] && walks[e].len() > k;
+            let here: Vec<usize> = (0..n).filter(reach).collect();
             self.place(c, &roles, (&here, k), request, &mut row)?;
             self.read_row(c, &roles, (&here, k), request, (out, ramps), &mut row)?;
             for (substeps, now) in by_substeps(&walks, here, k) {

@@ -1,0 +1,115 @@
+//! Slopes in the state that are kept while they hardly change (a chord method).
+//!
+//! They cost most of a linearisation, and what is found does not depend on them, only how fast.
+
+use asid_core::Result;
+
+use crate::latent_force::context::Context;
+use crate::latent_force::estimate::Estimate;
+use crate::latent_force::step_map::{Derivatives, LinearEpisode, StepMap, Variation};
+use crate::latent_force::tangent::difference;
+use crate::latent_force::unknown::Unknown;
+
+/// Linearisations that slopes along rows are kept for: their trajectory moves in each.
+const KEPT: usize = 3;
+/// How far a value may move meanwhile, in deviations of its prior.
+const KEPT_MOVE: f64 = 0.3;
+/// How far the start of a segment may move meanwhile, in steps that its slopes are taken over: within a few of them the same
+/// points touch.
+const KEPT_START: f64 = 5.0;
+
+/// Slopes of each walk, and where they were taken.
+#[derive(Clone, Debug, Default)]
+pub struct Slopes {
+    a: Vec<Vec<f64>>,
+    h: Vec<Vec<f64>>,
+    /// First states of the walks.
+    first: Vec<Vec<f64>>,
+    /// The values.
+    theta: Vec<f64>,
+    /// Linearisations that have used them.
+    used: usize,
+}
+
+impl Slopes {
+    /// The same at the beginning of another fit.
+    #[must_use]
+    pub fn begun(&self) -> Self {
+        Self {
+            used: 0,
+            ..self.clone()
+        }
+    }
+
+    /// Linearises a model at some values about an estimate's trajectory, with slopes in the state that are taken anew where they
+    /// are due, and kept elsewhere.
+    ///
+    /// # Errors
+    /// When a value is not physical or the engine fails.
+    pub fn linearise(
+        &mut self,
+        (context, map): (&Context<'_>, &mut StepMap<'_>),
+        (theta, unknowns): (&[f64], &[Unknown]),
+        estimate: &Estimate,
+        variations: &[Variation],
+    ) -> Result<Vec<LinearEpisode>> {
+        let moved = self.h.is_empty() || self.furthest(theta, unknowns) > KEPT_MOVE;
+        // Readings that remember have slopes of their own past.
+        let along = moved || self.used >= KEPT || map.reads() && !map.is_all_segments();
+        let due: Vec<bool> = (0..context.walks.len())
+            .map(|w| match context.walks[w].segment {
+                Some(_) => moved || self.has_left(context, estimate, w),
+                None => along,
+            })
+            .collect();
+        let want = Derivatives {
+            state: due.contains(&true),
+            ..Derivatives::default()
+        };
+        let steps = context.start_steps();
+        let trajectory = &estimate.trajectory;
+        let mut linear =
+            map.linearise_due(theta, trajectory, (want, &due), &steps, variations)?;
+        self.exchange(&mut linear, &due, trajectory);
+        if moved || along && !context.has_segments() {
+            self.theta = theta.to_vec();
+        }
+        self.used = if along { 0 } else { self.used + 1 };
+        Ok(linear)
+    }
+
+    /// The largest move of a value since the slopes were taken, in deviations of its prior.
+    fn furthest(&self, theta: &[f64], unknowns: &[Unknown]) -> f64 {
+        let moved = |((a, b), u): ((&f64, &f64), &Unknown)| (a - b).abs() / u.deviation;
+        let pairs = self.theta.iter().zip(theta).zip(unknowns);
+        pairs.map(moved).fold(0.0, f64::max)
+    }
+
+    /// Whether the start of a segment is no longer where its slopes were taken, or these kept no promise.
+    fn has_left(&self, context: &Context<'_>, estimate: &Estimate, walk: usize) -> bool {
+        let layout = &context.plant().layout;
+        let now = &estimate.trajectory[walk][..layout.nq + layout.nv];
+        let mut change = vec![0.0; 2 * layout.nv];
+        difference(layout, now, &self.first[walk][..now.len()], &mut change);
+        let steps = context.start_steps();
+        let mut pairs = change.iter().zip(&steps);
+        estimate.misled[walk] > 1.0 || pairs.any(|(c, step)| c.abs() > KEPT_START * step)
+    }
+
+    /// Takes fresh slopes over where they were due, and gives the kept ones to the other walks.
+    fn exchange(&mut self, linear: &mut [LinearEpisode], due: &[bool], trajectory: &[Vec<f64>]) {
+        self.a.resize(linear.len(), Vec::new());
+        self.h.resize(linear.len(), Vec::new());
+        self.first.resize(linear.len(), Vec::new());
+        for (w, linear) in linear.iter_mut().enumerate() {
+            if due[w] {
+                self.a[w].clone_from(&linear.a);
+                self.h[w].clone_from(&linear.h);
+                self.first[w].clone_from(&trajectory[w]);
+            } else {
+                linear.a.clone_from(&self.a[w]);
+                linear.h.clone_from(&self.h[w]);
+            }
+        }
+    }
+}
