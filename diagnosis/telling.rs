@@ -172,13 +172,13 @@ impl Telling<'_> {
             checks: self.checks(none, &explanation, short.as_ref())?,
             next_experiment: self.next(best)?,
             missing_force: self.findings.missing.clone(),
-            wiring: Vec::new(),
+            ..DiagnosisResult::default()
         };
         let rest = short
             .and_then(|(before, after, _)| least_explained(&before, &after))
             .or_else(|| least_made_up(&result.missing_force));
         result.sentence = crate::sentence::sentence(&result, &labels, rest.as_deref());
-        let trace = self.trace(&nominal, &identified, &refined)?;
+        let trace = self.trace(&nominal, &identified, &refined, &result.effects)?;
         let study = self.bench.parameters.len();
         Ok(Diagnosis {
             result,
@@ -347,6 +347,8 @@ impl Telling<'_> {
                 let [low, high] = p.range;
                 ParameterResult {
                     name: p.name.clone(),
+                    unit: self.study.parameters[i].unit.clone(),
+                    nominal: Some(self.nominal[i]),
                     estimate,
                     std,
                     interval95: [

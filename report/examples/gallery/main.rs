@@ -10,7 +10,8 @@ mod synthetic;
 use std::path::{Path, PathBuf};
 
 use asid_core::error::{Error, Result};
-use asid_report::diagnosis::{Diagnosis, page};
+use asid_report::diagnosis::page;
+use diagnosed::Diagnosis;
 
 fn main() -> Result<()> {
     let folder = PathBuf::from(std::env::args().nth(1).unwrap_or_else(|| "gallery".into()));
@@ -30,9 +31,11 @@ fn main() -> Result<()> {
     ];
     for (name, diagnosis) in diagnoses {
         let path = made(&folder, name)?.join("report.html");
-        std::fs::write(&path, page(&diagnosis)).map_err(|e| Error::File {
-            path,
-            message: e.to_string(),
+        std::fs::write(&path, page(&diagnosis.result, &diagnosis.trace)).map_err(|e| {
+            Error::File {
+                path,
+                message: e.to_string(),
+            }
         })?;
     }
     Ok(())

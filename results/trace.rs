@@ -1,8 +1,38 @@
-//! The data of a diagnosis' pictures.
+//! `trace.json` of a diagnosis: what its report shows besides `result.json`.
+
+use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
 use crate::nullable;
+
+/// What the report shows besides `result.json`. What a diagnosis does not have stays empty and is left out.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct DiagnosisTrace {
+    /// Readings of the first held-out episodes beside the simulations.
+    pub signals: Vec<SignalTrace>,
+    /// Gap on the held-out logs of each single effect that was tried to the end.
+    pub ladder: Vec<Rung>,
+    /// Residuals by place, where a sensor reads a position.
+    pub map: Option<Map>,
+    /// Candidates that could not be tried, and why.
+    pub left_out: Vec<NamedText>,
+    /// What the catalogue says of the effects of the result, by name.
+    pub catalogue: BTreeMap<String, EffectWords>,
+    /// Number of episodes held out; 0 where it is not known.
+    pub held_out: usize,
+    /// Number of episodes fitted to; 0 where it is not known.
+    pub fitted_to: usize,
+    /// Engine of the simulations, with its version.
+    pub engine: String,
+    /// The command line that repeats the diagnosis.
+    pub command: String,
+    /// Versions and whatever else it takes: `asid`, `seed`, ….
+    pub versions: Vec<NamedText>,
+    /// What else lies in the folder.
+    pub files: Vec<FileEntry>,
+}
 
 /// One signal of one held-out episode. What is missing or diverged is NaN.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -36,7 +66,8 @@ pub struct SignalTrace {
 
 impl SignalTrace {
     /// Residuals of a simulation in units of the noise; in the signal's unit where no noise is known.
-    pub(super) fn residuals(&self, simulated: &[f64]) -> Vec<f64> {
+    #[must_use]
+    pub fn residuals(&self, simulated: &[f64]) -> Vec<f64> {
         let unit = if self.has_noise() { self.noise } else { 1.0 };
         self.real
             .iter()
@@ -46,14 +77,16 @@ impl SignalTrace {
     }
 
     /// Root mean square of the residuals; NaN where there are none.
-    pub(super) fn gap(&self, simulated: &[f64]) -> f64 {
+    #[must_use]
+    pub fn gap(&self, simulated: &[f64]) -> f64 {
         let squares = self.residuals(simulated).into_iter().map(|r| r * r);
         let finite: Vec<f64> = squares.filter(|s| s.is_finite()).collect();
         (finite.iter().sum::<f64>() / finite.len() as f64).sqrt()
     }
 
     /// Whether residuals can be told in units of the noise.
-    pub(super) fn has_noise(&self) -> bool {
+    #[must_use]
+    pub fn has_noise(&self) -> bool {
         self.noise.is_finite() && self.noise > 0.0
     }
 }
@@ -78,6 +111,53 @@ pub struct Map {
     /// Position on both axes, and the residual there in units of the noise.
     #[serde(deserialize_with = "nullable::rows")]
     pub points: Vec<[f64; 3]>,
+}
+
+/// What the catalogue says of an effect.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct EffectWords {
+    /// What it is, in a few words.
+    pub about: String,
+    /// Its parameters, by name.
+    pub parameters: BTreeMap<String, ParameterWords>,
+}
+
+/// What the catalogue says of a parameter of an effect.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ParameterWords {
+    /// Unit; may be empty.
+    pub unit: String,
+    /// Value at which the effect is off.
+    #[serde(deserialize_with = "nullable::scalar")]
+    pub null: f64,
+}
+
+/// A name and a text.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct NamedText {
+    /// The name.
+    pub name: String,
+    /// The text.
+    pub value: String,
+}
+
+impl NamedText {
+    /// A name and a text.
+    pub fn new(name: impl Into<String>, value: impl Into<String>) -> Self {
+        Self {
+            name: name.into(),
+            value: value.into(),
+        }
+    }
+}
+
+/// A file of a result's folder.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct FileEntry {
+    /// Name relative to the folder.
+    pub name: String,
+    /// What it holds.
+    pub what: String,
 }
 
 #[cfg(test)]
