@@ -161,6 +161,7 @@ fn tell(
         judgement: &work.judgement,
         nominal: &work.nominal,
         settings,
+        stopped: progress.is_stopped(),
     }
     .tell()?;
     progress.end();

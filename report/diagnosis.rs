@@ -14,6 +14,8 @@
 
 mod causes;
 mod closing;
+mod evidence;
+mod forces;
 mod head;
 mod ladder;
 mod lines;
@@ -36,12 +38,14 @@ pub fn page(result: &DiagnosisResult, trace: &DiagnosisTrace) -> String {
         wiring::section(d),
         Some(ladder::section(d, t)),
         real_world::section(d),
+        forces::section(d, t),
         Some(pictures::section(d, t)),
         Some(places::section(d, t)),
         Some(causes::section(d, t)),
         closing::parameters(d),
         closing::checks(d),
         closing::next(d),
+        closing::not_tried(d),
         closing::left_out(t),
         closing::repeat(t),
     ];

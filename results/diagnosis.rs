@@ -233,6 +233,37 @@ pub struct MissingForce {
     pub correlation_time: f64,
 }
 
+/// A set of effects with the evidence for it over the model without effects, natural logarithms.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct RankedSet {
+    /// Effects at their sites.
+    pub effects: Vec<String>,
+    /// In the first screening: to first order, at fixed noise.
+    pub screened: Option<f64>,
+    /// With the set in the model, values and noise fitted.
+    pub fitted: Option<f64>,
+}
+
+/// How well the logs tell effects apart: principal angles between what they add to the model along the logs, what
+/// the study's parameters can do projected out.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Isolability {
+    /// Effects at their sites, the most evident first.
+    pub effects: Vec<String>,
+    /// Smallest angle between each two, rad: 0 where they act alike, pi / 2 where they have nothing in common.
+    #[serde(deserialize_with = "nullable::table")]
+    pub angles: Vec<Vec<f64>>,
+}
+
+/// A stage that a time limit or an interruption cut short.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct NotTried {
+    /// What was left out.
+    pub stage: String,
+    /// For which sets of effects, `a@x + b@y`; empty where it concerns none.
+    pub effects: Vec<String>,
+}
+
 /// `result.json`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct DiagnosisResult {
@@ -265,6 +296,21 @@ pub struct DiagnosisResult {
     /// The force that is missing at each degree of freedom; empty where contact lasts, and it is not estimated.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub missing_force: Vec<MissingForce>,
+    /// Sets of effects by their evidence, the best first, at most 20; empty where replays decide.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub ranking: Vec<RankedSet>,
+    /// Which of the leading effects these logs tell apart; `None` where replays decide.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub isolability: Option<Isolability>,
+    /// What a time limit or an interruption left out; empty where the search came to its end.
+    #[serde(default)]
+    pub not_tried: Vec<NotTried>,
+    /// Wall time of the diagnosis, s.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub seconds: Option<f64>,
+    /// Wall time until the first ranking was known, s.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub seconds_to_first_table: Option<f64>,
     /// The task in the real world, before and after; `None` for a study.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub real_world: Option<RealWorld>,
@@ -325,7 +371,11 @@ mod tests {
         "checks":[{"check":"excitation","ok":true,"detail":""}],
         "next_experiment":{"separates":["a","b"],"how":"faster"},
         "wiring":[{"fault":"wiring-sign","columns":["q"],"probability":1.0,"mend":"sign = -1"}],
-        "missing_force":[{"dof":"elbow","unit":"N m","identified":0.4,"refined":0.1,"correlation_time":0.2}]}"#;
+        "missing_force":[{"dof":"elbow","unit":"N m","identified":0.4,"refined":0.1,"correlation_time":0.2}],
+        "ranking":[{"effects":["actuator-delay@elbow"],"screened":90.5,"fitted":112.0}],
+        "isolability":{"effects":["a@q","b@q"],"angles":[[0.0,1.2],[1.2,0.0]]},
+        "not_tried":[{"stage":"confirmation","effects":["b@q"]}],
+        "seconds":9.5,"seconds_to_first_table":2.5}"#;
 
     #[test]
     fn a_result_that_is_read_and_written_again_is_the_same() {

@@ -68,6 +68,18 @@ pub fn rows<'de, D: Deserializer<'de>, const N: usize>(
         .collect()
 }
 
+/// A list of lists of numbers.
+///
+/// # Errors
+/// Where the text holds something else.
+pub fn table<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<Vec<f64>>, D::Error> {
+    let rows = Vec::<Vec<Number>>::deserialize(deserializer)?;
+    Ok(rows
+        .into_iter()
+        .map(|row| row.into_iter().map(|n| n.0).collect())
+        .collect())
+}
+
 /// Numbers by name.
 ///
 /// # Errors

@@ -14,6 +14,8 @@ pub struct DiagnosisTrace {
     pub signals: Vec<SignalTrace>,
     /// Gap on the held-out logs of each single effect that was tried to the end.
     pub ladder: Vec<Rung>,
+    /// The force that the model lacks, at the degrees of freedom where most is missing, the most first.
+    pub forces: Vec<ForceTrace>,
     /// Residuals by place, where a sensor reads a position.
     pub map: Option<Map>,
     /// Candidates that could not be tried, and why.
@@ -99,6 +101,51 @@ pub struct Rung {
     /// Gap with it.
     #[serde(deserialize_with = "nullable::scalar")]
     pub gap: f64,
+}
+
+/// The force that the model lacks at a degree of freedom, along the training logs.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct ForceTrace {
+    /// Joint; with the axis (`.x`, `.rx`, …) where it has several.
+    pub dof: String,
+    /// Unit of forces: `N` or `N m`.
+    pub unit: String,
+    /// Unit of positions: `m` or `rad`.
+    pub position_unit: String,
+    /// Episode of the stretch.
+    pub episode: String,
+    /// Rows of one episode, one after the other.
+    pub stretch: ForceSeries,
+    /// Rows from all episodes, evenly chosen.
+    pub spread: ForceSeries,
+}
+
+/// Rows along which a force is missing. A column that a machine does not have is empty.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct ForceSeries {
+    /// Times from the episode's first row on, s.
+    #[serde(deserialize_with = "nullable::list")]
+    pub time: Vec<f64>,
+    /// Positions, m or rad.
+    #[serde(deserialize_with = "nullable::list")]
+    pub position: Vec<f64>,
+    /// Speeds, m/s or rad/s.
+    #[serde(deserialize_with = "nullable::list")]
+    pub speed: Vec<f64>,
+    /// Force of the drives as modelled, N or N m.
+    #[serde(deserialize_with = "nullable::list")]
+    pub load: Vec<f64>,
+    /// What is missing once the study's parameters are fitted, N or N m.
+    #[serde(deserialize_with = "nullable::list")]
+    pub before: Vec<f64>,
+    /// What is missing with the verdict's effects, N or N m.
+    #[serde(deserialize_with = "nullable::list")]
+    pub after: Vec<f64>,
+    /// What these effects, and the values fitted with them, add to the model there, N or N m.
+    #[serde(deserialize_with = "nullable::list")]
+    pub law: Vec<f64>,
 }
 
 /// Residuals by place.

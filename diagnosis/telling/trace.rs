@@ -91,6 +91,7 @@ impl Telling<'_> {
             left_out: (self.left_out.iter())
                 .map(|l| NamedText::new(&l.label, &l.why))
                 .collect(),
+            forces: self.findings.forces.clone(),
             catalogue: catalogue(effects),
             held_out: self.study.test.len(),
             fitted_to: self.study.train.len(),

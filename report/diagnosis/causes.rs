@@ -3,6 +3,7 @@
 use asid_results::diagnosis::{DiagnosisResult, EffectResult, HypothesisResult, Kind};
 use asid_results::trace::DiagnosisTrace;
 
+use super::evidence;
 use super::head::refined;
 use super::words::{
     about, count, found, gap, hypothesis, joined, percent, probability, set, values,
@@ -24,6 +25,9 @@ pub(super) fn section(d: &DiagnosisResult, t: &DiagnosisTrace) -> Section {
     let mut section = Section::new("Which effect").lead(lead);
     section = explanation(d, t).into_iter().fold(section, Section::text);
     section = section.figures(vec![figure(d)]);
+    section = evidence::figures(d)
+        .into_iter()
+        .fold(section, |section, figure| section.figures(vec![figure]));
     let (shown, folded): (Vec<&EffectResult>, Vec<&EffectResult>) =
         d.effects.iter().partition(|e| matters(d, e));
     if !shown.is_empty() {

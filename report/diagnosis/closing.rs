@@ -104,6 +104,25 @@ pub(super) fn checks(d: &DiagnosisResult) -> Option<Section> {
     )
 }
 
+pub(super) fn not_tried(d: &DiagnosisResult) -> Option<Section> {
+    if d.not_tried.is_empty() {
+        return None;
+    }
+    let columns = vec![Column::prose("what"), Column::prose("of which effects")];
+    let table = d.not_tried.iter().fold(Table::new(columns), |table, n| {
+        let effects = match &n.effects[..] {
+            [] => "–".to_owned(),
+            effects => joined(effects, "and"),
+        };
+        table.row(vec![n.stage.clone().into(), effects.into()])
+    });
+    Some(
+        Section::new("Stopped early")
+            .lead("The search was stopped, by a time limit or by hand. This was left out; with more time the answer may change.")
+            .table(table),
+    )
+}
+
 pub(super) fn left_out(t: &DiagnosisTrace) -> Option<Section> {
     if t.left_out.is_empty() {
         return None;
@@ -114,7 +133,7 @@ pub(super) fn left_out(t: &DiagnosisTrace) -> Option<Section> {
     });
     let summary = format!("{} of the catalogue", count(t.left_out.len(), "candidate"));
     Some(
-        Section::new("What was not tried")
+        Section::new("What could not be tried")
             .lead("Effects that this model, engine or data do not allow: the diagnosis says nothing of them.")
             .folded(summary, Section::new("").table(table)),
     )

@@ -17,7 +17,7 @@ fn page(d: &Diagnosis) -> String {
 }
 
 /// A diagnosis of each kind, one of nothing, and ones whose numbers are none.
-fn diagnoses() -> [Diagnosis; 6] {
+fn diagnoses() -> [Diagnosis; 7] {
     let mut numberless = diagnosed::patch();
     numberless.result.gap = Default::default();
     for signal in &mut numberless.trace.signals {
@@ -35,6 +35,7 @@ fn diagnoses() -> [Diagnosis; 6] {
     timeless.trace.signals[1].nominal.fill(f64::INFINITY);
     [
         diagnosed::patch(),
+        diagnosed::by_force(),
         diagnosed::complete(),
         diagnosed::crowded(),
         Diagnosis::default(),
@@ -137,6 +138,33 @@ fn a_verdict_of_two_effects_describes_both() {
     let html = page(&d);
     assert!(html.contains("lacks friction-patch@board and gravity-tilt"));
     assert!(html.contains("gravity-tilt: The ground is not level; fitted: pitch = −0.021"));
+}
+
+#[test]
+fn the_missing_force_is_drawn_with_the_law_and_an_early_end_says_what_was_left_out() {
+    let html = page(&diagnosed::by_force());
+    for told in [
+        "shoulder: 1.3\u{a0}N m is missing, 0.13\u{a0}N m is left",
+        "Against speed",
+        "Against angle",
+        "Against force of the drives",
+        "How the explanations rank",
+        "Which effects these logs tell apart",
+        "1  friction-anisotropy@joint_0",
+        "Stopped early",
+        "linear-drag@puck and gravity-tilt",
+    ] {
+        assert!(html.contains(told), "{told}");
+    }
+    // A machine that was diagnosed by replays shows none of it.
+    let html = page(&diagnosed::patch());
+    for untold in [
+        "that is missing",
+        "How the explanations rank",
+        "Stopped early",
+    ] {
+        assert!(!html.contains(untold), "{untold}");
+    }
 }
 
 #[test]

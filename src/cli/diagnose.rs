@@ -1,31 +1,31 @@
 //! `asid diagnose`: where the sim-to-real gap lies, which effect causes it, how far it shrinks.
 
 mod config;
+mod live;
 mod real_world;
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::Instant;
 
 use anyhow::Result;
-use asid_core::{Backend, Target};
+use asid_core::{Backend, Progress as _, Target};
 use asid_diagnosis::diagnose::{Diagnosis, diagnose as diagnose_study};
 use asid_diagnosis::machine::Machine;
 use asid_diagnosis::study::Study;
 use asid_effects::refined_model::RefinedModel;
 use asid_report::diagnosis::{page, real_world_lines};
-use asid_results::diagnosis::{DiagnosisResult, RealWorld};
+use asid_results::diagnosis::{DiagnosisResult, NotTried, RealWorld};
 use asid_results::trace::{DiagnosisTrace, NamedText};
 
 use super::failure;
 use super::options::{Algorithms, Common, Worlds};
 use super::output::{OutFolder, write_json, write_text};
-use super::progress::Bars;
 use super::session::backend;
 use super::trace::files;
 use config::Config;
 pub use config::default_backend;
+use live::Live;
 
 /// Arguments of `diagnose`.
 #[derive(clap::Args)]
@@ -61,6 +61,9 @@ pub struct Arguments {
     /// Run the task this often without and with the answer, to count successes [default: 5]
     #[arg(long, value_name = "N")]
     seeds: Option<u64>,
+    /// Answer after about this time with what is known by then; result.json lists what was not tried. Ctrl-C does the same
+    #[arg(long, value_name = "MINUTES")]
+    minutes: Option<f64>,
     /// Leave out an effect of the catalogue (repeatable)
     #[arg(long, value_name = "EFFECT")]
     without: Vec<String>,
@@ -115,10 +118,9 @@ pub fn machine(study: &Study, engine: &str, threads: usize) -> Result<Machine> {
 
 /// Diagnoses a study, or a task.
 pub fn diagnose(arguments: &Arguments) -> Result<()> {
-    let clock = Instant::now();
     let common = &arguments.common;
     let (config, of_run) = Config::resolve(arguments)?;
-    let progress = Bars::new(common.quiet);
+    let progress = Live::new(common.quiet, config.minutes);
     let world = of_run
         .map(|of_run| {
             let (algorithms, worlds) = (&arguments.algorithms, &arguments.worlds);
@@ -148,9 +150,11 @@ pub fn diagnose(arguments: &Arguments) -> Result<()> {
         (None, None) => config.study(None)?,
     };
     let machine = machine(&study, &config.backend, common.threads.unwrap_or(0))?;
+    progress.watch()?;
     let (mut diagnosis, work) = diagnose_study(&study, machine, config.settings(), &progress)?;
     let mut experiments = None;
     if let (Some(world), Some(n @ 1..)) = (&world, config.experiments)
+        && !progress.is_stopped()
         && let Some(played) = world.tell_apart(&work, n, &progress)?
     {
         let (train, test) = world.logs(&runs);
@@ -167,7 +171,12 @@ pub fn diagnose(arguments: &Arguments) -> Result<()> {
         diagnosis = diagnose_study(&study, again, config.settings(), &progress)?.0;
     }
     drop(work);
-    if let Some(world) = &world {
+    if progress.is_stopped() && world.is_some() {
+        diagnosis.result.not_tried.push(NotTried {
+            stage: "experiments, and the task before and after".into(),
+            effects: Vec::new(),
+        });
+    } else if let Some(world) = &world {
         let compared = world.compare(&runs, &diagnosis.effects, &progress)?;
         diagnosis.result.real_world = Some(RealWorld {
             experiments: experiments.unwrap_or_default(),
@@ -185,6 +194,8 @@ pub fn diagnose(arguments: &Arguments) -> Result<()> {
         let more: Vec<_> = of_run.filter(|(k, _)| !settings.contains_key(k)).collect();
         settings.extend(more);
     }
+    diagnosis.result.seconds = Some(progress.seconds());
+    diagnosis.result.seconds_to_first_table = progress.seconds_to_first_table();
     tell_origin(&mut diagnosis.trace, &engine, config.seed);
     let result = &diagnosis.result;
     out.write(|folder| {
@@ -203,8 +214,7 @@ pub fn diagnose(arguments: &Arguments) -> Result<()> {
     if common.json {
         writeln!(stdout, "{}", serde_json::to_string_pretty(result)?)?;
     } else {
-        let seconds = clock.elapsed().as_secs_f64();
-        for line in lines(result, &engine, seconds) {
+        for line in lines(result, &engine, progress.seconds()) {
             writeln!(stdout, "{line}")?;
         }
         for line in result.real_world.iter().flat_map(real_world_lines) {
@@ -309,6 +319,9 @@ fn lines(result: &DiagnosisResult, engine: &str, seconds: f64) -> Vec<String> {
     }
     for p in &result.parameters {
         line(&format!("  {} = {:.5} ± {:.5}", p.name, p.estimate, p.std));
+    }
+    for left in &result.not_tried {
+        line(&format!("not tried: {}", left.stage));
     }
     if !result.next_experiment.how.is_empty() {
         line(&format!("next: {}", result.next_experiment.how));

@@ -1,5 +1,8 @@
 //! Diagnoses that never happened, with the shapes and sizes of those that do.
 
+#[path = "missing.rs"]
+mod missing;
+
 use asid_results::diagnosis::*;
 use asid_results::trace::*;
 
@@ -286,6 +289,14 @@ pub fn complete() -> Diagnosis {
         ..DiagnosisTrace::default()
     };
     Diagnosis { result, trace }
+}
+
+/// The same by the missing force, stopped early.
+pub fn by_force() -> Diagnosis {
+    let mut d = patch();
+    d.trace.map = None;
+    missing::add(&mut d);
+    d
 }
 
 /// A gap that nothing explains; many signals, hostile names, readings that are missing, simulations that diverge.

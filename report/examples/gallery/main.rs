@@ -1,7 +1,7 @@
 //! Writes reports of made-up but realistic data, to look at the layout.
 //!
 //! `cargo run -p asid-report --example gallery -- FOLDER` writes runs (`full`, `bare`
-//! and `crowded`, each with `trace.json`) and diagnoses (`patch`, `complete`,
+//! and `crowded`, each with `trace.json`) and diagnoses (`patch`, `force`, `complete`,
 //! `unexplained` and `empty`) below it, each with `report.html`.
 
 mod diagnosed;
@@ -25,6 +25,7 @@ fn main() -> Result<()> {
     }
     let diagnoses = [
         ("patch", diagnosed::patch()),
+        ("force", diagnosed::by_force()),
         ("complete", diagnosed::complete()),
         ("unexplained", diagnosed::crowded()),
         ("empty", Diagnosis::default()),
