@@ -144,12 +144,9 @@ pub(super) fn forces(
     let most = order.first().map_or(0.0, |&d| missing(d));
     order.retain(|&d| missing(d) >= LEAST * most);
     order.truncate(SHOWN);
-    let (Some(&longest), false) = (
-        smoothed.iter().max_by_key(|&&w| context.walks[w].len()),
-        order.is_empty(),
-    ) else {
+    if smoothed.is_empty() {
         return Ok(Vec::new());
-    };
+    }
     let law = law(context, outcome, candidates)?;
     let rows: Vec<(usize, usize)> = smoothed
         .iter()
@@ -160,19 +157,44 @@ pub(super) fn forces(
         .step_by(rows.len().div_ceil(ROWS).max(1))
         .copied()
         .collect();
-    let stretch: Vec<(usize, usize)> = (0..(context.walks[longest].len() - 1).min(ROWS))
-        .map(|k| (longest, k))
-        .collect();
-    let episode = &context.logs.episodes[context.walks[longest].episode].name;
-    let trace = |&d: &usize| ForceTrace {
-        dof: dofs[d].name.clone(),
-        unit: dofs[d].unit().to_owned(),
-        position_unit: if dofs[d].turns { "rad" } else { "m" }.to_owned(),
-        episode: episode.clone(),
-        stretch: series(context, outcome, &law, (&dofs[d], d), &stretch),
-        spread: series(context, outcome, &law, (&dofs[d], d), &spread),
+    let trace = |&d: &usize| {
+        let stretch = most_missing(context, outcome, &smoothed, d);
+        let walk = stretch.first().map_or(0, |s| s.0);
+        let episode = &context.logs.episodes[context.walks[walk].episode];
+        ForceTrace {
+            dof: dofs[d].name.clone(),
+            unit: dofs[d].unit().to_owned(),
+            position_unit: if dofs[d].turns { "rad" } else { "m" }.to_owned(),
+            episode: episode.name.clone(),
+            stretch: series(context, outcome, &law, (&dofs[d], d), &stretch),
+            spread: series(context, outcome, &law, (&dofs[d], d), &spread),
+        }
     };
     Ok(order.iter().map(trace).collect())
+}
+
+/// The rows of one walk, [`ROWS`] at most, along which most is missing at a degree of freedom.
+fn most_missing(
+    context: &Context<'_>,
+    outcome: &Outcome,
+    smoothed: &[usize],
+    d: usize,
+) -> Vec<(usize, usize)> {
+    let nv = context.plant().layout.nv;
+    let mut best = (f64::NEG_INFINITY, 0..0, 0);
+    for &w in smoothed {
+        let rows = context.walks[w].len() - 1;
+        let force = &outcome.none.estimate.smoothed[w].force;
+        for first in (0..rows).step_by(ROWS / 2) {
+            let range = first..rows.min(first + ROWS);
+            let power: f64 = range.clone().map(|k| force[k * nv + d].powi(2)).sum();
+            if power > best.0 {
+                best = (power, range, w);
+            }
+        }
+    }
+    let (_, range, w) = best;
+    range.map(|k| (w, k)).collect()
 }
 
 /// A degree of freedom along some rows, each a walk and its row.

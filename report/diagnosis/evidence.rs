@@ -8,7 +8,9 @@ use crate::page::Figure;
 use crate::plot::{Axis, Colour, Heat, Ranked, Ranking};
 
 /// Sets that are shown.
-const MOST: usize = 16;
+const MOST: usize = 12;
+/// Evidence from which on a set is shown, natural logarithm: less is against it.
+const LEAST: f64 = 0.0;
 
 /// The pictures; none where replays decided.
 pub(super) fn figures(d: &DiagnosisResult) -> Vec<Figure> {
@@ -44,11 +46,13 @@ fn ranking(d: &DiagnosisResult) -> Figure {
     let caption = "Logarithm of the odds for a set of effects against the model without them, on the training logs, prices for \
                    further parameters included. Blue: the verdict. Ochre: fitted, grey: screened to first order and not \
                    followed. The best of a hundred wrong candidates reaches 3 to 5 by chance.";
+    let for_it = |r: &&RankedSet| r.fitted.or(r.screened).is_some_and(|e| e > LEAST);
+    let shown = d.ranking.iter().filter(for_it).take(MOST);
     let plot = Ranking::new(
         "Evidence for each set",
         Axis::new("evidence, natural logarithm", ""),
     )
-    .rows(d.ranking.iter().take(MOST).map(row))
+    .rows(shown.map(row))
     .description(caption);
     Figure::new("How the explanations rank", plot, caption)
 }
@@ -70,7 +74,7 @@ fn isolability(table: &Isolability) -> Figure {
     let plot = Heat::new(
         "Principal angles between effects",
         table.effects.clone(),
-        cells(&f64::cos),
+        cells(&|angle| 1.0 - angle / std::f64::consts::FRAC_PI_2),
         texts.collect(),
     )
     .description(caption);

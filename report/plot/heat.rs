@@ -24,7 +24,7 @@ pub struct Heat {
 }
 
 impl Heat {
-    /// Cells of `shades` (0 to 1, one row a name; what is not finite stays empty) with `texts` in them where they fit.
+    /// Cells of `shades` (0 to 1, one row a name; what is not finite stays empty) with `texts` in them where all fit.
     #[must_use]
     pub fn new(
         title: &str,
@@ -70,7 +70,7 @@ impl Plot for Heat {
     fn svg(&self, id: &str, width: f64) -> String {
         let n = self.names.len();
         let numbered: Vec<String> = (self.names.iter().enumerate())
-            .map(|(i, name)| format!("{}  {name}", i + 1))
+            .map(|(i, name)| format!("{}. {name}", i + 1))
             .collect();
         let longest = numbered
             .iter()
@@ -86,6 +86,8 @@ impl Plot for Heat {
         let mut svg = header.svg;
         let middle = |y: f64| y + 0.5 * height + 0.35 * FONT_SIZE;
         let numbers_fit = side > text_width("00", FONT_SIZE) + 3.0;
+        let texts = || self.texts.iter().flatten();
+        let texts_fit = texts().all(|t| text_width(t, FONT_SIZE) + 3.0 < side);
         for (i, name) in numbered.iter().enumerate() {
             let y = top + height * i as f64;
             let name_fits = fit(name, FONT_SIZE, room);
@@ -112,7 +114,7 @@ impl Plot for Heat {
                     coordinate(height - 1.0),
                     coordinate(0.04 + 0.96 * shade),
                 ));
-                if i != j && text_width(told, FONT_SIZE) + 3.0 < side {
+                if i != j && texts_fit {
                     let class = if shade > DARK { "on-fill" } else { "" };
                     let place = [x + 0.5 * side, middle(y)];
                     svg.push_str(&text(class, "middle", place, told));

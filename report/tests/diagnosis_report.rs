@@ -150,7 +150,7 @@ fn the_missing_force_is_drawn_with_the_law_and_an_early_end_says_what_was_left_o
         "Against force of the drives",
         "How the explanations rank",
         "Which effects these logs tell apart",
-        "1  friction-anisotropy@joint_0",
+        "1. friction-anisotropy@joint_0",
         "Stopped early",
         "linear-drag@puck and gravity-tilt",
     ] {

@@ -240,6 +240,7 @@ pub fn patch() -> Diagnosis {
             what: what.into(),
         })
         .into(),
+        ..DiagnosisTrace::default()
     };
     Diagnosis { result, trace }
 }
