@@ -42,6 +42,8 @@ const REPLAYED: usize = 500_000;
 const RIVALS: usize = 4;
 /// Most sets that are listed with their evidence.
 const RANKED: usize = 20;
+/// Steps a rad that angles between effects are told in: a picture shows degrees.
+const ANGLES: f64 = 1e4;
 
 /// Diagnoses a study; gives the machine back where bodies touch and whole replays are asked for there.
 ///
@@ -242,7 +244,11 @@ fn ranking(candidates: &[Candidate], outcome: &Outcome, fitted: &[Set]) -> Vec<R
 fn isolability(candidates: &[Candidate], outcome: &Outcome) -> Option<Isolability> {
     let (leading, cosines) = &outcome.rounds.first()?.alike;
     let n = leading.len();
-    let row = |i: usize| (0..n).map(|j| cosines[(i, j)].min(1.0).acos()).collect();
+    let angle = |i: usize, j: usize| {
+        let angle = cosines[(i, j)].min(1.0).acos();
+        (angle * ANGLES).round() / ANGLES
+    };
+    let row = |i: usize| (0..n).map(|j| angle(i, j)).collect();
     Some(Isolability {
         effects: leading.iter().map(|&c| candidates[c].label()).collect(),
         angles: (0..n).map(row).collect(),

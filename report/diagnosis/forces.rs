@@ -5,7 +5,6 @@ use asid_results::trace::{DiagnosisTrace, ForceSeries, ForceTrace};
 
 use super::head::refined;
 use super::lines::{finite, stretches};
-use super::words::count;
 use crate::number::{quantity, significant};
 use crate::page::{Figure, Section};
 use crate::plot::{Axis, Chart, Colour, Layer};
@@ -33,11 +32,7 @@ pub(super) fn section(d: &DiagnosisResult, t: &DiagnosisTrace) -> Option<Section
     }
     if !folded.is_empty() {
         let names: Vec<&str> = folded.iter().map(|f| &*f.dof).collect();
-        let summary = format!(
-            "{} with less missing: {}",
-            count(folded.len(), "joint or axis").replace("axiss", "axes"),
-            names.join(", ")
-        );
+        let summary = format!("Where less is missing: {}", names.join(", "));
         let inner = folded.iter().fold(Section::new(""), |inner, force| {
             inner
                 .heading(heading(d, force, law))

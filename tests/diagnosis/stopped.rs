@@ -84,7 +84,13 @@ fn stopped_after_the_screening_it_ranks_what_was_screened_and_says_what_was_not_
             assert!((angle - table.angles[j][i]).abs() < 1e-6);
         }
     }
-    assert_eq!(run(&Until::ranking_number(1)).result, r);
+    // Nothing of it hangs on the clock; the study is named after its folder.
+    let again = run(&Until::ranking_number(1)).result;
+    let study = r.study.clone();
+    assert_eq!(
+        asid::results::diagnosis::DiagnosisResult { study, ..again },
+        r
+    );
 }
 
 #[test]
@@ -97,20 +103,18 @@ fn a_diagnosis_that_is_not_stopped_leaves_nothing_untried_and_draws_the_law_thro
     assert_eq!((&*force.dof, &*force.unit), ("rail", "N"));
     let s = &force.spread;
     assert!(s.before.len() > 100 && s.before.len() <= 400);
-    // Dry friction acts against the motion with the force that was put in.
+    // What is missing is what the refined model adds, friction and the mass that was fitted with it, and what is left.
     let moving: Vec<usize> = (0..s.speed.len())
         .filter(|&k| s.speed[k].abs() > 0.2 && s.law[k].is_finite())
         .collect();
     assert!(moving.len() > 50);
-    let against = |values: &[f64]| -> f64 {
-        let sum: f64 = moving
-            .iter()
-            .map(|&k| -values[k] * s.speed[k].signum())
-            .sum();
-        sum / moving.len() as f64
+    let rms = |f: &dyn Fn(usize) -> f64| -> f64 {
+        let sum: f64 = moving.iter().map(|&k| f(k).powi(2)).sum();
+        (sum / moving.len() as f64).sqrt()
     };
-    let (law, before, after) = (against(&s.law), against(&s.before), against(&s.after));
-    assert!((law / 1.2 - 1.0).abs() < 0.1, "law {law}");
-    assert!((before / 1.2 - 1.0).abs() < 0.25, "missing {before}");
-    assert!(after.abs() < 0.15, "left {after}");
+    let before = rms(&|k| s.before[k]);
+    let apart = rms(&|k| s.before[k] - s.law[k] - s.after[k]);
+    let left = rms(&|k| s.after[k]);
+    assert!(apart < 0.3 * before, "{apart} of {before}");
+    assert!(left < 0.2 * before, "{left} of {before}");
 }
