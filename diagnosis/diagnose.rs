@@ -12,10 +12,11 @@ use crate::machine::Machine;
 use crate::predict::{Point, State};
 use crate::prepare::{Prepared, plain_residuals, prepare};
 use crate::record::Record;
-use crate::result::{DiagnosisResult, DiagnosisTrace};
+use crate::result::DiagnosisResult;
 use crate::search::{Breadth, Findings, Search, trials};
 use crate::study::Study;
 use crate::telling::Telling;
+use crate::trace::DiagnosisTrace;
 use crate::trajectory::Trajectory;
 use crate::verdict::judge;
 
@@ -161,6 +162,7 @@ fn tell(
         judgement: &work.judgement,
         nominal: &work.nominal,
         settings,
+        stopped: progress.is_stopped(),
     }
     .tell()?;
     progress.end();

@@ -29,7 +29,6 @@ pub mod outliers;
 pub mod predict;
 pub mod prepare;
 pub mod record;
-pub mod result;
 pub mod roughness;
 mod scatter;
 pub mod screen;
@@ -44,3 +43,5 @@ pub mod whitening;
 pub mod windows;
 pub mod wiring;
 mod work;
+
+pub use asid_results::{diagnosis as result, trace};

@@ -13,9 +13,10 @@ use asid_core::{Error, Progress, Result};
 use crate::bench::{Bench, Explanation, Trial};
 use crate::candidate::Candidate;
 use crate::fit::Effort;
-use crate::result::MissingForce;
+use crate::result::{Isolability, MissingForce, NotTried, RankedSet};
 use crate::scatter::Scatter;
 use crate::screen::{Base, Screened, propose, take, worthwhile};
+use crate::trace::ForceTrace;
 
 /// How widely to search.
 #[derive(Clone, Copy, Debug)]
@@ -64,6 +65,14 @@ pub struct Findings {
     pub found: Vec<Found>,
     /// The force that is missing at each degree of freedom, where it was estimated.
     pub missing: Vec<MissingForce>,
+    /// The same along the logs, where most is missing.
+    pub forces: Vec<ForceTrace>,
+    /// Sets of effects by their evidence, where there is one.
+    pub ranking: Vec<RankedSet>,
+    /// Which of the leading effects the logs tell apart.
+    pub isolability: Option<Isolability>,
+    /// What was left out because the work was stopped.
+    pub not_tried: Vec<NotTried>,
     /// Candidates with the cost that screening on the first stage reached, best first.
     pub screened: Vec<Screened>,
 }
@@ -77,6 +86,9 @@ const GROWN: f64 = 3.0;
 
 /// How many times as many single effects are followed where fits begin with short windows.
 const AFTER_WINDOWS: usize = 3;
+
+/// Explanations that are taken to the whole of the logs where the work is stopped: the leader and a rival.
+const KEPT: usize = 2;
 
 /// Multiple of the best cost up to which a fit is worth its end.
 const NEAR_BEST: f64 = 10.0;
@@ -117,11 +129,28 @@ impl Search<'_> {
         let mut all = self.fit_round(0, &nothing(0), &screened, &[], self.quota(0))?;
         self.sort(&mut all);
         let mut before = NEGLIGIBLE / GROWN;
+        let mut stopped_at = None;
         for stage in 0..=last {
+            if self.progress.is_stopped() {
+                // What leads is taken to the whole of the logs as it stands.
+                stopped_at = stopped_at.or(Some(stage));
+                if stage < last {
+                    continue;
+                }
+                if last > 0 {
+                    all.truncate(KEPT);
+                    all = self.follow(last, all)?;
+                }
+                break;
+            }
             self.foresee(stage, &all)?;
             all = self.follow(stage, all)?;
             self.settle(stage, &mut all)?;
             for _ in 1..self.breadth.depth {
+                if self.progress.is_stopped() {
+                    stopped_at = Some(stage);
+                    break;
+                }
                 // A gap that was not there on the shorter stages.
                 let gap = self.gap(stage, &all);
                 if gap < NEGLIGIBLE.max(GROWN * before) {
@@ -142,6 +171,7 @@ impl Search<'_> {
             }
             before = self.gap(stage, &all);
         }
+        let not_tried = self.not_tried(stopped_at, &screened, &all);
         Ok(Findings {
             none: none[last].clone(),
             short: self.bench.stages[0]
@@ -149,8 +179,47 @@ impl Search<'_> {
                 .then(|| excess(none[0].fit.cost / self.bench.readings(0))),
             found: all,
             missing: Vec::new(),
+            forces: Vec::new(),
+            ranking: Vec::new(),
+            isolability: None,
+            not_tried,
             screened,
         })
+    }
+
+    /// What was left out where the work was stopped at a stage: the rest of the stages, and the effects that screening
+    /// proposed and no fit followed.
+    fn not_tried(
+        &self,
+        stage: Option<usize>,
+        screened: &[Screened],
+        all: &[Found],
+    ) -> Vec<NotTried> {
+        let Some(stage) = stage else {
+            return Vec::new();
+        };
+        let followed = |c: &usize| all.iter().any(|f| f.candidates.contains(c));
+        let mut open: Vec<usize> = Vec::new();
+        for s in screened.iter().filter(|s| !followed(&s.candidate)) {
+            if !open.contains(&s.candidate) && open.len() < self.quota(0) {
+                open.push(s.candidate);
+            }
+        }
+        let label = |c: &usize| self.candidates[*c].label();
+        vec![
+            NotTried {
+                stage: format!(
+                    "search on the logs from stage {} of {} on",
+                    stage + 1,
+                    self.bench.stages.len()
+                ),
+                effects: Vec::new(),
+            },
+            NotTried {
+                stage: "fits of what leads in screening".into(),
+                effects: open.iter().map(label).collect(),
+            },
+        ]
     }
 
     fn sort(&self, all: &mut [Found]) {
@@ -206,7 +275,9 @@ impl Search<'_> {
         });
         self.progress.begin("fitting longer", all.len() as u64);
         for found in &mut all {
-            found.explanation = self.extend(stage, found, Effort::BRIEF)?;
+            let stopped = self.progress.is_stopped();
+            let effort = if stopped { Effort::LOOK } else { Effort::BRIEF };
+            found.explanation = self.extend(stage, found, effort)?;
             self.progress.advance(1);
         }
         self.sort(&mut all);
@@ -214,7 +285,7 @@ impl Search<'_> {
         let best = all.first().map_or(0.0, |f| f.explanation.fit.cost);
         if stage + 1 == self.bench.stages.len() {
             for found in &mut all {
-                if found.explanation.fit.cost < NEAR_BEST * best {
+                if found.explanation.fit.cost < NEAR_BEST * best && !self.progress.is_stopped() {
                     found.explanation = self.extend(stage, found, Effort::FULL)?;
                 }
             }
@@ -245,6 +316,9 @@ impl Search<'_> {
         self.progress
             .begin("screening", self.candidates.len() as u64);
         for (i, candidate) in self.candidates.iter().enumerate() {
+            if stage > 0 && self.progress.is_stopped() {
+                break;
+            }
             if !base.candidates.contains(&i) {
                 match propose(self.bench, record, &linear, (i, candidate)) {
                     Ok(found) => proposals.extend(found),
@@ -266,6 +340,12 @@ impl Search<'_> {
         }
         self.progress.end();
         all.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+        let gap = |s: &Screened| (s.cost / self.bench.readings(stage)).sqrt();
+        let rows = all
+            .iter()
+            .map(|s| (self.candidates[s.candidate].label(), gap(s)));
+        self.progress
+            .ranking("gap in screening", &rows.collect::<Vec<_>>());
         Ok(all)
     }
 
@@ -294,6 +374,9 @@ impl Search<'_> {
         let mut fitted = Vec::with_capacity(new.len());
         self.progress.begin("fitting", new.len() as u64);
         for starts in new {
+            if !fitted.is_empty() && self.progress.is_stopped() {
+                break;
+            }
             let mut best: Option<Explanation> = None;
             for s in &starts {
                 let fit = self.fit_one(stage, &trials, &base.explanation, s)?;

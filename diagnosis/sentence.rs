@@ -97,5 +97,10 @@ pub fn sentence(result: &DiagnosisResult, labels: &[String], rest: Option<&str>)
             closed()
         ),
     };
-    body + &caution
+    let early = if result.not_tried.is_empty() {
+        ""
+    } else {
+        " The search was stopped early; what it left out may change the answer."
+    };
+    body + &caution + early
 }

@@ -13,7 +13,7 @@ use crate::predict::Point;
 use crate::record::Record;
 use crate::result::{
     DiagnosisResult, EffectResult, Gap, HypothesisResult, Kind, MissingForce, NextExperiment,
-    ParameterResult, SignalGap, Verdict,
+    NotTried, ParameterResult, SignalGap, Verdict,
 };
 use crate::search::{Findings, Found, trials};
 use crate::study::Study;
@@ -39,6 +39,8 @@ pub(crate) struct Telling<'a> {
     pub(crate) judgement: &'a Judgement,
     pub(crate) nominal: &'a [f64],
     pub(crate) settings: Settings,
+    /// Whether only what the answer needs is to be computed.
+    pub(crate) stopped: bool,
 }
 
 /// Share of the force that the model lacks at a joint from which on it counts as unexplained.
@@ -170,15 +172,28 @@ impl Telling<'_> {
             verdict,
             parameters: self.parameters(&explanation),
             checks: self.checks(none, &explanation, short.as_ref())?,
-            next_experiment: self.next(best)?,
+            next_experiment: if self.stopped {
+                NextExperiment::default()
+            } else {
+                self.next(best)?
+            },
             missing_force: self.findings.missing.clone(),
-            wiring: Vec::new(),
+            ranking: self.findings.ranking.clone(),
+            isolability: self.findings.isolability.clone(),
+            not_tried: self.findings.not_tried.clone(),
+            ..DiagnosisResult::default()
         };
+        if self.stopped {
+            result.not_tried.push(NotTried {
+                stage: "check of the time step, and the next experiment".into(),
+                effects: Vec::new(),
+            });
+        }
         let rest = short
             .and_then(|(before, after, _)| least_explained(&before, &after))
             .or_else(|| least_made_up(&result.missing_force));
         result.sentence = crate::sentence::sentence(&result, &labels, rest.as_deref());
-        let trace = self.trace(&nominal, &identified, &refined)?;
+        let trace = self.trace(&nominal, &identified, &refined, &result.effects)?;
         let study = self.bench.parameters.len();
         Ok(Diagnosis {
             result,
@@ -347,6 +362,8 @@ impl Telling<'_> {
                 let [low, high] = p.range;
                 ParameterResult {
                     name: p.name.clone(),
+                    unit: self.study.parameters[i].unit.clone(),
+                    nominal: Some(self.nominal[i]),
                     estimate,
                     std,
                     interval95: [
@@ -419,7 +436,9 @@ impl Telling<'_> {
         if self.findings.missing.is_empty() {
             all.push(checks::repeatability(bench));
         }
-        if let Ok(halved) = bench.machine.halved() {
+        if let Ok(halved) = bench.machine.halved()
+            && !self.stopped
+        {
             all.push(checks::time_step(bench, none, &halved)?);
         }
         if let Some((before, after, seconds)) = short {

@@ -1,57 +1,57 @@
 //! The report of a diagnosis: where simulation leaves reality, which effect is missing, and
 //! how far the gap shrinks with it.
 //!
-//! [`Diagnosis`] holds everything that the page shows, as plain data. Gaps are in units of
+//! It is drawn from `result.json` and `trace.json` ([`asid_results`]). Gaps are in units of
 //! the sensors' noise, all else in the units that stand beside it. Whatever a diagnosis
 //! does not have stays empty (`None`, NaN, an empty `Vec`) and is left out, with a remark
 //! where a reader would look for it.
 //!
 //! ```
-//! use asid_report::diagnosis::{Diagnosis, page};
-//! let diagnosis = Diagnosis { study: "puck".into(), sentence: "The board changes.".into(), ..Diagnosis::default() };
-//! assert!(page(&diagnosis).contains("The board changes."));
+//! use asid_results::diagnosis::DiagnosisResult;
+//! let result = DiagnosisResult { sentence: "The board changes.".into(), ..Default::default() };
+//! assert!(asid_report::diagnosis::page(&result, &Default::default()).contains("The board changes."));
 //! ```
 
 mod causes;
 mod closing;
-mod data;
+mod evidence;
+mod forces;
 mod head;
 mod ladder;
 mod lines;
 mod pictures;
 mod places;
 mod real_world;
-mod trace;
 mod wiring;
 mod words;
 
-pub use data::{
-    Check, Diagnosis, Effect, EffectValue, Gap, Hypothesis, Kind, Parameter, Place, SignalGap,
-    Verdict, Wiring,
-};
-pub use real_world::{RealWorld, TaskTrial};
-pub use trace::{Map, Rung, SignalTrace};
+pub use real_world::lines as real_world_lines;
+
+use asid_results::diagnosis::DiagnosisResult;
+use asid_results::trace::DiagnosisTrace;
 
 /// The report as one self-contained HTML page.
 #[must_use]
-pub fn page(diagnosis: &Diagnosis) -> String {
-    let d = diagnosis;
+pub fn page(result: &DiagnosisResult, trace: &DiagnosisTrace) -> String {
+    let (d, t) = (result, trace);
     let sections = [
         wiring::section(d),
-        Some(ladder::section(d)),
+        Some(ladder::section(d, t)),
         real_world::section(d),
-        Some(pictures::section(d)),
-        Some(places::section(d)),
-        Some(causes::section(d)),
+        forces::section(d, t),
+        Some(pictures::section(d, t)),
+        Some(places::section(d, t)),
+        Some(causes::section(d, t)),
         closing::parameters(d),
         closing::checks(d),
         closing::next(d),
-        closing::left_out(d),
-        closing::repeat(d),
+        closing::not_tried(d),
+        closing::left_out(t),
+        closing::repeat(t),
     ];
     sections
         .into_iter()
         .flatten()
-        .fold(head::page(d), crate::page::Page::section)
+        .fold(head::page(d, t), crate::page::Page::section)
         .html()
 }

@@ -7,14 +7,13 @@
 //! - [`page`] is the shell: header, tiles, sections, figures, tables.
 //! - [`run`] holds what the report of a run shows, as plain data that is
 //!   stored as `trace.json` in the run's folder, and writes it as a page.
-//!   [`diagnosis`] does the same for what a diagnosis found.
+//!   [`diagnosis`] does the same for what a diagnosis found, from the types of `asid-results`.
 //!
 //! Nothing here fails on strange numbers: a point that is not finite is not
 //! drawn, and in a table it reads `n/a`.
 
 pub mod diagnosis;
 pub mod markup;
-mod nullable;
 pub mod number;
 pub mod page;
 pub mod plot;

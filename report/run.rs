@@ -24,10 +24,11 @@ mod posterior;
 mod signals;
 mod trace;
 
+pub use asid_results::trace::{FileEntry, NamedText};
 pub use trace::{
-    Downstream, Episode, ExpectedStd, Exploration, FileEntry, LearningCurve, NamedText, NamedValue,
-    Narrowing, ObjectTrack, ParameterReport, Phase, PlanarPath, Prior, RealWorld, Replay,
-    RunReport, SCHEMA, Search, Shape, ShapeKind, SideView, Signal, StageCost, Trial,
+    Downstream, Episode, ExpectedStd, Exploration, LearningCurve, NamedValue, Narrowing,
+    ObjectTrack, ParameterReport, Phase, PlanarPath, Prior, RealWorld, Replay, RunReport, SCHEMA,
+    Search, Shape, ShapeKind, SideView, Signal, StageCost, Trial,
 };
 
 use std::path::Path;

@@ -240,3 +240,64 @@ fn degrees_in_place_of_radians_are_noticed() {
         "{units}"
     );
 }
+
+#[test]
+fn a_time_limit_and_an_interruption_end_with_what_is_known() {
+    let folder = tempfile::tempdir().unwrap();
+    let study = folder.path().join("study");
+    write_study(&study, Truth::Coulomb(1.2));
+    let out = folder.path().join("limit");
+    let done = asid(&[
+        "diagnose",
+        text(&study),
+        "--minutes",
+        "1e-4",
+        "--out",
+        text(&out),
+    ]);
+    let said = String::from_utf8(done.stderr).unwrap();
+    assert!(done.status.success(), "{said}");
+    assert!(said.contains("first table, screening"), "{said}");
+    assert!(said.contains("the time is up"), "{said}");
+    let result = json(&out.join("result.json"));
+    assert!(!result["not_tried"].as_array().unwrap().is_empty());
+    assert!(!result["ranking"].as_array().unwrap().is_empty());
+    let seconds = |key: &str| result[key].as_f64().unwrap();
+    assert!(seconds("seconds_to_first_table") <= seconds("seconds"));
+    let config = std::fs::read_to_string(out.join("config.toml")).unwrap();
+    assert!(config.contains("minutes = 0.0001"), "{config}");
+
+    let (said, status) = refusal(&["diagnose", text(&study), "--minutes", "0"]);
+    assert!(said.contains("--minutes") && status == Some(2), "{said}");
+}
+
+#[cfg(unix)]
+#[test]
+fn the_first_interruption_writes_what_is_known() {
+    use std::io::{BufRead as _, BufReader};
+    use std::process::{Command, Stdio};
+
+    let folder = tempfile::tempdir().unwrap();
+    let (study, out) = (folder.path().join("study"), folder.path().join("out"));
+    write_study(&study, Truth::Coulomb(1.2));
+    let mut child = Command::new(env!("CARGO_BIN_EXE_asid"))
+        .args(["diagnose", text(&study), "--out", text(&out)])
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let lines = BufReader::new(child.stderr.take().unwrap()).lines();
+    let mut interrupted = false;
+    for line in lines.map_while(Result::ok) {
+        if !interrupted && line.contains("first table") {
+            let pid = child.id().to_string();
+            let sent = Command::new("kill").args(["-INT", &pid]).status().unwrap();
+            assert!(sent.success());
+            interrupted = true;
+        }
+    }
+    assert!(interrupted && child.wait().unwrap().success());
+    let result = json(&out.join("result.json"));
+    assert!(!result["not_tried"].as_array().unwrap().is_empty());
+    assert!(out.join("report.html").is_file());
+}

@@ -8,6 +8,12 @@ pub trait Progress: Sync {
     fn advance(&self, units: u64);
     /// The present figure of merit, in words.
     fn note(&self, _text: &str) {}
+    /// How the explanations tried so far rank, best first: each with its figure of merit. `stage` says what it rests on.
+    fn ranking(&self, _stage: &str, _rows: &[(String, f64)]) {}
+    /// Whether the work is to end with what is known: what is under way stops at its next step, and nothing further begins.
+    fn is_stopped(&self) -> bool {
+        false
+    }
     /// The stage is over.
     fn end(&self);
 }

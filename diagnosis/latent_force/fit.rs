@@ -5,7 +5,7 @@
 
 mod slopes;
 
-use asid_core::{Parameter, Result};
+use asid_core::{Parameter, Progress, Result};
 use asid_effects::EffectSpec;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -138,7 +138,8 @@ struct Anchor {
     to: (Vec<f64>, Estimate),
 }
 
-/// Fits a model from some values, an estimate and the slopes of a like model on, over at most `rounds` linearisations.
+/// Fits a model from some values, an estimate and the slopes of a like model on, over at most `rounds` linearisations;
+/// over those so far, but at least one, where the work is stopped.
 ///
 /// # Errors
 /// When a value is not physical or the engine fails.
@@ -147,7 +148,7 @@ pub fn fit(
     hypothesis: &Hypothesis,
     theta: &[f64],
     (estimate, slopes): (&Estimate, &Slopes),
-    rounds: usize,
+    (rounds, progress): (usize, &dyn Progress),
 ) -> Result<Fitted> {
     let unknowns = &hypothesis.unknowns;
     let free = hypothesis.free();
@@ -235,7 +236,7 @@ pub fn fit(
             });
         }
         let stands = round > 0 && !rose && promised < RISE;
-        if stands || failed == FAILURES || round + 1 == rounds {
+        if stands || failed == FAILURES || round + 1 == rounds || progress.is_stopped() {
             break;
         }
         if waited > PATIENCE {

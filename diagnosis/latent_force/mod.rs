@@ -6,7 +6,8 @@
 //!
 //! From below: [`tangent`] (states), [`walk`] (rows), [`segments`] (where bodies touch), [`step_map`] (the model over a row and its derivatives),
 //! [`smoother`], [`initial`], [`context`] and [`estimate`] (trajectory, force and noise), [`unknown`] and [`fit`] (a model with its values),
-//! [`evidence`], [`trace`], [`columns`], [`screen`], [`search`], [`selection`], [`pipeline`].
+//! [`evidence`], [`trace`], [`columns`], [`screen`], [`search`], [`selection`],
+//! `picture` (what the report draws of the force), [`pipeline`].
 
 pub mod columns;
 pub mod context;
@@ -14,6 +15,7 @@ pub mod estimate;
 pub mod evidence;
 pub mod fit;
 pub mod initial;
+mod picture;
 pub mod pipeline;
 pub mod screen;
 pub mod search;

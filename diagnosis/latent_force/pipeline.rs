@@ -1,6 +1,5 @@
 //! From a study to what its result is told from, by the missing force.
 
-use asid_core::layout::JointKind;
 use asid_core::{Layout, Progress, Result};
 
 use crate::bench::{Bench, Explanation, Stage};
@@ -10,7 +9,7 @@ use crate::fit::Effort;
 use crate::machine::Machine;
 use crate::predict::State;
 use crate::prepare::{dataset, set_reading_noise};
-use crate::result::MissingForce;
+use crate::result::{Isolability, MissingForce, NotTried, RankedSet};
 use crate::search::{Findings, Found};
 use crate::starts::given_start;
 use crate::study::Study;
@@ -21,7 +20,8 @@ use super::context::{Taken, begin};
 use super::estimate::Estimate;
 use super::fit::{Fitted, Hypothesis, Slopes, fit, settle_noise};
 use super::initial::{from_readings, scales};
-use super::search::{Breadth, Outcome, Set, search};
+use super::picture::{dofs, forces};
+use super::search::{Breadth, Outcome, Set, name_of, search};
 use super::segments::cut;
 use super::selection::select;
 use super::touching::touching;
@@ -44,6 +44,10 @@ const REPLAYED: usize = 500_000;
 const AFFORDABLE: usize = 1_500_000;
 /// Most sets besides the verdict's that are replayed.
 const RIVALS: usize = 4;
+/// Most sets that are listed with their evidence.
+const RANKED: usize = 20;
+/// Steps a rad that angles between effects are told in: a picture shows degrees.
+const ANGLES: f64 = 1e4;
 
 /// Diagnoses a study; gives the machine back where bodies touch and whole replays are asked for there.
 ///
@@ -71,17 +75,18 @@ pub fn diagnose(
         progress.end();
         return Ok(Err(bench.machine));
     }
-    let (outcome, candidates, left_out, firsts) = {
+    let (outcome, candidates, left_out, firsts, forces) = {
         let parameters = (&study.parameters[..], &nominal[..]);
         let (context, mut estimate) = begin(&bench.machine, &logs, taken, parameters)?;
         settle_noise(&context, &hypothesis, &nominal, &mut estimate, FIRST)?;
         let begin = (&estimate, &Slopes::default());
-        let mut none = fit(&context, &hypothesis, &nominal, begin, ROUNDS)?;
+        let rounds = (ROUNDS, progress);
+        let mut none = fit(&context, &hypothesis, &nominal, begin, rounds)?;
         if none.estimate.missing(&context).share < 1.0 {
             none.estimate.free_at_rest(&context);
             none.estimate.set_resolution(&context);
             let from = (&none.estimate, &none.slopes);
-            none = fit(&context, &hypothesis, &none.theta, from, ROUNDS)?;
+            none = fit(&context, &hypothesis, &none.theta, from, rounds)?;
         }
         progress.end();
         let shown = along(
@@ -93,10 +98,14 @@ pub fn diagnose(
         let (candidates, left_out) = enumerate(&bench.machine, &shown, without);
         let outcome = search(&context, &none, &candidates, Breadth::default(), progress)?;
         let firsts = (0..context.walks.len()).filter(|&w| context.walks[w].rows[0] == 0);
-        (outcome, candidates, left_out, firsts.collect::<Vec<_>>())
+        let firsts = firsts.collect::<Vec<_>>();
+        let forces = forces(&context, &outcome, &candidates)?;
+        (outcome, candidates, left_out, firsts, forces)
     };
     progress.begin("replaying", 1);
-    let (findings, sets) = replay(&mut bench, &candidates, &outcome, &firsts)?;
+    let parts = (&candidates[..], &outcome);
+    let (mut findings, sets) = replay(&mut bench, parts, &firsts, progress)?;
+    findings.forces = forces;
     progress.end();
     let judgement = select(&bench, &outcome, &sets, &findings, &candidates);
     Ok(Ok(Work {
@@ -194,32 +203,61 @@ fn missing_forces(layout: &Layout, outcome: &Outcome) -> Vec<MissingForce> {
     }
     let (before, after) = (&outcome.none.estimate, &outcome.best.fitted.estimate);
     let deviation = |e: &Estimate, d: usize| (e.noise.q[d] + e.noise.white[d]).sqrt();
-    let dofs = layout.joints.iter().flat_map(|joint| {
-        let axes: &[(&str, &str)] = match joint.kind {
-            JointKind::Slide => &[("", "N")],
-            JointKind::Hinge => &[("", "N m")],
-            JointKind::Ball => &[(".rx", "N m"), (".ry", "N m"), (".rz", "N m")],
-            JointKind::Free => &[
-                (".x", "N"),
-                (".y", "N"),
-                (".z", "N"),
-                (".rx", "N m"),
-                (".ry", "N m"),
-                (".rz", "N m"),
-            ],
-        };
-        axes.iter()
-            .map(|(axis, unit)| (format!("{}{axis}", joint.name), *unit))
-    });
-    dofs.enumerate()
-        .map(|(d, (dof, unit))| MissingForce {
-            dof,
-            unit: unit.to_owned(),
+    let dofs = dofs(layout);
+    dofs.iter()
+        .enumerate()
+        .map(|(d, dof)| MissingForce {
+            dof: dof.name.clone(),
+            unit: dof.unit().to_owned(),
             identified: deviation(before, d),
             refined: deviation(after, d),
             correlation_time: before.noise.tau[d],
         })
         .collect()
+}
+
+/// Sets by their evidence over the model without effects: those that were fitted, then what the first screening had.
+fn ranking(candidates: &[Candidate], outcome: &Outcome, fitted: &[Set]) -> Vec<RankedSet> {
+    let none = outcome.none.evidence;
+    let labels = |set: &[usize]| -> Vec<String> {
+        let mut set = set.to_vec();
+        set.sort_unstable();
+        set.iter().map(|&c| candidates[c].label()).collect()
+    };
+    let of_fit = |set: &Set| RankedSet {
+        effects: labels(&set.candidates),
+        screened: None,
+        fitted: Some(set.fitted.evidence - none),
+    };
+    let mut all: Vec<RankedSet> = fitted.iter().map(of_fit).collect();
+    for (set, gain) in outcome.rounds.iter().take(1).flat_map(|r| &r.screened) {
+        let effects = labels(set);
+        match all.iter_mut().find(|r| r.effects == effects) {
+            Some(known) => known.screened = Some(*gain),
+            None => all.push(RankedSet {
+                effects,
+                screened: Some(*gain),
+                fitted: None,
+            }),
+        }
+    }
+    all.truncate(RANKED);
+    all
+}
+
+/// Principal angles between what leads in the first screening.
+fn isolability(candidates: &[Candidate], outcome: &Outcome) -> Option<Isolability> {
+    let (leading, cosines) = &outcome.rounds.first()?.alike;
+    let n = leading.len();
+    let angle = |i: usize, j: usize| {
+        let angle = cosines[(i, j)].min(1.0).acos();
+        (angle * ANGLES).round() / ANGLES
+    };
+    let row = |i: usize| (0..n).map(|j| angle(i, j)).collect();
+    Some(Isolability {
+        effects: leading.iter().map(|&c| candidates[c].label()).collect(),
+        angles: (0..n).map(row).collect(),
+    })
 }
 
 /// All sets that were fitted, each once, the most evident first.
@@ -247,9 +285,9 @@ fn all_sets(outcome: &Outcome) -> Vec<Set> {
 /// findings.
 fn replay(
     bench: &mut Bench,
-    candidates: &[Candidate],
-    outcome: &Outcome,
+    (candidates, outcome): (&[Candidate], &Outcome),
     firsts: &[usize],
+    progress: &dyn Progress,
 ) -> Result<(Findings, Vec<Set>)> {
     let episodes = &bench.train.logs.episodes;
     let steps: usize = episodes.iter().map(|e| e.plan.physics_steps()).sum();
@@ -277,19 +315,36 @@ fn replay(
         let starts = smoothed_starts(bench, fitted, firsts);
         bench.explain(0, &chosen, &fitted.theta[..study], &starts, effort)
     };
-    let none = of(&outcome.none, &[], Effort::BRIEF)?;
+    let mut not_tried: Vec<NotTried> = (outcome.untried.iter())
+        .map(|u| NotTried {
+            stage: u.stage.to_owned(),
+            effects: u.sets.iter().map(|s| name_of(candidates, s)).collect(),
+        })
+        .collect();
+    let stopped = progress.is_stopped();
+    let (once_more, rivals) = if stopped {
+        not_tried.push(NotTried {
+            stage: "fit of the values to whole replays, and replays of rivals".into(),
+            effects: Vec::new(),
+        });
+        (Effort::LOOK, 0)
+    } else {
+        (Effort::BRIEF, RIVALS)
+    };
+    let none = of(&outcome.none, &[], once_more)?;
     let mut sets = all_sets(outcome);
+    let ranking = ranking(candidates, outcome, &sets);
     let best = &outcome.best.candidates;
     let stands = sets.iter().position(|s| s.candidates == *best);
     if let Some(place) = stands {
         sets.remove(place);
         sets.insert(0, outcome.best.clone());
     }
-    sets.truncate(1 + RIVALS);
+    sets.truncate(1 + rivals);
     let mut found = Vec::new();
     for (i, set) in sets.iter().enumerate() {
         let effort = if i == 0 && stands.is_some() {
-            Effort::BRIEF
+            once_more
         } else {
             Effort::LOOK
         };
@@ -303,6 +358,10 @@ fn replay(
         short: None,
         found,
         missing: missing_forces(bench.layout(), outcome),
+        forces: Vec::new(),
+        ranking,
+        isolability: isolability(candidates, outcome),
+        not_tried,
         screened: Vec::new(),
     };
     Ok((findings, sets))

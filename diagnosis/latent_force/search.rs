@@ -2,6 +2,7 @@
 
 use asid_core::{Progress, Result};
 use asid_effects::Start;
+use nalgebra::DMatrix;
 
 use crate::candidate::Candidate;
 
@@ -9,7 +10,7 @@ use super::columns::{Columns, Form};
 use super::context::Context;
 use super::estimate::Missing;
 use super::fit::{Fitted, Hypothesis, Slopes, fit};
-use super::screen::{Screened, rank, regressions};
+use super::screen::{Screened, isolability, rank, regressions};
 
 /// How widely to search.
 #[derive(Clone, Copy, Debug)]
@@ -54,6 +55,8 @@ impl Default for Breadth {
     }
 }
 
+/// Leading candidates that are compared pair by pair.
+const COMPARED: usize = 20;
 /// Prior odds against an effect at a site where it comes to mind only after others.
 const UNUSUAL: f64 = 10.0;
 
@@ -70,14 +73,14 @@ pub struct Set {
 
 impl Set {
     /// Fits it on from where it stands, over at most `rounds` linearisations.
-    fn fit(&mut self, context: &Context<'_>, rounds: usize) -> Result<()> {
+    fn fit(&mut self, context: &Context<'_>, rounds: usize, progress: &dyn Progress) -> Result<()> {
         let from = &self.fitted;
         self.fitted = fit(
             context,
             &from.hypothesis,
             &from.theta,
             (&from.estimate, &from.slopes),
-            rounds,
+            (rounds, progress),
         )?;
         Ok(())
     }
@@ -90,8 +93,19 @@ pub struct Round {
     pub base: Vec<usize>,
     /// Labels and evidences of screening, best first.
     pub screened: Vec<(Vec<usize>, f64)>,
+    /// The leading candidates of screening, and the cosines of the smallest principal angle between each two.
+    pub alike: (Vec<usize>, DMatrix<f64>),
     /// Sets that were fitted to the end, best first.
     pub confirmed: Vec<Set>,
+}
+
+/// A stage that was cut short, and the sets that it left out.
+#[derive(Clone, Debug)]
+pub struct Untried {
+    /// What was left out.
+    pub stage: &'static str,
+    /// Candidates of each set.
+    pub sets: Vec<Vec<usize>>,
 }
 
 /// What a search found.
@@ -104,6 +118,8 @@ pub struct Outcome {
     pub missing: [Missing; 2],
     /// The set that stands; that without effects where nothing earned its place.
     pub best: Set,
+    /// What was left out because the work was stopped.
+    pub untried: Vec<Untried>,
 }
 
 /// The model with some more candidates, and values to begin with.
@@ -151,20 +167,30 @@ pub fn search(
     let at_first = none.estimate.missing(context);
     let mut none = none.clone();
     let left = |s: &Set| s.fitted.estimate.missing(context).relative_to(at_first);
-    let mut rounds = Vec::new();
+    let mut rounds: Vec<Round> = Vec::new();
+    let mut untried = Vec::new();
     for _ in 0..breadth.depth {
         if left(&best) < breadth.shrinks {
+            break;
+        }
+        // The first screening is the least that an answer rests on.
+        if !rounds.is_empty() && progress.is_stopped() {
+            untried.push(Untried {
+                stage: "further effects beside those named",
+                sets: vec![best.candidates.clone()],
+            });
             break;
         }
         let open: Vec<usize> = (0..candidates.len())
             .filter(|&c| !best.candidates.contains(&c) && is_due(candidates, &best, c))
             .collect();
-        let round = one_round(context, &best, candidates, &open, breadth, progress)?;
+        let told = (progress, &mut untried);
+        let round = one_round(context, &best, candidates, &open, breadth, told)?;
         let next = round.confirmed.first().cloned();
         rounds.push(round);
         let Some(next) = next else { break };
         if context.has_segments() {
-            let again = from_starts_of(context, &best, &next, breadth)?;
+            let again = from_starts_of(context, (&best, &next), breadth, progress)?;
             if again.fitted.evidence > best.fitted.evidence {
                 best = again;
                 if best.candidates.is_empty() {
@@ -179,13 +205,24 @@ pub fn search(
         best = next;
     }
     let none = &none;
-    let best = free_what_is_given(context, candidates, best, breadth, threshold)?;
+    let best = if progress.is_stopped() {
+        if !best.candidates.is_empty() {
+            untried.push(Untried {
+                stage: "values of the effects named that no search tries, such as an offset",
+                sets: vec![best.candidates.clone()],
+            });
+        }
+        best
+    } else {
+        free_what_is_given(context, candidates, best, (breadth, threshold), progress)?
+    };
     let of = |f: &Fitted| f.estimate.missing(context);
     Ok(Outcome {
         none: none.clone(),
         missing: [of(none), of(&best.fitted)],
         rounds,
         best,
+        untried,
     })
 }
 
@@ -193,14 +230,14 @@ pub fn search(
 /// the readings a fit finds one, and what another one owes to a better one is no evidence for its effects.
 fn from_starts_of(
     context: &Context<'_>,
-    set: &Set,
-    other: &Set,
+    (set, other): (&Set, &Set),
     breadth: Breadth,
+    progress: &dyn Progress,
 ) -> Result<Set> {
     let mut again = set.clone();
     again.fitted.estimate = other.fitted.estimate.clone();
     again.fitted.slopes = Slopes::default();
-    again.fit(context, breadth.rounds[1])?;
+    again.fit(context, breadth.rounds[1], progress)?;
     Ok(again)
 }
 
@@ -210,8 +247,8 @@ fn free_what_is_given(
     context: &Context<'_>,
     candidates: &[Candidate],
     best: Set,
-    breadth: Breadth,
-    threshold: f64,
+    (breadth, threshold): (Breadth, f64),
+    progress: &dyn Progress,
 ) -> Result<Set> {
     let mut best = best;
     let mut at = best.fitted.hypothesis.unknowns.len();
@@ -237,13 +274,21 @@ fn free_what_is_given(
             }
             let (theta, from) = (&best.fitted.theta, &best.fitted);
             let from = (&from.estimate, &from.slopes);
-            let fitted = fit(context, &hypothesis, theta, from, breadth.rounds[1])?;
+            let rounds = (breadth.rounds[1], progress);
+            let fitted = fit(context, &hypothesis, theta, from, rounds)?;
             if fitted.evidence - best.fitted.evidence > threshold {
                 best.fitted = fitted;
             }
         }
     }
     Ok(best)
+}
+
+/// Labels of some candidates.
+#[must_use]
+pub fn name_of(candidates: &[Candidate], set: &[usize]) -> String {
+    let labels: Vec<String> = set.iter().map(|&c| candidates[c].label()).collect();
+    labels.join(" + ")
 }
 
 /// The candidate that another one refines: the simpler law at the same site.
@@ -291,6 +336,7 @@ fn pruned(
     candidates: &[Candidate],
     set: Set,
     breadth: Breadth,
+    progress: &dyn Progress,
 ) -> Result<Set> {
     let fitted = &set.fitted;
     let free = fitted.hypothesis.free();
@@ -318,7 +364,7 @@ fn pruned(
     for c in idle {
         smaller = without(&smaller, candidates, c);
     }
-    smaller.fit(context, breadth.rounds[1])?;
+    smaller.fit(context, breadth.rounds[1], progress)?;
     let kept = smaller.fitted.evidence > set.fitted.evidence - IDLE_LOSS;
     Ok(if kept { smaller } else { set })
 }
@@ -335,7 +381,7 @@ fn one_round(
     candidates: &[Candidate],
     open: &[usize],
     breadth: Breadth,
-    progress: &dyn Progress,
+    (progress, untried): (&dyn Progress, &mut Vec<Untried>),
 ) -> Result<Round> {
     progress.begin("screening", 1);
     let some: Vec<Candidate> = open.iter().map(|&c| candidates[c].clone()).collect();
@@ -352,11 +398,35 @@ fn one_round(
             .collect()
     };
     let screened: Vec<(Vec<usize>, f64)> = ranked.iter().map(|s| (label(s), s.gain)).collect();
-    progress.begin("confirming", breadth.raced.min(ranked.len()) as u64);
-    let mut racing = Vec::new();
+    let singles = ranked.iter().filter(|s| s.forms.len() == 1);
+    let leading: Vec<usize> = singles.map(|s| s.forms[0]).take(COMPARED).collect();
+    let alike = (
+        leading
+            .iter()
+            .map(|&f| open[columns.forms[f].candidate])
+            .collect(),
+        isolability(&sums[0], &columns, &leading),
+    );
+    let name = |set: &[usize]| name_of(candidates, set);
+    let rows = screened.iter().map(|(set, gain)| (name(set), *gain));
+    let upon = match &base.candidates[..] {
+        [] => String::new(),
+        set => format!(" upon {}", name(set)),
+    };
+    progress.ranking(&format!("screening{upon}"), &rows.collect::<Vec<_>>());
     let lead = ranked.first().map_or(0.0, |s| s.gain);
     let least = (breadth.share * lead).max(breadth.least);
-    for s in ranked.iter().take(breadth.raced).filter(|s| s.gain > least) {
+    let due = ranked.iter().take(breadth.raced).filter(|s| s.gain > least);
+    let due: Vec<&Screened> = due.collect();
+    progress.begin("confirming", due.len() as u64);
+    let mut racing = Vec::new();
+    let mut left_out = Vec::new();
+    for s in due {
+        if !racing.is_empty() && progress.is_stopped() {
+            left_out.push(label(s));
+            continue;
+        }
+        progress.note(&format!("trying {}", name(&label(s))));
         let (hypothesis, theta, added) = with(fitted, &columns, &some, s);
         let mut members = base.candidates.clone();
         members.extend(added.iter().map(|&c| open[c]));
@@ -375,7 +445,7 @@ fn one_round(
                 set.names = base.names;
             }
         }
-        set.fit(context, breadth.rounds[0])?;
+        set.fit(context, breadth.rounds[0], progress)?;
         racing.push(set);
         progress.advance(1);
     }
@@ -385,18 +455,36 @@ fn one_round(
     let reached = racing.iter().map(|s| s.fitted.evidence);
     let mut best = reached.fold(fitted.evidence, f64::max);
     let mut confirmed: Vec<Set> = Vec::new();
+    let mut unfinished = Vec::new();
     for mut set in racing.into_iter().take(breadth.finished) {
         let behind = (breadth.behind * (best - fitted.evidence)).max(breadth.near);
         if best - hoped(&set) > behind {
             continue;
         }
+        if progress.is_stopped() {
+            unfinished.push(set.candidates.clone());
+            confirmed.push(set);
+            continue;
+        }
+        progress.note(&format!("fitting {}", name(&set.candidates)));
         // To the end by slopes of its own.
         set.fitted.slopes = Slopes::default();
-        set.fit(context, breadth.rounds[1])?;
+        set.fit(context, breadth.rounds[1], progress)?;
         best = best.max(set.fitted.evidence);
-        confirmed.push(pruned(context, candidates, set, breadth)?);
+        if progress.is_stopped() {
+            unfinished.push(set.candidates.clone());
+            confirmed.push(set);
+            continue;
+        }
+        confirmed.push(pruned(context, candidates, set, breadth, progress)?);
     }
     progress.end();
+    let cut = [
+        ("confirmation of what leads in screening", left_out),
+        ("fit to the end", unfinished),
+    ];
+    let cut = cut.into_iter().filter(|(_, sets)| !sets.is_empty());
+    untried.extend(cut.map(|(stage, sets)| Untried { stage, sets }));
     let plant = context.plant();
     let unusual = |c: &usize| {
         let c = &candidates[*c];
@@ -407,9 +495,13 @@ fn one_round(
         s.fitted.evidence - UNUSUAL.ln() * count as f64
     };
     confirmed.sort_by(|a, b| worth(b).total_cmp(&worth(a)));
+    let gain = |s: &Set| worth(s) - fitted.evidence;
+    let rows = confirmed.iter().map(|s| (name(&s.candidates), gain(s)));
+    progress.ranking(&format!("fits{upon}"), &rows.collect::<Vec<_>>());
     Ok(Round {
         base: base.candidates.clone(),
         screened,
+        alike,
         confirmed,
     })
 }

@@ -1,10 +1,17 @@
 //! What the report shows besides the numbers: curves, the ladder of single effects, the map.
 
+use std::collections::BTreeMap;
+
 use asid_core::Result;
+use asid_core::registry::find;
+use asid_effects::EffectEntry;
 
 use super::{HeldOut, Telling};
-use crate::result::{DiagnosisTrace, SignalTrace};
+use crate::result::EffectResult;
 use crate::search::trials;
+use crate::trace::{
+    DiagnosisTrace, EffectWords, Map, NamedText, ParameterWords, Rung, SignalTrace,
+};
 
 /// Points of one curve in the trace.
 const CURVE: usize = 600;
@@ -20,6 +27,7 @@ impl Telling<'_> {
         nominal: &HeldOut,
         identified: &HeldOut,
         refined: &HeldOut,
+        effects: &[EffectResult],
     ) -> Result<DiagnosisTrace> {
         let logs = &self.bench.test.logs;
         let width = logs.width();
@@ -27,9 +35,9 @@ impl Telling<'_> {
         for (e, log) in logs.episodes.iter().enumerate().take(SHOWN) {
             let rows = log.plan.rows();
             let stride = rows.div_ceil(CURVE);
-            let pick = |all: &[f64], column: usize| -> Vec<Option<f64>> {
+            let pick = |all: &[f64], column: usize| -> Vec<f64> {
                 let values = all.iter().skip(column).step_by(width).step_by(stride);
-                values.map(|x| x.is_finite().then_some(*x)).collect()
+                values.copied().collect()
             };
             let mut column = 0;
             for (s, sensor) in logs.sensors.iter().enumerate() {
@@ -71,26 +79,28 @@ impl Telling<'_> {
                 let held = self.held(&trials, &found.explanation.fit.point.theta)?;
                 let (square, count) = self.rms(&held.residuals, None, None);
                 let label = found.explanation.effects[0].label();
-                ladder.push((label, (square / f64::max(count, 1.0)).sqrt()));
+                let gap = (square / f64::max(count, 1.0)).sqrt();
+                ladder.push(Rung { label, gap });
             }
         }
-        ladder.sort_by(|a, b| a.1.total_cmp(&b.1));
-        let (map, map_axes) = self.map(identified);
+        ladder.sort_by(|a, b| a.gap.total_cmp(&b.gap));
         Ok(DiagnosisTrace {
             signals,
             ladder,
-            map,
-            map_axes,
-            left_out: self
-                .left_out
-                .iter()
-                .map(|l| (l.label.clone(), l.why.clone()))
+            map: self.map(identified),
+            left_out: (self.left_out.iter())
+                .map(|l| NamedText::new(&l.label, &l.why))
                 .collect(),
+            forces: self.findings.forces.clone(),
+            catalogue: catalogue(effects),
+            held_out: self.study.test.len(),
+            fitted_to: self.study.train.len(),
+            ..DiagnosisTrace::default()
         })
     }
 
     /// Where a position sensor was, and how large its residual there.
-    fn map(&self, identified: &HeldOut) -> (Vec<[f64; 3]>, [String; 2]) {
+    fn map(&self, identified: &HeldOut) -> Option<Map> {
         let logs = &self.bench.test.logs;
         let (n, width) = (logs.entries.len(), logs.width());
         let mut column = 0;
@@ -110,11 +120,35 @@ impl Telling<'_> {
                 }
                 let stride = map.len().div_ceil(MAP).max(1);
                 let map = map.into_iter().step_by(stride).collect();
-                let axis = |i: usize| format!("{}.{i} (m)", sensor.name);
-                return (map, [axis(0), axis(1)]);
+                return Some(Map {
+                    axes: [0, 1].map(|i| format!("{}.{i}", sensor.name)),
+                    unit: sensor.unit.clone(),
+                    points: map,
+                });
             }
             column += if sensor.rotation { 4 } else { own.len() };
         }
-        (Vec::new(), [String::new(), String::new()])
+        None
     }
+}
+
+/// What the catalogue says of some effects.
+fn catalogue(effects: &[EffectResult]) -> BTreeMap<String, EffectWords> {
+    let known = effects.iter().filter_map(|e| {
+        let entry = find::<EffectEntry>(&e.effect).ok()?;
+        let made = (entry.make)();
+        let parameters = made.parameters().iter().map(|p| {
+            let words = ParameterWords {
+                unit: p.unit.to_owned(),
+                null: p.null,
+            };
+            (p.name.to_owned(), words)
+        });
+        let words = EffectWords {
+            about: entry.about.to_owned(),
+            parameters: parameters.collect(),
+        };
+        Some((e.effect.clone(), words))
+    });
+    known.collect()
 }

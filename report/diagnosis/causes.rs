@@ -1,8 +1,13 @@
 //! Which effect: probabilities, the verdict in words, and the effects with their values.
 
-use super::data::{Diagnosis, Effect, Hypothesis, Kind};
+use asid_results::diagnosis::{DiagnosisResult, EffectResult, HypothesisResult, Kind};
+use asid_results::trace::DiagnosisTrace;
+
+use super::evidence;
 use super::head::refined;
-use super::words::{count, found, gap, hypothesis, joined, percent, probability, set, values};
+use super::words::{
+    about, count, found, gap, hypothesis, joined, percent, probability, set, values,
+};
 use crate::markup::capitalise;
 use crate::number::NOT_A_NUMBER;
 use crate::page::{Cell, Column, Figure, Section, Table};
@@ -14,35 +19,38 @@ const MOST: usize = 10;
 /// Probability under which an effect that is in no verdict is folded away.
 const LITTLE: f64 = 0.01;
 
-pub(super) fn section(d: &Diagnosis) -> Section {
+pub(super) fn section(d: &DiagnosisResult, t: &DiagnosisTrace) -> Section {
     let lead = "An effect is written name@site, the site being the part of the scene that it acts on. A hypothesis is a set of effects of the catalogue, refitted together with the study's parameters. Its probability \
                 comes from how well it predicts the episodes held out; an effect's own is the sum over the hypotheses that it is in.";
     let mut section = Section::new("Which effect").lead(lead);
-    section = explanation(d).into_iter().fold(section, Section::text);
+    section = explanation(d, t).into_iter().fold(section, Section::text);
     section = section.figures(vec![figure(d)]);
-    let (shown, folded): (Vec<&Effect>, Vec<&Effect>) =
+    section = evidence::figures(d)
+        .into_iter()
+        .fold(section, |section, figure| section.figures(vec![figure]));
+    let (shown, folded): (Vec<&EffectResult>, Vec<&EffectResult>) =
         d.effects.iter().partition(|e| matters(d, e));
     if !shown.is_empty() {
         section = section
             .heading("Each effect by itself")
-            .table(table(&shown));
+            .table(table(t, &shown));
     }
     if !folded.is_empty() {
         let summary = count(folded.len(), "less probable effect");
-        section = section.folded(summary, Section::new("").table(table(&folded)));
+        section = section.folded(summary, Section::new("").table(table(t, &folded)));
     }
     section
 }
 
 /// Whether an effect is probable, in the verdict, or cannot be told from it.
-fn matters(d: &Diagnosis, effect: &Effect) -> bool {
+fn matters(d: &DiagnosisResult, effect: &EffectResult) -> bool {
     let label = effect.label();
     let sets = d.verdict.ambiguous_with.iter().chain([&d.verdict.effects]);
     effect.probability >= LITTLE || sets.flatten().any(|e| *e == label)
 }
 
 /// The verdict in words, a paragraph each for what it is and what it leaves open.
-fn explanation(d: &Diagnosis) -> Vec<String> {
+fn explanation(d: &DiagnosisResult, t: &DiagnosisTrace) -> Vec<String> {
     let found = found(d);
     let sure = probability(d.verdict.probability);
     let mut first = match d.verdict.kind {
@@ -62,7 +70,7 @@ fn explanation(d: &Diagnosis) -> Vec<String> {
                 joined(&found, "and")
             );
             for effect in d.effects.iter().filter(|e| found.contains(&e.label())) {
-                text.push_str(&described(effect, found.len() > 1));
+                text.push_str(&described(t, effect, found.len() > 1));
             }
             text
         }
@@ -105,12 +113,12 @@ fn explanation(d: &Diagnosis) -> Vec<String> {
 }
 
 /// What an effect is and how strong, as a sentence with a space before it; by name where it is not the only one.
-fn described(effect: &Effect, by_name: bool) -> String {
-    let values = match &*values(effect) {
+fn described(t: &DiagnosisTrace, effect: &EffectResult, by_name: bool) -> String {
+    let values = match &*values(t, effect) {
         "" => String::new(),
         values => format!("fitted: {values}"),
     };
-    let parts = [capitalise(&effect.about), values];
+    let parts = [capitalise(about(t, effect)), values];
     let told: Vec<String> = parts.into_iter().filter(|p| !p.is_empty()).collect();
     match (told.is_empty(), by_name) {
         (true, _) => String::new(),
@@ -119,13 +127,13 @@ fn described(effect: &Effect, by_name: bool) -> String {
     }
 }
 
-fn figure(d: &Diagnosis) -> Figure {
-    let special = |h: &Hypothesis| matches!(&*hypothesis(h).0, "none" | "unknown");
+fn figure(d: &DiagnosisResult) -> Figure {
+    let special = |h: &HypothesisResult| matches!(&*hypothesis(h).0, "none" | "unknown");
     // `none` and `unknown` are always told, however improbable.
-    let shown = |(i, h): &(usize, &Hypothesis)| *i < MOST || special(h);
+    let shown = |(i, h): &(usize, &HypothesisResult)| *i < MOST || special(h);
     let all = || d.hypotheses.iter().enumerate();
     let mut rows: Vec<Ranked> = all().filter(shown).map(|(_, h)| row(d, h)).collect();
-    let rest: Vec<&Hypothesis> = all().filter(|h| !shown(h)).map(|h| h.1).collect();
+    let rest: Vec<&HypothesisResult> = all().filter(|h| !shown(h)).map(|h| h.1).collect();
     if !rest.is_empty() {
         let sum = rest
             .iter()
@@ -152,7 +160,7 @@ fn figure(d: &Diagnosis) -> Figure {
     Figure::new("How probable each explanation is", ranking, caption)
 }
 
-fn row(d: &Diagnosis, h: &Hypothesis) -> Ranked {
+fn row(d: &DiagnosisResult, h: &HypothesisResult) -> Ranked {
     let (name, note) = hypothesis(h);
     let verdict = match d.verdict.kind {
         Kind::None => name == "none",
@@ -172,7 +180,7 @@ fn row(d: &Diagnosis, h: &Hypothesis) -> Ranked {
     if verdict { row.strong() } else { row }
 }
 
-fn table(effects: &[&Effect]) -> Table {
+fn table(t: &DiagnosisTrace, effects: &[&EffectResult]) -> Table {
     let columns = vec![
         Column::prose("effect"),
         Column::prose("fitted values"),
@@ -180,15 +188,15 @@ fn table(effects: &[&Effect]) -> Table {
         Column::number("closes alone"),
     ];
     effects.iter().fold(Table::new(columns), |table, e| {
-        let values = match &*values(e) {
+        let values = match &*values(t, e) {
             "" => "–".to_owned(),
             values => values.to_owned(),
         };
         table.row(vec![
-            Cell::from(e.label()).note(e.about.clone()),
+            Cell::from(e.label()).note(about(t, e)),
             values.into(),
             probability(e.probability).into(),
-            e.closes
+            e.gap_closed
                 .map_or_else(|| NOT_A_NUMBER.to_owned(), percent)
                 .into(),
         ])

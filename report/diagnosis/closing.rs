@@ -1,33 +1,36 @@
 //! The end of the page: the study's parameters, the checks, what to do next, and how to repeat it.
 
-use super::data::{Diagnosis, Kind, Parameter};
+use asid_results::diagnosis::{DiagnosisResult, Kind, ParameterResult};
+use asid_results::trace::DiagnosisTrace;
+
 use super::words::{count, joined};
 use crate::markup::capitalise;
 use crate::number::{Precision, quantity, round};
 use crate::page::{Cell, Column, Section, Table, Tone};
 
-pub(super) fn next(d: &Diagnosis) -> Option<Section> {
-    if d.next_experiment.is_empty() && d.separates.is_empty() {
+pub(super) fn next(d: &DiagnosisResult) -> Option<Section> {
+    let next = &d.next_experiment;
+    if next.how.is_empty() && next.separates.is_empty() {
         return None;
     }
     let section = Section::new("The next experiment")
         .lead("What the robot could do to tell apart what these logs cannot.");
-    let section = if d.separates.is_empty() {
+    let section = if next.separates.is_empty() {
         section
     } else {
         section.facts(vec![(
             "tells apart".to_owned(),
-            joined(&d.separates, "and"),
+            joined(&next.separates, "and"),
         )])
     };
-    Some(if d.next_experiment.is_empty() {
+    Some(if next.how.is_empty() {
         section
     } else {
-        section.text(capitalise(&d.next_experiment))
+        section.text(capitalise(&next.how))
     })
 }
 
-pub(super) fn parameters(d: &Diagnosis) -> Option<Section> {
+pub(super) fn parameters(d: &DiagnosisResult) -> Option<Section> {
     if d.parameters.is_empty() {
         return None;
     }
@@ -69,7 +72,7 @@ pub(super) fn parameters(d: &Diagnosis) -> Option<Section> {
     )
 }
 
-fn interval(p: &Parameter, precision: Precision) -> String {
+fn interval(p: &ParameterResult, precision: Precision) -> String {
     if p.interval95.iter().all(|x| x.is_finite()) {
         quantity(&precision.interval(p.interval95), &p.unit)
     } else {
@@ -77,7 +80,7 @@ fn interval(p: &Parameter, precision: Precision) -> String {
     }
 }
 
-pub(super) fn checks(d: &Diagnosis) -> Option<Section> {
+pub(super) fn checks(d: &DiagnosisResult) -> Option<Section> {
     if d.checks.is_empty() {
         return None;
     }
@@ -90,7 +93,7 @@ pub(super) fn checks(d: &Diagnosis) -> Option<Section> {
             Cell::toned("not ok", Tone::Bad)
         };
         table.row(vec![
-            Cell::from(c.name.clone()).note(c.detail.clone()),
+            Cell::from(c.check.clone()).note(c.detail.clone()),
             result,
         ])
     });
@@ -101,36 +104,55 @@ pub(super) fn checks(d: &Diagnosis) -> Option<Section> {
     )
 }
 
-pub(super) fn left_out(d: &Diagnosis) -> Option<Section> {
-    if d.left_out.is_empty() {
+pub(super) fn not_tried(d: &DiagnosisResult) -> Option<Section> {
+    if d.not_tried.is_empty() {
+        return None;
+    }
+    let columns = vec![Column::prose("what"), Column::prose("of which effects")];
+    let table = d.not_tried.iter().fold(Table::new(columns), |table, n| {
+        let effects = match &n.effects[..] {
+            [] => "–".to_owned(),
+            effects => joined(effects, "and"),
+        };
+        table.row(vec![n.stage.clone().into(), effects.into()])
+    });
+    Some(
+        Section::new("Stopped early")
+            .lead("The search was stopped, by a time limit or by hand. This was left out; with more time the answer may change.")
+            .table(table),
+    )
+}
+
+pub(super) fn left_out(t: &DiagnosisTrace) -> Option<Section> {
+    if t.left_out.is_empty() {
         return None;
     }
     let columns = vec![Column::text("candidate"), Column::prose("why")];
-    let table = d.left_out.iter().fold(Table::new(columns), |table, left| {
+    let table = t.left_out.iter().fold(Table::new(columns), |table, left| {
         table.row(vec![left.name.clone().into(), left.value.clone().into()])
     });
-    let summary = format!("{} of the catalogue", count(d.left_out.len(), "candidate"));
+    let summary = format!("{} of the catalogue", count(t.left_out.len(), "candidate"));
     Some(
-        Section::new("What was not tried")
+        Section::new("What could not be tried")
             .lead("Effects that this model, engine or data do not allow: the diagnosis says nothing of them.")
             .folded(summary, Section::new("").table(table)),
     )
 }
 
-pub(super) fn repeat(d: &Diagnosis) -> Option<Section> {
-    if d.command.is_empty() && d.files.is_empty() && d.versions.is_empty() {
+pub(super) fn repeat(t: &DiagnosisTrace) -> Option<Section> {
+    if t.command.is_empty() && t.files.is_empty() && t.versions.is_empty() {
         return None;
     }
     let mut section = Section::new("Repeat it")
         .lead("The same seed and binary give the same result, at any thread count.");
-    if !d.command.is_empty() {
-        section = section.command(d.command.clone());
+    if !t.command.is_empty() {
+        section = section.command(t.command.clone());
     }
-    let versions = d.versions.iter().map(|v| (v.name.clone(), v.value.clone()));
+    let versions = t.versions.iter().map(|v| (v.name.clone(), v.value.clone()));
     section = section.facts(versions.collect());
-    if !d.files.is_empty() {
+    if !t.files.is_empty() {
         let columns = vec![Column::text("file"), Column::prose("holds")];
-        section = section.table(d.files.iter().fold(Table::new(columns), |table, f| {
+        section = section.table(t.files.iter().fold(Table::new(columns), |table, f| {
             table.row(vec![f.name.clone().into(), f.what.clone().into()])
         }));
     }

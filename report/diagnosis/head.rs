@@ -1,11 +1,13 @@
 //! The top of the page: the answer and the key figures.
 
-use super::data::{Diagnosis, Kind};
+use asid_results::diagnosis::{DiagnosisResult, Kind};
+use asid_results::trace::DiagnosisTrace;
+
 use super::words::{count, found, gap, joined, percent, probability, set};
 use crate::number::round;
 use crate::page::{Page, Tile, Tone};
 
-pub(super) fn page(d: &Diagnosis) -> Page {
+pub(super) fn page(d: &DiagnosisResult, t: &DiagnosisTrace) -> Page {
     let title = if d.study.is_empty() {
         "Diagnosis"
     } else {
@@ -16,11 +18,11 @@ pub(super) fn page(d: &Diagnosis) -> Page {
         .kicker("ASID diagnose: where does simulation leave reality, and why")
         .badge(badge, tone)
         .answer(answer(d));
-    if !d.engine.is_empty() {
-        page = page.fact("simulator", d.engine.clone());
+    if !t.engine.is_empty() {
+        page = page.fact("simulator", t.engine.clone());
     }
     let failed: Vec<String> = (d.checks.iter().filter(|c| !c.ok))
-        .map(|c| c.name.clone())
+        .map(|c| c.check.clone())
         .collect();
     if !failed.is_empty() {
         page = page.fact(
@@ -28,10 +30,10 @@ pub(super) fn page(d: &Diagnosis) -> Page {
             format!("not all checks passed: {}", joined(&failed, "and")),
         );
     }
-    tiles(d).into_iter().fold(page, Page::tile)
+    tiles(d, t).into_iter().fold(page, Page::tile)
 }
 
-fn badge(d: &Diagnosis) -> (&'static str, Tone) {
+fn badge(d: &DiagnosisResult) -> (&'static str, Tone) {
     match d.verdict.kind {
         Kind::None => ("no effect missing", Tone::Good),
         Kind::Effects if d.verdict.ambiguous_with.is_empty() => ("cause found", Tone::Good),
@@ -40,7 +42,7 @@ fn badge(d: &Diagnosis) -> (&'static str, Tone) {
     }
 }
 
-fn answer(d: &Diagnosis) -> String {
+fn answer(d: &DiagnosisResult) -> String {
     if !d.sentence.is_empty() {
         return d.sentence.clone();
     }
@@ -53,7 +55,7 @@ fn answer(d: &Diagnosis) -> String {
     }
 }
 
-fn tiles(d: &Diagnosis) -> Vec<Tile> {
+fn tiles(d: &DiagnosisResult, t: &DiagnosisTrace) -> Vec<Tile> {
     let gaps = [d.gap.nominal, d.gap.identified, d.gap.refined];
     let shown = if refined(d) { &gaps[..] } else { &gaps[..2] };
     let names = if refined(d) {
@@ -88,18 +90,18 @@ fn tiles(d: &Diagnosis) -> Vec<Tile> {
         )
         .note(note),
     );
-    if d.held_out > 0 {
-        let note = if d.fitted_to > 0 {
-            format!("all gaps are on these; fitted to {} others", d.fitted_to)
+    if t.held_out > 0 {
+        let note = if t.fitted_to > 0 {
+            format!("all gaps are on these; fitted to {} others", t.fitted_to)
         } else {
             "all gaps are on these; no fit saw them".to_owned()
         };
-        tiles.push(Tile::new("held out", &count(d.held_out, "episode")).note(note));
+        tiles.push(Tile::new("held out", &count(t.held_out, "episode")).note(note));
     }
     tiles
 }
 
-fn closed(d: &Diagnosis) -> Tile {
+fn closed(d: &DiagnosisResult) -> Tile {
     let Some(closed) = d.gap.closed.filter(|c| c.is_finite()) else {
         let why = if d.gap.identified <= 1.05 {
             "no gap is left once the study's parameters are fitted"
@@ -134,6 +136,6 @@ fn closed(d: &Diagnosis) -> Tile {
 }
 
 /// Whether there is a refined model that is another one than the identified.
-pub(super) fn refined(d: &Diagnosis) -> bool {
+pub(super) fn refined(d: &DiagnosisResult) -> bool {
     !found(d).is_empty() || (d.gap.refined - d.gap.identified).abs() > 1e-9
 }

@@ -1,6 +1,8 @@
 //! How far each step and each single effect brings simulation to reality.
 
-use super::data::Diagnosis;
+use asid_results::diagnosis::DiagnosisResult;
+use asid_results::trace::DiagnosisTrace;
+
 use super::head::refined;
 use super::words::{found, gap, set};
 use crate::number::{quantity, significant};
@@ -13,24 +15,24 @@ const MOST: usize = 16;
 /// Ratio of the largest to the smallest gap from which on the axis is logarithmic.
 const DECADES: f64 = 8.0;
 
-pub(super) fn section(d: &Diagnosis) -> Section {
+pub(super) fn section(d: &DiagnosisResult, t: &DiagnosisTrace) -> Section {
     let lead = "Gap: root mean square of real minus simulated over all readings of the held-out episodes, each divided by its \
                 sensor's noise. At 1 the simulation is as good as the sensors allow. Nominal is the model as given; identified after \
                 fitting only the study's own parameters; refined with the verdict's effects added.";
     let section = Section::new("How far the gap closes")
         .lead(lead)
-        .figures(vec![figure(d)]);
-    if d.signal_gaps.is_empty() {
+        .figures(vec![figure(d, t)]);
+    if d.gap.signals.is_empty() {
         section
     } else {
         section.table(by_signal(d))
     }
 }
 
-fn figure(d: &Diagnosis) -> Figure {
+fn figure(d: &DiagnosisResult, t: &DiagnosisTrace) -> Figure {
     let found = found(d);
     // The verdict's own rung is the refined model.
-    let mut singles: Vec<(&str, f64)> = (d.ladder.iter())
+    let mut singles: Vec<(&str, f64)> = (t.ladder.iter())
         .filter(|r| found != [r.label.clone()])
         .map(|r| (&*r.label, r.gap))
         .collect();
@@ -68,7 +70,7 @@ fn figure(d: &Diagnosis) -> Figure {
         rows.push(step("refined", d.gap.refined, Colour::Blue).note(note));
     }
 
-    let values = (d.ladder.iter().map(|r| r.gap))
+    let values = (t.ladder.iter().map(|r| r.gap))
         .chain([d.gap.nominal, d.gap.identified, d.gap.refined])
         .filter(|g| g.is_finite() && *g > 0.0);
     let [low, high] = values.fold([1.0f64, 1.0f64], |[l, h], g| [l.min(g), h.max(g)]);
@@ -111,7 +113,7 @@ fn figure(d: &Diagnosis) -> Figure {
     )
 }
 
-fn by_signal(d: &Diagnosis) -> Table {
+fn by_signal(d: &DiagnosisResult) -> Table {
     let mut columns = vec![
         Column::text("sensor"),
         Column::number("nominal"),
@@ -121,12 +123,13 @@ fn by_signal(d: &Diagnosis) -> Table {
         columns.push(Column::number("refined"));
     }
     let table = Table::new(columns).caption("The same gaps, sensor by sensor.");
-    d.signal_gaps.iter().fold(table, |table, s| {
+    d.gap.signals.iter().fold(table, |table, s| {
         let mut row = vec![Cell::from(s.signal.clone()).note(format!(
             "noise {}",
             quantity(&significant(s.noise, 2), &s.unit)
         ))];
-        row.extend(s.gaps.iter().map(|g| gap(*g).into()));
+        let gaps = [s.nominal, s.identified, s.refined];
+        row.extend(gaps.map(|g| gap(g).into()));
         table.row(row)
     })
 }

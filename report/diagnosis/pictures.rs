@@ -1,9 +1,10 @@
 //! Held-out episodes signal by signal: real against simulated, and what is left.
 
-use super::data::Diagnosis;
+use asid_results::diagnosis::DiagnosisResult;
+use asid_results::trace::{DiagnosisTrace, SignalTrace};
+
 use super::head::refined;
 use super::lines::{MOST_DOTS, around_zero, dots, finite, lone, reach, span, stretches};
-use super::trace::SignalTrace;
 use super::words::{count, gap};
 use crate::number::{quantity, significant};
 use crate::page::{Figure, Section};
@@ -24,24 +25,24 @@ struct Shown {
     refined: bool,
 }
 
-pub(super) fn section(d: &Diagnosis) -> Section {
+pub(super) fn section(d: &DiagnosisResult, t: &DiagnosisTrace) -> Section {
     let section = Section::new("Real against simulated");
-    if d.signals.is_empty() {
+    if t.signals.is_empty() {
         return section.note("No pictures: the diagnosis kept no readings of held-out episodes.");
     }
     let shown = Shown {
-        nominal: d.signals.iter().any(|s| differ(&s.nominal, &s.identified)),
+        nominal: t.signals.iter().any(|s| differ(&s.nominal, &s.identified)),
         refined: refined(d),
     };
     let mut section = section.lead(lead(shown));
-    let order = by_gap(&d.signals);
+    let order = by_gap(&t.signals);
     let mut room = UNFOLDED;
     let mut left = FOLDED;
     let mut untold = 0;
-    for (i, episode) in episodes(&d.signals).into_iter().enumerate() {
+    for (i, episode) in episodes(&t.signals).into_iter().enumerate() {
         let mut traces: Vec<&SignalTrace> =
-            d.signals.iter().filter(|s| s.episode == episode).collect();
-        traces.sort_by_key(|t| order.iter().position(|o| *o == t.signal));
+            t.signals.iter().filter(|s| s.episode == episode).collect();
+        traces.sort_by_key(|s| order.iter().position(|o| *o == s.signal));
         // A later episode is in sight only as a whole.
         let open = match (i, traces.len() <= room) {
             (0, _) => traces.len().min(room),
@@ -52,7 +53,7 @@ pub(super) fn section(d: &Diagnosis) -> Section {
         if open > 0 {
             section = section
                 .heading(format!("Episode {episode}"))
-                .figures(traces[..open].iter().map(|t| figure(t, shown)).collect());
+                .figures(traces[..open].iter().map(|s| figure(s, shown)).collect());
         } else {
             room = 0;
         }
@@ -65,7 +66,7 @@ pub(super) fn section(d: &Diagnosis) -> Section {
                 "Episode {episode}: {}",
                 count(folded, &format!("{more}signal"))
             );
-            let figures = traces[open..open + folded].iter().map(|t| figure(t, shown));
+            let figures = traces[open..open + folded].iter().map(|s| figure(s, shown));
             section = section.folded(summary, Section::new("").figures(figures.collect()));
         }
     }

@@ -1,7 +1,8 @@
 //! Where the gap lies: by signal and regime of motion, and on a map.
 
-use super::data::{Diagnosis, Place};
-use super::trace::Map;
+use asid_results::diagnosis::{DiagnosisResult, Where};
+use asid_results::trace::{DiagnosisTrace, Map};
+
 use super::words::percent;
 use crate::page::{Figure, Section};
 use crate::plot::{Axis, Colour, Outline, Plan, Ranked, Ranking};
@@ -15,12 +16,12 @@ const POINTS: usize = 2500;
 /// Residuals, in units of the noise, at which the colour of a point changes.
 const STEPS: [f64; 3] = [2.0, 5.0, 20.0];
 
-pub(super) fn section(d: &Diagnosis) -> Section {
+pub(super) fn section(d: &DiagnosisResult, t: &DiagnosisTrace) -> Section {
     let section = Section::new("Where the gap lies").lead(
         "What the identified model gets wrong beyond the noise, shared out over signals and regimes of motion, before any \
          effect is added.",
     );
-    let map = d.map.as_ref().filter(|m| !m.points.is_empty());
+    let map = t.map.as_ref().filter(|m| !m.points.is_empty());
     if d.places.is_empty() && map.is_none() {
         return section.note(if d.gap.identified <= 1.05 {
             "Nothing to share out: no residual stands out of the noise."
@@ -38,7 +39,7 @@ pub(super) fn section(d: &Diagnosis) -> Section {
     }
 }
 
-fn shares(places: &[Place]) -> Figure {
+fn shares(places: &[Where]) -> Figure {
     let mut rows: Vec<Ranked> = places.iter().take(MOST).map(row).collect();
     if let Some(rest) = places.get(MOST..).filter(|r| !r.is_empty()) {
         let share = rest.iter().map(|p| p.share).filter(|s| s.is_finite()).sum();
@@ -58,7 +59,7 @@ fn shares(places: &[Place]) -> Figure {
     Figure::new("By signal and regime of motion", ranking, caption)
 }
 
-fn row(place: &Place) -> Ranked {
+fn row(place: &Where) -> Ranked {
     let name = match (&*place.signal, &*place.regime) {
         (signal, "") => signal.to_owned(),
         ("", regime) => regime.to_owned(),
@@ -66,10 +67,9 @@ fn row(place: &Place) -> Ranked {
     };
     let row =
         Ranked::new(name, 100.0 * place.share, percent(place.share)).colour(Colour::Vermillion);
-    if place.condition.is_empty() {
-        row
-    } else {
-        row.note(format!("where {}", place.condition))
+    match &place.condition {
+        None => row,
+        Some(condition) => row.note(format!("where {condition}")),
     }
 }
 

@@ -1,84 +1,39 @@
 //! What the answer is worth where it counts: the task in the real world, before and after.
 
-use serde::{Deserialize, Serialize};
+use asid_results::diagnosis::{DiagnosisResult, RealWorld, TaskTrial};
 
-use super::data::Diagnosis;
 use crate::number::{quantity, significant};
 use crate::page::{Cell, Column, Figure, Section, Table};
 use crate::plot::{Axis, Colour, Ranked, Ranking};
 
-/// A task in the real world with one simulator after the other.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(default)]
-pub struct RealWorld {
-    /// The task.
-    pub task: String,
-    /// Its condition; may be empty.
-    pub condition: String,
-    /// Name of its metric.
-    pub metric: String,
-    /// Unit of the metric.
-    pub unit: String,
-    /// The rule of success, in words.
-    pub rule: String,
-    /// Effects that the real world has and the simulator lacks.
-    pub effects: Vec<String>,
-    /// Episodes that were played to tell explanations apart, in words; may be empty.
-    pub experiments: String,
-    /// The hidden true values, by name.
-    pub truth: Vec<(String, f64)>,
-    /// One a world and simulator, in the order shown.
-    pub trials: Vec<TaskTrial>,
+fn successes(trial: &TaskTrial) -> String {
+    format!("{} of {}", trial.successes, trial.values.len())
 }
 
-/// Runs of a task in one world with one simulator.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(default)]
-pub struct TaskTrial {
-    /// In which world.
-    pub world: String,
-    /// With which simulator.
-    pub simulator: String,
-    /// The metric of each run, in its unit.
-    pub values: Vec<f64>,
-    /// Runs that succeeded.
-    pub successes: usize,
+/// Mean of the metric.
+fn mean(trial: &TaskTrial) -> f64 {
+    trial.values.iter().sum::<f64>() / trial.values.len() as f64
 }
 
-impl TaskTrial {
-    fn label(&self) -> String {
-        format!("{}, {}", self.world, self.simulator)
-    }
-
-    fn successes(&self) -> String {
-        format!("{} of {}", self.successes, self.values.len())
-    }
-
-    /// Mean of the metric.
-    fn mean(&self) -> f64 {
-        self.values.iter().sum::<f64>() / self.values.len() as f64
-    }
+/// Lines for a terminal.
+#[must_use]
+pub fn lines(world: &RealWorld) -> Vec<String> {
+    let trials = world.trials.iter().filter(|t| !t.values.is_empty());
+    let experiments = (!world.experiments.is_empty()).then(|| world.experiments.clone());
+    let counted = trials.map(|t| {
+        let mean = quantity(&significant(mean(t), 3), &world.unit);
+        format!(
+            "  {}, {}: {} in the mean {mean}, {} succeed",
+            t.world,
+            t.simulator,
+            world.metric,
+            successes(t)
+        )
+    });
+    experiments.into_iter().chain(counted).collect()
 }
 
-impl RealWorld {
-    /// Lines for a terminal.
-    #[must_use]
-    pub fn lines(&self) -> Vec<String> {
-        let trials = self.trials.iter().filter(|t| !t.values.is_empty());
-        let experiments = (!self.experiments.is_empty()).then(|| self.experiments.clone());
-        let counted = trials.map(|t| {
-            let mean = quantity(&significant(t.mean(), 3), &self.unit);
-            let (label, successes) = (t.label(), t.successes());
-            format!(
-                "  {label}: {} in the mean {mean}, {successes} succeed",
-                self.metric
-            )
-        });
-        experiments.into_iter().chain(counted).collect()
-    }
-}
-
-pub(super) fn section(d: &Diagnosis) -> Option<Section> {
+pub(super) fn section(d: &DiagnosisResult) -> Option<Section> {
     let world = d.real_world.as_ref()?;
     let trials: Vec<&TaskTrial> = world
         .trials
@@ -100,7 +55,7 @@ pub(super) fn section(d: &Diagnosis) -> Option<Section> {
             _ if t.world == "the real world" => Colour::Vermillion,
             _ => Colour::Muted,
         };
-        Ranked::new(t.world.clone(), share, t.successes())
+        Ranked::new(t.world.clone(), share, successes(t))
             .note(t.simulator.clone())
             .colour(colour)
             .strong()
@@ -111,19 +66,19 @@ pub(super) fn section(d: &Diagnosis) -> Option<Section> {
         "Longer is better. A run explores, identifies, solves and tries once; success: {}.",
         world.rule
     );
-    let mean = format!("mean {}", world.metric);
+    let metric = format!("mean {}", world.metric);
     let columns = vec![
         Column::text("in"),
         Column::text("with"),
         Column::number("success"),
-        Column::number(&mean),
+        Column::number(&metric),
     ];
     let table = trials.iter().fold(Table::new(columns), |table, t| {
         table.row(vec![
             Cell::from(t.world.clone()),
             t.simulator.clone().into(),
-            t.successes().into(),
-            quantity(&significant(t.mean(), 3), &world.unit).into(),
+            successes(t).into(),
+            quantity(&significant(mean(t), 3), &world.unit).into(),
         ])
     });
     let mut facts = Vec::new();

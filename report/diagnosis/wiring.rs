@@ -1,10 +1,11 @@
 //! Faults of wiring, before everything else: what is wrong with the columns, and the lines that mend it.
 
-use super::data::Diagnosis;
+use asid_results::diagnosis::DiagnosisResult;
+
 use super::words::{joined, probability};
 use crate::page::{Column, Section, Table};
 
-pub(super) fn section(d: &Diagnosis) -> Option<Section> {
+pub(super) fn section(d: &DiagnosisResult) -> Option<Section> {
     if d.wiring.is_empty() {
         return None;
     }

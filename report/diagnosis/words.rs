@@ -1,6 +1,8 @@
 //! How sets of effects, probabilities and shares are told.
 
-use super::data::{Diagnosis, Effect, EffectValue, Hypothesis};
+use asid_results::diagnosis::{DiagnosisResult, EffectResult, HypothesisResult};
+use asid_results::trace::DiagnosisTrace;
+
 use crate::number::{NOT_A_NUMBER, decimals, quantity, round, significant, unit_symbol};
 
 /// `a + b`.
@@ -9,7 +11,7 @@ pub(super) fn set(effects: &[String]) -> String {
 }
 
 /// A hypothesis by name, and what it says where that is not an effect's name.
-pub(super) fn hypothesis(hypothesis: &Hypothesis) -> (String, &'static str) {
+pub(super) fn hypothesis(hypothesis: &HypothesisResult) -> (String, &'static str) {
     match &hypothesis.effects[..] {
         [] => ("none".to_owned(), "no effect is missing"),
         [one] if one == "none" => ("none".to_owned(), "no effect is missing"),
@@ -19,7 +21,7 @@ pub(super) fn hypothesis(hypothesis: &Hypothesis) -> (String, &'static str) {
 }
 
 /// The verdict's effects, without the words that stand for none.
-pub(super) fn found(diagnosis: &Diagnosis) -> Vec<String> {
+pub(super) fn found(diagnosis: &DiagnosisResult) -> Vec<String> {
     let effects = diagnosis.verdict.effects.iter();
     effects
         .filter(|e| *e != "none" && *e != "unknown")
@@ -50,22 +52,33 @@ pub(super) fn percent(share: f64) -> String {
     }
 }
 
+/// What an effect is, as the catalogue has it; may be empty.
+pub(super) fn about<'t>(trace: &'t DiagnosisTrace, effect: &EffectResult) -> &'t str {
+    let known = trace.catalogue.get(&effect.effect);
+    known.map_or("", |words| &*words.about)
+}
+
 /// `place = 0.41 m`.
-pub(super) fn value(value: &EffectValue) -> String {
-    let number = round(value.value, 3);
+fn value(name: &str, value: f64, unit: &str) -> String {
+    let number = round(value, 3);
     // What a parameter's unit depends on is told in words.
-    let told = if unit_symbol(&value.unit).contains(' ') && value.unit.len() > 6 {
-        format!("{number} ({})", value.unit)
+    let told = if unit_symbol(unit).contains(' ') && unit.len() > 6 {
+        format!("{number} ({unit})")
     } else {
-        quantity(&number, &value.unit)
+        quantity(&number, unit)
     };
-    format!("{} = {told}", value.name)
+    format!("{name} = {told}")
 }
 
 /// The fitted values of an effect; those that have no part in it are left out.
-pub(super) fn values(effect: &Effect) -> String {
-    let acting = effect.values.iter().filter(|v| v.null != Some(v.value));
-    acting.map(value).collect::<Vec<_>>().join(", ")
+pub(super) fn values(trace: &DiagnosisTrace, effect: &EffectResult) -> String {
+    let words = trace.catalogue.get(&effect.effect);
+    let acting = effect.parameters.iter().filter_map(|(name, x)| {
+        let known = words.and_then(|w| w.parameters.get(name));
+        let acts = known.is_none_or(|k| k.null != *x);
+        acts.then(|| value(name, *x, known.map_or("", |k| &*k.unit)))
+    });
+    acting.collect::<Vec<_>>().join(", ")
 }
 
 /// `a`, `a and b`, `a, b and c`.

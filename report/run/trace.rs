@@ -10,7 +10,8 @@ pub use stages::{
 
 use serde::{Deserialize, Serialize};
 
-use crate::nullable;
+use asid_results::nullable;
+use asid_results::trace::{FileEntry, NamedText};
 
 /// Version of the layout of `trace.json`.
 pub const SCHEMA: u32 = 1;
@@ -123,15 +124,6 @@ pub struct RealWorld {
     pub effects: Vec<String>,
     /// Noise of the readings in words, such as `2 mm, 0.01 rad`; empty where it is not known.
     pub noise: String,
-}
-
-/// A name and a text.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct NamedText {
-    /// The name.
-    pub name: String,
-    /// The text.
-    pub value: String,
 }
 
 /// A name, a number and its unit.
@@ -257,13 +249,4 @@ pub struct StageCost {
     pub wall_s: f64,
     /// Physics steps.
     pub physics_steps: u64,
-}
-
-/// A file of the run's folder.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct FileEntry {
-    /// Name relative to the folder.
-    pub name: String,
-    /// What it holds.
-    pub what: String,
 }

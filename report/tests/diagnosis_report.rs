@@ -6,28 +6,36 @@
 mod diagnosed;
 mod legible;
 
-use asid_report::diagnosis::{Diagnosis, Kind, Verdict, page};
+use asid_results::diagnosis::{Kind, Verdict};
+use diagnosed::Diagnosis;
 use legible::xml;
 use roxmltree::Document;
 
+/// The page of a diagnosis.
+fn page(d: &Diagnosis) -> String {
+    asid_report::diagnosis::page(&d.result, &d.trace)
+}
+
 /// A diagnosis of each kind, one of nothing, and ones whose numbers are none.
-fn diagnoses() -> [Diagnosis; 6] {
+fn diagnoses() -> [Diagnosis; 7] {
     let mut numberless = diagnosed::patch();
-    numberless.gap = Default::default();
-    for signal in &mut numberless.signals {
+    numberless.result.gap = Default::default();
+    for signal in &mut numberless.trace.signals {
         signal.noise = f64::NAN;
         signal.real.fill(f64::NAN);
         signal.refined.clear();
     }
-    numberless.places[0].share = f64::NAN;
-    numberless.ladder[0].gap = f64::NAN;
-    numberless.effects[0].values[1].value = f64::NAN;
-    numberless.effects[1].closes = None;
+    numberless.result.places[0].share = f64::NAN;
+    numberless.trace.ladder[0].gap = f64::NAN;
+    let values = &mut numberless.result.effects[0].parameters;
+    values.insert("place".into(), f64::NAN);
+    numberless.result.effects[1].gap_closed = None;
     let mut timeless = diagnosed::complete();
-    timeless.signals[0].time.clear();
-    timeless.signals[1].nominal.fill(f64::INFINITY);
+    timeless.trace.signals[0].time.clear();
+    timeless.trace.signals[1].nominal.fill(f64::INFINITY);
     [
         diagnosed::patch(),
+        diagnosed::by_force(),
         diagnosed::complete(),
         diagnosed::crowded(),
         Diagnosis::default(),
@@ -40,9 +48,9 @@ fn diagnoses() -> [Diagnosis; 6] {
 fn every_page_is_well_formed_self_contained_and_legible() {
     for d in diagnoses() {
         let html = page(&d);
-        legible::well_formed(&html, &d.study);
+        legible::well_formed(&html, &d.result.study);
         legible::fetches_nothing(&html);
-        legible::texts_apart(&html, &d.study);
+        legible::texts_apart(&html, &d.result.study);
     }
 }
 
@@ -50,35 +58,43 @@ fn every_page_is_well_formed_self_contained_and_legible() {
 fn names_from_files_cannot_break_out_of_the_page() {
     let hostile = "</title><script>alert(1)</script>&\"'";
     let mut d = diagnosed::patch();
-    d.study = hostile.into();
-    d.sentence = hostile.into();
-    d.signals[0].signal = hostile.into();
-    d.signals[0].unit = hostile.into();
-    d.signals[3].episode = hostile.into();
-    d.places[0].condition = hostile.into();
-    d.hypotheses[0].effects = vec![hostile.into()];
-    d.effects[0].site = hostile.into();
-    d.verdict.ambiguous_with[0][0] = hostile.into();
-    d.ladder[1].label = hostile.into();
-    d.checks[0].detail = hostile.into();
-    d.left_out[0].value = hostile.into();
-    d.next_experiment = hostile.into();
-    d.command = hostile.into();
-    d.map.as_mut().unwrap().axes[0] = hostile.into();
+    d.result.study = hostile.into();
+    d.result.sentence = hostile.into();
+    d.trace.signals[0].signal = hostile.into();
+    d.trace.signals[0].unit = hostile.into();
+    d.trace.signals[3].episode = hostile.into();
+    d.result.places[0].condition = Some(hostile.into());
+    d.result.hypotheses[0].effects = vec![hostile.into()];
+    d.result.effects[0].site = hostile.into();
+    d.result.verdict.ambiguous_with[0][0] = hostile.into();
+    d.trace.ladder[1].label = hostile.into();
+    d.result.checks[0].detail = hostile.into();
+    d.trace.left_out[0].value = hostile.into();
+    d.result.next_experiment.how = hostile.into();
+    d.trace.command = hostile.into();
+    d.trace.map.as_mut().unwrap().axes[0] = hostile.into();
     let html = page(&d);
     assert!(Document::parse(xml(&html)).is_ok());
     assert!(!html.contains("<script>alert"));
+}
+
+/// A diagnosis written to its files and read back.
+fn stored(d: &Diagnosis) -> Diagnosis {
+    let result = serde_json::to_string(&d.result).unwrap();
+    let trace = serde_json::to_string(&d.trace).unwrap();
+    Diagnosis {
+        result: serde_json::from_str(&result).unwrap(),
+        trace: serde_json::from_str(&trace).unwrap(),
+    }
 }
 
 #[test]
 fn stored_data_give_the_same_page() {
     for d in diagnoses() {
         // NaN is null in JSON and comes back as NaN; so does what is infinite.
-        let text = serde_json::to_string(&d).unwrap();
-        let once: Diagnosis = serde_json::from_str(&text).unwrap();
-        let twice: Diagnosis =
-            serde_json::from_str(&serde_json::to_string(&once).unwrap()).unwrap();
-        assert!(page(&once) == page(&twice), "{} differs", d.study);
+        let once = stored(&d);
+        let twice = stored(&once);
+        assert!(page(&once) == page(&twice), "{} differs", d.result.study);
     }
 }
 
@@ -98,7 +114,7 @@ fn each_kind_of_verdict_is_told_with_what_cannot_be_told_from_it() {
         assert!(html.contains(told), "{told}");
     }
     let mut sure = diagnosed::patch();
-    sure.verdict.ambiguous_with.clear();
+    sure.result.verdict.ambiguous_with.clear();
     assert!(page(&sure).contains("cause found") && page(&sure).contains("These data tell it from"));
 
     let html = page(&diagnosed::complete());
@@ -113,7 +129,7 @@ fn each_kind_of_verdict_is_told_with_what_cannot_be_told_from_it() {
 fn a_verdict_of_two_effects_describes_both() {
     let mut d = diagnosed::patch();
     let both = ["friction-patch@board", "gravity-tilt"].map(str::to_owned);
-    d.verdict = Verdict {
+    d.result.verdict = Verdict {
         kind: Kind::Effects,
         effects: both.to_vec(),
         probability: 0.99,
@@ -125,9 +141,36 @@ fn a_verdict_of_two_effects_describes_both() {
 }
 
 #[test]
+fn the_missing_force_is_drawn_with_the_law_and_an_early_end_says_what_was_left_out() {
+    let html = page(&diagnosed::by_force());
+    for told in [
+        "shoulder: 1.3\u{a0}N m is missing, 0.13\u{a0}N m is left",
+        "Against speed",
+        "Against angle",
+        "Against force of the drives",
+        "How the explanations rank",
+        "Which effects these logs tell apart",
+        "1. friction-anisotropy@joint_0",
+        "Stopped early",
+        "linear-drag@puck and gravity-tilt",
+    ] {
+        assert!(html.contains(told), "{told}");
+    }
+    // A machine that was diagnosed by replays shows none of it.
+    let html = page(&diagnosed::patch());
+    for untold in [
+        "that is missing",
+        "How the explanations rank",
+        "Stopped early",
+    ] {
+        assert!(!html.contains(untold), "{untold}");
+    }
+}
+
+#[test]
 fn missing_readings_interrupt_the_lines() {
     let mut d = diagnosed::complete();
-    d.signals.truncate(1);
+    d.trace.signals.truncate(1);
     let count = |d: &Diagnosis| {
         let html = page(d);
         let document = Document::parse(xml(&html)).unwrap();
@@ -135,7 +178,7 @@ fn missing_readings_interrupt_the_lines() {
         paths.map(|d| d.matches('M').count()).sum::<usize>()
     };
     let whole = count(&d);
-    d.signals[0].identified[40..50].fill(f64::NAN);
+    d.trace.signals[0].identified[40..50].fill(f64::NAN);
     // Two widths; the identified model in the picture and in its residual.
     assert_eq!(count(&d), whole + 4);
 }

@@ -1,31 +1,31 @@
 //! `asid diagnose`: where the sim-to-real gap lies, which effect causes it, how far it shrinks.
 
 mod config;
+mod live;
 mod real_world;
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::Instant;
 
 use anyhow::Result;
-use asid_core::{Backend, Target};
+use asid_core::{Backend, Progress as _, Target};
 use asid_diagnosis::diagnose::{Diagnosis, diagnose as diagnose_study};
 use asid_diagnosis::machine::Machine;
-use asid_diagnosis::result::DiagnosisResult;
 use asid_diagnosis::study::Study;
 use asid_effects::refined_model::RefinedModel;
-use asid_report::diagnosis as report;
-use serde::Serialize;
+use asid_report::diagnosis::{page, real_world_lines};
+use asid_results::diagnosis::{DiagnosisResult, NotTried, RealWorld};
+use asid_results::trace::{DiagnosisTrace, NamedText};
 
-use super::diagnosis_report::{self, Meta};
 use super::failure;
 use super::options::{Algorithms, Common, Worlds};
 use super::output::{OutFolder, write_json, write_text};
-use super::progress::Bars;
 use super::session::backend;
+use super::trace::files;
 use config::Config;
 pub use config::default_backend;
+use live::Live;
 
 /// Arguments of `diagnose`.
 #[derive(clap::Args)]
@@ -61,6 +61,9 @@ pub struct Arguments {
     /// Run the task this often without and with the answer, to count successes [default: 5]
     #[arg(long, value_name = "N")]
     seeds: Option<u64>,
+    /// Answer after about this time with what is known by then; result.json lists what was not tried. Ctrl-C does the same
+    #[arg(long, value_name = "MINUTES")]
+    minutes: Option<f64>,
     /// Leave out an effect of the catalogue (repeatable)
     #[arg(long, value_name = "EFFECT")]
     without: Vec<String>,
@@ -101,16 +104,6 @@ impl Arguments {
     }
 }
 
-/// `result.json`.
-#[derive(Serialize)]
-struct Output<'a> {
-    #[serde(flatten)]
-    result: &'a DiagnosisResult,
-    /// The task in the real world, before and after.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    real_world: Option<&'a report::RealWorld>,
-}
-
 /// The machine of a study on an engine.
 pub fn machine(study: &Study, engine: &str, threads: usize) -> Result<Machine> {
     let backend: Arc<dyn Backend> = backend(engine)?.into();
@@ -125,10 +118,9 @@ pub fn machine(study: &Study, engine: &str, threads: usize) -> Result<Machine> {
 
 /// Diagnoses a study, or a task.
 pub fn diagnose(arguments: &Arguments) -> Result<()> {
-    let clock = Instant::now();
     let common = &arguments.common;
     let (config, of_run) = Config::resolve(arguments)?;
-    let progress = Bars::new(common.quiet);
+    let progress = Live::new(common.quiet, config.minutes);
     let world = of_run
         .map(|of_run| {
             let (algorithms, worlds) = (&arguments.algorithms, &arguments.worlds);
@@ -158,9 +150,11 @@ pub fn diagnose(arguments: &Arguments) -> Result<()> {
         (None, None) => config.study(None)?,
     };
     let machine = machine(&study, &config.backend, common.threads.unwrap_or(0))?;
+    progress.watch()?;
     let (mut diagnosis, work) = diagnose_study(&study, machine, config.settings(), &progress)?;
     let mut experiments = None;
     if let (Some(world), Some(n @ 1..)) = (&world, config.experiments)
+        && !progress.is_stopped()
         && let Some(played) = world.tell_apart(&work, n, &progress)?
     {
         let (train, test) = world.logs(&runs);
@@ -177,16 +171,18 @@ pub fn diagnose(arguments: &Arguments) -> Result<()> {
         diagnosis = diagnose_study(&study, again, config.settings(), &progress)?.0;
     }
     drop(work);
-    let tried = match &world {
-        Some(world) => {
-            let compared = world.compare(&runs, &diagnosis.effects, &progress)?;
-            Some(report::RealWorld {
-                experiments: experiments.unwrap_or_default(),
-                ..compared
-            })
-        }
-        None => None,
-    };
+    if progress.is_stopped() && world.is_some() {
+        diagnosis.result.not_tried.push(NotTried {
+            stage: "experiments, and the task before and after".into(),
+            effects: Vec::new(),
+        });
+    } else if let Some(world) = &world {
+        let compared = world.compare(&runs, &diagnosis.effects, &progress)?;
+        diagnosis.result.real_world = Some(RealWorld {
+            experiments: experiments.unwrap_or_default(),
+            ..compared
+        });
+    }
     let engine = {
         let backend = backend(&config.backend)?;
         format!("{} {}", backend.name(), backend.version())
@@ -198,20 +194,14 @@ pub fn diagnose(arguments: &Arguments) -> Result<()> {
         let more: Vec<_> = of_run.filter(|(k, _)| !settings.contains_key(k)).collect();
         settings.extend(more);
     }
-    let result = Output {
-        result: &diagnosis.result,
-        real_world: tried.as_ref(),
-    };
+    diagnosis.result.seconds = Some(progress.seconds());
+    diagnosis.result.seconds_to_first_table = progress.seconds_to_first_table();
+    tell_origin(&mut diagnosis.trace, &engine, config.seed);
+    let result = &diagnosis.result;
     out.write(|folder| {
-        write_json(&folder.join("result.json"), &result)?;
-        let mut report = diagnosis_report::diagnosis(
-            &diagnosis.result,
-            &diagnosis.trace,
-            meta(&study, &engine, config.seed),
-        );
-        report.real_world.clone_from(&tried);
-        write_json(&folder.join("trace.json"), &report)?;
-        write_text(&folder.join("report.html"), &report::page(&report))?;
+        write_json(&folder.join("result.json"), result)?;
+        write_json(&folder.join("trace.json"), &diagnosis.trace)?;
+        write_text(&folder.join("report.html"), &page(result, &diagnosis.trace))?;
         write_text(&folder.join("config.toml"), &toml::to_string(&settings)?)?;
         write_text(
             &folder.join("refined.toml"),
@@ -222,46 +212,42 @@ pub fn diagnose(arguments: &Arguments) -> Result<()> {
     })?;
     let mut stdout = std::io::stdout().lock();
     if common.json {
-        writeln!(stdout, "{}", serde_json::to_string_pretty(&result)?)?;
+        writeln!(stdout, "{}", serde_json::to_string_pretty(result)?)?;
     } else {
-        let seconds = clock.elapsed().as_secs_f64();
-        for line in lines(&diagnosis.result, &engine, seconds) {
+        for line in lines(result, &engine, progress.seconds()) {
             writeln!(stdout, "{line}")?;
         }
-        for line in tried.iter().flat_map(report::RealWorld::lines) {
+        for line in result.real_world.iter().flat_map(real_world_lines) {
             writeln!(stdout, "{line}")?;
         }
         writeln!(stdout, "results: {}", out.path().display())?;
     }
     drop(stdout);
-    for check in diagnosis.result.checks.iter().filter(|c| !c.ok) {
+    for check in result.checks.iter().filter(|c| !c.ok) {
         failure::warn(&format!("check {}: {}", check.check, check.detail));
     }
     Ok(())
 }
 
-/// What the report tells besides the result.
-fn meta(study: &Study, engine: &str, seed: u64) -> Meta {
-    let parameters = study.parameters.iter();
-    Meta {
-        command: super::run::command_line(),
-        engine: engine.to_owned(),
-        seed,
-        parameters: parameters
-            .map(|p| (p.name.clone(), p.unit.clone(), None))
-            .collect(),
-        held_out: study.test.len(),
-        fitted_to: study.train.len(),
-        files: vec![
-            ("result.json", "the numbers"),
-            ("refined.toml", "the model with the effects of the verdict"),
-            (
-                "config.toml",
-                "the settings: `--config` with it repeats this",
-            ),
-            ("trace.json", "the data of this report"),
-        ],
-    }
+/// Adds to a trace what it was made with and what lies beside it.
+fn tell_origin(trace: &mut DiagnosisTrace, engine: &str, seed: u64) {
+    trace.command = super::run::command_line();
+    trace.engine = engine.to_owned();
+    trace.versions = vec![
+        NamedText::new("seed", seed.to_string()),
+        NamedText::new("asid", env!("CARGO_PKG_VERSION")),
+        NamedText::new("engine", engine),
+        NamedText::new("git", env!("ASID_GIT")),
+    ];
+    trace.files = files(&[
+        ("result.json", "the numbers"),
+        ("refined.toml", "the model with the effects of the verdict"),
+        (
+            "config.toml",
+            "the settings: `--config` with it repeats this",
+        ),
+        ("trace.json", "the data of the pictures"),
+    ]);
 }
 
 /// The text of the refined model; its document is copied beside it where it needs no other file.
@@ -322,20 +308,20 @@ fn lines(result: &DiagnosisResult, engine: &str, seconds: f64) -> Vec<String> {
             h.effects.join(" + ")
         ));
     }
-    for e in result.effects.iter().filter(|e| {
-        let label = if e.site.is_empty() {
-            e.effect.clone()
-        } else {
-            format!("{}@{}", e.effect, e.site)
-        };
-        result.verdict.effects.contains(&label)
-    }) {
+    for e in result
+        .effects
+        .iter()
+        .filter(|e| result.verdict.effects.contains(&e.label()))
+    {
         let values = e.parameters.iter().filter(|(_, v)| **v != 0.0);
         let text: Vec<String> = values.map(|(n, v)| format!("{n} = {v:.4}")).collect();
         line(&format!("  {} {}: {}", e.effect, e.site, text.join(", ")));
     }
     for p in &result.parameters {
         line(&format!("  {} = {:.5} ± {:.5}", p.name, p.estimate, p.std));
+    }
+    for left in &result.not_tried {
+        line(&format!("not tried: {}", left.stage));
     }
     if !result.next_experiment.how.is_empty() {
         line(&format!("next: {}", result.next_experiment.how));

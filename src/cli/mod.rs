@@ -4,7 +4,6 @@ mod compare;
 mod config;
 mod conformance;
 mod diagnose;
-mod diagnosis_report;
 mod doctor;
 mod explore;
 mod export;

@@ -1,5 +1,6 @@
 //! Progress bars on standard error, with the time left.
 
+use std::io::Write as _;
 use std::sync::Mutex;
 use std::time::Duration;
 
@@ -19,6 +20,18 @@ impl Bars {
             quiet,
             bar: Mutex::new(None),
         }
+    }
+
+    /// Prints lines above the bar.
+    pub fn line(&self, text: &str) {
+        let print = || {
+            // A closed standard error is no reason to stop the work.
+            let _ = writeln!(std::io::stderr(), "{text}");
+        };
+        self.with(|bar| match bar {
+            Some(bar) => bar.suspend(print),
+            None => print(),
+        });
     }
 
     fn with(&self, f: impl FnOnce(&mut Option<ProgressBar>)) {

@@ -1,34 +1,37 @@
 //! `asid report`: the HTML report of a finished run, from its files.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use asid_core::Error;
+use asid_report::diagnosis;
 use asid_report::run::RunReport;
+use serde::de::DeserializeOwned;
 
 /// Arguments of `report`.
 #[derive(clap::Args)]
 pub struct Arguments {
-    /// The folder of a run
+    /// The folder of a run or of a diagnosis
     dir: PathBuf,
+}
+
+/// Reads a file of a result's folder.
+fn read<T: DeserializeOwned>(folder: &Path, name: &str) -> Result<T> {
+    let path = folder.join(name);
+    let read = std::fs::read_to_string(&path);
+    let text = read.map_err(|e| format!("{e}; is this the folder of a finished run?"));
+    let value = text.and_then(|t| serde_json::from_str(&t).map_err(|e| e.to_string()));
+    Ok(value.map_err(|message| Error::File { path, message })?)
 }
 
 /// Writes `report.html` anew.
 pub fn report(arguments: &Arguments) -> Result<()> {
-    let path = arguments.dir.join("trace.json");
-    let fail = |message: String| Error::File {
-        path: path.clone(),
-        message,
-    };
-    let text = std::fs::read_to_string(&path)
-        .map_err(|e| fail(format!("{e}; is this the folder of a finished run?")))?;
-    let value: serde_json::Value = serde_json::from_str(&text).map_err(|e| fail(e.to_string()))?;
-    let page = if value.get("study").is_some() {
-        let diagnosis = serde_json::from_value(value).map_err(|e| fail(e.to_string()))?;
-        asid_report::diagnosis::page(&diagnosis)
+    let folder = &arguments.dir;
+    let value: serde_json::Value = read(folder, "result.json")?;
+    let page = if value.get("verdict").is_some() {
+        diagnosis::page(&read(folder, "result.json")?, &read(folder, "trace.json")?)
     } else {
-        let report: RunReport = serde_json::from_value(value).map_err(|e| fail(e.to_string()))?;
-        report.html()
+        read::<RunReport>(folder, "trace.json")?.html()
     };
     let html = arguments.dir.join("report.html");
     let staging = arguments.dir.join(".report.html");

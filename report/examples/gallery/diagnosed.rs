@@ -1,7 +1,17 @@
 //! Diagnoses that never happened, with the shapes and sizes of those that do.
 
-use asid_report::diagnosis::*;
-use asid_report::run::{FileEntry, NamedText};
+#[path = "missing.rs"]
+mod missing;
+
+use asid_results::diagnosis::*;
+use asid_results::trace::*;
+
+/// What a page is drawn from.
+#[derive(Clone, Default)]
+pub struct Diagnosis {
+    pub result: DiagnosisResult,
+    pub trace: DiagnosisTrace,
+}
 
 /// Names as owned texts.
 fn names(names: &[&str]) -> Vec<String> {
@@ -9,49 +19,59 @@ fn names(names: &[&str]) -> Vec<String> {
 }
 
 fn texts(pairs: &[(&str, &str)]) -> Vec<NamedText> {
-    let text = |(name, value): &(&str, &str)| NamedText {
-        name: (*name).into(),
-        value: (*value).into(),
-    };
+    let text = |(name, value): &(&str, &str)| NamedText::new(*name, *value);
     pairs.iter().map(text).collect()
 }
 
-fn hypothesis(effects: &[&str], probability: f64) -> Hypothesis {
-    Hypothesis {
+fn hypothesis(effects: &[&str], probability: f64) -> HypothesisResult {
+    HypothesisResult {
         effects: names(effects),
         probability,
     }
 }
 
-/// `[value, null]` by name and unit.
-fn effect(
-    label: [&str; 3],
-    probability: f64,
-    closes: f64,
-    values: &[(&str, &str, [f64; 2])],
-) -> Effect {
-    Effect {
-        name: label[0].into(),
+/// An effect with its values by name.
+fn effect(label: [&str; 2], probability: f64, closes: f64, values: &[(&str, f64)]) -> EffectResult {
+    let values = values.iter().map(|(name, value)| ((*name).into(), *value));
+    EffectResult {
+        effect: label[0].into(),
         site: label[1].into(),
-        about: label[2].into(),
         probability,
-        closes: Some(closes),
-        values: (values.iter())
-            .map(|(name, unit, [value, null])| EffectValue {
-                name: (*name).into(),
-                value: *value,
-                unit: (*unit).into(),
-                null: Some(*null),
-            })
-            .collect(),
+        gap_closed: Some(closes),
+        parameters: values.collect(),
     }
 }
 
-fn check(name: &str, ok: bool, detail: &str) -> Check {
-    Check {
-        name: name.into(),
+/// What a catalogue says of an effect: unit and null of its parameters by name.
+fn words(name: &str, about: &str, parameters: &[(&str, &str, f64)]) -> (String, EffectWords) {
+    let words = |(name, unit, null): &(&str, &str, f64)| {
+        let unit = (*unit).to_owned();
+        ((*name).into(), ParameterWords { unit, null: *null })
+    };
+    let words = EffectWords {
+        about: about.into(),
+        parameters: parameters.iter().map(words).collect(),
+    };
+    (name.into(), words)
+}
+
+fn check(name: &str, ok: bool, detail: &str) -> CheckResult {
+    CheckResult {
+        check: name.into(),
         ok,
         detail: detail.into(),
+    }
+}
+
+fn signal_gap(signal: &str, unit: &str, noise: f64, gaps: [f64; 3]) -> SignalGap {
+    let [nominal, identified, refined] = gaps;
+    SignalGap {
+        signal: signal.into(),
+        unit: unit.into(),
+        noise,
+        nominal,
+        identified,
+        refined,
     }
 }
 
@@ -59,8 +79,7 @@ fn check(name: &str, ok: bool, detail: &str) -> Check {
 pub fn patch() -> Diagnosis {
     let signals = puck();
     let map = map(&signals);
-    Diagnosis {
-        wiring: Vec::new(),
+    let result = DiagnosisResult {
         study: "puck-on-board".into(),
         sentence: "The real board is rougher beyond 0.41 m: sliding friction there is 1.8 times the modelled one, which closes 98 % of the gap."
             .into(),
@@ -70,11 +89,12 @@ pub fn patch() -> Diagnosis {
             refined: 1.9,
             closed: Some(0.984),
             closed_interval95: Some([0.961, 0.993]),
+            signals: vec![
+                signal_gap("puck_pos", "m", 0.002, [48.0, 16.5, 2.1]),
+                signal_gap("puck_yaw", "rad", 0.01, [12.3, 5.2, 1.2]),
+            ],
+            ..Gap::default()
         },
-        signal_gaps: vec![
-            SignalGap { signal: "puck_pos".into(), unit: "m".into(), noise: 0.002, gaps: [48.0, 16.5, 2.1] },
-            SignalGap { signal: "puck_yaw".into(), unit: "rad".into(), noise: 0.01, gaps: [12.3, 5.2, 1.2] },
-        ],
         places: [
             ("puck_pos.0", "sliding, puck/board", 0.71, "puck_pos.0 > 0.41"),
             ("puck_pos.1", "sliding, puck/board", 0.13, "puck_pos.0 > 0.41"),
@@ -83,11 +103,11 @@ pub fn patch() -> Diagnosis {
             ("puck_pos.0", "sticking", 0.018, ""),
             ("puck_yaw", "start-up", 0.002, ""),
         ]
-        .map(|(signal, regime, share, condition)| Place {
+        .map(|(signal, regime, share, condition): (&str, &str, f64, &str)| Where {
             signal: signal.into(),
             regime: regime.into(),
             share,
-            condition: condition.into(),
+            condition: (!condition.is_empty()).then(|| condition.into()),
         })
         .into(),
         hypotheses: vec![
@@ -99,16 +119,11 @@ pub fn patch() -> Diagnosis {
             hypothesis(&["none"], 1e-9),
         ],
         effects: vec![
-            effect(
-                ["friction-patch", "board", "sliding friction differs beyond a place"],
-                0.71,
-                0.984,
-                &[("axis", "", [0.0, 0.0]), ("place", "m", [0.4112, 0.0]), ("ratio", "1", [1.812, 1.0])],
-            ),
-            effect(["friction-drift", "board", "sliding friction changes over time"], 0.22, 0.957, &[("per_second", "1/s", [0.62, 0.0])]),
-            effect(["gravity-tilt", "", "the ground is not level"], 0.034, 0.31, &[("pitch", "rad", [-0.021, 0.0]), ("roll", "rad", [0.004, 0.0])]),
-            effect(["friction-anisotropy", "board", "sliding friction differs by direction"], 0.034, 0.42, &[("cos_2", "1", [0.12, 0.0])]),
-            effect(["linear-drag", "puck", "a drag in proportion to speed"], 0.0048, 0.66, &[("coefficient", "N s/m", [0.31, 0.0])]),
+            effect(["friction-patch", "board"], 0.71, 0.984, &[("axis", 0.0), ("place", 0.4112), ("ratio", 1.812)]),
+            effect(["friction-drift", "board"], 0.22, 0.957, &[("per_second", 0.62)]),
+            effect(["gravity-tilt", ""], 0.034, 0.31, &[("pitch", -0.021), ("roll", 0.004)]),
+            effect(["friction-anisotropy", "board"], 0.034, 0.42, &[("cos_2", 0.12)]),
+            effect(["linear-drag", "puck"], 0.0048, 0.66, &[("coefficient", 0.31)]),
         ],
         verdict: Verdict {
             kind: Kind::Effects,
@@ -118,8 +133,8 @@ pub fn patch() -> Diagnosis {
             unexplained: 0.016,
         },
         parameters: vec![
-            Parameter { name: "board_friction".into(), unit: String::new(), nominal: Some(0.4), estimate: 0.2213, std: 0.0031, interval95: [0.2152, 0.2274] },
-            Parameter { name: "puck_mass".into(), unit: "kg".into(), nominal: Some(0.2), estimate: 0.2021, std: f64::NAN, interval95: [f64::NAN; 2] },
+            ParameterResult { name: "board_friction".into(), unit: String::new(), nominal: Some(0.4), estimate: 0.2213, std: 0.0031, interval95: [0.2152, 0.2274] },
+            ParameterResult { name: "puck_mass".into(), unit: "kg".into(), nominal: Some(0.2), estimate: 0.2021, std: f64::NAN, interval95: [f64::NAN; 2] },
         ],
         checks: vec![
             check("time stamps", true, "even to 0.1 ms"),
@@ -127,28 +142,12 @@ pub fn patch() -> Diagnosis {
             check("excitation", false, "puck_mass does not show in any reading: it was kept at its value. Push harder, or weigh the puck."),
             check("time step", true, "halving it changes no reading by more than 0.1 of its noise"),
         ],
-        separates: names(&["friction-patch@board", "friction-drift@board"]),
-        next_experiment: "slide the puck across 0.41 m once more after waiting, then back across it: a rough place stays where it is, wear grows \
+        next_experiment: NextExperiment {
+            separates: names(&["friction-patch@board", "friction-drift@board"]),
+            how: "slide the puck across 0.41 m once more after waiting, then back across it: a rough place stays where it is, wear grows \
                           with every pass."
-            .into(),
-        held_out: 3,
-        fitted_to: 9,
-        ladder: [
-            ("friction-patch@board", 1.9),
-            ("friction-drift@board", 3.1),
-            ("linear-drag@puck", 8.3),
-            ("friction-anisotropy@board", 10.9),
-            ("gravity-tilt", 11.8),
-            ("payload@puck", 14.1),
-        ]
-        .map(|(label, gap)| Rung { label: label.into(), gap })
-        .into(),
-        signals,
-        map: Some(map),
-        left_out: texts(&[
-            ("contact-restitution@board", "rapier cannot set it"),
-            ("inertia@puck", "cannot be joined with the study's geom/puck/mass"),
-        ]),
+                .into(),
+        },
         real_world: Some(RealWorld {
             task: "shuffleboard".into(),
             condition: "far".into(),
@@ -171,13 +170,79 @@ pub fn patch() -> Diagnosis {
             .into(),
             ..RealWorld::default()
         }),
+        ..DiagnosisResult::default()
+    };
+    let trace = DiagnosisTrace {
+        catalogue: [
+            words(
+                "friction-patch",
+                "sliding friction differs beyond a place",
+                &[("axis", "", 0.0), ("place", "m", 0.0), ("ratio", "1", 1.0)],
+            ),
+            words(
+                "friction-drift",
+                "sliding friction changes over time",
+                &[("per_second", "1/s", 0.0)],
+            ),
+            words(
+                "gravity-tilt",
+                "the ground is not level",
+                &[("pitch", "rad", 0.0), ("roll", "rad", 0.0)],
+            ),
+            words(
+                "friction-anisotropy",
+                "sliding friction differs by direction",
+                &[("cos_2", "1", 0.0)],
+            ),
+            words(
+                "linear-drag",
+                "a drag in proportion to speed",
+                &[("coefficient", "N s/m", 0.0)],
+            ),
+        ]
+        .into(),
+        held_out: 3,
+        fitted_to: 9,
+        ladder: [
+            ("friction-patch@board", 1.9),
+            ("friction-drift@board", 3.1),
+            ("linear-drag@puck", 8.3),
+            ("friction-anisotropy@board", 10.9),
+            ("gravity-tilt", 11.8),
+            ("payload@puck", 14.1),
+        ]
+        .map(|(label, gap)| Rung {
+            label: label.into(),
+            gap,
+        })
+        .into(),
+        signals,
+        map: Some(map),
+        left_out: texts(&[
+            ("contact-restitution@board", "rapier cannot set it"),
+            (
+                "inertia@puck",
+                "cannot be joined with the study's geom/puck/mass",
+            ),
+        ]),
         engine: "rapier 0.36.1".into(),
-        command: "asid diagnose studies/puck-on-board --backend rapier --seed 0 --out diagnoses/puck".into(),
+        command:
+            "asid diagnose studies/puck-on-board --backend rapier --seed 0 --out diagnoses/puck"
+                .into(),
         versions: texts(&[("asid", "0.1.0"), ("seed", "0"), ("git", "6c5e301")]),
-        files: [("result.json", "the numbers"), ("trace.json", "the data of the pictures"), ("refined.toml", "the refined model, for every command")]
-            .map(|(name, what)| FileEntry { name: name.into(), what: what.into() })
-            .into(),
-    }
+        files: [
+            ("result.json", "the numbers"),
+            ("trace.json", "the data of the pictures"),
+            ("refined.toml", "the refined model, for every command"),
+        ]
+        .map(|(name, what)| FileEntry {
+            name: name.into(),
+            what: what.into(),
+        })
+        .into(),
+        ..DiagnosisTrace::default()
+    };
+    Diagnosis { result, trace }
 }
 
 /// A pendulum whose model is complete.
@@ -201,13 +266,13 @@ pub fn complete() -> Diagnosis {
             time,
         }
     };
-    Diagnosis {
+    let result = DiagnosisResult {
         study: "pendulum".into(),
         sentence: "Nothing is missing: with its damping fitted, the model predicts the pendulum as well as the sensor allows.".into(),
-        gap: Gap { nominal: 11.2, identified: 1.02, refined: 1.02, closed: None, closed_interval95: None },
+        gap: Gap { nominal: 11.2, identified: 1.02, refined: 1.02, ..Gap::default() },
         hypotheses: vec![hypothesis(&["none"], 0.97), hypothesis(&["coulomb-friction@hinge"], 0.02), hypothesis(&["unknown"], 0.01)],
         verdict: Verdict { kind: Kind::None, effects: vec![], probability: 0.97, ambiguous_with: vec![], unexplained: 0.0 },
-        parameters: vec![Parameter {
+        parameters: vec![ParameterResult {
             name: "damping".into(),
             unit: "N m s/rad".into(),
             nominal: Some(0.1),
@@ -216,17 +281,30 @@ pub fn complete() -> Diagnosis {
             interval95: [0.2087, 0.2115],
         }],
         checks: vec![check("excitation", true, "every parameter shows")],
+        ..DiagnosisResult::default()
+    };
+    let trace = DiagnosisTrace {
         held_out: 2,
         signals: (0..2).map(trace).collect(),
         engine: "mujoco 3.3.7".into(),
-        ..Diagnosis::default()
-    }
+        ..DiagnosisTrace::default()
+    };
+    Diagnosis { result, trace }
+}
+
+/// The same by the missing force, stopped early.
+pub fn by_force() -> Diagnosis {
+    let mut d = patch();
+    d.trace.map = None;
+    missing::add(&mut d);
+    d
 }
 
 /// A gap that nothing explains; many signals, hostile names, readings that are missing, simulations that diverge.
 pub fn crowded() -> Diagnosis {
     let long = "friction-anisotropy@a_body_with_a_name_that_is_much_too_long_for_a_phone";
-    let mut d = patch();
+    let mut patch = patch();
+    let d = &mut patch.result;
     d.study = "arm <&\"'>".into();
     d.sentence = String::new();
     d.verdict = Verdict {
@@ -241,7 +319,7 @@ pub fn crowded() -> Diagnosis {
         identified: 96.4,
         refined: 96.4,
         closed: Some(0.0),
-        closed_interval95: None,
+        ..Gap::default()
     };
     d.hypotheses = vec![
         hypothesis(&["unknown"], 0.58),
@@ -250,18 +328,19 @@ pub fn crowded() -> Diagnosis {
     d.hypotheses
         .extend((0..14).map(|i| hypothesis(&[&format!("armature@joint_{i}")], 0.015)));
     d.hypotheses.push(hypothesis(&["none"], f64::NAN));
-    d.ladder = (0..23)
+    let t = &mut patch.trace;
+    t.ladder = (0..23)
         .map(|i| Rung {
             label: format!("armature@joint_{i}"),
             gap: 50.0 + f64::from(i),
         })
         .collect();
-    d.ladder.push(Rung {
+    t.ladder.push(Rung {
         label: long.into(),
         gap: f64::INFINITY,
     });
     d.places = (0..17)
-        .map(|i| Place {
+        .map(|i| Where {
             signal: format!("joint_{i}_pos"),
             regime: if i % 2 == 0 {
                 "reversal".into()
@@ -269,17 +348,17 @@ pub fn crowded() -> Diagnosis {
                 long.into()
             },
             share: 1.0 / 17.0,
-            condition: String::new(),
+            condition: None,
         })
         .collect();
-    d.signals = (0..5).flat_map(arm).collect();
-    d.map = None;
+    t.signals = (0..5).flat_map(arm).collect();
+    t.map = None;
     d.checks.push(check(
         "<b>units</b>",
         false,
         "joint_3_pos looks like degrees & not rad",
     ));
-    d
+    patch
 }
 
 /// Seven signals of an arm; every fourth row has a reading, one stretch has none.

@@ -1,7 +1,7 @@
 //! Writes reports of made-up but realistic data, to look at the layout.
 //!
 //! `cargo run -p asid-report --example gallery -- FOLDER` writes runs (`full`, `bare`
-//! and `crowded`, each with `trace.json`) and diagnoses (`patch`, `complete`,
+//! and `crowded`, each with `trace.json`) and diagnoses (`patch`, `force`, `complete`,
 //! `unexplained` and `empty`) below it, each with `report.html`.
 
 mod diagnosed;
@@ -10,7 +10,8 @@ mod synthetic;
 use std::path::{Path, PathBuf};
 
 use asid_core::error::{Error, Result};
-use asid_report::diagnosis::{Diagnosis, page};
+use asid_report::diagnosis::page;
+use diagnosed::Diagnosis;
 
 fn main() -> Result<()> {
     let folder = PathBuf::from(std::env::args().nth(1).unwrap_or_else(|| "gallery".into()));
@@ -24,15 +25,18 @@ fn main() -> Result<()> {
     }
     let diagnoses = [
         ("patch", diagnosed::patch()),
+        ("force", diagnosed::by_force()),
         ("complete", diagnosed::complete()),
         ("unexplained", diagnosed::crowded()),
         ("empty", Diagnosis::default()),
     ];
     for (name, diagnosis) in diagnoses {
         let path = made(&folder, name)?.join("report.html");
-        std::fs::write(&path, page(&diagnosis)).map_err(|e| Error::File {
-            path,
-            message: e.to_string(),
+        std::fs::write(&path, page(&diagnosis.result, &diagnosis.trace)).map_err(|e| {
+            Error::File {
+                path,
+                message: e.to_string(),
+            }
         })?;
     }
     Ok(())

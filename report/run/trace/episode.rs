@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::nullable;
+use asid_results::nullable;
 
 /// The real episode in the horizontal plane of the world, in m.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

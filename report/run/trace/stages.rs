@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::{NamedValue, Shape};
-use crate::nullable;
+use asid_results::nullable;
 
 /// What the exploration was for and what the real episode gathered.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

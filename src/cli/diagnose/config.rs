@@ -55,6 +55,9 @@ pub struct Config {
     /// Seeds that the task is tried with, before and after.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub seeds: Option<u64>,
+    /// Time limit.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub minutes: Option<f64>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     without: Vec<String>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -87,7 +90,7 @@ impl RunLogs {
 }
 
 /// Keys that are a diagnosis' own; where a task is run, the others are that run's.
-const OWN: [&str; 16] = [
+const OWN: [&str; 17] = [
     "study",
     "task",
     "model",
@@ -99,6 +102,7 @@ const OWN: [&str; 16] = [
     "experiments",
     "logs",
     "seeds",
+    "minutes",
     "without",
     "plugins",
     "search",
@@ -189,6 +193,10 @@ impl Config {
         config.runs = arguments.runs.or(config.runs);
         config.experiments = arguments.experiments.or(config.experiments);
         config.seeds = arguments.seeds.or(config.seeds);
+        config.minutes = arguments.minutes.or(config.minutes);
+        if config.minutes.is_some_and(|m| !(m.is_finite() && m > 0.0)) {
+            return Err(wrong("--minutes", "is a number above 0"));
+        }
         config.without.extend(arguments.without.iter().cloned());
         for name in &config.without {
             find::<EffectEntry>(name)?;

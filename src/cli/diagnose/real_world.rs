@@ -11,7 +11,7 @@ use asid_diagnosis::diagnose::Work;
 use asid_diagnosis::search::trials;
 use asid_effects::EffectSpec;
 use asid_effects::refined_model::RefinedModel;
-use asid_report::diagnosis::{RealWorld, TaskTrial};
+use asid_results::diagnosis::{RealWorld, TaskTrial};
 
 use super::super::model;
 use super::super::options::{Algorithms, Common, Real, Worlds};

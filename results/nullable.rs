@@ -1,5 +1,7 @@
 //! Reading numbers that may not have been finite: JSON has only `null` for them.
 
+use std::collections::BTreeMap;
+
 use serde::{Deserialize, Deserializer};
 
 /// A number, `null` read as NaN.
@@ -15,12 +17,18 @@ impl<'de> Deserialize<'de> for Number {
 }
 
 /// One number.
-pub(crate) fn scalar<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+///
+/// # Errors
+/// Where the text holds something else.
+pub fn scalar<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
     Number::deserialize(deserializer).map(|n| n.0)
 }
 
 /// A list of numbers.
-pub(crate) fn list<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<f64>, D::Error> {
+///
+/// # Errors
+/// Where the text holds something else.
+pub fn list<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<f64>, D::Error> {
     Ok(Vec::<Number>::deserialize(deserializer)?
         .into_iter()
         .map(|n| n.0)
@@ -28,7 +36,10 @@ pub(crate) fn list<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<f64
 }
 
 /// A fixed number of numbers.
-pub(crate) fn array<'de, D: Deserializer<'de>, const N: usize>(
+///
+/// # Errors
+/// Where the text holds something else.
+pub fn array<'de, D: Deserializer<'de>, const N: usize>(
     deserializer: D,
 ) -> Result<[f64; N], D::Error> {
     let numbers = list(deserializer)?;
@@ -39,7 +50,10 @@ pub(crate) fn array<'de, D: Deserializer<'de>, const N: usize>(
 }
 
 /// A list of rows of `N` numbers.
-pub(crate) fn rows<'de, D: Deserializer<'de>, const N: usize>(
+///
+/// # Errors
+/// Where the text holds something else.
+pub fn rows<'de, D: Deserializer<'de>, const N: usize>(
     deserializer: D,
 ) -> Result<Vec<[f64; N]>, D::Error> {
     Vec::<Vec<Number>>::deserialize(deserializer)?
@@ -52,4 +66,25 @@ pub(crate) fn rows<'de, D: Deserializer<'de>, const N: usize>(
             })
         })
         .collect()
+}
+
+/// A list of lists of numbers.
+///
+/// # Errors
+/// Where the text holds something else.
+pub fn table<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<Vec<f64>>, D::Error> {
+    let rows = Vec::<Vec<Number>>::deserialize(deserializer)?;
+    Ok(rows
+        .into_iter()
+        .map(|row| row.into_iter().map(|n| n.0).collect())
+        .collect())
+}
+
+/// Numbers by name.
+///
+/// # Errors
+/// Where the text holds something else.
+pub fn map<'de, D: Deserializer<'de>>(deserializer: D) -> Result<BTreeMap<String, f64>, D::Error> {
+    let numbers = BTreeMap::<String, Number>::deserialize(deserializer)?;
+    Ok(numbers.into_iter().map(|(k, n)| (k, n.0)).collect())
 }

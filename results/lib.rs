@@ -1,0 +1,11 @@
+//! What a diagnosis writes, as types that go to JSON and back.
+//!
+//! - [`diagnosis`] is `result.json`: the answer.
+//! - [`trace`] is `trace.json`: what the pictures of the report need besides.
+//!
+//! The diagnosis fills them, the command line writes them, the report reads them. A number that is not finite
+//! is `null` in JSON and comes back as NaN ([`nullable`]).
+
+pub mod diagnosis;
+pub mod nullable;
+pub mod trace;

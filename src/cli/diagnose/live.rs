@@ -1,0 +1,161 @@
+//! A diagnosis under way: bars, rankings as they stand, and when it is to end.
+
+use std::fmt::Write as _;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, OnceLock};
+use std::time::{Duration, Instant};
+
+use anyhow::Result;
+use asid_core::{Error, Progress};
+use signal_hook::consts::SIGINT;
+
+use super::super::progress::Bars;
+
+/// Share of the time limit after which nothing further is fitted: replays and the report take the rest (5 to 15 % of the
+/// time of diagnoses of 5 s to a minute).
+const SEARCHING: f64 = 0.85;
+/// Exit status of a process that SIGINT ended, as shells count it.
+const INTERRUPTED: i32 = 130;
+/// Rows of a ranking that are printed.
+const ROWS: usize = 5;
+/// Characters of a name that are printed: a group of many joints is long.
+const WIDEST: usize = 90;
+
+/// Progress on standard error. It ends the work at a time limit or at the first Ctrl-C; a second one ends the process at once.
+pub struct Live {
+    bars: Bars,
+    quiet: bool,
+    begun: Instant,
+    until: Option<Instant>,
+    interrupted: Arc<AtomicBool>,
+    told: AtomicBool,
+    first_table: OnceLock<f64>,
+}
+
+impl Live {
+    /// Begins now; `minutes` is the time limit.
+    pub fn new(quiet: bool, minutes: Option<f64>) -> Self {
+        let begun = Instant::now();
+        let limit = minutes.map(|m| Duration::from_secs_f64(60.0 * SEARCHING * m));
+        Self {
+            bars: Bars::new(quiet),
+            quiet,
+            begun,
+            until: limit.and_then(|l| begun.checked_add(l)),
+            interrupted: Arc::new(AtomicBool::new(false)),
+            told: AtomicBool::new(false),
+            first_table: OnceLock::new(),
+        }
+    }
+
+    /// From here on the first Ctrl-C ends the search and a second one the process.
+    pub fn watch(&self) -> Result<()> {
+        let failed = |e| Error::Failed(format!("cannot watch for signals: {e}"));
+        let flag = || Arc::clone(&self.interrupted);
+        // In this order: the first signal finds the flag down, and raises it.
+        signal_hook::flag::register_conditional_shutdown(SIGINT, INTERRUPTED, flag())
+            .map_err(failed)?;
+        signal_hook::flag::register(SIGINT, flag()).map_err(failed)?;
+        Ok(())
+    }
+
+    /// Time so far, s.
+    pub fn seconds(&self) -> f64 {
+        self.begun.elapsed().as_secs_f64()
+    }
+
+    /// Time until the first ranking, s.
+    pub fn seconds_to_first_table(&self) -> Option<f64> {
+        self.first_table.get().copied()
+    }
+}
+
+/// A ranking as lines.
+fn table(stage: &str, seconds: f64, rows: &[(String, f64)]) -> String {
+    let mut text = format!("{seconds:.1} s, {stage}:");
+    for (name, value) in rows.iter().take(ROWS) {
+        let mut name: String = name.clone();
+        if name.chars().count() > WIDEST {
+            name = name.chars().take(WIDEST - 1).chain(['…']).collect();
+        }
+        let _ = write!(text, "\n  {value:>9.1}  {name}");
+    }
+    if rows.len() > ROWS {
+        let _ = write!(text, "\n  and {} more", rows.len() - ROWS);
+    }
+    text
+}
+
+impl Progress for Live {
+    fn begin(&self, stage: &str, total: u64) {
+        self.bars.begin(stage, total);
+    }
+
+    fn advance(&self, units: u64) {
+        self.bars.advance(units);
+    }
+
+    fn note(&self, text: &str) {
+        self.bars.note(text);
+    }
+
+    fn ranking(&self, stage: &str, rows: &[(String, f64)]) {
+        let seconds = self.seconds();
+        let first = self.first_table.set(seconds).is_ok();
+        if self.quiet || rows.is_empty() {
+            return;
+        }
+        let stage = match (first, stage.starts_with("gap")) {
+            (true, true) => format!("first table, {stage} (in units of the noise)"),
+            (true, false) => format!("first table, {stage} (evidence, natural logarithm)"),
+            (false, _) => stage.to_owned(),
+        };
+        self.bars.line(&table(&stage, seconds, rows));
+    }
+
+    fn is_stopped(&self) -> bool {
+        let interrupted = self.interrupted.load(Ordering::SeqCst);
+        let stopped = interrupted || self.until.is_some_and(|until| Instant::now() >= until);
+        if stopped && !self.quiet && !self.told.swap(true, Ordering::SeqCst) {
+            let why = if interrupted {
+                "stopping: what is known is written; Ctrl-C once more ends at once"
+            } else {
+                "the time is up: what is known is written"
+            };
+            self.bars.line(why);
+        }
+        stopped
+    }
+
+    fn end(&self) {
+        self.bars.end();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn it_stops_when_the_time_is_up_or_at_an_interruption_and_knows_when_the_first_table_came() {
+        let live = Live::new(true, None);
+        assert!(!live.is_stopped() && live.seconds_to_first_table().is_none());
+        live.ranking("screening", &[("a@x".into(), 3.0)]);
+        let first = live.seconds_to_first_table();
+        live.ranking("fits", &[]);
+        assert_eq!(live.seconds_to_first_table(), first);
+        live.interrupted.store(true, Ordering::SeqCst);
+        assert!(live.is_stopped());
+        assert!(Live::new(true, Some(0.0)).is_stopped());
+        assert!(!Live::new(true, Some(1e9)).is_stopped());
+    }
+
+    #[test]
+    fn a_ranking_is_cut_to_what_a_terminal_shows() {
+        let rows: Vec<(String, f64)> = (0..7).map(|i| ("é".repeat(200), f64::from(i))).collect();
+        let text = table("screening", 2.04, &rows);
+        assert!(text.starts_with("2.0 s, screening:\n        0.0  é"));
+        assert!(text.ends_with("and 2 more"));
+        assert!(text.lines().all(|l| l.chars().count() < WIDEST + 15));
+    }
+}

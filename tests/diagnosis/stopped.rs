@@ -1,0 +1,120 @@
+//! A diagnosis that is stopped answers with what it knows by then.
+
+use std::sync::Mutex;
+
+use asid::core::Progress;
+use asid::diagnosis::diagnose::{Diagnosis, Settings, diagnose};
+use asid::diagnosis::machine::Machine;
+use asid::diagnosis::study::Study;
+
+use super::diagnosis_support::engine;
+use super::world::{Truth, write_study};
+
+/// Stops the work at the ranking of this number, from 1.
+struct Until {
+    last: usize,
+    seen: Mutex<Vec<Vec<(String, f64)>>>,
+}
+
+impl Until {
+    fn ranking_number(last: usize) -> Self {
+        let seen = Mutex::default();
+        Self { last, seen }
+    }
+}
+
+impl Progress for Until {
+    fn begin(&self, _stage: &str, _total: u64) {}
+    fn advance(&self, _units: u64) {}
+    fn end(&self) {}
+    fn ranking(&self, _stage: &str, rows: &[(String, f64)]) {
+        self.seen.lock().unwrap().push(rows.to_vec());
+    }
+    fn is_stopped(&self) -> bool {
+        self.seen.lock().unwrap().len() >= self.last
+    }
+}
+
+fn run(until: &Until) -> Diagnosis {
+    let folder = tempfile::tempdir().unwrap();
+    write_study(folder.path(), Truth::Coulomb(1.2));
+    let study = Study::read(folder.path()).unwrap();
+    let (fixed, effects) = (&study.fixed, &study.effects);
+    let machine = Machine::new(engine(), &study.scene, fixed, effects, 0).unwrap();
+    diagnose(&study, machine, Settings::default(), until)
+        .unwrap()
+        .0
+}
+
+#[test]
+fn stopped_after_the_screening_it_ranks_what_was_screened_and_says_what_was_not_tried() {
+    let until = Until::ranking_number(1);
+    let r = run(&until).result;
+    let table = &until.seen.lock().unwrap()[0];
+    // The ranking is what the screening saw, in its order, but for the leader, which was linearised once more.
+    let screened = r.ranking.iter().filter(|s| s.fitted.is_none());
+    for (row, (name, gain)) in screened.zip(&table[1..]) {
+        assert_eq!(&row.effects.join(" + "), name);
+        assert_eq!(row.screened, Some(*gain));
+    }
+    assert!(table.windows(2).all(|w| w[0].1 >= w[1].1));
+    let stages: Vec<&str> = r.not_tried.iter().map(|n| &*n.stage).collect();
+    assert!(
+        stages.contains(&"confirmation of what leads in screening"),
+        "{stages:?}"
+    );
+    assert!(r.not_tried.iter().all(|n| !n.stage.is_empty()));
+    let left = &r.not_tried[0].effects;
+    assert!(
+        !left.is_empty() && left.iter().all(|l| table.iter().any(|t| t.0 == *l)),
+        "{left:?}"
+    );
+    assert!(r.sentence.contains("stopped early"), "{}", r.sentence);
+    let sum: f64 = r.hypotheses.iter().map(|h| h.probability).sum();
+    assert!((sum - 1.0).abs() < 1e-9, "probabilities sum to {sum}");
+    // Angles: alike to itself, symmetric, and between alike and nothing in common.
+    let table = r.isolability.as_ref().unwrap();
+    let n = table.effects.len();
+    assert!(n > 1 && n <= 20);
+    for i in 0..n {
+        assert!(table.angles[i][i] < 1e-3, "{}", table.effects[i]);
+        for j in 0..n {
+            let angle = table.angles[i][j];
+            assert!((0.0..=std::f64::consts::FRAC_PI_2 + 1e-9).contains(&angle));
+            assert!((angle - table.angles[j][i]).abs() < 1e-6);
+        }
+    }
+    // Nothing of it hangs on the clock; the study is named after its folder.
+    let again = run(&Until::ranking_number(1)).result;
+    let study = r.study.clone();
+    assert_eq!(
+        asid::results::diagnosis::DiagnosisResult { study, ..again },
+        r
+    );
+}
+
+#[test]
+fn a_diagnosis_that_is_not_stopped_leaves_nothing_untried_and_draws_the_law_through_the_missing_force()
+ {
+    let Diagnosis { result, trace, .. } = run(&Until::ranking_number(usize::MAX));
+    assert!(result.not_tried.is_empty(), "{:?}", result.not_tried);
+    assert_eq!(result.verdict.effects, ["coulomb-friction@rail"]);
+    let force = &trace.forces[0];
+    assert_eq!((&*force.dof, &*force.unit), ("rail", "N"));
+    let s = &force.spread;
+    assert!(s.before.len() > 100 && s.before.len() <= 400);
+    // What is missing is what the refined model adds, friction and the mass that was fitted with it, and what is left.
+    let moving: Vec<usize> = (0..s.speed.len())
+        .filter(|&k| s.speed[k].abs() > 0.2 && s.law[k].is_finite())
+        .collect();
+    assert!(moving.len() > 50);
+    let rms = |f: &dyn Fn(usize) -> f64| -> f64 {
+        let sum: f64 = moving.iter().map(|&k| f(k).powi(2)).sum();
+        (sum / moving.len() as f64).sqrt()
+    };
+    let before = rms(&|k| s.before[k]);
+    let apart = rms(&|k| s.before[k] - s.law[k] - s.after[k]);
+    let left = rms(&|k| s.after[k]);
+    assert!(apart < 0.3 * before, "{apart} of {before}");
+    assert!(left < 0.2 * before, "{left} of {before}");
+}
