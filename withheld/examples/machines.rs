@@ -1,21 +1,34 @@
 //! What each machine does without a cause: run time, gap of its time step, readings, forces.
 //!
-//! `cargo run --release -p asid-withheld --example machines [NAME…]`
+//! `cargo run --release -p asid-withheld --example machines [NAME…] [DIR]`; the machines of others come from a folder that
+//! `withheld/models/fetch.py` filled.
 
 use std::io::Write as _;
 use std::time::Instant;
 
 use asid_withheld::anatomy::Anatomy;
 use asid_withheld::gap::Bench;
-use asid_withheld::machines;
+use asid_withheld::{Half, machines, outside};
 use asid_withheld::motion::{Motion, Style};
 use asid_withheld::random::stream;
 use asid_withheld::world::World;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let names: Vec<String> = std::env::args().skip(1).collect();
+    let (folders, names): (Vec<String>, Vec<String>) = std::env::args()
+        .skip(1)
+        .partition(|a| std::path::Path::new(a).is_dir());
     let mut out = std::io::stdout().lock();
-    for machine in machines::ALL {
+    let mut machines = machines::ALL.to_vec();
+    for folder in &folders {
+        for half in [Half::Training, Half::Test] {
+            let found = outside::read(folder.as_ref(), half)?;
+            machines.extend(found.machines);
+            for why in found.refused {
+                writeln!(out, "{why}")?;
+            }
+        }
+    }
+    for machine in machines {
         if !names.is_empty() && !names.iter().any(|n| n == machine.name) {
             continue;
         }
