@@ -2,7 +2,7 @@
 
 mod parts;
 
-pub use parts::{Drive, DriveKind, Joint, JointKind, Sensor};
+pub use parts::{Drive, DriveKind, Joint, JointKind, Reads, Sensor};
 
 use mujoco_rs::wrappers::mj_model::MjtObjBase;
 
@@ -10,7 +10,7 @@ use crate::document::Element;
 use crate::engine;
 use crate::error::{Error, Result};
 use crate::machine::{Machine, Shows};
-use parts::{drive, joint_kind};
+use parts::{drive, joint_kind, reads};
 
 /// A machine, taken apart.
 #[derive(Clone, Debug)]
@@ -98,6 +98,7 @@ impl Anatomy {
             sensors.push(Sensor {
                 name: name.to_owned(),
                 kind: e.tag.clone(),
+                reads: reads(&model, id, &joints),
                 address: model.sensor_adr()[id] as usize,
                 len: model.sensor_dim()[id] as usize,
                 // A rotation by a small angle turns a quaternion by half of it.

@@ -11,6 +11,7 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::anatomy::Anatomy;
 use crate::dirt;
+use crate::engine::Sim;
 use crate::error::{Error, Result};
 use crate::faults::LogFault;
 use crate::gap::Bench;
@@ -19,8 +20,9 @@ use crate::log;
 use crate::motion::{self, Motion};
 use crate::plan::{Plan, Slot};
 use crate::random::{digest, stream};
+use crate::regime::{Watch, places};
 use crate::seal::hex;
-use crate::simulate::simulate;
+use crate::simulate::watched;
 use rules::LeftOut;
 
 /// Logs to fit to.
@@ -159,7 +161,9 @@ impl Draw<'_> {
             integration_gap = self.integration_gap(&bench)?;
         }
         let mut world = self.world(&bench, &truth, &dirt, &causes, timestep)?;
-        let record = simulate(anatomy, &mut world, bench.motions)?;
+        let mut watch = Watch::new(anatomy, bench.motions);
+        let look = &mut |sim: &Sim, step| watch.look(sim, step);
+        let record = watched(anatomy, &mut world, bench.motions, look)?;
         let steps = world.steps.clone();
         let readings = bench.rows(&record, &steps);
         let whole = bench.refit(&readings)?;
@@ -193,6 +197,7 @@ impl Draw<'_> {
         label.excess_gap = excess_gap;
         if excess_gap > SPEAKS {
             label.signals = whole.shares(anatomy).into_iter().collect();
+            label.places = places(anatomy, &whole, &watch.regimes());
         }
         label.integration_gap = integration_gap;
         Ok(Case { study, label })

@@ -205,6 +205,50 @@ impl Sim {
         self.data.xipos()[body]
     }
 
+    /// Whether an actuator is at a limit of its command, or was at one of its force in the last step.
+    #[must_use]
+    pub fn saturated(&self, drive: usize) -> bool {
+        let model = self.model();
+        let at = |limited: bool, [low, high]: [f64; 2], x: f64| limited && (x <= low || x >= high);
+        at(
+            model.actuator_ctrllimited()[drive],
+            model.actuator_ctrlrange()[drive],
+            self.data.ctrl()[drive],
+        ) || at(
+            model.actuator_forcelimited()[drive],
+            model.actuator_forcerange()[drive],
+            self.data.actuator_force()[drive],
+        )
+    }
+
+    /// The body that a body pressed on most in the last step, among those that move where there is one.
+    #[must_use]
+    pub fn touches(&self, body: usize) -> Option<usize> {
+        let model = self.model();
+        let of = |geom: i32| Some(model.geom_bodyid()[usize::try_from(geom).ok()?]);
+        let mut touched: Option<(bool, f64, usize)> = None;
+        for (i, contact) in self.data.contact().iter().enumerate() {
+            let (Some(a), Some(b)) = (of(contact.geom1), of(contact.geom2)) else {
+                continue;
+            };
+            let [Ok(a), Ok(b)] = [a, b].map(usize::try_from) else {
+                continue;
+            };
+            // Contacts that exert nothing have no row among the constraints.
+            if (a != body && b != body) || contact.efc_address < 0 {
+                continue;
+            }
+            let other = if a == body { b } else { a };
+            let force = self.data.contact_force(i)[0];
+            let moves = model.body_weldid()[other] != 0;
+            let firmer = touched.is_none_or(|(m, f, _)| (moves, force) > (m, f));
+            if force > 0.0 && firmer {
+                touched = Some((moves, force, other));
+            }
+        }
+        touched.map(|(_, _, other)| other)
+    }
+
     /// The compiled model.
     #[must_use]
     pub fn model(&self) -> &MjModel {

@@ -4,6 +4,7 @@
 //! its actuators' range, its owner fits nothing, and none of its contacts is a site. [Meshes](meshes) are left out.
 //! What leaves all bounds or cannot be repeated is left out by the rules for all cases.
 
+mod length;
 mod meshes;
 mod starts;
 
@@ -27,8 +28,6 @@ const DRIVEN: f64 = 0.4;
 const RANGE: [f64; 2] = [-1.0, 1.0];
 /// Band of commands, Hz.
 const BAND: [f64; 2] = [0.3, 2.0];
-/// Length of an episode, s.
-const SECONDS: f64 = 1.5;
 /// Rows a second.
 const RATE: f64 = 100.0;
 
@@ -99,7 +98,7 @@ pub fn machine(text: &str, half: Half) -> Result<&'static Machine> {
         commands: &[],
         starts: &[],
         contacts: &[],
-        seconds: SECONDS,
+        seconds: 0.0,
         rate: RATE,
     };
     let anatomy = Anatomy::of(&bare)?;
@@ -123,10 +122,14 @@ pub fn machine(text: &str, half: Half) -> Result<&'static Machine> {
             }
         })
         .collect();
-    let made = Machine {
+    let driven = Machine {
         starts: starts.leak(),
         commands: commands.leak(),
         ..bare
+    };
+    let made = Machine {
+        seconds: length::of(&Anatomy::of(&driven)?),
+        ..driven
     };
     Ok(Box::leak(Box::new(made)))
 }

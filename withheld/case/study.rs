@@ -128,6 +128,7 @@ impl Draw<'_> {
             own_gaps: causes.own.clone(),
             excess_gap: 0.0,
             signals: BTreeMap::new(),
+            places: Vec::new(),
             wiring: style
                 .wiring
                 .iter()

@@ -34,6 +34,5 @@ fn clear(body: &mut Element) -> Result<(), String> {
 }
 
 fn is_mesh(element: &Element) -> bool {
-    element.tag == "geom"
-        && (element.get("type") == Some("mesh") || element.get("mesh").is_some())
+    element.tag == "geom" && (element.get("type") == Some("mesh") || element.get("mesh").is_some())
 }

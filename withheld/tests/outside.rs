@@ -86,6 +86,22 @@ fn a_machine_starts_within_its_limits_and_with_its_loops_closed() {
 }
 
 #[test]
+fn an_episode_is_as_long_as_the_time_step_can_tell_the_motion() {
+    // A damped joint; and an arm of three links without friction that is thrown about by a motor.
+    let calm = model(r#"<geom size="0.1"/>"#).replace("axis=", "damping=\"1\" axis=");
+    let link = r#"<geom type="capsule" size="0.02" fromto="0 0 0 0 0 -0.2"/>"#;
+    let joint = r#"<joint type="hinge" axis="0 1 0"/>"#;
+    let hung = |inside: &str| format!(r#"<body pos="0 0 -0.2">{joint}{link}{inside}</body>"#);
+    let wild = model(&format!("{link}{}", hung(&hung(""))));
+    let wild = wild.replace("-2 4", "-40 44").replace("0.001", "0.004");
+    let seconds = |text: &str| {
+        let machine = outside::machine(text, Half::Test);
+        machine.expect("a machine").seconds
+    };
+    assert!(seconds(&wild) < seconds(&calm));
+}
+
+#[test]
 fn a_folder_of_models_gives_its_machines_and_says_what_it_refuses() {
     let folder = tempfile::tempdir().expect("a folder");
     let half = folder.path().join("training");
