@@ -243,6 +243,13 @@ impl Anatomy {
         !free && self.machine.contacts.is_empty()
     }
 
+    /// Whether it is one free body without drives and without contacts that matter: what both engines move alike.
+    #[must_use]
+    pub fn is_free_flight(&self) -> bool {
+        let free = self.joints.len() == 1 && self.joints[0].kind == JointKind::Free;
+        free && self.bodies.len() == 2 && self.drives.is_empty() && self.machine.contacts.is_empty()
+    }
+
     /// Length of a row of readings.
     #[must_use]
     pub fn width(&self) -> usize {

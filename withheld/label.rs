@@ -93,9 +93,12 @@ pub struct Label {
     pub starts: bool,
     /// Time step of the world, s.
     pub timestep: f64,
+    /// Engine that moves the world: `mujoco` or `rapier`.
+    #[serde(default = "mujoco")]
+    pub engine: String,
     /// Integrator of the world.
     pub integrator: String,
-    /// Gap that the time step alone makes between world and study.
+    /// Gap that time step and engine alone make between world and study.
     pub integration_gap: f64,
     /// Noise of each sensor, in its unit; rad for an orientation.
     pub noise: BTreeMap<String, f64>,
@@ -104,4 +107,9 @@ pub struct Label {
     /// Salt of the seal.
     #[serde(default)]
     pub salt: String,
+}
+
+/// Engine of labels that do not say one.
+fn mujoco() -> String {
+    "mujoco".to_owned()
 }

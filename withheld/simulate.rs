@@ -81,7 +81,7 @@ pub fn watched(
     look: &mut dyn FnMut(&Sim, usize),
 ) -> Result<Record> {
     let name = anatomy.machine.name;
-    let mut sim = Sim::new(world.compile(name)?);
+    let mut sim = Sim::new(world.compile(name)?, world.by_rapier);
     let (width, nu) = (anatomy.width(), anatomy.drives.len());
     let mut episodes = Vec::with_capacity(motions.len());
     let mut tally = Tally::new(anatomy);

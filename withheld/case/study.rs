@@ -9,6 +9,7 @@ use super::rules::LeftOut;
 use super::sizing::Causes;
 use crate::cause::Standing;
 use crate::dirt::Item;
+use crate::engine::RAPIER;
 use crate::faults::{LogFault, Wiring, WiringKind};
 use crate::gap::Bench;
 use crate::label::{Label, WiringLabel};
@@ -94,6 +95,10 @@ impl Draw<'_> {
         style: &log::Style,
     ) -> Label {
         let machine = &self.anatomy.machine;
+        let (engine, integrator) = match bench.integrator {
+            RAPIER => (RAPIER, "semi-implicit Euler"),
+            other => ("mujoco", other),
+        };
         let mut label = Label {
             world: machine.name.to_owned(),
             half: machine.half.name().to_owned(),
@@ -149,7 +154,8 @@ impl Draw<'_> {
             little_excitation: self.slot.little,
             starts: style.starts,
             timestep: bench.timestep,
-            integrator: bench.integrator.to_owned(),
+            engine: engine.to_owned(),
+            integrator: integrator.to_owned(),
             integration_gap: 0.0,
             noise: machine
                 .noise

@@ -6,12 +6,13 @@
 use std::io::Write as _;
 use std::time::Instant;
 
-use asid_withheld::anatomy::Anatomy;
+use asid_withheld::anatomy::{Anatomy, JointKind};
+use asid_withheld::engine::RAPIER;
 use asid_withheld::gap::Bench;
-use asid_withheld::{Half, machines, outside};
 use asid_withheld::motion::{Motion, Style};
 use asid_withheld::random::stream;
 use asid_withheld::world::World;
+use asid_withheld::{Half, machines, outside};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let (folders, names): (Vec<String>, Vec<String>) = std::env::args()
@@ -64,17 +65,23 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             }
         };
         let seconds = clock.elapsed().as_secs_f64() / (1 + truth.len()) as f64;
-        let gap = |step: f64, integrator: &str| -> Result<f64, asid_withheld::Error> {
-            let mut world = World::new(&anatomy, &truth, step, integrator)?;
-            Ok(bench.distance(&bench.run(&mut world)?, &bench.clean))
-        };
-        let option = anatomy.document.find("option", None);
-        let integrator = option.and_then(|o| o.get("integrator")).unwrap_or("Euler");
-        let t = &bench.typical;
         let show = |v: &[f64]| {
             let all: Vec<String> = v.iter().map(|x| format!("{x:.3}")).collect();
             all.join(" ")
         };
+        let gap = |step: f64, integrator: &str| -> Result<f64, asid_withheld::Error> {
+            let mut world = World::new(&anatomy, &truth, step, integrator)?;
+            Ok(bench.distance(&bench.run(&mut world)?, &bench.clean))
+        };
+        let free = anatomy.joints.len() == 1 && anatomy.joints[0].kind == JointKind::Free;
+        let by_rapier: Vec<f64> = [2.0, 4.0, 8.0]
+            .into_iter()
+            .filter(|_| free)
+            .map(|finer| gap(step / finer, RAPIER))
+            .collect::<Result<_, _>>()?;
+        let option = anatomy.document.find("option", None);
+        let integrator = option.and_then(|o| o.get("integrator")).unwrap_or("Euler");
+        let t = &bench.typical;
         let parameters: Vec<f64> = machine
             .parameters
             .iter()
@@ -88,11 +95,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             .collect::<Result<_, asid_withheld::Error>>()?;
         writeln!(
             out,
-            "{:14} {seconds:.3} s a run; step alone {:.3}, Euler {:.3}, quarter {:.3}; 2 % of a parameter {}\n    speed {}\n    drive {}\n    weight {}\n    spread {}",
+            "{:14} {seconds:.3} s a run; step alone {:.3}, Euler {:.3}, quarter {:.3}, rapier at a half, a quarter, an eighth {}; 2 % of a parameter {}\n    speed {}\n    drive {}\n    weight {}\n    spread {}",
             machine.name,
             gap(step, integrator)?,
             gap(step / 2.0, "Euler")?,
             gap(step / 4.0, "implicitfast")?,
+            show(&by_rapier),
             show(&parameters),
             show(&t.speed),
             show(&t.drive),
