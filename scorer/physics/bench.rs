@@ -66,7 +66,8 @@ impl<'a> Bench<'a> {
         }
         let set = answer.verdict.set();
         let names_agree = judge.of_set(&set, answer).is_right();
-        if !names_agree && !label.is_none() && answer.verdict.kind != "unknown" {
+        let named = answer.verdict.kind != "unknown" && !answer.names_nothing();
+        if !names_agree && !label.is_none() && named {
             let said = verdict(answer);
             let targets = self.predictions(&true_world, &best)?;
             let distance = self.distance(&said, &targets)?;

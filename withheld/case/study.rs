@@ -81,7 +81,8 @@ impl Draw<'_> {
         if self.random.random::<f64>() < NOISE_GIVEN {
             text += "\n[noise]\n";
             for (name, noise) in self.anatomy.machine.noise {
-                text += &format!("{name} = {noise}\n");
+                // A name may have what a bare key of TOML may not.
+                text += &format!("\"{name}\" = {noise}\n");
             }
         }
         text

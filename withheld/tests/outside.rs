@@ -1,6 +1,8 @@
 //! Models that others wrote: what is a machine, and what is refused in a sentence that names the element.
 
 use asid_withheld::anatomy::Anatomy;
+use asid_withheld::case;
+use asid_withheld::plan::{Kind, Plan};
 use asid_withheld::{Half, outside};
 
 fn model(inside: &str) -> String {
@@ -99,6 +101,21 @@ fn an_episode_is_as_long_as_the_time_step_can_tell_the_motion() {
         machine.expect("a machine").seconds
     };
     assert!(seconds(&wild) < seconds(&calm));
+}
+
+#[test]
+fn a_study_gives_the_noise_of_a_sensor_whatever_its_name() {
+    let text = model(r#"<geom size="0.1"/>"#).replace("axis=", "damping=\"1\" axis=");
+    let machine = outside::machine(&text, Half::Test).expect("a machine");
+    let plan = Plan::draw(Half::Test, 1, 400, &[machine]).expect("a plan");
+    let mut given = (0..plan.slots.len())
+        .filter(|&i| plan.machines[plan.slots[i].machine].machine.name == machine.name)
+        .filter(|&i| plan.slots[i].kind == Kind::None && plan.slots[i].fault.is_none())
+        .filter_map(|i| case::make(&plan, 1, i).ok())
+        .filter_map(|c| Some(c.study["study.toml"].split_once("[noise]\n")?.1.to_owned()));
+    // A bare key of TOML has no slash and no space.
+    let noise = given.next().expect("a case whose study gives the noise");
+    assert_eq!(noise, "\"q_a/joint 1\" = 0.003\n");
 }
 
 #[test]

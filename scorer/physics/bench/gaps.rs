@@ -8,11 +8,9 @@ use crate::answer::Answer;
 use crate::label::Label;
 use crate::physics::Gaps;
 use crate::physics::fit::{Fit, robust_deviation};
-use crate::physics::logs::head_rows;
+use crate::physics::logs::{HEAD, head_rows};
 use crate::physics::model::{Point, World};
 
-/// Share of a log on which a start that it does not give is fitted, and which then does not count.
-const HEAD: f64 = 0.1;
 /// Residual, in robust deviations of the best model's, from which on a reading is an outlier of the log and counts for
 /// no model: a normal reading in half a thousand million is.
 const OUTLIER: f64 = 6.0;
@@ -51,6 +49,18 @@ impl Bench<'_> {
         Ok(residuals)
     }
 
+    /// Residuals less what an answer learned of them.
+    fn without_learned(&self, residuals: &[Vec<f64>], answer: &Answer) -> Vec<Vec<f64>> {
+        let mut left = residuals.to_vec();
+        for (left, learned) in left.iter_mut().zip(&answer.learned) {
+            let noise = self.logs[1].noise.iter().cycle();
+            for ((left, learned), noise) in left.iter_mut().zip(learned).zip(noise) {
+                *left -= learned / noise;
+            }
+        }
+        left
+    }
+
     pub(super) fn gaps(
         &mut self,
         label: &Label,
@@ -72,7 +82,7 @@ impl Bench<'_> {
             let values: Vec<f64> = world.unknowns.iter().map(|u| u.start).collect();
             self.residuals(&world, &values)?
         } else {
-            identified.clone()
+            self.without_learned(&identified, answer)
         };
         let bound = OUTLIER * robust_deviation(&best).max(1.0);
         let counts: Vec<bool> = best
