@@ -35,6 +35,9 @@ pub struct SignalNoise {
     pub noise: f64,
 }
 
+/// Kind of the verdict of an answer that names nothing, and takes what it learned off the residuals.
+pub const RESIDUAL: &str = "residual";
+
 /// A share of the excess.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Place {
@@ -87,7 +90,7 @@ impl EffectValues {
 /// The verdict.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Verdict {
-    /// `none`, `effects` or `unknown`.
+    /// `none`, `effects`, `unknown`, or [`RESIDUAL`].
     pub kind: String,
     /// Effects at their sites.
     #[serde(default)]
@@ -162,6 +165,10 @@ pub struct Answer {
     /// Faults of wiring.
     #[serde(default)]
     pub wiring: Vec<WiringFound>,
+    /// What it learned is left of the readings of the logs held out by a replay with the study's parameters: `rows x
+    /// entries` of each log, three an orientation, in the sensor's unit, rad of an orientation.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub learned: Vec<Vec<f64>>,
 }
 
 /// Probability of a fault of wiring from which on it counts as named: as likely as not.
@@ -179,6 +186,12 @@ impl Answer {
         };
         let text = std::fs::read_to_string(path).map_err(|e| fail(e.to_string()))?;
         serde_json::from_str(&text).map_err(|e| fail(format!("is no result of a diagnosis: {e}")))
+    }
+
+    /// Whether it says by no name what is missing.
+    #[must_use]
+    pub fn names_nothing(&self) -> bool {
+        self.verdict.kind == RESIDUAL
     }
 
     /// Fitted values of an effect at its site.

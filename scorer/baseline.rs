@@ -6,6 +6,7 @@
 
 mod candidates;
 mod noise;
+mod residual;
 mod work;
 
 use std::collections::BTreeMap;
@@ -32,6 +33,8 @@ pub enum Baseline {
     BestResidual,
     /// Adds effects, and drops those before, for as long as the Bayesian information criterion (Schwarz 1978) falls.
     Bic,
+    /// Names nothing: a network learns what is left of the readings.
+    ResidualNetwork,
 }
 
 /// Effects that are added at most.
@@ -45,11 +48,12 @@ impl Baseline {
             Self::IdentifyOnly => "identify-only",
             Self::BestResidual => "best-residual",
             Self::Bic => "bic",
+            Self::ResidualNetwork => "residual-network",
         }
     }
 }
 
-/// What a baseline says of the study in a folder, with a catalogue that lacks some effects.
+/// What a baseline says of the study in a folder, with a catalogue that lacks some effects; the seed is for one that learns.
 ///
 /// # Errors
 /// When the study cannot be read or an engine fails.
@@ -58,6 +62,7 @@ pub fn answer(
     backend: Arc<dyn Backend>,
     folder: &Path,
     without: &[String],
+    seed: u64,
 ) -> Result<Answer> {
     let study = Study::read(folder)?;
     let engine = Engine::new(backend, &study)?;
@@ -65,6 +70,10 @@ pub fn answer(
     let none = work.fit(&[], &work.middle())?;
     if baseline == Baseline::IdentifyOnly {
         return Ok(said(&study, &none, vec![(Vec::new(), 1.0)]));
+    }
+    if baseline == Baseline::ResidualNetwork {
+        let identified = said(&study, &none, vec![(Vec::new(), 1.0)]);
+        return residual::add(&mut work, &none, seed, identified);
     }
     let shown = work.shown(&none)?;
     let all = candidates(&study, &shown, without);

@@ -159,6 +159,7 @@ fn power(cases: &[&Case]) -> Vec<Power> {
         let inside = |c: &&&Case| {
             let gap = c.cause_gap;
             !["none", "unknown"].contains(&c.kind)
+                && c.names()
                 && gap > low
                 && high.is_none_or(|high| gap <= high)
         };
@@ -204,9 +205,11 @@ impl Score {
         }
         let logs: Vec<f64> = counted
             .iter()
+            .filter(|c| c.names())
             .map(|c| c.true_probability.max(FLOOR).ln())
             .collect();
-        let answered = || counted.iter().filter(|c| c.standing != Standing::NoAnswer);
+        let said = |c: &&&Case| c.standing != Standing::NoAnswer && c.names();
+        let answered = || counted.iter().filter(said);
         let stated: Vec<(f64, bool)> = answered().map(|c| (c.probability, c.claims_hold)).collect();
         let squares: Vec<f64> = stated
             .iter()
@@ -234,7 +237,7 @@ impl Score {
             unknowns: Share::of(
                 counted
                     .iter()
-                    .filter(|c| c.kind == "unknown")
+                    .filter(|c| c.kind == "unknown" && c.names())
                     .map(|c| c.standing.is_right()),
             ),
             log_score: Figure::mean(&logs),

@@ -102,6 +102,11 @@ impl Case {
         let Ok(answer) = &run.answer else {
             return case;
         };
+        if answer.names_nothing() {
+            case.standing = Standing::NamesNothing;
+            case.parameters = values::of_study(label, answer);
+            return case;
+        }
         let set = answer.verdict.set();
         let mut standing = judge.of_set(&set, answer);
         let same = case.physics.same_as_truth == Some(true);
@@ -140,6 +145,12 @@ impl Case {
         case.parameters = values::of_study(label, answer);
         case.verdict = set;
         case
+    }
+
+    /// Whether its answer may name what is missing; so also where there is none.
+    #[must_use]
+    pub fn names(&self) -> bool {
+        self.standing != Standing::NamesNothing
     }
 
     fn unanswered(name: &str, run: &Run, judge: &Judge<'_>, physics: Physics) -> Self {

@@ -34,13 +34,18 @@ pub enum Standing {
     Wrong,
     /// No answer: an error, or the time limit.
     NoAnswer,
+    /// An answer that says by no name what is missing: neither right nor wrong.
+    NamesNothing,
 }
 
 impl Standing {
     /// Whether it counts as right.
     #[must_use]
     pub fn is_right(self) -> bool {
-        !matches!(self, Self::Apart | Self::Wrong | Self::NoAnswer)
+        !matches!(
+            self,
+            Self::Apart | Self::Wrong | Self::NoAnswer | Self::NamesNothing
+        )
     }
 
     /// Whether it counts at all.
@@ -61,6 +66,7 @@ impl Standing {
             Self::Apart => "apart",
             Self::Wrong => "WRONG",
             Self::NoAnswer => "NONE",
+            Self::NamesNothing => "-",
         }
     }
 }

@@ -87,14 +87,21 @@ fn cases(score: &Score) -> Vec<String> {
 }
 
 fn row(row: &Row) -> String {
+    let count = |s: &Share| {
+        if s.of == 0 {
+            "-".to_owned()
+        } else {
+            s.count.to_string()
+        }
+    };
     let size = |s: Option<f64>| s.map_or_else(|| "-".into(), |s| format!("{s:.1}"));
     format!(
         "{:NAME$} {:>5} {:>18} {:>5} {:>7} {:>6} {:>5} {:>4} {:>7} {:>7}",
         cut(&row.name, NAME),
-        row.right.of,
+        row.cases,
         percent(&row.right),
-        row.top2.count,
-        row.covered.count,
+        count(&row.top2),
+        count(&row.covered),
         row.unanswered.count,
         row.true_probability
             .map_or_else(|| "-".into(), |p| format!("{:.2}", p.value)),

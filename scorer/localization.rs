@@ -39,6 +39,19 @@ fn sums(places: impl Iterator<Item = (String, f64)>) -> BTreeMap<String, f64> {
     sums
 }
 
+/// What a column stands for: itself, or the orientation that it is a number of. A log has four numbers of one, a residual three,
+/// so that only the orientation as a whole can be compared.
+fn signal<'a>(column: &'a str, label: &Label) -> &'a str {
+    match column.rsplit_once('.') {
+        Some((sensor, "0" | "1" | "2" | "3"))
+            if label.signals.contains_key(&format!("{sensor}.3")) =>
+        {
+            sensor
+        }
+        _ => column,
+    }
+}
+
 impl Localization {
     /// Of a case with an answer.
     #[must_use]
@@ -46,13 +59,15 @@ impl Localization {
         let said = |key: &dyn Fn(&crate::answer::Place) -> String| {
             sums(answer.places.iter().map(|p| (key(p), p.share)))
         };
-        let both = |signal: &str, regime: &str| format!("{signal} / {regime}");
+        let of = |column: &str| signal(column, label).to_owned();
+        let both = |column: &str, regime: &str| format!("{} / {regime}", signal(column, label));
         let true_regimes = label
             .places
             .iter()
             .map(|p| (both(&p.signal, &p.regime), p.share));
+        let true_signals = label.signals.iter().map(|(c, share)| (of(c), *share));
         Self {
-            signals: f1(&said(&|p| p.signal.clone()), &label.signals),
+            signals: f1(&said(&|p| of(&p.signal)), &sums(true_signals)),
             regimes: f1(&said(&|p| both(&p.signal, &p.regime)), &sums(true_regimes)),
         }
     }
@@ -89,5 +104,30 @@ mod tests {
         assert_eq!(scored.signals, Some(0.5));
         assert_eq!(scored.regimes, None);
         assert_eq!(Localization::of(&Label::default(), &answer).signals, None);
+    }
+
+    #[test]
+    fn an_orientation_is_one_place_however_many_numbers_tell_it() {
+        let label = Label {
+            signals: [("r.0", 0.1), ("r.1", 0.3), ("r.2", 0.3), ("r.3", 0.3)]
+                .map(|(s, x)| (s.to_owned(), x))
+                .into(),
+            places: vec![crate::label::TruePlace {
+                signal: "r.3".into(),
+                regime: "free".into(),
+                share: 0.9,
+            }],
+            ..Label::default()
+        };
+        let answer = Answer {
+            places: vec![Place {
+                signal: "r.2".into(),
+                regime: "free".into(),
+                share: 1.0,
+            }],
+            ..Answer::default()
+        };
+        let scored = Localization::of(&label, &answer);
+        assert_eq!((scored.signals, scored.regimes), (Some(1.0), Some(1.0)));
     }
 }

@@ -2,7 +2,7 @@
 
 mod parts;
 
-pub use parts::{Drive, DriveKind, Joint, JointKind, Sensor};
+pub use parts::{Drive, DriveKind, Joint, JointKind, Reads, Sensor};
 
 use mujoco_rs::wrappers::mj_model::MjtObjBase;
 
@@ -10,7 +10,7 @@ use crate::document::Element;
 use crate::engine;
 use crate::error::{Error, Result};
 use crate::machine::{Machine, Shows};
-use parts::{drive, joint_kind};
+use parts::{drive, joint_kind, reads};
 
 /// A machine, taken apart.
 #[derive(Clone, Debug)]
@@ -98,6 +98,7 @@ impl Anatomy {
             sensors.push(Sensor {
                 name: name.to_owned(),
                 kind: e.tag.clone(),
+                reads: reads(&model, id, &joints),
                 address: model.sensor_adr()[id] as usize,
                 len: model.sensor_dim()[id] as usize,
                 // A rotation by a small angle turns a quaternion by half of it.
@@ -240,6 +241,13 @@ impl Anatomy {
     pub fn is_tireless(&self) -> bool {
         let free = self.joints.iter().any(|j| j.kind == JointKind::Free);
         !free && self.machine.contacts.is_empty()
+    }
+
+    /// Whether it is one free body without drives and without contacts that matter: what both engines move alike.
+    #[must_use]
+    pub fn is_free_flight(&self) -> bool {
+        let free = self.joints.len() == 1 && self.joints[0].kind == JointKind::Free;
+        free && self.bodies.len() == 2 && self.drives.is_empty() && self.machine.contacts.is_empty()
     }
 
     /// Length of a row of readings.

@@ -11,6 +11,7 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::anatomy::Anatomy;
 use crate::dirt;
+use crate::engine::{RAPIER, Sim};
 use crate::error::{Error, Result};
 use crate::faults::LogFault;
 use crate::gap::Bench;
@@ -19,8 +20,9 @@ use crate::log;
 use crate::motion::{self, Motion};
 use crate::plan::{Plan, Slot};
 use crate::random::{digest, stream};
+use crate::regime::{Watch, places};
 use crate::seal::hex;
-use crate::simulate::simulate;
+use crate::simulate::watched;
 use rules::LeftOut;
 
 /// Logs to fit to.
@@ -39,6 +41,8 @@ const RATES: [f64; 5] = [0.5, 1.0, 1.0, 2.0, 2.5];
 const LENGTHS: [f64; 2] = [0.7, 1.3];
 /// Excess gap from which on its signals are told, in noise floors.
 const SPEAKS: f64 = 0.05;
+/// Share of the worlds of a body in free flight that rapier moves: as many as not.
+const BY_RAPIER: f64 = 0.5;
 /// Rest before the motion of a log whose encoder rests.
 const REST: f64 = 0.3;
 /// Rows a second of a fast log.
@@ -159,7 +163,9 @@ impl Draw<'_> {
             integration_gap = self.integration_gap(&bench)?;
         }
         let mut world = self.world(&bench, &truth, &dirt, &causes, timestep)?;
-        let record = simulate(anatomy, &mut world, bench.motions)?;
+        let mut watch = Watch::new(anatomy, bench.motions);
+        let look = &mut |sim: &Sim, step| watch.look(sim, step);
+        let record = watched(anatomy, &mut world, bench.motions, look)?;
         let steps = world.steps.clone();
         let readings = bench.rows(&record, &steps);
         let whole = bench.refit(&readings)?;
@@ -193,19 +199,21 @@ impl Draw<'_> {
         label.excess_gap = excess_gap;
         if excess_gap > SPEAKS {
             label.signals = whole.shares(anatomy).into_iter().collect();
+            label.places = places(anatomy, &whole, &watch.regimes());
         }
         label.integration_gap = integration_gap;
         Ok(Case { study, label })
     }
 
-    /// Time step and integrator of the world: never those of the study together.
+    /// Time step and integrator of the world: never those of the study together. What flies freely may be moved by rapier.
     fn world_step(&mut self) -> (f64, &'static str) {
         let finer = [2.0, 2.0, 4.0][self.random.random_range(0..3)];
         let integrators = ["implicitfast", "implicit", "Euler"];
-        (
-            self.anatomy.timestep / finer,
-            integrators[self.random.random_range(0..3)],
-        )
+        let mut integrator = integrators[self.random.random_range(0..3)];
+        if self.anatomy.is_free_flight() && self.random.random::<f64>() < BY_RAPIER {
+            integrator = RAPIER;
+        }
+        (self.anatomy.timestep / finer, integrator)
     }
 
     fn usual(&self) -> motion::Style {

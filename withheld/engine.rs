@@ -1,4 +1,4 @@
-//! MuJoCo, one simulation at a time: the only module with pointers behind it.
+//! MuJoCo, one simulation at a time: the only module with pointers behind it. A free body can be moved by rapier instead.
 //!
 //! A step is taken in MuJoCo's two halves: after the first, positions, velocities and readings are
 //! those of the state before the step; forces written by hand go in between, so that a law of position
@@ -7,11 +7,16 @@
 // The model of a running simulation can only be changed through an unsafe accessor.
 #![allow(unsafe_code)]
 
+mod rapier;
+
 use std::sync::Once;
 
 use mujoco_rs::mujoco_c::{mjLogMessage, mju_setLogHandler};
 use mujoco_rs::wrappers::mj_data::MjData;
 use mujoco_rs::wrappers::mj_model::{MjModel, MjtObjBase};
+
+/// What takes a world's steps in place of an integrator of MuJoCo's.
+pub const RAPIER: &str = "rapier";
 
 /// State beyond which a simulation has diverged, SI units. MuJoCo itself calls 1e10 huge.
 const HUGE: f64 = 1e8;
@@ -66,6 +71,10 @@ pub fn names(model: &MjModel, kind: MjtObjBase, count: i64) -> Vec<String> {
 /// A running simulation.
 pub struct Sim {
     data: MjData<Box<MjModel>>,
+    /// What moves it, where that is not MuJoCo.
+    mover: Option<rapier::Mover>,
+    /// Whether rapier is to move it.
+    by_rapier: bool,
     /// Time step, s.
     pub dt: f64,
     /// Time since the start of the episode, s.
@@ -81,9 +90,9 @@ pub struct Sim {
 }
 
 impl Sim {
-    /// A simulation of a compiled model.
+    /// A simulation of a compiled model, whose only body is free where `by_rapier`.
     #[must_use]
-    pub fn new(model: MjModel) -> Self {
+    pub fn new(model: MjModel, by_rapier: bool) -> Self {
         let sliding = model.geom_friction().iter().map(|f| f[0]);
         Self {
             dt: model.opt().timestep,
@@ -92,6 +101,8 @@ impl Sim {
             dry_extra: vec![0.0; model.dof_frictionloss().len()],
             sliding_factor: vec![1.0; model.geom_friction().len()],
             data: MjData::new(Box::new(model)),
+            mover: None,
+            by_rapier,
             time: 0.0,
             episode: 0,
         }
@@ -105,6 +116,8 @@ impl Sim {
         self.time = 0.0;
         self.episode = episode;
         self.data.forward();
+        let new = || rapier::Mover::new(self.data.model(), qpos, qvel);
+        self.mover = self.by_rapier.then(new);
     }
 
     /// First half of a step: what follows from position and velocity.
@@ -117,7 +130,14 @@ impl Sim {
 
     /// Second half: forces, and the state after the step. False where it left all bounds.
     pub fn advance(&mut self) -> bool {
-        self.data.step2();
+        match &mut self.mover {
+            None => self.data.step2(),
+            Some(mover) => {
+                let (qpos, qvel) = mover.step(&self.data.xfrc_applied()[1]);
+                self.data.qpos_mut().copy_from_slice(&qpos);
+                self.data.qvel_mut().copy_from_slice(&qvel);
+            }
+        }
         self.time += self.dt;
         let fine = |x: &f64| x.abs() < HUGE;
         self.data.qpos().iter().all(fine) && self.data.qvel().iter().all(fine)
@@ -203,6 +223,54 @@ impl Sim {
     #[must_use]
     pub fn body_position(&self, body: usize) -> [f64; 3] {
         self.data.xipos()[body]
+    }
+
+    /// Whether an actuator is at a limit of its command, or was at one of its force in the last step.
+    #[must_use]
+    pub fn saturated(&self, drive: usize) -> bool {
+        let model = self.model();
+        let at = |limited: bool, [low, high]: [f64; 2], x: f64| limited && (x <= low || x >= high);
+        at(
+            model.actuator_ctrllimited()[drive],
+            model.actuator_ctrlrange()[drive],
+            self.data.ctrl()[drive],
+        ) || at(
+            model.actuator_forcelimited()[drive],
+            model.actuator_forcerange()[drive],
+            self.data.actuator_force()[drive],
+        )
+    }
+
+    /// The body that a body pressed on most in the last step, among those that move where there is one.
+    #[must_use]
+    pub fn touches(&self, body: usize) -> Option<usize> {
+        let model = self.model();
+        let of = |geom: i32| Some(model.geom_bodyid()[usize::try_from(geom).ok()?]);
+        let mut touched: Option<(bool, f64, usize)> = None;
+        for (i, contact) in self.data.contact().iter().enumerate() {
+            let (Some(a), Some(b)) = (of(contact.geom1), of(contact.geom2)) else {
+                continue;
+            };
+            let [Ok(a), Ok(b)] = [a, b].map(usize::try_from) else {
+                continue;
+            };
+            // Contacts that exert nothing have no row among the constraints.
+            if (a != body && b != body) || contact.efc_address < 0 {
+                continue;
+            }
+            let other = if a == body { b } else { a };
+            let force = match self.mover {
+                None => self.data.contact_force(i)[0],
+                // MuJoCo knows how deep, and not how hard.
+                Some(_) => -contact.dist,
+            };
+            let moves = model.body_weldid()[other] != 0;
+            let firmer = touched.is_none_or(|(m, f, _)| (moves, force) > (m, f));
+            if force > 0.0 && firmer {
+                touched = Some((moves, force, other));
+            }
+        }
+        touched.map(|(_, _, other)| other)
     }
 
     /// The compiled model.

@@ -31,7 +31,7 @@ pub struct Bench<'a> {
     pub motions: &'a [Motion],
     /// Time step of the world, s.
     pub timestep: f64,
-    /// Integrator of the world.
+    /// Integrator of the world, or [`crate::engine::RAPIER`].
     pub integrator: &'static str,
     /// Readings without a cause, in units of the noise.
     pub clean: Vec<f64>,

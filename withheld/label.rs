@@ -28,6 +28,17 @@ pub struct WiringLabel {
     pub value: f64,
 }
 
+/// A share of the excess: a column of the logs in a regime of motion.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Place {
+    /// Column.
+    pub signal: String,
+    /// Regime ([`crate::regime`]).
+    pub regime: String,
+    /// Share of the squared excess.
+    pub share: f64,
+}
+
 /// A case's label.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Label {
@@ -65,6 +76,9 @@ pub struct Label {
     pub excess_gap: f64,
     /// Share of the squared excess in each column of the logs; empty where there is no excess to speak of.
     pub signals: BTreeMap<String, f64>,
+    /// The same by column and regime of motion, largest first; what has next to nothing is not listed.
+    #[serde(default, rename = "where")]
+    pub places: Vec<Place>,
     /// Wiring faults.
     pub wiring: Vec<WiringLabel>,
     /// Correlation of the noise from row to row; 0 is white.
@@ -79,9 +93,12 @@ pub struct Label {
     pub starts: bool,
     /// Time step of the world, s.
     pub timestep: f64,
+    /// Engine that moves the world: `mujoco` or `rapier`.
+    #[serde(default = "mujoco")]
+    pub engine: String,
     /// Integrator of the world.
     pub integrator: String,
-    /// Gap that the time step alone makes between world and study.
+    /// Gap that time step and engine alone make between world and study.
     pub integration_gap: f64,
     /// Noise of each sensor, in its unit; rad for an orientation.
     pub noise: BTreeMap<String, f64>,
@@ -90,4 +107,9 @@ pub struct Label {
     /// Salt of the seal.
     #[serde(default)]
     pub salt: String,
+}
+
+/// Engine of labels that do not say one.
+fn mujoco() -> String {
+    "mujoco".to_owned()
 }

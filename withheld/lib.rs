@@ -10,6 +10,7 @@
 //! - [`causes`]: one file each.
 //! - [`world`], [`simulate`], [`rotor`]: a machine with causes, and its run.
 //! - [`gap`], [`size`]: how far a world is from its model, and how large a cause must be for that.
+//! - [`regime`]: in which motion it is so.
 //! - [`dirt`], [`faults`], [`log`]: what is off at every machine, and what happens to logs.
 //! - [`plan`], [`case`], [`make`], [`seal`]: which cases there are, and how they are written and sealed.
 
@@ -32,6 +33,7 @@ pub mod motion;
 pub mod outside;
 pub mod plan;
 pub mod random;
+pub mod regime;
 pub mod rotor;
 pub mod seal;
 pub mod simulate;

@@ -1,15 +1,20 @@
 //! Machines that others modelled: files in a folder, as `withheld/models/fetch.py` leaves them.
 //!
 //! Nothing is known of such a machine but its model: its noise is the usual one of its sensors, it is driven over a part of
-//! its actuators' range, its owner fits nothing, and none of its contacts is a site. What leaves all bounds or cannot be
-//! repeated is left out by the rules for all cases.
+//! its actuators' range, its owner fits nothing, and none of its contacts is a site. [Meshes](meshes) are left out.
+//! What leaves all bounds or cannot be repeated is left out by the rules for all cases.
+
+mod length;
+mod meshes;
+mod starts;
 
 use std::path::Path;
 
-use crate::anatomy::{Anatomy, JointKind};
+use crate::anatomy::Anatomy;
 use crate::document::Element;
+use crate::engine;
 use crate::error::{Error, Result};
-use crate::machine::{Command, Half, Machine, Start};
+use crate::machine::{Command, Half, Machine};
 
 /// Noise by sensor: angles and orientations, rad; lengths, m.
 const NOISE: [(&str, f64); 3] = [
@@ -23,10 +28,6 @@ const DRIVEN: f64 = 0.4;
 const RANGE: [f64; 2] = [-1.0, 1.0];
 /// Band of commands, Hz.
 const BAND: [f64; 2] = [0.3, 2.0];
-/// Spread of positions and of velocities at the start, rad or m, and rad/s or m/s.
-const SPREAD: [f64; 2] = [0.05, 0.1];
-/// Length of an episode, s.
-const SECONDS: f64 = 1.5;
 /// Rows a second.
 const RATE: f64 = 100.0;
 
@@ -55,7 +56,7 @@ pub fn read(folder: &Path, half: Half) -> Result<Outside> {
     let (mut machines, mut refused) = (Vec::new(), Vec::new());
     for path in &paths {
         let text = std::fs::read_to_string(path).map_err(|e| failed(path, e.to_string()))?;
-        match machine(text, half) {
+        match machine(&text, half) {
             Ok(one) => machines.push(one),
             Err(error) => refused.push(failed(path, error.to_string()).to_string()),
         }
@@ -72,9 +73,10 @@ fn keep(text: &str) -> &'static str {
 ///
 /// # Errors
 /// Where MuJoCo refuses it, or it has an element that the generator cannot start or read.
-pub fn machine(text: String, half: Half) -> Result<&'static Machine> {
+pub fn machine(text: &str, half: Half) -> Result<&'static Machine> {
     let unfit = |why: String| Error::Unfit { why };
-    let document = Element::parse(&text).map_err(unfit)?;
+    let mut document = Element::parse(text).map_err(unfit)?;
+    meshes::leave_out(&mut document).map_err(unfit)?;
     check(&document).map_err(unfit)?;
     let sensors = document
         .find("sensor", None)
@@ -90,24 +92,18 @@ pub fn machine(text: String, half: Half) -> Result<&'static Machine> {
         name: keep(document.get("model").unwrap_or("outside")),
         about: "a model that others wrote",
         half,
-        model: keep(&text),
+        model: keep(&document.text()),
         parameters: &[],
         noise: noise.leak(),
         commands: &[],
         starts: &[],
         contacts: &[],
-        seconds: SECONDS,
+        seconds: 0.0,
         rate: RATE,
     };
     let anatomy = Anatomy::of(&bare)?;
-    let scalar = anatomy.joints.iter().filter(|j| j.kind != JointKind::Free);
-    let starts: Vec<Start> = scalar
-        .map(|j| Start {
-            joint: keep(&j.name),
-            position: vec![[anatomy.qpos0[j.qpos], SPREAD[0]]].leak(),
-            velocity: vec![[0.0, SPREAD[1]]].leak(),
-        })
-        .collect();
+    let model = engine::compile(bare.model).map_err(unfit)?;
+    let starts = starts::of(&anatomy, &model);
     let actuators = document
         .find("actuator", None)
         .map_or(&[][..], |s| &s.children);
@@ -126,10 +122,14 @@ pub fn machine(text: String, half: Half) -> Result<&'static Machine> {
             }
         })
         .collect();
-    let made = Machine {
+    let driven = Machine {
         starts: starts.leak(),
         commands: commands.leak(),
         ..bare
+    };
+    let made = Machine {
+        seconds: length::of(&Anatomy::of(&driven)?),
+        ..driven
     };
     Ok(Box::leak(Box::new(made)))
 }
@@ -141,7 +141,6 @@ fn check(document: &Element) -> Result<(), String> {
         let name = e.get("name").unwrap_or("without a name");
         let why = match (e.tag.as_str(), e.get("type")) {
             ("joint", Some("ball")) => "is a ball joint, whose start the generator cannot write",
-            ("geom", Some("mesh")) => "is a mesh, whose file the generator does not copy",
             ("geom", Some("hfield")) => "is a height field, whose file the generator does not copy",
             ("muscle" | "adhesion" | "plugin", _) => "is an actuator with a law of its own",
             ("flexcomp" | "composite" | "replicate" | "attach", _) => "is made by a macro",

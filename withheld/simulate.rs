@@ -67,8 +67,21 @@ impl Record {
 /// # Errors
 /// Where the model is refused or a simulation leaves all bounds.
 pub fn simulate(anatomy: &Anatomy, world: &mut World, motions: &[Motion]) -> Result<Record> {
+    watched(anatomy, world, motions, &mut |_, _| {})
+}
+
+/// The same; `look` sees the simulation after each step, with the number of the step in its episode.
+///
+/// # Errors
+/// As [`simulate`].
+pub fn watched(
+    anatomy: &Anatomy,
+    world: &mut World,
+    motions: &[Motion],
+    look: &mut dyn FnMut(&Sim, usize),
+) -> Result<Record> {
     let name = anatomy.machine.name;
-    let mut sim = Sim::new(world.compile(name)?);
+    let mut sim = Sim::new(world.compile(name)?, world.by_rapier);
     let (width, nu) = (anatomy.width(), anatomy.drives.len());
     let mut episodes = Vec::with_capacity(motions.len());
     let mut tally = Tally::new(anatomy);
@@ -110,6 +123,7 @@ pub fn simulate(anatomy: &Anatomy, world: &mut World, motions: &[Motion]) -> Res
                 });
             }
             tally.add(&sim, sent);
+            look(&sim, step);
         }
         let mut column = vec![0.0; steps];
         for (place, path) in &world.readings {

@@ -65,6 +65,8 @@ impl InertiaEdit {
 
 /// A world, ready to be run.
 pub struct World {
+    /// Whether rapier moves it, and not MuJoCo.
+    pub by_rapier: bool,
     /// The model.
     pub document: Element,
     /// Changes of bodies.
@@ -81,12 +83,13 @@ pub struct World {
 
 impl World {
     /// The machine as its model has it, but with the true values of the study's parameters, at
-    /// another time step.
+    /// another time step, by an integrator of MuJoCo's or by [rapier](engine::RAPIER).
     ///
     /// # Errors
     /// Where a parameter's target is not in the model.
     pub fn new(anatomy: &Anatomy, truth: &[f64], timestep: f64, integrator: &str) -> Result<Self> {
         let mut world = Self {
+            by_rapier: integrator == engine::RAPIER,
             document: anatomy.document.clone(),
             inertias: Vec::new(),
             commands: Vec::new(),
@@ -105,7 +108,9 @@ impl World {
         }
         if let Some(option) = world.document.find_mut("option", None) {
             option.set_numbers("timestep", &[timestep]);
-            option.set("integrator", integrator);
+            if !world.by_rapier {
+                option.set("integrator", integrator);
+            }
             if !option.children.iter().any(|c| c.tag == "flag") {
                 option.children.push(Element::new("flag"));
             }

@@ -1,5 +1,7 @@
 //! A study ready for fits: sets of effects are ranked by linearisations and fitted by replays.
 
+#[cfg(feature = "torch")]
+use asid_core::Episode;
 use asid_core::Result;
 use asid_core::replay::Replay;
 use asid_effects::EffectSpec;
@@ -8,6 +10,8 @@ use super::candidates::Shown;
 use super::noise;
 use crate::physics::Study;
 use crate::physics::fit::Fit;
+#[cfg(feature = "torch")]
+use crate::physics::logs::{HEAD, Log, MOST_STEPS};
 use crate::physics::logs::{Logs, within};
 use crate::physics::model::{Engine, Point, World};
 use crate::physics::start::{State, first_state, open_coordinates};
@@ -73,6 +77,42 @@ impl<'a> Work<'a> {
             study,
             engine,
         })
+    }
+
+    /// The training logs.
+    #[cfg(feature = "torch")]
+    pub fn training(&self) -> &'a [Episode] {
+        &self.study.train
+    }
+
+    /// The logs held out.
+    #[cfg(feature = "torch")]
+    pub fn testing(&self) -> &'a [Episode] {
+        &self.study.test
+    }
+
+    /// Noise of each entry of a residual, in the sensor's unit.
+    #[cfg(feature = "torch")]
+    pub fn noise_by_entry(&self) -> Vec<f64> {
+        self.fitting.noise.clone()
+    }
+
+    /// Episodes, as far as the scorer compares them, and their readings as a fitted set predicts them. Starts that they do
+    /// not give are fitted to their heads.
+    #[cfg(feature = "torch")]
+    pub fn replayed(&self, fitted: &Fitted, episodes: &[Episode]) -> Result<(Logs, Vec<Vec<f64>>)> {
+        let layout = &self.study.plant.layout;
+        let cut = within(episodes, layout.timestep, MOST_STEPS);
+        let mut logs = Logs::new(layout, &noise::signals(self.study), cut)?;
+        let (world, values) = self.world(&fitted.effects, &fitted.point)?;
+        let first = |l: &Log| first_state(&self.study.plant, &l.episode);
+        let starts = logs.logs.iter().map(first).collect();
+        let open = open_coordinates(layout, episodes);
+        let mut heads = logs.heads(layout, HEAD)?;
+        let mut fit = Fit::new(layout, &world, open)?.starts_only();
+        let point = fit.run(&mut heads, Point { values, starts })?;
+        let readings = fit.predict(&mut logs, &point)?;
+        Ok((logs, readings))
     }
 
     fn starts(&self) -> Vec<State> {

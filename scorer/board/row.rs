@@ -16,7 +16,9 @@ pub struct Row {
     pub by: &'static str,
     /// Of that, which.
     pub name: String,
-    /// Verdict right.
+    /// How many.
+    pub cases: usize,
+    /// Verdict right; of the cases whose answer may name something, like the next two.
     pub right: Share,
     /// Right, or among the two most probable sets.
     pub top2: Share,
@@ -37,6 +39,8 @@ pub struct Row {
 impl Row {
     fn of(by: &'static str, name: &str, cases: &[&Case]) -> Self {
         let share = |f: &dyn Fn(&Case) -> bool| Share::of(cases.iter().map(|c| f(c)));
+        let named = || cases.iter().filter(|c| c.names());
+        let share_named = |f: &dyn Fn(&Case) -> bool| Share::of(named().map(|c| f(c)));
         let figures = |f: &dyn Fn(&Case) -> Option<f64>| -> Vec<f64> {
             cases.iter().filter_map(|c| f(c)).collect()
         };
@@ -45,11 +49,12 @@ impl Row {
         Self {
             by,
             name: name.to_owned(),
-            right: share(&|c| c.standing.is_right()),
-            top2: share(&|c| c.top2),
-            covered: share(&|c| c.covered),
+            cases: cases.len(),
+            right: share_named(&|c| c.standing.is_right()),
+            top2: share_named(&|c| c.top2),
+            covered: share_named(&|c| c.covered),
             unanswered: share(&|c| c.standing == Standing::NoAnswer),
-            true_probability: Figure::mean(&figures(&|c| Some(c.true_probability))),
+            true_probability: Figure::mean(&figures(&|c| c.names().then_some(c.true_probability))),
             set_size: median(&mut figures(&size)),
             closed: Figure::median(&closed),
             seconds: median(&mut figures(&|c| Some(c.seconds))),

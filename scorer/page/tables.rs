@@ -34,7 +34,7 @@ fn cells(name: &str, r: &Row) -> Vec<Cell> {
     );
     vec![
         name.into(),
-        r.right.of.to_string().into(),
+        r.cases.to_string().into(),
         r.right.count.to_string().into(),
         interval.into(),
         r.top2.count.to_string().into(),
@@ -115,7 +115,7 @@ pub(super) fn cases(score: &Score) -> Section {
     for c in &score.answers {
         let tone = match c.standing {
             Standing::Wrong | Standing::NoAnswer => Tone::Bad,
-            Standing::Apart => Tone::Fair,
+            Standing::Apart | Standing::NamesNothing => Tone::Fair,
             _ => Tone::Good,
         };
         let closed = c.physics.gaps.and_then(|g| g.closed_of_possible);

@@ -12,7 +12,9 @@ use crate::answer::Answer;
 use crate::label::{Label, WiringTruth};
 
 /// Physics steps of all logs of a kind together: what a fit of some twenty replays does in seconds on one core.
-const MOST_STEPS: f64 = 24_000.0;
+pub const MOST_STEPS: f64 = 24_000.0;
+/// Share of a log on which a start that it does not give is fitted, and which then does not count.
+pub const HEAD: f64 = 0.1;
 /// Rows that a log keeps at least, where it has as many.
 const FEWEST_ROWS: usize = 12;
 
@@ -32,6 +34,8 @@ pub struct Logs {
     pub logs: Vec<Log>,
     /// Names of the sensors compared.
     pub sensors: Vec<String>,
+    /// Noise of each entry of a residual, three of an orientation, in the sensor's unit.
+    pub noise: Vec<f64>,
     /// Differences of readings in units of the noise.
     pub signals: SignalSet,
 }
@@ -134,6 +138,7 @@ impl Logs {
         Ok(Self {
             logs: logs.collect::<Result<_>>()?,
             signals: SignalSet::new(layout, signals)?,
+            noise: noise_by_entry(layout, signals)?,
             sensors,
         })
     }
@@ -167,6 +172,7 @@ impl Logs {
             logs: logs.collect::<Result<_>>()?,
             sensors: self.sensors.clone(),
             signals: self.signals.clone(),
+            noise: self.noise.clone(),
         })
     }
 
@@ -202,6 +208,19 @@ impl Logs {
         })
         .collect()
     }
+}
+
+/// Noise of each entry of a residual.
+fn noise_by_entry(layout: &Layout, signals: &[Signal]) -> Result<Vec<f64>> {
+    let mut all = Vec::new();
+    for signal in signals {
+        let entries = match layout.sensor(&signal.sensor)?.len {
+            4 => 3,
+            len => len,
+        };
+        all.extend(std::iter::repeat_n(signal.noise, entries));
+    }
+    Ok(all)
 }
 
 /// Rows of the head of a log with so many rows.

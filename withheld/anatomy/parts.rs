@@ -1,5 +1,7 @@
 //! Joints, actuators and sensors, as the model describes them.
 
+use mujoco_rs::wrappers::mj_model::{MjModel, MjtObjBase};
+
 use crate::document::Element;
 
 /// Kind of a joint.
@@ -64,6 +66,17 @@ pub struct Drive {
     pub limit: f64,
 }
 
+/// What a sensor tells of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Reads {
+    /// A joint, as an index of `Anatomy::joints`.
+    Joint(usize),
+    /// A body, or something that is fixed to it, as an index of `Anatomy::bodies`.
+    Body(usize),
+    /// Something else.
+    Other,
+}
+
 /// A sensor.
 #[derive(Clone, Debug)]
 pub struct Sensor {
@@ -71,6 +84,8 @@ pub struct Sensor {
     pub name: String,
     /// Tag in the model.
     pub kind: String,
+    /// What it tells of.
+    pub reads: Reads,
     /// First number of its reading.
     pub address: usize,
     /// Numbers of its reading.
@@ -104,6 +119,25 @@ pub(super) fn joint_kind(tag: &str, element: &Element) -> Option<JointKind> {
         ("joint", Some("slide")) => Some(JointKind::Slide),
         ("joint", None | Some("hinge")) => Some(JointKind::Hinge),
         _ => None,
+    }
+}
+
+/// What a sensor of a compiled model tells of.
+pub(super) fn reads(model: &MjModel, sensor: usize, joints: &[Joint]) -> Reads {
+    let Ok(id) = usize::try_from(model.sensor_objid()[sensor]) else {
+        return Reads::Other;
+    };
+    let body = |id: i32| usize::try_from(id).map_or(Reads::Other, Reads::Body);
+    match model.sensor_objtype()[sensor] {
+        MjtObjBase::mjOBJ_JOINT => {
+            let name = model.id_to_name(MjtObjBase::mjOBJ_JOINT, id);
+            let joint = joints.iter().position(|j| Some(&*j.name) == name);
+            joint.map_or(Reads::Other, Reads::Joint)
+        }
+        MjtObjBase::mjOBJ_BODY | MjtObjBase::mjOBJ_XBODY => Reads::Body(id),
+        MjtObjBase::mjOBJ_GEOM => body(model.geom_bodyid()[id]),
+        MjtObjBase::mjOBJ_SITE => body(model.site_bodyid()[id]),
+        _ => Reads::Other,
     }
 }
 

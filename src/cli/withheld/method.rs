@@ -23,6 +23,8 @@ pub enum Method {
     BestResidual,
     /// Add and drop effects for as long as the Bayesian information criterion falls
     Bic,
+    /// Name nothing, and let a network learn what is left of the readings; with --features torch
+    ResidualNetwork,
 }
 
 impl Method {
@@ -33,6 +35,7 @@ impl Method {
             Self::IdentifyOnly => Baseline::IdentifyOnly.name(),
             Self::BestResidual => Baseline::BestResidual.name(),
             Self::Bic => Baseline::Bic.name(),
+            Self::ResidualNetwork => Baseline::ResidualNetwork.name(),
         }
     }
 
@@ -42,6 +45,7 @@ impl Method {
             Self::IdentifyOnly => Some(Baseline::IdentifyOnly),
             Self::BestResidual => Some(Baseline::BestResidual),
             Self::Bic => Some(Baseline::Bic),
+            Self::ResidualNetwork => Some(Baseline::ResidualNetwork),
         }
     }
 }
@@ -146,7 +150,13 @@ pub fn answer(study: &Path, arguments: &Arguments) -> Result<()> {
         .backend
         .clone()
         .unwrap_or_else(default_backend);
-    let said = baseline::answer(baseline, backend(&name)?.into(), study, &arguments.without)?;
+    let said = baseline::answer(
+        baseline,
+        backend(&name)?.into(),
+        study,
+        &arguments.without,
+        arguments.common.seed.unwrap_or(0),
+    )?;
     std::fs::create_dir_all(out).map_err(|e| Error::Failed(format!("{}: {e}", out.display())))?;
     write_json(&out.join("result.json"), &said)
 }

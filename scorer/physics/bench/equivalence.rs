@@ -1,0 +1,89 @@
+//! Whether two sets of effects are the same physics: what they predict without noise, each fitted to the other.
+
+use asid_core::Result;
+
+use super::named::Named;
+use super::{Bench, gap};
+use crate::physics::fit::Fit;
+use crate::physics::model::{Point, World};
+
+/// Difference of noise-free predictions, root mean square in units of the noise, below which two sets of effects are
+/// the same physics: a likelihood ratio could tell them apart from some 400 readings on, were the noise white and
+/// the model otherwise exact, which it is not.
+pub(super) const SAME: f64 = 0.1;
+
+impl Bench<'_> {
+    /// What a fitted world predicts in the logs to fit to and in those held out, without noise.
+    pub(super) fn predictions(
+        &mut self,
+        world: &World,
+        values: &[f64],
+    ) -> Result<[Vec<Vec<f64>>; 2]> {
+        let (starts, open) = self.starts(0);
+        let layout = &self.study.plant.layout;
+        let mut fit = Fit::new(layout, world, open)?.starts_only();
+        let point = Point {
+            values: values.to_vec(),
+            starts,
+        };
+        let point = fit.run(&mut self.logs[0], point)?;
+        let train = fit.predict(&mut self.logs[0], &point)?;
+        let (point, _) = self.held_out(world, values)?;
+        let test = fit.predict(&mut self.logs[1], &point)?;
+        Ok([train, test])
+    }
+
+    /// Root mean square difference of `targets` and what a set predicts at its best refit to them, on the logs held
+    /// out, in units of the noise.
+    pub(super) fn distance(
+        &mut self,
+        named: &Named<'_>,
+        targets: &[Vec<Vec<f64>>; 2],
+    ) -> Result<f64> {
+        let world = self
+            .engine
+            .world(self.study, &named.effects, &*named.parameters)?;
+        let layout = &self.study.plant.layout;
+        let mut values: Vec<f64> = world.unknowns.iter().map(|u| u.start).collect();
+        let mut distance = f64::INFINITY;
+        // All to the training logs; then, with these values, the open starts of those held out.
+        for which in 0..2 {
+            let (starts, open) = self.starts(which);
+            let mut fit = Fit::new(layout, &world, open)?;
+            if which == 1 {
+                fit = fit.starts_only();
+            }
+            let mut logs = self.logs[which]
+                .like(layout)?
+                .with_readings(&targets[which]);
+            let point = fit.run(&mut logs, Point { values, starts })?;
+            let readings = fit.predict(&mut logs, &point)?;
+            let residuals = logs.residuals(&readings);
+            let present = logs.residuals(&targets[which]);
+            let counts: Vec<bool> = present.iter().flatten().map(|r| r.is_finite()).collect();
+            distance = gap(&residuals, &counts);
+            values = point.values;
+        }
+        Ok(distance)
+    }
+
+    /// Whether a set without any one of its effects predicts something else than `targets`.
+    pub(super) fn each_is_needed(
+        &mut self,
+        named: &Named<'_>,
+        targets: &[Vec<Vec<f64>>; 2],
+    ) -> Result<bool> {
+        for left_out in 0..named.effects.len() {
+            let mut effects = named.effects.clone();
+            effects.remove(left_out);
+            let fewer = Named {
+                effects,
+                parameters: Box::new(|name| (named.parameters)(name)),
+            };
+            if self.distance(&fewer, targets)? < SAME {
+                return Ok(false);
+            }
+        }
+        Ok(true)
+    }
+}
