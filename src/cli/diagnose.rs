@@ -62,6 +62,7 @@ pub struct Arguments {
     #[arg(long, value_name = "N")]
     seeds: Option<u64>,
     /// Answer after about this time with what is known by then; result.json lists what was not tried. Ctrl-C does the same
+    /// [default: 1.75]
     #[arg(long, value_name = "MINUTES")]
     minutes: Option<f64>,
     /// Leave out an effect of the catalogue (repeatable)

@@ -110,6 +110,10 @@ const OWN: [&str; 17] = [
     "preset",
 ];
 
+/// Time limit where none is given, min: most machines have their whole answer within a minute, and who waits for it would rather know
+/// by then what is known.
+pub const MINUTES: f64 = 1.75;
+
 /// How widely to search.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -193,7 +197,7 @@ impl Config {
         config.runs = arguments.runs.or(config.runs);
         config.experiments = arguments.experiments.or(config.experiments);
         config.seeds = arguments.seeds.or(config.seeds);
-        config.minutes = arguments.minutes.or(config.minutes);
+        config.minutes = arguments.minutes.or(config.minutes).or(Some(MINUTES));
         if config.minutes.is_some_and(|m| !(m.is_finite() && m > 0.0)) {
             return Err(wrong("--minutes", "is a number above 0"));
         }
