@@ -1,0 +1,143 @@
+//! Replays, open loop, of the model without effects, of the set that stands and of its rivals.
+
+use asid_core::{Progress, Result};
+
+use crate::bench::{Bench, Explanation, Stage};
+use crate::candidate::Candidate;
+use crate::fit::Effort;
+use crate::latent_force::fit::Fitted;
+use crate::latent_force::search::{Outcome, Set, name_of};
+use crate::predict::State;
+use crate::result::NotTried;
+use crate::search::{Findings, Found};
+
+use super::told::{isolability, missing_forces, ranking};
+
+/// Physics steps of a replay of all logs times coordinates of the starts that they leave open up to which starts are fitted
+/// once more with the values; beyond it they stay as smoothed.
+const REPLAYED: usize = 500_000;
+/// Most sets besides the verdict's that are replayed.
+const RIVALS: usize = 4;
+
+/// Starts of the training episodes as a fit smoothed them, where the logs leave them open; `firsts` are the walks that begin
+/// an episode.
+fn smoothed_starts(bench: &Bench, fitted: &Fitted, firsts: &[usize]) -> Vec<State> {
+    let layout = bench.layout();
+    let width = layout.nq + layout.nv;
+    if bench.open.is_empty() {
+        return bench.train.starts.clone();
+    }
+    let state = |states: &Vec<f64>| State {
+        qpos: states[..layout.nq].to_vec(),
+        qvel: states[layout.nq..width].to_vec(),
+    };
+    let trajectory = &fitted.estimate.trajectory;
+    firsts.iter().map(|&w| state(&trajectory[w])).collect()
+}
+
+/// All sets that were fitted, each once, the most evident first.
+fn all_sets(outcome: &Outcome) -> Vec<Set> {
+    let mut sets: Vec<Set> = Vec::new();
+    for set in outcome.rounds.iter().flat_map(|r| &r.confirmed) {
+        let mut members = set.candidates.clone();
+        members.sort_unstable();
+        let same = |s: &&mut Set| {
+            let mut other = s.candidates.clone();
+            other.sort_unstable();
+            other == members
+        };
+        match sets.iter_mut().find(same) {
+            Some(known) if known.fitted.evidence < set.fitted.evidence => *known = set.clone(),
+            Some(_) => {}
+            None => sets.push(set.clone()),
+        }
+    }
+    sets.sort_by(|a, b| b.fitted.evidence.total_cmp(&a.fitted.evidence));
+    sets
+}
+
+/// Replays the model without effects, the set that stands and its nearest rivals, open loop; with the sets behind the
+/// findings.
+pub(super) fn replay(
+    bench: &mut Bench,
+    (candidates, outcome): (&[Candidate], &Outcome),
+    firsts: &[usize],
+    progress: &dyn Progress,
+) -> Result<(Findings, Vec<Set>)> {
+    let episodes = &bench.train.logs.episodes;
+    let steps: usize = episodes.iter().map(|e| e.plan.physics_steps()).sum();
+    bench.stages = vec![Stage {
+        record: bench.train.clone(),
+        episodes: (0..episodes.len()).collect(),
+        open: if steps * bench.fitted.len() > REPLAYED {
+            Vec::new()
+        } else {
+            bench.fitted.clone()
+        },
+    }];
+    let study = bench.parameters.len();
+    let of = |fitted: &Fitted, members: &[usize], effort: Effort| -> Result<Explanation> {
+        let mut at = study;
+        let chosen: Vec<_> = members
+            .iter()
+            .map(|&c| {
+                let n = candidates[c].parameters().len();
+                let values = fitted.theta[at..at + n].to_vec();
+                at += n;
+                (&candidates[c], values)
+            })
+            .collect();
+        let starts = smoothed_starts(bench, fitted, firsts);
+        bench.explain(0, &chosen, &fitted.theta[..study], &starts, effort)
+    };
+    let mut not_tried: Vec<NotTried> = (outcome.untried.iter())
+        .map(|u| NotTried {
+            stage: u.stage.to_owned(),
+            effects: u.sets.iter().map(|s| name_of(candidates, s)).collect(),
+        })
+        .collect();
+    let stopped = progress.is_stopped();
+    let (once_more, rivals) = if stopped {
+        not_tried.push(NotTried {
+            stage: "fit of the values to whole replays, and replays of rivals".into(),
+            effects: Vec::new(),
+        });
+        (Effort::LOOK, 0)
+    } else {
+        (Effort::BRIEF, RIVALS)
+    };
+    let none = of(&outcome.none, &[], once_more)?;
+    let mut sets = all_sets(outcome);
+    let ranking = ranking(candidates, outcome, &sets);
+    let best = &outcome.best.candidates;
+    let stands = sets.iter().position(|s| s.candidates == *best);
+    if let Some(place) = stands {
+        sets.remove(place);
+        sets.insert(0, outcome.best.clone());
+    }
+    sets.truncate(1 + rivals);
+    let mut found = Vec::new();
+    for (i, set) in sets.iter().enumerate() {
+        let effort = if i == 0 && stands.is_some() {
+            once_more
+        } else {
+            Effort::LOOK
+        };
+        found.push(Found {
+            candidates: set.candidates.clone(),
+            explanation: of(&set.fitted, &set.candidates, effort)?,
+        });
+    }
+    let findings = Findings {
+        none,
+        short: None,
+        found,
+        missing: missing_forces(bench.layout(), outcome),
+        forces: Vec::new(),
+        ranking,
+        isolability: isolability(candidates, outcome),
+        not_tried,
+        screened: Vec::new(),
+    };
+    Ok((findings, sets))
+}

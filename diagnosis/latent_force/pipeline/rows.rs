@@ -1,0 +1,93 @@
+//! Which rows of the logs are smoothed, and which are taken in segments.
+
+use asid_core::Result;
+
+use crate::bench::Bench;
+use crate::candidate::enumerate;
+use crate::latent_force::context::Taken;
+use crate::latent_force::initial::{from_readings, scales};
+use crate::latent_force::segments::cut;
+use crate::latent_force::touching::touching;
+use crate::latent_force::walk::Walk;
+use crate::starts::given_start;
+use crate::study::Study;
+use crate::trajectory::Trajectory;
+
+/// Physics steps of one walk along all logs times degrees of freedom, at most, and rows of a log that are walked in any
+/// case: a walk is taken once a coordinate and once a candidate, and both grow with the degrees of freedom.
+const BUDGET: f64 = 72_000.0;
+const FEWEST: usize = 150;
+/// Physics steps of a replay of all logs for each candidate up to which machines that touch something go by whole replays: a search
+/// by them takes some twenty such rounds, and a core 10^5 to 3 x 10^5 steps a second.
+const AFFORDABLE: usize = 1_500_000;
+
+/// What the model does along some states.
+pub(super) fn along(
+    bench: &Bench,
+    walks: &[Walk],
+    theta: &[f64],
+    states: &[Vec<f64>],
+) -> Result<Trajectory> {
+    let model = bench.machine.with(&[])?;
+    let plant = &bench.machine.plant;
+    let values = (&bench.parameters[..], theta);
+    let rows: Vec<(usize, &[usize])> = walks.iter().map(|w| (w.episode, &w.rows[..])).collect();
+    Trajectory::along(&*model, plant, values, &bench.train.logs, states, &rows)
+}
+
+/// Whether a machine that touches something goes by whole replays: where one of all training logs for each candidate is
+/// affordable.
+pub(super) fn replays_are_affordable(
+    bench: &Bench,
+    shown: &Trajectory,
+    without: &[String],
+) -> bool {
+    let episodes = &bench.train.logs.episodes;
+    let steps: usize = episodes.iter().map(|e| e.plan.physics_steps()).sum();
+    steps * enumerate(&bench.machine, shown, without).0.len() < AFFORDABLE
+}
+
+/// Takes the training logs within the budget, in segments where something touches; with the contacts along them.
+pub(super) fn take(study: &Study, bench: &Bench, nominal: &[f64]) -> Result<(Taken, Trajectory)> {
+    let layout = bench.layout();
+    let plant = &bench.machine.plant;
+    let logs = &bench.train.logs;
+    let whole = |e| Walk::new(logs, e, layout.timestep);
+    let whole = within_budget((0..logs.episodes.len()).map(whole).collect(), layout.nv);
+    let home = asid_core::problem::home(layout);
+    let still = [&home.0[..], &home.1[..]].concat();
+    let at_home =
+        |walks: &[Walk]| -> Vec<Vec<f64>> { walks.iter().map(|w| still.repeat(w.len())).collect() };
+    let first = from_readings(plant, logs, &whole, &at_home(&whole));
+    let shown = along(bench, &whole, nominal, &first)?;
+    let touches = touching(plant, logs, &shown);
+    let each = whole.iter().zip(&touches);
+    let walks: Vec<Walk> = each.flat_map(|(walk, t)| cut(walk, t)).collect();
+    let given = |w: &Walk| {
+        let episode = &study.train[w.episode].1;
+        let known = w.rows[0] == 0 && episode.initial.is_some();
+        known.then(|| given_start(plant, episode))
+    };
+    let taken = Taken {
+        given: walks.iter().map(given).collect(),
+        open: bench.open.clone(),
+        otherwise: at_home(&walks),
+        scale: scales(plant, &first),
+        walks,
+    };
+    Ok((taken, shown))
+}
+
+/// The first rows of each walk, as many as the budget of physics steps allows: a screening takes all of them once a column.
+fn within_budget(walks: Vec<Walk>, nv: usize) -> Vec<Walk> {
+    let steps: usize = walks.iter().flat_map(|w| &w.substeps).sum();
+    let share = BUDGET / (steps.max(1) * nv.max(1)) as f64;
+    if share >= 1.0 {
+        return walks;
+    }
+    let part = |w: &Walk| {
+        let rows = (share * w.len() as f64).round() as usize;
+        w.part(0..rows.max(FEWEST).min(w.len()))
+    };
+    walks.iter().map(part).collect()
+}

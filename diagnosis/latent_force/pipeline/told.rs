@@ -1,0 +1,82 @@
+//! What is told of a search besides its replays: missing forces, the ranking, and what the logs cannot tell apart.
+
+use asid_core::Layout;
+
+use crate::candidate::Candidate;
+use crate::latent_force::estimate::Estimate;
+use crate::latent_force::picture::dofs;
+use crate::latent_force::search::{Outcome, Set};
+use crate::result::{Isolability, MissingForce, RankedSet};
+
+/// Most sets that are listed with their evidence.
+const RANKED: usize = 20;
+/// Steps a rad that angles between effects are told in: a picture shows degrees.
+const ANGLES: f64 = 1e4;
+
+/// What is missing at each degree of freedom, without effects and with those that stand; empty where all is segments.
+pub(super) fn missing_forces(layout: &Layout, outcome: &Outcome) -> Vec<MissingForce> {
+    if outcome.missing[0].share >= 1.0 {
+        return Vec::new();
+    }
+    let (before, after) = (&outcome.none.estimate, &outcome.best.fitted.estimate);
+    let deviation = |e: &Estimate, d: usize| (e.noise.q[d] + e.noise.white[d]).sqrt();
+    let dofs = dofs(layout);
+    dofs.iter()
+        .enumerate()
+        .map(|(d, dof)| MissingForce {
+            dof: dof.name.clone(),
+            unit: dof.unit().to_owned(),
+            identified: deviation(before, d),
+            refined: deviation(after, d),
+            correlation_time: before.noise.tau[d],
+        })
+        .collect()
+}
+
+/// Sets by their evidence over the model without effects: those that were fitted, then what the first screening had.
+pub(super) fn ranking(
+    candidates: &[Candidate],
+    outcome: &Outcome,
+    fitted: &[Set],
+) -> Vec<RankedSet> {
+    let none = outcome.none.evidence;
+    let labels = |set: &[usize]| -> Vec<String> {
+        let mut set = set.to_vec();
+        set.sort_unstable();
+        set.iter().map(|&c| candidates[c].label()).collect()
+    };
+    let of_fit = |set: &Set| RankedSet {
+        effects: labels(&set.candidates),
+        screened: None,
+        fitted: Some(set.fitted.evidence - none),
+    };
+    let mut all: Vec<RankedSet> = fitted.iter().map(of_fit).collect();
+    for (set, gain) in outcome.rounds.iter().take(1).flat_map(|r| &r.screened) {
+        let effects = labels(set);
+        match all.iter_mut().find(|r| r.effects == effects) {
+            Some(known) => known.screened = Some(*gain),
+            None => all.push(RankedSet {
+                effects,
+                screened: Some(*gain),
+                fitted: None,
+            }),
+        }
+    }
+    all.truncate(RANKED);
+    all
+}
+
+/// Principal angles between what leads in the first screening.
+pub(super) fn isolability(candidates: &[Candidate], outcome: &Outcome) -> Option<Isolability> {
+    let (leading, cosines) = &outcome.rounds.first()?.alike;
+    let n = leading.len();
+    let angle = |i: usize, j: usize| {
+        let angle = cosines[(i, j)].min(1.0).acos();
+        (angle * ANGLES).round() / ANGLES
+    };
+    let row = |i: usize| (0..n).map(|j| angle(i, j)).collect();
+    Some(Isolability {
+        effects: leading.iter().map(|&c| candidates[c].label()).collect(),
+        angles: (0..n).map(row).collect(),
+    })
+}

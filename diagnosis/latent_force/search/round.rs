@@ -1,0 +1,233 @@
+//! A round of a search: all open candidates are screened upon a set, and the few that lead are fitted.
+
+use asid_core::{Progress, Result};
+use nalgebra::DMatrix;
+
+use crate::candidate::Candidate;
+use crate::latent_force::columns::Columns;
+use crate::latent_force::context::Context;
+use crate::latent_force::fit::{Fitted, Slopes};
+use crate::latent_force::screen::{Screened, isolability, rank, regressions};
+
+use super::Untried;
+use super::breadth::Breadth;
+use super::set::{Set, name_of, pruned, refined_by, with, without};
+
+/// Leading candidates that are compared pair by pair.
+const COMPARED: usize = 20;
+/// Prior odds against an effect at a site where it comes to mind only after others.
+const UNUSUAL: f64 = 10.0;
+
+/// A round: what was screened and what was fitted upon a base.
+#[derive(Clone, Debug)]
+pub struct Round {
+    /// Candidates of the base.
+    pub base: Vec<usize>,
+    /// Labels and evidences of screening, best first.
+    pub screened: Vec<(Vec<usize>, f64)>,
+    /// The leading candidates of screening, and the cosines of the smallest principal angle between each two.
+    pub alike: (Vec<usize>, DMatrix<f64>),
+    /// Sets that were fitted to the end, best first.
+    pub confirmed: Vec<Set>,
+}
+
+/// What a round is about.
+pub(super) struct Upon<'r> {
+    pub(super) context: &'r Context<'r>,
+    /// The set that stands.
+    pub(super) base: &'r Set,
+    /// All candidates, and the places of those that are open.
+    pub(super) candidates: &'r [Candidate],
+    pub(super) open: &'r [usize],
+    pub(super) breadth: Breadth,
+    pub(super) progress: &'r dyn Progress,
+}
+
+/// A screening: the open candidates, their columns, and the sets of them by evidence.
+struct Screening {
+    some: Vec<Candidate>,
+    columns: Columns,
+    ranked: Vec<Screened>,
+    /// Leading candidates, and the cosines between each two.
+    alike: (Vec<usize>, DMatrix<f64>),
+}
+
+/// Sets that were fitted, and those that there was no time for.
+struct Fits {
+    sets: Vec<Set>,
+    left_out: Vec<Vec<usize>>,
+}
+
+impl Upon<'_> {
+    /// Screens the open candidates and fits the few that lead.
+    ///
+    /// # Errors
+    /// When the engine fails.
+    pub(super) fn round(&self, untried: &mut Vec<Untried>) -> Result<Round> {
+        let progress = self.progress;
+        let name = |set: &[usize]| name_of(self.candidates, set);
+        let upon = match &self.base.candidates[..] {
+            [] => String::new(),
+            set => format!(" upon {}", name(set)),
+        };
+        let screening = self.screen()?;
+        let ranked = screening.ranked.iter();
+        let screened: Vec<(Vec<usize>, f64)> = ranked
+            .map(|s| (self.members(&screening, s), s.gain))
+            .collect();
+        let rows = screened.iter().map(|(set, gain)| (name(set), *gain));
+        progress.ranking(&format!("screening{upon}"), &rows.collect::<Vec<_>>());
+        let raced = self.race(&screening)?;
+        let finished = self.finish(raced.sets)?;
+        progress.end();
+        let cut = [
+            ("confirmation of what leads in screening", raced.left_out),
+            ("fit to the end", finished.left_out),
+        ];
+        let cut = cut.into_iter().filter(|(_, sets)| !sets.is_empty());
+        untried.extend(cut.map(|(stage, sets)| Untried { stage, sets }));
+        let mut confirmed = finished.sets;
+        confirmed.sort_by(|a, b| self.worth(b).total_cmp(&self.worth(a)));
+        let gain = |s: &Set| self.worth(s) - self.base.fitted.evidence;
+        let rows = confirmed.iter().map(|s| (name(&s.candidates), gain(s)));
+        progress.ranking(&format!("fits{upon}"), &rows.collect::<Vec<_>>());
+        Ok(Round {
+            base: self.base.candidates.clone(),
+            screened,
+            alike: screening.alike,
+            confirmed,
+        })
+    }
+
+    /// Evidence of a set, that of effects at unusual sites the lower.
+    fn worth(&self, set: &Set) -> f64 {
+        let plant = self.context.plant();
+        let unusual = |c: &&usize| {
+            let c = &self.candidates[**c];
+            c.effect.unusual_at(plant, &c.spec.site)
+        };
+        let count = set.candidates.iter().filter(unusual).count();
+        set.fitted.evidence - UNUSUAL.ln() * count as f64
+    }
+
+    /// Candidates of a set of a screening.
+    fn members(&self, screening: &Screening, set: &Screened) -> Vec<usize> {
+        let candidate = |&f: &usize| self.open[screening.columns.forms[f].candidate];
+        set.forms.iter().map(candidate).collect()
+    }
+
+    /// Ranks the open candidates by one regression.
+    fn screen(&self) -> Result<Screening> {
+        self.progress.begin("screening", 1);
+        let open = self.open.iter();
+        let some: Vec<Candidate> = open.map(|&c| self.candidates[c].clone()).collect();
+        let fitted = &self.base.fitted;
+        let model = (&fitted.hypothesis, &fitted.theta[..]);
+        let columns = Columns::of(self.context, model, &fitted.estimate, &some)?;
+        let sums = regressions(self.context, &fitted.estimate, &columns);
+        let ranked = rank(&sums, &columns, &some);
+        let singles = ranked.iter().filter(|s| s.forms.len() == 1);
+        let leading: Vec<usize> = singles.map(|s| s.forms[0]).take(COMPARED).collect();
+        let candidate = |&f: &usize| self.open[columns.forms[f].candidate];
+        let alike = (
+            leading.iter().map(candidate).collect(),
+            isolability(&sums[0], &columns, &leading),
+        );
+        self.progress.end();
+        Ok(Screening {
+            some,
+            columns,
+            ranked,
+            alike,
+        })
+    }
+
+    /// Fits what leads in a screening a little.
+    fn race(&self, screening: &Screening) -> Result<Fits> {
+        let (breadth, progress) = (self.breadth, self.progress);
+        let ranked = &screening.ranked;
+        let lead = ranked.first().map_or(0.0, |s| s.gain);
+        let least = (breadth.share * lead).max(breadth.least);
+        let due = ranked.iter().take(breadth.raced).filter(|s| s.gain > least);
+        let due: Vec<&Screened> = due.collect();
+        progress.begin("confirming", due.len() as u64);
+        let mut sets = Vec::new();
+        let mut left_out = Vec::new();
+        for s in due {
+            let members = self.members(screening, s);
+            if !sets.is_empty() && progress.is_stopped() {
+                left_out.push(members);
+                continue;
+            }
+            progress.note(&format!("trying {}", name_of(self.candidates, &members)));
+            let mut set = self.enlarged(screening, s);
+            set.fit(self.context, breadth.rounds[0], progress)?;
+            sets.push(set);
+            progress.advance(1);
+        }
+        Ok(Fits { sets, left_out })
+    }
+
+    /// The base with the candidates of a set of a screening; a finer law takes the place of the simpler one.
+    fn enlarged(&self, screening: &Screening, screened: &Screened) -> Set {
+        let Screening { some, columns, .. } = screening;
+        let base = self.base;
+        let (hypothesis, theta, added) = with(&base.fitted, columns, some, screened);
+        let mut candidates = base.candidates.clone();
+        candidates.extend(added.iter().map(|&c| self.open[c]));
+        let mut set = Set {
+            candidates,
+            fitted: Fitted {
+                hypothesis,
+                theta,
+                ..base.fitted.clone()
+            },
+            names: base.names + 1,
+        };
+        for &c in &added {
+            if let Some(simpler) = refined_by(self.candidates, self.open[c]) {
+                set = without(&set, self.candidates, simpler);
+                set.names = base.names;
+            }
+        }
+        set
+    }
+
+    /// Fits those that are not far behind to the end, and takes out of each what does nothing in it.
+    fn finish(&self, raced: Vec<Set>) -> Result<Fits> {
+        let (context, breadth, progress) = (self.context, self.breadth, self.progress);
+        let base = self.base.fitted.evidence;
+        // What a set promises counts for it, but only what one has reached counts against the others.
+        let hoped = |s: &Set| s.fitted.evidence + s.fitted.promised;
+        let mut raced = raced;
+        raced.sort_by(|a, b| hoped(b).total_cmp(&hoped(a)));
+        let mut best = raced.iter().map(|s| s.fitted.evidence).fold(base, f64::max);
+        let mut fits = Fits {
+            sets: Vec::new(),
+            left_out: Vec::new(),
+        };
+        for mut set in raced.into_iter().take(breadth.finished) {
+            let behind = (breadth.behind * (best - base)).max(breadth.near);
+            if best - hoped(&set) > behind {
+                continue;
+            }
+            if !progress.is_stopped() {
+                progress.note(&format!(
+                    "fitting {}",
+                    name_of(self.candidates, &set.candidates)
+                ));
+                // To the end by slopes of its own.
+                set.fitted.slopes = Slopes::default();
+                set.fit(context, breadth.rounds[1], progress)?;
+                best = best.max(set.fitted.evidence);
+            }
+            if progress.is_stopped() {
+                fits.left_out.push(set.candidates.clone());
+            } else {
+                set = pruned(context, self.candidates, set, breadth, progress)?;
+            }
+            fits.sets.push(set);
+        }
+        Ok(fits)
+    }
+}
