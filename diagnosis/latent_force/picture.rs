@@ -240,7 +240,12 @@ fn series(
             along(&load)
         },
         before: force(0),
-        after: force(1),
+        // A fit that was stopped at its first linearisation has not smoothed anew.
+        after: if force(1) == force(0) && !law.iter().all(Vec::is_empty) {
+            Vec::new()
+        } else {
+            force(1)
+        },
         law: if law.iter().all(Vec::is_empty) {
             Vec::new()
         } else {

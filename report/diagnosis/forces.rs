@@ -129,18 +129,12 @@ fn against_time(force: &ForceTrace, law: bool) -> Figure {
     .layer(line(before).width(5.0).opacity(0.3).label("missing"));
     let mut caption = format!("Episode {}.", force.episode);
     if law {
-        chart = chart
-            .layer(
-                line(added)
-                    .colour(Colour::Blue)
-                    .label("added by the effects"),
-            )
-            .layer(
-                line(after)
-                    .colour(Colour::Vermillion)
-                    .dashed()
-                    .label("left"),
-            );
+        let added = line(added).colour(Colour::Blue);
+        chart = chart.layer(added.label("added by the effects"));
+    }
+    if law && finite_in(after) {
+        let left = line(after).colour(Colour::Vermillion).dashed();
+        chart = chart.layer(left.label("left"));
         caption.push_str(" Dashed: what is missing once the effects are in the model.");
     }
     Figure::new("Against time", chart.description(caption.clone()), caption)
