@@ -1,5 +1,7 @@
 //! What is told of a search besides its replays: missing forces, the ranking, and what the logs cannot tell apart.
 
+use std::f64::consts::FRAC_PI_2;
+
 use asid_core::Layout;
 
 use crate::candidate::Candidate;
@@ -72,7 +74,7 @@ pub(super) fn isolability(candidates: &[Candidate], outcome: &Outcome) -> Option
     let n = leading.len();
     let angle = |i: usize, j: usize| {
         let angle = cosines[(i, j)].min(1.0).acos();
-        (angle * ANGLES).round() / ANGLES
+        ((angle * ANGLES).round() / ANGLES).min(FRAC_PI_2)
     };
     let row = |i: usize| (0..n).map(|j| angle(i, j)).collect();
     Some(Isolability {
