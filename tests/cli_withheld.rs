@@ -161,6 +161,32 @@ fn shares_answer_and_the_call_without_one_scores() {
 }
 
 #[test]
+fn a_residual_network_closes_a_gap_and_names_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let (cases, out) = (folder.path().join("cases"), folder.path().join("out"));
+    // A reading that is shifted leaves the same residual in every row.
+    write_study(&cases.join("a"), Truth::SensorBias(0.02));
+    let labels = r#"{"a": {"effects": ["sensor-bias@x"]}}"#;
+    std::fs::write(cases.join("labels.json"), labels).unwrap();
+    let done = withheld(&cases, &out, &["--method", "residual-network"]);
+    if !cfg!(feature = "torch") {
+        // One line says what to build with.
+        let run = json(&out.join("answers/residual-network/a/run.json"));
+        assert!(run.to_string().contains("--features torch"), "{run}");
+        return;
+    }
+    assert!(done.status.success(), "{}", said(&done));
+    let result = json(&out.join("result.json"));
+    let (row, answer) = (&result["rows"][0], &result["answers"][0]);
+    assert_eq!((&row["cases"], &row["right"]["of"]), (&1.into(), &0.into()));
+    assert_eq!(answer["verdict"], serde_json::json!([]));
+    let gaps = &answer["physics"]["gaps"];
+    let gap = |name: &str| gaps[name].as_f64().unwrap();
+    // Far below what the study's parameters leave.
+    assert!(gap("refined") < 0.5 * gap("identified"), "{answer}");
+}
+
+#[test]
 fn controls_fail_as_they_must() {
     let folder = tempfile::tempdir().unwrap();
     let (cases, out) = (folder.path().join("cases"), folder.path().join("out"));

@@ -85,12 +85,17 @@ fn sequences((logs, predicted): &(Logs, Vec<Vec<f64>>)) -> Vec<Sequence> {
         .map(|((log, predicted), residuals)| {
             let episode = &log.episode;
             let (rows, nu) = (episode.rows(), episode.actuators.len());
+            let at = |row: usize| {
+                let replayed = predicted[row * width..(row + 1) * width].iter();
+                replayed.chain(&episode.ctrl[row * nu..(row + 1) * nu])
+            };
             let mut inputs = Vec::new();
             for row in 0..rows {
-                for back in 0..WINDOW {
-                    let at = row.saturating_sub(back);
-                    inputs.extend_from_slice(&predicted[at * width..(at + 1) * width]);
-                    inputs.extend_from_slice(&episode.ctrl[at * nu..(at + 1) * nu]);
+                inputs.extend(at(row));
+                // Rows before as differences: as numbers they are nearly the same, and a delay is in what they differ by.
+                for back in 1..WINDOW {
+                    let before = at(row.saturating_sub(back));
+                    inputs.extend(at(row).zip(before).map(|(now, then)| now - then));
                 }
             }
             Sequence {
