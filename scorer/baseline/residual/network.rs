@@ -1,5 +1,7 @@
 //! A network of two hidden layers, trained by Adam (Kingma and Ba 2015) and stopped early on a log that it does not learn from.
 
+use std::sync::{Mutex, PoisonError};
+
 use tch::nn::{self, Module, OptimizerConfig};
 use tch::{Device, Kind, Tensor};
 
@@ -76,10 +78,14 @@ fn residuals(log: &Sequence) -> Tensor {
     matrix(&log.residuals, log.residuals.len() / rows.max(1))
 }
 
+/// Held while a network is trained: libtorch has one generator of random numbers for all threads.
+static SEEDED: Mutex<()> = Mutex::new(());
+
 impl Network {
     /// Trained on some logs; the last of several stops it. Before its first step it says nothing is left, so that where no
     /// step helps on that log it says so still. The same seed gives the same network.
     pub fn trained(logs: &[Sequence], seed: u64) -> Self {
+        let _alone = SEEDED.lock().unwrap_or_else(PoisonError::into_inner);
         tch::manual_seed(i64::from_ne_bytes(seed.to_ne_bytes()));
         // Sums over rows in one order, whatever the machine.
         tch::set_num_threads(1);
