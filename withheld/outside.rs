@@ -1,7 +1,7 @@
 //! Machines that others modelled: files in a folder, as `withheld/models/fetch.py` leaves them.
 //!
 //! Nothing is known of such a machine but its model: its noise is the usual one of its sensors, it is driven over a part of
-//! its actuators' range, its owner fits nothing, and none of its contacts is a site. [Meshes](meshes) are left out.
+//! its actuators' range, its owner fits nothing, and none of its contacts is a site. Meshes are left out.
 //! What leaves all bounds or cannot be repeated is left out by the rules for all cases.
 
 mod length;

@@ -62,7 +62,8 @@ impl Estimate {
                 let from = self.trajectory.clone();
                 let nx = context.scale.len();
                 let normal = DVector::from_fn(nx, |_, _| random.sample::<f64, _>(StandardNormal));
-                let wide = DVector::from_fn(nx, |i, _| reading * normal[i] * open_by_reading(i, scales));
+                let wide =
+                    DVector::from_fn(nx, |i, _| reading * normal[i] * open_by_reading(i, scales));
                 let along = |s: &Self, w: usize| {
                     let root = &s.smoothed[w].root;
                     (root.ncols() == nx).then(|| (posterior * root * &normal).as_slice().to_vec())

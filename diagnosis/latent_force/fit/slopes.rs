@@ -68,8 +68,7 @@ impl Slopes {
         };
         let steps = context.start_steps();
         let trajectory = &estimate.trajectory;
-        let mut linear =
-            map.linearise_due(theta, trajectory, (want, &due), &steps, variations)?;
+        let mut linear = map.linearise_due(theta, trajectory, (want, &due), &steps, variations)?;
         self.exchange(&mut linear, &due, trajectory);
         if moved || along && !context.has_segments() {
             self.theta = theta.to_vec();

@@ -111,7 +111,11 @@ impl Part {
             .map(|e| vec![0.0; late * e.rows * ns * nv])
             .collect();
         for (roles, which) in [(&in_state, &due), (&others, &all)] {
-            let roles = if which.contains(&true) { &roles[..] } else { &[] };
+            let roles = if which.contains(&true) {
+                &roles[..]
+            } else {
+                &[]
+            };
             for chunk in roles.chunks(c.capacity - 1) {
                 self.pass(c, request, (chunk, which), &mut episodes, &mut ramps)?;
             }
