@@ -29,8 +29,8 @@ fn clear(body: &mut Element) -> Result<(), String> {
         ));
     }
     body.children.retain(|c| !is_mesh(c));
-    let inside = body.children.iter_mut().filter(|c| c.tag == "body");
-    inside.map(clear).collect()
+    let mut inside = body.children.iter_mut().filter(|c| c.tag == "body");
+    inside.try_for_each(clear)
 }
 
 fn is_mesh(element: &Element) -> bool {
