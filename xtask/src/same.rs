@@ -14,7 +14,15 @@ use serde_json::Value;
 use crate::library::repository;
 
 /// Keys whose values are not of the result.
-const APART: [&str; 7] = ["wall_s", "seconds", "seconds_to_first_table", "versions", "git", "commit", "command"];
+const APART: [&str; 7] = [
+    "wall_s",
+    "seconds",
+    "seconds_to_first_table",
+    "versions",
+    "git",
+    "commit",
+    "command",
+];
 
 /// The smallest searches: the paths through the code are those of long ones.
 const TINY: [&str; 11] = [
