@@ -4,8 +4,8 @@
 //! - [`study`] is what the user brings: a model, logs of the real machine, what is fitted already.
 //! - [`intake`] looks at its logs before any physics: outliers, and [`wiring`].
 //! - [`latent_force`] asks which force is missing at each moment, and which effects make up for it: for machines that
-//!   touch nothing in their logs.
-//! - [`search`] asks whether whole replays land on the logs: for those that do.
+//!   touch nothing in their logs, and for those whose replays would take too long.
+//! - [`search`] asks whether whole replays land on the logs: for the others.
 //! - [`predict`] replays the logs in a model, for many parameter values at once; [`fit`]
 //!   is least squares over such replays.
 

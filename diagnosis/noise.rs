@@ -9,6 +9,9 @@
 //! that is logged faster than it reads) has none of its own: such rows are passed over. And noise that was filtered
 //! differs little from row to row: third differences over two and four rows show it ([`Noise::correlation`]), for those of
 //! such noise grow by at most two from row to row, and those of a smooth residual by 64.
+//!
+//! Called three times: by [`crate::prepare`] before a search, from readings or from residuals, and by [`crate::diagnose`] on what
+//! the best explanation leaves. A study's own `noise` overrides it.
 
 use crate::data::Logs;
 

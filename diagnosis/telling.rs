@@ -375,7 +375,7 @@ impl Telling<'_> {
             .collect()
     }
 
-    /// Where the gap of the identified model lies, in all logs.
+    /// Where the gap of the identified model lies, in the training logs.
     fn places(&self, none: &Explanation) -> Result<Vec<crate::result::Where>> {
         let record = &self.bench.train;
         let mut predictor = self.bench.predictor(&[], record)?;

@@ -19,9 +19,9 @@ mod forces;
 mod head;
 mod ladder;
 mod lines;
-mod pictures;
 mod places;
 mod real_world;
+mod signals;
 mod wiring;
 mod words;
 
@@ -39,7 +39,7 @@ pub fn page(result: &DiagnosisResult, trace: &DiagnosisTrace) -> String {
         Some(ladder::section(d, t)),
         real_world::section(d),
         forces::section(d, t),
-        Some(pictures::section(d, t)),
+        Some(signals::section(d, t)),
         Some(places::section(d, t)),
         Some(causes::section(d, t)),
         closing::parameters(d),

@@ -1,4 +1,5 @@
-//! The tasks of the ASID paper, one folder each: the code and its `scene.xml` side by side.
+//! The tasks of the ASID paper, one folder each: the code and its `scene.xml` side by side. When an attempt succeeds is
+//! decided by `outcome` in the folder's `metric.rs`. [`sphere`] is no task but what the sphere tasks share.
 
 mod difficulty;
 pub mod laptop_articulation;

@@ -150,7 +150,10 @@ fn difficulties_that_cannot_be_are_refused_in_a_line() {
 fn an_exported_scene_is_that_of_the_difficulty() {
     let place = Workplace::new();
     let set = ["--set", "difficulty.ledge_width=0.02"];
-    let output = place.run(&[&["export", "rod-balancing", "--out", "rod.xml"], &set[..]].concat());
+    let export = ["export", "rod-balancing", "--out", "rod.xml", "--json"];
+    let output = place.run(&[&export[..], &set[..]].concat());
     assert!(output.status.success());
+    let summary: serde_json::Value = serde_json::from_slice(&output.stdout).expect("a summary");
+    assert_eq!(summary["file"], "rod.xml");
     assert!(place.read("rod.xml").contains(r#"size="0.01 0.05 0.075""#));
 }

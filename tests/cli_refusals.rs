@@ -165,6 +165,13 @@ fn a_folder_that_cannot_take_a_result_is_refused_before_work() {
         &["exists already"],
     );
     assert_eq!(place.read("scene.xml"), "mine");
+    // Difficulties belong to tasks.
+    let export = ["export", "scene.xml", "--out", "plain.xml"];
+    refused(
+        &place,
+        &[&export[..], &["--preset", "published"]].concat(),
+        &["scene.xml", "--preset"],
+    );
     refused(&place, &["report", "old"], &["finished run"]);
     refused(&place, &["report", "nowhere"], &["nowhere"]);
 }

@@ -10,7 +10,7 @@ mod task_support;
 use std::sync::atomic::AtomicU64;
 use std::time::Instant;
 
-use asid::algorithms::fisher::sensitivity::check_parameters;
+use asid::algorithms::fisher::inert::check_parameters;
 use asid::core::progress::Silent;
 use asid::core::real_world::RealEpisode;
 use asid::core::registry::{

@@ -65,8 +65,12 @@ impl Rotor {
                 .unwrap_or(drive.limit);
             // A motor of no gear: the command goes to the rotor instead.
             e.tag = "motor".into();
-            e.attributes
-                .retain(|(n, _)| !matches!(&**n, "kp" | "kv" | "forcerange" | "dampratio"));
+            e.attributes.retain(|(n, _)| {
+                !matches!(
+                    &**n,
+                    "kp" | "kv" | "forcerange" | "forcelimited" | "dampratio"
+                )
+            });
             e.set("gear", "0");
         }
         world.forces.push(Box::new(Self {

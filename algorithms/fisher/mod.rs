@@ -2,15 +2,15 @@
 //!
 //! [`FisherBatch`] plays episodes with their information; [`Information`] adds it up and scores it;
 //! [`expected`] is the deviation that an identification should reach, from fits of the readings over a
-//! region ([`local_fit`], [`precision`]); [`sensitivity`] tells unknowns that change no reading.
+//! region ([`local_fit`], [`precision`]); [`inert`] tells unknowns that change no reading.
 
 mod batch;
 mod eigen;
 pub mod expected;
+pub mod inert;
 mod information;
 pub mod local_fit;
 pub mod precision;
-pub mod sensitivity;
 
 pub use batch::{FisherBatch, FisherSettings, Form};
 pub use eigen::symmetric_eigen;

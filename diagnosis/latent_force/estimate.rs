@@ -5,9 +5,9 @@
 //! the readings. Between linearisations a few rounds are taken, lengthened, for EM is slow where a variance is small.
 
 mod missing;
-mod noise;
 mod replay;
 mod rest;
+mod variances;
 
 use rayon::prelude::*;
 

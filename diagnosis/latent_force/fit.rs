@@ -13,9 +13,9 @@ use rayon::prelude::*;
 use super::context::Context;
 use super::estimate::Estimate;
 use super::evidence::{Evidence, evidence};
+use super::fitted_value::Unknown;
 use super::smoother::{Regression, regress};
 use super::step_map::{Derivatives, LinearEpisode, Variation};
-use super::unknown::Unknown;
 
 pub use slopes::Slopes;
 

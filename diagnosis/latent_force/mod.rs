@@ -5,7 +5,7 @@
 //! columns of one linear regression on its innovations; the few that lead are put into the model and fitted anew.
 //!
 //! From below: [`tangent`] (states), [`walk`] (rows), [`segments`] (where bodies touch), [`step_map`] (the model over a row and its derivatives),
-//! [`smoother`], [`initial`], [`context`] and [`estimate`] (trajectory, force and noise), [`unknown`] and [`fit`] (a model with its values),
+//! [`smoother`], [`initial`], [`context`] and [`estimate`] (trajectory, force and noise), [`fitted_value`] and [`fit`] (a model with its values),
 //! [`evidence`], [`trace`], [`columns`], [`screen`], [`search`], [`selection`],
 //! `picture` (what the report draws of the force), [`pipeline`].
 
@@ -14,6 +14,7 @@ pub mod context;
 pub mod estimate;
 pub mod evidence;
 pub mod fit;
+pub mod fitted_value;
 pub mod initial;
 mod picture;
 pub mod pipeline;
@@ -26,5 +27,4 @@ pub mod step_map;
 pub mod tangent;
 mod touching;
 pub mod trace;
-pub mod unknown;
 pub mod walk;

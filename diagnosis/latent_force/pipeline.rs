@@ -15,10 +15,10 @@ use crate::work::Work;
 
 use super::context::begin;
 use super::fit::{Hypothesis, Slopes, fit, settle_noise};
+use super::fitted_value::Unknown;
 use super::picture::forces;
 use super::search::{Breadth, search};
 use super::selection::select;
-use super::unknown::Unknown;
 
 use replays::replay;
 use rows::{along, replays_are_affordable, take};

@@ -75,7 +75,8 @@ fn explanation(d: &DiagnosisResult, t: &DiagnosisTrace) -> Vec<String> {
             text
         }
         Kind::Unknown => format!(
-            "The gap of {} times the noise is real, and no effect of the catalogue explains it (probability {sure}).",
+            "The gap is {} times the noise, and no effect of the catalogue explains it. The probability of this verdict, `unknown`, is \
+             {sure}.",
             gap(d.gap.identified)
         ),
     };
@@ -88,7 +89,7 @@ fn explanation(d: &DiagnosisResult, t: &DiagnosisTrace) -> Vec<String> {
     }
     if d.verdict.kind != Kind::None && d.verdict.unexplained.is_finite() {
         first.push_str(&format!(
-            " Unexplained: {} of the squared gap above the noise floor.",
+            " {} of the squared gap above the noise floor remain unexplained.",
             percent(d.verdict.unexplained)
         ));
     }

@@ -43,9 +43,16 @@ fn ranking(d: &DiagnosisResult) -> Figure {
             row
         }
     };
-    let caption = "Logarithm of the odds for a set of effects against the model without them, on the training logs, prices for \
-                   further parameters included. Blue: the verdict. Ochre: fitted, grey: screened to first order and not \
-                   followed. The best of a hundred wrong candidates reaches 3 to 5 by chance.";
+    let alike = if d.verdict.ambiguous_with.is_empty() {
+        ""
+    } else {
+        " Purple: sets that these data cannot tell from the verdict."
+    };
+    let caption = format!(
+        "Natural logarithm of the Bayes factor of each set of effects, against the model without effects, on the training logs. \
+         Each further parameter is penalised. Blue: the verdict.{alike} Ochre: other sets that were fitted. Grey: sets that were \
+         screened only, by a linear approximation. Among a hundred wrong candidates the best reaches 3 to 5 by chance."
+    );
     let for_it = |r: &&RankedSet| r.fitted.or(r.screened).is_some_and(|e| e > LEAST);
     let shown = d.ranking.iter().filter(for_it).take(MOST);
     let plot = Ranking::new(
@@ -53,7 +60,7 @@ fn ranking(d: &DiagnosisResult) -> Figure {
         Axis::new("evidence, natural logarithm", ""),
     )
     .rows(shown.map(row))
-    .description(caption);
+    .description(caption.clone());
     Figure::new("How the explanations rank", plot, caption)
 }
 

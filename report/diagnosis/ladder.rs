@@ -104,9 +104,9 @@ fn figure(d: &DiagnosisResult, t: &DiagnosisTrace) -> Figure {
     }
     Figure::new(
         if refined(d) {
-            "From the model as given to the refined one"
+            "Gap of each model: nominal, identified, with one effect, refined"
         } else {
-            "The model as given, fitted, and with single effects"
+            "Gap of each model: nominal, identified, with one effect"
         },
         ranking.description(caption.clone()),
         caption,

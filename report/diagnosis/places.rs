@@ -18,8 +18,8 @@ const STEPS: [f64; 3] = [2.0, 5.0, 20.0];
 
 pub(super) fn section(d: &DiagnosisResult, t: &DiagnosisTrace) -> Section {
     let section = Section::new("Where the gap lies").lead(
-        "What the identified model gets wrong beyond the noise, shared out over signals and regimes of motion, before any \
-         effect is added.",
+        "Which signals, in which regime of motion, account for the gap of the identified model. Shares are of the squared \
+         residual above the noise, on the training logs, before any effect is added.",
     );
     let map = t.map.as_ref().filter(|m| !m.points.is_empty());
     if d.places.is_empty() && map.is_none() {

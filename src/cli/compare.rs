@@ -108,7 +108,7 @@ pub struct Arguments {
     /// Take settings from a file, such as a comparison's or a run's config.toml
     #[arg(long, value_name = "FILE.toml")]
     pub config: Option<PathBuf>,
-    /// Make the tasks as hard as this preset, such as published; single values by --set difficulty.NAME=VALUE
+    /// Set the difficulty of all tasks: default, or published; a single value by --set difficulty.NAME=VALUE
     #[arg(long, value_name = "NAME")]
     preset: Option<String>,
     /// Set a value, such as solver.iterations=10, for every method that has it (repeatable)

@@ -1,422 +1,200 @@
-//! The settings of a command: defaults, then the configuration file, then
-//! `--set`, then the options, resolved into one record that repeats the run.
+//! `asid config`: every setting of a task with its value and meaning, as a file for `--config`.
 
-use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::io::Write as _;
+use std::path::PathBuf;
 
 use anyhow::Result;
-use asid_core::task::{Condition, Coordinate};
-use asid_core::{Error, Parameter, Task, registry};
-use asid_effects::EffectSpec;
-use asid_effects::refined_model::RefinedModel;
-use schemars::JsonSchema;
-use serde::Serialize;
+use asid_core::registry::{AlgorithmEntry, Entry, Meanings, TaskEntry, find, meanings};
+use asid_core::{Explorer, Identifier, Task, TaskSolver};
 
 use super::options::{Algorithms, Common, Worlds};
-use super::plugins::{file_of, used};
-use component::{Component, component};
-use expected::ExpectedConfig;
-pub use real::RealConfig;
-use table::{check_keys, numbers, section, text, wrong};
-pub use table::{read_table, set};
-pub use unknowns::ParameterConfig;
-use unknowns::{noise, unknowns};
+use super::settings::{Config, ParameterConfig, Stage, difficulty};
 
-mod component;
-pub mod difficulty;
-mod expected;
-mod real;
-mod table;
-mod unknowns;
+/// Columns of a comment.
+const WIDTH: usize = 100;
 
-/// What settings are resolved for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Stage {
-    /// The whole pipeline, or many of them.
-    Run,
-    /// Exploration alone.
-    Explore,
-    /// Identification alone.
-    Identify,
-    /// Solving alone.
-    Solve,
+/// Arguments of `config`.
+#[derive(clap::Args)]
+pub struct Arguments {
+    /// The task
+    task: String,
+    #[command(flatten)]
+    algorithms: Algorithms,
+    #[command(flatten)]
+    worlds: Worlds,
+    /// Simulate with this engine: see `asid list`
+    #[arg(long, value_name = "NAME")]
+    backend: Option<String>,
+    /// Take the difficulty `default`, or `published`, as in the paper where it says so
+    #[arg(long, value_name = "NAME")]
+    preset: Option<String>,
+    /// Set a value, such as explorer.iterations=10 (repeatable)
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// Take settings from a file, such as a run's config.toml
+    #[arg(long, value_name = "FILE.toml")]
+    pub config: Option<PathBuf>,
 }
 
-impl Stage {
-    /// Name on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Run => "run",
-            Self::Explore => "explore",
-            Self::Identify => "identify",
-            Self::Solve => "solve",
-        }
-    }
-
-    /// Coordinates of the start pose that the stage is told.
-    pub fn start(self, task: &dyn Task) -> &[Coordinate] {
-        match self {
-            Self::Run | Self::Identify => &[],
-            Self::Explore => &task.exploration().start,
-            Self::Solve => &task.downstream().start,
-        }
-    }
-
-    fn is_run(&self) -> bool {
-        *self == Self::Run
-    }
-}
-
-/// Everything that decides the result of a command.
-#[derive(Clone, Debug, Serialize, JsonSchema)]
-pub struct Config {
-    /// What it was resolved for.
-    #[serde(skip_serializing_if = "Stage::is_run")]
-    #[schemars(with = "String")]
-    pub command: Stage,
-    /// The task's name.
-    pub task: String,
-    /// Engine of the simulator.
-    pub backend: String,
-    /// Model file of the simulator, MJCF or TOML; empty for the task's scene.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub model: Option<PathBuf>,
-    /// Condition of the task; `prior` for the whole prior.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub condition: Option<String>,
-    /// Seed.
-    pub seed: u64,
-    /// Files of the plugins that it needs.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub plugins: Vec<PathBuf>,
-    /// Start pose of the object by coordinate, for a stage that is told it.
-    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
-    pub start: BTreeMap<String, f64>,
-    /// Coordinates of the start pose that were not given and took the middle of their range.
-    #[serde(skip)]
-    pub assumed: Vec<String>,
-    /// The explorer: which episode is played in the real world.
-    #[schemars(with = "()")]
-    pub explorer: Component,
-    /// The identifier: what the unknowns are, given that episode.
-    #[schemars(with = "()")]
-    pub identifier: Component,
-    /// The solver: which action achieves the task.
-    #[schemars(with = "()")]
-    pub solver: Component,
-    /// How the expected deviations of a run are computed.
-    pub expected: ExpectedConfig,
-    /// Real world.
-    pub real: RealConfig,
-    /// How hard the task is, by name.
-    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
-    pub difficulty: BTreeMap<String, f64>,
-    /// Noise of each tracked sensor, in its unit.
-    pub noise: BTreeMap<String, f64>,
-    /// The unknowns, by name.
-    pub parameter: BTreeMap<String, ParameterConfig>,
-}
-
-/// Keys at the top of a configuration.
-const KEYS: [&str; 18] = [
-    "schema",
-    "command",
-    "task",
-    "backend",
-    "model",
-    "condition",
-    "seed",
-    "plugins",
-    "start",
-    "explorer",
-    "identifier",
-    "solver",
-    "expected",
-    "real",
-    "preset",
-    "difficulty",
-    "noise",
-    "parameter",
-];
-
-/// Names that are used where nothing else is said.
-pub struct Defaults {
-    /// Explorer.
-    pub explorer: &'static str,
-    /// Identifier.
-    pub identifier: &'static str,
-    /// Solver.
-    pub solver: &'static str,
-}
-
-/// The method that measures best, `asid`.
-pub const ASID: Defaults = Defaults {
-    explorer: "fisher-cem",
-    identifier: "reps",
-    solver: "cem",
-};
-
-impl Config {
-    /// Resolves the settings of a task for a stage, and the unknowns they make. The task is as hard
-    /// as [`difficulty::levels`] says.
-    pub fn resolve(
-        stage: Stage,
-        task: &dyn Task,
-        common: &Common,
-        algorithms: &Algorithms,
-        worlds: &Worlds,
-    ) -> Result<(Self, Vec<Parameter>)> {
-        let Worlds { simulator, real } = worlds;
-        let mut table = match &common.config {
-            Some(path) => read_table(path)?,
-            None => common.base.clone(),
-        };
-        difficulty::forget_noise(task, &mut table)?;
-        // A start pose in the settings of one stage means nothing to another.
-        if text(&table, "command")?.is_some_and(|c| c != stage.name()) {
-            table.remove("start");
-        }
-        for assignment in &common.set {
-            if assignment.trim_start().starts_with("plugins") {
-                return Err(wrong("plugins", "is given by --plugin FILE, not by --set"));
-            }
-            set(&mut table, assignment)?;
-        }
-        for key in table.keys() {
-            if !KEYS.contains(&key.as_str()) {
-                return Err(Error::unknown("setting", key, KEYS).into());
-            }
-        }
-        if let Some(name) = text(&table, "task")?
-            && name != task.name()
-        {
-            return Err(wrong(
-                "task",
-                format!(
-                    "the configuration is for `{name}`, the command for `{}`",
-                    task.name()
-                ),
-            ));
-        }
-        let backend = match (&common.backend, text(&table, "backend")?) {
-            (Some(name), _) => name.clone(),
-            (None, Some(name)) => name,
-            (None, None) => default_backend(),
-        };
-        let condition = text(&table, "condition")?;
-        if let Some(name) = &condition {
-            check_condition(&task.conditions(), name)?;
-        }
-        let (parameter, parameters) = unknowns(task, &section(&table, "parameter")?)?;
-        let real = real::resolve(&section(&table, "real")?, real, task, &parameters, &backend)?;
-        let (start, assumed) = start(stage, task, &section(&table, "start")?)?;
-        let mut config = Self {
-            command: stage,
-            task: task.name().to_owned(),
-            model: model_file(&simulator.model, &table)?,
-            condition,
-            seed: match (common.seed, table.get("seed")) {
-                (Some(seed), _) => seed,
-                (None, None) => 0,
-                (None, Some(value)) => value
-                    .as_integer()
-                    .and_then(|s| u64::try_from(s).ok())
-                    .ok_or_else(|| {
-                        wrong("seed", format!("{value} is not a whole number from 0 up"))
-                    })?,
-            },
-            plugins: Vec::new(),
-            start,
-            assumed,
-            explorer: with_policy(
-                component::<dyn asid_core::Explorer>(
-                    task,
-                    &table,
-                    "explorer",
-                    algorithms.explorer.as_deref(),
-                    ASID.explorer,
-                )?,
-                algorithms.policy.as_deref(),
-            )?,
-            identifier: component::<dyn asid_core::Identifier>(
-                task,
-                &table,
-                "identifier",
-                algorithms.identifier.as_deref(),
-                ASID.identifier,
-            )?,
-            solver: component::<dyn asid_core::TaskSolver>(
-                task,
-                &table,
-                "solver",
-                algorithms.solver.as_deref(),
-                ASID.solver,
-            )?,
-            expected: ExpectedConfig::of(&table)?,
-            real,
-            difficulty: difficulty::levels(task, common)?,
-            noise: noise(task, &section(&table, "noise")?)?,
-            backend,
-            parameter,
-        };
-        config.plugins = config.used_plugins();
-        config.learn_from_explorer(&section(&table, "identifier")?);
-        Ok((config, parameters))
-    }
-
-    /// An identifier that learns from an explorer's episodes learns from those of this run's
-    /// explorer, unless it was told another.
-    fn learn_from_explorer(&mut self, given: &toml::Table) {
-        if self.command == Stage::Run
-            && !given.contains_key("explorer")
-            && let Some(setting) = self.identifier.settings.get_mut("explorer")
-        {
-            *setting = self.explorer.name.clone().into();
-        }
-    }
-
-    /// Files of plugins that were named, or that the settings name parts of.
-    fn used_plugins(&self) -> Vec<PathBuf> {
-        use asid_effects::EffectEntry;
-        use registry::{BackendEntry, ExplorerEntry, IdentifierEntry, SolverEntry, TaskEntry};
-        let mut files = vec![
-            file_of::<TaskEntry>(&self.task),
-            file_of::<BackendEntry>(&self.backend),
-            file_of::<BackendEntry>(&self.real.backend),
-            file_of::<ExplorerEntry>(&self.explorer.name),
-            file_of::<IdentifierEntry>(&self.identifier.name),
-            file_of::<SolverEntry>(&self.solver.name),
-        ];
-        let effects = self.real.effects.iter();
-        let specs = effects.filter_map(|text| text.parse::<EffectSpec>().ok());
-        files.extend(specs.map(|spec| file_of::<EffectEntry>(&spec.name)));
-        // A file that cannot be opened is told of where it is used.
-        let models = [&self.model, &self.real.model].into_iter().flatten();
-        for model in models.filter_map(|path| RefinedModel::open(path).ok()) {
-            let names = model.effects.iter().map(|e| &e.name);
-            files.extend(names.map(|name| file_of::<EffectEntry>(name)));
-        }
-        used(&files)
-    }
-}
-
-/// The explorer, told the file of `--policy`.
-fn with_policy(mut explorer: Component, policy: Option<&Path>) -> Result<Component> {
-    let Some(file) = policy else {
-        return Ok(explorer);
+/// Prints the settings.
+pub fn print(arguments: &Arguments) -> Result<()> {
+    let task = (find::<TaskEntry>(&arguments.task)?.make)()?;
+    let common = Common {
+        backend: arguments.backend.clone(),
+        preset: arguments.preset.clone(),
+        set: arguments.set.clone(),
+        config: arguments.config.clone(),
+        ..Common::default()
     };
-    let Some(setting) = explorer.settings.get_mut("policy") else {
-        let message = format!("the explorer `{}` plays no trained policy", explorer.name);
-        return Err(wrong("--policy", message));
+    let levels = difficulty::levels(&*task, &common)?;
+    let task = difficulty::at(task, &levels)?;
+    let (algorithms, worlds) = (&arguments.algorithms, &arguments.worlds);
+    let (config, _) = Config::resolve(Stage::Run, &*task, &common, algorithms, worlds)?;
+    let mut page = format!(
+        "# Settings of `asid run {}`. A setting is changed by --set KEY=VALUE, with the section before\n\
+         # its name, such as --set explorer.name=value; this text in a file is read by --config FILE.\n",
+        task.name()
+    );
+    let table = toml::Table::try_from(&config)?;
+    write(&table, &[], &meanings_of(&config, &*task)?, &mut page);
+    std::io::stdout().lock().write_all(page.as_bytes())?;
+    Ok(())
+}
+
+/// What every setting means, by its whole key.
+fn meanings_of(config: &Config, task: &dyn Task) -> Result<Meanings> {
+    let mut all = meanings::<Config>();
+    let mut add = |section: &str, found: Meanings| {
+        all.extend(
+            found
+                .into_iter()
+                .map(|(k, v)| (format!("{section}.{k}"), v)),
+        );
     };
-    *setting = file.display().to_string().into();
-    Ok(explorer)
-}
-
-/// The condition whose truths are drawn from the whole prior; every task has it.
-pub const PRIOR: &str = "prior";
-
-/// Checks that a task has a condition of this name.
-pub fn check_condition(all: &[Condition], name: &str) -> Result<()> {
-    let known = || all.iter().map(|c| &*c.name).chain([PRIOR]);
-    if known().any(|k| k == name) {
-        return Ok(());
+    add("explorer", of::<dyn Explorer>(&config.explorer.name)?);
+    add("identifier", of::<dyn Identifier>(&config.identifier.name)?);
+    add("solver", of::<dyn TaskSolver>(&config.solver.name)?);
+    for level in task.difficulty() {
+        let [low, high] = level.range;
+        let unit = Some(level.unit).filter(|u| !u.is_empty());
+        let unit = unit.map_or_else(String::new, |u| format!(", {u}"));
+        let text = format!("{}{unit}. From {low} to {high}.", level.about);
+        all.insert(format!("difficulty.{}", level.name), text);
     }
-    Err(Error::unknown("condition", name, known()).into())
+    for p in task
+        .parameters()
+        .into_iter()
+        .chain(task.optional_parameters())
+    {
+        let unit = Some(p.unit).filter(|u| !u.is_empty());
+        let text = unit.map_or_else(|| "An unknown.".into(), |u| format!("An unknown, in {u}."));
+        let of_unknown = meanings::<ParameterConfig>().into_iter();
+        all.extend(of_unknown.map(|(k, v)| (format!("parameter.{}.{k}", p.name), v)));
+        all.insert(format!("parameter.{}", p.name), text);
+    }
+    Ok(all)
 }
 
-/// Plugins that a configuration file names.
-pub fn plugins(path: &Path) -> Result<Vec<PathBuf>> {
-    match read_table(path)?.get("plugins") {
-        None => Ok(Vec::new()),
-        Some(value) => value
-            .as_array()
-            .and_then(|a| a.iter().map(|v| v.as_str().map(PathBuf::from)).collect())
-            .ok_or_else(|| wrong("plugins", format!("{value} is not a list of files"))),
+/// What the settings of an algorithm mean, its name among them.
+fn of<T: ?Sized + 'static>(name: &str) -> Result<Meanings>
+where
+    AlgorithmEntry<T>: Entry,
+{
+    let entry = find::<AlgorithmEntry<T>>(name)?;
+    let mut found = (entry.meanings)();
+    found.insert("name".into(), format!("{name}: {}.", entry.about));
+    Ok(found)
+}
+
+/// Writes the table at `path`: its values, each under its meaning, then its inner tables.
+fn write(table: &toml::Table, path: &[&str], meanings: &Meanings, page: &mut String) {
+    let meaning = |path: &[&str]| meanings.get(&path.join("."));
+    for (key, value) in table.iter().filter(|(_, v)| !v.is_table()) {
+        page.push('\n');
+        comment(meaning(&[path, &[key]].concat()), page);
+        let line = toml::Table::from_iter([(key.clone(), value.clone())]);
+        page.push_str(&line.to_string());
+    }
+    for (key, inner) in table.iter().filter_map(|(k, v)| Some((k, v.as_table()?))) {
+        let path = [path, &[key]].concat();
+        page.push_str("\n\n");
+        comment(meaning(&path), page);
+        let header: Vec<String> = path.iter().map(|k| quoted(k)).collect();
+        page.push_str(&format!("[{}]\n", header.join(".")));
+        write(inner, &path, meanings, page);
     }
 }
 
-/// The settings of a file that may have these keys and no others.
-pub fn read(path: &Path, known: &[&'static str]) -> Result<toml::Table> {
-    let table = read_table(path)?;
-    check_keys(&path.display().to_string(), &table, known)?;
-    Ok(table)
+/// A key as TOML writes it.
+fn quoted(key: &str) -> String {
+    let line = toml::Table::from_iter([(key.to_owned(), toml::Value::Boolean(true))]).to_string();
+    line.trim_end().trim_end_matches(" = true").to_owned()
 }
 
-/// A list of texts; none where the key is not there.
-pub fn texts(table: &toml::Table, key: &str) -> Result<Vec<String>> {
-    match table.get(key) {
-        None => Ok(Vec::new()),
-        Some(value) => value
-            .as_array()
-            .and_then(|a| a.iter().map(|v| v.as_str().map(str::to_owned)).collect())
-            .ok_or_else(|| wrong(key, format!("{value} is not a list of texts"))),
-    }
-}
-
-/// The file of a model: as given, else as a section says.
-fn model_file(given: &Option<PathBuf>, table: &toml::Table) -> Result<Option<PathBuf>> {
-    let set = text(table, "model")?.map(PathBuf::from);
-    Ok(given.clone().or(set))
-}
-
-/// The engine that is used where none is named: the first that is built in, MuJoCo last,
-/// so that nothing depends on a native library.
-pub fn default_backend() -> String {
-    let all = registry::all::<registry::BackendEntry>();
-    let rapier = all.iter().find(|e| e.name == "rapier");
-    rapier
-        .or(all.first())
-        .map_or_else(String::new, |e| e.name.to_owned())
-}
-
-/// The start pose of a stage that is told it, and the names of the coordinates that
-/// were not given and took the middle of their range.
-fn start(
-    stage: Stage,
-    task: &dyn Task,
-    table: &toml::Table,
-) -> Result<(BTreeMap<String, f64>, Vec<String>)> {
-    let given = numbers("start", table)?;
-    let coordinates = stage.start(task);
-    for (name, &value) in &given {
-        if coordinates.is_empty() {
-            return Err(wrong(
-                &format!("start.{name}"),
-                format!(
-                    "`{}` takes no start pose; `explore` and `solve` do",
-                    stage.name()
-                ),
-            ));
+/// A meaning as comment lines.
+fn comment(meaning: Option<&String>, page: &mut String) {
+    let mut line = String::from("#");
+    for word in meaning.map(String::as_str).unwrap_or_default().split(' ') {
+        if line.len() + 1 + word.len() > WIDTH {
+            page.push_str(&line);
+            page.push('\n');
+            line = String::from("#");
         }
-        let Some(c) = coordinates.iter().find(|c| &c.name == name) else {
-            let known = coordinates.iter().map(|c| &*c.name);
-            return Err(Error::unknown("start coordinate", name, known).into());
+        if !word.is_empty() {
+            line.push(' ');
+            line.push_str(word);
+        }
+    }
+    if line.len() > 1 {
+        page.push_str(&line);
+        page.push('\n');
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use asid_core::registry::all;
+
+    use super::*;
+
+    /// Whole keys of a table's values and inner tables.
+    fn keys(table: &toml::Table, prefix: &str) -> Vec<String> {
+        let of = |(key, value): (&String, &toml::Value)| {
+            let own = format!("{prefix}{key}");
+            let inner = value.as_table().map(|t| keys(t, &format!("{own}.")));
+            [vec![own], inner.unwrap_or_default()].concat()
         };
-        // A tracker may show an object a little outside; further off it is another unit or frame.
-        let [low, high] = c.range;
-        let slack = high - low;
-        if !(low - slack..=high + slack).contains(&value) {
-            return Err(wrong(
-                &format!("start.{name}"),
-                format!(
-                    "{value} {} is far outside the task's range, {low} to {high}",
-                    c.unit
-                ),
-            ));
-        }
+        table.iter().flat_map(of).collect()
     }
-    let missing = coordinates.iter().filter(|c| !given.contains_key(&c.name));
-    let assumed = missing.map(|c| c.name.clone()).collect();
-    let all = coordinates
-        .iter()
-        .map(|c| {
-            (
-                c.name.clone(),
-                given.get(&c.name).copied().unwrap_or(c.center()),
-            )
-        })
-        .collect();
-    Ok((all, assumed))
+
+    #[test]
+    fn every_setting_of_every_algorithm_has_a_meaning() {
+        fn check<T: ?Sized + 'static>()
+        where
+            AlgorithmEntry<T>: Entry,
+        {
+            for entry in all::<AlgorithmEntry<T>>() {
+                let meanings = (entry.meanings)();
+                for key in keys(&(entry.defaults)(), "") {
+                    assert!(
+                        meanings.contains_key(&key),
+                        "{} has no meaning of `{key}`",
+                        entry.name
+                    );
+                }
+            }
+        }
+        check::<dyn Explorer>();
+        check::<dyn Identifier>();
+        check::<dyn TaskSolver>();
+    }
+
+    #[test]
+    fn comments_are_broken_at_words_and_keys_are_quoted_where_they_must_be() {
+        let mut page = String::new();
+        comment(Some(&"word ".repeat(30)), &mut page);
+        assert!(page.lines().count() == 2 && page.lines().all(|l| l.len() <= WIDTH));
+        assert_eq!(quoted("plain-key"), "plain-key");
+        assert_eq!(quoted("robot/arm"), "\"robot/arm\"");
+    }
 }

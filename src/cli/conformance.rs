@@ -10,9 +10,9 @@ use asid_core::registry::{self, BackendEntry, Origin};
 use asid_core::{Backend, Error, Progress as _};
 use serde::Serialize;
 
-use super::config;
 use super::output::{OutFolder, write_json, write_text};
 use super::progress::Bars;
+use super::settings;
 use super::{failure, plugins, session};
 
 mod cell;
@@ -37,7 +37,7 @@ pub struct Arguments {
     /// Run this many checks at a time; results do not depend on it [default: one a core]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = super::options::threads)]
     threads: Option<usize>,
-    /// Take engines and checks from a file, such as the config.toml of another call
+    /// Take engines and checks from a file, such as the config.toml of an earlier `asid conformance`
     #[arg(long, value_name = "FILE.toml")]
     pub config: Option<PathBuf>,
     /// Write the results and their report into this folder [default: none is written]
@@ -208,12 +208,12 @@ fn bits(capabilities: asid_core::Capabilities) -> Vec<&'static str> {
 /// Engines and parts of checks' names, from the options, else from the configuration.
 fn wanted(arguments: &Arguments) -> Result<(Vec<String>, Vec<String>)> {
     let table = match &arguments.config {
-        Some(path) => config::read(path, &["backend", "check", "plugins"])?,
+        Some(path) => settings::read(path, &["backend", "check", "plugins"])?,
         None => toml::Table::new(),
     };
     let or_configured = |given: &Vec<String>, key: &str| {
         if given.is_empty() {
-            config::texts(&table, key)
+            settings::texts(&table, key)
         } else {
             Ok(given.clone())
         }

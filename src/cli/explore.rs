@@ -18,11 +18,11 @@ use asid_core::{Episode, Parameter, RealWorld as _};
 use asid_worlds::SimulatedWorld;
 use serde::Serialize;
 
-use super::config::Stage;
 use super::options::{Algorithms, Common, Worlds};
 use super::output::{OutFolder, write_json};
 use super::result::{CostResult, ExplorationResult, SCHEMA, Versions, figure};
 use super::session::Session;
+use super::settings::Stage;
 use super::{machine, stage, trace, train};
 
 /// Arguments of `explore`.

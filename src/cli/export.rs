@@ -1,14 +1,15 @@
 //! `asid export`: a task's scene, or a refined model of any machine, as one MJCF document.
 
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use asid_core::Error;
 use asid_core::registry::{TaskEntry, find};
 
-use super::config::difficulty;
 use super::machine;
 use super::options::Common;
+use super::settings::difficulty;
 
 /// Arguments of `export`.
 #[derive(clap::Args)]
@@ -22,16 +23,16 @@ pub struct Arguments {
     /// Write this file; it must not exist
     #[arg(long, visible_alias = "mjcf", value_name = "FILE.xml")]
     out: PathBuf,
-    /// Compile and replay with this engine, for a study or model: see `asid list`
+    /// Check the exported model with this engine (of a study or model only; see `asid list`)
     #[arg(long, value_name = "NAME")]
     backend: Option<String>,
-    /// Print what was written as JSON, and nothing else, on standard output
+    /// Print a summary of the export as JSON, and nothing else, on standard output
     #[arg(long)]
     json: bool,
-    /// Make the task as hard as this preset: default, or published; see its page
+    /// Set the difficulty of a task: default, or published (values of the paper or its code)
     #[arg(long, value_name = "NAME")]
     preset: Option<String>,
-    /// Set a difficulty, such as difficulty.ledge_width=0.02 (repeatable)
+    /// Set one difficulty of a task, such as difficulty.ledge_width=0.02 (repeatable)
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
 }
@@ -39,6 +40,12 @@ pub struct Arguments {
 /// Writes the scene.
 pub fn export(arguments: &Arguments) -> Result<()> {
     if let Some(path) = machine::path_of(&arguments.task)? {
+        if arguments.preset.is_some() || !arguments.set.is_empty() {
+            anyhow::bail!(
+                "`{}` is no task: --preset and --set are of tasks",
+                arguments.task
+            );
+        }
         return machine::export::export(&machine::export::Request {
             path,
             out: &arguments.out,
@@ -54,12 +61,20 @@ pub fn export(arguments: &Arguments) -> Result<()> {
     };
     let levels = difficulty::levels(&*task, &common)?;
     let task = difficulty::at(task, &levels)?;
-    create(&arguments.out, task.scene().xml())
+    create(&arguments.out, task.scene().xml())?;
+    if arguments.json {
+        let summary = serde_json::json!({
+            "schema": super::result::SCHEMA,
+            "task": arguments.task,
+            "file": arguments.out,
+        });
+        writeln!(std::io::stdout(), "{summary:#}")?;
+    }
+    Ok(())
 }
 
 /// Writes a file that must not exist.
 pub fn create(path: &Path, text: &str) -> Result<()> {
-    use std::io::Write as _;
     let failed = |e: std::io::Error| Error::File {
         path: path.to_owned(),
         message: match e.kind() {

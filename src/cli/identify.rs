@@ -13,7 +13,6 @@ use asid_core::{Episode, Error, Parameter};
 use asid_report::run::{RealWorld, RunReport};
 use serde::Serialize;
 
-use super::config::Stage;
 use super::options::{Algorithms, Common, Simulator, Worlds};
 use super::output::{OutFolder, write_json};
 use super::result::{
@@ -21,6 +20,7 @@ use super::result::{
     parameter_line,
 };
 use super::session::Session;
+use super::settings::Stage;
 use super::{failure, machine, stage, trace, train};
 
 /// A residual above this many standard deviations of the noise is more than chance and
@@ -46,7 +46,7 @@ and the gap is measured on those held out. Its folder holds refined.toml, the mo
 pub struct Arguments {
     /// The task (see `asid list`), or a study: a folder or a TOML file
     task: String,
-    /// Fit to this log of a real episode, CSV or Parquet; several are fitted together
+    /// Fit to these logs of real episodes, all together (CSV; Parquet in a build with the feature parquet)
     #[arg(long, value_name = "FILE", num_args = 1..)]
     log: Vec<PathBuf>,
     /// Trains the identifier on episodes of --explorer, saves it for the setting `network`, and

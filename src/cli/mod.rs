@@ -72,12 +72,12 @@ enum Command {
     /// Score diagnoses of cases whose effect is withheld, or make such cases
     Withheld(withheld::Arguments),
     /// Print every setting of a task with its value and meaning, as a file for --config
-    Config(settings::Arguments),
+    Config(config::Arguments),
     /// Write a task's scene, or a refined model, as plain MJCF
     Export(export::Arguments),
     /// Write a folder that a plugin starts from
     New(new::Arguments),
-    /// Write the report of a finished run anew
+    /// Make report.html of a finished run or diagnosis again
     Report(report::Arguments),
 }
 
@@ -164,7 +164,7 @@ fn run_command(cli: &Cli, mut named: Vec<PathBuf>) -> Result<()> {
         Command::Conformance(arguments) => conformance::conformance(arguments),
         Command::Diagnose(arguments) => diagnose::diagnose(arguments),
         Command::Withheld(arguments) => withheld::withheld(arguments),
-        Command::Config(arguments) => settings::print(arguments),
+        Command::Config(arguments) => config::print(arguments),
         Command::Export(arguments) => export::export(arguments),
         Command::New(arguments) => new::new(arguments),
         Command::Report(arguments) => report::report(arguments),

@@ -46,8 +46,8 @@ pub struct Common {
     /// Set a value, such as explorer.iterations=10; `asid config TASK` lists them (repeatable)
     #[arg(long, value_name = "KEY=VALUE")]
     pub set: Vec<String>,
-    /// Make the task as hard as this preset: default, or published, as in the paper where it says so; single values
-    /// by --set difficulty.NAME=VALUE
+    /// Set the difficulty: default, or published (values of the paper or its code, defaults where they give none); a
+    /// single value by --set difficulty.NAME=VALUE
     #[arg(long, value_name = "NAME")]
     pub preset: Option<String>,
     /// Write the results into this folder [default: the next free one below runs/]

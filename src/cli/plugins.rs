@@ -55,7 +55,7 @@ pub fn load(named: &[PathBuf]) -> Result<Vec<Refused>> {
 /// # Errors
 /// When the file cannot be read or its `plugins` are no list of files.
 pub fn of_config(path: Option<&Path>) -> Result<Vec<PathBuf>> {
-    path.map_or_else(|| Ok(Vec::new()), super::config::plugins)
+    path.map_or_else(|| Ok(Vec::new()), super::settings::plugins)
 }
 
 /// Files that were named in this call, and those that registered what it uses.

@@ -9,11 +9,11 @@ use asid_core::signal::Signal;
 use asid_core::{Backend, Capabilities, Error, Model, Parameter, Problem, Streams, Task};
 use asid_worlds::{SimulatedWorld, TrackerErrors};
 
-use super::config::{Config, Stage, difficulty};
 use super::model::{self, Needs};
 use super::options::{Algorithms, Common, Worlds};
 use super::progress::Bars;
 use super::result::CostResult;
+use super::settings::{Config, Stage, difficulty};
 use super::world::{PerturbedResult, World};
 
 /// An open task.
@@ -111,7 +111,7 @@ impl Session {
             env_steps: AtomicU64::new(0),
             config,
         };
-        asid_algorithms::fisher::sensitivity::check_parameters(&session.problem())?;
+        asid_algorithms::fisher::inert::check_parameters(&session.problem())?;
         session.real = World::open(&session, &scene, session.world_streams())?;
         Ok(session)
     }

@@ -10,11 +10,11 @@ use asid_core::registry::{SolverEntry, find};
 use asid_core::{Control, Episode, Error, Posterior, Rollout};
 use serde::Serialize;
 
-use super::config::Stage;
 use super::options::{Algorithms, Common, Simulator, Worlds};
 use super::output::{OutFolder, write_json};
 use super::result::{CostResult, ParameterResult, SCHEMA, Versions};
 use super::session::Session;
+use super::settings::Stage;
 use super::stage::{self, Named};
 use super::trace;
 

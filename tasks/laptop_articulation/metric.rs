@@ -1,4 +1,4 @@
-//! The lid's angle, from the poses of base and lid.
+//! When closing the lid succeeds: the lid's angle, from the poses of base and lid.
 
 use asid_core::signal::{unit_quaternion, yaw};
 use asid_core::task::{Outcome, Outline};

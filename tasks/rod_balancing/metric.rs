@@ -1,4 +1,4 @@
-//! The tilt of the rod, from its pose.
+//! When balancing succeeds: the tilt of the rod, from its pose.
 
 use asid_core::signal::unit_quaternion;
 use asid_core::task::{Outcome, Outline};

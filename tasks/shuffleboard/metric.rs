@@ -1,4 +1,4 @@
-//! How far from the zone's middle the puck comes to rest.
+//! When a shot succeeds: how far from the zone's middle the puck comes to rest.
 
 use asid_core::task::Outcome;
 

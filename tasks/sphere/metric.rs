@@ -1,4 +1,4 @@
-//! How far from the goal the ball comes to rest.
+//! When a strike succeeds: how far from the goal the ball comes to rest.
 
 use asid_core::task::Outcome;
 

@@ -3,7 +3,7 @@
 use asid_effects::Start;
 
 use crate::candidate::Candidate;
-use crate::latent_force::unknown::Unknown;
+use crate::latent_force::fitted_value::Unknown;
 
 /// One way to take a candidate: some values to begin with, and the columns that stand for it.
 #[derive(Clone, Debug)]

@@ -6,9 +6,9 @@ use asid_core::Result;
 
 use crate::latent_force::context::Context;
 use crate::latent_force::estimate::Estimate;
+use crate::latent_force::fitted_value::Unknown;
 use crate::latent_force::step_map::{Derivatives, LinearEpisode, StepMap, Variation};
 use crate::latent_force::tangent::difference;
-use crate::latent_force::unknown::Unknown;
 
 /// Linearisations that slopes along rows are kept for: their trajectory moves in each.
 const KEPT: usize = 3;

@@ -11,8 +11,8 @@ use asid_core::registry::{self, AlgorithmEntry, Entry, TaskEntry, find};
 use asid_core::{Explorer, Identifier, Task, TaskSolver};
 use asid_learned::learning::SHIPPED;
 
-use crate::cli::config::{Config, Stage, difficulty};
 use crate::cli::options::{Algorithms, Common, Worlds};
+use crate::cli::settings::{Config, Stage, difficulty};
 
 /// An arm with its resolved settings.
 #[derive(Clone)]
@@ -193,7 +193,7 @@ where
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cli::config::ASID;
+    use crate::cli::settings::ASID;
 
     #[test]
     fn the_method_asid_is_what_a_run_does_by_itself() {

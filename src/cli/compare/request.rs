@@ -12,9 +12,9 @@ use asid_core::registry::{
 use asid_effects::EffectSpec;
 
 use super::Arguments;
-use crate::cli::config::{PRIOR, check_condition, default_backend, read_table, set};
 use crate::cli::list;
 use crate::cli::plugins::{file_of, used};
+use crate::cli::settings::{PRIOR, check_condition, default_backend, read_table, set};
 
 fn wrong(key: &str, message: impl Into<String>) -> anyhow::Error {
     Error::Config {

@@ -54,7 +54,7 @@ impl Trainer<'_> {
         arm.common.threads = self.threads;
         arm.common.quiet = self.quiet;
         let key = CellKey {
-            condition: crate::cli::config::PRIOR.to_owned(),
+            condition: crate::cli::settings::PRIOR.to_owned(),
             world: MATCHED.to_owned(),
             seed: self.seed,
             ..key.clone()

@@ -13,9 +13,9 @@ use asid_effects::EffectEntry;
 use asid_effects::refined_model::RefinedModel;
 use serde::{Deserialize, Serialize};
 
-use super::super::config::{self, difficulty};
 use super::super::model::{self, Needs};
 use super::super::session::backend;
+use super::super::settings::{self, difficulty};
 use super::Arguments;
 
 /// `config.toml` of a diagnosis.
@@ -152,11 +152,11 @@ impl Config {
     pub fn resolve(arguments: &Arguments) -> Result<(Self, Option<toml::Table>)> {
         let common = &arguments.common;
         let mut table = match &common.config {
-            Some(path) => config::read_table(path)?,
+            Some(path) => settings::read_table(path)?,
             None => toml::Table::new(),
         };
         for setting in &common.set {
-            config::set(&mut table, setting)?;
+            settings::set(&mut table, setting)?;
         }
         let mut of_run = toml::Table::new();
         let runs_task = arguments.runs_task(&table);

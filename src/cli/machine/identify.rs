@@ -16,12 +16,12 @@ use asid_sysid::gap::gap;
 use serde::{Deserialize, Serialize};
 
 use super::Subject;
-use crate::cli::config::{read_table, set};
 use crate::cli::failure;
 use crate::cli::options::Common;
 use crate::cli::output::{OutFolder, write_json, write_text};
 use crate::cli::progress::Bars;
 use crate::cli::result::{CostResult, ParameterResult, SCHEMA, caveats, parameter_line};
+use crate::cli::settings::{read_table, set};
 use crate::cli::{run, trace};
 
 /// `config.toml`.

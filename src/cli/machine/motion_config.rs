@@ -11,8 +11,8 @@ use asid_sysid::limits::{LimitRequest, REST};
 use serde::{Deserialize, Serialize};
 
 use super::Subject;
-use crate::cli::config::{read_table, set};
 use crate::cli::options::Common;
+use crate::cli::settings::{read_table, set};
 
 /// Length of a motion where nothing is said, s: some swings of an arm.
 const SECONDS: f64 = 5.0;

@@ -139,6 +139,26 @@ fn compliance_lets_a_load_sag_by_its_weight_times_itself() {
     near(run.at(3.0, 0), -G * (1.0 / 1000.0 + compliance), 1e-2);
 }
 
+/// A servo whose limit is stated twice, by `forcelimited` and by its range.
+#[test]
+fn compliance_keeps_the_limit_of_a_servo_that_says_it_is_limited() {
+    let limited = r#"<position name="servo" joint="rail" kp="1000" kv="60" forcelimited="true" forcerange="-5 5"/>"#;
+    let plain = r#"<position name="servo" joint="rail" kp="1000" kv="60"/>"#;
+    let model = SERVO.model.replace(plain, limited);
+    let machine = asid_withheld::machine::Machine {
+        model: Box::leak(model.into_boxed_str()),
+        ..SERVO
+    };
+    let run = Setup::new(machine, "joint-compliance", "rail", 0.002).run(|_| 0.0);
+    // 5 N of drive against 9.81 N of weight: the load falls, held back by its damping of 2 N s/m.
+    let (pull, damping) = (G - 5.0, 2.0);
+    near(
+        run.at(1.0, 1),
+        -pull / damping * (1.0 - f64::exp(-damping)),
+        2e-2,
+    );
+}
+
 #[test]
 fn backlash_hangs_a_load_half_its_width_lower() {
     let width = 0.03;

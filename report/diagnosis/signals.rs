@@ -147,7 +147,7 @@ fn figure(trace: &SignalTrace, shown: Shown) -> Figure {
     }
     let noise = if trace.has_noise() {
         format!(
-            " times the noise of {}",
+            ", in units of the noise ({})",
             quantity(&significant(trace.noise, 2), &trace.unit)
         )
     } else {
@@ -156,9 +156,16 @@ fn figure(trace: &SignalTrace, shown: Shown) -> Figure {
     let (chart, outside) = readings(trace, shown);
     let outside = match &outside[..] {
         [] => String::new(),
-        names => format!(" The {} model leaves the picture.", names.join(" and the ")),
+        [name] => format!(" The curve of the {name} model runs off the plot."),
+        names => format!(
+            " The curves of the {} models run off the plot.",
+            names.join(" and ")
+        ),
     };
-    let caption = format!("Off by: {}{noise}.{outside}", steps.join(", "));
+    let caption = format!(
+        "Root mean square error{noise}: {}.{outside}",
+        steps.join(", ")
+    );
     Figure::new(
         trace.signal.clone(),
         chart.description(caption.clone()),
