@@ -54,6 +54,14 @@ pub struct Found {
     pub explanation: Explanation,
 }
 
+/// What a round of screening found.
+struct Round {
+    /// Best first.
+    screened: Vec<Screened>,
+    /// Candidates that it did not come to, because the work was stopped.
+    skipped: Vec<usize>,
+}
+
 /// What a search found.
 pub struct Findings {
     /// Without any effect, at the last stage.
@@ -125,7 +133,7 @@ impl Search<'_> {
             candidates: Vec::new(),
             explanation: none[stage].clone(),
         };
-        let screened = self.round(0, &nothing(0))?;
+        let Round { screened, skipped } = self.round(0, &nothing(0))?;
         let mut all = self.fit_round(0, &nothing(0), &screened, &[], self.quota(0))?;
         self.sort(&mut all);
         let mut before = NEGLIGIBLE / GROWN;
@@ -162,7 +170,7 @@ impl Search<'_> {
                 let beam = if stage == 0 { self.breadth.beam } else { 1 };
                 let bases: Vec<Found> = smaller.take(beam).cloned().collect();
                 for base in bases {
-                    let round = self.round(stage, &base)?;
+                    let round = self.round(stage, &base)?.screened;
                     let quota = (self.quota(stage) / 2).max(2);
                     let new = self.fit_round(stage, &base, &round, &all, quota)?;
                     all.extend(new);
@@ -171,7 +179,7 @@ impl Search<'_> {
             }
             before = self.gap(stage, &all);
         }
-        let not_tried = self.not_tried(stopped_at, &screened, &all);
+        let not_tried = self.not_tried(stopped_at, (&screened, &skipped), &all);
         Ok(Findings {
             none: none[last].clone(),
             short: self.bench.stages[0]
@@ -192,7 +200,7 @@ impl Search<'_> {
     fn not_tried(
         &self,
         stage: Option<usize>,
-        screened: &[Screened],
+        (screened, skipped): (&[Screened], &[usize]),
         all: &[Found],
     ) -> Vec<NotTried> {
         let Some(stage) = stage else {
@@ -206,7 +214,11 @@ impl Search<'_> {
             }
         }
         let label = |c: &usize| self.candidates[*c].label();
-        vec![
+        let screening = NotTried {
+            stage: "screening".into(),
+            effects: skipped.iter().map(label).collect(),
+        };
+        let mut not_tried = vec![
             NotTried {
                 stage: format!(
                     "search on the logs from stage {} of {} on",
@@ -219,7 +231,11 @@ impl Search<'_> {
                 stage: "fits of what leads in screening".into(),
                 effects: open.iter().map(label).collect(),
             },
-        ]
+        ];
+        if !skipped.is_empty() {
+            not_tried.push(screening);
+        }
+        not_tried
     }
 
     fn sort(&self, all: &mut [Found]) {
@@ -308,15 +324,18 @@ impl Search<'_> {
     }
 
     /// Screens all candidates upon an explanation, best first.
-    fn round(&self, stage: usize, base: &Found) -> Result<Vec<Screened>> {
+    fn round(&self, stage: usize, base: &Found) -> Result<Round> {
         let trials = trials(self.candidates, &base.candidates, &base.explanation);
         let linear = Base::new(self.bench, stage, &trials, &base.explanation)?;
         let record = &self.bench.stages[stage].record;
         let mut proposals = Vec::new();
         self.progress
             .begin("screening", self.candidates.len() as u64);
+        let mut skipped = Vec::new();
         for (i, candidate) in self.candidates.iter().enumerate() {
-            if stage > 0 && self.progress.is_stopped() {
+            // One proposal at least, so that there is something to say.
+            if !proposals.is_empty() && self.progress.is_stopped() {
+                skipped.extend(i..self.candidates.len());
                 break;
             }
             if !base.candidates.contains(&i) {
@@ -334,6 +353,10 @@ impl Search<'_> {
         let mut all = Vec::new();
         self.progress.begin("trying the best", chosen.len() as u64);
         for (i, proposals) in &chosen {
+            if !all.is_empty() && self.progress.is_stopped() {
+                skipped.push(*i);
+                continue;
+            }
             let candidate = &self.candidates[*i];
             all.extend(take(self.bench, record, &linear, candidate, proposals)?);
             self.progress.advance(1);
@@ -346,7 +369,10 @@ impl Search<'_> {
             .map(|s| (self.candidates[s.candidate].label(), gap(s)));
         self.progress
             .ranking("gap in screening", &rows.collect::<Vec<_>>());
-        Ok(all)
+        Ok(Round {
+            screened: all,
+            skipped,
+        })
     }
 
     /// Fits the best of a round of screening, but for sets that are known.

@@ -137,7 +137,10 @@ impl Search<'_> {
         let mut best: Option<Tried> = None;
         for one in tried {
             let misses = self.all.misses(&one.hypothesis.view)?;
-            let one = self.judged(one.hypothesis, &given, &misses);
+            let mut one = self.judged(one.hypothesis, &given, &misses);
+            if self.is_nonsense(&one.hypothesis, &misses) {
+                one.probability = one.probability.min(self.settings.named / 2.0);
+            }
             if best.as_ref().is_none_or(|b| one.shrinkage > b.shrinkage) {
                 best = Some(one);
             }
@@ -168,6 +171,15 @@ impl Search<'_> {
             (true, None) => any,
         };
         self.quantities.iter().map(of).collect()
+    }
+
+    /// Whether a mended column would be in question again. A unit that is far too large makes everything fly on, so that the
+    /// column says nothing against the model, and nothing for it.
+    fn is_nonsense(&self, hypothesis: &Hypothesis, misses: &Misses) -> bool {
+        let missed = Settings::missed(misses, self.settings.nonsense);
+        let quantities = hypothesis.quantities.iter().map(|&q| &self.quantities[q]);
+        let mut readings = quantities.filter(|q| !q.command);
+        hypothesis.fault == Fault::Unit && readings.any(|q| missed[q.place])
     }
 
     /// Whether the starts that logs give speak against a view.
