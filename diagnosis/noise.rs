@@ -186,7 +186,7 @@ pub fn median(values: &mut [f64]) -> Option<f64> {
 }
 
 /// Readings of a sensor, component after component.
-fn readings(logs: &Logs, sensor: usize) -> Vec<Vec<f64>> {
+pub(crate) fn readings(logs: &Logs, sensor: usize) -> Vec<Vec<f64>> {
     let width = logs.width();
     let mut at = 0;
     for s in &logs.sensors[..sensor] {

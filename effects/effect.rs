@@ -176,6 +176,10 @@ pub trait Effect: Send + Sync {
     fn unusual_at(&self, _plant: &Plant, _site: &str) -> bool {
         false
     }
+    /// Whether it rounds readings to multiples of its one parameter: a log shows that by itself.
+    fn rounds(&self) -> bool {
+        false
+    }
     /// What an engine must be able to do for it, besides setting its targets and, where it
     /// [steps](Effect::steps), calling hooks.
     fn needs(&self) -> Capabilities {

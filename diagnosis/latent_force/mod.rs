@@ -7,7 +7,7 @@
 //! From below: [`tangent`] (states), [`walk`] (rows), [`segments`] (where bodies touch), [`step_map`] (the model over a row and its derivatives),
 //! [`smoother`], [`initial`], [`context`] and [`estimate`] (trajectory, force and noise), [`fitted_value`] and [`fit`] (a model with its values),
 //! [`evidence`], [`trace`], [`columns`], [`screen`], [`search`], [`selection`],
-//! `picture` (what the report draws of the force), [`pipeline`].
+//! `steps` (encoder steps), `picture` (what the report draws of the force), [`pipeline`].
 
 pub mod columns;
 pub mod context;
@@ -24,6 +24,7 @@ pub mod segments;
 pub mod selection;
 pub mod smoother;
 pub mod step_map;
+mod steps;
 pub mod tangent;
 mod touching;
 pub mod trace;

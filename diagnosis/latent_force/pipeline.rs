@@ -19,6 +19,7 @@ use super::fitted_value::Unknown;
 use super::picture::forces;
 use super::search::{Breadth, search};
 use super::selection::select;
+use super::steps::{beside, seen};
 
 use replays::replay;
 use rows::{along, replays_are_affordable, take};
@@ -75,10 +76,14 @@ pub fn diagnose(
             &none.estimate.trajectory,
         )?;
         let (candidates, left_out) = enumerate(&bench.machine, &shown, without);
-        let outcome = search(&context, &none, &candidates, Breadth::default(), progress)?;
+        let seen = seen(&logs, &candidates);
+        let known: Vec<usize> = seen.iter().map(|s| s.candidate).collect();
+        let offered = (&candidates[..], &known[..]);
+        let outcome = search(&context, &none, offered, Breadth::default(), progress)?;
         let firsts = (0..context.walks.len()).filter(|&w| context.walks[w].rows[0] == 0);
         let firsts = firsts.collect::<Vec<_>>();
         let forces = forces(&context, &outcome, &candidates)?;
+        let outcome = beside(outcome, &seen, &candidates);
         (outcome, candidates, left_out, firsts, forces)
     };
     progress.begin("replaying", 1);

@@ -42,14 +42,14 @@ pub struct Outcome {
     pub untried: Vec<Untried>,
 }
 
-/// Searches upon the model without effects.
+/// Searches upon the model without effects, among `candidates` without those that are `known` to act or not.
 ///
 /// # Errors
 /// When the engine fails.
 pub fn search(
     context: &Context<'_>,
     none: &Fitted,
-    candidates: &[Candidate],
+    (candidates, known): (&[Candidate], &[usize]),
     breadth: Breadth,
     progress: &dyn Progress,
 ) -> Result<Outcome> {
@@ -77,7 +77,8 @@ pub fn search(
             break;
         }
         let open: Vec<usize> = (0..candidates.len())
-            .filter(|&c| !best.candidates.contains(&c) && is_due(candidates, &best, c))
+            .filter(|c| !best.candidates.contains(c) && !known.contains(c))
+            .filter(|&c| is_due(candidates, &best, c))
             .collect();
         let upon = Upon {
             context,

@@ -115,6 +115,10 @@ impl Effect for Reading {
         }
     }
 
+    fn rounds(&self) -> bool {
+        matches!(self, Self::Quantization)
+    }
+
     fn sites(&self, plant: &Plant) -> Vec<String> {
         sensors(plant)
     }

@@ -195,6 +195,9 @@ impl Effect for Across<Box<dyn Effect>> {
     fn unusual_at(&self, plant: &Plant, site: &str) -> bool {
         self.run(|effect| effect.unusual_at(plant, site))
     }
+    fn rounds(&self) -> bool {
+        self.run(|effect| effect.rounds())
+    }
 
     fn needs(&self) -> Capabilities {
         self.run(|effect| effect.needs())

@@ -41,10 +41,11 @@ pub struct Arguments {
 pub fn export(arguments: &Arguments) -> Result<()> {
     if let Some(path) = machine::path_of(&arguments.task)? {
         if arguments.preset.is_some() || !arguments.set.is_empty() {
-            anyhow::bail!(
-                "`{}` is no task: --preset and --set are of tasks",
-                arguments.task
-            );
+            return Err(Error::Config {
+                key: "--preset, --set".into(),
+                message: format!("are of tasks, and `{}` is none", arguments.task),
+            }
+            .into());
         }
         return machine::export::export(&machine::export::Request {
             path,

@@ -33,6 +33,8 @@ pub enum Truth {
     Delay(f64),
     /// The position is read too large, m.
     SensorBias(f64),
+    /// The speed is read in steps, m/s.
+    SpeedSteps(f64),
     /// A magnet at 0.05 m, N: in no catalogue.
     Magnet(f64),
     /// There are no readings but noise.
@@ -44,7 +46,7 @@ pub const MASS: f64 = 1.3;
 const DAMPING: f64 = 2.0;
 const SECONDS: f64 = 2.4;
 /// Deviations of the noise, m and m/s.
-const NOISE: [f64; 2] = [5e-4, 5e-3];
+pub const NOISE: [f64; 2] = [5e-4, 5e-3];
 
 /// A command of a few sines, different for each episode, N.
 fn command(episode: usize, t: f64) -> f64 {
@@ -100,7 +102,10 @@ pub fn log(truth: Truth, episode: usize) -> String {
             Truth::Noise => [0.0, 0.0],
             _ => [x + bias, v],
         };
-        let readings = [seen[0] + NOISE[0] * normal(), seen[1] + NOISE[1] * normal()];
+        let mut readings = [seen[0] + NOISE[0] * normal(), seen[1] + NOISE[1] * normal()];
+        if let Truth::SpeedSteps(step) = truth {
+            readings[1] = (readings[1] / step).round() * step;
+        }
         let start = if row == 0 { "0,0" } else { "," };
         let u = if truth == Truth::Noise {
             0.0

@@ -72,6 +72,9 @@ pub(super) fn ranking(
 pub(super) fn isolability(candidates: &[Candidate], outcome: &Outcome) -> Option<Isolability> {
     let (leading, cosines) = &outcome.rounds.first()?.alike;
     let n = leading.len();
+    if n == 0 {
+        return None;
+    }
     let angle = |i: usize, j: usize| {
         let angle = cosines[(i, j)].min(1.0).acos();
         ((angle * ANGLES).round() / ANGLES).min(FRAC_PI_2)

@@ -1,0 +1,31 @@
+//! An encoder whose steps are far wider than the sensor's noise: rounding has no slope, and the log shows it by itself.
+
+use super::world::{NOISE, Truth, write_study};
+use super::{MASS, run_on};
+
+/// Sixty deviations of the noise, m/s.
+const STEP: f64 = 0.3;
+
+#[test]
+fn steps_wider_than_the_noise_are_named_with_their_width_and_hide_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    write_study(folder.path(), Truth::SpeedSteps(STEP));
+    let path = folder.path().join("study.toml");
+    let study = std::fs::read_to_string(&path).unwrap();
+    let noise = format!("[noise]\nx = {}\ndx = {}\n", NOISE[0], NOISE[1]);
+    std::fs::write(&path, study + &noise).unwrap();
+    let r = run_on(folder.path(), &[]).0.result;
+    assert_eq!(r.verdict.effects, ["sensor-quantization@dx"]);
+    assert!(r.verdict.probability > 0.9, "{}", r.verdict.probability);
+    let step = r.effects[0].parameters["step"];
+    assert!((step - STEP).abs() < 0.01 * STEP, "{step}");
+    let mass = r.parameters.iter().find(|p| p.name == "mass").unwrap();
+    assert!(
+        (mass.estimate - MASS).abs() < 0.02 * MASS,
+        "{}",
+        mass.estimate
+    );
+    // The steps' own deviation is seventeen times the noise.
+    let [before, after] = [r.gap.identified, r.gap.refined];
+    assert!(before > 8.0 && after < 0.3 * before, "{before} {after}");
+}
