@@ -229,6 +229,13 @@ impl Bench {
         Ok(explanation)
     }
 
+    /// Sets the noise of each sensor in all records.
+    pub fn set_noise(&mut self, noise: &[f64]) {
+        for record in [&mut self.train, &mut self.test, &mut self.head] {
+            record.logs.set_noise(noise);
+        }
+    }
+
     /// Whether predictions scatter in some episode.
     #[must_use]
     pub fn is_rough(&self) -> bool {

@@ -202,9 +202,7 @@ fn final_noise(
             None => x.min(s.noise),
         })
         .collect();
-    for record in [&mut bench.train, &mut bench.test, &mut bench.head] {
-        record.logs.set_noise(&noise);
-    }
+    bench.set_noise(&noise);
     rescore(bench, &[], &mut findings.none)?;
     for found in &mut findings.found {
         let trials = trials(candidates, &found.candidates, &found.explanation);

@@ -150,9 +150,7 @@ pub fn set_reading_noise(bench: &mut Bench, given: &BTreeMap<String, f64>) {
         .zip(estimated)
         .map(|(s, x)| given.get(&s.name).copied().unwrap_or(x))
         .collect();
-    for record in [&mut bench.train, &mut bench.test, &mut bench.head] {
-        record.logs.set_noise(&noise);
-    }
+    bench.set_noise(&noise);
 }
 
 /// Prepares a study on a machine.

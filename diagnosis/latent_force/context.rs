@@ -5,7 +5,7 @@ use asid_core::{Parameter, Result};
 use asid_effects::EffectSpec;
 use asid_mjcf::Plant;
 
-use crate::data::{Entry, Logs};
+use crate::data::Logs;
 use crate::machine::Machine;
 use crate::predict::State;
 
@@ -13,7 +13,6 @@ use super::estimate::Estimate;
 use super::initial::{from_readings, open_by_reading, position_noise, start, start_of_segment};
 use super::smoother::{NoiseModel, Start};
 use super::step_map::{Derivatives, StepMap};
-use super::steps::roundings;
 use super::walk::Walk;
 
 /// Change of a segment's start that slopes are taken over, as a share of what its readings leave open.
@@ -167,11 +166,7 @@ pub fn begin<'a>(
     let (nv, width) = (layout.nv, layout.nq + layout.nv);
     let mut trajectory = from_readings(plant, logs, &taken.walks, &taken.otherwise);
     let read = trajectory.iter().map(|s| s[..width].to_vec());
-    let roundings = roundings(logs);
-    let variance = |e: &Entry| {
-        let noise = logs.sensors[e.sensor].noise;
-        noise.max(roundings[e.sensor]).powi(2)
-    };
+    let noise = logs.entry_noise();
     let mut context = Context {
         machine,
         logs,
@@ -180,7 +175,7 @@ pub fn begin<'a>(
         open: taken.open,
         scale: taken.scale,
         position_noise: position_noise(plant, logs),
-        reading_variance: logs.entries.iter().map(variance).collect(),
+        reading_variance: noise.iter().map(|n| n * n).collect(),
         inertial: vec![0.0; nv],
         walks: taken.walks,
     };

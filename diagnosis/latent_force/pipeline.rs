@@ -19,7 +19,7 @@ use super::fitted_value::Unknown;
 use super::picture::forces;
 use super::search::{Breadth, search};
 use super::selection::select;
-use super::steps::{beside, seen};
+use super::steps::{beside, known, noise_with_steps, shown};
 
 use replays::replay;
 use rows::{along, replays_are_affordable, take};
@@ -42,6 +42,9 @@ pub fn diagnose(
     progress.begin("smoothing the logs", 1);
     let (mut bench, nominal) = dataset(study, machine)?;
     set_reading_noise(&mut bench, &study.noise);
+    let shown_steps = shown(&bench.train.logs);
+    // Until the end, where gaps are told in units of the sensors' own noise.
+    bench.set_noise(&noise_with_steps(&bench.train.logs));
     let logs = bench.train.logs.clone();
     let unknowns = study.parameters.iter().zip(&nominal);
     let hypothesis = Hypothesis {
@@ -55,7 +58,7 @@ pub fn diagnose(
         progress.end();
         return Ok(Err(bench.machine));
     }
-    let (outcome, candidates, left_out, firsts, forces) = {
+    let (outcome, candidates, left_out, firsts, forces, members) = {
         let parameters = (&study.parameters[..], &nominal[..]);
         let (context, mut estimate) = begin(&bench.machine, &logs, taken, parameters)?;
         settle_noise(&context, &hypothesis, &nominal, &mut estimate, FIRST)?;
@@ -76,22 +79,22 @@ pub fn diagnose(
             &none.estimate.trajectory,
         )?;
         let (candidates, left_out) = enumerate(&bench.machine, &shown, without);
-        let seen = seen(&logs, &candidates);
-        let known: Vec<usize> = seen.iter().map(|s| s.candidate).collect();
-        let offered = (&candidates[..], &known[..]);
+        let steps = known(&shown_steps, &candidates);
+        let members: Vec<usize> = steps.iter().map(|s| s.candidate).collect();
+        let offered = (&candidates[..], &members[..]);
         let outcome = search(&context, &none, offered, Breadth::default(), progress)?;
         let firsts = (0..context.walks.len()).filter(|&w| context.walks[w].rows[0] == 0);
         let firsts = firsts.collect::<Vec<_>>();
         let forces = forces(&context, &outcome, &candidates)?;
-        let outcome = beside(outcome, &seen, &candidates);
-        (outcome, candidates, left_out, firsts, forces)
+        let outcome = beside(outcome, &steps, &candidates);
+        (outcome, candidates, left_out, firsts, forces, members)
     };
     progress.begin("replaying", 1);
-    let parts = (&candidates[..], &outcome);
+    let parts = (&candidates[..], &outcome, &members[..]);
     let (mut findings, sets) = replay(&mut bench, parts, &firsts, progress)?;
     findings.forces = forces;
     progress.end();
-    let judgement = select(&bench, &outcome, &sets, &findings, &candidates);
+    let judgement = select(&bench, &outcome, (&sets, &members), &findings, &candidates);
     Ok(Ok(Work {
         none: vec![findings.none.clone()],
         bench,

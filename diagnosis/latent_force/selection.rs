@@ -23,12 +23,13 @@ const GAP_SCALE: f64 = 0.3;
 /// Root mean square of the missing force, relative to the inertial forces, up to which nothing is missing.
 const NOTHING: f64 = 0.01;
 
-/// Judges what a search found; `sets` are those behind the findings, in their order.
+/// Judges what a search found; `sets` are those behind the findings, in their order, and `known` the candidates that the logs
+/// show to act without a search.
 #[must_use]
 pub fn select(
     bench: &Bench,
     outcome: &Outcome,
-    sets: &[Set],
+    (sets, known): (&[Set], &[usize]),
     findings: &Findings,
     candidates: &[Candidate],
 ) -> Judgement {
@@ -68,10 +69,13 @@ pub fn select(
     let readings = bench.held_readings().max(1.0);
     let gap = (findings.none.held_plain / readings).sqrt();
     let train = (findings.none.fit.cost / bench.train.readings.max(1) as f64).sqrt();
+    // What stands without a search: no effect, or the known ones.
+    let least = sets.iter().position(|s| s.candidates == known);
+    let least = least.map_or(0, |i| i + 1);
     let best = if best < all.len() && excess(gap.max(train).powi(2)) > NEGLIGIBLE {
         best
     } else {
-        0
+        least
     };
     // What parsimony passes over is not more probable than what it picks.
     for i in 0..all.len() {
@@ -87,7 +91,7 @@ pub fn select(
     // What is named may make up for most of the gap and leave much of what is missing from row to row, or the other way round.
     let rest = after.relative_to(before).min(open_loop).clamp(0.0, 1.0);
     let sigmoid = |x: f64| 1.0 / (1.0 + (-x).exp());
-    let unknown = if best == 0 {
+    let unknown = if best == least {
         let missing = before.force.sqrt() > NOTHING || before.readings > LEAST_LEFT;
         let seen = sigmoid((gap - GAP) / GAP_SCALE);
         if missing {

@@ -25,7 +25,8 @@ fn steps_wider_than_the_noise_are_named_with_their_width_and_hide_nothing() {
         "{}",
         mass.estimate
     );
-    // The steps' own deviation is seventeen times the noise.
+    // The steps' own deviation is seventeen times the noise. What is left: noise puts a reading near an edge on either side of it,
+    // sixty times the noise apart, in about one of a hundred.
     let [before, after] = [r.gap.identified, r.gap.refined];
-    assert!(before > 8.0 && after < 0.3 * before, "{before} {after}");
+    assert!(before > 8.0 && after < 0.6 * before, "{before} {after}");
 }

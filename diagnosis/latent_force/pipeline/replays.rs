@@ -57,10 +57,10 @@ fn all_sets(outcome: &Outcome) -> Vec<Set> {
 }
 
 /// Replays the model without effects, the set that stands and its nearest rivals, open loop; with the sets behind the
-/// findings.
+/// findings. The set of the `known` candidates is always among them.
 pub(super) fn replay(
     bench: &mut Bench,
-    (candidates, outcome): (&[Candidate], &Outcome),
+    (candidates, outcome, known): (&[Candidate], &Outcome, &[usize]),
     firsts: &[usize],
     progress: &dyn Progress,
 ) -> Result<(Findings, Vec<Set>)> {
@@ -115,7 +115,10 @@ pub(super) fn replay(
         sets.remove(place);
         sets.insert(0, outcome.best.clone());
     }
+    let of_known = sets.iter().position(|s| s.candidates == known);
+    let of_known = of_known.filter(|i| *i > rivals).map(|i| sets.remove(i));
     sets.truncate(1 + rivals);
+    sets.extend(of_known);
     let mut found = Vec::new();
     for (i, set) in sets.iter().enumerate() {
         let effort = if i == 0 && stands.is_some() {
