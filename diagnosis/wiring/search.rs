@@ -138,7 +138,7 @@ impl Search<'_> {
         for one in tried {
             let misses = self.all.misses(&one.hypothesis.view)?;
             let mut one = self.judged(one.hypothesis, &given, &misses);
-            if self.is_nonsense(&one.hypothesis, &misses) {
+            if self.is_nonsense(view, &one.hypothesis, &misses) {
                 one.probability = one.probability.min(self.settings.named / 2.0);
             }
             if best.as_ref().is_none_or(|b| one.shrinkage > b.shrinkage) {
@@ -173,12 +173,14 @@ impl Search<'_> {
         self.quantities.iter().map(of).collect()
     }
 
-    /// Whether a mended column would be in question again. A unit that is far too large makes everything fly on, so that the
-    /// column says nothing against the model, and nothing for it.
-    fn is_nonsense(&self, hypothesis: &Hypothesis, misses: &Misses) -> bool {
+    /// Whether a unit makes a column larger that would then be in question again. With a unit that is far too large everything flies
+    /// on, so that the column says nothing against the model, and nothing for it.
+    fn is_nonsense(&self, view: &View, hypothesis: &Hypothesis, misses: &Misses) -> bool {
         let missed = Settings::missed(misses, self.settings.nonsense);
         let quantities = hypothesis.quantities.iter().map(|&q| &self.quantities[q]);
-        let mut readings = quantities.filter(|q| !q.command);
+        let size = |view: &View, q: &Quantity| view_of(view, q).factor.abs();
+        let larger = |q: &&Quantity| size(&hypothesis.view, q) > size(view, q);
+        let mut readings = quantities.filter(|q| !q.command).filter(larger);
         hypothesis.fault == Fault::Unit && readings.any(|q| missed[q.place])
     }
 
