@@ -5,34 +5,48 @@
 //! DIR/studies/case-0000/           study.toml, nominal.xml, train_*.csv, test_*.csv
 //! DIR/sealed/labels.json           labels and salts; readable by the owner alone
 //! DIR/sealed/set.json              half, seed, count
+//! DIR/sealed/case-0000.json        label of a case that is made, until the set is whole
 //! ```
-//! A diagnosis is given `DIR/studies`.
+//! A diagnosis is given `DIR/studies`. A set that was interrupted goes on where it was: a case whose label lies there is
+//! not made again.
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::case;
 use crate::error::{Error, Result};
 use crate::label::Label;
 use crate::machine::{Half, Machine};
 use crate::plan::Plan;
-use crate::seal::{LABELS, SEAL, Seal, commitment, digest};
+use crate::seal::{LABELS, SEAL, Seal, commitment, digest, files};
 
 /// Folder of the studies, and that of the labels.
 pub const STUDIES: &str = "studies";
 /// Folder of the labels.
 pub const SEALED: &str = "sealed";
 
+/// Name of the file that tells what set this is.
+const SET: &str = "set.json";
+
 /// What set this is; for who may read the labels.
-#[derive(Serialize)]
+#[derive(PartialEq, Serialize, Deserialize)]
 struct Set {
     schema: u32,
     half: Half,
     seed: u64,
     count: usize,
+    /// Machines that others wrote.
+    outside: Vec<String>,
+}
+
+/// A case that was made.
+struct Sealed {
+    label: Label,
+    seal: String,
+    seconds: f64,
 }
 
 /// What was made.
@@ -40,9 +54,10 @@ struct Set {
 pub struct Made {
     /// Cases that were written.
     pub cases: usize,
-    /// Cases of which no draw was usable, with the reason; they are not in the set.
-    pub exhausted: Vec<String>,
-    /// Seconds that each case took.
+    /// Cases that could not be made, with the reason: no draw was usable, or MuJoCo refuses the world. They are not in the
+    /// set.
+    pub left_out: Vec<String>,
+    /// Seconds that each case took; 0 where it was there from a run before.
     pub seconds: Vec<f64>,
 }
 
@@ -60,7 +75,7 @@ impl Made {
             at(0.9).unwrap_or(0.0),
             sorted.iter().sum::<f64>(),
         )];
-        lines.extend(self.exhausted.iter().map(|e| format!("left out: {e}")));
+        lines.extend(self.left_out.iter().map(|e| format!("left out: {e}")));
         lines
     }
 }
@@ -95,11 +110,11 @@ fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
     write(path, &(text + "\n"))
 }
 
-/// Makes a set of cases in a folder that is not there yet or is empty, of the machines of a half and of those
-/// `outside` of the project. `done` is called after each case.
+/// Makes a set of cases in a folder that is new, is empty or holds a part of the same set, of the machines of a half and of
+/// those `outside` of the project. `done` is called after each case.
 ///
 /// # Errors
-/// Where the folder holds something, a file cannot be written or a model is wrong.
+/// Where the folder holds something else, or a file cannot be written.
 pub fn make(
     folder: &Path,
     half: Half,
@@ -108,64 +123,117 @@ pub fn make(
     outside: &[&'static Machine],
     done: &(dyn Fn() + Sync),
 ) -> Result<Made> {
-    let studies = folder.join(STUDIES);
-    let sealed = folder.join(SEALED);
-    if std::fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_some()) {
-        return Err(failed(folder, &"is not empty; name a new folder"));
-    }
-    for path in [&studies, &sealed] {
-        std::fs::create_dir_all(path).map_err(|e| failed(path, &e))?;
-    }
-    close(&sealed)?;
-    let plan = Plan::draw(half, seed, count, outside)?;
-    let digits = count.saturating_sub(1).to_string().len().max(3);
-    let results: Vec<Result<(String, Label, String, f64)>> = (0..count)
-        .into_par_iter()
-        .map(|number| {
-            let clock = std::time::Instant::now();
-            let case = case::make(&plan, seed, number)?;
-            let name = format!("case-{number:0digits$}");
-            let path = studies.join(&name);
-            std::fs::create_dir_all(&path).map_err(|e| failed(&path, &e))?;
-            for (file, text) in &case.study {
-                write(&path.join(file), text)?;
-            }
-            let seal = commitment(&name, &digest(&case.study), &case.label);
-            done();
-            Ok((name, case.label, seal, clock.elapsed().as_secs_f64()))
-        })
-        .collect();
-    let (mut labels, mut seals) = (BTreeMap::new(), BTreeMap::new());
-    let (mut exhausted, mut seconds) = (Vec::new(), Vec::new());
-    for result in results {
-        match result {
-            Ok((name, label, seal, took)) => {
-                labels.insert(name.clone(), label);
-                seals.insert(name, seal);
-                seconds.push(took);
-            }
-            Err(error @ Error::Exhausted { .. }) => exhausted.push(error.to_string()),
-            Err(other) => return Err(other),
-        }
-    }
-    write_json(&sealed.join(LABELS), &labels)?;
     let set = Set {
         schema: 1,
         half,
         seed,
         count,
+        outside: outside.iter().map(|m| m.name.to_owned()).collect(),
     };
-    write_json(&sealed.join("set.json"), &set)?;
+    let [studies, sealed] = open(folder, &set)?;
+    let plan = Plan::draw(half, seed, count, outside)?;
+    let digits = count.saturating_sub(1).to_string().len().max(3);
+    let results: Vec<Result<(String, Sealed)>> = (0..count)
+        .into_par_iter()
+        .map(|number| {
+            let name = format!("case-{number:0digits$}");
+            let study = studies.join(&name);
+            let label = sealed.join(&name).with_extension("json");
+            let made = match kept(&name, &study, &label)? {
+                Some(kept) => kept,
+                None => case(&plan, (seed, number), &name, (&study, &label))?,
+            };
+            done();
+            Ok((name, made))
+        })
+        .collect();
+    let (mut labels, mut seals) = (BTreeMap::new(), BTreeMap::new());
+    let (mut left_out, mut seconds) = (Vec::new(), Vec::new());
+    for (number, result) in results.into_iter().enumerate() {
+        match result {
+            Ok((name, made)) => {
+                labels.insert(name.clone(), made.label);
+                seals.insert(name, made.seal);
+                seconds.push(made.seconds);
+            }
+            Err(error @ Error::File { .. }) => return Err(error),
+            Err(error @ Error::Exhausted { .. }) => left_out.push(error.to_string()),
+            Err(other) => left_out.push(format!("case {number}: {other}")),
+        }
+    }
     let seal = Seal {
         schema: 1,
         commitment: "SHA-256 of salt, case, digest of the study's files, label".into(),
         cases: seals,
     };
     write_json(&studies.join(SEAL), &seal)?;
+    write_json(&sealed.join(LABELS), &labels)?;
+    for name in labels.keys() {
+        let part = sealed.join(name).with_extension("json");
+        std::fs::remove_file(&part).map_err(|e| failed(&part, &e))?;
+    }
     Ok(Made {
         cases: labels.len(),
-        exhausted,
+        left_out,
         seconds,
+    })
+}
+
+/// The folders of a set's studies and of its labels, made where they are not there.
+fn open(folder: &Path, set: &Set) -> Result<[PathBuf; 2]> {
+    let studies = folder.join(STUDIES);
+    let sealed = folder.join(SEALED);
+    let own = sealed.join(SET);
+    let begun = std::fs::read_to_string(&own).ok();
+    let begun = begun.and_then(|text| serde_json::from_str::<Set>(&text).ok());
+    let is_part = begun.is_some_and(|b| b == *set) && !sealed.join(LABELS).exists();
+    if !is_part && std::fs::read_dir(folder).is_ok_and(|mut e| e.next().is_some()) {
+        let message = "holds another set, or a whole one; name a new folder";
+        return Err(failed(folder, &message));
+    }
+    for path in [&studies, &sealed] {
+        std::fs::create_dir_all(path).map_err(|e| failed(path, &e))?;
+    }
+    close(&sealed)?;
+    write_json(&own, set)?;
+    Ok([studies, sealed])
+}
+
+/// A case that a run before has made.
+fn kept(name: &str, study: &Path, label: &Path) -> Result<Option<Sealed>> {
+    let Ok(text) = std::fs::read_to_string(label) else {
+        return Ok(None);
+    };
+    let label: Label = serde_json::from_str(&text).map_err(|e| failed(label, &e))?;
+    Ok(Some(Sealed {
+        seal: commitment(name, &digest(&files(study)?), &label),
+        label,
+        seconds: 0.0,
+    }))
+}
+
+/// Makes a case and writes its study and then its label.
+fn case(
+    plan: &Plan,
+    (seed, number): (u64, usize),
+    name: &str,
+    (study, label): (&Path, &Path),
+) -> Result<Sealed> {
+    let clock = std::time::Instant::now();
+    let case = case::make(plan, seed, number)?;
+    if study.exists() {
+        // What an interrupted run left of it.
+        std::fs::remove_dir_all(study).map_err(|e| failed(study, &e))?;
+    }
+    std::fs::create_dir_all(study).map_err(|e| failed(study, &e))?;
+    for (file, text) in &case.study {
+        write(&study.join(file), text)?;
+    }
+    write_json(label, &case.label)?;
+    Ok(Sealed {
+        seal: commitment(name, &digest(&case.study), &case.label),
+        label: case.label,
+        seconds: clock.elapsed().as_secs_f64(),
     })
 }
 

@@ -108,7 +108,11 @@ fn read<T: serde::de::DeserializeOwned>(path: &Path) -> Result<T> {
     serde_json::from_str(&text).map_err(|e| failed(path, &e))
 }
 
-fn files(folder: &Path) -> Result<BTreeMap<String, String>> {
+/// Names and contents of a study's files.
+///
+/// # Errors
+/// When a file cannot be read.
+pub(crate) fn files(folder: &Path) -> Result<BTreeMap<String, String>> {
     let entries = std::fs::read_dir(folder).map_err(|e| failed(folder, &e))?;
     let paths: Vec<PathBuf> = entries.filter_map(|e| Some(e.ok()?.path())).collect();
     let mut found = BTreeMap::new();

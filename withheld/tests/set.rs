@@ -15,7 +15,7 @@ const COUNT: usize = 6;
 fn made(folder: &Path, seed: u64, threads: usize) -> Result<()> {
     let work = || make(folder, Half::Training, seed, COUNT, &[], &|| {});
     let made = with_threads(threads, work)?;
-    assert_eq!(made.cases + made.exhausted.len(), COUNT);
+    assert_eq!(made.cases + made.left_out.len(), COUNT);
     Ok(())
 }
 
@@ -73,8 +73,30 @@ fn a_set_is_the_same_bytes_from_the_same_seed_and_sealed() -> Result<()> {
         assert_eq!(label.effects.is_empty(), label.kind == "none");
     }
     notices_changes(&a)?;
-    // A folder that holds something is never written into.
+    // A whole set is never written into.
     assert!(made(&a, 7, 1).is_err());
+    goes_on_where_it_was_interrupted(&a, &b)
+}
+
+/// Brings `b` to where a run may be killed: two cases are there, a third has no label yet, and the rest was not begun.
+fn goes_on_where_it_was_interrupted(a: &Path, b: &Path) -> Result<()> {
+    let remove = |path: PathBuf| std::fs::remove_file(path).expect("a file");
+    for (number, (case, label)) in labels(a).iter().enumerate() {
+        if number < 2 {
+            let text = serde_json::to_string(label).expect("a label");
+            std::fs::write(b.join("sealed").join(format!("{case}.json")), text).expect("a label");
+        } else if number > 2 {
+            std::fs::remove_dir_all(b.join("studies").join(case)).expect("a study");
+        } else {
+            std::fs::write(b.join("studies").join(case).join("train_9.part"), "tim").expect("half");
+        }
+    }
+    remove(b.join("sealed/labels.json"));
+    remove(b.join("studies/seal.json"));
+    // Of another seed it is another set.
+    assert!(made(b, 8, 2).is_err());
+    made(b, 7, 2)?;
+    assert!(files(a) == files(b), "an interrupted set differs");
     Ok(())
 }
 
