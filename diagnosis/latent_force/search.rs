@@ -92,7 +92,8 @@ pub fn search(
         let next = round.confirmed.first().cloned();
         rounds.push(round);
         let Some(next) = next else { break };
-        if context.has_segments() {
+        let stopped = progress.is_stopped();
+        if context.has_segments() && !stopped {
             let again = from_starts_of(context, (&best, &next), breadth, progress)?;
             if again.fitted.evidence > best.fitted.evidence {
                 best = again;
@@ -101,24 +102,23 @@ pub fn search(
                 }
             }
         }
-        let shrinks = left(&best) - left(&next) > breadth.shrinks;
+        // A fit that was cut short has not told yet how much of the force it makes up for.
+        let shrinks = stopped || left(&best) - left(&next) > breadth.shrinks;
         if next.fitted.evidence - best.fitted.evidence < threshold || !shrinks {
             break;
         }
         best = next;
-    }
-    let none = &none;
-    let best = if progress.is_stopped() {
-        if !best.candidates.is_empty() {
+        if stopped {
             untried.push(Untried {
                 stage: "values of the effects named that no search tries, such as an offset",
                 sets: vec![best.candidates.clone()],
             });
+            break;
         }
-        best
-    } else {
-        free_what_is_given(context, candidates, best, (breadth, threshold), progress)?
-    };
+        // Before further effects, which would stand in for it.
+        best = free_what_is_given(context, candidates, best, (breadth, threshold), progress)?;
+    }
+    let none = &none;
     let of = |f: &Fitted| f.estimate.missing(context);
     Ok(Outcome {
         none: none.clone(),

@@ -224,7 +224,8 @@ impl Upon<'_> {
             if progress.is_stopped() {
                 fits.left_out.push(set.candidates.clone());
             } else {
-                set = pruned(context, self.candidates, set, breadth, progress)?;
+                let gain = set.fitted.evidence - base;
+                set = pruned(context, self.candidates, set, (breadth, gain), progress)?;
             }
             fits.sets.push(set);
         }

@@ -82,8 +82,8 @@ pub(super) fn from_starts_of(
     Ok(again)
 }
 
-/// Fits what no search tries (an offset of friction between the directions) of the effects that were named, where it
-/// earns its place.
+/// Fits what no search tries (an offset of friction between the directions) of the effects that were named, all of it at
+/// once, where it earns its place; what is no larger than its uncertainty then goes back to where it was.
 pub(super) fn free_what_is_given(
     context: &Context<'_>,
     candidates: &[Candidate],
@@ -91,20 +91,22 @@ pub(super) fn free_what_is_given(
     (breadth, threshold): (Breadth, f64),
     progress: &dyn Progress,
 ) -> Result<Set> {
-    let mut best = best;
-    let mut at = best.fitted.hypothesis.unknowns.len();
-    for &c in best.candidates.clone().iter().rev() {
+    let fitted = &best.fitted;
+    let mut hypothesis = fitted.hypothesis.clone();
+    let mut freed = Vec::new();
+    let mut at = fitted.theta.len();
+    for &c in best.candidates.iter().rev() {
         let parameters = candidates[c].parameters();
         at -= parameters.len();
+        let own = &fitted.theta[at..at + parameters.len()];
         for (i, p) in parameters.iter().enumerate() {
-            if p.start != Start::Given {
+            let unknown = &mut hypothesis.unknowns[at + i];
+            if p.start != Start::Given || unknown.free {
                 continue;
             }
-            let mut hypothesis = best.fitted.hypothesis.clone();
-            let unknown = &mut hypothesis.unknowns[at + i];
             unknown.free = true;
+            freed.push((at + i, p.null));
             // As uncertain as the effect itself is large.
-            let own = &best.fitted.theta[at..at + parameters.len()];
             let sizes = own.iter().zip(parameters);
             let size = sizes
                 .filter(|(_, q)| q.unit == p.unit)
@@ -113,16 +115,35 @@ pub(super) fn free_what_is_given(
             if size > 0.0 {
                 unknown.deviation = unknown.deviation.min(size);
             }
-            let (theta, from) = (&best.fitted.theta, &best.fitted);
-            let from = (&from.estimate, &from.slopes);
-            let rounds = (breadth.rounds[1], progress);
-            let fitted = fit(context, &hypothesis, theta, from, rounds)?;
-            if fitted.evidence - best.fitted.evidence > threshold {
-                best.fitted = fitted;
-            }
         }
     }
-    Ok(best)
+    if freed.is_empty() {
+        return Ok(best);
+    }
+    let rounds = (breadth.rounds[1], progress);
+    let from = (&fitted.estimate, &fitted.slopes);
+    let all = fit(context, &hypothesis, &fitted.theta, from, rounds)?;
+    if all.evidence - fitted.evidence <= threshold {
+        return Ok(best);
+    }
+    let free = hypothesis.free();
+    let (mut theta, mut idle) = (all.theta.clone(), false);
+    for (i, null) in freed {
+        let place = free.iter().position(|&f| f == i);
+        let variance = place.map_or(0.0, |k| all.covariance[(k, k)]);
+        if (theta[i] - null).abs() < IDLE * variance.max(0.0).sqrt() {
+            hypothesis.unknowns[i].free = false;
+            theta[i] = null;
+            idle = true;
+        }
+    }
+    let fitted = if idle {
+        let from = (&all.estimate, &all.slopes);
+        fit(context, &hypothesis, &theta, from, rounds)?
+    } else {
+        all
+    };
+    Ok(Set { fitted, ..best })
 }
 
 /// Labels of some candidates.
@@ -169,43 +190,90 @@ pub(super) fn without(set: &Set, candidates: &[Candidate], out: usize) -> Set {
 /// Deviations from null up to which a value counts as nothing, and the evidence that a set may lose when it is left out.
 const IDLE: f64 = 2.0;
 const IDLE_LOSS: f64 = 1.0;
+/// Size, relative to the largest of the same law, and share of what all of them earn up to which a member of a group stands in
+/// for something else: a law that all joints have in common is no thousandth at one of them.
+const SLIGHT: f64 = 0.1;
 
-/// A set without the members that do nothing in it: those of a group that are as the model has them, and those that a later
-/// effect has taken the place of.
-pub(super) fn pruned(
-    context: &Context<'_>,
-    candidates: &[Candidate],
-    set: Set,
-    breadth: Breadth,
-    progress: &dyn Progress,
-) -> Result<Set> {
+/// What a member of a set does: by how many deviations it is off its null values, and by how much.
+struct Deed {
+    candidate: usize,
+    law: String,
+    strength: f64,
+    size: f64,
+}
+
+/// What each member of a set does; those that have no size are left out.
+fn deeds(candidates: &[Candidate], set: &Set) -> Vec<Deed> {
     let fitted = &set.fitted;
     let free = fitted.hypothesis.free();
     let parameters = |c: usize| candidates[c].parameters().len();
     let mut at = fitted.theta.len() - set.candidates.iter().map(|&c| parameters(c)).sum::<usize>();
-    let mut idle = Vec::new();
+    let mut all = Vec::new();
     for &c in &set.candidates {
         let range = at..at + parameters(c);
         at = range.end;
-        let strength = |i: usize| {
+        let sizes = range.clone().filter_map(|i| {
             let p = &candidates[c].parameters()[i - range.start];
             let k = free.iter().position(|&f| f == i)?;
+            let is_size = matches!(
+                p.start,
+                Start::Slope | Start::Values(_) | Start::Multiples(..)
+            );
             let deviation = fitted.covariance[(k, k)].max(0.0).sqrt();
-            (p.start == Start::Slope).then(|| (fitted.theta[i] - p.null).abs() / deviation)
-        };
-        let strengths: Vec<f64> = range.clone().filter_map(strength).collect();
-        if !strengths.is_empty() && strengths.iter().all(|s| *s < IDLE) {
-            idle.push(c);
+            let size = (fitted.theta[i] - p.null).abs();
+            is_size.then_some((size / deviation, size))
+        });
+        let largest = sizes.reduce(|a, b| (a.0.max(b.0), a.1.max(b.1)));
+        all.extend(largest.map(|(strength, size)| Deed {
+            candidate: c,
+            law: candidates[c].spec.name.clone(),
+            strength,
+            size,
+        }));
+    }
+    all
+}
+
+/// A set without the members that do nothing in it: those of a group that are as the model has them or next to it, and those
+/// that a later effect has taken the place of. `gain` is the evidence of the set beyond its base, and `shrinks` the
+/// share of it that a slight member may be worth.
+pub(super) fn pruned(
+    context: &Context<'_>,
+    candidates: &[Candidate],
+    set: Set,
+    (breadth, gain): (Breadth, f64),
+    progress: &dyn Progress,
+) -> Result<Set> {
+    let deeds = deeds(candidates, &set);
+    let is_idle = |d: &&Deed| d.strength < IDLE;
+    let is_slight = |d: &&Deed| {
+        let like = || deeds.iter().filter(|o| o.law == d.law);
+        let largest = like().map(|o| o.size).fold(0.0, f64::max);
+        let all: f64 = like().map(|o| o.strength.powi(2)).sum();
+        d.size < SLIGHT * largest && d.strength.powi(2) < breadth.shrinks * all
+    };
+    let places = |which: &dyn Fn(&&Deed) -> bool| -> Vec<usize> {
+        deeds.iter().filter(which).map(|d| d.candidate).collect()
+    };
+    let mut set = set;
+    for (out, loss) in [
+        (places(&is_idle), IDLE_LOSS),
+        (places(&is_slight), IDLE_LOSS.max(breadth.shrinks * gain)),
+    ] {
+        let out: Vec<usize> = (out.into_iter())
+            .filter(|c| set.candidates.contains(c))
+            .collect();
+        if out.is_empty() || out.len() == set.candidates.len() {
+            continue;
+        }
+        let mut smaller = set.clone();
+        for c in out {
+            smaller = without(&smaller, candidates, c);
+        }
+        smaller.fit(context, breadth.rounds[1], progress)?;
+        if smaller.fitted.evidence > set.fitted.evidence - loss {
+            set = smaller;
         }
     }
-    if idle.is_empty() || idle.len() == set.candidates.len() {
-        return Ok(set);
-    }
-    let mut smaller = set.clone();
-    for c in idle {
-        smaller = without(&smaller, candidates, c);
-    }
-    smaller.fit(context, breadth.rounds[1], progress)?;
-    let kept = smaller.fitted.evidence > set.fitted.evidence - IDLE_LOSS;
-    Ok(if kept { smaller } else { set })
+    Ok(set)
 }
