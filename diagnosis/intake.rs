@@ -8,10 +8,16 @@ use crate::result::{CheckResult, DiagnosisResult, WiringResult};
 use crate::study::Study;
 use crate::wiring::{self, Settings};
 
+/// Faults that effects can look like: friction holds a drive back as a late clock does, and a load shifts it as another zero
+/// does. Nothing looks like a sign, a unit or a swap.
+const IMITABLE: [&str; 2] = ["wiring-clock", "wiring-offset"];
+
 /// A study whose logs are ready for a diagnosis.
 pub struct Intake {
     /// The study, with outliers left out of its logs and its wiring mended.
     pub study: Study,
+    /// The same without mended wiring, where all that was mended is of a kind that physics can look like.
+    doubted: Option<Study>,
     /// Faults of wiring that were mended.
     wiring: Vec<WiringResult>,
     left_out: Vec<LeftOut>,
@@ -29,16 +35,35 @@ impl Intake {
             let mut logs: Vec<_> = logs.map(|(_, e)| e).collect();
             outliers::leave_out(&mut logs, &machine.plant.layout)
         };
-        let mut wiring = Vec::new();
+        let (mut wiring, mut doubted) = (Vec::new(), None);
         if !study.wired {
             let mended = wiring::mend(&study, machine, &Settings::default())?;
+            let imitable = |w: &WiringResult| IMITABLE.contains(&&*w.fault);
+            if !mended.wiring.is_empty() && mended.wiring.iter().all(imitable) {
+                doubted = Some(study);
+            }
             (study, wiring) = (mended.study, mended.wiring);
         }
         Ok(Self {
             study,
+            doubted,
             wiring,
             left_out,
         })
+    }
+
+    /// The study with its wiring as given, where an effect can look like what was mended.
+    #[must_use]
+    pub fn doubted(&self) -> Option<&Study> {
+        self.doubted.as_ref()
+    }
+
+    /// Goes on with the wiring as given.
+    pub fn take_as_given(&mut self) {
+        if let Some(study) = self.doubted.take() {
+            self.study = study;
+            self.wiring.clear();
+        }
     }
 
     /// Says in a result what was done, and what the noise is like.

@@ -9,6 +9,7 @@ use asid_mjcf::Plant;
 
 /// A scene compiled by an engine, what is known of its machine, and what the study's model
 /// file has set and added already.
+#[derive(Clone)]
 pub struct Machine {
     /// The engine.
     pub backend: Arc<dyn Backend>,

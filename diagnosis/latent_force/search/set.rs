@@ -212,16 +212,21 @@ fn deeds(candidates: &[Candidate], set: &Set) -> Vec<Deed> {
     for &c in &set.candidates {
         let range = at..at + parameters(c);
         at = range.end;
+        // A speed at which a law changes is no size of it; a delay, which no slope is taken in, is.
+        let all_of = candidates[c].parameters();
+        let has_slopes = all_of.iter().any(|p| p.start == Start::Slope);
         let sizes = range.clone().filter_map(|i| {
             let p = &candidates[c].parameters()[i - range.start];
             let k = free.iter().position(|&f| f == i)?;
-            let is_size = matches!(
-                p.start,
-                Start::Slope | Start::Values(_) | Start::Multiples(..)
-            );
+            let is_slope = p.start == Start::Slope;
+            if !is_slope
+                && (has_slopes || !matches!(p.start, Start::Values(_) | Start::Multiples(..)))
+            {
+                return None;
+            }
             let deviation = fitted.covariance[(k, k)].max(0.0).sqrt();
             let size = (fitted.theta[i] - p.null).abs();
-            is_size.then_some((size / deviation, size))
+            Some((size / deviation, size))
         });
         let largest = sizes.reduce(|a, b| (a.0.max(b.0), a.1.max(b.1)));
         all.extend(largest.map(|(strength, size)| Deed {
