@@ -64,6 +64,9 @@ pub fn search(
     let left = |s: &Set| s.fitted.estimate.missing(context).relative_to(at_first);
     let mut rounds: Vec<Round> = Vec::new();
     let mut untried = Vec::new();
+    // The set that stands with what no search tries, such as an offset of its friction: a rival of every further effect, which
+    // needs no further name.
+    let mut freed: Option<Set> = None;
     for _ in 0..breadth.depth {
         if left(&best) < breadth.shrinks {
             break;
@@ -91,10 +94,9 @@ pub fn search(
         let round = upon.round(&mut untried)?;
         let next = round.confirmed.first().cloned();
         rounds.push(round);
-        let Some(next) = next else { break };
         let stopped = progress.is_stopped();
-        if context.has_segments() && !stopped {
-            let again = from_starts_of(context, (&best, &next), breadth, progress)?;
+        if let (true, false, Some(next)) = (context.has_segments(), stopped, &next) {
+            let again = from_starts_of(context, (&best, next), breadth, progress)?;
             if again.fitted.evidence > best.fitted.evidence {
                 best = again;
                 if best.candidates.is_empty() {
@@ -102,11 +104,19 @@ pub fn search(
                 }
             }
         }
-        // A fit that was cut short has not told yet how much of the force it makes up for.
-        let shrinks = stopped || left(&best) - left(&next) > breadth.shrinks;
-        if next.fitted.evidence - best.fitted.evidence < threshold || !shrinks {
-            break;
+        let next = next.filter(|n| {
+            // A fit that was cut short has not told yet how much of the force it makes up for.
+            let shrinks = stopped || left(&best) - left(n) > breadth.shrinks;
+            shrinks && n.fitted.evidence - best.fitted.evidence > threshold
+        });
+        if let Some(own) = freed.take() {
+            let evidence = own.fitted.evidence + threshold;
+            if next.as_ref().is_none_or(|n| n.fitted.evidence < evidence) {
+                best = own;
+                continue;
+            }
         }
+        let Some(next) = next else { break };
         best = next;
         if stopped {
             untried.push(Untried {
@@ -115,9 +125,9 @@ pub fn search(
             });
             break;
         }
-        // Before further effects, which would stand in for it.
-        best = free_what_is_given(context, candidates, best, (breadth, threshold), progress)?;
+        freed = free_what_is_given(context, candidates, &best, (breadth, threshold), progress)?;
     }
+    let best = freed.unwrap_or(best);
     let none = &none;
     let of = |f: &Fitted| f.estimate.missing(context);
     Ok(Outcome {

@@ -83,14 +83,14 @@ pub(super) fn from_starts_of(
 }
 
 /// Fits what no search tries (an offset of friction between the directions) of the effects that were named, all of it at
-/// once, where it earns its place; what is no larger than its uncertainty then goes back to where it was.
+/// once; nothing where it does not earn its place. What is no larger than its uncertainty goes back to where it was.
 pub(super) fn free_what_is_given(
     context: &Context<'_>,
     candidates: &[Candidate],
-    best: Set,
+    best: &Set,
     (breadth, threshold): (Breadth, f64),
     progress: &dyn Progress,
-) -> Result<Set> {
+) -> Result<Option<Set>> {
     let fitted = &best.fitted;
     let mut hypothesis = fitted.hypothesis.clone();
     let mut freed = Vec::new();
@@ -118,13 +118,13 @@ pub(super) fn free_what_is_given(
         }
     }
     if freed.is_empty() {
-        return Ok(best);
+        return Ok(None);
     }
     let rounds = (breadth.rounds[1], progress);
     let from = (&fitted.estimate, &fitted.slopes);
     let all = fit(context, &hypothesis, &fitted.theta, from, rounds)?;
     if all.evidence - fitted.evidence <= threshold {
-        return Ok(best);
+        return Ok(None);
     }
     let free = hypothesis.free();
     let (mut theta, mut idle) = (all.theta.clone(), false);
@@ -143,7 +143,10 @@ pub(super) fn free_what_is_given(
     } else {
         all
     };
-    Ok(Set { fitted, ..best })
+    Ok(Some(Set {
+        fitted,
+        ..best.clone()
+    }))
 }
 
 /// Labels of some candidates.
