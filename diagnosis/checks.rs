@@ -323,11 +323,12 @@ pub fn missing_force(missing: &[MissingForce]) -> Option<CheckResult> {
     })
 }
 
-/// Does the gap depend on the time step? `halved` is the same machine with half of it.
+/// Change of the predictions of the training logs by a halved time step, in units of the noise; `halved` is the same machine with
+/// half of it.
 ///
 /// # Errors
 /// When a rollout fails.
-pub fn time_step(bench: &Bench, none: &Explanation, halved: &Machine) -> Result<CheckResult> {
+pub fn change_by_step(bench: &Bench, none: &Explanation, halved: &Machine) -> Result<Vec<f64>> {
     let point = &none.fit.point;
     let read = |machine: &Machine| -> Result<Vec<f64>> {
         let model = machine.with(&[])?;
@@ -337,7 +338,15 @@ pub fn time_step(bench: &Bench, none: &Explanation, halved: &Machine) -> Result<
         Ok(residuals.pop().unwrap_or_default())
     };
     let (here, there) = (read(&bench.machine)?, read(halved)?);
-    let mut change: Vec<f64> = here.iter().zip(&there).map(|(a, b)| a - b).collect();
+    Ok(here.iter().zip(&there).map(|(a, b)| a - b).collect())
+}
+
+/// Does the gap depend on the time step? `halved` is the same machine with half of it.
+///
+/// # Errors
+/// When a rollout fails.
+pub fn time_step(bench: &Bench, none: &Explanation, halved: &Machine) -> Result<CheckResult> {
+    let mut change = change_by_step(bench, none, halved)?;
     let rms = |r: &[f64]| (cost(r) / bench.train.readings.max(1) as f64).sqrt();
     let plain = rms(&change);
     bench.train.scattering.apply(&bench.train.logs, &mut change);

@@ -94,7 +94,7 @@ pub fn diagnose(
     let (mut findings, sets) = replay(&mut bench, parts, &firsts, progress)?;
     findings.forces = forces;
     progress.end();
-    let judgement = select(&bench, &outcome, (&sets, &members), &findings, &candidates);
+    let judgement = select(&bench, &outcome, (&sets, &members), &findings, &candidates)?;
     Ok(Ok(Work {
         none: vec![findings.none.clone()],
         bench,

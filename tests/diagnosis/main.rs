@@ -6,6 +6,7 @@
 mod arm;
 #[path = "../diagnosis_support/mod.rs"]
 mod diagnosis_support;
+mod small;
 mod steps;
 mod stopped;
 mod wiring;

@@ -25,6 +25,8 @@ pub enum Truth {
     None,
     /// Dry friction, N, smoothed over 5 mm/s.
     Coulomb(f64),
+    /// The same, and how much more of it acts against motion in the positive direction than the mean, N.
+    UnevenFriction([f64; 2]),
     /// More viscous friction, N s/m.
     Viscous(f64),
     /// A spring, N/m.
@@ -59,6 +61,7 @@ fn command(episode: usize, t: f64) -> f64 {
 fn extra(truth: Truth, x: f64, v: f64) -> f64 {
     match truth {
         Truth::Coulomb(force) => -force * (v / 5e-3).tanh(),
+        Truth::UnevenFriction([force, offset]) => -force * (v / 5e-3).tanh() - offset,
         Truth::Viscous(d) => -d * v,
         Truth::Spring(k) => -k * x,
         Truth::Magnet(force) => {
