@@ -1,7 +1,8 @@
 //! The shell of a report: one HTML file with header, tiles, sections, figures and tables.
 //!
 //! The file is also well-formed XML, opens offline, follows the reader's light
-//! or dark preference, prints, and needs no script. On a wide screen a
+//! or dark preference, prints, and needs no script but to play the
+//! machine in 3-D. On a wide screen a
 //! section's title and introduction stand in the margin; on a phone all is one
 //! column and only tables scroll sideways.
 //!
@@ -24,6 +25,7 @@ mod gauge;
 mod section;
 mod table;
 mod tile;
+mod view;
 
 use section::Block;
 
@@ -153,6 +155,11 @@ impl Page {
     /// The page as one self-contained HTML file.
     #[must_use]
     pub fn html(&self) -> String {
+        let player = if self.sections.iter().any(Section::has_view) {
+            view::script()
+        } else {
+            String::new()
+        };
         let some = |tag: &str, class: &str, text: &str| {
             if text.is_empty() {
                 String::new()
@@ -180,7 +187,7 @@ impl Page {
              <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\" />\n\
              <meta name=\"color-scheme\" content=\"light dark\" />\n<title>{title}</title>\n<style>\n{STYLE}</style>\n</head>\n\
              <body>\n<header>{kicker}<h1>{title}{badge}</h1>{answer}{lead}{facts}</header>\n<main>\n{tiles}{sections}</main>\n{footer}\
-             <script>\n{SCRIPT}</script>\n</body>\n</html>\n",
+             <script>\n{SCRIPT}</script>\n{player}</body>\n</html>\n",
             title = escape(&self.title),
             kicker = some("p", "kicker", &self.kicker),
             answer = some("p", "lead answer", &self.answer),

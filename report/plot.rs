@@ -120,6 +120,29 @@ pub(crate) fn coordinate(value: f64) -> String {
     }
 }
 
+/// What ties a plot over time to the 3-D view: the episode, and when its time begins.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Clock {
+    /// Episode; empty for whichever is played.
+    pub(crate) take: String,
+    /// What the plot's axis reads at the episode's first row, s.
+    pub(crate) start: f64,
+}
+
+impl Clock {
+    /// Attributes of a plot whose axis of time spans `domain` and whose box has these edges.
+    pub(crate) fn attributes(&self, domain: [f64; 2], area: [f64; 4]) -> String {
+        use crate::markup::escape;
+        let [from, to] = domain.map(|t| t - self.start);
+        let edges = area.map(coordinate).join(" ");
+        if !(from.is_finite() && to.is_finite()) {
+            return String::new();
+        }
+        let take = escape(&self.take);
+        format!(" data-take=\"{take}\" data-clock=\"{from} {to} {edges}\"")
+    }
+}
+
 /// The root element with title and description for those who cannot see the drawing.
 pub(crate) fn root(id: &str, size: [f64; 2], title: &str, description: &str, body: &str) -> String {
     use crate::markup::escape;
