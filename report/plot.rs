@@ -130,8 +130,14 @@ pub(crate) struct Clock {
 }
 
 impl Clock {
-    /// Attributes of a plot whose axis of time spans `domain` and whose box has these edges.
-    pub(crate) fn attributes(&self, domain: [f64; 2], area: [f64; 4]) -> String {
+    /// Attributes of a plot whose axis of time spans `domain`, whose other one, `label`, spans `range`, and whose
+    /// box has these edges.
+    pub(crate) fn attributes(
+        &self,
+        domain: [f64; 2],
+        (label, range): (&str, [f64; 2]),
+        area: [f64; 4],
+    ) -> String {
         use crate::markup::escape;
         let [from, to] = domain.map(|t| t - self.start);
         let edges = area.map(coordinate).join(" ");
@@ -139,7 +145,11 @@ impl Clock {
             return String::new();
         }
         let take = escape(&self.take);
-        format!(" data-take=\"{take}\" data-clock=\"{from} {to} {edges}\"")
+        let (start, [low, high], label) = (self.start, range, escape(label));
+        format!(
+            " data-take=\"{take}\" data-clock=\"{from} {to} {edges}\" data-start=\"{start}\" \
+             data-range=\"{low} {high}\" data-label=\"{label}\""
+        )
     }
 }
 

@@ -11,7 +11,6 @@
 //! | `shaders.js` | what the graphics card computes |
 //! | `scene.js` | draws a moment |
 //! | `camera.js` | a camera that is turned by dragging |
-//! | `cursors.js` | the moment in the plots over time |
 //! | `player.js` | slider, legend, episodes |
 //!
 //! Without scripts or WebGL 2 a sentence stands in its place; the plots show the same motions.
@@ -22,14 +21,13 @@ use crate::markup::escape;
 use super::Section;
 
 /// The scripts, in an order in which each uses only those before it when it is first run.
-const SCRIPTS: [&str; 8] = [
+const SCRIPTS: [&str; 7] = [
     include_str!("view/space.js"),
     include_str!("view/solids.js"),
     include_str!("view/replay.js"),
     include_str!("view/shaders.js"),
     include_str!("view/scene.js"),
     include_str!("view/camera.js"),
-    include_str!("view/cursors.js"),
     include_str!("view/player.js"),
 ];
 
@@ -37,12 +35,9 @@ const SCRIPTS: [&str; 8] = [
 const NOT_HERE: &str =
     "The machine in 3-D needs a browser that runs scripts and has WebGL 2. The plots show the same motions.";
 
-/// The scripts as one, which a page needs once. It is XML as well as HTML.
-pub(super) fn script() -> String {
-    format!(
-        "<script>//<![CDATA[\n(function () {{\n'use strict';\n{}}})();\n//]]></script>\n",
-        SCRIPTS.concat()
-    )
+/// The scripts as one.
+pub(super) fn scripts() -> String {
+    SCRIPTS.concat()
 }
 
 /// The place of a view on the page, with its data.
@@ -95,16 +90,6 @@ mod tests {
             .unwrap();
         let read: View = serde_json::from_str(script.text().unwrap()).unwrap();
         assert_eq!(read, view);
-    }
-
-    #[test]
-    fn the_scripts_are_xml_and_small() {
-        let script = script();
-        let document = roxmltree::Document::parse(script.trim()).unwrap();
-        assert!(document.root_element().text().unwrap().contains("function Player"));
-        // A report is to stay under 3 MB, and what draws it a small part of that.
-        assert!(script.len() < 60_000, "{}", script.len());
-        assert!(!SCRIPTS.concat().contains("]]>"));
     }
 
     #[test]

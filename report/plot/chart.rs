@@ -208,7 +208,10 @@ impl Plot for Chart {
             ));
         }
         let clock = (self.clock.as_ref()).filter(|_| domains.is_some());
-        let clock = clock.map(|c| c.attributes(frame.x.domain(), frame.area));
+        let clock = clock.map(|c| {
+            let label = self.y.text(0);
+            c.attributes(frame.x.domain(), (&label, frame.y.domain()), frame.area)
+        });
         let svg = root(
             id,
             [frame.width, frame.height],

@@ -3,13 +3,6 @@
 // Speeds that can be chosen; the first is the default.
 var SPEEDS = [1, 0.5, 0.25, 0.1];
 
-function element(name, attributes, inner) {
-  var made = document.createElement(name);
-  Object.keys(attributes).forEach(function (key) { made.setAttribute(key, attributes[key]); });
-  (inner || []).forEach(function (part) { made.append(part); });
-  return made;
-}
-
 function choice(label, options) {
   return element('select', { 'aria-label': label }, options.map(function (text, i) { return element('option', { value: i }, [text]); }));
 }
@@ -24,7 +17,7 @@ function Player(box) {
   var ids = ['real', 'predicted', 'after', 'before', 'nominal'];
   var shown = { real: true, predicted: true, after: true, before: true, nominal: false, contacts: true, forces: true };
   var take = takes[0], ball, t = 0, playing = null, speed = SPEEDS[0], waiting = false;
-  var camera = Camera(canvas, later), cursors = Cursors(go);
+  var camera = Camera(canvas, later);
 
   var play = element('button', { type: 'button' }, ['play']);
   var slider = element('input', { type: 'range', min: 0, step: 'any', 'aria-label': 'time' });
@@ -82,7 +75,7 @@ function Player(box) {
     t = time;
     slider.value = t;
     clock.textContent = t.toFixed(2) + ' s';
-    cursors(take.name, t);
+    cursors.moment(take.name, t);
     later();
   }
 
@@ -158,6 +151,7 @@ function Player(box) {
   });
   matchMedia('(prefers-color-scheme: dark)').addEventListener('change', function () { scene.theme(); later(); });
   new ResizeObserver(later).observe(canvas);
+  cursors.listen(go);
   choose(0);
 }
 
