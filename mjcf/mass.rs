@@ -64,10 +64,9 @@ pub fn placed(geom: &Geom) -> (mjcf_rs::Pose, [f64; 3]) {
         let (a, b) = (Vector3::new(x1, y1, z1), Vector3::new(x2, y2, z2));
         // z points from the second end to the first, as MuJoCo has it.
         let along = a - b;
-        let turn =
-            UnitQuaternion::rotation_between(&Vector3::z(), &along).unwrap_or_else(|| {
-                UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI)
-            });
+        let turn = UnitQuaternion::rotation_between(&Vector3::z(), &along).unwrap_or_else(|| {
+            UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI)
+        });
         let center = (a + b) / 2.0;
         pose.translation = mjcf_rs::glam::DVec3::new(center.x, center.y, center.z);
         pose.rotation = mjcf_rs::glam::DQuat::from_xyzw(turn.i, turn.j, turn.k, turn.w);

@@ -207,8 +207,7 @@ fn player(sections: &str, has_view: bool) -> (&'static str, String) {
         return ("", String::new());
     }
     let scripts = [time::scripts(), view::scripts()].concat();
-    let script =
-        format!("<script>//<![CDATA[\n(function () {{\n{scripts}}})();\n//]]></script>\n");
+    let script = format!("<script>//<![CDATA[\n(function () {{\n{scripts}}})();\n//]]></script>\n");
     (time::STYLE, script)
 }
 

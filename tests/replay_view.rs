@@ -37,28 +37,61 @@ fn looks_right(place: &Workplace, folder: &str, machines: &[&str]) {
     };
     for dark in [false, true] {
         let seen = browser_support::seen(&browser, &page, dark);
-        let number = |key: &str| seen[key].as_f64().unwrap_or_else(|| panic!("{key}: {seen}"));
+        let number = |key: &str| {
+            seen[key]
+                .as_f64()
+                .unwrap_or_else(|| panic!("{key}: {seen}"))
+        };
         assert_eq!(seen["wrong"], Value::Array(Vec::new()), "{folder}: {seen}");
         // A blank canvas has one colour; a machine's curved surfaces, and the grid's soft lines, have many.
         assert!(number("colours") > 50.0, "{folder}: {seen}");
         // A machine a thousandth of whose picture moves can be seen to move.
-        assert!(number("moved") > number("pixels") / 1000.0, "{folder}: {seen}");
-        assert_eq!(number("same"), 0.0, "{folder}: the slider came back: {seen}");
-        assert!(number("turned") > number("pixels") / 100.0, "{folder}: {seen}");
-        assert!(number("lines") > 0.0 && seen["lines"] == seen["linesMoved"], "{folder}: {seen}");
+        assert!(
+            number("moved") > number("pixels") / 1000.0,
+            "{folder}: {seen}"
+        );
+        assert_eq!(
+            number("same"),
+            0.0,
+            "{folder}: the slider came back: {seen}"
+        );
+        assert!(
+            number("turned") > number("pixels") / 100.0,
+            "{folder}: {seen}"
+        );
+        assert!(
+            number("lines") > 0.0 && seen["lines"] == seen["linesMoved"],
+            "{folder}: {seen}"
+        );
         let clicked = number("clicked") / number("end");
         assert!((0.4..0.8).contains(&clicked), "{folder}: {clicked}");
         // The corner shows the page's own ground.
-        let bright: f64 = seen["corner"].as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).sum();
-        assert!(if dark { bright < 150.0 } else { bright > 600.0 }, "{folder}: {seen}");
+        let bright: f64 = seen["corner"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|x| x.as_f64().unwrap())
+            .sum();
+        assert!(
+            if dark { bright < 150.0 } else { bright > 600.0 },
+            "{folder}: {seen}"
+        );
         let legend = seen["legend"].as_array().unwrap();
         for machine in machines {
-            let entry = legend.iter().find(|e| e["name"].as_str().unwrap().starts_with(machine));
+            let entry = legend
+                .iter()
+                .find(|e| e["name"].as_str().unwrap().starts_with(machine));
             let entry = entry.unwrap_or_else(|| panic!("{folder}: no {machine} in {seen}"));
-            assert!(entry["changed"].as_f64().unwrap() > 20.0, "{folder}: {entry}");
+            assert!(
+                entry["changed"].as_f64().unwrap() > 20.0,
+                "{folder}: {entry}"
+            );
         }
         for episode in seen["episodes"].as_array().unwrap() {
-            assert!(episode["moved"].as_f64().unwrap() > 100.0, "{folder}: {episode}");
+            assert!(
+                episode["moved"].as_f64().unwrap() > 100.0,
+                "{folder}: {episode}"
+            );
         }
     }
 }
@@ -78,20 +111,37 @@ fn a_diagnosis_shows_the_log_both_models_and_the_force_that_is_missing() {
     let takes = view["takes"].as_array().unwrap();
     let origins = |take: &Value| -> Vec<String> {
         let machines = take["machines"].as_array().unwrap().iter();
-        machines.map(|m| m["origin"].as_str().unwrap().to_owned()).collect()
+        machines
+            .map(|m| m["origin"].as_str().unwrap().to_owned())
+            .collect()
     };
     assert_eq!(origins(&takes[0]), ["real", "nominal", "before", "after"]);
     assert_eq!(takes[0]["what"], "held out");
-    let with_force = takes.iter().find(|t| !t["forces"].as_array().unwrap().is_empty()).unwrap();
+    let with_force = takes
+        .iter()
+        .find(|t| !t["forces"].as_array().unwrap().is_empty())
+        .unwrap();
     let force = &with_force["forces"][0];
-    assert_eq!((&force["dof"], &force["axis"][0]), (&"rail".into(), &1.0.into()));
+    assert_eq!(
+        (&force["dof"], &force["axis"][0]),
+        (&"rail".into(), &1.0.into())
+    );
     let sum = |key: &str| -> f64 {
         let values = force[key].as_array().unwrap().iter();
         values.map(|x| x.as_f64().unwrap().powi(2)).sum()
     };
     // What the refined model lacks is a small part of what the nominal one does.
-    assert!(sum("after") < 0.2 * sum("before"), "{} {}", sum("after"), sum("before"));
-    looks_right(&place, "out", &["real", "nominal model", "identified model", "missing force"]);
+    assert!(
+        sum("after") < 0.2 * sum("before"),
+        "{} {}",
+        sum("after"),
+        sum("before")
+    );
+    looks_right(
+        &place,
+        "out",
+        &["real", "nominal model", "identified model", "missing force"],
+    );
     // The report is written anew from its files to the byte.
     let page = place.read("out/report.html");
     ok(&place, &["report", "out"]);
@@ -101,13 +151,19 @@ fn a_diagnosis_shows_the_log_both_models_and_the_force_that_is_missing() {
 #[test]
 fn a_run_shows_the_real_episode_and_its_replays() {
     let place = Workplace::new();
-    ok(&place, &tiny(&["run", "rod-balancing", "--quiet", "--out", "out"]));
+    ok(
+        &place,
+        &tiny(&["run", "rod-balancing", "--quiet", "--out", "out"]),
+    );
     let view = view(&place, "out");
     let take = &view["takes"][0];
     assert_eq!(take["machines"].as_array().unwrap().len(), 3);
     // The rod lies on the table.
     let touching = take["machines"][2]["touching"].as_array().unwrap();
-    assert!(touching.iter().any(|n| n.as_u64().unwrap() > 0), "{touching:?}");
+    assert!(
+        touching.iter().any(|n| n.as_u64().unwrap() > 0),
+        "{touching:?}"
+    );
     looks_right(&place, "out", &["real", "before", "contact points"]);
 }
 
@@ -118,9 +174,16 @@ fn an_exploration_shows_what_the_simulator_expects() {
         .filter(|s| s.starts_with("explorer."))
         .flat_map(|s| ["--set", s])
         .collect();
-    let arguments = [&["explore", "rod-balancing", "--quiet", "--out", "task"][..], &quick].concat();
+    let arguments = [
+        &["explore", "rod-balancing", "--quiet", "--out", "task"][..],
+        &quick,
+    ]
+    .concat();
     ok(&place, &arguments);
-    assert_eq!(view(&place, "task")["takes"][0]["machines"][0]["origin"], "predicted");
+    assert_eq!(
+        view(&place, "task")["takes"][0]["machines"][0]["origin"],
+        "predicted"
+    );
     looks_right_without_plots(&place, "task");
 }
 

@@ -49,12 +49,18 @@ impl Touch {
         if plant.contacts.len() > MOST_PAIRS {
             return Self::default();
         }
-        let solid = |(g, (frame, kind, size, mesh)): (usize, &(Isometry3<f64>, GeomType, [f64; 3], Option<usize>))| {
+        let solid = |(g, (frame, kind, size, mesh)): (
+            usize,
+            &(Isometry3<f64>, GeomType, [f64; 3], Option<usize>),
+        )| {
             let surface = mesh.map(|m| &meshes[m]);
             let (shape, turn) = shape(*kind, size.map(|x| x as f32), surface)?;
             let radius = match kind {
                 GeomType::Plane => f32::INFINITY,
-                _ => shape.compute_local_bounding_sphere().radius + shape.compute_local_bounding_sphere().center.length(),
+                _ => {
+                    shape.compute_local_bounding_sphere().radius
+                        + shape.compute_local_bounding_sphere().center.length()
+                }
             };
             Some(Solid {
                 part: part_of[plant.geoms[g].body],
@@ -72,7 +78,13 @@ impl Touch {
     /// Points where something touches, `parts` being the poses of all parts but the world.
     pub(crate) fn points(&self, parts: &[Isometry3<f64>]) -> Vec<[f64; 3]> {
         let mut found = Vec::new();
-        let there = |p: &Isometry3<f64>| p.translation.vector.iter().chain(p.rotation.coords.iter()).all(|x| x.is_finite());
+        let there = |p: &Isometry3<f64>| {
+            p.translation
+                .vector
+                .iter()
+                .chain(p.rotation.coords.iter())
+                .all(|x| x.is_finite())
+        };
         if !parts.iter().all(there) {
             return found;
         }
@@ -83,7 +95,9 @@ impl Touch {
         };
         let at: Vec<Option<Pose>> = self.solids.iter().map(|s| s.as_ref().map(place)).collect();
         for &[i, j] in &self.pairs {
-            let (Some(a), Some(b), Some(p), Some(q)) = (&self.solids[i], &self.solids[j], at[i], at[j]) else {
+            let (Some(a), Some(b), Some(p), Some(q)) =
+                (&self.solids[i], &self.solids[j], at[i], at[j])
+            else {
                 continue;
             };
             if (p.translation - q.translation).length() > a.radius + b.radius + NEAR {
@@ -101,7 +115,11 @@ impl Touch {
             if of.is_err() {
                 continue;
             }
-            for point in manifolds.iter().flat_map(|m| &m.points).filter(|c| c.dist <= NEAR) {
+            for point in manifolds
+                .iter()
+                .flat_map(|m| &m.points)
+                .filter(|c| c.dist <= NEAR)
+            {
                 let world = p.transform_point(point.local_p1).to_array().map(f64::from);
                 if world.iter().all(|x| x.is_finite()) {
                     found.push(world);
@@ -122,7 +140,11 @@ fn pose(p: &Isometry3<f64>) -> Pose {
 }
 
 /// The shape, and how it is turned from the geom's frame.
-fn shape(kind: GeomType, [a, b, c]: [f32; 3], mesh: Option<&Surface>) -> Option<(SharedShape, Pose)> {
+fn shape(
+    kind: GeomType,
+    [a, b, c]: [f32; 3],
+    mesh: Option<&Surface>,
+) -> Option<(SharedShape, Pose)> {
     let none = Pose::identity();
     Some(match kind {
         GeomType::Plane => (SharedShape::new(HalfSpace::new(Vector::Z)), none),
@@ -146,7 +168,9 @@ fn shape(kind: GeomType, [a, b, c]: [f32; 3], mesh: Option<&Surface>) -> Option<
 }
 
 fn hull(points: &[Vector]) -> Option<SharedShape> {
-    Some(SharedShape::new(ConvexPolyhedron::from_convex_hull(points)?))
+    Some(SharedShape::new(ConvexPolyhedron::from_convex_hull(
+        points,
+    )?))
 }
 
 /// Points on an ellipsoid.

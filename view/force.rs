@@ -24,7 +24,10 @@ pub struct Missing {
 impl From<&ForceTrace> for Missing {
     fn from(trace: &ForceTrace) -> Self {
         let ForceSeries {
-            time, before, after, ..
+            time,
+            before,
+            after,
+            ..
         } = trace.whole.clone();
         Self {
             dof: trace.dof.clone(),
@@ -135,7 +138,10 @@ mod tests {
         let slide = of("arm_2").unwrap();
         assert_eq!((slide.part, slide.turns), (2, false));
         let fly = of("fly.y").unwrap();
-        assert_eq!((fly.in_world, fly.axis, fly.at[2]), (true, [0.0, 1.0, 0.0], 0.5));
+        assert_eq!(
+            (fly.in_world, fly.axis, fly.at[2]),
+            (true, [0.0, 1.0, 0.0], 0.5)
+        );
         assert!(of("fly.rz").unwrap().turns);
         assert!(of("fly.q").is_none() && of("nowhere").is_none());
     }

@@ -9,7 +9,11 @@ use asid_mjcf::plant::Reads;
 /// `otherwise` (`rows x nq`), which a simulation of the same commands gave. Between two readings of a slow sensor
 /// positions are interpolated. `None` where no sensor reads any position.
 #[must_use]
-pub fn positions(plant: &Plant, log: &Episode, otherwise: &[f64]) -> Option<(Vec<f64>, Vec<String>)> {
+pub fn positions(
+    plant: &Plant,
+    log: &Episode,
+    otherwise: &[f64],
+) -> Option<(Vec<f64>, Vec<String>)> {
     let nq = plant.layout.nq;
     let mut qpos = otherwise.to_vec();
     let mut read = vec![false; plant.layout.joints.len()];
@@ -23,7 +27,9 @@ pub fn positions(plant: &Plant, log: &Episode, otherwise: &[f64]) -> Option<(Vec
             (Reads::Body(b), "framequat") => plant.free_joint(b).map(|j| (j, 3)),
             _ => None,
         };
-        let Some((joint, offset)) = joint else { continue };
+        let Some((joint, offset)) = joint else {
+            continue;
+        };
         let place = &plant.layout.joints[joint];
         let fits = match (place.kind, offset) {
             (JointKind::Hinge | JointKind::Slide, 0) => range.len() == 1,
@@ -45,7 +51,12 @@ pub fn positions(plant: &Plant, log: &Episode, otherwise: &[f64]) -> Option<(Vec
             }
         }
     }
-    let unread = plant.layout.joints.iter().zip(&read).filter(|(_, read)| !**read);
+    let unread = plant
+        .layout
+        .joints
+        .iter()
+        .zip(&read)
+        .filter(|(_, read)| !**read);
     let unread = unread.map(|(j, _)| j.name.clone()).collect();
     read.contains(&true).then_some((qpos, unread))
 }
@@ -70,7 +81,9 @@ pub fn remark(unread: &[String]) -> Option<String> {
 
 /// Readings with what is missing interpolated, and held before the first and after the last; `None` where there are none.
 fn filled(time: &[f64], readings: &[f64]) -> Option<Vec<f64>> {
-    let there: Vec<usize> = (0..readings.len()).filter(|&k| readings[k].is_finite()).collect();
+    let there: Vec<usize> = (0..readings.len())
+        .filter(|&k| readings[k].is_finite())
+        .collect();
     let (&first, &last) = (there.first()?, there.last()?);
     let mut next = 0;
     let at = (0..readings.len()).map(|k| {

@@ -62,7 +62,11 @@ impl Surface {
 
 /// The meshes of these names, in the frames of their geoms, with at most [`TRIANGLES`] in all; `Err` says in words
 /// why one is not there.
-pub(crate) fn of_scene(scene: &Scene, model: &Model, names: &[&str]) -> Vec<Result<Surface, String>> {
+pub(crate) fn of_scene(
+    scene: &Scene,
+    model: &Model,
+    names: &[&str],
+) -> Vec<Result<Surface, String>> {
     let whole: Vec<Result<Surface, String>> = names
         .iter()
         .map(|name| {
@@ -77,7 +81,11 @@ pub(crate) fn of_scene(scene: &Scene, model: &Model, names: &[&str]) -> Vec<Resu
         .into_iter()
         .map(|surface| {
             let surface = surface?;
-            let most = if all <= TRIANGLES { usize::MAX } else { share(surface.triangles.len()) };
+            let most = if all <= TRIANGLES {
+                usize::MAX
+            } else {
+                share(surface.triangles.len())
+            };
             let mut few = simplify(&surface, most);
             if few.vertices.len() > VERTICES {
                 few = simplify(&surface, TRIANGLES / 2);
@@ -122,7 +130,10 @@ fn surface(scene: &Scene, model: &Model, mesh: &Mesh) -> Result<Surface, String>
 fn place(scene: &Scene, model: &Model, file: &str) -> PathBuf {
     let home = scene.directory().unwrap_or(Path::new(""));
     let compiler = &model.compiler;
-    let folder = compiler.mesh_dir.as_deref().or(compiler.asset_dir.as_deref());
+    let folder = compiler
+        .mesh_dir
+        .as_deref()
+        .or(compiler.asset_dir.as_deref());
     home.join(folder.unwrap_or("")).join(file)
 }
 
@@ -131,7 +142,10 @@ fn inline(flat: &[f64], faces: Option<&[u32]>) -> Result<Surface, String> {
     let vertices: Vec<[f64; 3]> = flat.chunks_exact(3).map(|p| [p[0], p[1], p[2]]).collect();
     if let Some(faces) = faces {
         let triangles = faces.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect();
-        return checked(Surface { vertices, triangles });
+        return checked(Surface {
+            vertices,
+            triangles,
+        });
     }
     let points: Vec<Vector> = vertices
         .iter()
@@ -140,7 +154,10 @@ fn inline(flat: &[f64], faces: Option<&[u32]>) -> Result<Surface, String> {
     let hull = parry3d::transformation::try_convex_hull(&points);
     let (points, triangles) = hull.map_err(|_| "its vertices enclose nothing".to_owned())?;
     let vertices = points.iter().map(|p| p.to_array().map(f64::from)).collect();
-    checked(Surface { vertices, triangles })
+    checked(Surface {
+        vertices,
+        triangles,
+    })
 }
 
 /// A surface whose triangles have their vertices.
@@ -149,7 +166,12 @@ fn checked(surface: Surface) -> Result<Surface, String> {
     if surface.triangles.is_empty() {
         return Err("it has no triangles".into());
     }
-    match surface.triangles.iter().flatten().find(|&&v| v as usize >= n) {
+    match surface
+        .triangles
+        .iter()
+        .flatten()
+        .find(|&&v| v as usize >= n)
+    {
         Some(v) => Err(format!("a triangle has vertex {v} of {n}")),
         None => Ok(surface),
     }
@@ -167,18 +189,27 @@ fn read(path: &Path) -> Result<Surface, String> {
     let surface = match &*ending.to_string_lossy() {
         "stl" => stl(&bytes),
         "obj" => obj(&String::from_utf8_lossy(&bytes)),
-        other => return Err(said(&format!("`.{other}` files are not read, STL and OBJ are"))),
+        other => {
+            return Err(said(&format!(
+                "`.{other}` files are not read, STL and OBJ are"
+            )));
+        }
     };
     checked(surface).map_err(|e| said(&e))
 }
 
 /// STL, binary where its length fits its count, text otherwise. Equal vertices become one.
 fn stl(bytes: &[u8]) -> Surface {
-    let count = bytes.get(80..84).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
+    let count = bytes
+        .get(80..84)
+        .map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
     let fits = count.is_some_and(|n| bytes.len() as u64 >= 84 + 50 * u64::from(n));
     let mut corners: Vec<[f32; 3]> = Vec::new();
     if fits && !(bytes.starts_with(b"solid") && bytes.windows(5).take(400).any(|w| w == b"facet")) {
-        for facet in bytes[84..].chunks_exact(50).take(count.unwrap_or(0) as usize) {
+        for facet in bytes[84..]
+            .chunks_exact(50)
+            .take(count.unwrap_or(0) as usize)
+        {
             for corner in facet[12..48].chunks_exact(12) {
                 let x = |k: usize| {
                     f32::from_le_bytes([corner[k], corner[k + 1], corner[k + 2], corner[k + 3]])
@@ -229,7 +260,9 @@ fn obj(text: &str) -> Surface {
             };
             let corners: Vec<u32> = rest.split_whitespace().filter_map(corner).collect();
             let fan = corners.windows(2).skip(1);
-            surface.triangles.extend(fan.map(|w| [corners[0], w[0], w[1]]));
+            surface
+                .triangles
+                .extend(fan.map(|w| [corners[0], w[0], w[1]]));
         }
     }
     surface
@@ -255,8 +288,13 @@ mod tests {
         binary.extend([0; 12]);
         binary.extend(corners.iter().flatten().flat_map(|x| x.to_le_bytes()));
         binary.extend([0; 2]);
-        let lines: String = corners.iter().map(|p| format!("vertex {} {} {}\n", p[0], p[1], p[2])).collect();
-        let text = format!("solid a\nfacet normal 0 0 1\nouter loop\n{lines}endloop\nendfacet\nendsolid a\n");
+        let lines: String = corners
+            .iter()
+            .map(|p| format!("vertex {} {} {}\n", p[0], p[1], p[2]))
+            .collect();
+        let text = format!(
+            "solid a\nfacet normal 0 0 1\nouter loop\n{lines}endloop\nendfacet\nendsolid a\n"
+        );
         assert_eq!(stl(&binary), stl(text.as_bytes()));
         assert_eq!(stl(&binary).vertices.len(), 3);
     }
@@ -268,7 +306,11 @@ mod tests {
         binary.extend(u32::MAX.to_le_bytes());
         binary.extend([7; 30]);
         assert_eq!(checked(stl(&binary)).unwrap_err(), "it has no triangles");
-        assert!(checked(obj("v 0 0 0\nf 1 2 3\n")).unwrap_err().contains("vertex 1 of 1"));
+        assert!(
+            checked(obj("v 0 0 0\nf 1 2 3\n"))
+                .unwrap_err()
+                .contains("vertex 1 of 1")
+        );
         assert!(checked(obj("v a b\nf 1 x\nf\nf -9 -9 -9")).is_err());
     }
 

@@ -63,7 +63,9 @@ impl Stage<'_> {
         let machines: usize = episodes.iter().map(|e| e.motions.len()).sum();
         let poses = machines * (self.heads.len() - 1);
         let most = (POSES / poses.max(1)).clamp(FEWEST, FRAMES);
-        let seen = episodes.iter().filter(|e| !e.time.is_empty() && !e.motions.is_empty());
+        let seen = episodes
+            .iter()
+            .filter(|e| !e.time.is_empty() && !e.motions.is_empty());
         let mut view = self.view();
         view.takes = seen.map(|e| self.take(e, most)).collect();
         view
@@ -78,11 +80,20 @@ impl Stage<'_> {
         let poses: Vec<Vec<Vec<Isometry3<f64>>>> = played
             .motions
             .iter()
-            .map(|m| rows.iter().map(|&k| self.poses(&m.qpos[k * nq..(k + 1) * nq])).collect())
+            .map(|m| {
+                rows.iter()
+                    .map(|&k| self.poses(&m.qpos[k * nq..(k + 1) * nq]))
+                    .collect()
+            })
             .collect();
         let touching: Vec<Vec<Vec<[f64; 3]>>> = poses
             .iter()
-            .map(|frames| frames.iter().map(|parts| self.touch.points(parts)).collect())
+            .map(|frames| {
+                frames
+                    .iter()
+                    .map(|parts| self.touch.points(parts))
+                    .collect()
+            })
             .collect();
         let of = |poses: &[Vec<Vec<Isometry3<f64>>>]| {
             Cube::around((poses.iter().flatten().flatten()).map(|p| p.translation.vector.into()))
@@ -93,9 +104,16 @@ impl Stage<'_> {
         let points = touching.iter().flatten().flatten().copied();
         let all = Cube::around(of(&poses).corners().into_iter().chain(points));
         let cube = all.near(first, most);
-        let machine = |(motion, (poses, points)): (&crate::Motion, (&Vec<Vec<Isometry3<f64>>>, &Vec<Vec<[f64; 3]>>))| {
+        let machine = |(motion, (poses, points)): (
+            &crate::Motion,
+            (&Vec<Vec<Isometry3<f64>>>, &Vec<Vec<[f64; 3]>>),
+        )| {
             let numbers: Vec<u16> = poses.iter().flatten().flat_map(|p| cube.pose(p)).collect();
-            let contacts: Vec<u16> = points.iter().flatten().flat_map(|p| cube.point(*p)).collect();
+            let contacts: Vec<u16> = points
+                .iter()
+                .flatten()
+                .flat_map(|p| cube.point(*p))
+                .collect();
             Machine {
                 origin: motion.origin,
                 label: motion.label.clone(),
@@ -108,10 +126,18 @@ impl Stage<'_> {
         let mut take = Take {
             name: played.name.to_owned(),
             what: played.what.to_owned(),
-            machines: (played.motions.iter()).zip(poses.iter().zip(&touching)).map(machine).collect(),
-            forces: (played.missing.iter()).filter_map(|m| m.at(self, &time)).collect(),
+            machines: (played.motions.iter())
+                .zip(poses.iter().zip(&touching))
+                .map(machine)
+                .collect(),
+            forces: (played.missing.iter())
+                .filter_map(|m| m.at(self, &time))
+                .collect(),
             // A tenth of a millisecond is far below a frame.
-            time: time.iter().map(|t| ((t * 1e4).round() / 1e4) as f32).collect(),
+            time: time
+                .iter()
+                .map(|t| ((t * 1e4).round() / 1e4) as f32)
+                .collect(),
             ..Take::default()
         };
         cube.tell(&mut take);

@@ -105,7 +105,9 @@ mod tests {
         let cube = Cube::around([[-1.0, 2.0, 0.0], [3.0, 2.5, 1.0], [f64::NAN; 3]].into_iter());
         let turn = UnitQuaternion::from_euler_angles(0.4, -1.2, 3.0);
         let place = Translation3::new(1.234, 2.3, 0.7);
-        let n = cube.pose(&Isometry3::from_parts(place, turn)).map(f64::from);
+        let n = cube
+            .pose(&Isometry3::from_parts(place, turn))
+            .map(f64::from);
         for k in 0..3 {
             let back = cube.low[k] + n[k] / STEPS * cube.size;
             assert!((back - place.vector[k]).abs() <= 0.51 * cube.size / STEPS);

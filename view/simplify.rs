@@ -112,11 +112,19 @@ mod tests {
     fn a_ball_stays_a_ball_with_a_tenth_of_its_triangles() {
         let ball = ball(60);
         let few = simplify(&ball, 1400);
-        assert!((700..=1400).contains(&few.triangles.len()), "{}", few.triangles.len());
+        assert!(
+            (700..=1400).contains(&few.triangles.len()),
+            "{}",
+            few.triangles.len()
+        );
         // A vertex is the mean of points of the ball in a cell of about 2/12 across: at most h^2/2 below the surface.
         for t in &few.triangles {
             for v in t {
-                let r = few.vertices[*v as usize].map(|x| x * x).iter().sum::<f64>().sqrt();
+                let r = few.vertices[*v as usize]
+                    .map(|x| x * x)
+                    .iter()
+                    .sum::<f64>()
+                    .sqrt();
                 assert!((0.96..=1.000_001).contains(&r), "{r}");
             }
         }

@@ -42,7 +42,9 @@ impl<'p> Stage<'p> {
         let mut heads = vec![0];
         heads.extend((1..plant.bodies.len()).filter(|&b| plant.bodies[b].weld == b));
         let part = |b: usize| heads.iter().position(|&h| h == plant.bodies[b].weld);
-        let part_of: Vec<usize> = (0..plant.bodies.len()).map(|b| part(b).unwrap_or(0)).collect();
+        let part_of: Vec<usize> = (0..plant.bodies.len())
+            .map(|b| part(b).unwrap_or(0))
+            .collect();
 
         let all: Vec<(usize, &Geom)> = (model.bodies.iter().enumerate())
             .flat_map(|(b, entry)| entry.body.geoms.iter().map(move |g| (b, g)))
@@ -83,7 +85,9 @@ impl<'p> Stage<'p> {
                 notes.push("height fields and signed distance fields are not drawn".to_owned());
                 continue;
             };
-            if !(visible(geom) || !has_visible[part]) || (kind == ShapeKind::Mesh && mesh(geom).is_none()) {
+            if !(visible(geom) || !has_visible[part])
+                || (kind == ShapeKind::Mesh && mesh(geom).is_none())
+            {
                 continue;
             }
             let (t, q) = (part_from_geom.translation, part_from_geom.rotation);
@@ -121,7 +125,11 @@ impl<'p> Stage<'p> {
     #[must_use]
     pub fn view(&self) -> View {
         View {
-            parts: self.heads.iter().map(|&b| self.plant.layout.bodies[b].clone()).collect(),
+            parts: self
+                .heads
+                .iter()
+                .map(|&b| self.plant.layout.bodies[b].clone())
+                .collect(),
             shapes: self.shapes.clone(),
             meshes: self.meshes.iter().map(Surface::packed).collect(),
             takes: Vec::new(),
@@ -136,9 +144,18 @@ fn reach(shapes: &[Shape], meshes: &[Surface]) -> f64 {
         (ShapeKind::Plane, _) => 0.0,
         (_, Some(mesh)) => {
             let [low, high] = meshes[mesh].bounds();
-            (0..3).map(|k| (high[k] - low[k]).powi(2)).sum::<f64>().sqrt() / 2.0
+            (0..3)
+                .map(|k| (high[k] - low[k]).powi(2))
+                .sum::<f64>()
+                .sqrt()
+                / 2.0
         }
-        _ => shape.size.iter().map(|x| f64::from(*x).powi(2)).sum::<f64>().sqrt(),
+        _ => shape
+            .size
+            .iter()
+            .map(|x| f64::from(*x).powi(2))
+            .sum::<f64>()
+            .sqrt(),
     };
     shapes.iter().map(of).fold(0.0, f64::max)
 }
@@ -154,7 +171,9 @@ fn isometry(pose: &mjcf_rs::Pose) -> Isometry3<f64> {
 
 /// The mesh that a geom is; a primitive that was fitted to one is itself.
 fn mesh_of(geom: &Geom) -> Option<&str> {
-    geom.mesh.as_deref().filter(|_| geom.type_ == GeomType::Mesh)
+    geom.mesh
+        .as_deref()
+        .filter(|_| geom.type_ == GeomType::Mesh)
 }
 
 fn kind(kind: GeomType) -> Option<ShapeKind> {

@@ -159,7 +159,9 @@ pub(super) fn forces(
         .collect();
     // All rows of the episode in which most is missing where most is.
     let first = most_missing(context, outcome, &smoothed, order[0]);
-    let of_episode = first.first().map_or(0..0, |s| 0..context.walks[s.0].len() - 1);
+    let of_episode = first
+        .first()
+        .map_or(0..0, |s| 0..context.walks[s.0].len() - 1);
     let whole: Vec<(usize, usize)> = (of_episode.clone())
         .step_by(of_episode.len().div_ceil(asid_view::motion::FRAMES).max(1))
         .map(|k| (first[0].0, k))

@@ -60,7 +60,12 @@ impl Telling<'_> {
         for e in 0..bench.test.logs.episodes.len().min(SHOWN) {
             let starts = [nominal, identified, refined].map(|h| h.starts.get(e));
             let motions = self.motions(&bench.test.logs, e, &models, &starts, &mut unread)?;
-            told.push((&bench.test.logs.episodes[e], "held out", motions, Vec::new()));
+            told.push((
+                &bench.test.logs.episodes[e],
+                "held out",
+                motions,
+                Vec::new(),
+            ));
         }
         let forces = &self.findings.forces;
         let trained = forces.first().and_then(|f| {
@@ -72,7 +77,12 @@ impl Telling<'_> {
             let starts = starts.map(|s| s.get(e));
             let motions = self.motions(&bench.train.logs, e, &models, &starts, &mut unread)?;
             let missing: Vec<Missing> = forces.iter().map(Missing::from).collect();
-            told.push((&bench.train.logs.episodes[e], "fitted to, with the missing force", motions, missing));
+            told.push((
+                &bench.train.logs.episodes[e],
+                "fitted to, with the missing force",
+                motions,
+                missing,
+            ));
         }
         let stage = Stage::of(&machine.scene, &machine.plant)?;
         let played: Vec<Played<'_>> = told

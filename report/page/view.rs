@@ -17,8 +17,8 @@
 
 use asid_results::view::View;
 
-use crate::markup::escape;
 use super::Section;
+use crate::markup::escape;
 
 /// The scripts, in an order in which each uses only those before it when it is first run.
 const SCRIPTS: [&str; 7] = [
@@ -32,8 +32,7 @@ const SCRIPTS: [&str; 7] = [
 ];
 
 /// What stands in the place of the view where it cannot be drawn.
-const NOT_HERE: &str =
-    "The machine in 3-D needs a browser that runs scripts and has WebGL 2. The plots show the same motions.";
+const NOT_HERE: &str = "The machine in 3-D needs a browser that runs scripts and has WebGL 2. The plots show the same motions.";
 
 /// The scripts as one.
 pub(super) fn scripts() -> String {

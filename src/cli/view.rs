@@ -21,7 +21,11 @@ pub fn of_run(session: &Session, outcome: &RunOutcome) -> Result<Option<View>> {
     let center: Vec<f64> = session.parameters.iter().map(Parameter::center).collect();
     let replays = [
         (Origin::Before, "before, at the prior's centre", center),
-        (Origin::After, "after, at the estimate", outcome.belief.mean()),
+        (
+            Origin::After,
+            "after, at the estimate",
+            outcome.belief.mean(),
+        ),
     ];
     of_episode(session, &real.episode, &found.starts[0], &replays, true)
 }

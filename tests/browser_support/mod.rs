@@ -56,9 +56,16 @@ pub fn seen(browser: &Path, page: &Path, dark: bool) -> Value {
     let mut command = Command::new(browser);
     command
         .args(["--headless", "--no-sandbox", "--dump-dom", "--no-first-run"])
-        .args(["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"])
+        .args([
+            "--use-gl=angle",
+            "--use-angle=swiftshader",
+            "--enable-unsafe-swiftshader",
+        ])
         .args(["--window-size=800,700", "--virtual-time-budget=60000"])
-        .arg(format!("--user-data-dir={}", folder.path().join("profile").display()));
+        .arg(format!(
+            "--user-data-dir={}",
+            folder.path().join("profile").display()
+        ));
     if dark {
         command.arg("--blink-settings=preferredColorScheme=0");
     }
@@ -77,16 +84,25 @@ pub fn seen(browser: &Path, page: &Path, dark: bool) -> Value {
         if begun.elapsed() > PATIENCE {
             child.kill().unwrap();
             child.wait().unwrap();
-            panic!("the browser is not done with {} after {PATIENCE:?}", page.display());
+            panic!(
+                "the browser is not done with {} after {PATIENCE:?}",
+                page.display()
+            );
         }
         std::thread::sleep(Duration::from_millis(50));
     }
     let dom = std::fs::read_to_string(&dom).unwrap();
-    let told = dom.split("PROBED:").nth(1).and_then(|t| t.split(":DEBORP").next());
+    let told = dom
+        .split("PROBED:")
+        .nth(1)
+        .and_then(|t| t.split(":DEBORP").next());
     let told = told.unwrap_or_else(|| {
         let said = std::fs::read_to_string(&errors).unwrap_or_default();
         panic!("the page told nothing; the browser said: {said}")
     });
-    let plain = told.replace("&lt;", "<").replace("&gt;", ">").replace("&amp;", "&");
+    let plain = told
+        .replace("&lt;", "<")
+        .replace("&gt;", ">")
+        .replace("&amp;", "&");
     serde_json::from_str(&plain).unwrap_or_else(|e| panic!("{e}: {plain}"))
 }

@@ -25,8 +25,8 @@ use crate::cli::failure;
 use crate::cli::options::Common;
 use crate::cli::output::{OutFolder, write_json, write_text};
 use crate::cli::progress::Bars;
-use crate::cli::view;
 use crate::cli::result::{CostResult, SCHEMA, figure};
+use crate::cli::view;
 
 /// Most repeats that are counted: who would play more looks for another motion.
 const MOST_REPEATS: usize = 1000;
