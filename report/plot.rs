@@ -16,6 +16,7 @@
 //! thinned until they fit.
 
 mod chart;
+mod clock;
 mod density;
 mod frame;
 mod header;
@@ -117,39 +118,6 @@ pub(crate) fn coordinate(value: f64) -> String {
         "0".to_owned()
     } else {
         trimmed.to_owned()
-    }
-}
-
-/// What ties a plot over time to the 3-D view: the episode, and when its time begins.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Clock {
-    /// Episode; empty for whichever is played.
-    pub(crate) take: String,
-    /// What the plot's axis reads at the episode's first row, s.
-    pub(crate) start: f64,
-}
-
-impl Clock {
-    /// Attributes of a plot whose axis of time spans `domain`, whose other one, `label`, spans `range`, and whose
-    /// box has these edges.
-    pub(crate) fn attributes(
-        &self,
-        domain: [f64; 2],
-        (label, range): (&str, [f64; 2]),
-        area: [f64; 4],
-    ) -> String {
-        use crate::markup::escape;
-        let [from, to] = domain.map(|t| t - self.start);
-        let edges = area.map(coordinate).join(" ");
-        if !(from.is_finite() && to.is_finite()) {
-            return String::new();
-        }
-        let take = escape(&self.take);
-        let (start, [low, high], label) = (self.start, range, escape(label));
-        format!(
-            " data-take=\"{take}\" data-clock=\"{from} {to} {edges}\" data-start=\"{start}\" \
-             data-range=\"{low} {high}\" data-label=\"{label}\""
-        )
     }
 }
 

@@ -1,11 +1,12 @@
 //! A chart: layers of data over two axes.
 
+use super::clock::Clock;
 use super::frame::{Axis, Frame, Request};
 use super::header::{Above, Entry, Key};
 use super::layer::{Extent, Layer, Mark};
 use super::marks::draw;
 use super::scale::Spacing;
-use super::{Clock, Dash, NARROW, Plot, coordinate, root};
+use super::{Dash, NARROW, Plot, coordinate, root};
 use crate::markup::escape;
 
 /// A chart of [`Layer`]s.

@@ -11,7 +11,7 @@ function Camera(canvas, changed) {
   // Looks at a ball; a machine that moves in a plane is seen from its side.
   function frame(ball) {
     var s = ball.sides, thin = 0.35 * Math.max(s[0], s[1], s[2]);
-    home = { target: ball.middle, away: 0.82 * ball.radius / Math.sin(ANGLE / 2), round: -0.9, above: 0.36 };
+    home = { target: ball.middle, away: 0.76 * ball.radius / Math.sin(ANGLE / 2), round: -0.9, above: 0.36 };
     if (s[1] < thin && s[1] <= s[0]) { home.round = -Math.PI / 2 + 0.3; home.above = 0.2; }
     else if (s[0] < thin) { home.round = -0.3; home.above = 0.2; }
     reset();

@@ -10,7 +10,7 @@ function choice(label, options) {
 function Player(box) {
   var view = JSON.parse(box.querySelector('script').textContent);
   if (!view.takes.length) { return; }
-  var canvas = element('canvas', { tabindex: 0, 'aria-label': 'The machine in 3-D: drag to turn it, the slider below sets the time' });
+  var canvas = element('canvas', { tabindex: 0, role: 'img', 'aria-label': 'The machine in 3-D: drag to turn it, the slider below sets the time' });
   var scene = Scene(canvas, view);
   if (!scene) { return; }
   var takes = view.takes.map(function (take) { return readTake(take, view.parts.length); });
@@ -55,14 +55,15 @@ function Player(box) {
     scale.replaceChildren();
     take.largest = {};
     take.forces.forEach(function (f) {
-      var most = f.before.concat(f.after).reduce(function (a, x) { return Math.max(a, Math.abs(x)); }, 0);
+      // What nine in ten of the largest force's moments stay below: a spike would leave nothing to see of the rest.
+      var sizes = f.before.map(Math.abs).sort(function (a, b) { return a - b; }), most = sizes[Math.floor(0.9 * sizes.length)] || 0;
       take.largest[f.unit] = Math.max(take.largest[f.unit] || 0, most);
     });
     if (take.forces.length) {
       key('forces', 'missing force', 'arrow before');
       if (take.forces.some(function (f) { return f.after.length; })) { legend.append(element('span', { 'class': 'arrow after' }, [element('i', {}), 'what is left of it'])); }
       scale.append('Arrows at ' + take.forces.map(function (f) { return f.dof; }).join(', ') + '; the longest is ' +
-        Object.keys(take.largest).map(function (u) { return take.largest[u].toPrecision(2) + ' ' + u; }).join(' or ') + '.');
+        Object.keys(take.largest).map(function (u) { return take.largest[u].toPrecision(2) + ' ' + u; }).join(' or ') + ', or more.');
     }
     slider.max = take.time[take.time.length - 1];
     episodes.value = index;
@@ -110,13 +111,15 @@ function Player(box) {
     if (shown.forces) {
       take.forces.forEach(function (f) {
         var most = take.largest[f.unit] || 1;
-        moment.forces.push({ force: f, share: valueAt(f.before, at) / most, colour: colours.before, wider: 1 });
-        moment.forces.push({ force: f, share: valueAt(f.after, at) / most, colour: colours.after, wider: 1.4 });
+        moment.forces.push({ force: f, share: share(valueAt(f.before, at) / most), colour: colours.before, wider: 1 });
+        moment.forces.push({ force: f, share: share(valueAt(f.after, at) / most), colour: colours.after, wider: 1.4 });
       });
     }
     scene.render(moment);
     canvas.dataset.drawn = t.toFixed(4);
   }
+
+  function share(x) { return Math.max(-1, Math.min(1, x)); }
 
   function distance(poses, eye) {
     var there = poses.slice(1).filter(Boolean);

@@ -5,7 +5,7 @@ var LIGHT = unit([0.35, -0.5, 0.9]);
 // Vertical angle of view, rad: a standard lens.
 var ANGLE = 0.6;
 // Length of the longest arrow, and radius of a round one, relative to the radius of what moves.
-var LONGEST = 0.75, ROUND = 0.32;
+var LONGEST = 0.75, ROUND = 0.4;
 // Sweep of the largest round arrow, rad.
 var SWEEP = 4.7;
 
@@ -110,7 +110,7 @@ function Scene(canvas, view) {
       }
       set(gl, floors, {
         model: poseMatrix(pose, scale), size: scale, middle: ball.middle, reach: reach, cell: cell,
-        colour: own.slice(0, 3).concat(plane.none ? 0 : colours.dark ? 0.22 : 0.4 * own[3]), ruled: colours.rule.concat(0.5)
+        colour: own.slice(0, 3).concat(plane.none ? 0 : colours.dark ? 0.22 : 0.4 * own[3]), ruled: colours.rule.concat(plane.none ? 0.28 : 0.5)
       });
       gl.bindVertexArray(stock.plane.array);
       gl.drawArrays(gl.TRIANGLES, 0, stock.plane.count);
@@ -155,7 +155,7 @@ function Scene(canvas, view) {
     var more = { colour: colour.concat(1), ghost: 0, flatness: 0 };
     if (f.turns) {
       if (ring) { discard(gl, ring); }
-      ring = upload(gl, ringArrow(0.055 * wider, SWEEP * share));
+      ring = upload(gl, ringArrow(0.05 * wider, SWEEP * share));
       drawAlong(ring, place, [x, y, z], ROUND * ball.radius * (wider > 1 ? 1 : 0.86), more);
     } else {
       var long = LONGEST * ball.radius * Math.abs(share);

@@ -106,6 +106,8 @@ function arrow(radius) {
 
 // A round arrow about z: part of a ring of radius 1 that sweeps `angle`, a head at its end.
 function ringArrow(radius, angle) {
+  // A small one is thin too, so that it still looks like an arrow.
+  radius *= Math.min(1, Math.abs(angle) / 0.9);
   var out = solid(), sign = 0 > angle ? -1 : 1, head = Math.min(0.45, Math.abs(angle) / 2), steps = 36, sides = 10;
   var row = function (along, r) {
     var radial = [Math.cos(along), Math.sin(along), 0], ring = [];
