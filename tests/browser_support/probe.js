@@ -33,9 +33,13 @@
         return line.hidden ? '' : line.style.transform;
       });
     };
-    // Plots are made to zoom once they come in sight.
-    var svg = Array.prototype.find.call(document.querySelectorAll('svg[data-clock]'), function (s) { return s.clientWidth > 0; });
-    for (var wait = 0; svg && wait < 200 && !document.querySelector('.timeplot'); wait++) {
+    // A plot of the episode that is shown, made to zoom once it comes in sight.
+    var episodes = document.querySelector('.view-bar select'), shown = episodes ? episodes.options[0].textContent : '';
+    var svg = Array.prototype.find.call(document.querySelectorAll('svg[data-clock]'), function (s) {
+      return s.clientWidth > 0 && (!shown || shown.split(',')[0] === s.getAttribute('data-take'));
+    });
+    var live = function () { return svg && svg.nextElementSibling && svg.nextElementSibling.querySelector('.u-over'); };
+    for (var wait = 0; svg && wait < 200 && !live(); wait++) {
       svg.scrollIntoView();
       await drawn();
     }
@@ -71,7 +75,7 @@
     await drawn();
     seen.turned = changed(still, pixels());
     // A plot: values at the moment, a click at six tenths, and a stretch that is dragged over.
-    var over = document.querySelector('.timeplot .u-over');
+    var over = live();
     if (over) {
       var box = over.getBoundingClientRect(), mouse = function (kind, share, on) {
         var at = { clientX: box.left + share * box.width, clientY: box.top + box.height / 2, button: 0, buttons: 1, movementX: 1, bubbles: true };
@@ -98,13 +102,14 @@
       over.dispatchEvent(new MouseEvent('dblclick', { bubbles: true }));
     }
     // Every other episode is drawn too.
-    var episodes = document.querySelector('.view-bar select');
     seen.episodes = [];
     for (var k = 0; episodes && k < episodes.options.length; k++) {
       episodes.value = k;
       episodes.dispatchEvent(new Event('change'));
       var start = await to(Number(slider.min)), half = await to(Number(slider.max) / 2);
-      seen.episodes.push({ name: episodes.options[k].textContent, moved: changed(start, half) });
+      seen.episodes.push({
+        name: episodes.options[k].textContent, moved: changed(start, half), legend: document.querySelector('.view-legend').textContent
+      });
     }
   } catch (e) {
     seen.wrong.push(String(e && e.stack || e));
