@@ -10,7 +10,7 @@ use parry3d::math::{Pose, Rotation, Vector};
 use parry3d::query::{ContactManifold, DefaultQueryDispatcher, PersistentQueryDispatcher};
 use parry3d::shape::{Capsule, ConvexPolyhedron, Cuboid, Cylinder, HalfSpace, SharedShape};
 
-use crate::mesh::Surface;
+use crate::surface::Surface;
 
 /// Distance up to which shapes count as touching, m: what an engine leaves between bodies at rest, and what sensors
 /// of real machines resolve.

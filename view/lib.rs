@@ -18,6 +18,7 @@ pub mod motion;
 mod pack;
 mod simplify;
 mod stage;
+mod surface;
 
 pub use motion::Motion;
 pub use stage::Stage;

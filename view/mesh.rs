@@ -6,13 +6,12 @@
 use std::path::{Path, PathBuf};
 
 use asid_core::Scene;
-use asid_results::view as out;
 use mjcf_rs::Model;
 use mjcf_rs::assets::Mesh;
 use parry3d::math::Vector;
 
-use crate::pack::{Cube, text};
 use crate::simplify::simplify;
+use crate::surface::Surface;
 
 /// Triangles of all meshes of a scene together: about 300 kB of a report.
 pub const TRIANGLES: usize = 24_000;
@@ -22,43 +21,6 @@ const FEWEST: usize = 120;
 const VERTICES: usize = 65_535;
 /// Largest file that is read, bytes: far above any robot's, and read in a second.
 const LARGEST: u64 = 256 << 20;
-
-/// Triangles in space.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Surface {
-    /// Vertices, m.
-    pub vertices: Vec<[f64; 3]>,
-    /// Three vertices a triangle, counterclockwise from outside.
-    pub triangles: Vec<[u32; 3]>,
-}
-
-impl Surface {
-    /// Lowest and highest corner.
-    #[must_use]
-    pub fn bounds(&self) -> [[f64; 3]; 2] {
-        let mut bounds = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
-        for p in &self.vertices {
-            for k in 0..3 {
-                bounds[0][k] = bounds[0][k].min(p[k]);
-                bounds[1][k] = bounds[1][k].max(p[k]);
-            }
-        }
-        bounds
-    }
-
-    /// For the page.
-    pub(crate) fn packed(&self) -> out::Mesh {
-        let cube = Cube::around(self.vertices.iter().copied());
-        let vertices: Vec<u16> = self.vertices.iter().flat_map(|p| cube.point(*p)).collect();
-        let triangles: Vec<u16> = self.triangles.iter().flatten().map(|&v| v as u16).collect();
-        out::Mesh {
-            low: cube.low.map(|x| x as f32),
-            size: cube.size as f32,
-            vertices: text(&vertices),
-            triangles: text(&triangles),
-        }
-    }
-}
 
 /// The meshes of these names, in the frames of their geoms, with at most [`TRIANGLES`] in all; `Err` says in words
 /// why one is not there.

@@ -6,7 +6,7 @@
 
 use std::collections::HashMap;
 
-use crate::mesh::Surface;
+use crate::surface::Surface;
 
 /// Halvings of the search for the grid: the last changes the cell by 1/1000 of the widest.
 const HALVINGS: usize = 10;

@@ -10,7 +10,8 @@ use mjcf_rs::body::{Geom, GeomType};
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 
 use crate::contact::Touch;
-use crate::mesh::{self, Surface};
+use crate::mesh;
+use crate::surface::Surface;
 
 /// Highest group of geoms that is drawn where a scene has any in it: MuJoCo's viewer shows groups 0 to 2.
 const SHOWN_GROUP: i32 = 2;
