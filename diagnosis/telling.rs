@@ -9,7 +9,7 @@ use crate::diagnose::{Diagnosis, Settings};
 use crate::experiment;
 use crate::forces::{self, Short};
 use crate::localise::localise;
-use crate::predict::Point;
+use crate::predict::{Point, State};
 use crate::record::Record;
 use crate::result::{
     DiagnosisResult, EffectResult, Gap, HypothesisResult, Kind, MissingForce, NextExperiment,
@@ -23,6 +23,7 @@ use crate::whitening::Scattering;
 use crate::windows;
 
 mod trace;
+mod view;
 
 /// Samples of the bootstrap.
 const RESAMPLES: usize = 2000;
@@ -79,6 +80,7 @@ fn least_made_up(missing: &[MissingForce]) -> Option<String> {
 /// Predictions of the held-out logs by one model: readings and plain residuals in units of
 /// the noise.
 struct HeldOut {
+    starts: Vec<State>,
     readings: Vec<Vec<f64>>,
     residuals: Vec<f64>,
 }
@@ -107,12 +109,13 @@ impl Telling<'_> {
         predictor.set_scattering(Scattering::default());
         let point = Point {
             theta: theta.to_vec(),
-            starts,
+            starts: starts.clone(),
         };
         let readings = predictor.readings(std::slice::from_ref(&point))?.pop();
         let mut residuals = predictor.residuals(&[point])?.pop().unwrap_or_default();
         bench.mask_head(&mut residuals);
         Ok(HeldOut {
+            starts,
             readings: readings.unwrap_or_default(),
             residuals,
         })
@@ -193,7 +196,8 @@ impl Telling<'_> {
             .and_then(|(before, after, _)| least_explained(&before, &after))
             .or_else(|| least_made_up(&result.missing_force));
         result.sentence = crate::sentence::sentence(&result, &labels, rest.as_deref());
-        let trace = self.trace(&nominal, &identified, &refined, &result.effects)?;
+        let mut trace = self.trace(&nominal, &identified, &refined, &result.effects)?;
+        trace.view = Some(self.view([&nominal, &identified, &refined], &explanation)?);
         let study = self.bench.parameters.len();
         Ok(Diagnosis {
             result,

@@ -274,6 +274,42 @@ impl Trajectory {
     }
 }
 
+/// Positions `qpos` at the rows of an episode (`rows x nq`), replayed from the first start of `point`.
+///
+/// # Errors
+/// When a value is not physical or the engine fails.
+pub fn positions(
+    model: &dyn Model,
+    parameters: &[Parameter],
+    plan: &ReplayPlan,
+    point: &Point,
+) -> Result<Vec<f64>> {
+    let layout = model.layout();
+    let joints = layout.joints.iter();
+    let names: Vec<String> = joints.map(|j| format!("qpos.{}", j.name)).collect();
+    let recording = layout.recording(&names)?;
+    let mut simulator = model.simulator(&BatchConfig {
+        size: 1,
+        threads: 1,
+        targets: parameters.iter().flat_map(|p| p.targets.clone()).collect(),
+    })?;
+    simulator.set_parameters(&[0], &columns_of(parameters, &point.theta))?;
+    for start in point.starts.iter().take(1) {
+        simulator.set_state(&[0], &start.qpos, &start.qvel)?;
+    }
+    let width = recording.width();
+    let mut first = vec![0.0; width];
+    simulator.read(&[0], &recording, &mut first)?;
+    let mut out = vec![0.0; plan.frames * width];
+    let control = Control::Shared(&plan.ctrl);
+    let rollout = Rollout::new(&[0], plan.frames, plan.substeps, control, &recording);
+    simulator.rollout(&rollout, &mut out)?;
+    let mut rows = vec![0.0; plan.rows() * width];
+    let turns = asid_core::replay::quaternions(layout, &recording, &names);
+    plan.resample(&first, &out, &turns, &mut rows);
+    Ok(rows)
+}
+
 /// Pairs of bodies that can touch.
 fn pairs_of(plant: &Plant) -> Vec<[usize; 2]> {
     let mut pairs: Vec<[usize; 2]> = plant

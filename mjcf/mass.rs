@@ -40,25 +40,7 @@ impl GeomMass {
     /// plane, a mesh or a height field.
     #[must_use]
     pub fn of(geom: &Geom) -> Option<Self> {
-        let mut size = geom.size;
-        let mut pose = geom.pose;
-        if let Some([x1, y1, z1, x2, y2, z2]) = geom.fromto {
-            let (a, b) = (Vector3::new(x1, y1, z1), Vector3::new(x2, y2, z2));
-            // z points from the second end to the first, as MuJoCo has it.
-            let along = a - b;
-            let turn =
-                UnitQuaternion::rotation_between(&Vector3::z(), &along).unwrap_or_else(|| {
-                    UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI)
-                });
-            let center = (a + b) / 2.0;
-            pose.translation = mjcf_rs::glam::DVec3::new(center.x, center.y, center.z);
-            pose.rotation = mjcf_rs::glam::DQuat::from_xyzw(turn.i, turn.j, turn.k, turn.w);
-            let half = along.norm() / 2.0;
-            size = match geom.type_ {
-                GeomType::Box | GeomType::Ellipsoid => [size[0], size[0], half],
-                _ => [size[0], half, 0.0],
-            };
-        }
+        let (pose, size) = placed(geom);
         let (volume, unit_inertia) = primitive(geom.type_, size)?;
         let mass = geom
             .mass
@@ -71,6 +53,30 @@ impl GeomMass {
             unit_inertia,
         })
     }
+}
+
+/// Frame of a geom in its body, and its size, with `fromto` resolved as MuJoCo does.
+#[must_use]
+pub fn placed(geom: &Geom) -> (mjcf_rs::Pose, [f64; 3]) {
+    let mut size = geom.size;
+    let mut pose = geom.pose;
+    if let Some([x1, y1, z1, x2, y2, z2]) = geom.fromto {
+        let (a, b) = (Vector3::new(x1, y1, z1), Vector3::new(x2, y2, z2));
+        // z points from the second end to the first, as MuJoCo has it.
+        let along = a - b;
+        let turn = UnitQuaternion::rotation_between(&Vector3::z(), &along).unwrap_or_else(|| {
+            UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI)
+        });
+        let center = (a + b) / 2.0;
+        pose.translation = mjcf_rs::glam::DVec3::new(center.x, center.y, center.z);
+        pose.rotation = mjcf_rs::glam::DQuat::from_xyzw(turn.i, turn.j, turn.k, turn.w);
+        let half = along.norm() / 2.0;
+        size = match geom.type_ {
+            GeomType::Box | GeomType::Ellipsoid => [size[0], size[0], half],
+            _ => [size[0], half, 0.0],
+        };
+    }
+    (pose, size)
 }
 
 /// Volume (m³) and principal moments for unit mass (m²) of a primitive.

@@ -6,6 +6,7 @@
 
 mod drive;
 mod jacobian;
+mod poses;
 mod reading;
 
 use asid_core::error::{Error, Result};

@@ -30,6 +30,10 @@ pub use real_world::lines as real_world_lines;
 use asid_results::diagnosis::DiagnosisResult;
 use asid_results::trace::DiagnosisTrace;
 
+/// What the 3-D view shows.
+const MACHINE: &str = "As logged, and as simulated by the recorded commands from the same start. Drag to turn it. The slider moves \
+                       the line in the plots below; a click in a plot moves the slider.";
+
 /// The report as one self-contained HTML page.
 #[must_use]
 pub fn page(result: &DiagnosisResult, trace: &DiagnosisTrace) -> String {
@@ -38,6 +42,7 @@ pub fn page(result: &DiagnosisResult, trace: &DiagnosisTrace) -> String {
         wiring::section(d),
         Some(ladder::section(d, t)),
         real_world::section(d),
+        crate::page::Section::machine(t.view.as_ref(), MACHINE),
         forces::section(d, t),
         Some(signals::section(d, t)),
         Some(places::section(d, t)),

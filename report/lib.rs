@@ -4,7 +4,7 @@
 //!
 //! - [`plot`] draws charts and plan views as SVG. All colours are CSS
 //!   variables, so that one drawing serves a light and a dark page.
-//! - [`page`] is the shell: header, tiles, sections, figures, tables.
+//! - [`page`] is the shell: header, tiles, sections, figures, tables, and the machine in 3-D.
 //! - [`run`] holds what the report of a run shows, as plain data that is
 //!   stored as `trace.json` in the run's folder, and writes it as a page.
 //!   [`diagnosis`] does the same for what a diagnosis found, from the types of `asid-results`.

@@ -1,7 +1,8 @@
 //! The shell of a report: one HTML file with header, tiles, sections, figures and tables.
 //!
 //! The file is also well-formed XML, opens offline, follows the reader's light
-//! or dark preference, prints, and needs no script. On a wide screen a
+//! or dark preference, prints, and needs no script but to play the
+//! machine in 3-D. On a wide screen a
 //! section's title and introduction stand in the margin; on a phone all is one
 //! column and only tables scroll sideways.
 //!
@@ -24,6 +25,8 @@ mod gauge;
 mod section;
 mod table;
 mod tile;
+mod time;
+mod view;
 
 use section::Block;
 
@@ -175,12 +178,13 @@ impl Page {
             .enumerate()
             .map(|(i, s)| s.html(i + 1))
             .collect();
+        let (style, player) = player(&sections, self.sections.iter().any(Section::has_view));
         format!(
             "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\" />\n\
              <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\" />\n\
-             <meta name=\"color-scheme\" content=\"light dark\" />\n<title>{title}</title>\n<style>\n{STYLE}</style>\n</head>\n\
+             <meta name=\"color-scheme\" content=\"light dark\" />\n<title>{title}</title>\n<style>\n{style}{STYLE}</style>\n</head>\n\
              <body>\n<header>{kicker}<h1>{title}{badge}</h1>{answer}{lead}{facts}</header>\n<main>\n{tiles}{sections}</main>\n{footer}\
-             <script>\n{SCRIPT}</script>\n</body>\n</html>\n",
+             <script>\n{SCRIPT}</script>\n{player}</body>\n</html>\n",
             title = escape(&self.title),
             kicker = some("p", "kicker", &self.kicker),
             answer = some("p", "lead answer", &self.answer),
@@ -193,5 +197,33 @@ impl Page {
             },
             footer = some("footer", "", &self.footer),
         )
+    }
+}
+
+/// Style sheet and script of what moves on a page: the machine in 3-D, and plots over time. Nothing where neither is
+/// there. The script is XML as well as HTML.
+fn player(sections: &str, has_view: bool) -> (&'static str, String) {
+    if !has_view && !time::has_plots(sections) {
+        return ("", String::new());
+    }
+    let scripts = [time::scripts(), view::scripts()].concat();
+    let script = format!("<script>//<![CDATA[\n(function () {{\n{scripts}}})();\n//]]></script>\n");
+    (time::STYLE, script)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_scripts_are_xml_and_small() {
+        let (_, script) = player("", true);
+        let document = roxmltree::Document::parse(script.trim()).unwrap();
+        let text = document.root_element().text().unwrap();
+        assert!(text.contains("function Player") && text.contains("uPlot"));
+        // A report is to stay under 3 MB, and what draws it a small part of that.
+        assert!(script.len() < 150_000, "{}", script.len());
+        assert_eq!(script.matches("]]>").count(), 1);
+        assert_eq!(player("<svg></svg>", false), ("", String::new()));
     }
 }

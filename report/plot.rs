@@ -16,6 +16,7 @@
 //! thinned until they fit.
 
 mod chart;
+mod clock;
 mod density;
 mod frame;
 mod header;

@@ -42,6 +42,10 @@ pub const TRACE_FILE: &str = "trace.json";
 /// Name of the page in a run's folder.
 pub const REPORT_FILE: &str = "report.html";
 
+/// What the 3-D view shows.
+const MACHINE: &str = "The episode in 3-D. Drag to turn it. The slider moves the line in the plots below; a click in a plot \
+                       moves the slider.";
+
 impl RunReport {
     /// Whether the simulator predicted what is shown: nothing was done in the real world yet.
     fn predicted(&self) -> bool {
@@ -54,6 +58,7 @@ impl RunReport {
         let mut page: Page = head::page(self);
         for section in [
             episode::section(self),
+            crate::page::Section::machine(self.view.as_ref(), MACHINE),
             signals::section(self),
             exploration::section(self),
             posterior::section(self),

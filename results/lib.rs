@@ -2,6 +2,7 @@
 //!
 //! - [`diagnosis`] is `result.json`: the answer.
 //! - [`trace`] is `trace.json`: what the pictures of the report need besides.
+//! - [`view`] is the part of it that the 3-D view needs.
 //!
 //! The diagnosis fills them, the command line writes them, the report reads them. A number that is not finite
 //! is `null` in JSON and comes back as NaN ([`nullable`]).
@@ -9,3 +10,4 @@
 pub mod diagnosis;
 pub mod nullable;
 pub mod trace;
+pub mod view;

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use crate::nullable;
+use crate::view::View;
 
 /// What the report shows besides `result.json`. What a diagnosis does not have stays empty and is left out.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -16,6 +17,9 @@ pub struct DiagnosisTrace {
     pub ladder: Vec<Rung>,
     /// The force that the model lacks, at the degrees of freedom where most is missing, the most first.
     pub forces: Vec<ForceTrace>,
+    /// The machine in 3-D.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub view: Option<View>,
     /// Residuals by place, where a sensor reads a position.
     pub map: Option<Map>,
     /// Candidates that could not be tried, and why.
@@ -119,6 +123,9 @@ pub struct ForceTrace {
     pub stretch: ForceSeries,
     /// Rows from all episodes, evenly chosen.
     pub spread: ForceSeries,
+    /// Rows of a whole episode, evenly chosen: the episode of the first of the degrees of freedom, the same for all.
+    /// Times and what is missing, no more.
+    pub whole: ForceSeries,
 }
 
 /// Rows along which a force is missing. A column that a machine does not have is empty.

@@ -5,7 +5,7 @@
 
 use crate::episode::Episode;
 use crate::error::Result;
-use crate::layout::{Layout, Recording};
+use crate::layout::{JointKind, Layout, Recording};
 use crate::simulator::{Control, Rollout, Simulator};
 
 /// How a log's commands are replayed, and how its rows lie among the recorded states.
@@ -117,14 +117,23 @@ impl ReplayPlan {
     }
 }
 
-/// Where the quaternions among some sensors begin in a row of them.
+/// Where the quaternions among some sensors and positions of joints begin in a row of them.
 #[must_use]
 pub fn quaternions(layout: &Layout, recording: &Recording, channels: &[String]) -> Vec<usize> {
     channels
         .iter()
         .enumerate()
-        .filter(|(_, name)| layout.sensor(name).is_ok_and(|s| s.len == 4))
-        .map(|(i, _)| recording.range(i).start)
+        .filter_map(|(i, name)| {
+            let within = match name.strip_prefix("qpos.") {
+                Some(joint) => match layout.joint(joint).ok()?.kind {
+                    JointKind::Free => 3,
+                    JointKind::Ball => 0,
+                    JointKind::Hinge | JointKind::Slide => return None,
+                },
+                None => layout.sensor(name).ok().filter(|s| s.len == 4).map(|_| 0)?,
+            };
+            Some(recording.range(i).start + within)
+        })
         .collect()
 }
 

@@ -157,6 +157,15 @@ pub(super) fn forces(
         .step_by(rows.len().div_ceil(ROWS).max(1))
         .copied()
         .collect();
+    // All rows of the episode in which most is missing where most is.
+    let first = most_missing(context, outcome, &smoothed, order[0]);
+    let of_episode = first
+        .first()
+        .map_or(0..0, |s| 0..context.walks[s.0].len() - 1);
+    let whole: Vec<(usize, usize)> = (of_episode.clone())
+        .step_by(of_episode.len().div_ceil(asid_view::motion::FRAMES).max(1))
+        .map(|k| (first[0].0, k))
+        .collect();
     let trace = |&d: &usize| {
         let stretch = most_missing(context, outcome, &smoothed, d);
         let walk = stretch.first().map_or(0, |s| s.0);
@@ -168,6 +177,13 @@ pub(super) fn forces(
             episode: episode.name.clone(),
             stretch: series(context, outcome, &law, (&dofs[d], d), &stretch),
             spread: series(context, outcome, &law, (&dofs[d], d), &spread),
+            whole: ForceSeries {
+                position: Vec::new(),
+                speed: Vec::new(),
+                load: Vec::new(),
+                law: Vec::new(),
+                ..series(context, outcome, &law, (&dofs[d], d), &whole)
+            },
         }
     };
     Ok(order.iter().map(trace).collect())

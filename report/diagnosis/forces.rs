@@ -126,6 +126,7 @@ fn against_time(force: &ForceTrace, law: bool) -> Figure {
         Axis::new("time", "s"),
         force_axis(force),
     )
+    .clock(&force.episode, 0.0)
     .layer(line(before).width(5.0).opacity(0.3).label("missing"));
     let mut caption = format!("Episode {}.", force.episode);
     if law {

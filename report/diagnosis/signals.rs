@@ -183,6 +183,11 @@ fn times(label: &str, trace: &SignalTrace) -> Axis {
     }
 }
 
+/// Time of the episode's first row, s.
+fn start(trace: &SignalTrace) -> f64 {
+    trace.time.first().copied().unwrap_or(0.0)
+}
+
 /// The readings with the simulations over them, and the models that leave the picture.
 fn readings(trace: &SignalTrace, shown: Shown) -> (Chart, Vec<&'static str>) {
     let models = [
@@ -222,6 +227,7 @@ fn readings(trace: &SignalTrace, shown: Shown) -> (Chart, Vec<&'static str>) {
         axis.gutter(GUTTER),
     )
     .height(170.0)
+    .clock(&trace.episode, start(trace))
     .layer(real.label("real"));
     if shown.nominal {
         chart = chart.layer(
@@ -262,7 +268,8 @@ fn residuals(trace: &SignalTrace, shown: Shown) -> Chart {
             .domain(around_zero(all.copied(), least)),
     )
     .description("Real minus simulated, before and after the effects are added.")
-    .height(84.0);
+    .height(84.0)
+    .clock(&trace.episode, start(trace));
     let chart = match span(&trace.time) {
         Some([first, last]) if trace.has_noise() => chart.layer(
             Layer::band(vec![[first, -2.0, 2.0], [last, -2.0, 2.0]])

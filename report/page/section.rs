@@ -1,5 +1,7 @@
 //! A titled part of a page and what can stand in it.
 
+use asid_results::view::View;
+
 use super::{Figure, Table};
 use crate::markup::escape;
 
@@ -8,6 +10,7 @@ use crate::markup::escape;
 pub(super) enum Block {
     Figures(Vec<Figure>),
     Table(Table),
+    View(Box<View>),
     Note(String),
     Command(String),
     Facts(Vec<(String, String)>),
@@ -56,6 +59,18 @@ impl Section {
     pub fn table(mut self, table: Table) -> Self {
         self.blocks.push(Block::Table(table));
         self
+    }
+
+    /// Adds the machine in 3-D.
+    #[must_use]
+    pub fn view(mut self, view: View) -> Self {
+        self.blocks.push(Block::View(Box::new(view)));
+        self
+    }
+
+    /// Whether the machine is to be seen in it.
+    pub(super) fn has_view(&self) -> bool {
+        self.blocks.iter().any(|b| matches!(b, Block::View(_)))
     }
 
     /// Adds a remark, such as why something that a reader expects is not there.
@@ -142,6 +157,7 @@ impl Block {
                 out
             }
             Self::Table(table) => table.html(),
+            Self::View(view) => super::view::html(view),
             Self::Note(text) => format!("<p class=\"note\">{}</p>", escape(text)),
             Self::Command(text) => {
                 format!(

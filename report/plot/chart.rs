@@ -1,5 +1,6 @@
 //! A chart: layers of data over two axes.
 
+use super::clock::Clock;
 use super::frame::{Axis, Frame, Request};
 use super::header::{Above, Entry, Key};
 use super::layer::{Extent, Layer, Mark};
@@ -24,6 +25,7 @@ pub struct Chart {
     y: Axis,
     height: f64,
     layers: Vec<Layer>,
+    clock: Option<Clock>,
 }
 
 impl Chart {
@@ -37,6 +39,7 @@ impl Chart {
             y,
             height: 190.0,
             layers: Vec::new(),
+            clock: None,
         }
     }
 
@@ -58,6 +61,17 @@ impl Chart {
     #[must_use]
     pub fn description(mut self, description: impl Into<String>) -> Self {
         self.description = description.into();
+        self
+    }
+
+    /// Ties it to the 3-D view of an episode (`take`; empty for whichever is played), whose first row is at
+    /// `start` on its axis, s: a line shows the moment, a click goes to one.
+    #[must_use]
+    pub fn clock(mut self, take: &str, start: f64) -> Self {
+        self.clock = Some(Clock {
+            take: take.to_owned(),
+            start,
+        });
         self
     }
 
@@ -194,13 +208,22 @@ impl Plot for Chart {
                 &marks.iter().map(|l| draw(l, &frame)).collect::<String>(),
             ));
         }
-        root(
+        let clock = (self.clock.as_ref()).filter(|_| domains.is_some());
+        let clock = clock.map(|c| {
+            let label = self.y.text(0);
+            c.attributes(frame.x.domain(), (&label, frame.y.domain()), frame.area)
+        });
+        let svg = root(
             id,
             [frame.width, frame.height],
             &self.title,
             &self.description,
             &body,
-        )
+        );
+        match clock {
+            Some(attributes) => svg.replacen("<svg", &format!("<svg{attributes}"), 1),
+            None => svg,
+        }
     }
 }
 

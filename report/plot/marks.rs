@@ -3,6 +3,7 @@
 use super::coordinate;
 use super::frame::Frame;
 use super::layer::{Layer, Mark};
+use crate::markup::escape;
 
 /// Points a line is thinned to; a plot has fewer pixels than this.
 const MOST_POINTS: usize = 900;
@@ -15,12 +16,16 @@ pub(super) fn draw(layer: &Layer, frame: &Frame) -> String {
     let zero = y.map_clamped(0.0);
     let opacity = coordinate(layer.opacity);
     let at = |p: &[f64; 2]| [x.map(p[0]), y.map(p[1])];
+    // What the legend calls it, for whoever points at it.
+    let name = (layer.label.as_deref()).map_or_else(String::new, |label| {
+        format!(" data-name=\"{}\"", escape(label))
+    });
     let stroke = |path: &str| {
         if path.is_empty() {
             return String::new();
         }
         format!(
-            "<path class=\"line {class}\" d=\"{path}\" stroke-opacity=\"{opacity}\"{}{}/>",
+            "<path class=\"line {class}\" d=\"{path}\"{name} stroke-opacity=\"{opacity}\"{}{}/>",
             layer.dash.attribute(),
             layer.width_style()
         )
@@ -64,7 +69,7 @@ pub(super) fn draw(layer: &Layer, frame: &Frame) -> String {
                     )
                 })
                 .collect();
-            format!("<g class=\"fill {class}\" fill-opacity=\"{opacity}\">{dots}</g>")
+            format!("<g class=\"fill {class}\"{name} fill-opacity=\"{opacity}\">{dots}</g>")
         }
         Mark::Whiskers(points) => {
             let strokes: String = points

@@ -51,6 +51,7 @@ fn chart(signal: &Signal) -> Chart {
         Axis::new("time", "s"),
         Axis::new(label, &signal.unit),
     )
+    .clock("", signal.time.first().copied().unwrap_or(0.0))
     .description(caption(signal));
     if let Some(after) = &signal.after {
         let band = after

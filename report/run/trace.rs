@@ -12,6 +12,7 @@ use serde::{Deserialize, Serialize};
 
 use asid_results::nullable;
 use asid_results::trace::{FileEntry, NamedText};
+use asid_results::view::View;
 
 /// Version of the layout of `trace.json`.
 pub const SCHEMA: u32 = 1;
@@ -48,6 +49,9 @@ pub struct RunReport {
     /// The real episode, seen from above.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub episode: Option<Episode>,
+    /// The machine in 3-D.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub view: Option<View>,
     /// Tracked signals of the real episode with their replays.
     pub signals: Vec<Signal>,
     /// What the exploration was for and what it gathered.
@@ -94,6 +98,7 @@ impl Default for RunReport {
             answer: String::new(),
             parameters: Vec::new(),
             episode: None,
+            view: None,
             signals: Vec::new(),
             exploration: None,
             learning: None,

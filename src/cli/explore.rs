@@ -23,7 +23,7 @@ use super::output::{OutFolder, write_json};
 use super::result::{CostResult, ExplorationResult, SCHEMA, Versions, figure};
 use super::session::Session;
 use super::settings::Stage;
-use super::{machine, stage, trace, train};
+use super::{machine, stage, trace, train, view};
 
 /// Arguments of `explore`.
 #[derive(clap::Args)]
@@ -176,6 +176,7 @@ pub fn explore(arguments: &Arguments) -> Result<()> {
         expected.join(", ")
     );
     report.episode = trace::episode(&session, &played.episode);
+    report.view = view::of_prediction(&session, &played.episode, &center, &start)?;
     report.exploration = trace::exploration(
         &session,
         &explored.objective,

@@ -27,6 +27,7 @@ mod solve;
 mod stage;
 mod trace;
 mod train;
+mod view;
 mod withheld;
 mod world;
 

@@ -63,6 +63,7 @@ pub fn run_report(
             .as_ref()
             .and_then(|real| episode(session, &real.episode)),
         signals: signals(session, outcome)?,
+        view: super::view::of_run(session, outcome)?,
         exploration: exploration(
             session,
             &outcome.objective,

@@ -37,6 +37,7 @@ fn joint(dof: &str, size: f64) -> ForceTrace {
         episode: "train_0.csv".into(),
         stretch: series(400, 0.01),
         spread: series(400, 0.137),
+        whole: ForceSeries::default(),
     }
 }
 

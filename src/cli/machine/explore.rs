@@ -26,6 +26,7 @@ use crate::cli::options::Common;
 use crate::cli::output::{OutFolder, write_json, write_text};
 use crate::cli::progress::Bars;
 use crate::cli::result::{CostResult, SCHEMA, figure};
+use crate::cli::view;
 
 /// Most repeats that are counted: who would play more looks for another motion.
 const MOST_REPEATS: usize = 1000;
@@ -186,7 +187,8 @@ pub fn explore(path: &Path, common: &Common, given: &super::motion_config::Optio
             env_steps: 0,
         },
     };
-    let page = motion_page::page(&result, &subject, &found, player.limits());
+    let view = view::of_motion(&subject, &found.played.qpos, period)?;
+    let page = motion_page::page(&result, &subject, &found, player.limits(), view.as_ref());
     out.write(|folder| {
         write_json(&folder.join("result.json"), &result)?;
         write_text(&folder.join("config.toml"), &toml::to_string(&config)?)?;

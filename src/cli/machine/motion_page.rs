@@ -2,6 +2,7 @@
 
 use asid_report::page::{Column, Figure, Page, Section, Table, Tile, Tone};
 use asid_report::plot::{Axis, Chart, Colour, Layer};
+use asid_results::view::View;
 use asid_sysid::design::Designed;
 use asid_sysid::limits::Limits;
 
@@ -19,6 +20,7 @@ pub fn page(
     subject: &Subject,
     found: &Designed,
     limits: &Limits,
+    view: Option<&View>,
 ) -> String {
     let mut page = Page::new(&format!("A motion for {}", result.machine))
         .kicker("asid explore")
@@ -39,8 +41,17 @@ pub fn page(
         );
         page = page.tile(Tile::new(&u.name, &relative(u.motion, u.reference)).note(note));
     }
-    page.section(told(result))
-        .section(commands(result, subject, found))
+    let machine = Section::machine(
+        view,
+        "The motion in 3-D, as the simulator expects it. Drag to turn it. The slider moves the line in the plots below; a click in \
+         a plot moves the slider.",
+    );
+    let page = page.section(told(result));
+    let page = match machine {
+        Some(machine) => page.section(machine),
+        None => page,
+    };
+    page.section(commands(result, subject, found))
         .section(joints(result, subject, found, limits))
         .section(repeat(result))
         .html()
@@ -120,6 +131,7 @@ fn commands(result: &ExploreResult, subject: &Subject, found: &Designed) -> Sect
             let points = series(result, found.commands.iter().skip(a).step_by(nu).copied());
             let title = format!("Command of {}", actuator.name);
             let chart = Chart::new(&title, Axis::new("time", "s"), Axis::new("command", ""))
+                .clock("", 0.0)
                 .layer(Layer::steps(points).colour(Colour::Blue));
             Figure::new(
                 title,
@@ -149,6 +161,7 @@ fn joints(result: &ExploreResult, subject: &Subject, found: &Designed, limits: &
             Axis::new("time", "s"),
             Axis::new("position", "rad or m"),
         )
+        .clock("", 0.0)
         .layer(Layer::line(points).colour(Colour::Blue));
         for end in joint.position.iter().flatten() {
             chart = chart.layer(Layer::horizontal(*end).colour(Colour::Muted).label("limit"));

@@ -1,0 +1,131 @@
+//! What a log says of the positions of a machine.
+
+use asid_core::Episode;
+use asid_core::layout::JointKind;
+use asid_mjcf::Plant;
+use asid_mjcf::plant::Reads;
+
+/// Positions `qpos` at the rows of a log, `rows x nq`, and the joints that no sensor reads. These have the values of
+/// `otherwise` (`rows x nq`), which a simulation of the same commands gave. Between two readings of a slow sensor
+/// positions are interpolated. `None` where no sensor reads any position.
+#[must_use]
+pub fn positions(
+    plant: &Plant,
+    log: &Episode,
+    otherwise: &[f64],
+) -> Option<(Vec<f64>, Vec<String>)> {
+    let nq = plant.layout.nq;
+    let mut qpos = otherwise.to_vec();
+    let mut read = vec![false; plant.layout.joints.len()];
+    for (sensor, reads) in plant.layout.sensors.iter().zip(&plant.sensors) {
+        let Some(range) = log.channel(&sensor.name) else {
+            continue;
+        };
+        let joint = match (*reads, &*sensor.kind) {
+            (Reads::Joint(j), "jointpos") => Some((j, 0)),
+            (Reads::Body(b), "framepos") => plant.free_joint(b).map(|j| (j, 0)),
+            (Reads::Body(b), "framequat") => plant.free_joint(b).map(|j| (j, 3)),
+            _ => None,
+        };
+        let Some((joint, offset)) = joint else {
+            continue;
+        };
+        let place = &plant.layout.joints[joint];
+        let fits = match (place.kind, offset) {
+            (JointKind::Hinge | JointKind::Slide, 0) => range.len() == 1,
+            (JointKind::Free, 0) => range.len() == 3,
+            (JointKind::Free, _) => range.len() == 4,
+            _ => false,
+        };
+        if !fits {
+            continue;
+        }
+        for (i, column) in range.enumerate() {
+            let readings: Vec<f64> = (0..log.rows()).map(|k| log.reading(k)[column]).collect();
+            let Some(filled) = filled(&log.time, &readings) else {
+                continue;
+            };
+            read[joint] = true;
+            for (row, x) in qpos.chunks_exact_mut(nq).zip(filled) {
+                row[place.qpos + offset + i] = x;
+            }
+        }
+    }
+    let unread = plant
+        .layout
+        .joints
+        .iter()
+        .zip(&read)
+        .filter(|(_, read)| !**read);
+    let unread = unread.map(|(j, _)| j.name.clone()).collect();
+    read.contains(&true).then_some((qpos, unread))
+}
+
+/// A remark on joints that no sensor reads; `None` where there are none.
+#[must_use]
+pub fn remark(unread: &[String]) -> Option<String> {
+    // More names than this are not read by anyone.
+    const NAMED: usize = 8;
+    let (named, more) = unread.split_at(unread.len().min(NAMED));
+    let more = match more.len() {
+        0 => String::new(),
+        n => format!(" and {n} more"),
+    };
+    (!unread.is_empty()).then(|| {
+        format!(
+            "No sensor of the log reads {}{more}: the machine as logged has the simulated position there.",
+            named.join(", ")
+        )
+    })
+}
+
+/// Readings with what is missing interpolated, and held before the first and after the last; `None` where there are none.
+fn filled(time: &[f64], readings: &[f64]) -> Option<Vec<f64>> {
+    let there: Vec<usize> = (0..readings.len())
+        .filter(|&k| readings[k].is_finite())
+        .collect();
+    let (&first, &last) = (there.first()?, there.last()?);
+    let mut next = 0;
+    let at = (0..readings.len()).map(|k| {
+        while next < there.len() && there[next] < k {
+            next += 1;
+        }
+        if k <= first || k >= last {
+            return readings[k.clamp(first, last)];
+        }
+        let (a, b) = (there[next - 1], there[next]);
+        let share = (time[k] - time[a]) / (time[b] - time[a]);
+        readings[a] + share * (readings[b] - readings[a])
+    });
+    Some(at.collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use asid_core::Scene;
+    use asid_core::episode::ChannelColumns;
+
+    #[test]
+    fn sensors_say_where_the_machine_was_and_the_simulation_the_rest() {
+        let xml = r#"<mujoco><worldbody><body><joint name="seen"/><geom size="1"/>
+          <body><joint name="hidden"/><geom size="1"/></body></body></worldbody>
+          <sensor><jointpos name="angle" joint="seen"/></sensor></mujoco>"#;
+        let plant = Plant::of(&Scene::from_xml("two", xml, &[]).unwrap()).unwrap();
+        let nan = f64::NAN;
+        let mut log = Episode {
+            time: vec![0.0, 1.0, 2.0, 4.0, 5.0],
+            channels: vec![ChannelColumns {
+                name: "angle".into(),
+                len: 1,
+            }],
+            readings: vec![nan, 1.0, nan, 7.0, nan],
+            ..Episode::default()
+        };
+        let (qpos, unread) = positions(&plant, &log, &[9.0; 10]).unwrap();
+        assert_eq!(qpos, [1.0, 9.0, 1.0, 9.0, 3.0, 9.0, 7.0, 9.0, 7.0, 9.0]);
+        assert_eq!(unread, ["hidden"]);
+        log.readings.fill(nan);
+        assert!(positions(&plant, &log, &[9.0; 10]).is_none());
+    }
+}

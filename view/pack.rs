@@ -1,0 +1,130 @@
+//! Numbers by the thousand as text: 16-bit integers, little-endian, in base64.
+
+use asid_results::view::Take;
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD_NO_PAD;
+
+/// Steps of a position across the box: one below the largest, which says that a pose is missing.
+const STEPS: f64 = 65534.0;
+/// Steps of a quaternion's component from 0 to 1.
+const TURN: f64 = 32767.0;
+/// What a missing pose begins with.
+const MISSING: u16 = u16::MAX;
+
+/// The text of some numbers.
+pub fn text(numbers: &[u16]) -> String {
+    let bytes: Vec<u8> = numbers.iter().flat_map(|n| n.to_le_bytes()).collect();
+    STANDARD_NO_PAD.encode(bytes)
+}
+
+/// A cube that positions are counted in.
+#[derive(Clone, Copy, Debug)]
+pub struct Cube {
+    /// Lowest corner, m.
+    pub low: [f64; 3],
+    /// Side, m.
+    pub size: f64,
+}
+
+impl Cube {
+    /// The smallest around some points; those that are not finite do not count.
+    pub fn around(points: impl Iterator<Item = [f64; 3]>) -> Self {
+        let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+        for p in points.filter(|p| p.iter().all(|x| x.is_finite())) {
+            for k in 0..3 {
+                low[k] = low[k].min(p[k]);
+                high[k] = high[k].max(p[k]);
+            }
+        }
+        if low[0] > high[0] {
+            (low, high) = ([0.0; 3], [1.0; 3]);
+        }
+        // As it is written: the corner has fewer digits than it was found with, and nothing may fall out.
+        let low = low.map(|x| f64::from(x as f32));
+        let widest = (0..3).map(|k| high[k] - low[k]).fold(1e-6, f64::max);
+        Self {
+            low,
+            size: f64::from((widest * 1.000_001) as f32),
+        }
+    }
+
+    /// Its lowest and its highest corner.
+    pub fn corners(&self) -> [[f64; 3]; 2] {
+        [self.low, self.low.map(|x| x + self.size)]
+    }
+
+    /// No farther than `most` around another one: what a simulation that goes astray reaches is not worth the steps.
+    pub fn near(self, other: Self, most: f64) -> Self {
+        let [low, high] = [0, 1].map(|side| {
+            [0, 1, 2].map(|k| match side {
+                0 => self.low[k].max(other.low[k] - most),
+                _ => (self.low[k] + self.size).min(other.low[k] + other.size + most),
+            })
+        });
+        Self::around([low, high].into_iter())
+    }
+
+    /// A point in steps.
+    pub fn point(&self, p: [f64; 3]) -> [u16; 3] {
+        [0, 1, 2].map(|k| {
+            let steps = (p[k] - self.low[k]) / self.size * STEPS;
+            steps.round().clamp(0.0, STEPS) as u16
+        })
+    }
+
+    /// A pose in steps; missing where it is not finite, or outside.
+    pub fn pose(&self, pose: &nalgebra::Isometry3<f64>) -> [u16; 7] {
+        let (t, q) = (&pose.translation, &pose.rotation);
+        let inside = |k: usize| {
+            let across = (t.vector[k] - self.low[k]) / self.size;
+            (-1e-6..=1.0 + 1e-6).contains(&across)
+        };
+        if ![q.w, q.i, q.j, q.k].iter().all(|x| x.is_finite()) || !(0..3).all(inside) {
+            return [MISSING; 7];
+        }
+        let turn = |x: f64| ((x + 1.0) * TURN).round().clamp(0.0, 2.0 * TURN) as u16;
+        let [x, y, z] = self.point([t.x, t.y, t.z]);
+        [x, y, z, turn(q.w), turn(q.i), turn(q.j), turn(q.k)]
+    }
+
+    /// Writes it where the page reads it.
+    pub fn tell(&self, take: &mut Take) {
+        take.low = self.low.map(|x| x as f32);
+        take.size = self.size as f32;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{Isometry3, Translation3, UnitQuaternion};
+
+    /// Half a step each way: 1/65534 of the cube for positions, 1/32767 for a quaternion's component.
+    #[test]
+    fn a_pose_comes_back_within_half_a_step() {
+        let cube = Cube::around([[-1.0, 2.0, 0.0], [3.0, 2.5, 1.0], [f64::NAN; 3]].into_iter());
+        let turn = UnitQuaternion::from_euler_angles(0.4, -1.2, 3.0);
+        let place = Translation3::new(1.234, 2.3, 0.7);
+        let n = cube
+            .pose(&Isometry3::from_parts(place, turn))
+            .map(f64::from);
+        for k in 0..3 {
+            let back = cube.low[k] + n[k] / STEPS * cube.size;
+            assert!((back - place.vector[k]).abs() <= 0.51 * cube.size / STEPS);
+        }
+        for (n, x) in n[3..].iter().zip([turn.w, turn.i, turn.j, turn.k]) {
+            assert!((n / TURN - 1.0 - x).abs() <= 0.51 / TURN);
+        }
+    }
+
+    #[test]
+    fn what_is_not_finite_is_missing() {
+        let cube = Cube::around(std::iter::empty());
+        let nowhere = Isometry3::from_parts(
+            Translation3::new(f64::NAN, 0.0, 0.0),
+            UnitQuaternion::identity(),
+        );
+        assert_eq!(cube.pose(&nowhere)[0], MISSING);
+        assert_eq!(text(&[1, 65535]), "AQD//w");
+    }
+}
