@@ -16,6 +16,8 @@ pub mod format;
 pub mod lerobot;
 #[cfg(feature = "ros")]
 pub mod mcap_file;
+#[cfg(feature = "ros")]
+pub mod mcap_out;
 pub mod open;
 #[cfg(feature = "parquet")]
 mod parquet_file;

@@ -12,7 +12,7 @@ mod unit;
 mod words;
 
 use asid_core::log::{ColumnMapping, unit_factor};
-use asid_core::{Result, Scene};
+use asid_core::{Error, Result, Scene};
 use asid_mjcf::Plant;
 
 pub use quantity::Quantity;
@@ -84,14 +84,28 @@ impl Proposal {
     }
 }
 
-/// Proposes a mapping for a log of a machine.
+/// Proposes a mapping for a log of a machine; `given` are quantities with their columns that are known already.
 ///
 /// # Errors
-/// When the document is not valid MJCF.
-pub fn propose(scene: &Scene, plant: &Plant, log: &RawLog, kind: Kind) -> Result<Proposal> {
+/// When the document is not valid MJCF, or a given name is not known.
+pub fn propose(
+    scene: &Scene,
+    plant: &Plant,
+    (log, kind): (&RawLog, Kind),
+    given: &[(String, String)],
+) -> Result<Proposal> {
     let quantities = quantity::quantities(scene, plant)?;
     let context = Context::new(log, &quantities, kind);
     let mut taken: Vec<Option<Candidate>> = vec![None; quantities.len()];
+    for (name, column) in given {
+        let names = quantities.iter().map(|q| &*q.name);
+        let place = quantities.iter().position(|q| q.name == *name);
+        let place = place.ok_or_else(|| Error::unknown("sensor or command", name, names))?;
+        let columns = log.series.iter().map(|s| &*s.name);
+        let series = log.series.iter().position(|s| s.name == *column);
+        let series = series.ok_or_else(|| Error::unknown("column", column, columns))?;
+        taken[place] = Some(context.given(place, series));
+    }
     // Readings first: commands are compared with them.
     context.assign(&mut taken, false, |_, _| 0.0);
     context.drop_incomplete(&mut taken);
@@ -250,7 +264,7 @@ fn match_speed(
         ));
         return;
     };
-    if **unit != units[0] {
+    if *unit != units[0] {
         mapping.unit = Some((*unit).to_owned());
     }
     if wanted < 0.0 {

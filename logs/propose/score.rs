@@ -92,6 +92,23 @@ impl<'a> Context<'a> {
         }
     }
 
+    /// A pair that somebody knows of.
+    pub(super) fn given(&self, quantity: usize, series: usize) -> Candidate {
+        let words = &self.named[series].leaf;
+        let unit = unit(
+            &self.quantities[quantity],
+            &self.log.series[series],
+            words,
+            self.kind,
+        );
+        Candidate {
+            series,
+            unit,
+            reasons: vec!["as you say".into()],
+            points: OWN_NAME,
+        }
+    }
+
     /// Gives columns to the commands or the readings, the best pair first; `more` are further points, -1 to 1.
     pub(super) fn assign(
         &self,

@@ -37,7 +37,7 @@ fn proposed(series: Vec<Series>, kind: Kind) -> Proposal {
         series,
         ..RawLog::default()
     };
-    propose(&scene, &plant, &log, kind).unwrap()
+    propose(&scene, &plant, (&log, kind), &[]).unwrap()
 }
 
 fn from<'a>(proposal: &'a Proposal, name: &str) -> &'a str {
@@ -171,4 +171,20 @@ fn a_log_of_the_models_own_names_needs_no_mapping() {
     assert!(found.mappings().is_empty());
     assert_eq!(found.missing_commands(), ["elbow", "gripper"]);
     assert_eq!(found.readings(), 1);
+}
+
+#[test]
+fn what_is_known_is_taken_and_a_name_that_is_not_there_is_refused() {
+    let scene = Scene::from_xml("arm", ARM, &[]).unwrap();
+    let plant = Plant::of(&scene).unwrap();
+    let log = RawLog {
+        series: vec![series("", "q_pan", |t| t), series("", "other", |t| t)],
+        ..RawLog::default()
+    };
+    let of = |column: &str| {
+        let given = [("q_pan".to_owned(), column.to_owned())];
+        propose(&scene, &plant, (&log, Kind::Csv), &given)
+    };
+    assert_eq!(from(&of("other").unwrap(), "q_pan"), "other");
+    assert!(of("othr").unwrap_err().to_string().contains("`other`"));
 }
