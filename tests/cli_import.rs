@@ -17,37 +17,67 @@ use serde_json::Value;
 const EPISODES: [&str; 4] = ["train_0", "train_1", "train_2", "test_3"];
 
 fn fixture(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("logs/tests/fixtures").join(name)
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("logs/tests/fixtures")
+        .join(name)
 }
 
 /// Runs `import` on some logs into a folder.
 fn import(logs: &[PathBuf], out: &Path, more: &[&str]) -> std::process::Output {
     let model = fixture("nominal.xml");
-    let mut arguments = vec!["import", "--model", text(&model), "--out", text(out), "--quiet"];
+    let mut arguments = vec![
+        "import",
+        "--model",
+        text(&model),
+        "--out",
+        text(out),
+        "--quiet",
+    ];
     arguments.extend(logs.iter().map(|l| text(l)));
     arguments.extend(more);
     asid(&arguments)
 }
 
 fn told(out: &std::process::Output) -> String {
-    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+    assert!(
+        out.status.success(),
+        "{}",
+        String::from_utf8_lossy(&out.stderr)
+    );
     String::from_utf8_lossy(&out.stdout).into_owned()
 }
 
 fn each(folder: &str, ending: &str) -> Vec<PathBuf> {
-    EPISODES.iter().map(|n| fixture(&format!("{folder}/{n}{ending}"))).collect()
+    EPISODES
+        .iter()
+        .map(|n| fixture(&format!("{folder}/{n}{ending}")))
+        .collect()
 }
 
 /// The largest difference of the numbers of two studies.
 fn apart(a: &Study, b: &Study) -> f64 {
     let mut most: f64 = 0.0;
-    let all = |s: &Study| -> Vec<Episode> { s.train.iter().chain(&s.test).map(|(_, e)| e.clone()).collect() };
+    let all = |s: &Study| -> Vec<Episode> {
+        s.train
+            .iter()
+            .chain(&s.test)
+            .map(|(_, e)| e.clone())
+            .collect()
+    };
     let (a, b) = (all(a), all(b));
     assert_eq!(a.len(), b.len());
     for (x, y) in a.iter().zip(&b) {
         assert_eq!((&x.channels, x.rows()), (&y.channels, y.rows()));
-        for (p, q) in [(&x.time, &y.time), (&x.ctrl, &y.ctrl), (&x.readings, &y.readings)] {
-            most = p.iter().zip(q).map(|(p, q)| (p - q).abs()).fold(most, f64::max);
+        for (p, q) in [
+            (&x.time, &y.time),
+            (&x.ctrl, &y.ctrl),
+            (&x.readings, &y.readings),
+        ] {
+            most = p
+                .iter()
+                .zip(q)
+                .map(|(p, q)| (p - q).abs())
+                .fold(most, f64::max);
         }
     }
     most
@@ -77,14 +107,20 @@ fn logs_of_other_stacks_are_diagnosed_as_the_csv_study() {
     ] {
         let study = at(name);
         let said = told(&import(&logs, &study, &[]));
-        assert!(said.contains("gripper_gap") && said.contains("4 episodes, 1 of them held out"), "{said}");
+        assert!(
+            said.contains("gripper_gap") && said.contains("4 episodes, 1 of them held out"),
+            "{said}"
+        );
         assert!(study.join("import.html").is_file());
         let read = Study::read(&study).unwrap();
         assert!(apart(&read, &csv) <= off, "{name}: {}", apart(&read, &csv));
         // The same numbers to the last bit have the same diagnosis; those in single precision are diagnosed too.
         if name == "sqlite" || name == "lerobot" {
             let result = diagnosed(&study, &at(&format!("{name}-out")));
-            assert_eq!(result["verdict"]["effects"], wanted["verdict"]["effects"], "{name}");
+            assert_eq!(
+                result["verdict"]["effects"], wanted["verdict"]["effects"],
+                "{name}"
+            );
             assert_eq!(result["wiring"].as_array().map_or(0, Vec::len), 0, "{name}");
             let number = |v: &Value, key: &str| v["gap"][key].as_f64().unwrap();
             for key in ["nominal", "refined"] {
@@ -100,7 +136,10 @@ fn copies_are_the_same_study_in_the_models_own_names() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("study");
     told(&import(&each("bag_sqlite", ""), &out, &["--copy"]));
-    let (read, csv) = (Study::read(&out).unwrap(), Study::read(&fixture("csv")).unwrap());
+    let (read, csv) = (
+        Study::read(&out).unwrap(),
+        Study::read(&fixture("csv")).unwrap(),
+    );
     assert!(apart(&read, &csv) < 1e-12);
     assert!(read.columns.is_empty());
 }
@@ -120,10 +159,18 @@ fn a_table_with_other_names_and_units_is_mapped() {
     let mut logs = Vec::new();
     for name in EPISODES {
         let csv = std::fs::read_to_string(fixture(&format!("csv/{name}.csv"))).unwrap();
-        let mut text = "Time [ms];pan target;gripper target;pan angle [deg];gripper [mm];battery\n".to_owned();
+        let mut text =
+            "Time [ms];pan target;gripper target;pan angle [deg];gripper [mm];battery\n".to_owned();
         for line in csv.lines().skip(1) {
             let x: Vec<f64> = line.split(',').map(|c| c.parse().unwrap()).collect();
-            text += &format!("{};{};{};{};{};12\n", 1e3 * x[0], x[1], x[2], x[3].to_degrees(), 1e3 * x[4]);
+            text += &format!(
+                "{};{};{};{};{};12\n",
+                1e3 * x[0],
+                x[1],
+                x[2],
+                x[3].to_degrees(),
+                1e3 * x[4]
+            );
         }
         let path = folder.path().join(format!("{name}.csv"));
         std::fs::write(&path, text).unwrap();
@@ -131,7 +178,10 @@ fn a_table_with_other_names_and_units_is_mapped() {
     }
     let out = folder.path().join("study");
     told(&import(&logs, &out, &[]));
-    let (read, csv) = (Study::read(&out).unwrap(), Study::read(&fixture("csv")).unwrap());
+    let (read, csv) = (
+        Study::read(&out).unwrap(),
+        Study::read(&fixture("csv")).unwrap(),
+    );
     assert!(apart(&read, &csv) < 1e-9);
 }
 
@@ -140,11 +190,22 @@ fn a_table_with_other_names_and_units_is_mapped() {
 fn a_model_without_sensors_reads_its_joints() {
     let folder = tempfile::tempdir().unwrap();
     let xml = std::fs::read_to_string(fixture("nominal.xml")).unwrap();
-    let (from, to) = (xml.find("<sensor>").unwrap(), xml.find("</sensor>").unwrap());
+    let (from, to) = (
+        xml.find("<sensor>").unwrap(),
+        xml.find("</sensor>").unwrap(),
+    );
     let model = folder.path().join("bare.xml");
     std::fs::write(&model, format!("{}{}", &xml[..from], &xml[to + 9..])).unwrap();
     let (out, dataset) = (folder.path().join("study"), fixture("lerobot"));
-    let done = asid(&["import", text(&dataset), "--model", text(&model), "--out", text(&out), "--quiet"]);
+    let done = asid(&[
+        "import",
+        text(&dataset),
+        "--model",
+        text(&model),
+        "--out",
+        text(&out),
+        "--quiet",
+    ]);
     told(&done);
     let read = Study::read(&out).unwrap();
     assert_eq!(read.train[0].1.width(), 2);
@@ -157,15 +218,28 @@ fn wrong_calls_are_one_line_and_write_nothing() {
     let logs = each("bag_sqlite", "");
     for (more, said) in [
         (&["--map", "ctrl.pan"][..], "is not NAME=COLUMN"),
-        (&["--map", "pan_angl=/joint_states.position.pan"], "unknown sensor or command `pan_angl`"),
-        (&["--map", "pan_angle=/joint_states.position.pam"], "unknown column"),
-        (&["--topic", "/joint_states"], "no column is the command of actuator `pan`"),
+        (
+            &["--map", "pan_angl=/joint_states.position.pan"],
+            "unknown sensor or command `pan_angl`",
+        ),
+        (
+            &["--map", "pan_angle=/joint_states.position.pam"],
+            "unknown column",
+        ),
+        (
+            &["--topic", "/joint_states"],
+            "no column is the command of actuator `pan`",
+        ),
         (&["--topic", "/nothing"], "no messages of topic `/nothing`"),
         (&["--test", "nowhere.mcap"], "nowhere.mcap"),
     ] {
         let done = import(&logs, &out, more);
         let error = String::from_utf8_lossy(&done.stderr).into_owned();
-        assert_eq!((done.status.code(), error.lines().count()), (Some(2), 1), "{error}");
+        assert_eq!(
+            (done.status.code(), error.lines().count()),
+            (Some(2), 1),
+            "{error}"
+        );
         assert!(error.contains(said), "{error}");
         assert!(!out.exists());
     }
@@ -180,13 +254,23 @@ fn wrong_calls_are_one_line_and_write_nothing() {
 fn exported_logs_are_read_back_with_the_same_numbers() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("mcap");
-    told(&asid(&["export-log", text(&fixture("csv")), "--out", text(&out)]));
+    told(&asid(&[
+        "export-log",
+        text(&fixture("csv")),
+        "--out",
+        text(&out),
+    ]));
     let logs = EPISODES.map(|n| out.join(format!("{n}.mcap")));
-    let raw = Opener::default().open(&logs[0], &LogSettings::default()).unwrap();
+    let raw = Opener::default()
+        .open(&logs[0], &LogSettings::default())
+        .unwrap();
     assert!(raw[0].series("/joint_states.position.pan").is_some());
     let study = folder.path().join("study");
     told(&import(&logs, &study, &[]));
-    let (read, csv) = (Study::read(&study).unwrap(), Study::read(&fixture("csv")).unwrap());
+    let (read, csv) = (
+        Study::read(&study).unwrap(),
+        Study::read(&fixture("csv")).unwrap(),
+    );
     // Stamps are whole nanoseconds.
     assert!(apart(&read, &csv) < 1e-9);
 }

@@ -16,11 +16,13 @@ const SAME_WORDS: f64 = 4.0;
 const BY_TOPIC: f64 = 0.8;
 /// Points lost where both have words, and none in common.
 const OTHER_WORDS: f64 = 1.5;
-/// Points of the same measure, and lost by another.
+/// Points of the same measure.
 const SAME_MEASURE: f64 = 2.0;
+/// Points lost by another measure: a speed is no place, whatever its name.
 const OTHER_MEASURE: f64 = 4.0;
-/// Points of being named as sent, for a command, or as read, for a reading; and lost by the contrary.
+/// Points of being named as sent, for a command, or as read, for a reading.
 const SAME_ROLE: f64 = 1.0;
+/// Points lost by the contrary.
 const OTHER_ROLE: f64 = 4.0;
 /// Points of the same place in a list.
 const SAME_PLACE: f64 = 1.5;

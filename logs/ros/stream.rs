@@ -110,7 +110,7 @@ impl Stream {
                         Value::Text(name) => Some(name.clone()),
                         _ => None,
                     });
-                    let name = given.or_else(|| own_name(entry)).unwrap_or(i.to_string());
+                    let name = own_name(entry).or(given).unwrap_or(i.to_string());
                     within(path, &name, |path| self.flatten(path, entry, None));
                 }
             }

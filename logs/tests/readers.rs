@@ -33,7 +33,11 @@ fn imported(paths: &[PathBuf]) -> Vec<Episode> {
         let log = opener.open(path, &settings).unwrap().remove(0);
         let kind = Kind::of(&asid_logs::open::split(path).0);
         let proposal = propose(&scene, &plant, (&log, kind), &[]).unwrap();
-        assert!(proposal.missing_commands().is_empty(), "{:#?}", proposal.matches);
+        assert!(
+            proposal.missing_commands().is_empty(),
+            "{:#?}",
+            proposal.matches
+        );
         let mappings = proposal.mappings();
         let [commands, readings] = wanted(&plant.layout, &mappings);
         let (table, _) = log.table(&commands, &readings);
@@ -85,7 +89,9 @@ fn mcap_with_messages_of_its_own_definition_is_the_csv_log() {
 /// Single precision has 24 bits: a degree of a hundred is good to 4e-6 of them, 7e-8 rad.
 #[test]
 fn a_dataset_of_lerobot_is_the_csv_log_in_single_precision() {
-    let paths: Vec<PathBuf> = (0..4).map(|n| fixtures().join(format!("lerobot#{n}"))).collect();
+    let paths: Vec<PathBuf> = (0..4)
+        .map(|n| fixtures().join(format!("lerobot#{n}")))
+        .collect();
     assert_same(&paths, 2e-7);
 }
 
@@ -95,9 +101,18 @@ fn a_topic_that_is_not_there_is_named() {
         topics: vec!["/joint_state".into()],
         ..LogSettings::default()
     };
-    for path in [&in_folder("bag_sqlite", "")[0], &in_folder("mcap", ".mcap")[0]] {
-        let error = Opener::default().open(path, &settings).unwrap_err().to_string();
-        assert!(error.contains("`/joint_state`") && error.lines().count() == 1, "{error}");
+    for path in [
+        &in_folder("bag_sqlite", "")[0],
+        &in_folder("mcap", ".mcap")[0],
+    ] {
+        let error = Opener::default()
+            .open(path, &settings)
+            .unwrap_err()
+            .to_string();
+        assert!(
+            error.contains("`/joint_state`") && error.lines().count() == 1,
+            "{error}"
+        );
     }
 }
 
@@ -127,7 +142,10 @@ fn cut_files_are_refused_or_read_but_never_panic() {
                 assert_eq!(error.to_string().lines().count(), 1, "{error}");
             }
             // Whole pages of SQLite may be missing behind what is read.
-            assert!(opened.is_err() || name.ends_with("db3"), "{name} cut to {length} bytes was read");
+            assert!(
+                opened.is_err() || name.ends_with("db3"),
+                "{name} cut to {length} bytes was read"
+            );
         }
     }
 }
