@@ -66,6 +66,12 @@ fn sqlite(path: &Path, topics: &mut Topics) -> Result<(), String> {
     let said = |e: rusqlite::Error| format!("is no bag of ROS 2 in SQLite, or a damaged one: {e}");
     let flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_NO_MUTEX;
     let bag = Connection::open_with_flags(path, flags).map_err(said)?;
+    // A view could take for ever to answer.
+    let tables = "SELECT count(*) FROM sqlite_master WHERE type = 'table' AND name IN ('topics', 'messages')";
+    let tables: i64 = bag.query_row(tables, [], |row| row.get(0)).map_err(said)?;
+    if tables != 2 {
+        return Err("is no bag of ROS 2: it has no tables `topics` and `messages`".into());
+    }
     let mut query = bag
         .prepare("SELECT id, name, type, serialization_format FROM topics")
         .map_err(said)?;

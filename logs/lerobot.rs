@@ -68,7 +68,7 @@ pub fn read(path: &Path) -> Result<Vec<(usize, RawLog)>, String> {
             .unwrap_or(&file)
             .display()
             .to_string();
-        let columns = parquet_file::columns(&file).map_err(|e| format!("{shown}: {e}"))?;
+        let columns = parquet_file::columns(&file, true).map_err(|e| format!("{shown}: {e}"))?;
         add(&mut episodes, &columns, &info).map_err(|e| format!("{shown}: {e}"))?;
     }
     if episodes.is_empty() {
@@ -108,7 +108,7 @@ fn add(
         let named = feature_name(name, info);
         for (row, x) in values.iter().enumerate().filter(|(_, x)| x.is_finite()) {
             let number = episode[row];
-            if !(number >= 0.0) {
+            if number.is_nan() || number < 0.0 {
                 return Err(format!(
                     "row {}: the number of its episode is missing",
                     row + 1

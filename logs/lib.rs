@@ -8,6 +8,7 @@
 //! Readers believe nothing: a damaged or cut file is one line of error, whatever its bytes. The formats that need more
 //! than the default build has (SQLite, compression) are behind the features `ros` and `parquet`.
 
+pub mod align;
 #[cfg(feature = "ros")]
 pub mod bag;
 mod csv_file;

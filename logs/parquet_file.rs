@@ -17,17 +17,18 @@ use crate::table_file;
 /// Longest list that is kept: states and actions of robots are shorter.
 const LONGEST_LIST: usize = 512;
 
-/// Columns of a file, by name in its order; entries of lists are `name.0`, `name.1`, …; NaN where there is no number.
+/// Columns of a file, by name in its order, NaN where there is no number; with `lists`, entries of lists are `name.0`,
+/// `name.1`, ….
 ///
 /// # Errors
 /// When the file is damaged.
-pub fn columns(path: &Path) -> Result<Vec<(String, Vec<f64>)>, String> {
+pub fn columns(path: &Path, lists: bool) -> Result<Vec<(String, Vec<f64>)>, String> {
     // The parser of damaged files may fail an inner check instead of returning an error.
-    let read = std::panic::catch_unwind(AssertUnwindSafe(|| read_columns(path)));
+    let read = std::panic::catch_unwind(AssertUnwindSafe(|| read_columns(path, lists)));
     read.unwrap_or_else(|_| Err("is a damaged Parquet file".into()))
 }
 
-fn read_columns(path: &Path) -> Result<Vec<(String, Vec<f64>)>, String> {
+fn read_columns(path: &Path, lists: bool) -> Result<Vec<(String, Vec<f64>)>, String> {
     let told = |e: ParquetError| e.to_string().replace('\n', " ");
     let file = File::open(path).map_err(|e| e.to_string())?;
     let file = SerializedFileReader::new(file).map_err(told)?;
@@ -35,7 +36,7 @@ fn read_columns(path: &Path) -> Result<Vec<(String, Vec<f64>)>, String> {
     let chosen: Vec<Arc<Type>> = schema
         .get_fields()
         .iter()
-        .filter(|f| is_numeric(f))
+        .filter(|f| is_numeric(f) && (lists || f.is_primitive()))
         .cloned()
         .collect();
     if chosen.is_empty() {
@@ -46,14 +47,14 @@ fn read_columns(path: &Path) -> Result<Vec<(String, Vec<f64>)>, String> {
         .build()
         .map_err(told)?;
     let mut columns: Vec<(String, Vec<f64>)> = Vec::new();
-    let mut lists: Vec<Vec<usize>> = vec![Vec::new(); projection.get_fields().len()];
+    let mut places: Vec<Vec<usize>> = vec![Vec::new(); projection.get_fields().len()];
     for (k, row) in file
         .get_row_iter(Some(projection))
         .map_err(told)?
         .enumerate()
     {
         let row = row.map_err(|e| format!("row {}: {}", k + 1, told(e)))?;
-        for ((name, field), places) in row.get_column_iter().zip(&mut lists) {
+        for ((name, field), places) in row.get_column_iter().zip(&mut places) {
             let values = numbers(field);
             let single = !matches!(field, Field::ListInternal(_));
             for (i, x) in values.into_iter().take(LONGEST_LIST).enumerate() {
@@ -135,5 +136,5 @@ fn number(field: &Field) -> f64 {
 /// # Errors
 /// When the file is damaged, or has no column of stamps.
 pub fn read(path: &Path, name: &str) -> Result<RawLog, String> {
-    table_file::log(name, columns(path)?)
+    table_file::log(name, columns(path, false)?)
 }

@@ -4,6 +4,8 @@ use std::collections::HashMap;
 
 use asid_core::log::{LogNotes, Table};
 
+use crate::align;
+
 /// One column of a log: a number over time.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Series {
@@ -49,10 +51,8 @@ impl RawLog {
         (last - first).max(0.0)
     }
 
-    /// The series of these names as a table, and what was not among them, by stream.
-    ///
-    /// Rows are all stamps from the first reading to the last, and time counts from the first row. A command that was sent
-    /// before is held there.
+    /// The series of these names as a table (see [`align`]), and what was not among them, by stream. Time counts from the
+    /// first row.
     #[must_use]
     pub fn table(&self, commands: &[String], readings: &[String]) -> (Table, LogNotes) {
         let found = |names: &[String]| -> Vec<&Series> {
@@ -60,48 +60,25 @@ impl RawLog {
             all.filter(|s| !s.time.is_empty()).collect()
         };
         let (sent, read) = (found(commands), found(readings));
-        let all = sent.iter().chain(&read);
-        let bounding = if read.is_empty() { &sent } else { &read };
-        let first = bounding.iter().map(|s| s.time[0]);
-        let first = first.fold(f64::INFINITY, f64::min);
-        let last = bounding.iter().filter_map(|s| s.time.last().copied());
-        let last = last.fold(f64::NEG_INFINITY, f64::max);
-        let mut stamps: Vec<f64> = all.clone().flat_map(|s| s.time.iter().copied()).collect();
-        stamps.retain(|t| (first..=last).contains(t));
-        stamps.sort_by(f64::total_cmp);
-        stamps.dedup();
-        let mut columns = Vec::new();
-        for s in all {
-            let mut column = vec![f64::NAN; stamps.len()];
-            for (t, x) in s.time.iter().zip(&s.values) {
-                if let Ok(row) = stamps.binary_search_by(|other| other.total_cmp(t)) {
-                    column[row] = *x;
-                }
-            }
-            columns.push((s.name.clone(), column));
-        }
-        for (s, (_, column)) in sent.iter().zip(&mut columns) {
-            let before = s.time.partition_point(|t| *t <= first);
-            if let (Some(cell), Some(k)) = (column.first_mut(), before.checked_sub(1)) {
-                *cell = s.values[k];
-            }
-        }
+        let rows = align::rows(if read.is_empty() { &sent } else { &read });
+        let mut columns: Vec<(String, Vec<f64>)> = sent
+            .iter()
+            .map(|s| (s.name.clone(), align::commands(s, &rows)))
+            .collect();
+        let readings = read.iter();
+        columns.extend(readings.map(|s| (s.name.clone(), align::readings(s, &rows))));
+        let first = rows.first().copied().unwrap_or(0.0);
+        let names: Vec<&Series> = sent.into_iter().chain(read).collect();
         let notes = LogNotes {
-            passed_over: self.passed_over(&[commands, readings].concat()),
+            passed_over: self.passed_over(&names),
             ..LogNotes::default()
         };
-        stamps.iter_mut().for_each(|t| *t -= first);
-        (
-            Table {
-                time: stamps,
-                columns,
-            },
-            notes,
-        )
+        let time = rows.iter().map(|t| t - first).collect();
+        (Table { time, columns }, notes)
     }
 
-    /// Streams of which nothing is among `names`, and single columns of a log that is one table.
-    fn passed_over(&self, names: &[String]) -> Vec<String> {
+    /// Streams of which nothing is among `chosen`, and single columns of a log that is one table.
+    fn passed_over(&self, chosen: &[&Series]) -> Vec<String> {
         let mut used: HashMap<&str, bool> = HashMap::new();
         let mut order = Vec::new();
         for s in &self.series {
@@ -114,7 +91,7 @@ impl RawLog {
                 order.push(own);
                 false
             });
-            *entry |= names.contains(&s.name);
+            *entry |= chosen.iter().any(|c| c.name == s.name);
         }
         let unused = order.into_iter().filter(|name| !used[name.as_str()]);
         unused.cloned().collect()
@@ -135,35 +112,31 @@ mod tests {
     }
 
     #[test]
-    fn streams_keep_their_own_times() {
+    fn rows_are_those_of_the_readings_and_what_is_not_used_is_named() {
         let log = RawLog {
             series: vec![
-                series("/a.x", "/a", &[(0.0, 1.0), (0.2, 2.0)]),
-                series("/b.u", "/b", &[(0.1, 5.0), (0.2, 6.0)]),
-                series("/c.z", "/c", &[(0.15, 9.0)]),
+                series("/a.x", "/a", &[(5.0, 1.0), (5.2, 2.0), (5.4, 3.0)]),
+                series(
+                    "/b.u",
+                    "/b",
+                    &[(1.0, 7.0), (4.9, 5.0), (5.3, 6.0), (40.0, 0.0)],
+                ),
+                series("/c.z", "/c", &[(5.1, 9.0)]),
             ],
             ..RawLog::default()
         };
         let (table, notes) = log.table(&["/b.u".into()], &["/a.x".into(), "absent".into()]);
-        assert_eq!(table.time, [0.0, 0.1, 0.2]);
-        let (b, a) = (&table.columns[0].1, &table.columns[1].1);
-        assert!(a[1].is_nan() && b[0].is_nan());
-        assert_eq!([a[0], a[2], b[1], b[2]], [1.0, 2.0, 5.0, 6.0]);
+        for (t, want) in table.time.iter().zip([0.0, 0.2, 0.4]) {
+            assert!((t - want).abs() < 1e-12);
+        }
+        let (u, x) = (&table.columns[0].1, &table.columns[1].1);
+        assert_eq!(x, &[1.0, 2.0, 3.0]);
+        assert!(
+            u[0] == 5.0 && (u[1] - 5.5).abs() < 1e-9 && u[2] == 6.0,
+            "{u:?}"
+        );
         assert_eq!(notes.passed_over, ["/c"]);
-        assert!((log.duration() - 0.2).abs() < 1e-12);
-    }
-
-    #[test]
-    fn a_log_begins_and_ends_with_its_readings() {
-        let log = RawLog {
-            series: vec![
-                series("x", "", &[(5.0, 1.0), (6.0, 2.0)]),
-                series("u", "", &[(1.0, 7.0), (2.0, 8.0), (5.5, 9.0), (40.0, 0.0)]),
-            ],
-            ..RawLog::default()
-        };
-        let (table, _) = log.table(&["u".into()], &["x".into()]);
-        assert_eq!(table.time, [0.0, 0.5, 1.0]);
-        assert_eq!(table.columns[0].1[..2], [8.0, 9.0]);
+        assert_eq!(table.columns.len(), 2);
+        assert!((log.duration() - 39.0).abs() < 1e-12);
     }
 }

@@ -222,7 +222,7 @@ impl Words {
                 found.axis = word.chars().next();
             } else if word == "angular" || word == "linear" {
                 found.turning = Some(word == "angular");
-            } else if !FILLER.contains(&&**word) && !(entry && i == last) {
+            } else if !(FILLER.contains(&&**word) || entry && i == last) {
                 found.own.push(word.clone());
             }
             if i == last {

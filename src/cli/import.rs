@@ -2,6 +2,7 @@
 
 mod files;
 mod page;
+mod table;
 mod wired;
 
 use std::io::Write as _;
@@ -10,14 +11,12 @@ use std::path::{Path, PathBuf};
 use anyhow::Result;
 use asid_core::log::{ColumnMapping, of_table, wanted};
 use asid_core::{Episode, Error, Layout};
-use asid_logs::propose::{Match, Proposal, propose};
+use asid_logs::propose::{Proposal, propose};
 use asid_logs::{Kind, LogSettings, Opener, RawLog};
-use serde::Serialize;
 
 use super::failure;
 use super::machine::{Subject, sensors};
 use super::output::OutFolder;
-use super::result::{SCHEMA, figure};
 
 /// Columns that are named at most where one is sought; the rest is counted.
 const NAMED: usize = 12;
@@ -77,22 +76,6 @@ pub struct Imported {
     pub episode: Episode,
 }
 
-/// A row of the mapping, for JSON.
-#[derive(Serialize)]
-struct Row<'a> {
-    name: &'a str,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    from: Option<&'a str>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    unit: Option<&'a str>,
-    sign: f64,
-    scale: f64,
-    offset: f64,
-    delay: f64,
-    rate: f64,
-    reasons: &'a [String],
-}
-
 /// Imports.
 pub fn import(arguments: &Arguments) -> Result<()> {
     let subject = Subject::open(&arguments.model, arguments.backend.as_deref())?;
@@ -121,7 +104,7 @@ pub fn import(arguments: &Arguments) -> Result<()> {
     notes.extend(first.remarks.iter().cloned());
     if let Err(error) = complete(&proposal) {
         if !arguments.json {
-            show(&proposal)?;
+            table::show(&proposal)?;
         }
         return Err(error);
     }
@@ -145,9 +128,9 @@ pub fn import(arguments: &Arguments) -> Result<()> {
         out.write(|folder| study.write(folder, &out.path(), &page))?;
     }
     if arguments.json {
-        return json(&proposal, &notes, out.as_ref());
+        return table::json(&proposal, &notes, out.as_ref());
     }
-    show(&proposal)?;
+    table::show(&proposal)?;
     notes.iter().for_each(|note| failure::note(note));
     let mut stdout = std::io::stdout().lock();
     match out {
@@ -186,7 +169,10 @@ fn open(arguments: &Arguments) -> Result<(Vec<(PathBuf, RawLog, bool)>, LogSetti
         for log in opener.open(path, &settings)? {
             // Episodes of a dataset are named by their number.
             let own = match (kind, episode) {
-                (Kind::Lerobot, None) => file.with_file_name(&log.name),
+                (Kind::Lerobot, None) => match log.name.rsplit_once('#') {
+                    Some((_, number)) => PathBuf::from(format!("{}#{number}", file.display())),
+                    None => path.clone(),
+                },
                 _ => path.clone(),
             };
             all.push((own, log, test));
@@ -276,89 +262,4 @@ fn episode(
     let [commands, readings] = wanted(layout, mappings);
     let (table, _) = raw.table(&commands, &readings);
     Ok(of_table(path, &table, layout, mappings)?.0)
-}
-
-/// How a column is read, in short.
-fn reading(found: &Match) -> String {
-    let Some(m) = &found.mapping else {
-        return String::new();
-    };
-    let mut parts = Vec::new();
-    parts.extend(m.unit.clone());
-    if m.scale != 1.0 {
-        parts.push(format!("× {}", figure(m.scale)));
-    }
-    if m.sign < 0.0 {
-        parts.push("× -1".into());
-    }
-    if m.offset != 0.0 {
-        parts.push(format!("+ {}", figure(m.offset)));
-    }
-    if m.delay != 0.0 {
-        parts.push(format!("{} s late", figure(m.delay)));
-    }
-    parts.join(" ")
-}
-
-/// The cells of a quantity: its column, how it is read, rate, values, reasons.
-fn cells(found: &Match) -> [String; 5] {
-    let Some(mapping) = &found.mapping else {
-        return ["-", "", "", "", "no column"].map(str::to_owned);
-    };
-    let [low, high] = found.values;
-    [
-        mapping.from.clone().unwrap_or_else(|| found.name.clone()),
-        reading(found),
-        format!("{:.0}", found.rate),
-        format!("{} to {}", figure(low), figure(high)),
-        found.reasons.join(", "),
-    ]
-}
-
-/// Prints the mapping as a table.
-fn show(proposal: &Proposal) -> Result<()> {
-    let head = ["quantity", "column", "read as", "Hz", "values", "because"];
-    let mut rows = vec![head.map(str::to_owned)];
-    for found in &proposal.matches {
-        let [column, read, rate, values, why] = cells(found);
-        rows.push([found.name.clone(), column, read, rate, values, why]);
-    }
-    let width = |i: usize| rows.iter().map(|r| r[i].chars().count()).max().unwrap_or(0);
-    let widths: Vec<usize> = (0..head.len()).map(width).collect();
-    let mut stdout = std::io::stdout().lock();
-    for row in &rows {
-        let cells = row
-            .iter()
-            .zip(&widths)
-            .map(|(cell, w)| format!("{cell:<w$}"));
-        let line = cells.collect::<Vec<_>>().join("  ");
-        writeln!(stdout, "{}", line.trim_end())?;
-    }
-    Ok(())
-}
-
-fn json(proposal: &Proposal, notes: &[String], out: Option<&OutFolder>) -> Result<()> {
-    let rows = proposal.matches.iter().map(|found| {
-        let m = found.mapping.as_ref();
-        Row {
-            name: &found.name,
-            from: m.map(|m| m.from.as_deref().unwrap_or(&m.name)),
-            unit: m.and_then(|m| m.unit.as_deref()),
-            sign: m.map_or(1.0, |m| m.sign),
-            scale: m.map_or(1.0, |m| m.scale),
-            offset: m.map_or(0.0, |m| m.offset),
-            delay: m.map_or(0.0, |m| m.delay),
-            rate: found.rate,
-            reasons: &found.reasons,
-        }
-    });
-    let summary = serde_json::json!({
-        "schema": SCHEMA,
-        "columns": rows.collect::<Vec<_>>(),
-        "unused": proposal.unused,
-        "notes": notes,
-        "out": out.map(OutFolder::path),
-    });
-    writeln!(std::io::stdout(), "{summary:#}")?;
-    Ok(())
 }

@@ -4,8 +4,9 @@ use asid_logs::propose::Match;
 use asid_report::page::{Column, Figure, Page, Section, Table, Tone};
 use asid_report::plot::{Axis, Chart, Colour, Layer};
 
+use super::Imported;
 use super::files::Files;
-use super::{Imported, cells};
+use super::table::cells;
 
 /// Points of a line that are drawn at most: a page of them stays below some MB.
 const DRAWN: usize = 1500;
