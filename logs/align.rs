@@ -5,7 +5,7 @@
 //! slower stream each sample goes to the row nearest to it, and the other rows are empty. A command is the mean of what was
 //! sent over its row, so that its integral is kept.
 
-use crate::raw::Series;
+use crate::series::Series;
 
 /// A stream with fewer samples than this part of the rows is slower: its samples go to single rows.
 const SLOWER: f64 = 0.7;

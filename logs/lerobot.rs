@@ -11,7 +11,8 @@ use serde::Deserialize;
 use serde_json::Value as Json;
 
 use crate::parquet_file;
-use crate::raw::{RawLog, Series};
+use crate::raw::RawLog;
+use crate::series::Series;
 
 /// Columns that number rows and are no readings.
 const INDICES: [&str; 5] = [

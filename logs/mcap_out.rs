@@ -9,8 +9,9 @@ use std::io::{Seek, Write};
 use mcap::records::MessageHeader;
 use mcap::{Compression, McapError, WriteOptions, Writer};
 
-use crate::raw::{RawLog, Series};
+use crate::raw::RawLog;
 use crate::ros::cdr::Encoder;
+use crate::series::Series;
 
 /// Nanoseconds in a second.
 const SECOND: f64 = 1e9;

@@ -21,7 +21,8 @@ use unit::Unit;
 use words::Measure;
 
 use crate::format::Kind;
-use crate::raw::{RawLog, Series};
+use crate::raw::RawLog;
+use crate::series::Series;
 
 /// Correlation of ways above which a speed is sure to belong to a position.
 const SURE: f64 = 0.8;

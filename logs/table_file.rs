@@ -2,7 +2,8 @@
 
 use asid_core::log::seconds;
 
-use crate::raw::{RawLog, Series};
+use crate::raw::RawLog;
+use crate::series::Series;
 
 /// Names of columns of stamps, as programs write them, the usual ones first.
 const STAMPS: [&str; 12] = [

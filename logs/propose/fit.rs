@@ -1,6 +1,6 @@
 //! What two series say of each other: a command and the position that follows it, a speed and the way that it makes.
 
-use crate::raw::Series;
+use crate::series::Series;
 
 /// Times at which two series are compared.
 const SAMPLES: usize = 400;

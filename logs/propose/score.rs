@@ -6,7 +6,8 @@ use super::quantity::{Dimension, Quantity};
 use super::unit::{Unit, unit};
 use super::words::{Measure, Words};
 use crate::format::Kind;
-use crate::raw::{RawLog, Series};
+use crate::raw::RawLog;
+use crate::series::Series;
 
 /// Points of a name that is the quantity's own: above all else together.
 const OWN_NAME: f64 = 100.0;

@@ -3,7 +3,7 @@
 use super::quantity::{Dimension, Quantity};
 use super::words::{Measure, Words};
 use crate::format::Kind;
-use crate::raw::Series;
+use crate::series::Series;
 
 /// How far beyond a joint's range readings may lie, as a part of the range: stops give way, zeros are off.
 const BEYOND: f64 = 0.15;

@@ -7,7 +7,7 @@
 use std::collections::HashMap;
 
 use super::cdr::Value;
-use crate::raw::Series;
+use crate::series::Series;
 
 /// Most series of one topic; beyond it names change from message to message.
 const MOST_SERIES: usize = 2048;
