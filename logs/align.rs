@@ -1,6 +1,6 @@
 //! Streams of different stamps as one table.
 //!
-//! Rows are the stamps of the stream that holds the most readings. A reading of another stream that falls between two of its
+//! Rows are the stamps of the stream that holds the most readings, while all that are as fast have readings. A reading of another stream that falls between two of its
 //! samples lies on the line between them, as a reading with a `delay` does (docs/logs.md): its noise is a little smaller there. Of a
 //! slower stream each sample goes to the row nearest to it, and the other rows are empty. A command is the mean of what was
 //! sent over its row, so that its integral is kept.
@@ -35,7 +35,19 @@ pub fn rows(readings: &[&Series]) -> Vec<f64> {
     let mut stamps: Vec<f64> = of_main.flat_map(|s| s.time.iter().copied()).collect();
     stamps.sort_by(f64::total_cmp);
     stamps.dedup();
+    // A log begins and ends with rows that are whole: where a state starts must be told.
+    let count = stamps.len();
+    for s in readings.iter().filter(|s| !is_slower(s, count)) {
+        if let (Some(first), Some(last)) = (s.time.first(), s.time.last()) {
+            stamps.retain(|t| (*first..=*last).contains(t));
+        }
+    }
     stamps
+}
+
+/// Whether a stream has far fewer samples than there are rows.
+fn is_slower(series: &Series, rows: usize) -> bool {
+    (series.time.len() as f64) < SLOWER * rows as f64
 }
 
 /// A series' readings at some rows; NaN where it has none.
@@ -43,7 +55,7 @@ pub fn rows(readings: &[&Series]) -> Vec<f64> {
 pub fn readings(series: &Series, rows: &[f64]) -> Vec<f64> {
     let mut column = vec![f64::NAN; rows.len()];
     let usual = usual_step(series);
-    if (series.time.len() as f64) < SLOWER * rows.len() as f64 {
+    if is_slower(series, rows.len()) {
         for time in &series.time {
             let Some(row) = nearest(rows, *time) else {
                 continue;
@@ -151,9 +163,13 @@ mod tests {
             line("/a", 0.1, 0.0, 5),
             line("/b", 0.01, 0.003, 40),
         );
-        assert_eq!(rows(&[&c, &a, &b]), a.time);
+        assert_eq!(rows(&[&c, &a, &b]), a.time[1..4], "c runs from 3 to 393 ms");
         assert_eq!(rows(&[&a, &c]), c.time);
         assert!(rows(&[]).is_empty());
+        // Streams that are as fast decide where the log begins and ends; slower ones do not.
+        let (later, slow) = (line("/b", 0.1, 0.05, 4), line("/b", 0.4, 0.07, 1));
+        assert_eq!(rows(&[&a, &a, &later]), a.time[1..4]);
+        assert_eq!(rows(&[&a, &a, &slow]), a.time);
     }
 
     /// A straight motion reads the same whatever the stamps are.

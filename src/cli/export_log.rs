@@ -63,7 +63,7 @@ mod with_mcap {
         let dir = &arguments.dir;
         let is_study =
             dir.extension().is_some_and(|e| e == "toml") || dir.join("study.toml").exists();
-        let (logs, own) = if is_study {
+        let (mut logs, own) = if is_study {
             let study = Study::read(dir)?;
             let all = study.train.iter().chain(&study.test);
             let logs: Vec<RawLog> = all.map(|(name, episode)| raw(name, episode)).collect();
@@ -74,6 +74,7 @@ mod with_mcap {
             let plant = own.transpose()?.map(|m| Plant::of(&m.scene)).transpose()?;
             (of_folder(dir)?, plant)
         };
+        tell_apart(&mut logs);
         let plant = match &arguments.model {
             Some(model) => Some(Plant::of(&RefinedModel::open(model)?.scene)?),
             None => own,
@@ -162,13 +163,29 @@ mod with_mcap {
             );
         }
         RawLog {
-            // `sub/train_0.csv` and `set#3` become names of files.
-            name: Path::new(name)
-                .with_extension("")
-                .to_string_lossy()
-                .replace(['/', '\\', '#'], "_"),
+            name: short(name),
             series,
             ..RawLog::default()
+        }
+    }
+
+    /// Name of a log's file: of `../sub/train_0.csv` its stem, of `set#3` `set_3`.
+    fn short(name: &str) -> String {
+        let file = Path::new(name).file_name();
+        let file = file.map_or_else(|| name.into(), |f| f.to_string_lossy());
+        file.trim_end_matches(".csv")
+            .trim_end_matches(".mcap")
+            .trim_end_matches(".db3")
+            .replace('#', "_")
+    }
+
+    /// Numbers names that occur twice.
+    fn tell_apart(logs: &mut [RawLog]) {
+        let names: Vec<String> = logs.iter().map(|l| l.name.clone()).collect();
+        for (i, log) in logs.iter_mut().enumerate() {
+            if names.iter().filter(|n| **n == names[i]).count() > 1 {
+                log.name = format!("{}_{}", names[i], i + 1);
+            }
         }
     }
 
