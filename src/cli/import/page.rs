@@ -1,7 +1,7 @@
 //! The picture of an import: which column is what, and every column over time.
 
 use asid_logs::propose::Match;
-use asid_report::page::{Column, Figure, Page, Section, Table, Tone};
+use asid_report::page::{Cell, Column, Figure, Page, Section, Table, Tone};
 use asid_report::plot::{Axis, Chart, Colour, Layer};
 
 use super::Imported;
@@ -43,13 +43,17 @@ fn mapping(matches: &[Match], notes: &[String], unused: &[String]) -> Section {
         Column::text("read as"),
         Column::number("Hz"),
         Column::text("values"),
-        Column::prose("because"),
     ])
     .caption("Values after the unit, in the unit of the model.");
     for found in matches {
-        let own = [found.name.clone()];
-        let cells = own.into_iter().chain(cells(found));
-        table = table.row(cells.map(Into::into).collect());
+        let [column, read, rate, values, why] = cells(found);
+        table = table.row(vec![
+            found.name.clone().into(),
+            Cell::from(column).note(why),
+            read.into(),
+            rate.into(),
+            values.into(),
+        ]);
     }
     let mut section = Section::new("Which column is what").table(table);
     for note in notes {
