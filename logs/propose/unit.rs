@@ -77,7 +77,12 @@ pub fn unit(quantity: &Quantity, series: &Series, words: &Words, kind: Kind) -> 
         };
     }
     let position = quantity.measure == Some(Measure::Position);
-    if kind == Kind::Lerobot && position && quantity.joint.is_some() {
+    // A table may hold what LeRobot recorded, under its names.
+    let features = ["action.", "observation.state."];
+    let named_so =
+        series.name.ends_with(".pos") && features.iter().any(|f| series.name.starts_with(f));
+    let lerobot = kind == Kind::Lerobot || (kind.is_table() && named_so);
+    if lerobot && position && quantity.joint.is_some() {
         let gripper = words.own.iter().any(|w| w == "gripper");
         return match (quantity.dimension, quantity.range) {
             (Dimension::Length, Some(range)) => percent(range, "LeRobot: 0 to 100 of the range"),

@@ -14,6 +14,9 @@ use super::super::machine::Subject;
 use super::super::session::backend;
 use super::{Imported, episode};
 
+/// A fault that may as well be an effect: it is not mended before the diagnosis has seen it.
+const CLOCK: &str = "wiring-clock";
+
 /// The lines that mend a fault.
 #[derive(Deserialize)]
 struct Lines {
@@ -56,6 +59,14 @@ pub(super) fn look(
     let mended = mend(&study, &machine, &Settings::default())?;
     let mut said = Vec::new();
     for fault in &mended.wiring {
+        if fault.fault == CLOCK {
+            said.push(format!(
+                "tried in the model, readings are late against the commands (probability {:.2}): a clock or a delay of the \
+                 machine, which is left to asid diagnose",
+                fault.probability
+            ));
+            continue;
+        }
         let lines = toml::from_str::<Lines>(&fault.mend).map_or_else(|_| Vec::new(), |l| l.column);
         let place = |m: &ColumnMapping| proposal.matches.iter().position(|f| f.name == m.name);
         let places: Option<Vec<usize>> = lines.iter().map(place).collect();
