@@ -147,8 +147,11 @@ pub fn import(arguments: &Arguments) -> Result<()> {
     Ok(())
 }
 
+/// A log with its path, and whether it is held out.
+type Opened = (PathBuf, RawLog, bool);
+
 /// The logs as they were recorded, each with its path and whether it is held out; and the kind that they are of.
-fn open(arguments: &Arguments) -> Result<(Vec<(PathBuf, RawLog, bool)>, LogSettings)> {
+fn open(arguments: &Arguments) -> Result<(Vec<Opened>, LogSettings)> {
     let mut settings = LogSettings {
         kind: None,
         topics: arguments.topic.clone(),
@@ -231,13 +234,9 @@ fn complete(proposal: &Proposal) -> Result<()> {
 }
 
 /// The logs as episodes of the model.
-fn episodes(
-    raw: Vec<(PathBuf, RawLog, bool)>,
-    subject: &Subject,
-    proposal: &Proposal,
-) -> Result<Vec<Imported>> {
+fn episodes(raw: Vec<Opened>, subject: &Subject, proposal: &Proposal) -> Result<Vec<Imported>> {
     let mappings = proposal.mappings();
-    let one = |(path, raw, test): (PathBuf, RawLog, bool)| {
+    let one = |(path, raw, test): Opened| {
         let episode = episode(&path, &raw, &subject.plant.layout, &mappings)?;
         Ok(Imported {
             path,
