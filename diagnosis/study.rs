@@ -1,5 +1,7 @@
 //! A study: a model, logs of the real machine, and what the user fits already.
 
+mod files;
+
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -9,6 +11,7 @@ use asid_core::parameter::Scale;
 use asid_core::problem::home;
 use asid_core::{Episode, Error, Layout, Parameter, Result, Scene, Target, Task};
 use asid_effects::EffectSpec;
+use asid_logs::LogSettings;
 use asid_mjcf::Plant;
 use serde::Deserialize;
 
@@ -31,6 +34,8 @@ struct Document {
     parameter: Vec<StudyParameter>,
     #[serde(default)]
     noise: BTreeMap<String, f64>,
+    #[serde(default)]
+    log: LogSettings,
     #[serde(default)]
     column: Vec<ColumnMapping>,
 }
@@ -141,9 +146,9 @@ impl Study {
             }
         }
         let mut notes = Vec::new();
+        let mut logs = files::Logs::new(&folder, &plant.layout, &document.column, &document.log);
         let mut read = |patterns: &[String], key: &str| -> Result<Vec<(String, Episode)>> {
-            let columns = (&plant.layout, &document.column[..]);
-            let read = logs(&folder, patterns, columns, key).map_err(|e| match e {
+            let read = logs.read(patterns, key).map_err(|e| match e {
                 Error::Config { message, .. } => fail(message),
                 other => other,
             })?;
@@ -321,106 +326,4 @@ fn parameter(written: &StudyParameter) -> Result<Parameter, String> {
         scale: written.scale,
         unit: written.unit.clone(),
     })
-}
-
-/// Reads the logs that some patterns name, each once, sorted by name within a pattern.
-fn logs(
-    folder: &Path,
-    patterns: &[String],
-    (layout, columns): (&Layout, &[ColumnMapping]),
-    key: &str,
-) -> Result<Vec<(String, Episode, LogNotes)>> {
-    let mut files: Vec<PathBuf> = Vec::new();
-    for pattern in patterns {
-        let found = matching(folder, pattern)?;
-        if found.is_empty() {
-            return Err(Error::Config {
-                key: key.into(),
-                message: format!("`{key}`: no file matches `{pattern}`"),
-            });
-        }
-        for file in found {
-            if !files.contains(&file) {
-                files.push(file);
-            }
-        }
-    }
-    if files.is_empty() && key == "train" {
-        return Err(Error::Config {
-            key: key.into(),
-            message: "`train` names no logs".into(),
-        });
-    }
-    files
-        .iter()
-        .map(|file| {
-            let name = file.strip_prefix(folder).unwrap_or(file);
-            let (episode, notes) = asid_core::log::read(file, layout, columns)?;
-            Ok((name.display().to_string(), episode, notes))
-        })
-        .collect()
-}
-
-/// Files of a folder whose name matches a pattern with `*` in its last part, sorted.
-fn matching(folder: &Path, pattern: &str) -> Result<Vec<PathBuf>> {
-    let path = folder.join(pattern);
-    let (Some(parent), Some(last)) = (path.parent(), path.file_name()) else {
-        return Ok(Vec::new());
-    };
-    let last = last.to_string_lossy();
-    if !last.contains('*') {
-        return Ok(vec![path.clone()]);
-    }
-    let entries = std::fs::read_dir(parent).map_err(|e| Error::File {
-        path: parent.to_owned(),
-        message: e.to_string(),
-    })?;
-    let mut found: Vec<PathBuf> = entries
-        .filter_map(|entry| entry.ok().map(|e| e.path()))
-        .filter(|p| {
-            p.file_name()
-                .is_some_and(|n| matches(&last, &n.to_string_lossy()))
-        })
-        .collect();
-    found.sort();
-    Ok(found)
-}
-
-/// Whether a name matches a pattern whose `*` stand for any characters.
-fn matches(pattern: &str, name: &str) -> bool {
-    let mut parts = pattern.split('*');
-    let first = parts.next().unwrap_or_default();
-    let Some(mut rest) = name.strip_prefix(first) else {
-        return false;
-    };
-    let parts: Vec<&str> = parts.collect();
-    let Some((last, middle)) = parts.split_last() else {
-        return rest.is_empty();
-    };
-    for part in middle {
-        match rest.find(part) {
-            Some(at) => rest = &rest[at + part.len()..],
-            None => return false,
-        }
-    }
-    rest.ends_with(last)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::matches;
-
-    #[test]
-    fn a_star_stands_for_any_characters() {
-        for (pattern, name, expected) in [
-            ("train_*.csv", "train_0.csv", true),
-            ("train_*.csv", "test_0.csv", false),
-            ("*.csv", "a.csv", true),
-            ("a*b*c", "axxbyyc", true),
-            ("a*b*c", "axxc", false),
-            ("log.csv", "log.csv", true),
-        ] {
-            assert_eq!(matches(pattern, name), expected, "{pattern} {name}");
-        }
-    }
 }

@@ -10,6 +10,7 @@ pub use asid_core as core;
 pub use asid_diagnosis as diagnosis;
 pub use asid_effects as effects;
 pub use asid_learned as learned;
+pub use asid_logs as logs;
 pub use asid_mjcf as mjcf;
 pub use asid_plugin as plugin;
 pub use asid_report as report;

@@ -6,7 +6,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Rooms whose numbers are looked at. The C ABI's are those of its header, which explains them.
-const ROOMS: [&str; 16] = [
+const ROOMS: [&str; 17] = [
     "asid-core",
     "mjcf",
     "effects",
@@ -18,6 +18,7 @@ const ROOMS: [&str; 16] = [
     "worlds",
     "comparison",
     "conformance",
+    "logs",
     "report",
     "sysid",
     "withheld",

@@ -12,6 +12,7 @@ mod mapping;
 mod notes;
 #[cfg(feature = "parquet")]
 mod parquet;
+mod table;
 
 use std::path::Path;
 
@@ -19,9 +20,12 @@ use crate::episode::{ChannelColumns, Episode, InitialState};
 use crate::error::{Error, Result};
 use crate::layout::Layout;
 
-pub use mapping::ColumnMapping;
+pub use self::csv::{cell_number, delimiter};
+pub use clock::seconds;
 use mapping::Source;
+pub use mapping::{ColumnMapping, unit_factor};
 pub use notes::LogNotes;
+pub use table::{Table, of_table, quantities, wanted};
 
 impl Episode {
     /// Reads a log of a scene with this layout; a name that ends in `.parquet` is a Parquet

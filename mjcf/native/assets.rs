@@ -32,16 +32,28 @@ impl Writer<'_, '_> {
     }
 }
 
-/// A folder from the root of the file system, links resolved where it exists.
+/// The way from a folder to a file or another folder: up and down, or the whole path where they share nothing. The folder need
+/// not exist yet.
+#[must_use]
+pub fn way(folder: &Path, to: &Path) -> PathBuf {
+    relative(&absolute(folder), &absolute(to))
+}
+
+/// A path from the root of the file system, links resolved as far as it exists.
 fn absolute(path: &Path) -> PathBuf {
     let path = if path.as_os_str().is_empty() {
         Path::new(".")
     } else {
         path
     };
-    path.canonicalize()
-        .or_else(|_| std::path::absolute(path))
-        .unwrap_or_else(|_| path.to_owned())
+    if let Ok(found) = path.canonicalize() {
+        return found;
+    }
+    // What is to be made lies in what there is.
+    match (path.parent(), path.file_name()) {
+        (Some(parent), Some(name)) if parent != path => absolute(parent).join(name),
+        _ => std::path::absolute(path).unwrap_or_else(|_| path.to_owned()),
+    }
 }
 
 /// The way from one folder to another, both absolute.

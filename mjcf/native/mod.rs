@@ -21,6 +21,7 @@ use roxmltree::{Document, Node};
 
 use crate::Plant;
 use crate::markup::Markup;
+pub use assets::way;
 use elements::Elements;
 
 /// What an actuator does with its command, beside its gains.

@@ -5,7 +5,7 @@ pub mod export;
 pub mod identify;
 pub mod motion_config;
 mod motion_page;
-mod sensors;
+pub mod sensors;
 mod subject;
 
 use std::path::Path;

@@ -7,9 +7,11 @@ mod diagnose;
 mod doctor;
 mod explore;
 mod export;
+mod export_log;
 mod failure;
 mod figure;
 mod identify;
+mod import;
 mod list;
 mod machine;
 mod model;
@@ -76,6 +78,10 @@ enum Command {
     Config(config::Arguments),
     /// Write a task's scene, or a refined model, as plain MJCF
     Export(export::Arguments),
+    /// Make a study of a model and logs of another stack: CSV of any names, ROS 2 (MCAP, bags), LeRobot
+    Import(import::Arguments),
+    /// Write logs as MCAP, for Foxglove and Rerun
+    ExportLog(export_log::Arguments),
     /// Write a folder that a plugin starts from
     New(new::Arguments),
     /// Make report.html of a finished run or diagnosis again
@@ -98,6 +104,8 @@ impl Command {
             | Self::Doctor(_)
             | Self::Config(_)
             | Self::Export(_)
+            | Self::Import(_)
+            | Self::ExportLog(_)
             | Self::New(_)
             | Self::Report(_) => return None,
         };
@@ -167,6 +175,8 @@ fn run_command(cli: &Cli, mut named: Vec<PathBuf>) -> Result<()> {
         Command::Withheld(arguments) => withheld::withheld(arguments),
         Command::Config(arguments) => config::print(arguments),
         Command::Export(arguments) => export::export(arguments),
+        Command::Import(arguments) => import::import(arguments),
+        Command::ExportLog(arguments) => export_log::export_log(arguments),
         Command::New(arguments) => new::new(arguments),
         Command::Report(arguments) => report::report(arguments),
     }

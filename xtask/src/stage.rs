@@ -8,7 +8,7 @@ use anyhow::{Context, Result};
 use crate::library::repository;
 
 /// Features that bring in every engine and the networks.
-pub const ALL_FEATURES: &str = "--features=mujoco,torch,parquet";
+pub const ALL_FEATURES: &str = "--features=mujoco,torch,logs";
 
 /// How a stage ended.
 #[derive(Clone, Copy, PartialEq, Eq)]

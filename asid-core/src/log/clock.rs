@@ -62,6 +62,13 @@ pub(super) fn to_seconds(stamps: &mut [f64], given: Option<f64>, notes: &mut Log
     stamps.iter_mut().for_each(|t| *t = (*t - start) * length);
 }
 
+/// Brings stamps of an unknown unit to seconds, as the reader of logs does; the unit where it is not the second.
+pub fn seconds(stamps: &mut [f64]) -> Option<&'static str> {
+    let mut notes = LogNotes::default();
+    to_seconds(stamps, None, &mut notes);
+    notes.time_unit
+}
+
 /// Order of the rows in time: doubled stamps once, the last of them; late arrivals where they belong.
 pub(super) fn order(time: &[f64], notes: &mut LogNotes) -> Result<Vec<usize>, String> {
     let usual = row_time(time).unwrap_or(0.0);

@@ -1,5 +1,6 @@
 //! Logs as CSV files.
 
+use std::io::{BufRead as _, BufReader, Read as _};
 use std::path::Path;
 
 use super::{ColumnMapping, LogNotes, Reader};
@@ -10,6 +11,36 @@ use crate::scene::one_line;
 /// How writers of CSV files put a missing number, besides an empty cell: NumPy and pandas, R, SQL, JSON.
 const MISSING: [&str; 6] = ["nan", "na", "n/a", "null", "none", "-"];
 
+/// Longest first line that is looked at, bytes: some thousand names.
+const LONGEST_HEADER: u64 = 1 << 20;
+
+/// What stands between the cells of a table whose first line is this: a comma, a semicolon or a tab, the most frequent.
+#[must_use]
+pub fn delimiter(first_line: &str) -> u8 {
+    let count = |mark: u8| first_line.bytes().filter(|b| *b == mark).count();
+    // The comma wins a draw: it is what the name says.
+    let marks = [b'\t', b';', b','];
+    marks.into_iter().max_by_key(|m| count(*m)).unwrap_or(b',')
+}
+
+/// The number in a cell: NaN where it is missing, `None` where it is no finite number.
+#[must_use]
+pub fn cell_number(text: &str) -> Option<f64> {
+    if text.is_empty() || MISSING.iter().any(|m| text.eq_ignore_ascii_case(m)) {
+        return Some(f64::NAN);
+    }
+    text.parse().ok().filter(|x: &f64| x.is_finite())
+}
+
+/// The delimiter of a file; a comma where it cannot be read, which the reader tells of.
+fn delimiter_of(path: &Path) -> u8 {
+    let mut line = Vec::new();
+    if let Ok(file) = std::fs::File::open(path) {
+        let _ = BufReader::new(file.take(LONGEST_HEADER)).read_until(b'\n', &mut line);
+    }
+    delimiter(&String::from_utf8_lossy(&line))
+}
+
 /// Reads a CSV file.
 pub(super) fn read(
     path: &Path,
@@ -19,6 +50,7 @@ pub(super) fn read(
     let told = |e: csv::Error| one_line(&e.to_string());
     let mut file = csv::ReaderBuilder::new()
         .trim(csv::Trim::All)
+        .delimiter(delimiter_of(path))
         .from_path(path)
         .map_err(told)?;
     let header = file.headers().map_err(told)?;
@@ -28,12 +60,7 @@ pub(super) fn read(
         let record = record.map_err(|e| format!("row {}: {}", i + 2, told(e)))?;
         reader.row(|column| {
             let text = record.get(column).unwrap_or("");
-            if text.is_empty() || MISSING.iter().any(|m| text.eq_ignore_ascii_case(m)) {
-                return Ok(f64::NAN);
-            }
-            let parsed: Option<f64> = text.parse().ok();
-            let finite = parsed.filter(|x| x.is_finite());
-            finite.ok_or_else(|| text.to_owned())
+            cell_number(text).ok_or_else(|| text.to_owned())
         })?;
     }
     reader.finish()

@@ -150,8 +150,9 @@ impl ColumnMapping {
     }
 }
 
-/// Factor that brings a unit to SI.
-fn unit_factor(unit: &str) -> Option<f64> {
+/// Factor that brings a unit to SI; `None` for one that is not known.
+#[must_use]
+pub fn unit_factor(unit: &str) -> Option<f64> {
     let found = UNITS.iter().find(|(name, _)| *name == unit);
     found.map(|(_, factor)| *factor)
 }

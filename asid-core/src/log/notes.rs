@@ -15,6 +15,8 @@ pub struct LogNotes {
     pub reordered: usize,
     /// Commands that were missing, and held from the row before.
     pub held: usize,
+    /// What a reader of another stack's files says: streams that could not be read, clocks that disagree.
+    pub remarks: Vec<String>,
 }
 
 impl LogNotes {
@@ -48,6 +50,7 @@ impl LogNotes {
                 all.push(format!("{count} {what}"));
             }
         }
+        all.extend(self.remarks.iter().cloned());
         all
     }
 

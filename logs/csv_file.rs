@@ -1,0 +1,38 @@
+//! Tables of text with any names: CSV, with commas, semicolons or tabs.
+
+use std::path::Path;
+
+use asid_core::log::{cell_number, delimiter};
+
+use crate::raw::RawLog;
+use crate::table_file;
+
+/// Reads a file. Cells that are no numbers are missing; columns without any number are left out.
+///
+/// # Errors
+/// When the file is no table, or has no column of stamps.
+pub fn read(path: &Path, name: &str) -> Result<RawLog, String> {
+    let text = std::fs::read(path).map_err(|e| e.to_string())?;
+    let text = String::from_utf8_lossy(&text);
+    // A mark of the byte order, as Excel writes it.
+    let text = text.trim_start_matches('\u{feff}');
+    let first = text.lines().next().unwrap_or_default();
+    let mut reader = csv::ReaderBuilder::new()
+        .trim(csv::Trim::All)
+        .flexible(true)
+        .delimiter(delimiter(first))
+        .from_reader(text.as_bytes());
+    let header = reader.headers().map_err(|e| e.to_string())?.clone();
+    let mut columns: Vec<(String, Vec<f64>)> = header
+        .iter()
+        .map(|name| (name.to_owned(), Vec::new()))
+        .collect();
+    for record in reader.records() {
+        let record = record.map_err(|e| e.to_string())?;
+        for (i, (_, values)) in columns.iter_mut().enumerate() {
+            let number = record.get(i).and_then(cell_number);
+            values.push(number.unwrap_or(f64::NAN));
+        }
+    }
+    table_file::log(name, columns)
+}

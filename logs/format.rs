@@ -1,0 +1,102 @@
+//! Kinds of log files, and `[log]` of a study, which names the kind and the topics.
+
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+/// What a log is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Kind {
+    /// A table of text, one row a stamp.
+    Csv,
+    /// The same table as a Parquet file.
+    Parquet,
+    /// [MCAP](https://mcap.dev) with messages of ROS 2 (CDR) or JSON.
+    Mcap,
+    /// A bag of ROS 2: a folder with `metadata.yaml` and files of SQLite or MCAP, or one such file of SQLite.
+    Rosbag2,
+    /// A dataset of [LeRobot](https://github.com/huggingface/lerobot), version 2.1 or 3: a folder with `meta/info.json`.
+    Lerobot,
+}
+
+impl Kind {
+    /// The kind that a path looks like; a table of text where nothing else fits.
+    #[must_use]
+    pub fn of(path: &Path) -> Self {
+        if path.is_dir() {
+            return if path.join("meta/info.json").is_file() {
+                Self::Lerobot
+            } else {
+                Self::Rosbag2
+            };
+        }
+        let ending = path.extension().map(|e| e.to_ascii_lowercase());
+        match ending.as_deref().and_then(|e| e.to_str()) {
+            Some("mcap") => Self::Mcap,
+            Some("db3") => Self::Rosbag2,
+            Some("parquet") => Self::Parquet,
+            _ => Self::Csv,
+        }
+    }
+
+    /// Whether rows of one table hold all columns, as the project's own logs do.
+    #[must_use]
+    pub fn is_table(self) -> bool {
+        matches!(self, Self::Csv | Self::Parquet)
+    }
+
+    /// Its name in a study.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Csv => "csv",
+            Self::Parquet => "parquet",
+            Self::Mcap => "mcap",
+            Self::Rosbag2 => "rosbag2",
+            Self::Lerobot => "lerobot",
+        }
+    }
+}
+
+/// `[log]` of a study.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LogSettings {
+    /// Kind of the files; by their looks where it is left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub kind: Option<Kind>,
+    /// Topics that are read; all where there are none.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub topics: Vec<String>,
+}
+
+impl LogSettings {
+    /// The kind of a file.
+    #[must_use]
+    pub fn kind_of(&self, path: &Path) -> Kind {
+        self.kind.unwrap_or_else(|| Kind::of(path))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn kinds_are_told_by_their_looks() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::create_dir(folder.path().join("meta")).unwrap();
+        assert_eq!(Kind::of(folder.path()), Kind::Rosbag2);
+        std::fs::write(folder.path().join("meta/info.json"), "{}").unwrap();
+        assert_eq!(Kind::of(folder.path()), Kind::Lerobot);
+        for (name, kind) in [
+            ("a.MCAP", Kind::Mcap),
+            ("a.db3", Kind::Rosbag2),
+            ("a.parquet", Kind::Parquet),
+            ("a.log", Kind::Csv),
+        ] {
+            assert_eq!(Kind::of(Path::new(name)), kind);
+        }
+    }
+}

@@ -1,0 +1,210 @@
+//! Datasets of LeRobot, version 2.1 and 3: a folder with `meta/info.json` and tables in `data/`.
+//!
+//! `info.json` says the rate and, of each feature, the names of its entries. Version 3 packs many episodes into a file, version 2.1
+//! has a file an episode; the column `episode_index` tells in both which row is of which. A row has the observation of its time
+//! and the action that was sent upon it, as a row of the project's own logs does.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use serde::Deserialize;
+use serde_json::Value as Json;
+
+use crate::parquet_file;
+use crate::raw::RawLog;
+use crate::series::Series;
+
+/// Columns that number rows and are no readings.
+const INDICES: [&str; 5] = [
+    "index",
+    "episode_index",
+    "frame_index",
+    "task_index",
+    "timestamp",
+];
+/// A stamp that is within this part of a frame of its number by the rate is that number: files hold stamps in single precision.
+const ROUNDED: f64 = 0.02;
+
+/// `meta/info.json`, as far as it is needed.
+#[derive(Debug, Deserialize)]
+struct Info {
+    codebase_version: String,
+    fps: f64,
+    features: BTreeMap<String, Feature>,
+}
+
+#[derive(Debug, Deserialize)]
+struct Feature {
+    #[serde(default)]
+    names: Json,
+}
+
+/// Reads all episodes of a dataset, in order; each with its number.
+///
+/// # Errors
+/// When a file is missing or damaged, or the dataset is of another version.
+pub fn read(path: &Path) -> Result<Vec<(usize, RawLog)>, String> {
+    let text = std::fs::read_to_string(path.join("meta/info.json"));
+    let text = text.map_err(|e| format!("meta/info.json: {e}"))?;
+    let info: Info = serde_json::from_str(&text).map_err(|e| format!("meta/info.json: {e}"))?;
+    if !["v2", "v3"]
+        .iter()
+        .any(|v| info.codebase_version.starts_with(v))
+    {
+        return Err(format!(
+            "meta/info.json: a dataset of version {}; versions 2 and 3 are read",
+            info.codebase_version
+        ));
+    }
+    if !(info.fps.is_finite() && info.fps > 0.0) {
+        return Err(format!("meta/info.json: fps = {} is no rate", info.fps));
+    }
+    let mut files = Vec::new();
+    tables(&path.join("data"), 0, &mut files)?;
+    files.sort();
+    let mut episodes: BTreeMap<usize, RawLog> = BTreeMap::new();
+    for file in files {
+        let shown = file
+            .strip_prefix(path)
+            .unwrap_or(&file)
+            .display()
+            .to_string();
+        let columns = parquet_file::columns(&file, true).map_err(|e| format!("{shown}: {e}"))?;
+        add(&mut episodes, &columns, &info).map_err(|e| format!("{shown}: {e}"))?;
+    }
+    if episodes.is_empty() {
+        return Err("has no episodes in data/".into());
+    }
+    Ok(episodes.into_iter().collect())
+}
+
+/// Parquet files below `data/`, which has folders of chunks.
+fn tables(folder: &Path, depth: usize, files: &mut Vec<PathBuf>) -> Result<(), String> {
+    let said = |e: std::io::Error| format!("{}: {e}", folder.display());
+    for entry in std::fs::read_dir(folder).map_err(said)? {
+        let path = entry.map_err(said)?.path();
+        if path.is_dir() && depth == 0 {
+            tables(&path, 1, files)?;
+        } else if path.extension().is_some_and(|e| e == "parquet") {
+            files.push(path);
+        }
+    }
+    Ok(())
+}
+
+/// Adds the rows of a file to their episodes.
+fn add(
+    episodes: &mut BTreeMap<usize, RawLog>,
+    columns: &[(String, Vec<f64>)],
+    info: &Info,
+) -> Result<(), String> {
+    let column = |name: &str| columns.iter().find(|(n, _)| n == name).map(|(_, v)| v);
+    let episode = column("episode_index").ok_or("has no column `episode_index`")?;
+    let frame = column("frame_index");
+    let timestamp = column("timestamp");
+    for (name, values) in columns {
+        if INDICES.contains(&&**name) {
+            continue;
+        }
+        let named = feature_name(name, info);
+        for (row, x) in values.iter().enumerate().filter(|(_, x)| x.is_finite()) {
+            let number = episode[row];
+            if number.is_nan() || number < 0.0 {
+                return Err(format!(
+                    "row {}: the number of its episode is missing",
+                    row + 1
+                ));
+            }
+            let by_rate = frame.map(|f| f[row] / info.fps);
+            let stamp = timestamp.map(|t| t[row]);
+            let time = match (by_rate, stamp) {
+                (Some(a), Some(b)) if (a - b).abs() * info.fps > ROUNDED => b,
+                (Some(a), _) => a,
+                (None, Some(b)) => b,
+                (None, None) => return Err("has no column `timestamp` or `frame_index`".into()),
+            };
+            let log = episodes.entry(number as usize).or_default();
+            let at = match log.series.iter().position(|s| s.name == named) {
+                Some(at) => at,
+                None => {
+                    log.series.push(Series {
+                        name: named.clone(),
+                        ..Series::default()
+                    });
+                    log.series.len() - 1
+                }
+            };
+            log.series[at].time.push(time);
+            log.series[at].values.push(*x);
+        }
+    }
+    Ok(())
+}
+
+/// Name of a column: of an entry of a feature, the feature's and the entry's.
+fn feature_name(column: &str, info: &Info) -> String {
+    let Some((feature, entry)) = column.rsplit_once('.') else {
+        return column.to_owned();
+    };
+    let name = info.features.get(feature).and_then(|f| {
+        let entry: usize = entry.parse().ok()?;
+        names(&f.names).get(entry).cloned()
+    });
+    name.map_or_else(|| column.to_owned(), |name| format!("{feature}.{name}"))
+}
+
+/// Names of a feature's entries: a list, or lists under headings (`{"motors": [...]}`).
+fn names(json: &Json) -> Vec<String> {
+    match json {
+        Json::Array(all) => {
+            let text = |j: &Json| j.as_str().map(str::to_owned);
+            all.iter().filter_map(text).collect()
+        }
+        Json::Object(headings) => headings.values().flat_map(names).collect(),
+        _ => Vec::new(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn info() -> Info {
+        serde_json::from_str(
+            r#"{"codebase_version": "v3.0", "fps": 50, "features": {
+                "action": {"dtype": "float32", "names": ["pan.pos", "gripper.pos"]},
+                "observation.state": {"dtype": "float32", "names": {"motors": ["pan", "gripper"]}},
+                "timestamp": {"dtype": "float32", "names": null}}}"#,
+        )
+        .unwrap()
+    }
+
+    #[test]
+    fn entries_are_named_as_the_dataset_says() {
+        let info = info();
+        assert_eq!(feature_name("action.1", &info), "action.gripper.pos");
+        assert_eq!(
+            feature_name("observation.state.0", &info),
+            "observation.state.pan"
+        );
+        assert_eq!(feature_name("action.7", &info), "action.7");
+        assert_eq!(feature_name("next.reward", &info), "next.reward");
+    }
+
+    #[test]
+    fn rows_go_to_their_episodes_at_the_times_of_the_rate() {
+        let column = |name: &str, values: &[f64]| (name.to_owned(), values.to_vec());
+        let single = f64::from(0.02_f32);
+        let columns = [
+            column("action.0", &[1.0, 2.0, 3.0]),
+            column("episode_index", &[0.0, 0.0, 1.0]),
+            column("frame_index", &[0.0, 1.0, 0.0]),
+            column("timestamp", &[0.0, single, 0.0]),
+        ];
+        let mut episodes = BTreeMap::new();
+        add(&mut episodes, &columns, &info()).unwrap();
+        assert_eq!(episodes[&0].series[0].time, [0.0, 0.02]);
+        assert_eq!(episodes[&1].series[0].values, [3.0]);
+        assert!(add(&mut episodes, &columns[..1], &info()).is_err());
+    }
+}

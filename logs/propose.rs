@@ -1,0 +1,283 @@
+//! Proposes what the columns of a log are on a model's machine.
+//!
+//! Each pair of a quantity and a column gets points: for [words](words) that they share, for what is measured, for being sent or
+//! read, for its place in a list, for values that fit the [range](unit), and, once the readings are placed, for a command that
+//! [looks like](fit) the position that follows it. The best pair is taken, then the best of what is left. It is a
+//! proposal: it is shown with its reasons, and what it says is looked at again by the check of wiring, which knows physics.
+
+mod fit;
+mod quantity;
+mod score;
+mod unit;
+mod words;
+
+use asid_core::log::{ColumnMapping, unit_factor};
+use asid_core::{Error, Result, Scene};
+use asid_mjcf::Plant;
+
+pub use quantity::Quantity;
+use score::{Candidate, Context};
+use unit::Unit;
+use words::Measure;
+
+use crate::format::Kind;
+use crate::raw::RawLog;
+use crate::series::Series;
+
+/// Correlation of ways above which a speed is sure to belong to a position.
+const SURE: f64 = 0.8;
+/// A unit explains the factor between a speed and its position where it is within this of it, as a logarithm: 35 %.
+const NEAR: f64 = 0.3;
+
+/// What a quantity is read from.
+#[derive(Clone, Debug)]
+pub struct Match {
+    /// The quantity's name: a sensor, an entry of one, or `ctrl.<actuator>`.
+    pub name: String,
+    /// The mapping, where a column was found.
+    pub mapping: Option<ColumnMapping>,
+    /// Why, in a few words each.
+    pub reasons: Vec<String>,
+    /// Readings or commands in a second.
+    pub rate: f64,
+    /// Smallest and largest value, in the quantity's unit.
+    pub values: [f64; 2],
+}
+
+/// A proposed mapping.
+#[derive(Clone, Debug)]
+pub struct Proposal {
+    /// Every quantity, commands first.
+    pub matches: Vec<Match>,
+    /// Where the stamps are, of a table that does not call them `time`.
+    pub time: Option<ColumnMapping>,
+    /// Topics that are needed.
+    pub topics: Vec<String>,
+    /// Columns that nothing is read from.
+    pub unused: Vec<String>,
+}
+
+impl Proposal {
+    /// The mappings of a study: those that say more than a name does.
+    #[must_use]
+    pub fn mappings(&self) -> Vec<ColumnMapping> {
+        let found = self.matches.iter().filter_map(|m| m.mapping.as_ref());
+        let all = self.time.iter().chain(found);
+        all.filter(|m| **m != ColumnMapping::of(&m.name))
+            .cloned()
+            .collect()
+    }
+
+    /// Commands of the model without a column.
+    #[must_use]
+    pub fn missing_commands(&self) -> Vec<&str> {
+        let lacking = self.matches.iter().filter(|m| m.mapping.is_none());
+        lacking
+            .filter_map(|m| m.name.strip_prefix("ctrl."))
+            .collect()
+    }
+
+    /// How many sensors are read, entries of vectors counted one by one.
+    #[must_use]
+    pub fn readings(&self) -> usize {
+        let found = self.matches.iter().filter(|m| m.mapping.is_some());
+        found.filter(|m| !m.name.starts_with("ctrl.")).count()
+    }
+}
+
+/// Proposes a mapping for a log of a machine; `given` are quantities with their columns that are known already.
+///
+/// # Errors
+/// When the document is not valid MJCF, or a given name is not known.
+pub fn propose(
+    scene: &Scene,
+    plant: &Plant,
+    (log, kind): (&RawLog, Kind),
+    given: &[(String, String)],
+) -> Result<Proposal> {
+    let quantities = quantity::quantities(scene, plant)?;
+    let context = Context::new(log, &quantities, kind);
+    let mut taken: Vec<Option<Candidate>> = vec![None; quantities.len()];
+    for (name, column) in given {
+        let names = quantities.iter().map(|q| &*q.name);
+        let place = quantities.iter().position(|q| q.name == *name);
+        let place = place.ok_or_else(|| Error::unknown("sensor or command", name, names))?;
+        let columns = log.series.iter().map(|s| &*s.name);
+        let series = log.series.iter().position(|s| s.name == *column);
+        let series = series.ok_or_else(|| Error::unknown("column", column, columns))?;
+        taken[place] = Some(context.given(place, series));
+    }
+    // Readings first: commands are compared with them.
+    context.assign(&mut taken, false, |_, _| 0.0);
+    context.drop_incomplete(&mut taken);
+    let positions: Vec<Option<usize>> = (0..plant.layout.joints.len())
+        .map(|joint| {
+            let reads = |q: &Quantity| {
+                !q.command
+                    && q.joint == Some(joint)
+                    && q.measure == Some(Measure::Position)
+                    && q.vector.is_none()
+            };
+            let place = quantities.iter().position(reads)?;
+            taken[place].as_ref().map(|c| c.series)
+        })
+        .collect();
+    context.assign(&mut taken, true, |q, s| {
+        let position = q.joint.filter(|_| q.measure == Some(Measure::Position));
+        let position = position.and_then(|j| positions[j]);
+        position.map_or(0.0, |p| fit::correlation(&log.series[s], &log.series[p]))
+    });
+    let mut matches: Vec<Match> = quantities
+        .iter()
+        .zip(&taken)
+        .map(|(q, c)| matched(q, c.as_ref(), log))
+        .collect();
+    for (q, m) in quantities.iter().zip(&mut matches) {
+        let position = q.joint.and_then(|j| positions[j]).map(|p| &log.series[p]);
+        let own = position.and_then(|p| {
+            let other = taken
+                .iter()
+                .flatten()
+                .find(|c| log.series[c.series].name == p.name)?;
+            Some((p, factor(&other.unit)))
+        });
+        if let (Some(own), Some(Measure::Velocity), false) = (own, q.measure, q.command) {
+            match_speed(m, log, own, q.dimension);
+        }
+    }
+    let used = |s: &Series| {
+        matches
+            .iter()
+            .filter_map(|m| m.mapping.as_ref())
+            .any(|m| source(m) == s.name)
+    };
+    let mut topics: Vec<String> = Vec::new();
+    let mut unused = Vec::new();
+    for s in &log.series {
+        if !used(s) {
+            unused.push(s.name.clone());
+        } else if !s.stream.is_empty() && !topics.contains(&s.stream) {
+            topics.push(s.stream.clone());
+        }
+    }
+    let time = log.stamps.as_ref().filter(|stamps| *stamps != "time");
+    Ok(Proposal {
+        time: time.map(|stamps| ColumnMapping {
+            from: Some(stamps.clone()),
+            ..ColumnMapping::of("time")
+        }),
+        matches,
+        topics,
+        unused,
+    })
+}
+
+fn source(mapping: &ColumnMapping) -> &str {
+    mapping.from.as_deref().unwrap_or(&mapping.name)
+}
+
+fn factor(unit: &Unit) -> f64 {
+    unit.scale * unit.name.and_then(unit_factor).unwrap_or(1.0)
+}
+
+/// What was found for a quantity.
+fn matched(quantity: &Quantity, candidate: Option<&Candidate>, log: &RawLog) -> Match {
+    let Some(candidate) = candidate else {
+        return Match {
+            name: quantity.name.clone(),
+            mapping: None,
+            reasons: Vec::new(),
+            rate: 0.0,
+            values: [f64::NAN; 2],
+        };
+    };
+    let series = &log.series[candidate.series];
+    let unit = &candidate.unit;
+    let mapping = ColumnMapping {
+        from: (series.name != quantity.name).then(|| series.name.clone()),
+        unit: unit.name.map(str::to_owned),
+        scale: unit.scale,
+        offset: unit.offset,
+        ..ColumnMapping::of(&quantity.name)
+    };
+    let mut reasons = candidate.reasons.clone();
+    if !unit.reason.is_empty() {
+        reasons.push(unit.reason.clone());
+    }
+    if !unit.fits {
+        reasons.push("values beyond the model's range".into());
+    }
+    let seconds = series.time.last().unwrap_or(&0.0) - series.time.first().unwrap_or(&0.0);
+    Match {
+        name: quantity.name.clone(),
+        values: values(series, &mapping),
+        mapping: Some(mapping),
+        reasons,
+        rate: if seconds > 0.0 {
+            (series.time.len() - 1) as f64 / seconds
+        } else {
+            0.0
+        },
+    }
+}
+
+/// Smallest and largest value under a mapping.
+fn values(series: &Series, mapping: &ColumnMapping) -> [f64; 2] {
+    let all = series
+        .values
+        .iter()
+        .map(|x| mapping.factor() * x + mapping.offset);
+    all.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], x| {
+        [a.min(x), b.max(x)]
+    })
+}
+
+/// Unit and sign of a speed, by the way that the position goes; `own` is the position's series and factor.
+fn match_speed(
+    found: &mut Match,
+    log: &RawLog,
+    own: (&Series, f64),
+    dimension: quantity::Dimension,
+) {
+    let Some(mapping) = &mut found.mapping else {
+        return;
+    };
+    let Some(speed) = log.series(source(mapping)) else {
+        return;
+    };
+    let Some((per, sure)) = fit::speed_factor(speed, own.0) else {
+        return;
+    };
+    if sure.abs() < SURE || mapping.unit.is_some() {
+        return;
+    }
+    let wanted = per * own.1;
+    let units: &[&str] = match dimension {
+        quantity::Dimension::Angle => &["rad/s", "deg/s", "rpm"],
+        quantity::Dimension::Length => &["m/s", "cm/s", "mm/s"],
+        quantity::Dimension::Other => return,
+    };
+    let apart = |unit: &&&str| (wanted.abs() / unit_factor(unit).unwrap_or(1.0)).ln().abs();
+    let nearest = units.iter().min_by(|a, b| apart(a).total_cmp(&apart(b)));
+    let Some(unit) = nearest.filter(|u| apart(u) < NEAR) else {
+        found.reasons.push(format!(
+            "no unit makes it its position's speed: that is {wanted:.3} times it"
+        ));
+        return;
+    };
+    if *unit != units[0] {
+        mapping.unit = Some((*unit).to_owned());
+    }
+    if wanted < 0.0 {
+        mapping.sign = -1.0;
+        found
+            .reasons
+            .push("runs against its position: one of the two counts the other way".into());
+    } else {
+        found.reasons.push("is its position's speed".into());
+    }
+    found.values = values(speed, mapping);
+}
+
+#[cfg(test)]
+mod tests;

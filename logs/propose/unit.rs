@@ -1,0 +1,180 @@
+//! The unit of a column: what its name says, what its stack writes, what its values allow.
+
+use super::quantity::{Dimension, Quantity};
+use super::words::{Measure, Words};
+use crate::format::Kind;
+use crate::series::Series;
+
+/// How far beyond a joint's range readings may lie, as a part of the range: stops give way, zeros are off.
+const BEYOND: f64 = 0.15;
+/// The same in the unit of the joint, rad or m.
+const BEYOND_LEAST: f64 = 0.05;
+/// Largest angle that is taken for radians where the model states no range, rad: two turns.
+const LARGEST_ANGLE: f64 = 12.6;
+/// Largest place that is taken for metres where the model states no range, m.
+const LARGEST_PLACE: f64 = 20.0;
+
+/// How a column is brought to a quantity's unit.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Unit {
+    /// Unit as a study spells it; `None` for SI.
+    pub name: Option<&'static str>,
+    /// Factor besides the unit.
+    pub scale: f64,
+    /// Added after it.
+    pub offset: f64,
+    /// How it is known, in a few words; empty for SI.
+    pub reason: String,
+    /// Whether the values allow it.
+    pub fits: bool,
+}
+
+impl Unit {
+    fn si(fits: bool) -> Self {
+        Self {
+            name: None,
+            scale: 1.0,
+            offset: 0.0,
+            reason: String::new(),
+            fits,
+        }
+    }
+
+    fn named(name: &'static str, reason: &str) -> Self {
+        Self {
+            name: Some(name),
+            reason: reason.into(),
+            ..Self::si(true)
+        }
+    }
+}
+
+/// Share of a range, 0 to 100: what grippers of LeRobot count.
+fn percent(range: [f64; 2], reason: &str) -> Unit {
+    Unit {
+        name: Some("%"),
+        scale: range[1] - range[0],
+        offset: range[0],
+        reason: reason.into(),
+        fits: true,
+    }
+}
+
+/// The unit of a series that is to be a quantity.
+#[must_use]
+pub fn unit(quantity: &Quantity, series: &Series, words: &Words, kind: Kind) -> Unit {
+    let per_second = |unit: &'static str| match (unit, quantity.measure) {
+        ("deg", Some(Measure::Velocity)) => "deg/s",
+        ("rad", Some(Measure::Velocity)) => "rad/s",
+        ("mm", Some(Measure::Velocity)) => "mm/s",
+        ("cm", Some(Measure::Velocity)) => "cm/s",
+        (unit, _) => unit,
+    };
+    if let Some(named) = words.unit {
+        return match (named, quantity.range) {
+            ("%", Some(range)) => percent(range, "named so"),
+            _ => Unit::named(per_second(named), "named so"),
+        };
+    }
+    let position = quantity.measure == Some(Measure::Position);
+    // A table may hold what LeRobot recorded, under its names.
+    let features = ["action.", "observation.state."];
+    let named_so =
+        series.name.ends_with(".pos") && features.iter().any(|f| series.name.starts_with(f));
+    let lerobot = kind == Kind::Lerobot || (kind.is_table() && named_so);
+    if lerobot && position && quantity.joint.is_some() {
+        let gripper = words.own.iter().any(|w| w == "gripper");
+        return match (quantity.dimension, quantity.range) {
+            (Dimension::Length, Some(range)) => percent(range, "LeRobot: 0 to 100 of the range"),
+            (Dimension::Angle, Some(range)) if gripper => {
+                percent(range, "LeRobot: 0 to 100 of the range")
+            }
+            _ => Unit::named("deg", "LeRobot: degrees"),
+        };
+    }
+    let candidates: &[&'static str] = match quantity.dimension {
+        Dimension::Angle if position => &["rad", "deg"],
+        Dimension::Length if position => &["m", "cm", "mm"],
+        _ => return Unit::si(true),
+    };
+    // What is written by the rules of ROS is in SI (REP 103), whatever the values are.
+    if matches!(kind, Kind::Mcap | Kind::Rosbag2) {
+        return Unit::si(allows(quantity, series, 1.0));
+    }
+    let fitting = candidates.iter().find(|name| {
+        let factor = asid_core::log::unit_factor(name).unwrap_or(1.0);
+        allows(quantity, series, factor)
+    });
+    match fitting {
+        Some(&("rad" | "m")) => Unit::si(true),
+        Some(name) => Unit::named(name, "by the joint's range"),
+        None => Unit::si(false),
+    }
+}
+
+/// Whether the values of a series, times a factor, can be those of a position.
+fn allows(quantity: &Quantity, series: &Series, factor: f64) -> bool {
+    let fold = |start: f64, f: fn(f64, f64) -> f64| series.values.iter().copied().fold(start, f);
+    let (low, high) = (
+        factor * fold(f64::INFINITY, f64::min),
+        factor * fold(f64::NEG_INFINITY, f64::max),
+    );
+    match (quantity.range, quantity.dimension) {
+        (Some([a, b]), _) => {
+            let slack = BEYOND * (b - a) + BEYOND_LEAST;
+            a - slack <= low && high <= b + slack
+        }
+        (None, Dimension::Angle) => high.max(-low) <= LARGEST_ANGLE,
+        (None, _) => high.max(-low) <= LARGEST_PLACE,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn quantity(dimension: Dimension, range: Option<[f64; 2]>) -> Quantity {
+        Quantity {
+            name: "q".into(),
+            vector: None,
+            command: false,
+            place: Some(0),
+            joint: Some(0),
+            measure: Some(Measure::Position),
+            dimension,
+            range,
+            words: vec![Words::of("q")],
+            axis: None,
+        }
+    }
+
+    fn series(values: &[f64]) -> Series {
+        Series {
+            values: values.to_vec(),
+            ..Series::default()
+        }
+    }
+
+    #[test]
+    fn names_stacks_and_ranges_tell_units() {
+        let joint = quantity(Dimension::Angle, Some([-1.5, 1.5]));
+        let slide = quantity(Dimension::Length, Some([0.0, 0.04]));
+        let unit = |q: &Quantity, values: &[f64], name: &str, kind| {
+            unit(q, &series(values), &Words::of(name), kind)
+        };
+        assert_eq!(unit(&joint, &[0.1, 1.2], "a", Kind::Csv).name, None);
+        assert_eq!(unit(&joint, &[5.0, 60.0], "a", Kind::Csv).name, Some("deg"));
+        assert_eq!(
+            unit(&joint, &[0.1, 1.2], "a_deg", Kind::Csv).name,
+            Some("deg")
+        );
+        assert!(!unit(&joint, &[900.0], "a", Kind::Csv).fits);
+        assert_eq!(
+            unit(&joint, &[0.1], "a.pos", Kind::Lerobot).name,
+            Some("deg")
+        );
+        let gripper = unit(&slide, &[0.0, 100.0], "gripper.pos", Kind::Lerobot);
+        assert_eq!((gripper.name, gripper.scale), (Some("%"), 0.04));
+        assert_eq!(unit(&slide, &[0.0, 38.0], "a", Kind::Csv).name, Some("mm"));
+    }
+}

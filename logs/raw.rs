@@ -1,0 +1,130 @@
+//! A log as it was recorded: series of numbers, each with the stamps of its own stream.
+
+use std::collections::HashMap;
+
+use asid_core::log::{LogNotes, Table};
+
+use crate::align;
+use crate::series::Series;
+
+/// A log of one episode.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct RawLog {
+    /// Name: that of its file, with the episode's number where a file holds several.
+    pub name: String,
+    /// Its series, by name.
+    pub series: Vec<Series>,
+    /// Column of the stamps, of a table.
+    pub stamps: Option<String>,
+    /// What a reader should know: streams that could not be read, and why.
+    pub remarks: Vec<String>,
+}
+
+impl RawLog {
+    /// The series of this name.
+    #[must_use]
+    pub fn series(&self, name: &str) -> Option<&Series> {
+        self.series.iter().find(|s| s.name == name)
+    }
+
+    /// Seconds from the first stamp to the last.
+    #[must_use]
+    pub fn duration(&self) -> f64 {
+        let ends = |s: &Series| Some((*s.time.first()?, *s.time.last()?));
+        let (mut first, mut last) = (f64::INFINITY, f64::NEG_INFINITY);
+        for (a, b) in self.series.iter().filter_map(ends) {
+            first = first.min(a);
+            last = last.max(b);
+        }
+        (last - first).max(0.0)
+    }
+
+    /// The series of these names as a table (see [`align`]), and what was not among them, by stream. Time counts from the
+    /// first row.
+    #[must_use]
+    pub fn table(&self, commands: &[String], readings: &[String]) -> (Table, LogNotes) {
+        let found = |names: &[String]| -> Vec<&Series> {
+            let all = names.iter().filter_map(|name| self.series(name));
+            all.filter(|s| !s.time.is_empty()).collect()
+        };
+        let (sent, read) = (found(commands), found(readings));
+        let rows = align::rows(if read.is_empty() { &sent } else { &read });
+        let mut columns: Vec<(String, Vec<f64>)> = sent
+            .iter()
+            .map(|s| (s.name.clone(), align::commands(s, &rows)))
+            .collect();
+        let readings = read.iter();
+        columns.extend(readings.map(|s| (s.name.clone(), align::readings(s, &rows))));
+        let first = rows.first().copied().unwrap_or(0.0);
+        let names: Vec<&Series> = sent.into_iter().chain(read).collect();
+        let notes = LogNotes {
+            passed_over: self.passed_over(&names),
+            ..LogNotes::default()
+        };
+        let time = rows.iter().map(|t| t - first).collect();
+        (Table { time, columns }, notes)
+    }
+
+    /// Streams of which nothing is among `chosen`, and single columns of a log that is one table.
+    fn passed_over(&self, chosen: &[&Series]) -> Vec<String> {
+        let mut used: HashMap<&str, bool> = HashMap::new();
+        let mut order = Vec::new();
+        for s in &self.series {
+            let own = if s.stream.is_empty() {
+                &s.name
+            } else {
+                &s.stream
+            };
+            let entry = used.entry(own).or_insert_with(|| {
+                order.push(own);
+                false
+            });
+            *entry |= chosen.iter().any(|c| c.name == s.name);
+        }
+        let unused = order.into_iter().filter(|name| !used[name.as_str()]);
+        unused.cloned().collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn series(name: &str, stream: &str, points: &[(f64, f64)]) -> Series {
+        Series {
+            name: name.into(),
+            stream: stream.into(),
+            time: points.iter().map(|p| p.0).collect(),
+            values: points.iter().map(|p| p.1).collect(),
+        }
+    }
+
+    #[test]
+    fn rows_are_those_of_the_readings_and_what_is_not_used_is_named() {
+        let log = RawLog {
+            series: vec![
+                series("/a.x", "/a", &[(5.0, 1.0), (5.2, 2.0), (5.4, 3.0)]),
+                series(
+                    "/b.u",
+                    "/b",
+                    &[(1.0, 7.0), (4.9, 5.0), (5.3, 6.0), (40.0, 0.0)],
+                ),
+                series("/c.z", "/c", &[(5.1, 9.0)]),
+            ],
+            ..RawLog::default()
+        };
+        let (table, notes) = log.table(&["/b.u".into()], &["/a.x".into(), "absent".into()]);
+        for (t, want) in table.time.iter().zip([0.0, 0.2, 0.4]) {
+            assert!((t - want).abs() < 1e-12);
+        }
+        let (u, x) = (&table.columns[0].1, &table.columns[1].1);
+        assert_eq!(x, &[1.0, 2.0, 3.0]);
+        assert!(
+            u[0] == 5.0 && (u[1] - 5.5).abs() < 1e-9 && u[2] == 6.0,
+            "{u:?}"
+        );
+        assert_eq!(notes.passed_over, ["/c"]);
+        assert_eq!(table.columns.len(), 2);
+        assert!((log.duration() - 39.0).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,264 @@
+//! `asid import`: logs of another stack as a study of a model.
+
+mod files;
+mod page;
+mod table;
+mod wired;
+
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+use anyhow::Result;
+use asid_core::log::{ColumnMapping, of_table, wanted};
+use asid_core::{Episode, Error, Layout};
+use asid_logs::propose::{Proposal, propose};
+use asid_logs::{Kind, LogSettings, Opener, RawLog};
+
+use super::failure;
+use super::machine::{Subject, sensors};
+use super::output::OutFolder;
+
+/// Columns that are named at most where one is sought; the rest is counted.
+const NAMED: usize = 12;
+
+/// Arguments of `import`.
+#[derive(clap::Args)]
+#[command(after_help = "\
+A log is a CSV file of any names, or, in a build with --features logs, an MCAP file with messages of ROS 2 or JSON, a bag of \
+ROS 2 (a folder, or a file of SQLite), a LeRobot dataset of version 2 or 3 (all its episodes, or one as DATASET#3), or a \
+Parquet file.
+
+Which column is which sensor or command is proposed by names, units, ranges and fit, and shown with the reasons. What is wrong \
+is set right by --map, or in the study's [[column]]. The folder holds study.toml, import.html (each column over time), and \
+model.xml where the model had no sensors; `asid diagnose DIR` runs on it. Without --out nothing is written.")]
+pub struct Arguments {
+    /// The logs, one an episode; the last third of them is held out, unless --test names others
+    #[arg(required = true, value_name = "LOG")]
+    logs: Vec<PathBuf>,
+    /// The model: MJCF, or a refined model (TOML)
+    #[arg(long, value_name = "FILE")]
+    model: PathBuf,
+    /// Hold out this log (repeatable)
+    #[arg(long, value_name = "LOG")]
+    test: Vec<PathBuf>,
+    /// Write the study into this folder, new or empty
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Read this topic only (repeatable) [default: all that hold numbers]
+    #[arg(long, value_name = "TOPIC")]
+    topic: Vec<String>,
+    /// Read a sensor or command from this column, such as ctrl.elbow=/arm/target.data.1 (repeatable)
+    #[arg(long, value_name = "NAME=COLUMN")]
+    map: Vec<String>,
+    /// Write the episodes as CSV files of the model's own names and units, in place of references to the logs
+    #[arg(long)]
+    copy: bool,
+    /// Try the mapping with this engine: see `asid list`
+    #[arg(long, value_name = "NAME")]
+    backend: Option<String>,
+    /// Show no progress on standard error
+    #[arg(long)]
+    quiet: bool,
+    /// Print the mapping as JSON, and nothing else, on standard output
+    #[arg(long)]
+    json: bool,
+}
+
+/// A log that is imported.
+pub struct Imported {
+    /// Where it is: the path, with `#` and the number of an episode in a dataset.
+    pub path: PathBuf,
+    /// Whether it is held out.
+    pub test: bool,
+    /// As it was recorded.
+    pub raw: RawLog,
+    /// As the model has it.
+    pub episode: Episode,
+}
+
+/// Imports.
+pub fn import(arguments: &Arguments) -> Result<()> {
+    let subject = Subject::open(&arguments.model, arguments.backend.as_deref())?;
+    if subject.study.is_some() {
+        return Err(Error::File {
+            path: arguments.model.clone(),
+            message: "is a study; --model is an MJCF file or a refined model".into(),
+        }
+        .into());
+    }
+    let out = match &arguments.out {
+        Some(out) => Some(OutFolder::claim(Some(out), "import")?),
+        None => None,
+    };
+    let mut notes = Vec::new();
+    let bare = subject.plant.layout.sensors.is_empty();
+    let subject = sensors::with_sensors(subject, &mut notes)?;
+    let (raw, settings) = open(arguments)?;
+    let kind = settings.kind.unwrap_or(Kind::Csv);
+    let given = given(&arguments.map)?;
+    let Some((_, first, _)) = raw.first() else {
+        return Err(Error::Failed("no log holds an episode".into()).into());
+    };
+    let scene = &subject.source.scene;
+    let mut proposal = propose(scene, &subject.plant, (first, kind), &given)?;
+    notes.extend(first.remarks.iter().cloned());
+    if let Err(error) = complete(&proposal) {
+        if !arguments.json {
+            table::show(&proposal)?;
+        }
+        return Err(error);
+    }
+    let mut imported = episodes(raw, &subject, &proposal)?;
+    if !arguments.quiet {
+        failure::note("trying the mapping in the model");
+    }
+    let found = wired::look(&subject, &mut imported, &mut proposal)?;
+    notes.extend(found);
+    let study = files::Files {
+        subject: &subject,
+        given: &arguments.model,
+        bare,
+        settings: &settings,
+        proposal: &proposal,
+        imported: &imported,
+        copy: arguments.copy,
+    };
+    if let Some(out) = &out {
+        let page = page::page(&study, &notes);
+        out.write(|folder| study.write(folder, &out.path(), &page))?;
+    }
+    if arguments.json {
+        return table::json(&proposal, &notes, out.as_ref());
+    }
+    table::show(&proposal)?;
+    notes.iter().for_each(|note| failure::note(note));
+    let mut stdout = std::io::stdout().lock();
+    match out {
+        Some(out) => writeln!(
+            stdout,
+            "wrote {}: {} episodes, {} of them held out; look at import.html, then: asid diagnose {}",
+            out.path().display(),
+            study.count(),
+            study.held_out(),
+            out.path().display()
+        )?,
+        None => writeln!(stdout, "nothing is written without --out DIR")?,
+    }
+    Ok(())
+}
+
+/// A log with its path, and whether it is held out.
+type Opened = (PathBuf, RawLog, bool);
+
+/// The logs as they were recorded, each with its path and whether it is held out; and the kind that they are of.
+fn open(arguments: &Arguments) -> Result<(Vec<Opened>, LogSettings)> {
+    let mut settings = LogSettings {
+        kind: None,
+        topics: arguments.topic.clone(),
+    };
+    let mut opener = Opener::default();
+    let mut all = Vec::new();
+    let fitted = arguments.logs.iter().map(|p| (p, false));
+    for (path, test) in fitted.chain(arguments.test.iter().map(|p| (p, true))) {
+        let (file, episode) = asid_logs::open::split(path);
+        let kind = Kind::of(&file);
+        if *settings.kind.get_or_insert(kind) != kind {
+            return Err(Error::Log {
+                path: path.clone(),
+                message: "is of another kind than the log before: one import takes one kind".into(),
+            }
+            .into());
+        }
+        for log in opener.open(path, &settings)? {
+            // Episodes of a dataset are named by their number.
+            let own = match (kind, episode) {
+                (Kind::Lerobot, None) => match log.name.rsplit_once('#') {
+                    Some((_, number)) => PathBuf::from(format!("{}#{number}", file.display())),
+                    None => path.clone(),
+                },
+                _ => path.clone(),
+            };
+            all.push((own, log, test));
+        }
+    }
+    if arguments.test.is_empty() && all.len() > 1 {
+        let held = (all.len() / 3).max(1);
+        let first = all.len() - held;
+        all[first..].iter_mut().for_each(|(.., test)| *test = true);
+    }
+    Ok((all, settings))
+}
+
+fn given(map: &[String]) -> Result<Vec<(String, String)>> {
+    let one = |text: &String| {
+        let (name, column) = text.split_once('=').ok_or_else(|| Error::Config {
+            key: "--map".into(),
+            message: format!("`{text}` is not NAME=COLUMN, such as ctrl.elbow=/arm/target.data.1"),
+        })?;
+        Ok((name.to_owned(), column.to_owned()))
+    };
+    map.iter().map(one).collect()
+}
+
+/// Refuses a mapping that no diagnosis can start from.
+fn complete(proposal: &Proposal) -> Result<()> {
+    let missing = proposal.missing_commands();
+    let mut left: Vec<String> = proposal.unused.iter().take(NAMED).cloned().collect();
+    if proposal.unused.len() > NAMED {
+        left.push(format!("and {} more", proposal.unused.len() - NAMED));
+    }
+    let left = if left.is_empty() {
+        "nothing is left in the log".to_owned()
+    } else {
+        format!("left are {}", left.join(", "))
+    };
+    if let Some(name) = missing.first() {
+        return Err(Error::Config {
+            key: "--map".into(),
+            message: format!(
+                "no column is the command of actuator `{name}`; a diagnosis needs what was sent: --map ctrl.{name}=COLUMN names it; {left}"
+            ),
+        }
+        .into());
+    }
+    if proposal.readings() == 0 {
+        return Err(Error::Config {
+            key: "--map".into(),
+            message: format!(
+                "no column is a sensor of the model: --map SENSOR=COLUMN names one; {left}"
+            ),
+        }
+        .into());
+    }
+    Ok(())
+}
+
+/// The logs as episodes of the model.
+fn episodes(raw: Vec<Opened>, subject: &Subject, proposal: &Proposal) -> Result<Vec<Imported>> {
+    let mappings = proposal.mappings();
+    let one = |(path, raw, test): Opened| {
+        let episode = episode(&path, &raw, &subject.plant.layout, &mappings)?;
+        Ok(Imported {
+            path,
+            test,
+            raw,
+            episode,
+        })
+    };
+    raw.into_iter().map(one).collect()
+}
+
+/// A log as an episode of a model: what a study reads of it.
+fn episode(
+    path: &Path,
+    raw: &RawLog,
+    layout: &Layout,
+    mappings: &[ColumnMapping],
+) -> Result<Episode> {
+    if raw.stamps.is_some() {
+        return Ok(asid_core::log::read(path, layout, mappings)?.0);
+    }
+    let [commands, readings] = wanted(layout, mappings);
+    let (table, _) = raw.table(&commands, &readings);
+    Ok(of_table(path, &table, layout, mappings)?.0)
+}

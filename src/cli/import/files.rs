@@ -1,0 +1,153 @@
+//! The study folder that an import writes.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use anyhow::Result;
+use asid_core::Error;
+use asid_effects::native::plain;
+use asid_logs::LogSettings;
+use asid_logs::propose::Proposal;
+use asid_mjcf::native::way;
+use serde::Serialize;
+
+use super::super::machine::Subject;
+use super::super::output::write_text;
+use super::Imported;
+
+/// Parts that a single episode is cut into, the last of which is held out.
+const PARTS: usize = 3;
+
+/// What is written.
+pub(super) struct Files<'a> {
+    /// The machine.
+    pub subject: &'a Subject,
+    /// The model's file as it was named.
+    pub given: &'a Path,
+    /// Whether the model had no sensors, and has them now.
+    pub bare: bool,
+    /// Kind of the logs, and their topics.
+    pub settings: &'a LogSettings,
+    /// The mapping.
+    pub proposal: &'a Proposal,
+    /// The episodes.
+    pub imported: &'a [Imported],
+    /// Whether the episodes are written in place of references.
+    pub copy: bool,
+}
+
+#[derive(Serialize)]
+struct Head<'a> {
+    model: &'a str,
+    train: &'a [String],
+    test: &'a [String],
+}
+
+#[derive(Serialize)]
+struct LogPart<'a> {
+    log: &'a LogSettings,
+}
+
+impl Files<'_> {
+    /// Whether there is one episode, which is cut into parts: what is fitted cannot be held out.
+    fn is_cut(&self) -> bool {
+        self.imported.len() == 1
+    }
+
+    /// How many episodes the study has.
+    pub(super) fn count(&self) -> usize {
+        if self.is_cut() {
+            PARTS
+        } else {
+            self.imported.len()
+        }
+    }
+
+    /// How many of them are held out.
+    pub(super) fn held_out(&self) -> usize {
+        if self.is_cut() {
+            1
+        } else {
+            self.imported.iter().filter(|i| i.test).count()
+        }
+    }
+
+    /// Writes the files into `folder`, which will be `home`.
+    pub(super) fn write(&self, folder: &Path, home: &Path, page: &str) -> Result<()> {
+        let model = if self.bare {
+            let backend = &*self.subject.backend;
+            let document = plain(backend, &self.subject.source, home)?;
+            write_text(&folder.join("model.xml"), &document.xml)?;
+            "model.xml".to_owned()
+        } else {
+            way(home, self.given).display().to_string()
+        };
+        let copied = self.copy || self.is_cut();
+        let (train, test) = if copied {
+            self.copies(folder)?
+        } else {
+            self.references(home)
+        };
+        let head = Head {
+            model: &model,
+            train: &train,
+            test: &test,
+        };
+        let toml = |e: toml::ser::Error| Error::Failed(e.to_string());
+        let mut text = toml::to_string(&head).map_err(toml)?;
+        if !copied {
+            let settings = LogSettings {
+                kind: self.settings.kind,
+                topics: self.proposal.topics.clone(),
+            };
+            let log = toml::to_string(&LogPart { log: &settings }).map_err(toml)?;
+            let _ = write!(text, "\n{log}");
+            for mapping in self.proposal.mappings() {
+                let _ = write!(text, "\n{}\n", mapping.lines());
+            }
+        }
+        write_text(&folder.join("study.toml"), &text)?;
+        write_text(&folder.join("import.html"), page)
+    }
+
+    /// The logs where they are.
+    fn references(&self, home: &Path) -> (Vec<String>, Vec<String>) {
+        let names = |test: bool| -> Vec<String> {
+            let chosen = self.imported.iter().filter(|i| i.test == test);
+            chosen.map(|i| reference(home, &i.path)).collect()
+        };
+        (names(false), names(true))
+    }
+
+    /// The episodes as files of their own.
+    fn copies(&self, folder: &Path) -> Result<(Vec<String>, Vec<String>)> {
+        let (mut train, mut test) = (Vec::new(), Vec::new());
+        if self.is_cut() {
+            let episode = &self.imported[0].episode;
+            for part in 0..PARTS {
+                let rows = episode.rows() * part / PARTS..episode.rows() * (part + 1) / PARTS;
+                let held = part + 1 == PARTS;
+                let name = format!("{}_{part}.csv", if held { "test" } else { "train" });
+                episode.part(rows).write_csv(&folder.join(&name))?;
+                if held { &mut test } else { &mut train }.push(name);
+            }
+            return Ok((train, test));
+        }
+        for (i, one) in self.imported.iter().enumerate() {
+            let name = format!("{}_{i}.csv", if one.test { "test" } else { "train" });
+            one.episode.write_csv(&folder.join(&name))?;
+            if one.test { &mut test } else { &mut train }.push(name);
+        }
+        Ok((train, test))
+    }
+}
+
+/// The way to a log, which may be an episode of a dataset.
+fn reference(home: &Path, log: &Path) -> String {
+    let (file, episode) = asid_logs::open::split(log);
+    let way = way(home, &file).display().to_string();
+    match episode {
+        Some(number) => format!("{way}#{number}"),
+        None => way,
+    }
+}

@@ -1,0 +1,99 @@
+//! The proposed mapping, tried in the model: what the check of wiring finds is put right before the study is written.
+
+use std::collections::BTreeMap;
+
+use anyhow::Result;
+use asid_core::log::ColumnMapping;
+use asid_diagnosis::machine::Machine;
+use asid_diagnosis::study::Study;
+use asid_diagnosis::wiring::{Settings, mend};
+use asid_logs::propose::Proposal;
+use serde::Deserialize;
+
+use super::super::machine::Subject;
+use super::super::session::backend;
+use super::{Imported, episode};
+
+/// A fault that may as well be an effect: it is not mended before the diagnosis has seen it.
+const CLOCK: &str = "wiring-clock";
+
+/// The lines that mend a fault.
+#[derive(Deserialize)]
+struct Lines {
+    column: Vec<ColumnMapping>,
+}
+
+/// Looks at the wiring of the episodes, puts what is found into the proposal and the episodes, and says it.
+pub(super) fn look(
+    subject: &Subject,
+    imported: &mut [Imported],
+    proposal: &mut Proposal,
+) -> Result<Vec<String>> {
+    let source = &subject.source;
+    let train: Vec<_> = imported
+        .iter()
+        .filter(|i| !i.test)
+        .map(|i| (i.raw.name.clone(), i.episode.clone()))
+        .collect();
+    let study = Study {
+        name: subject.name.clone(),
+        model: subject.file.clone(),
+        scene: source.scene.clone(),
+        fixed: source.parameters.clone(),
+        effects: source.effects.clone(),
+        parameters: Vec::new(),
+        train,
+        test: Vec::new(),
+        noise: BTreeMap::new(),
+        columns: proposal.mappings(),
+        notes: Vec::new(),
+        wired: false,
+    };
+    let machine = Machine::new(
+        backend(subject.backend.name())?.into(),
+        &source.scene,
+        &source.parameters,
+        &source.effects,
+        0,
+    )?;
+    let mended = mend(&study, &machine, &Settings::default())?;
+    let mut said = Vec::new();
+    for fault in &mended.wiring {
+        if fault.fault == CLOCK {
+            said.push(format!(
+                "tried in the model, readings are late against the commands (probability {:.2}): a clock or a delay of the \
+                 machine, which is left to asid diagnose",
+                fault.probability
+            ));
+            continue;
+        }
+        let lines = toml::from_str::<Lines>(&fault.mend).map_or_else(|_| Vec::new(), |l| l.column);
+        let place = |m: &ColumnMapping| proposal.matches.iter().position(|f| f.name == m.name);
+        let places: Option<Vec<usize>> = lines.iter().map(place).collect();
+        let then = if places.is_some() {
+            "the mapping has the lines that mend it"
+        } else {
+            "asid diagnose mends it and has the lines"
+        };
+        said.push(format!(
+            "tried in the model, {} of {} is likely (probability {:.2}): {then}",
+            fault.fault,
+            fault.columns.join(", "),
+            fault.probability
+        ));
+        for (place, mapping) in places.into_iter().flatten().zip(lines) {
+            let found = &mut proposal.matches[place];
+            found
+                .reasons
+                .push(format!("tried in the model: {}", fault.fault));
+            found.mapping = Some(mapping);
+        }
+    }
+    if !mended.wiring.is_empty() {
+        let mappings = proposal.mappings();
+        for one in imported {
+            one.episode = episode(&one.path, &one.raw, &subject.plant.layout, &mappings)?;
+        }
+    }
+    Ok(said)
+}

@@ -1,0 +1,276 @@
+//! `asid import` and `asid export-log` as the user runs them, on logs that public Python packages wrote.
+
+#![cfg(feature = "logs")]
+#![allow(clippy::unwrap_used)]
+
+#[path = "cli_support/program.rs"]
+mod program;
+
+use std::path::{Path, PathBuf};
+
+use asid::core::Episode;
+use asid::diagnosis::study::Study;
+use asid::logs::{LogSettings, Opener};
+use program::{asid, json, text};
+use serde_json::Value;
+
+const EPISODES: [&str; 4] = ["train_0", "train_1", "train_2", "test_3"];
+
+fn fixture(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("logs/tests/fixtures")
+        .join(name)
+}
+
+/// Runs `import` on some logs into a folder.
+fn import(logs: &[PathBuf], out: &Path, more: &[&str]) -> std::process::Output {
+    let model = fixture("nominal.xml");
+    let mut arguments = vec![
+        "import",
+        "--model",
+        text(&model),
+        "--out",
+        text(out),
+        "--quiet",
+    ];
+    arguments.extend(logs.iter().map(|l| text(l)));
+    arguments.extend(more);
+    asid(&arguments)
+}
+
+fn told(out: &std::process::Output) -> String {
+    assert!(
+        out.status.success(),
+        "{}",
+        String::from_utf8_lossy(&out.stderr)
+    );
+    String::from_utf8_lossy(&out.stdout).into_owned()
+}
+
+fn each(folder: &str, ending: &str) -> Vec<PathBuf> {
+    EPISODES
+        .iter()
+        .map(|n| fixture(&format!("{folder}/{n}{ending}")))
+        .collect()
+}
+
+/// The largest difference of the numbers of two studies.
+fn apart(a: &Study, b: &Study) -> f64 {
+    let mut most: f64 = 0.0;
+    let all = |s: &Study| -> Vec<Episode> {
+        s.train
+            .iter()
+            .chain(&s.test)
+            .map(|(_, e)| e.clone())
+            .collect()
+    };
+    let (a, b) = (all(a), all(b));
+    assert_eq!(a.len(), b.len());
+    for (x, y) in a.iter().zip(&b) {
+        assert_eq!((&x.channels, x.rows()), (&y.channels, y.rows()));
+        for (p, q) in [
+            (&x.time, &y.time),
+            (&x.ctrl, &y.ctrl),
+            (&x.readings, &y.readings),
+        ] {
+            most = p
+                .iter()
+                .zip(q)
+                .map(|(p, q)| (p - q).abs())
+                .fold(most, f64::max);
+        }
+    }
+    most
+}
+
+fn diagnosed(study: &Path, out: &Path) -> Value {
+    let done = asid(&["diagnose", text(study), "--quiet", "--out", text(out)]);
+    told(&done);
+    json(&out.join("result.json"))
+}
+
+/// Bags of both storages, MCAP, and a dataset give the verdict of the CSV study, with values as they are printed.
+#[test]
+fn logs_of_other_stacks_are_diagnosed_as_the_csv_study() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let csv = Study::read(&fixture("csv")).unwrap();
+    let wanted = diagnosed(&fixture("csv"), &at("csv"));
+    let found = wanted["verdict"]["effects"].as_array().unwrap();
+    assert!(found.contains(&"coulomb-friction@pan".into()), "{found:?}");
+    for (name, logs, off) in [
+        ("sqlite", each("bag_sqlite", ""), 1e-12),
+        ("bag-mcap", each("bag_mcap", ""), 1e-12),
+        ("mcap", each("mcap", ".mcap"), 1e-12),
+        // Single precision: see the crate's own test.
+        ("lerobot", vec![fixture("lerobot")], 2e-7),
+    ] {
+        let study = at(name);
+        let said = told(&import(&logs, &study, &[]));
+        assert!(
+            said.contains("gripper_gap") && said.contains("4 episodes, 1 of them held out"),
+            "{said}"
+        );
+        assert!(study.join("import.html").is_file());
+        let read = Study::read(&study).unwrap();
+        assert!(apart(&read, &csv) <= off, "{name}: {}", apart(&read, &csv));
+        // The same numbers to the last bit have the same diagnosis; those in single precision are diagnosed too.
+        if name == "sqlite" || name == "lerobot" {
+            let result = diagnosed(&study, &at(&format!("{name}-out")));
+            assert_eq!(
+                result["verdict"]["effects"], wanted["verdict"]["effects"],
+                "{name}"
+            );
+            assert_eq!(result["wiring"].as_array().map_or(0, Vec::len), 0, "{name}");
+            let number = |v: &Value, key: &str| v["gap"][key].as_f64().unwrap();
+            for key in ["nominal", "refined"] {
+                let (a, b) = (number(&result, key), number(&wanted, key));
+                assert!((a - b).abs() <= 5e-3 * b.max(1.0), "{name} {key}: {a} {b}");
+            }
+        }
+    }
+}
+
+#[test]
+fn copies_are_the_same_study_in_the_models_own_names() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("study");
+    told(&import(&each("bag_sqlite", ""), &out, &["--copy"]));
+    let (read, csv) = (
+        Study::read(&out).unwrap(),
+        Study::read(&fixture("csv")).unwrap(),
+    );
+    assert!(apart(&read, &csv) < 1e-12);
+    assert!(read.columns.is_empty());
+}
+
+#[test]
+fn one_episode_is_cut_so_that_a_part_is_held_out() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("study");
+    told(&import(&each("mcap", ".mcap")[..1], &out, &[]));
+    let read = Study::read(&out).unwrap();
+    assert_eq!((read.train.len(), read.test.len()), (2, 1));
+}
+
+#[test]
+fn a_table_with_other_names_and_units_is_mapped() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut logs = Vec::new();
+    for name in EPISODES {
+        let csv = std::fs::read_to_string(fixture(&format!("csv/{name}.csv"))).unwrap();
+        let mut text =
+            "Time [ms];pan target;gripper target;pan angle [deg];gripper [mm];battery\n".to_owned();
+        for line in csv.lines().skip(1) {
+            let x: Vec<f64> = line.split(',').map(|c| c.parse().unwrap()).collect();
+            text += &format!(
+                "{};{};{};{};{};12\n",
+                1e3 * x[0],
+                x[1],
+                x[2],
+                x[3].to_degrees(),
+                1e3 * x[4]
+            );
+        }
+        let path = folder.path().join(format!("{name}.csv"));
+        std::fs::write(&path, text).unwrap();
+        logs.push(path);
+    }
+    let out = folder.path().join("study");
+    told(&import(&logs, &out, &[]));
+    let (read, csv) = (
+        Study::read(&out).unwrap(),
+        Study::read(&fixture("csv")).unwrap(),
+    );
+    assert!(apart(&read, &csv) < 1e-9);
+}
+
+/// A model without sensors gets one at each joint: most robots' models have none.
+#[test]
+fn a_model_without_sensors_reads_its_joints() {
+    let folder = tempfile::tempdir().unwrap();
+    let xml = std::fs::read_to_string(fixture("nominal.xml")).unwrap();
+    let (from, to) = (
+        xml.find("<sensor>").unwrap(),
+        xml.find("</sensor>").unwrap(),
+    );
+    let model = folder.path().join("bare.xml");
+    std::fs::write(&model, format!("{}{}", &xml[..from], &xml[to + 9..])).unwrap();
+    let (out, dataset) = (folder.path().join("study"), fixture("lerobot"));
+    let done = asid(&[
+        "import",
+        text(&dataset),
+        "--model",
+        text(&model),
+        "--out",
+        text(&out),
+        "--quiet",
+    ]);
+    told(&done);
+    let read = Study::read(&out).unwrap();
+    assert_eq!(read.train[0].1.width(), 2);
+}
+
+#[test]
+fn wrong_calls_are_one_line_and_write_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("study");
+    let logs = each("bag_sqlite", "");
+    for (more, said) in [
+        (&["--map", "ctrl.pan"][..], "is not NAME=COLUMN"),
+        (
+            &["--map", "pan_angl=/joint_states.position.pan"],
+            "unknown sensor or command `pan_angl`",
+        ),
+        (
+            &["--map", "pan_angle=/joint_states.position.pam"],
+            "unknown column",
+        ),
+        (
+            &["--topic", "/joint_states"],
+            "no column is the command of actuator `pan`",
+        ),
+        (&["--topic", "/nothing"], "no messages of topic `/nothing`"),
+        (&["--test", "nowhere.mcap"], "nowhere.mcap"),
+    ] {
+        let done = import(&logs, &out, more);
+        let error = String::from_utf8_lossy(&done.stderr).into_owned();
+        assert_eq!(
+            (done.status.code(), error.lines().count()),
+            (Some(2), 1),
+            "{error}"
+        );
+        assert!(error.contains(said), "{error}");
+        assert!(!out.exists());
+    }
+    std::fs::create_dir(&out).unwrap();
+    std::fs::write(out.join("mine"), "").unwrap();
+    let done = import(&logs, &out, &[]);
+    assert_eq!(done.status.code(), Some(2));
+    assert_eq!(std::fs::read_dir(&out).unwrap().count(), 1);
+}
+
+#[test]
+fn exported_logs_are_read_back_with_the_same_numbers() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("mcap");
+    told(&asid(&[
+        "export-log",
+        text(&fixture("csv")),
+        "--out",
+        text(&out),
+    ]));
+    let logs = EPISODES.map(|n| out.join(format!("{n}.mcap")));
+    let raw = Opener::default()
+        .open(&logs[0], &LogSettings::default())
+        .unwrap();
+    assert!(raw[0].series("/joint_states.position.pan").is_some());
+    let study = folder.path().join("study");
+    told(&import(&logs, &study, &[]));
+    let (read, csv) = (
+        Study::read(&study).unwrap(),
+        Study::read(&fixture("csv")).unwrap(),
+    );
+    // Stamps are whole nanoseconds.
+    assert!(apart(&read, &csv) < 1e-9);
+}
