@@ -12,7 +12,7 @@ import json
 import types
 import typing
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypeVar, Union
+from typing import TYPE_CHECKING, Any, Literal, TypeVar, Union
 
 import numpy as np
 
@@ -25,18 +25,14 @@ R = TypeVar("R", bound="Record")
 class Record:
     """A part of a result."""
 
-    #: Names in the file of fields whose own name would not do in Python.
-    _names: ClassVar[dict[str, str]] = {}
-
     @classmethod
     def from_json(cls: type[R], value: dict[str, Any]) -> R:
         """Makes one from what ``json.load`` gives; a field that the file lacks takes its default."""
         hints = _hints(cls)
         given = {}
         for field in dataclasses.fields(cls):  # type: ignore[arg-type]
-            name = cls._names.get(field.name, field.name)
-            if name in value:
-                given[field.name] = _convert(hints[field.name], value[name])
+            if field.name in value:
+                given[field.name] = _convert(hints[field.name], value[field.name])
         return cls(**given)
 
 

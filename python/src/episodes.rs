@@ -2,7 +2,9 @@
 
 use asid_algorithms::fisher::{FisherSettings, Objective};
 use asid_core::Transition;
-use numpy::{PyArray1, PyArray2, PyArrayMethods as _, PyReadonlyArray2, PyUntypedArrayMethods as _};
+use numpy::{
+    PyArray1, PyArray2, PyArrayMethods as _, PyReadonlyArray2, PyUntypedArrayMethods as _,
+};
 use pyo3::prelude::*;
 
 use crate::batch::{Call, Shape};
