@@ -6,10 +6,15 @@
 >>> print(found.table("hypotheses"))
 """
 
+from typing import TYPE_CHECKING
+
 from asid._native import __version__, backends, tasks
 from asid.calls import compare, diagnose, explore, identify, run
 from asid.errors import AsidError, UsageError
 from asid.program import program
+
+if TYPE_CHECKING:
+    from asid.play import play
 
 try:
     from asid.environments import register as _register

@@ -13,6 +13,7 @@ import signal
 import subprocess
 import sys
 import threading
+import warnings
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import IO
@@ -21,6 +22,9 @@ from asid.errors import AsidError, UsageError
 
 #: What may stand for one option: repeated where it is a list, ``NAME=VALUE`` each where it is a mapping.
 Option = str | int | float | bool | Path | Iterable["str | Path"] | Mapping[str, object] | None
+
+#: How the program begins a line that stops nothing.
+WARNING = "asid: warning:"
 
 
 def program() -> Path:
@@ -63,6 +67,8 @@ def _text(value: object) -> str:
 def call(words: Iterable[str | Path], progress: bool = False) -> str:
     """Runs the program and returns its standard output; bars of progress go to standard error where asked for.
 
+    What the program warns of becomes a warning of Python.
+
     Raises:
         UsageError: the call was wrong.
         AsidError: the work failed.
@@ -97,6 +103,9 @@ def call(words: Iterable[str | Path], progress: bool = False) -> str:
     child.stdout.close()
     child.stderr.close()
     if status == 0:
+        for line in said:
+            if line.startswith(WARNING):
+                warnings.warn(line.removeprefix(WARNING).strip(), stacklevel=4)
         return output
     if interrupted:
         raise KeyboardInterrupt
@@ -119,13 +128,13 @@ def _listen(stream: IO[str], said: list[str], progress: bool) -> None:
     """Collects what the program says beside its result."""
     for line in stream:
         said.append(line)
-        if progress or line.startswith("asid: warning:"):
+        if progress:
             sys.stderr.write(line)
 
 
 def _error(status: int, said: list[str]) -> AsidError:
     """The exception of a program that failed: its line, without its name."""
-    lines = [line.strip() for line in said if line.strip() and not line.startswith("asid: warning:")]
+    lines = [line.strip() for line in said if line.strip() and not line.startswith(WARNING)]
     if status < 0:
         return AsidError(f"the program was ended by signal {-status}" + (f": {lines[-1]}" if lines else ""))
     line = lines[-1].removeprefix("asid: ") if lines else f"the program ended with status {status}"

@@ -34,7 +34,7 @@ Array = NDArray[np.float64]
 /// Classes by name.
 #[derive(Default)]
 pub struct Generator {
-    /// Classes in an order in which each stands behind those that it is made of: name and text.
+    /// In the order of the results: name and text.
     classes: Vec<(String, String)>,
     /// Names of kinds: texts of which one is given.
     kinds: BTreeMap<String, String>,
