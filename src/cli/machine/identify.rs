@@ -62,6 +62,7 @@ struct GapResult {
     identified_fitted: f64,
 }
 
+/// What made a result.
 #[derive(Serialize, schemars::JsonSchema)]
 struct Versions {
     asid: &'static str,
