@@ -3,7 +3,7 @@
 >>> import asid
 >>> found = asid.diagnose("studies/servo-pendulum")
 >>> print(found.sentence)
->>> print(found.table("hypotheses"))
+>>> print(found.frame("hypotheses"))
 """
 
 from typing import TYPE_CHECKING

@@ -55,8 +55,8 @@ class Result(Record):
         """The page of the result: one file that opens offline."""
         return self.folder / "report.html"
 
-    def table(self, name: str) -> pandas.DataFrame:
-        """A list of records as a table, one row each: ``diagnosis.table("hypotheses")``."""
+    def frame(self, name: str) -> pandas.DataFrame:
+        """A list of records as a table, one row each: ``diagnosis.frame("hypotheses")``."""
         rows = getattr(self, name)
         if not isinstance(rows, list) or not all(isinstance(row, Record) for row in rows):
             raise TypeError(f"{type(self).__name__}.{name} is no list of records")

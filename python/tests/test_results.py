@@ -34,7 +34,7 @@ def test_the_readme_diagnoses_a_study(readme):
     total = sum(h.probability for h in found.hypotheses)
     assert abs(total - 1.0) < 1e-6, "probabilities are of exact sets"
     assert isinstance(found.parameters[0].interval95, np.ndarray)
-    table = found.table("hypotheses")
+    table = found.frame("hypotheses")
     assert isinstance(table, pandas.DataFrame) and list(table.columns) == ["effects", "probability"]
     assert found.report.exists()
     log = found.log("train-1")

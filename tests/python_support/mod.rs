@@ -31,6 +31,9 @@ from asid.records import Record, Result
 Array = NDArray[np.float64]
 ";
 
+/// Names that every result has beside its fields.
+const TAKEN: [&str; 6] = ["folder", "frame", "from_json", "log", "read", "report"];
+
 /// Classes by name.
 #[derive(Default)]
 pub struct Generator {
@@ -90,6 +93,7 @@ impl Generator {
             .iter()
             .partition(|(name, _)| required.contains(&name.as_str()));
         for (name, field) in given {
+            assert!(!TAKEN.contains(&name.as_str()), "a result has a `{name}`");
             let _ = writeln!(text, "    {name}: {}", hint(field));
             documented(&mut text, field);
         }
