@@ -5,6 +5,7 @@ an error, so that what is added to the module is typed.
 """
 
 import inspect
+import sys
 from types import ModuleType
 
 #: Types of arguments by name, of which one name has one meaning.
@@ -103,6 +104,8 @@ def stub(module: ModuleType) -> str:
 
 
 if __name__ == "__main__":
+    # The package that is installed, and not the one beside this file, which has no module.
+    sys.path.pop(0)
     from asid import _native
 
     print(stub(_native), end="")

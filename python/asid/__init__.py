@@ -14,7 +14,7 @@ from asid.errors import AsidError, UsageError
 from asid.program import program
 
 if TYPE_CHECKING:
-    from asid.play import play
+    from asid.playing import play
 
 try:
     from asid.environments import register as _register
@@ -43,7 +43,7 @@ __all__ = [
 def __getattr__(name: str) -> object:
     # `play` needs gymnasium, which is told where it is used.
     if name == "play":
-        from asid.play import play
+        from asid.playing import play
 
         return play
     raise AttributeError(f"module 'asid' has no attribute '{name}'")
