@@ -53,7 +53,9 @@ def identify(
     """
     logs: list[str | Path] = [log] if isinstance(log, (str, Path)) else list(log)
     folder, value = _work("identify", [subject], out, progress, {**options, "log": logs})
-    return _result(StudyIdentification if "study" in value else Identification, folder, value)
+    if "study" in value:
+        return _result(StudyIdentification, folder, value)
+    return _result(Identification, folder, value)
 
 
 def explore(
@@ -70,7 +72,9 @@ def explore(
     The commands are ``result.log("commands")``.
     """
     folder, value = _work("explore", [subject] if subject is not None else [], out, progress, options)
-    return _result(Motion if "machine" in value else ExploredTask, folder, value)
+    if "machine" in value:
+        return _result(Motion, folder, value)
+    return _result(ExploredTask, folder, value)
 
 
 def run(task: str, *, out: str | Path | None = None, progress: bool = False, **options: Option) -> Run:
@@ -104,7 +108,7 @@ def _work(
 ) -> tuple[_Folder, dict[str, Any]]:
     """Runs a command into a folder, and returns that with what ``result.json`` holds."""
     folder = _Folder.of(command, out)
-    words = [command, "--json", "--out", folder.path]
+    words: list[str | Path] = [command, "--json", "--out", folder.path]
     if not progress:
         words.append("--quiet")
     try:

@@ -46,7 +46,7 @@ def register() -> None:
             )
 
 
-def _spaces(episodes: _native.Episodes) -> tuple[Box, Box]:
+def _spaces(episodes: _native.Episodes) -> tuple[Any, Any]:
     entries = sum(count for _, count in episodes.entries)
     observation = Box(-np.inf, np.inf, (entries,), np.float32)
     return observation, Box(-1.0, 1.0, (len(episodes.actions),), np.float32)
@@ -137,7 +137,7 @@ class ExplorationVectorEnv(VectorEnv[Floats, Floats, NDArray[Any]]):
         self.action_space = batch_space(self.single_action_space, num_envs)
         self._seeded = False
 
-    def reset(  # type: ignore[override]
+    def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Floats, dict[str, Any]]:
         """Begins all episodes; a list of seeds stands for one seed, since one stream draws for the whole batch."""

@@ -151,11 +151,12 @@ fn build(profile: Profile) -> Result<PathBuf> {
 /// Builds the program, and puts it with MuJoCo's library where the wheel has them.
 fn program(profile: Profile) -> Result<()> {
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
-    // The same features as those of the tests but for libtorch, whose 500 MB no wheel is to carry.
+    // The features of the tests but for libtorch, whose 500 MB no wheel is to carry. The module is named beside the
+    // program, though maturin builds it, so that crates have the features that both ask for, and are built once.
     let status = Command::new(cargo)
-        .args(["rustc", "--package=asid", "--bin=asid", "--locked"])
-        .args(["--features=mujoco,parquet", "--profile", profile.name()])
-        .args(["--", "-Cstrip=symbols"])
+        .args(["build", "--package=asid", "--package=asid-python"])
+        .args(["--bin=asid", "--features=mujoco,parquet", "--locked"])
+        .args(["--profile", profile.name()])
         .env("ASID_RELOCATABLE", "1")
         .current_dir(repository())
         .status()
@@ -169,7 +170,10 @@ fn program(profile: Profile) -> Result<()> {
     }
     fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
     let built = target()?.join(profile.folder()).join("asid");
-    copy(&built, &folder.join("asid"))?;
+    let program = folder.join("asid");
+    copy(&built, &program)?;
+    // Names of functions are nine tenths of the file. Without the tool the wheel is larger, and no worse.
+    let _ = Command::new("strip").arg(&program).status();
     let library = format!("libmujoco.so.{}", MUJOCO.wheels[0].version);
     let from = MUJOCO
         .chosen()
