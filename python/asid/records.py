@@ -7,7 +7,6 @@ and where it is ``float | None``, it is ``None``: there is no such value.
 from __future__ import annotations
 
 import dataclasses
-import functools
 import json
 import types
 import typing
@@ -20,6 +19,9 @@ if TYPE_CHECKING:
     import pandas
 
 R = TypeVar("R", bound="Record")
+
+#: Types of the fields of classes that have been read.
+_HINTS: dict[type, dict[str, Any]] = {}
 
 
 class Record:
@@ -91,9 +93,10 @@ def _pandas() -> Any:
     return pandas
 
 
-@functools.lru_cache(maxsize=None)
-def _hints(cls: Any) -> dict[str, Any]:
-    return typing.get_type_hints(cls)
+def _hints(cls: type) -> dict[str, Any]:
+    if cls not in _HINTS:
+        _HINTS[cls] = typing.get_type_hints(cls)
+    return _HINTS[cls]
 
 
 def _convert(hint: Any, value: Any) -> Any:
