@@ -172,7 +172,7 @@ fn program(profile: Profile) -> Result<()> {
     let built = target()?.join(profile.folder()).join("asid");
     let program = folder.join("asid");
     copy(&built, &program)?;
-    // Names of functions are nine tenths of the file. Without the tool the wheel is larger, and no worse.
+    // What debuggers read is most of the file. Without the tool the wheel is larger, and no worse.
     let _ = Command::new("strip").arg(&program).status();
     let library = format!("libmujoco.so.{}", MUJOCO.wheels[0].version);
     let from = MUJOCO
