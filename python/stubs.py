@@ -12,7 +12,6 @@ from types import ModuleType
 ARGUMENTS = {
     "task": "str",
     "episodes": "int",
-    "steps": "int",
     "backend": "str | None",
     "objective": "str | None",
     "form": "str | None",
@@ -26,7 +25,6 @@ ARGUMENTS = {
 RETURNS = {
     "tasks": "list[tuple[str, str]]",
     "backends": "list[str]",
-    "measure": "float",
     "Episodes.episodes": "int",
     "Episodes.engine": "str",
     "Episodes.entries": "list[tuple[str, int]]",
@@ -34,6 +32,7 @@ RETURNS = {
     "Episodes.unknowns": "list[tuple[str, str]]",
     "Episodes.horizon": "int",
     "Episodes.period": "float",
+    "Episodes.seconds": "float",
     "Episodes.seed": "None",
     "Episodes.reset": "NDArray[np.float32]",
     "Episodes.step": "tuple[NDArray[np.float32], NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], NDArray[np.float32]]",

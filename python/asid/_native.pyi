@@ -36,6 +36,10 @@ class Episodes:
     def reset(self) -> NDArray[np.float32]:
         """Begins all episodes anew: the first observations, episodes x entries."""
 
+    @property
+    def seconds(self) -> float:
+        """Time that the simulator took so far for steps and resets, s: all the rest is Python's."""
+
     def seed(self, seed: int) -> None:
         """Draws all further chance from this seed."""
 
@@ -51,9 +55,6 @@ class Episodes:
 
 def backends() -> list[str]:
     """The engines that this module holds, by name."""
-
-def measure(task: str, episodes: int, steps: int, *, backend: str | None = None, threads: int = 0, seed: int = 0) -> float:
-    """Control steps a second, over all episodes, of a batch that Rust steps alone, with actions of 0."""
 
 def tasks() -> list[tuple[str, str]]:
     """The tasks that are registered: name and one line about each."""

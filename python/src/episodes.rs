@@ -30,7 +30,7 @@ pub struct Episodes {
 }
 
 /// The settings of an episode's reward from their names.
-pub fn fisher(
+fn fisher(
     objective: Option<&str>,
     form: Option<&str>,
     nuisance: Option<bool>,
@@ -122,6 +122,12 @@ impl Episodes {
     #[getter]
     fn period(&self) -> f64 {
         self.shape.period
+    }
+
+    /// Time that the simulator took so far for steps and resets, s: all the rest is Python's.
+    #[getter]
+    fn seconds(&self) -> f64 {
+        self.worker.seconds
     }
 
     /// Draws all further chance from this seed.

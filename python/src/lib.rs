@@ -7,7 +7,6 @@
 mod batch;
 mod episodes;
 mod failure;
-mod measure;
 mod opened;
 mod worker;
 
@@ -38,6 +37,5 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<episodes::Episodes>()?;
     module.add_function(wrap_pyfunction!(tasks, module)?)?;
     module.add_function(wrap_pyfunction!(backends, module)?)?;
-    module.add_function(wrap_pyfunction!(measure::measure, module)?)?;
     module.add("__version__", env!("CARGO_PKG_VERSION"))
 }

@@ -6,7 +6,7 @@
 
 use std::sync::Mutex;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use asid_algorithms::explore::environment::FisherEnvironment;
 use asid_core::{Result, Transition};
@@ -19,12 +19,17 @@ use crate::opened::{Opened, Request};
 /// How long a wait is until Python is asked for signals again, such as that of Ctrl-C: shorter than a person notices.
 const LOOK: Duration = Duration::from_millis(100);
 
+/// An answer, and the time that the simulator took for it, s.
+type Timed = (Result<Transition>, f64);
+
 /// The ends of the channels.
 pub struct Worker {
     calls: Sender<Call>,
-    answers: Mutex<Receiver<Result<Transition>>>,
+    answers: Mutex<Receiver<Timed>>,
     /// A call was interrupted: its answer is still to come.
     outstanding: bool,
+    /// Time that the simulator took for all answers, s.
+    pub seconds: f64,
 }
 
 impl Worker {
@@ -51,6 +56,7 @@ impl Worker {
             calls,
             answers: Mutex::new(answers),
             outstanding: false,
+            seconds: 0.0,
         };
         Ok((worker, shape))
     }
@@ -75,8 +81,9 @@ impl Worker {
         }
         self.tell(call)?;
         self.outstanding = true;
-        let answer = wait(py, &self.answers)?;
+        let (answer, seconds) = wait(py, &self.answers)?;
         self.outstanding = false;
+        self.seconds += seconds;
         answer.map_err(|e| exception(&e))
     }
 }
@@ -86,7 +93,7 @@ fn own(
     request: &Request,
     opening: &Sender<Result<Shape>>,
     called: &Receiver<Call>,
-    answering: &Sender<Result<Transition>>,
+    answering: &Sender<Timed>,
 ) -> Result<()> {
     let opened = Opened::new(request)?;
     let problem = opened.problem();
@@ -96,8 +103,11 @@ fn own(
         return Ok(());
     }
     for call in called {
+        let clock = Instant::now();
         if let Some(answer) = answer(&mut environment, call)
-            && answering.send(answer).is_err()
+            && answering
+                .send((answer, clock.elapsed().as_secs_f64()))
+                .is_err()
         {
             break;
         }

@@ -89,17 +89,14 @@ def test_wrong_calls_say_what_is_known():
 
 
 def test_a_batch_is_as_fast_as_in_rust():
-    """The faster of several turns each, taken in turns: what else runs on the machine slows both."""
-    task, episodes, steps = "sphere-striking", 16, 5
-    environment = ExplorationVectorEnv(task, episodes, backend="mujoco")
+    """What the simulator takes is timed in Rust, within the same steps: what else runs on the machine slows both."""
+    environment = ExplorationVectorEnv("sphere-striking", 32, backend="mujoco")
     environment.reset(seed=0)
     actions = np.zeros(environment.action_space.shape, np.float32)
-    python, rust = [], []
-    for _ in range(4):
-        clock = time.perf_counter()
-        for _ in range(steps):
-            environment.step(actions)
-        python.append(steps * episodes / (time.perf_counter() - clock))
-        rust.append(_native.measure(task, episodes, steps, backend="mujoco"))
-    print(f"{max(python):.0f} steps a second in Python, {max(rust):.0f} in Rust: {max(python) / max(rust):.3f}")
-    assert max(python) >= KEPT * max(rust)
+    before = environment.episodes.seconds
+    clock = time.perf_counter()
+    for _ in range(10):
+        environment.step(actions)
+    kept = (environment.episodes.seconds - before) / (time.perf_counter() - clock)
+    print(f"{kept:.4f} of the steps a second in Rust")
+    assert KEPT <= kept <= 1.0
