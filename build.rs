@@ -2,6 +2,8 @@
 //! (or the user) put them: an rpath for each feature that links one. Where a
 //! variable is not set, the loader's own search path holds.
 //!
+//! With `ASID_RELOCATABLE` set, the programs look beside themselves instead, as those in a package do.
+//!
 //! It also notes the commit that is built, for results to carry.
 
 // A build script speaks to cargo through its standard output.
@@ -39,6 +41,11 @@ fn commit() {
 /// Adds the folder `below` of what `variable` names to the run-time search path.
 fn rpath(variable: &str, below: &str) {
     println!("cargo:rerun-if-env-changed={variable}");
+    println!("cargo:rerun-if-env-changed=ASID_RELOCATABLE");
+    if env::var_os("ASID_RELOCATABLE").is_some() {
+        println!("cargo:rustc-link-arg=-Wl,-rpath,$ORIGIN");
+        return;
+    }
     let Some(value) = env::var_os(variable).filter(|v| !v.is_empty()) else {
         return;
     };

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::number;
 
 /// What tells a cell from all others.
-#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct CellKey {
     /// Task.
     pub task: String,
@@ -152,7 +152,8 @@ pub struct Cell {
 pub const SCHEMA: u32 = 1;
 
 /// Why a cell is not there.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
+#[schemars(rename = "FailedRun")]
 pub struct Failure {
     /// Which one it is.
     #[serde(flatten)]

@@ -12,7 +12,7 @@ use serde::Serialize;
 pub const STAND_IN: &str = "stand-in";
 
 /// What a published value measures.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, schemars::JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Measure {
     /// The task's metric, in its unit.
@@ -22,7 +22,7 @@ pub enum Measure {
 }
 
 /// A published value.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Published {
     /// Number of the paper's table.
     pub table: u8,

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::nullable;
 
 /// Gap of one sensor, root mean square in units of its noise.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct SignalGap {
     /// Sensor.
     pub signal: String,
@@ -28,7 +28,7 @@ pub struct SignalGap {
 }
 
 /// Gaps on the logs held out, root mean square in units of the noise.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct Gap {
     /// 1 by definition.
     #[serde(deserialize_with = "nullable::scalar")]
@@ -65,7 +65,8 @@ impl Default for Gap {
 }
 
 /// A share of the excess squared residual.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[schemars(rename = "Place")]
 pub struct Where {
     /// Entry of a sensor.
     pub signal: String,
@@ -79,7 +80,8 @@ pub struct Where {
 }
 
 /// A set of effects, or `none` or `unknown`, with its probability.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[schemars(rename = "Hypothesis")]
 pub struct HypothesisResult {
     /// Effects at their sites.
     pub effects: Vec<String>,
@@ -89,7 +91,8 @@ pub struct HypothesisResult {
 }
 
 /// An effect with its marginal probability.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[schemars(rename = "Effect")]
 pub struct EffectResult {
     /// Name.
     pub effect: String,
@@ -118,8 +121,11 @@ impl EffectResult {
 }
 
 /// What kind of answer.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
+)]
 #[serde(rename_all = "lowercase")]
+#[schemars(rename = "VerdictKind")]
 pub enum Kind {
     /// No gap beyond the noise and the study's parameters.
     #[default]
@@ -131,7 +137,7 @@ pub enum Kind {
 }
 
 /// The answer.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct Verdict {
     /// What kind.
     pub kind: Kind,
@@ -160,7 +166,8 @@ impl Default for Verdict {
 }
 
 /// A parameter of the study, as fitted with the verdict's effects.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[schemars(rename = "StudyParameter")]
 pub struct ParameterResult {
     /// Name.
     pub name: String,
@@ -182,7 +189,8 @@ pub struct ParameterResult {
 }
 
 /// A check before the diagnosis.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[schemars(rename = "Check")]
 pub struct CheckResult {
     /// Name.
     pub check: String,
@@ -193,7 +201,8 @@ pub struct CheckResult {
 }
 
 /// A fault of wiring: columns of the logs that do not mean what their names say.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[schemars(rename = "Wiring")]
 pub struct WiringResult {
     /// `wiring-swapped`, `wiring-sign`, `wiring-unit`, `wiring-offset` or `wiring-clock`.
     pub fault: String,
@@ -207,7 +216,7 @@ pub struct WiringResult {
 }
 
 /// The experiment that would tell rivals apart.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct NextExperiment {
     /// What it would tell apart.
     pub separates: Vec<String>,
@@ -216,7 +225,7 @@ pub struct NextExperiment {
 }
 
 /// The generalized force that the model lacks at a degree of freedom: its deviation over the training logs.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct MissingForce {
     /// Joint; with the axis (`.x`, `.rx`, …) where it has several.
     pub dof: String,
@@ -234,7 +243,7 @@ pub struct MissingForce {
 }
 
 /// A set of effects with the evidence for it over the model without effects, natural logarithms.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct RankedSet {
     /// Effects at their sites.
     pub effects: Vec<String>,
@@ -246,7 +255,7 @@ pub struct RankedSet {
 
 /// How well the logs tell effects apart: principal angles between what they add to the model along the logs, what
 /// the study's parameters can do projected out.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct Isolability {
     /// Effects at their sites, the most evident first.
     pub effects: Vec<String>,
@@ -256,7 +265,7 @@ pub struct Isolability {
 }
 
 /// A stage that a time limit or an interruption cut short.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct NotTried {
     /// What was left out.
     pub stage: String,
@@ -265,7 +274,8 @@ pub struct NotTried {
 }
 
 /// `result.json`.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[schemars(rename = "Diagnosis")]
 pub struct DiagnosisResult {
     /// 1.
     pub schema: u32,
@@ -317,8 +327,9 @@ pub struct DiagnosisResult {
 }
 
 /// A task in the real world with one simulator after the other.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default)]
+#[schemars(rename = "RealWorldTrials")]
 pub struct RealWorld {
     /// The task.
     pub task: String,
@@ -341,7 +352,7 @@ pub struct RealWorld {
 }
 
 /// Runs of a task in one world with one simulator.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default)]
 pub struct TaskTrial {
     /// In which world.

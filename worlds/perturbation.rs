@@ -12,7 +12,8 @@ use crate::PerturbationRanges;
 
 /// The values that a world's seed drew. Each has a stream of its own, so that a range that is
 /// changed moves no other value.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, schemars::JsonSchema)]
+#[schemars(rename = "DrawnPerturbation")]
 pub struct Perturbation {
     /// Physics steps in one of the simulator's.
     pub steps: usize,
@@ -29,7 +30,7 @@ pub struct Perturbation {
 }
 
 /// What is off in a tracker.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct TrackerPerturbation {
     /// Age of a reading, s.
     pub latency: f64,

@@ -8,11 +8,14 @@ use crate::fisher::{FisherBatch, FisherSettings};
 use asid_core::environment::{BatchEnvironment, Transition};
 use asid_core::rng::Rng;
 use asid_core::signal::SignalSet;
-use asid_core::{Problem, Result};
+use asid_core::{Problem, Result, Streams};
 use rand::Rng as _;
 use rand_distr::{Distribution, StandardNormal};
 
 use super::observation::Observer;
+
+/// Name of the stream that unknowns, start poses and the trackers' noise are drawn from.
+const STREAM: &str = "fisher environment";
 
 /// A batch of Fisher exploration episodes that step together.
 pub struct FisherEnvironment<'a> {
@@ -41,13 +44,18 @@ impl<'a> FisherEnvironment<'a> {
         Ok(Self {
             readings: vec![0.0; episodes * batch.width()],
             ended: vec![false; episodes],
-            rng: problem.streams.stream("fisher environment"),
+            rng: problem.streams.stream(STREAM),
             observer: Observer::new(problem)?,
             signals: SignalSet::new(problem.model.layout(), problem.signals)?,
             batch,
             problem,
             step: 0,
         })
+    }
+
+    /// Draws all further chance from these streams, so that what follows repeats.
+    pub fn reseed(&mut self, streams: &Streams) {
+        self.rng = streams.stream(STREAM);
     }
 
     /// Starts one episode in each environment at given unknowns and start poses.

@@ -17,7 +17,7 @@ use nalgebra::{DMatrix, DVector, Isometry3, Matrix3, Matrix6, UnitQuaternion, Ve
 use serde::{Deserialize, Serialize};
 
 /// A kind of joint.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Joint {
     /// The parts do not move against each other.
@@ -38,7 +38,7 @@ pub struct Noise {
 }
 
 /// How two parts are joined.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct Articulation {
     /// The most probable kind.
     pub joint: Joint,

@@ -30,7 +30,7 @@ pub struct Marginal {
 }
 
 /// An end of a prior's range.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Edge {
     /// The smallest value.
@@ -51,7 +51,7 @@ impl Edge {
 }
 
 /// A combination of unknowns that the data do not see.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct Direction {
     /// Name of each unknown that takes part, and its share in prior deviations; the squares of
     /// all shares sum to 1.

@@ -6,7 +6,8 @@ use crate::cell::Failure;
 use crate::paper::Published;
 
 /// How well one unknown was identified over the runs of a row.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, schemars::JsonSchema)]
+#[schemars(rename = "IdentifiedUnknown")]
 pub struct Identification {
     /// Name.
     pub name: String,
@@ -23,7 +24,7 @@ pub struct Identification {
 }
 
 /// Probability that a run is better than one of the next best method.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, schemars::JsonSchema)]
 pub struct Improvement {
     /// The next best method.
     pub over: String,
@@ -34,7 +35,7 @@ pub struct Improvement {
 }
 
 /// Whether a row is the best of its column, with an interval apart from the next one's.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, schemars::JsonSchema)]
 pub struct Best {
     /// In the interquartile mean of the metric.
     pub iqm: bool,
@@ -43,7 +44,7 @@ pub struct Best {
 }
 
 /// Figures of one or more conditions' runs.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, schemars::JsonSchema)]
 pub struct Summary {
     /// Runs.
     pub n: usize,
@@ -70,7 +71,8 @@ pub struct Summary {
 }
 
 /// One row of the table.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, schemars::JsonSchema)]
+#[schemars(rename = "ComparisonRow")]
 pub struct Row {
     /// Task.
     pub task: String,
@@ -112,7 +114,8 @@ pub struct Row {
 }
 
 /// A method over all conditions of a task, each condition a stratum.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, schemars::JsonSchema)]
+#[schemars(rename = "PooledRow")]
 pub struct Pooled {
     /// Task.
     pub task: String,
@@ -132,7 +135,7 @@ pub struct Pooled {
 }
 
 /// A method that could not be run at all on a task.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, schemars::JsonSchema)]
 pub struct Omitted {
     /// Task.
     pub task: String,
@@ -147,7 +150,8 @@ pub struct Omitted {
 }
 
 /// What is asked of a comparison, and how much of it there is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, schemars::JsonSchema)]
+#[schemars(rename = "CellCount")]
 pub struct Count {
     /// Cells of the plan.
     pub planned: usize,
@@ -156,7 +160,8 @@ pub struct Count {
 }
 
 /// `result.json` of a comparison.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, schemars::JsonSchema)]
+#[schemars(rename = "Comparison")]
 pub struct ComparisonResult {
     /// Layout version.
     pub schema: u32,

@@ -62,8 +62,9 @@ pub struct Arguments {
 }
 
 /// `result.json` of `explore`.
-#[derive(Serialize)]
-struct ExploreResult {
+#[derive(Serialize, schemars::JsonSchema)]
+#[schemars(rename = "ExploredTask")]
+pub struct ExploreResult {
     schema: u32,
     task: String,
     backend: String,

@@ -69,8 +69,9 @@ pub struct Arguments {
 }
 
 /// `result.json` of `identify`.
-#[derive(Serialize)]
-struct IdentifyResult {
+#[derive(Serialize, schemars::JsonSchema)]
+#[schemars(rename = "Identification")]
+pub struct IdentifyResult {
     schema: u32,
     task: String,
     backend: String,

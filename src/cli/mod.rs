@@ -23,6 +23,7 @@ mod progress;
 mod report;
 mod result;
 mod run;
+pub mod schemas;
 mod session;
 mod settings;
 mod solve;

@@ -22,7 +22,8 @@ pub fn figure(x: f64) -> String {
 }
 
 /// An unknown: truth where it is known, estimate and interval.
-#[derive(Serialize)]
+#[derive(Serialize, schemars::JsonSchema)]
+#[schemars(rename = "Unknown")]
 pub struct ParameterResult {
     name: String,
     unit: String,
@@ -56,7 +57,8 @@ impl ParameterResult {
 }
 
 /// What the exploration tells about the unknowns.
-#[derive(Serialize)]
+#[derive(Serialize, schemars::JsonSchema)]
+#[schemars(rename = "Exploration")]
 pub struct ExplorationResult {
     objective: String,
     expected_std: Vec<f64>,
@@ -79,14 +81,16 @@ impl ExplorationResult {
     }
 }
 
-#[derive(Serialize)]
+#[derive(Serialize, schemars::JsonSchema)]
+#[schemars(rename = "Downstream")]
 struct DownstreamResult {
     metric: String,
     value: f64,
     success: bool,
 }
 
-#[derive(Serialize)]
+#[derive(Serialize, schemars::JsonSchema)]
+#[schemars(rename = "Cost")]
 pub struct CostResult {
     pub wall_s: f64,
     pub physics_steps: u64,
@@ -94,7 +98,7 @@ pub struct CostResult {
 }
 
 /// What made a result.
-#[derive(Serialize)]
+#[derive(Serialize, schemars::JsonSchema)]
 pub struct Versions {
     asid: &'static str,
     engine: String,
@@ -112,7 +116,8 @@ impl Versions {
 }
 
 /// `result.json` of `run`.
-#[derive(Serialize)]
+#[derive(Serialize, schemars::JsonSchema)]
+#[schemars(rename = "Run")]
 pub struct RunResult {
     schema: u32,
     task: String,

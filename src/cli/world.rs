@@ -22,7 +22,8 @@ pub struct World {
 }
 
 /// What is off in a perturbed world.
-#[derive(Clone, Serialize)]
+#[derive(Clone, Serialize, schemars::JsonSchema)]
+#[schemars(rename = "Perturbation")]
 pub struct PerturbedResult {
     #[serde(flatten)]
     pub drawn: Perturbation,
@@ -32,8 +33,10 @@ pub struct PerturbedResult {
 }
 
 /// What a result says of its real world.
-#[derive(Serialize)]
+#[derive(Serialize, schemars::JsonSchema)]
+#[schemars(rename = "World")]
 pub struct RealResult {
+    #[schemars(with = "String")]
     world: Kind,
     backend: String,
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -7,10 +7,12 @@
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
 mod bench;
+mod environment;
 mod library;
 mod lint;
 mod miri;
 mod peers;
+mod python;
 mod same;
 mod setup;
 mod slurm;
@@ -28,6 +30,8 @@ Usage: cargo xtask <subcommand>
   setup [--only mujoco|torch]  fetches the native libraries into .native/ (quick when all is there)
   lint                         formatting, clippy and rustdoc over the workspace, all features
   test                         setup, lint and every test: what CI runs
+  wheel                        the Python package as a wheel, into target/wheels/release
+  python [--release]           the Python package's tests, on a wheel in a fresh virtual environment
   miri                         the engine ABI's unsafe code under Miri, where a toolchain has it
   slurm [--program FILE]       comparisons as job arrays of a real Slurm, where its packages can be had
   same OLD NEW                 whether two builds of asid give the same results: for changes that
@@ -64,6 +68,8 @@ fn run(arguments: &[String]) -> Result<bool> {
         "lint" => without_arguments(rest).and_then(|()| lint::run()),
         "test" => without_arguments(rest).and_then(|()| test::run()),
         "miri" => without_arguments(rest).and_then(|()| miri::run()),
+        "wheel" => python::wheel(rest),
+        "python" => python::tests(rest),
         "same" => same::run(rest),
         "slurm" => slurm::run(rest),
         "bench" => bench::run(rest),
@@ -72,7 +78,7 @@ fn run(arguments: &[String]) -> Result<bool> {
             Ok(true)
         }
         other => bail!(
-            "unknown subcommand `{other}`; known: setup, lint, test, miri, slurm, bench, help"
+            "unknown subcommand `{other}`; known: setup, lint, test, wheel, python, miri, slurm, bench, help"
         ),
     }
 }

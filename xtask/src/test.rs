@@ -1,10 +1,10 @@
-//! `cargo xtask test`: set-up, lints, every test, a real Slurm, and Miri, with one summary. CI runs this.
+//! `cargo xtask test`: set-up, lints, every test, a real Slurm, Miri, and the Python package, with one summary. CI runs this.
 
 use anyhow::Result;
 
 use crate::lint::stages_of_lint;
 use crate::stage::{ALL_FEATURES, Stages};
-use crate::{library, miri, setup, slurm};
+use crate::{library, miri, python, setup, slurm};
 
 /// Runs everything; without the native libraries nothing else can be built.
 pub fn run() -> Result<bool> {
@@ -18,5 +18,6 @@ pub fn run() -> Result<bool> {
     )?;
     slurm::stage(&mut stages, None)?;
     miri::stage(&mut stages)?;
+    python::stage(&mut stages, python::Profile::Dev)?;
     Ok(stages.finish())
 }

@@ -32,7 +32,8 @@ use crate::cli::view;
 const MOST_REPEATS: usize = 1000;
 
 /// What is known of an unknown, in its unit.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, schemars::JsonSchema)]
+#[schemars(rename = "MotionUnknown")]
 pub struct UnknownResult {
     pub name: String,
     pub unit: String,
@@ -53,7 +54,8 @@ pub struct UnknownResult {
 }
 
 /// `result.json`.
-#[derive(Serialize)]
+#[derive(Serialize, schemars::JsonSchema)]
+#[schemars(rename = "Motion")]
 pub struct ExploreResult {
     pub schema: u32,
     pub machine: String,

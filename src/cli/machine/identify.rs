@@ -50,7 +50,8 @@ fn smooth() -> GaussNewtonSettings {
 }
 
 /// Gaps in units of the noise.
-#[derive(Serialize)]
+#[derive(Serialize, schemars::JsonSchema)]
+#[schemars(rename = "FitGap")]
 struct GapResult {
     /// With the model as given, on logs held out.
     nominal: f64,
@@ -61,7 +62,8 @@ struct GapResult {
     identified_fitted: f64,
 }
 
-#[derive(Serialize)]
+/// What made a result.
+#[derive(Serialize, schemars::JsonSchema)]
 struct Versions {
     asid: &'static str,
     engine: String,
@@ -69,8 +71,9 @@ struct Versions {
 }
 
 /// `result.json`.
-#[derive(Serialize)]
-struct IdentifyResult {
+#[derive(Serialize, schemars::JsonSchema)]
+#[schemars(rename = "StudyIdentification")]
+pub struct IdentifyResult {
     schema: u32,
     study: String,
     backend: String,

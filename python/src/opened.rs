@@ -1,0 +1,111 @@
+//! A task on an engine, with what its exploration is paid for.
+
+use std::sync::Arc;
+use std::sync::atomic::AtomicU64;
+
+use asid_algorithms::fisher::FisherSettings;
+use asid_core::progress::Silent;
+use asid_core::registry::{BackendEntry, TaskEntry, find};
+use asid_core::{Backend, Error, Model, Parameter, Problem, Result, Streams, Task};
+
+/// The engine where none is named, as on the command line: the one that needs no native library.
+const DEFAULT: &str = "rapier";
+
+/// What a batch of episodes is asked for.
+#[derive(Clone, Debug)]
+pub struct Request {
+    /// Name of the task.
+    pub task: String,
+    /// Name of the engine; none for the one of the command line.
+    pub backend: Option<String>,
+    /// Episodes side by side.
+    pub episodes: usize,
+    /// What a step is paid for.
+    pub fisher: FisherSettings,
+    /// Threads; 0 for one a core.
+    pub threads: usize,
+    /// Seed of all chance.
+    pub seed: u64,
+}
+
+/// What a problem borrows.
+pub struct Opened {
+    task: Box<dyn Task>,
+    backend: Box<dyn Backend>,
+    model: Arc<dyn Model>,
+    parameters: Vec<Parameter>,
+    counter: AtomicU64,
+    threads: usize,
+    seed: u64,
+}
+
+/// The streams of a seed, those of the command line's `--seed`.
+pub fn streams(seed: u64) -> Streams {
+    Streams::new(seed).sealed("method")
+}
+
+impl Opened {
+    /// Finds task and engine, and compiles the scene.
+    ///
+    /// # Errors
+    /// When a name is unknown, the engine lacks what the task needs, or refuses its scene.
+    pub fn new(request: &Request) -> Result<Self> {
+        if request.episodes == 0 {
+            return Err(Error::Config {
+                key: "num_envs".into(),
+                message: "must be at least 1".into(),
+            });
+        }
+        let task = (find::<TaskEntry>(&request.task)?.make)()?;
+        let backend = backend(request.backend.as_deref(), &*task)?;
+        let model = backend.load(task.scene())?;
+        Ok(Self {
+            parameters: task.parameters(),
+            counter: AtomicU64::new(0),
+            threads: request.threads,
+            seed: request.seed,
+            task,
+            backend,
+            model,
+        })
+    }
+
+    /// Name and version of the engine.
+    pub fn engine(&self) -> String {
+        format!("{} {}", self.backend.name(), self.backend.version())
+    }
+
+    /// The problem, with the trackers' noise of the task.
+    pub fn problem(&self) -> Problem<'_> {
+        Problem {
+            task: &*self.task,
+            model: &*self.model,
+            capabilities: self.backend.capabilities(),
+            parameters: &self.parameters,
+            signals: &self.task.exploration().signals,
+            threads: self.threads,
+            streams: streams(self.seed),
+            progress: &Silent,
+            physics_counter: &self.counter,
+            env_counter: &self.counter,
+        }
+    }
+}
+
+/// The engine of this name, where it can do what the task needs.
+fn backend(name: Option<&str>, task: &dyn Task) -> Result<Box<dyn Backend>> {
+    let name = name.unwrap_or(DEFAULT);
+    let backend = (find::<BackendEntry>(name)?.make)()?;
+    let lacking = task.requires() - backend.capabilities();
+    if lacking.is_empty() {
+        return Ok(backend);
+    }
+    let names: Vec<String> = lacking
+        .iter_names()
+        .map(|(n, _)| n.to_lowercase().replace('_', " "))
+        .collect();
+    Err(Error::Incapable {
+        backend: name.to_owned(),
+        what: format!("do what this task needs: {}", names.join(", ")),
+    })
+}
