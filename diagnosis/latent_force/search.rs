@@ -105,8 +105,9 @@ pub fn search(
             }
         }
         let next = next.filter(|n| {
-            // A fit that was cut short has not told yet how much of the force it makes up for.
-            let shrinks = stopped || left(&best) - left(n) > breadth.shrinks;
+            // A first fit that was cut short has not told yet how much of the force it makes up for.
+            let cut_short = stopped && best.candidates.is_empty();
+            let shrinks = cut_short || left(&best) - left(n) > breadth.shrinks;
             shrinks && n.fitted.evidence - best.fitted.evidence > threshold
         });
         if let Some(own) = freed.take() {
