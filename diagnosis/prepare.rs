@@ -136,7 +136,13 @@ pub fn set_reading_noise(bench: &mut Bench, given: &BTreeMap<String, f64>) {
         .map(|e| {
             let rows = e.plan.rows();
             let mut out = vec![0.0; rows * n];
-            let first = e.readings[..width].to_vec();
+            // Of each column the first reading that is there: any fixed one takes the place of the start.
+            let first: Vec<f64> = (0..width)
+                .map(|c| {
+                    let mut column = e.readings.iter().skip(c).step_by(width);
+                    column.find(|x| x.is_finite()).copied().unwrap_or(0.0)
+                })
+                .collect();
             for (row, out) in e.readings.chunks_exact(width).zip(out.chunks_exact_mut(n)) {
                 logs.reading_difference(row, &first, out);
             }

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::world::{NOMINAL, Truth, write_study};
+use super::world::{NOISE, NOMINAL, Truth, write_study};
 use super::{Kind, run_on};
 
 /// The cart's study with a time step so fine that what is left of a gap is no integrator's.
@@ -24,6 +24,32 @@ fn a_gap_below_two_is_named_where_replays_of_logs_held_out_close_it() {
     // Drag on the cart, friction on the rail and damping of the drive are one law here.
     let damping = r.effects[0].parameters.values().next().copied();
     assert!((damping.unwrap() - 0.012).abs() < 0.004, "{:?}", r.effects);
+}
+
+#[test]
+fn a_missing_first_reading_leaves_the_noise_as_it_is() {
+    let folder = tempfile::tempdir().unwrap();
+    write_study(folder.path(), Truth::Coulomb(1.2));
+    for entry in std::fs::read_dir(folder.path()).unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_some_and(|e| e == "csv") {
+            let text = std::fs::read_to_string(&path).unwrap();
+            let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
+            let mut cells: Vec<&str> = lines[1].split(',').collect();
+            cells[2] = "";
+            lines[1] = cells.join(",");
+            std::fs::write(&path, lines.join("\n") + "\n").unwrap();
+        }
+    }
+    let r = run_on(folder.path(), &[]).0.result;
+    assert_eq!(
+        r.verdict.effects,
+        ["coulomb-friction@rail"],
+        "{}",
+        r.sentence
+    );
+    let x = r.gap.signals.iter().find(|s| s.signal == "x").unwrap();
+    assert!((x.noise / NOISE[0] - 1.0).abs() < 0.2, "{}", x.noise);
 }
 
 #[test]
