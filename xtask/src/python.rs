@@ -155,7 +155,7 @@ fn program(profile: Profile) -> Result<()> {
     // program, though maturin builds it, so that crates have the features that both ask for, and are built once.
     let status = Command::new(cargo)
         .args(["build", "--package=asid", "--package=asid-python"])
-        .args(["--bin=asid", "--features=mujoco,parquet", "--locked"])
+        .args(["--bin=asid", "--features=mujoco,logs", "--locked"])
         .args(["--profile", profile.name()])
         .env("ASID_RELOCATABLE", "1")
         .current_dir(repository())
