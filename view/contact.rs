@@ -31,6 +31,9 @@ struct Solid {
     radius: f32,
 }
 
+/// Of a geom its frame in its part, kind, size, and mesh.
+pub(crate) type Framed = (Isometry3<f64>, GeomType, [f64; 3], Option<usize>);
+
 /// Geometry of what may touch.
 #[derive(Default)]
 pub(crate) struct Touch {
@@ -39,20 +42,18 @@ pub(crate) struct Touch {
 }
 
 impl Touch {
-    /// `frames`: of each geom its frame in its part, kind, size, and mesh.
+    /// `frames` are of all geoms, in the plant's order.
     pub(crate) fn new(
         plant: &Plant,
         part_of: &[usize],
-        frames: &[(Isometry3<f64>, GeomType, [f64; 3], Option<usize>)],
+        frames: &[Framed],
         meshes: &[Surface],
     ) -> Self {
         if plant.contacts.len() > MOST_PAIRS {
             return Self::default();
         }
-        let solid = |(g, (frame, kind, size, mesh)): (
-            usize,
-            &(Isometry3<f64>, GeomType, [f64; 3], Option<usize>),
-        )| {
+        let solid = |(g, framed): (usize, &Framed)| {
+            let (frame, kind, size, mesh) = framed;
             let surface = mesh.map(|m| &meshes[m]);
             let (shape, turn) = shape(*kind, size.map(|x| x as f32), surface)?;
             let radius = match kind {

@@ -104,31 +104,29 @@ impl Stage<'_> {
         let points = touching.iter().flatten().flatten().copied();
         let all = Cube::around(of(&poses).corners().into_iter().chain(points));
         let cube = all.near(first, most);
-        let machine = |(motion, (poses, points)): (
-            &crate::Motion,
-            (&Vec<Vec<Isometry3<f64>>>, &Vec<Vec<[f64; 3]>>),
-        )| {
-            let numbers: Vec<u16> = poses.iter().flatten().flat_map(|p| cube.pose(p)).collect();
-            let contacts: Vec<u16> = points
-                .iter()
-                .flatten()
-                .flat_map(|p| cube.point(*p))
-                .collect();
-            Machine {
-                origin: motion.origin,
-                label: motion.label.clone(),
-                poses: text(&numbers),
-                touching: points.iter().map(|p| p.len() as u16).collect(),
-                contacts: text(&contacts),
-            }
-        };
+        let machine =
+            |motion: &crate::Motion, poses: &[Vec<Isometry3<f64>>], points: &[Vec<[f64; 3]>]| {
+                let numbers: Vec<u16> = poses.iter().flatten().flat_map(|p| cube.pose(p)).collect();
+                let contacts: Vec<u16> = points
+                    .iter()
+                    .flatten()
+                    .flat_map(|p| cube.point(*p))
+                    .collect();
+                Machine {
+                    origin: motion.origin,
+                    label: motion.label.clone(),
+                    poses: text(&numbers),
+                    touching: points.iter().map(|p| p.len() as u16).collect(),
+                    contacts: text(&contacts),
+                }
+            };
         let time: Vec<f64> = rows.iter().map(|&k| played.time[k] - start).collect();
         let mut take = Take {
             name: played.name.to_owned(),
             what: played.what.to_owned(),
             machines: (played.motions.iter())
                 .zip(poses.iter().zip(&touching))
-                .map(machine)
+                .map(|(motion, (poses, points))| machine(motion, poses, points))
                 .collect(),
             forces: (played.missing.iter())
                 .filter_map(|m| m.at(self, &time))

@@ -86,9 +86,8 @@ impl<'p> Stage<'p> {
                 notes.push("height fields and signed distance fields are not drawn".to_owned());
                 continue;
             };
-            if !(visible(geom) || !has_visible[part])
-                || (kind == ShapeKind::Mesh && mesh(geom).is_none())
-            {
+            let hidden = has_visible[part] && !visible(geom);
+            if hidden || kind == ShapeKind::Mesh && mesh(geom).is_none() {
                 continue;
             }
             let (t, q) = (part_from_geom.translation, part_from_geom.rotation);
