@@ -24,11 +24,6 @@ const SHARPNESS: f64 = 0.35;
 /// the logistic about it.
 const GAP: f64 = 2.0;
 const GAP_SCALE: f64 = 0.3;
-/// Share of named effects that are the cause, however sure the evidence is: a law that the catalogue lacks, or many small things
-/// at once, can look like one that it has. Measured on training worlds (docs/withheld.md).
-const NAME_HOLDS: f64 = 0.93;
-/// Temperature at which rivals share one half of what the verdict may lack; `unknown` has the other.
-const RIVALS: f64 = 10.0;
 /// Root mean square of the missing force, relative to the inertial forces, up to which nothing is missing.
 const NOTHING: f64 = 0.01;
 
@@ -59,30 +54,6 @@ fn closes_a_small_gap(bench: &Bench, none: &Explanation, set: &Explanation) -> R
     let change = change_by_step(bench, none, &bench.machine.halved()?)?;
     let own = RICHARDSON.powi(2) * cost(&change) / readings.max(1.0);
     Ok(own < (1.0 - CLOSES) * train(none))
-}
-
-/// Takes from each hypothesis what its names may lack, gives one half of it to the rivals of the best and returns the other.
-fn doubt(all: &mut [Judged], best: usize, names: impl Fn(usize) -> usize, scores: &[f64]) -> f64 {
-    let mut taken = 0.0;
-    for (i, h) in all.iter_mut().enumerate() {
-        let holds = NAME_HOLDS.powi(i32::try_from(names(i)).unwrap_or(i32::MAX));
-        taken += h.probability * (1.0 - holds);
-        h.probability *= holds;
-    }
-    let rivals = (1..all.len()).filter(|&i| i != best);
-    let leader = rivals
-        .clone()
-        .map(|i| scores[i])
-        .fold(f64::NEG_INFINITY, f64::max);
-    let weight = |i: usize| ((scores[i] - leader) / RIVALS).exp();
-    let sum: f64 = rivals.clone().map(weight).sum();
-    if sum == 0.0 {
-        return taken;
-    }
-    for i in rivals {
-        all[i].probability += 0.5 * taken * weight(i) / sum;
-    }
-    0.5 * taken
 }
 
 /// Judges what a search found; `sets` are those behind the findings, in their order, and `known` the candidates that the logs
@@ -171,8 +142,6 @@ pub fn select(
     for h in &mut all {
         h.probability *= (1.0 - unknown) / sum;
     }
-    let names = |i: usize| i.checked_sub(1).map_or(0, |i| sets[i].names);
-    let unknown = unknown + doubt(&mut all, best, names, &scores);
     let ambiguous = (0..all.len())
         .filter(|&i| {
             let larger = all[best].labels.iter().all(|l| all[i].labels.contains(l));

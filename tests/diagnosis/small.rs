@@ -21,9 +21,12 @@ fn a_gap_below_two_is_named_where_replays_of_logs_held_out_close_it() {
     assert!(1.2 < before && before < 2.2, "{before}");
     assert_eq!(r.verdict.kind, Kind::Effects, "{}", r.sentence);
     assert!(after < 1.05, "{after}");
-    // Drag on the cart, friction on the rail and damping of the drive are one law here.
-    let damping = r.effects[0].parameters.values().next().copied();
-    assert!((damping.unwrap() - 0.012).abs() < 0.004, "{:?}", r.effects);
+    // Drag on the cart, friction on the rail and a weaker drive are much alike here.
+    let friction = r.effects.iter().find(|e| e.effect == "viscous-friction");
+    let friction = friction.expect("friction is among what is likely");
+    let damping = friction.parameters["damping"];
+    assert!((damping - 0.012).abs() < 0.003, "{:?}", r.effects);
+    assert!(friction.probability > 0.1, "{:?}", r.effects);
 }
 
 #[test]
