@@ -1,8 +1,8 @@
 //! Proposes what the columns of a log are on a model's machine.
 //!
-//! Each pair of a quantity and a column gets points: for [words](words) that they share, for what is measured, for being sent or
-//! read, for its place in a list, for values that fit the [range](unit), and, once the readings are placed, for a command that
-//! [looks like](fit) the position that follows it. The best pair is taken, then the best of what is left. It is a
+//! Each pair of a quantity and a column gets points: for words that they share, for what is measured, for being sent or
+//! read, for its place in a list, for values that fit the range, and, once the readings are placed, for a command that
+//! looks like the position that follows it. The best pair is taken, then the best of what is left. It is a
 //! proposal: it is shown with its reasons, and what it says is looked at again by the check of wiring, which knows physics.
 
 mod fit;

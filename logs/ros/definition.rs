@@ -2,7 +2,7 @@
 //!
 //! A line of 80 `=` and a line `MSG: package/Type` lead to each further definition
 //! ([MCAP: ros2msg](https://mcap.dev/spec/registry#ros2msg)). Bags of Humble and before hold no definitions: those of the common
-//! messages are in [`COMMON`].
+//! messages are in `COMMON`.
 
 use std::collections::HashMap;
 
