@@ -11,7 +11,7 @@ use super::session::Session;
 mod episode;
 mod stages;
 
-pub use episode::{episode, replay, signals, tracked};
+pub use episode::{episode, replay, replay_of, signals, tracked};
 pub use stages::{downstream, exploration};
 
 /// Samples of the posterior kept for the picture.

@@ -1,7 +1,6 @@
 //! The 3-D view of a report: the episode of a task, or a motion that was designed.
 
 use anyhow::Result;
-use asid_core::replay::Replay;
 use asid_core::{Episode, Parameter};
 use asid_mjcf::Plant;
 use asid_results::view::{Origin, View};
@@ -10,6 +9,7 @@ use asid_view::{Motion, Stage, logged};
 
 use super::machine::Subject;
 use super::session::Session;
+use super::trace::replay_of;
 use crate::pipeline::RunOutcome;
 
 /// The real episode of a run, as logged and as replayed at the prior's centre and at the estimate; `None` where
@@ -66,7 +66,7 @@ fn of_episode(
     }
     let mut motions = Vec::new();
     for (origin, label, theta) in replays {
-        let qpos = positions(session, log, theta, start, &channels)?;
+        let qpos = replay_of(session, log, (theta, start), &channels)?;
         motions.push(Motion::new(*origin, label, qpos));
     }
     let mut unread = Vec::new();
@@ -86,24 +86,6 @@ fn of_episode(
     }]);
     view.notes.extend(logged::remark(&unread));
     Ok(Some(view))
-}
-
-/// Positions `qpos` at the rows of a log (`rows x nq`) that the simulator gives at these values.
-fn positions(
-    session: &Session,
-    log: &Episode,
-    theta: &[f64],
-    start: &[f64],
-    channels: &[String],
-) -> Result<Vec<f64>> {
-    let problem = session.problem();
-    let mut replay = Replay::new(session.model.layout(), log, channels)?;
-    let mut batch = problem.batch(1)?;
-    batch.set_parameters(&[0], theta)?;
-    batch.place(&*session.task, &[0], start)?;
-    let mut out = vec![0.0; replay.rows() * replay.width()];
-    replay.run(&mut *batch.simulator, &[0], &mut out)?;
-    Ok(out)
 }
 
 /// A motion that was designed: `qpos` at the ends of frames of `period` seconds.

@@ -195,9 +195,20 @@ pub fn replay(
     theta: &[f64],
     start: &[f64],
 ) -> Result<Vec<f64>> {
-    let problem = session.problem();
     let names: Vec<String> = session.signals.iter().map(|s| s.sensor.clone()).collect();
-    let mut replay = Replayed::new(session.model.layout(), log, &names)?;
+    replay_of(session, log, (theta, start), &names)
+}
+
+/// The channels named, at the rows of a log (`rows x width`), that the simulator gives at the values and start `at`.
+pub fn replay_of(
+    session: &Session,
+    log: &asid_core::Episode,
+    at: (&[f64], &[f64]),
+    channels: &[String],
+) -> Result<Vec<f64>> {
+    let (theta, start) = at;
+    let problem = session.problem();
+    let mut replay = Replayed::new(session.model.layout(), log, channels)?;
     let mut batch = problem.batch(1)?;
     batch.set_parameters(&[0], theta)?;
     batch.place(&*session.task, &[0], start)?;
