@@ -290,8 +290,16 @@ impl Bench {
     /// # Errors
     /// When a rollout fails.
     pub fn hold_out(&self, trials: &[Trial<'_>], of: &mut Explanation) -> Result<()> {
+        of.held_starts = self.head_starts(trials, &of.fit.point.theta, &of.held_starts)?;
+        self.score_held_out(trials, of)
+    }
+
+    /// Replays the logs held out at an explanation's parameters, from the starts that it has, and sets what it leaves of them.
+    ///
+    /// # Errors
+    /// When a rollout fails.
+    pub fn score_held_out(&self, trials: &[Trial<'_>], of: &mut Explanation) -> Result<()> {
         let theta = of.fit.point.theta.clone();
-        of.held_starts = self.head_starts(trials, &theta, &of.held_starts)?;
         let mut predictor = self.predictor(trials, &self.test)?;
         predictor.set_scattering(Scattering::default());
         let point = Point {
@@ -334,7 +342,7 @@ impl Bench {
             &unknowns,
             point,
             &self.open,
-            Effort::BRIEF,
+            Effort::START,
         )?;
         Ok(fit.point.starts)
     }

@@ -238,7 +238,7 @@ fn rescore(bench: &Bench, trials: &[Trial<'_>], of: &mut Explanation) -> Result<
     let mut residuals = predictor.residuals(std::slice::from_ref(&of.fit.point))?;
     of.fit.residuals = residuals.pop().unwrap_or_default();
     of.fit.cost = cost(&of.fit.residuals);
-    bench.hold_out(trials, of)
+    bench.score_held_out(trials, of)
 }
 
 /// Deviation of the sum of squares over all logs that next to nothing at the starts makes.

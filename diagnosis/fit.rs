@@ -57,6 +57,12 @@ impl Effort {
         tolerance: 1e-3,
         chord: false,
     };
+    /// Starts on the first part of an episode, where slopes hardly change.
+    pub const START: Self = Self {
+        iterations: 6,
+        tolerance: 1e-3,
+        chord: true,
+    };
     /// A quick look.
     pub const BRIEF: Self = Self {
         iterations: 6,

@@ -9,7 +9,7 @@ mod form;
 mod sizes;
 mod source;
 
-use asid_core::Result;
+use asid_core::{Progress, Result};
 
 use crate::candidate::Candidate;
 
@@ -44,6 +44,8 @@ pub struct Columns {
     pub center: Vec<f64>,
     /// Bounds about the present point, in deviations.
     pub bounds: Vec<[f64; 2]>,
+    /// Whether all candidates are there: those that work was stopped before add nothing.
+    pub complete: bool,
 }
 
 /// Two row-major matrices of `n` and `m` columns side by side.
@@ -91,7 +93,8 @@ fn resize(
 }
 
 impl Columns {
-    /// Columns of a fitted model's unknowns and of all candidates, along its trajectory.
+    /// Columns of a fitted model's unknowns and of all candidates, along its trajectory; of those that there is time for where
+    /// the work is stopped.
     ///
     /// # Errors
     /// When the engine fails.
@@ -100,6 +103,7 @@ impl Columns {
         (base, theta): (&Hypothesis, &[f64]),
         estimate: &Estimate,
         candidates: &[Candidate],
+        progress: &dyn Progress,
     ) -> Result<Self> {
         let all = All::new(context, base, theta, candidates);
         let free = base.free();
@@ -139,6 +143,7 @@ impl Columns {
             all,
             slopes: &estimate.b,
             late: &late,
+            progress,
         };
         // Every start of a candidate, with the slopes at it.
         let mut trials = Vec::new();
@@ -153,15 +158,13 @@ impl Columns {
             }
         }
         let replayed = context.has_segments();
-        let sizes = if replayed {
+        let (sizes, felt) = if replayed {
             let range = |&(c, _, p): &(usize, Vec<f64>, usize)| {
                 let [low, high]: [f64; 2] = candidates[c].ranges[p];
                 high - low
             };
-            trials
-                .iter()
-                .map(|t| REPLAY_TRIAL / SHARE * range(t))
-                .collect()
+            let range = |t| REPLAY_TRIAL / SHARE * range(t);
+            (trials.iter().map(range).collect(), true)
         } else {
             sizes(context, estimate, &source, &trials)?
         };
@@ -210,7 +213,7 @@ impl Columns {
                 }
             }
         }
-        let mut found = source.columns(context, &estimate.trajectory, &wanted)?;
+        let (mut found, walked) = source.columns(context, &estimate.trajectory, &wanted)?;
         let (base, more) = (free.len(), wanted.len());
         if replayed {
             let sizes = sizes_by_replay(context, estimate, &found, more);
@@ -228,6 +231,7 @@ impl Columns {
             forms,
             center,
             bounds,
+            complete: felt && walked,
         })
     }
 }

@@ -301,11 +301,15 @@ pub fn settle_noise(
     theta: &[f64],
     estimate: &mut Estimate,
     (rounds, em_rounds): (usize, usize),
+    progress: &dyn Progress,
 ) -> Result<()> {
     let nx = 2 * context.plant().layout.nv;
     let mut map = context.map(&hypothesis.specs, &hypothesis.parameters(), 2 * nx + 1)?;
     let mut slopes = Slopes::default();
-    for _ in 0..rounds {
+    for round in 0..rounds {
+        if round > 0 && progress.is_stopped() {
+            break;
+        }
         let linear = slopes.linearise(
             (context, &mut map),
             (theta, &hypothesis.unknowns),

@@ -66,13 +66,13 @@ pub(super) fn parts<'c>(
 }
 
 /// Deviations of priors from what a trial step of each parameter does, for `(candidate, start, parameter)`; 0 where it does
-/// nothing.
+/// nothing, and where work was stopped before it was felt for, which is said.
 pub(super) fn sizes(
     context: &Context<'_>,
     estimate: &Estimate,
     source: &Source<'_>,
     trials: &[(usize, Vec<f64>, usize)],
-) -> Result<Vec<f64>> {
+) -> Result<(Vec<f64>, bool)> {
     let nv = context.plant().layout.nv;
     let (nx, ns) = (2 * nv, context.logs.entries.len());
     let (short, states, slopes) = parts(context, estimate, source.slopes);
@@ -89,8 +89,9 @@ pub(super) fn sizes(
         all: source.all.clone(),
         slopes: &slopes,
         late: &[],
+        progress: source.progress,
     };
-    let columns = source.columns(&short, &states, &wanted)?;
+    let (columns, complete) = source.columns(&short, &states, &wanted)?;
     // A joint that neither moves nor lacks a force says nothing of sizes.
     let missing: Vec<f64> = estimate
         .force_quantile(context, QUANTILE)
@@ -130,7 +131,7 @@ pub(super) fn sizes(
             count += 1.0;
         }
     }
-    Ok((0..m)
+    let sizes = (0..m)
         .map(|i| {
             let acting = sums[i]
                 .iter()
@@ -150,7 +151,8 @@ pub(super) fn sizes(
             let acts = ratio > 0.0 || readings[i] > 0.0;
             if acts && size.is_finite() { size } else { 0.0 }
         })
-        .collect())
+        .collect();
+    Ok((sizes, complete))
 }
 
 /// Spread of the readings of each entry.

@@ -1,6 +1,6 @@
 //! Where columns come from: the engine, or a trace of the forces.
 
-use asid_core::{Parameter, Result};
+use asid_core::{Parameter, Progress, Result};
 use asid_effects::EffectSpec;
 
 use crate::candidate::Candidate;
@@ -8,6 +8,10 @@ use crate::latent_force::context::Context;
 use crate::latent_force::fit::Hypothesis;
 use crate::latent_force::step_map::{Derivatives, Variation, retime_columns};
 use crate::latent_force::trace::{is_traceable, trace};
+
+/// Columns that one walk of the engine takes, at most: between two of them work can be stopped, and of all at once the memory
+/// would grow with the candidates.
+const SLICE: usize = 64;
 
 /// The present model with all candidates that need the engine at their nulls: effects, parameters and values.
 #[derive(Clone)]
@@ -102,16 +106,19 @@ pub(super) struct Source<'s> {
     pub(super) slopes: &'s [Vec<f64>],
     /// How late readings are in the present model.
     pub(super) late: &'s [Vec<f64>],
+    /// Who says when to stop.
+    pub(super) progress: &'s dyn Progress,
 }
 
 impl Source<'_> {
-    /// The columns wanted, `(rows - 1) x nx x m` and `rows x ns x m`, one pair a walk.
+    /// The columns wanted, `(rows - 1) x nx x m` and `rows x ns x m`, one pair a walk, and whether they are all there: where work
+    /// is stopped, those that the engine has not come to are zero.
     pub(super) fn columns(
         &self,
         context: &Context<'_>,
         states: &[Vec<f64>],
         wanted: &[Wanted],
-    ) -> Result<Vec<(Vec<f64>, Vec<f64>)>> {
+    ) -> Result<(Vec<(Vec<f64>, Vec<f64>)>, bool)> {
         let plant = context.plant();
         let (nv, m) = (plant.layout.nv, wanted.len());
         let (nx, ns) = (2 * nv, context.logs.entries.len());
@@ -120,13 +127,6 @@ impl Source<'_> {
                 .is_traced(context, &self.all.candidates[w.candidate])
         };
         let by_engine: Vec<usize> = (0..m).filter(|&i| !traced(&wanted[i])).collect();
-        let variations: Vec<Variation> = by_engine
-            .iter()
-            .map(|&i| Variation {
-                theta: self.all.with(wanted[i].candidate, &wanted[i].values),
-                scale: wanted[i].scale,
-            })
-            .collect();
         let mut out: Vec<(Vec<f64>, Vec<f64>)> = context
             .walks
             .iter()
@@ -135,8 +135,20 @@ impl Source<'_> {
                 (vec![0.0; (n - 1) * nx * m], vec![0.0; n * ns * m])
             })
             .collect();
-        if !variations.is_empty() {
-            let own = variations.len();
+        let mut complete = true;
+        for (n, slice) in by_engine.chunks(SLICE).enumerate() {
+            if n > 0 && self.progress.is_stopped() {
+                complete = false;
+                break;
+            }
+            let variations: Vec<Variation> = slice
+                .iter()
+                .map(|&i| Variation {
+                    theta: self.all.with(wanted[i].candidate, &wanted[i].values),
+                    scale: wanted[i].scale,
+                })
+                .collect();
+            let own = slice.len();
             let mut map = context.map(&self.all.specs, &self.all.parameters, own + 1)?;
             let found = map.linearise(
                 &self.all.theta,
@@ -152,9 +164,7 @@ impl Source<'_> {
                 }
                 let spread = |from: &[f64], to: &mut [f64]| {
                     for (row, target) in from.chunks_exact(own).zip(to.chunks_exact_mut(m)) {
-                        row.iter()
-                            .zip(&by_engine)
-                            .for_each(|(x, &i)| target[i] = *x);
+                        row.iter().zip(slice).for_each(|(x, &i)| target[i] = *x);
                     }
                 };
                 // Of a segment there are none: its columns are those of its readings.
@@ -179,6 +189,6 @@ impl Source<'_> {
                 }
             }
         }
-        Ok(out)
+        Ok((out, complete))
     }
 }

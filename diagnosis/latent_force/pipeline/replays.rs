@@ -66,10 +66,11 @@ pub(super) fn replay(
 ) -> Result<(Findings, Vec<Set>)> {
     let episodes = &bench.train.logs.episodes;
     let steps: usize = episodes.iter().map(|e| e.plan.physics_steps()).sum();
+    let stopped = progress.is_stopped();
     bench.stages = vec![Stage {
         record: bench.train.clone(),
         episodes: (0..episodes.len()).collect(),
-        open: if steps * bench.fitted.len() > REPLAYED {
+        open: if stopped || steps * bench.fitted.len() > REPLAYED {
             Vec::new()
         } else {
             bench.fitted.clone()
@@ -96,7 +97,6 @@ pub(super) fn replay(
             effects: u.sets.iter().map(|s| name_of(candidates, s)).collect(),
         })
         .collect();
-    let stopped = progress.is_stopped();
     let (once_more, rivals) = if stopped {
         not_tried.push(NotTried {
             stage: "fit of the values to whole replays, and replays of rivals".into(),

@@ -71,6 +71,12 @@ impl Upon<'_> {
             set => format!(" upon {}", name(set)),
         };
         let screening = self.screen()?;
+        if !screening.columns.complete {
+            untried.push(Untried {
+                stage: "screening of some of the effects that need the engine",
+                sets: Vec::new(),
+            });
+        }
         let ranked = screening.ranked.iter();
         let screened: Vec<(Vec<usize>, f64)> = ranked
             .map(|s| (self.members(&screening, s), s.gain))
@@ -123,7 +129,7 @@ impl Upon<'_> {
         let some: Vec<Candidate> = open.map(|&c| self.candidates[c].clone()).collect();
         let fitted = &self.base.fitted;
         let model = (&fitted.hypothesis, &fitted.theta[..]);
-        let columns = Columns::of(self.context, model, &fitted.estimate, &some)?;
+        let columns = Columns::of(self.context, model, &fitted.estimate, &some, self.progress)?;
         let sums = regressions(self.context, &fitted.estimate, &columns);
         let ranked = rank(&sums, &columns, &some);
         let singles = ranked.iter().filter(|s| s.forms.len() == 1);

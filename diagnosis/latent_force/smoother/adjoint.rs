@@ -1,6 +1,6 @@
 //! The adjoint recursion of Bryson and Frazier, from the last row to the first.
 
-use super::filter::{Filter, Step, dot, multiply, symmetrise};
+use super::filter::{Filter, Step, dot, multiply, multiply_transposing, symmetrise};
 use super::{Smoothed, Sums};
 
 /// The adjoint recursion from the last row to the first. States are corrected from where their own row's readings leave
@@ -59,15 +59,7 @@ pub(super) fn backward(filter: &mut Filter<'_>, steps: &[Step]) -> Smoothed {
                 }
                 lambda = next;
                 multiply(&curvature, f, nz, &mut scratch);
-                // `F' (Lambda F)`, row by row of `F`.
-                curvature.fill(0.0);
-                for (l, row) in f.chunks_exact(nz).enumerate() {
-                    let right = &scratch[l * nz..(l + 1) * nz];
-                    for (i, &x) in row.iter().enumerate().filter(|(_, x)| **x != 0.0) {
-                        let target = &mut curvature[i * nz..(i + 1) * nz];
-                        target.iter_mut().zip(right).for_each(|(t, y)| *t += x * y);
-                    }
-                }
+                multiply_transposing(f, &scratch, nz, &mut curvature);
                 symmetrise(&mut curvature, nz);
             }
         }

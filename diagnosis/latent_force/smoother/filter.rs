@@ -1,5 +1,7 @@
 //! The filter: from the first row to the last, reading by reading.
 
+use nalgebra::{DMatrixView, DMatrixViewMut};
+
 use super::{NoiseModel, Problem};
 
 /// Ratio of an innovation's variance to its reading's own from which on rounding is taken out of the covariance: it has
@@ -7,8 +9,20 @@ use super::{NoiseModel, Problem};
 /// within a walk stay far below.
 pub(super) const FINE: f64 = 1e6;
 
+/// Width from which on a blocked product beats loops that pass over zeros, measured on transitions of machines of 1 to 22
+/// degrees of freedom.
+const BLOCKED: usize = 16;
+/// Sums that a dot product runs side by side: one alone waits for each addition to end.
+const LANES: usize = 8;
+
 /// A row-major square matrix product `out = a b`.
 pub(super) fn multiply(a: &[f64], b: &[f64], n: usize, out: &mut [f64]) {
+    if n >= BLOCKED {
+        // Read by columns these are transposed, and `(a b)' = b' a'`.
+        let (a, b) = (view(a, n), view(b, n));
+        DMatrixViewMut::from_slice(out, n, n).gemm(1.0, &b, &a, 0.0);
+        return;
+    }
     out.fill(0.0);
     for i in 0..n {
         let row = &mut out[i * n..(i + 1) * n];
@@ -23,6 +37,11 @@ pub(super) fn multiply(a: &[f64], b: &[f64], n: usize, out: &mut [f64]) {
 
 /// `out = a b'`.
 pub(super) fn multiply_transposed(a: &[f64], b: &[f64], n: usize, out: &mut [f64]) {
+    if n >= BLOCKED {
+        let b = view(b, n).transpose();
+        DMatrixViewMut::from_slice(out, n, n).gemm(1.0, &b, &view(a, n), 0.0);
+        return;
+    }
     for i in 0..n {
         let row = &a[i * n..(i + 1) * n];
         for j in 0..n {
@@ -31,8 +50,57 @@ pub(super) fn multiply_transposed(a: &[f64], b: &[f64], n: usize, out: &mut [f64
     }
 }
 
+/// `out = a s` of a row-major square matrix and one of `m` columns.
+pub(super) fn multiply_columns(a: &[f64], s: &[f64], (n, m): (usize, usize), out: &mut [f64]) {
+    if n >= BLOCKED {
+        let s = DMatrixView::from_slice(s, m, n);
+        DMatrixViewMut::from_slice(out, m, n).gemm(1.0, &s, &view(a, n), 0.0);
+        return;
+    }
+    out.fill(0.0);
+    for i in 0..n {
+        let target = &mut out[i * m..(i + 1) * m];
+        for (l, &x) in a[i * n..(i + 1) * n].iter().enumerate() {
+            if x != 0.0 {
+                let row = &s[l * m..(l + 1) * m];
+                target.iter_mut().zip(row).for_each(|(t, s)| *t += x * s);
+            }
+        }
+    }
+}
+
+/// `out = a' b`.
+pub(super) fn multiply_transposing(a: &[f64], b: &[f64], n: usize, out: &mut [f64]) {
+    if n >= BLOCKED {
+        let a = view(a, n).transpose();
+        DMatrixViewMut::from_slice(out, n, n).gemm(1.0, &view(b, n), &a, 0.0);
+        return;
+    }
+    out.fill(0.0);
+    for (l, row) in a.chunks_exact(n).enumerate() {
+        let right = &b[l * n..(l + 1) * n];
+        for (i, &x) in row.iter().enumerate().filter(|(_, x)| **x != 0.0) {
+            let target = &mut out[i * n..(i + 1) * n];
+            target.iter_mut().zip(right).for_each(|(t, y)| *t += x * y);
+        }
+    }
+}
+
+/// A row-major square matrix, read by columns: its transpose.
+fn view(a: &[f64], n: usize) -> DMatrixView<'_, f64> {
+    DMatrixView::from_slice(a, n, n)
+}
+
 pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(x, y)| x * y).sum()
+    let (mut x, mut y) = (a.chunks_exact(LANES), b.chunks_exact(LANES));
+    let mut sums = [0.0; LANES];
+    for (x, y) in x.by_ref().zip(y.by_ref()) {
+        for (s, (x, y)) in sums.iter_mut().zip(x.iter().zip(y)) {
+            *s += x * y;
+        }
+    }
+    let rest = x.remainder().iter().zip(y.remainder());
+    sums.iter().sum::<f64>() + rest.map(|(x, y)| x * y).sum::<f64>()
 }
 
 pub(super) fn symmetrise(p: &mut [f64], n: usize) {

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::filter::Filter;
+use super::filter::{Filter, multiply_columns};
 use super::{NoiseModel, Problem, Regression};
 
 /// Innovations that are collected before they are added up.
@@ -65,22 +65,9 @@ pub fn regress(problem: Problem<'_>, noise: &NoiseModel, m: usize) -> Regression
             sensitivity.fill(0.0);
             continue;
         }
-        next.fill(0.0);
-        for i in 0..nz {
-            let target = &mut next[i * m..(i + 1) * m];
-            for l in 0..nz {
-                let f = filter.transition[i * nz + l];
-                if f != 0.0 {
-                    let row = &sensitivity[l * m..(l + 1) * m];
-                    target.iter_mut().zip(row).for_each(|(t, s)| *t += f * s);
-                }
-            }
-            if i < nx {
-                let at = (k * nx + i) * m;
-                let own = &problem.linear.state_columns[at..at + m];
-                target.iter_mut().zip(own).for_each(|(t, c)| *t += c);
-            }
-        }
+        multiply_columns(&filter.transition, &sensitivity, (nz, m), &mut next);
+        let own = &problem.linear.state_columns[k * nx * m..(k + 1) * nx * m];
+        next.iter_mut().zip(own).for_each(|(t, c)| *t += c);
         std::mem::swap(&mut sensitivity, &mut next);
     }
     let block = block.columns(0, filled);
