@@ -201,7 +201,7 @@ pub fn identifiability(
         check(
             "identifiability",
             true,
-            "no combination of parameters is open".into(),
+            "the logs determine every combination of parameters".into(),
         )
     } else {
         check(
@@ -357,7 +357,7 @@ pub fn time_step(bench: &Bench, none: &Explanation, halved: &Machine) -> Result<
         "time-step",
         ok,
         format!(
-            "half the time step changes the predictions by {plain:.2} of the noise; without what goes with the step alone {left:.2}, where the gap is {gap:.2}{}",
+            "halving the time step changes the predictions by {plain:.2} standard deviations of the noise, {left:.2} of them beyond the integrator's own error; the gap is {gap:.2}{}",
             if ok {
                 ""
             } else {

@@ -124,7 +124,7 @@ pub fn next(
         };
     }
     how += &format!(
-        ": the two predictions then lie {:.1} deviations of the noise apart over the episode",
+        ": the two predictions then differ by {:.1} standard deviations of the noise over the episode",
         apart.sqrt()
     );
     if apart < ENOUGH {

@@ -21,7 +21,7 @@ const LITTLE: f64 = 0.01;
 
 pub(super) fn section(d: &DiagnosisResult, t: &DiagnosisTrace) -> Section {
     let lead = "An effect is written name@site, the site being the part of the scene that it acts on. A hypothesis is a set of effects of the catalogue, refitted together with the study's parameters. Its probability \
-                comes from how well it predicts the episodes held out; an effect's own is the sum over the hypotheses that it is in.";
+                comes from its evidence; that of an effect is the sum over the hypotheses that contain it.";
     let mut section = Section::new("Which effect").lead(lead);
     section = explanation(d, t).into_iter().fold(section, Section::text);
     section = section.figures(vec![figure(d)]);
@@ -89,7 +89,7 @@ fn explanation(d: &DiagnosisResult, t: &DiagnosisTrace) -> Vec<String> {
     }
     if d.verdict.kind != Kind::None && d.verdict.unexplained.is_finite() {
         first.push_str(&format!(
-            " {} of the squared gap above the noise floor remain unexplained.",
+            " {} of the squared gap above the noise floor remains unexplained.",
             percent(d.verdict.unexplained)
         ));
     }
@@ -107,7 +107,7 @@ fn explanation(d: &DiagnosisResult, t: &DiagnosisTrace) -> Vec<String> {
         ));
     } else if d.verdict.kind == Kind::Effects {
         paragraphs.push(
-            "These data tell it from every other explanation that was tried, as surely as the probabilities say.".to_owned(),
+            "No other explanation that was tried fits these data as well; the probabilities say how sure that is.".to_owned(),
         );
     }
     paragraphs

@@ -99,7 +99,7 @@ pub(super) fn checks(d: &DiagnosisResult) -> Option<Section> {
     });
     Some(
         Section::new("Checks")
-            .lead("Whether the logs and the model can carry a diagnosis at all. What is not ok comes first.")
+            .lead("Whether the logs and the model can carry a diagnosis at all. Failed checks come first.")
             .table(table),
     )
 }

@@ -136,7 +136,7 @@ fn against_time(force: &ForceTrace, law: bool) -> Figure {
     if law && finite_in(after) {
         let left = line(after).colour(Colour::Vermillion).dashed();
         chart = chart.layer(left.label("left"));
-        caption.push_str(" Dashed: what is missing once the effects are in the model.");
+        caption.push_str(" Dashed: the missing force that remains with the effects in the model.");
     }
     Figure::new("Against time", chart.description(caption.clone()), caption)
 }

@@ -15,7 +15,7 @@ pub(super) fn page(d: &DiagnosisResult, t: &DiagnosisTrace) -> Page {
     };
     let (badge, tone) = badge(d);
     let mut page = Page::new(title)
-        .kicker("ASID diagnose: where does simulation leave reality, and why")
+        .kicker("ASID diagnose: where simulation departs from reality, and why")
         .badge(badge, tone)
         .answer(answer(d));
     if !t.engine.is_empty() {
@@ -92,9 +92,9 @@ fn tiles(d: &DiagnosisResult, t: &DiagnosisTrace) -> Vec<Tile> {
     );
     if t.held_out > 0 {
         let note = if t.fitted_to > 0 {
-            format!("all gaps are on these; fitted to {} others", t.fitted_to)
+            format!("every gap is measured on these; the models are fitted to {} others", t.fitted_to)
         } else {
-            "all gaps are on these; no fit saw them".to_owned()
+            "every gap is measured on these; no fit saw them".to_owned()
         };
         tiles.push(Tile::new("held out", &count(t.held_out, "episode")).note(note));
     }

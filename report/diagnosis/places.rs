@@ -49,7 +49,7 @@ fn shares(places: &[Where]) -> Figure {
         };
         rows.push(Ranked::new(name, 100.0 * share, percent(share)));
     }
-    let caption = "Signal and regime, the condition found in the data beneath. Shares of the excess squared residual; together 100 %.";
+    let caption = "Signal and regime; below them, the condition found in the data. Shares of the excess squared residual; together 100 %.";
     let ranking = Ranking::new(
         "Share of the gap by signal and regime",
         Axis::new("share of the gap", "%"),

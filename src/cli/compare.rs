@@ -96,10 +96,10 @@ pub struct Arguments {
     /// Print the job array's script and submit nothing
     #[arg(long, requires = "submit")]
     print_script: bool,
-    /// Put comparisons together instead, such as those of several machines
+    /// Merge finished comparisons, such as those of several machines, instead of running one
     #[arg(long, value_name = "DIR", num_args = 1..)]
     merge: Vec<PathBuf>,
-    /// Let rows of different commits stand in one table, each row of one; rows say their commit
+    /// Allow rows of different commits in one table; each row is of one commit and names it
     #[arg(long, requires = "merge")]
     across_commits: bool,
     /// Play this many runs side by side, one a thread; results do not depend on it [default: one a core]
@@ -114,7 +114,7 @@ pub struct Arguments {
     /// Set a value, such as solver.iterations=10, for every method that has it (repeatable)
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// Folder for the results; one that holds a part of the comparison is gone on with
+    /// Folder for the results; one that holds a part of this comparison is resumed
     /// [default: the next free one below runs/]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,

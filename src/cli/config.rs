@@ -25,7 +25,7 @@ pub struct Arguments {
     /// Simulate with this engine: see `asid list`
     #[arg(long, value_name = "NAME")]
     backend: Option<String>,
-    /// Take the difficulty `default`, or `published`, as in the paper where it says so
+    /// Set the difficulty: `default`, or `published` (the paper's values where it gives them)
     #[arg(long, value_name = "NAME")]
     preset: Option<String>,
     /// Set a value, such as explorer.iterations=10 (repeatable)

@@ -58,7 +58,7 @@ pub struct Arguments {
     /// Play this many further episodes that tell the rival explanations apart [default: 0]
     #[arg(long, value_name = "N", conflicts_with = "train")]
     experiments: Option<usize>,
-    /// Run the task this often without and with the answer, to count successes [default: 5]
+    /// Run the task this many times with the nominal and with the refined model, to count successes [default: 5]
     #[arg(long, value_name = "N")]
     seeds: Option<u64>,
     /// Answer after about this time with what is known by then; result.json lists what was not tried. Ctrl-C does the same
@@ -245,7 +245,7 @@ fn tell_origin(trace: &mut DiagnosisTrace, engine: &str, seed: u64) {
         ("refined.toml", "the model with the effects of the verdict"),
         (
             "config.toml",
-            "the settings: `--config` with it repeats this",
+            "the settings; `asid diagnose --config config.toml` repeats the diagnosis",
         ),
         ("trace.json", "the data of the pictures"),
     ]);

@@ -32,12 +32,12 @@ The start pose of the object is given by --set start.NAME=VALUE, such as --set s
 what is not given takes the middle of its range.
 
 The folder holds commands.csv (time in s and the command of each actuator), predicted.csv (the log \
-that the simulator expects), policy.json, result.json, config.toml, report.html and trace.json. With a \
---truth or another option of the real world the episode is also played there, from the same start pose: \
+that the simulator expects), policy.json, result.json, config.toml, report.html and trace.json. With \
+--truth or a --real-… option the episode is also played in that simulated real world, from the same start pose: \
 real.csv is its log, for `asid identify` and `asid diagnose`.
 
-Of any machine (a study, or --model FILE with --unknown) the motion is designed that tells the most about the unknowns \
-and keeps the limits; explorers are fisher-cem, random, multisine and fourier. docs/any-machine.md has the whole way.")]
+For any machine (a study, or --model FILE with --unknown) it designs the motion with the most information about the unknowns \
+within the limits; explorers are fisher-cem, random, multisine and fourier. docs/any-machine.md has the whole way.")]
 pub struct Arguments {
     /// The task (see `asid list`), or a study: a folder or a TOML file
     #[arg(required_unless_present = "model")]

@@ -35,8 +35,8 @@ const LONGEST: f64 = 100.0;
 #[command(after_help = "\
 A log is a CSV file: `time` in seconds, strictly increasing, at any rate; `ctrl.ACTUATOR`, the command \
 from that time on; and columns named after the scene's sensors, vectors as NAME.0, NAME.1 and so on \
-(quaternions w x y z). An empty cell is a missing reading. The machine begins where the scene's first \
-keyframe has it; where the object begins is estimated.
+(quaternions w x y z). An empty cell is a missing reading. The machine's initial state is the scene's first \
+keyframe; the object's initial pose is estimated.
 
 The folder holds posterior.json (for `asid solve`), result.json, config.toml, a copy of the logs, \
 report.html and trace.json.

@@ -28,8 +28,8 @@ A log is a CSV file of any names, or, in a build with --features logs, an MCAP f
 ROS 2 (a folder, or a file of SQLite), a LeRobot dataset of version 2 or 3 (all its episodes, or one as DATASET#3), or a \
 Parquet file.
 
-Which column is which sensor or command is proposed by names, units, ranges and fit, and shown with the reasons. What is wrong \
-is set right by --map, or in the study's [[column]]. The folder holds study.toml, import.html (each column over time), and \
+Which column is which sensor or command is proposed by names, units, ranges and fit, and shown with the reasons. Correct a wrong \
+mapping by --map, or in the study's [[column]]. The folder holds study.toml, import.html (each column over time), and \
 model.xml where the model had no sensors; `asid diagnose DIR` runs on it. Without --out nothing is written.")]
 pub struct Arguments {
     /// The logs, one an episode; the last third of them is held out, unless --test names others

@@ -42,7 +42,7 @@ With --make a folder of new cases is written instead: DIR/studies, which is for 
 DIR/sealed/labels.json, which is for --labels.")]
 #[group(id = "work", required = true, args = ["cases", "make", "answer"])]
 pub struct Arguments {
-    /// Answer the cases in this folder, and score the answers
+    /// Diagnose the cases in this folder and score the answers
     #[arg(long, value_name = "DIR")]
     cases: Option<PathBuf>,
     /// Read the labels from this file [default: labels.json in the folder of the cases]
