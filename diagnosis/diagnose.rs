@@ -131,7 +131,8 @@ fn diagnose_physics(
         none,
         nominal,
         mut scatter,
-    } = prepare(study, machine, streams.stream("scatter"))?;
+        is_whole,
+    } = prepare(study, machine, streams.stream("scatter"), progress)?;
     progress.end();
     let last = &none[none.len() - 1];
     let model = bench.machine.with(&[])?;
@@ -144,14 +145,18 @@ fn diagnose_physics(
         bench.machine.threads,
     )?;
     let (candidates, left_out) = enumerate(&bench.machine, &shown, &settings.without);
-    let findings = Search {
-        bench: &mut bench,
-        scatter: &mut scatter,
-        candidates: &candidates,
-        breadth: settings.breadth,
-        progress,
-    }
-    .run(&none)?;
+    let findings = if is_whole {
+        Findings::without_search(last.clone())
+    } else {
+        Search {
+            bench: &mut bench,
+            scatter: &mut scatter,
+            candidates: &candidates,
+            breadth: settings.breadth,
+            progress,
+        }
+        .run(&none)?
+    };
     let findings = final_noise(&mut bench, study, &candidates, findings)?;
     let scatter = cost_scatter(&bench, &findings.none)?;
     let judgement = judge(&bench, &findings, candidates.len(), scatter);

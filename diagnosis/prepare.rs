@@ -4,17 +4,18 @@
 use std::collections::BTreeMap;
 
 use asid_core::rng::Rng;
-use asid_core::{Layout, Result};
+use asid_core::{Layout, Progress, Result};
 
 use crate::bench::{Bench, CAPACITY, Explanation, Stage};
 use crate::data::Logs;
-use crate::fit::{Effort, Unknown, fit, scan};
+use crate::fit::{Effort, Unknown, cost, fit, scan};
 use crate::machine::Machine;
 use crate::noise;
 use crate::predict::Point;
 use crate::record::Record;
 use crate::roughness::Spread;
 use crate::scatter::Scatter;
+use crate::search::LEAST_GAP;
 use crate::starts::{given_start, open_coordinates};
 use crate::study::Study;
 use crate::whitening::Scattering;
@@ -44,6 +45,8 @@ pub struct Prepared {
     pub nominal: Vec<f64>,
     /// What the bench's scatter is estimated with.
     pub scatter: Scatter,
+    /// Whether nothing is missing: replays of all logs, those held out too, leave the noise only.
+    pub is_whole: bool,
 }
 
 /// Sensors that some of the logs have, in the scene's order.
@@ -163,7 +166,12 @@ pub fn set_reading_noise(bench: &mut Bench, given: &BTreeMap<String, f64>) {
 ///
 /// # Errors
 /// When a parameter cannot be set or a rollout fails.
-pub fn prepare(study: &Study, machine: Machine, rng: Rng) -> Result<Prepared> {
+pub fn prepare(
+    study: &Study,
+    machine: Machine,
+    rng: Rng,
+    progress: &dyn Progress,
+) -> Result<Prepared> {
     let (mut bench, nominal) = dataset(study, machine)?;
     let layout = bench.layout().clone();
     let finer = bench.machine.halved().and_then(|half| {
@@ -186,16 +194,25 @@ pub fn prepare(study: &Study, machine: Machine, rng: Rng) -> Result<Prepared> {
     if !bench.open.is_empty() && left < QUIET {
         scatter.keep_starts(&mut bench, &point)?;
     }
-    let none = if bench.is_rough() {
+    let direct = if bench.is_rough() {
+        None
+    } else {
+        fit_directly(&mut bench, study, &point, &mut scatter)?
+    };
+    let is_whole = direct.is_some();
+    let none = if let Some(direct) = direct {
+        vec![direct]
+    } else if bench.is_rough() {
         identify_rough(&mut bench, study, point, &mut scatter)?
     } else {
-        identify_smooth(&mut bench, study, point, &mut scatter)?
+        identify_smooth(&mut bench, study, point, (&mut scatter, progress))?
     };
     Ok(Prepared {
         bench,
         none,
         nominal,
         scatter,
+        is_whole,
     })
 }
 
@@ -261,12 +278,47 @@ fn scan_and_fit(bench: &Bench, stage: usize, point: &Point, effort: Effort) -> R
     bench.explain(stage, &[], &best.theta, &point.starts, effort)
 }
 
-/// Where predictions are smooth: fits grow with the episodes.
+/// A fit to the whole of the logs from the model as given on, where it leaves the noise only.
+fn fit_directly(
+    bench: &mut Bench,
+    study: &Study,
+    point: &Point,
+    scatter: &mut Scatter,
+) -> Result<Option<Explanation>> {
+    let found = (bench.train.clone(), bench.test.clone(), bench.head.clone());
+    let first = bench.explain(0, &[], &point.theta, &point.starts, Effort::BRIEF)?;
+    let point = &first.fit.point;
+    set_noise(bench, &study.noise, point)?;
+    scatter.estimate(bench, point)?;
+    bench.stages = vec![whole(bench)];
+    let again = bench.explain(0, &[], &point.theta, &point.starts, Effort::BRIEF)?;
+    let is_noise = |cost: f64, readings: f64| cost <= LEAST_GAP.powi(2) * readings;
+    let train = cost(&plain(bench, &again.fit.point)?);
+    if is_noise(train, bench.train.readings as f64)
+        && is_noise(again.held_plain, bench.held_readings())
+    {
+        return Ok(Some(again));
+    }
+    (bench.train, bench.test, bench.head) = found;
+    bench.stages = vec![whole(bench)];
+    Ok(None)
+}
+
+/// Residuals of all training logs without whitening, in units of the noise.
+fn plain(bench: &Bench, point: &Point) -> Result<Vec<f64>> {
+    let mut predictor = bench.predictor(&[], &bench.train)?;
+    predictor.set_scattering(Scattering::default());
+    let mut residuals = predictor.residuals(std::slice::from_ref(point))?;
+    Ok(residuals.pop().unwrap_or_default())
+}
+
+/// Where predictions are smooth: fits grow with the episodes, and once more with the noise and the scatter that the first found;
+/// once only where work is stopped.
 fn identify_smooth(
     bench: &mut Bench,
     study: &Study,
     point: Point,
-    scatter: &mut Scatter,
+    (scatter, progress): (&mut Scatter, &dyn Progress),
 ) -> Result<Vec<Explanation>> {
     let layout = bench.layout().clone();
     let all: Vec<usize> = (0..bench.train.logs.episodes.len()).collect();
@@ -299,7 +351,7 @@ fn identify_smooth(
             } else {
                 bench.explain(stage, &[], &from.theta, &from.starts, Effort::FULL)?
             };
-            if last {
+            if last && !progress.is_stopped() {
                 let followed =
                     bench.explain(stage, &[], &from.theta, &from.starts, Effort::FULL)?;
                 if followed.fit.cost < fit.fit.cost {
@@ -313,7 +365,9 @@ fn identify_smooth(
         if round == 0 {
             set_noise(bench, &study.noise, &point)?;
             scatter.estimate(bench, &point)?;
-            continue;
+            if !progress.is_stopped() {
+                continue;
+            }
         }
         // The longest stage on which a gradient can be believed comes first.
         let rms = |i: usize| (fits[i].fit.cost / bench.readings(i)).sqrt();

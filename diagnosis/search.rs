@@ -85,9 +85,31 @@ pub struct Findings {
     pub screened: Vec<Screened>,
 }
 
+impl Findings {
+    /// Of no search: the model without any effect alone.
+    #[must_use]
+    pub fn without_search(none: Explanation) -> Self {
+        Self {
+            none,
+            short: None,
+            found: Vec::new(),
+            missing: Vec::new(),
+            forces: Vec::new(),
+            ranking: Vec::new(),
+            isolability: None,
+            not_tried: Vec::new(),
+            screened: Vec::new(),
+        }
+    }
+}
+
 /// Excess of the root mean square residual, in units of the noise, that no further effect
 /// is looked for below: another program's version of the same effect leaves as much.
 pub const NEGLIGIBLE: f64 = 2.0;
+
+/// Gap without effects, in deviations of the noise, up to which nothing is there to be closed: noise that is estimated from a
+/// log is right to some hundredths.
+pub const LEAST_GAP: f64 = 1.1;
 
 /// Growth of a gap from one stage to the next from which on it counts as another gap.
 const GROWN: f64 = 3.0;

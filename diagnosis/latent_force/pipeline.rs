@@ -61,7 +61,14 @@ pub fn diagnose(
     let (outcome, candidates, left_out, firsts, forces, members) = {
         let parameters = (&study.parameters[..], &nominal[..]);
         let (context, mut estimate) = begin(&bench.machine, &logs, taken, parameters)?;
-        settle_noise(&context, &hypothesis, &nominal, &mut estimate, FIRST, progress)?;
+        settle_noise(
+            &context,
+            &hypothesis,
+            &nominal,
+            &mut estimate,
+            FIRST,
+            progress,
+        )?;
         let begin = (&estimate, &Slopes::default());
         let rounds = (ROUNDS, progress);
         let mut none = fit(&context, &hypothesis, &nominal, begin, rounds)?;

@@ -6,7 +6,7 @@ use crate::bench::{Bench, Explanation};
 use crate::candidate::Candidate;
 use crate::checks::change_by_step;
 use crate::fit::cost;
-use crate::search::{Findings, NEGLIGIBLE, excess};
+use crate::search::{Findings, LEAST_GAP, NEGLIGIBLE, excess};
 use crate::verdict::{Hypothesis as Judged, Judgement};
 
 use super::estimate::LEAST_LEFT;
@@ -27,9 +27,6 @@ const GAP_SCALE: f64 = 0.3;
 /// Root mean square of the missing force, relative to the inertial forces, up to which nothing is missing.
 const NOTHING: f64 = 0.01;
 
-/// Gap without effects, in deviations of the noise, up to which nothing is there to be closed: noise that is estimated from a
-/// log is right to some hundredths.
-const LEAST_GAP: f64 = 1.1;
 /// Share of a small gap's power, of the logs fitted to and of those held out, that an effect must close in replays.
 const CLOSES: f64 = 0.5;
 /// An engine's own error, in changes by half the time step: what is of first order in the step (Richardson 1911), the worst

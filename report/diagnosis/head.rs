@@ -92,7 +92,10 @@ fn tiles(d: &DiagnosisResult, t: &DiagnosisTrace) -> Vec<Tile> {
     );
     if t.held_out > 0 {
         let note = if t.fitted_to > 0 {
-            format!("every gap is measured on these; the models are fitted to {} others", t.fitted_to)
+            format!(
+                "every gap is measured on these; the models are fitted to {} others",
+                t.fitted_to
+            )
         } else {
             "every gap is measured on these; no fit saw them".to_owned()
         };

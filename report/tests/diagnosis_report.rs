@@ -115,7 +115,10 @@ fn each_kind_of_verdict_is_told_with_what_cannot_be_told_from_it() {
     }
     let mut sure = diagnosed::patch();
     sure.result.verdict.ambiguous_with.clear();
-    assert!(page(&sure).contains("cause found") && page(&sure).contains("No other explanation that was tried"));
+    assert!(
+        page(&sure).contains("cause found")
+            && page(&sure).contains("No other explanation that was tried")
+    );
 
     let html = page(&diagnosed::complete());
     assert!(html.contains("No effect is missing") && !html.contains(">refined<"));
