@@ -226,11 +226,65 @@ fn read(path: &Path) -> Result<String> {
     })
 }
 
+/// Levels of elements that a document may have: robots have some 30, and ropes of 200 bodies fit. Parsers and
+/// engines follow them by recursion, at some kB of the stack a level.
+const MAX_LEVELS: usize = 256;
+
 fn parse<'a>(name: &str, xml: &'a str) -> Result<roxmltree::Document<'a>> {
+    if levels(xml) > MAX_LEVELS {
+        return Err(Error::Scene {
+            scene: name.to_owned(),
+            message: format!(
+                "its elements are nested deeper than {MAX_LEVELS}: is an end tag missing?"
+            ),
+        });
+    }
     roxmltree::Document::parse(xml).map_err(|e| Error::Scene {
         scene: name.to_owned(),
         message: format!("is not well-formed XML: {}", one_line(&e.to_string())),
     })
+}
+
+/// The most elements of a document that are open at a time, found without recursion; of what is no XML any number.
+fn levels(xml: &str) -> usize {
+    let (mut open, mut most) = (0_usize, 0);
+    let mut rest = xml;
+    while let Some(at) = rest.find('<') {
+        rest = &rest[at..];
+        let passed = |end: &str| rest.find(end).map_or("", |i| &rest[i + end.len()..]);
+        rest = if rest.starts_with("<!--") {
+            passed("-->")
+        } else if rest.starts_with("<![CDATA[") {
+            passed("]]>")
+        } else if rest.starts_with("<?") {
+            passed("?>")
+        } else if rest.starts_with("</") {
+            open = open.saturating_sub(1);
+            passed(">")
+        } else {
+            let end = end_of_tag(rest);
+            if !rest[..end].ends_with('/') {
+                open += 1;
+                most = most.max(open);
+            }
+            &rest[end..]
+        };
+    }
+    most
+}
+
+/// Where the `>` of a tag is, outside of quotes; the end of the text where it has none.
+fn end_of_tag(tag: &str) -> usize {
+    let mut quote = None;
+    for (i, b) in tag.bytes().enumerate() {
+        match (quote, b) {
+            (None, b'>') => return i,
+            (None, b'"' | b'\'') => quote = Some(b),
+            (Some(q), b) if q == b => quote = None,
+            _ => {}
+        }
+    }
+    tag.len()
 }
 
 /// Replaces every `<include file="…"/>` by the children of that file's root; `left` is how many more
@@ -336,6 +390,28 @@ mod tests {
         )
         .unwrap_err();
         assert!(error.to_string().contains("cycle"), "{error}");
+    }
+
+    /// Symptom: a document of 260 kB ended the process by an overflow of the stack. Cause: 25 000 elements inside of
+    /// each other, which the parser of XML follows by recursion.
+    #[test]
+    fn elements_that_are_nested_without_end_are_refused() {
+        let nested = |n: usize| {
+            let (open, close) = ("<body>".repeat(n), "</body>".repeat(n));
+            format!("<mujoco><worldbody>{open}{close}</worldbody></mujoco>")
+        };
+        for xml in [nested(40_000), "<a>".repeat(100_000)] {
+            let error = Scene::from_xml("deep", &xml, &[]).unwrap_err().to_string();
+            assert!(error.contains("nested deeper than 256"), "{error}");
+        }
+        assert!(Scene::from_xml("deep", &nested(MAX_LEVELS - 2), &[]).is_ok());
+    }
+
+    #[test]
+    fn levels_are_those_of_elements_alone() {
+        let xml = "<?xml version='1.0'?><a b='>'><!-- <c><d> --><e f=\"/>\"/><g>x</g><![CDATA[<h><i>]]></a>";
+        assert_eq!(levels(xml), 2);
+        assert_eq!(levels("<a><b"), 2);
     }
 
     #[test]
