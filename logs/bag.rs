@@ -8,7 +8,8 @@ use std::path::{Path, PathBuf};
 
 use rusqlite::{Connection, OpenFlags};
 
-use crate::guard::guarded;
+use asid_core::guard::guarded;
+
 use crate::mcap_file;
 use crate::ros::topics::{Described, Topics};
 

@@ -13,8 +13,6 @@ pub mod align;
 pub mod bag;
 mod csv_file;
 pub mod format;
-#[cfg(any(feature = "parquet", feature = "ros"))]
-mod guard;
 #[cfg(feature = "parquet")]
 pub mod lerobot;
 #[cfg(feature = "ros")]

@@ -13,7 +13,8 @@ use mcap::records::op;
 use mcap::sans_io::LinearReaderOptions;
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader};
 
-use crate::guard::guarded;
+use asid_core::guard::guarded;
+
 use crate::ros::topics::{Described, Topics};
 
 /// Largest record, decompressed, bytes: recorders write messages of some MB, and a damaged length must not ask for all memory.

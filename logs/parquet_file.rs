@@ -10,7 +10,8 @@ use parquet::file::reader::{FileReader as _, SerializedFileReader};
 use parquet::record::Field;
 use parquet::schema::types::Type;
 
-use crate::guard::guarded;
+use asid_core::guard::guarded;
+
 use crate::raw::RawLog;
 use crate::table_file;
 

@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
 use crate::error::{Error, Result};
+use crate::guard::guarded;
 
 /// Deepest chain of `<include>` that is followed.
 const MAX_INCLUDE_DEPTH: usize = 8;
@@ -88,6 +89,15 @@ impl Scene {
                 message: format!("the root element is <{root}>, but MJCF begins with <mujoco>"),
             });
         }
+        if let Some((node, given)) = wrong_eulerseq(&document) {
+            return Err(Error::Scene {
+                scene: name,
+                message: format!(
+                    "line {}: eulerseq=\"{given}\" is not three of the letters x, y, z, X, Y and Z",
+                    document.text_pos_at(node.range().start).row
+                ),
+            });
+        }
         Ok(Self {
             name,
             xml,
@@ -135,9 +145,10 @@ impl Scene {
             return Ok(Arc::clone(parsed));
         }
         let base = self.directory.clone().unwrap_or_default();
-        let parsed = mjcf_rs::Model::from_str(&self.xml, &base).map_err(|e| Error::Scene {
+        let parse = || mjcf_rs::Model::from_str(&self.xml, &base).map_err(|e| e.to_string());
+        let parsed = guarded("an MJCF document", parse).map_err(|message| Error::Scene {
             scene: self.name.clone(),
-            message: one_line(&e.to_string()),
+            message: one_line(&message),
         })?;
         Ok(Arc::clone(
             self.description.get_or_init(|| Arc::new(parsed)),
@@ -224,6 +235,17 @@ fn read(path: &Path) -> Result<String> {
             _ => e.to_string(),
         },
     })
+}
+
+/// An order of Euler's axes that is none, which parsers take for three letters.
+fn wrong_eulerseq<'a>(
+    document: &'a roxmltree::Document<'_>,
+) -> Option<(roxmltree::Node<'a, 'a>, &'a str)> {
+    let given = document
+        .descendants()
+        .filter_map(|n| Some((n, n.attribute("eulerseq")?)));
+    let axes = |text: &str| text.len() == 3 && text.chars().all(|c| "xyzXYZ".contains(c));
+    given.into_iter().find(|(_, text)| !axes(text))
 }
 
 /// Levels of elements that a document may have: robots have some 30, and ropes of 200 bodies fit. Parsers and
@@ -405,6 +427,28 @@ mod tests {
             assert!(error.contains("nested deeper than 256"), "{error}");
         }
         assert!(Scene::from_xml("deep", &nested(MAX_LEVELS - 2), &[]).is_ok());
+    }
+
+    /// Symptom: "index out of bounds: the len is 3 but the index is 3" from the parser of MJCF. Cause: a fourth axis.
+    #[test]
+    fn an_order_of_four_euler_axes_is_refused() {
+        let xml = |axes: &str| {
+            format!(
+                "<mujoco>\n<compiler eulerseq='{axes}'/><worldbody><body euler='0 1 2'/></worldbody></mujoco>"
+            )
+        };
+        for axes in ["xyzx", "xy", "abc", "éx"] {
+            let error = Scene::from_xml("s", &xml(axes), &[])
+                .unwrap_err()
+                .to_string();
+            assert!(error.contains("line 2: eulerseq"), "{error}");
+        }
+        assert!(
+            Scene::from_xml("s", &xml("XYZ"), &[])
+                .unwrap()
+                .description()
+                .is_ok()
+        );
     }
 
     #[test]
