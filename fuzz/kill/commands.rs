@@ -17,6 +17,8 @@ pub struct Case {
     pub out: &'static str,
     /// Whether that is a folder that may be there already, empty.
     pub folder: bool,
+    /// Whether it may be called again where its result is whole.
+    pub repeats: bool,
     /// Writes into the folder what the command reads; the program is at the second path.
     pub prepare: fn(&Path, &Path) -> Result<()>,
 }
@@ -58,6 +60,7 @@ pub const COMMANDS: &[Case] = &[
         ],
         out: "out",
         folder: true,
+        repeats: false,
         prepare: nothing,
     },
     Case {
@@ -85,6 +88,7 @@ pub const COMMANDS: &[Case] = &[
         ],
         out: "out",
         folder: true,
+        repeats: false,
         prepare: study,
     },
     Case {
@@ -92,6 +96,7 @@ pub const COMMANDS: &[Case] = &[
         arguments: &["identify", "study", "--quiet", "--out", "out"],
         out: "out",
         folder: true,
+        repeats: false,
         prepare: study,
     },
     Case {
@@ -113,6 +118,7 @@ pub const COMMANDS: &[Case] = &[
         ],
         out: "out",
         folder: true,
+        repeats: false,
         prepare: nothing,
     },
     Case {
@@ -138,6 +144,7 @@ pub const COMMANDS: &[Case] = &[
         ],
         out: "out",
         folder: true,
+        repeats: true,
         prepare: nothing,
     },
     Case {
@@ -145,6 +152,7 @@ pub const COMMANDS: &[Case] = &[
         arguments: &["diagnose", "study", "--quiet", "--out", "out"],
         out: "out",
         folder: true,
+        repeats: false,
         prepare: study,
     },
     Case {
@@ -160,6 +168,7 @@ pub const COMMANDS: &[Case] = &[
         ],
         out: "out",
         folder: true,
+        repeats: false,
         prepare: study,
     },
     Case {
@@ -167,6 +176,7 @@ pub const COMMANDS: &[Case] = &[
         arguments: &["export-log", "study", "--out", "out"],
         out: "out",
         folder: true,
+        repeats: false,
         prepare: study,
     },
     Case {
@@ -174,6 +184,7 @@ pub const COMMANDS: &[Case] = &[
         arguments: &["export", "rod-balancing", "--mjcf", "scene.xml"],
         out: "scene.xml",
         folder: false,
+        repeats: false,
         prepare: nothing,
     },
     Case {
@@ -181,6 +192,7 @@ pub const COMMANDS: &[Case] = &[
         arguments: &["report", "diagnosis"],
         out: "diagnosis",
         folder: false,
+        repeats: true,
         prepare: diagnosis,
     },
     Case {
@@ -188,6 +200,7 @@ pub const COMMANDS: &[Case] = &[
         arguments: &["new", "task", "my-task"],
         out: "my-task",
         folder: true,
+        repeats: false,
         prepare: nothing,
     },
 ];

@@ -8,7 +8,7 @@
 //! What a call that was killed leaves is taken away by the next one with the same `--out`.
 
 use std::cell::RefCell;
-use std::io::Write as _;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
@@ -182,16 +182,16 @@ pub fn write_json(path: &Path, value: &impl serde::Serialize) -> Result<()> {
 /// Writes a file that must not be there yet, whole or not at all.
 pub fn create_text(path: &Path, text: &str) -> std::io::Result<()> {
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".asid-");
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt as _;
-        // As any new file: the mask of the process takes its part away.
-        builder.permissions(std::fs::Permissions::from_mode(0o666));
+    let folder = folder.unwrap_or(Path::new("."));
+    staging::clear(folder);
+    let staging = Staging::new_in(folder)?;
+    let written = staging.content().join("text");
+    std::fs::write(&written, text)?;
+    // A link gives a name only where there is none yet, a rename takes any.
+    match std::fs::hard_link(&written, path) {
+        Err(e) if e.kind() != ErrorKind::AlreadyExists && !path.exists() => {
+            std::fs::rename(&written, path)
+        }
+        linked => linked,
     }
-    let mut file = builder.tempfile_in(folder.unwrap_or(Path::new(".")))?;
-    file.write_all(text.as_bytes())?;
-    file.persist_noclobber(path).map_err(|e| e.error)?;
-    Ok(())
 }
