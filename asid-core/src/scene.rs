@@ -241,11 +241,11 @@ fn read(path: &Path) -> Result<String> {
 fn wrong_eulerseq<'a>(
     document: &'a roxmltree::Document<'_>,
 ) -> Option<(roxmltree::Node<'a, 'a>, &'a str)> {
-    let given = document
+    let mut given = document
         .descendants()
         .filter_map(|n| Some((n, n.attribute("eulerseq")?)));
     let axes = |text: &str| text.len() == 3 && text.chars().all(|c| "xyzXYZ".contains(c));
-    given.into_iter().find(|(_, text)| !axes(text))
+    given.find(|(_, text)| !axes(text))
 }
 
 /// Levels of elements that a document may have: robots have some 30, and ropes of 200 bodies fit. Parsers and

@@ -23,7 +23,7 @@ pub struct Case {
     pub prepare: fn(&Path, &Path) -> Result<()>,
 }
 
-/// All commands that write files. `config`, `list`, `doctor` and `solve` without `--out` write none.
+/// Commands that write files. `conformance`, `withheld` and the figures of `compare` write by the same code as `run` and `compare`.
 pub const COMMANDS: &[Case] = &[
     Case {
         name: "run",
