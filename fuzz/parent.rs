@@ -155,16 +155,10 @@ impl<'a> Watch<'a> {
         let to = from + self.arguments.inputs;
         while from < to && self.seconds_left() > 0.0 {
             let (ended, status, found) = self.child(from, to)?;
-            for (sum, now) in [
-                &mut self.summary.inputs,
-                &mut self.summary.accepted,
-                &mut self.summary.cpu_us,
-            ]
-            .into_iter()
-            .zip(self.running)
-            {
-                *sum += now;
-            }
+            let [inputs, accepted, cpu] = self.running;
+            self.summary.inputs += inputs;
+            self.summary.accepted += accepted;
+            self.summary.cpu_us += cpu;
             self.running = [0; 3];
             if ended {
                 break;
@@ -179,7 +173,8 @@ impl<'a> Watch<'a> {
                     message,
                 })?;
             }
-            self.summary.inputs += 1;
+            // What it had read since its last line is not in that line.
+            self.summary.inputs = index + 1 - self.arguments.from;
             from = index + 1;
         }
         Ok(self.summary)

@@ -50,6 +50,6 @@ pub fn trace(path: &Path) -> Result<()> {
     };
     let text = std::fs::read_to_string(path).map_err(|e| fail(e.to_string()))?;
     let report: RunReport = serde_json::from_str(&text).map_err(|e| fail(e.to_string()))?;
-    report.html();
+    let _ = report.html();
     Ok(())
 }
