@@ -85,7 +85,7 @@ fn a_plugins_folder_that_was_begun_is_begun_anew() {
     std::fs::create_dir_all(left.join("content/src")).unwrap();
     std::fs::write(left.join("lock"), "").unwrap();
     std::fs::write(left.join("moves"), "Cargo.toml\nsrc").unwrap();
-    std::fs::write(place.path("swing/Cargo.toml"), "half").unwrap();
+    place.write("swing/Cargo.toml", "half");
     let new = place.run(&["new", "task", "swing"]);
     assert!(
         new.status.success(),
