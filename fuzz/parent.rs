@@ -1,7 +1,6 @@
 //! Starts a child for each reader, goes on after one that died, and sums up.
 
 use std::collections::BTreeMap;
-use std::fmt::Write as _;
 use std::io::{BufRead as _, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitStatus, Stdio};
@@ -80,14 +79,15 @@ pub fn read(arguments: &Arguments) -> Result<bool> {
             .map(|n| named(n))
             .collect::<Result<_>>()?
     };
-    let mut table = String::from(
-        "| reader | inputs | read as valid | inputs/s of CPU time | most memory, MB | slowest, ms (input) | faults |\n|---|--:|--:|--:|--:|--:|--:|\n",
+    println!(
+        "| reader | inputs | read as valid | inputs/s of CPU time | most memory, MB | slowest, ms (input) | faults |\n\
+         |---|--:|--:|--:|--:|--:|--:|"
     );
     let mut clean = true;
     for reader in chosen {
         let summary = Watch::new(reader, arguments)?.run()?;
         clean &= summary.faults.is_empty();
-        let _ = writeln!(table, "{}", row(reader.name, &summary));
+        println!("{}", row(reader.name, &summary));
         for (fault, (count, first)) in &summary.faults {
             eprintln!(
                 "{}: {fault}: {count} inputs, first {}: {}",
@@ -95,7 +95,6 @@ pub fn read(arguments: &Arguments) -> Result<bool> {
             );
         }
     }
-    print!("{table}");
     Ok(clean)
 }
 
