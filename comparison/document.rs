@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use asid_core::{Error, Result};
+use asid_core::{Error, Result, toml_text};
 
 use crate::plan::Plan;
 
@@ -63,9 +63,8 @@ impl Document {
         };
         let text = std::fs::read_to_string(path)
             .map_err(|e| wrong(format!("{e}; is this the folder of a comparison?")))?;
-        let mut settings: toml::Table = text
-            .parse()
-            .map_err(|e: toml::de::Error| wrong(e.message().to_owned()))?;
+        let mut settings: toml::Table =
+            toml_text::read(&text).map_err(|e| wrong(e.message().to_owned()))?;
         let plan = Self::plan_of(&mut settings).map_err(|e| wrong(e.to_string()))?;
         let plan = plan.ok_or_else(|| wrong("is not the configuration of a comparison".into()))?;
         Ok(Self { plan, settings })

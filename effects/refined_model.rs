@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use crate::EffectSpec;
-use asid_core::{Error, Result, Scene, Target};
+use asid_core::{Error, Result, Scene, Target, toml_text};
 use serde::{Deserialize, Serialize};
 
 /// The file, as written.
@@ -81,7 +81,7 @@ impl RefinedModel {
                 _ => e.to_string(),
             })
         })?;
-        let document: Document = toml::from_str(&text).map_err(|e| {
+        let document: Document = toml_text::read(&text).map_err(|e| {
             let message = e.message().split_whitespace().collect::<Vec<_>>().join(" ");
             fail(format!("is no refined model: {message}"))
         })?;

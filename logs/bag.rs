@@ -8,6 +8,8 @@ use std::path::{Path, PathBuf};
 
 use rusqlite::{Connection, OpenFlags};
 
+use asid_core::guard::guarded;
+
 use crate::mcap_file;
 use crate::ros::topics::{Described, Topics};
 
@@ -20,7 +22,7 @@ pub fn read(path: &Path, topics: &mut Topics) -> Result<(), String> {
         let read = if has_ending(&file, "mcap") {
             mcap_file::read(&file, topics)
         } else {
-            sqlite(&file, topics)
+            guarded("a bag of ROS 2", || sqlite(&file, topics))
         };
         read.map_err(|e| match file.file_name() {
             Some(name) if path.is_dir() => format!("{}: {e}", name.to_string_lossy()),

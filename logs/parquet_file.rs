@@ -1,7 +1,6 @@
 //! Parquet files: flat columns of numbers, and lists of numbers as LeRobot writes them.
 
 use std::fs::File;
-use std::panic::AssertUnwindSafe;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -10,6 +9,8 @@ use parquet::errors::ParquetError;
 use parquet::file::reader::{FileReader as _, SerializedFileReader};
 use parquet::record::Field;
 use parquet::schema::types::Type;
+
+use asid_core::guard::guarded;
 
 use crate::raw::RawLog;
 use crate::table_file;
@@ -23,9 +24,7 @@ const LONGEST_LIST: usize = 512;
 /// # Errors
 /// When the file is damaged.
 pub fn columns(path: &Path, lists: bool) -> Result<Vec<(String, Vec<f64>)>, String> {
-    // The parser of damaged files may fail an inner check instead of returning an error.
-    let read = std::panic::catch_unwind(AssertUnwindSafe(|| read_columns(path, lists)));
-    read.unwrap_or_else(|_| Err("is a damaged Parquet file".into()))
+    guarded("a Parquet file", || read_columns(path, lists))
 }
 
 fn read_columns(path: &Path, lists: bool) -> Result<Vec<(String, Vec<f64>)>, String> {

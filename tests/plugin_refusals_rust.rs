@@ -264,7 +264,13 @@ fn files_that_are_no_libraries_are_refused() {
         assert_eq!(status, Some(2));
     }
     place.write("run.toml", "plugins = [\"absent.so\"]");
-    let (said, status) = line(&place.run(&["run", "rod-balancing", "--config", "run.toml"]));
+    let (said, status) = line(&place.run(&[
+        "run",
+        "rod-balancing",
+        "--config",
+        "run.toml",
+        "--trust-plugins",
+    ]));
     assert!(said.contains("plugin absent.so: no such file"), "{said}");
     assert_eq!(status, Some(2));
 }

@@ -72,17 +72,62 @@ fn a_loaded_task_runs_like_a_built_in_one_and_its_settings_repeat_the_run() {
     assert!(width > 0.0 && width < 0.05, "{mass}");
     assert_eq!(result["downstream"]["success"], true);
     // Without naming the plugin again.
-    done(
-        place.run(
-            &[
-                &run[..2],
-                &["--config", "a/config.toml", "--quiet", "--out", "b"],
-            ]
-            .concat(),
-        ),
-    );
+    let again = ["--config", "a/config.toml", "--quiet", "--out", "b"];
+    let again = [&run[..2], &again].concat();
+    done(place.run(&[&again[..], &["--trust-plugins"]].concat()));
     let again: Value = serde_json::from_str(&place.read("b/result.json")).unwrap();
     assert_eq!(again["parameters"], result["parameters"]);
+}
+
+/// The line on standard error of a call that is wrong.
+fn refused(output: &Output) -> String {
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(2), "{said}");
+    assert_eq!(said.lines().count(), 1, "{said}");
+    said
+}
+
+#[test]
+fn plugins_of_a_configuration_run_only_where_they_are_trusted_and_the_ones_that_were_recorded() {
+    let place = Workplace::new();
+    let suffix = std::env::consts::DLL_SUFFIX;
+    let library = place.path(&format!("swing{suffix}"));
+    std::fs::copy(&LIBRARIES[0], &library).unwrap();
+    let call = [
+        "compare",
+        "payload-swing",
+        "--method",
+        "dr",
+        "--seeds",
+        "1",
+        "--quiet",
+        "--out",
+    ];
+    let quick = [
+        "--set",
+        "solver.iterations=1",
+        "--set",
+        "solver.population=2",
+    ];
+    done(place.run(&[&call[..], &["a", "--plugin", text(&library)], &quick].concat()));
+    assert!(place.read("a/config.toml").contains("#sha256="));
+    let again = ["compare", "--config", "a/config.toml", "--quiet", "--out"];
+    let said = refused(&place.run(&[&again[..], &["b"]].concat()));
+    assert!(
+        said.contains("a/config.toml: names plugins") && said.contains("--trust-plugins"),
+        "{said}"
+    );
+    done(place.run(&[&again[..], &["b", "--trust-plugins"]].concat()));
+    // Whoever names the file trusts it.
+    done(place.run(&[&again[..], &["c", "--plugin", text(&library)]].concat()));
+    // Another library in its place: nothing of it is run.
+    std::fs::write(&library, std::fs::read(&LIBRARIES[1]).unwrap()).unwrap();
+    let said = refused(&place.run(&[&again[..], &["d", "--trust-plugins"]].concat()));
+    assert!(
+        said.contains("is not the library that a/config.toml was made with"),
+        "{said}"
+    );
+    assert!(!place.path("d").exists());
 }
 
 #[test]
@@ -160,7 +205,19 @@ fn folders_are_searched_and_a_name_that_is_taken_gets_a_suffix() {
         doctor.contains("ASID_PLUGIN_PATH") && doctor.contains("data/asid/plugins"),
         "{doctor}"
     );
-    run(&["export", "payload-swing@plugin", "--out", "scene.xml"]);
+    let mut export = place.asid(&["export", "payload-swing@plugin", "--out", "scene.xml"]);
+    let export = export.env("ASID_PLUGIN_PATH", place.path("listed"));
+    let said = export
+        .env("XDG_DATA_HOME", place.path("data"))
+        .output()
+        .unwrap();
+    let said = String::from_utf8(said.stderr).unwrap();
+    for from in [
+        "from ASID_PLUGIN_PATH: task `payload-swing`",
+        "from the user's data folder: task `payload-swing@plugin`",
+    ] {
+        assert!(said.contains(from), "{said}");
+    }
     assert!(place.read("scene.xml").contains("payload"));
     // The same file twice is one plugin.
     let named = place.path(&format!("listed/swing{suffix}"));

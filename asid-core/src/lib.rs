@@ -16,6 +16,7 @@ pub mod environment;
 pub mod episode;
 pub mod error;
 pub mod explore;
+pub mod guard;
 pub mod identify;
 pub mod layout;
 pub mod log;
@@ -34,6 +35,7 @@ pub mod simulator;
 pub mod solve;
 pub mod target;
 pub mod task;
+pub mod toml_text;
 pub mod tracker;
 
 // What public items speak of, so that an author need not match versions.

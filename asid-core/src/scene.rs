@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
 use crate::error::{Error, Result};
+use crate::guard::guarded;
 
 /// Deepest chain of `<include>` that is followed.
 const MAX_INCLUDE_DEPTH: usize = 8;
@@ -88,6 +89,15 @@ impl Scene {
                 message: format!("the root element is <{root}>, but MJCF begins with <mujoco>"),
             });
         }
+        if let Some((node, given)) = wrong_eulerseq(&document) {
+            return Err(Error::Scene {
+                scene: name,
+                message: format!(
+                    "line {}: eulerseq=\"{given}\" is not three of the letters x, y, z, X, Y and Z",
+                    document.text_pos_at(node.range().start).row
+                ),
+            });
+        }
         Ok(Self {
             name,
             xml,
@@ -135,9 +145,10 @@ impl Scene {
             return Ok(Arc::clone(parsed));
         }
         let base = self.directory.clone().unwrap_or_default();
-        let parsed = mjcf_rs::Model::from_str(&self.xml, &base).map_err(|e| Error::Scene {
+        let parse = || mjcf_rs::Model::from_str(&self.xml, &base).map_err(|e| e.to_string());
+        let parsed = guarded("an MJCF document", parse).map_err(|message| Error::Scene {
             scene: self.name.clone(),
-            message: one_line(&e.to_string()),
+            message: one_line(&message),
         })?;
         Ok(Arc::clone(
             self.description.get_or_init(|| Arc::new(parsed)),
@@ -226,11 +237,76 @@ fn read(path: &Path) -> Result<String> {
     })
 }
 
+/// An order of Euler's axes that is none, which parsers take for three letters.
+fn wrong_eulerseq<'a>(
+    document: &'a roxmltree::Document<'_>,
+) -> Option<(roxmltree::Node<'a, 'a>, &'a str)> {
+    let mut given = document
+        .descendants()
+        .filter_map(|n| Some((n, n.attribute("eulerseq")?)));
+    let axes = |text: &str| text.len() == 3 && text.chars().all(|c| "xyzXYZ".contains(c));
+    given.find(|(_, text)| !axes(text))
+}
+
+/// Levels of elements that a document may have: robots have some 30, and ropes of 200 bodies fit. Parsers and
+/// engines follow them by recursion, at some kB of the stack a level.
+const MAX_LEVELS: usize = 256;
+
 fn parse<'a>(name: &str, xml: &'a str) -> Result<roxmltree::Document<'a>> {
+    if levels(xml) > MAX_LEVELS {
+        return Err(Error::Scene {
+            scene: name.to_owned(),
+            message: format!(
+                "its elements are nested deeper than {MAX_LEVELS}: is an end tag missing?"
+            ),
+        });
+    }
     roxmltree::Document::parse(xml).map_err(|e| Error::Scene {
         scene: name.to_owned(),
         message: format!("is not well-formed XML: {}", one_line(&e.to_string())),
     })
+}
+
+/// The most elements of a document that are open at a time, found without recursion; of what is no XML any number.
+fn levels(xml: &str) -> usize {
+    let (mut open, mut most) = (0_usize, 0);
+    let mut rest = xml;
+    while let Some(at) = rest.find('<') {
+        rest = &rest[at..];
+        let passed = |end: &str| rest.find(end).map_or("", |i| &rest[i + end.len()..]);
+        rest = if rest.starts_with("<!--") {
+            passed("-->")
+        } else if rest.starts_with("<![CDATA[") {
+            passed("]]>")
+        } else if rest.starts_with("<?") {
+            passed("?>")
+        } else if rest.starts_with("</") {
+            open = open.saturating_sub(1);
+            passed(">")
+        } else {
+            let end = end_of_tag(rest);
+            if !rest[..end].ends_with('/') {
+                open += 1;
+                most = most.max(open);
+            }
+            &rest[end..]
+        };
+    }
+    most
+}
+
+/// Where the `>` of a tag is, outside of quotes; the end of the text where it has none.
+fn end_of_tag(tag: &str) -> usize {
+    let mut quote = None;
+    for (i, b) in tag.bytes().enumerate() {
+        match (quote, b) {
+            (None, b'>') => return i,
+            (None, b'"' | b'\'') => quote = Some(b),
+            (Some(q), b) if q == b => quote = None,
+            _ => {}
+        }
+    }
+    tag.len()
 }
 
 /// Replaces every `<include file="…"/>` by the children of that file's root; `left` is how many more
@@ -336,6 +412,50 @@ mod tests {
         )
         .unwrap_err();
         assert!(error.to_string().contains("cycle"), "{error}");
+    }
+
+    /// Symptom: a document of 260 kB ended the process by an overflow of the stack. Cause: 25 000 elements inside of
+    /// each other, which the parser of XML follows by recursion.
+    #[test]
+    fn elements_that_are_nested_without_end_are_refused() {
+        let nested = |n: usize| {
+            let (open, close) = ("<body>".repeat(n), "</body>".repeat(n));
+            format!("<mujoco><worldbody>{open}{close}</worldbody></mujoco>")
+        };
+        for xml in [nested(40_000), "<a>".repeat(100_000)] {
+            let error = Scene::from_xml("deep", &xml, &[]).unwrap_err().to_string();
+            assert!(error.contains("nested deeper than 256"), "{error}");
+        }
+        assert!(Scene::from_xml("deep", &nested(MAX_LEVELS - 2), &[]).is_ok());
+    }
+
+    /// Symptom: "index out of bounds: the len is 3 but the index is 3" from the parser of MJCF. Cause: a fourth axis.
+    #[test]
+    fn an_order_of_four_euler_axes_is_refused() {
+        let xml = |axes: &str| {
+            format!(
+                "<mujoco>\n<compiler eulerseq='{axes}'/><worldbody><body euler='0 1 2'/></worldbody></mujoco>"
+            )
+        };
+        for axes in ["xyzx", "xy", "abc", "éx"] {
+            let error = Scene::from_xml("s", &xml(axes), &[])
+                .unwrap_err()
+                .to_string();
+            assert!(error.contains("line 2: eulerseq"), "{error}");
+        }
+        assert!(
+            Scene::from_xml("s", &xml("XYZ"), &[])
+                .unwrap()
+                .description()
+                .is_ok()
+        );
+    }
+
+    #[test]
+    fn levels_are_those_of_elements_alone() {
+        let xml = "<?xml version='1.0'?><a b='>'><!-- <c><d> --><e f=\"/>\"/><g>x</g><![CDATA[<h><i>]]></a>";
+        assert_eq!(levels(xml), 2);
+        assert_eq!(levels("<a><b"), 2);
     }
 
     #[test]

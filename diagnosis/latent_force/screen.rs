@@ -193,6 +193,7 @@ mod tests {
             forms: forms.collect(),
             center: vec![0.0; x.ncols()],
             bounds: vec![[-1.0, 1.0]; x.ncols()],
+            complete: true,
         };
         let sum = Regression {
             log_likelihood: 0.0,

@@ -277,11 +277,11 @@ fn write(
     let resolved = Resolved {
         backend: engines.iter().map(|e| e.entry.name.to_owned()).collect(),
         check,
-        plugins: plugins::used(
+        plugins: plugins::recorded(plugins::used(
             &(engines.iter())
                 .map(|e| plugins::file_of::<BackendEntry>(e.entry.name))
                 .collect::<Vec<_>>(),
-        ),
+        )),
     };
     out.write(|folder| {
         write_json(&folder.join("result.json"), result)?;

@@ -9,6 +9,7 @@ use asid_core::registry::{TaskEntry, find};
 
 use super::machine;
 use super::options::Common;
+use super::output::create_text;
 use super::settings::difficulty;
 
 /// Arguments of `export`.
@@ -83,7 +84,6 @@ pub fn create(path: &Path, text: &str) -> Result<()> {
             _ => format!("cannot be written: {e}"),
         },
     };
-    let mut file = std::fs::File::create_new(path).map_err(failed)?;
-    file.write_all(text.as_bytes()).map_err(failed)?;
+    create_text(path, text).map_err(failed)?;
     Ok(())
 }

@@ -113,8 +113,18 @@ pub fn of_panic(payload: &(dyn std::any::Any + Send)) -> String {
     format!("internal error: {said}; please report it with the command line")
 }
 
+/// A text as one line. Names come from files that others wrote: characters that would steer the terminal are spelt out.
 fn one_line(text: &str) -> String {
-    text.split_whitespace().collect::<Vec<_>>().join(" ")
+    let line = text.split_whitespace().collect::<Vec<_>>().join(" ");
+    let mut shown = String::with_capacity(line.len());
+    for c in line.chars() {
+        if c.is_control() {
+            shown.extend(c.escape_unicode());
+        } else {
+            shown.push(c);
+        }
+    }
+    shown
 }
 
 fn tell(line: &str) {
@@ -132,6 +142,15 @@ mod tests {
         assert_eq!(
             usage_line(text),
             "unexpected argument '--sed' found; tip: a similar argument exists: '--seed'; see --help"
+        );
+    }
+
+    /// Symptom: a log with a column named by an escape sequence changed the colour of the terminal that told of it.
+    #[test]
+    fn names_from_files_do_not_steer_the_terminal() {
+        assert_eq!(
+            one_line("column `\u{1b}[31m`\nis é"),
+            "column `\\u{1b}[31m` is é"
         );
     }
 

@@ -20,6 +20,7 @@ mod options;
 mod output;
 mod plugins;
 mod progress;
+pub mod readers;
 mod report;
 mod result;
 mod run;
@@ -49,6 +50,9 @@ struct Cli {
     /// Load a plugin, a shared library (repeatable); `asid list` shows what it brings
     #[arg(long, global = true, value_name = "FILE")]
     plugin: Vec<PathBuf>,
+    /// Load the plugins that the file of --config names: their code runs as you
+    #[arg(long, global = true)]
+    trust_plugins: bool,
     #[command(subcommand)]
     command: Command,
 }
@@ -157,11 +161,16 @@ fn leading_plugins(arguments: &mut Vec<OsString>) -> Vec<PathBuf> {
 }
 
 fn run_command(cli: &Cli, mut named: Vec<PathBuf>) -> Result<()> {
-    named.extend(plugins::of_config(cli.command.config())?);
-    let refused = plugins::load(&named)?;
+    let of_config = plugins::of_config(cli.command.config(), &named, cli.trust_plugins)?;
+    named.extend(of_config);
+    let plugins::Searched { found, refused } = plugins::load(&named)?;
     match &cli.command {
+        // Their rows say it.
         Command::List(_) | Command::Doctor(_) => {}
-        _ => refused.iter().for_each(|r| failure::warn(&r.why)),
+        _ => {
+            found.iter().for_each(|line| failure::note(line));
+            refused.iter().for_each(|r| failure::warn(&r.why));
+        }
     }
     match &cli.command {
         Command::List(arguments) => list::list(arguments, &refused),

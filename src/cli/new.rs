@@ -9,6 +9,8 @@ use asid_core::registry::{self, BackendEntry, Entry, ExplorerEntry, Origin, Task
 use asid_effects::EffectEntry;
 use clap::builder::{PossibleValue, PossibleValuesParser};
 
+use super::output::{OutFolder, staging};
+
 /// Arguments of `new`.
 #[derive(clap::Args)]
 pub struct Arguments {
@@ -220,15 +222,15 @@ pub fn new(arguments: &Arguments) -> Result<()> {
         .into());
     }
     prepare(dir)?;
-    for (file, text) in kind.files {
-        let path = dir.join(file);
-        let folder = path.parent().unwrap_or(dir);
-        // Nothing is there, but something may have come meanwhile.
-        let written = std::fs::create_dir_all(folder)
-            .and_then(|()| std::fs::File::create_new(&path))
-            .and_then(|mut f| f.write_all(kind.text(text, &name).as_bytes()));
-        written.map_err(|e| failed(&path, &e))?;
-    }
+    OutFolder::claim(Some(dir), "plugin")?.write(|staging| {
+        for (file, text) in kind.files {
+            let path = staging.join(file);
+            std::fs::create_dir_all(path.parent().unwrap_or(staging))
+                .and_then(|()| std::fs::write(&path, kind.text(text, &name)))
+                .map_err(|e| failed(&dir.join(file), &e))?;
+        }
+        Ok(())
+    })?;
     let names: Vec<&str> = kind.files.iter().map(|(file, _)| *file).collect();
     let mut out = std::io::stdout().lock();
     writeln!(out, "{}: {}", dir.display(), names.join(", "))?;
@@ -262,6 +264,7 @@ fn prepare(dir: &Path) -> Result<()> {
         path: dir.to_path_buf(),
         message: message.to_owned(),
     };
+    staging::clear(dir);
     match std::fs::read_dir(dir) {
         Ok(mut entries) => match entries.next() {
             None => Ok(()),

@@ -4,12 +4,19 @@
 //! their own, which takes its final name when all are there. A folder that exists
 //! already (it may be the root of a volume, which nothing can be renamed onto) gets
 //! the files one by one, `result.json` last.
+//!
+//! What a call that was killed leaves is taken away by the next one with the same `--out`.
 
 use std::cell::RefCell;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use asid_core::Error;
+
+use staging::Staging;
+
+pub mod staging;
 
 /// Where results go when `--out` is not given.
 const RUNS: &str = "runs";
@@ -69,6 +76,7 @@ impl OutFolder {
             return Err(file(Path::new("--out"), "names no folder"));
         }
         if path.is_dir() {
+            staging::clear(&path);
             let entries = std::fs::read_dir(&path).map_err(|e| file(&path, e.to_string()))?;
             let mut names = entries.filter_map(|e| Some(e.ok()?.file_name()));
             if names.any(|n| kept.is_none_or(|kept| n != kept)) {
@@ -94,9 +102,8 @@ impl OutFolder {
             })
             .find(|p| p.exists())
             .unwrap_or(Path::new("."));
-        let probe = base.join(format!(".asid-{}", std::process::id()));
-        std::fs::create_dir(&probe).map_err(|e| file(&path, format!("cannot be written: {e}")))?;
-        std::fs::remove_dir(&probe).map_err(|e| file(&probe, e.to_string()))?;
+        staging::clear(base);
+        Staging::new_in(base).map_err(|e| file(&path, format!("cannot be written: {e}")))?;
         Ok(Self {
             path: RefCell::new(path),
             stem,
@@ -112,18 +119,15 @@ impl OutFolder {
             .filter(|p| !p.as_os_str().is_empty())
             .unwrap_or(Path::new("."));
         std::fs::create_dir_all(beside).map_err(|e| failed(beside, &e))?;
-        let staging = beside.join(format!(".asid-{}", std::process::id()));
-        std::fs::create_dir(&staging).map_err(|e| failed(&staging, &e))?;
-        let done = fill(&staging).and_then(|()| {
+        let staging = Staging::new_in(beside).map_err(|e| failed(beside, &e))?;
+        let content = staging.content();
+        let done = fill(&content).and_then(|()| {
             if exists {
                 move_into(&staging, &path)
             } else {
-                self.name(&staging)
+                self.name(&content)
             }
         });
-        if done.is_err() {
-            let _ = std::fs::remove_dir_all(&staging);
-        }
         // Whatever went wrong, the work had been done: the call was not at fault.
         done.map_err(|e| Error::Failed(format!("{e:#}")).into())
     }
@@ -149,10 +153,11 @@ impl OutFolder {
     }
 }
 
-/// Moves the files of one folder into another, the result last.
-fn move_into(from: &Path, to: &Path) -> Result<()> {
-    let entries = std::fs::read_dir(from).map_err(|e| failed(to, &e))?;
-    let mut names: Vec<_> = entries.filter_map(|e| Some(e.ok()?.file_name())).collect();
+/// Moves the files into a folder that was there before, the result last.
+fn move_into(staging: &Staging, to: &Path) -> Result<()> {
+    let entries = std::fs::read_dir(staging.content()).map_err(|e| failed(to, &e))?;
+    let names = entries.filter_map(|e| e.ok()?.file_name().into_string().ok());
+    let mut names: Vec<String> = names.collect();
     names.sort_by_key(|n| n == RESULT);
     if let Some(taken) = names.iter().map(|n| to.join(n)).find(|p| p.exists()) {
         return Err(Error::Failed(format!(
@@ -161,11 +166,7 @@ fn move_into(from: &Path, to: &Path) -> Result<()> {
         ))
         .into());
     }
-    for name in names {
-        std::fs::rename(from.join(&name), to.join(&name))
-            .map_err(|e| failed(&to.join(&name), &e))?;
-    }
-    std::fs::remove_dir(from).map_err(|e| failed(from, &e))
+    staging.move_into(to, &names).map_err(|e| failed(to, &e))
 }
 
 /// Writes a text file.
@@ -176,4 +177,21 @@ pub fn write_text(path: &Path, text: &str) -> Result<()> {
 /// Writes a value as indented JSON.
 pub fn write_json(path: &Path, value: &impl serde::Serialize) -> Result<()> {
     write_text(path, &(serde_json::to_string_pretty(value)? + "\n"))
+}
+
+/// Writes a file that must not be there yet, whole or not at all.
+pub fn create_text(path: &Path, text: &str) -> std::io::Result<()> {
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
+    let folder = folder.unwrap_or(Path::new("."));
+    staging::clear(folder);
+    let staging = Staging::new_in(folder)?;
+    let written = staging.content().join("text");
+    std::fs::write(&written, text)?;
+    // A link gives a name only where there is none yet, a rename takes any.
+    match std::fs::hard_link(&written, path) {
+        Err(e) if e.kind() != ErrorKind::AlreadyExists && !path.exists() => {
+            std::fs::rename(&written, path)
+        }
+        linked => linked,
+    }
 }

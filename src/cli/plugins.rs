@@ -4,8 +4,10 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
 use anyhow::Result;
+use asid_core::Error;
 use asid_core::registry::{Entry, Origin, find};
 use asid_plugin::search;
+use sha2::{Digest as _, Sha256};
 
 /// A plugin that was found in a folder and cannot be used.
 #[derive(Clone, Debug)]
@@ -16,14 +18,22 @@ pub struct Refused {
     pub why: String,
 }
 
+/// What the folders gave that are searched.
+pub struct Searched {
+    /// A line for each plugin that was loaded.
+    pub found: Vec<String>,
+    /// Those that cannot be used.
+    pub refused: Vec<Refused>,
+}
+
 /// Files that were named in this call, without links in their paths, in order.
 static GIVEN: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
 /// Loads the plugins that are named, then those of the folders that are searched.
 ///
 /// # Errors
-/// When one that is named cannot be used. Those found in folders are handed back.
-pub fn load(named: &[PathBuf]) -> Result<Vec<Refused>> {
+/// When one that is named cannot be used. Those found in folders that cannot are handed back.
+pub fn load(named: &[PathBuf]) -> Result<Searched> {
     for path in named {
         let loaded = asid_plugin::load(path)?;
         let mut given = GIVEN.lock().unwrap_or_else(PoisonError::into_inner);
@@ -31,7 +41,7 @@ pub fn load(named: &[PathBuf]) -> Result<Vec<Refused>> {
             given.push(loaded.file.to_owned());
         }
     }
-    let mut refused = Vec::new();
+    let (mut found, mut refused) = (Vec::new(), Vec::new());
     for place in search::places() {
         let files = search::files(&place).unwrap_or_else(|error| {
             refused.push(Refused {
@@ -41,21 +51,142 @@ pub fn load(named: &[PathBuf]) -> Result<Vec<Refused>> {
             Vec::new()
         });
         for path in files {
-            if let Err(error) = asid_plugin::load(&path) {
-                let why = error.to_string();
-                refused.push(Refused { path, why });
+            let before = asid_plugin::loaded().len();
+            match asid_plugin::load(&path) {
+                Ok(loaded) if asid_plugin::loaded().len() > before => {
+                    found.push(said(&loaded, place.from));
+                }
+                Ok(_) => {}
+                Err(error) => {
+                    let why = error.to_string();
+                    refused.push(Refused { path, why });
+                }
             }
         }
     }
-    Ok(refused)
+    Ok(Searched { found, refused })
 }
 
-/// Plugins that a configuration names.
+/// Plugins that a configuration names. Their code would run, so the call must trust them: by `--trust-plugins`, or
+/// by naming the file itself.
 ///
 /// # Errors
-/// When the file cannot be read or its `plugins` are no list of files.
-pub fn of_config(path: Option<&Path>) -> Result<Vec<PathBuf>> {
-    path.map_or_else(|| Ok(Vec::new()), super::settings::plugins)
+/// When the configuration cannot be read, its plugins are not trusted, or one is not the file that it records.
+pub fn of_config(path: Option<&Path>, named: &[PathBuf], trusted: bool) -> Result<Vec<PathBuf>> {
+    let Some(config) = path else {
+        return Ok(Vec::new());
+    };
+    let recorded: Vec<Recorded> = super::settings::plugins(config)?
+        .iter()
+        .map(|text| Recorded::of(text))
+        .collect();
+    let is_named = |file: &Path| named.iter().any(|n| real(n) == real(file));
+    let mut strange = recorded
+        .iter()
+        .filter(|r| !trusted && !is_named(&r.file))
+        .peekable();
+    if strange.peek().is_some() {
+        let files: Vec<String> = strange.map(|r| r.file.display().to_string()).collect();
+        return Err(Error::File {
+            path: config.to_owned(),
+            message: format!(
+                "names plugins, whose code would run: {}; if you trust them, add --trust-plugins",
+                files.join(", ")
+            ),
+        }
+        .into());
+    }
+    for plugin in &recorded {
+        plugin.check(config)?;
+    }
+    Ok(recorded.into_iter().map(|r| r.file).collect())
+}
+
+/// What leads from a plugin's file to its hash in a configuration: `FILE#sha256=HEX`.
+const HASH: &str = "#sha256=";
+
+/// A plugin as a configuration records it.
+struct Recorded {
+    file: PathBuf,
+    /// SHA-256 of the file, in hexadecimal; files that people write may leave it out.
+    hash: Option<String>,
+}
+
+impl Recorded {
+    fn of(text: &str) -> Self {
+        match text.rsplit_once(HASH) {
+            Some((file, hash)) => Self {
+                file: file.into(),
+                hash: Some(hash.to_lowercase()),
+            },
+            None => Self {
+                file: text.into(),
+                hash: None,
+            },
+        }
+    }
+
+    /// Whether the file is the one that was recorded; one that is not there is told of where it is loaded.
+    fn check(&self, config: &Path) -> Result<()> {
+        let (Some(wanted), Some(found)) = (&self.hash, sha256(&self.file)) else {
+            return Ok(());
+        };
+        if found == *wanted {
+            return Ok(());
+        }
+        Err(Error::Plugin {
+            path: self.file.clone(),
+            message: format!(
+                "is not the library that {} was made with: its SHA-256 is {found}, and {wanted} is recorded; \
+                 take that library, or remove `{HASH}…` there to use this one",
+                config.display()
+            ),
+        }
+        .into())
+    }
+}
+
+/// A path without links in it, where it exists.
+fn real(path: &Path) -> PathBuf {
+    std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned())
+}
+
+/// SHA-256 of a file in hexadecimal; none where it cannot be read.
+fn sha256(file: &Path) -> Option<String> {
+    use std::fmt::Write as _;
+    let mut hash = Sha256::new();
+    std::io::copy(&mut std::fs::File::open(file).ok()?, &mut hash).ok()?;
+    Some(
+        hash.finalize()
+            .iter()
+            .fold(String::new(), |mut text, byte| {
+                let _ = write!(text, "{byte:02x}");
+                text
+            }),
+    )
+}
+
+/// Files with their hashes, as a result's configuration records them.
+pub fn recorded(files: Vec<PathBuf>) -> Vec<PathBuf> {
+    let with_hash = |file: PathBuf| match sha256(&file) {
+        Some(hash) => PathBuf::from(format!("{}{HASH}{hash}", file.display())),
+        None => file,
+    };
+    files.into_iter().map(with_hash).collect()
+}
+
+/// What a plugin brought that nobody named in this call, in one line.
+fn said(loaded: &asid_plugin::Loaded, from: &str) -> String {
+    let parts: Vec<String> = loaded
+        .parts
+        .iter()
+        .map(|p| format!("{} `{}`", p.kind, p.name))
+        .collect();
+    format!(
+        "loaded plugin {} from {from}: {}",
+        loaded.file.display(),
+        parts.join(", ")
+    )
 }
 
 /// Files that were named in this call, and those that registered what it uses.
@@ -74,5 +205,53 @@ pub fn file_of<E: Entry>(name: &str) -> Option<&'static Path> {
     match find::<E>(name).ok()?.origin() {
         Origin::Loaded(file) => Some(file),
         Origin::Linked(_) => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_recorded_library_is_read_back_with_its_hash() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("lib#1.so");
+        std::fs::write(&file, "abc").unwrap();
+        let text = recorded(vec![file.clone()])[0].display().to_string();
+        let read = Recorded::of(&text);
+        assert_eq!(read.file, file);
+        // FIPS 180-2, appendix B.1.
+        let hash = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
+        assert_eq!(read.hash.as_deref(), Some(hash));
+        assert!(read.check(Path::new("config.toml")).is_ok());
+        std::fs::write(&file, "abd").unwrap();
+        let error = read
+            .check(Path::new("config.toml"))
+            .unwrap_err()
+            .to_string();
+        assert!(
+            error.contains("is not the library that config.toml was made with"),
+            "{error}"
+        );
+        assert!(Recorded::of("lib#1.so").hash.is_none());
+    }
+
+    #[test]
+    fn plugins_of_a_configuration_must_be_trusted_or_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let (config, library) = (folder.path().join("c.toml"), folder.path().join("a.so"));
+        std::fs::write(&library, "").unwrap();
+        std::fs::write(&config, format!("plugins = ['{}']", library.display())).unwrap();
+        let error = of_config(Some(&config), &[], false)
+            .unwrap_err()
+            .to_string();
+        assert!(
+            error.contains("a.so; if you trust them, add --trust-plugins"),
+            "{error}"
+        );
+        for (named, trusted) in [(vec![], true), (vec![library.clone()], false)] {
+            let files = of_config(Some(&config), &named, trusted).unwrap();
+            assert_eq!(files, std::slice::from_ref(&library));
+        }
     }
 }

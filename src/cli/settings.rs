@@ -13,7 +13,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::options::{Algorithms, Common, Worlds};
-use super::plugins::{file_of, used};
+use super::plugins::{file_of, recorded, used};
 use component::{Component, component};
 use expected::ExpectedConfig;
 pub use real::RealConfig;
@@ -87,7 +87,7 @@ pub struct Config {
     pub condition: Option<String>,
     /// Seed.
     pub seed: u64,
-    /// Files of the plugins that it needs.
+    /// Files of the plugins that it needs, each with its hash: `FILE#sha256=HEX`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub plugins: Vec<PathBuf>,
     /// Start pose of the object by coordinate, for a stage that is told it.
@@ -297,7 +297,7 @@ impl Config {
             let names = model.effects.iter().map(|e| &e.name);
             files.extend(names.map(|name| file_of::<EffectEntry>(name)));
         }
-        used(&files)
+        recorded(used(&files))
     }
 }
 
@@ -327,12 +327,12 @@ pub fn check_condition(all: &[Condition], name: &str) -> Result<()> {
 }
 
 /// Plugins that a configuration file names.
-pub fn plugins(path: &Path) -> Result<Vec<PathBuf>> {
+pub fn plugins(path: &Path) -> Result<Vec<String>> {
     match read_table(path)?.get("plugins") {
         None => Ok(Vec::new()),
         Some(value) => value
             .as_array()
-            .and_then(|a| a.iter().map(|v| v.as_str().map(PathBuf::from)).collect())
+            .and_then(|a| a.iter().map(|v| v.as_str().map(str::to_owned)).collect())
             .ok_or_else(|| wrong("plugins", format!("{value} is not a list of files"))),
     }
 }

@@ -198,13 +198,7 @@ fn belief(session: &Session, from: &Path) -> Result<Posterior> {
         path: path.clone(),
         message,
     };
-    let text = std::fs::read_to_string(&path).map_err(|e| {
-        fail(format!(
-            "{e}; --posterior takes a folder of `asid identify` or `asid run`, or `prior`"
-        ))
-    })?;
-    let posterior: Posterior =
-        serde_json::from_str(&text).map_err(|e| fail(format!("is not a posterior: {e}")))?;
+    let posterior = read_posterior(&path)?;
     if let Some(task) = task_of(from)
         && task != session.config.task
     {
@@ -225,6 +219,22 @@ fn belief(session: &Session, from: &Path) -> Result<Posterior> {
         ))
         .into());
     }
+    Ok(posterior)
+}
+
+/// Reads a posterior and checks that it is a distribution.
+pub fn read_posterior(path: &Path) -> Result<Posterior> {
+    let fail = |message: String| Error::File {
+        path: path.to_owned(),
+        message,
+    };
+    let text = std::fs::read_to_string(path).map_err(|e| {
+        fail(format!(
+            "{e}; --posterior takes a folder of `asid identify` or `asid run`, or `prior`"
+        ))
+    })?;
+    let posterior: Posterior =
+        serde_json::from_str(&text).map_err(|e| fail(format!("is not a posterior: {e}")))?;
     check(&posterior).map_err(fail)?;
     Ok(posterior)
 }

@@ -8,6 +8,7 @@
 
 mod bench;
 mod environment;
+mod fuzz;
 mod library;
 mod lint;
 mod miri;
@@ -41,6 +42,10 @@ Usage: cargo xtask <subcommand>
   bench --peers [--quick] [--out FILE.json] [--markdown FILE.md]
                                against Stable-Baselines3 and mujoco.sysid in a virtual environment of
                                its own in the target folder (2.3 GB of packages)
+  fuzz [READER…] [--inputs N] [--seed S] [--minutes M]
+                               damaged files for every reader: 10^6 each; docs/reliability.md
+  fuzz repeat READER FILE      one file, such as a finding
+  kill [COMMAND…] [--times N]  commands that write, killed at random moments and called again
 
 A library that you have already wins: set MUJOCO_DYNAMIC_LINK_DIR to the folder of libmujoco.so,
 LIBTORCH to the folder that holds lib/ and include/, or LIBTORCH_USE_PYTORCH=1.
@@ -73,12 +78,14 @@ fn run(arguments: &[String]) -> Result<bool> {
         "same" => same::run(rest),
         "slurm" => slurm::run(rest),
         "bench" => bench::run(rest),
+        "fuzz" => fuzz::run("read", rest),
+        "kill" => fuzz::run("kill", rest),
         "help" | "--help" | "-h" => {
             println!("{HELP}");
             Ok(true)
         }
         other => bail!(
-            "unknown subcommand `{other}`; known: setup, lint, test, wheel, python, miri, slurm, bench, help"
+            "unknown subcommand `{other}`; known: setup, lint, test, wheel, python, miri, slurm, bench, fuzz, kill, help"
         ),
     }
 }

@@ -8,11 +8,20 @@ use parquet::record::Field;
 
 use super::{ColumnMapping, LogNotes, Reader};
 use crate::episode::Episode;
+use crate::guard::guarded;
 use crate::layout::Layout;
 use crate::scene::one_line;
 
 /// Reads a Parquet file.
 pub(super) fn read(
+    path: &Path,
+    layout: &Layout,
+    mappings: &[ColumnMapping],
+) -> Result<(Episode, LogNotes), String> {
+    guarded("a Parquet file", || read_rows(path, layout, mappings))
+}
+
+fn read_rows(
     path: &Path,
     layout: &Layout,
     mappings: &[ColumnMapping],

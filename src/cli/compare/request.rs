@@ -13,7 +13,7 @@ use asid_effects::EffectSpec;
 
 use super::Arguments;
 use crate::cli::list;
-use crate::cli::plugins::{file_of, used};
+use crate::cli::plugins::{file_of, recorded, used};
 use crate::cli::settings::{PRIOR, check_condition, default_backend, read_table, set};
 
 fn wrong(key: &str, message: impl Into<String>) -> anyhow::Error {
@@ -100,7 +100,7 @@ fn plugin_files(plan: &Plan) -> Vec<toml::Value> {
             file_of::<SolverEntry>(&method.solver),
         ]);
     }
-    let files = used(&parts).into_iter();
+    let files = recorded(used(&parts)).into_iter();
     files.map(|f| f.display().to_string().into()).collect()
 }
 

@@ -14,6 +14,7 @@ use asid_effects::refined_model::RefinedModel;
 use serde::{Deserialize, Serialize};
 
 use super::super::model::{self, Needs};
+use super::super::plugins::{file_of, recorded, used};
 use super::super::session::backend;
 use super::super::settings::{self, difficulty};
 use super::Arguments;
@@ -194,6 +195,8 @@ impl Config {
             let levels = toml::Table::try_from(&config.difficulty)?;
             of_run.insert("difficulty".into(), levels.into());
         }
+        // Those that the file names are among those that were loaded.
+        config.plugins = recorded(used(&[file_of::<BackendEntry>(&config.backend)]));
         config.runs = arguments.runs.or(config.runs);
         config.experiments = arguments.experiments.or(config.experiments);
         config.seeds = arguments.seeds.or(config.seeds);

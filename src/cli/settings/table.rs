@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use anyhow::Result;
-use asid_core::Error;
+use asid_core::{Error, toml_text};
 
 pub fn wrong(key: &str, message: impl Into<String>) -> anyhow::Error {
     Error::Config {
@@ -20,7 +20,7 @@ pub fn read_table(path: &Path) -> Result<toml::Table> {
         message,
     };
     let text = std::fs::read_to_string(path).map_err(|e| file(e.to_string()))?;
-    Ok(text.parse().map_err(|e: toml::de::Error| {
+    Ok(toml_text::read(&text).map_err(|e| {
         let line = e.span().map_or(0, |s| {
             text[..s.start.min(text.len())].lines().count().max(1)
         });
@@ -33,8 +33,7 @@ pub fn set(table: &mut toml::Table, assignment: &str) -> Result<()> {
     let (key, value) = assignment
         .split_once('=')
         .ok_or_else(|| wrong("--set", format!("`{assignment}` is not KEY=VALUE")))?;
-    let value = format!("x = {value}")
-        .parse::<toml::Table>()
+    let value = toml_text::read::<toml::Table>(&format!("x = {value}"))
         .ok()
         .and_then(|mut t| t.remove("x"))
         .unwrap_or_else(|| toml::Value::String(value.trim().to_owned()));

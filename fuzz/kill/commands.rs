@@ -1,0 +1,251 @@
+//! The commands that write, with settings that make them quick, and what they need.
+
+use std::path::Path;
+use std::sync::OnceLock;
+
+use anyhow::{Context, Result, ensure};
+
+use crate::corpus::root;
+
+/// A command.
+pub struct Case {
+    /// Name in the table.
+    pub name: &'static str,
+    /// Its arguments, in a folder of its own.
+    pub arguments: &'static [&'static str],
+    /// What it writes.
+    pub out: &'static str,
+    /// Whether that is a folder that may be there already, empty.
+    pub folder: bool,
+    /// Whether it may be called again where its result is whole.
+    pub repeats: bool,
+    /// Writes into the folder what the command reads; the program is at the second path.
+    pub prepare: fn(&Path, &Path) -> Result<()>,
+}
+
+/// Commands that write files. `conformance`, `withheld` and the figures of `compare` write by the same code as `run` and `compare`.
+pub const COMMANDS: &[Case] = &[
+    Case {
+        name: "run",
+        arguments: &[
+            "run",
+            "rod-balancing",
+            "--set",
+            "condition=left",
+            "--quiet",
+            "--out",
+            "out",
+            "--set",
+            "explorer.iterations=1",
+            "--set",
+            "explorer.population=4",
+            "--set",
+            "explorer.prior_samples=1",
+            "--set",
+            "identifier.iterations=1",
+            "--set",
+            "identifier.population=8",
+            "--set",
+            "identifier.sampling.rounds=1",
+            "--set",
+            "identifier.sampling.draws=8",
+            "--set",
+            "solver.iterations=1",
+            "--set",
+            "solver.population=2",
+            "--set",
+            "solver.belief_samples=1",
+            "--set",
+            "expected.rounds=0",
+        ],
+        out: "out",
+        folder: true,
+        repeats: false,
+        prepare: nothing,
+    },
+    Case {
+        name: "explore",
+        arguments: &[
+            "explore",
+            "study",
+            "--quiet",
+            "--seconds",
+            "1",
+            "--out",
+            "out",
+            "--limit-position",
+            "pan:-1:1",
+            "--limit-position",
+            "gripper:0:0.08",
+            "--limit-speed",
+            "pan:4",
+            "--limit-speed",
+            "gripper:1",
+            "--set",
+            "design.iterations=1",
+            "--set",
+            "design.population=4",
+        ],
+        out: "out",
+        folder: true,
+        repeats: false,
+        prepare: study,
+    },
+    Case {
+        name: "identify",
+        arguments: &["identify", "study", "--quiet", "--out", "out"],
+        out: "out",
+        folder: true,
+        repeats: false,
+        prepare: study,
+    },
+    Case {
+        name: "solve",
+        arguments: &[
+            "solve",
+            "rod-balancing",
+            "--posterior",
+            "prior",
+            "--quiet",
+            "--out",
+            "out",
+            "--set",
+            "solver.iterations=1",
+            "--set",
+            "solver.population=2",
+            "--set",
+            "solver.belief_samples=1",
+        ],
+        out: "out",
+        folder: true,
+        repeats: false,
+        prepare: nothing,
+    },
+    Case {
+        name: "compare",
+        arguments: &[
+            "compare",
+            "rod-balancing",
+            "--method",
+            "dr",
+            "--condition",
+            "left",
+            "--seeds",
+            "2",
+            "--quiet",
+            "--out",
+            "out",
+            "--set",
+            "solver.iterations=1",
+            "--set",
+            "solver.population=2",
+            "--set",
+            "solver.belief_samples=1",
+        ],
+        out: "out",
+        folder: true,
+        repeats: true,
+        prepare: nothing,
+    },
+    Case {
+        name: "diagnose",
+        arguments: &["diagnose", "study", "--quiet", "--out", "out"],
+        out: "out",
+        folder: true,
+        repeats: false,
+        prepare: study,
+    },
+    Case {
+        name: "import",
+        arguments: &[
+            "import",
+            "study/train_0.csv",
+            "study/test_0.csv",
+            "--model",
+            "study/model.xml",
+            "--out",
+            "out",
+        ],
+        out: "out",
+        folder: true,
+        repeats: false,
+        prepare: study,
+    },
+    Case {
+        name: "export-log",
+        arguments: &["export-log", "study", "--out", "out"],
+        out: "out",
+        folder: true,
+        repeats: false,
+        prepare: study,
+    },
+    Case {
+        name: "export",
+        arguments: &["export", "rod-balancing", "--mjcf", "scene.xml"],
+        out: "scene.xml",
+        folder: false,
+        repeats: false,
+        prepare: nothing,
+    },
+    Case {
+        name: "report",
+        arguments: &["report", "diagnosis"],
+        out: "diagnosis",
+        folder: false,
+        repeats: true,
+        prepare: diagnosis,
+    },
+    Case {
+        name: "new",
+        arguments: &["new", "task", "my-task"],
+        out: "my-task",
+        folder: true,
+        repeats: false,
+        prepare: nothing,
+    },
+];
+
+fn nothing(_: &Path, _: &Path) -> Result<()> {
+    Ok(())
+}
+
+/// The study of a machine of two joints, with one parameter.
+fn study(folder: &Path, _: &Path) -> Result<()> {
+    let (from, to) = (root().join("logs/tests/fixtures"), folder.join("study"));
+    std::fs::create_dir_all(&to)?;
+    std::fs::copy(from.join("nominal.xml"), to.join("model.xml"))?;
+    for (name, new) in [("train_0", "train_0"), ("test_3", "test_0")] {
+        let file = from.join("csv").join(name).with_extension("csv");
+        std::fs::copy(file, to.join(new).with_extension("csv"))?;
+    }
+    let text = "model = 'model.xml'\ntrain = ['train_0.csv']\ntest = ['test_0.csv']\n\
+                [[parameter]]\nname = 'damping'\ntarget = 'joint/pan/damping'\nrange = [0.01, 0.5]\n";
+    std::fs::write(to.join("study.toml"), text)?;
+    Ok(())
+}
+
+/// A finished diagnosis of that study, made once.
+fn diagnosis(folder: &Path, asid: &Path) -> Result<()> {
+    static MADE: OnceLock<tempfile::TempDir> = OnceLock::new();
+    if MADE.get().is_none() {
+        let made = tempfile::tempdir()?;
+        study(made.path(), asid)?;
+        let mut call = std::process::Command::new(asid);
+        let call = call.args(["diagnose", "study", "--quiet", "--out", "diagnosis"]);
+        let done = call.current_dir(made.path()).output()?;
+        ensure!(
+            done.status.success(),
+            "{}",
+            String::from_utf8_lossy(&done.stderr)
+        );
+        let _ = MADE.set(made);
+    }
+    let made = MADE.get().context("no diagnosis")?.path().join("diagnosis");
+    let to = folder.join("diagnosis");
+    std::fs::create_dir_all(&to)?;
+    for entry in std::fs::read_dir(made)? {
+        let entry = entry?;
+        std::fs::copy(entry.path(), to.join(entry.file_name()))?;
+    }
+    Ok(())
+}

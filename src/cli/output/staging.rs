@@ -1,0 +1,188 @@
+//! Folders in which a result is filled before it has its name, and what a process that was killed leaves of them.
+//!
+//! ```text
+//! .asid-UNIQUE/lock       locked as long as the process that fills it lives
+//! .asid-UNIQUE/content/   the result
+//! .asid-UNIQUE/moves      names that are being moved from `content` into a folder that was there before
+//! ```
+//!
+//! The lock tells what is left over from what is in use, across containers and machines, where numbers of processes repeat.
+
+use std::fs::{self, File, TryLockError};
+use std::io::{self, Write as _};
+use std::path::{Path, PathBuf};
+
+use asid_comparison::store::unique;
+
+/// How the names of such folders begin.
+const PREFIX: &str = ".asid-";
+const LOCK: &str = "lock";
+const CONTENT: &str = "content";
+const MOVES: &str = "moves";
+
+/// Attempts to make a folder: [`clear`] of another process may take it before it is locked.
+const ATTEMPTS: usize = 3;
+
+/// A folder that is being filled; it is removed with what is left in it.
+pub struct Staging {
+    root: PathBuf,
+    /// Holds the lock.
+    _lock: File,
+}
+
+impl Staging {
+    /// Makes one beside what it will become.
+    pub fn new_in(folder: &Path) -> io::Result<Self> {
+        let mut made = Self::try_new_in(folder);
+        for _ in 1..ATTEMPTS {
+            match &made {
+                Err(e) if e.kind() == io::ErrorKind::NotFound => made = Self::try_new_in(folder),
+                _ => break,
+            }
+        }
+        made
+    }
+
+    fn try_new_in(folder: &Path) -> io::Result<Self> {
+        let root = folder.join(format!("{PREFIX}{}", unique()));
+        fs::create_dir(&root)?;
+        let filled = || -> io::Result<File> {
+            let lock = File::create_new(root.join(LOCK))?;
+            // A file system without locks: what is left over there stays.
+            let _ = lock.lock();
+            fs::create_dir(root.join(CONTENT))?;
+            Ok(lock)
+        };
+        match filled() {
+            Ok(lock) => Ok(Self { root, _lock: lock }),
+            Err(e) => {
+                let _ = fs::remove_dir_all(&root);
+                Err(e)
+            }
+        }
+    }
+
+    /// What is filled.
+    pub fn content(&self) -> PathBuf {
+        self.root.join(CONTENT)
+    }
+
+    /// Moves what it holds into a folder, in this order; a move that is cut short is undone by [`clear`].
+    pub fn move_into(&self, folder: &Path, names: &[String]) -> io::Result<()> {
+        let mut moves = File::create_new(self.root.join(MOVES))?;
+        moves.write_all(names.join("\n").as_bytes())?;
+        moves.sync_all()?;
+        for name in names {
+            fs::rename(self.content().join(name), folder.join(name))?;
+        }
+        Ok(())
+    }
+}
+
+impl Drop for Staging {
+    fn drop(&mut self) {
+        let _ = fs::remove_dir_all(&self.root);
+    }
+}
+
+/// Removes from a folder what processes left that were killed while they wrote into it. What cannot be removed stays.
+pub fn clear(folder: &Path) {
+    let entries = fs::read_dir(folder).into_iter().flatten();
+    for root in entries.filter_map(|e| Some(e.ok()?.path())) {
+        let name = root.file_name().unwrap_or_default().to_string_lossy();
+        if !name.starts_with(PREFIX) || !root.is_dir() {
+            continue;
+        }
+        // One that was not locked yet holds nothing.
+        if fs::remove_dir(&root).is_ok() || !is_left(&root) {
+            continue;
+        }
+        undo_moves(folder, &root);
+        let _ = fs::remove_dir_all(&root);
+    }
+}
+
+/// Whether nobody holds the lock.
+fn is_left(root: &Path) -> bool {
+    let Ok(lock) = File::open(root.join(LOCK)) else {
+        return false;
+    };
+    !matches!(
+        lock.try_lock(),
+        Err(TryLockError::WouldBlock | TryLockError::Error(_))
+    )
+}
+
+/// Takes back what was moved already, where some of it was not.
+fn undo_moves(folder: &Path, root: &Path) {
+    let unmoved = fs::read_dir(root.join(CONTENT)).is_ok_and(|mut all| all.next().is_some());
+    let Ok(moves) = fs::read_to_string(root.join(MOVES)) else {
+        return;
+    };
+    for name in moves.lines().filter(|_| unmoved) {
+        let (from, to) = (root.join(CONTENT).join(name), folder.join(name));
+        // What is still here was not moved: a file of that name is somebody else's.
+        if from.exists() || Path::new(name).components().count() != 1 {
+            continue;
+        }
+        let _ = if to.is_dir() {
+            fs::remove_dir_all(&to)
+        } else {
+            fs::remove_file(&to)
+        };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A folder as a process leaves it that is killed after `moved` of two files.
+    fn killed_after(moved: usize) -> tempfile::TempDir {
+        let folder = tempfile::tempdir().unwrap();
+        let staging = Staging::new_in(folder.path()).unwrap();
+        for name in ["a.json", "result.json"] {
+            fs::write(staging.content().join(name), name).unwrap();
+        }
+        fs::write(staging.root.join(MOVES), "a.json\nresult.json").unwrap();
+        for name in &["a.json", "result.json"][..moved] {
+            fs::rename(staging.content().join(name), folder.path().join(name)).unwrap();
+        }
+        // The lock goes with the process; the folder stays.
+        let copy = folder.path().join(format!("{PREFIX}dead"));
+        fs::rename(&staging.root, &copy).unwrap();
+        drop(staging);
+        folder
+    }
+
+    fn names(folder: &Path) -> Vec<String> {
+        let entries = fs::read_dir(folder).unwrap();
+        let mut names: Vec<String> = entries
+            .map(|e| e.unwrap().file_name().into_string().unwrap())
+            .collect();
+        names.sort();
+        names
+    }
+
+    #[test]
+    fn a_move_that_was_cut_short_is_undone_and_a_whole_one_stays() {
+        for (moved, left) in [(0, &[][..]), (1, &[]), (2, &["a.json", "result.json"])] {
+            let folder = killed_after(moved);
+            clear(folder.path());
+            assert_eq!(names(folder.path()), left, "killed after {moved}");
+        }
+    }
+
+    #[test]
+    fn what_is_in_use_and_what_is_not_ours_stays() {
+        let folder = tempfile::tempdir().unwrap();
+        let staging = Staging::new_in(folder.path()).unwrap();
+        fs::write(folder.path().join("notes.txt"), "").unwrap();
+        fs::create_dir(folder.path().join(".asid-empty")).unwrap();
+        clear(folder.path());
+        assert!(staging.content().is_dir());
+        assert_eq!(names(folder.path()).len(), 2);
+        drop(staging);
+        assert_eq!(names(folder.path()), ["notes.txt"]);
+    }
+}

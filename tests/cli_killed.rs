@@ -1,0 +1,101 @@
+//! A command that is killed leaves no half of a result and nothing that stops the next one. `cargo xtask kill` does the same to every
+//! command, at random moments.
+
+#![cfg(unix)]
+#![allow(clippy::unwrap_used)]
+
+mod cli_support;
+
+use std::path::Path;
+
+use cli_support::{Workplace, names, tiny};
+
+const FILES: [&str; 7] = [
+    "attempt.csv",
+    "config.toml",
+    "policy.json",
+    "posterior.json",
+    "real.csv",
+    "report.html",
+    "result.json",
+];
+
+fn staged(folder: &Path) -> bool {
+    folder.is_dir() && names(folder).iter().any(|n| n.starts_with(".asid-"))
+}
+
+#[test]
+fn a_run_that_is_killed_as_it_writes_is_run_again() {
+    let call = [
+        "run",
+        "rod-balancing",
+        "--set",
+        "condition=left",
+        "--quiet",
+        "--out",
+        "out",
+    ];
+    for there_before in [false, true] {
+        let place = Workplace::new();
+        let (home, out) = (place.path("."), place.path("out"));
+        if there_before {
+            std::fs::create_dir(&out).unwrap();
+        }
+        let mut child = place.asid(&tiny(&call)).spawn().unwrap();
+        while !staged(&home) && !staged(&out) && child.try_wait().unwrap().is_none() {
+            std::thread::yield_now();
+        }
+        child.kill().unwrap();
+        child.wait().unwrap();
+        // It may have been as quick as to end before.
+        if !place.path("out/result.json").exists() {
+            let again = place.run(&tiny(&call));
+            let said = String::from_utf8_lossy(&again.stderr);
+            assert!(again.status.success(), "{said}");
+            assert_eq!(place.names(), ["out"]);
+        }
+        let found = names(&out);
+        assert!(
+            FILES.iter().all(|f| found.iter().any(|n| n == f)),
+            "{found:?}"
+        );
+        assert!(!found.iter().any(|n| n.starts_with('.')), "{found:?}");
+    }
+}
+
+/// Symptom: in a container, where a process has the same number each time, a run after a killed one failed when its work was
+/// done. Cause: the folder that it writes into was named by that number alone.
+#[test]
+fn what_a_killed_process_leaves_is_in_nobodys_way() {
+    let place = Workplace::new();
+    for n in 1..200 {
+        let left = place.path(&format!(".asid-{n}"));
+        std::fs::create_dir(&left).unwrap();
+        std::fs::write(left.join("lock"), "").unwrap();
+    }
+    let export = place.run(&["export", "rod-balancing", "--mjcf", "scene.xml"]);
+    assert!(export.status.success());
+    assert_eq!(place.names(), ["scene.xml"]);
+}
+
+#[test]
+fn a_plugins_folder_that_was_begun_is_begun_anew() {
+    let place = Workplace::new();
+    let left = place.path("swing/.asid-dead");
+    std::fs::create_dir_all(left.join("content/src")).unwrap();
+    std::fs::write(left.join("lock"), "").unwrap();
+    std::fs::write(left.join("moves"), "Cargo.toml\nsrc").unwrap();
+    place.write("swing/Cargo.toml", "half");
+    let new = place.run(&["new", "task", "swing"]);
+    assert!(
+        new.status.success(),
+        "{}",
+        String::from_utf8_lossy(&new.stderr)
+    );
+    assert_ne!(place.read("swing/Cargo.toml"), "half");
+    assert!(
+        names(&place.path("swing"))
+            .iter()
+            .all(|n| !n.starts_with(".asid-"))
+    );
+}
