@@ -1,7 +1,7 @@
 //! MCAP files, read record by record, so that memory holds one record or piece of a chunk and not all of a file.
 //!
 //! The crate `mcap` finds the records and decompresses chunks. The three kinds of records that matter are taken apart
-//! [here](Fields): its own parser reserves whatever length a damaged record states.
+//! here: its own parser reserves whatever length a damaged record states.
 
 use std::collections::HashMap;
 use std::fs::File;

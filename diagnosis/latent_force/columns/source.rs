@@ -99,6 +99,9 @@ impl Wanted {
     }
 }
 
+/// Columns along a walk: of the next states, `(rows - 1) x nx x m`, and of the readings, `rows x ns x m`.
+pub(super) type Along = (Vec<f64>, Vec<f64>);
+
 /// Columns of the present model with some candidates: those that need the engine from it, the others traced.
 pub(super) struct Source<'s> {
     pub(super) all: All<'s>,
@@ -111,14 +114,14 @@ pub(super) struct Source<'s> {
 }
 
 impl Source<'_> {
-    /// The columns wanted, `(rows - 1) x nx x m` and `rows x ns x m`, one pair a walk, and whether they are all there: where work
+    /// The columns wanted, along each walk, and whether they are all there: where work
     /// is stopped, those that the engine has not come to are zero.
     pub(super) fn columns(
         &self,
         context: &Context<'_>,
         states: &[Vec<f64>],
         wanted: &[Wanted],
-    ) -> Result<(Vec<(Vec<f64>, Vec<f64>)>, bool)> {
+    ) -> Result<(Vec<Along>, bool)> {
         let plant = context.plant();
         let (nv, m) = (plant.layout.nv, wanted.len());
         let (nx, ns) = (2 * nv, context.logs.entries.len());
@@ -127,7 +130,7 @@ impl Source<'_> {
                 .is_traced(context, &self.all.candidates[w.candidate])
         };
         let by_engine: Vec<usize> = (0..m).filter(|&i| !traced(&wanted[i])).collect();
-        let mut out: Vec<(Vec<f64>, Vec<f64>)> = context
+        let mut out: Vec<Along> = context
             .walks
             .iter()
             .map(|w| {
