@@ -161,7 +161,7 @@ fn look(case: &Case, asid: &Path, place: &Path, wanted: &[String]) -> Result<()>
 fn command(case: &Case, asid: &Path, place: &Path) -> Command {
     let mut command = Command::new(asid);
     command
-        .args(case.arguments)
+        .args(case.call())
         .current_dir(place)
         .env_remove("ASID_PLUGIN_PATH")
         .stdin(Stdio::null())
@@ -180,7 +180,7 @@ fn run(case: &Case, asid: &Path, place: &Path) -> Result<()> {
     ensure!(
         output.status.success(),
         "`asid {}`: {}",
-        case.arguments.join(" "),
+        case.call().join(" "),
         said.trim()
     );
     Ok(())

@@ -13,6 +13,8 @@ pub struct Case {
     pub name: &'static str,
     /// Its arguments, in a folder of its own.
     pub arguments: &'static [&'static str],
+    /// Settings that it takes by `--set`, besides.
+    pub settings: &'static [&'static [&'static str]],
     /// What it writes.
     pub out: &'static str,
     /// Whether that is a folder that may be there already, empty.
@@ -21,6 +23,35 @@ pub struct Case {
     pub repeats: bool,
     /// Writes into the folder what the command reads; the program is at the second path.
     pub prepare: fn(&Path, &Path) -> Result<()>,
+}
+
+/// Settings that make each part of a command quick.
+const EXPLORER: &[&str] = &[
+    "explorer.iterations=1",
+    "explorer.population=4",
+    "explorer.prior_samples=1",
+];
+const IDENTIFIER: &[&str] = &[
+    "identifier.iterations=1",
+    "identifier.population=8",
+    "identifier.sampling.rounds=1",
+    "identifier.sampling.draws=8",
+    "expected.rounds=0",
+];
+const SOLVER: &[&str] = &[
+    "solver.iterations=1",
+    "solver.population=2",
+    "solver.belief_samples=1",
+];
+const DESIGN: &[&str] = &["design.iterations=1", "design.population=4"];
+
+impl Case {
+    /// All its arguments.
+    pub fn call(&self) -> Vec<&'static str> {
+        let set = |s: &&'static str| ["--set", *s];
+        let settings = self.settings.iter().copied().flatten().flat_map(set);
+        self.arguments.iter().copied().chain(settings).collect()
+    }
 }
 
 /// Commands that write files. `conformance`, `withheld` and the figures of `compare` write by the same code as `run` and `compare`.
@@ -35,29 +66,8 @@ pub const COMMANDS: &[Case] = &[
             "--quiet",
             "--out",
             "out",
-            "--set",
-            "explorer.iterations=1",
-            "--set",
-            "explorer.population=4",
-            "--set",
-            "explorer.prior_samples=1",
-            "--set",
-            "identifier.iterations=1",
-            "--set",
-            "identifier.population=8",
-            "--set",
-            "identifier.sampling.rounds=1",
-            "--set",
-            "identifier.sampling.draws=8",
-            "--set",
-            "solver.iterations=1",
-            "--set",
-            "solver.population=2",
-            "--set",
-            "solver.belief_samples=1",
-            "--set",
-            "expected.rounds=0",
         ],
+        settings: &[EXPLORER, IDENTIFIER, SOLVER],
         out: "out",
         folder: true,
         repeats: false,
@@ -81,11 +91,8 @@ pub const COMMANDS: &[Case] = &[
             "pan:4",
             "--limit-speed",
             "gripper:1",
-            "--set",
-            "design.iterations=1",
-            "--set",
-            "design.population=4",
         ],
+        settings: &[DESIGN],
         out: "out",
         folder: true,
         repeats: false,
@@ -94,6 +101,7 @@ pub const COMMANDS: &[Case] = &[
     Case {
         name: "identify",
         arguments: &["identify", "study", "--quiet", "--out", "out"],
+        settings: &[],
         out: "out",
         folder: true,
         repeats: false,
@@ -109,13 +117,8 @@ pub const COMMANDS: &[Case] = &[
             "--quiet",
             "--out",
             "out",
-            "--set",
-            "solver.iterations=1",
-            "--set",
-            "solver.population=2",
-            "--set",
-            "solver.belief_samples=1",
         ],
+        settings: &[SOLVER],
         out: "out",
         folder: true,
         repeats: false,
@@ -135,13 +138,8 @@ pub const COMMANDS: &[Case] = &[
             "--quiet",
             "--out",
             "out",
-            "--set",
-            "solver.iterations=1",
-            "--set",
-            "solver.population=2",
-            "--set",
-            "solver.belief_samples=1",
         ],
+        settings: &[SOLVER],
         out: "out",
         folder: true,
         repeats: true,
@@ -150,6 +148,7 @@ pub const COMMANDS: &[Case] = &[
     Case {
         name: "diagnose",
         arguments: &["diagnose", "study", "--quiet", "--out", "out"],
+        settings: &[],
         out: "out",
         folder: true,
         repeats: false,
@@ -166,6 +165,7 @@ pub const COMMANDS: &[Case] = &[
             "--out",
             "out",
         ],
+        settings: &[],
         out: "out",
         folder: true,
         repeats: false,
@@ -174,6 +174,7 @@ pub const COMMANDS: &[Case] = &[
     Case {
         name: "export-log",
         arguments: &["export-log", "study", "--out", "out"],
+        settings: &[],
         out: "out",
         folder: true,
         repeats: false,
@@ -182,6 +183,7 @@ pub const COMMANDS: &[Case] = &[
     Case {
         name: "export",
         arguments: &["export", "rod-balancing", "--mjcf", "scene.xml"],
+        settings: &[],
         out: "scene.xml",
         folder: false,
         repeats: false,
@@ -190,6 +192,7 @@ pub const COMMANDS: &[Case] = &[
     Case {
         name: "report",
         arguments: &["report", "diagnosis"],
+        settings: &[],
         out: "diagnosis",
         folder: false,
         repeats: true,
@@ -198,6 +201,7 @@ pub const COMMANDS: &[Case] = &[
     Case {
         name: "new",
         arguments: &["new", "task", "my-task"],
+        settings: &[],
         out: "my-task",
         folder: true,
         repeats: false,

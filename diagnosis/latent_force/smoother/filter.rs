@@ -17,22 +17,7 @@ const LANES: usize = 8;
 
 /// A row-major square matrix product `out = a b`.
 pub(super) fn multiply(a: &[f64], b: &[f64], n: usize, out: &mut [f64]) {
-    if n >= BLOCKED {
-        // Read by columns these are transposed, and `(a b)' = b' a'`.
-        let (a, b) = (view(a, n), view(b, n));
-        DMatrixViewMut::from_slice(out, n, n).gemm(1.0, &b, &a, 0.0);
-        return;
-    }
-    out.fill(0.0);
-    for i in 0..n {
-        let row = &mut out[i * n..(i + 1) * n];
-        for (l, &x) in a[i * n..(i + 1) * n].iter().enumerate() {
-            if x != 0.0 {
-                let other = &b[l * n..(l + 1) * n];
-                row.iter_mut().zip(other).for_each(|(o, y)| *o += x * y);
-            }
-        }
-    }
+    multiply_columns(a, b, (n, n), out);
 }
 
 /// `out = a b'`.
@@ -53,6 +38,7 @@ pub(super) fn multiply_transposed(a: &[f64], b: &[f64], n: usize, out: &mut [f64
 /// `out = a s` of a row-major square matrix and one of `m` columns.
 pub(super) fn multiply_columns(a: &[f64], s: &[f64], (n, m): (usize, usize), out: &mut [f64]) {
     if n >= BLOCKED {
+        // Read by columns these are transposed, and `(a s)' = s' a'`.
         let s = DMatrixView::from_slice(s, m, n);
         DMatrixViewMut::from_slice(out, m, n).gemm(1.0, &s, &view(a, n), 0.0);
         return;
