@@ -2,12 +2,14 @@
 
 use asid_core::{Progress, Result, Streams};
 use asid_effects::EffectSpec;
+use asid_results::evidence::Evidence;
 
 use crate::bench::{Bench, Explanation, Trial};
 use crate::candidate::{Candidate, enumerate};
 use crate::fit::cost;
 use crate::intake::Intake;
 use crate::latent_force;
+use crate::latent_force::search::FALSE_ALARMS;
 use crate::machine::Machine;
 use crate::predict::{Point, State};
 use crate::prepare::{Prepared, plain_residuals, prepare};
@@ -36,7 +38,7 @@ pub enum Contact {
 }
 
 /// Settings of a diagnosis.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct Settings {
     /// Seed of all chance.
     pub seed: u64,
@@ -46,6 +48,20 @@ pub struct Settings {
     pub without: Vec<String>,
     /// How logs are taken in which bodies touch.
     pub contact: Contact,
+    /// Rate of false alarms that the decision is made at.
+    pub false_alarms: f64,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            seed: 0,
+            breadth: Breadth::default(),
+            without: Vec::new(),
+            contact: Contact::default(),
+            false_alarms: FALSE_ALARMS,
+        }
+    }
 }
 
 /// A finished diagnosis.
@@ -54,6 +70,8 @@ pub struct Diagnosis {
     pub result: DiagnosisResult,
     /// What the report shows besides.
     pub trace: DiagnosisTrace,
+    /// What the decision rests on; `None` where replays decide.
+    pub evidence: Option<Evidence>,
     /// Effects of the verdict, with their values; empty for none.
     pub effects: Vec<EffectSpec>,
     /// Values of the study's parameters that go with them.
@@ -110,12 +128,7 @@ fn diagnose_physics(
     settings: Settings,
     progress: &dyn Progress,
 ) -> Result<(Diagnosis, Work)> {
-    let by_force = latent_force::pipeline::diagnose(
-        study,
-        machine,
-        (&settings.without, settings.contact),
-        progress,
-    )?;
+    let by_force = latent_force::pipeline::diagnose(study, machine, &settings, progress)?;
     let machine = match by_force {
         Ok(mut work) => {
             work.findings = final_noise(&mut work.bench, study, &work.candidates, work.findings)?;
@@ -159,13 +172,15 @@ fn diagnose_physics(
     };
     let findings = final_noise(&mut bench, study, &candidates, findings)?;
     let scatter = cost_scatter(&bench, &findings.none)?;
-    let judgement = judge(&bench, &findings, candidates.len(), scatter);
+    let chance = (candidates.len(), settings.false_alarms);
+    let judgement = judge(&bench, &findings, chance, scatter);
     let work = Work {
         bench,
         candidates,
         left_out,
         findings,
         none,
+        evidence: None,
         judgement,
         nominal,
     };
@@ -180,7 +195,7 @@ fn tell(
     progress: &dyn Progress,
 ) -> Result<(Diagnosis, Work)> {
     progress.begin("telling", 1);
-    let diagnosis = Telling {
+    let mut diagnosis = Telling {
         study,
         bench: &work.bench,
         candidates: &work.candidates,
@@ -192,6 +207,7 @@ fn tell(
         stopped: progress.is_stopped(),
     }
     .tell()?;
+    diagnosis.evidence = work.evidence.clone();
     progress.end();
     Ok((diagnosis, work))
 }

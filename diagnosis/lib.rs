@@ -11,8 +11,10 @@
 
 pub mod bench;
 pub mod candidate;
+pub mod ceiling;
 pub mod checks;
 pub mod data;
+pub mod decision;
 pub mod diagnose;
 pub mod experiment;
 pub mod fit;

@@ -12,8 +12,9 @@ use asid_core::{Error, Progress, Result};
 
 use crate::bench::{Bench, Explanation, Trial};
 use crate::candidate::Candidate;
+use crate::ceiling::Left;
 use crate::fit::Effort;
-use crate::result::{Isolability, MissingForce, NotTried, RankedSet};
+use crate::result::{DetectionLimit, Isolability, MissingForce, NotTried, RankedSet};
 use crate::scatter::Scatter;
 use crate::screen::{Base, Screened, propose, take, worthwhile};
 use crate::trace::ForceTrace;
@@ -79,6 +80,10 @@ pub struct Findings {
     pub ranking: Vec<RankedSet>,
     /// Which of the leading effects the logs tell apart.
     pub isolability: Option<Isolability>,
+    /// The smallest size of each effect that the logs could have shown, where that is known.
+    pub detection_limits: Vec<DetectionLimit>,
+    /// What the best explanation leaves of the missing force, where it was estimated.
+    pub left: Vec<Left>,
     /// What was left out because the work was stopped.
     pub not_tried: Vec<NotTried>,
     /// Candidates with the cost that screening on the first stage reached, best first.
@@ -97,6 +102,8 @@ impl Findings {
             forces: Vec::new(),
             ranking: Vec::new(),
             isolability: None,
+            detection_limits: Vec::new(),
+            left: Vec::new(),
             not_tried: Vec::new(),
             screened: Vec::new(),
         }
@@ -203,17 +210,13 @@ impl Search<'_> {
         }
         let not_tried = self.not_tried(stopped_at, (&screened, &skipped), &all);
         Ok(Findings {
-            none: none[last].clone(),
             short: self.bench.stages[0]
                 .is_windows(self.bench)
                 .then(|| excess(none[0].fit.cost / self.bench.readings(0))),
             found: all,
-            missing: Vec::new(),
-            forces: Vec::new(),
-            ranking: Vec::new(),
-            isolability: None,
             not_tried,
             screened,
+            ..Findings::without_search(none[last].clone())
         })
     }
 

@@ -2,6 +2,23 @@
 
 use crate::result::{DiagnosisResult, Kind};
 
+/// Share of the gap from which on what is left beside a verdict is worth a word in the sentence.
+const WORTH_A_WORD: f64 = 0.05;
+
+/// What is left beside the effects that are named; empty where it is little.
+fn beside(result: &DiagnosisResult) -> String {
+    let remainder = result.verdict.remainder.as_ref();
+    remainder
+        .filter(|r| r.share > WORTH_A_WORD)
+        .map_or_else(String::new, |r| {
+            let with = match &*r.against {
+                "" => String::new(),
+                variable => format!(" and goes with the {variable}"),
+            };
+            format!(" Of the rest, most is at {}{with}.", r.place)
+        })
+}
+
 /// Says what a result means, in one sentence; `labels` are the effects of the best
 /// explanation, whether or not it is the verdict, and `rest` what they leave, where one knows.
 #[must_use]
@@ -70,9 +87,10 @@ pub fn sentence(result: &DiagnosisResult, labels: &[String], rest: Option<&str>)
                 )
             };
             format!(
-                "{place}{} explains {}.{ambiguous}",
+                "{place}{} explains {}.{}{ambiguous}",
                 result.verdict.effects.join(" with "),
-                closed()
+                closed(),
+                beside(result)
             )
         }
         Kind::Unknown if result.gap.closed.is_some_and(|c| c > 0.5) => format!(

@@ -12,8 +12,7 @@ use crate::localise::localise;
 use crate::predict::{Point, State};
 use crate::record::Record;
 use crate::result::{
-    DiagnosisResult, EffectResult, Gap, HypothesisResult, Kind, MissingForce, NextExperiment,
-    NotTried, ParameterResult, SignalGap, Verdict,
+    DiagnosisResult, Gap, Kind, MissingForce, NextExperiment, NotTried, SignalGap,
 };
 use crate::search::{Findings, Found, trials};
 use crate::study::Study;
@@ -22,8 +21,14 @@ use crate::verdict::Judgement;
 use crate::whitening::Scattering;
 use crate::windows;
 
+mod answer;
+mod remainder;
 mod trace;
+mod values;
 mod view;
+
+use answer::groups;
+use remainder::shares;
 
 /// Samples of the bootstrap.
 const RESAMPLES: usize = 2000;
@@ -129,7 +134,7 @@ impl Telling<'_> {
         let nominal = self.held(&[], self.nominal)?;
         let identified = self.held(&[], &none.fit.point.theta)?;
         let refined = self.held(&members, &explanation.fit.point.theta)?;
-        let gap = self.gap(&nominal, &identified, &refined);
+        let mut gap = self.gap(&nominal, &identified, &refined);
         let kind = if j.is_unknown() {
             Kind::Unknown
         } else if best.is_none() {
@@ -140,28 +145,9 @@ impl Telling<'_> {
         let effects = self.effects(gap.identified)?;
         let hypotheses = self.hypotheses();
         let labels = explanation.labels();
-        let verdict = Verdict {
-            kind,
-            effects: if kind == Kind::Effects {
-                labels.clone()
-            } else {
-                Vec::new()
-            },
-            probability: if kind == Kind::Unknown {
-                j.unknown
-            } else {
-                j.verdict().probability
-            },
-            ambiguous_with: if kind == Kind::Effects {
-                j.ambiguous
-                    .iter()
-                    .map(|&i| j.hypotheses[i].labels.clone())
-                    .collect()
-            } else {
-                Vec::new()
-            },
-            unexplained: gap.closed.map_or(0.0, |c| 1.0 - c),
-        };
+        let left = self.left(&members, &explanation)?;
+        let verdict = self.verdict(kind, &labels, &gap, &left);
+        gap.shares = shares(&gap, kind, &left);
         let places = self.places(none)?;
         let short = self.short(none, (&members, &explanation))?;
         let mut result = DiagnosisResult {
@@ -172,6 +158,7 @@ impl Telling<'_> {
             places,
             hypotheses,
             effects,
+            groups: groups(&verdict.effects),
             verdict,
             parameters: self.parameters(&explanation),
             checks: self.checks(none, &explanation, short.as_ref())?,
@@ -183,6 +170,7 @@ impl Telling<'_> {
             missing_force: self.findings.missing.clone(),
             ranking: self.findings.ranking.clone(),
             isolability: self.findings.isolability.clone(),
+            detection_limits: self.findings.detection_limits.clone(),
             not_tried: self.findings.not_tried.clone(),
             ..DiagnosisResult::default()
         };
@@ -202,6 +190,7 @@ impl Telling<'_> {
         Ok(Diagnosis {
             result,
             trace,
+            evidence: None,
             effects: explanation.effects.clone(),
             values: explanation.fit.point.theta[..study].to_vec(),
         })
@@ -239,7 +228,7 @@ impl Telling<'_> {
         let root = |(square, count): (f64, f64)| (square / f64::max(count, 1.0)).sqrt();
         let of = |h: &HeldOut, sensor| root(self.rms(&h.residuals, sensor, None));
         let (i, r) = (of(identified, None), of(refined, None));
-        let closed = |i2: f64, r2: f64| (1.0 - (r2 - 1.0) / (i2 - 1.0)).clamp(0.0, 1.0);
+        let closed = |i2: f64, r2: f64| (1.0 - (r2 - 1.0) / (i2 - 1.0)).min(1.0);
         let has_gap = i > NO_GAP;
         let interval = has_gap.then(|| {
             let episodes: Vec<_> = (0..logs.episodes.len())
@@ -274,6 +263,7 @@ impl Telling<'_> {
             refined: r,
             closed: has_gap.then(|| closed(i * i, r * r)),
             closed_interval95: interval,
+            shares: None,
             signals: logs
                 .sensors
                 .iter()
@@ -288,95 +278,6 @@ impl Telling<'_> {
                 })
                 .collect(),
         }
-    }
-
-    fn hypotheses(&self) -> Vec<HypothesisResult> {
-        let mut all: Vec<HypothesisResult> = self
-            .judgement
-            .hypotheses
-            .iter()
-            .map(|h| HypothesisResult {
-                effects: if h.labels.is_empty() {
-                    vec!["none".into()]
-                } else {
-                    h.labels.clone()
-                },
-                probability: h.probability,
-            })
-            .collect();
-        all.push(HypothesisResult {
-            effects: vec!["unknown".into()],
-            probability: self.judgement.unknown,
-        });
-        all.sort_by(|a, b| b.probability.total_cmp(&a.probability));
-        all
-    }
-
-    /// Effects of the hypotheses, each as fitted in the most probable set that has it.
-    fn effects(&self, identified: f64) -> Result<Vec<EffectResult>> {
-        let j = self.judgement;
-        let mut all: Vec<EffectResult> = Vec::new();
-        for (i, h) in j.hypotheses.iter().enumerate() {
-            let Some(found) = self.found(i) else { continue };
-            for effect in &found.explanation.effects {
-                let known = all
-                    .iter_mut()
-                    .find(|e| e.effect == effect.name && e.site == effect.site);
-                if let Some(known) = known {
-                    known.probability += h.probability;
-                    continue;
-                }
-                let alone = self.findings.found.iter().find(|f| {
-                    f.candidates.len() == 1 && f.explanation.effects[0].label() == effect.label()
-                });
-                let gap_closed = match alone {
-                    Some(f) if identified > NO_GAP => {
-                        let trials = trials(self.candidates, &f.candidates, &f.explanation);
-                        let held = self.held(&trials, &f.explanation.fit.point.theta)?;
-                        let (square, count) = self.rms(&held.residuals, None, None);
-                        let r2 = square / f64::max(count, 1.0);
-                        Some((1.0 - (r2 - 1.0) / (identified * identified - 1.0)).clamp(0.0, 1.0))
-                    }
-                    _ => None,
-                };
-                all.push(EffectResult {
-                    effect: effect.name.clone(),
-                    site: effect.site.clone(),
-                    probability: h.probability,
-                    gap_closed,
-                    parameters: effect.values.iter().cloned().collect(),
-                });
-            }
-        }
-        all.sort_by(|a, b| b.probability.total_cmp(&a.probability));
-        Ok(all)
-    }
-
-    fn parameters(&self, explanation: &Explanation) -> Vec<ParameterResult> {
-        let fit = &explanation.fit;
-        self.bench
-            .parameters
-            .iter()
-            .enumerate()
-            .map(|(i, p)| {
-                let estimate = fit.point.theta[i];
-                let k = fit.free.iter().position(|&f| f == i);
-                let variance = k.map_or(0.0, |k| fit.covariance[(k, k)].max(0.0));
-                let std = (variance * self.judgement.temperature).sqrt();
-                let [low, high] = p.range;
-                ParameterResult {
-                    name: p.name.clone(),
-                    unit: self.study.parameters[i].unit.clone(),
-                    nominal: Some(self.nominal[i]),
-                    estimate,
-                    std,
-                    interval95: [
-                        (estimate - 1.96 * std).max(low),
-                        (estimate + 1.96 * std).min(high),
-                    ],
-                }
-            })
-            .collect()
     }
 
     /// Where the gap of the identified model lies, in the training logs.

@@ -10,15 +10,15 @@ use crate::bench::{Bench, Explanation};
 use crate::search::{Findings, Found, NEGLIGIBLE, excess};
 
 /// A set of effects with its probability and what it costs.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Hypothesis {
     /// Place in [`Findings::found`]; `None` for no effect.
     pub found: Option<usize>,
     /// Labels, sorted.
     pub labels: Vec<String>,
-    /// Sum of squares over all logs.
+    /// Sum of squares over all logs, where replays decide.
     pub cost: f64,
-    /// Free parameters of its effects that do something.
+    /// Free parameters of its effects that do something, where replays decide.
     pub size: usize,
     /// Probability.
     pub probability: f64,
@@ -35,8 +35,6 @@ pub struct Judgement {
     pub best: usize,
     /// Indices of hypotheses that these data cannot tell from it.
     pub ambiguous: Vec<usize>,
-    /// By how much sums of squares overstate what they tell.
-    pub temperature: f64,
     /// Share of the excess that the best leaves.
     pub rest: f64,
 }
@@ -168,9 +166,15 @@ fn reduces(found: &Found, bench: &Bench) -> bool {
 }
 
 /// Judges what a search found; `scatter` is the deviation of a sum of squares that the
-/// simulator's own scatter makes, and `candidates` how many effects were tried.
+/// simulator's own scatter makes, `candidates` how many effects were tried, and `false_alarms` how often chance alone may
+/// earn one of them its place.
 #[must_use]
-pub fn judge(bench: &Bench, findings: &Findings, candidates: usize, scatter: f64) -> Judgement {
+pub fn judge(
+    bench: &Bench,
+    findings: &Findings,
+    (candidates, false_alarms): (usize, f64),
+    scatter: f64,
+) -> Judgement {
     let readings = (bench.train.readings + bench.test.readings) as f64;
     let mut all = vec![Hypothesis {
         found: None,
@@ -208,7 +212,12 @@ pub fn judge(bench: &Bench, findings: &Findings, candidates: usize, scatter: f64
             2.0 * UNUSUAL.ln() * h.labels.iter().filter(|l| is_unusual(bench, l)).count() as f64;
         let choice = 2.0 * (candidates.max(1) as f64).ln() * h.labels.len() as f64;
         let further = 2.0 * FURTHER.ln() * h.labels.len().saturating_sub(1) as f64;
-        h.cost / temperature + h.size as f64 * readings.ln() + choice + further + unusual
+        let chance = if h.labels.is_empty() {
+            0.0
+        } else {
+            -2.0 * false_alarms.ln()
+        };
+        h.cost / temperature + h.size as f64 * readings.ln() + choice + chance + further + unusual
     };
     let gap = |h: &Hypothesis| excess(h.cost / readings);
     let explanation = |h: &Hypothesis| {
@@ -299,7 +308,6 @@ pub fn judge(bench: &Bench, findings: &Findings, candidates: usize, scatter: f64
         best,
         ambiguous,
         unknown,
-        temperature,
         rest,
         hypotheses: all,
     };
@@ -326,6 +334,17 @@ impl Judgement {
     #[must_use]
     pub fn verdict(&self) -> &Hypothesis {
         &self.hypotheses[self.best]
+    }
+
+    /// Probability that some effects are all among the true ones: of all sets that hold them.
+    #[must_use]
+    pub fn marginal(&self, labels: &[String]) -> f64 {
+        let holds = |h: &&Hypothesis| labels.iter().all(|l| h.labels.contains(l));
+        self.hypotheses
+            .iter()
+            .filter(holds)
+            .map(|h| h.probability)
+            .sum()
     }
 
     /// Whether nothing in the catalogue explains the gap.

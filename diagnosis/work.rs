@@ -1,5 +1,7 @@
 //! What a diagnosis works with, from the logs to the verdict.
 
+use asid_results::evidence::Evidence;
+
 use crate::bench::{Bench, Explanation};
 use crate::candidate::{Candidate, LeftOut};
 use crate::search::Findings;
@@ -17,6 +19,8 @@ pub struct Work {
     pub findings: Findings,
     /// Fits without any effect, one a stage.
     pub none: Vec<Explanation>,
+    /// What the decision rests on; `None` where replays decide.
+    pub evidence: Option<Evidence>,
     /// What was made of it.
     pub judgement: Judgement,
     /// Values of the study's parameters in the model as given.

@@ -21,6 +21,7 @@ mod ladder;
 mod lines;
 mod places;
 mod real_world;
+mod remainder;
 mod signals;
 mod wiring;
 mod words;
@@ -47,6 +48,7 @@ pub fn page(result: &DiagnosisResult, trace: &DiagnosisTrace) -> String {
         Some(signals::section(d, t)),
         Some(places::section(d, t)),
         Some(causes::section(d, t)),
+        remainder::section(d),
         closing::parameters(d),
         closing::checks(d),
         closing::next(d),

@@ -1,6 +1,7 @@
 //! What a diagnosis writes, as types that go to JSON and back.
 //!
 //! - [`diagnosis`] is `result.json`: the answer.
+//! - [`evidence`] is `evidence.json`: what the decision rests on.
 //! - [`trace`] is `trace.json`: what the pictures of the report need besides.
 //! - [`view`] is the part of it that the 3-D view needs.
 //!
@@ -8,6 +9,7 @@
 //! is `null` in JSON and comes back as NaN ([`nullable`]).
 
 pub mod diagnosis;
+pub mod evidence;
 pub mod nullable;
 pub mod trace;
 pub mod view;

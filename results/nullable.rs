@@ -88,3 +88,15 @@ pub fn map<'de, D: Deserializer<'de>>(deserializer: D) -> Result<BTreeMap<String
     let numbers = BTreeMap::<String, Number>::deserialize(deserializer)?;
     Ok(numbers.into_iter().map(|(k, n)| (k, n.0)).collect())
 }
+
+/// Intervals by name.
+///
+/// # Errors
+/// Where the text holds something else.
+pub fn intervals<'de, D: Deserializer<'de>>(
+    deserializer: D,
+) -> Result<BTreeMap<String, [f64; 2]>, D::Error> {
+    let intervals = BTreeMap::<String, [Number; 2]>::deserialize(deserializer)?;
+    let ends = |(name, [low, high]): (String, [Number; 2])| (name, [low.0, high.0]);
+    Ok(intervals.into_iter().map(ends).collect())
+}

@@ -30,7 +30,7 @@ const SHARE: f64 = 0.2;
 /// Most that a coefficient may be, in deviations of its prior.
 const MOST: f64 = 3.0;
 /// Secants may be taken up to this multiple of their start value.
-const SECANT: f64 = 1.5;
+pub const SECANT: f64 = 1.5;
 
 /// All candidates as columns of one regression, those of the present model's own unknowns first.
 pub struct Columns {

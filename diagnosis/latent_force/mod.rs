@@ -7,15 +7,18 @@
 //! From below: [`tangent`] (states), [`walk`] (rows), [`segments`] (where bodies touch), [`step_map`] (the model over a row and its derivatives),
 //! [`smoother`], [`initial`], [`context`] and [`estimate`] (trajectory, force and noise), [`fitted_value`] and [`fit`] (a model with its values),
 //! [`evidence`], [`trace`], [`columns`], [`screen`], [`search`], [`selection`],
-//! `steps` (encoder steps), `picture` (what the report draws of the force), [`pipeline`].
+//! `detection` (what could have been seen), `steps` (encoder steps), `picture` (what the report draws of the force), `left` (what could
+//! be learned of the rest), [`pipeline`].
 
 pub mod columns;
 pub mod context;
+pub mod detection;
 pub mod estimate;
 pub mod evidence;
 pub mod fit;
 pub mod fitted_value;
 pub mod initial;
+mod left;
 mod picture;
 pub mod pipeline;
 pub mod screen;

@@ -9,6 +9,7 @@ use crate::candidate::Candidate;
 use crate::trace::{ForceSeries, ForceTrace};
 
 use super::context::Context;
+use super::estimate::Estimate;
 use super::search::Outcome;
 use super::step_map::{Derivatives, Variation};
 
@@ -124,6 +125,18 @@ fn law(
     Ok(along.collect())
 }
 
+/// The degrees of freedom at which most is missing, relative to the inertial forces, most first.
+pub(super) fn most_missing_of(context: &Context<'_>, estimate: &Estimate) -> Vec<usize> {
+    let noise = &estimate.noise;
+    let missing = |d: usize| (noise.q[d] + noise.white[d]).sqrt() / context.inertial[d];
+    let mut order: Vec<usize> = (0..noise.q.len()).collect();
+    order.sort_by(|&a, &b| missing(b).total_cmp(&missing(a)));
+    let most = order.first().map_or(0.0, |&d| missing(d));
+    order.retain(|&d| missing(d) >= LEAST * most);
+    order.truncate(SHOWN);
+    order
+}
+
 /// The missing force at the degrees of freedom where most is missing, relative to the inertial forces.
 ///
 /// # Errors
@@ -136,14 +149,8 @@ pub(super) fn forces(
     let smoothed: Vec<usize> = (0..context.walks.len())
         .filter(|&w| context.walks[w].segment.is_none())
         .collect();
-    let noise = &outcome.none.estimate.noise;
-    let missing = |d: usize| (noise.q[d] + noise.white[d]).sqrt() / context.inertial[d];
     let dofs = dofs(&context.plant().layout);
-    let mut order: Vec<usize> = (0..dofs.len()).collect();
-    order.sort_by(|&a, &b| missing(b).total_cmp(&missing(a)));
-    let most = order.first().map_or(0.0, |&d| missing(d));
-    order.retain(|&d| missing(d) >= LEAST * most);
-    order.truncate(SHOWN);
+    let order = most_missing_of(context, &outcome.none.estimate);
     if smoothed.is_empty() {
         return Ok(Vec::new());
     }
@@ -214,7 +221,7 @@ fn most_missing(
 }
 
 /// A degree of freedom along some rows, each a walk and its row.
-fn series(
+pub(super) fn series(
     context: &Context<'_>,
     outcome: &Outcome,
     law: &[Vec<f64>],

@@ -7,7 +7,8 @@ mod told;
 use asid_core::{Progress, Result};
 
 use crate::candidate::enumerate;
-use crate::diagnose::Contact;
+use crate::decision::{Rules, decide};
+use crate::diagnose::{Contact, Settings};
 use crate::machine::Machine;
 use crate::prepare::{dataset, set_reading_noise};
 use crate::study::Study;
@@ -16,9 +17,10 @@ use crate::work::Work;
 use super::context::begin;
 use super::fit::{Hypothesis, Slopes, fit, settle_noise};
 use super::fitted_value::Unknown;
+use super::left::left;
 use super::picture::forces;
 use super::search::{Breadth, search};
-use super::selection::select;
+use super::selection::gather;
 use super::steps::{beside, known, noise_with_steps, shown};
 
 use replays::replay;
@@ -36,10 +38,15 @@ const ROUNDS: usize = 15;
 pub fn diagnose(
     study: &Study,
     machine: Machine,
-    (without, contact): (&[String], Contact),
+    settings: &Settings,
     progress: &dyn Progress,
 ) -> Result<std::result::Result<Work, Machine>> {
     progress.begin("smoothing the logs", 1);
+    let (without, contact) = (&settings.without[..], settings.contact);
+    let breadth = Breadth {
+        false_alarms: settings.false_alarms,
+        ..Breadth::default()
+    };
     let (mut bench, nominal) = dataset(study, machine)?;
     set_reading_noise(&mut bench, &study.noise);
     let shown_steps = shown(&bench.train.logs);
@@ -58,7 +65,7 @@ pub fn diagnose(
         progress.end();
         return Ok(Err(bench.machine));
     }
-    let (outcome, candidates, left_out, firsts, forces, members) = {
+    let (outcome, candidates, left_out, firsts, drawn, members) = {
         let parameters = (&study.parameters[..], &nominal[..]);
         let (context, mut estimate) = begin(&bench.machine, &logs, taken, parameters)?;
         settle_noise(
@@ -89,25 +96,30 @@ pub fn diagnose(
         let steps = known(&shown_steps, &candidates);
         let members: Vec<usize> = steps.iter().map(|s| s.candidate).collect();
         let offered = (&candidates[..], &members[..]);
-        let outcome = search(&context, &none, offered, Breadth::default(), progress)?;
+        let outcome = search(&context, &none, offered, breadth, progress)?;
         let firsts = (0..context.walks.len()).filter(|&w| context.walks[w].rows[0] == 0);
         let firsts = firsts.collect::<Vec<_>>();
-        let forces = forces(&context, &outcome, &candidates)?;
+        let drawn = (
+            forces(&context, &outcome, &candidates)?,
+            left(&context, &outcome),
+        );
         let outcome = beside(outcome, &steps, &candidates);
-        (outcome, candidates, left_out, firsts, forces, members)
+        (outcome, candidates, left_out, firsts, drawn, members)
     };
     progress.begin("replaying", 1);
     let parts = (&candidates[..], &outcome, &members[..]);
     let (mut findings, sets) = replay(&mut bench, parts, &firsts, progress)?;
-    findings.forces = forces;
+    (findings.forces, findings.left) = drawn;
     progress.end();
-    let judgement = select(&bench, &outcome, (&sets, &members), &findings, &candidates)?;
+    let evidence = gather(&bench, &outcome, (&sets, &members), &findings, &candidates)?;
+    let judgement = decide(&evidence, &Rules::default());
     Ok(Ok(Work {
         none: vec![findings.none.clone()],
         bench,
         candidates,
         left_out,
         findings,
+        evidence: Some(evidence),
         judgement,
         nominal,
     }))

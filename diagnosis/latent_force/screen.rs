@@ -153,7 +153,7 @@ pub fn isolability(sum: &Regression, columns: &Columns, forms: &[usize]) -> DMat
 }
 
 /// A Gram matrix with some columns projected out of all.
-fn project(gram: &DMatrix<f64>, out: &[usize]) -> DMatrix<f64> {
+pub(super) fn project(gram: &DMatrix<f64>, out: &[usize]) -> DMatrix<f64> {
     if out.is_empty() {
         return gram.clone();
     }

@@ -12,7 +12,7 @@ use super::context::Context;
 use super::estimate::Missing;
 use super::fit::Fitted;
 
-pub use breadth::Breadth;
+pub use breadth::{Breadth, FALSE_ALARMS};
 pub use round::Round;
 pub use set::{Set, name_of};
 
@@ -53,7 +53,7 @@ pub fn search(
     breadth: Breadth,
     progress: &dyn Progress,
 ) -> Result<Outcome> {
-    let threshold = threshold(candidates.len());
+    let threshold = threshold(candidates.len(), breadth.false_alarms);
     let mut best = Set {
         candidates: Vec::new(),
         fitted: none.clone(),
@@ -86,6 +86,7 @@ pub fn search(
         let upon = Upon {
             context,
             base: &best,
+            at_first,
             candidates,
             open: &open,
             breadth,
@@ -140,7 +141,7 @@ pub fn search(
     })
 }
 
-/// Evidence that a further effect must earn: the best of `n` reaches about `ln n` by chance, and a factor of 20 upon it.
-fn threshold(n: usize) -> f64 {
-    (20.0 * n.max(1) as f64).ln()
+/// Evidence that a further effect must earn where `n` candidates are tried.
+fn threshold(n: usize, false_alarms: f64) -> f64 {
+    (n.max(1) as f64 / false_alarms).ln()
 }

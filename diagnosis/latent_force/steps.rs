@@ -156,6 +156,8 @@ pub fn beside(mut outcome: Outcome, known: &[Known], candidates: &[Candidate]) -
             base: Vec::new(),
             screened: Vec::new(),
             alike: (Vec::new(), DMatrix::zeros(0, 0)),
+            limits: Vec::new(),
+            raced: Vec::new(),
             confirmed: vec![alone.clone()],
         }),
     }

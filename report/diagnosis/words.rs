@@ -3,7 +3,7 @@
 use asid_results::diagnosis::{DiagnosisResult, EffectResult, HypothesisResult};
 use asid_results::trace::DiagnosisTrace;
 
-use crate::number::{NOT_A_NUMBER, decimals, quantity, round, significant, unit_symbol};
+use crate::number::{NOT_A_NUMBER, Precision, decimals, quantity, round, significant, unit_symbol};
 
 /// `a + b`.
 pub(super) fn set(effects: &[String]) -> String {
@@ -58,9 +58,16 @@ pub(super) fn about<'t>(trace: &'t DiagnosisTrace, effect: &EffectResult) -> &'t
     known.map_or("", |words| &*words.about)
 }
 
-/// `place = 0.41 m`.
-fn value(name: &str, value: f64, unit: &str) -> String {
-    let number = round(value, 3);
+/// `place = 0.41 m`, or `place = 0.41 (0.38 to 0.44) m` where there is an interval.
+fn value(name: &str, value: f64, unit: &str, interval: Option<[f64; 2]>) -> String {
+    let number = match interval.filter(|i| i.iter().all(|x| x.is_finite())) {
+        Some([low, high]) => {
+            let precision = Precision::of(value, (high - low) / 4.0);
+            let shown = precision.show(value);
+            format!("{shown} ({})", precision.interval([low, high]))
+        }
+        None => round(value, 3),
+    };
     // What a parameter's unit depends on is told in words.
     let told = if unit_symbol(unit).contains(' ') && unit.len() > 6 {
         format!("{number} ({unit})")
@@ -76,9 +83,14 @@ pub(super) fn values(trace: &DiagnosisTrace, effect: &EffectResult) -> String {
     let acting = effect.parameters.iter().filter_map(|(name, x)| {
         let known = words.and_then(|w| w.parameters.get(name));
         let acts = known.is_none_or(|k| k.null != *x);
-        acts.then(|| value(name, *x, known.map_or("", |k| &*k.unit)))
+        let interval = effect.intervals95.get(name).copied();
+        acts.then(|| value(name, *x, known.map_or("", |k| &*k.unit), interval))
     });
-    acting.collect::<Vec<_>>().join(", ")
+    let text = acting.collect::<Vec<_>>().join(", ");
+    if effect.at_bound && !text.is_empty() {
+        return format!("{text} (at an end of its range: the best value may lie beyond)");
+    }
+    text
 }
 
 /// `a`, `a and b`, `a, b and c`.

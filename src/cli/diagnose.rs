@@ -15,6 +15,7 @@ use asid_diagnosis::machine::Machine;
 use asid_diagnosis::study::Study;
 use asid_effects::refined_model::RefinedModel;
 use asid_report::diagnosis::{page, real_world_lines};
+use asid_report::number::{Precision, round};
 use asid_results::diagnosis::{DiagnosisResult, NotTried, RealWorld};
 use asid_results::trace::{DiagnosisTrace, NamedText};
 
@@ -38,7 +39,8 @@ real world (--real-effect and the like); the logs of these runs are diagnosed, t
 simulator, and the task is run again.
 
 The folder holds result.json, refined.toml (the model with the effects of the verdict, for a study's \
-`model`), config.toml, copies of the logs, report.html and trace.json.")]
+`model`), config.toml, copies of the logs, report.html, trace.json and \
+evidence.json (what the decision rests on).")]
 pub struct Arguments {
     /// Diagnose this study: a TOML file, or a folder with study.toml
     #[arg(required_unless_present_any = ["task", "config"], conflicts_with = "task")]
@@ -65,6 +67,9 @@ pub struct Arguments {
     /// [default: 1.75]
     #[arg(long, value_name = "MINUTES")]
     minutes: Option<f64>,
+    /// Accuse a machine that lacks nothing no more often than this, by chance; 0.05 finds smaller effects [default: 0.01]
+    #[arg(long, value_name = "P")]
+    false_alarms: Option<f64>,
     /// Leave out an effect of the catalogue (repeatable)
     #[arg(long, value_name = "EFFECT")]
     without: Vec<String>,
@@ -198,10 +203,17 @@ pub fn diagnose(arguments: &Arguments) -> Result<()> {
     diagnosis.result.seconds = Some(progress.seconds());
     diagnosis.result.seconds_to_first_table = progress.seconds_to_first_table();
     tell_origin(&mut diagnosis.trace, &engine, config.seed);
+    if diagnosis.evidence.is_some() {
+        let more = files(&[("evidence.json", "what the decision rests on")]);
+        diagnosis.trace.files.extend(more);
+    }
     let result = &diagnosis.result;
     out.write(|folder| {
         write_json(&folder.join("result.json"), result)?;
         write_json(&folder.join("trace.json"), &diagnosis.trace)?;
+        if let Some(evidence) = &diagnosis.evidence {
+            write_json(&folder.join("evidence.json"), evidence)?;
+        }
         write_text(&folder.join("report.html"), &page(result, &diagnosis.trace))?;
         write_text(&folder.join("config.toml"), &toml::to_string(&settings)?)?;
         write_text(
@@ -315,11 +327,24 @@ fn lines(result: &DiagnosisResult, engine: &str, seconds: f64) -> Vec<String> {
         .filter(|e| result.verdict.effects.contains(&e.label()))
     {
         let values = e.parameters.iter().filter(|(_, v)| **v != 0.0);
-        let text: Vec<String> = values.map(|(n, v)| format!("{n} = {v:.4}")).collect();
+        let text: Vec<String> = values
+            .map(|(n, v)| match e.intervals95.get(n) {
+                Some(ends) => {
+                    let precision = Precision::of(*v, (ends[1] - ends[0]) / 4.0);
+                    format!(
+                        "{n} = {} ({})",
+                        precision.show(*v),
+                        precision.interval(*ends)
+                    )
+                }
+                None => format!("{n} = {}", round(*v, 4)),
+            })
+            .collect();
         line(&format!("  {} {}: {}", e.effect, e.site, text.join(", ")));
     }
     for p in &result.parameters {
-        line(&format!("  {} = {:.5} ± {:.5}", p.name, p.estimate, p.std));
+        let estimate = Precision::of(p.estimate, p.std).with_uncertainty(p.estimate, p.std);
+        line(&format!("  {} = {estimate}", p.name));
     }
     for left in &result.not_tried {
         line(&format!("not tried: {}", left.stage));

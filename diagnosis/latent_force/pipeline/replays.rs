@@ -11,7 +11,7 @@ use crate::predict::State;
 use crate::result::NotTried;
 use crate::search::{Findings, Found};
 
-use super::told::{isolability, missing_forces, ranking};
+use super::told::{detection_limits, isolability, missing_forces, ranking};
 
 /// Physics steps of a replay of all logs times coordinates of the starts that they leave open up to which starts are fitted
 /// once more with the values; beyond it they stay as smoothed.
@@ -139,6 +139,8 @@ pub(super) fn replay(
         forces: Vec::new(),
         ranking,
         isolability: isolability(candidates, outcome),
+        detection_limits: detection_limits(candidates, outcome),
+        left: Vec::new(),
         not_tried,
         screened: Vec::new(),
     };

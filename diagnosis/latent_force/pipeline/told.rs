@@ -5,10 +5,11 @@ use std::f64::consts::FRAC_PI_2;
 use asid_core::Layout;
 
 use crate::candidate::Candidate;
+use crate::latent_force::detection::Limit;
 use crate::latent_force::estimate::Estimate;
 use crate::latent_force::picture::dofs;
 use crate::latent_force::search::{Outcome, Set};
-use crate::result::{Isolability, MissingForce, RankedSet};
+use crate::result::{DetectionLimit, Isolability, MissingForce, RankedSet};
 
 /// Most sets that are listed with their evidence.
 const RANKED: usize = 20;
@@ -66,6 +67,22 @@ pub(super) fn ranking(
     }
     all.truncate(RANKED);
     all
+}
+
+/// What the logs could have shown beside what stands.
+pub(super) fn detection_limits(candidates: &[Candidate], outcome: &Outcome) -> Vec<DetectionLimit> {
+    let last = outcome.rounds.iter().next_back();
+    let told = |l: &Limit| {
+        let candidate = &candidates[l.candidate];
+        let parameter = &candidate.parameters()[l.parameter];
+        DetectionLimit {
+            effect: candidate.label(),
+            parameter: parameter.name.to_owned(),
+            unit: parameter.unit.to_owned(),
+            value: l.value,
+        }
+    };
+    last.map_or_else(Vec::new, |r| r.limits.iter().map(told).collect())
 }
 
 /// Principal angles between what leads in the first screening.

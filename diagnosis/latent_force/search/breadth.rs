@@ -1,5 +1,8 @@
 //! How widely a search looks.
 
+/// Rate of false alarms that decisions are made at where none is stated: what is read as "not by chance" in the field.
+pub const FALSE_ALARMS: f64 = 0.01;
+
 /// How widely to search.
 #[derive(Clone, Copy, Debug)]
 pub struct Breadth {
@@ -7,6 +10,9 @@ pub struct Breadth {
     /// evidence and leaves the force as it was mends the noise model, and one that makes up for little is among the many
     /// small things by which any machine differs from its model. 0.04 is a fifth of the force.
     pub shrinks: f64,
+    /// Probability with which chance alone would earn an effect its place, over all candidates: the odds for the model with an effect
+    /// exceed `1 / p` with probability `p` at most where it does not act (Markov's inequality), and of `n` candidates at most `n` times as often.
+    pub false_alarms: f64,
     /// Sets that are fitted a little after each screening.
     pub raced: usize,
     /// Share of the leader's evidence that a set needs to be raced.
@@ -31,6 +37,7 @@ impl Default for Breadth {
     fn default() -> Self {
         Self {
             shrinks: 0.04,
+            false_alarms: FALSE_ALARMS,
             raced: 8,
             share: 0.1,
             least: 3.0,

@@ -6,12 +6,14 @@ use nalgebra::DMatrix;
 use crate::candidate::Candidate;
 use crate::latent_force::columns::Columns;
 use crate::latent_force::context::Context;
+use crate::latent_force::detection::{Limit, limits};
+use crate::latent_force::estimate::Missing;
 use crate::latent_force::fit::{Fitted, Slopes};
 use crate::latent_force::screen::{Screened, isolability, rank, regressions};
 
-use super::Untried;
 use super::breadth::Breadth;
 use super::set::{Set, name_of, pruned, refined_by, with, without};
+use super::{Untried, threshold};
 
 /// Leading candidates that are compared pair by pair.
 const COMPARED: usize = 20;
@@ -27,6 +29,10 @@ pub struct Round {
     pub screened: Vec<(Vec<usize>, f64)>,
     /// The leading candidates of screening, and the cosines of the smallest principal angle between each two.
     pub alike: (Vec<usize>, DMatrix<f64>),
+    /// What could have been seen upon the base.
+    pub limits: Vec<Limit>,
+    /// Candidates of the sets that were fitted a little.
+    pub raced: Vec<Vec<usize>>,
     /// Sets that were fitted to the end, best first.
     pub confirmed: Vec<Set>,
 }
@@ -36,6 +42,8 @@ pub(super) struct Upon<'r> {
     pub(super) context: &'r Context<'r>,
     /// The set that stands.
     pub(super) base: &'r Set,
+    /// What is missing without effects.
+    pub(super) at_first: Missing,
     /// All candidates, and the places of those that are open.
     pub(super) candidates: &'r [Candidate],
     pub(super) open: &'r [usize],
@@ -50,6 +58,7 @@ struct Screening {
     ranked: Vec<Screened>,
     /// Leading candidates, and the cosines between each two.
     alike: (Vec<usize>, DMatrix<f64>),
+    limits: Vec<Limit>,
 }
 
 /// Sets that were fitted, and those that there was no time for.
@@ -84,6 +93,7 @@ impl Upon<'_> {
         let rows = screened.iter().map(|(set, gain)| (name(set), *gain));
         progress.ranking(&format!("screening{upon}"), &rows.collect::<Vec<_>>());
         let raced = self.race(&screening)?;
+        let of_race = raced.sets.iter().map(|s| s.candidates.clone()).collect();
         let finished = self.finish(raced.sets)?;
         progress.end();
         let cut = [
@@ -101,6 +111,8 @@ impl Upon<'_> {
             base: self.base.candidates.clone(),
             screened,
             alike: screening.alike,
+            limits: screening.limits,
+            raced: of_race,
             confirmed,
         })
     }
@@ -139,12 +151,18 @@ impl Upon<'_> {
             leading.iter().map(candidate).collect(),
             isolability(&sums[0], &columns, &leading),
         );
+        let threshold = threshold(self.candidates.len(), self.breadth.false_alarms);
+        let mut limits = limits(&sums, &columns, &some, threshold);
+        limits
+            .iter_mut()
+            .for_each(|l| l.candidate = self.open[l.candidate]);
         self.progress.end();
         Ok(Screening {
             some,
             columns,
             ranked,
             alike,
+            limits,
         })
     }
 
@@ -230,8 +248,8 @@ impl Upon<'_> {
             if progress.is_stopped() {
                 fits.left_out.push(set.candidates.clone());
             } else {
-                let gain = set.fitted.evidence - base;
-                set = pruned(context, self.candidates, set, (breadth, gain), progress)?;
+                let least = (breadth, self.at_first);
+                set = pruned(context, self.candidates, set, least, progress)?;
             }
             fits.sets.push(set);
         }

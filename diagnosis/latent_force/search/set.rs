@@ -6,6 +6,7 @@ use asid_effects::Start;
 use crate::candidate::Candidate;
 use crate::latent_force::columns::{Columns, Form};
 use crate::latent_force::context::Context;
+use crate::latent_force::estimate::Missing;
 use crate::latent_force::fit::{Fitted, Hypothesis, Slopes, fit};
 use crate::latent_force::screen::Screened;
 
@@ -193,9 +194,9 @@ pub(super) fn without(set: &Set, candidates: &[Candidate], out: usize) -> Set {
 /// Deviations from null up to which a value counts as nothing, and the evidence that a set may lose when it is left out.
 const IDLE: f64 = 2.0;
 const IDLE_LOSS: f64 = 1.0;
-/// Size, relative to the largest of the same law, and share of what all of them earn up to which a member of a group stands in
-/// for something else: a law that all joints have in common is no thousandth at one of them.
-const SLIGHT: f64 = 0.1;
+/// Size, relative to the largest of the same law, below which a member of a group may stand in for something else: a law that joints
+/// have in common is not much smaller at one of them, unless it makes up for its share of what is missing.
+const SLIGHT: f64 = 1.0 / 3.0;
 
 /// What a member of a set does: by how many deviations it is off its null values, and by how much.
 struct Deed {
@@ -243,31 +244,28 @@ fn deeds(candidates: &[Candidate], set: &Set) -> Vec<Deed> {
 }
 
 /// A set without the members that do nothing in it: those of a group that are as the model has them or next to it, and those
-/// that a later effect has taken the place of. `gain` is the evidence of the set beyond its base, and `shrinks` the
-/// share of it that a slight member may be worth.
+/// that a later effect has taken the place of. A slight member of a group must make up for the share of what was missing `at_first`
+/// that any further effect must.
 pub(super) fn pruned(
     context: &Context<'_>,
     candidates: &[Candidate],
     set: Set,
-    (breadth, gain): (Breadth, f64),
+    (breadth, at_first): (Breadth, Missing),
     progress: &dyn Progress,
 ) -> Result<Set> {
     let deeds = deeds(candidates, &set);
     let is_idle = |d: &&Deed| d.strength < IDLE;
     let is_slight = |d: &&Deed| {
-        let like = || deeds.iter().filter(|o| o.law == d.law);
-        let largest = like().map(|o| o.size).fold(0.0, f64::max);
-        let all: f64 = like().map(|o| o.strength.powi(2)).sum();
-        d.size < SLIGHT * largest && d.strength.powi(2) < breadth.shrinks * all
+        let like = deeds.iter().filter(|o| o.law == d.law);
+        d.size < SLIGHT * like.map(|o| o.size).fold(0.0, f64::max)
     };
     let places = |which: &dyn Fn(&&Deed) -> bool| -> Vec<usize> {
         deeds.iter().filter(which).map(|d| d.candidate).collect()
     };
+    let left = |s: &Set| s.fitted.estimate.missing(context).relative_to(at_first);
+    let (idle, slight) = (places(&is_idle), places(&is_slight));
     let mut set = set;
-    for (out, loss) in [
-        (places(&is_idle), IDLE_LOSS),
-        (places(&is_slight), IDLE_LOSS.max(breadth.shrinks * gain)),
-    ] {
+    for (out, slight) in [(idle, false), (slight, true)] {
         let out: Vec<usize> = (out.into_iter())
             .filter(|c| set.candidates.contains(c))
             .collect();
@@ -275,11 +273,16 @@ pub(super) fn pruned(
             continue;
         }
         let mut smaller = set.clone();
-        for c in out {
+        for &c in &out {
             smaller = without(&smaller, candidates, c);
         }
         smaller.fit(context, breadth.rounds[1], progress)?;
-        if smaller.fitted.evidence > set.fitted.evidence - loss {
+        let stands = if slight {
+            left(&smaller) - left(&set) < breadth.shrinks * out.len() as f64
+        } else {
+            smaller.fitted.evidence > set.fitted.evidence - IDLE_LOSS
+        };
+        if stands {
             set = smaller;
         }
     }

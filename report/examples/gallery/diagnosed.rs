@@ -39,6 +39,7 @@ fn effect(label: [&str; 2], probability: f64, closes: f64, values: &[(&str, f64)
         probability,
         gap_closed: Some(closes),
         parameters: values.collect(),
+        ..EffectResult::default()
     }
 }
 
@@ -89,6 +90,7 @@ pub fn patch() -> Diagnosis {
             refined: 1.9,
             closed: Some(0.984),
             closed_interval95: Some([0.961, 0.993]),
+            shares: Some(Shares { named: 0.984, learnable: 0.01, unrepeatable: 0.006 }),
             signals: vec![
                 signal_gap("puck_pos", "m", 0.002, [48.0, 16.5, 2.1]),
                 signal_gap("puck_yaw", "rad", 0.01, [12.3, 5.2, 1.2]),
@@ -131,6 +133,12 @@ pub fn patch() -> Diagnosis {
             probability: 0.71,
             ambiguous_with: vec![names(&["friction-drift@board"])],
             unexplained: 0.016,
+            remainder: Some(Remainder {
+                share: 0.016,
+                place: "puck_pos".into(),
+                against: "rate of puck_pos".into(),
+                kinds: names(&["friction-like", "delay-like"]),
+            }),
         },
         parameters: vec![
             ParameterResult { name: "board_friction".into(), unit: String::new(), nominal: Some(0.4), estimate: 0.2213, std: 0.0031, interval95: [0.2152, 0.2274] },
@@ -271,7 +279,7 @@ pub fn complete() -> Diagnosis {
         sentence: "Nothing is missing: with its damping fitted, the model predicts the pendulum as well as the sensor allows.".into(),
         gap: Gap { nominal: 11.2, identified: 1.02, refined: 1.02, ..Gap::default() },
         hypotheses: vec![hypothesis(&["none"], 0.97), hypothesis(&["coulomb-friction@hinge"], 0.02), hypothesis(&["unknown"], 0.01)],
-        verdict: Verdict { kind: Kind::None, effects: vec![], probability: 0.97, ambiguous_with: vec![], unexplained: 0.0 },
+        verdict: Verdict { kind: Kind::None, effects: vec![], probability: 0.97, ambiguous_with: vec![], unexplained: 0.0, remainder: None },
         parameters: vec![ParameterResult {
             name: "damping".into(),
             unit: "N m s/rad".into(),
@@ -313,6 +321,7 @@ pub fn crowded() -> Diagnosis {
         probability: 0.58,
         ambiguous_with: vec![],
         unexplained: 0.44,
+        remainder: None,
     };
     d.gap = Gap {
         nominal: 2300.0,

@@ -7,6 +7,7 @@ use anyhow::Result;
 use asid_core::registry::{self, BackendEntry, TaskEntry, find};
 use asid_core::{Capabilities, Episode, Error};
 use asid_diagnosis::diagnose::{Contact, Settings};
+use asid_diagnosis::latent_force::search::FALSE_ALARMS;
 use asid_diagnosis::search::Breadth;
 use asid_diagnosis::study::Study;
 use asid_effects::EffectEntry;
@@ -59,6 +60,9 @@ pub struct Config {
     /// Time limit.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub minutes: Option<f64>,
+    /// Rate of false alarms.
+    #[serde(default = "false_alarms")]
+    false_alarms: f64,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     without: Vec<String>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -91,7 +95,7 @@ impl RunLogs {
 }
 
 /// Keys that are a diagnosis' own; where a task is run, the others are that run's.
-const OWN: [&str; 17] = [
+const OWN: [&str; 18] = [
     "study",
     "task",
     "model",
@@ -104,6 +108,7 @@ const OWN: [&str; 17] = [
     "logs",
     "seeds",
     "minutes",
+    "false_alarms",
     "without",
     "plugins",
     "search",
@@ -114,6 +119,11 @@ const OWN: [&str; 17] = [
 /// Time limit where none is given, min: most machines have their whole answer within a minute, and who waits for it would rather know
 /// by then what is known.
 pub const MINUTES: f64 = 1.75;
+
+/// Rate of false alarms where none is stated.
+fn false_alarms() -> f64 {
+    FALSE_ALARMS
+}
 
 /// How widely to search.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
@@ -204,6 +214,13 @@ impl Config {
         if config.minutes.is_some_and(|m| !(m.is_finite() && m > 0.0)) {
             return Err(wrong("--minutes", "is a number above 0"));
         }
+        config.false_alarms = arguments.false_alarms.unwrap_or(config.false_alarms);
+        if !(config.false_alarms > 0.0 && config.false_alarms < 1.0) {
+            return Err(wrong(
+                "--false-alarms",
+                "is a probability between 0 and 1, such as 0.01",
+            ));
+        }
         config.without.extend(arguments.without.iter().cloned());
         for name in &config.without {
             find::<EffectEntry>(name)?;
@@ -258,6 +275,7 @@ impl Config {
             },
             without: self.without.clone(),
             contact,
+            false_alarms: self.false_alarms,
         }
     }
 

@@ -15,7 +15,7 @@ use crate::cli::output::write_json;
 /// The file that says that a case is done.
 const RUN: &str = "run.json";
 /// The files of an answer that are kept: the others repeat the logs.
-const KEPT: [&str; 2] = ["result.json", "refined.toml"];
+const KEPT: [&str; 3] = ["result.json", "refined.toml", "evidence.json"];
 
 /// How a case was answered; `run.json`.
 #[derive(Clone, Debug, Serialize, Deserialize)]

@@ -1,0 +1,328 @@
+//! The ceiling: how much of what is left a flexible model foretells, and with which variable it goes.
+//!
+//! A series that a diagnosis leaves (a missing force, a residual) is regressed on variables of the motion: an additive
+//! model of piecewise linear functions of each (Hastie and Tibshirani 1986), with a normal prior on their values at the knots. What counts
+//! is the power that it foretells of episodes that were left out of the fit in turn: noise and chance are not foretold.
+
+use nalgebra::{DMatrix, DVector};
+
+/// Knots of the function of each variable, at quantiles of its values. Ten follow a law of friction about rest as well as
+/// the curve of a spring; more cost rows that short logs do not have.
+const KNOTS: usize = 10;
+/// Precisions of the prior that are tried, relative to the mean square of a basis function times the rows: from next to none
+/// up to one that leaves a tenth of a law.
+const PRIORS: [f64; 4] = [1e-4, 1e-2, 1.0, 10.0];
+/// Parts that a single episode is cut into, one of which is left out in turn.
+const PARTS: usize = 4;
+
+/// What a series may go with.
+#[derive(Clone, Debug)]
+pub struct Variable {
+    /// Name, such as `speed`.
+    pub name: String,
+    /// Kinds of effects that go with it.
+    pub kinds: &'static [&'static str],
+    /// Its value in each row.
+    pub values: Vec<f64>,
+}
+
+/// A series of one episode, with the variables that it may go with; each series of a place has the same ones.
+#[derive(Clone, Debug)]
+pub struct Course {
+    /// The series.
+    pub left: Vec<f64>,
+    /// The variables.
+    pub variables: Vec<Variable>,
+}
+
+/// What is foretold of a series.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Foretold {
+    /// Share of its power that all variables together foretell, of episodes that no fit saw.
+    pub share: f64,
+    /// The variable that foretells most by itself; `None` where none foretells any.
+    pub variable: Option<String>,
+    /// Kinds of effects that go with it.
+    pub kinds: Vec<String>,
+}
+
+/// What is left at one place.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Left {
+    /// Joint or sensor.
+    pub place: String,
+    /// Power of what is left, relative to that of the other places.
+    pub weight: f64,
+    /// What is foretold of it.
+    pub foretold: Foretold,
+}
+
+/// Share of the power that is left at all places together that is foretold.
+#[must_use]
+pub fn learnable(left: &[Left]) -> f64 {
+    let sum: f64 = left.iter().map(|l| l.weight).sum();
+    let foretold: f64 = left.iter().map(|l| l.weight * l.foretold.share).sum();
+    if sum > 0.0 { foretold / sum } else { 0.0 }
+}
+
+/// The place at which most is foretold; at which most is left, where nothing is.
+#[must_use]
+pub fn most(left: &[Left]) -> Option<&Left> {
+    let foretold = |l: &&Left| l.weight * l.foretold.share;
+    let named = left.iter().filter(|l| l.foretold.variable.is_some());
+    let most = named.max_by(|a, b| foretold(a).total_cmp(&foretold(b)));
+    most.or_else(|| left.iter().max_by(|a, b| a.weight.total_cmp(&b.weight)))
+}
+
+/// Sums of one part of the rows: `X'X`, `X'y` and `y'y`.
+#[derive(Clone)]
+struct Sums {
+    gram: DMatrix<f64>,
+    moment: DVector<f64>,
+    power: f64,
+}
+
+/// Values of the hat functions about `knots` at `x`: at most two differ from zero.
+fn hats(knots: &[f64], x: f64) -> [(usize, f64); 2] {
+    let last = knots.len() - 1;
+    let above = knots.partition_point(|k| *k <= x);
+    if above == 0 || last == 0 {
+        return [(0, 1.0), (0, 0.0)];
+    }
+    if above > last {
+        return [(last, 1.0), (last, 0.0)];
+    }
+    let (low, high) = (knots[above - 1], knots[above]);
+    let share = (x - low) / (high - low);
+    [(above - 1, 1.0 - share), (above, share)]
+}
+
+/// Knots at quantiles of some values, each once.
+fn knots(values: impl Iterator<Item = f64>) -> Vec<f64> {
+    let mut all: Vec<f64> = values.filter(|x| x.is_finite()).collect();
+    if all.is_empty() {
+        return vec![0.0];
+    }
+    all.sort_by(f64::total_cmp);
+    let at = |k: usize| all[(all.len() - 1) * k / (KNOTS - 1)];
+    let mut knots: Vec<f64> = (0..KNOTS).map(at).collect();
+    knots.dedup();
+    knots
+}
+
+/// Sums of the parts of all episodes; the columns of each variable are those of its knots.
+fn sums(courses: &[Course], knots: &[Vec<f64>]) -> Vec<Sums> {
+    let width: usize = knots.iter().map(Vec::len).sum();
+    let parts = if courses.len() > 1 { 1 } else { PARTS };
+    let empty = Sums {
+        gram: DMatrix::zeros(width, width),
+        moment: DVector::zeros(width),
+        power: 0.0,
+    };
+    let mut all = vec![empty; parts * courses.len()];
+    let mut row: Vec<(usize, f64)> = Vec::new();
+    for (e, course) in courses.iter().enumerate() {
+        let n = course.left.len();
+        for (k, y) in course.left.iter().enumerate() {
+            let is_whole = course.variables.iter().all(|v| v.values[k].is_finite());
+            if !y.is_finite() || !is_whole {
+                continue;
+            }
+            row.clear();
+            let mut first = 0;
+            for (v, knots) in course.variables.iter().zip(knots) {
+                row.extend(hats(knots, v.values[k]).map(|(i, x)| (first + i, x)));
+                first += knots.len();
+            }
+            let sums = &mut all[e * parts + k * parts / n];
+            sums.power += y * y;
+            for &(i, a) in &row {
+                sums.moment[i] += a * y;
+                for &(j, b) in &row {
+                    sums.gram[(i, j)] += a * b;
+                }
+            }
+        }
+    }
+    all
+}
+
+/// Share of the power of parts left out in turn that the columns `which` foretell, at the best of the priors.
+fn foretold(parts: &[Sums], which: &[usize]) -> f64 {
+    let total: f64 = parts.iter().map(|p| p.power).sum();
+    if total <= 0.0 || which.is_empty() {
+        return 0.0;
+    }
+    let n = which.len();
+    let gram = |p: &Sums| DMatrix::from_fn(n, n, |i, j| p.gram[(which[i], which[j])]);
+    let moment = |p: &Sums| DVector::from_fn(n, |i, _| p.moment[which[i]]);
+    let each: Vec<_> = parts.iter().map(|p| (gram(p), moment(p))).collect();
+    let mut whole = (DMatrix::zeros(n, n), DVector::zeros(n));
+    for (gram, moment) in &each {
+        whole.0 += gram;
+        whole.1 += moment;
+    }
+    let typical = whole.0.trace() / n as f64;
+    let left = |prior: f64| -> f64 {
+        let of_part = |((gram, moment), part): (&(DMatrix<f64>, DVector<f64>), &Sums)| {
+            let mut others = &whole.0 - gram;
+            for i in 0..n {
+                others[(i, i)] += (prior * typical).max(f64::MIN_POSITIVE);
+            }
+            let found = others.cholesky().map(|f| f.solve(&(&whole.1 - moment)));
+            let c = found.unwrap_or_else(|| DVector::zeros(n));
+            part.power - 2.0 * c.dot(moment) + c.dot(&(gram * &c))
+        };
+        each.iter().zip(parts).map(of_part).sum()
+    };
+    let least = PRIORS.map(left).into_iter().fold(total, f64::min);
+    (1.0 - least / total).clamp(0.0, 1.0)
+}
+
+/// Least share that a variable must foretell by itself to be named: less is what a slow series shares with any other slow one.
+const NAMED: f64 = 0.05;
+
+/// What the variables foretell of a series.
+#[must_use]
+pub fn learn(courses: &[Course]) -> Foretold {
+    let Some(first) = courses.first() else {
+        return Foretold::default();
+    };
+    let knots: Vec<Vec<f64>> = (0..first.variables.len())
+        .map(|v| {
+            knots(
+                courses
+                    .iter()
+                    .flat_map(|c| c.variables[v].values.iter().copied()),
+            )
+        })
+        .collect();
+    let parts = sums(courses, &knots);
+    let all: Vec<usize> = (0..knots.iter().map(Vec::len).sum()).collect();
+    let share = foretold(&parts, &all);
+    let mut at = 0;
+    let alone = knots.iter().map(|k| {
+        let own: Vec<usize> = (at..at + k.len()).collect();
+        at += k.len();
+        foretold(&parts, &own)
+    });
+    let best = alone.enumerate().max_by(|a, b| a.1.total_cmp(&b.1));
+    match best.filter(|(_, s)| *s > NAMED) {
+        Some((v, alone)) => Foretold {
+            share: share.max(alone),
+            variable: Some(first.variables[v].name.clone()),
+            kinds: first.variables[v]
+                .kinds
+                .iter()
+                .map(|&k| k.to_owned())
+                .collect(),
+        },
+        None => Foretold {
+            share,
+            ..Foretold::default()
+        },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Numbers that look like noise, of unit deviation at most.
+    fn noise(seed: usize, k: usize) -> f64 {
+        let x = (12.9898 * k as f64 + 78.233 * seed as f64).sin() * 43_758.545;
+        2.0 * (x - x.floor()) - 1.0
+    }
+
+    /// Three episodes of a motion whose `left` is a function of position, speed and noise.
+    fn courses(left: impl Fn(f64, f64, f64) -> f64) -> Vec<Course> {
+        let variable = |name: &str, kinds, values: Vec<f64>| Variable {
+            name: name.into(),
+            kinds,
+            values,
+        };
+        (0..3)
+            .map(|e| {
+                let t = |k: usize| 0.02 * k as f64 + 7.0 * e as f64;
+                let position: Vec<f64> = (0..400).map(|k| (1.3 * t(k)).sin()).collect();
+                let speed: Vec<f64> = (0..400).map(|k| (2.9 * t(k)).cos()).collect();
+                Course {
+                    left: (0..400)
+                        .map(|k| left(position[k], speed[k], noise(e, k)))
+                        .collect(),
+                    variables: vec![
+                        variable("position", &["stiffness-like"], position),
+                        variable("speed", &["friction-like"], speed),
+                    ],
+                }
+            })
+            .collect()
+    }
+
+    #[test]
+    fn hats_are_a_partition_of_one_and_follow_lines() {
+        let knots = [-1.0, 0.5, 2.0];
+        for x in [-3.0, -1.0, -0.2, 0.5, 1.9, 2.0, 9.0] {
+            let found = hats(&knots, x);
+            let sum: f64 = found.iter().map(|h| h.1).sum();
+            let line: f64 = found.iter().map(|&(i, h)| h * knots[i]).sum();
+            assert!((sum - 1.0).abs() < 1e-12);
+            assert!((line - f64::clamp(x, -1.0, 2.0)).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn dry_friction_goes_with_speed_and_is_foretold() {
+        let found = learn(&courses(|_, v, _| -0.4 * v.signum()));
+        assert!(found.share > 0.9, "{found:?}");
+        assert_eq!(found.variable.as_deref(), Some("speed"));
+        assert_eq!(found.kinds, ["friction-like"]);
+    }
+
+    #[test]
+    fn a_spring_beside_noise_is_foretold_by_its_share_of_the_power() {
+        // Power of the spring x^2 is 1/2, of the noise 1/3.
+        let found = learn(&courses(|x, _, n| x + n));
+        assert!((found.share - 0.6).abs() < 0.06, "{found:?}");
+        assert_eq!(found.variable.as_deref(), Some("position"));
+    }
+
+    #[test]
+    fn noise_is_not_foretold() {
+        let found = learn(&courses(|_, _, n| n));
+        assert!(found.share < 0.02, "{found:?}");
+        assert_eq!(found.variable, None);
+    }
+
+    #[test]
+    fn places_count_by_the_power_that_is_left_there() {
+        let left = |place: &str, weight, share, variable: Option<&str>| Left {
+            place: place.into(),
+            weight,
+            foretold: Foretold {
+                share,
+                variable: variable.map(str::to_owned),
+                kinds: Vec::new(),
+            },
+        };
+        let all = [
+            left("shoulder", 3.0, 0.1, Some("time")),
+            left("elbow", 1.0, 0.9, Some("speed")),
+        ];
+        assert!((learnable(&all) - 0.3).abs() < 1e-12);
+        assert_eq!(most(&all).unwrap().place, "elbow");
+        let noise = [left("a", 1.0, 0.0, None), left("b", 2.0, 0.0, None)];
+        assert_eq!(most(&noise).unwrap().place, "b");
+        assert_eq!(learnable(&[]), 0.0);
+    }
+
+    #[test]
+    fn one_episode_is_cut_into_parts_and_rows_without_a_value_are_passed_over() {
+        let mut one = courses(|_, v, _| v);
+        one.truncate(1);
+        one[0].left[17] = f64::NAN;
+        one[0].variables[0].values[40] = f64::NAN;
+        assert!(learn(&one).share > 0.9);
+        assert_eq!(learn(&[]), Foretold::default());
+    }
+}
