@@ -31,6 +31,8 @@ pub struct Explanation {
     pub held_plain: f64,
     /// Starts of the held-out episodes under it.
     pub held_starts: Vec<State>,
+    /// Variances of the unknowns by a fit that allows for a missing force, in their units; 0 where they were not fitted so.
+    pub local_variances: Vec<f64>,
 }
 
 impl Explanation {
@@ -217,6 +219,7 @@ impl Bench {
             .collect();
         let mut explanation = Explanation {
             effects,
+            local_variances: vec![0.0; unknowns.len()],
             unknowns,
             fit,
             held_out: f64::NAN,

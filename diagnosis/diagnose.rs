@@ -5,7 +5,9 @@ use asid_effects::EffectSpec;
 use asid_results::evidence::Evidence;
 
 use crate::bench::{Bench, Explanation, Trial};
+use crate::calibration::calibrate;
 use crate::candidate::{Candidate, enumerate};
+use crate::confidence::Confidence;
 use crate::fit::cost;
 use crate::intake::Intake;
 use crate::latent_force;
@@ -14,7 +16,7 @@ use crate::machine::Machine;
 use crate::predict::{Point, State};
 use crate::prepare::{Prepared, plain_residuals, prepare};
 use crate::record::Record;
-use crate::result::DiagnosisResult;
+use crate::result::{DiagnosisResult, NotTried};
 use crate::search::{Breadth, Findings, Search, trials};
 use crate::study::Study;
 use crate::telling::Telling;
@@ -50,6 +52,8 @@ pub struct Settings {
     pub contact: Contact,
     /// Rate of false alarms that the decision is made at.
     pub false_alarms: f64,
+    /// Whether the diagnosis is repeated on simulated logs for as long as there is time.
+    pub calibrate: bool,
 }
 
 impl Default for Settings {
@@ -60,6 +64,7 @@ impl Default for Settings {
             without: Vec::new(),
             contact: Contact::default(),
             false_alarms: FALSE_ALARMS,
+            calibrate: false,
         }
     }
 }
@@ -101,6 +106,7 @@ pub fn diagnose(
     let again = intake
         .doubted()
         .map(|_| (machine.clone(), settings.clone()));
+    let rehearsed = (settings.calibrate).then(|| (machine.clone(), settings.clone()));
     let (mut diagnosis, mut work) = diagnose_physics(&intake.study, machine, settings, progress)?;
     let left = diagnosis.result.gap.refined;
     if let (Some((machine, settings)), Some(as_given)) = (again, intake.doubted())
@@ -117,12 +123,23 @@ pub fn diagnose(
     let (bench, point) = (&work.bench, &work.findings.none.fit.point);
     let residuals = plain_residuals(bench, &bench.train, &[], point)?;
     let whiteness = crate::checks::whiteness(&bench.train.logs, &residuals);
+    if let Some((machine, settings)) = rehearsed {
+        let parts = (&diagnosis, &work);
+        let found = calibrate(&intake.study, &machine, parts, &settings, progress)?;
+        if found.runs == 0 {
+            diagnosis.result.not_tried.push(NotTried {
+                stage: "calibration: there was no time for a single run".into(),
+                effects: Vec::new(),
+            });
+        }
+        diagnosis.result.calibration = Some(found);
+    }
     intake.tell(&mut diagnosis.result, whiteness);
     Ok((diagnosis, work))
 }
 
 /// Diagnoses a study whose logs are in order.
-fn diagnose_physics(
+pub(crate) fn diagnose_physics(
     study: &Study,
     machine: Machine,
     settings: Settings,
@@ -173,7 +190,14 @@ fn diagnose_physics(
     let findings = final_noise(&mut bench, study, &candidates, findings)?;
     let scatter = cost_scatter(&bench, &findings.none)?;
     let chance = (candidates.len(), settings.false_alarms);
-    let judgement = judge(&bench, &findings, chance, scatter);
+    let mut judgement = judge(&bench, &findings, chance, scatter);
+    let best = judgement
+        .verdict()
+        .found
+        .map(|i| &findings.found[i].explanation);
+    let left = best.unwrap_or(&findings.none).held_plain / bench.held_readings().max(1.0);
+    let seen = (left, !findings.not_tried.is_empty());
+    Confidence::default().settle(&mut judgement, seen, &[]);
     let work = Work {
         bench,
         candidates,

@@ -10,9 +10,11 @@
 //!   is least squares over such replays.
 
 pub mod bench;
+pub mod calibration;
 pub mod candidate;
 pub mod ceiling;
 pub mod checks;
+pub mod confidence;
 pub mod data;
 pub mod decision;
 pub mod diagnose;
@@ -20,6 +22,7 @@ pub mod experiment;
 pub mod fit;
 pub mod forces;
 pub mod intake;
+pub mod judgement;
 pub mod latent_force;
 pub mod linearise;
 pub mod localise;

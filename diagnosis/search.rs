@@ -82,6 +82,8 @@ pub struct Findings {
     pub isolability: Option<Isolability>,
     /// The smallest size of each effect that the logs could have shown, where that is known.
     pub detection_limits: Vec<DetectionLimit>,
+    /// Probability of as much evidence for the best candidate where nothing is missing, where that is known.
+    pub p_value: Option<f64>,
     /// What the best explanation leaves of the missing force, where it was estimated.
     pub left: Vec<Left>,
     /// What was left out because the work was stopped.
@@ -103,6 +105,7 @@ impl Findings {
             ranking: Vec::new(),
             isolability: None,
             detection_limits: Vec::new(),
+            p_value: None,
             left: Vec::new(),
             not_tried: Vec::new(),
             screened: Vec::new(),

@@ -8,6 +8,7 @@ use crate::checks;
 use crate::diagnose::{Diagnosis, Settings};
 use crate::experiment;
 use crate::forces::{self, Short};
+use crate::judgement::Judgement;
 use crate::localise::localise;
 use crate::predict::{Point, State};
 use crate::record::Record;
@@ -17,7 +18,6 @@ use crate::result::{
 use crate::search::{Findings, Found, trials};
 use crate::study::Study;
 use crate::trajectory::Trajectory;
-use crate::verdict::Judgement;
 use crate::whitening::Scattering;
 use crate::windows;
 
@@ -135,7 +135,7 @@ impl Telling<'_> {
         let identified = self.held(&[], &none.fit.point.theta)?;
         let refined = self.held(&members, &explanation.fit.point.theta)?;
         let mut gap = self.gap(&nominal, &identified, &refined);
-        let kind = if j.is_unknown() {
+        let kind = if j.is_unknown {
             Kind::Unknown
         } else if best.is_none() {
             Kind::None
@@ -147,6 +147,7 @@ impl Telling<'_> {
         let labels = explanation.labels();
         let left = self.left(&members, &explanation)?;
         let verdict = self.verdict(kind, &labels, &gap, &left);
+        gap.p_value = self.findings.p_value;
         gap.shares = shares(&gap, kind, &left);
         let places = self.places(none)?;
         let short = self.short(none, (&members, &explanation))?;
@@ -264,6 +265,7 @@ impl Telling<'_> {
             closed: has_gap.then(|| closed(i * i, r * r)),
             closed_interval95: interval,
             shares: None,
+            p_value: None,
             signals: logs
                 .sensors
                 .iter()
@@ -358,9 +360,10 @@ impl Telling<'_> {
         let j = self.judgement;
         let rival = j.ambiguous.first().copied().or_else(|| {
             let rivals = || (0..j.hypotheses.len()).filter(|&i| i != j.best);
+            let none = |i: &usize| j.hypotheses[*i].labels.is_empty();
             rivals()
-                .find(|&i| !j.hypotheses[i].labels.is_empty())
-                .or_else(|| rivals().next())
+                .find(|&i| j.hypotheses[i].found.is_some())
+                .or_else(|| rivals().find(none))
         });
         let Some(rival) = rival else {
             return Ok(NextExperiment::default());

@@ -7,37 +7,8 @@
 //! this leaves is no second effect.
 
 use crate::bench::{Bench, Explanation};
+use crate::judgement::{Hypothesis, Judgement};
 use crate::search::{Findings, Found, NEGLIGIBLE, excess};
-
-/// A set of effects with its probability and what it costs.
-#[derive(Clone, Debug, Default)]
-pub struct Hypothesis {
-    /// Place in [`Findings::found`]; `None` for no effect.
-    pub found: Option<usize>,
-    /// Labels, sorted.
-    pub labels: Vec<String>,
-    /// Sum of squares over all logs, where replays decide.
-    pub cost: f64,
-    /// Free parameters of its effects that do something, where replays decide.
-    pub size: usize,
-    /// Probability.
-    pub probability: f64,
-}
-
-/// What kind of answer, with its probability.
-#[derive(Clone, Debug)]
-pub struct Judgement {
-    /// All sets, most probable first.
-    pub hypotheses: Vec<Hypothesis>,
-    /// Probability that nothing in the catalogue explains the gap.
-    pub unknown: f64,
-    /// Index of the verdict in `hypotheses`, whether or not `unknown` is more probable.
-    pub best: usize,
-    /// Indices of hypotheses that these data cannot tell from it.
-    pub ambiguous: Vec<usize>,
-    /// Share of the excess that the best leaves.
-    pub rest: f64,
-}
 
 /// Share of the excess left from which on an unknown effect is as likely as not, and how
 /// sharply that changes with its logarithm.
@@ -305,6 +276,7 @@ pub fn judge(
         })
         .collect();
     let mut judgement = Judgement {
+        is_unknown: unknown > all[best].probability,
         best,
         ambiguous,
         unknown,
@@ -313,43 +285,4 @@ pub fn judge(
     };
     judgement.sort();
     judgement
-}
-
-impl Judgement {
-    /// Most probable first.
-    pub(crate) fn sort(&mut self) {
-        let mut order: Vec<usize> = (0..self.hypotheses.len()).collect();
-        let p = |i: usize| self.hypotheses[i].probability;
-        order.sort_by(|&a, &b| p(b).total_cmp(&p(a)));
-        let place = |old: usize| order.iter().position(|&o| o == old).unwrap_or(0);
-        let (best, ambiguous) = (place(self.best), self.ambiguous.iter().map(|&i| place(i)));
-        let mut ambiguous: Vec<usize> = ambiguous.collect();
-        ambiguous.sort_unstable();
-        self.hypotheses = order.iter().map(|&i| self.hypotheses[i].clone()).collect();
-        self.best = best;
-        self.ambiguous = ambiguous;
-    }
-
-    /// The hypothesis of the verdict.
-    #[must_use]
-    pub fn verdict(&self) -> &Hypothesis {
-        &self.hypotheses[self.best]
-    }
-
-    /// Probability that some effects are all among the true ones: of all sets that hold them.
-    #[must_use]
-    pub fn marginal(&self, labels: &[String]) -> f64 {
-        let holds = |h: &&Hypothesis| labels.iter().all(|l| h.labels.contains(l));
-        self.hypotheses
-            .iter()
-            .filter(holds)
-            .map(|h| h.probability)
-            .sum()
-    }
-
-    /// Whether nothing in the catalogue explains the gap.
-    #[must_use]
-    pub fn is_unknown(&self) -> bool {
-        self.unknown > self.verdict().probability
-    }
 }

@@ -4,8 +4,8 @@ use asid_results::evidence::Evidence;
 
 use crate::bench::{Bench, Explanation};
 use crate::candidate::{Candidate, LeftOut};
+use crate::judgement::Judgement;
 use crate::search::Findings;
-use crate::verdict::Judgement;
 
 /// What a diagnosis has worked with, for what comes after it.
 pub struct Work {

@@ -9,7 +9,9 @@ use serde::{Deserialize, Serialize};
 use crate::nullable;
 
 pub use gap::{Gap, Shares, SignalGap, Where};
-pub use sight::{DetectionLimit, Isolability, MissingForce, RankedSet};
+pub use sight::{
+    Calibration, CalibrationRow, DetectionLimit, Isolability, MissingForce, RankedSet,
+};
 pub use verdict::{EffectResult, Group, HypothesisResult, Kind, Remainder, Verdict};
 
 /// A parameter of the study, as fitted with the verdict's effects.
@@ -125,6 +127,9 @@ pub struct DiagnosisResult {
     /// The smallest size of each effect that these logs could have shown; empty where replays decide.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub detection_limits: Vec<DetectionLimit>,
+    /// What the diagnosis says of simulated logs; `None` where that was not asked.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub calibration: Option<Calibration>,
     /// What a time limit or an interruption left out; empty where the search came to its end.
     #[serde(default)]
     pub not_tried: Vec<NotTried>,

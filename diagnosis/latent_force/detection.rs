@@ -21,6 +21,10 @@ pub struct Limit {
     pub parameter: usize,
     /// The value; NaN where none within its range is seen.
     pub value: f64,
+    /// Its column.
+    pub column: usize,
+    /// Coefficient of the column from which on it is seen, in deviations of its prior.
+    pub coefficient: f64,
 }
 
 /// Coefficient from which on a column of information `g` earns `threshold`.
@@ -29,17 +33,14 @@ fn coefficient(g: f64, threshold: f64) -> f64 {
 }
 
 /// Limits of all candidates that have columns, one for each parameter that is a slope, or the first of those that a secant
-/// moves; at the most likely of the scales of `q`, of which `sums` are the regressions.
+/// moves.
+#[must_use]
 pub fn limits(
-    sums: &[Regression],
+    sum: &Regression,
     columns: &Columns,
     candidates: &[Candidate],
     threshold: f64,
 ) -> Vec<Limit> {
-    let likely = |a: &&Regression, b: &&Regression| a.log_likelihood.total_cmp(&b.log_likelihood);
-    let Some(sum) = sums.iter().max_by(likely) else {
-        return Vec::new();
-    };
     let base: Vec<usize> = (0..columns.base).collect();
     let gram = project(&sum.gram, &base);
     let mut all: Vec<Limit> = Vec::new();
@@ -76,6 +77,8 @@ pub fn limits(
                 candidate: form.candidate,
                 parameter,
                 value,
+                column,
+                coefficient: c,
             };
             match all.iter_mut().find(same) {
                 Some(known) => {

@@ -7,7 +7,7 @@
 //! From below: [`tangent`] (states), [`walk`] (rows), [`segments`] (where bodies touch), [`step_map`] (the model over a row and its derivatives),
 //! [`smoother`], [`initial`], [`context`] and [`estimate`] (trajectory, force and noise), [`fitted_value`] and [`fit`] (a model with its values),
 //! [`evidence`], [`trace`], [`columns`], [`screen`], [`search`], [`selection`],
-//! `detection` (what could have been seen), `steps` (encoder steps), `picture` (what the report draws of the force), `left` (what could
+//! [`detection`] (what could have been seen), [`rehearsal`] (what a screening would say of machines like this one), `steps` (encoder steps), `picture` (what the report draws of the force), `left` (what could
 //! be learned of the rest), [`pipeline`].
 
 pub mod columns;
@@ -21,6 +21,7 @@ pub mod initial;
 mod left;
 mod picture;
 pub mod pipeline;
+pub mod rehearsal;
 pub mod screen;
 pub mod search;
 pub mod segments;

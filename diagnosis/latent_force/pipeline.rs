@@ -45,6 +45,7 @@ pub fn diagnose(
     let (without, contact) = (&settings.without[..], settings.contact);
     let breadth = Breadth {
         false_alarms: settings.false_alarms,
+        seed: settings.seed,
         ..Breadth::default()
     };
     let (mut bench, nominal) = dataset(study, machine)?;

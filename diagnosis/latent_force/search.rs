@@ -13,7 +13,7 @@ use super::estimate::Missing;
 use super::fit::Fitted;
 
 pub use breadth::{Breadth, FALSE_ALARMS};
-pub use round::Round;
+pub use round::{Round, Sight};
 pub use set::{Set, name_of};
 
 use round::Upon;

@@ -94,13 +94,14 @@ pub fn gather(
     let place = |set: &[usize]| sets.iter().position(|s| s.candidates == set);
     let found = place(&outcome.best.candidates);
     let none = replayed(bench, &findings.none);
-    let own_error = if found.is_some() && is_small(none) {
+    let [before, after] = outcome.missing;
+    let is_missing = before.force.sqrt() > NOTHING || before.readings > LEAST_LEFT;
+    let own_error = if is_small(none) && (found.is_some() || is_missing) {
         let change = change_by_step(bench, &findings.none, &bench.machine.halved()?)?;
         RICHARDSON.powi(2) * cost(&change) / bench.train.readings.max(1) as f64
     } else {
         f64::NAN
     };
-    let [before, after] = outcome.missing;
     Ok(Evidence {
         schema: 1,
         candidates: candidates.len(),
@@ -110,7 +111,7 @@ pub fn gather(
         found,
         known: place(known).filter(|_| !known.is_empty()),
         own_error,
-        is_missing: before.force.sqrt() > NOTHING || before.readings > LEAST_LEFT,
+        is_missing,
         left: after.relative_to(before),
         stopped: !outcome.untried.is_empty(),
     })

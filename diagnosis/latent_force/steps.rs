@@ -11,7 +11,7 @@ use crate::data::Logs;
 use crate::noise;
 
 use super::columns::Form;
-use super::search::{Outcome, Round, Set};
+use super::search::{Outcome, Round, Set, Sight};
 
 /// Deviation of the rounding, relative to the noise of the sensor, from which on steps are an effect. Smaller: steps that the
 /// noise hides are named too. A study whose noise is that of its encoder (`step / sqrt(12)`) has no such effect.
@@ -156,7 +156,7 @@ pub fn beside(mut outcome: Outcome, known: &[Known], candidates: &[Candidate]) -
             base: Vec::new(),
             screened: Vec::new(),
             alike: (Vec::new(), DMatrix::zeros(0, 0)),
-            limits: Vec::new(),
+            sight: Sight::default(),
             raced: Vec::new(),
             confirmed: vec![alone.clone()],
         }),

@@ -24,6 +24,22 @@ pub(super) fn groups(labels: &[String]) -> Vec<Group> {
     all
 }
 
+/// Counts an effect of a set that was screened only: it has no fitted values.
+fn screened(all: &mut Vec<EffectResult>, label: &str, probability: f64) {
+    match all.iter_mut().find(|e| e.label() == label) {
+        Some(known) => known.probability += probability,
+        None => {
+            let (effect, site) = label.split_once('@').unwrap_or((label, ""));
+            all.push(EffectResult {
+                effect: effect.to_owned(),
+                site: site.to_owned(),
+                probability,
+                ..EffectResult::default()
+            });
+        }
+    }
+}
+
 impl Telling<'_> {
     /// The verdict of a kind; `labels` are the effects of the best explanation.
     pub(super) fn verdict(
@@ -81,7 +97,9 @@ impl Telling<'_> {
         let j = self.judgement;
         let mut all: Vec<EffectResult> = Vec::new();
         for (i, h) in j.hypotheses.iter().enumerate() {
-            let Some(found) = self.found(i) else { continue };
+            let Some(found) = self.found(i) else {
+                continue;
+            };
             let intervals = self.intervals(&found.explanation);
             for (effect, (intervals95, at_bound)) in found.explanation.effects.iter().zip(intervals)
             {
@@ -114,6 +132,12 @@ impl Telling<'_> {
                     intervals95,
                     at_bound,
                 });
+            }
+        }
+        let screened_only = j.hypotheses.iter().filter(|h| h.found.is_none());
+        for h in screened_only {
+            for label in &h.labels {
+                screened(&mut all, label, h.probability);
             }
         }
         all.sort_by(|a, b| b.probability.total_cmp(&a.probability));

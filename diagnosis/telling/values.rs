@@ -1,7 +1,8 @@
 //! Fitted values with their intervals.
 //!
 //! Intervals are those of least squares (Gauss), widened by how much more the fit leaves than the noise and by how alike
-//! neighbouring residuals are: many readings of one and the same error count once.
+//! neighbouring residuals are: many readings of one and the same error count once. Where the missing force was estimated they
+//! are no narrower than those of the fit that allows for it: what the model lacks leaves values as uncertain as it does there.
 
 use std::collections::BTreeMap;
 
@@ -43,7 +44,8 @@ impl Telling<'_> {
         let column = fit.jacobian.column(k);
         let shows = column.norm() * (high - low) / (column.len().max(1) as f64).sqrt();
         let deviation = if shows > NOTHING {
-            (fit.covariance[(k, k)].max(0.0) * self.inflation(of)).sqrt()
+            let by_replays = fit.covariance[(k, k)].max(0.0) * self.inflation(of);
+            by_replays.max(of.local_variances[unknown]).sqrt()
         } else {
             f64::INFINITY
         };

@@ -1,15 +1,15 @@
 //! How the gap is shared out, what is left beside the verdict, and what these logs could have shown at all.
 
-use asid_results::diagnosis::{DetectionLimit, DiagnosisResult, Remainder, Shares};
+use asid_results::diagnosis::{Calibration, DetectionLimit, DiagnosisResult, Remainder, Shares};
 
-use super::words::{joined, percent};
+use super::words::{joined, percent, probability, set};
 use crate::number::{quantity, round};
 use crate::page::{Column, Section, Table};
 use crate::plot::{Axis, Colour, Ranked, Ranking};
 
 pub(super) fn section(d: &DiagnosisResult) -> Option<Section> {
     let shares = d.gap.shares.as_ref();
-    if shares.is_none() && d.detection_limits.is_empty() {
+    if shares.is_none() && d.detection_limits.is_empty() && d.calibration.is_none() {
         return None;
     }
     let mut section = Section::new("What is left, and what could have been seen");
@@ -26,9 +26,65 @@ pub(super) fn section(d: &DiagnosisResult) -> Option<Section> {
             seen.count(),
             d.detection_limits.len()
         );
-        section = section.folded(summary, Section::new("").table(limits(&d.detection_limits)));
+        let lead = "Recognised: the share of logs drawn with twice that value whose screening ranks the effect first.";
+        let table = Section::new("")
+            .lead(lead)
+            .table(limits(&d.detection_limits));
+        section = section.folded(summary, table);
+    }
+    if let Some(calibration) = &d.calibration {
+        section = section
+            .heading("The same diagnosis of simulated logs")
+            .text(summed(calibration))
+            .table(rehearsed(calibration));
     }
     Some(section)
+}
+
+/// What simulated logs say of the answer.
+fn summed(c: &Calibration) -> String {
+    let mut text = format!(
+        "The model played the commands of the logs {} times, with nothing missing and with each of the leading explanations, and the \
+         readings, with the sensors' noise, were diagnosed in place of the real ones.",
+        c.runs
+    );
+    if let Some(p) = c.probability {
+        text.push_str(&format!(
+            " Of the runs with the answer above {} are right.",
+            percent(p)
+        ));
+    }
+    if let Some(p) = c.p_no_gap {
+        text.push_str(&format!(
+            " A machine that lacks nothing shows as large a gap with probability {} at most.",
+            percent(p)
+        ));
+    }
+    text
+}
+
+fn rehearsed(c: &Calibration) -> Table {
+    let columns = vec![
+        Column::prose("the simulated machine lacks"),
+        Column::number("runs"),
+        Column::number("right"),
+        Column::number("none"),
+        Column::number("unknown"),
+        Column::number("other effects"),
+        Column::number("probability stated"),
+    ];
+    c.rows.iter().fold(Table::new(columns), |table, r| {
+        let lacks = if r.effects.is_empty() {
+            "nothing".to_owned()
+        } else {
+            set(&r.effects)
+        };
+        let counts = [r.runs, r.right, r.none, r.unknown, r.other].map(|n| n.to_string().into());
+        let mut row = vec![lacks.into()];
+        row.extend(counts);
+        row.push(probability(r.probability).into());
+        table.row(row)
+    })
 }
 
 /// A remainder as a sentence.
@@ -72,6 +128,8 @@ fn limits(limits: &[DetectionLimit]) -> Table {
         Column::text("effect"),
         Column::text("parameter"),
         Column::number("seen from"),
+        Column::number("recognised"),
+        Column::text("else taken for"),
     ];
     limits.iter().fold(Table::new(columns), |table, l| {
         let value = if l.value.is_finite() {

@@ -47,6 +47,9 @@ pub struct Gap {
     /// By what it goes with; `None` where there is none.
     #[serde(default)]
     pub shares: Option<Shares>,
+    /// Probability that a machine that lacks nothing shows as much evidence for its best candidate; `None` where replays decide.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub p_value: Option<f64>,
     /// By sensor.
     pub signals: Vec<SignalGap>,
 }
@@ -75,6 +78,7 @@ impl Default for Gap {
             closed: None,
             closed_interval95: None,
             shares: None,
+            p_value: None,
             signals: Vec::new(),
         }
     }

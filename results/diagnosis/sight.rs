@@ -57,4 +57,43 @@ pub struct DetectionLimit {
     /// Value from which on it is seen; NaN where no value within its range is.
     #[serde(deserialize_with = "nullable::scalar")]
     pub value: f64,
+    /// At twice that value: the share of such logs by which it is ranked first; `None` where it is not known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub recognised: Option<f64>,
+    /// The effect that most of the others rank first; `None` where there is none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub taken_for: Option<String>,
+}
+
+/// What the diagnosis says of logs that were simulated in place of the real ones.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct Calibration {
+    /// Simulated sets of logs that were diagnosed.
+    pub runs: usize,
+    /// Of the runs that gave the real logs' answer, the share in which it was right; `None` where there was none.
+    pub probability: Option<f64>,
+    /// Probability of as large a gap where the model lacks nothing; `None` where that was not simulated.
+    pub p_no_gap: Option<f64>,
+    /// By what the simulated machine lacked.
+    pub rows: Vec<CalibrationRow>,
+}
+
+/// Diagnoses of machines that lack the same.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct CalibrationRow {
+    /// What they lack, as fitted to the real logs; empty for nothing.
+    pub effects: Vec<String>,
+    /// Runs.
+    pub runs: usize,
+    /// Runs that said just this.
+    pub right: usize,
+    /// Runs that said that nothing is missing, where that is wrong.
+    pub none: usize,
+    /// Runs that named no effect.
+    pub unknown: usize,
+    /// Runs that named other effects.
+    pub other: usize,
+    /// Mean probability that they stated.
+    #[serde(deserialize_with = "nullable::scalar")]
+    pub probability: f64,
 }

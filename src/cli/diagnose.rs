@@ -67,6 +67,9 @@ pub struct Arguments {
     /// [default: 1.75]
     #[arg(long, value_name = "MINUTES")]
     minutes: Option<f64>,
+    /// Repeat the diagnosis on simulated logs for as long as --minutes allows, and tell how often it was right
+    #[arg(long)]
+    calibrate: bool,
     /// Accuse a machine that lacks nothing no more often than this, by chance; 0.05 finds smaller effects [default: 0.01]
     #[arg(long, value_name = "P")]
     false_alarms: Option<f64>,
@@ -345,6 +348,26 @@ fn lines(result: &DiagnosisResult, engine: &str, seconds: f64) -> Vec<String> {
     for p in &result.parameters {
         let estimate = Precision::of(p.estimate, p.std).with_uncertainty(p.estimate, p.std);
         line(&format!("  {} = {estimate}", p.name));
+    }
+    if let Some(c) = &result.calibration {
+        line(&format!("calibration on simulated logs, {} runs:", c.runs));
+        for r in c.rows.iter().filter(|r| r.runs > 0) {
+            let lacks = if r.effects.is_empty() {
+                "nothing".to_owned()
+            } else {
+                r.effects.join(" + ")
+            };
+            line(&format!(
+                "  lacking {lacks}: {} of {} right",
+                r.right, r.runs
+            ));
+        }
+        if let Some(p) = c.probability {
+            line(&format!(
+                "  of the runs with this answer {:.0} % are right",
+                100.0 * p
+            ));
+        }
     }
     for left in &result.not_tried {
         line(&format!("not tried: {}", left.stage));

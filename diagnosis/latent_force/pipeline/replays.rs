@@ -11,7 +11,7 @@ use crate::predict::State;
 use crate::result::NotTried;
 use crate::search::{Findings, Found};
 
-use super::told::{detection_limits, isolability, missing_forces, ranking};
+use super::told::{detection_limits, isolability, missing_forces, p_value, ranking};
 
 /// Physics steps of a replay of all logs times coordinates of the starts that they leave open up to which starts are fitted
 /// once more with the values; beyond it they stay as smoothed.
@@ -89,7 +89,11 @@ pub(super) fn replay(
             })
             .collect();
         let starts = smoothed_starts(bench, fitted, firsts);
-        bench.explain(0, &chosen, &fitted.theta[..study], &starts, effort)
+        let mut of = bench.explain(0, &chosen, &fitted.theta[..study], &starts, effort)?;
+        for (k, i) in fitted.hypothesis.free().into_iter().enumerate() {
+            of.local_variances[i] = fitted.covariance[(k, k)];
+        }
+        Ok(of)
     };
     let mut not_tried: Vec<NotTried> = (outcome.untried.iter())
         .map(|u| NotTried {
@@ -140,6 +144,7 @@ pub(super) fn replay(
         ranking,
         isolability: isolability(candidates, outcome),
         detection_limits: detection_limits(candidates, outcome),
+        p_value: p_value(outcome),
         left: Vec::new(),
         not_tried,
         screened: Vec::new(),

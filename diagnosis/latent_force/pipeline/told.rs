@@ -8,7 +8,7 @@ use crate::candidate::Candidate;
 use crate::latent_force::detection::Limit;
 use crate::latent_force::estimate::Estimate;
 use crate::latent_force::picture::dofs;
-use crate::latent_force::search::{Outcome, Set};
+use crate::latent_force::search::{Outcome, Set, Sight};
 use crate::result::{DetectionLimit, Isolability, MissingForce, RankedSet};
 
 /// Most sets that are listed with their evidence.
@@ -71,8 +71,10 @@ pub(super) fn ranking(
 
 /// What the logs could have shown beside what stands.
 pub(super) fn detection_limits(candidates: &[Candidate], outcome: &Outcome) -> Vec<DetectionLimit> {
-    let last = outcome.rounds.iter().next_back();
-    let told = |l: &Limit| {
+    let Some(Sight { limits, rehearsal }) = outcome.rounds.last().map(|r| &r.sight) else {
+        return Vec::new();
+    };
+    let told = |(l, recognised): (&Limit, &Option<(f64, Option<usize>)>)| {
         let candidate = &candidates[l.candidate];
         let parameter = &candidate.parameters()[l.parameter];
         DetectionLimit {
@@ -80,9 +82,17 @@ pub(super) fn detection_limits(candidates: &[Candidate], outcome: &Outcome) -> V
             parameter: parameter.name.to_owned(),
             unit: parameter.unit.to_owned(),
             value: l.value,
+            recognised: recognised.map(|r| r.0),
+            taken_for: recognised.and_then(|r| r.1).map(|c| candidates[c].label()),
         }
     };
-    last.map_or_else(Vec::new, |r| r.limits.iter().map(told).collect())
+    limits.iter().zip(&rehearsal.recognised).map(told).collect()
+}
+
+/// Probability of as much evidence for the best candidate where nothing is missing; `None` where that is not known.
+pub(super) fn p_value(outcome: &Outcome) -> Option<f64> {
+    let first = outcome.rounds.first().map(|r| r.sight.rehearsal.p_value);
+    first.filter(|p| p.is_finite())
 }
 
 /// Principal angles between what leads in the first screening.

@@ -31,6 +31,8 @@ pub struct Breadth {
     pub depth: usize,
     /// Linearisations of a first short fit, and of a whole one.
     pub rounds: [usize; 2],
+    /// Seed of all chance.
+    pub seed: u64,
 }
 
 impl Default for Breadth {
@@ -46,6 +48,7 @@ impl Default for Breadth {
             finished: 3,
             depth: 4,
             rounds: [3, 15],
+            seed: 0,
         }
     }
 }

@@ -9,7 +9,9 @@ use crate::latent_force::context::Context;
 use crate::latent_force::detection::{Limit, limits};
 use crate::latent_force::estimate::Missing;
 use crate::latent_force::fit::{Fitted, Slopes};
+use crate::latent_force::rehearsal::{Rehearsal, rehearse};
 use crate::latent_force::screen::{Screened, isolability, rank, regressions};
+use crate::latent_force::smoother::Regression;
 
 use super::breadth::Breadth;
 use super::set::{Set, name_of, pruned, refined_by, with, without};
@@ -19,6 +21,15 @@ use super::{Untried, threshold};
 const COMPARED: usize = 20;
 /// Prior odds against an effect at a site where it comes to mind only after others.
 const UNUSUAL: f64 = 10.0;
+
+/// What a screening could have seen.
+#[derive(Clone, Debug, Default)]
+pub struct Sight {
+    /// The least that each candidate must be.
+    pub limits: Vec<Limit>,
+    /// What screenings of drawn logs say.
+    pub rehearsal: Rehearsal,
+}
 
 /// A round: what was screened and what was fitted upon a base.
 #[derive(Clone, Debug)]
@@ -30,7 +41,7 @@ pub struct Round {
     /// The leading candidates of screening, and the cosines of the smallest principal angle between each two.
     pub alike: (Vec<usize>, DMatrix<f64>),
     /// What could have been seen upon the base.
-    pub limits: Vec<Limit>,
+    pub sight: Sight,
     /// Candidates of the sets that were fitted a little.
     pub raced: Vec<Vec<usize>>,
     /// Sets that were fitted to the end, best first.
@@ -58,7 +69,7 @@ struct Screening {
     ranked: Vec<Screened>,
     /// Leading candidates, and the cosines between each two.
     alike: (Vec<usize>, DMatrix<f64>),
-    limits: Vec<Limit>,
+    sight: Sight,
 }
 
 /// Sets that were fitted, and those that there was no time for.
@@ -111,7 +122,7 @@ impl Upon<'_> {
             base: self.base.candidates.clone(),
             screened,
             alike: screening.alike,
-            limits: screening.limits,
+            sight: screening.sight,
             raced: of_race,
             confirmed,
         })
@@ -151,19 +162,32 @@ impl Upon<'_> {
             leading.iter().map(candidate).collect(),
             isolability(&sums[0], &columns, &leading),
         );
-        let threshold = threshold(self.candidates.len(), self.breadth.false_alarms);
-        let mut limits = limits(&sums, &columns, &some, threshold);
-        limits
-            .iter_mut()
-            .for_each(|l| l.candidate = self.open[l.candidate]);
+        let sight = self.sight(&sums, &columns, &some);
         self.progress.end();
         Ok(Screening {
             some,
             columns,
             ranked,
             alike,
-            limits,
+            sight,
         })
+    }
+
+    /// What a screening could have seen, at the most likely of the scales of `q`.
+    fn sight(&self, sums: &[Regression], columns: &Columns, some: &[Candidate]) -> Sight {
+        let likely =
+            |a: &&Regression, b: &&Regression| a.log_likelihood.total_cmp(&b.log_likelihood);
+        let Some(sum) = sums.iter().max_by(likely) else {
+            return Sight::default();
+        };
+        let threshold = threshold(self.candidates.len(), self.breadth.false_alarms);
+        let mut limits = limits(sum, columns, some, threshold);
+        let mut rehearsal = rehearse(sum, columns, &limits, self.breadth.seed);
+        let place = |c: &mut usize| *c = self.open[*c];
+        limits.iter_mut().for_each(|l| place(&mut l.candidate));
+        let taken_for = rehearsal.recognised.iter_mut().flatten();
+        taken_for.filter_map(|r| r.1.as_mut()).for_each(place);
+        Sight { limits, rehearsal }
     }
 
     /// Fits what leads in a screening a little.

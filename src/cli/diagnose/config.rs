@@ -60,6 +60,9 @@ pub struct Config {
     /// Time limit.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub minutes: Option<f64>,
+    /// Whether the diagnosis is repeated on simulated logs.
+    #[serde(default)]
+    calibrate: bool,
     /// Rate of false alarms.
     #[serde(default = "false_alarms")]
     false_alarms: f64,
@@ -95,7 +98,7 @@ impl RunLogs {
 }
 
 /// Keys that are a diagnosis' own; where a task is run, the others are that run's.
-const OWN: [&str; 18] = [
+const OWN: [&str; 19] = [
     "study",
     "task",
     "model",
@@ -108,6 +111,7 @@ const OWN: [&str; 18] = [
     "logs",
     "seeds",
     "minutes",
+    "calibrate",
     "false_alarms",
     "without",
     "plugins",
@@ -221,6 +225,7 @@ impl Config {
                 "is a probability between 0 and 1, such as 0.01",
             ));
         }
+        config.calibrate |= arguments.calibrate;
         config.without.extend(arguments.without.iter().cloned());
         for name in &config.without {
             find::<EffectEntry>(name)?;
@@ -276,6 +281,7 @@ impl Config {
             without: self.without.clone(),
             contact,
             false_alarms: self.false_alarms,
+            calibrate: self.calibrate,
         }
     }
 

@@ -48,8 +48,11 @@ const APART: u64 = 1000;
 
 /// The most probable explanations as simulators with the values that were fitted.
 fn rivals(work: &Work) -> Result<Vec<Rival>> {
-    let hypotheses = work.judgement.hypotheses.iter().take(RIVALS);
-    hypotheses
+    let hypotheses = work.judgement.hypotheses.iter();
+    // A set that was screened only has no values to play with.
+    let fitted = hypotheses.filter(|h| h.found.is_some() || h.labels.is_empty());
+    fitted
+        .take(RIVALS)
         .map(|h| {
             let (members, explanation) = match h.found {
                 Some(i) => {

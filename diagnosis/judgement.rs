@@ -1,0 +1,66 @@
+//! Explanations with their probabilities, and which of them is the verdict.
+
+/// A set of effects with its probability and what it costs.
+#[derive(Clone, Debug, Default)]
+pub struct Hypothesis {
+    /// Place in the findings of what was fitted; `None` for no effect, and for a set that was screened only.
+    pub found: Option<usize>,
+    /// Labels, sorted.
+    pub labels: Vec<String>,
+    /// Sum of squares over all logs, where replays decide.
+    pub cost: f64,
+    /// Free parameters of its effects that do something, where replays decide.
+    pub size: usize,
+    /// Probability.
+    pub probability: f64,
+}
+
+/// What kind of answer, with its probability.
+#[derive(Clone, Debug)]
+pub struct Judgement {
+    /// All sets, most probable first.
+    pub hypotheses: Vec<Hypothesis>,
+    /// Probability that nothing in the catalogue explains the gap.
+    pub unknown: f64,
+    /// Whether nothing in the catalogue explains the gap.
+    pub is_unknown: bool,
+    /// Index in `hypotheses` of the best explanation, whether or not it is the verdict.
+    pub best: usize,
+    /// Indices of hypotheses that these data cannot tell from it.
+    pub ambiguous: Vec<usize>,
+    /// Share of the excess that the best leaves.
+    pub rest: f64,
+}
+
+impl Judgement {
+    /// Most probable first.
+    pub(crate) fn sort(&mut self) {
+        let mut order: Vec<usize> = (0..self.hypotheses.len()).collect();
+        let p = |i: usize| self.hypotheses[i].probability;
+        order.sort_by(|&a, &b| p(b).total_cmp(&p(a)));
+        let place = |old: usize| order.iter().position(|&o| o == old).unwrap_or(0);
+        let (best, ambiguous) = (place(self.best), self.ambiguous.iter().map(|&i| place(i)));
+        let mut ambiguous: Vec<usize> = ambiguous.collect();
+        ambiguous.sort_unstable();
+        self.hypotheses = order.iter().map(|&i| self.hypotheses[i].clone()).collect();
+        self.best = best;
+        self.ambiguous = ambiguous;
+    }
+
+    /// The hypothesis of the best explanation.
+    #[must_use]
+    pub fn verdict(&self) -> &Hypothesis {
+        &self.hypotheses[self.best]
+    }
+
+    /// Probability that some effects are all among the true ones: of all sets that hold them.
+    #[must_use]
+    pub fn marginal(&self, labels: &[String]) -> f64 {
+        let holds = |h: &&Hypothesis| labels.iter().all(|l| h.labels.contains(l));
+        self.hypotheses
+            .iter()
+            .filter(holds)
+            .map(|h| h.probability)
+            .sum()
+    }
+}

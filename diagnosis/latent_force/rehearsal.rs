@@ -1,0 +1,238 @@
+//! What the screening would say of machines that are like this one: of those that lack nothing, and of those that lack one effect.
+//!
+//! The screening is a linear problem: whitened innovations are `X c` and normal noise, and all that it sees of them is `X'y`. So logs that
+//! the same commands would have given need no simulation: `X'y = G c + z`, with `z ~ N(0, G)` and `G = X'X`, what the present model can do
+//! projected out. Each draw is screened as the logs were.
+
+use asid_core::Streams;
+use nalgebra::{DMatrix, DVector};
+use rand::Rng as _;
+use rand_distr::StandardNormal;
+
+use super::columns::{Columns, Form};
+use super::detection::Limit;
+use super::screen::project;
+use super::smoother::Regression;
+
+/// Draws of a machine that lacks nothing: its evidence is known to half a percent of them.
+const NOTHING_MISSING: usize = 199;
+/// Draws of a machine that lacks one effect: shares are known to a fifth.
+const ONE_MISSING: usize = 24;
+/// Multiple of its limit that an effect is given: at the limit itself half of the draws do not show it.
+const SIZE: f64 = 2.0;
+/// Most columns: the cube of their number is what a rehearsal costs.
+const COLUMNS: usize = 600;
+
+/// What screenings of drawn logs say.
+#[derive(Clone, Debug, Default)]
+pub struct Rehearsal {
+    /// Probability of as much evidence for the best candidate where nothing is missing; NaN where that is not known.
+    pub p_value: f64,
+    /// Of each limit: the share of draws that rank its candidate first, and the candidate that most of the others rank first.
+    pub recognised: Vec<Option<(f64, Option<usize>)>>,
+}
+
+/// A form with what its evidence needs.
+struct Ranked<'a> {
+    form: &'a Form,
+    places: Vec<usize>,
+    /// Inverse of `G + 1`, and half the logarithm of its determinant.
+    inverse: DMatrix<f64>,
+    half_log: f64,
+    /// Bounds of the one coefficient, where there is but one.
+    bounds: Option<[f64; 2]>,
+}
+
+impl<'a> Ranked<'a> {
+    fn of(form: &'a Form, gram: &DMatrix<f64>, bounds: &[[f64; 2]]) -> Option<Self> {
+        let places: Vec<usize> = form.columns().collect();
+        let n = places.len();
+        let own = DMatrix::from_fn(n, n, |i, j| {
+            gram[(places[i], places[j])] + f64::from(u8::from(i == j))
+        });
+        let factor = own.cholesky()?;
+        let half_log = factor.l_dirty().diagonal().iter().map(|x| x.ln()).sum();
+        Some(Self {
+            form,
+            bounds: (n == 1).then(|| bounds[places[0]]),
+            places,
+            inverse: factor.inverse(),
+            half_log,
+        })
+    }
+
+    /// Evidence for the form where `X'y` is `moment`.
+    fn gain(&self, moment: &DVector<f64>) -> f64 {
+        let b = DVector::from_fn(self.places.len(), |i, _| moment[self.places[i]]);
+        let c = &self.inverse * &b;
+        if let Some([low, high]) = self.bounds {
+            let c = c[0].clamp(low, high);
+            return b[0] * c - 0.5 * c * c / self.inverse[(0, 0)] - self.half_log;
+        }
+        0.5 * b.dot(&c) - self.half_log
+    }
+}
+
+/// The best of all forms.
+fn best(forms: &[Ranked<'_>], moment: &DVector<f64>) -> (f64, usize) {
+    let gains = forms.iter().map(|f| (f.gain(moment), f.form.candidate));
+    gains.max_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((0.0, 0))
+}
+
+/// The factor `L` of `G = L L'`, of a matrix that may be singular: of one a little larger.
+fn root(gram: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let typical = gram.trace() / gram.nrows().max(1) as f64;
+    [1e-12, 1e-9, 1e-6].into_iter().find_map(|share| {
+        let mut larger = gram.clone();
+        for i in 0..larger.nrows() {
+            larger[(i, i)] += share * typical + f64::MIN_POSITIVE;
+        }
+        larger.cholesky().map(|f| f.l())
+    })
+}
+
+/// `X'X` and `X'y` with what the present model can do projected out; its own rows and columns are zero.
+fn projected(sum: &Regression, base: usize) -> Option<(DMatrix<f64>, DVector<f64>)> {
+    let places: Vec<usize> = (0..base).collect();
+    let mut gram = project(&sum.gram, &places);
+    let own = DMatrix::from_fn(base, base, |i, j| {
+        sum.gram[(i, j)] + f64::from(u8::from(i == j))
+    });
+    let by_base = own
+        .cholesky()?
+        .solve(&sum.moment.rows(0, base).into_owned());
+    let mut moment = &sum.moment - sum.gram.columns(0, base) * by_base;
+    for i in 0..base {
+        gram.row_mut(i).fill(0.0);
+        gram.column_mut(i).fill(0.0);
+        moment[i] = 0.0;
+    }
+    Some((gram, moment))
+}
+
+/// Rehearses a screening.
+#[must_use]
+pub fn rehearse(sum: &Regression, columns: &Columns, limits: &[Limit], seed: u64) -> Rehearsal {
+    let n = sum.gram.nrows();
+    let none = Rehearsal {
+        p_value: f64::NAN,
+        recognised: vec![None; limits.len()],
+    };
+    if n == columns.base || n > COLUMNS {
+        return none;
+    }
+    let Some((gram, moment)) = projected(sum, columns.base) else {
+        return none;
+    };
+    let Some(root) = root(&gram) else {
+        return none;
+    };
+    let ranked = columns.forms.iter();
+    let forms: Vec<Ranked<'_>> = ranked
+        .filter_map(|f| Ranked::of(f, &gram, &columns.bounds))
+        .collect();
+    let mut random = Streams::new(seed).stream("rehearsal");
+    let noise: Vec<DVector<f64>> = (0..NOTHING_MISSING)
+        .map(|_| &root * DVector::from_fn(n, |_, _| random.sample::<f64, _>(StandardNormal)))
+        .collect();
+    let found = best(&forms, &moment).0;
+    let as_much = noise.iter().filter(|z| best(&forms, z).0 >= found).count();
+    let recognised = limits.iter().map(|limit| {
+        if !limit.coefficient.is_finite() || limit.value.is_nan() {
+            return None;
+        }
+        let shown = gram.column(limit.column) * (SIZE * limit.coefficient);
+        let draws = noise.iter().take(ONE_MISSING);
+        let named: Vec<usize> = draws.map(|z| best(&forms, &(&shown + z)).1).collect();
+        let right = named.iter().filter(|c| **c == limit.candidate).count();
+        let count = |c: usize| named.iter().filter(|x| **x == c).count();
+        let others = named.iter().copied().filter(|c| *c != limit.candidate);
+        let taken_for = others.max_by_key(|&c| (count(c), std::cmp::Reverse(c)));
+        Some((right as f64 / ONE_MISSING as f64, taken_for))
+    });
+    Rehearsal {
+        p_value: (1 + as_much) as f64 / (1 + NOTHING_MISSING) as f64,
+        recognised: recognised.collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// One form a column.
+    fn columns(n: usize) -> Columns {
+        let form = |candidate| Form {
+            candidate,
+            begin: vec![0.0],
+            slopes: vec![Some((0, 1.0))],
+            first: candidate,
+        };
+        Columns {
+            linear: Vec::new(),
+            base: 0,
+            forms: (0..n).map(form).collect(),
+            center: vec![0.0; n],
+            bounds: vec![[-1e9, 1e9]; n],
+            complete: true,
+        }
+    }
+
+    fn regression(gram: DMatrix<f64>, moment: &[f64]) -> Regression {
+        Regression {
+            log_likelihood: 0.0,
+            gram,
+            moment: DVector::from_row_slice(moment),
+        }
+    }
+
+    fn limit(candidate: usize, coefficient: f64) -> Limit {
+        Limit {
+            candidate,
+            parameter: 0,
+            value: 1.0,
+            column: candidate,
+            coefficient,
+        }
+    }
+
+    #[test]
+    fn what_chance_reaches_is_as_probable_as_the_chi_square_distribution_says() {
+        // One column of information g, and a moment of 1.645 deviations: a tenth of the draws are further from zero.
+        let g = 1e6_f64;
+        let of = |deviations: f64| {
+            let sum = regression(DMatrix::from_element(1, 1, g), &[deviations * g.sqrt()]);
+            rehearse(&sum, &columns(1), &[], 3).p_value
+        };
+        assert!((of(1.645) - 0.1).abs() < 0.06, "{}", of(1.645));
+        assert!(of(9.0) < 0.006);
+    }
+
+    #[test]
+    fn what_the_present_model_explains_is_no_evidence() {
+        // The readings are those of the model's own column, which the candidate shares.
+        let x = DMatrix::from_row_slice(3, 2, &[100.0, 60.0, 0.0, 40.0, 0.0, 0.0]);
+        let y = DVector::from_row_slice(&[250.0, 0.0, 0.0]);
+        let mut columns = columns(1);
+        columns.base = 1;
+        columns.forms[0].first = 1;
+        columns.bounds = vec![[-1e9, 1e9]; 2];
+        let sum = regression(x.transpose() * &x, (x.transpose() * y).as_slice());
+        assert!(rehearse(&sum, &columns, &[], 5).p_value > 0.5);
+    }
+
+    #[test]
+    fn effects_that_act_alike_are_taken_for_each_other_and_others_are_recognised() {
+        let gram = DMatrix::from_row_slice(
+            3,
+            3,
+            &[1e4, 0.99999e4, 0.0, 0.99999e4, 1e4, 0.0, 0.0, 0.0, 1e4],
+        );
+        let limits = [limit(0, 0.05), limit(2, 0.05)];
+        let found = rehearse(&regression(gram, &[0.0; 3]), &columns(3), &limits, 1);
+        let (share, other) = found.recognised[0].unwrap();
+        assert!(share > 0.1 && share < 0.9, "{share}");
+        assert_eq!(other, Some(1));
+        assert_eq!(found.recognised[1].unwrap().0, 1.0);
+    }
+}
