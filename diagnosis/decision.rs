@@ -44,6 +44,29 @@ impl Default for Rules {
     }
 }
 
+/// A number that decides, by name.
+pub type Rule = (&'static str, fn(&mut Rules) -> &mut f64);
+
+impl Rules {
+    /// All numbers, so that each can be changed and the decision repeated.
+    pub const ALL: [Rule; 14] = [
+        ("temperature", |r| &mut r.temperature),
+        ("apart", |r| &mut r.apart),
+        ("unexplained", |r| &mut r.unexplained),
+        ("sharpness", |r| &mut r.sharpness),
+        ("gap", |r| &mut r.gap),
+        ("gap_scale", |r| &mut r.gap_scale),
+        ("closes", |r| &mut r.closes),
+        ("confidence.named", |r| &mut r.confidence.named),
+        ("confidence.evidence", |r| &mut r.confidence.evidence),
+        ("confidence.stopped", |r| &mut r.confidence.stopped),
+        ("confidence.gap_left", |r| &mut r.confidence.gap_left),
+        ("confidence.unknown", |r| &mut r.confidence.unknown),
+        ("confidence.beside", |r| &mut r.confidence.beside),
+        ("confidence.screening", |r| &mut r.confidence.screening),
+    ];
+}
+
 /// Whether a gap without effects is so small that what evidence from row to row is for must be borne out by replays of whole logs.
 #[must_use]
 pub fn is_small(none: Replayed) -> bool {

@@ -7,7 +7,7 @@ use asid_results::evidence::Evidence;
 use crate::bench::{Bench, Explanation, Trial};
 use crate::calibration::calibrate;
 use crate::candidate::{Candidate, enumerate};
-use crate::confidence::Confidence;
+use crate::confidence::{Confidence, Untried};
 use crate::fit::cost;
 use crate::intake::Intake;
 use crate::latent_force;
@@ -197,7 +197,8 @@ pub(crate) fn diagnose_physics(
         .map(|i| &findings.found[i].explanation);
     let left = best.unwrap_or(&findings.none).held_plain / bench.held_readings().max(1.0);
     let seen = (left, !findings.not_tried.is_empty());
-    Confidence::default().settle(&mut judgement, seen, &[]);
+    let untried = untried(&findings, &candidates);
+    Confidence::default().settle(&mut judgement, seen, &untried);
     let work = Work {
         bench,
         candidates,
@@ -209,6 +210,19 @@ pub(crate) fn diagnose_physics(
         nominal,
     };
     tell(study, work, settings, progress)
+}
+
+/// What the replay search screened and never fitted, by how near its cost is to the least.
+fn untried(findings: &Findings, candidates: &[Candidate]) -> Vec<Untried> {
+    let is_fitted = |c: usize| findings.found.iter().any(|f| f.candidates == [c]);
+    let screened = || findings.screened.iter();
+    let least = screened().map(|s| s.cost).fold(f64::INFINITY, f64::min);
+    let unfitted = screened().filter(|s| !is_fitted(s.candidate));
+    let untried = unfitted.map(|s| Untried {
+        labels: vec![candidates[s.candidate].label()],
+        relative: least / s.cost,
+    });
+    untried.collect()
 }
 
 /// Tells what was found.

@@ -13,6 +13,7 @@ mod make;
 mod method;
 mod score;
 mod seal;
+mod sensitivity;
 mod written;
 
 use std::path::PathBuf;
@@ -89,6 +90,9 @@ pub struct Arguments {
     /// Score the answers that OUT holds, whatever made them, and answer nothing
     #[arg(long, requires = "cases")]
     only_score: bool,
+    /// Repeat the decisions of the answers that OUT holds with each number that decides halved and doubled; replays nothing
+    #[arg(long, requires = "cases", conflicts_with_all = ["shard", "control", "only_score"])]
+    sensitivity: bool,
     /// Score by names alone: without replays no set counts as the same physics, and no gap as the best possible
     #[arg(long, requires = "cases")]
     names_only: bool,

@@ -27,6 +27,7 @@ use super::jobs::side_by_side;
 use super::kept::{self, Kept, Maker};
 use super::method::{Asked, Method};
 use super::seal::sealed;
+use super::sensitivity::{Stored, sensitivity};
 use crate::cli::failure;
 use crate::cli::output::OutFolder;
 use crate::cli::progress::Bars;
@@ -60,6 +61,11 @@ pub fn score(folder: &Path, arguments: &Arguments) -> Result<()> {
         [] => vec![Method::Diagnose],
         methods => methods.to_vec(),
     };
+    if arguments.sensitivity {
+        let labels = read_labels(file)?;
+        sealed(folder, file)?;
+        return session.sensitivity(&labels);
+    }
     if !arguments.only_score && arguments.control != Some(Control::Oracle) {
         for method in &methods {
             session.answer(*method, early.as_ref())?;
@@ -211,6 +217,19 @@ impl<'a> Session<'a> {
         }
         let scored: Vec<Scored> = scored.into_iter().flatten().collect();
         Ok(Score::of(method.name(), scored, self.left_out.clone()))
+    }
+
+    /// Repeats the decisions of the diagnosis' stored answers.
+    fn sensitivity(&self, labels: &BTreeMap<String, Label>) -> Result<()> {
+        let folder = self.answers(Method::Diagnose);
+        let stored = self
+            .cases
+            .iter()
+            .filter_map(|(name, study)| Stored::read(&folder.join(name), study, labels.get(name)?));
+        let stored: Vec<Stored<'_>> = stored.collect();
+        let effects = all::<EffectEntry>();
+        let catalogue = effects.iter().map(|e| e.name.to_owned()).collect();
+        sensitivity(&stored, &catalogue, &self.out)
     }
 
     fn scored(&self, name: &str, study: &Path, label: &Label, run: &Run) -> Scored {
