@@ -13,6 +13,7 @@ pub mod bench;
 pub mod calibration;
 pub mod candidate;
 pub mod ceiling;
+pub mod chance;
 pub mod checks;
 pub mod confidence;
 pub mod data;

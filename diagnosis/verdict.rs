@@ -7,15 +7,14 @@
 //! this leaves is no second effect.
 
 use crate::bench::{Bench, Explanation};
+use crate::chance::threshold;
 use crate::judgement::{Hypothesis, Judgement};
 use crate::search::{Findings, Found, NEGLIGIBLE, excess};
 
-/// Share of the excess left from which on an unknown effect is as likely as not, and how
-/// sharply that changes with its logarithm.
-const REST: f64 = 0.15;
+/// Share of the excess power left from which on an unknown effect is as likely as not: `unknown` is for a gap of which nothing
+/// named explains the larger part. And how sharply that changes with its logarithm.
+const REST: f64 = 0.5;
 const SHARPNESS: f64 = 0.35;
-/// Excess that the explanations in [`REST`] are thought of with, in deviations of the noise.
-const USUAL: f64 = 8.0;
 /// A further effect must bring the excess below this share of what it was.
 const WORTH: f64 = 0.4;
 /// A first effect in a gap that is small anyway must bring the excess below this share of what it
@@ -177,18 +176,17 @@ pub fn judge(
     let rho = correlation(bench, residuals);
     let temperature =
         (lowest / readings).max(1.0) * (1.0 + rho) / (1.0 - rho) + scatter / (2.0 * APART.sqrt());
+    let by_chance = threshold(candidates, false_alarms);
     // Twice the negative logarithm of the posterior, up to a constant.
     let score = |h: &Hypothesis| {
         let unusual =
             2.0 * UNUSUAL.ln() * h.labels.iter().filter(|l| is_unusual(bench, l)).count() as f64;
-        let choice = 2.0 * (candidates.max(1) as f64).ln() * h.labels.len() as f64;
-        let further = 2.0 * FURTHER.ln() * h.labels.len().saturating_sub(1) as f64;
-        let chance = if h.labels.is_empty() {
-            0.0
-        } else {
-            -2.0 * false_alarms.ln()
-        };
-        h.cost / temperature + h.size as f64 * readings.ln() + choice + chance + further + unusual
+        // A first effect pays for what chance reaches, each further one for the choice.
+        let further_ones = h.labels.len().saturating_sub(1) as f64;
+        let first = if h.labels.is_empty() { 0.0 } else { by_chance };
+        let choice = 2.0 * (first + (candidates.max(1) as f64).ln() * further_ones);
+        let further = 2.0 * FURTHER.ln() * further_ones;
+        h.cost / temperature + h.size as f64 * readings.ln() + choice + further + unusual
     };
     let gap = |h: &Hypothesis| excess(h.cost / readings);
     let explanation = |h: &Hypothesis| {
@@ -256,7 +254,7 @@ pub fn judge(
         let short = findings.short.unwrap_or(0.0);
         sigmoid((short.max(left) - NEGLIGIBLE) / 0.3).clamp(0.02, 0.999)
     } else {
-        let share = sigmoid((rest / REST).ln() / SHARPNESS + 0.5 * (left / USUAL).max(1e-9).ln());
+        let share = sigmoid((rest / REST).ln() / SHARPNESS);
         (share * sigmoid((left - NEGLIGIBLE) / 0.3)).clamp(0.001, 0.999)
     };
     for h in &mut all {

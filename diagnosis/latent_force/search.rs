@@ -7,6 +7,7 @@ mod set;
 use asid_core::{Progress, Result};
 
 use crate::candidate::Candidate;
+use crate::chance::threshold;
 
 use super::context::Context;
 use super::estimate::Missing;
@@ -139,9 +140,4 @@ pub fn search(
         best,
         untried,
     })
-}
-
-/// Evidence that a further effect must earn where `n` candidates are tried.
-fn threshold(n: usize, false_alarms: f64) -> f64 {
-    (n.max(1) as f64 / false_alarms).ln()
 }

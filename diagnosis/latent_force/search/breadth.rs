@@ -10,8 +10,7 @@ pub struct Breadth {
     /// evidence and leaves the force as it was mends the noise model, and one that makes up for little is among the many
     /// small things by which any machine differs from its model. 0.04 is a fifth of the force.
     pub shrinks: f64,
-    /// Probability with which chance alone would earn an effect its place, over all candidates: the odds for the model with an effect
-    /// exceed `1 / p` with probability `p` at most where it does not act (Markov's inequality), and of `n` candidates at most `n` times as often.
+    /// Probability with which chance alone would earn an effect its place, over all candidates.
     pub false_alarms: f64,
     /// Sets that are fitted a little after each screening.
     pub raced: usize,

@@ -4,6 +4,7 @@ use asid_core::{Progress, Result};
 use nalgebra::DMatrix;
 
 use crate::candidate::Candidate;
+use crate::chance::threshold;
 use crate::latent_force::columns::Columns;
 use crate::latent_force::context::Context;
 use crate::latent_force::detection::{Limit, limits};
@@ -13,9 +14,9 @@ use crate::latent_force::rehearsal::{Rehearsal, rehearse};
 use crate::latent_force::screen::{Screened, isolability, rank, regressions};
 use crate::latent_force::smoother::Regression;
 
+use super::Untried;
 use super::breadth::Breadth;
 use super::set::{Set, name_of, pruned, refined_by, with, without};
-use super::{Untried, threshold};
 
 /// Leading candidates that are compared pair by pair.
 const COMPARED: usize = 20;
