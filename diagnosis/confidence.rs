@@ -55,8 +55,8 @@ const LISTED: usize = 8;
 pub struct Untried {
     /// Its effects, sorted.
     pub labels: Vec<String>,
-    /// Its evidence relative to that of the best set.
-    pub relative: f64,
+    /// Its weight, relative to the best set.
+    pub weight: f64,
 }
 
 fn sigmoid(x: f64) -> f64 {
@@ -89,6 +89,12 @@ impl Confidence {
         self.named + self.evidence * odds - self.gap_left * is_left - self.stopped * is_stopped
     }
 
+    /// Probability that a set would pass the best one if it were fitted, of which a screening has the evidence `relative` to that of the best.
+    #[must_use]
+    pub fn passes(&self, relative: f64) -> f64 {
+        normal(relative.max(f64::MIN_POSITIVE).ln() / self.screening)
+    }
+
     /// What a verdict of probability `p`, each unit of weight of its rivals, and `unknown` have, where the rivals weigh `others` relative to the
     /// verdict. What neither the verdict nor a rival takes is `unknown`, which is less probable than the verdict.
     fn shares(&self, p: f64, others: f64) -> [f64; 3] {
@@ -118,11 +124,10 @@ impl Confidence {
         // Of what is given to hypotheses: those that hold the verdict's effects, the others, and those that were not fitted.
         let weight =
             |h: &Hypothesis| (h.probability / best.probability.max(f64::MIN_POSITIVE)).min(1.0);
-        let likely = |u: &Untried| normal(u.relative.max(f64::MIN_POSITIVE).ln() / self.screening);
         let listed = untried.iter().take(LISTED);
         judgement.hypotheses.extend(listed.map(|u| Hypothesis {
             labels: u.labels.clone(),
-            probability: best.probability * likely(u),
+            probability: best.probability * u.weight,
             ..Hypothesis::default()
         }));
         let [with, others] = [true, false].map(|side| -> f64 {
@@ -209,11 +214,12 @@ mod tests {
     fn what_was_screened_only_has_a_share_by_its_evidence() {
         let sets: &[(&[&str], f64)] = &[(&[], 0.0), (&["a"], 0.999)];
         let mut j = judgement(sets, 1, 0.001);
+        let confidence = Confidence::default();
         let untried = [("b", 0.9), ("c", 0.1)].map(|(label, relative)| Untried {
             labels: vec![label.to_owned()],
-            relative,
+            weight: confidence.passes(relative),
         });
-        Confidence::default().settle(&mut j, (4.0, true), &untried);
+        confidence.settle(&mut j, (4.0, true), &untried);
         assert!((sum(&j) - 1.0).abs() < 1e-12);
         let p = |label: &str| j.marginal(&[label.to_owned()]);
         assert!(p("b") > 0.1 && p("c") < 0.01, "{} {}", p("b"), p("c"));

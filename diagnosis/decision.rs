@@ -1,6 +1,6 @@
 //! From evidence to probabilities and a verdict: a function of what a search has stored, without a replay.
 
-use asid_results::evidence::{Evidence, Replayed};
+use asid_results::evidence::{Evidence, Replayed, Screened, Tried};
 
 use crate::confidence::{Confidence, Untried};
 use crate::judgement::{Hypothesis, Judgement};
@@ -87,6 +87,41 @@ fn closes_a_small_gap(evidence: &Evidence, set: Replayed, rules: &Rules) -> bool
         && evidence.own_error < kept * train
 }
 
+fn sigmoid(x: f64) -> f64 {
+    1.0 / (1.0 + (-x).exp())
+}
+
+/// Probability that the gap without effects is one, and not the noise or the engine's own error.
+fn seen(evidence: &Evidence, rules: &Rules) -> f64 {
+    // The larger of 0 and NaN is 0: no error of the engine's own is known where the gap is large.
+    let own = evidence.own_error.max(0.0);
+    let gap = (evidence.none.held_out - own).max(1.0).sqrt();
+    sigmoid((gap - rules.gap) / rules.gap_scale)
+}
+
+/// What was screened and never fitted, with its weight relative to the best set: by whether a fit would pass that one; with
+/// more names by the evidence that they add, at their price.
+fn untried(evidence: &Evidence, best: Option<&Tried>, rules: &Rules) -> Vec<Untried> {
+    let Some(best) = best.filter(|b| b.evidence > 0.0) else {
+        return Vec::new();
+    };
+    let price = (evidence.candidates.max(1) as f64).ln();
+    let weight = |s: &Screened| {
+        if best.effects.iter().all(|e| s.effects.contains(e)) {
+            let more = s.names.saturating_sub(best.names) as f64;
+            return ((s.evidence - best.evidence) / rules.temperature - price * more)
+                .exp()
+                .min(1.0);
+        }
+        rules.confidence.passes(s.evidence / best.evidence)
+    };
+    let untried = evidence.screened.iter().map(|s| Untried {
+        labels: s.effects.clone(),
+        weight: weight(s),
+    });
+    untried.collect()
+}
+
 /// Decides.
 #[must_use]
 pub fn decide(evidence: &Evidence, rules: &Rules) -> Judgement {
@@ -114,20 +149,20 @@ pub fn decide(evidence: &Evidence, rules: &Rules) -> Judgement {
         let passed = all[i].labels.len() > all[best].labels.len();
         all[i].probability = odds.min(if passed { -price } else { 0.0 }).exp();
     }
-    let sum: f64 = all.iter().map(|h| h.probability).sum();
     let beyond = |r: Replayed| excess(r.train).powi(2);
     let open_loop = match all[best].found {
         Some(i) => beyond(evidence.tried[i].replayed) / beyond(evidence.none),
         None => 1.0,
     };
+    let seen = seen(evidence, rules);
+    if best != least {
+        // Chance may reach the evidence of no effect, and no chance makes a gap.
+        all[least].probability *= 1.0 - seen;
+    }
+    let sum: f64 = all.iter().map(|h| h.probability).sum();
     // What is named may make up for most of the gap and leave much of what is missing from row to row, or the other way round.
     let rest = evidence.left.min(open_loop).clamp(0.0, 1.0);
-    let sigmoid = |x: f64| 1.0 / (1.0 + (-x).exp());
     let unknown = if best == least {
-        // The larger of 0 and NaN is 0: no error of the engine's own is known where the gap is large.
-        let own = evidence.own_error.max(0.0);
-        let gap = (evidence.none.held_out - own).max(1.0).sqrt();
-        let seen = sigmoid((gap - rules.gap) / rules.gap_scale);
         if evidence.is_missing {
             seen.clamp(0.02, 0.999)
         } else {
@@ -160,17 +195,141 @@ pub fn decide(evidence: &Evidence, rules: &Rules) -> Judgement {
     };
     let found = judgement.verdict().found.map(|i| &evidence.tried[i]);
     let replayed = found.map_or(evidence.none, |t| t.replayed);
-    let most = found.map_or(f64::NAN, |t| t.evidence);
-    let screened = evidence.screened.iter();
-    let untried: Vec<Untried> = screened
-        .filter(|_| most > 0.0)
-        .map(|s| Untried {
-            labels: s.effects.clone(),
-            relative: s.evidence / most,
-        })
-        .collect();
+    let untried = untried(evidence, found, rules);
     judgement.sort();
-    let seen = (replayed.held_out, evidence.stopped);
-    rules.confidence.settle(&mut judgement, seen, &untried);
+    let shown = (replayed.held_out, evidence.stopped);
+    rules.confidence.settle(&mut judgement, shown, &untried);
     judgement
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn replayed(train: f64, held_out: f64) -> Replayed {
+        Replayed { train, held_out }
+    }
+
+    fn tried(effects: &[&str], names: usize, evidence: f64, left: f64) -> Tried {
+        Tried {
+            effects: effects.iter().map(|&e| e.to_owned()).collect(),
+            names,
+            evidence,
+            replayed: replayed(left, left),
+        }
+    }
+
+    /// A search among 50 candidates that ended with the first of the sets.
+    fn evidence(none: f64, tried: Vec<Tried>, left: f64) -> Evidence {
+        Evidence {
+            schema: 1,
+            candidates: 50,
+            none: replayed(none, none),
+            found: (!tried.is_empty()).then_some(0),
+            tried,
+            known: None,
+            screened: Vec::new(),
+            own_error: 0.0,
+            is_missing: true,
+            left,
+            stopped: false,
+        }
+    }
+
+    fn decided(evidence: &Evidence) -> Judgement {
+        let judgement = decide(evidence, &Rules::default());
+        let sum: f64 = judgement.hypotheses.iter().map(|h| h.probability).sum();
+        assert!((sum + judgement.unknown - 1.0).abs() < 1e-12);
+        judgement
+    }
+
+    #[test]
+    fn what_closes_the_gap_is_named_and_trusted() {
+        let rival = tried(&["b"], 1, 90.0, 5.0);
+        let found = decided(&evidence(
+            100.0,
+            vec![tried(&["a"], 1, 300.0, 1.0), rival],
+            0.01,
+        ));
+        assert_eq!(found.verdict().labels, ["a"]);
+        assert!(!found.is_unknown && found.marginal(&["a".to_owned()]) > 0.9);
+    }
+
+    #[test]
+    fn a_gap_that_nothing_closes_is_unknown_and_one_within_the_noise_is_none() {
+        let found = decided(&evidence(30.0, Vec::new(), 1.0));
+        assert!(found.is_unknown && found.verdict().labels.is_empty());
+        let found = decided(&evidence(1.02, Vec::new(), 1.0));
+        assert!(!found.is_unknown && found.verdict().labels.is_empty());
+        // What is named makes up for a tenth.
+        let found = decided(&evidence(30.0, vec![tried(&["a"], 1, 40.0, 27.0)], 0.9));
+        assert!(found.is_unknown);
+    }
+
+    #[test]
+    fn a_named_effect_is_the_verdict_even_where_a_third_of_the_gap_remains() {
+        let found = decided(&evidence(91.0, vec![tried(&["a"], 1, 200.0, 31.0)], 0.3));
+        assert_eq!(found.verdict().labels, ["a"]);
+        assert!(!found.is_unknown);
+        let p = found.marginal(&["a".to_owned()]);
+        assert!(p > 0.5 && p < 0.9, "{p}");
+    }
+
+    #[test]
+    fn in_a_small_gap_replays_must_bear_out_what_is_named() {
+        let named = |left: f64, own_error: f64| {
+            let mut e = evidence(3.0, vec![tried(&["a"], 1, 50.0, left)], 0.1);
+            e.own_error = own_error;
+            !decided(&e).verdict().labels.is_empty()
+        };
+        assert!(named(1.1, 0.0));
+        assert!(!named(2.5, 0.0), "it closes a quarter of the power");
+        assert!(
+            !named(1.1, 1.5),
+            "the engine's own error is as large as the gap"
+        );
+    }
+
+    #[test]
+    fn what_the_logs_show_without_a_search_stands_beside_no_effect() {
+        let steps = tried(&["sensor-quantization@q"], 1, 800.0, 1.0);
+        let mut e = evidence(1.01, vec![steps], 1.0);
+        (e.found, e.known) = (None, Some(0));
+        assert_eq!(decided(&e).verdict().labels, ["sensor-quantization@q"]);
+    }
+
+    #[test]
+    fn a_set_with_more_names_that_adds_nothing_takes_no_share() {
+        let mut e = evidence(100.0, vec![tried(&["a"], 1, 300.0, 2.0)], 0.01);
+        let screened = |effects: &[&str], names, evidence| Screened {
+            effects: effects.iter().map(|&e| e.to_owned()).collect(),
+            names,
+            evidence,
+        };
+        e.screened = vec![screened(&["a", "b"], 2, 301.0), screened(&["c"], 1, 290.0)];
+        let found = decided(&e);
+        let p = |label: &str| found.marginal(&[label.to_owned()]);
+        assert!(p("b") < 0.03 && p("c") > 0.1, "{} {}", p("b"), p("c"));
+        assert!(found.verdict().probability > p("c"));
+    }
+
+    #[test]
+    fn evidence_that_is_read_and_written_again_decides_the_same() {
+        let mut e = evidence(100.0, vec![tried(&["a"], 1, 300.0, 1.0)], 0.01);
+        e.own_error = f64::NAN;
+        let text = serde_json::to_string(&e).expect("it has a form");
+        let again: Evidence = serde_json::from_str(&text).expect("it is of the form");
+        assert_eq!(serde_json::to_string(&again).expect("it has a form"), text);
+        assert_eq!(decided(&again).unknown, decided(&e).unknown);
+    }
+
+    #[test]
+    fn every_number_can_be_changed_by_its_name() {
+        for (name, field) in Rules::ALL {
+            let mut rules = Rules::default();
+            let before = *field(&mut rules);
+            *field(&mut rules) *= 2.0;
+            assert_eq!(*field(&mut rules), 2.0 * before, "{name}");
+        }
+    }
 }

@@ -197,8 +197,9 @@ pub(crate) fn diagnose_physics(
         .map(|i| &findings.found[i].explanation);
     let left = best.unwrap_or(&findings.none).held_plain / bench.held_readings().max(1.0);
     let seen = (left, !findings.not_tried.is_empty());
-    let untried = untried(&findings, &candidates);
-    Confidence::default().settle(&mut judgement, seen, &untried);
+    let confidence = Confidence::default();
+    let untried = untried(&findings, &candidates, &confidence);
+    confidence.settle(&mut judgement, seen, &untried);
     let work = Work {
         bench,
         candidates,
@@ -213,14 +214,14 @@ pub(crate) fn diagnose_physics(
 }
 
 /// What the replay search screened and never fitted, by how near its cost is to the least.
-fn untried(findings: &Findings, candidates: &[Candidate]) -> Vec<Untried> {
+fn untried(findings: &Findings, candidates: &[Candidate], confidence: &Confidence) -> Vec<Untried> {
     let is_fitted = |c: usize| findings.found.iter().any(|f| f.candidates == [c]);
     let screened = || findings.screened.iter();
     let least = screened().map(|s| s.cost).fold(f64::INFINITY, f64::min);
     let unfitted = screened().filter(|s| !is_fitted(s.candidate));
     let untried = unfitted.map(|s| Untried {
         labels: vec![candidates[s.candidate].label()],
-        relative: least / s.cost,
+        weight: confidence.passes(least / s.cost),
     });
     untried.collect()
 }
