@@ -142,6 +142,32 @@ fn played(study: &Study, work: &Work, found: Option<&Found>, seed: u64) -> Resul
     Ok(Some(study))
 }
 
+/// Probability that the real logs' answer is right, by Bayes' rule over the worlds that were played: how probable each is, times how often it
+/// gave that answer. `None` where none did.
+fn probability(
+    work: &Work,
+    worlds: &[(Answer, Option<&Found>)],
+    said: &Answer,
+    alike: &[f64],
+    rows: &[CalibrationRow],
+) -> Option<f64> {
+    let prior = |effects: &[String]| -> f64 {
+        let all = work.judgement.hypotheses.iter();
+        all.filter(|h| h.labels == effects)
+            .map(|h| h.probability)
+            .sum()
+    };
+    let (mut right, mut all) = (0.0, 0.0);
+    for (((truth, _), alike), row) in worlds.iter().zip(alike).zip(rows) {
+        let weight = prior(&truth.1) * alike / row.runs.max(1) as f64;
+        all += weight;
+        if truth == said {
+            right += weight;
+        }
+    }
+    (all > 0.0).then(|| right / all)
+}
+
 /// Repeats a diagnosis on simulated logs until the work is stopped.
 ///
 /// # Errors
@@ -154,7 +180,16 @@ pub fn calibrate(
     progress: &dyn Progress,
 ) -> Result<Calibration> {
     let hypotheses = work.judgement.hypotheses.iter();
-    let found = hypotheses.filter_map(|h| h.found.map(|f| (&h.labels, &work.findings.found[f])));
+    // What is named and more is not played: what more there is would not be seen.
+    let verdict = &work.judgement.verdict().labels;
+    let is_more = |labels: &[String]| {
+        !verdict.is_empty()
+            && labels.len() > verdict.len()
+            && verdict.iter().all(|l| labels.contains(l))
+    };
+    let found = hypotheses
+        .filter(|h| !is_more(&h.labels))
+        .filter_map(|h| h.found.map(|f| (&h.labels, &work.findings.found[f])));
     let mut worlds: Vec<(Answer, Option<&Found>)> = vec![((Kind::None, Vec::new()), None)];
     worlds.extend(
         found
@@ -168,7 +203,9 @@ pub fn calibrate(
             ..CalibrationRow::default()
         })
         .collect();
-    let [mut as_large, mut of_none, mut alike, mut alike_right] = [0.0; 4];
+    let [mut as_large, mut of_none] = [0.0; 2];
+    // Runs of each world that gave the real logs' answer.
+    let mut alike = vec![0.0; worlds.len()];
     let said = answer(diagnosis);
     progress.begin("calibrating", 0);
     let mut idle = 0;
@@ -211,10 +248,7 @@ pub fn calibrate(
             }
         }
         if answered == said {
-            alike += 1.0;
-            if answered == *truth {
-                alike_right += 1.0;
-            }
+            alike[place] += 1.0;
         }
     }
     progress.end();
@@ -222,8 +256,7 @@ pub fn calibrate(
         .for_each(|r| r.probability /= r.runs.max(1) as f64);
     Ok(Calibration {
         runs: rows.iter().map(|r| r.runs).sum(),
-        // Of as many runs of each world: Laplace's rule of succession.
-        probability: (alike > 0.0).then(|| (alike_right + 1.0) / (alike + 2.0)),
+        probability: probability(work, &worlds, &said, &alike, &rows),
         p_no_gap: (of_none > 0.0).then(|| (1.0 + as_large) / (1.0 + of_none)),
         rows,
     })

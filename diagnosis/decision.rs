@@ -109,9 +109,9 @@ fn untried(evidence: &Evidence, best: Option<&Tried>, rules: &Rules) -> Vec<Untr
     let weight = |s: &Screened| {
         if best.effects.iter().all(|e| s.effects.contains(e)) {
             let more = s.names.saturating_sub(best.names) as f64;
-            return ((s.evidence - best.evidence) / rules.temperature - price * more)
-                .exp()
-                .min(1.0);
+            let odds = (s.evidence - best.evidence) / rules.temperature - price * more;
+            // What parsimony passes over, as below.
+            return odds.min(-price).exp();
         }
         rules.confidence.passes(s.evidence / best.evidence)
     };

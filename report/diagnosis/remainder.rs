@@ -50,7 +50,7 @@ fn summed(c: &Calibration) -> String {
     );
     if let Some(p) = c.probability {
         text.push_str(&format!(
-            " Of the runs with the answer above {} are right.",
+            " By Bayes' rule over these runs the answer above is right with probability {}.",
             percent(p)
         ));
     }

@@ -70,7 +70,7 @@ pub struct DetectionLimit {
 pub struct Calibration {
     /// Simulated sets of logs that were diagnosed.
     pub runs: usize,
-    /// Of the runs that gave the real logs' answer, the share in which it was right; `None` where there was none.
+    /// Probability that the real logs' answer is right, by Bayes' rule over these runs; `None` where none gave it.
     pub probability: Option<f64>,
     /// Probability of as large a gap where the model lacks nothing; `None` where that was not simulated.
     pub p_no_gap: Option<f64>,

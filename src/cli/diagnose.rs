@@ -364,7 +364,7 @@ fn lines(result: &DiagnosisResult, engine: &str, seconds: f64) -> Vec<String> {
         }
         if let Some(p) = c.probability {
             line(&format!(
-                "  of the runs with this answer {:.0} % are right",
+                "  by these runs the answer is right with probability {:.0} %",
                 100.0 * p
             ));
         }
