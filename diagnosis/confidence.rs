@@ -80,7 +80,7 @@ fn normal(x: f64) -> f64 {
 
 impl Confidence {
     /// Log odds that all effects of a verdict are among the true ones, of which evidence says `probability`; `left` is the mean square of what
-    /// replays of the logs held out leave, in units of the noise.
+    /// replays of the logs held out leave beyond the engine's own error, in units of the noise.
     fn of_named(&self, probability: f64, left: f64, stopped: bool) -> f64 {
         let p = probability.clamp(CLIP[0], CLIP[1]);
         let is_left = f64::from(u8::from(left > LEAST_GAP * LEAST_GAP));

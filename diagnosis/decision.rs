@@ -84,18 +84,23 @@ fn closes_a_small_gap(evidence: &Evidence, set: Replayed, rules: &Rules) -> bool
         && is_there(train)
         && power(set.held_out) < kept * held
         && power(set.train) < kept * train
-        && evidence.own_error < kept * train
+        && own_error(evidence) < kept * train
 }
 
 fn sigmoid(x: f64) -> f64 {
     1.0 / (1.0 + (-x).exp())
 }
 
+/// Mean square of the engine's own error; 0 where it is not known, for the larger of 0 and NaN is 0.
+fn own_error(evidence: &Evidence) -> f64 {
+    evidence.own_error.max(0.0)
+}
+
 /// Probability that the gap without effects is one, and not the noise or the engine's own error.
 fn seen(evidence: &Evidence, rules: &Rules) -> f64 {
-    // The larger of 0 and NaN is 0: no error of the engine's own is known where the gap is large.
-    let own = evidence.own_error.max(0.0);
-    let gap = (evidence.none.held_out - own).max(1.0).sqrt();
+    let gap = (evidence.none.held_out - own_error(evidence))
+        .max(1.0)
+        .sqrt();
     sigmoid((gap - rules.gap) / rules.gap_scale)
 }
 
@@ -197,7 +202,7 @@ pub fn decide(evidence: &Evidence, rules: &Rules) -> Judgement {
     let replayed = found.map_or(evidence.none, |t| t.replayed);
     let untried = untried(evidence, found, rules);
     judgement.sort();
-    let shown = (replayed.held_out, evidence.stopped);
+    let shown = (replayed.held_out - own_error(evidence), evidence.stopped);
     rules.confidence.settle(&mut judgement, shown, &untried);
     judgement
 }

@@ -203,7 +203,7 @@ pub fn prepare(
     let none = if let Some(direct) = direct {
         vec![direct]
     } else if bench.is_rough() {
-        identify_rough(&mut bench, study, point, &mut scatter)?
+        identify_rough(&mut bench, study, point, (&mut scatter, progress))?
     } else {
         identify_smooth(&mut bench, study, point, (&mut scatter, progress))?
     };
@@ -313,7 +313,7 @@ fn plain(bench: &Bench, point: &Point) -> Result<Vec<f64>> {
 }
 
 /// Where predictions are smooth: fits grow with the episodes, and once more with the noise and the scatter that the first found;
-/// once only where work is stopped.
+/// once, and as far as they have come, where work is stopped.
 fn identify_smooth(
     bench: &mut Bench,
     study: &Study,
@@ -346,10 +346,12 @@ fn identify_smooth(
         for stage in 0..SHARES.len() {
             let from = fits.last().map_or(&point, |f| &f.fit.point);
             let last = stage + 1 == SHARES.len();
-            let mut fit = if stage == 0 || last {
-                scan_and_fit(bench, stage, from, Effort::FULL)?
+            let stopped = progress.is_stopped();
+            let effort = if stopped { Effort::LOOK } else { Effort::FULL };
+            let mut fit = if (stage == 0 || last) && !stopped {
+                scan_and_fit(bench, stage, from, effort)?
             } else {
-                bench.explain(stage, &[], &from.theta, &from.starts, Effort::FULL)?
+                bench.explain(stage, &[], &from.theta, &from.starts, effort)?
             };
             if last && !progress.is_stopped() {
                 let followed =
@@ -415,7 +417,7 @@ fn identify_rough(
     bench: &mut Bench,
     study: &Study,
     point: Point,
-    scatter: &mut Scatter,
+    (scatter, progress): (&mut Scatter, &dyn Progress),
 ) -> Result<Vec<Explanation>> {
     // What only rests at the end of an episode tells nothing more.
     let layout = bench.layout().clone();
@@ -445,8 +447,15 @@ fn identify_rough(
     scatter.estimate(bench, &first.fit.point)?;
     let (found, from) = stages(bench, &first.fit.point)?;
     bench.stages = found;
-    let part = bench.explain(0, &[], &from.theta, &from.starts, Effort::BRIEF)?;
+    let effort = || {
+        if progress.is_stopped() {
+            Effort::LOOK
+        } else {
+            Effort::BRIEF
+        }
+    };
+    let part = bench.explain(0, &[], &from.theta, &from.starts, effort())?;
     let from = &part.fit.point;
-    let all = bench.explain(1, &[], &from.theta, &from.starts, Effort::BRIEF)?;
+    let all = bench.explain(1, &[], &from.theta, &from.starts, effort())?;
     Ok(vec![part, all])
 }

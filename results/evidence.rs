@@ -60,7 +60,7 @@ pub struct Evidence {
     pub known: Option<usize>,
     /// Sets that were screened and not fitted, the most evident first.
     pub screened: Vec<Screened>,
-    /// Mean square of the engine's own error over the logs that were fitted to, in units of the noise; NaN where it was not asked.
+    /// Mean square of the engine's own error over the logs that were fitted to, in units of the noise; NaN where it was not asked, as in a search that was cut short.
     #[serde(deserialize_with = "nullable::scalar")]
     pub own_error: f64,
     /// Whether a force, or something of the readings, is missing without effects.

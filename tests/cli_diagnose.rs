@@ -40,11 +40,29 @@ fn a_fault_is_found_and_its_refined_model_has_none() {
         "config.toml",
         "refined.toml",
         "trace.json",
+        "evidence.json",
         "train-1.csv",
         "test-2.csv",
     ] {
         assert!(out.join(file).is_file(), "{file}");
     }
+    // The true force is within its interval, and could have been seen were it a tenth of that.
+    let effect = &result["effects"][0];
+    let [low, high] = [0, 1].map(|i| effect["intervals95"]["force"][i].as_f64().unwrap());
+    assert!(low < 1.2 && 1.2 < high, "{low} to {high}");
+    assert_eq!(effect["at_bound"], false);
+    let limits = result["detection_limits"].as_array().unwrap();
+    let of = |name: &str| limits.iter().find(|l| l["effect"] == name).unwrap();
+    assert!(of("viscous-friction@rail")["value"].as_f64().unwrap() > 0.0);
+    let shares = &result["gap"]["shares"];
+    let sum: f64 = ["named", "learnable", "unrepeatable"]
+        .iter()
+        .map(|k| shares[k].as_f64().unwrap())
+        .sum();
+    assert!(
+        (sum - 1.0).abs() < 1e-9 && shares["named"].as_f64().unwrap() > 0.9,
+        "{shares}"
+    );
     // The refined model stands in for the model: nothing is left to explain.
     let refined = out.join("refined.toml");
     let toml = std::fs::read_to_string(study.join("study.toml")).unwrap();
@@ -61,6 +79,44 @@ fn a_fault_is_found_and_its_refined_model_has_none() {
     let result: Value = serde_json::from_slice(&again.stdout).unwrap();
     let nominal = result["gap"]["nominal"].as_f64().unwrap();
     assert!(nominal < 3.0, "gap {nominal} with the refined model");
+}
+
+#[test]
+fn the_diagnosis_is_repeated_on_simulated_logs_and_a_rate_of_false_alarms_is_a_probability() {
+    let folder = tempfile::tempdir().unwrap();
+    let (study, out) = (folder.path().join("study"), folder.path().join("out"));
+    write_study(&study, Truth::Coulomb(1.2));
+    let (line, status) = refusal(&["diagnose", text(&study), "--quiet", "--false-alarms", "5"]);
+    assert_eq!(status, Some(2));
+    assert!(
+        line.contains("--false-alarms") && line.contains("between 0 and 1"),
+        "{line}"
+    );
+    let done = asid(&[
+        "diagnose",
+        text(&study),
+        "--quiet",
+        "--calibrate",
+        "--minutes",
+        "1",
+        "--out",
+        text(&out),
+    ]);
+    assert!(
+        done.status.success(),
+        "{}",
+        String::from_utf8_lossy(&done.stderr)
+    );
+    let found = &json(&out.join("result.json"))["calibration"];
+    let rows = found["rows"].as_array().unwrap();
+    assert!(rows[0]["effects"].as_array().unwrap().is_empty());
+    let count = |r: &Value, key: &str| r[key].as_u64().unwrap();
+    let all: u64 = rows.iter().map(|r| count(r, "runs")).sum();
+    assert_eq!(all, found["runs"].as_u64().unwrap());
+    // What lacks nothing is said to lack nothing, and the friction is found where it was put.
+    for row in rows.iter().take(2).filter(|r| count(r, "runs") > 0) {
+        assert_eq!(count(row, "right"), count(row, "runs"), "{row}");
+    }
 }
 
 /// What is spoilt, how, and what is said of it.

@@ -61,14 +61,7 @@ pub fn limits(
                     let Some(p) = (0..parameters.len()).find(moves) else {
                         continue;
                     };
-                    let null = parameters[p].null;
-                    let seen = c <= SECANT;
-                    let value = if seen {
-                        null + c * (form.begin[p] - null)
-                    } else {
-                        f64::NAN
-                    };
-                    (p, value)
+                    (p, by_secant(parameters[p].null, form.begin[p], c))
                 }
             };
             let same = |l: &&mut Limit| l.candidate == form.candidate && l.parameter == parameter;
@@ -94,6 +87,26 @@ pub fn limits(
     all
 }
 
+/// Least part of a secant that tells of smaller values: a law that has no slope at null bends.
+const LEAST_PART: f64 = 0.3;
+
+/// The value from which on an effect is seen whose secant at `begin` is seen from the coefficient `c` on; NaN where that is beyond what the
+/// secant tells of.
+fn by_secant(null: f64, begin: f64, c: f64) -> f64 {
+    match c {
+        c if c > SECANT => f64::NAN,
+        // Between a limit and none there is no proportion.
+        c if null != 0.0 => {
+            if c <= 1.0 {
+                begin
+            } else {
+                f64::NAN
+            }
+        }
+        c => begin * c.max(LEAST_PART),
+    }
+}
+
 /// `null` and a distance from it, up where the range allows that, else down; NaN where neither.
 fn within([low, high]: [f64; 2], null: f64, distance: f64) -> f64 {
     if null + distance <= high {
@@ -116,6 +129,15 @@ mod tests {
             assert!((0.5 * c * c * g - 0.5 * (1.0 + g).ln() - 7.0).abs() < 1e-9);
         }
         assert_eq!(coefficient(0.0, 7.0), f64::INFINITY);
+    }
+
+    #[test]
+    fn a_secant_tells_of_values_about_its_own() {
+        assert_eq!(by_secant(0.0, 0.02, 0.5), 0.01);
+        assert_eq!(by_secant(0.0, 0.02, 1e-6), 0.006);
+        assert!(by_secant(0.0, 0.02, 2.0).is_nan());
+        // A limit of 3 in place of 500 that is easily seen.
+        assert_eq!(by_secant(500.0, 3.0, 0.1), 3.0);
     }
 
     #[test]

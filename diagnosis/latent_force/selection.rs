@@ -96,7 +96,14 @@ pub fn gather(
     let none = replayed(bench, &findings.none);
     let [before, after] = outcome.missing;
     let is_missing = before.force.sqrt() > NOTHING || before.readings > LEAST_LEFT;
-    let own_error = if is_small(none) && (found.is_some() || is_missing) {
+    let stopped = !outcome.untried.is_empty();
+    // One more replay at half the time step: what is named in a small gap cannot do without.
+    let is_asked = if stopped {
+        is_small(none) && found.is_some()
+    } else {
+        is_missing || found.is_some()
+    };
+    let own_error = if is_asked {
         let change = change_by_step(bench, &findings.none, &bench.machine.halved()?)?;
         RICHARDSON.powi(2) * cost(&change) / bench.train.readings.max(1) as f64
     } else {
@@ -113,6 +120,6 @@ pub fn gather(
         own_error,
         is_missing,
         left: after.relative_to(before),
-        stopped: !outcome.untried.is_empty(),
+        stopped,
     })
 }

@@ -299,6 +299,40 @@ class StudyIdentification(Result):
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
+class Calibration(Record):
+    """What the diagnosis says of logs that were simulated in place of the real ones."""
+
+    p_no_gap: float | None
+    """Probability of as large a gap where the model lacks nothing; `None` where that was not simulated."""
+    probability: float | None
+    """Probability that the real logs' answer is right, by Bayes' rule over these runs; `None` where none gave it."""
+    rows: list[CalibrationRow]
+    """By what the simulated machine lacked."""
+    runs: int
+    """Simulated sets of logs that were diagnosed."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class CalibrationRow(Record):
+    """Diagnoses of machines that lack the same."""
+
+    effects: list[str]
+    """What they lack, as fitted to the real logs; empty for nothing."""
+    none: int
+    """Runs that said that nothing is missing, where that is wrong."""
+    other: int
+    """Runs that named other effects."""
+    probability: float
+    """Mean probability that they stated."""
+    right: int
+    """Runs that said just this."""
+    runs: int
+    """Runs."""
+    unknown: int
+    """Runs that named no effect."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
 class Check(Record):
     """A check before the diagnosis."""
 
@@ -311,13 +345,35 @@ class Check(Record):
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
+class DetectionLimit(Record):
+    """The smallest size of an effect that these logs could have shown."""
+
+    effect: str
+    """Effect at its site."""
+    parameter: str
+    """Its parameter."""
+    value: float
+    """Value from which on it is seen; NaN where no value within its range is."""
+    recognised: float | None = None
+    """At twice that value: the share of such logs by which it is ranked first; `None` where it is not known."""
+    taken_for: str | None = None
+    """The effect that most of the others rank first; `None` where there is none."""
+    unit: str | None = None
+    """Unit of the parameter; may be empty."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
 class Effect(Record):
     """An effect with its marginal probability."""
 
+    at_bound: bool
+    """Whether a fitted value is at the end of its range: the best one may lie beyond."""
     effect: str
     """Name."""
     gap_closed: float | None
     """Share of the excess squared gap that it closes alone."""
+    intervals95: dict[str, Array]
+    """95 % intervals of those that were fitted."""
     parameters: dict[str, float]
     """Fitted values."""
     probability: float
@@ -331,7 +387,7 @@ class Gap(Record):
     """Gaps on the logs held out, root mean square in units of the noise."""
 
     closed: float | None
-    """Share of the excess squared gap that they close; null where there is none."""
+    """Share of the excess squared gap that they close, negative where they widen it; null where there is none."""
     closed_interval95: Array | None
     """95 % interval of it, by a bootstrap over episodes."""
     identified: float
@@ -342,8 +398,22 @@ class Gap(Record):
     """The model as given."""
     refined: float
     """With the verdict's effects."""
+    shares: Shares | None
+    """By what it goes with; `None` where there is none."""
     signals: list[SignalGap]
     """By sensor."""
+    p_value: float | None = None
+    """Probability that a machine that lacks nothing shows as much evidence for its best candidate; `None` where replays decide."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Group(Record):
+    """One law at several sites."""
+
+    effect: str
+    """Effect."""
+    sites: list[str]
+    """Its sites."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -453,6 +523,32 @@ class RealWorldTrials(Record):
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
+class Remainder(Record):
+    """What is left of the gap beside the effects that are named."""
+
+    against: str
+    """The variable that most of what is there goes with; empty where it goes with none."""
+    kinds: list[str]
+    """Kinds of effects that go with that variable, the most probable first."""
+    share: float
+    """Share of the excess squared gap."""
+    where: str
+    """The joint or sensor at which most of it is."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Shares(Record):
+    """How the excess squared gap is shared out; the sum is 1."""
+
+    learnable: float
+    """Left by them, and foretold by a regression on position, speed, load and time."""
+    named: float
+    """Closed by the verdict's effects."""
+    unrepeatable: float
+    """Left by both."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
 class SignalGap(Record):
     """Gap of one sensor, root mean square in units of its noise."""
 
@@ -513,7 +609,9 @@ class Verdict(Record):
     kind: VerdictKind
     """What kind."""
     probability: float
-    """Probability of it."""
+    """Probability of it; of effects, that all of them are among the true ones."""
+    remainder: Remainder | None
+    """What is left beside the effects that are named; `None` where nothing is, or none is named."""
     unexplained: float
     """Share of the excess squared gap that it leaves."""
 
@@ -542,6 +640,8 @@ class Diagnosis(Result):
     """Effects of the hypotheses."""
     gap: Gap
     """Gaps."""
+    groups: list[Group]
+    """Effects of the verdict that are one law at several sites."""
     hypotheses: list[Hypothesis]
     """Probabilities, most probable first."""
     next_experiment: NextExperiment
@@ -562,6 +662,10 @@ class Diagnosis(Result):
     """Where the gap of the identified model lies, largest share first."""
     wiring: list[Wiring]
     """Faults of wiring; everything else is said of the study after their mending."""
+    calibration: Calibration | None = None
+    """What the diagnosis says of simulated logs; `None` where that was not asked."""
+    detection_limits: list[DetectionLimit] = dataclasses.field(default_factory=list)
+    """The smallest size of each effect that these logs could have shown; empty where replays decide."""
     isolability: Isolability | None = None
     """Which of the leading effects these logs tell apart; `None` where replays decide."""
     missing_force: list[MissingForce] = dataclasses.field(default_factory=list)

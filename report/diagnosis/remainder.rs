@@ -133,7 +133,7 @@ fn limits(limits: &[DetectionLimit]) -> Table {
     ];
     limits.iter().fold(Table::new(columns), |table, l| {
         let value = if l.value.is_finite() {
-            quantity(&round(l.value, 2), &l.unit)
+            quantity(&round(l.value, 4), &l.unit)
         } else {
             "not seen".to_owned()
         };
