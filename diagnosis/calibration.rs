@@ -11,7 +11,6 @@ use crate::data::Logs;
 use crate::diagnose::{Diagnosis, Settings, diagnose_physics};
 use crate::machine::Machine;
 use crate::predict::Point;
-use crate::record::Record;
 use crate::result::{Calibration, CalibrationRow, Kind};
 use crate::search::{Found, trials};
 use crate::study::Study;
@@ -109,27 +108,20 @@ fn played(study: &Study, work: &Work, found: Option<&Found>, seed: u64) -> Resul
     });
     let mut random = Streams::new(seed).stream("calibration");
     let mut study = study.clone();
-    let parts: [(&mut Vec<(String, Episode)>, &Record, Vec<_>); 2] = [
-        (
-            &mut study.train,
-            &bench.train,
-            explanation.fit.point.starts.clone(),
-        ),
-        (
-            &mut study.test,
-            &bench.test,
-            explanation.held_starts.clone(),
-        ),
-    ];
-    for (episodes, record, starts) in parts {
+    let starts = [&explanation.fit.point.starts, &explanation.held_starts];
+    for (held_out, starts) in [false, true].into_iter().zip(starts) {
+        let (episodes, record) = if held_out {
+            (&mut study.test, &bench.test)
+        } else {
+            (&mut study.train, &bench.train)
+        };
         let mut predictor = bench.predictor(&members, record)?;
         predictor.set_scattering(Scattering::default());
-        let starts = starts[..record.logs.episodes.len()].to_vec();
-        let theta = explanation.fit.point.theta.clone();
-        let predicted = predictor
-            .readings(&[Point { theta, starts }])?
-            .pop()
-            .unwrap_or_default();
+        let point = Point {
+            theta: explanation.fit.point.theta.clone(),
+            starts: starts[..record.logs.episodes.len()].to_vec(),
+        };
+        let predicted = predictor.readings(&[point])?.pop().unwrap_or_default();
         for ((_, episode), predicted) in episodes.iter_mut().zip(&predicted) {
             if predicted.iter().any(|x| !x.is_finite()) {
                 return Ok(None);
