@@ -82,6 +82,17 @@ fn labels_are_read_by_the_scorer_only_and_last() {
     let page = std::fs::read_to_string(out.join("report.html")).unwrap();
     let page = page.trim_start_matches("<!DOCTYPE html>");
     assert!(roxmltree::Document::parse(page).is_ok() && page.contains("1 of 1 cases are right"));
+    // The decision is repeated with each of its numbers halved and doubled: a clear case stays as it is.
+    let again = withheld(&cases, &out, &["--labels", text(&sealed), "--sensitivity"]);
+    assert!(again.status.success(), "{}", said(&again));
+    let table = json(&out.join("sensitivity.json"));
+    assert_eq!(
+        (&table["cases"], &table["as_is"]["right"]),
+        (&1.into(), &1.into())
+    );
+    let rows = table["rows"].as_array().unwrap();
+    let stays = |r: &serde_json::Value| ["halved", "doubled"].iter().all(|k| r[k]["changed"] == 0);
+    assert!(rows.len() > 10 && rows.iter().all(stays), "{table}");
 }
 
 #[test]
