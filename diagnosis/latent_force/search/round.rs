@@ -163,7 +163,9 @@ impl Upon<'_> {
             leading.iter().map(candidate).collect(),
             isolability(&sums[0], &columns, &leading),
         );
-        let sight = self.sight(&sums, &columns, &some);
+        let found = ranked.iter().find(|s| s.forms.len() == 1);
+        let found = found.map_or(0.0, |s| s.gain);
+        let sight = self.sight((&sums, found), &columns, &some);
         self.progress.end();
         Ok(Screening {
             some,
@@ -174,8 +176,13 @@ impl Upon<'_> {
         })
     }
 
-    /// What a screening could have seen, at the most likely of the scales of `q`.
-    fn sight(&self, sums: &[Regression], columns: &Columns, some: &[Candidate]) -> Sight {
+    /// What a screening could have seen whose best candidate has the evidence `found`, at the most likely of the scales of `q`.
+    fn sight(
+        &self,
+        (sums, found): (&[Regression], f64),
+        columns: &Columns,
+        some: &[Candidate],
+    ) -> Sight {
         let likely =
             |a: &&Regression, b: &&Regression| a.log_likelihood.total_cmp(&b.log_likelihood);
         let Some(sum) = sums.iter().max_by(likely) else {
@@ -183,7 +190,7 @@ impl Upon<'_> {
         };
         let threshold = threshold(self.candidates.len(), self.breadth.false_alarms);
         let mut limits = limits(sum, columns, some, threshold);
-        let mut rehearsal = rehearse(sum, columns, &limits, self.breadth.seed);
+        let mut rehearsal = rehearse(sum, columns, (&limits, found), self.breadth.seed);
         let place = |c: &mut usize| *c = self.open[*c];
         limits.iter_mut().for_each(|l| place(&mut l.candidate));
         let taken_for = rehearsal.recognised.iter_mut().flatten();
