@@ -79,15 +79,21 @@ fn best(forms: &[Ranked<'_>], moment: &DVector<f64>) -> (f64, usize) {
     gains.max_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((0.0, 0))
 }
 
-/// The factor `L` of `G = L L'`, of a matrix that may be singular: of one a little larger.
+/// The factor `L` of `G = L L'`, of a matrix that may be singular: of one whose diagonal is a little larger, each entry relative to itself,
+/// for columns differ by many powers of ten.
 fn root(gram: &DMatrix<f64>) -> Option<DMatrix<f64>> {
-    let typical = gram.trace() / gram.nrows().max(1) as f64;
+    let sizes = gram.diagonal().map(|g| g.max(0.0).sqrt());
+    let unit = |i: usize| if sizes[i] > 0.0 { sizes[i] } else { 1.0 };
     [1e-12, 1e-9, 1e-6].into_iter().find_map(|share| {
-        let mut larger = gram.clone();
-        for i in 0..larger.nrows() {
-            larger[(i, i)] += share * typical + f64::MIN_POSITIVE;
+        let correlation = DMatrix::from_fn(gram.nrows(), gram.ncols(), |i, j| {
+            let own = if i == j { share } else { 0.0 };
+            gram[(i, j)] / (unit(i) * unit(j)) + own
+        });
+        let mut root = correlation.cholesky()?.l();
+        for (i, mut row) in root.row_iter_mut().enumerate() {
+            row *= sizes[i];
         }
-        larger.cholesky().map(|f| f.l())
+        Some(root)
     })
 }
 
@@ -201,6 +207,13 @@ mod tests {
         };
         assert!((of(1.645) - 0.1).abs() < 0.06, "{}", of(1.645));
         assert!(of(9.0) < 0.006);
+    }
+
+    #[test]
+    fn a_column_of_far_more_information_makes_no_noise_in_the_others() {
+        let gram = DMatrix::from_diagonal(&DVector::from_row_slice(&[1e24, 1e4]));
+        let p = rehearse(&regression(gram), &columns(2), (&[], 6.0), 3).p_value;
+        assert!(p < 0.006, "{p}");
     }
 
     #[test]
