@@ -59,7 +59,8 @@ pub struct Untried {
     pub weight: f64,
 }
 
-fn sigmoid(x: f64) -> f64 {
+/// The logistic function: from log odds to a probability.
+pub(crate) fn sigmoid(x: f64) -> f64 {
     1.0 / (1.0 + (-x).exp())
 }
 

@@ -2,7 +2,7 @@
 
 use asid_results::evidence::{Evidence, Replayed, Screened, Tried};
 
-use crate::confidence::{Confidence, Untried};
+use crate::confidence::{Confidence, Untried, sigmoid};
 use crate::judgement::{Hypothesis, Judgement};
 use crate::search::{LEAST_GAP, NEGLIGIBLE, excess};
 
@@ -87,10 +87,6 @@ fn closes_a_small_gap(evidence: &Evidence, set: Replayed, rules: &Rules) -> bool
         && own_error(evidence) < kept * train
 }
 
-fn sigmoid(x: f64) -> f64 {
-    1.0 / (1.0 + (-x).exp())
-}
-
 /// Mean square of the engine's own error; 0 where it is not known, for the larger of 0 and NaN is 0.
 fn own_error(evidence: &Evidence) -> f64 {
     evidence.own_error.max(0.0)
@@ -164,7 +160,6 @@ pub fn decide(evidence: &Evidence, rules: &Rules) -> Judgement {
         // Chance may reach the evidence of no effect, and no chance makes a gap.
         all[least].probability *= 1.0 - seen;
     }
-    let sum: f64 = all.iter().map(|h| h.probability).sum();
     // What is named may make up for most of the gap and leave much of what is missing from row to row, or the other way round.
     let rest = evidence.left.min(open_loop).clamp(0.0, 1.0);
     let unknown = if best == least {
@@ -176,9 +171,6 @@ pub fn decide(evidence: &Evidence, rules: &Rules) -> Judgement {
     } else {
         sigmoid((rest / rules.unexplained).ln() / rules.sharpness).clamp(0.001, 0.999)
     };
-    for h in &mut all {
-        h.probability *= (1.0 - unknown) / sum;
-    }
     let ambiguous = (0..all.len())
         .filter(|&i| {
             let larger = all[best].labels.iter().all(|l| all[i].labels.contains(l));
@@ -190,18 +182,10 @@ pub fn decide(evidence: &Evidence, rules: &Rules) -> Judgement {
                 && rules.temperature * (scores[best] - scores[i]) < rules.apart
         })
         .collect();
-    let mut judgement = Judgement {
-        is_unknown: unknown > all[best].probability,
-        best,
-        ambiguous,
-        unknown,
-        rest,
-        hypotheses: all,
-    };
+    let mut judgement = Judgement::of(all, (best, ambiguous), (unknown, rest));
     let found = judgement.verdict().found.map(|i| &evidence.tried[i]);
     let replayed = found.map_or(evidence.none, |t| t.replayed);
     let untried = untried(evidence, found, rules);
-    judgement.sort();
     let shown = (replayed.held_out - own_error(evidence), evidence.stopped);
     rules.confidence.settle(&mut judgement, shown, &untried);
     judgement

@@ -33,6 +33,28 @@ pub struct Judgement {
 }
 
 impl Judgement {
+    /// Of hypotheses by their weights, which share what `unknown` leaves; `ambiguous` cannot be told from the best.
+    pub(crate) fn of(
+        mut hypotheses: Vec<Hypothesis>,
+        (best, ambiguous): (usize, Vec<usize>),
+        (unknown, rest): (f64, f64),
+    ) -> Self {
+        let sum: f64 = hypotheses.iter().map(|h| h.probability).sum();
+        for h in &mut hypotheses {
+            h.probability *= (1.0 - unknown) / sum;
+        }
+        let mut judgement = Self {
+            is_unknown: unknown > hypotheses[best].probability,
+            hypotheses,
+            unknown,
+            best,
+            ambiguous,
+            rest,
+        };
+        judgement.sort();
+        judgement
+    }
+
     /// Most probable first.
     pub(crate) fn sort(&mut self) {
         let mut order: Vec<usize> = (0..self.hypotheses.len()).collect();

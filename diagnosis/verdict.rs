@@ -8,6 +8,7 @@
 
 use crate::bench::{Bench, Explanation};
 use crate::chance::threshold;
+use crate::confidence::sigmoid;
 use crate::judgement::{Hypothesis, Judgement};
 use crate::search::{Findings, Found, NEGLIGIBLE, excess};
 
@@ -245,10 +246,8 @@ pub fn judge(
         }
         all[i].probability = (-0.5 * worse).exp();
     }
-    let sum: f64 = all.iter().map(|h| h.probability).sum();
     let left = gap(&all[best]);
     let rest = (left / gap(&all[0]).max(1e-9)).powi(2).min(1.0);
-    let sigmoid = |x: f64| 1.0 / (1.0 + (-x).exp());
     let unknown = if best == 0 {
         // Where long replays tell nothing, short ones may still leave a gap.
         let short = findings.short.unwrap_or(0.0);
@@ -257,9 +256,6 @@ pub fn judge(
         let share = sigmoid((rest / REST).ln() / SHARPNESS);
         (share * sigmoid((left - NEGLIGIBLE) / 0.3)).clamp(0.001, 0.999)
     };
-    for h in &mut all {
-        h.probability *= (1.0 - unknown) / sum;
-    }
     let ambiguous = (0..all.len())
         .filter(|&i| {
             let Some(found) = all[i].found.map(|f| &findings.found[f]) else {
@@ -273,14 +269,5 @@ pub fn judge(
                 && (all[i].cost - all[best].cost) / temperature < APART
         })
         .collect();
-    let mut judgement = Judgement {
-        is_unknown: unknown > all[best].probability,
-        best,
-        ambiguous,
-        unknown,
-        rest,
-        hypotheses: all,
-    };
-    judgement.sort();
-    judgement
+    Judgement::of(all, (best, ambiguous), (unknown, rest))
 }
