@@ -8,6 +8,8 @@ use asid_core::target::Target;
 use asid_mjcf::native::NativeModel;
 use asid_mjcf::plant::Plant;
 
+use crate::reach::Reach;
+
 /// Where an effect acts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Acts {
@@ -157,6 +159,11 @@ pub trait Effect: Send + Sync {
     /// Parameters of the model that it changes at a site.
     fn targets(&self, _plant: &Plant, _site: &str) -> Vec<Target> {
         Vec::new()
+    }
+    /// What it moves by itself at a site. An effect whose forces act elsewhere than on what its targets name, or that moves
+    /// another drive than that of its site, says [`Reach::Everything`].
+    fn reach(&self, plant: &Plant, site: &str) -> Reach {
+        Reach::of(plant, self.acts(), site, &self.targets(plant, site))
     }
     /// Whether [`Acting::before_step`] has something to do.
     fn steps(&self) -> bool {

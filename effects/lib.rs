@@ -17,6 +17,7 @@
 pub mod catalogue;
 mod effect;
 pub mod native;
+mod reach;
 pub mod refined;
 pub mod refined_model;
 mod spec;
@@ -24,6 +25,7 @@ mod spec;
 pub use effect::{
     Acting, Acts, Confusion, Effect, EffectEntry, EffectParameter, Native, Reference, Site, Start,
 };
+pub use reach::Reach;
 pub use refined_model::RefinedModel;
 pub use spec::EffectSpec;
 

@@ -8,12 +8,13 @@
 mod form;
 mod sizes;
 mod source;
+mod together;
 
 use asid_core::{Progress, Result};
 
 use crate::candidate::Candidate;
 
-use super::context::Context;
+use super::context::{Context, PUSH};
 use super::estimate::Estimate;
 use super::fit::Hypothesis;
 use super::step_map::{Derivatives, LinearEpisode, Variation};
@@ -21,6 +22,7 @@ use super::step_map::{Derivatives, LinearEpisode, Variation};
 pub use form::Form;
 use sizes::{REPLAY_TRIAL, sizes, sizes_by_replay};
 use source::{All, Source, Wanted};
+use together::ForceSlopes;
 
 /// Share of a deviation of the prior that slopes of the present model are taken over.
 const BASE_SHARE: f64 = 0.01;
@@ -124,25 +126,30 @@ impl Columns {
                 }
             })
             .collect();
-        let nx = 2 * context.plant().layout.nv;
-        let roles = 3 * nx + free.len() + 1;
+        let nv = context.plant().layout.nv;
+        let roles = 8 * nv + free.len() + 1;
         let mut map = context.map(&base.specs, &base.parameters(), roles)?;
+        let replayed = context.has_segments();
         let want = Derivatives {
             state: true,
-            ..Derivatives::default()
+            // Columns are told apart by slopes in forces at the very point that they are taken at.
+            force: !replayed,
+            jolt: !replayed,
         };
-        let mut linear = map.linearise(
-            theta,
-            &estimate.trajectory,
-            want,
-            &context.start_steps(),
-            &variations,
-        )?;
+        let push = if replayed {
+            context.start_steps()
+        } else {
+            vec![PUSH; nv]
+        };
+        let mut linear = map.linearise(theta, &estimate.trajectory, want, &push, &variations)?;
         let late: Vec<Vec<f64>> = linear.iter().map(|l| l.late.clone()).collect();
+        let slopes = linear.iter_mut().map(ForceSlopes::take);
+        let slopes: Vec<ForceSlopes> = slopes.collect();
         let source = Source {
             all,
-            slopes: &estimate.b,
+            slopes: &slopes,
             late: &late,
+            together: true,
             progress,
         };
         // Every start of a candidate, with the slopes at it.
@@ -157,7 +164,6 @@ impl Columns {
                 );
             }
         }
-        let replayed = context.has_segments();
         let (sizes, felt) = if replayed {
             let range = |&(c, _, p): &(usize, Vec<f64>, usize)| {
                 let [low, high]: [f64; 2] = candidates[c].ranges[p];

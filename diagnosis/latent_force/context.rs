@@ -21,8 +21,8 @@ const START_SHARE: f64 = 0.02;
 const FIRST_CORRELATION: f64 = 0.9;
 /// Deviation of the white part of a missing force that the search begins with, relative to the whole.
 const FIRST_WHITE: f64 = 0.1;
-/// Force that slopes are first taken over, N or N m: an inertia of 1e-5 to 1e3 moves by what doubles resolve.
-const FIRST_PUSH: f64 = 1e-4;
+/// Force that slopes are taken over, N or N m: an inertia of 1e-5 to 1e3 moves by what doubles resolve.
+pub(super) const PUSH: f64 = 1e-4;
 
 /// What is being explained: logs of a machine, walked row by row.
 pub struct Context<'a> {
@@ -186,7 +186,7 @@ pub fn begin<'a>(
         force: true,
         ..Derivatives::default()
     };
-    let push = vec![FIRST_PUSH; nv];
+    let push = vec![PUSH; nv];
     let linear = map.linearise(theta, &trajectory, want, &push, &[])?;
     let b: Vec<Vec<f64>> = linear.into_iter().map(|l| l.b).collect();
     // Inertia by the speed that a force makes, where no contact takes it up, times the acceleration seen.

@@ -44,6 +44,8 @@ pub struct Derivatives {
     pub state: bool,
     /// Slopes in generalized forces, with the size of each force (N or N m) that differences are taken over.
     pub force: bool,
+    /// Slopes in such forces that act in the first physics step of a row.
+    pub jolt: bool,
 }
 
 /// One episode, linearised about a trajectory. Matrices are row-major, one a row of the log; states are counted
@@ -58,6 +60,8 @@ pub struct LinearEpisode {
     pub a: Vec<f64>,
     /// Slope of `f` in a generalized force held over the row, `(rows - 1) x nx x nv`.
     pub b: Vec<f64>,
+    /// The same of a force in the first physics step of the row.
+    pub jolt: Vec<f64>,
     /// `y_k - h(x_k)`, `rows x ns`; NaN where a reading is missing.
     pub residual: Vec<f64>,
     /// Slope of `h` in the state, `rows x ns x nx`; of a segment the slope in its start.

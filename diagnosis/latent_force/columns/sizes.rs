@@ -5,6 +5,7 @@ use asid_core::Result;
 use nalgebra::DMatrix;
 
 use super::source::{Source, Wanted};
+use super::together::ForceSlopes;
 use crate::latent_force::context::Context;
 use crate::latent_force::estimate::Estimate;
 
@@ -32,8 +33,8 @@ const PARTS: usize = 24;
 pub(super) fn parts<'c>(
     context: &'c Context<'_>,
     estimate: &Estimate,
-    slopes_of: &[Vec<f64>],
-) -> (Context<'c>, Vec<Vec<f64>>, Vec<Vec<f64>>) {
+    slopes_of: &[ForceSlopes],
+) -> (Context<'c>, Vec<Vec<f64>>, Vec<ForceSlopes>) {
     let layout = &context.plant().layout;
     let (nv, width) = (layout.nv, layout.nq + layout.nv);
     let rows: usize = context.walks.iter().map(|w| w.len()).sum();
@@ -44,8 +45,7 @@ pub(super) fn parts<'c>(
         while first + 2 <= walk.len() {
             let range = first..(first + PART).min(walk.len());
             states.push(estimate.trajectory[w][range.start * width..range.end * width].to_vec());
-            let own = range.start * 2 * nv * nv..(range.end - 1) * 2 * nv * nv;
-            slopes.push(slopes_of[w][own].to_vec());
+            slopes.push(slopes_of[w].part(range.start..range.end - 1, 2 * nv * nv));
             walks.push(walk.part(range));
             first += every;
         }
@@ -89,6 +89,8 @@ pub(super) fn sizes(
         all: source.all.clone(),
         slopes: &slopes,
         late: &[],
+        // What does nothing has no size: here nothing of another column may come into it.
+        together: false,
         progress: source.progress,
     };
     let (columns, complete) = source.columns(&short, &states, &wanted)?;
@@ -109,9 +111,9 @@ pub(super) fn sizes(
     let mut sums = vec![vec![0.0; nv]; m];
     let mut readings = vec![0.0; m];
     let (mut rows, mut count) = (0.0, 0.0);
-    for ((walk, (states, read)), b) in short.walks.iter().zip(&columns).zip(&slopes) {
+    for ((walk, (states, read)), slopes) in short.walks.iter().zip(&columns).zip(&slopes) {
         for k in 0..walk.len() - 1 {
-            let matrix = DMatrix::from_fn(nv, nv, |i, j| b[(k * nx + nv + i) * nv + j]);
+            let matrix = DMatrix::from_fn(nv, nv, |i, j| slopes.held[(k * nx + nv + i) * nv + j]);
             let change = DMatrix::from_fn(nv, m, |d, i| states[(k * nx + nv + d) * m + i]);
             if let Some(force) = matrix.lu().solve(&change) {
                 for (i, sums) in sums.iter_mut().enumerate() {

@@ -9,7 +9,9 @@ use crate::latent_force::fit::Hypothesis;
 use crate::latent_force::step_map::{Derivatives, Variation, retime_columns};
 use crate::latent_force::trace::{is_traceable, trace};
 
-/// Columns that one walk of the engine takes, at most: between two of them work can be stopped, and of all at once the memory
+use super::together::{Account, Entries, ForceSlopes, Group, Row, grouped};
+
+/// Variations that one walk of the engine takes, at most: between two of them work can be stopped, and of all at once the memory
 /// would grow with the candidates.
 const SLICE: usize = 64;
 
@@ -58,11 +60,13 @@ impl<'c> All<'c> {
         self.traces && is_traceable(context.plant(), candidate)
     }
 
-    /// All values with those of one candidate.
-    pub(super) fn with(&self, candidate: usize, values: &[f64]) -> Vec<f64> {
+    /// All values with those of some candidates.
+    fn with_all<'w>(&self, wanted: impl Iterator<Item = &'w Wanted>) -> Vec<f64> {
         let mut theta = self.theta.clone();
-        let first = self.first[candidate];
-        theta[first..first + values.len()].copy_from_slice(values);
+        for w in wanted {
+            let first = self.first[w.candidate];
+            theta[first..first + w.values.len()].copy_from_slice(&w.values);
+        }
         theta
     }
 }
@@ -106,9 +110,11 @@ pub(super) type Along = (Vec<f64>, Vec<f64>);
 pub(super) struct Source<'s> {
     pub(super) all: All<'s>,
     /// Slopes in forces, one a walk.
-    pub(super) slopes: &'s [Vec<f64>],
+    pub(super) slopes: &'s [ForceSlopes],
     /// How late readings are in the present model.
     pub(super) late: &'s [Vec<f64>],
+    /// Whether the engine walks once for what can be told apart, to a few percent of each column.
+    pub(super) together: bool,
     /// Who says when to stop.
     pub(super) progress: &'s dyn Progress,
 }
@@ -138,45 +144,9 @@ impl Source<'_> {
                 (vec![0.0; (n - 1) * nx * m], vec![0.0; n * ns * m])
             })
             .collect();
-        let mut complete = true;
-        for (n, slice) in by_engine.chunks(SLICE).enumerate() {
-            if n > 0 && self.progress.is_stopped() {
-                complete = false;
-                break;
-            }
-            let variations: Vec<Variation> = slice
-                .iter()
-                .map(|&i| Variation {
-                    theta: self.all.with(wanted[i].candidate, &wanted[i].values),
-                    scale: wanted[i].scale,
-                })
-                .collect();
-            let own = slice.len();
-            let mut map = context.map(&self.all.specs, &self.all.parameters, own + 1)?;
-            let found = map.linearise(
-                &self.all.theta,
-                states,
-                Derivatives::default(),
-                &[],
-                &variations,
-            )?;
-            for (w, mut linear) in found.into_iter().enumerate() {
-                if let Some(late) = self.late.get(w).filter(|l| !l.is_empty()) {
-                    let time = &context.walks[w].time;
-                    retime_columns(&mut linear.reading_columns, time, late, own);
-                }
-                let spread = |from: &[f64], to: &mut [f64]| {
-                    for (row, target) in from.chunks_exact(own).zip(to.chunks_exact_mut(m)) {
-                        row.iter().zip(slice).for_each(|(x, &i)| target[i] = *x);
-                    }
-                };
-                // Of a segment there are none: its columns are those of its readings.
-                spread(&linear.state_columns, &mut out[w].0);
-                spread(&linear.reading_columns, &mut out[w].1);
-            }
-        }
+        let complete = self.walk((context, states), wanted, &by_engine, &mut out)?;
         for (w, walk) in context.walks.iter().enumerate() {
-            let b = &self.slopes[w];
+            let b = &self.slopes[w].held;
             for (i, wanted) in wanted.iter().enumerate().filter(|(_, w)| traced(w)) {
                 let candidate = &self.all.candidates[wanted.candidate];
                 let forces = trace(plant, candidate, &wanted.values, walk, &states[w])?;
@@ -193,5 +163,116 @@ impl Source<'_> {
             }
         }
         Ok((out, complete))
+    }
+
+    /// Fills in the columns that the engine walks for, those together that can be told apart; says whether there was time for all.
+    fn walk(
+        &self,
+        (context, states): (&Context<'_>, &[Vec<f64>]),
+        wanted: &[Wanted],
+        by_engine: &[usize],
+        out: &mut [Along],
+    ) -> Result<bool> {
+        let plant = context.plant();
+        let reach = |i: usize| {
+            let candidate = &self.all.candidates[wanted[i].candidate];
+            candidate.effect.reach(plant, &candidate.spec.site)
+        };
+        let reaches = by_engine.iter().map(|&i| (i, reach(i)));
+        // Of a segment the columns are those of its whole replay, which no row's slopes take apart.
+        let mut due: Vec<Group> = if self.together && !context.has_segments() {
+            grouped(reaches)
+        } else {
+            reaches.map(|(i, reach)| Group::single(i, reach)).collect()
+        };
+        let entries = Entries::of(context);
+        let mut begun = false;
+        while !due.is_empty() {
+            if begun && self.progress.is_stopped() {
+                return Ok(false);
+            }
+            begun = true;
+            let rest = due.split_off(SLICE.min(due.len()));
+            let balances = self.slice((context, states), (&due, wanted), &entries, out)?;
+            // What reaches further than it says is walked for alone.
+            let odd = due.into_iter().zip(balances).filter(|(_, fine)| !fine);
+            due = odd.flat_map(|(group, _)| group.apart()).collect();
+            due.extend(rest);
+        }
+        Ok(true)
+    }
+
+    /// One walk of the engine for some groups; says of each whether its members could be told apart.
+    fn slice(
+        &self,
+        (context, states): (&Context<'_>, &[Vec<f64>]),
+        (groups, wanted): (&[Group], &[Wanted]),
+        entries: &Entries,
+        out: &mut [Along],
+    ) -> Result<Vec<bool>> {
+        let (nv, m, own) = (context.plant().layout.nv, wanted.len(), groups.len());
+        let (nx, ns) = (2 * nv, entries.sensors.len());
+        let variation = |group: &Group| {
+            let each = group.members.iter().map(|&i| &wanted[i]);
+            Variation {
+                theta: self.all.with_all(each),
+                scale: 1.0,
+            }
+        };
+        let variations: Vec<Variation> = groups.iter().map(variation).collect();
+        let mut map = context.map(&self.all.specs, &self.all.parameters, own + 1)?;
+        let want = Derivatives::default();
+        let found = map.linearise(&self.all.theta, states, want, &[], &variations)?;
+        let mut accounts = vec![Account::default(); own];
+        let mut change = vec![0.0; nx.max(ns)];
+        for (w, mut linear) in found.into_iter().enumerate() {
+            if let Some(late) = self.late.get(w).filter(|l| !l.is_empty()) {
+                let time = &context.walks[w].time;
+                retime_columns(&mut linear.reading_columns, time, late, own);
+            }
+            let (to_states, to_readings) = &mut out[w];
+            // Of a segment there are none: its columns are those of its readings.
+            for (k, block) in linear.state_columns.chunks_exact(nx * own).enumerate() {
+                let steps = context.walks[w].substeps[k];
+                let row = Row::of(&self.slopes[w].part(k..k + 1, nx * nv), nv, steps);
+                for (g, group) in groups.iter().enumerate() {
+                    let mut set = |i: usize, s: usize, x: f64| {
+                        let place = group.members[i];
+                        to_states[(k * nx + s) * m + place] = x / wanted[place].scale;
+                    };
+                    let change = &mut change[..nx];
+                    let column = block.iter().skip(g).step_by(own);
+                    change.iter_mut().zip(column).for_each(|(c, x)| *c = *x);
+                    if group.members.len() == 1 {
+                        change.iter().enumerate().for_each(|(s, x)| set(0, s, *x));
+                        continue;
+                    }
+                    if group.is_of_sensors() {
+                        accounts[g].still(change, &context.scale);
+                        continue;
+                    }
+                    accounts[g].states(group, &row, change, |i, part| {
+                        part.iter().enumerate().for_each(|(s, x)| set(i, s, *x));
+                    });
+                }
+            }
+            for (k, block) in linear.reading_columns.chunks_exact(ns * own).enumerate() {
+                for (g, group) in groups.iter().enumerate() {
+                    let mut set = |i: usize, s: usize, x: f64| {
+                        let place = group.members[i];
+                        to_readings[(k * ns + s) * m + place] = x / wanted[place].scale;
+                    };
+                    let change = &mut change[..ns];
+                    let column = block.iter().skip(g).step_by(own);
+                    change.iter_mut().zip(column).for_each(|(c, x)| *c = *x);
+                    if group.members.len() == 1 {
+                        change.iter().enumerate().for_each(|(s, x)| set(0, s, *x));
+                        continue;
+                    }
+                    accounts[g].readings(group, entries, change, set);
+                }
+            }
+        }
+        Ok(accounts.iter().map(Account::balances).collect())
     }
 }

@@ -16,13 +16,15 @@ const STATE_STEP: f64 = 1e-6;
 
 /// A generalized force on some rows of a rollout.
 struct Push<'a> {
-    /// For each row of the rollout, the degree of freedom and the force.
-    rows: &'a [Option<(usize, f64)>],
+    /// For each row of the rollout, the degree of freedom, the force, and whether it acts in the first physics step alone.
+    rows: &'a [Option<(usize, f64, bool)>],
 }
 
 impl StepHook for Push<'_> {
-    fn before_step(&self, row: usize, _step: usize, view: &mut StepView<'_>) {
-        if let Some((dof, force)) = self.rows[row] {
+    fn before_step(&self, row: usize, step: usize, view: &mut StepView<'_>) {
+        if let Some((dof, force, at_first)) = self.rows[row]
+            && (step == 0 || !at_first)
+        {
             view.force[dof] += force;
         }
     }
@@ -41,8 +43,10 @@ enum Role {
     Reading(usize),
     /// A speed is moved by a ramp, for how late a sensor of speeds is.
     Ramp(usize),
-    /// A generalized force acts.
+    /// A generalized force acts all along the row.
     Force(usize),
+    /// It acts in the first physics step of the row.
+    Jolt(usize),
     /// A variation of the parameters.
     Varied(usize),
 }
@@ -79,6 +83,9 @@ impl Part {
         if want.force {
             others.extend((0..nv).map(Role::Force));
         }
+        if want.jolt {
+            others.extend((0..nv).map(Role::Jolt));
+        }
         others.extend((0..variations.len()).map(Role::Varied));
         if due == all {
             in_state.append(&mut others);
@@ -96,6 +103,7 @@ impl Part {
                     defect: vec![0.0; steps * nx],
                     a: vec![0.0; state * steps * nx * nx],
                     b: vec![0.0; usize::from(want.force) * steps * nx * nv],
+                    jolt: vec![0.0; usize::from(want.jolt) * steps * nx * nv],
                     residual: vec![f64::NAN; n * ns],
                     h: vec![0.0; usize::from(want.state) * n * ns * nx],
                     early: Vec::new(),
@@ -193,7 +201,7 @@ impl Part {
         if c.remembers && k > 0 {
             let (mut from, mut to) = (Vec::new(), Vec::new());
             for (v, role) in roles.iter().enumerate() {
-                if matches!(role, Role::State(_) | Role::Force(_)) {
+                if matches!(role, Role::State(_) | Role::Force(_) | Role::Jolt(_)) {
                     from.extend(here);
                     to.extend(here.iter().map(|e| v * n + e));
                 }
@@ -350,7 +358,8 @@ impl Part {
                 let ctrl = &c.walks[self.walks[e]].ctrl[k * nu..(k + 1) * nu];
                 row.ctrl.extend_from_slice(ctrl);
                 row.pushes.push(match *role {
-                    Role::Force(d) => Some((d, push[d])),
+                    Role::Force(d) => Some((d, push[d], false)),
+                    Role::Jolt(d) => Some((d, push[d], true)),
                     _ => None,
                 });
             }
@@ -385,6 +394,7 @@ impl Part {
                 let (matrix, columns, at, scale) = match *role {
                     Role::State(i) => (&mut out[e].a, nx, i, STATE_STEP),
                     Role::Force(i) => (&mut out[e].b, nv, i, push[i]),
+                    Role::Jolt(i) => (&mut out[e].jolt, nv, i, push[i]),
                     Role::Varied(i) => (&mut out[e].state_columns, m, i, variations[i].scale),
                     Role::Nominal | Role::Reading(_) | Role::Ramp(_) => continue,
                 };
@@ -406,7 +416,7 @@ struct RowBuffers {
     qpos: Vec<f64>,
     qvel: Vec<f64>,
     ctrl: Vec<f64>,
-    pushes: Vec<Option<(usize, f64)>>,
+    pushes: Vec<Option<(usize, f64, bool)>>,
     read: Vec<f64>,
     next: Vec<f64>,
 }

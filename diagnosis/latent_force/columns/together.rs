@@ -1,0 +1,352 @@
+//! Columns that one walk of the engine can tell apart.
+//!
+//! Friction at each of ten joints is ten columns, and one simulation that has all ten: what happened to the speeds over a
+//! row says by the slopes in forces which joint each part of it came from. So the engine walks once for all columns whose
+//! effects reach different joints, or different sensors: the grouping of Curtis, Powell and Reid (1974) for sparse
+//! Jacobians, with the force as the space in which the matrix is sparse.
+
+use std::ops::Range;
+
+use asid_effects::Reach;
+use nalgebra::{DMatrix, DVector, Dyn, LU};
+
+use crate::latent_force::context::Context;
+use crate::latent_force::step_map::LinearEpisode;
+
+/// Share of the force of a group, by magnitude, that may come up where no member reaches: more, and one reaches further than
+/// it says. Differences are right to a thousandth of it.
+const ELSEWHERE: f64 = 0.01;
+
+/// Change of a reading, in deviations of its noise, and of a coordinate of the state, relative to its largest, that is none:
+/// the rotation between two orientations that are the same is one of 1e-17.
+const NO_CHANGE: f64 = 1e-6;
+const NO_MOTION: f64 = 1e-12;
+
+/// Columns that are walked together, by their places in a list, with what each reaches.
+#[derive(Clone, Debug)]
+pub(super) struct Group {
+    pub(super) members: Vec<usize>,
+    reaches: Vec<Reach>,
+}
+
+impl Group {
+    /// A column by itself.
+    pub(super) fn single(member: usize, reach: Reach) -> Self {
+        Self {
+            members: vec![member],
+            reaches: vec![reach],
+        }
+    }
+
+    /// The columns, each by itself.
+    pub(super) fn apart(self) -> impl Iterator<Item = Self> {
+        let each = self.members.into_iter().zip(self.reaches);
+        each.map(|(member, reach)| Self::single(member, reach))
+    }
+
+    /// Whether its columns are of readings alone.
+    pub(super) fn is_of_sensors(&self) -> bool {
+        matches!(self.reaches[0], Reach::Sensor(_))
+    }
+
+    fn takes(&self, reach: &Reach) -> bool {
+        self.reaches.iter().all(|own| own.is_apart_from(reach))
+    }
+}
+
+/// Groups of columns, given with what they reach; each comes into the first that takes it.
+pub(super) fn grouped(columns: impl Iterator<Item = (usize, Reach)>) -> Vec<Group> {
+    let mut groups: Vec<Group> = Vec::new();
+    for (member, reach) in columns {
+        match groups.iter_mut().find(|g| g.takes(&reach)) {
+            Some(group) => {
+                group.members.push(member);
+                group.reaches.push(reach);
+            }
+            None => groups.push(Group::single(member, reach)),
+        }
+    }
+    groups
+}
+
+/// Slopes of the state after a row in generalized forces, `rows x nx x nv` along a walk.
+#[derive(Clone, Debug, Default)]
+pub(super) struct ForceSlopes {
+    /// In a force held over the row.
+    pub(super) held: Vec<f64>,
+    /// In one that acts in the first physics step alone.
+    jolt: Vec<f64>,
+}
+
+impl ForceSlopes {
+    /// Those of a linearised walk, which are taken out of it.
+    pub(super) fn take(from: &mut LinearEpisode) -> Self {
+        Self {
+            held: std::mem::take(&mut from.b),
+            jolt: std::mem::take(&mut from.jolt),
+        }
+    }
+
+    /// Those of some rows, each `size` numbers.
+    pub(super) fn part(&self, rows: Range<usize>, size: usize) -> Self {
+        let own = rows.start * size..rows.end * size;
+        let of = |all: &[f64]| all.get(own.clone()).map_or_else(Vec::new, <[f64]>::to_vec);
+        Self {
+            held: of(&self.held),
+            jolt: of(&self.jolt),
+        }
+    }
+}
+
+/// What the change of the state over a row says of the forces behind it: one held over the row and one at its beginning, at
+/// each joint. Two, since places and speeds are two numbers a joint, and a force that fades, as of a late command, moves a
+/// place further than one that is held.
+///
+/// Over a row of a single physics step the two are one, and the speeds say it all.
+pub(super) struct Row {
+    /// Change of the state by a unit of each force, `nx x nx`: the held ones, then those at the beginning; or `nx x nv`.
+    response: DMatrix<f64>,
+    /// Of as many of its last rows as it has columns.
+    factors: LU<f64, Dyn, Dyn>,
+}
+
+impl Row {
+    /// Of a row of some physics steps with these slopes.
+    pub(super) fn of(slopes: &ForceSlopes, nv: usize, steps: usize) -> Self {
+        let half = |from: &[f64]| DMatrix::from_row_slice(2 * nv, nv, from);
+        let mut response = half(&slopes.held);
+        if steps > 1 {
+            response = response.resize_horizontally(2 * nv, 0.0);
+            response.columns_mut(nv, nv).copy_from(&half(&slopes.jolt));
+        }
+        let n = response.ncols();
+        Self {
+            factors: response.rows(2 * nv - n, n).into_owned().lu(),
+            response,
+        }
+    }
+}
+
+/// The entries of a row of readings.
+pub(super) struct Entries {
+    /// The sensor of each, by index in the layout.
+    pub(super) sensors: Vec<usize>,
+    /// The least change of each that counts, in its unit.
+    least: Vec<f64>,
+}
+
+impl Entries {
+    pub(super) fn of(context: &Context<'_>) -> Self {
+        let layout = &context.plant().layout.sensors;
+        let logs = context.logs;
+        let name = logs
+            .entries
+            .iter()
+            .map(|e| &logs.sensors[e.sensor].name);
+        // A sensor that the layout lacks is no effect's own.
+        let place = |name: &String| layout.iter().position(|s| s.name == *name);
+        let noise = logs.entry_noise();
+        Self {
+            sensors: name.map(|n| place(n).unwrap_or(layout.len())).collect(),
+            least: noise.iter().map(|n| NO_CHANGE * n).collect(),
+        }
+    }
+}
+
+/// How the changes of a group came out.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Account {
+    /// Sum of squares of all forces that the changes stand for, and of those where no member reaches.
+    forces: [f64; 2],
+    /// Whether something came up that members cannot have made.
+    strange: bool,
+}
+
+impl Account {
+    /// Whether the members reach what they say and nothing else.
+    pub(super) fn balances(&self) -> bool {
+        !self.strange && self.forces[1] <= ELSEWHERE.powi(2) * self.forces[0]
+    }
+
+    /// Takes note of the change of the state (`nx`, relative to the largest of each) by effects that do not reach it.
+    pub(super) fn still(&mut self, change: &[f64], scale: &[f64]) {
+        let mut each = change.iter().zip(scale);
+        self.strange |= each.any(|(x, s)| x.abs() > NO_MOTION * s);
+    }
+
+    /// Takes the change of the state over a row (`nx`, places before speeds) apart; `set` is given each member's place in the
+    /// group and its part.
+    pub(super) fn states(
+        &mut self,
+        group: &Group,
+        row: &Row,
+        change: &[f64],
+        mut set: impl FnMut(usize, &[f64]),
+    ) {
+        if change.iter().all(|x| *x == 0.0) {
+            return;
+        }
+        let (nx, n) = row.response.shape();
+        let nv = nx / 2;
+        let told = DVector::from_column_slice(&change[nx - n..]);
+        let Some(forces) = row.factors.solve(&told) else {
+            self.strange = true;
+            return;
+        };
+        let mut reached = vec![false; nv];
+        let mut part = vec![0.0; 2 * nv];
+        for (i, reach) in group.reaches.iter().enumerate() {
+            let Reach::Dofs(dofs) = reach else { continue };
+            part.fill(0.0);
+            for &d in dofs {
+                reached[d] = true;
+                for place in (d..n).step_by(nv) {
+                    let response = row.response.column(place);
+                    let own = part.iter_mut().zip(response.iter());
+                    own.for_each(|(p, s)| *p += s * forces[place]);
+                }
+            }
+            set(i, &part);
+        }
+        for (d, reached) in reached.iter().enumerate() {
+            let square: f64 = (d..n).step_by(nv).map(|p| forces[p].powi(2)).sum();
+            self.forces[0] += square;
+            if !reached {
+                self.forces[1] += square;
+            }
+        }
+    }
+
+    /// Takes the change of the readings of a row apart; `set` is given the member's place in the group, the entry and its change.
+    pub(super) fn readings(
+        &mut self,
+        group: &Group,
+        entries: &Entries,
+        change: &[f64],
+        mut set: impl FnMut(usize, usize, f64),
+    ) {
+        let each = entries.sensors.iter().zip(&entries.least).zip(change);
+        for (entry, ((sensor, least), x)) in each.enumerate() {
+            if x.abs() <= *least {
+                continue;
+            }
+            let is_own = |r: &Reach| *r == Reach::Sensor(*sensor);
+            match group.reaches.iter().position(is_own) {
+                Some(i) => set(i, entry, *x),
+                None => self.strange = true,
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn dofs(own: &[usize]) -> Reach {
+        Reach::Dofs(own.iter().copied().collect())
+    }
+
+    #[test]
+    fn columns_of_a_group_reach_different_things() {
+        let reaches = [
+            dofs(&[0]),
+            dofs(&[1]),
+            dofs(&[0, 1]),
+            Reach::Sensor(0),
+            Reach::Sensor(1),
+            Reach::Everything,
+            dofs(&[2]),
+            Reach::Everything,
+        ];
+        let groups = grouped(reaches.into_iter().enumerate());
+        let members: Vec<_> = groups.iter().map(|g| &g.members[..]).collect();
+        assert_eq!(members, [&[0, 1, 6][..], &[2], &[3, 4], &[5], &[7]]);
+    }
+
+    /// Two coupled joints, as of an arm: a force at one moves both.
+    fn coupled() -> Row {
+        let inverse = [1.0, -0.4, -0.4, 2.0];
+        let by = |place: f64, speed: f64| -> Vec<f64> {
+            let places = inverse.iter().map(|x| place * x);
+            places.chain(inverse.iter().map(|x| speed * x)).collect()
+        };
+        // Held over 0.02 s, and in the first of ten steps.
+        let (held, jolt) = (by(2e-4, 0.02), by(3.8e-5, 0.002));
+        Row::of(&ForceSlopes { held, jolt }, 2, 10)
+    }
+
+    #[test]
+    fn a_change_is_taken_apart_into_what_each_joint_made() {
+        // 3 N m at the first joint early in the row, -2 N m at the second all along it.
+        let first = [1.14e-4, -4.56e-5, 0.006, -0.0024];
+        let second = [1.6e-4, -8e-4, 0.016, -0.08];
+        let both: Vec<f64> = first.iter().zip(&second).map(|(a, b)| a + b).collect();
+        let group = &grouped([(7, dofs(&[0])), (9, dofs(&[1]))].into_iter())[0];
+        let mut account = Account::default();
+        let mut parts = Vec::new();
+        account.states(group, &coupled(), &both, |i, part| {
+            parts.push((i, part.to_vec()));
+        });
+        for (want, (i, part)) in [first, second].iter().zip(&parts) {
+            for (a, b) in want.iter().zip(part) {
+                assert!((a - b).abs() < 1e-12, "{i}: {part:?}");
+            }
+        }
+        assert!(account.balances());
+    }
+
+    #[test]
+    fn over_a_single_physics_step_the_speeds_say_it_all() {
+        let held = vec![2e-6, -8e-7, -8e-7, 4e-6, 0.002, -0.0008, -0.0008, 0.004];
+        let jolt = held.clone();
+        let row = Row::of(&ForceSlopes { held, jolt }, 2, 1);
+        // 3 N m at the first joint, -2 N m at the second.
+        let (first, second) = (
+            [6e-6, -2.4e-6, 0.006, -0.0024],
+            [1.6e-6, -8e-6, 0.0016, -0.008],
+        );
+        let both: Vec<f64> = first.iter().zip(&second).map(|(a, b)| a + b).collect();
+        let group = &grouped([(0, dofs(&[0])), (1, dofs(&[1]))].into_iter())[0];
+        let mut account = Account::default();
+        account.states(group, &row, &both, |i, part| {
+            let want = [first, second][i];
+            for (a, b) in want.iter().zip(part) {
+                assert!((a - b).abs() < 1e-15, "{i}: {part:?}");
+            }
+        });
+        assert!(account.balances());
+    }
+
+    #[test]
+    fn a_force_where_no_member_reaches_is_noticed() {
+        let group = Group::single(0, dofs(&[0]));
+        let account = |second: f64| {
+            let mut account = Account::default();
+            let speeds = [1.0 - 0.4 * second, -0.4 + 2.0 * second];
+            let change = [0.01 * speeds[0], 0.01 * speeds[1], speeds[0], speeds[1]];
+            account.states(&group, &coupled(), &change, |_, _| {});
+            account
+        };
+        assert!(account(0.0).balances() && account(0.001).balances());
+        assert!(!account(0.1).balances());
+    }
+
+    #[test]
+    fn a_reading_that_no_member_makes_is_noticed() {
+        let group = &grouped([(0, Reach::Sensor(0)), (1, Reach::Sensor(2))].into_iter())[0];
+        let entries = Entries {
+            sensors: vec![0, 0, 1, 2],
+            least: vec![1e-9; 4],
+        };
+        let mut found = Vec::new();
+        let mut account = Account::default();
+        account.readings(group, &entries, &[0.1, 0.2, 1e-17, 0.3], |i, entry, x| {
+            found.push((i, entry, x));
+        });
+        assert_eq!(found, [(0, 0, 0.1), (0, 1, 0.2), (1, 3, 0.3)]);
+        assert!(account.balances());
+        account.readings(group, &entries, &[0.0, 0.0, 0.1, 0.0], |_, _, _| {});
+        assert!(!account.balances());
+    }
+}

@@ -1,0 +1,145 @@
+//! What an effect moves by itself, before the machine passes it on.
+//!
+//! Two effects that reach different joints, or different sensors, can be tried in one simulation and told apart
+//! afterwards, as columns of a sparse Jacobian are (Curtis, Powell, Reid 1974).
+
+use std::collections::BTreeSet;
+
+use asid_core::layout::JointKind;
+use asid_core::target::Target;
+use asid_mjcf::plant::Plant;
+
+use crate::effect::Acts;
+
+/// What an effect moves by itself.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Reach {
+    /// Anything: nothing is known of it.
+    Everything,
+    /// Generalized forces on these degrees of freedom, places in `qvel`, and nothing else.
+    Dofs(BTreeSet<usize>),
+    /// What one sensor says, by index in the layout.
+    Sensor(usize),
+}
+
+impl Reach {
+    /// Of an effect that acts on nothing but the sensor or the drive of its site, or else on what its targets name.
+    #[must_use]
+    pub fn of(plant: &Plant, acts: Acts, site: &str, targets: &[Target]) -> Self {
+        let layout = &plant.layout;
+        let named = match acts {
+            Acts::Measurement => {
+                let sensor = layout.sensors.iter().position(|s| s.name == site);
+                return sensor.map_or(Self::Everything, Self::Sensor);
+            }
+            Acts::Command => drive_dofs(plant, site),
+            Acts::Model | Acts::Force if targets.is_empty() => None,
+            Acts::Model | Acts::Force => Some(BTreeSet::new()),
+        };
+        let join = |all: BTreeSet<usize>, target: &Target| {
+            target_dofs(plant, target).map(|own| all.union(&own).copied().collect())
+        };
+        let dofs = named.and_then(|named| targets.iter().try_fold(named, join));
+        dofs.map_or(Self::Everything, Self::Dofs)
+    }
+
+    /// Whether a third party can tell what this makes from what the other makes.
+    #[must_use]
+    pub fn is_apart_from(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Dofs(a), Self::Dofs(b)) => a.is_disjoint(b),
+            (Self::Sensor(a), Self::Sensor(b)) => a != b,
+            _ => false,
+        }
+    }
+}
+
+/// Degrees of freedom of a joint.
+fn joint_dofs(plant: &Plant, joint: usize) -> BTreeSet<usize> {
+    let joint = &plant.layout.joints[joint];
+    let count = match joint.kind {
+        JointKind::Free => 6,
+        JointKind::Ball => 3,
+        JointKind::Hinge | JointKind::Slide => 1,
+    };
+    (joint.qvel..joint.qvel + count).collect()
+}
+
+/// Those that an actuator drives; `None` where it is no plain drive of a joint.
+fn drive_dofs(plant: &Plant, actuator: &str) -> Option<BTreeSet<usize>> {
+    let actuators = &plant.layout.actuators;
+    let place = actuators.iter().position(|a| a.name == actuator)?;
+    let drive = plant.drives[place].as_ref()?;
+    Some(joint_dofs(plant, drive.joint))
+}
+
+/// Those that a target's value makes forces on: of a body's mass all joints that carry it.
+fn target_dofs(plant: &Plant, target: &Target) -> Option<BTreeSet<usize>> {
+    let layout = &plant.layout;
+    match &*target.element {
+        "actuator" => drive_dofs(plant, &target.name),
+        "joint" => {
+            let joint = layout.joints.iter().position(|j| j.name == target.name)?;
+            let own = ["damping", "frictionloss", "stiffness", "armature", "springref"];
+            own.contains(&&*target.attribute)
+                .then(|| joint_dofs(plant, joint))
+        }
+        "body" if ["mass", "ipos", "inertia"].contains(&&*target.attribute) => {
+            let mut body = layout.bodies.iter().position(|b| *b == target.name)?;
+            let mut dofs = BTreeSet::new();
+            while body != 0 {
+                let joints = plant.bodies[body].joints.clone();
+                joints.for_each(|joint| dofs.extend(joint_dofs(plant, joint)));
+                body = plant.bodies[body].parent;
+            }
+            Some(dofs)
+        }
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use asid_core::Scene;
+    use asid_core::registry::all;
+
+    use super::*;
+    use crate::EffectEntry;
+
+    const ARM: &str = r#"<mujoco><worldbody>
+        <body name="upper"><joint name="shoulder" type="hinge"/><geom name="u" size="0.1" mass="1"/>
+          <body name="lower"><joint name="elbow" type="hinge"/><geom name="l" size="0.1" mass="1"/></body></body>
+        <body name="box"><freejoint name="box"/><geom name="b" size="0.1" mass="1"/></body></worldbody>
+        <actuator><motor name="elbow" joint="shoulder"/></actuator>
+        <sensor><jointpos name="angle" joint="elbow"/></sensor></mujoco>"#;
+
+    fn reach(name: &str, site: &str) -> Reach {
+        let plant = Plant::of(&Scene::from_xml("arm", ARM, &[]).unwrap()).unwrap();
+        let entry = all::<EffectEntry>().find(|e| e.name == name).unwrap();
+        (entry.make)().reach(&plant, site)
+    }
+
+    #[test]
+    fn a_mass_is_felt_at_the_joints_that_carry_it_and_at_no_other() {
+        assert_eq!(reach("mass", "upper"), Reach::Dofs([0].into()));
+        assert_eq!(reach("mass", "lower"), Reach::Dofs([0, 1].into()));
+        assert_eq!(reach("mass", "box"), Reach::Dofs((2..8).collect()));
+        assert!(reach("mass", "lower").is_apart_from(&reach("mass", "box")));
+        assert!(!reach("mass", "lower").is_apart_from(&reach("mass", "upper")));
+    }
+
+    #[test]
+    fn an_effect_on_a_drive_reaches_its_joint_whatever_the_drive_is_called() {
+        assert_eq!(reach("actuator-gain", "elbow"), Reach::Dofs([0].into()));
+        assert_eq!(reach("viscous-friction", "elbow"), Reach::Dofs([1].into()));
+        assert_eq!(reach("sensor-delay", "angle"), Reach::Sensor(0));
+    }
+
+    #[test]
+    fn what_is_felt_everywhere_or_says_nothing_of_itself_is_apart_from_nothing() {
+        assert_eq!(reach("gravity-tilt", ""), Reach::Everything);
+        assert_eq!(reach("sliding-friction", "b"), Reach::Everything);
+        assert!(!Reach::Everything.is_apart_from(&Reach::Sensor(0)));
+        assert!(!Reach::Sensor(0).is_apart_from(&Reach::Dofs([0].into())));
+    }
+}
