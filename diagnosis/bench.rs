@@ -2,7 +2,8 @@
 //! scatter, and the starts of the episodes.
 
 use asid_core::layout::Layout;
-use asid_core::{Parameter, Result};
+use asid_core::progress::Silent;
+use asid_core::{Parameter, Progress, Result};
 use asid_effects::EffectSpec;
 
 use crate::candidate::Candidate;
@@ -182,7 +183,7 @@ impl Bench {
         trials: &[Trial<'_>],
         theta: &[f64],
         starts: &[State],
-        effort: Effort,
+        (effort, progress): (Effort, &dyn Progress),
     ) -> Result<Explanation> {
         let unknowns = self.unknowns(trials);
         let mut values = theta.to_vec();
@@ -196,7 +197,7 @@ impl Bench {
             &unknowns,
             point,
             &part.open,
-            part.effort(self, effort),
+            (part.effort(self, effort), progress),
         )?;
         let mut all = starts.to_vec();
         for (&e, start) in part.episodes.iter().zip(&fit.point.starts) {
@@ -345,7 +346,7 @@ impl Bench {
             &unknowns,
             point,
             &self.open,
-            Effort::START,
+            (Effort::START, &Silent),
         )?;
         Ok(fit.point.starts)
     }

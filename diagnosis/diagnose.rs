@@ -146,13 +146,13 @@ pub(crate) fn diagnose_physics(
     progress: &dyn Progress,
 ) -> Result<(Diagnosis, Work)> {
     let by_force = latent_force::pipeline::diagnose(study, machine, &settings, progress)?;
-    let machine = match by_force {
+    let latent_force::pipeline::Handover { machine, shot } = match by_force {
         Ok(mut work) => {
             work.findings = final_noise(&mut work.bench, study, &work.candidates, work.findings)?;
             work.none = vec![work.findings.none.clone()];
             return tell(study, work, settings, progress);
         }
-        Err(machine) => machine,
+        Err(handover) => handover,
     };
     let streams = Streams::new(settings.seed);
     progress.begin("fitting the study's parameters", 1);
@@ -162,7 +162,7 @@ pub(crate) fn diagnose_physics(
         nominal,
         mut scatter,
         is_whole,
-    } = prepare(study, machine, streams.stream("scatter"), progress)?;
+    } = prepare(study, (machine, shot), streams.stream("scatter"), progress)?;
     progress.end();
     let last = &none[none.len() - 1];
     let model = bench.machine.with(&[])?;

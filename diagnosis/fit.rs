@@ -5,7 +5,7 @@
 //! dampings are one batch.
 
 use asid_core::layout::Layout;
-use asid_core::{Parameter, Result};
+use asid_core::{Parameter, Progress, Result};
 use nalgebra::DMatrix;
 
 use crate::linearise::{Differences, Linearisation, NOTHING, Open, linearise, slope};
@@ -148,7 +148,7 @@ fn bounds(predictor: &Predictor<'_>) -> Vec<std::ops::Range<usize>> {
         .collect()
 }
 
-/// Fits the unknowns and the starts' open coordinates from `point` on.
+/// Fits the unknowns and the starts' open coordinates from `point` on, as far as it comes until work is stopped.
 ///
 /// # Errors
 /// As [`Predictor::residuals`].
@@ -158,7 +158,7 @@ pub fn fit(
     unknowns: &[Unknown],
     point: Point,
     open: &Open,
-    effort: Effort,
+    (effort, progress): (Effort, &dyn Progress),
 ) -> Result<Fit> {
     let free: Vec<usize> = (0..unknowns.len()).filter(|&i| unknowns[i].free).collect();
     let bounds = bounds(predictor);
@@ -183,6 +183,9 @@ pub fn fit(
     }
     // The first differences are a guess; they are right once they hardly change.
     for _ in 0..4 {
+        if progress.is_stopped() {
+            break;
+        }
         let before = differences.clone();
         line = linearise(predictor, layout, unknowns, &point, open, &mut differences)?;
         let settled = |(a, b): (&f64, &f64)| (a / b).max(b / a) < 4.0;
@@ -193,6 +196,9 @@ pub fn fit(
         }
     }
     for _ in 0..effort.iterations {
+        if progress.is_stopped() {
+            break;
+        }
         let mut accepted = None;
         for _ in 0..3 {
             let dampings = [damping * 0.1, damping, damping * 10.0];

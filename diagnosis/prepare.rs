@@ -9,6 +9,7 @@ use asid_core::{Layout, Progress, Result};
 use crate::bench::{Bench, CAPACITY, Explanation, Stage};
 use crate::data::Logs;
 use crate::fit::{Effort, Unknown, cost, fit, scan};
+use crate::latent_force::pipeline::Shot;
 use crate::machine::Machine;
 use crate::noise;
 use crate::predict::Point;
@@ -162,13 +163,13 @@ pub fn set_reading_noise(bench: &mut Bench, given: &BTreeMap<String, f64>) {
     bench.set_noise(&noise);
 }
 
-/// Prepares a study on a machine.
+/// Prepares a study on a machine, from where multiple shooting arrived.
 ///
 /// # Errors
 /// When a parameter cannot be set or a rollout fails.
 pub fn prepare(
     study: &Study,
-    machine: Machine,
+    (machine, shot): (Machine, Option<Shot>),
     rng: Rng,
     progress: &dyn Progress,
 ) -> Result<Prepared> {
@@ -189,15 +190,20 @@ pub fn prepare(
     };
     set_noise(&mut bench, &study.noise, &point)?;
     bench.stages = vec![whole(&bench)];
-    let (point, left) = settle_starts(&mut bench, point)?;
+    let (mut point, left) = settle_starts(&mut bench, (point, progress))?;
+    let mut lacks = false;
+    if let Some(shot) = shot {
+        lacks = shot.lacks;
+        point = nearest(&mut bench, point, shot)?;
+    }
     scatter.estimate(&mut bench, &point)?;
     if !bench.open.is_empty() && left < QUIET {
         scatter.keep_starts(&mut bench, &point)?;
     }
-    let direct = if bench.is_rough() {
+    let direct = if bench.is_rough() || lacks {
         None
     } else {
-        fit_directly(&mut bench, study, &point, &mut scatter)?
+        fit_directly(&mut bench, study, &point, (&mut scatter, progress))?
     };
     let is_whole = direct.is_some();
     let none = if let Some(direct) = direct {
@@ -243,7 +249,10 @@ fn set_noise(bench: &mut Bench, given: &BTreeMap<String, f64>, point: &Point) ->
 
 /// Fits open starts alone, so that the model as given begins where the logs do; with the root
 /// mean square that this leaves of the first tenth.
-fn settle_starts(bench: &mut Bench, point: Point) -> Result<(Point, f64)> {
+fn settle_starts(
+    bench: &mut Bench,
+    (point, progress): (Point, &dyn Progress),
+) -> Result<(Point, f64)> {
     if bench.open.is_empty() {
         return Ok((point, 0.0));
     }
@@ -258,7 +267,7 @@ fn settle_starts(bench: &mut Bench, point: Point) -> Result<(Point, f64)> {
         &unknowns,
         point,
         &bench.open,
-        Effort::BRIEF,
+        (Effort::BRIEF, progress),
     )?;
     bench.train.starts.clone_from(&fitted.point.starts);
     let theta = &fitted.point.theta;
@@ -268,8 +277,38 @@ fn settle_starts(bench: &mut Bench, point: Point) -> Result<(Point, f64)> {
     Ok((fitted.point, left))
 }
 
+/// Of the point as it is, the values of a shot in its place, and its starts too, what leaves least.
+fn nearest(bench: &mut Bench, point: Point, shot: Shot) -> Result<Point> {
+    let mut points = vec![point.clone(), point.clone(), point];
+    points[1].theta.clone_from(&shot.theta);
+    points[2].theta = shot.theta;
+    if !bench.open.is_empty() {
+        let starts = points[2].starts.iter_mut().zip(shot.starts);
+        starts.for_each(|(start, found)| *start = found.unwrap_or_else(|| start.clone()));
+    }
+    let mut predictor = bench.predictor(&[], &bench.train)?;
+    let costs: Vec<f64> = predictor
+        .residuals(&points)?
+        .iter()
+        .map(|r| cost(r))
+        .collect();
+    drop(predictor);
+    let least = (0..costs.len()).min_by(|&a, &b| costs[a].total_cmp(&costs[b]));
+    let point = points.swap_remove(least.unwrap_or(0));
+    bench.train.starts.clone_from(&point.starts);
+    bench.test.starts = bench.head_starts(&[], &point.theta, &bench.test.starts)?;
+    bench.head.starts.clone_from(&bench.test.starts);
+    bench.stages = vec![whole(bench)];
+    Ok(point)
+}
+
 /// Looks over the ranges on a stage and fits from the best.
-fn scan_and_fit(bench: &Bench, stage: usize, point: &Point, effort: Effort) -> Result<Explanation> {
+fn scan_and_fit(
+    bench: &Bench,
+    stage: usize,
+    point: &Point,
+    effort: (Effort, &dyn Progress),
+) -> Result<Explanation> {
     let unknowns: Vec<Unknown> = bench.unknowns(&[]);
     let part = &bench.stages[stage];
     let start = part.point(point.theta.clone(), &point.starts);
@@ -283,15 +322,16 @@ fn fit_directly(
     bench: &mut Bench,
     study: &Study,
     point: &Point,
-    scatter: &mut Scatter,
+    (scatter, progress): (&mut Scatter, &dyn Progress),
 ) -> Result<Option<Explanation>> {
+    let effort = (Effort::BRIEF, progress);
     let found = (bench.train.clone(), bench.test.clone(), bench.head.clone());
-    let first = bench.explain(0, &[], &point.theta, &point.starts, Effort::BRIEF)?;
+    let first = bench.explain(0, &[], &point.theta, &point.starts, effort)?;
     let point = &first.fit.point;
     set_noise(bench, &study.noise, point)?;
     scatter.estimate(bench, point)?;
     bench.stages = vec![whole(bench)];
-    let again = bench.explain(0, &[], &point.theta, &point.starts, Effort::BRIEF)?;
+    let again = bench.explain(0, &[], &point.theta, &point.starts, effort)?;
     let is_noise = |cost: f64, readings: f64| cost <= LEAST_GAP.powi(2) * readings;
     let train = cost(&plain(bench, &again.fit.point)?);
     if is_noise(train, bench.train.readings as f64)
@@ -348,14 +388,14 @@ fn identify_smooth(
             let last = stage + 1 == SHARES.len();
             let stopped = progress.is_stopped();
             let effort = if stopped { Effort::LOOK } else { Effort::FULL };
+            let effort = (effort, progress);
             let mut fit = if (stage == 0 || last) && !stopped {
                 scan_and_fit(bench, stage, from, effort)?
             } else {
                 bench.explain(stage, &[], &from.theta, &from.starts, effort)?
             };
             if last && !progress.is_stopped() {
-                let followed =
-                    bench.explain(stage, &[], &from.theta, &from.starts, Effort::FULL)?;
+                let followed = bench.explain(stage, &[], &from.theta, &from.starts, effort)?;
                 if followed.fit.cost < fit.fit.cost {
                     fit = followed;
                 }
@@ -442,17 +482,14 @@ fn identify_rough(
     };
     let (found, point) = stages(bench, &point)?;
     bench.stages = found;
-    let first = scan_and_fit(bench, 0, &point, Effort::BRIEF)?;
+    let first = scan_and_fit(bench, 0, &point, (Effort::BRIEF, progress))?;
     set_noise(bench, &study.noise, &first.fit.point)?;
     scatter.estimate(bench, &first.fit.point)?;
     let (found, from) = stages(bench, &first.fit.point)?;
     bench.stages = found;
-    let effort = || {
-        if progress.is_stopped() {
-            Effort::LOOK
-        } else {
-            Effort::BRIEF
-        }
+    let effort = || match progress.is_stopped() {
+        true => (Effort::LOOK, progress),
+        false => (Effort::BRIEF, progress),
     };
     let part = bench.explain(0, &[], &from.theta, &from.starts, effort())?;
     let from = &part.fit.point;

@@ -348,7 +348,8 @@ impl Search<'_> {
         let trials = trials(self.candidates, &found.candidates, from);
         let theta = &from.fit.point.theta[..self.bench.parameters.len()];
         let starts = &from.fit.point.starts;
-        self.bench.explain(stage, &trials, theta, starts, effort)
+        self.bench
+            .explain(stage, &trials, theta, starts, (effort, self.progress))
     }
 
     /// Screens all candidates upon an explanation, best first.
@@ -473,7 +474,8 @@ impl Search<'_> {
         let (theta, starts) = (&screened.theta[..study], &base.fit.point.starts);
         let last = stage + 1 == self.bench.stages.len();
         let effort = if last { Effort::FULL } else { Effort::BRIEF };
-        self.bench.explain(stage, &all, theta, starts, effort)
+        self.bench
+            .explain(stage, &all, theta, starts, (effort, self.progress))
     }
 }
 

@@ -8,6 +8,7 @@
 
 use asid_core::Result;
 use asid_core::layout::JointKind;
+use asid_core::progress::Silent;
 use asid_mjcf::Plant;
 use asid_mjcf::plant::Reads;
 
@@ -79,16 +80,17 @@ pub fn settle(
     };
     trials.iter().for_each(|(_, v)| point.theta.extend(v));
     let mut predictor = bench.predictor(trials, windows)?;
+    let effort = Effort {
+        chord: true,
+        ..Effort::BRIEF
+    };
     let found = fit(
         &mut predictor,
         bench.layout(),
         &unknowns,
         point,
         &bench.open,
-        Effort {
-            chord: true,
-            ..Effort::BRIEF
-        },
+        (effort, &Silent),
     )?;
     Ok(found.point.starts)
 }

@@ -80,7 +80,13 @@ fn target_dofs(plant: &Plant, target: &Target) -> Option<BTreeSet<usize>> {
         "actuator" => drive_dofs(plant, &target.name),
         "joint" => {
             let joint = layout.joints.iter().position(|j| j.name == target.name)?;
-            let own = ["damping", "frictionloss", "stiffness", "armature", "springref"];
+            let own = [
+                "damping",
+                "frictionloss",
+                "stiffness",
+                "armature",
+                "springref",
+            ];
             own.contains(&&*target.attribute)
                 .then(|| joint_dofs(plant, joint))
         }

@@ -2,6 +2,7 @@
 
 mod replays;
 mod rows;
+mod shooting;
 mod told;
 
 use asid_core::{Progress, Result};
@@ -25,13 +26,15 @@ use super::steps::{beside, known, noise_with_steps, shown};
 
 use replays::replay;
 use rows::{along, replays_are_affordable, take};
+use shooting::shoot;
+pub use shooting::{Handover, Shot};
 
 /// Linearisations and rounds of EM of the first smoothing.
 const FIRST: (usize, usize) = (4, 8);
 /// Most linearisations of the fit without effects.
 const ROUNDS: usize = 15;
 
-/// Diagnoses a study; gives the machine back where bodies touch and whole replays are asked for there.
+/// Diagnoses a study; hands it over where bodies touch and whole replays are to decide there.
 ///
 /// # Errors
 /// When a parameter cannot be set or the engine fails.
@@ -40,7 +43,7 @@ pub fn diagnose(
     machine: Machine,
     settings: &Settings,
     progress: &dyn Progress,
-) -> Result<std::result::Result<Work, Machine>> {
+) -> Result<std::result::Result<Work, Handover>> {
     progress.begin("smoothing the logs", 1);
     let (without, contact) = (&settings.without[..], settings.contact);
     let breadth = Breadth {
@@ -63,8 +66,16 @@ pub fn diagnose(
     let segments = taken.walks.iter().any(|w| w.segment.is_some());
     let affordable = || replays_are_affordable(&bench, &shown, without);
     if segments && (contact == Contact::Replays || contact == Contact::Auto && affordable()) {
+        let shot = {
+            let parameters = (&study.parameters[..], &nominal[..]);
+            let (context, estimate) = begin(&bench.machine, &logs, taken, parameters)?;
+            shoot(&context, (&hypothesis, &nominal), estimate, progress)?
+        };
         progress.end();
-        return Ok(Err(bench.machine));
+        return Ok(Err(Handover {
+            machine: bench.machine,
+            shot: Some(shot),
+        }));
     }
     let (outcome, candidates, left_out, firsts, drawn, members) = {
         let parameters = (&study.parameters[..], &nominal[..]);

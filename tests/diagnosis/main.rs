@@ -9,6 +9,7 @@ mod diagnosis_support;
 mod small;
 mod steps;
 mod stopped;
+mod together;
 mod wiring;
 mod world;
 

@@ -139,10 +139,7 @@ impl Entries {
     pub(super) fn of(context: &Context<'_>) -> Self {
         let layout = &context.plant().layout.sensors;
         let logs = context.logs;
-        let name = logs
-            .entries
-            .iter()
-            .map(|e| &logs.sensors[e.sensor].name);
+        let name = logs.entries.iter().map(|e| &logs.sensors[e.sensor].name);
         // A sensor that the layout lacks is no effect's own.
         let place = |name: &String| layout.iter().position(|s| s.name == *name);
         let noise = logs.entry_noise();

@@ -1,5 +1,6 @@
 //! Replays, open loop, of the model without effects, of the set that stands and of its rivals.
 
+use asid_core::progress::Silent;
 use asid_core::{Progress, Result};
 
 use crate::bench::{Bench, Explanation, Stage};
@@ -89,7 +90,13 @@ pub(super) fn replay(
             })
             .collect();
         let starts = smoothed_starts(bench, fitted, firsts);
-        let mut of = bench.explain(0, &chosen, &fitted.theta[..study], &starts, effort)?;
+        let mut of = bench.explain(
+            0,
+            &chosen,
+            &fitted.theta[..study],
+            &starts,
+            (effort, &Silent),
+        )?;
         for (k, i) in fitted.hypothesis.free().into_iter().enumerate() {
             of.local_variances[i] = fitted.covariance[(k, k)];
         }
