@@ -40,6 +40,7 @@ mod scatter;
 pub mod screen;
 pub mod search;
 pub mod sentence;
+pub mod shot;
 mod starts;
 pub mod study;
 mod telling;

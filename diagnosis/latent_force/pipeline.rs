@@ -26,8 +26,8 @@ use super::steps::{beside, known, noise_with_steps, shown};
 
 use replays::replay;
 use rows::{along, replays_are_affordable, take};
+pub use shooting::Handover;
 use shooting::shoot;
-pub use shooting::{Handover, Shot};
 
 /// Linearisations and rounds of EM of the first smoothing.
 const FIRST: (usize, usize) = (4, 8);

@@ -11,6 +11,7 @@ use crate::latent_force::estimate::Estimate;
 use crate::latent_force::fit::{Hypothesis, Slopes, fit, settle_noise};
 use crate::machine::Machine;
 use crate::predict::State;
+use crate::shot::Shot;
 
 /// Linearisations and rounds of EM before the fit, and most linearisations of the fit: replays take it further.
 const FIRST: (usize, usize) = (2, 8);
@@ -24,16 +25,6 @@ pub struct Handover {
     pub machine: Machine,
     /// Where multiple shooting arrived; `None` where it was not asked for.
     pub shot: Option<Shot>,
-}
-
-/// Where multiple shooting arrived without effects.
-pub struct Shot {
-    /// Values of the study's parameters.
-    pub theta: Vec<f64>,
-    /// State at the start of each episode.
-    pub starts: Vec<Option<State>>,
-    /// Whether segments show something that the parameters cannot make up for.
-    pub lacks: bool,
 }
 
 /// Fits the study's parameters and the starts of all segments.
