@@ -15,6 +15,7 @@ use asid_tasks as _;
 
 mod bare;
 mod clock;
+mod diagnosis;
 mod fisher;
 mod loops;
 mod machine;
@@ -56,6 +57,8 @@ enum Part {
     Fisher,
     /// A whole run, and identification alone
     Program,
+    /// Diagnoses of arms, against joints and rows
+    Diagnosis,
     /// Start-up
     Start,
 }
@@ -89,7 +92,7 @@ struct Arguments {
 
 impl Arguments {
     fn wants(&self, part: Part) -> bool {
-        let whole = part != Part::Program || !self.quick;
+        let whole = !matches!(part, Part::Program | Part::Diagnosis) || !self.quick;
         self.only.contains(&part) || (self.only.is_empty() && whole)
     }
 
@@ -114,6 +117,7 @@ struct Results {
     plugin: Vec<plugin::PluginRow>,
     fisher: Vec<fisher::FisherRow>,
     program: Vec<program::RunRow>,
+    diagnosis: Vec<diagnosis::DiagnosisRow>,
     start: Vec<program::StartRow>,
 }
 
@@ -167,6 +171,20 @@ impl Results {
             "Whole runs, default settings",
             &["engine", "command", "s", "million physics steps"],
             &program::table_of_runs(&self.program),
+        );
+        out += &page::table(
+            "Diagnoses of arms of servos, logged at 100 Hz",
+            &[
+                "engine",
+                "joints",
+                "rows",
+                "ranked",
+                "the real arm lacks",
+                "named",
+                "first table, s",
+                "s",
+            ],
+            &diagnosis::table(&self.diagnosis),
         );
         out += &page::table(
             "Start-up",
@@ -268,6 +286,7 @@ fn measure(arguments: &Arguments, engines: &[String]) -> Result<Results> {
         plugin: Vec::new(),
         fisher: Vec::new(),
         program: Vec::new(),
+        diagnosis: Vec::new(),
         start: Vec::new(),
     };
     for name in engines {
@@ -289,6 +308,10 @@ fn measure(arguments: &Arguments, engines: &[String]) -> Result<Results> {
         if arguments.wants(Part::Program) {
             let rows = program::runs(&program::find()?, TASK, name)?;
             results.program.extend(rows);
+        }
+        if arguments.wants(Part::Diagnosis) {
+            let rows = diagnosis::rows(&program::find()?, name, &*backend)?;
+            results.diagnosis.extend(rows);
         }
     }
     if arguments.wants(Part::Start) {

@@ -27,6 +27,30 @@ impl RawLog {
         self.series.iter().find(|s| s.name == name)
     }
 
+    /// Logs one after the other as one, with the series of the first: what one episode does not move another may.
+    #[must_use]
+    pub fn joined<'l>(logs: impl IntoIterator<Item = &'l Self>) -> Self {
+        let mut logs = logs.into_iter();
+        let Some(mut whole) = logs.next().cloned() else {
+            return Self::default();
+        };
+        for log in logs {
+            let rows = log.series.iter().map(|s| s.time.len()).max().unwrap_or(0);
+            let between = log.duration() / rows.max(2) as f64;
+            let ends = whole.series.iter().filter_map(|s| s.time.last());
+            let after = ends.copied().fold(0.0, f64::max) + between;
+            let first = log.series.iter().filter_map(|s| s.time.first());
+            let shift = after - first.copied().fold(f64::INFINITY, f64::min);
+            for own in &mut whole.series {
+                if let Some(more) = log.series(&own.name) {
+                    own.time.extend(more.time.iter().map(|t| t + shift));
+                    own.values.extend(&more.values);
+                }
+            }
+        }
+        whole
+    }
+
     /// Seconds from the first stamp to the last.
     #[must_use]
     pub fn duration(&self) -> f64 {

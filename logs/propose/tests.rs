@@ -188,3 +188,29 @@ fn what_is_known_is_taken_and_a_name_that_is_not_there_is_refused() {
     assert_eq!(from(&of("other").unwrap(), "q_pan"), "other");
     assert!(of("othr").unwrap_err().to_string().contains("`other`"));
 }
+
+#[test]
+fn a_unit_is_told_by_the_episode_that_moves_where_the_first_stands_still() {
+    let column = |scale: f64| series("", "elbow_pos", move |t| scale * motion(1, t));
+    let log = |series: Vec<Series>| RawLog {
+        series,
+        ..RawLog::default()
+    };
+    // Up to a degree and a tenth may be anything; 63 is no angle in radians of a joint that ends at 1.6.
+    let (still, moved) = (
+        log(vec![column(1.0)]),
+        log(vec![column(180.0 / std::f64::consts::PI)]),
+    );
+    let whole = RawLog::joined([&still, &moved]);
+    let joined = &whole.series[0];
+    assert_eq!(joined.values.len(), 600);
+    assert!(joined.time.windows(2).all(|w| w[0] < w[1]));
+    let unit = |log: &RawLog| {
+        let scene = Scene::from_xml("arm", ARM, &[]).unwrap();
+        let plant = Plant::of(&scene).unwrap();
+        let found = propose(&scene, &plant, (log, Kind::Csv), &[]).unwrap();
+        let own = found.matches.into_iter().find(|m| m.name == "q_elbow");
+        own.unwrap().mapping.and_then(|m| m.unit)
+    };
+    assert_eq!(unit(&whole).as_deref(), Some("deg"));
+}

@@ -100,7 +100,8 @@ pub fn import(arguments: &Arguments) -> Result<()> {
         return Err(Error::Failed("no log holds an episode".into()).into());
     };
     let scene = &subject.source.scene;
-    let mut proposal = propose(scene, &subject.plant, (first, kind), &given)?;
+    let whole = RawLog::joined(raw.iter().map(|(_, log, _)| log));
+    let mut proposal = propose(scene, &subject.plant, (&whole, kind), &given)?;
     notes.extend(first.remarks.iter().cloned());
     if let Err(error) = complete(&proposal) {
         if !arguments.json {
