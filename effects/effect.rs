@@ -8,20 +8,8 @@ use asid_core::target::Target;
 use asid_mjcf::native::NativeModel;
 use asid_mjcf::plant::Plant;
 
+use crate::acts::Acts;
 use crate::reach::Reach;
-
-/// Where an effect acts.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Acts {
-    /// On the model's parameters.
-    Model,
-    /// On the command on its way to the drive.
-    Command,
-    /// As a force during the step.
-    Force,
-    /// On the reading on its way from the sensor.
-    Measurement,
-}
 
 /// How a search for a parameter's value begins.
 #[derive(Clone, Copy, Debug, PartialEq)]

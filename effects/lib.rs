@@ -14,6 +14,7 @@
 //! [`catalogue`] has the effects of ASID, one file a family; [`refined_model`] is the file of a model
 //! with effects. [`native`] writes such a model as a plain MJCF document.
 
+mod acts;
 pub mod catalogue;
 mod effect;
 pub mod native;
@@ -22,8 +23,9 @@ pub mod refined;
 pub mod refined_model;
 mod spec;
 
+pub use acts::Acts;
 pub use effect::{
-    Acting, Acts, Confusion, Effect, EffectEntry, EffectParameter, Native, Reference, Site, Start,
+    Acting, Confusion, Effect, EffectEntry, EffectParameter, Native, Reference, Site, Start,
 };
 pub use reach::Reach;
 pub use refined_model::RefinedModel;

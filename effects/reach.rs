@@ -9,7 +9,7 @@ use asid_core::layout::JointKind;
 use asid_core::target::Target;
 use asid_mjcf::plant::Plant;
 
-use crate::effect::Acts;
+use crate::acts::Acts;
 
 /// What an effect moves by itself.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -121,7 +121,10 @@ mod tests {
 
     fn reach(name: &str, site: &str) -> Reach {
         let plant = Plant::of(&Scene::from_xml("arm", ARM, &[]).unwrap()).unwrap();
-        let entry = all::<EffectEntry>().find(|e| e.name == name).unwrap();
+        let entry = all::<EffectEntry>()
+            .into_iter()
+            .find(|e| e.name == name)
+            .unwrap();
         (entry.make)().reach(&plant, site)
     }
 

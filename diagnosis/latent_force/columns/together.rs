@@ -17,9 +17,10 @@ use crate::latent_force::step_map::LinearEpisode;
 /// it says. Differences are right to a thousandth of it.
 const ELSEWHERE: f64 = 0.01;
 
-/// Change of a reading, in deviations of its noise, and of a coordinate of the state, relative to its largest, that is none:
-/// the rotation between two orientations that are the same is one of 1e-17.
+/// Change of a reading, in deviations of its noise, that is none: the rotation between two orientations that are the same is one
+/// of 1e-17 rad.
 const NO_CHANGE: f64 = 1e-6;
+/// Change of a coordinate of the state, relative to its largest, that is none, for the same reason.
 const NO_MOTION: f64 = 1e-12;
 
 /// Columns that are walked together, by their places in a list, with what each reaches.

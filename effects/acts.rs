@@ -1,0 +1,14 @@
+//! The four places where effects act.
+
+/// Where an effect acts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Acts {
+    /// On the model's parameters.
+    Model,
+    /// On the command on its way to the drive.
+    Command,
+    /// As a force during the step.
+    Force,
+    /// On the reading on its way from the sensor.
+    Measurement,
+}
