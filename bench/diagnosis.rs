@@ -31,8 +31,8 @@ pub struct DiagnosisRow {
     joints: usize,
     rows: usize,
     lacks: &'static str,
-    /// Effects and groups that the first screening ranked.
-    ranked: usize,
+    /// Effects at a site that a screening weighed.
+    candidates: usize,
     /// What was named.
     named: String,
     first_table_s: f64,
@@ -188,7 +188,7 @@ pub fn rows(asid: &Path, name: &str, engine: &dyn Backend) -> Result<Vec<Diagnos
                 joints,
                 rows,
                 lacks,
-                ranked: result["ranking"].as_array().map_or(0, Vec::len),
+                candidates: result["detection_limits"].as_array().map_or(0, Vec::len),
                 named: match &named[..] {
                     [] => result["verdict"]["kind"].as_str().unwrap_or("").to_owned(),
                     named => named.join(" + "),
@@ -211,7 +211,7 @@ pub fn table(rows: &[DiagnosisRow]) -> Vec<Vec<String>> {
                 r.engine.clone(),
                 r.joints.to_string(),
                 r.rows.to_string(),
-                r.ranked.to_string(),
+                r.candidates.to_string(),
                 r.lacks.to_owned(),
                 r.named.clone(),
                 format!("{:.1}", r.first_table_s),

@@ -178,7 +178,7 @@ impl Results {
                 "engine",
                 "joints",
                 "rows",
-                "ranked",
+                "candidates",
                 "the real arm lacks",
                 "named",
                 "first table, s",
