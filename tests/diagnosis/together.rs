@@ -44,8 +44,8 @@ fn columns(
     .collect()
 }
 
-#[test]
-fn columns_are_the_same_together_and_one_by_one() {
+/// Compares the columns of all candidates with those of each alone; `segments` says which walks are replayed.
+fn compare(segments: [Option<usize>; 2]) {
     let folder = tempfile::tempdir().unwrap();
     arm::write_study(folder.path());
     let study = Study::read(folder.path()).unwrap();
@@ -55,7 +55,10 @@ fn columns_are_the_same_together_and_one_by_one() {
     let (plant, logs) = (&bench.machine.plant, &bench.train.logs);
     let layout = &plant.layout;
     let walks: Vec<Walk> = (0..2)
-        .map(|e| Walk::new(logs, e, layout.timestep).part(0..ROWS))
+        .map(|e| Walk {
+            segment: segments[e],
+            ..Walk::new(logs, e, layout.timestep).part(0..ROWS)
+        })
         .collect();
     let still = walks
         .iter()
@@ -110,4 +113,14 @@ fn columns_are_the_same_together_and_one_by_one() {
         assert!(share < SHARE, "{}: {share}", candidates[*c].label());
     }
     assert!(compared > 30, "{compared}");
+}
+
+#[test]
+fn columns_are_the_same_together_and_one_by_one() {
+    compare([None, None]);
+}
+
+#[test]
+fn logs_that_are_in_part_in_segments_have_columns_without_slopes_in_forces() {
+    compare([Some(0), None]);
 }

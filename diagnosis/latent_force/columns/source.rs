@@ -223,6 +223,10 @@ impl Source<'_> {
         let mut map = context.map(&self.all.specs, &self.all.parameters, own + 1)?;
         let want = Derivatives::default();
         let found = map.linearise(&self.all.theta, states, want, &[], &variations)?;
+        // Only forces take several columns apart, and where all are walked for alone there may be no slopes in forces.
+        let by_forces = groups
+            .iter()
+            .any(|g| g.members.len() > 1 && !g.is_of_sensors());
         let mut accounts = vec![Account::default(); own];
         let mut change = vec![0.0; nx.max(ns)];
         for (w, mut linear) in found.into_iter().enumerate() {
@@ -233,46 +237,64 @@ impl Source<'_> {
             let (to_states, to_readings) = &mut out[w];
             // Of a segment there are none: its columns are those of its readings.
             for (k, block) in linear.state_columns.chunks_exact(nx * own).enumerate() {
-                let steps = context.walks[w].substeps[k];
-                let row = Row::of(&self.slopes[w].part(k..k + 1, nx * nv), nv, steps);
-                for (g, group) in groups.iter().enumerate() {
-                    let mut set = |i: usize, s: usize, x: f64| {
-                        let place = group.members[i];
-                        to_states[(k * nx + s) * m + place] = x / wanted[place].scale;
-                    };
-                    let change = &mut change[..nx];
-                    let column = block.iter().skip(g).step_by(own);
-                    change.iter_mut().zip(column).for_each(|(c, x)| *c = *x);
-                    if group.members.len() == 1 {
-                        change.iter().enumerate().for_each(|(s, x)| set(0, s, *x));
-                        continue;
-                    }
-                    if group.is_of_sensors() {
-                        accounts[g].still(change, &context.scale);
-                        continue;
-                    }
-                    accounts[g].states(group, &row, change, |i, part| {
-                        part.iter().enumerate().for_each(|(s, x)| set(i, s, *x));
-                    });
-                }
+                let row = by_forces.then(|| {
+                    let steps = context.walks[w].substeps[k];
+                    Row::of(&self.slopes[w].part(k..k + 1, nx * nv), nv, steps)
+                });
+                let to = &mut to_states[k * nx * m..(k + 1) * nx * m];
+                spread(
+                    block,
+                    (groups, wanted),
+                    &mut change[..nx],
+                    to,
+                    |g, change, set| match &row {
+                        Some(row) if !groups[g].is_of_sensors() => {
+                            accounts[g].states(&groups[g], row, change, |i, part| {
+                                part.iter().enumerate().for_each(|(s, x)| set(i, s, *x));
+                            });
+                        }
+                        _ => accounts[g].still(change, &context.scale),
+                    },
+                );
             }
             for (k, block) in linear.reading_columns.chunks_exact(ns * own).enumerate() {
-                for (g, group) in groups.iter().enumerate() {
-                    let mut set = |i: usize, s: usize, x: f64| {
-                        let place = group.members[i];
-                        to_readings[(k * ns + s) * m + place] = x / wanted[place].scale;
-                    };
-                    let change = &mut change[..ns];
-                    let column = block.iter().skip(g).step_by(own);
-                    change.iter_mut().zip(column).for_each(|(c, x)| *c = *x);
-                    if group.members.len() == 1 {
-                        change.iter().enumerate().for_each(|(s, x)| set(0, s, *x));
-                        continue;
-                    }
-                    accounts[g].readings(group, entries, change, set);
-                }
+                let to = &mut to_readings[k * ns * m..(k + 1) * ns * m];
+                spread(
+                    block,
+                    (groups, wanted),
+                    &mut change[..ns],
+                    to,
+                    |g, change, set| {
+                        accounts[g].readings(&groups[g], entries, change, set);
+                    },
+                );
             }
         }
         Ok(accounts.iter().map(Account::balances).collect())
+    }
+}
+
+/// Spreads the changes of a row (`block`, as many numbers of each group as `change` holds) to the columns of the groups' members (`to`):
+/// those of a group of one as they are, the others as `apart` takes them apart. It is given the group's place, its changes and
+/// what sets a member's.
+fn spread(
+    block: &[f64],
+    (groups, wanted): (&[Group], &[Wanted]),
+    change: &mut [f64],
+    to: &mut [f64],
+    mut apart: impl FnMut(usize, &[f64], &mut dyn FnMut(usize, usize, f64)),
+) {
+    for (g, group) in groups.iter().enumerate() {
+        let column = block.iter().skip(g).step_by(groups.len());
+        change.iter_mut().zip(column).for_each(|(c, x)| *c = *x);
+        let mut set = |member: usize, s: usize, x: f64| {
+            let place = group.members[member];
+            to[s * wanted.len() + place] = x / wanted[place].scale;
+        };
+        if group.members.len() == 1 {
+            change.iter().enumerate().for_each(|(s, x)| set(0, s, *x));
+        } else {
+            apart(g, change, &mut set);
+        }
     }
 }
