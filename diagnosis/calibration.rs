@@ -173,7 +173,7 @@ pub fn calibrate(
 ) -> Result<Calibration> {
     let hypotheses = work.judgement.hypotheses.iter();
     // What is named and more is not played: what more there is would not be seen.
-    let verdict = &work.judgement.verdict().labels;
+    let verdict = &work.judgement.best_explanation().labels;
     let is_more = |labels: &[String]| {
         !verdict.is_empty()
             && labels.len() > verdict.len()

@@ -96,8 +96,9 @@ impl Confidence {
         normal(relative.max(f64::MIN_POSITIVE).ln() / self.screening)
     }
 
-    /// What a verdict of probability `p`, each unit of weight of its rivals, and `unknown` have, where the rivals weigh `others` relative to the
-    /// verdict. What neither the verdict nor a rival takes is `unknown`, which is less probable than the verdict.
+    /// Probabilities of a verdict, of a rival as likely as it, and of `unknown`. `p` is the calibrated probability of the verdict, `others`
+    /// the sum of its rivals' likelihoods relative to its own. What neither the verdict nor a rival takes is `unknown`, which stays less
+    /// probable than the verdict.
     fn shares(&self, p: f64, others: f64) -> [f64; 3] {
         let rest = 1.0 - p;
         let most = (1.0 - self.beside) * rest;
@@ -116,7 +117,7 @@ impl Confidence {
         (left, stopped): (f64, bool),
         untried: &[Untried],
     ) {
-        let best = judgement.verdict().clone();
+        let best = judgement.best_explanation().clone();
         let holds = |h: &Hypothesis| best.labels.iter().all(|l| h.labels.contains(l));
         let is_named = !best.labels.is_empty() && !judgement.is_unknown;
         if !is_named && !judgement.is_unknown {
@@ -201,7 +202,7 @@ mod tests {
             let mut j = judgement(sets, 1, 0.001);
             Confidence::default().settle(&mut j, (left, stopped), &[]);
             assert!((sum(&j) - 1.0).abs() < 1e-12);
-            assert_eq!(j.verdict().labels, ["a"]);
+            assert_eq!(j.best_explanation().labels, ["a"]);
             j.marginal(&["a".to_owned()])
         };
         assert!(stated(1.0, false) > 0.9);
@@ -230,7 +231,7 @@ mod tests {
     fn none_stays_as_it_is_and_unknown_is_never_certain() {
         let mut j = judgement(&[(&[], 0.97), (&["a"], 0.01)], 0, 0.02);
         Confidence::default().settle(&mut j, (1.0, false), &[]);
-        assert_eq!(j.verdict().probability, 0.97);
+        assert_eq!(j.best_explanation().probability, 0.97);
         let mut j = judgement(&[(&[], 0.0), (&["a"], 0.001)], 1, 0.999);
         Confidence::default().settle(&mut j, (9.0, true), &[]);
         assert_eq!(j.unknown, 0.55);

@@ -183,7 +183,7 @@ pub fn decide(evidence: &Evidence, rules: &Rules) -> Judgement {
         })
         .collect();
     let mut judgement = Judgement::of(all, (best, ambiguous), (unknown, rest));
-    let found = judgement.verdict().found.map(|i| &evidence.tried[i]);
+    let found = judgement.best_explanation().found.map(|i| &evidence.tried[i]);
     let replayed = found.map_or(evidence.none, |t| t.replayed);
     let untried = untried(evidence, found, rules);
     let shown = (replayed.held_out - own_error(evidence), evidence.stopped);
@@ -240,16 +240,16 @@ mod tests {
             vec![tried(&["a"], 1, 300.0, 1.0), rival],
             0.01,
         ));
-        assert_eq!(found.verdict().labels, ["a"]);
+        assert_eq!(found.best_explanation().labels, ["a"]);
         assert!(!found.is_unknown && found.marginal(&["a".to_owned()]) > 0.9);
     }
 
     #[test]
     fn a_gap_that_nothing_closes_is_unknown_and_one_within_the_noise_is_none() {
         let found = decided(&evidence(30.0, Vec::new(), 1.0));
-        assert!(found.is_unknown && found.verdict().labels.is_empty());
+        assert!(found.is_unknown && found.best_explanation().labels.is_empty());
         let found = decided(&evidence(1.02, Vec::new(), 1.0));
-        assert!(!found.is_unknown && found.verdict().labels.is_empty());
+        assert!(!found.is_unknown && found.best_explanation().labels.is_empty());
         // What is named makes up for a tenth.
         let found = decided(&evidence(30.0, vec![tried(&["a"], 1, 40.0, 27.0)], 0.9));
         assert!(found.is_unknown);
@@ -258,7 +258,7 @@ mod tests {
     #[test]
     fn a_named_effect_is_the_verdict_even_where_a_third_of_the_gap_remains() {
         let found = decided(&evidence(91.0, vec![tried(&["a"], 1, 200.0, 31.0)], 0.3));
-        assert_eq!(found.verdict().labels, ["a"]);
+        assert_eq!(found.best_explanation().labels, ["a"]);
         assert!(!found.is_unknown);
         let p = found.marginal(&["a".to_owned()]);
         assert!(p > 0.5 && p < 0.9, "{p}");
@@ -269,7 +269,7 @@ mod tests {
         let named = |left: f64, own_error: f64| {
             let mut e = evidence(3.0, vec![tried(&["a"], 1, 50.0, left)], 0.1);
             e.own_error = own_error;
-            !decided(&e).verdict().labels.is_empty()
+            !decided(&e).best_explanation().labels.is_empty()
         };
         assert!(named(1.1, 0.0));
         assert!(!named(2.5, 0.0), "it closes a quarter of the power");
@@ -284,7 +284,7 @@ mod tests {
         let steps = tried(&["sensor-quantization@q"], 1, 800.0, 1.0);
         let mut e = evidence(1.01, vec![steps], 1.0);
         (e.found, e.known) = (None, Some(0));
-        assert_eq!(decided(&e).verdict().labels, ["sensor-quantization@q"]);
+        assert_eq!(decided(&e).best_explanation().labels, ["sensor-quantization@q"]);
     }
 
     #[test]
@@ -299,7 +299,7 @@ mod tests {
         let found = decided(&e);
         let p = |label: &str| found.marginal(&[label.to_owned()]);
         assert!(p("b") < 0.03 && p("c") > 0.1, "{} {}", p("b"), p("c"));
-        assert!(found.verdict().probability > p("c"));
+        assert!(found.best_explanation().probability > p("c"));
     }
 
     #[test]

@@ -86,8 +86,6 @@ pub struct Diagnosis {
 /// Gap in units of the noise that a verdict upon mended wiring leaves from which on the wiring is doubted: whole wiring and a
 /// named effect leave the noise, wrong wiring cannot be made up for by any.
 const DOUBTFUL: f64 = 2.0;
-/// Factor by which the gap must be smaller with the wiring as given for it to be taken so.
-const BETTER: f64 = 0.5;
 
 /// Diagnoses a study on a machine, with outliers left out of its logs and its wiring mended. Where an effect can look like what
 /// was mended and a gap is left all the same, the wiring as given is diagnosed too, and what leaves less stands.
@@ -115,7 +113,7 @@ pub fn diagnose(
     {
         progress.note("the wiring as given");
         let other = diagnose_physics(as_given, machine, settings, progress)?;
-        if other.0.result.gap.refined < BETTER * left {
+        if other.0.result.gap.refined < left {
             (diagnosis, work) = other;
             intake.take_as_given();
         }
@@ -192,7 +190,7 @@ pub(crate) fn diagnose_physics(
     let chance = (candidates.len(), settings.false_alarms);
     let mut judgement = judge(&bench, &findings, chance, scatter);
     let best = judgement
-        .verdict()
+        .best_explanation()
         .found
         .map(|i| &findings.found[i].explanation);
     let left = best.unwrap_or(&findings.none).held_plain / bench.held_readings().max(1.0);

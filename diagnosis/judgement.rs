@@ -43,8 +43,10 @@ impl Judgement {
         for h in &mut hypotheses {
             h.probability *= (1.0 - unknown) / sum;
         }
+        // Here it is decided.
+        let is_unknown = unknown > hypotheses[best].probability;
         let mut judgement = Self {
-            is_unknown: unknown > hypotheses[best].probability,
+            is_unknown,
             hypotheses,
             unknown,
             best,
@@ -69,9 +71,9 @@ impl Judgement {
         self.ambiguous = ambiguous;
     }
 
-    /// The hypothesis of the best explanation.
+    /// The best explanation, whether or not it is the verdict: that may be `unknown`.
     #[must_use]
-    pub fn verdict(&self) -> &Hypothesis {
+    pub fn best_explanation(&self) -> &Hypothesis {
         &self.hypotheses[self.best]
     }
 

@@ -10,8 +10,9 @@
 //! differs little from row to row: third differences over two and four rows show it ([`Noise::correlation`]), for those of
 //! such noise grow by at most two from row to row, and those of a smooth residual by 64.
 //!
-//! Called three times: by [`crate::prepare`] before a search, from readings or from residuals, and by [`crate::diagnose`] on what
-//! the best explanation leaves. A study's own `noise` overrides it.
+//! Replays are measured in units of it ([`crate::prepare`] takes it from readings or residuals, [`crate::diagnose`] once more from what the
+//! best explanation leaves, [`crate::checks`] asks whether it is white). For the missing force it is where the variances of the readings begin, and
+//! what bounds them (`latent_force/estimate/variances.rs`). A study's own `noise` overrides it.
 
 use crate::data::Logs;
 

@@ -2,9 +2,8 @@
 //!
 //! Sums of squares over all logs are compared, those held out included. They are tempered
 //! by how badly and how correlatedly the best explanation still misses, so that many
-//! readings of one and the same error count once. A further effect has to earn its place:
-//! whoever wrote the real world's friction wrote it differently, and the small rest that
-//! this leaves is no second effect.
+//! readings of one and the same error count once. A further effect has to earn its place: where the real law differs a
+//! little from the model's, a small residual is left, and is no second effect.
 
 use crate::bench::{Bench, Explanation};
 use crate::chance::threshold;

@@ -13,6 +13,10 @@ use asid_mjcf::Plant;
 /// Share of a joint's range that is kept free at either end: where a real machine's end stop may be.
 const END_MARGIN: f64 = 0.02;
 
+/// Share of a joint's range within which it counts as resting at the end of it, and by which it may then pass it: stops of a simulated
+/// machine give way by less (MuJoCo's default `solimp` lets them by a thousandth of a rad or m).
+pub const STOP: f64 = 2e-3;
+
 /// Share of the command's range that is kept free likewise.
 const COMMAND_MARGIN: f64 = 0.0;
 

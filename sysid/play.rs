@@ -7,8 +7,9 @@ use asid_core::signal::{Signal, SignalSet};
 use asid_core::simulator::{BatchConfig, Simulator};
 use asid_core::{Control, Error, Model, Parameter, Rollout};
 use asid_mjcf::Plant;
+use asid_mjcf::plant::Drive;
 
-use crate::limits::{DIVERGED, Excess, Limits};
+use crate::limits::{DIVERGED, Excess, Limits, STOP};
 use crate::{columns, targets};
 
 /// Simulations of a batch at most.
@@ -28,11 +29,21 @@ pub struct Played {
     pub excess: Excess,
 }
 
+/// A column of the batch that is a property of a drive.
+struct DriveColumn {
+    column: usize,
+    actuator: usize,
+    attribute: String,
+    index: usize,
+    nominal: f64,
+}
+
 /// What plays motions.
 pub struct Player<'a> {
     plant: &'a Plant,
     limits: Limits,
     parameters: Vec<Parameter>,
+    drives: Vec<DriveColumn>,
     simulator: Box<dyn Simulator>,
     record: Recording,
     /// Sensors that tell, with their noise.
@@ -80,8 +91,21 @@ impl<'a> Player<'a> {
             threads,
             targets: targets(parameters),
         })?;
+        let targets = targets(parameters);
+        let drives = targets.iter().enumerate().filter_map(|(column, target)| {
+            let of = |a: &asid_core::layout::Actuator| a.name == target.name;
+            Some(DriveColumn {
+                column,
+                actuator: (target.element == "actuator")
+                    .then(|| layout.actuators.iter().position(of))??,
+                attribute: target.attribute.clone(),
+                index: target.index,
+                nominal: model.nominal(target).ok()?,
+            })
+        });
         Ok(Self {
             plant,
+            drives: drives.collect(),
             parameters: parameters.to_vec(),
             simulator,
             readings: match sensors {
@@ -189,6 +213,57 @@ impl<'a> Player<'a> {
             .collect())
     }
 
+    /// Looks at the posture that motions begin in, at values of the parameters. A joint that rests at the end of its range there, a hair
+    /// within it or beyond it as a stop gives way, may go on doing so: the names of such joints, and by how much other limits are passed.
+    ///
+    /// # Errors
+    /// As [`Player::play`].
+    pub fn look_at_begin(&mut self, point: &[f64]) -> Result<(Vec<String>, Excess)> {
+        self.begin(&[point])?;
+        let layout = &self.plant.layout;
+        let (nq, nv) = (layout.nq, layout.nv);
+        let mut row = vec![0.0; self.record.width()];
+        self.simulator.read(&[0], &self.record, &mut row)?;
+        let state = &row[self.readings..self.readings + nq + nv];
+        let at_stop = self.limits.joints.iter_mut().filter_map(|joint| {
+            let [low, high] = joint.position.as_mut()?;
+            let (at, hair) = (state[joint.qpos], STOP * (*high - *low));
+            let is_low = (at - *low).abs() <= hair;
+            let is_high = (at - *high).abs() <= hair;
+            if is_low {
+                *low -= hair;
+            }
+            if is_high {
+                *high += hair;
+            }
+            (is_low || is_high).then(|| joint.name.clone())
+        });
+        let at_stop = at_stop.collect();
+        let mut excess = Excess::default();
+        let drives = self.drives_at(point);
+        self.look_at_joints(&state[..nq], &state[nq..], 1, &mut excess);
+        self.look_at_drives(
+            &drives,
+            &self.base,
+            (&state[..nq], &state[nq..], 1),
+            &mut excess,
+        );
+        self.look_at_boxes(&state[..nq], 1, &mut excess);
+        Ok((at_stop, excess))
+    }
+
+    /// The drives at values of the parameters.
+    fn drives_at(&self, point: &[f64]) -> Vec<Option<Drive>> {
+        let values = columns(&self.parameters, point);
+        let mut drives = self.plant.drives.clone();
+        for d in &self.drives {
+            let drive = &mut drives[d.actuator];
+            let at = [d.nominal, values[d.column]];
+            *drive = drive.map(|law| law.with(&d.attribute, d.index, at));
+        }
+        drives
+    }
+
     /// Does without settling.
     pub fn skip_settling(&mut self) {
         self.settle = 0.0;
@@ -217,15 +292,20 @@ impl<'a> Player<'a> {
                 &self.record,
             );
             self.simulator.rollout(&rollout, &mut out)?;
-            for (rows, (commands, _)) in out.chunks_exact((frames * width).max(1)).zip(chunk) {
-                all.push(self.look(rows, commands, frames));
+            for (rows, (commands, point)) in out.chunks_exact((frames * width).max(1)).zip(chunk) {
+                all.push(self.look(rows, (commands, &self.drives_at(point)), frames));
             }
         }
         Ok(all)
     }
 
     /// One trajectory beside the limits.
-    fn look(&self, rows: &[f64], commands: &[f64], frames: usize) -> Played {
+    fn look(
+        &self,
+        rows: &[f64],
+        (commands, drives): (&[f64], &[Option<Drive>]),
+        frames: usize,
+    ) -> Played {
         let layout = &self.plant.layout;
         let (nq, nv, nu) = (layout.nq, layout.nv, layout.nu());
         let width = self.record.width();
@@ -245,20 +325,8 @@ impl<'a> Player<'a> {
             let v = &row[self.readings + nq..self.readings + nq + nv];
             let contact = &row[self.readings + nq + nv..];
             self.look_at_joints(q, v, frames, &mut excess);
-            for drive in &self.limits.drives {
-                let Some(law) = self.plant.drives[drive.actuator] else {
-                    continue;
-                };
-                let joint = &layout.joints[law.joint];
-                let command = commands[k * nu + drive.actuator];
-                let force = law.force(command, q[joint.qpos], v[joint.qvel]).abs();
-                excess.add(force / drive.force - 1.0, frames, || {
-                    format!(
-                        "force of `{}` {force:.3}",
-                        layout.actuators[drive.actuator].name
-                    )
-                });
-            }
+            let command = &commands[k * nu..(k + 1) * nu];
+            self.look_at_drives(drives, command, (q, v, frames), &mut excess);
             let pairs = self.limits.apart.iter().zip(&self.touching);
             for ((pair, touching), force) in pairs.zip(contact) {
                 if !touching && force.abs() > TOUCH {
@@ -298,6 +366,31 @@ impl<'a> Player<'a> {
                     format!("speed of `{}` {speed:.3}", joint.name)
                 });
             }
+        }
+    }
+
+    /// Forces of the drives under a row of commands.
+    fn look_at_drives(
+        &self,
+        drives: &[Option<Drive>],
+        command: &[f64],
+        (q, v, frames): (&[f64], &[f64], usize),
+        excess: &mut Excess,
+    ) {
+        let layout = &self.plant.layout;
+        for limit in &self.limits.drives {
+            let Some(drive) = drives[limit.actuator] else {
+                continue;
+            };
+            let joint = &layout.joints[drive.joint];
+            let command = command[limit.actuator];
+            let force = drive.force(command, q[joint.qpos], v[joint.qvel]).abs();
+            excess.add(force / limit.force - 1.0, frames, || {
+                format!(
+                    "force of `{}` {force:.3}",
+                    layout.actuators[limit.actuator].name
+                )
+            });
         }
     }
 

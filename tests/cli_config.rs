@@ -47,6 +47,29 @@ fn settings_stand_under_their_meanings_and_follow_the_options() {
 }
 
 #[test]
+fn what_is_printed_for_a_study_is_read_back_as_the_same() {
+    let place = Workplace::new();
+    place.write("study.toml", "model = \"robot.xml\"\ntrain = [\"*.csv\"]\n");
+    let options = ["--set", "search.contact=segments", "--set", "minutes=3.0"];
+    let page = printed(&place, &[&["study.toml"], &options[..]].concat());
+    for told in [
+        "study = \"study.toml\"",
+        "minutes = 3.0",
+        "contact = \"segments\"",
+        "false_alarms = 0.01",
+    ] {
+        assert!(page.contains(told), "`{told}` is not in\n{page}");
+    }
+    let unexplained = page
+        .split("\n\n")
+        .filter(|part| part.contains(" = ") && !part.contains('#'));
+    assert_eq!(unexplained.count(), 0, "{page}");
+    place.write("settings.toml", &page);
+    let again = printed(&place, &["study.toml", "--config", "settings.toml"]);
+    assert_eq!(page, again);
+}
+
+#[test]
 fn an_unknown_task_is_refused_with_the_near_ones() {
     let place = Workplace::new();
     let output = place.run(&["config", "rod-balancin"]);

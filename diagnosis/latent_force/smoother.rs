@@ -5,20 +5,23 @@
 //! ```text
 //! d_{k+1} = A_k d_k + B_k (w_k + e_k) + f(x_k) - x_{k+1}
 //! w_{k+1} = rho_k w_k + noise,   variance q (1 - rho_k^2),   rho_k = exp(-dt_k / tau)
+//! e_k     = noise,               variance white + free_k
 //! y_k     = h(x_k) + H_k d_k + noise,   variance r
 //! ```
 //!
-//! `e_k` is the part of it that is another one in each row: what changes at once, as friction does where a joint turns
-//! round, is no rare event of a slow process.
-//! `w` is the generalized force that the model lacks, one a degree of freedom (a latent force model, Alvarez,
-//! Luengo and Lawrence 2009, in state-space form, Hartikainen and Sarkka 2010); `e_k` is a force of known variance
-//! that only some rows have: what may hold a joint at rest. Readings are taken one by one, so that no matrix is
-//! inverted; smoothing is by Bryson and Frazier's adjoint recursion (Bierman 1977), which inverts none either.
+//! `w_k` is the generalized force that the model lacks, a first-order process at each degree of freedom (a latent force
+//! model, Alvarez, Luengo and Lawrence 2009, in state-space form, Hartikainen and Sarkka 2010). `e_k` is independent from row to
+//! row: `white` covers what changes at once, as friction does where a joint turns round, and `free_k`, known and of some rows only,
+//! the force that may hold a joint at rest.
+//!
+//! Readings are taken one by one, so that no matrix is inverted. The forward pass is in `filter.rs`; smoothing is by the adjoint
+//! recursion of Bryson and Frazier (Bierman 1977), which inverts none either, in `adjoint.rs`.
 //! Columns (what a unit of an effect adds to `f` and `h`) go through the same filter: in whitened innovations all
 //! effects are one linear regression.
 
 mod adjoint;
 mod filter;
+mod matrix;
 mod regress;
 mod segment;
 
@@ -158,6 +161,7 @@ impl Regression {
         self.moment += &other.moment;
     }
 }
+
 /// Logarithm of the likelihood of an episode.
 #[must_use]
 pub fn log_likelihood(problem: Problem<'_>, noise: &NoiseModel) -> f64 {

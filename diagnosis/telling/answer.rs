@@ -57,7 +57,7 @@ impl Telling<'_> {
             effects: if named { labels.to_vec() } else { Vec::new() },
             probability: match kind {
                 Kind::Unknown => j.unknown,
-                Kind::None => j.verdict().probability,
+                Kind::None => j.best_explanation().probability,
                 Kind::Effects => j.marginal(labels),
             },
             ambiguous_with: if named {

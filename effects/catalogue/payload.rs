@@ -9,7 +9,7 @@ use super::{target, values};
 
 crate::register!(EffectEntry {
     name: "payload",
-    about: "a body carries an extra mass, at its centre of mass or off it",
+    about: "a body carries an extra mass, at the body's centre of mass or off it",
     make: || Box::new(Payload),
 });
 

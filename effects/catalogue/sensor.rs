@@ -83,7 +83,7 @@ impl Effect for Reading {
 
     fn parameters(&self) -> &'static [EffectParameter] {
         const UNIT: &str = "unit of the reading";
-        const RATE: &str = "unit of the reading/s";
+        const RATE: &str = "units of the reading per second";
         match self {
             Self::Bias => {
                 const {

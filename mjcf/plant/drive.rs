@@ -65,6 +65,24 @@ impl Drive {
         command.is_finite().then_some(command)
     }
 
+    /// The same drive with another value of a target of its actuator (`kp`, `kv`, `gear`, `forcerange`) whose value in the document is
+    /// `nominal`; of another attribute the drive itself.
+    #[must_use]
+    pub fn with(mut self, attribute: &str, index: usize, [nominal, value]: [f64; 2]) -> Self {
+        match (attribute, &mut self.law) {
+            ("kp", DriveLaw::Position { kp, .. }) => *kp = value,
+            ("kv", DriveLaw::Position { kv, .. } | DriveLaw::Velocity { kv }) => *kv = value,
+            ("gear", _) if index == 0 && nominal != 0.0 => self.gear *= value / nominal,
+            ("forcerange", _) => {
+                if let Some(end) = self.force_range.as_mut().and_then(|r| r.get_mut(index)) {
+                    *end = value;
+                }
+            }
+            _ => {}
+        }
+        self
+    }
+
     /// Whether its command is a position, which it pursues.
     #[must_use]
     pub fn is_position_servo(&self) -> bool {

@@ -20,8 +20,8 @@ const MOST: usize = 10;
 const LITTLE: f64 = 0.01;
 
 pub(super) fn section(d: &DiagnosisResult, t: &DiagnosisTrace) -> Section {
-    let lead = "An effect is written name@site, the site being the part of the scene that it acts on. A hypothesis is a set of effects of the catalogue, refitted together with the study's parameters. Its probability \
-                comes from its evidence; that of an effect is the sum over the hypotheses that contain it.";
+    let lead = "An effect is written name@site, the site being the part of the scene that it acts on. A hypothesis is a set of effects of the catalogue, refitted together with the study's parameters. The probability of a hypothesis \
+                comes from its evidence (marginal likelihood); the probability of an effect is the sum over the hypotheses that contain it.";
     let mut section = Section::new("Which effect").lead(lead);
     section = explanation(d, t).into_iter().fold(section, Section::text);
     section = section.figures(vec![figure(d)]);

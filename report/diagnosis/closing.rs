@@ -36,13 +36,13 @@ pub(super) fn parameters(d: &DiagnosisResult) -> Option<Section> {
     }
     let lead = match d.verdict.kind {
         Kind::Effects => {
-            "What the study fits anyway, as found together with the verdict's effects: without them, these values would make up for \
+            "Parameters that the study fits under every explanation, with their values beside the verdict's effects: without these, the values would make up for \
              what the model lacks."
         }
         Kind::Unknown => {
-            "What the study fits anyway, as found: these values may make up for what the model lacks."
+            "Parameters that the study fits under every explanation: their values may make up for what the model lacks."
         }
-        Kind::None => "What the study fits anyway, as found.",
+        Kind::None => "Parameters that the study fits under every explanation, with their values.",
     };
     let nominal = d.parameters.iter().any(|p| p.nominal.is_some());
     let mut columns = vec![Column::text("parameter")];

@@ -50,7 +50,7 @@ fn ranking(d: &DiagnosisResult) -> Figure {
     };
     let caption = format!(
         "Natural logarithm of the Bayes factor of each set of effects, against the model without effects, on the training logs. \
-         Each further parameter is penalised. Blue: the verdict.{alike} Ochre: other sets that were fitted. Grey: sets that were \
+         It is a marginal likelihood: a parameter that the logs do not need lowers it. Blue: the verdict.{alike} Ochre: other sets that were fitted. Grey: sets that were \
          screened only, by a linear approximation. Among a hundred wrong candidates the best reaches 3 to 5 by chance."
     );
     let for_it = |r: &&RankedSet| r.fitted.or(r.screened).is_some_and(|e| e > LEAST);
@@ -76,8 +76,8 @@ fn isolability(table: &Isolability) -> Figure {
         told.collect()
     });
     let caption = "Angle in degrees between what two effects would add to the readings of these logs, once the study's own parameters \
-                   have taken what they can. Near 0 (dark) both act alike here and only other motions tell them apart; at 90 they have \
-                   nothing in common. The most evident effects of the first screening, best first.";
+                   have taken what they can. Near 0 (dark) these motions cannot tell the two effects apart, and only others can; at 90 degrees \
+                   they tell them apart fully. The most evident effects of the first screening, best first.";
     let plot = Heat::new(
         "Principal angles between effects",
         table.effects.clone(),

@@ -175,9 +175,9 @@ fn cloud(
         );
     }
     let caption = if what == "load" {
-        "Rows of all training logs. The force of the drives is that of the model under the recorded commands."
+        "Each dot is a row of a training log. The force of the drives is that of the model under the recorded commands."
     } else {
-        "Rows of all training logs."
+        "Each dot is a row of a training log."
     };
     Figure::new(
         format!("Against {label}"),

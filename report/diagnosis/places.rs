@@ -56,7 +56,11 @@ fn shares(places: &[Where]) -> Figure {
     )
     .rows(rows)
     .description(caption);
-    Figure::new("By signal and regime of motion", ranking, caption)
+    Figure::new(
+        "Where the gap is: by signal and regime of motion",
+        ranking,
+        caption,
+    )
 }
 
 fn row(place: &Where) -> Ranked {

@@ -22,7 +22,7 @@ pub(super) fn section(d: &DiagnosisResult) -> Option<Section> {
     if !d.detection_limits.is_empty() {
         let seen = d.detection_limits.iter().filter(|l| l.value.is_finite());
         let summary = format!(
-            "The smallest value that these logs could have shown, of {} of {} effects and their parameters",
+            "Detection limits: the smallest value that these logs could have shown, for {} of {} parameters of effects",
             seen.count(),
             d.detection_limits.len()
         );

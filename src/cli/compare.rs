@@ -47,7 +47,7 @@ pub struct Arguments {
     /// Simulate with this engine: see `asid list` (repeatable)
     #[arg(long, value_name = "NAME")]
     backend: Vec<String>,
-    /// Run each row this often [default: 10; 3 in a quick look]
+    /// Run each row with this many seeds [default: 10; 3 with --quick]
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     seeds: Option<u64>,
     /// Begin each row with this seed; its other runs count up from it
@@ -135,13 +135,13 @@ pub struct Arguments {
 /// The real world of every run, but for its kind.
 #[derive(clap::Args, Clone)]
 struct Real {
-    /// Hide this true value in the real world, such as mass_offset=0.06 [default: that of the condition, else drawn]
+    /// Give the real world this true value, which the methods do not see, such as mass_offset=0.06 [default: that of the condition, else drawn]
     #[arg(long, value_name = "NAME=VALUE")]
     truth: Vec<String>,
     /// Play the real world with this engine [default: the simulator's]
     #[arg(long, value_name = "NAME")]
     real_backend: Option<String>,
-    /// Use this model as the real world: MJCF, or TOML of a refined model [default: the task's scene]
+    /// Simulate the real world with this model: MJCF, or a refined.toml of a diagnosis [default: the task's scene]
     #[arg(long, value_name = "FILE")]
     real_model: Option<PathBuf>,
     /// Add an effect to the real world that the simulator lacks (repeatable)

@@ -1,12 +1,13 @@
-//! `asid config`: every setting of a task with its value and meaning, as a file for `--config`.
+//! `asid config`: every setting of a task, or of the diagnosis of a study, with its value and meaning, as a file for `--config`.
 
 use std::io::Write as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use asid_core::registry::{AlgorithmEntry, Entry, Meanings, TaskEntry, find, meanings};
 use asid_core::{Explorer, Identifier, Task, TaskSolver};
 
+use super::diagnose;
 use super::options::{Algorithms, Common, Worlds};
 use super::settings::{Config, ParameterConfig, Stage, difficulty};
 
@@ -16,8 +17,9 @@ const WIDTH: usize = 100;
 /// Arguments of `config`.
 #[derive(clap::Args)]
 pub struct Arguments {
-    /// The task
-    task: String,
+    /// The task, or the study: a TOML file, or a folder with study.toml
+    #[arg(value_name = "TASK|STUDY")]
+    subject: String,
     #[command(flatten)]
     algorithms: Algorithms,
     #[command(flatten)]
@@ -38,7 +40,6 @@ pub struct Arguments {
 
 /// Prints the settings.
 pub fn print(arguments: &Arguments) -> Result<()> {
-    let task = (find::<TaskEntry>(&arguments.task)?.make)()?;
     let common = Common {
         backend: arguments.backend.clone(),
         preset: arguments.preset.clone(),
@@ -46,10 +47,36 @@ pub fn print(arguments: &Arguments) -> Result<()> {
         config: arguments.config.clone(),
         ..Common::default()
     };
-    let levels = difficulty::levels(&*task, &common)?;
+    let page = match find::<TaskEntry>(&arguments.subject) {
+        Ok(entry) => of_task((entry.make)()?, arguments, &common)?,
+        Err(_) if Path::new(&arguments.subject).exists() => {
+            of_study(Path::new(&arguments.subject), &common)?
+        }
+        Err(unknown) => return Err(unknown.into()),
+    };
+    std::io::stdout().lock().write_all(page.as_bytes())?;
+    Ok(())
+}
+
+/// The settings of the diagnosis of a study.
+fn of_study(study: &Path, common: &Common) -> Result<String> {
+    let config = diagnose::Config::of_study(study, common)?;
+    let mut page = format!(
+        "# Settings of `asid diagnose {}`. A setting is changed by --set KEY=VALUE, with the section before\n\
+         # its name, such as --set search.contact=segments; this text in a file is read by --config FILE.\n",
+        study.display()
+    );
+    let table = toml::Table::try_from(&config)?;
+    write(&table, &[], &meanings::<diagnose::Config>(), &mut page);
+    Ok(page)
+}
+
+/// The settings of a task.
+fn of_task(task: Box<dyn Task>, arguments: &Arguments, common: &Common) -> Result<String> {
+    let levels = difficulty::levels(&*task, common)?;
     let task = difficulty::at(task, &levels)?;
     let (algorithms, worlds) = (&arguments.algorithms, &arguments.worlds);
-    let (config, _) = Config::resolve(Stage::Run, &*task, &common, algorithms, worlds)?;
+    let (config, _) = Config::resolve(Stage::Run, &*task, common, algorithms, worlds)?;
     let mut page = format!(
         "# Settings of `asid run {}`. A setting is changed by --set KEY=VALUE, with the section before\n\
          # its name, such as --set explorer.name=value; this text in a file is read by --config FILE.\n",
@@ -57,8 +84,7 @@ pub fn print(arguments: &Arguments) -> Result<()> {
     );
     let table = toml::Table::try_from(&config)?;
     write(&table, &[], &meanings_of(&config, &*task)?, &mut page);
-    std::io::stdout().lock().write_all(page.as_bytes())?;
-    Ok(())
+    Ok(page)
 }
 
 /// What every setting means, by its whole key.

@@ -24,8 +24,7 @@ use super::options::{Algorithms, Common, Worlds};
 use super::output::{OutFolder, write_json, write_text};
 use super::session::backend;
 use super::trace::files;
-use config::Config;
-pub use config::default_backend;
+pub use config::{Config, default_backend};
 use live::Live;
 
 /// Arguments of `diagnose`.
@@ -38,7 +37,7 @@ With --task a built-in task takes the study's place. Without --train it is run s
 real world (--real-effect and the like); the logs of these runs are diagnosed, the answer is added to the \
 simulator, and the task is run again.
 
-The folder holds result.json, refined.toml (the model with the effects of the verdict, for a study's \
+The folder holds result.json, refined.toml (the model with the diagnosed effects added, for a study's \
 `model`), config.toml, copies of the logs, report.html, trace.json and \
 evidence.json (what the decision rests on).")]
 pub struct Arguments {
@@ -48,7 +47,7 @@ pub struct Arguments {
     /// Diagnose a task in place of a study
     #[arg(long, value_name = "TASK")]
     task: Option<String>,
-    /// Fit to these logs of the task [default: those of its runs]
+    /// Fit to these logs of the task [default: logs of runs in its simulated real world, made first: see --runs]
     #[arg(long, value_name = "FILE", num_args = 1.., requires = "task")]
     train: Vec<PathBuf>,
     /// Hold out these logs of the task
@@ -63,7 +62,7 @@ pub struct Arguments {
     /// Run the task this many times with the nominal and with the refined model, to count successes [default: 5]
     #[arg(long, value_name = "N")]
     seeds: Option<u64>,
-    /// Answer after about this time with what is known by then; result.json lists what was not tried. Ctrl-C does the same
+    /// Answer after about this time with what is known by then; result.json lists the explanations not tried. Ctrl-C does the same
     /// [default: 1.75]
     #[arg(long, value_name = "MINUTES")]
     minutes: Option<f64>,
@@ -257,7 +256,7 @@ fn tell_origin(trace: &mut DiagnosisTrace, engine: &str, seed: u64) {
     ];
     trace.files = files(&[
         ("result.json", "the numbers"),
-        ("refined.toml", "the model with the effects of the verdict"),
+        ("refined.toml", "the model with the diagnosed effects added"),
         (
             "config.toml",
             "the settings; `asid diagnose --config config.toml` repeats the diagnosis",

@@ -79,7 +79,7 @@ enum Command {
     Diagnose(diagnose::Arguments),
     /// Score diagnoses of cases whose effect is withheld, or make such cases
     Withheld(withheld::Arguments),
-    /// Print every setting of a task with its value and meaning, as a file for --config
+    /// Print every setting of a task or of a diagnosis with its value and meaning, as a file for --config
     Config(config::Arguments),
     /// Write a task's scene, or a refined model, as plain MJCF
     Export(export::Arguments),

@@ -31,7 +31,7 @@ pub struct Common {
     /// Simulate with this engine: see `asid list`
     #[arg(long, value_name = "NAME")]
     pub backend: Option<String>,
-    /// Draw all chance from this seed
+    /// Seed all random numbers with this
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = seed)]
     pub seed: Option<u64>,
     /// Use this many threads; results do not depend on it [default: one a core]
@@ -43,7 +43,7 @@ pub struct Common {
     /// Take settings from a file, such as a run's config.toml
     #[arg(long, value_name = "FILE.toml")]
     pub config: Option<PathBuf>,
-    /// Set a value, such as explorer.iterations=10; `asid config TASK` lists them (repeatable)
+    /// Set a value, such as explorer.iterations=10; `asid config TASK|STUDY` lists them (repeatable)
     #[arg(long, value_name = "KEY=VALUE")]
     pub set: Vec<String>,
     /// Set the difficulty: default, or published (values of the paper or its code, defaults where they give none); a
@@ -71,10 +71,10 @@ pub struct Algorithms {
     /// one that ships for the task, else it is trained on the spot]
     #[arg(long, value_name = "FILE")]
     pub policy: Option<PathBuf>,
-    /// Identify by this algorithm
+    /// Identify by this algorithm: see `asid list`
     #[arg(long, value_name = "NAME")]
     pub identifier: Option<String>,
-    /// Solve by this algorithm
+    /// Solve the task by this algorithm: see `asid list`
     #[arg(long, value_name = "NAME")]
     pub solver: Option<String>,
 }
@@ -99,13 +99,13 @@ pub struct Real {
     /// [default: matched, or custom where a --real-… option says more]
     #[arg(long, value_name = "KIND")]
     pub world: Option<String>,
-    /// Hide this true value in the real world, such as mass_offset=0.06 [default: drawn from the prior by the seed]
+    /// Give the real world this true value, which the methods do not see, such as mass_offset=0.06 [default: drawn from the prior by the seed]
     #[arg(long, value_name = "NAME=VALUE")]
     pub truth: Vec<String>,
     /// Play the real world with this engine [default: the simulator's; the other one for --world crossed]
     #[arg(long, value_name = "NAME")]
     pub real_backend: Option<String>,
-    /// Use this model as the real world: MJCF, or TOML of a refined model [default: the task's scene]
+    /// Simulate the real world with this model: MJCF, or a refined.toml of a diagnosis [default: the task's scene]
     #[arg(long, value_name = "FILE")]
     pub real_model: Option<PathBuf>,
     /// Add an effect to the real world that the simulator lacks, such as

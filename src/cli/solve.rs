@@ -41,7 +41,7 @@ pub struct Arguments {
     /// The folder of `asid identify` or `asid run`; `prior` for the prior (domain randomisation)
     #[arg(long, value_name = "DIR")]
     posterior: PathBuf,
-    /// Solve by this algorithm: see `asid list`
+    /// Solve the task by this algorithm: see `asid list`
     #[arg(long, value_name = "NAME")]
     solver: Option<String>,
     #[command(flatten)]

@@ -7,6 +7,8 @@
 use std::env;
 use std::path::{Path, PathBuf};
 
+use anyhow::{Context as _, Result};
+
 use crate::wheel::{Member, Wheel};
 
 /// One native library: its wheels and its folder in the repository.
@@ -129,6 +131,13 @@ impl Library {
         let path = PathBuf::from(&value);
         (!value.is_empty() && !same(&path, &self.path())).then(|| path.display().to_string())
     }
+}
+
+/// The target folder, in which this program lies.
+pub fn target() -> Result<PathBuf> {
+    let own = std::env::current_exe().context("cannot tell where this program lies")?;
+    let folder = own.ancestors().nth(2).context("no target folder")?;
+    Ok(folder.to_owned())
 }
 
 /// Root of the repository.

@@ -11,7 +11,7 @@ use std::process::Command;
 
 use anyhow::{Context, Result, bail};
 
-use crate::library::{MUJOCO, repository};
+use crate::library::{MUJOCO, repository, target};
 use crate::stage::Stages;
 use crate::{environment, setup};
 
@@ -110,13 +110,6 @@ fn fresh() -> Result<PathBuf> {
 fn maturin() -> Result<PathBuf> {
     let list = repository().join("python/requirements-build.txt");
     environment::of(&target()?.join("python/build"), &list, "11 MB")
-}
-
-/// The target folder.
-fn target() -> Result<PathBuf> {
-    let own = std::env::current_exe().context("cannot tell where this program lies")?;
-    let folder = own.ancestors().nth(2).context("no target folder")?;
-    Ok(folder.to_owned())
 }
 
 /// Builds the wheel: first the program, then the module with what lies in its folder.

@@ -12,7 +12,7 @@ use std::process::Command;
 
 use anyhow::{Context, Result, bail};
 
-use crate::library::repository;
+use crate::library::{repository, target};
 use crate::stage::{ALL_FEATURES, Stages};
 use cluster::{Cluster, Programs};
 
@@ -60,9 +60,7 @@ fn build() -> Result<PathBuf> {
     if !built.success() {
         bail!("the program cannot be built");
     }
-    let target = std::env::var_os("CARGO_TARGET_DIR")
-        .map_or_else(|| repository().join("target"), PathBuf::from);
-    Ok(target.join("debug").join("asid"))
+    Ok(target()?.join("debug").join("asid"))
 }
 
 /// Every check; true where all hold. What the cluster said is shown where one does not.

@@ -16,7 +16,9 @@ pub fn run() -> Result<bool> {
         &["test", "--workspace", "--no-fail-fast", ALL_FEATURES],
         &[],
     )?;
-    slurm::stage(&mut stages, None)?;
+    // The program that the tests have built: alone it would be built anew, with other features of its dependencies.
+    let program = library::target()?.join("debug/asid");
+    slurm::stage(&mut stages, Some(&program))?;
     miri::stage(&mut stages)?;
     python::stage(&mut stages, python::Profile::Dev)?;
     Ok(stages.finish())

@@ -1,141 +1,206 @@
-//! The adjoint recursion of Bryson and Frazier, from the last row to the first.
+//! The backward pass: the adjoint recursion of Bryson and Frazier, from the last row to the first.
+//!
+//! With `P` and `m` of the forward pass, the smoothed state is `m - P lambda` and its covariance `P - P Lambda P`; the adjoint
+//! variables `lambda` and `Lambda` take up each reading and go back through each transition (Bierman 1977). States are smoothed from the filtered
+//! state *after* the row's readings. From the predicted one, a wide prior and a fine reading would leave a small
+//! difference of two large numbers.
 
-use super::filter::{Filter, Step, dot, multiply, multiply_transposing, symmetrise};
+use nalgebra::DMatrix;
+
+use super::filter::{Filter, Step};
+use super::matrix::{dot, multiply, multiply_atb, symmetrise};
 use super::{Smoothed, Sums};
 
-/// The adjoint recursion from the last row to the first. States are corrected from where their own row's readings leave
-/// them: from before these, what a wide start and a fine reading have in common would be the difference of two
-/// large numbers.
+/// Smooths an episode whose forward pass took these steps.
 pub(super) fn backward(filter: &mut Filter<'_>, steps: &[Step]) -> Smoothed {
-    let (nx, nv, nz, ns) = (filter.nx, filter.nv, filter.nz, filter.ns);
-    let rows = steps.len();
-    let mut out = Smoothed {
-        log_likelihood: filter.total(),
-        change: vec![0.0; rows * nx],
-        damped: Vec::new(),
-        root: nalgebra::DMatrix::zeros(0, 0),
-        change_variance: vec![0.0; rows * nx],
-        force: vec![0.0; rows * nv],
-        force_variance: vec![0.0; rows * nv],
-        sums: Sums {
-            force: vec![[0.0; 3]; nv],
-            white: vec![0.0; nv],
-            reading: vec![[0.0; 2]; ns],
-            ..Sums::default()
-        },
-    };
-    let mut lambda = vec![0.0; nz];
-    let mut curvature = vec![0.0; nz * nz];
-    let mut product = vec![0.0; nz * nz];
-    let mut scratch = vec![0.0; nz * nz];
-    // Of the row after: the forces' rows of `P Lambda` before its readings, and its forces with their variances.
-    let mut later: Option<(Vec<f64>, Vec<f64>, Vec<f64>)> = None;
-    for k in (0..rows).rev() {
-        let step = &steps[k];
-        if k + 1 < rows {
-            if !step.breaks {
-                for j in 0..nv {
-                    let v = filter.noise.white[j];
-                    let b = |i: usize| filter.problem.b[(k * nx + i) * nv + j];
-                    let along: f64 = (0..nx).map(|i| b(i) * lambda[i]).sum();
-                    let bent: f64 = (0..nx)
-                        .map(|i| {
-                            let row = &curvature[i * nz..i * nz + nx];
-                            b(i) * row.iter().enumerate().map(|(l, x)| x * b(l)).sum::<f64>()
-                        })
-                        .sum();
-                    out.sums.white[j] += (v * along).powi(2) + (v - v * v * bent).max(0.0);
-                }
-            }
+    let mut pass = Adjoint::new(filter, steps.len());
+    let mut later: Option<Later> = None;
+    for (k, step) in steps.iter().enumerate().rev() {
+        if k + 1 < steps.len() {
             if step.breaks {
-                lambda.fill(0.0);
-                curvature.fill(0.0);
+                pass.forget();
             } else {
-                filter.set_transition(k);
-                let f = &filter.transition;
-                let mut next = vec![0.0; nz];
-                for (row, &l) in f.chunks_exact(nz).zip(&lambda) {
-                    next.iter_mut().zip(row).for_each(|(n, x)| *n += l * x);
-                }
-                lambda = next;
-                multiply(&curvature, f, nz, &mut scratch);
-                multiply_transposing(f, &scratch, nz, &mut curvature);
-                symmetrise(&mut curvature, nz);
+                pass.sum_white(k);
+                pass.transport(k);
             }
         }
-        multiply(&step.covariance, &curvature, nz, &mut product);
-        let p = |i: usize, j: usize| step.covariance[i * nz + j];
-        let smoothed =
-            |i: usize| step.mean[i] - dot(&step.covariance[i * nz..(i + 1) * nz], &lambda);
+        pass.smooth(k, step);
+        pass.sum_readings(k, step);
+        if let Some(later) = later.take().filter(|_| !step.breaks) {
+            pass.sum_forces(k, step, &later);
+        }
+        pass.take_up(k, step);
+        later = Some(pass.later(k, step));
+    }
+    pass.out
+}
+
+/// What the sums of a row need of the row after it.
+struct Later {
+    /// Rows of `P Lambda` that belong to the forces, before its readings, `nv x nz`.
+    correction: Vec<f64>,
+    /// Smoothed forces and their variances, `nv`.
+    force: Vec<f64>,
+    variance: Vec<f64>,
+}
+
+/// The adjoint variables at a row, and what has been smoothed so far.
+struct Adjoint<'f, 'a> {
+    filter: &'f mut Filter<'a>,
+    /// `lambda`, `nz`.
+    vector: Vec<f64>,
+    /// `Lambda`, `nz x nz`.
+    matrix: Vec<f64>,
+    scratch: Vec<f64>,
+    out: Smoothed,
+}
+
+impl<'f, 'a> Adjoint<'f, 'a> {
+    fn new(filter: &'f mut Filter<'a>, rows: usize) -> Self {
+        let (nx, nv, nz, ns) = (filter.nx, filter.nv, filter.nz, filter.ns);
+        let out = Smoothed {
+            log_likelihood: filter.total(),
+            change: vec![0.0; rows * nx],
+            damped: Vec::new(),
+            root: DMatrix::zeros(0, 0),
+            change_variance: vec![0.0; rows * nx],
+            force: vec![0.0; rows * nv],
+            force_variance: vec![0.0; rows * nv],
+            sums: Sums {
+                force: vec![[0.0; 3]; nv],
+                white: vec![0.0; nv],
+                reading: vec![[0.0; 2]; ns],
+                ..Sums::default()
+            },
+        };
+        Self {
+            filter,
+            vector: vec![0.0; nz],
+            matrix: vec![0.0; nz * nz],
+            scratch: vec![0.0; nz * nz],
+            out,
+        }
+    }
+
+    /// Nothing that follows tells of this row.
+    fn forget(&mut self) {
+        self.vector.fill(0.0);
+        self.matrix.fill(0.0);
+    }
+
+    /// Adds the expected square of the forces' white part between row `k` and the next to its sums.
+    fn sum_white(&mut self, k: usize) {
+        let (nx, nv, nz) = (self.filter.nx, self.filter.nv, self.filter.nz);
+        for j in 0..nv {
+            let v = self.filter.noise.white[j];
+            let b = |i: usize| self.filter.problem.b[(k * nx + i) * nv + j];
+            let along: f64 = (0..nx).map(|i| b(i) * self.vector[i]).sum();
+            let bent: f64 = (0..nx)
+                .map(|i| {
+                    let row = &self.matrix[i * nz..i * nz + nx];
+                    b(i) * row.iter().enumerate().map(|(l, x)| x * b(l)).sum::<f64>()
+                })
+                .sum();
+            self.out.sums.white[j] += (v * along).powi(2) + (v - v * v * bent).max(0.0);
+        }
+    }
+
+    /// Carries the adjoint variables back through the transition of row `k`, which the filter holds from here on.
+    fn transport(&mut self, k: usize) {
+        let nz = self.filter.nz;
+        self.filter.set_transition(k);
+        let f = &self.filter.transition;
+        let mut vector = vec![0.0; nz];
+        for (row, &l) in f.chunks_exact(nz).zip(&self.vector) {
+            vector.iter_mut().zip(row).for_each(|(n, x)| *n += l * x);
+        }
+        self.vector = vector;
+        multiply(&self.matrix, f, nz, &mut self.scratch);
+        multiply_atb(f, &self.scratch, nz, &mut self.matrix);
+        symmetrise(&mut self.matrix, nz);
+    }
+
+    /// Smoothed state and force of row `k`, with their variances.
+    fn smooth(&mut self, k: usize, step: &Step) {
+        let (nx, nv, nz) = (self.filter.nx, self.filter.nv, self.filter.nz);
+        multiply(&step.covariance, &self.matrix, nz, &mut self.scratch);
+        let row = |i: usize| &step.covariance[i * nz..(i + 1) * nz];
+        let mean = |i: usize| step.mean[i] - dot(row(i), &self.vector);
         let variance = |i: usize| {
-            let row = &product[i * nz..(i + 1) * nz];
-            let column: f64 = (0..nz).map(|l| row[l] * p(l, i)).sum();
-            (p(i, i) - column).max(0.0)
+            let product = &self.scratch[i * nz..(i + 1) * nz];
+            let column: f64 = (0..nz).map(|l| product[l] * row(l)[i]).sum();
+            (row(i)[i] - column).max(0.0)
         };
         for i in 0..nx {
-            out.change[k * nx + i] = smoothed(i);
-            out.change_variance[k * nx + i] = variance(i);
+            self.out.change[k * nx + i] = mean(i);
+            self.out.change_variance[k * nx + i] = variance(i);
         }
         for j in 0..nv {
-            out.force[k * nv + j] = smoothed(nx + j);
-            out.force_variance[k * nv + j] = variance(nx + j);
+            self.out.force[k * nv + j] = mean(nx + j);
+            self.out.force_variance[k * nv + j] = variance(nx + j);
         }
+    }
+
+    /// Adds what is left of the readings of row `k`, with its variance, to their sums.
+    fn sum_readings(&mut self, k: usize, step: &Step) {
+        let (nx, nz, ns) = (self.filter.nx, self.filter.nz, self.filter.ns);
         for taken in &step.taken {
-            let h = filter.slope(k, taken.entry);
+            let h = self.filter.slope(k, taken.entry);
             let mut v = vec![0.0; nz];
             for (v, row) in v.iter_mut().zip(step.covariance.chunks_exact(nz)) {
                 *v = dot(&row[..nx], h);
             }
-            let bent: f64 = curvature
-                .chunks_exact(nz)
-                .zip(&v)
-                .map(|(row, x)| x * dot(row, &v))
-                .sum();
+            let rows = self.matrix.chunks_exact(nz).zip(&v);
+            let bent: f64 = rows.map(|(row, x)| x * dot(row, &v)).sum();
             let spread = (dot(&v[..nx], h) - bent).max(0.0);
-            let reading = filter.problem.linear.residual[k * ns + taken.entry];
-            let left = reading - dot(&out.change[k * nx..(k + 1) * nx], h);
-            let sums = &mut out.sums.reading[taken.entry];
+            let reading = self.filter.problem.linear.residual[k * ns + taken.entry];
+            let left = reading - dot(&self.out.change[k * nx..(k + 1) * nx], h);
+            let sums = &mut self.out.sums.reading[taken.entry];
             sums[0] += left * left + spread;
             sums[1] += 1.0;
         }
-        if let Some((after, force, spread)) = later.take().filter(|_| !step.breaks) {
-            let time = &filter.problem.walk.time;
-            out.sums.steps += 1.0;
-            out.sums.seconds += time[k + 1] - time[k];
-            // `filter.transition` is that of this row still.
-            let f = &filter.transition;
-            for j in 0..nv {
-                let column: Vec<f64> = (0..nz)
-                    .map(|l| {
-                        let row = &f[l * nz..(l + 1) * nz];
-                        (0..nz)
-                            .map(|i| row[i] * step.covariance[i * nz + nx + j])
-                            .sum()
-                    })
-                    .collect();
-                let cross = column[nx + j] - dot(&after[j * nz..(j + 1) * nz], &column);
-                let (w0, w1) = (out.force[k * nv + j], force[j]);
-                let sums = &mut out.sums.force[j];
-                sums[0] += w1 * w1 + spread[j];
-                sums[1] += w0 * w0 + out.force_variance[k * nv + j];
-                sums[2] += w1 * w0 + cross;
-            }
+    }
+
+    /// Adds the expected squares and products of the forces of row `k` and of the row after it to their sums.
+    fn sum_forces(&mut self, k: usize, step: &Step, later: &Later) {
+        let (nx, nv, nz) = (self.filter.nx, self.filter.nv, self.filter.nz);
+        let time = &self.filter.problem.walk.time;
+        self.out.sums.steps += 1.0;
+        self.out.sums.seconds += time[k + 1] - time[k];
+        let transition = &self.filter.transition;
+        for j in 0..nv {
+            let carried = |l: usize| -> f64 {
+                let row = &transition[l * nz..(l + 1) * nz];
+                let column = |i: usize| step.covariance[i * nz + nx + j];
+                (0..nz).map(|i| row[i] * column(i)).sum()
+            };
+            let column: Vec<f64> = (0..nz).map(carried).collect();
+            let correction = &later.correction[j * nz..(j + 1) * nz];
+            let cross = column[nx + j] - dot(correction, &column);
+            let (w0, w1) = (self.out.force[k * nv + j], later.force[j]);
+            let sums = &mut self.out.sums.force[j];
+            sums[0] += w1 * w1 + later.variance[j];
+            sums[1] += w0 * w0 + self.out.force_variance[k * nv + j];
+            sums[2] += w1 * w0 + cross;
         }
+    }
+
+    /// Takes the readings of row `k` up into the adjoint variables, the last one first.
+    fn take_up(&mut self, k: usize, step: &Step) {
+        let (nx, nz) = (self.filter.nx, self.filter.nz);
         for taken in step.taken.iter().rev() {
-            let h = filter.slope(k, taken.entry);
+            let h = self.filter.slope(k, taken.entry);
             let s = taken.variance;
-            let along = dot(&taken.gain, &lambda) / s;
-            for (l, h) in lambda.iter_mut().zip(h) {
+            let along = dot(&taken.gain, &self.vector) / s;
+            for (l, h) in self.vector.iter_mut().zip(h) {
                 *l -= h * (taken.innovation / s + along);
             }
-            let u: Vec<f64> = curvature
-                .chunks_exact(nz)
-                .map(|row| dot(row, &taken.gain) / s)
-                .collect();
+            let rows = self.matrix.chunks_exact(nz);
+            let u: Vec<f64> = rows.map(|row| dot(row, &taken.gain) / s).collect();
             let c = dot(&u, &taken.gain) / s + 1.0 / s;
             for i in 0..nz {
                 let hi = if i < nx { h[i] } else { 0.0 };
-                let row = &mut curvature[i * nz..(i + 1) * nz];
+                let row = &mut self.matrix[i * nz..(i + 1) * nz];
                 for (x, u) in row.iter_mut().zip(&u) {
                     *x -= hi * u;
                 }
@@ -144,19 +209,23 @@ pub(super) fn backward(filter: &mut Filter<'_>, steps: &[Step]) -> Smoothed {
                 }
             }
         }
-        // Rows of `P Lambda` for the forces.
-        let mut rows_of_force = vec![0.0; nv * nz];
-        for (j, target) in rows_of_force.chunks_exact_mut(nz).enumerate() {
+    }
+
+    /// What the row before `k` needs of it.
+    fn later(&self, k: usize, step: &Step) -> Later {
+        let (nx, nv, nz) = (self.filter.nx, self.filter.nv, self.filter.nz);
+        let mut correction = vec![0.0; nv * nz];
+        for (j, target) in correction.chunks_exact_mut(nz).enumerate() {
             let p = &step.predicted[(nx + j) * nz..(nx + j + 1) * nz];
-            for (&p, row) in p.iter().zip(curvature.chunks_exact(nz)) {
+            for (&p, row) in p.iter().zip(self.matrix.chunks_exact(nz)) {
                 target.iter_mut().zip(row).for_each(|(t, x)| *t += p * x);
             }
         }
-        later = Some((
-            rows_of_force,
-            out.force[k * nv..(k + 1) * nv].to_vec(),
-            out.force_variance[k * nv..(k + 1) * nv].to_vec(),
-        ));
+        let of = |all: &[f64]| all[k * nv..(k + 1) * nv].to_vec();
+        Later {
+            correction,
+            force: of(&self.out.force),
+            variance: of(&self.out.force_variance),
+        }
     }
-    out
 }

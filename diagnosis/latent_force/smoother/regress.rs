@@ -2,7 +2,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::filter::{Filter, multiply_columns};
+use super::filter::Filter;
+use super::matrix::multiply_columns;
 use super::{NoiseModel, Problem, Regression};
 
 /// Innovations that are collected before they are added up.

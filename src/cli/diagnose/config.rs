@@ -12,30 +12,39 @@ use asid_diagnosis::search::Breadth;
 use asid_diagnosis::study::Study;
 use asid_effects::EffectEntry;
 use asid_effects::refined_model::RefinedModel;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::super::model::{self, Needs};
+use super::super::options::Common;
 use super::super::plugins::{file_of, recorded, used};
 use super::super::session::backend;
 use super::super::settings::{self, difficulty};
 use super::Arguments;
 
 /// `config.toml` of a diagnosis.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Config {
+    /// The study that is diagnosed: a TOML file, or a folder with study.toml.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub study: Option<PathBuf>,
+    /// The task that is diagnosed in place of a study.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub task: Option<String>,
+    /// The model in place of the task's scene: MJCF, or a refined model.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub model: Option<PathBuf>,
+    /// Logs of the task that are fitted to.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub train: Vec<PathBuf>,
+    /// Logs of the task that are held out.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub test: Vec<PathBuf>,
+    /// The engine: see `asid list`.
     #[serde(default = "default_backend")]
     pub backend: String,
+    /// Seed of all random numbers.
     #[serde(default)]
     pub seed: u64,
     /// How hard the task is, by name.
@@ -57,25 +66,28 @@ pub struct Config {
     /// Seeds that the task is tried with, before and after.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub seeds: Option<u64>,
-    /// Time limit.
+    /// Time limit, minutes: it answers by then with what is known, and lists what was not tried.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub minutes: Option<f64>,
-    /// Whether the diagnosis is repeated on simulated logs.
+    /// Whether the diagnosis is repeated on simulated logs, for as long as `minutes` allows.
     #[serde(default)]
     calibrate: bool,
-    /// Rate of false alarms.
+    /// Probability at which chance may accuse a machine that lacks nothing; a larger one finds smaller effects.
     #[serde(default = "false_alarms")]
     false_alarms: f64,
+    /// Effects of the catalogue that are left out, by name.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     without: Vec<String>,
+    /// Plugins that are loaded first, with the SHA-256 of each.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     plugins: Vec<PathBuf>,
+    /// How machines that touch something are searched.
     #[serde(default)]
     search: SearchConfig,
 }
 
 /// Logs of a run of a task.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum RunLogs {
     /// Of exploration.
@@ -130,14 +142,22 @@ fn false_alarms() -> f64 {
 }
 
 /// How widely to search.
-#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 struct SearchConfig {
+    /// Effects that the replay search fits on its first, shortest stage. More take longer and miss less.
     first: usize,
+    /// Of these, those that it follows to whole logs.
     last: usize,
+    /// Single effects that it follows to whole logs whatever sets of more do.
     singles: usize,
+    /// Explanations that it tries a further effect upon.
     beam: usize,
+    /// Most effects that it joins.
     depth: usize,
+    /// How logs are taken in which bodies touch: by whole replays, in short segments, or by what is affordable. One of auto,
+    /// replays, segments.
+    #[schemars(with = "String")]
     contact: Contact,
 }
 
@@ -162,17 +182,27 @@ impl Default for SearchConfig {
 }
 
 impl Config {
+    /// The settings of a study where nothing but the configuration file and `--set` says more.
+    pub fn of_study(study: &Path, common: &Common) -> Result<Self> {
+        let mut config = Self::of_table(given(common)?)?;
+        config.study = Some(study.to_owned());
+        if let Some(name) = &common.backend {
+            config.backend.clone_from(name);
+        }
+        config.minutes = config.minutes.or(Some(MINUTES));
+        Ok(config)
+    }
+
+    fn of_table(table: toml::Table) -> Result<Self> {
+        let read = table.try_into();
+        read.map_err(|e: toml::de::Error| wrong("config", e.message().replace('\n', " ")))
+    }
+
     /// The configuration file, `--set`, then the command line; and apart from it the settings of
     /// the task's runs, where the task is to be run.
     pub fn resolve(arguments: &Arguments) -> Result<(Self, Option<toml::Table>)> {
         let common = &arguments.common;
-        let mut table = match &common.config {
-            Some(path) => settings::read_table(path)?,
-            None => toml::Table::new(),
-        };
-        for setting in &common.set {
-            settings::set(&mut table, setting)?;
-        }
+        let mut table = given(common)?;
         let mut of_run = toml::Table::new();
         let runs_task = arguments.runs_task(&table);
         if runs_task {
@@ -185,9 +215,7 @@ impl Config {
                 of_run.extend(table.remove_entry(&key));
             }
         }
-        let mut config: Self = table
-            .try_into()
-            .map_err(|e: toml::de::Error| wrong("config", e.message().replace('\n', " ")))?;
+        let mut config = Self::of_table(table)?;
         if arguments.study.is_some() || arguments.task.is_some() {
             config.study.clone_from(&arguments.study);
             config.task.clone_from(&arguments.task);
@@ -313,6 +341,18 @@ impl Config {
             (None, None) => Err(wrong("study", "is missing")),
         }
     }
+}
+
+/// What the configuration file and `--set` say.
+fn given(common: &Common) -> Result<toml::Table> {
+    let mut table = match &common.config {
+        Some(path) => settings::read_table(path)?,
+        None => toml::Table::new(),
+    };
+    for setting in &common.set {
+        settings::set(&mut table, setting)?;
+    }
+    Ok(table)
 }
 
 /// Logs to fit to and logs held out, with their names.

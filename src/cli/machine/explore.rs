@@ -9,7 +9,7 @@ use anyhow::Result;
 use asid_algorithms::fisher::Objective;
 use asid_core::posterior::Direction;
 use asid_core::signal::Signal;
-use asid_core::{Episode, Parameter, Streams};
+use asid_core::{Episode, Error, Parameter, Streams};
 use asid_report::number::significant;
 use asid_sysid::dataset::Dataset;
 use asid_sysid::design::{Designed, Designer, Method};
@@ -286,6 +286,23 @@ fn settle(
             config.settle
         ));
         player.skip_settling();
+    }
+    let (at_stop, beyond) = player.look_at_begin(values)?;
+    if let Some((what, _)) = beyond.worst {
+        let message = format!(
+            "the machine begins beyond one: {what}; move its first keyframe within the limits, or widen this one"
+        );
+        return Err(Error::Config {
+            key: "limits".into(),
+            message,
+        }
+        .into());
+    }
+    if !at_stop.is_empty() {
+        let names = at_stop.join(", ");
+        notes.push(format!(
+            "at rest at the end of the range, and may stay there: {names}"
+        ));
     }
     let touching = player.allow_present_contacts(values)?;
     if !touching.is_empty() {

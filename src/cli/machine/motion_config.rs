@@ -54,7 +54,7 @@ pub struct Options {
     /// Keep a drive's force on its joint below this, N or N m; without an actuator all (repeatable)
     #[arg(long, value_name = "[ACTUATOR:]FORCE", help_heading = "Any machine")]
     pub limit_force: Vec<String>,
-    /// Keep the frame of a body in a box of the world, m (repeatable)
+    /// Keep the origin of a body's frame in this box of the world, m, along the whole motion (repeatable)
     #[arg(
         long,
         value_name = "BODY:X0:X1:Y0:Y1:Z0:Z1",

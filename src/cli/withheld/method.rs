@@ -19,7 +19,7 @@ pub enum Method {
     Diagnose,
     /// Fit the study's parameters, and say that nothing is missing
     IdentifyOnly,
-    /// Name the single effect that leaves the least on the logs it is fitted to
+    /// Name the single effect whose fit has the smallest residual on the training logs
     BestResidual,
     /// Add and drop effects for as long as the Bayesian information criterion falls
     Bic,

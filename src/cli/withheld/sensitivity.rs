@@ -69,7 +69,7 @@ impl<'a> Stored<'a> {
     /// The set of the verdict by some rules, whether it is right by its names, and the logarithm of the true set's probability.
     fn decided(&self, rules: &Rules, catalogue: &BTreeSet<String>) -> (Vec<String>, bool, f64) {
         let judgement = decide(&self.evidence, rules);
-        let verdict = judgement.verdict();
+        let verdict = judgement.best_explanation();
         let set = match (judgement.is_unknown, verdict.labels.is_empty()) {
             (true, _) => vec!["unknown".to_owned()],
             (_, true) => vec!["none".to_owned()],
