@@ -37,6 +37,15 @@ struct Pair {
     own: Option<Friction>,
 }
 
+/// What leaves the friction of a geom without effect.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Overruled {
+    /// The friction of an explicit `<pair>` with this geom.
+    ByPair(usize),
+    /// The higher priority of this geom.
+    ByPriority(usize),
+}
+
 /// The rules for every pair of geoms.
 #[derive(Clone, Debug)]
 pub struct PairTable {
@@ -119,6 +128,23 @@ impl PairTable {
     /// True where some pair resists rolling or spinning.
     pub fn has_rolling_or_spinning_friction(&self) -> bool {
         self.has_rolling_or_spinning_friction
+    }
+
+    /// What overrules the friction of a geom in all the contacts that it can make; `None` where it counts in some, or
+    /// where the geom can touch nothing.
+    pub fn overruled(&self, geom: usize) -> Option<Overruled> {
+        let mut by = None;
+        let touched = (0..self.geoms).filter(|&other| self.pair(geom, other).may_collide);
+        for other in touched {
+            let pair = self.pair(geom, other);
+            let found = match (pair.own, pair.ruling) {
+                (Some(_), _) => Overruled::ByPair(other),
+                (None, Ruling::Second) => Overruled::ByPriority(other),
+                (None, Ruling::First | Ruling::Both) => return None,
+            };
+            by = by.or(Some(found));
+        }
+        by
     }
 
     /// Friction and `condim` of a pair of geoms.

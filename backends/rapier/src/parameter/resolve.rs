@@ -1,4 +1,7 @@
 //! From a target's name to a slot, one function for each kind of element.
+//!
+//! A target that would change nothing is refused: an identification of it would return its prior and look like a
+//! measurement.
 
 use asid_core::layout::{JointKind, Layout};
 use asid_core::{Error, Result, Target};
@@ -6,6 +9,7 @@ use mjcf_rs::extras::ActuatorKind;
 
 use super::{ParameterSlot, bad};
 use crate::compiled::Compiled;
+use crate::pairs::Overruled;
 
 impl ParameterSlot {
     /// Resolves a target.
@@ -52,7 +56,12 @@ fn of_geom(target: &Target, compiled: &Compiled) -> Result<ParameterSlot> {
         "friction" if compiled.colliders[geom].is_none() => {
             return Err(bad(target, "the geom takes part in no contact"));
         }
-        "friction" => ParameterSlot::GeomFriction(geom, target.index),
+        "friction" => {
+            if let Some(by) = compiled.pairs.overruled(geom) {
+                return Err(without_effect(target, by, &compiled.layout));
+            }
+            ParameterSlot::GeomFriction(geom, target.index)
+        }
         "pos" if !follows && compiled.colliders[geom].is_none() => {
             return Err(bad(target, "the geom has neither mass nor contact"));
         }
@@ -147,6 +156,21 @@ fn find<'a>(
             Error::unknown(kind, &target.name, names).to_string(),
         )
     })
+}
+
+/// A friction that another one overrules in all contacts of its geom.
+fn without_effect(target: &Target, by: Overruled, layout: &Layout) -> Error {
+    let why = match by {
+        Overruled::ByPair(other) => format!(
+            "a <pair> gives the friction between `{}` and `{}`",
+            target.name, layout.geoms[other]
+        ),
+        Overruled::ByPriority(other) => format!(
+            "geom `{}` has the higher priority, so that its friction alone counts",
+            layout.geoms[other]
+        ),
+    };
+    bad(target, format!("it would have no effect: {why}"))
 }
 
 fn unknown(target: &Target, known: &str) -> Error {
