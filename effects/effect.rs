@@ -166,8 +166,8 @@ pub trait Effect: Send + Sync {
     fn mistaken_for(&self) -> &'static [Confusion] {
         &[]
     }
-    /// Whether who knows such machines would think of it at this site only after others, as of a force on a
-    /// body that joints hold, where friction and drives come to mind first.
+    /// Whether this effect is an unlikely explanation at this site a priori. A force on a body that joints hold
+    /// is one: friction and drives are likelier there.
     fn unusual_at(&self, _plant: &Plant, _site: &str) -> bool {
         false
     }

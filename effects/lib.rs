@@ -4,8 +4,8 @@
 //! with values of its parameters. At their null values it does exactly nothing.
 //! It acts in one of four places: on the model's parameters, on the command on
 //! its way to the drive, as a force during the step, or on the reading on its way
-//! from the sensor. What acts is made anew for each simulation ([`Acting`]), so
-//! that it may remember what was, as a delay must, and needs no lock.
+//! from the sensor. Each simulation has its own [`Acting`], which may hold state,
+//! as a delay must, and needs no lock.
 //!
 //! [`refined`] gives a compiled scene its effects; from then on every
 //! algorithm sees an ordinary model, and an effect's parameter is a target like

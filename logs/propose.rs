@@ -8,6 +8,7 @@
 mod fit;
 mod quantity;
 mod score;
+mod speed;
 mod unit;
 mod words;
 
@@ -17,17 +18,13 @@ use asid_mjcf::Plant;
 
 pub use quantity::Quantity;
 use score::{Candidate, Context};
+use speed::match_speed;
 use unit::Unit;
 use words::Measure;
 
 use crate::format::Kind;
 use crate::raw::RawLog;
 use crate::series::Series;
-
-/// Correlation of ways above which a speed is sure to belong to a position.
-const SURE: f64 = 0.8;
-/// A unit explains the factor between a speed and its position where it is within this of it, as a logarithm: 35 %.
-const NEAR: f64 = 0.3;
 
 /// What a quantity is read from.
 #[derive(Clone, Debug)]
@@ -230,53 +227,6 @@ fn values(series: &Series, mapping: &ColumnMapping) -> [f64; 2] {
     all.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], x| {
         [a.min(x), b.max(x)]
     })
-}
-
-/// Unit and sign of a speed, by the way that the position goes; `own` is the position's series and factor.
-fn match_speed(
-    found: &mut Match,
-    log: &RawLog,
-    own: (&Series, f64),
-    dimension: quantity::Dimension,
-) {
-    let Some(mapping) = &mut found.mapping else {
-        return;
-    };
-    let Some(speed) = log.series(source(mapping)) else {
-        return;
-    };
-    let Some((per, sure)) = fit::speed_factor(speed, own.0) else {
-        return;
-    };
-    if sure.abs() < SURE || mapping.unit.is_some() {
-        return;
-    }
-    let wanted = per * own.1;
-    let units: &[&str] = match dimension {
-        quantity::Dimension::Angle => &["rad/s", "deg/s", "rpm"],
-        quantity::Dimension::Length => &["m/s", "cm/s", "mm/s"],
-        quantity::Dimension::Other => return,
-    };
-    let apart = |unit: &&&str| (wanted.abs() / unit_factor(unit).unwrap_or(1.0)).ln().abs();
-    let nearest = units.iter().min_by(|a, b| apart(a).total_cmp(&apart(b)));
-    let Some(unit) = nearest.filter(|u| apart(u) < NEAR) else {
-        found.reasons.push(format!(
-            "no unit makes it its position's speed: that is {wanted:.3} times it"
-        ));
-        return;
-    };
-    if *unit != units[0] {
-        mapping.unit = Some((*unit).to_owned());
-    }
-    if wanted < 0.0 {
-        mapping.sign = -1.0;
-        found
-            .reasons
-            .push("runs against its position: one of the two counts the other way".into());
-    } else {
-        found.reasons.push("is its position's speed".into());
-    }
-    found.values = values(speed, mapping);
 }
 
 #[cfg(test)]

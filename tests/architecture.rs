@@ -1,4 +1,4 @@
-//! The rooms of the house: crates use each other as `docs/architecture.md` says, and nothing goes in circles.
+//! Crates use each other as `docs/architecture.md` says, and neither they nor the modules of a crate use each other in circles.
 
 #![allow(clippy::unwrap_used)]
 
@@ -12,7 +12,7 @@ fn root() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// The rooms of the page from above, each with the rooms that it uses.
+/// The folders of the crates in the page's table from above, each with those that it uses.
 fn page() -> Vec<(String, Names)> {
     let text = fs::read_to_string(root().join("docs/architecture.md")).unwrap();
     let quoted = |cell: &str| -> Vec<String> {
@@ -60,21 +60,21 @@ fn crates_use_each_other_as_the_page_says() {
     let (page, manifests) = (page(), manifests());
     assert!(page.len() > 10, "the page's table was not found");
     let mut above = Names::new();
-    for (room, uses) in &page {
-        let found = &manifests[room];
+    for (folder, uses) in &page {
+        let found = &manifests[folder];
         assert_eq!(
             found, uses,
-            "`{room}` uses the left, and docs/architecture.md says the right"
+            "`{folder}` uses the left, and docs/architecture.md says the right"
         );
         let below: Vec<_> = uses.difference(&above).collect();
-        assert!(below.is_empty(), "`{room}` uses {below:?}, below it");
-        above.insert(room.clone());
+        assert!(below.is_empty(), "`{folder}` uses {below:?}, below it");
+        above.insert(folder.clone());
     }
-    // What is outside of the house is used by nobody else but what is outside too.
-    let outside = |room: &str| !above.contains(room);
-    for (room, uses) in manifests.iter().filter(|(room, _)| !outside(room)) {
+    // A crate that is not in the table is used only by others that are not.
+    let outside = |folder: &str| !above.contains(folder);
+    for (folder, uses) in manifests.iter().filter(|(folder, _)| !outside(folder)) {
         let strange: Vec<_> = uses.iter().filter(|u| outside(u)).collect();
-        assert!(strange.is_empty(), "`{room}` uses {strange:?}");
+        assert!(strange.is_empty(), "`{folder}` uses {strange:?}");
     }
 }
 
@@ -201,10 +201,10 @@ fn circles(mut graph: BTreeMap<String, Names>) -> BTreeMap<String, Names> {
 }
 
 #[test]
-fn modules_inside_of_a_room_use_each_other_in_one_direction() {
-    for (room, _) in page().iter().filter(|(room, _)| room != "diagnosis") {
-        let circles = circles(modules(room));
-        assert!(circles.is_empty(), "circles in `{room}`: {circles:#?}");
+fn modules_of_a_crate_use_each_other_in_one_direction() {
+    for (folder, _) in page().iter().filter(|(folder, _)| folder != "diagnosis") {
+        let circles = circles(modules(folder));
+        assert!(circles.is_empty(), "circles in `{folder}`: {circles:#?}");
     }
 }
 

@@ -1,12 +1,12 @@
-//! No number without a reason: every constant of the rooms says what it is.
+//! No number without a reason: every constant of the crates says what it is.
 
 #![allow(clippy::unwrap_used)]
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Rooms whose numbers are looked at. The C ABI's are those of its header, which explains them.
-const ROOMS: [&str; 17] = [
+/// Folders of the crates whose numbers are looked at. The C ABI's are those of its header, which explains them.
+const CRATES: [&str; 17] = [
     "asid-core",
     "mjcf",
     "effects",
@@ -85,9 +85,9 @@ fn unexplained(text: &str) -> Vec<String> {
 fn every_number_says_what_it_is() {
     let root = PathBuf::from(env!("CARGO_MANIFEST_DIR"));
     let mut silent = Vec::new();
-    for room in ROOMS {
+    for folder in CRATES {
         let mut files = Vec::new();
-        sources(&root.join(room), &mut files);
+        sources(&root.join(folder), &mut files);
         for file in files {
             let text = fs::read_to_string(&file).unwrap();
             let place = file.strip_prefix(&root).unwrap().display().to_string();

@@ -7,7 +7,7 @@ use crate::Stage;
 use crate::force::Missing;
 use crate::pack::{Cube, text};
 
-/// Frames a second at most: a viewer that draws 60 has one of its own between any two, and the eye sees no step.
+/// Most frames a second. A viewer that draws 60 a second interpolates one more between any two, which looks smooth.
 pub const RATE: f64 = 30.0;
 /// Frames of an episode at most: 20 s at [`RATE`].
 pub const FRAMES: usize = 600;

@@ -1,26 +1,30 @@
 //! Kinds of real worlds: how a simulated real world differs from the method's simulator.
 //!
-//! A method that is tried in the simulator it identifies with has an easy life: its model is right but
-//! for the unknowns. Of such a world nothing can be said for a real one. So there are four kinds, and a
-//! result says which one it is from:
+//! Where a method is tried in the simulator that it identifies with, its model is right but for the
+//! unknowns. Its errors there say nothing of a real world. So there are five kinds, and a result says
+//! which one it is from:
 //!
 //! - [`Kind::Matched`]: the simulator itself, with a hidden truth.
 //! - [`Kind::Crossed`]: the same scene in another engine.
 //! - [`Kind::Perturbed`]: many small errors of the model at once, drawn by the world's seed.
 //! - [`Kind::StandIn`]: the task's scene with another object.
+//! - [`Kind::Custom`]: an engine, a model file or effects that a user named one by one.
 //!
-//! Each world draws its own chance, from streams that no part of a method can reach.
+//! A perturbed world comes about in three modules: `ranges` says how far off it may be, `drawn` has the
+//! values that its seed drew, and `applied` gives them to a scene.
+//!
+//! Each world has random streams of its own, which no part of a method can reach.
 
+mod applied;
 mod crossed;
+mod drawn;
 mod kind;
-mod perturbation;
-mod perturbed;
 mod ranges;
 mod simulated;
 
+pub use applied::{Perturbed, perturb};
 pub use crossed::other_engine;
+pub use drawn::{Perturbation, TrackerPerturbation};
 pub use kind::Kind;
-pub use perturbation::{Perturbation, TrackerPerturbation};
-pub use perturbed::{Perturbed, perturb};
 pub use ranges::PerturbationRanges;
 pub use simulated::{SimulatedWorld, TrackerErrors};

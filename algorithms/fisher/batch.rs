@@ -2,24 +2,13 @@
 //! copies with one entry (an unknown, or a coordinate of the start pose) a little
 //! up and a little down.
 //!
-//! Two forms of the sensitivity are offered. *One-step*: before each control step
-//! the copies take the episode's state, so that their difference is
-//! `d f_theta(s_h, a_h) / d theta`, the derivative in the paper. *Trajectory*: the
-//! copies go their own way from the start of the episode, so that their difference
-//! is `d s_h / d theta` under the same actions, which counts what a tracked
-//! trajectory reveals when it is replayed as a whole. Start-pose entries make sense in
-//! the trajectory form only.
-//!
-//! The noise `S` is that of the trackers, plus, where [`FisherSettings::roughness`] says
-//! so, the square of what each reading deviates from a straight line over the copies.
+//! [`Form`] says from which state the copies start a control step. [`Sensitivity`] makes
+//! derivatives of what they read, and [`Information`] adds these up and rewards them.
 
-use std::str::FromStr;
-
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
-
-use crate::fisher::{Information, Objective};
-use asid_core::error::{Error, Result};
+use super::sensitivity::Sensitivity;
+use super::settings::{FisherSettings, Form};
+use crate::fisher::Information;
+use asid_core::error::Result;
 use asid_core::layout::Recording;
 use asid_core::parameter::Parameter;
 use asid_core::problem::{Batch, Problem, substeps};
@@ -27,100 +16,6 @@ use asid_core::signal::SignalSet;
 use asid_core::simulator::{Control, Rollout};
 use asid_core::task::Commander;
 use asid_core::tracker::ReadingFrames;
-
-/// Which derivative is taken; see the module.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum Form {
-    /// From the episode's state, one control step at a time.
-    OneStep,
-    /// From the start of the episode.
-    #[default]
-    Trajectory,
-}
-
-impl Form {
-    /// Name on the command line.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::OneStep => "one-step",
-            Self::Trajectory => "trajectory",
-        }
-    }
-}
-
-impl FromStr for Form {
-    type Err = Error;
-
-    fn from_str(text: &str) -> Result<Self> {
-        [Self::OneStep, Self::Trajectory]
-            .into_iter()
-            .find(|f| f.name() == text)
-            .ok_or_else(|| Error::unknown("form", text, ["one-step", "trajectory"]))
-    }
-}
-
-/// What is computed of an episode.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct FisherSettings {
-    /// What a step is rewarded for.
-    pub objective: Objective,
-    /// Which derivative.
-    pub form: Form,
-    /// Estimate the start pose along (trajectory form only).
-    pub nuisance: bool,
-    /// Half the difference between the copies, in prior standard deviations.
-    pub delta: f64,
-    /// Count what the copies deviate from a straight line as noise. With contact the
-    /// trajectory is rough: a difference divided by a small step is then mostly luck, and
-    /// an explorer that is paid for it seeks chaos.
-    pub roughness: bool,
-}
-
-impl Default for FisherSettings {
-    fn default() -> Self {
-        Self {
-            objective: Objective::AOptimal,
-            form: Form::Trajectory,
-            nuisance: true,
-            delta: 0.3,
-            roughness: true,
-        }
-    }
-}
-
-impl FisherSettings {
-    /// The objective in words, such as `a-optimal (trajectory form)`.
-    #[must_use]
-    pub fn describe(&self) -> String {
-        let start = if self.nuisance {
-            ", start pose co-estimated"
-        } else {
-            ""
-        };
-        let (objective, form) = (self.objective.name(), self.form.name());
-        format!("{objective} ({form} form{start})")
-    }
-
-    /// Checks that the settings go together.
-    ///
-    /// # Errors
-    /// When `delta` is negative.
-    pub fn check(&self) -> Result<()> {
-        if !(self.delta.is_finite() && self.delta > 0.0 && self.delta <= 1.0) {
-            return Err(Error::Config {
-                key: "explorer.fisher.delta".into(),
-                message: format!(
-                    "must be above 0 and at most 1 prior standard deviation, not {}",
-                    self.delta
-                ),
-            });
-        }
-        Ok(())
-    }
-}
 
 /// Step of the start pose in finite differences, in standard deviations of its range.
 const START_DELTA: f64 = 0.02;
@@ -135,7 +30,7 @@ pub struct FisherBatch<'a> {
     sims: Vec<usize>,
     commanders: Vec<Box<dyn Commander>>,
     recording: Recording,
-    signals: SignalSet,
+    sensitivity: Sensitivity,
     substeps: usize,
     read: ReadingFrames,
     /// Control steps taken.
@@ -146,10 +41,6 @@ pub struct FisherBatch<'a> {
     ctrl: Vec<f64>,
     control: Vec<f64>,
     readings: Vec<f64>,
-    jacobian: Vec<f64>,
-    difference: Vec<f64>,
-    below: Vec<f64>,
-    noise: Vec<f64>,
     copies: (Vec<usize>, Vec<usize>),
     alive: Vec<bool>,
 }
@@ -158,7 +49,7 @@ impl<'a> FisherBatch<'a> {
     /// `episodes` episodes at once.
     ///
     /// # Errors
-    /// When the engine cannot set an unknown or the settings do not go together.
+    /// When the engine cannot set an unknown or the settings make no sense.
     pub fn new(
         problem: &'a Problem<'a>,
         settings: &FisherSettings,
@@ -175,7 +66,16 @@ impl<'a> FisherBatch<'a> {
         let layout = problem.model.layout();
         let recording = layout.recording(&protocol.channels())?;
         let signals = SignalSet::new(layout, problem.signals)?;
-        let rows = signals.whitened_len();
+        // A binary unknown's copies are two models, with nothing between them to be straight.
+        let binary = |entry| {
+            problem
+                .parameters
+                .get(entry)
+                .is_some_and(Parameter::is_binary)
+        };
+        let rough = (0..entries)
+            .map(|entry| settings.roughness && !binary(entry))
+            .collect();
         let from: Vec<usize> = (0..episodes)
             .flat_map(|e| std::iter::repeat_n(e * copies, copies - 1))
             .collect();
@@ -197,14 +97,10 @@ impl<'a> FisherBatch<'a> {
             ctrl: vec![0.0; protocol.frames_per_step * layout.nu()],
             control: vec![0.0; n * protocol.frames_per_step * layout.nu()],
             readings: vec![0.0; n * protocol.frames_per_step * recording.width()],
-            jacobian: vec![0.0; entries * rows],
-            difference: vec![0.0; rows],
-            below: vec![0.0; rows],
-            noise: vec![1.0; rows],
+            sensitivity: Sensitivity::new(signals, rough),
             copies: (from, to),
             alive: vec![true; episodes],
             recording,
-            signals,
             batch,
             problem,
         })
@@ -378,38 +274,11 @@ impl<'a> FisherBatch<'a> {
         readings: &[f64],
     ) {
         let width = self.recording.width();
-        let rows = self.signals.whitened_len();
-        let row =
+        let rows = self.sensitivity.rows();
+        let reading =
             |copy: usize| &readings[((e * copies + copy) * frames + frame) * width..][..width];
-        self.noise.fill(1.0);
-        for entry in 0..self.entries {
-            let (up, down) = (row(1 + 2 * entry), row(2 + 2 * entry));
-            self.signals.difference(up, down, &mut self.difference);
-            let step = self.steps[e * self.entries + entry];
-            for k in 0..rows {
-                self.jacobian[entry * rows + k] = self.difference[k] / step;
-            }
-            let binary = self
-                .problem
-                .parameters
-                .get(entry)
-                .is_some_and(Parameter::is_binary);
-            if self.settings.roughness && !binary {
-                // up + down - 2 middle: nothing on a straight line, luck and curvature otherwise.
-                self.signals.difference(up, row(0), &mut self.difference);
-                self.signals.difference(row(0), down, &mut self.below);
-                for (noise, (a, b)) in self
-                    .noise
-                    .iter_mut()
-                    .zip(self.difference.iter().zip(&self.below))
-                {
-                    *noise += (0.5 * (a - b)).powi(2);
-                }
-            }
-        }
-        for (i, j) in self.jacobian.iter_mut().enumerate() {
-            *j /= self.noise[i % rows].sqrt();
-        }
-        self.information[e].add(&self.jacobian, rows);
+        let steps = &self.steps[e * self.entries..(e + 1) * self.entries];
+        let jacobian = self.sensitivity.jacobian(reading, steps);
+        self.information[e].add(jacobian, rows);
     }
 }

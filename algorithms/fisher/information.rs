@@ -7,8 +7,8 @@
 //! products and the prior's information `I_0` is the identity.
 //!
 //! Parameters come first; behind them there may be *nuisance* entries (the start
-//! pose), which are estimated along but not sought: objectives look at the
-//! parameters' block of the inverse.
+//! pose), which are estimated jointly with them but not sought: objectives look at
+//! the parameters' block of the inverse.
 
 use std::str::FromStr;
 

@@ -1,8 +1,9 @@
 //! Fisher information: what an episode tells about the unknowns.
 //!
-//! [`FisherBatch`] plays episodes with their information; [`Information`] adds it up and scores it;
-//! [`expected`] is the deviation that an identification should reach, from fits of the readings over a
-//! region ([`local_fit`], [`precision`]); [`inert`] tells unknowns that change no reading.
+//! [`FisherBatch`] plays episodes with their information, as [`FisherSettings`] say; [`Information`]
+//! adds it up and scores it; [`expected`] is the deviation that an identification should reach, from
+//! fits of the readings over a region ([`local_fit`], [`precision`]); [`inert`] tells unknowns that
+//! change no reading.
 
 mod batch;
 mod eigen;
@@ -11,7 +12,10 @@ pub mod inert;
 mod information;
 pub mod local_fit;
 pub mod precision;
+mod sensitivity;
+mod settings;
 
-pub use batch::{FisherBatch, FisherSettings, Form};
+pub use batch::FisherBatch;
 pub use eigen::symmetric_eigen;
 pub use information::{Information, Objective, TRACE_CLIP, inverse_above_prior};
+pub use settings::{FisherSettings, Form};

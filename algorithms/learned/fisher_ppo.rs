@@ -1,5 +1,9 @@
 //! The Fisher objective with PPO: a policy that reacts to what it sees.
 //!
+//! The reward of a step is what it adds to the information about the unknowns,
+//! [`Information::reward`](asid_algorithms::fisher::Information::reward). It comes by way of
+//! [`FisherEnvironment`](asid_algorithms::explore::FisherEnvironment), in which the crate `asid-nn` trains.
+//!
 //! It is trained once, over start poses and unknowns drawn anew for every episode
 //! (domain randomisation), and then plays any episode without a search. In the real
 //! world the information gathered so far, part of its observation, is that of a

@@ -3,8 +3,8 @@
 //! On the command: [`command`], [`delay`], [`hysteresis`], [`supply`]. Of servos: [`servo`]. Between a drive and
 //! its joint: [`backlash`], [`compliance`]. At a joint: [`joint_friction`], [`joint_force`], [`rotor`]. On bodies:
 //! [`mass`], [`payload`], [`body_force`], [`gravity`]. In contacts: [`contact_friction`], [`friction_field`], [`contact_softness`]. On
-//! readings: [`sensor`], [`sensor_dynamics`]. A new family is a file here and its `mod` line; modules that are not public
-//! hold what several families share.
+//! readings: [`sensor`], [`sensor_dynamics`]. A new family is a file here and its `mod` line
+//! (docs/add-an-effect.md has what else it needs); modules that are not public hold what several families share.
 //!
 //! Where the engine has the same physics (damping and rotor inertia of a joint, friction
 //! and softness of contacts, masses, gravity) an effect changes the engine's own parameter, which is

@@ -1,10 +1,10 @@
-//! What two series say of each other: a command and the position that follows it, a speed and the way that it makes.
+//! What two series say of each other: a command and the position that follows it, a speed and the displacement that it makes.
 
 use crate::series::Series;
 
 /// Times at which two series are compared.
 const SAMPLES: usize = 400;
-/// Windows over which ways are compared with speeds: some tenths of a second in usual logs.
+/// Windows over which displacements are compared with speeds: some tenths of a second in usual logs.
 const WINDOWS: usize = 120;
 /// Fewest common samples that say anything.
 const FEWEST: usize = 12;
@@ -68,23 +68,23 @@ fn of_pairs(pairs: &[(f64, f64)]) -> f64 {
     }
 }
 
-/// Factor that turns a speed into the speed of a position, and how surely (correlation of ways, -1 to 1). The ways that
-/// the position goes in short windows are compared with the integral of the speed, which noise hardly touches.
+/// Factor that turns a speed into the speed of a position, and how surely (correlation of displacements, -1 to 1). The
+/// displacements of the position in short windows are compared with the integral of the speed, which noise hardly touches.
 #[must_use]
 pub fn speed_factor(speed: &Series, position: &Series) -> Option<(f64, f64)> {
     let ends = shared(speed, position, WINDOWS + 1);
-    let ways: Vec<(f64, f64)> = ends
+    let displacements: Vec<(f64, f64)> = ends
         .windows(2)
         .filter_map(|w| {
-            let way = at(position, w[1])? - at(position, w[0])?;
-            Some((integral(speed, w[0], w[1])?, way))
+            let displacement = at(position, w[1])? - at(position, w[0])?;
+            Some((integral(speed, w[0], w[1])?, displacement))
         })
         .collect();
-    let sure = of_pairs(&ways);
-    let (xx, xy) = ways
+    let sure = of_pairs(&displacements);
+    let (xx, xy) = displacements
         .iter()
         .fold((0.0, 0.0), |(xx, xy), (a, b)| (xx + a * a, xy + a * b));
-    (xx > 0.0 && ways.len() >= FEWEST).then(|| (xy / xx, sure))
+    (xx > 0.0 && displacements.len() >= FEWEST).then(|| (xy / xx, sure))
 }
 
 /// Integral of a series between two times, by trapezoids at its own samples.
@@ -116,7 +116,7 @@ mod tests {
     }
 
     #[test]
-    fn a_speed_in_degrees_and_the_other_way_is_seen_by_the_way_that_it_makes() {
+    fn a_speed_in_degrees_and_the_other_way_is_seen_by_the_displacement_that_it_makes() {
         let position = sampled(100.0, 0.0, |t| (3.0 * t).sin());
         let speed = sampled(73.0, 0.002, |t| -(3.0 * (3.0 * t).cos()).to_degrees());
         let (factor, sure) = speed_factor(&speed, &position).unwrap();

@@ -134,7 +134,7 @@ fn features_of_lerobot_are_in_degrees_and_the_gripper_in_parts_of_its_range() {
 }
 
 #[test]
-fn columns_of_a_script_are_told_by_words_units_and_the_way_that_they_make() {
+fn columns_of_a_script_are_told_by_words_units_and_the_displacement_that_they_make() {
     let degrees = |j: usize| move |t: f64| motion(j, t).to_degrees();
     let turned = |t: f64| -((motion(0, t + 1e-5) - motion(0, t - 1e-5)) / 2e-5).to_degrees();
     let all = vec![

@@ -1,4 +1,11 @@
-//! The unit of a column: what its name says, what its stack writes, what its values allow.
+//! The unit of a column. The first of these that says something decides:
+//!
+//! 1. its name, such as `elbow_deg`;
+//! 2. its stack: positions of LeRobot are degrees or shares of a range, and ROS writes SI;
+//! 3. its values: the first usual unit in which a position lies within the range of the model.
+//!
+//! A speed without a named unit passes for SI here. Its position settles it later, in
+//! [`match_speed`](super::speed::match_speed).
 
 use super::quantity::{Dimension, Quantity};
 use super::words::{Measure, Words};

@@ -4,23 +4,23 @@
 //! A pair with `condim` 4 or 6 resists spinning about its normal with at most
 //! `friction[1] * N`, one with 6 also rolling with at most `friction[2] * N` (N m,
 //! for a normal force N). It is applied as a pair of torques in the following
-//! step, from this step's normal force: proportional to the relative rotation up
-//! to what would just stop it, with a slow integral part so that a body at rest on
-//! a slope stays there without creeping, and the whole clamped to its bound. The
+//! step, from this step's normal force: proportional to the relative angular
+//! velocity up to what would just stop it, with a slow integral part so that a body
+//! at rest on a slope stays there without creeping, and the whole clamped to its bound. The
 //! bounds of sliding, spinning and rolling are independent, where MuJoCo's
 //! elliptic cone joins them.
 
 use rapier3d::dynamics::RigidBody;
-use rapier3d::geometry::{ColliderSet, NarrowPhase};
+use rapier3d::geometry::{ColliderSet, ContactPair, NarrowPhase};
 use rapier3d::math::Vector;
 use rapier3d::utils::AngularInertiaOps;
 
 use crate::pairs::{Friction, PairTable};
 
-/// Part of a relative rotation that one step takes out.
+/// Part of a relative angular velocity that one step takes out.
 const STOPPING: f32 = 0.7;
 
-/// Part of a relative rotation whose stopping torque is remembered.
+/// Part of a relative angular velocity whose stopping torque is remembered.
 const HOLDING: f32 = 0.1;
 
 /// Normal force between the geoms of two bodies in the last step, N.
@@ -87,7 +87,7 @@ impl Resistance {
         dt: f32,
         torques: &mut Vec<(usize, Vector)>,
     ) {
-        if !table.resists() {
+        if !table.has_rolling_or_spinning_friction() {
             return;
         }
         let Touching {
@@ -112,56 +112,75 @@ impl Resistance {
             if condim < 4 {
                 continue;
             }
-            let (mut load, mut normal) = (0.0, Vector::ZERO);
-            for manifold in pair.manifolds() {
-                let impulse: f32 = manifold.points.iter().map(|p| p.data.impulse).sum();
-                load += impulse / dt;
-                normal += manifold.data.normal * impulse;
-            }
+            let (load, normal) = pressing(pair, dt);
             if load <= 0.0 {
                 continue;
             }
-            let normal = normal.normalize_or_zero();
+            let rolling = if condim >= 6 { mu[2] } else { 0.0 };
             let (first, second) = (body_of[a], body_of[b]);
-            let relative = angular_velocity(second) - angular_velocity(first);
             let key = (a as u32, b as u32);
-            let held = self
-                .before
-                .iter()
-                .find(|h| h.pair == key)
-                .map_or(Vector::ZERO, |h| h.torque);
-            let spin = normal * relative.dot(normal);
-            let parts = [
-                (spin, normal * held.dot(normal), mu[1]),
-                (
-                    relative - spin,
-                    held - normal * held.dot(normal),
-                    if condim >= 6 { mu[2] } else { 0.0 },
-                ),
-            ];
-            let mut keep = Vector::ZERO;
-            for (rate, held, coefficient) in parts {
-                let bound = coefficient * load;
-                let direction = rate.normalize_or_zero();
-                let inverse =
-                    inverse_inertia(first, direction) + inverse_inertia(second, direction);
-                let stop = if inverse > 0.0 {
-                    rate / (inverse * dt)
-                } else {
-                    Vector::ZERO
-                };
-                let wanted = held - stop * STOPPING;
-                let torque = wanted.clamp_length_max(bound);
-                let sliding = torque != wanted;
-                let next = if sliding { held } else { held - stop * HOLDING };
-                keep += next.clamp_length_max(bound);
+            let before = self.before.iter().find(|h| h.pair == key);
+            let turning = Turning {
+                normal,
+                relative: angular_velocity(second) - angular_velocity(first),
+                bounds: [mu[1] * load, rolling * load],
+                held: before.map_or(Vector::ZERO, |h| h.torque),
+            };
+            let both = |axis| inverse_inertia(first, axis) + inverse_inertia(second, axis);
+            let (resisting, torque) = turning.resist(both, dt);
+            for torque in resisting {
                 torques.push((second, torque));
                 torques.push((first, -torque));
             }
-            self.held.push(Held {
-                pair: key,
-                torque: keep,
-            });
+            self.held.push(Held { pair: key, torque });
         }
+    }
+}
+
+/// Normal force between two shapes in the last step, N, and its direction.
+fn pressing(pair: &ContactPair, dt: f32) -> (f32, Vector) {
+    let (mut load, mut normal) = (0.0, Vector::ZERO);
+    for manifold in pair.manifolds() {
+        let impulse: f32 = manifold.points.iter().map(|p| p.data.impulse).sum();
+        load += impulse / dt;
+        normal += manifold.data.normal * impulse;
+    }
+    (load, normal.normalize_or_zero())
+}
+
+/// A contact whose bodies turn against each other.
+struct Turning {
+    /// Direction of the normal force.
+    normal: Vector,
+    /// Angular velocity of the second body relative to the first, rad/s.
+    relative: Vector,
+    /// Largest torques against spinning and against rolling, N m.
+    bounds: [f32; 2],
+    /// Torque that is remembered, N m.
+    held: Vector,
+}
+
+impl Turning {
+    /// The law of one contact: the torques on the second body against spinning and against rolling, and the torque
+    /// to remember, N m. `inverse_inertia` is that of both bodies together about an axis, 1/(kg m²).
+    fn resist(&self, inverse_inertia: impl Fn(Vector) -> f32, dt: f32) -> ([Vector; 2], Vector) {
+        let spin = self.normal * self.relative.dot(self.normal);
+        let twist = self.normal * self.held.dot(self.normal);
+        let parts = [(spin, twist), (self.relative - spin, self.held - twist)];
+        let (mut torques, mut keep) = ([Vector::ZERO; 2], Vector::ZERO);
+        for (i, (rate, held)) in parts.into_iter().enumerate() {
+            let inverse = inverse_inertia(rate.normalize_or_zero());
+            let stop = if inverse > 0.0 {
+                rate / (inverse * dt)
+            } else {
+                Vector::ZERO
+            };
+            let wanted = held - stop * STOPPING;
+            torques[i] = wanted.clamp_length_max(self.bounds[i]);
+            let sliding = torques[i] != wanted;
+            let next = if sliding { held } else { held - stop * HOLDING };
+            keep += next.clamp_length_max(self.bounds[i]);
+        }
+        (torques, keep)
     }
 }

@@ -1,4 +1,4 @@
-//! Who meets whom, and with what friction.
+//! Which pairs of geoms can collide, and the friction of each pair.
 //!
 //! The rules are MuJoCo's: contact bits in either direction, excluded and explicit
 //! pairs, no contact between a body and its parent; the elementwise larger
@@ -16,15 +16,34 @@ const NEW_CONTACT: u32 = 1 << 31;
 /// Friction of one geom: sliding, torsional (m), rolling (m).
 pub type Friction = [f32; 3];
 
+/// Which geom of a pair rules its friction.
+#[derive(Clone, Copy, Debug)]
+enum Ruling {
+    /// The first one: it has the higher priority.
+    First,
+    /// The second one: it has the higher priority.
+    Second,
+    /// Both, by the elementwise larger friction: their priorities are equal.
+    Both,
+}
+
 /// What the document says about the contact of a pair of geoms.
 #[derive(Clone, Copy, Debug)]
 struct Pair {
-    meets: bool,
+    may_collide: bool,
     condim: u32,
-    /// 0 or 1 where one geom has the higher priority, 2 where they are equal.
-    wins: u8,
-    /// Friction of an explicit `<pair>`.
+    ruling: Ruling,
+    /// Friction of an explicit `<pair>`, which overrules that of both geoms.
     own: Option<Friction>,
+}
+
+/// What leaves the friction of a geom without effect.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Overruled {
+    /// The friction of an explicit `<pair>` with this geom.
+    ByPair(usize),
+    /// The higher priority of this geom.
+    ByPriority(usize),
 }
 
 /// The rules for every pair of geoms.
@@ -32,12 +51,12 @@ struct Pair {
 pub struct PairTable {
     geoms: usize,
     pairs: Vec<Pair>,
-    resists: bool,
+    has_rolling_or_spinning_friction: bool,
 }
 
 impl PairTable {
     /// Reads the rules of a document: contact bits, excluded and explicit pairs,
-    /// and MuJoCo's rule that a body does not meet its parent (unless the world)
+    /// and MuJoCo's rule that a body does not collide with its parent (unless the world)
     /// or what it is welded to.
     ///
     /// # Errors
@@ -67,15 +86,15 @@ impl PairTable {
                 let (u, v) = (welded[p], welded[q]);
                 let family = (u != 0 && u == parent_group(q)) || (v != 0 && v == parent_group(p));
                 let apart = excluded.contains(&(p, q)) || excluded.contains(&(q, p));
-                let (condim, wins) = match a.priority.cmp(&b.priority) {
-                    std::cmp::Ordering::Greater => (a.condim, 0),
-                    std::cmp::Ordering::Less => (b.condim, 1),
-                    std::cmp::Ordering::Equal => (a.condim.max(b.condim), 2),
+                let (condim, ruling) = match a.priority.cmp(&b.priority) {
+                    std::cmp::Ordering::Greater => (a.condim, Ruling::First),
+                    std::cmp::Ordering::Less => (b.condim, Ruling::Second),
+                    std::cmp::Ordering::Equal => (a.condim.max(b.condim), Ruling::Both),
                 };
                 pairs.push(Pair {
-                    meets: bits && u != v && !family && !apart,
+                    may_collide: bits && u != v && !family && !apart,
                     condim,
-                    wins,
+                    ruling,
                     own: None,
                 });
             }
@@ -89,16 +108,16 @@ impl PairTable {
         for pair in &model.contact.pairs {
             let (i, j) = (index(&pair.geom1)?, index(&pair.geom2)?);
             for at in [i * n + j, j * n + i] {
-                pairs[at].meets = true;
+                pairs[at].may_collide = true;
                 pairs[at].condim = pair.condim.unwrap_or(pairs[at].condim);
                 pairs[at].own = pair.friction.map(|f| f.map(|x| x as f32));
             }
         }
-        let resists = pairs.iter().any(|p| p.meets && p.condim >= 4);
+        let turning = |p: &Pair| p.may_collide && p.condim >= 4;
         Ok(Self {
             geoms: n,
+            has_rolling_or_spinning_friction: pairs.iter().any(turning),
             pairs,
-            resists,
         })
     }
 
@@ -107,18 +126,35 @@ impl PairTable {
     }
 
     /// True where some pair resists rolling or spinning.
-    pub fn resists(&self) -> bool {
-        self.resists
+    pub fn has_rolling_or_spinning_friction(&self) -> bool {
+        self.has_rolling_or_spinning_friction
+    }
+
+    /// What overrules the friction of a geom in all the contacts that it can make; `None` where it counts in some, or
+    /// where the geom can touch nothing.
+    pub fn overruled(&self, geom: usize) -> Option<Overruled> {
+        let mut by = None;
+        let touched = (0..self.geoms).filter(|&other| self.pair(geom, other).may_collide);
+        for other in touched {
+            let pair = self.pair(geom, other);
+            let found = match (pair.own, pair.ruling) {
+                (Some(_), _) => Overruled::ByPair(other),
+                (None, Ruling::Second) => Overruled::ByPriority(other),
+                (None, Ruling::First | Ruling::Both) => return None,
+            };
+            by = by.or(Some(found));
+        }
+        by
     }
 
     /// Friction and `condim` of a pair of geoms.
     pub fn friction(&self, friction: &[Friction], a: usize, b: usize) -> (Friction, u32) {
         let pair = self.pair(a, b);
-        let value = match (pair.own, pair.wins) {
+        let value = match (pair.own, pair.ruling) {
             (Some(own), _) => own,
-            (None, 0) => friction[a],
-            (None, 1) => friction[b],
-            _ => std::array::from_fn(|i| friction[a][i].max(friction[b][i])),
+            (None, Ruling::First) => friction[a],
+            (None, Ruling::Second) => friction[b],
+            (None, Ruling::Both) => std::array::from_fn(|i| friction[a][i].max(friction[b][i])),
         };
         (value, pair.condim)
     }
@@ -158,7 +194,7 @@ impl PhysicsHooks for Hooks<'_> {
         let b = context.colliders[context.collider2].user_data as usize;
         self.table
             .pair(a, b)
-            .meets
+            .may_collide
             .then_some(SolverFlags::COMPUTE_RIGID_IMPULSES)
     }
 

@@ -1,8 +1,8 @@
-//! Parameters: what a target is in this engine, its value, and setting it.
+//! Parameters: what a target is in this engine ([`resolve`]), its value, and setting it.
 
-use asid_core::layout::{JointKind, Layout};
+mod resolve;
+
 use asid_core::{Error, Result, Target};
-use mjcf_rs::extras::ActuatorKind;
 
 use crate::compiled::Compiled;
 use crate::tables::Tables;
@@ -49,140 +49,7 @@ fn bad(target: &Target, message: impl Into<String>) -> Error {
     }
 }
 
-fn find<'a>(
-    target: &Target,
-    kind: &'static str,
-    names: impl Iterator<Item = &'a str> + Clone,
-) -> Result<usize> {
-    names.clone().position(|n| n == target.name).ok_or_else(|| {
-        bad(
-            target,
-            Error::unknown(kind, &target.name, names).to_string(),
-        )
-    })
-}
-
 impl ParameterSlot {
-    /// Resolves a target.
-    ///
-    /// # Errors
-    /// [`Error::Parameter`] where the scene has no such thing or setting it
-    /// changes nothing, [`Error::Incapable`] where this engine cannot.
-    pub fn resolve(target: &Target, compiled: &Compiled) -> Result<Self> {
-        let layout: &Layout = &compiled.layout;
-        let (attribute, i) = (target.attribute.as_str(), target.index);
-        let slot = match target.element.as_str() {
-            "option" if attribute == "gravity" => Self::Gravity(i),
-            "geom" => {
-                let geom = find(target, "geom", layout.geoms.iter().map(String::as_str))?;
-                let body = compiled.body_of_geom[geom];
-                let follows = body != 0 && compiled.masses.follows_geoms(body);
-                match attribute {
-                    "friction" if compiled.colliders[geom].is_none() => {
-                        return Err(bad(target, "the geom takes part in no contact"));
-                    }
-                    "friction" => Self::GeomFriction(geom, i),
-                    "pos" if !follows && compiled.colliders[geom].is_none() => {
-                        return Err(bad(target, "the geom has neither mass nor contact"));
-                    }
-                    "pos" => Self::GeomPosition(geom, i),
-                    "mass" if !compiled.masses.is_primitive(geom) => {
-                        return Err(bad(target, "the geom is no primitive with a mass"));
-                    }
-                    "mass" if !follows => {
-                        return Err(bad(
-                            target,
-                            "the body's mass comes from its <inertial> and not from its geoms",
-                        ));
-                    }
-                    "mass" => Self::GeomMass(geom),
-                    "solref" | "solimp" => {
-                        return Err(Error::Incapable {
-                            backend: "rapier".into(),
-                            what: format!(
-                                "set `{target}`: its contacts are equally stiff everywhere"
-                            ),
-                        });
-                    }
-                    _ => return Err(unknown(target, "friction, pos, mass")),
-                }
-            }
-            "body" => {
-                let body = find(target, "body", layout.bodies.iter().map(String::as_str))?;
-                if body == 0 {
-                    return Err(bad(target, "the world has no mass"));
-                }
-                match attribute {
-                    "mass" => Self::BodyMass(body),
-                    "ipos" => Self::BodyCenter(body, i),
-                    "inertia" => Self::BodyInertia(body, i),
-                    _ => return Err(unknown(target, "mass, ipos, inertia")),
-                }
-            }
-            "joint" => {
-                let names = layout.joints.iter().map(|j| j.name.as_str());
-                let joint = find(target, "joint", names)?;
-                let slot = &compiled.joints[joint];
-                if slot.handle.is_none() {
-                    return Err(incapable_of(target, "a free joint"));
-                }
-                let alone = layout.joints.len()
-                    == 1 + (compiled.joints.iter().enumerate())
-                        .filter(|&(i, j)| i != joint && j.body != slot.body)
-                        .count();
-                match attribute {
-                    "pos" if slot.kind != JointKind::Hinge => {
-                        return Err(bad(target, "only the anchor of a hinge can be changed"));
-                    }
-                    "pos" if !alone => {
-                        return Err(incapable_of(target, "a body with several joints"));
-                    }
-                    "pos" => Self::Anchor(joint, i),
-                    "damping" => Self::Damping(joint),
-                    "frictionloss" => Self::Frictionloss(joint),
-                    "stiffness" if slot.kind.qvel_len() > 1 => {
-                        return Err(incapable_of(target, "a ball joint"));
-                    }
-                    "stiffness" => Self::Stiffness(joint),
-                    "armature" => Self::Armature(joint),
-                    _ => {
-                        return Err(unknown(
-                            target,
-                            "pos, damping, frictionloss, stiffness, armature",
-                        ));
-                    }
-                }
-            }
-            "actuator" => {
-                let names = layout.actuators.iter().map(|a| a.name.as_str());
-                let actuator = find(target, "actuator", names)?;
-                match (attribute, compiled.actuators[actuator].kind) {
-                    ("kp", ActuatorKind::Position) => Self::PositionGain(actuator),
-                    ("kv", ActuatorKind::Position | ActuatorKind::Velocity) => {
-                        Self::VelocityGain(actuator)
-                    }
-                    ("gear", _) => Self::Gear(actuator),
-                    ("kp" | "kv", _) => return Err(bad(target, "this actuator has no such gain")),
-                    _ => return Err(unknown(target, "kp, kv, gear")),
-                }
-            }
-            _ => return Err(bad(target, "this engine has no such parameter")),
-        };
-        let entries = match slot {
-            Self::GeomFriction(..)
-            | Self::GeomPosition(..)
-            | Self::Anchor(..)
-            | Self::BodyCenter(..)
-            | Self::BodyInertia(..)
-            | Self::Gravity(_) => 3,
-            _ => 1,
-        };
-        if i >= entries {
-            return Err(bad(target, format!("index {i} is out of 0..{entries}")));
-        }
-        Ok(slot)
-    }
-
     /// Its value.
     pub fn get(self, tables: &Tables, compiled: &Compiled) -> f64 {
         let inertia = |body| compiled.masses.inertia(body, &tables.structure);
@@ -270,22 +137,5 @@ impl ParameterSlot {
             _ => {}
         }
         Ok(())
-    }
-}
-
-fn unknown(target: &Target, known: &str) -> Error {
-    bad(
-        target,
-        format!(
-            "`{}` of a {} is not a parameter; known: {known}",
-            target.attribute, target.element
-        ),
-    )
-}
-
-fn incapable_of(target: &Target, what: &str) -> Error {
-    Error::Incapable {
-        backend: "rapier".into(),
-        what: format!("set `{target}`: it is that of {what}"),
     }
 }

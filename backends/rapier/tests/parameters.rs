@@ -197,3 +197,37 @@ fn targets_that_make_no_sense_are_refused() {
         assert!(error.to_string().contains("geom/crate/mass"), "{error}");
     }
 }
+
+#[test]
+fn a_friction_that_never_counts_is_refused() {
+    let target: Target = "geom/crate/friction/0".parse().unwrap();
+    let nominal = |inside: &str| Rapier.load(&scene(inside)).unwrap().nominal(&target);
+    let refused = |inside: &str, says: [&str; 2]| {
+        let error = nominal(inside).unwrap_err().to_string();
+        let whole =
+            error.contains("geom/crate/friction/0") && says.iter().all(|s| error.contains(s));
+        assert!(whole && error.lines().count() == 1, "{error}");
+    };
+    // A pair with the floor leaves the crate's own friction to the ball.
+    let pair =
+        r#"<contact><pair geom1="floor" geom2="crate" friction="0.5 0.5 0.1 0.1 0.1"/></contact>"#;
+    let paired = format!("{SCENE}{pair}");
+    assert!(nominal(&paired).is_ok());
+    // Without contact bits the crate touches the floor alone, by the pair.
+    let own = r#"<geom name="crate" "#;
+    let ghost = format!(r#"{own}contype="0" conaffinity="0" "#);
+    let alone = paired.replace(own, &ghost);
+    refused(&alone, ["<pair>", "`floor`"]);
+    // A pair without a friction leaves that to its geoms.
+    let plain = alone.replace(r#" friction="0.5 0.5 0.1 0.1 0.1""#, "");
+    assert!(nominal(&plain).is_ok());
+    // All others rule the crate; with one fewer its friction counts.
+    let others = SCENE.replace("<geom ", r#"<geom priority="1" "#);
+    let others = others.replace(
+        r#"<geom priority="1" name="crate""#,
+        r#"<geom name="crate""#,
+    );
+    refused(&others, ["higher priority", "`floor`"]);
+    let equal = others.replace(r#"<geom priority="1" name="ball""#, r#"<geom name="ball""#);
+    assert!(nominal(&equal).is_ok());
+}

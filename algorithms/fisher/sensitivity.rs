@@ -1,0 +1,73 @@
+//! The derivative of one reading, from the copies of an episode.
+//!
+//! Each entry (an unknown, or a coordinate of the start pose) has two copies: one with the entry a little up, one
+//! with it a little down. The difference of their readings over that of the entry is one column of the Jacobian.
+//! It is divided by the noise, that of the trackers plus, of some entries, the square of what the reading deviates
+//! from a straight line over the copies.
+
+use asid_core::signal::SignalSet;
+
+/// Turns the readings of an episode and its copies into whitened Jacobians.
+pub struct Sensitivity {
+    signals: SignalSet,
+    /// Of each entry, whether its deviation from a straight line counts as noise.
+    rough: Vec<bool>,
+    jacobian: Vec<f64>,
+    difference: Vec<f64>,
+    below: Vec<f64>,
+    noise: Vec<f64>,
+}
+
+impl Sensitivity {
+    /// Sensitivities of these signals to one entry for each of `rough`, which tells of which entries the deviation
+    /// from a straight line counts as noise.
+    pub fn new(signals: SignalSet, rough: Vec<bool>) -> Self {
+        let rows = signals.whitened_len();
+        Self {
+            signals,
+            jacobian: vec![0.0; rough.len() * rows],
+            rough,
+            difference: vec![0.0; rows],
+            below: vec![0.0; rows],
+            noise: vec![1.0; rows],
+        }
+    }
+
+    /// Numbers of a whitened reading: the rows of a Jacobian.
+    pub fn rows(&self) -> usize {
+        self.signals.whitened_len()
+    }
+
+    /// The whitened Jacobian of a reading, one column an entry, one after the other.
+    ///
+    /// `reading` gives the row that was read of a copy: 0 is the episode itself, `1 + 2 i` has entry `i` up and
+    /// `2 + 2 i` has it down. `steps` are the differences of the entries between the two, prior-scaled.
+    pub fn jacobian<'r>(&mut self, reading: impl Fn(usize) -> &'r [f64], steps: &[f64]) -> &[f64] {
+        let rows = self.rows();
+        self.noise.fill(1.0);
+        for (entry, step) in steps.iter().enumerate() {
+            let (up, down) = (reading(1 + 2 * entry), reading(2 + 2 * entry));
+            self.signals.difference(up, down, &mut self.difference);
+            for k in 0..rows {
+                self.jacobian[entry * rows + k] = self.difference[k] / step;
+            }
+            if self.rough[entry] {
+                // up + down - 2 middle: nothing on a straight line, luck and curvature otherwise.
+                let middle = reading(0);
+                self.signals.difference(up, middle, &mut self.difference);
+                self.signals.difference(middle, down, &mut self.below);
+                for (noise, (a, b)) in self
+                    .noise
+                    .iter_mut()
+                    .zip(self.difference.iter().zip(&self.below))
+                {
+                    *noise += (0.5 * (a - b)).powi(2);
+                }
+            }
+        }
+        for (i, j) in self.jacobian.iter_mut().enumerate() {
+            *j /= self.noise[i % rows].sqrt();
+        }
+        &self.jacobian
+    }
+}
