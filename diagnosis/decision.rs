@@ -183,7 +183,10 @@ pub fn decide(evidence: &Evidence, rules: &Rules) -> Judgement {
         })
         .collect();
     let mut judgement = Judgement::of(all, (best, ambiguous), (unknown, rest));
-    let found = judgement.best_explanation().found.map(|i| &evidence.tried[i]);
+    let found = judgement
+        .best_explanation()
+        .found
+        .map(|i| &evidence.tried[i]);
     let replayed = found.map_or(evidence.none, |t| t.replayed);
     let untried = untried(evidence, found, rules);
     let shown = (replayed.held_out - own_error(evidence), evidence.stopped);
@@ -284,7 +287,10 @@ mod tests {
         let steps = tried(&["sensor-quantization@q"], 1, 800.0, 1.0);
         let mut e = evidence(1.01, vec![steps], 1.0);
         (e.found, e.known) = (None, Some(0));
-        assert_eq!(decided(&e).best_explanation().labels, ["sensor-quantization@q"]);
+        assert_eq!(
+            decided(&e).best_explanation().labels,
+            ["sensor-quantization@q"]
+        );
     }
 
     #[test]

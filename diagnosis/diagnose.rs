@@ -83,12 +83,15 @@ pub struct Diagnosis {
     pub values: Vec<f64>,
 }
 
-/// Gap in units of the noise that a verdict upon mended wiring leaves from which on the wiring is doubted: whole wiring and a
-/// named effect leave the noise, wrong wiring cannot be made up for by any.
+/// Gap in units of the noise from which on a verdict leaves so much that the other way to take the wiring is tried as well: the right
+/// wiring and the right effect leave the noise.
 const DOUBTFUL: f64 = 2.0;
+/// Share of the gap that the other way must leave at most to stand: each way estimates the noise for itself, and a tenth of it is chance.
+const BETTER: f64 = 0.8;
 
 /// Diagnoses a study on a machine, with outliers left out of its logs and its wiring mended. Where an effect can look like what
-/// was mended and a gap is left all the same, the wiring as given is diagnosed too, and what leaves less stands.
+/// was mended, and a gap is left all the same, the wiring is taken the other way too, and what leaves less stands. The way
+/// that is more probable beforehand comes first.
 ///
 /// # Errors
 /// When a parameter cannot be set or a rollout fails.
@@ -101,23 +104,23 @@ pub fn diagnose(
     progress.begin("looking at the logs", 1);
     let mut intake = Intake::of(study, &machine)?;
     progress.end();
-    let again = intake
-        .doubted()
-        .map(|_| (machine.clone(), settings.clone()));
+    let (first, second) = intake.ways();
+    let again = second.map(|_| (machine.clone(), settings.clone()));
     let rehearsed = (settings.calibrate).then(|| (machine.clone(), settings.clone()));
-    let (mut diagnosis, mut work) = diagnose_physics(&intake.study, machine, settings, progress)?;
+    let (mut diagnosis, mut work) = diagnose_physics(first, machine, settings, progress)?;
     let left = diagnosis.result.gap.refined;
-    if let (Some((machine, settings)), Some(as_given)) = (again, intake.doubted())
+    if let (Some((machine, settings)), Some(second)) = (again, second)
         && left > DOUBTFUL
         && !progress.is_stopped()
     {
-        progress.note("the wiring as given");
-        let other = diagnose_physics(as_given, machine, settings, progress)?;
-        if other.0.result.gap.refined < left {
+        progress.note("the wiring taken the other way");
+        let other = diagnose_physics(second, machine, settings, progress)?;
+        if other.0.result.gap.refined < BETTER * left {
             (diagnosis, work) = other;
-            intake.take_as_given();
+            intake.turn();
         }
     }
+    intake.settle();
     let (bench, point) = (&work.bench, &work.findings.none.fit.point);
     let residuals = plain_residuals(bench, &bench.train, &[], point)?;
     let whiteness = crate::checks::whiteness(&bench.train.logs, &residuals);

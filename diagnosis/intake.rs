@@ -2,8 +2,11 @@
 
 use asid_core::Result;
 
+use crate::fit::cost;
 use crate::machine::Machine;
 use crate::outliers::{self, LeftOut};
+use crate::predict::Point;
+use crate::prepare::{dataset, set_reading_noise};
 use crate::result::{CheckResult, DiagnosisResult, WiringResult};
 use crate::study::Study;
 use crate::wiring::{self, Settings};
@@ -12,13 +15,19 @@ use crate::wiring::{self, Settings};
 /// does. Nothing looks like a sign, a unit or a swap.
 const IMITABLE: [&str; 2] = ["wiring-clock", "wiring-offset"];
 
+/// Share of the gap's power, in replays of the model as given, that is left once such a fault is mended, from which on the wiring as given
+/// is the more probable: what is left is then as large as the fault, and may be the cause of both.
+const HALF: f64 = 0.5;
+
 /// A study whose logs are ready for a diagnosis.
 pub struct Intake {
-    /// The study, with outliers left out of its logs and its wiring mended.
+    /// The study, with outliers left out of its logs and its wiring as it is taken.
     pub study: Study,
-    /// The same without mended wiring, where all that was mended is of a kind that physics can look like.
-    doubted: Option<Study>,
-    /// Faults of wiring that were mended.
+    /// The other way to take the wiring, where an effect can look like all that was mended.
+    other: Option<Study>,
+    /// Whether the wiring of `study` is the mended one.
+    is_mended: bool,
+    /// Faults of wiring that can be mended.
     wiring: Vec<WiringResult>,
     left_out: Vec<LeftOut>,
 }
@@ -35,33 +44,53 @@ impl Intake {
             let mut logs: Vec<_> = logs.map(|(_, e)| e).collect();
             outliers::leave_out(&mut logs, &machine.plant.layout)
         };
-        let (mut wiring, mut doubted) = (Vec::new(), None);
-        if !study.wired {
-            let mended = wiring::mend(&study, machine, &Settings::default())?;
-            let imitable = |w: &WiringResult| IMITABLE.contains(&&*w.fault);
-            if !mended.wiring.is_empty() && mended.wiring.iter().all(imitable) {
-                doubted = Some(study);
-            }
-            (study, wiring) = (mended.study, mended.wiring);
-        }
-        Ok(Self {
+        let mut intake = Self {
             study,
-            doubted,
-            wiring,
+            other: None,
+            is_mended: false,
+            wiring: Vec::new(),
             left_out,
-        })
+        };
+        if intake.study.wired {
+            return Ok(intake);
+        }
+        let mended = wiring::mend(&intake.study, machine, &Settings::default())?;
+        if mended.wiring.is_empty() {
+            return Ok(intake);
+        }
+        let imitable = |w: &WiringResult| IMITABLE.contains(&&*w.fault);
+        let doubted = mended.wiring.iter().all(imitable);
+        let as_given = std::mem::replace(&mut intake.study, mended.study);
+        (intake.wiring, intake.is_mended) = (mended.wiring, true);
+        if doubted {
+            let power = |s: &Study| open_loop_power(s, machine);
+            let is_most = power(&intake.study)? < HALF * power(&as_given)?;
+            intake.other = Some(as_given);
+            if !is_most {
+                intake.turn();
+            }
+        }
+        Ok(intake)
     }
 
-    /// The study with its wiring as given, where an effect can look like what was mended.
+    /// The study, and the other way to take its wiring where there is one.
     #[must_use]
-    pub fn doubted(&self) -> Option<&Study> {
-        self.doubted.as_ref()
+    pub fn ways(&self) -> (&Study, Option<&Study>) {
+        (&self.study, self.other.as_ref())
     }
 
-    /// Goes on with the wiring as given.
-    pub fn take_as_given(&mut self) {
-        if let Some(study) = self.doubted.take() {
-            self.study = study;
+    /// Takes the wiring the other way.
+    pub fn turn(&mut self) {
+        if let Some(other) = &mut self.other {
+            std::mem::swap(&mut self.study, other);
+            self.is_mended = !self.is_mended;
+        }
+    }
+
+    /// Stays with the way that the wiring is taken.
+    pub fn settle(&mut self) {
+        self.other = None;
+        if !self.is_mended {
             self.wiring.clear();
         }
     }
@@ -155,6 +184,19 @@ impl Intake {
             },
         })
     }
+}
+
+/// Mean square of what the model as given leaves of the training logs in replays, in units of the noise.
+fn open_loop_power(study: &Study, machine: &Machine) -> Result<f64> {
+    let (mut bench, theta) = dataset(study, machine.clone())?;
+    set_reading_noise(&mut bench, &study.noise);
+    let point = Point {
+        theta,
+        starts: bench.train.starts.clone(),
+    };
+    let mut predictor = bench.predictor(&[], &bench.train)?;
+    let residuals = predictor.residuals(&[point])?;
+    Ok(residuals.iter().map(|r| cost(r)).sum::<f64>() / bench.train.readings.max(1) as f64)
 }
 
 /// A fault of wiring in words.
