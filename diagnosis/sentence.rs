@@ -1,5 +1,7 @@
 //! The answer in one sentence.
 
+use asid_results::naming::grouped;
+
 use crate::result::{DiagnosisResult, Kind};
 
 /// Share of the gap from which on what is left beside a verdict is worth a word in the sentence.
@@ -80,7 +82,7 @@ pub fn sentence(result: &DiagnosisResult, labels: &[String], rest: Option<&str>)
                 String::new()
             } else {
                 let sets = result.verdict.ambiguous_with.iter();
-                let names: Vec<String> = sets.map(|s| s.join(" + ")).collect();
+                let names: Vec<String> = sets.map(|s| grouped(s).join(" + ")).collect();
                 format!(
                     " These data cannot tell it from {}.",
                     names.join(", nor from ")
@@ -88,14 +90,14 @@ pub fn sentence(result: &DiagnosisResult, labels: &[String], rest: Option<&str>)
             };
             format!(
                 "{place}{} explains {}.{}{ambiguous}",
-                result.verdict.effects.join(" with "),
+                grouped(&result.verdict.effects).join(" with "),
                 closed(),
                 beside(result)
             )
         }
         Kind::Unknown if result.gap.closed.is_some_and(|c| c > 0.5) => format!(
             "{place}{} explains {}, and what is left is more than an effect of the catalogue usually leaves: there is something else{}.",
-            labels.join(" with "),
+            grouped(labels).join(" with "),
             closed(),
             rest.map_or_else(String::new, |r| format!(": {r}"))
         ),
@@ -110,7 +112,7 @@ pub fn sentence(result: &DiagnosisResult, labels: &[String], rest: Option<&str>)
             if labels.is_empty() {
                 "no effect".into()
             } else {
-                labels.join(" with ")
+                grouped(labels).join(" with ")
             },
             closed()
         ),

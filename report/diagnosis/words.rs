@@ -1,13 +1,14 @@
 //! How sets of effects, probabilities and shares are told.
 
 use asid_results::diagnosis::{DiagnosisResult, EffectResult, HypothesisResult};
+use asid_results::naming::grouped;
 use asid_results::trace::DiagnosisTrace;
 
 use crate::number::{NOT_A_NUMBER, Precision, decimals, quantity, round, significant, unit_symbol};
 
-/// `a + b`.
+/// `a + b`, with the sites of one law together.
 pub(super) fn set(effects: &[String]) -> String {
-    effects.join(" + ")
+    grouped(effects).join(" + ")
 }
 
 /// A hypothesis by name, and what it says where that is not an effect's name.

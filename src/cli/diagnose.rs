@@ -17,6 +17,7 @@ use asid_effects::refined_model::RefinedModel;
 use asid_report::diagnosis::{page, real_world_lines};
 use asid_report::number::{Precision, round};
 use asid_results::diagnosis::{DiagnosisResult, NotTried, RealWorld};
+use asid_results::naming::grouped;
 use asid_results::trace::{DiagnosisTrace, NamedText};
 
 use super::failure;
@@ -320,7 +321,7 @@ fn lines(result: &DiagnosisResult, engine: &str, seconds: f64) -> Vec<String> {
         line(&format!(
             "  {:5.1} %  {}",
             100.0 * h.probability,
-            h.effects.join(" + ")
+            grouped(&h.effects).join(" + ")
         ));
     }
     for e in result
@@ -354,7 +355,7 @@ fn lines(result: &DiagnosisResult, engine: &str, seconds: f64) -> Vec<String> {
             let lacks = if r.effects.is_empty() {
                 "nothing".to_owned()
             } else {
-                r.effects.join(" + ")
+                grouped(&r.effects).join(" + ")
             };
             line(&format!(
                 "  lacking {lacks}: {} of {} right",

@@ -6,6 +6,7 @@ use asid::core::Progress;
 use asid::diagnosis::diagnose::{Diagnosis, Settings, diagnose};
 use asid::diagnosis::machine::Machine;
 use asid::diagnosis::study::Study;
+use asid::results::naming::grouped;
 
 use super::diagnosis_support::engine;
 use super::world::{Truth, write_study};
@@ -54,7 +55,7 @@ fn stopped_after_the_screening_it_ranks_what_was_screened_and_says_what_was_not_
     // The ranking is what the screening saw, in its order, but for the leader, which was linearised once more.
     let screened = r.ranking.iter().filter(|s| s.fitted.is_none());
     for (row, (name, gain)) in screened.zip(&table[1..]) {
-        assert_eq!(&row.effects.join(" + "), name);
+        assert_eq!(&grouped(&row.effects).join(" + "), name);
         assert_eq!(row.screened, Some(*gain));
     }
     assert!(table.windows(2).all(|w| w[0].1 >= w[1].1));

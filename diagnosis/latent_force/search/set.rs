@@ -2,6 +2,7 @@
 
 use asid_core::{Progress, Result};
 use asid_effects::Start;
+use asid_results::naming::grouped;
 
 use crate::candidate::Candidate;
 use crate::latent_force::columns::{Columns, Form};
@@ -154,7 +155,7 @@ pub(super) fn free_what_is_given(
 #[must_use]
 pub fn name_of(candidates: &[Candidate], set: &[usize]) -> String {
     let labels: Vec<String> = set.iter().map(|&c| candidates[c].label()).collect();
-    labels.join(" + ")
+    grouped(&labels).join(" + ")
 }
 
 /// The candidate that another one refines: the simpler law at the same site.

@@ -112,7 +112,7 @@ pub fn export(request: &Request<'_>) -> Result<()> {
         .count();
     writeln!(
         stdout,
-        "wrote {}: {} values, {whole} of {} effects as they are",
+        "wrote {}: {} values, {whole} of {} effects in full",
         result.file,
         written.values.len(),
         result.effects.len()

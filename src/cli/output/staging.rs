@@ -19,6 +19,9 @@ const PREFIX: &str = ".asid-";
 const LOCK: &str = "lock";
 const CONTENT: &str = "content";
 const MOVES: &str = "moves";
+/// What such a folder holds, in the order in which it is removed: the lock last, so that whatever a kill leaves of it [`clear`] knows for
+/// left over.
+const PARTS: [&str; 3] = [CONTENT, MOVES, LOCK];
 
 /// Attempts to make a folder: [`clear`] of another process may take it before it is locked.
 const ATTEMPTS: usize = 3;
@@ -81,8 +84,20 @@ impl Staging {
 
 impl Drop for Staging {
     fn drop(&mut self) {
-        let _ = fs::remove_dir_all(&self.root);
+        remove(&self.root, &PARTS);
     }
+}
+
+/// Removes some parts of a folder, and the folder if it is empty then. What cannot be removed stays.
+fn remove(root: &Path, parts: &[&str]) {
+    for part in parts.iter().map(|p| root.join(p)) {
+        let _ = if part.is_dir() {
+            fs::remove_dir_all(&part)
+        } else {
+            fs::remove_file(&part)
+        };
+    }
+    let _ = fs::remove_dir(root);
 }
 
 /// Removes from a folder what processes left that were killed while they wrote into it. What cannot be removed stays.
@@ -98,7 +113,7 @@ pub fn clear(folder: &Path) {
             continue;
         }
         undo_moves(folder, &root);
-        let _ = fs::remove_dir_all(&root);
+        remove(&root, &PARTS);
     }
 }
 
@@ -170,6 +185,25 @@ mod tests {
             let folder = killed_after(moved);
             clear(folder.path());
             assert_eq!(names(folder.path()), left, "killed after {moved}");
+        }
+    }
+
+    /// Symptom: every other run that was killed as it began left a folder for good. Cause: it was killed as it removed one, whose lock
+    /// was gone before its content, so that nobody took it for left over.
+    #[test]
+    fn a_removal_that_was_cut_short_is_ended() {
+        for removed in 0..=PARTS.len() {
+            let folder = killed_after(2);
+            remove(
+                &folder.path().join(format!("{PREFIX}dead")),
+                &PARTS[..removed],
+            );
+            clear(folder.path());
+            let left = names(folder.path());
+            assert!(
+                !left.iter().any(|n| n.starts_with(PREFIX)),
+                "{removed}: {left:?}"
+            );
         }
     }
 
