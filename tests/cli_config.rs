@@ -17,6 +17,13 @@ fn printed(place: &Workplace, arguments: &[&str]) -> String {
     String::from_utf8(output.stdout).unwrap()
 }
 
+/// Asserts that a page holds all of some texts.
+fn assert_tells(page: &str, texts: &[&str]) {
+    for told in texts {
+        assert!(page.contains(told), "`{told}` is not in\n{page}");
+    }
+}
+
 #[test]
 fn what_is_printed_for_a_task_is_read_back_as_the_same() {
     let place = Workplace::new();
@@ -35,15 +42,16 @@ fn settings_stand_under_their_meanings_and_follow_the_options() {
     let place = Workplace::new();
     let options = ["--world", "perturbed", "--set", "explorer.iterations=7"];
     let page = printed(&place, &[&["rod-balancing"], &options[..]].concat());
-    for told in [
-        "# Refits of the distribution.\niterations = 7\n",
-        "One of one-step, trajectory.\nform = ",
-        "[real.perturbation]",
-        "# Time constant of a first-order lag between commands and servos, s.",
-        "width of the ledge",
-    ] {
-        assert!(page.contains(told), "`{told}` is not in\n{page}");
-    }
+    assert_tells(
+        &page,
+        &[
+            "# Refits of the distribution.\niterations = 7\n",
+            "One of one-step, trajectory.\nform = ",
+            "[real.perturbation]",
+            "# Time constant of a first-order lag between commands and servos, s.",
+            "width of the ledge",
+        ],
+    );
 }
 
 #[test]
@@ -52,14 +60,15 @@ fn what_is_printed_for_a_study_is_read_back_as_the_same() {
     place.write("study.toml", "model = \"robot.xml\"\ntrain = [\"*.csv\"]\n");
     let options = ["--set", "search.contact=segments", "--set", "minutes=3.0"];
     let page = printed(&place, &[&["study.toml"], &options[..]].concat());
-    for told in [
-        "study = \"study.toml\"",
-        "minutes = 3.0",
-        "contact = \"segments\"",
-        "false_alarms = 0.01",
-    ] {
-        assert!(page.contains(told), "`{told}` is not in\n{page}");
-    }
+    assert_tells(
+        &page,
+        &[
+            "study = \"study.toml\"",
+            "minutes = 3.0",
+            "contact = \"segments\"",
+            "false_alarms = 0.01",
+        ],
+    );
     let unexplained = page
         .split("\n\n")
         .filter(|part| part.contains(" = ") && !part.contains('#'));

@@ -142,6 +142,28 @@ pub struct Smoothed {
     pub sums: Sums,
 }
 
+impl Smoothed {
+    /// An episode of some rows along which nothing is changed or missing, with nothing summed.
+    fn unmoved(rows: usize, noise: &NoiseModel) -> Self {
+        let (nv, ns) = (noise.q.len(), noise.r.len());
+        let nx = 2 * nv;
+        Self {
+            change: vec![0.0; rows * nx],
+            root: DMatrix::zeros(0, 0),
+            change_variance: vec![0.0; rows * nx],
+            force: vec![0.0; rows * nv],
+            force_variance: vec![0.0; rows * nv],
+            sums: Sums {
+                force: vec![[0.0; 3]; nv],
+                white: vec![0.0; nv],
+                reading: vec![[0.0; 2]; ns],
+                ..Sums::default()
+            },
+            ..Self::default()
+        }
+    }
+}
+
 /// The linear regression that a filter pass with columns makes: `X'X`, `X'y` and the likelihood without them.
 #[derive(Clone, Debug)]
 pub struct Regression {

@@ -5,11 +5,9 @@
 //! state *after* the row's readings. From the predicted one, a wide prior and a fine reading would leave a small
 //! difference of two large numbers.
 
-use nalgebra::DMatrix;
-
+use super::Smoothed;
 use super::filter::{Filter, Step};
 use super::matrix::{dot, multiply, multiply_atb, symmetrise};
-use super::{Smoothed, Sums};
 
 /// Smooths an episode whose forward pass took these steps.
 pub(super) fn backward(filter: &mut Filter<'_>, steps: &[Step]) -> Smoothed {
@@ -57,21 +55,10 @@ struct Adjoint<'f, 'a> {
 
 impl<'f, 'a> Adjoint<'f, 'a> {
     fn new(filter: &'f mut Filter<'a>, rows: usize) -> Self {
-        let (nx, nv, nz, ns) = (filter.nx, filter.nv, filter.nz, filter.ns);
+        let nz = filter.nz;
         let out = Smoothed {
             log_likelihood: filter.total(),
-            change: vec![0.0; rows * nx],
-            damped: Vec::new(),
-            root: DMatrix::zeros(0, 0),
-            change_variance: vec![0.0; rows * nx],
-            force: vec![0.0; rows * nv],
-            force_variance: vec![0.0; rows * nv],
-            sums: Sums {
-                force: vec![[0.0; 3]; nv],
-                white: vec![0.0; nv],
-                reading: vec![[0.0; 2]; ns],
-                ..Sums::default()
-            },
+            ..Smoothed::unmoved(rows, filter.noise)
         };
         Self {
             filter,

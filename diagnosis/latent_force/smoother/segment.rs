@@ -6,7 +6,7 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-use super::{NoiseModel, Problem, Regression, Smoothed, Sums};
+use super::{NoiseModel, Problem, Regression, Smoothed};
 
 /// Shares of the diagonal by which the normal equations are lengthened for the shorter steps of a start that are offered.
 const DAMPINGS: [f64; 2] = [1.0, 100.0];
@@ -85,21 +85,11 @@ impl Rows {
 pub(super) fn smooth(problem: Problem<'_>, noise: &NoiseModel) -> Smoothed {
     let rows = Rows::of(problem, noise, 0);
     let start = problem.start;
-    let (nv, nx, ns) = (noise.q.len(), start.mean.len(), noise.r.len());
+    let nx = start.mean.len();
     let (scaled, factor, right) = rows.normal(problem, 0.0);
-    let n = problem.linear.rows;
     let mut out = Smoothed {
         log_likelihood: f64::NAN,
-        change: vec![0.0; n * nx],
-        damped: Vec::new(),
-        root: DMatrix::zeros(0, 0),
-        change_variance: vec![0.0; n * nx],
-        force: vec![0.0; n * nv],
-        force_variance: vec![0.0; n * nv],
-        sums: Sums {
-            reading: vec![[0.0; 2]; ns],
-            ..Sums::default()
-        },
+        ..Smoothed::unmoved(problem.linear.rows, noise)
     };
     let Some(factor) = factor else {
         return out;
