@@ -2,11 +2,10 @@
 
 use asid_core::Result;
 
-use crate::fit::cost;
 use crate::machine::Machine;
 use crate::outliers::{self, LeftOut};
 use crate::predict::Point;
-use crate::prepare::{dataset, set_reading_noise};
+use crate::prepare::{dataset, plain_residuals, set_reading_noise};
 use crate::result::{CheckResult, DiagnosisResult, WiringResult};
 use crate::study::Study;
 use crate::wiring::{self, Settings};
@@ -15,8 +14,8 @@ use crate::wiring::{self, Settings};
 /// does. Nothing looks like a sign, a unit or a swap.
 const IMITABLE: [&str; 2] = ["wiring-clock", "wiring-offset"];
 
-/// Share of the gap's power, in replays of the model as given, that is left once such a fault is mended, from which on the wiring as given
-/// is the more probable: what is left is then as large as the fault, and may be the cause of both.
+/// Share of the power of what replays of the model as given leave of a column, as a geometric mean over the columns concerned, up to which
+/// such a fault is the more probable cause: what is left is then less than what the fault explains.
 const HALF: f64 = 0.5;
 
 /// A study whose logs are ready for a diagnosis.
@@ -63,8 +62,8 @@ impl Intake {
         let as_given = std::mem::replace(&mut intake.study, mended.study);
         (intake.wiring, intake.is_mended) = (mended.wiring, true);
         if doubted {
-            let power = |s: &Study| open_loop_power(s, machine);
-            let is_most = power(&intake.study)? < HALF * power(&as_given)?;
+            let share = share_left(&intake, &as_given, machine)?;
+            let is_most = share < HALF;
             intake.other = Some(as_given);
             if !is_most {
                 intake.turn();
@@ -186,17 +185,46 @@ impl Intake {
     }
 }
 
-/// Mean square of what the model as given leaves of the training logs in replays, in units of the noise.
-fn open_loop_power(study: &Study, machine: &Machine) -> Result<f64> {
+/// Power of what the mended wiring leaves of the columns concerned in replays of the model as given, relative to what the wiring `as_given`
+/// leaves: the geometric mean over the columns, which needs no noise and weighs them alike.
+fn share_left(intake: &Intake, as_given: &Study, machine: &Machine) -> Result<f64> {
+    let [mended, given] = [&intake.study, as_given].map(|s| open_loop_power(s, machine));
+    let concerned = |sensor: &str| {
+        let mut columns = intake.wiring.iter().flat_map(|w| &w.columns);
+        columns.any(|c| c == sensor)
+    };
+    let (mended, given) = (mended?, given?);
+    let pairs = mended.iter().zip(&given);
+    let own = pairs.filter(|((name, m), (_, g))| concerned(name) && *m > 0.0 && *g > 0.0);
+    let logs: Vec<f64> = own.map(|((_, m), (_, g))| (m / g).ln()).collect();
+    Ok((logs.iter().sum::<f64>() / logs.len().max(1) as f64).exp())
+}
+
+/// Mean square of what replays of the model as given leave of each sensor's training readings, in its unit.
+fn open_loop_power(study: &Study, machine: &Machine) -> Result<Vec<(String, f64)>> {
     let (mut bench, theta) = dataset(study, machine.clone())?;
     set_reading_noise(&mut bench, &study.noise);
     let point = Point {
         theta,
         starts: bench.train.starts.clone(),
     };
-    let mut predictor = bench.predictor(&[], &bench.train)?;
-    let residuals = predictor.residuals(&[point])?;
-    Ok(residuals.iter().map(|r| cost(r)).sum::<f64>() / bench.train.readings.max(1) as f64)
+    let residuals = plain_residuals(&bench, &bench.train, &[], &point)?;
+    let logs = &bench.train.logs;
+    let of_sensor = |(sensor, name): (usize, String)| {
+        let entries = logs.entries.iter().enumerate();
+        let own = entries.filter(|(_, e)| e.sensor == sensor);
+        let readings = own.flat_map(|(j, _)| {
+            let each = residuals.iter();
+            each.flat_map(move |r| r.iter().skip(j).step_by(logs.entries.len()))
+        });
+        let squares: Vec<f64> = readings.map(|r| r * r).filter(|p| p.is_finite()).collect();
+        (
+            name,
+            squares.iter().sum::<f64>() / squares.len().max(1) as f64,
+        )
+    };
+    let names = logs.sensors.iter().map(|s| s.name.clone());
+    Ok(names.enumerate().map(of_sensor).collect())
 }
 
 /// A fault of wiring in words.

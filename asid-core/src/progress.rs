@@ -14,6 +14,10 @@ pub trait Progress: Sync {
     fn is_stopped(&self) -> bool {
         false
     }
+    /// Whether the little that stopped work does for a good end, such as a last fit of the values that were found, is to stay undone too.
+    fn is_late(&self) -> bool {
+        self.is_stopped()
+    }
     /// The stage is over.
     fn end(&self);
 }

@@ -11,6 +11,7 @@ use crate::predict::State;
 
 use super::estimate::Estimate;
 use super::initial::{from_readings, open_by_reading, position_noise, start, start_of_segment};
+use super::one_step::one_step_tells;
 use super::smoother::{NoiseModel, Start};
 use super::step_map::{Derivatives, StepMap};
 use super::walk::Walk;
@@ -46,6 +47,8 @@ pub struct Context<'a> {
     pub reading_variance: Vec<f64>,
     /// Typical inertial force at each degree of freedom, N or N m.
     pub inertial: Vec<f64>,
+    /// Whether one physics step of a row tells its slopes in the state.
+    pub one_step: bool,
 }
 
 /// What the logs of a study are taken as.
@@ -86,7 +89,9 @@ impl Context<'_> {
         roles: usize,
     ) -> Result<StepMap<'_>> {
         let rows = (self.logs, &self.walks[..]);
-        StepMap::new(self.machine, specs, parameters, rows, roles)
+        let mut map = StepMap::new(self.machine, specs, parameters, rows, roles)?;
+        map.by_one_step(self.one_step);
+        Ok(map)
     }
 
     /// Changes of the start of a segment that slopes are taken over: a part of what its first readings leave open, so that
@@ -178,7 +183,9 @@ pub fn begin<'a>(
         reading_variance: noise.iter().map(|n| n * n).collect(),
         inertial: vec![0.0; nv],
         walks: taken.walks,
+        one_step: false,
     };
+    context.one_step = one_step_tells(&context, parameters, (theta, &trajectory))?;
     let mut map = context.map(&[], parameters, nv + 1)?;
     let all = vec![true; trajectory.len()];
     map.roll(theta, (&mut trajectory, &all), &context.reading_variance)?;

@@ -5,7 +5,7 @@
 //! columns of one linear regression on its innovations; the few that lead are put into the model and fitted anew.
 //!
 //! From below: [`tangent`] (states), [`walk`] (rows), [`segments`] (where bodies touch), [`step_map`] (the model over a row and its derivatives),
-//! [`smoother`], [`initial`], [`context`] and [`estimate`] (trajectory, force and noise), [`fitted_value`] and [`fit`] (a model with its values),
+//! [`smoother`], [`initial`], `one_step` (how slopes are taken), [`context`] and [`estimate`] (trajectory, force and noise), [`fitted_value`] and [`fit`] (a model with its values),
 //! [`evidence`], [`trace`], [`columns`], [`screen`], [`search`], [`selection`],
 //! [`detection`] (what could have been seen), [`rehearsal`] (what a screening would say of machines like this one), `steps` (encoder steps), `picture` (what the report draws of the force), `left` (what could
 //! be learned of the rest), [`pipeline`].
@@ -19,6 +19,7 @@ pub mod fit;
 pub mod fitted_value;
 pub mod initial;
 mod left;
+mod one_step;
 mod picture;
 pub mod pipeline;
 pub mod rehearsal;

@@ -10,6 +10,7 @@
 mod late;
 mod pass;
 mod roll;
+mod step;
 
 use asid_core::layout::{Layout, Recording};
 use asid_core::{BatchConfig, Parameter, Result};
@@ -95,6 +96,10 @@ struct Common<'a> {
     /// Whether effects on the drive side remember, and whether some act on readings.
     remembers: bool,
     reads: bool,
+    /// Whether some remember how the machine has moved.
+    remembers_motion: bool,
+    /// Whether one physics step tells the slopes of a row in the state.
+    one_step: bool,
 }
 
 impl Common<'_> {
@@ -162,9 +167,11 @@ impl<'a> StepMap<'a> {
         let names: Vec<String> = names
             .chain(joints().map(|j| format!("qvel.{}", j.name)))
             .collect();
-        let (mut remembers, mut reads) = (false, false);
+        let (mut remembers, mut reads, mut remembers_motion) = (false, false, false);
         for spec in machine.given_effects().iter().chain(specs) {
-            match spec.find(&machine.plant)?.acts() {
+            let effect = spec.find(&machine.plant)?;
+            remembers_motion |= effect.remembers_motion();
+            match effect.acts() {
                 Acts::Measurement => reads = true,
                 Acts::Command | Acts::Force => remembers = true,
                 Acts::Model => {}
@@ -180,8 +187,16 @@ impl<'a> StepMap<'a> {
             capacity,
             remembers,
             reads,
+            remembers_motion,
+            one_step: false,
         };
         Ok(Self { common, parts })
+    }
+
+    /// Takes slopes in the state from one physics step of each row, where nothing remembers the motion; from the whole row otherwise, as a new
+    /// map does.
+    pub fn by_one_step(&mut self, one: bool) {
+        self.common.one_step = one;
     }
 
     /// Whether an effect acts on readings, which then may remember.

@@ -46,6 +46,10 @@ impl Effect for Stiffness {
         Acts::Force
     }
 
+    fn remembers_motion(&self) -> bool {
+        false
+    }
+
     fn parameters(&self) -> &'static [EffectParameter] {
         const {
             &[
@@ -110,6 +114,10 @@ impl Acting for RippleAt {
 impl Effect for Ripple {
     fn acts(&self) -> Acts {
         Acts::Force
+    }
+
+    fn remembers_motion(&self) -> bool {
+        false
     }
 
     fn parameters(&self) -> &'static [EffectParameter] {

@@ -6,6 +6,7 @@
 mod arm;
 #[path = "../diagnosis_support/mod.rs"]
 mod diagnosis_support;
+mod row_slopes;
 mod small;
 mod steps;
 mod stopped;

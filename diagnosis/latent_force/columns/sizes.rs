@@ -60,6 +60,7 @@ pub(super) fn parts<'c>(
         position_noise: context.position_noise.clone(),
         reading_variance: context.reading_variance.clone(),
         inertial: context.inertial.clone(),
+        one_step: context.one_step,
         walks,
     };
     (context, states, slopes)

@@ -1,6 +1,5 @@
 //! Replays, open loop, of the model without effects, of the set that stands and of its rivals.
 
-use asid_core::progress::Silent;
 use asid_core::{Progress, Result};
 
 use crate::bench::{Bench, Explanation, Stage};
@@ -19,6 +18,18 @@ use super::told::{detection_limits, isolability, missing_forces, p_value, rankin
 const REPLAYED: usize = 500_000;
 /// Most sets besides the verdict's that are replayed.
 const RIVALS: usize = 4;
+
+/// Progress of the last fit of values, which a stopped search still does for as long as it is not late. It tells nothing.
+struct Closing<'a>(&'a dyn Progress);
+
+impl Progress for Closing<'_> {
+    fn begin(&self, _stage: &str, _total: u64) {}
+    fn advance(&self, _units: u64) {}
+    fn end(&self) {}
+    fn is_stopped(&self) -> bool {
+        self.0.is_late()
+    }
+}
 
 /// Starts of the training episodes as a fit smoothed them, where the logs leave them open; `firsts` are the walks that begin
 /// an episode.
@@ -95,7 +106,7 @@ pub(super) fn replay(
             &chosen,
             &fitted.theta[..study],
             &starts,
-            (effort, &Silent),
+            (effort, &Closing(progress)),
         )?;
         for (k, i) in fitted.hypothesis.free().into_iter().enumerate() {
             of.local_variances[i] = fitted.covariance[(k, k)];
@@ -108,16 +119,26 @@ pub(super) fn replay(
             effects: u.sets.iter().map(|s| name_of(candidates, s)).collect(),
         })
         .collect();
-    let (once_more, rivals) = if stopped {
+    let mut cut = |stage: &str| {
         not_tried.push(NotTried {
-            stage: "fit of the values to whole replays, and replays of rivals".into(),
+            stage: stage.into(),
             effects: Vec::new(),
         });
+    };
+    // A stopped search fits the values of what stands alone.
+    let (of_none, rivals) = if stopped {
+        cut("replays of rivals");
         (Effort::LOOK, 0)
     } else {
         (Effort::BRIEF, RIVALS)
     };
-    let none = of(&outcome.none, &[], once_more)?;
+    let of_best = if progress.is_late() {
+        cut("fit of the values to whole replays");
+        Effort::LOOK
+    } else {
+        Effort::BRIEF
+    };
+    let none = of(&outcome.none, &[], of_none)?;
     let mut sets = all_sets(outcome);
     let ranking = ranking(candidates, outcome, &sets);
     let best = &outcome.best.candidates;
@@ -133,7 +154,7 @@ pub(super) fn replay(
     let mut found = Vec::new();
     for (i, set) in sets.iter().enumerate() {
         let effort = if i == 0 && stands.is_some() {
-            once_more
+            of_best
         } else {
             Effort::LOOK
         };

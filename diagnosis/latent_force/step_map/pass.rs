@@ -1,38 +1,22 @@
 //! One walk along the rows: every simulation is set to the trajectory at each row, read, and stepped to the next.
 
-use asid_core::simulator::{StepHook, StepView};
-use asid_core::{Control, Result, Rollout, Simulator};
+use asid_core::{Result, Simulator};
 
-use crate::latent_force::tangent::{difference, retract};
+use crate::latent_force::tangent::retract;
 use crate::latent_force::walk::{Walk, by_substeps};
 use crate::predict::columns_of;
 
 use super::late::retime;
+use super::step::{RowBuffers, Stepped};
 use super::{Common, LinearEpisode, Request};
 
 /// Change of a coordinate of the state that derivatives are taken over, rad, m, rad/s or m/s: forward
 /// differences of smooth dynamics in double precision are right to about six digits.
-const STATE_STEP: f64 = 1e-6;
-
-/// A generalized force on some rows of a rollout.
-struct Push<'a> {
-    /// For each row of the rollout, the degree of freedom, the force, and whether it acts in the first physics step alone.
-    rows: &'a [Option<(usize, f64, bool)>],
-}
-
-impl StepHook for Push<'_> {
-    fn before_step(&self, row: usize, step: usize, view: &mut StepView<'_>) {
-        if let Some((dof, force, at_first)) = self.rows[row]
-            && (step == 0 || !at_first)
-        {
-            view.force[dof] += force;
-        }
-    }
-}
+pub(super) const STATE_STEP: f64 = 1e-6;
 
 /// What one simulation an episode is for.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Role {
+pub(super) enum Role {
     /// The model as it is.
     Nominal,
     /// A coordinate of the state is moved, for `f` and `h`.
@@ -49,6 +33,16 @@ enum Role {
     Jolt(usize),
     /// A variation of the parameters.
     Varied(usize),
+}
+
+impl Role {
+    /// The coordinate of the state that it moves for `f`.
+    pub(super) fn coordinate(self) -> Option<usize> {
+        match self {
+            Self::State(i) => Some(i),
+            _ => None,
+        }
+    }
 }
 
 /// Some of the walks on a core of their own: a row is too little work to share out.
@@ -176,7 +170,18 @@ impl Part {
             self.place(c, &roles, (&here, k), request, &mut row)?;
             self.read_row(c, &roles, (&here, k), request, (out, ramps), &mut row)?;
             for (substeps, now) in by_substeps(&walks, here, k) {
-                self.step_row(c, (&roles, &now, k, substeps), request, out, &mut row)?;
+                let (rolled, placed): (Vec<usize>, Vec<usize>) = now
+                    .into_iter()
+                    .partition(|&e| c.rolls(self.walks[e], request.want));
+                for now in [rolled, placed].iter().filter(|now| !now.is_empty()) {
+                    let stepped = Stepped {
+                        roles: &roles,
+                        now,
+                        k,
+                        substeps,
+                    };
+                    self.step_row(c, stepped, request, out, &mut row)?;
+                }
             }
         }
         Ok(())
@@ -241,16 +246,7 @@ impl Part {
             }
         }
         // A simulation that failed at the row before begins anew.
-        let status = self.simulator.status();
-        let failed: Vec<usize> = row
-            .sims
-            .iter()
-            .copied()
-            .filter(|&s| !status[s].is_running())
-            .collect();
-        if !failed.is_empty() {
-            self.simulator.reset(&failed)?;
-        }
+        self.begin_anew(&row.sims)?;
         self.simulator.set_state(&row.sims, &row.qpos, &row.qvel)
     }
 
@@ -331,92 +327,4 @@ impl Part {
         }
         Ok(())
     }
-
-    /// Steps some episodes from row `k` to the next.
-    fn step_row(
-        &mut self,
-        c: &Common<'_>,
-        (roles, now, k, substeps): (&[Role], &[usize], usize, usize),
-        request: Request<'_>,
-        out: &mut [LinearEpisode],
-        row: &mut RowBuffers,
-    ) -> Result<()> {
-        let Request {
-            trajectory,
-            push,
-            variations,
-            ..
-        } = request;
-        let (n, nv, nu) = (self.walks.len(), c.layout.nv, c.layout.nu());
-        let (nx, width) = (2 * nv, c.layout.nq + nv);
-        row.sims.clear();
-        row.ctrl.clear();
-        row.pushes.clear();
-        for (v, role) in roles.iter().enumerate() {
-            for &e in now {
-                row.sims.push(v * n + e);
-                let ctrl = &c.walks[self.walks[e]].ctrl[k * nu..(k + 1) * nu];
-                row.ctrl.extend_from_slice(ctrl);
-                row.pushes.push(match *role {
-                    Role::Force(d) => Some((d, push[d], false)),
-                    Role::Jolt(d) => Some((d, push[d], true)),
-                    _ => None,
-                });
-            }
-        }
-        let hook = Push { rows: &row.pushes };
-        let mut rollout = Rollout::new(
-            &row.sims,
-            1,
-            substeps,
-            Control::PerSimulation(&row.ctrl),
-            &c.states,
-        );
-        if row.pushes.iter().any(Option::is_some) {
-            rollout.hook = Some(&hook);
-        }
-        row.next.resize(row.sims.len() * width, 0.0);
-        self.simulator.rollout(&rollout, &mut row.next)?;
-        let m = variations.len();
-        let mut differ = vec![0.0; nx];
-        for (i, &e) in now.iter().enumerate() {
-            let nominal = &row.next[i * width..(i + 1) * width];
-            let ahead = &trajectory[self.walks[e]][(k + 1) * width..(k + 2) * width];
-            let defect = &mut out[e].defect[k * nx..(k + 1) * nx];
-            difference(&c.layout, nominal, ahead, defect);
-            if c.rolls(self.walks[e], request.want) {
-                continue;
-            }
-            for (v, role) in roles.iter().enumerate().skip(1) {
-                let place = v * now.len() + i;
-                let other = &row.next[place * width..(place + 1) * width];
-                difference(&c.layout, other, nominal, &mut differ);
-                let (matrix, columns, at, scale) = match *role {
-                    Role::State(i) => (&mut out[e].a, nx, i, STATE_STEP),
-                    Role::Force(i) => (&mut out[e].b, nv, i, push[i]),
-                    Role::Jolt(i) => (&mut out[e].jolt, nv, i, push[i]),
-                    Role::Varied(i) => (&mut out[e].state_columns, m, i, variations[i].scale),
-                    Role::Nominal | Role::Reading(_) | Role::Ramp(_) => continue,
-                };
-                for (s, d) in differ.iter().enumerate() {
-                    let value = d / scale;
-                    matrix[(k * nx + s) * columns + at] =
-                        if value.is_finite() { value } else { 0.0 };
-                }
-            }
-        }
-        Ok(())
-    }
-}
-
-/// Arrays of one row, kept between rows.
-#[derive(Default)]
-struct RowBuffers {
-    sims: Vec<usize>,
-    qpos: Vec<f64>,
-    qvel: Vec<f64>,
-    ctrl: Vec<f64>,
-    pushes: Vec<Option<(usize, f64, bool)>>,
-    read: Vec<f64>,
-    next: Vec<f64>,
 }

@@ -11,9 +11,10 @@ use signal_hook::consts::SIGINT;
 
 use super::super::progress::Bars;
 
-/// Share of the time limit after which nothing further is fitted: replays and the report take the rest (5 to 15 % of the
-/// time of diagnoses of 5 s to a minute).
-const SEARCHING: f64 = 0.85;
+/// Share of the time limit after which nothing further is searched, and that after which the values of what was found are not fitted
+/// to whole replays any further: last replays and the report take the rest (5 to 15 % of the time of diagnoses of 5 s to a minute).
+const SEARCHING: f64 = 0.75;
+const FITTING: f64 = 0.87;
 /// Exit status of a process that SIGINT ended, as shells count it.
 const INTERRUPTED: i32 = 130;
 /// Rows of a ranking that are printed.
@@ -26,7 +27,8 @@ pub struct Live {
     bars: Bars,
     quiet: bool,
     begun: Instant,
-    until: Option<Instant>,
+    /// When the search ends, and the fits.
+    until: [Option<Instant>; 2],
     interrupted: Arc<AtomicBool>,
     told: AtomicBool,
     first_table: OnceLock<f64>,
@@ -36,12 +38,15 @@ impl Live {
     /// Begins now; `minutes` is the time limit.
     pub fn new(quiet: bool, minutes: Option<f64>) -> Self {
         let begun = Instant::now();
-        let limit = minutes.map(|m| Duration::from_secs_f64(60.0 * SEARCHING * m));
+        let until = |share: f64| {
+            let limit = minutes.map(|m| Duration::from_secs_f64(60.0 * share * m));
+            limit.and_then(|l| begun.checked_add(l))
+        };
         Self {
             bars: Bars::new(quiet),
             quiet,
             begun,
-            until: limit.and_then(|l| begun.checked_add(l)),
+            until: [SEARCHING, FITTING].map(until),
             interrupted: Arc::new(AtomicBool::new(false)),
             told: AtomicBool::new(false),
             first_table: OnceLock::new(),
@@ -57,6 +62,10 @@ impl Live {
             .map_err(failed)?;
         signal_hook::flag::register(SIGINT, flag()).map_err(failed)?;
         Ok(())
+    }
+
+    fn is_past(&self, end: usize) -> bool {
+        self.until[end].is_some_and(|until| Instant::now() >= until)
     }
 
     /// Time so far, s.
@@ -115,7 +124,7 @@ impl Progress for Live {
 
     fn is_stopped(&self) -> bool {
         let interrupted = self.interrupted.load(Ordering::SeqCst);
-        let stopped = interrupted || self.until.is_some_and(|until| Instant::now() >= until);
+        let stopped = interrupted || self.is_past(0);
         if stopped && !self.quiet && !self.told.swap(true, Ordering::SeqCst) {
             let why = if interrupted {
                 "stopping: what is known is written; Ctrl-C once more ends at once"
@@ -125,6 +134,10 @@ impl Progress for Live {
             self.bars.line(why);
         }
         stopped
+    }
+
+    fn is_late(&self) -> bool {
+        self.interrupted.load(Ordering::SeqCst) || self.is_past(1)
     }
 
     fn end(&self) {
@@ -146,7 +159,9 @@ mod tests {
         assert_eq!(live.seconds_to_first_table(), first);
         live.interrupted.store(true, Ordering::SeqCst);
         assert!(live.is_stopped());
-        assert!(Live::new(true, Some(0.0)).is_stopped());
+        assert!(live.is_late());
+        let over = Live::new(true, Some(0.0));
+        assert!(over.is_stopped() && over.is_late());
         assert!(!Live::new(true, Some(1e9)).is_stopped());
     }
 

@@ -1,0 +1,66 @@
+//! Whether one physics step of a row tells the slopes of the whole row.
+//!
+//! It does where the machine hardly changes over a row, and does not where a stiff drive comes to rest within one. Neither the model nor
+//! the log says which; a few rows that are taken both ways do.
+
+use asid_core::{Parameter, Result};
+
+use super::context::Context;
+use super::step_map::{Derivatives, StepMap};
+use super::walk::Walk;
+
+/// Rows in the middle of each walk that are taken both ways.
+const ROWS: usize = 16;
+/// Share of the slopes by which the two ways may differ in a row (Frobenius norm, coordinates in units of their largest): a chord
+/// method gains a digit a round with slopes that are right to a tenth.
+const APART: f64 = 0.1;
+/// Share of the rows that may differ by more, as where a joint comes to a stop within the row.
+const ODD: f64 = 0.05;
+
+/// Whether slopes in the state of one physics step, carried over its row, are those of the row, for a model without further effects along
+/// a trajectory.
+///
+/// # Errors
+/// When the engine fails.
+pub fn one_step_tells(
+    context: &Context<'_>,
+    parameters: &[Parameter],
+    (theta, trajectory): (&[f64], &[Vec<f64>]),
+) -> Result<bool> {
+    let layout = &context.plant().layout;
+    let (nx, width) = (2 * layout.nv, layout.nq + layout.nv);
+    let (mut walks, mut states): (Vec<Walk>, Vec<Vec<f64>>) = (Vec::new(), Vec::new());
+    let whole = context.walks.iter().zip(trajectory);
+    for (walk, trajectory) in whole.filter(|(w, _)| w.segment.is_none() && w.len() > 1) {
+        let rows = walk.len().min(ROWS + 1);
+        let first = (walk.len() - rows) / 2;
+        walks.push(walk.part(first..first + rows));
+        states.push(trajectory[first * width..(first + rows) * width].to_vec());
+    }
+    if walks.is_empty() {
+        return Ok(false);
+    }
+    let of = (context.logs, &walks[..]);
+    let mut map = StepMap::new(context.machine, &[], parameters, of, nx + 1)?;
+    let want = Derivatives {
+        state: true,
+        ..Derivatives::default()
+    };
+    let by_rows = map.linearise(theta, &states, want, &[], &[])?;
+    map.by_one_step(true);
+    let by_steps = map.linearise(theta, &states, want, &[], &[])?;
+    let (mut rows, mut odd) = (0_u32, 0_u32);
+    for (a, b) in by_rows.iter().zip(&by_steps) {
+        for (a, b) in a.a.chunks_exact(nx * nx).zip(b.a.chunks_exact(nx * nx)) {
+            let (mut apart, mut size) = (0.0, 0.0);
+            for (place, (x, y)) in a.iter().zip(b).enumerate() {
+                let unit = context.scale[place % nx] / context.scale[place / nx];
+                apart += ((x - y) * unit).powi(2);
+                size += (x * unit).powi(2);
+            }
+            rows += 1;
+            odd += u32::from(apart.is_nan() || apart > APART * APART * size);
+        }
+    }
+    Ok(f64::from(odd) <= ODD * f64::from(rows))
+}

@@ -1,0 +1,261 @@
+//! Steps of all simulations from one row to the next.
+//!
+//! Slopes in the state cost most: one simulation for each coordinate. Where a row is many physics steps they are those of one step in its
+//! middle, carried over all of them, `A = a^n`: right to second order in the duration of the row. What a fit finds does not depend on them,
+//! only how fast it is found. Where an effect remembers the motion (a rotor behind its play, friction that sticks) a change of the state is
+//! answered over several steps, and each coordinate takes all of the row.
+
+use asid_core::simulator::{StepHook, StepView};
+use asid_core::{Control, Result, Rollout};
+use nalgebra::DMatrix;
+
+use crate::latent_force::tangent::{difference, retract};
+
+use super::pass::{Part, Role, STATE_STEP};
+use super::{Common, LinearEpisode, Request};
+
+/// Fewest physics steps of a row whose slopes are those of one of them: placing a simulation costs about as much as a step.
+const MANY: usize = 4;
+
+/// A generalized force on some rows of a rollout.
+struct Push<'a> {
+    /// For each row of the rollout, the degree of freedom, the force, and whether it acts in the first physics step alone.
+    rows: &'a [Option<(usize, f64, bool)>],
+}
+
+impl StepHook for Push<'_> {
+    fn before_step(&self, row: usize, step: usize, view: &mut StepView<'_>) {
+        if let Some((dof, force, at_first)) = self.rows[row]
+            && (step == 0 || !at_first)
+        {
+            view.force[dof] += force;
+        }
+    }
+}
+
+/// What is stepped together: the roles, the walks (by their places in the part), the row, and its physics steps.
+#[derive(Clone, Copy)]
+pub(super) struct Stepped<'s> {
+    pub(super) roles: &'s [Role],
+    pub(super) now: &'s [usize],
+    pub(super) k: usize,
+    pub(super) substeps: usize,
+}
+
+impl Part {
+    /// Steps some walks from a row to the next, and takes differences there.
+    pub(super) fn step_row(
+        &mut self,
+        c: &Common<'_>,
+        stepped: Stepped<'_>,
+        request: Request<'_>,
+        out: &mut [LinearEpisode],
+        row: &mut RowBuffers,
+    ) -> Result<()> {
+        let Stepped {
+            roles,
+            now,
+            k,
+            substeps,
+        } = stepped;
+        let rolls = now.iter().any(|&e| c.rolls(self.walks[e], request.want));
+        let all: Vec<usize> = (0..roles.len()).collect();
+        let is_state = |v: &usize| roles[*v].coordinate().is_some();
+        let (mut short, mut whole): (Vec<usize>, Vec<usize>) =
+            all.iter().partition(|v| is_state(v));
+        // The power of a matrix takes all of it.
+        let may = c.one_step && !c.remembers_motion && !rolls;
+        if substeps < MANY || !may || short.len() < 2 * c.layout.nv {
+            (short, whole) = (Vec::new(), all.clone());
+        }
+        let mut done = 0;
+        if !short.is_empty() {
+            done = (substeps - 1) / 2;
+            self.advance(c, (stepped, &whole), 0..done, request, row)?;
+            self.place_at_nominal(c, (stepped, &short), request, row)?;
+            self.advance(c, (stepped, &all), done..done + 1, request, row)?;
+            done += 1;
+            carry_over(c, (stepped, &short), row, out);
+        }
+        self.advance(c, (stepped, &whole), done..substeps, request, row)?;
+        let (nv, m) = (c.layout.nv, request.variations.len());
+        let (nx, width) = (2 * nv, c.layout.nq + nv);
+        let mut differ = vec![0.0; nx];
+        for (i, &e) in now.iter().enumerate() {
+            let nominal = row.state(i, width);
+            let ahead = &request.trajectory[self.walks[e]][(k + 1) * width..(k + 2) * width];
+            let defect = &mut out[e].defect[k * nx..(k + 1) * nx];
+            difference(&c.layout, nominal, ahead, defect);
+            if c.rolls(self.walks[e], request.want) {
+                continue;
+            }
+            for (place, &v) in whole.iter().enumerate().skip(1) {
+                let other = row.state(place * now.len() + i, width);
+                difference(&c.layout, other, nominal, &mut differ);
+                let (matrix, columns, at, scale) = match roles[v] {
+                    Role::State(i) => (&mut out[e].a, nx, i, STATE_STEP),
+                    Role::Force(i) => (&mut out[e].b, nv, i, request.push[i]),
+                    Role::Jolt(i) => (&mut out[e].jolt, nv, i, request.push[i]),
+                    Role::Varied(i) => {
+                        (&mut out[e].state_columns, m, i, request.variations[i].scale)
+                    }
+                    Role::Nominal | Role::Reading(_) | Role::Ramp(_) => continue,
+                };
+                for (s, d) in differ.iter().enumerate() {
+                    let value = d / scale;
+                    matrix[(k * nx + s) * columns + at] =
+                        if value.is_finite() { value } else { 0.0 };
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Takes some physics steps of a row in some of the roles; their states come into `row.next`.
+    fn advance(
+        &mut self,
+        c: &Common<'_>,
+        (stepped, which): (Stepped<'_>, &[usize]),
+        steps: std::ops::Range<usize>,
+        request: Request<'_>,
+        row: &mut RowBuffers,
+    ) -> Result<()> {
+        let Stepped { roles, now, k, .. } = stepped;
+        let (n, nu) = (self.walks.len(), c.layout.nu());
+        row.sims.clear();
+        row.ctrl.clear();
+        row.pushes.clear();
+        for &v in which {
+            for &e in now {
+                row.sims.push(v * n + e);
+                let ctrl = &c.walks[self.walks[e]].ctrl[k * nu..(k + 1) * nu];
+                row.ctrl.extend_from_slice(ctrl);
+                row.pushes.push(match roles[v] {
+                    Role::Force(d) => Some((d, request.push[d], false)),
+                    Role::Jolt(d) if steps.start == 0 => Some((d, request.push[d], true)),
+                    _ => None,
+                });
+            }
+        }
+        let hook = Push { rows: &row.pushes };
+        let mut rollout = Rollout::new(
+            &row.sims,
+            1,
+            steps.len(),
+            Control::PerSimulation(&row.ctrl),
+            &c.states,
+        );
+        if row.pushes.iter().any(Option::is_some) {
+            rollout.hook = Some(&hook);
+        }
+        let width = c.layout.nq + c.layout.nv;
+        row.next.resize(row.sims.len() * width, 0.0);
+        self.simulator.rollout(&rollout, &mut row.next)
+    }
+
+    /// Places simulations of slopes in the state where the nominal ones have come to, which are the first of `row.next`, each with its
+    /// coordinate moved. Where the engine has failed they begin at the row.
+    fn place_at_nominal(
+        &mut self,
+        c: &Common<'_>,
+        (stepped, which): (Stepped<'_>, &[usize]),
+        request: Request<'_>,
+        row: &mut RowBuffers,
+    ) -> Result<()> {
+        let Stepped { roles, now, k, .. } = stepped;
+        let (n, nq, nv) = (self.walks.len(), c.layout.nq, c.layout.nv);
+        let width = nq + nv;
+        row.sims.clear();
+        row.qpos.clear();
+        row.qvel.clear();
+        let mut change = vec![0.0; 2 * nv];
+        for &v in which {
+            let Some(coordinate) = roles[v].coordinate() else {
+                continue;
+            };
+            for (i, &e) in now.iter().enumerate() {
+                let mut state = row.state(i, width).to_vec();
+                if !state.iter().all(|x| x.is_finite()) {
+                    let states = &request.trajectory[self.walks[e]];
+                    state.copy_from_slice(&states[k * width..(k + 1) * width]);
+                }
+                change[coordinate] = STATE_STEP;
+                retract(&c.layout, &mut state, &change);
+                change[coordinate] = 0.0;
+                row.sims.push(v * n + e);
+                row.qpos.extend_from_slice(&state[..nq]);
+                row.qvel.extend_from_slice(&state[nq..]);
+            }
+        }
+        let nominal = now.repeat(which.len());
+        self.simulator.copy_state(&nominal, &row.sims)?;
+        self.begin_anew(&row.sims)?;
+        self.simulator.set_state(&row.sims, &row.qpos, &row.qvel)
+    }
+
+    /// Resets those simulations that have failed.
+    pub(super) fn begin_anew(&mut self, sims: &[usize]) -> Result<()> {
+        let status = self.simulator.status();
+        let failed = sims.iter().copied().filter(|&s| !status[s].is_running());
+        let failed: Vec<usize> = failed.collect();
+        if failed.is_empty() {
+            return Ok(());
+        }
+        self.simulator.reset(&failed)
+    }
+}
+
+/// Slopes in the state over a row from those of one of its physics steps, which all roles have just taken.
+fn carry_over(
+    c: &Common<'_>,
+    (stepped, short): (Stepped<'_>, &[usize]),
+    row: &RowBuffers,
+    out: &mut [LinearEpisode],
+) {
+    let Stepped {
+        roles,
+        now,
+        k,
+        substeps,
+    } = stepped;
+    let (nx, width) = (2 * c.layout.nv, c.layout.nq + c.layout.nv);
+    let mut differ = vec![0.0; nx];
+    let steps = u32::try_from(substeps).unwrap_or(u32::MAX);
+    for (i, &e) in now.iter().enumerate() {
+        let nominal = row.state(i, width);
+        let mut of_step = DMatrix::zeros(nx, nx);
+        for &v in short {
+            let Some(coordinate) = roles[v].coordinate() else {
+                continue;
+            };
+            let other = row.state(v * now.len() + i, width);
+            difference(&c.layout, other, nominal, &mut differ);
+            for (s, d) in differ.iter().enumerate() {
+                let value = d / STATE_STEP;
+                of_step[(s, coordinate)] = if value.is_finite() { value } else { 0.0 };
+            }
+        }
+        // Row-major, which is what the transpose has in store.
+        let whole = of_step.pow(steps).transpose();
+        out[e].a[k * nx * nx..(k + 1) * nx * nx].copy_from_slice(whole.as_slice());
+    }
+}
+
+/// Arrays of one row, kept between rows.
+#[derive(Default)]
+pub(super) struct RowBuffers {
+    pub(super) sims: Vec<usize>,
+    pub(super) qpos: Vec<f64>,
+    pub(super) qvel: Vec<f64>,
+    ctrl: Vec<f64>,
+    pushes: Vec<Option<(usize, f64, bool)>>,
+    pub(super) read: Vec<f64>,
+    next: Vec<f64>,
+}
+
+impl RowBuffers {
+    /// One of the states that were stepped to, of some width.
+    fn state(&self, place: usize, width: usize) -> &[f64] {
+        &self.next[place * width..(place + 1) * width]
+    }
+}

@@ -1,0 +1,128 @@
+//! Slopes of a row in the state, by all its physics steps and by one of them.
+
+use asid::core::episode::ChannelColumns;
+use asid::core::{Episode, Scene};
+use asid::diagnosis::data::Logs;
+use asid::diagnosis::latent_force::context::{Taken, begin};
+use asid::diagnosis::latent_force::step_map::{Derivatives, LinearEpisode, StepMap};
+use asid::diagnosis::latent_force::walk::Walk;
+use asid::diagnosis::machine::Machine;
+use asid::effects::EffectSpec;
+
+use crate::diagnosis_support::engine;
+
+/// Rows of a log, physics steps of each, and their duration, s.
+const ROWS: usize = 20;
+const STEPS: usize = 10;
+const DT: f64 = 0.002;
+/// Mass, kg, stiffness, N/m, and damping, N s/m, of a slide.
+const SLIDE: [f64; 3] = [2.0, 8.0, 1.0];
+
+/// A slide on a spring, with a servo that pulls with `kp` (N/m) and at most `force` (N).
+fn scene(kp: f64, force: f64) -> Scene {
+    let [mass, stiffness, damping] = SLIDE;
+    let xml = format!(
+        r#"<mujoco><option timestep="{DT}" gravity="0 0 0"/><worldbody><body>
+        <joint name="slide" type="slide" axis="1 0 0" stiffness="{stiffness}" damping="{damping}"/>
+        <geom size="0.1" mass="{mass}" contype="0" conaffinity="0"/></body></worldbody>
+        <actuator><position name="pull" joint="slide" kp="{kp}" kv="{}" forcerange="-{force} {force}"/></actuator>
+        <sensor><jointpos name="x" joint="slide"/></sensor></mujoco>"#,
+        0.05 * kp
+    );
+    Scene::from_xml("slide", &xml, &[]).unwrap()
+}
+
+/// A log in which the slide moves back and forth while it is commanded to one side.
+fn logs(machine: &Machine) -> Logs {
+    let time: Vec<f64> = (0..ROWS).map(|k| (k * STEPS) as f64 * DT).collect();
+    let episode = Episode {
+        readings: time.iter().map(|t| 0.1 * (5.0 * t).sin()).collect(),
+        actuators: vec!["pull".into()],
+        ctrl: vec![0.12; ROWS],
+        channels: vec![ChannelColumns {
+            name: "x".into(),
+            len: 1,
+        }],
+        time,
+        ..Episode::default()
+    };
+    Logs::new(&machine.plant, &["x".into()], vec![("log".into(), episode)]).unwrap()
+}
+
+fn machine(scene: &Scene) -> Machine {
+    Machine::new(engine(), scene, &[], &[], 1).unwrap()
+}
+
+/// The log of a machine, linearised with some effects by one step of each row or by all.
+fn linearised(machine: &Machine, specs: &[EffectSpec], one_step: bool) -> LinearEpisode {
+    let logs = logs(machine);
+    let walks = [Walk::new(&logs, 0, DT)];
+    let mut map = StepMap::new(machine, specs, &[], (&logs, &walks), 3).unwrap();
+    map.by_one_step(one_step);
+    let state = |k: usize| [0.1 * (k as f64).sin(), 0.3 * (k as f64).cos()];
+    let states = (0..ROWS).flat_map(state).collect();
+    let want = Derivatives {
+        state: true,
+        ..Derivatives::default()
+    };
+    let mut found = map.linearise(&[], &[states], want, &[], &[]).unwrap();
+    found.remove(0)
+}
+
+fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
+    assert_eq!(a.len(), b.len());
+    let each = a.iter().zip(b).map(|(a, b)| (a - b).abs());
+    each.fold(0.0, f64::max)
+}
+
+#[test]
+fn slopes_of_an_oscillator_are_those_of_its_solution_either_way() {
+    let machine = machine(&scene(0.0, 1.0));
+    let [mass, stiffness, damping] = SLIDE;
+    // Of the damped oscillator.
+    let (square, decay) = (stiffness / mass, 0.5 * damping / mass);
+    let rate = (square - decay * decay).sqrt();
+    let time = STEPS as f64 * DT;
+    let (sin, cos) = (rate * time).sin_cos();
+    let row = [
+        cos + decay / rate * sin,
+        sin / rate,
+        -square / rate * sin,
+        cos - decay / rate * sin,
+    ];
+    let want = row.map(|x| (-decay * time).exp() * x).repeat(ROWS - 1);
+    let [whole, one] = [false, true].map(|one| linearised(&machine, &[], one));
+    // The integrator is of first order: half a step of the acceleration's slope.
+    assert!(largest_difference(&whole.a, &want) < 0.5 * DT * stiffness / mass);
+    assert!(largest_difference(&whole.a, &one.a) < 1e-6);
+    assert_eq!(whole.defect, one.defect);
+    assert_eq!(whole.residual, one.residual);
+}
+
+#[test]
+fn friction_that_remembers_the_motion_takes_all_of_the_row() {
+    let machine = machine(&scene(0.0, 1.0));
+    let friction: EffectSpec = "coulomb-friction@slide:force=0.4".parse().unwrap();
+    let of = |one| linearised(&machine, std::slice::from_ref(&friction), one);
+    assert_eq!(of(false).a, of(true).a);
+}
+
+#[test]
+fn a_soft_machine_is_told_by_one_step_and_one_that_settles_within_a_row_is_not() {
+    let tells = |kp: f64, force: f64| {
+        let machine = machine(&scene(kp, force));
+        let logs = logs(&machine);
+        let taken = Taken {
+            walks: vec![Walk::new(&logs, 0, DT)],
+            given: vec![None],
+            open: Vec::new(),
+            otherwise: vec![vec![0.0; 2 * ROWS]],
+            scale: vec![0.1, 0.5],
+        };
+        let (context, _) = begin(&machine, &logs, taken, (&[], &[])).unwrap();
+        context.one_step
+    };
+    assert!(tells(50.0, 100.0));
+    // 300 rad/s, and far from its target at full force.
+    assert!(!tells(2e5, 100.0));
+}
