@@ -14,13 +14,16 @@ use super::world::{Truth, write_study};
 /// Stops the work at the ranking of this number, from 1.
 struct Until {
     last: usize,
+    /// Whether it is late from then on.
+    late: bool,
     seen: Mutex<Vec<Vec<(String, f64)>>>,
 }
 
 impl Until {
     fn ranking_number(last: usize) -> Self {
         let seen = Mutex::default();
-        Self { last, seen }
+        let late = true;
+        Self { last, late, seen }
     }
 }
 
@@ -34,6 +37,9 @@ impl Progress for Until {
     fn is_stopped(&self) -> bool {
         self.seen.lock().unwrap().len() >= self.last
     }
+    fn is_late(&self) -> bool {
+        self.late && self.is_stopped()
+    }
 }
 
 fn run(until: &Until) -> Diagnosis {
@@ -45,6 +51,23 @@ fn run(until: &Until) -> Diagnosis {
     diagnose(&study, machine, Settings::default(), until)
         .unwrap()
         .0
+}
+
+#[test]
+fn a_stopped_search_still_fits_the_values_that_it_found_unless_it_is_late() {
+    let of = |late| {
+        let until = Until {
+            late,
+            ..Until::ranking_number(1)
+        };
+        let result = run(&until).result;
+        let mut stages = result.not_tried.iter().map(|n| &*n.stage);
+        let is_cut = stages.any(|s| s == "fit of the values to whole replays");
+        (is_cut, result.gap.refined)
+    };
+    let ((late_is_cut, late), (soon_is_cut, soon)) = (of(true), of(false));
+    assert!(late_is_cut && !soon_is_cut);
+    assert!(soon < 1.001 * late, "{soon} after the fit, {late} before");
 }
 
 #[test]
