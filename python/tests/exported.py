@@ -108,6 +108,7 @@ class Case:
         return ", ".join(f"`{part}`" for part in [*self.effects, *(f"{t} = {x}" for t, x in self.values)])
 
 
+LAG = "half a time step: MuJoCo takes the filter at the start of a step, not its mean"
 FRICTION = "MuJoCo's friction is a soft constraint, which creeps where the joint stops"
 
 CASES = [
@@ -131,8 +132,8 @@ CASES = [
     Case("arm", ("actuator-saturation@hold:limit=0.9",)),
     Case("arm", ("actuator-delay@push:delay=0.013",)),
     Case("arm", ("actuator-delay@hold:delay=0.0305",)),
-    Case("arm", ("actuator-lag@push:time_constant=0.1",), most=8, why="half a time step: MuJoCo takes the filter at the start of a step, not its mean"),
-    Case("arm", ("actuator-lag@hold:time_constant=0.1",), most=2, why="half a time step, as above"),
+    Case("arm", ("actuator-lag@push:time_constant=0.1",), most=8, why=LAG),
+    Case("arm", ("actuator-lag@hold:time_constant=0.1",), most=2, why=LAG),
     Case("arm", ("sensor-delay@q1:delay=0.02",)),
     Case("arm", ("sensor-delay@v2:delay=0.013",), most=1.5, why="between rows: ASID has a cubic through four rows, MuJoCo its steps"),
     Case("arm", ("coulomb-friction@shoulder:force=0.4",), most=1.5, why=FRICTION),

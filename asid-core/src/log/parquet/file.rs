@@ -15,6 +15,13 @@ use crate::scene::one_line;
 /// Length of what stands behind the footer: the footer's length in four bytes, and `PAR1`.
 const TAIL: u64 = 8;
 
+/// Field of a page's head that states how long the page is when it is unpacked.
+const UNPACKED_SIZE: i16 = 2;
+/// Length of an unpacked page that is never refused, bytes: writers begin a new page after 1 to 2 MB.
+const USUAL_PAGE: u64 = 64 << 20;
+/// Most that an unpacked page is longer than its file, beyond that: what is packed closer holds nothing but repetition.
+const CLOSEST_PACKED: u64 = 256;
+
 /// A Parquet file on disk.
 pub struct ParquetFile(File);
 
@@ -63,17 +70,35 @@ impl ChunkReader for ParquetFile {
     fn get_read(&self, start: u64) -> ParquetResult<Self::T> {
         let left = self.len().saturating_sub(start);
         if left != TAIL {
-            let mut head = self.0.get_read(start)?;
-            Walk::new(&mut head, left)
-                .structure(PAGE_HEADER)
-                .map_err(|e| {
-                    ParquetError::General(format!("the page at byte {start} is damaged: {e}"))
-                })?;
+            let head = self.0.get_read(start)?;
+            walk_page(head, left, self.len()).map_err(|e| {
+                ParquetError::General(format!("the page at byte {start} is damaged: {e}"))
+            })?;
         }
         self.0.get_read(start)
     }
 
     fn get_bytes(&self, start: u64, length: usize) -> ParquetResult<Bytes> {
+        let left = self.len().saturating_sub(start);
+        if length as u64 > left {
+            return Err(ParquetError::General(format!(
+                "{length} bytes are stated at byte {start}, where {left} are left"
+            )));
+        }
         self.0.get_bytes(start, length)
     }
+}
+
+/// Walks over the head of a page, and looks at the memory that it asks for: the crate takes it before it unpacks.
+fn walk_page(head: BufReader<File>, left: u64, file: u64) -> Result<(), String> {
+    let mut walk = Walk::new(head, left);
+    walk.structure(PAGE_HEADER)?;
+    let unpacked = walk.number(UNPACKED_SIZE).unwrap_or(0);
+    let most = USUAL_PAGE.max(file.saturating_mul(CLOSEST_PACKED));
+    if u64::try_from(unpacked).is_ok_and(|x| x > most) {
+        return Err(format!(
+            "it states {unpacked} bytes in a file of {file}; {most} are taken at most"
+        ));
+    }
+    Ok(())
 }

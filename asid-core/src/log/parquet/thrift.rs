@@ -69,12 +69,24 @@ pub struct Walk<R> {
     bytes: R,
     /// Bytes that are left.
     left: u64,
+    /// Whole numbers of the structure itself, by field.
+    numbers: Vec<(i16, i64)>,
 }
 
 impl<R: BufRead + Seek> Walk<R> {
     /// Begins where `bytes` stands, with `left` bytes from there on.
     pub fn new(bytes: R, left: u64) -> Self {
-        Self { bytes, left }
+        Self {
+            bytes,
+            left,
+            numbers: Vec::new(),
+        }
+    }
+
+    /// The whole number that a field of the structure had; the last one, where the field stood twice.
+    pub fn number(&self, field: i16) -> Option<i64> {
+        let found = self.numbers.iter().rev().find(|(n, _)| *n == field);
+        found.map(|(_, x)| *x)
     }
 
     /// Walks over a structure.
@@ -94,16 +106,18 @@ impl<R: BufRead + Seek> Walk<R> {
                 return Ok(());
             }
             number = match i16::from(head >> 4) {
-                // The number as it is, in a sign's last place.
-                0 => {
-                    let written = self.whole()?;
-                    ((written >> 1) ^ (written & 1).wrapping_neg()) as i16
-                }
+                0 => signed(self.whole()?) as i16,
                 more => number
                     .checked_add(more)
                     .ok_or_else(|| format!("a field has the number {number} + {more}"))?,
             };
             match layout.iter().find(|(n, _)| *n == number) {
+                Some((_, Kind::Whole)) if Kind::Whole.is(wire) => {
+                    let whole = signed(self.whole()?);
+                    if depth == DEEPEST {
+                        self.numbers.push((number, whole));
+                    }
+                }
                 Some((_, kind)) if kind.is(wire) => self.known(*kind, depth)?,
                 Some(_) => {
                     return Err(format!(
@@ -243,6 +257,11 @@ impl<R: BufRead + Seek> Walk<R> {
         })?;
         Ok(())
     }
+}
+
+/// The number that is written with its sign in the last place.
+fn signed(written: u64) -> i64 {
+    (written >> 1) as i64 ^ -((written & 1) as i64)
 }
 
 fn deeper(depth: usize) -> Result<usize, String> {
