@@ -2,7 +2,8 @@
 
 import mujoco
 import pytest
-from exported import CASES, SAME, Case, measure
+from exported import measure
+from exported_cases import CASES, SAME, Case
 
 #: A law of each kind: values, a remembered command, a spring, contacts, and dry friction, which MuJoCo integrates in its own way.
 CORE = [
