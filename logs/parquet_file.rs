@@ -1,16 +1,16 @@
 //! Parquet files: flat columns of numbers, and lists of numbers as LeRobot writes them.
 
-use std::fs::File;
 use std::path::Path;
 use std::sync::Arc;
 
 use parquet::basic::Type as Physical;
 use parquet::errors::ParquetError;
-use parquet::file::reader::{FileReader as _, SerializedFileReader};
+use parquet::file::reader::FileReader as _;
 use parquet::record::Field;
 use parquet::schema::types::Type;
 
 use asid_core::guard::guarded;
+use asid_core::log::ParquetFile;
 
 use crate::raw::RawLog;
 use crate::table_file;
@@ -29,8 +29,7 @@ pub fn columns(path: &Path, lists: bool) -> Result<Vec<(String, Vec<f64>)>, Stri
 
 fn read_columns(path: &Path, lists: bool) -> Result<Vec<(String, Vec<f64>)>, String> {
     let told = |e: ParquetError| e.to_string().replace('\n', " ");
-    let file = File::open(path).map_err(|e| e.to_string())?;
-    let file = SerializedFileReader::new(file).map_err(told)?;
+    let file = ParquetFile::open(path)?;
     let schema = file.metadata().file_metadata().schema_descr().root_schema();
     let chosen: Vec<Arc<Type>> = schema
         .get_fields()

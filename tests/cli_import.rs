@@ -89,7 +89,30 @@ fn diagnosed(study: &Path, out: &Path) -> Value {
     json(&out.join("result.json"))
 }
 
-/// Bags of both storages, MCAP, and a dataset give the verdict of the CSV study, with values as they are printed.
+/// All numbers of a result by their way into it, but for those that tell how long it took.
+fn numbers(value: &Value, way: &str, found: &mut Vec<(String, f64)>) {
+    match value {
+        Value::Number(x) if !way.contains("/seconds") => {
+            found.push((way.to_owned(), x.as_f64().unwrap()));
+        }
+        Value::Array(entries) => {
+            for (i, entry) in entries.iter().enumerate() {
+                numbers(entry, &format!("{way}/{i}"), found);
+            }
+        }
+        Value::Object(entries) => {
+            for (key, entry) in entries {
+                numbers(entry, &format!("{way}/{key}"), found);
+            }
+        }
+        _ => {}
+    }
+}
+
+/// Bags of both storages, MCAP, and a dataset, made by public packages (`logs/tests/fixtures/make.py`), give the
+/// verdict of the CSV study and its values. A bag has the same numbers to the last bit, and so has its result. A dataset
+/// of `LeRobot` is in single precision, 2e-7 rad off, less than the half of a digit that the CSV prints (5e-7 rad) and a thousandth of the noise:
+/// values that are told move by less than a digit of the four that are printed.
 #[test]
 fn logs_of_other_stacks_are_diagnosed_as_the_csv_study() {
     let folder = tempfile::tempdir().unwrap();
@@ -98,12 +121,12 @@ fn logs_of_other_stacks_are_diagnosed_as_the_csv_study() {
     let wanted = diagnosed(&fixture("csv"), &at("csv"));
     let found = wanted["verdict"]["effects"].as_array().unwrap();
     assert!(found.contains(&"coulomb-friction@pan".into()), "{found:?}");
-    for (name, logs, off) in [
-        ("sqlite", each("bag_sqlite", ""), 1e-12),
-        ("bag-mcap", each("bag_mcap", ""), 1e-12),
-        ("mcap", each("mcap", ".mcap"), 1e-12),
+    for (name, logs, off, relative) in [
+        ("sqlite", each("bag_sqlite", ""), 1e-12, 1e-9),
+        ("bag-mcap", each("bag_mcap", ""), 1e-12, 1e-9),
+        ("mcap", each("mcap", ".mcap"), 1e-12, 1e-9),
         // Single precision: see the crate's own test.
-        ("lerobot", vec![fixture("lerobot")], 2e-7),
+        ("lerobot", vec![fixture("lerobot")], 2e-7, 1e-3),
     ] {
         let study = at(name);
         let said = told(&import(&logs, &study, &[]));
@@ -114,18 +137,18 @@ fn logs_of_other_stacks_are_diagnosed_as_the_csv_study() {
         assert!(study.join("import.html").is_file());
         let read = Study::read(&study).unwrap();
         assert!(apart(&read, &csv) <= off, "{name}: {}", apart(&read, &csv));
-        // The same numbers to the last bit have the same diagnosis; those in single precision are diagnosed too.
-        if name == "sqlite" || name == "lerobot" {
-            let result = diagnosed(&study, &at(&format!("{name}-out")));
-            assert_eq!(
-                result["verdict"]["effects"], wanted["verdict"]["effects"],
-                "{name}"
-            );
-            assert_eq!(result["wiring"].as_array().map_or(0, Vec::len), 0, "{name}");
-            let number = |v: &Value, key: &str| v["gap"][key].as_f64().unwrap();
-            for key in ["nominal", "refined"] {
-                let (a, b) = (number(&result, key), number(&wanted, key));
-                assert!((a - b).abs() <= 5e-3 * b.max(1.0), "{name} {key}: {a} {b}");
+        let result = diagnosed(&study, &at(&format!("{name}-out")));
+        for key in ["kind", "effects", "ambiguous_with"] {
+            assert_eq!(result["verdict"][key], wanted["verdict"][key], "{name}");
+        }
+        assert_eq!(result["wiring"].as_array().map_or(0, Vec::len), 0, "{name}");
+        for part in ["gap", "effects", "verdict"] {
+            let (mut a, mut b) = (Vec::new(), Vec::new());
+            numbers(&result[part], part, &mut a);
+            numbers(&wanted[part], part, &mut b);
+            assert_eq!(a.len(), b.len(), "{name} {part}");
+            for ((way, x), (_, y)) in a.iter().zip(&b) {
+                assert!((x - y).abs() <= relative * y.abs(), "{name} {way}: {x} {y}");
             }
         }
     }

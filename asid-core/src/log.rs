@@ -21,6 +21,8 @@ use crate::error::{Error, Result};
 use crate::layout::Layout;
 
 pub use self::csv::{cell_number, delimiter};
+#[cfg(feature = "parquet")]
+pub use self::parquet::ParquetFile;
 pub use clock::seconds;
 use mapping::Source;
 pub use mapping::{ColumnMapping, unit_factor};

@@ -1,5 +1,7 @@
 //! The task itself: the metric over time, how the action was found, and the end of it.
 
+use std::collections::BTreeMap;
+
 use super::episode::outline_of;
 use super::head::{metric_name, metric_value};
 use super::trace::{Downstream, RunReport, Search, SideView};
@@ -139,16 +141,14 @@ fn tried(search: &Search, dimension: usize) -> Figure {
         Axis::new(cost, &search.cost_unit),
     );
     let mut labelled = false;
-    for iteration in 0..=iterations {
-        let dots: Vec<[f64; 2]> = search
-            .trials
-            .iter()
-            .filter(|t| t.iteration == iteration)
-            .filter_map(|t| Some([*t.action.get(dimension)?, t.cost]))
-            .collect();
-        if dots.is_empty() {
-            continue;
+    let mut tried: BTreeMap<u32, Vec<[f64; 2]>> = BTreeMap::new();
+    for trial in &search.trials {
+        if let Some(&place) = trial.action.get(dimension) {
+            let dots = tried.entry(trial.iteration).or_default();
+            dots.push([place, trial.cost]);
         }
+    }
+    for (iteration, dots) in tried {
         let share = f64::from(iteration) / f64::from(iterations.max(1));
         let mut layer = Layer::dots(dots)
             .colour(Colour::Blue)
@@ -178,7 +178,7 @@ fn tried(search: &Search, dimension: usize) -> Figure {
     let caption = format!(
         "{} actions in {} iterations of the solver, in the simulator; chosen: {} = {}.",
         grouped(search.trials.len() as u64),
-        iterations + 1,
+        u64::from(iterations) + 1,
         chosen.name,
         quantity(&value, &chosen.unit)
     );

@@ -98,3 +98,16 @@ fn the_answer_and_the_verdict_are_on_the_page() {
     let bare = synthetic::bare_run().html();
     assert!(bare.contains("No downstream part") && bare.contains("No learning curve"));
 }
+
+/// A trial says of which iteration it is: a `trace.json` with 2147483647 there took 8 s, one number for each iteration until then.
+#[test]
+fn an_iteration_of_any_number_is_drawn_at_once() {
+    let mut run = synthetic::full_run();
+    let search = run.downstream.as_mut().and_then(|d| d.search.as_mut());
+    search.unwrap().trials[0].iteration = u32::MAX;
+    let began = std::time::Instant::now();
+    let html = run.html();
+    assert!(html.contains("4294967296 iterations of the solver"));
+    // Milliseconds, where counting up takes ten seconds and more.
+    assert!(began.elapsed().as_secs_f64() < 5.0);
+}

@@ -103,7 +103,7 @@ pub fn stage(stages: &mut Stages, profile: Profile) -> Result<()> {
 /// The Python that has what the tests need.
 fn fresh() -> Result<PathBuf> {
     let list = repository().join("python/tests/requirements.txt");
-    environment::of(&target()?.join("python/tests"), &list, "32 MB")
+    environment::of(&target()?.join("python/tests"), &list, "58 MB")
 }
 
 /// The Python that has maturin.
@@ -191,7 +191,7 @@ mod tests_of_pins {
         assert_pinned(&folder.join("requirements-build.txt"), &["maturin"]);
         assert_pinned(
             &folder.join("tests/requirements.txt"),
-            &["gymnasium", "numpy", "pandas", "pytest"],
+            &["gymnasium", "mujoco", "numpy", "pandas", "pytest"],
         );
     }
 }

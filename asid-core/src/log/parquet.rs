@@ -1,10 +1,15 @@
 //! Logs as Parquet files: flat columns of numbers, null or NaN where a reading is missing.
 
-use std::fs::File;
+mod file;
+mod layouts;
+mod thrift;
+
 use std::path::Path;
 
-use parquet::file::reader::{FileReader as _, SerializedFileReader};
+use parquet::file::reader::FileReader as _;
 use parquet::record::Field;
+
+pub use file::ParquetFile;
 
 use super::{ColumnMapping, LogNotes, Reader};
 use crate::episode::Episode;
@@ -27,8 +32,7 @@ fn read_rows(
     mappings: &[ColumnMapping],
 ) -> Result<(Episode, LogNotes), String> {
     let told = |e: parquet::errors::ParquetError| one_line(&e.to_string());
-    let file = File::open(path).map_err(|e| e.to_string())?;
-    let file = SerializedFileReader::new(file).map_err(told)?;
+    let file = ParquetFile::open(path)?;
     let schema = file.metadata().file_metadata().schema_descr();
     let fields = schema.root_schema().get_fields().iter();
     let header = fields.map(|f| f.name().to_owned()).collect();
@@ -64,6 +68,7 @@ fn number(field: &Field) -> Result<f64, String> {
 
 #[cfg(test)]
 mod tests {
+    use std::fs::File;
     use std::sync::Arc;
 
     use parquet::data_type::DoubleType;
@@ -127,6 +132,44 @@ mod tests {
         let error = Episode::read(&path, &layout()).unwrap_err().to_string();
         assert!(
             error.contains("log.parquet") && error.lines().count() == 1,
+            "{error}"
+        );
+    }
+
+    /// The head of the first page states a field of 2^31 - 1 booleans, which `parquet` would skip one by one.
+    #[test]
+    fn a_page_that_states_more_than_there_is_is_refused_at_once() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("log.parquet");
+        write(&path, &[0.0, 1.0], &[1.0, 2.0], &[Some(0.1), Some(0.2)]);
+        let mut bytes = std::fs::read(&path).unwrap();
+        // Field 9, a list; its elements, booleans; their count.
+        let head = [0x99, 0xf2, 0xff, 0xff, 0xff, 0xff, 0x07];
+        bytes[4..4 + head.len()].copy_from_slice(&head);
+        std::fs::write(&path, bytes).unwrap();
+        let error = Episode::read(&path, &layout()).unwrap_err().to_string();
+        assert!(
+            error.contains("the page at byte 4 is damaged: a list states 2147483647 elements")
+                && error.lines().count() == 1,
+            "{error}"
+        );
+    }
+
+    /// The head of the first page states 2^31 - 1 bytes, which `parquet` would take from memory before it unpacks them.
+    #[test]
+    fn a_page_that_asks_for_two_gigabytes_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("log.parquet");
+        write(&path, &[0.0, 1.0], &[1.0, 2.0], &[Some(0.1), Some(0.2)]);
+        let mut bytes = std::fs::read(&path).unwrap();
+        // Field 1, the kind of the page; field 2, its length with the sign in the last place; the end.
+        let head = [0x15, 0x00, 0x15, 0xfe, 0xff, 0xff, 0xff, 0x0f, 0x00];
+        bytes[4..4 + head.len()].copy_from_slice(&head);
+        std::fs::write(&path, bytes).unwrap();
+        let error = Episode::read(&path, &layout()).unwrap_err().to_string();
+        assert!(
+            error.contains("the page at byte 4 is damaged: it states 2147483647 bytes")
+                && error.lines().count() == 1,
             "{error}"
         );
     }
