@@ -86,10 +86,15 @@ impl Candidates<'_, '_> {
         chosen: &[usize],
         points: &[Vec<f64>],
     ) -> Result<Vec<Vec<Played>>> {
-        let pairs = chosen.iter().flat_map(|&k| points.iter().map(move |p| (k, p)));
+        let pairs = chosen
+            .iter()
+            .flat_map(|&k| points.iter().map(move |p| (k, p)));
         let jobs: Vec<(&[f64], &[f64])> = pairs.map(|(k, p)| (&commands[k][..], &p[..])).collect();
         let plays = self.player.play(&jobs, self.substeps)?;
-        Ok(plays.chunks_exact(points.len().max(1)).map(<[Played]>::to_vec).collect())
+        Ok(plays
+            .chunks_exact(points.len().max(1))
+            .map(<[Played]>::to_vec)
+            .collect())
     }
 }
 

@@ -91,10 +91,7 @@ fn deviations(folder: &Path, method: Method) -> [f64; 2] {
         let data = Dataset::new(&subject.plant, &[("log".into(), real.log)], &noise).unwrap();
         let (model, search) = (&*subject.model, (&smooth(), streams));
         let found = fit(model, &setup.parameters, &data, search, 2, &Silent).unwrap();
-        let pairs = setup
-            .parameters
-            .iter()
-            .zip(found.values.iter().zip(&truth));
+        let pairs = setup.parameters.iter().zip(found.values.iter().zip(&truth));
         errors.extend(pairs.map(|(p, (x, y))| p.to_scaled(*x) - p.to_scaled(*y)));
     }
     [
@@ -111,7 +108,10 @@ fn a_designed_motion_beats_a_multisine_in_true_machines() {
     assert!(expected < 0.7 * baseline, "{expected} {baseline}");
     assert!(actual < baseline_actual, "{actual} {baseline_actual}");
     // Twenty-four errors give a deviation to 14 %; the machines lie all over the ranges, where a motion tells more or less.
-    assert!((0.4..2.5).contains(&(actual / expected)), "{actual} {expected}");
+    assert!(
+        (0.4..2.5).contains(&(actual / expected)),
+        "{actual} {expected}"
+    );
     let ratio = baseline_actual / baseline;
     assert!((0.4..2.5).contains(&ratio), "{baseline_actual} {baseline}");
 }

@@ -136,12 +136,19 @@ pub fn explore(path: &Path, common: &Common, given: &super::motion_config::Optio
         },
     };
     let view = view::of_motion(&subject, &found.played.qpos, period)?;
-    let page = motion_page::page(&result, &subject, &found, setup.player.limits(), view.as_ref());
+    let page = motion_page::page(
+        &result,
+        &subject,
+        &found,
+        setup.player.limits(),
+        view.as_ref(),
+    );
     out.write(|folder| {
         write_json(&folder.join("result.json"), &result)?;
         write_text(&folder.join("config.toml"), &toml::to_string(&config)?)?;
         commands(&subject, &found, period).write_csv(&folder.join("commands.csv"))?;
-        predicted(&subject, &found, &setup.signals, period).write_csv(&folder.join("predicted.csv"))?;
+        predicted(&subject, &found, &setup.signals, period)
+            .write_csv(&folder.join("predicted.csv"))?;
         write_text(&folder.join("report.html"), &page)?;
         if !subject.source.scene.xml().contains("file=") {
             write_text(&folder.join("model.xml"), subject.source.scene.xml())?;

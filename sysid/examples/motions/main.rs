@@ -50,7 +50,12 @@ fn main() -> Outcome<()> {
             continue;
         }
         let model = Path::new(models).join(format!("{name}.xml"));
-        rows.extend(compared(&model, &case, &Path::new(out).join(&*name), seeds)?);
+        rows.extend(compared(
+            &model,
+            &case,
+            &Path::new(out).join(&*name),
+            seeds,
+        )?);
         print!("{}", table::markdown(&rows));
     }
     Ok(())
@@ -92,7 +97,10 @@ fn compared(model: &Path, case: &Path, folder: &Path, seeds: u64) -> Outcome<Vec
                 motion.figure(),
                 world.figure(),
                 world.wall_s,
-                world.broken.as_ref().map_or(String::new(), |b| format!(", BROKEN {b}"))
+                world
+                    .broken
+                    .as_ref()
+                    .map_or(String::new(), |b| format!(", BROKEN {b}"))
             );
             if usize::try_from(design).is_ok_and(|d| d == motions.len()) {
                 motions.push(motion);

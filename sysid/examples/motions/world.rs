@@ -4,8 +4,8 @@ use std::path::Path;
 use std::time::Instant;
 
 use asid::cli::MotionSetup;
-use asid::core::progress::Silent;
 use asid::core::Streams;
+use asid::core::progress::Silent;
 use asid::sysid::dataset::Dataset;
 use asid::sysid::fit::{fit, smooth};
 use asid::sysid::rehearse::rehearse;
@@ -52,11 +52,28 @@ pub fn met(
     let streams = Streams::new(seed);
     // The same machines for all methods.
     let mut rng = streams.stream("truth");
-    let truth: Vec<f64> = setup.parameters.iter().map(|p| p.sample(&mut rng)).collect();
+    let truth: Vec<f64> = setup
+        .parameters
+        .iter()
+        .map(|p| p.sample(&mut rng))
+        .collect();
     let commands = (&motion.commands[..], setup.substeps);
-    let rehearsed = rehearse(&mut setup.player, commands, &truth, &mut streams.stream("noise"))?;
-    let noise = setup.signals.iter().map(|s| (s.sensor.clone(), s.noise)).collect();
-    let data = Dataset::new(&machine.subject.plant, &[(format!("{seed}"), rehearsed.log)], &noise)?;
+    let rehearsed = rehearse(
+        &mut setup.player,
+        commands,
+        &truth,
+        &mut streams.stream("noise"),
+    )?;
+    let noise = setup
+        .signals
+        .iter()
+        .map(|s| (s.sensor.clone(), s.noise))
+        .collect();
+    let data = Dataset::new(
+        &machine.subject.plant,
+        &[(format!("{seed}"), rehearsed.log)],
+        &noise,
+    )?;
     let clock = Instant::now();
     let settings = smooth();
     let found = fit(
@@ -69,7 +86,9 @@ pub fn met(
     )?;
     let pairs = setup.parameters.iter().zip(found.values.iter().zip(&truth));
     let world = World {
-        errors: pairs.map(|(p, (x, y))| p.to_scaled(*x) - p.to_scaled(*y)).collect(),
+        errors: pairs
+            .map(|(p, (x, y))| p.to_scaled(*x) - p.to_scaled(*y))
+            .collect(),
         truth,
         residual: found.residual,
         broken: rehearsed.excess.worst.map(|(what, _)| what),
