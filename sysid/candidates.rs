@@ -1,8 +1,8 @@
 //! Costs of candidate motions, with no more plays than their order needs.
 //!
 //! A candidate is played at the middle of the unknowns; where it keeps the limits there, a little up and down in each unknown, for what it
-//! tells. In the order of that, candidates are played far from the middle too, until as many keep the limits there as are
-//! wanted. The others keep their place behind these.
+//! tells. In the order of that, candidates are played far from the middle too, with every physics step looked at, until as many
+//! keep the limits there as are wanted. The others keep their place behind these.
 
 use asid_algorithms::fisher::Objective;
 use asid_core::Parameter;
@@ -17,7 +17,7 @@ use crate::tells::{Told, differences, of_plays};
 const FEW: usize = 3;
 
 /// A cost beyond any of a motion that keeps the limits.
-const BROKEN: f64 = 1e6;
+pub const BROKEN: f64 = 1e6;
 
 /// What ranks candidates.
 pub struct Candidates<'p, 'a> {
@@ -37,6 +37,8 @@ pub struct Candidates<'p, 'a> {
     pub objective: Objective,
     /// Physics steps of a frame.
     pub substeps: usize,
+    /// Points far from the middle.
+    pub far: &'p [Vec<f64>],
 }
 
 impl Candidates<'_, '_> {
@@ -46,14 +48,13 @@ impl Candidates<'_, '_> {
     /// When the engine fails.
     pub fn costs(&mut self, candidates: &[Vec<f64>], wanted: usize) -> Result<Vec<f64>> {
         let (near, widths) = differences(self.parameters, self.values);
-        let far = far(self.parameters, self.values);
         let commands = candidates.iter().map(|c| self.family.commands(c, 1.0));
         let commands: Vec<Vec<f64>> = commands.collect();
         let all: Vec<usize> = (0..candidates.len()).collect();
-        let middle = self.plays(&commands, &all, &near[..1])?;
+        let middle = self.plays(&commands, &all, &near[..1], self.substeps)?;
         let mut costs: Vec<f64> = middle.iter().map(|p| broken(p)).collect();
         let keep: Vec<usize> = all.into_iter().filter(|&k| costs[k] == 0.0).collect();
-        let beside = self.plays(&commands, &keep, &near[1..])?;
+        let beside = self.plays(&commands, &keep, &near[1..], self.substeps)?;
         for (&k, beside) in keep.iter().zip(beside) {
             costs[k] = broken(&beside);
             if costs[k] == 0.0 {
@@ -68,7 +69,9 @@ impl Candidates<'_, '_> {
         let (mut found, mut rest) = (0, &order[..]);
         while found < wanted && !rest.is_empty() {
             let (now, later) = rest.split_at((wanted - found).min(rest.len()));
-            for (&k, plays) in now.iter().zip(self.plays(&commands, now, &far)?) {
+            let fine: Vec<Vec<f64>> = commands.iter().map(|c| self.fine(c)).collect();
+            let plays = self.plays(&fine, now, self.far, 1)?;
+            for (&k, plays) in now.iter().zip(plays) {
                 match broken(&plays) {
                     0.0 => found += 1,
                     cost => costs[k] = cost,
@@ -79,18 +82,25 @@ impl Candidates<'_, '_> {
         Ok(costs)
     }
 
-    /// Plays of the chosen motions, each at all points.
+    /// Commands of every physics step.
+    fn fine(&self, commands: &[f64]) -> Vec<f64> {
+        let rows = commands.chunks_exact(self.family.base.len());
+        rows.flat_map(|row| row.repeat(self.substeps)).collect()
+    }
+
+    /// Plays of the chosen motions, each at all points, in frames of some physics steps.
     fn plays(
         &mut self,
         commands: &[Vec<f64>],
         chosen: &[usize],
         points: &[Vec<f64>],
+        substeps: usize,
     ) -> Result<Vec<Vec<Played>>> {
         let pairs = chosen
             .iter()
             .flat_map(|&k| points.iter().map(move |p| (k, p)));
         let jobs: Vec<(&[f64], &[f64])> = pairs.map(|(k, p)| (&commands[k][..], &p[..])).collect();
-        let plays = self.player.play(&jobs, self.substeps)?;
+        let plays = self.player.play(&jobs, substeps)?;
         Ok(plays
             .chunks_exact(points.len().max(1))
             .map(<[Played]>::to_vec)
@@ -109,9 +119,9 @@ fn broken(plays: &[Played]) -> f64 {
     }
 }
 
-/// Points far from the middle at which a search looks at the limits: all corners of the ranges where these are few,
+/// Points far from the middle at which a search begins to look at the limits: all corners of the ranges where these are few,
 /// else the ends of each range.
-fn far(parameters: &[Parameter], values: &[f64]) -> Vec<Vec<f64>> {
+pub fn far(parameters: &[Parameter], values: &[f64]) -> Vec<Vec<f64>> {
     let n = parameters.len();
     if n > FEW {
         return ends(parameters, values);

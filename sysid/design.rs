@@ -1,8 +1,9 @@
 //! The search for the motion that tells the most and keeps all limits.
 //!
 //! The cross-entropy method makes the objective small among the candidates that keep all limits; those that do not rank behind
-//! them, by how much they break ([`crate::candidates`]). The answer is played once more at corners of the ranges, with the limits looked
-//! at after every physics step, and is made smaller until none is broken.
+//! them, by how much they break ([`crate::candidates`]). A candidate that is better than all before it is played at the middle, the ends and
+//! corners of the ranges, with the limits looked at after every physics step; where it breaks one there, the search
+//! looks at that point from then on. The answer is made smaller until no limit is broken.
 
 use asid_algorithms::fisher::Objective;
 use asid_algorithms::optimise::cem::{Cem, CemSettings};
@@ -11,7 +12,7 @@ use asid_core::rng::Rng;
 use asid_core::{Parameter, Progress, Streams};
 use rand::Rng as _;
 
-use crate::candidates::{Candidates, ends};
+use crate::candidates::{BROKEN, Candidates, ends, far};
 use crate::limits::Excess;
 use crate::motion::{Family, Shape};
 use crate::play::{Played, Player};
@@ -84,7 +85,7 @@ pub struct DesignSettings {
     /// Candidates a round.
     pub population: usize,
     /// Physics steps of the whole search, which bound its time: after them no round begins, of which 8 are kept. Two cores
-    /// take some 1.5e5 steps of an arm of six joints a second; those of a machine of more coordinates count for more.
+    /// take some 5e5 steps of an arm of six joints a second; those of a machine of more coordinates count for more.
     pub physics_steps: f64,
 }
 
@@ -95,7 +96,7 @@ impl Default for DesignSettings {
             harmonics: 5,
             iterations: 40,
             population: 40,
-            physics_steps: 1e7,
+            physics_steps: 3e7,
         }
     }
 }
@@ -127,6 +128,9 @@ const SMALLEST: f64 = 1e-3;
 
 /// Sizes in which each round tries the best motion so far.
 const SIZES: [f64; 4] = [1.0, 0.9, 1.15, 1.4];
+
+/// Candidates of a round that are looked at everywhere, at most: each that breaks a limit shows the search a new point.
+const LOOKS: usize = 4;
 
 /// How much larger the answer is played to see which limit it would break first.
 const LARGER: f64 = 1.25;
@@ -194,18 +198,22 @@ impl<'a> Designer<'_, 'a> {
             });
         }
         let mut rng = streams.stream("design");
+        let corners = self.corners(&mut streams.stream("corners"));
+        let ends = ends(self.parameters, &self.values);
+        let points = [vec![self.values.clone()], ends, corners].concat();
         let (coefficients, course) = match method {
-            Method::FisherCem => self.search(settings, &mut rng, progress)?,
+            Method::FisherCem => self.search(settings, &points, &mut rng, progress)?,
             Method::Multisine => (self.family.multisine(), Vec::new()),
             Method::Random | Method::Fourier => (self.family.random(&mut rng), Vec::new()),
         };
-        self.finish(&coefficients, course, &mut rng)
+        self.finish(&coefficients, course, &points)
     }
 
     /// The cross-entropy search; the best coefficients, and the best cost after each round.
     fn search(
         &mut self,
         settings: &DesignSettings,
+        points: &[Vec<f64>],
         rng: &mut Rng,
         progress: &dyn Progress,
     ) -> Result<(Vec<f64>, Vec<f64>)> {
@@ -216,19 +224,30 @@ impl<'a> Designer<'_, 'a> {
         let begun = self.player.steps();
         let rounds = settings.iterations.max(FEWEST_ROUNDS);
         progress.begin("explore", rounds as u64 + 1);
-        // Draws at sizes from the whole down to a thousandth: the best that keeps the limits is the middle of the search.
+        // Draws, and curves like those of the baselines, at sizes from the whole down to a thousandth: the best that keeps the
+        // limits is the middle of the search.
+        let fourier = Family {
+            shape: Shape::Fourier(settings.harmonics),
+            ..self.family.clone()
+        };
         let mut draws = vec![vec![0.0; n]];
         let mut sizes = vec![SMALLEST];
         while draws.len() < settings.population {
             let along = (draws.len() - 1) as f64 / (settings.population - 2).max(1) as f64;
             let size = SMALLEST.powf(along);
-            draws.push(self.family.random(rng).iter().map(|c| c * size).collect());
+            let drawn = match draws.len() % 3 {
+                0 => self.family.random(rng),
+                1 => self.family.near(&fourier, &fourier.random(rng)),
+                _ => self.family.near(&fourier, &fourier.multisine()),
+            };
+            draws.push(drawn.iter().map(|c| c * size).collect());
             sizes.push(size);
         }
-        let costs = self.candidates().costs(&draws, 1)?;
-        let first = (0..draws.len())
-            .min_by(|&i, &j| costs[i].total_cmp(&costs[j]))
-            .unwrap_or(0);
+        let mut far = far(self.parameters, &self.values);
+        let mut costs = self.candidates(&far).costs(&draws, 1)?;
+        let mut looks = (draws.len(), f64::INFINITY);
+        let first = self.best(&draws, &mut costs, looks, points, &mut far)?;
+        let first = first.unwrap_or(0);
         let spread = SPREAD * sizes[first];
         progress.advance(1);
         let rule = CemSettings {
@@ -256,14 +275,12 @@ impl<'a> Designer<'_, 'a> {
             let drawn = settings.population.saturating_sub(SIZES.len()).max(2);
             candidates.extend(search.ask(drawn, rng));
             let elite = (ELITE * candidates.len() as f64).round() as usize;
-            let costs = self.candidates().costs(&candidates, elite.max(2))?;
-            search.tell(&candidates, &costs);
-            let k = (0..costs.len())
-                .min_by(|&i, &j| costs[i].total_cmp(&costs[j]))
-                .unwrap_or(0);
-            if costs[k] < best.1 {
+            let mut costs = self.candidates(&far).costs(&candidates, elite.max(2))?;
+            looks = (LOOKS, best.1);
+            if let Some(k) = self.best(&candidates, &mut costs, looks, points, &mut far)? {
                 best = (candidates[k].clone(), costs[k]);
             }
+            search.tell(&candidates, &costs);
             course.push(best.1);
             progress.note(&format!("explore, {:.3}", best.1));
             progress.advance(1);
@@ -272,8 +289,40 @@ impl<'a> Designer<'_, 'a> {
         Ok((best.0, course))
     }
 
+    /// The best candidate below a cost that keeps all limits at all points, of so many that are looked at; where all break one, that
+    /// which does by the least. Points where better ones break a limit join those far from the middle, and their costs say so.
+    fn best(
+        &mut self,
+        candidates: &[Vec<f64>],
+        costs: &mut [f64],
+        (looks, below): (usize, f64),
+        points: &[Vec<f64>],
+        far: &mut Vec<Vec<f64>>,
+    ) -> Result<Option<usize>> {
+        for _ in 0..looks {
+            let order = |&i: &usize, &j: &usize| costs[i].total_cmp(&costs[j]);
+            let best = (0..costs.len()).min_by(order);
+            let Some(k) = best.filter(|&k| costs[k] < below) else {
+                return Ok(None);
+            };
+            if costs[k] >= BROKEN {
+                return Ok(Some(k));
+            }
+            let all = self.excess_at(&candidates[k], 1.0, points)?;
+            if all.iter().all(Excess::is_none) {
+                return Ok(Some(k));
+            }
+            costs[k] = BROKEN * (1.0 + joined(&all).total);
+            let worst = points[worst_of(&all)].clone();
+            if !far.contains(&worst) {
+                far.push(worst);
+            }
+        }
+        Ok(None)
+    }
+
     /// What ranks candidates.
-    fn candidates(&mut self) -> Candidates<'_, 'a> {
+    fn candidates<'s>(&'s mut self, far: &'s [Vec<f64>]) -> Candidates<'s, 'a> {
         let family = self.family.clone();
         Candidates {
             player: &mut *self.player,
@@ -284,6 +333,7 @@ impl<'a> Designer<'_, 'a> {
             known: &self.known,
             objective: self.objective,
             substeps: self.substeps,
+            far,
         }
     }
 
@@ -336,10 +386,8 @@ impl<'a> Designer<'_, 'a> {
         &mut self,
         coefficients: &[f64],
         course: Vec<f64>,
-        rng: &mut Rng,
+        points: &[Vec<f64>],
     ) -> Result<Designed> {
-        let ends = ends(self.parameters, &self.values);
-        let points = [vec![self.values.clone()], ends, self.corners(rng)].concat();
         let mut scale = 1.0;
         let mut excess = Excess::default();
         // Where the last size broke the most: a size that breaks a limit there needs no look elsewhere.
@@ -347,18 +395,16 @@ impl<'a> Designer<'_, 'a> {
         for _ in 0..SHRINKS {
             excess = joined(&self.excess_at(coefficients, scale, &points[worst..=worst])?);
             if excess.is_none() {
-                let all = self.excess_at(coefficients, scale, &points)?;
+                let all = self.excess_at(coefficients, scale, points)?;
                 excess = joined(&all);
                 if excess.is_none() {
                     break;
                 }
-                worst = (0..all.len())
-                    .max_by(|&i, &j| all[i].total.total_cmp(&all[j].total))
-                    .unwrap_or(0);
+                worst = worst_of(&all);
             }
             scale *= SHRINK;
         }
-        let larger = joined(&self.excess_at(coefficients, LARGER * scale, &points)?);
+        let larger = joined(&self.excess_at(coefficients, LARGER * scale, points)?);
         let commands = self.family.commands(coefficients, scale);
         let (near, widths) = differences(self.parameters, &self.values);
         let jobs: Vec<(&[f64], &[f64])> = near.iter().map(|p| (&commands[..], &p[..])).collect();
@@ -383,4 +429,11 @@ fn joined(all: &[Excess]) -> Excess {
     let mut one = Excess::default();
     all.iter().for_each(|e| one.join(e));
     one
+}
+
+/// The place of the largest excess.
+fn worst_of(all: &[Excess]) -> usize {
+    (0..all.len())
+        .max_by(|&i, &j| all[i].total.total_cmp(&all[j].total))
+        .unwrap_or(0)
 }
