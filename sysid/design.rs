@@ -1,9 +1,9 @@
 //! The search for the motion that tells the most and keeps all limits.
 //!
-//! A candidate is played at the middle of the unknowns, a little up and down in each (what it tells), and at the ends of their
-//! ranges (whether it keeps the limits there too). The cross-entropy method makes the objective small among the
-//! candidates that keep all limits; those that do not rank behind them, by how much they break. The answer is played
-//! once more at corners of the ranges, with the limits looked at after every physics step, and is made smaller until none is broken.
+//! The cross-entropy method makes the objective small among the candidates that keep all limits; those that do not rank behind
+//! them, by how much they break ([`crate::candidates`]). A candidate that is better than all before it is played at the middle, the ends and
+//! corners of the ranges, with the limits looked at after every physics step; where it breaks one there, the search
+//! looks at that point from then on. The answer is made smaller until no limit is broken.
 
 use asid_algorithms::fisher::Objective;
 use asid_algorithms::optimise::cem::{Cem, CemSettings};
@@ -12,6 +12,7 @@ use asid_core::rng::Rng;
 use asid_core::{Parameter, Progress, Streams};
 use rand::Rng as _;
 
+use crate::candidates::{BROKEN, Candidates, ends, far};
 use crate::limits::Excess;
 use crate::motion::{Family, Shape};
 use crate::play::{Played, Player};
@@ -83,8 +84,8 @@ pub struct DesignSettings {
     pub iterations: usize,
     /// Candidates a round.
     pub population: usize,
-    /// Physics steps of the whole search at most, which bounds its time: rounds are left out, of which 8 are kept. Two cores
-    /// take some 1.5e5 steps of an arm of six joints a second.
+    /// Physics steps of the whole search, which bound its time: after them no round begins, of which 8 are kept. Two cores
+    /// take some 5e5 steps of an arm of six joints a second; those of a machine of more coordinates count for more.
     pub physics_steps: f64,
 }
 
@@ -95,10 +96,20 @@ impl Default for DesignSettings {
             harmonics: 5,
             iterations: 40,
             population: 40,
-            physics_steps: 1e7,
+            physics_steps: 3e7,
         }
     }
 }
+
+/// Coordinates of the machine whose physics steps count once.
+const SIX_JOINTS: f64 = 6.0;
+
+/// Power of the number of coordinates that the time of a physics step grows with: between the linear one of a chain and the
+/// cubic one of its constraints.
+const GROWTH: f64 = 1.5;
+
+/// Share of a round's candidates that the next one is drawn about.
+const ELITE: f64 = 0.2;
 
 /// Rounds of the search at least.
 const FEWEST_ROUNDS: usize = 8;
@@ -118,17 +129,14 @@ const SMALLEST: f64 = 1e-3;
 /// Sizes in which each round tries the best motion so far.
 const SIZES: [f64; 4] = [1.0, 0.9, 1.15, 1.4];
 
+/// Candidates of a round that are looked at everywhere, at most: each that breaks a limit shows the search a new point.
+const LOOKS: usize = 4;
+
 /// How much larger the answer is played to see which limit it would break first.
 const LARGER: f64 = 1.25;
 
-/// Unknowns of whose ranges a search looks at all corners, at most: eight plays a candidate, where the ends are six.
-const FEW: usize = 3;
-
 /// Corners of the ranges that the answer is played at, at most.
 const CORNERS: usize = 16;
-
-/// A cost beyond any of a motion that keeps the limits.
-const BROKEN: f64 = 1e6;
 
 /// A motion that was found.
 #[derive(Clone, Debug)]
@@ -169,7 +177,7 @@ pub struct Designer<'p, 'a> {
     pub substeps: usize,
 }
 
-impl Designer<'_, '_> {
+impl<'a> Designer<'_, 'a> {
     /// Finds a motion.
     ///
     /// # Errors
@@ -190,44 +198,60 @@ impl Designer<'_, '_> {
             });
         }
         let mut rng = streams.stream("design");
+        let corners = self.corners(&mut streams.stream("corners"));
+        let ends = ends(self.parameters, &self.values);
+        let points = [vec![self.values.clone()], ends, corners].concat();
         let (coefficients, course) = match method {
-            Method::FisherCem => self.search(settings, &mut rng, progress)?,
+            Method::FisherCem => self.search(settings, &points, &mut rng, progress)?,
             Method::Multisine => (self.family.multisine(), Vec::new()),
             Method::Random | Method::Fourier => (self.family.random(&mut rng), Vec::new()),
         };
-        self.finish(&coefficients, course, &mut rng)
+        self.finish(&coefficients, course, &points)
     }
 
     /// The cross-entropy search; the best coefficients, and the best cost after each round.
     fn search(
         &mut self,
         settings: &DesignSettings,
+        points: &[Vec<f64>],
         rng: &mut Rng,
         progress: &dyn Progress,
     ) -> Result<(Vec<f64>, Vec<f64>)> {
         let n = self.family.len();
-        let plays = (1 + 4 * self.parameters.len()) * settings.population;
-        let steps = (plays * self.family.all_frames() * self.substeps) as f64;
-        let rounds = ((settings.physics_steps / steps) as usize)
-            .clamp(FEWEST_ROUNDS, settings.iterations.max(FEWEST_ROUNDS));
+        // What a step counts.
+        let size = self.player.coordinates() as f64 / SIX_JOINTS;
+        let bound = settings.physics_steps / size.max(1.0).powf(GROWTH);
+        let begun = self.player.steps();
+        let rounds = settings.iterations.max(FEWEST_ROUNDS);
         progress.begin("explore", rounds as u64 + 1);
-        // Draws at sizes from the whole down to a thousandth: the best that keeps the limits is the middle of the search.
+        // Draws, and curves like those of the baselines, at sizes from the whole down to a thousandth: the best that keeps the
+        // limits is the middle of the search.
+        let fourier = Family {
+            shape: Shape::Fourier(settings.harmonics),
+            ..self.family.clone()
+        };
         let mut draws = vec![vec![0.0; n]];
         let mut sizes = vec![SMALLEST];
         while draws.len() < settings.population {
             let along = (draws.len() - 1) as f64 / (settings.population - 2).max(1) as f64;
             let size = SMALLEST.powf(along);
-            draws.push(self.family.random(rng).iter().map(|c| c * size).collect());
+            let drawn = match draws.len() % 3 {
+                0 => self.family.random(rng),
+                1 => self.family.near(&fourier, &fourier.random(rng)),
+                _ => self.family.near(&fourier, &fourier.multisine()),
+            };
+            draws.push(drawn.iter().map(|c| c * size).collect());
             sizes.push(size);
         }
-        let costs = self.costs(&draws)?;
-        let first = (0..draws.len())
-            .min_by(|&i, &j| costs[i].total_cmp(&costs[j]))
-            .unwrap_or(0);
+        let mut far = far(self.parameters, &self.values);
+        let mut costs = self.candidates(&far).costs(&draws, 1)?;
+        let mut looks = (draws.len(), f64::INFINITY);
+        let first = self.best(&draws, &mut costs, looks, points, &mut far)?;
+        let first = first.unwrap_or(0);
         let spread = SPREAD * sizes[first];
         progress.advance(1);
         let rule = CemSettings {
-            elite_fraction: 0.2,
+            elite_fraction: ELITE,
             ..CemSettings::default()
         };
         let mut search = Cem::new(
@@ -239,7 +263,10 @@ impl Designer<'_, '_> {
         );
         let mut course = vec![costs[first]];
         let mut best = (draws[first].clone(), costs[first]);
-        for _ in 0..rounds {
+        for round in 0..rounds {
+            if round >= FEWEST_ROUNDS && (self.player.steps() - begun) as f64 >= bound {
+                break;
+            }
             // The best so far, also larger and smaller: limits bind the size before the shape.
             let mut candidates: Vec<Vec<f64>> = SIZES
                 .iter()
@@ -247,14 +274,13 @@ impl Designer<'_, '_> {
                 .collect();
             let drawn = settings.population.saturating_sub(SIZES.len()).max(2);
             candidates.extend(search.ask(drawn, rng));
-            let costs = self.costs(&candidates)?;
-            search.tell(&candidates, &costs);
-            let k = (0..costs.len())
-                .min_by(|&i, &j| costs[i].total_cmp(&costs[j]))
-                .unwrap_or(0);
-            if costs[k] < best.1 {
+            let elite = (ELITE * candidates.len() as f64).round() as usize;
+            let mut costs = self.candidates(&far).costs(&candidates, elite.max(2))?;
+            looks = (LOOKS, best.1);
+            if let Some(k) = self.best(&candidates, &mut costs, looks, points, &mut far)? {
                 best = (candidates[k].clone(), costs[k]);
             }
+            search.tell(&candidates, &costs);
             course.push(best.1);
             progress.note(&format!("explore, {:.3}", best.1));
             progress.advance(1);
@@ -263,59 +289,52 @@ impl Designer<'_, '_> {
         Ok((best.0, course))
     }
 
-    /// Costs of some candidates.
-    fn costs(&mut self, candidates: &[Vec<f64>]) -> Result<Vec<f64>> {
-        let (near, widths) = differences(self.parameters, &self.values);
-        let points = [&near[..], &self.far()].concat();
-        let commands: Vec<Vec<f64>> = candidates
-            .iter()
-            .map(|c| self.family.commands(c, 1.0))
-            .collect();
-        let jobs: Vec<(&[f64], &[f64])> = commands
-            .iter()
-            .flat_map(|c| points.iter().map(move |p| (&c[..], &p[..])))
-            .collect();
-        let plays = self.player.play(&jobs, self.substeps)?;
-        Ok(plays
-            .chunks_exact(points.len())
-            .map(|plays| {
-                let mut excess = Excess::default();
-                plays.iter().for_each(|p| excess.join(&p.excess));
-                if excess.is_none() {
-                    let told = of_plays(self.player, &plays[..near.len()], &widths, self.sought);
-                    told.and(1.0, &self.known).cost(self.objective)
-                } else {
-                    BROKEN * (1.0 + excess.total)
-                }
-            })
-            .collect())
-    }
-
-    /// Points far from the middle at which a search looks at the limits: all corners of the ranges where these are few,
-    /// else the ends of each range.
-    fn far(&self) -> Vec<Vec<f64>> {
-        let n = self.parameters.len();
-        if n > FEW {
-            return self.ends();
-        }
-        let corner = |k: usize| {
-            let entries = self.parameters.iter().enumerate();
-            entries.map(|(i, p)| p.range[k >> i & 1]).collect()
-        };
-        (0..1 << n).map(corner).collect()
-    }
-
-    /// The middle with each entry at either end of its range.
-    fn ends(&self) -> Vec<Vec<f64>> {
-        let mut points = Vec::with_capacity(2 * self.parameters.len());
-        for (i, parameter) in self.parameters.iter().enumerate() {
-            for end in parameter.range {
-                let mut point = self.values.clone();
-                point[i] = end;
-                points.push(point);
+    /// The best candidate below a cost that keeps all limits at all points, of so many that are looked at; where all break one, that
+    /// which does by the least. Points where better ones break a limit join those far from the middle, and their costs say so.
+    fn best(
+        &mut self,
+        candidates: &[Vec<f64>],
+        costs: &mut [f64],
+        (looks, below): (usize, f64),
+        points: &[Vec<f64>],
+        far: &mut Vec<Vec<f64>>,
+    ) -> Result<Option<usize>> {
+        for _ in 0..looks {
+            let order = |&i: &usize, &j: &usize| costs[i].total_cmp(&costs[j]);
+            let best = (0..costs.len()).min_by(order);
+            let Some(k) = best.filter(|&k| costs[k] < below) else {
+                return Ok(None);
+            };
+            if costs[k] >= BROKEN {
+                return Ok(Some(k));
+            }
+            let all = self.excess_at(&candidates[k], 1.0, points)?;
+            if all.iter().all(Excess::is_none) {
+                return Ok(Some(k));
+            }
+            costs[k] = BROKEN * (1.0 + joined(&all).total);
+            let worst = points[worst_of(&all)].clone();
+            if !far.contains(&worst) {
+                far.push(worst);
             }
         }
-        points
+        Ok(None)
+    }
+
+    /// What ranks candidates.
+    fn candidates<'s>(&'s mut self, far: &'s [Vec<f64>]) -> Candidates<'s, 'a> {
+        let family = self.family.clone();
+        Candidates {
+            player: &mut *self.player,
+            family,
+            parameters: self.parameters,
+            sought: self.sought,
+            values: &self.values,
+            known: &self.known,
+            objective: self.objective,
+            substeps: self.substeps,
+            far,
+        }
     }
 
     /// The entries in which a point differs from the middle.
@@ -344,22 +363,22 @@ impl Designer<'_, '_> {
             .collect()
     }
 
-    /// By how much a motion passes limits at some points, with every physics step looked at.
+    /// By how much a motion passes limits at each of some points, with every physics step looked at.
     fn excess_at(
         &mut self,
         coefficients: &[f64],
         scale: f64,
         points: &[Vec<f64>],
-    ) -> Result<Excess> {
+    ) -> Result<Vec<Excess>> {
         let commands = self.family.commands(coefficients, scale);
         let rows = commands.chunks_exact(self.family.base.len());
         let fine: Vec<f64> = rows.flat_map(|row| row.repeat(self.substeps)).collect();
         let jobs: Vec<(&[f64], &[f64])> = points.iter().map(|p| (&fine[..], &p[..])).collect();
-        let mut excess = Excess::default();
-        for (played, point) in self.player.play(&jobs, 1)?.iter().zip(points) {
-            excess.join(&played.excess.at(|| self.words(point)));
-        }
-        Ok(excess)
+        let plays = self.player.play(&jobs, 1)?;
+        let pairs = plays.iter().zip(points);
+        Ok(pairs
+            .map(|(played, point)| played.excess.at(|| self.words(point)))
+            .collect())
     }
 
     /// Plays the answer with every step looked at, smaller and smaller until nothing is broken.
@@ -367,19 +386,25 @@ impl Designer<'_, '_> {
         &mut self,
         coefficients: &[f64],
         course: Vec<f64>,
-        rng: &mut Rng,
+        points: &[Vec<f64>],
     ) -> Result<Designed> {
-        let points = [vec![self.values.clone()], self.ends(), self.corners(rng)].concat();
         let mut scale = 1.0;
         let mut excess = Excess::default();
+        // Where the last size broke the most: a size that breaks a limit there needs no look elsewhere.
+        let mut worst = 0;
         for _ in 0..SHRINKS {
-            excess = self.excess_at(coefficients, scale, &points)?;
+            excess = joined(&self.excess_at(coefficients, scale, &points[worst..=worst])?);
             if excess.is_none() {
-                break;
+                let all = self.excess_at(coefficients, scale, points)?;
+                excess = joined(&all);
+                if excess.is_none() {
+                    break;
+                }
+                worst = worst_of(&all);
             }
             scale *= SHRINK;
         }
-        let larger = self.excess_at(coefficients, LARGER * scale, &points)?;
+        let larger = joined(&self.excess_at(coefficients, LARGER * scale, points)?);
         let commands = self.family.commands(coefficients, scale);
         let (near, widths) = differences(self.parameters, &self.values);
         let jobs: Vec<(&[f64], &[f64])> = near.iter().map(|p| (&commands[..], &p[..])).collect();
@@ -397,4 +422,18 @@ impl Designer<'_, '_> {
             course,
         })
     }
+}
+
+/// Excesses of several plays as one.
+fn joined(all: &[Excess]) -> Excess {
+    let mut one = Excess::default();
+    all.iter().for_each(|e| one.join(e));
+    one
+}
+
+/// The place of the largest excess.
+fn worst_of(all: &[Excess]) -> usize {
+    (0..all.len())
+        .max_by(|&i, &j| all[i].total.total_cmp(&all[j].total))
+        .unwrap_or(0)
 }

@@ -42,6 +42,19 @@ pub struct Identified {
     pub physics_steps: u64,
 }
 
+/// A search for machines whose replays are smooth in the unknowns, as they are where nothing bounces: from fewer
+/// points, and with fewer fits over the region of the posterior, than a task with contacts needs.
+#[must_use]
+pub fn smooth() -> GaussNewtonSettings {
+    GaussNewtonSettings {
+        screened: 32,
+        starts: 2,
+        iterations: 8,
+        rounds: 2,
+        ..GaussNewtonSettings::default()
+    }
+}
+
 /// Whitens residuals of an episode for what its start leaves open.
 pub(crate) struct Marginal {
     /// Where the episode begins.

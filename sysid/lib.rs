@@ -6,8 +6,10 @@
 //! - [`fit`]: the unknowns are fitted to logs by least squares over open-loop replays, with the initial states of the
 //!   episodes marginalised ([`dataset`], [`start`]), and the gap on logs held out is measured ([`gap`]).
 //! - [`design`]: the motion is searched that tells the most about the unknowns ([`tells`]) and keeps all
-//!   [`limits`]; it is a [`motion`] of a few numbers, simulated in batches by [`play`].
+//!   [`limits`], among [`candidates`]; it is a [`motion`] of a few numbers, simulated in batches by [`play`], and [`rehearse`]d in
+//!   simulated true machines.
 
+pub mod candidates;
 pub mod dataset;
 pub mod design;
 pub mod fit;
@@ -15,6 +17,7 @@ pub mod gap;
 pub mod limits;
 pub mod motion;
 pub mod play;
+pub mod rehearse;
 pub mod start;
 pub mod tells;
 

@@ -24,6 +24,9 @@ pub enum Shape {
 /// Share of a Fourier motion over which it is faded in, and out.
 const FADE: f64 = 0.15;
 
+/// Height of a curve of splines of height one: where a cubic one peaks its neighbours have a quarter each.
+const OVERLAP: f64 = 1.5;
+
 /// A family of motions.
 #[derive(Clone, Debug)]
 pub struct Family {
@@ -123,6 +126,17 @@ impl Family {
         }
     }
 
+    /// Heights of splines whose curves are near those of another family's coefficients; for a spline family.
+    #[must_use]
+    pub fn near(&self, other: &Self, coefficients: &[f64]) -> Vec<f64> {
+        let each = self.each();
+        // A spline of the support `[k, k + 4]` peaks in its middle.
+        let middle = |k: usize| (k + 2) as f64 / (each + 3) as f64;
+        let all = coefficients.chunks_exact(other.each().max(1));
+        all.flat_map(|own| (0..each).map(move |k| other.curve(own, middle(k)) / OVERLAP))
+            .collect()
+    }
+
     /// Coefficients that are drawn.
     pub fn random(&self, rng: &mut Rng) -> Vec<f64> {
         (0..self.len())
@@ -183,6 +197,20 @@ mod tests {
         // Continuous slope at a knot.
         let slope = |x: f64| (cubic(x + 1e-6) - cubic(x - 1e-6)) / 2e-6;
         assert!((slope(1.0 - 1e-5) - slope(1.0 + 1e-5)).abs() < 1e-3);
+    }
+
+    #[test]
+    fn splines_come_near_a_multisine() {
+        let [splines, fourier] = [Shape::Spline(24), Shape::Fourier(3)].map(family);
+        let wanted = fourier.commands(&fourier.multisine(), 1.0);
+        let found = splines.commands(&splines.near(&fourier, &fourier.multisine()), 1.0);
+        let (mut off, mut size) = (0.0, 0.0);
+        for (a, b) in wanted.iter().zip(&found).step_by(2) {
+            off += (a - b).powi(2);
+            size += (a - 0.5).powi(2);
+        }
+        // Heights in place of the curve itself flatten it where it turns sharply, by a tenth of its deviation.
+        assert!(off < 0.03 * size, "{off} {size}");
     }
 
     #[test]

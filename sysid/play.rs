@@ -40,7 +40,8 @@ struct DriveColumn {
 
 /// What plays motions.
 pub struct Player<'a> {
-    plant: &'a Plant,
+    /// The machine.
+    pub(crate) plant: &'a Plant,
     limits: Limits,
     parameters: Vec<Parameter>,
     drives: Vec<DriveColumn>,
@@ -54,9 +55,9 @@ pub struct Player<'a> {
     /// Which of the pairs that should stay apart touch at rest already, and may.
     touching: Vec<bool>,
     /// Commands at rest.
-    base: Vec<f64>,
+    pub(crate) base: Vec<f64>,
     /// Seconds that the machine settles under them before a motion.
-    settle: f64,
+    pub(crate) settle: f64,
 }
 
 impl<'a> Player<'a> {
@@ -126,6 +127,12 @@ impl<'a> Player<'a> {
     #[must_use]
     pub fn steps(&self) -> u64 {
         self.simulator.steps_taken()
+    }
+
+    /// Velocities of the machine, `nv`.
+    #[must_use]
+    pub fn coordinates(&self) -> usize {
+        self.plant.layout.nv
     }
 
     /// The limits.

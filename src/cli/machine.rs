@@ -6,6 +6,7 @@ pub mod identify;
 pub mod motion_config;
 mod motion_page;
 pub mod sensors;
+pub mod setup;
 mod subject;
 
 use std::path::Path;

@@ -35,6 +35,9 @@ mod view;
 mod withheld;
 mod world;
 
+pub use machine::motion_config::Config as MotionConfig;
+pub use machine::{Subject, setup::Setup as MotionSetup};
+
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;

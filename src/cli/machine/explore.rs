@@ -9,17 +9,14 @@ use anyhow::Result;
 use asid_algorithms::fisher::Objective;
 use asid_core::posterior::Direction;
 use asid_core::signal::Signal;
-use asid_core::{Episode, Error, Parameter, Streams};
+use asid_core::{Episode, Parameter};
 use asid_report::number::significant;
-use asid_sysid::dataset::Dataset;
-use asid_sysid::design::{Designed, Designer, Method};
-use asid_sysid::limits::Limits;
-use asid_sysid::motion::Family;
-use asid_sysid::play::{Player, substeps};
-use asid_sysid::tells::{Told, of_logs};
+use asid_sysid::design::{Designed, Method};
+use asid_sysid::tells::Told;
 use serde::Serialize;
 
 use super::motion_config::Config;
+use super::setup::Setup;
 use super::{Subject, motion_page, sensors};
 use crate::cli::failure;
 use crate::cli::options::Common;
@@ -91,72 +88,20 @@ pub fn explore(path: &Path, common: &Common, given: &super::motion_config::Optio
     let mut notes = Vec::new();
     let subject =
         sensors::with_sensors(Subject::open(path, config.backend.as_deref())?, &mut notes)?;
-    let parameters = config.parameters(&subject)?;
-    let sought = config.sought(&subject);
-    let (unknowns, nuisance) = parameters.split_at(sought);
-    let out = OutFolder::claim(common.out.as_deref(), &format!("{}-explore", subject.name))?;
-    let threads = common.threads.unwrap_or(0);
-    let plant = &subject.plant;
-    let limits = Limits::new(plant, &|j| range_of(&subject, j), &config.limits()?)?;
-    let data = match &subject.study {
-        Some(study) => Some(Dataset::new(plant, &study.train, &study.noise)?),
-        None => None,
-    };
-    let signals = sensors::signals(&subject, data.as_ref(), &config.noise, &mut notes)?;
-    let base = base_commands(&subject);
-    let frame = substeps(plant, config.period)?;
-    let period = frame as f64 * plant.layout.timestep;
-    let mut player = Player::new(
-        &*subject.model,
-        plant,
-        limits,
-        &parameters,
-        &signals,
-        (&base, config.settle),
-        threads,
-    )?;
-    let values = config.values(&subject, &parameters)?;
-    settle(&mut player, &values, &config, &mut notes)?;
-    let known = match &data {
-        Some(data) => of_logs(
-            &*subject.model,
-            &parameters,
-            (&values, sought),
-            data,
-            threads,
-        )?,
-        None => Told::nothing(sought, parameters.len()),
-    };
+    let mut setup = Setup::new(&subject, &config, common.threads.unwrap_or(0))?;
+    notes.append(&mut setup.notes);
     let method = Method::named(&config.explorer)?;
     let objective: Objective = config.objective.parse()?;
-    let frames = ((config.seconds / period).round() as usize).max(2);
-    let rest = (config.rest_seconds / period).round() as usize;
-    let family = Family {
-        shape: method.shape(&config.design),
-        amplitude: amplitudes(&subject, player.limits(), &base),
-        range: player.limits().command.clone(),
-        base: base.clone(),
-        frames,
-        rest,
-        period,
-    };
-    let progress = Bars::new(common.quiet);
-    let mut designer = Designer {
-        player: &mut player,
-        family,
-        parameters: &parameters,
-        sought,
-        values: values.clone(),
-        known: known.clone(),
-        objective,
-        substeps: frame,
-    };
-    let found = designer.design(method, &config.design, Streams::new(config.seed), &progress)?;
+    let out = OutFolder::claim(common.out.as_deref(), &format!("{}-explore", subject.name))?;
+    let found = setup.design(&config, method, config.seed, &Bars::new(common.quiet))?;
+    let period = setup.period();
+    let frames = found.commands.len() / setup.base.len().max(1);
+    let (unknowns, nuisance) = setup.parameters.split_at(setup.sought);
     let broken = found.excess.worst.as_ref().map(|(what, _)| what.clone());
     let rows = unknown_results(
         unknowns,
-        &values,
-        data.as_ref().map(|_| &known),
+        &setup.values,
+        subject.study.as_ref().map(|_| &setup.known),
         &found.told,
         config.precision,
     );
@@ -169,33 +114,41 @@ pub fn explore(path: &Path, common: &Common, given: &super::motion_config::Optio
         explorer: method.name(),
         objective: objective.name(),
         seed: config.seed,
-        seconds: (frames + rest) as f64 * period,
+        seconds: frames as f64 * period,
         period,
         unknowns: rows,
         nuisance: nuisance.iter().map(|p| p.name.clone()).collect(),
-        unseen: found.told.and(1.0, &known).unseen(&names),
+        unseen: found.told.and(1.0, &setup.known).unseen(&names),
         precision: config.precision,
         scale: found.scale,
         next_limit: found.next_limit.clone(),
         broken,
-        noise: signals
+        noise: setup
+            .signals
             .iter()
             .map(|s| (s.sensor.clone(), s.noise))
             .collect(),
         notes,
         cost: CostResult {
             wall_s: clock.elapsed().as_secs_f64(),
-            physics_steps: player.steps(),
+            physics_steps: setup.player.steps(),
             env_steps: 0,
         },
     };
     let view = view::of_motion(&subject, &found.played.qpos, period)?;
-    let page = motion_page::page(&result, &subject, &found, player.limits(), view.as_ref());
+    let page = motion_page::page(
+        &result,
+        &subject,
+        &found,
+        setup.player.limits(),
+        view.as_ref(),
+    );
     out.write(|folder| {
         write_json(&folder.join("result.json"), &result)?;
         write_text(&folder.join("config.toml"), &toml::to_string(&config)?)?;
         commands(&subject, &found, period).write_csv(&folder.join("commands.csv"))?;
-        predicted(&subject, &found, &signals, period).write_csv(&folder.join("predicted.csv"))?;
+        predicted(&subject, &found, &setup.signals, period)
+            .write_csv(&folder.join("predicted.csv"))?;
         write_text(&folder.join("report.html"), &page)?;
         if !subject.source.scene.xml().contains("file=") {
             write_text(&folder.join("model.xml"), subject.source.scene.xml())?;
@@ -216,103 +169,6 @@ pub fn explore(path: &Path, common: &Common, given: &super::motion_config::Optio
         failure::warn(&format!(
             "no motion of this kind keeps all limits, not even the smallest: {what}; do not play it, and look at the limits \
              and at the posture that it begins in"
-        ));
-    }
-    Ok(())
-}
-
-/// The range of a joint, by index, where the model has one.
-fn range_of(subject: &Subject, joint: usize) -> Option<[f64; 2]> {
-    let name = &subject.plant.layout.joints[joint].name;
-    let end = |index: usize| {
-        let target = format!("joint/{name}/range/{index}").parse().ok()?;
-        subject.model.nominal(&target).ok()
-    };
-    Some([end(0)?, end(1)?]).filter(|[low, high]| low < high)
-}
-
-/// Commands under which the machine rests: the first keyframe's, else those of servos that hold the first state.
-fn base_commands(subject: &Subject) -> Vec<f64> {
-    let layout = &subject.plant.layout;
-    if let Some(key) = layout.keyframes.first() {
-        return key.ctrl.clone();
-    }
-    let (qpos, _) = asid_core::problem::home(layout);
-    let drives = subject.plant.drives.iter();
-    drives
-        .map(|drive| match drive {
-            Some(d) if d.is_position_servo() => d.gear * qpos[layout.joints[d.joint].qpos],
-            _ => 0.0,
-        })
-        .collect()
-}
-
-/// How far each command may go from its base: half of what limits leave, whichever side is wider.
-fn amplitudes(subject: &Subject, limits: &Limits, base: &[f64]) -> Vec<f64> {
-    let reach = |range: Option<[f64; 2]>, base: f64| {
-        range.map_or(f64::INFINITY, |[low, high]| {
-            (high - base).max(base - low).max(0.0)
-        })
-    };
-    let each = base.iter().enumerate().map(|(a, &base)| {
-        let mut width = reach(limits.command[a], base);
-        if let Some(drive) = subject.plant.drives[a] {
-            let joint = &subject.plant.layout.joints[drive.joint];
-            let limit = limits.joints.iter().find(|l| l.name == joint.name);
-            if drive.is_position_servo() {
-                let range = limit.and_then(|l| l.position);
-                width = width.min(reach(range.map(|r| r.map(|x| x * drive.gear)), base));
-            } else if let Some(force) = limits.drives.iter().find(|d| d.actuator == a) {
-                width = width.min(force.force / drive.gear.abs());
-            }
-        }
-        if width.is_finite() { width } else { 0.0 }
-    });
-    each.collect()
-}
-
-/// Lets the machine come to rest before a motion, where it does.
-fn settle(
-    player: &mut Player<'_>,
-    values: &[f64],
-    config: &Config,
-    notes: &mut Vec<String>,
-) -> Result<()> {
-    let left = player.unrest(&[values.to_vec()])?;
-    if left > config.rest_speed {
-        notes.push(format!(
-            "under its first commands the machine does not come to rest within {} s (speed {left:.3} left): the motion \
-             begins in the first state itself, which is taken as known exactly",
-            config.settle
-        ));
-        player.skip_settling();
-    }
-    let (at_stop, beyond) = player.look_at_begin(values)?;
-    if let Some((what, _)) = beyond.worst {
-        let message = format!(
-            "the machine begins beyond one: {what}; move its first keyframe within the limits, or widen this one"
-        );
-        return Err(Error::Config {
-            key: "limits".into(),
-            message,
-        }
-        .into());
-    }
-    if !at_stop.is_empty() {
-        let names = at_stop.join(", ");
-        notes.push(format!(
-            "at rest at the end of the range, and may stay there: {names}"
-        ));
-    }
-    let touching = player.allow_present_contacts(values)?;
-    if !touching.is_empty() {
-        let pairs: Vec<String> = touching
-            .iter()
-            .map(|[a, b]| format!("{a} and {b}"))
-            .collect();
-        notes.push(format!(
-            "at rest there touch already, and may: {}",
-            pairs.join(", ")
         ));
     }
     Ok(())

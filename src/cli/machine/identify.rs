@@ -11,7 +11,7 @@ use asid_core::{Error, Parameter, Streams, Target};
 use asid_effects::RefinedModel;
 use asid_report::run::{NamedText, RealWorld, RunReport};
 use asid_sysid::dataset::Dataset;
-use asid_sysid::fit::{Identified, fit};
+use asid_sysid::fit::{Identified, fit, smooth};
 use asid_sysid::gap::gap;
 use serde::{Deserialize, Serialize};
 
@@ -35,18 +35,6 @@ struct Config {
     seed: u64,
     #[serde(default = "smooth")]
     gauss_newton: GaussNewtonSettings,
-}
-
-/// A search for machines whose replays are smooth in the unknowns, as they are where nothing bounces: from fewer
-/// points, and with fewer fits over the region of the posterior, than a task with contacts needs.
-fn smooth() -> GaussNewtonSettings {
-    GaussNewtonSettings {
-        screened: 32,
-        starts: 2,
-        iterations: 8,
-        rounds: 2,
-        ..GaussNewtonSettings::default()
-    }
 }
 
 /// Gaps in units of the noise.

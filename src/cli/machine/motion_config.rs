@@ -95,10 +95,14 @@ impl Options {
 pub struct Config {
     /// Study, or model.
     pub machine: String,
+    /// Engine; the default one where nothing is said.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub backend: Option<String>,
+    /// Seed of all random numbers.
     pub seed: u64,
+    /// Method of the search.
     pub explorer: String,
+    /// What is made small.
     pub objective: String,
     /// Length of the motion, s.
     pub seconds: f64,
@@ -114,15 +118,23 @@ pub struct Config {
     pub ends_at_rest: bool,
     /// Relative precision that repeats are counted for.
     pub precision: f64,
+    /// Unknowns that are sought, `TARGET:LOW:HIGH`, with `:log` behind for a logarithmic scale.
     pub unknown: Vec<String>,
+    /// Unknowns that are estimated along, likewise.
     pub nuisance: Vec<String>,
+    /// Positions of joints, `JOINT:LOW:HIGH`, rad or m.
     pub limit_position: Vec<String>,
+    /// Speeds of joints, `[JOINT:]SPEED`, rad/s or m/s.
     pub limit_speed: Vec<String>,
+    /// Forces of drives, `[ACTUATOR:]FORCE`, N or N m.
     pub limit_force: Vec<String>,
+    /// Boxes of bodies, `BODY:X0:X1:Y0:Y1:Z0:Z1`, m.
     pub limit_box: Vec<String>,
+    /// Bodies that may touch, `BODY:BODY`.
     pub may_touch: Vec<String>,
     /// Noise by sensor, in its unit.
     pub noise: BTreeMap<String, f64>,
+    /// How widely is searched.
     pub design: DesignSettings,
 }
 
@@ -197,6 +209,18 @@ fn maybe_name(key: &str, text: &str) -> Result<(String, f64)> {
 }
 
 impl Config {
+    /// The settings of a file alone, for a machine.
+    ///
+    /// # Errors
+    /// When the file cannot be read, or a setting is unknown or out of its domain.
+    pub fn of_file(machine: &Path, file: &Path) -> Result<Self> {
+        let common = Common {
+            config: Some(file.to_owned()),
+            ..Common::default()
+        };
+        Self::resolve(machine, &common, &Options::default())
+    }
+
     /// The configuration file, `--set`, then the options.
     pub fn resolve(path: &Path, common: &Common, given: &Options) -> Result<Self> {
         let mut table = match &common.config {

@@ -1,0 +1,228 @@
+//! What the search of a motion works on: a machine at rest, its unknowns and limits, and how far its commands may go.
+
+use anyhow::Result;
+use asid_core::signal::Signal;
+use asid_core::{Error, Parameter, Progress, Streams};
+use asid_sysid::dataset::Dataset;
+use asid_sysid::design::{Designed, Designer, Method};
+use asid_sysid::limits::Limits;
+use asid_sysid::motion::Family;
+use asid_sysid::play::{Player, substeps};
+use asid_sysid::tells::{Told, of_logs};
+
+use super::motion_config::Config;
+use super::{Subject, sensors};
+
+/// A machine at rest, ready for a search.
+pub struct Setup<'a> {
+    subject: &'a Subject,
+    /// Plays motions, and looks at limits.
+    pub player: Player<'a>,
+    /// The unknowns that are sought, then nuisance entries.
+    pub parameters: Vec<Parameter>,
+    /// Number of unknowns that are sought.
+    pub sought: usize,
+    /// Values about which is searched, in the parameters' units.
+    pub values: Vec<f64>,
+    /// What the logs of a study tell; nothing without one.
+    pub known: Told,
+    /// Sensors that are read, with their noise.
+    pub signals: Vec<Signal>,
+    /// Physics steps of a frame.
+    pub substeps: usize,
+    /// Commands under which the machine rests.
+    pub base: Vec<f64>,
+    /// What a user should know, one sentence each.
+    pub notes: Vec<String>,
+}
+
+impl<'a> Setup<'a> {
+    /// Puts a machine to rest and looks whether it keeps its limits there.
+    ///
+    /// # Errors
+    /// When a name of the configuration is unknown, the machine begins beyond a limit, or the engine fails.
+    pub fn new(subject: &'a Subject, config: &Config, threads: usize) -> Result<Self> {
+        let mut notes = Vec::new();
+        let parameters = config.parameters(subject)?;
+        let sought = config.sought(subject);
+        let plant = &subject.plant;
+        let limits = Limits::new(plant, &|j| range_of(subject, j), &config.limits()?)?;
+        let data = match &subject.study {
+            Some(study) => Some(Dataset::new(plant, &study.train, &study.noise)?),
+            None => None,
+        };
+        let signals = sensors::signals(subject, data.as_ref(), &config.noise, &mut notes)?;
+        let base = base_commands(subject);
+        let mut player = Player::new(
+            &*subject.model,
+            plant,
+            limits,
+            &parameters,
+            &signals,
+            (&base, config.settle),
+            threads,
+        )?;
+        let values = config.values(subject, &parameters)?;
+        settle(&mut player, &values, config, &mut notes)?;
+        let known = match &data {
+            Some(data) => of_logs(
+                &*subject.model,
+                &parameters,
+                (&values, sought),
+                data,
+                threads,
+            )?,
+            None => Told::nothing(sought, parameters.len()),
+        };
+        Ok(Self {
+            subject,
+            player,
+            parameters,
+            sought,
+            values,
+            known,
+            signals,
+            substeps: substeps(plant, config.period)?,
+            base,
+            notes,
+        })
+    }
+
+    /// Period of a frame, s: a whole number of physics steps.
+    #[must_use]
+    pub fn period(&self) -> f64 {
+        self.substeps as f64 * self.subject.plant.layout.timestep
+    }
+
+    /// Finds a motion.
+    ///
+    /// # Errors
+    /// When the configuration is off, nothing can move, or the engine fails.
+    pub fn design(
+        &mut self,
+        config: &Config,
+        method: Method,
+        seed: u64,
+        progress: &dyn Progress,
+    ) -> Result<Designed> {
+        let period = self.period();
+        let limits = self.player.limits();
+        let family = Family {
+            shape: method.shape(&config.design),
+            amplitude: amplitudes(self.subject, limits, &self.base),
+            range: limits.command.clone(),
+            base: self.base.clone(),
+            frames: ((config.seconds / period).round() as usize).max(2),
+            rest: (config.rest_seconds / period).round() as usize,
+            period,
+        };
+        let mut designer = Designer {
+            player: &mut self.player,
+            family,
+            parameters: &self.parameters,
+            sought: self.sought,
+            values: self.values.clone(),
+            known: self.known.clone(),
+            objective: config.objective.parse()?,
+            substeps: self.substeps,
+        };
+        Ok(designer.design(method, &config.design, Streams::new(seed), progress)?)
+    }
+}
+
+/// The range of a joint, by index, where the model has one.
+fn range_of(subject: &Subject, joint: usize) -> Option<[f64; 2]> {
+    let name = &subject.plant.layout.joints[joint].name;
+    let end = |index: usize| {
+        let target = format!("joint/{name}/range/{index}").parse().ok()?;
+        subject.model.nominal(&target).ok()
+    };
+    Some([end(0)?, end(1)?]).filter(|[low, high]| low < high)
+}
+
+/// Commands under which the machine rests: the first keyframe's, else those of servos that hold the first state.
+fn base_commands(subject: &Subject) -> Vec<f64> {
+    let layout = &subject.plant.layout;
+    if let Some(key) = layout.keyframes.first() {
+        return key.ctrl.clone();
+    }
+    let (qpos, _) = asid_core::problem::home(layout);
+    let drives = subject.plant.drives.iter();
+    drives
+        .map(|drive| match drive {
+            Some(d) if d.is_position_servo() => d.gear * qpos[layout.joints[d.joint].qpos],
+            _ => 0.0,
+        })
+        .collect()
+}
+
+/// How far each command may go from its base: half of what limits leave, whichever side is wider.
+fn amplitudes(subject: &Subject, limits: &Limits, base: &[f64]) -> Vec<f64> {
+    let reach = |range: Option<[f64; 2]>, base: f64| {
+        range.map_or(f64::INFINITY, |[low, high]| {
+            (high - base).max(base - low).max(0.0)
+        })
+    };
+    let each = base.iter().enumerate().map(|(a, &base)| {
+        let mut width = reach(limits.command[a], base);
+        if let Some(drive) = subject.plant.drives[a] {
+            let joint = &subject.plant.layout.joints[drive.joint];
+            let limit = limits.joints.iter().find(|l| l.name == joint.name);
+            if drive.is_position_servo() {
+                let range = limit.and_then(|l| l.position);
+                width = width.min(reach(range.map(|r| r.map(|x| x * drive.gear)), base));
+            } else if let Some(force) = limits.drives.iter().find(|d| d.actuator == a) {
+                width = width.min(force.force / drive.gear.abs());
+            }
+        }
+        if width.is_finite() { width } else { 0.0 }
+    });
+    each.collect()
+}
+
+/// Lets the machine come to rest before a motion, where it does.
+fn settle(
+    player: &mut Player<'_>,
+    values: &[f64],
+    config: &Config,
+    notes: &mut Vec<String>,
+) -> Result<()> {
+    let left = player.unrest(&[values.to_vec()])?;
+    if left > config.rest_speed {
+        notes.push(format!(
+            "under its first commands the machine does not come to rest within {} s (speed {left:.3} left): the motion \
+             begins in the first state itself, which is taken as known exactly",
+            config.settle
+        ));
+        player.skip_settling();
+    }
+    let (at_stop, beyond) = player.look_at_begin(values)?;
+    if let Some((what, _)) = beyond.worst {
+        let message = format!(
+            "the machine begins beyond one: {what}; move its first keyframe within the limits, or widen this one"
+        );
+        return Err(Error::Config {
+            key: "limits".into(),
+            message,
+        }
+        .into());
+    }
+    if !at_stop.is_empty() {
+        let names = at_stop.join(", ");
+        notes.push(format!(
+            "at rest at the end of the range, and may stay there: {names}"
+        ));
+    }
+    let touching = player.allow_present_contacts(values)?;
+    if !touching.is_empty() {
+        let pairs: Vec<String> = touching
+            .iter()
+            .map(|[a, b]| format!("{a} and {b}"))
+            .collect();
+        notes.push(format!(
+            "at rest there touch already, and may: {}",
+            pairs.join(", ")
+        ));
+    }
+    Ok(())
+}

@@ -1,0 +1,147 @@
+//! Costs of candidate motions, with no more plays than their order needs.
+//!
+//! A candidate is played at the middle of the unknowns; where it keeps the limits there, a little up and down in each unknown, for what it
+//! tells. In the order of that, candidates are played far from the middle too, with every physics step looked at, until as many
+//! keep the limits there as are wanted. The others keep their place behind these.
+
+use asid_algorithms::fisher::Objective;
+use asid_core::Parameter;
+use asid_core::error::Result;
+
+use crate::limits::Excess;
+use crate::motion::Family;
+use crate::play::{Played, Player};
+use crate::tells::{Told, differences, of_plays};
+
+/// Unknowns of whose ranges a search looks at all corners, at most: eight plays a candidate, where the ends are six.
+const FEW: usize = 3;
+
+/// A cost beyond any of a motion that keeps the limits.
+pub const BROKEN: f64 = 1e6;
+
+/// What ranks candidates.
+pub struct Candidates<'p, 'a> {
+    /// Plays motions.
+    pub player: &'p mut Player<'a>,
+    /// Motions.
+    pub family: Family,
+    /// Unknowns, then nuisance entries.
+    pub parameters: &'p [Parameter],
+    /// Number of unknowns.
+    pub sought: usize,
+    /// The middle: values about which is searched.
+    pub values: &'p [f64],
+    /// What is known beside the prior, such as from logs.
+    pub known: &'p Told,
+    /// What is made small.
+    pub objective: Objective,
+    /// Physics steps of a frame.
+    pub substeps: usize,
+    /// Points far from the middle.
+    pub far: &'p [Vec<f64>],
+}
+
+impl Candidates<'_, '_> {
+    /// Costs; the `wanted` lowest of them are of candidates that keep the limits everywhere, where so many do.
+    ///
+    /// # Errors
+    /// When the engine fails.
+    pub fn costs(&mut self, candidates: &[Vec<f64>], wanted: usize) -> Result<Vec<f64>> {
+        let (near, widths) = differences(self.parameters, self.values);
+        let commands = candidates.iter().map(|c| self.family.commands(c, 1.0));
+        let commands: Vec<Vec<f64>> = commands.collect();
+        let all: Vec<usize> = (0..candidates.len()).collect();
+        let middle = self.plays(&commands, &all, &near[..1], self.substeps)?;
+        let mut costs: Vec<f64> = middle.iter().map(|p| broken(p)).collect();
+        let keep: Vec<usize> = all.into_iter().filter(|&k| costs[k] == 0.0).collect();
+        let beside = self.plays(&commands, &keep, &near[1..], self.substeps)?;
+        for (&k, beside) in keep.iter().zip(beside) {
+            costs[k] = broken(&beside);
+            if costs[k] == 0.0 {
+                let plays = [middle[k].clone(), beside].concat();
+                let told = of_plays(self.player, &plays, &widths, self.sought);
+                costs[k] = told.and(1.0, self.known).cost(self.objective);
+            }
+        }
+        // In the order of what they tell, as many at a time as are still wanted.
+        let mut order: Vec<usize> = keep.into_iter().filter(|&k| costs[k] < BROKEN).collect();
+        order.sort_by(|&i, &j| costs[i].total_cmp(&costs[j]));
+        let (mut found, mut rest) = (0, &order[..]);
+        while found < wanted && !rest.is_empty() {
+            let (now, later) = rest.split_at((wanted - found).min(rest.len()));
+            let fine: Vec<Vec<f64>> = commands.iter().map(|c| self.fine(c)).collect();
+            let plays = self.plays(&fine, now, self.far, 1)?;
+            for (&k, plays) in now.iter().zip(plays) {
+                match broken(&plays) {
+                    0.0 => found += 1,
+                    cost => costs[k] = cost,
+                }
+            }
+            rest = later;
+        }
+        Ok(costs)
+    }
+
+    /// Commands of every physics step.
+    fn fine(&self, commands: &[f64]) -> Vec<f64> {
+        let rows = commands.chunks_exact(self.family.base.len());
+        rows.flat_map(|row| row.repeat(self.substeps)).collect()
+    }
+
+    /// Plays of the chosen motions, each at all points, in frames of some physics steps.
+    fn plays(
+        &mut self,
+        commands: &[Vec<f64>],
+        chosen: &[usize],
+        points: &[Vec<f64>],
+        substeps: usize,
+    ) -> Result<Vec<Vec<Played>>> {
+        let pairs = chosen
+            .iter()
+            .flat_map(|&k| points.iter().map(move |p| (k, p)));
+        let jobs: Vec<(&[f64], &[f64])> = pairs.map(|(k, p)| (&commands[k][..], &p[..])).collect();
+        let plays = self.player.play(&jobs, substeps)?;
+        Ok(plays
+            .chunks_exact(points.len().max(1))
+            .map(<[Played]>::to_vec)
+            .collect())
+    }
+}
+
+/// Cost of plays that break limits; zero where all are kept.
+fn broken(plays: &[Played]) -> f64 {
+    let mut excess = Excess::default();
+    plays.iter().for_each(|p| excess.join(&p.excess));
+    if excess.is_none() {
+        0.0
+    } else {
+        BROKEN * (1.0 + excess.total)
+    }
+}
+
+/// Points far from the middle at which a search begins to look at the limits: all corners of the ranges where these are few,
+/// else the ends of each range.
+pub fn far(parameters: &[Parameter], values: &[f64]) -> Vec<Vec<f64>> {
+    let n = parameters.len();
+    if n > FEW {
+        return ends(parameters, values);
+    }
+    let corner = |k: usize| {
+        let entries = parameters.iter().enumerate();
+        entries.map(|(i, p)| p.range[k >> i & 1]).collect()
+    };
+    (0..1 << n).map(corner).collect()
+}
+
+/// The middle with each entry at either end of its range.
+pub fn ends(parameters: &[Parameter], values: &[f64]) -> Vec<Vec<f64>> {
+    let mut points = Vec::with_capacity(2 * parameters.len());
+    for (i, parameter) in parameters.iter().enumerate() {
+        for end in parameter.range {
+            let mut point = values.to_vec();
+            point[i] = end;
+            points.push(point);
+        }
+    }
+    points
+}

@@ -1,0 +1,135 @@
+//! Motions rehearsed in simulated true machines: logs as a real machine would give them.
+//!
+//! The log begins in the scene's first state, which is known; the machine settles, unread, as before every motion of
+//! [`crate::play`], and then moves. So what an identification makes of it is what [`crate::tells`] expects, as far as the
+//! machine is linear in its unknowns.
+
+use asid_core::Episode;
+use asid_core::episode::{ChannelColumns, InitialState};
+use asid_core::error::{Error, Result};
+use asid_core::problem::home;
+use asid_core::rng::Rng;
+use rand::Rng as _;
+
+use crate::limits::Excess;
+use crate::play::Player;
+
+/// What a true machine did.
+#[derive(Clone, Debug)]
+pub struct Rehearsed {
+    /// Its log, with noise.
+    pub log: Episode,
+    /// By how much it passed limits, looked at after every physics step.
+    pub excess: Excess,
+}
+
+/// Plays commands (`frames x nu`, frames of `substeps` physics steps) on a machine whose unknowns have the values `truth`, in their
+/// units.
+///
+/// # Errors
+/// When the machine diverges, its time to settle is no whole number of frames, or the engine fails.
+pub fn rehearse(
+    player: &mut Player<'_>,
+    (commands, substeps): (&[f64], usize),
+    truth: &[f64],
+    rng: &mut Rng,
+) -> Result<Rehearsed> {
+    let nu = player.base.len();
+    let fine: Vec<f64> = commands
+        .chunks_exact(nu)
+        .flat_map(|row| row.repeat(substeps))
+        .collect();
+    let played = player.play(&[(&fine, truth)], 1)?;
+    let Some(played) = played.first().filter(|p| !p.readings.is_empty()) else {
+        return Err(Error::Failed("the true machine diverges".into()));
+    };
+    let layout = &player.plant.layout;
+    let settle = (player.settle / layout.timestep).round() as usize;
+    if settle % substeps != 0 {
+        return Err(Error::Config {
+            key: "settle".into(),
+            message: format!("{} s is no whole number of frames", player.settle),
+        });
+    }
+    let before = settle / substeps;
+    let mut ctrl = player.base.repeat(before);
+    ctrl.extend_from_slice(commands);
+    ctrl.extend_from_slice(&commands[commands.len() - nu..]);
+    let width = player.width();
+    let mut readings = vec![f64::NAN; (before + 1) * width];
+    let rows = played.readings.chunks_exact(width);
+    for row in rows.skip(substeps - 1).step_by(substeps) {
+        let mut rest = row;
+        for signal in &player.signals {
+            let (own, other) = rest.split_at(layout.sensor(&signal.sensor)?.len);
+            readings.extend(noisy(own, signal.noise, rng));
+            rest = other;
+        }
+    }
+    let channels = player.signals.iter().map(|s| layout.sensor(&s.sensor));
+    let channels: Result<Vec<ChannelColumns>> = channels
+        .map(|s| {
+            s.map(|s| ChannelColumns {
+                name: s.name.clone(),
+                len: s.len,
+            })
+        })
+        .collect();
+    let period = substeps as f64 * layout.timestep;
+    let (qpos, qvel) = home(layout);
+    Ok(Rehearsed {
+        log: Episode {
+            time: (0..ctrl.len() / nu).map(|k| k as f64 * period).collect(),
+            actuators: layout.actuators.iter().map(|a| a.name.clone()).collect(),
+            ctrl,
+            channels: channels?,
+            readings,
+            initial: Some(InitialState { qpos, qvel }),
+        },
+        excess: played.excess.clone(),
+    })
+}
+
+/// A reading with normal noise; one of four entries is an orientation, which is turned about its body's axes.
+fn noisy(reading: &[f64], deviation: f64, rng: &mut Rng) -> Vec<f64> {
+    let mut normal = || deviation * standard_normal(rng);
+    if let [w, x, y, z] = *reading {
+        let [a, b, c] = [normal() / 2.0, normal() / 2.0, normal() / 2.0];
+        return vec![
+            w - x * a - y * b - z * c,
+            x + w * a + y * c - z * b,
+            y + w * b + z * a - x * c,
+            z + w * c + x * b - y * a,
+        ];
+    }
+    reading.iter().map(|x| x + normal()).collect()
+}
+
+/// A standard normal number (G. Box, M. Muller, Annals of Mathematical Statistics 29, 1958).
+fn standard_normal(rng: &mut Rng) -> f64 {
+    let (u, v): (f64, f64) = (rng.random(), rng.random());
+    (-2.0 * (1.0 - u).ln()).sqrt() * (std::f64::consts::TAU * v).cos()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use asid_core::Streams;
+    use asid_core::signal::unit_quaternion;
+
+    #[test]
+    fn an_orientation_is_turned_by_the_noise() {
+        let mut rng = Streams::new(1).stream("t");
+        let still = [0.5, -0.5, 0.5, 0.5];
+        let turns: Vec<f64> = (0..4000)
+            .map(|_| {
+                let turned = noisy(&still, 0.01, &mut rng);
+                let by = unit_quaternion(&still).inverse() * unit_quaternion(&turned);
+                by.angle().powi(2)
+            })
+            .collect();
+        // Three axes; the mean of 12000 squares is good to 1.3 %.
+        let deviation = (turns.iter().sum::<f64>() / 12000.0).sqrt();
+        assert!((deviation / 0.01 - 1.0).abs() < 0.03, "{deviation}");
+    }
+}
