@@ -69,8 +69,9 @@ impl Candidates<'_, '_> {
         let (mut found, mut rest) = (0, &order[..]);
         while found < wanted && !rest.is_empty() {
             let (now, later) = rest.split_at((wanted - found).min(rest.len()));
-            let fine: Vec<Vec<f64>> = commands.iter().map(|c| self.fine(c)).collect();
-            let plays = self.plays(&fine, now, self.far, 1)?;
+            let fine: Vec<Vec<f64>> = now.iter().map(|&k| self.fine(&commands[k])).collect();
+            let all: Vec<usize> = (0..now.len()).collect();
+            let plays = self.plays(&fine, &all, self.far, 1)?;
             for (&k, plays) in now.iter().zip(plays) {
                 match broken(&plays) {
                     0.0 => found += 1,

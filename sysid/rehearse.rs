@@ -10,6 +10,7 @@ use asid_core::error::{Error, Result};
 use asid_core::problem::home;
 use asid_core::rng::Rng;
 use rand::Rng as _;
+use rand_distr::StandardNormal;
 
 use crate::limits::Excess;
 use crate::play::Player;
@@ -92,7 +93,7 @@ pub fn rehearse(
 
 /// A reading with normal noise; one of four entries is an orientation, which is turned about its body's axes.
 fn noisy(reading: &[f64], deviation: f64, rng: &mut Rng) -> Vec<f64> {
-    let mut normal = || deviation * standard_normal(rng);
+    let mut normal = || deviation * rng.sample::<f64, _>(StandardNormal);
     if let [w, x, y, z] = *reading {
         let [a, b, c] = [normal() / 2.0, normal() / 2.0, normal() / 2.0];
         return vec![
@@ -103,12 +104,6 @@ fn noisy(reading: &[f64], deviation: f64, rng: &mut Rng) -> Vec<f64> {
         ];
     }
     reading.iter().map(|x| x + normal()).collect()
-}
-
-/// A standard normal number (G. Box, M. Muller, Annals of Mathematical Statistics 29, 1958).
-fn standard_normal(rng: &mut Rng) -> f64 {
-    let (u, v): (f64, f64) = (rng.random(), rng.random());
-    (-2.0 * (1.0 - u).ln()).sqrt() * (std::f64::consts::TAU * v).cos()
 }
 
 #[cfg(test)]

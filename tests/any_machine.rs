@@ -191,42 +191,45 @@ fn a_motion_keeps_its_limits_and_tells_what_it_says() {
         "--unknown",
         "joint/rail/damping:0.5:4",
     ];
-    let design = |explorer: &str, out: &str| {
+    let design = |explorer: &str, seed: usize| {
+        let (seed, out) = (seed.to_string(), format!("{explorer}-{seed}"));
         let arguments = [
             &[
                 "explore",
                 "cart/nominal.xml",
                 "--quiet",
                 "--out",
-                out,
+                &out,
                 "--explorer",
                 explorer,
+                "--seed",
+                &seed,
             ][..],
             &limits,
             &SHORT,
         ]
         .concat();
         ok(&place, &arguments);
-        json(&place.read(&format!("{out}/result.json")))
-    };
-    let best = design("fisher-cem", "best");
-    assert_eq!(best["broken"], Value::Null, "{}", best["notes"]);
-    let deviations = |result: &Value| -> f64 {
+        let result = json(&place.read(&format!("{out}/result.json")));
+        assert_eq!(result["broken"], Value::Null, "{}", result["notes"]);
         let all = result["unknowns"].as_array().unwrap().iter();
         all.map(|u| (u["motion"].as_f64().unwrap() / u["prior"].as_f64().unwrap()).powi(2))
-            .sum()
+            .sum::<f64>()
     };
+    // The median of three seeds.
+    let typical = |explorer: &str| {
+        let mut costs = [0, 1, 2].map(|seed| design(explorer, seed));
+        costs.sort_by(f64::total_cmp);
+        costs[1]
+    };
+    let best = typical("fisher-cem");
     // A cart is linear: a periodic motion that fills its limits is near the best there is, and a short search comes near it.
     for (explorer, share) in [("random", 1.0), ("multisine", 1.5), ("fourier", 1.0)] {
-        let other = design(explorer, explorer);
-        assert_eq!(other["broken"], Value::Null, "{explorer}");
-        assert!(
-            deviations(&best) < share * deviations(&other),
-            "{explorer}: {other}"
-        );
+        let other = typical(explorer);
+        assert!(best < share * other, "{explorer}: {best} and {other}");
     }
     // The file is a log of the model's actuator, within the limits, and at rest at its end.
-    let text = place.read("best/commands.csv");
+    let text = place.read("fisher-cem-0/commands.csv");
     let rows: Vec<Vec<f64>> = text
         .lines()
         .skip(1)
@@ -266,7 +269,7 @@ fn a_motion_keeps_its_limits_and_tells_what_it_says() {
     .concat();
     ok(&place, &arguments);
     assert_eq!(place.read("again/commands.csv"), text);
-    assert!(place.path("best/report.html").is_file());
+    assert!(place.path("fisher-cem-0/report.html").is_file());
 }
 
 /// Twenty simulated carts play the motion and are identified: the spread of the estimates is what was expected.

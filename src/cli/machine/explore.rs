@@ -312,6 +312,7 @@ pub fn lines(result: &ExploreResult) -> Vec<String> {
         };
         line += &match u.repeats {
             Some(0) => format!("; the logs suffice for {:.1} %", 100.0 * result.precision),
+            Some(1) => format!("; one play makes it {:.1} %", 100.0 * result.precision),
             Some(n) => format!("; {n} plays for {:.1} %", 100.0 * result.precision),
             None => format!(
                 "; no number of plays makes it {:.1} %",
