@@ -1,5 +1,6 @@
 //! A diagnosis from a study to its result.
 
+use asid_core::progress::UntilLate;
 use asid_core::{Progress, Result, Streams};
 use asid_effects::EffectSpec;
 use asid_results::evidence::Evidence;
@@ -156,6 +157,9 @@ pub(crate) fn diagnose_physics(
         Err(handover) => handover,
     };
     let streams = Streams::new(settings.seed);
+    // A search by replays has fitted its values.
+    let until_late = UntilLate(progress);
+    let progress: &dyn Progress = &until_late;
     progress.begin("fitting the study's parameters", 1);
     let Prepared {
         mut bench,

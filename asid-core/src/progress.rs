@@ -22,6 +22,30 @@ pub trait Progress: Sync {
     fn end(&self);
 }
 
+/// Progress of work that may go on until it is late: a search that has no last fit to come to, or that fit.
+pub struct UntilLate<'a>(pub &'a dyn Progress);
+
+impl Progress for UntilLate<'_> {
+    fn begin(&self, stage: &str, total: u64) {
+        self.0.begin(stage, total);
+    }
+    fn advance(&self, units: u64) {
+        self.0.advance(units);
+    }
+    fn note(&self, text: &str) {
+        self.0.note(text);
+    }
+    fn ranking(&self, stage: &str, rows: &[(String, f64)]) {
+        self.0.ranking(stage, rows);
+    }
+    fn is_stopped(&self) -> bool {
+        self.0.is_late()
+    }
+    fn end(&self) {
+        self.0.end();
+    }
+}
+
 /// Progress that nobody looks at.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Silent;

@@ -1,5 +1,6 @@
 //! Replays, open loop, of the model without effects, of the set that stands and of its rivals.
 
+use asid_core::progress::UntilLate;
 use asid_core::{Progress, Result};
 
 use crate::bench::{Bench, Explanation, Stage};
@@ -18,18 +19,6 @@ use super::told::{detection_limits, isolability, missing_forces, p_value, rankin
 const REPLAYED: usize = 500_000;
 /// Most sets besides the verdict's that are replayed.
 const RIVALS: usize = 4;
-
-/// Progress of the last fit of values, which a stopped search still does for as long as it is not late. It tells nothing.
-struct Closing<'a>(&'a dyn Progress);
-
-impl Progress for Closing<'_> {
-    fn begin(&self, _stage: &str, _total: u64) {}
-    fn advance(&self, _units: u64) {}
-    fn end(&self) {}
-    fn is_stopped(&self) -> bool {
-        self.0.is_late()
-    }
-}
 
 /// Starts of the training episodes as a fit smoothed them, where the logs leave them open; `firsts` are the walks that begin
 /// an episode.
@@ -106,7 +95,7 @@ pub(super) fn replay(
             &chosen,
             &fitted.theta[..study],
             &starts,
-            (effort, &Closing(progress)),
+            (effort, &UntilLate(progress)),
         )?;
         for (k, i) in fitted.hypothesis.free().into_iter().enumerate() {
             of.local_variances[i] = fitted.covariance[(k, k)];
