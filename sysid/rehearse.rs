@@ -46,7 +46,7 @@ pub fn rehearse(
     };
     let layout = &player.plant.layout;
     let settle = (player.settle / layout.timestep).round() as usize;
-    if settle % substeps != 0 {
+    if !settle.is_multiple_of(substeps) {
         return Err(Error::Config {
             key: "settle".into(),
             message: format!("{} s is no whole number of frames", player.settle),
