@@ -136,41 +136,34 @@ mod tests {
         );
     }
 
-    /// The head of the first page states a field of 2^31 - 1 booleans, which `parquet` would skip one by one.
-    #[test]
-    fn a_page_that_states_more_than_there_is_is_refused_at_once() {
+    /// What is told of a log whose first page has another head.
+    fn told_of_page(head: &[u8]) -> String {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("log.parquet");
         write(&path, &[0.0, 1.0], &[1.0, 2.0], &[Some(0.1), Some(0.2)]);
         let mut bytes = std::fs::read(&path).unwrap();
-        // Field 9, a list; its elements, booleans; their count.
-        let head = [0x99, 0xf2, 0xff, 0xff, 0xff, 0xff, 0x07];
-        bytes[4..4 + head.len()].copy_from_slice(&head);
+        bytes[4..4 + head.len()].copy_from_slice(head);
         std::fs::write(&path, bytes).unwrap();
         let error = Episode::read(&path, &layout()).unwrap_err().to_string();
-        assert!(
-            error.contains("the page at byte 4 is damaged: a list states 2147483647 elements")
-                && error.lines().count() == 1,
-            "{error}"
-        );
+        assert_eq!(error.lines().count(), 1, "{error}");
+        error
+    }
+
+    /// The head of the first page states a field of 2^31 - 1 booleans, which `parquet` would skip one by one.
+    #[test]
+    fn a_page_that_states_more_than_there_is_is_refused_at_once() {
+        // Field 9, a list; its elements, booleans; their count.
+        let error = told_of_page(&[0x99, 0xf2, 0xff, 0xff, 0xff, 0xff, 0x07]);
+        let want = "the page at byte 4 is damaged: a list states 2147483647 elements";
+        assert!(error.contains(want), "{error}");
     }
 
     /// The head of the first page states 2^31 - 1 bytes, which `parquet` would take from memory before it unpacks them.
     #[test]
     fn a_page_that_asks_for_two_gigabytes_is_refused() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("log.parquet");
-        write(&path, &[0.0, 1.0], &[1.0, 2.0], &[Some(0.1), Some(0.2)]);
-        let mut bytes = std::fs::read(&path).unwrap();
         // Field 1, the kind of the page; field 2, its length with the sign in the last place; the end.
-        let head = [0x15, 0x00, 0x15, 0xfe, 0xff, 0xff, 0xff, 0x0f, 0x00];
-        bytes[4..4 + head.len()].copy_from_slice(&head);
-        std::fs::write(&path, bytes).unwrap();
-        let error = Episode::read(&path, &layout()).unwrap_err().to_string();
-        assert!(
-            error.contains("the page at byte 4 is damaged: it states 2147483647 bytes")
-                && error.lines().count() == 1,
-            "{error}"
-        );
+        let error = told_of_page(&[0x15, 0x00, 0x15, 0xfe, 0xff, 0xff, 0xff, 0x0f, 0x00]);
+        let want = "the page at byte 4 is damaged: it states 2147483647 bytes";
+        assert!(error.contains(want), "{error}");
     }
 }
