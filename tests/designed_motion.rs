@@ -3,16 +3,13 @@
 #![cfg(feature = "mujoco")]
 #![allow(clippy::unwrap_used)]
 
-use std::collections::BTreeMap;
 use std::path::Path;
 
 use asid::cli::{MotionConfig, MotionSetup, Subject};
 use asid::core::Streams;
 use asid::core::progress::Silent;
-use asid::sysid::dataset::Dataset;
 use asid::sysid::design::Method;
 use asid::sysid::fit::{fit, smooth};
-use asid::sysid::rehearse::rehearse;
 
 /// A cart on a rail, and a pole that hangs from it.
 const CART: &str = r#"<mujoco model="hanging">
@@ -70,26 +67,11 @@ fn deviations(folder: &Path, method: Method) -> [f64; 2] {
     let subject = Subject::open(&model, Some("mujoco")).unwrap();
     let mut setup = MotionSetup::new(&subject, &config, 2).unwrap();
     let motion = setup.design(&config, method, 0, &Silent).unwrap();
-    let noise: BTreeMap<String, f64> = setup
-        .signals
-        .iter()
-        .map(|s| (s.sensor.clone(), s.noise))
-        .collect();
     let mut errors = Vec::new();
     for seed in 0..WORLDS {
-        let streams = Streams::new(seed);
-        let mut rng = streams.stream("truth");
-        let truth: Vec<f64> = setup
-            .parameters
-            .iter()
-            .map(|p| p.sample(&mut rng))
-            .collect();
-        let mut rng = streams.stream("noise");
-        let commands = (&motion.commands[..], setup.substeps);
-        let real = rehearse(&mut setup.player, commands, &truth, &mut rng).unwrap();
+        let (truth, real, data) = setup.true_machine(&motion.commands, seed).unwrap();
         assert!(real.excess.is_none(), "{seed}: {:?}", real.excess.worst);
-        let data = Dataset::new(&subject.plant, &[("log".into(), real.log)], &noise).unwrap();
-        let (model, search) = (&*subject.model, (&smooth(), streams));
+        let (model, search) = (&*subject.model, (&smooth(), Streams::new(seed)));
         let found = fit(model, &setup.parameters, &data, search, 2, &Silent).unwrap();
         let pairs = setup.parameters.iter().zip(found.values.iter().zip(&truth));
         errors.extend(pairs.map(|(p, (x, y))| p.to_scaled(*x) - p.to_scaled(*y)));

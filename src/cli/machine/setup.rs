@@ -8,6 +8,7 @@ use asid_sysid::design::{Designed, Designer, Method};
 use asid_sysid::limits::Limits;
 use asid_sysid::motion::Family;
 use asid_sysid::play::{Player, substeps};
+use asid_sysid::rehearse::{Rehearsed, rehearse};
 use asid_sysid::tells::{Told, of_logs};
 
 use super::motion_config::Config;
@@ -86,6 +87,33 @@ impl<'a> Setup<'a> {
             base,
             notes,
         })
+    }
+
+    /// Plays commands (`frames x nu`) on a true machine that a seed draws from the ranges, the same for all commands: its values, in
+    /// their units, what it did, and its log with noise.
+    ///
+    /// # Errors
+    /// As [`rehearse`].
+    pub fn true_machine(
+        &mut self,
+        commands: &[f64],
+        seed: u64,
+    ) -> Result<(Vec<f64>, Rehearsed, Dataset)> {
+        let streams = Streams::new(seed);
+        let mut rng = streams.stream("truth");
+        let truth: Vec<f64> = self.parameters.iter().map(|p| p.sample(&mut rng)).collect();
+        let mut rng = streams.stream("noise");
+        let did = rehearse(
+            &mut self.player,
+            (commands, self.substeps),
+            &truth,
+            &mut rng,
+        )?;
+        let signals = self.signals.iter();
+        let noise = signals.map(|s| (s.sensor.clone(), s.noise)).collect();
+        let logs = [(seed.to_string(), did.log.clone())];
+        let data = Dataset::new(&self.subject.plant, &logs, &noise)?;
+        Ok((truth, did, data))
     }
 
     /// Period of a frame, s: a whole number of physics steps.

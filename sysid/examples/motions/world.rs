@@ -6,9 +6,7 @@ use std::time::Instant;
 use asid::cli::MotionSetup;
 use asid::core::Streams;
 use asid::core::progress::Silent;
-use asid::sysid::dataset::Dataset;
 use asid::sysid::fit::{fit, smooth};
-use asid::sysid::rehearse::rehearse;
 use serde::{Deserialize, Serialize};
 
 use crate::machine::Machine;
@@ -49,38 +47,14 @@ pub fn met(
     if file.is_file() {
         return Ok(serde_json::from_str(&std::fs::read_to_string(file)?)?);
     }
-    let streams = Streams::new(seed);
-    // The same machines for all methods.
-    let mut rng = streams.stream("truth");
-    let truth: Vec<f64> = setup
-        .parameters
-        .iter()
-        .map(|p| p.sample(&mut rng))
-        .collect();
-    let commands = (&motion.commands[..], setup.substeps);
-    let rehearsed = rehearse(
-        &mut setup.player,
-        commands,
-        &truth,
-        &mut streams.stream("noise"),
-    )?;
-    let noise = setup
-        .signals
-        .iter()
-        .map(|s| (s.sensor.clone(), s.noise))
-        .collect();
-    let data = Dataset::new(
-        &machine.subject.plant,
-        &[(format!("{seed}"), rehearsed.log)],
-        &noise,
-    )?;
+    let (truth, rehearsed, data) = setup.true_machine(&motion.commands, seed)?;
     let clock = Instant::now();
     let settings = smooth();
     let found = fit(
         &*machine.subject.model,
         &setup.parameters,
         &data,
-        (&settings, streams),
+        (&settings, Streams::new(seed)),
         THREADS,
         &Silent,
     )?;
