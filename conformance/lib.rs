@@ -29,7 +29,7 @@
 //! | `JOINT_IMPEDANCE` | `damping`, `stiffness` with `springref`, `armature`, and these as parameters |
 //! | `JOINT_FRICTION`, `JOINT_LIMITS` | `frictionloss`, also as a parameter; `range` |
 //! | `CONTACT` | planes, spheres, boxes, cylinders, capsules; `contype`, `conaffinity`, `priority`, `<exclude>`, `<pair>`; sliding friction, also as a parameter |
-//! | `JOINT_ANCHORS` | `joint/…/pos` |
+//! | `JOINT_ANCHORS` | `joint/…/pos`, `joint/…/axis`, `body/…/pos` |
 //! | `MASS_PARAMETERS` | `geom/…/pos`, `geom/…/mass`, `body/…/mass`, `ipos`, `inertia` |
 //!
 //! What an engine need not take, it may refuse and is not asked about: an inertia along

@@ -64,6 +64,22 @@ pub const CHECKS: &[Check] = &[
         measure: Figure(joint_anchor),
     },
     Check {
+        name: "parameters/joint-axis",
+        needs: Capabilities::ARTICULATION.union(Capabilities::JOINT_ANCHORS),
+        unit: "",
+        tolerance: ROUNDING,
+        reason: EXACT,
+        measure: Figure(joint_axis),
+    },
+    Check {
+        name: "parameters/body-place",
+        needs: Capabilities::ARTICULATION.union(Capabilities::JOINT_ANCHORS),
+        unit: "",
+        tolerance: ROUNDING,
+        reason: "place by geometry, and acceleration by the inertia of both links: rounding",
+        measure: Figure(body_place),
+    },
+    Check {
         name: "parameters/joint-armature",
         needs: IMPEDANCE,
         unit: "",
@@ -158,6 +174,41 @@ fn joint_anchor(backend: &dyn Backend) -> Result<f64> {
     let wanted = [[0.0, 0.0, 1.0], [0.1, 0.0, 1.1]].concat();
     let found = [&at[1..4], &at[5..8]].concat();
     let places = found.iter().zip(wanted).map(|(a, b)| (a - b).abs());
+    Ok(largest(places.chain([falls])))
+}
+
+fn joint_axis(backend: &dyn Backend) -> Result<f64> {
+    let inside = r#"<worldbody><body name="bar" pos="0 0 1"><joint name="j" axis="0 1 0"/>
+      <geom type="sphere" size=".05" pos=".4 0 0" mass="1" contype="0" conaffinity="0"/></body></worldbody>"#;
+    let mut rig = pair(backend, inside, &["qvel.j"], &[("joint/j/axis/2", 0.75)])?;
+    let rows = rig.run(1, &[])?;
+    let about = 0.4 * 0.4 + 0.4 * 0.05 * 0.05;
+    // Of the weight's torque, which is about y, the part along (0, 0.8, 0.6).
+    let wanted = [1.0, 0.8].map(|along| along * G * 0.4 / about);
+    Ok(both([rows[0][0] / STEP, rows[1][0] / STEP], wanted))
+}
+
+fn body_place(backend: &dyn Backend) -> Result<f64> {
+    // The outer link turns about the vertical, which weight does not.
+    let inside = r#"<worldbody><body name="inner" pos="0 0 1"><joint name="j" axis="0 1 0"/>
+      <geom type="sphere" size=".05" pos=".2 0 0" mass="1" contype="0" conaffinity="0"/>
+      <body name="outer" pos=".4 0 0"><joint name="k" axis="0 0 1"/>
+        <geom type="sphere" size=".05" mass="1" contype="0" conaffinity="0"/></body></body></worldbody>
+      <sensor><framepos name="at" objtype="xbody" objname="outer"/></sensor>"#;
+    let place = ("body/outer/pos/0", 0.3);
+    let mut rig = pair(backend, inside, &["qvel.j", "at"], &[place])?;
+    let mut at = vec![0.0; 2 * rig.record.width()];
+    rig.simulator.read(&[0, 1], &rig.record, &mut at)?;
+    let wanted = [[0.4, 0.0, 1.0], [0.3, 0.0, 1.0]].concat();
+    let found = [&at[1..4], &at[5..8]].concat();
+    let places = found.iter().zip(wanted).map(|(a, b)| (a - b).abs());
+    let own = 0.4 * 0.05 * 0.05;
+    let fall = |x: f64| G * (0.2 + x) / (0.2 * 0.2 + x * x + 2.0 * own);
+    let rows = rig.run(1, &[])?;
+    let falls = both(
+        [rows[0][0] / STEP, rows[1][0] / STEP],
+        [fall(0.4), fall(0.3)],
+    );
     Ok(largest(places.chain([falls])))
 }
 

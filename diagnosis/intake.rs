@@ -10,10 +10,6 @@ use crate::result::{CheckResult, DiagnosisResult, WiringResult};
 use crate::study::Study;
 use crate::wiring::{self, Settings};
 
-/// Faults that effects can look like: friction holds a drive back as a late clock does, and a load shifts it as another zero
-/// does. Nothing looks like a sign, a unit or a swap.
-const IMITABLE: [&str; 2] = ["wiring-clock", "wiring-offset"];
-
 /// Share of the power of what replays of the model as given leave of a column, as a geometric mean over the columns concerned, up to which
 /// such a fault is the more probable cause: what is left is then less than what the fault explains.
 const HALF: f64 = 0.5;
@@ -22,7 +18,7 @@ const HALF: f64 = 0.5;
 pub struct Intake {
     /// The study, with outliers left out of its logs and its wiring as it is taken.
     pub study: Study,
-    /// The other way to take the wiring, where an effect can look like all that was mended.
+    /// The other way to take the wiring, where all that was mended is in doubt.
     other: Option<Study>,
     /// Whether the wiring of `study` is the mended one.
     is_mended: bool,
@@ -57,11 +53,9 @@ impl Intake {
         if mended.wiring.is_empty() {
             return Ok(intake);
         }
-        let imitable = |w: &WiringResult| IMITABLE.contains(&&*w.fault);
-        let doubted = mended.wiring.iter().all(imitable);
         let as_given = std::mem::replace(&mut intake.study, mended.study);
         (intake.wiring, intake.is_mended) = (mended.wiring, true);
-        if doubted {
+        if mended.doubted {
             let share = share_left(&intake, &as_given, machine)?;
             let is_most = share < HALF;
             intake.other = Some(as_given);

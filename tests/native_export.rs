@@ -127,6 +127,7 @@ fn effects_that_are_values_or_gains_move_the_same() {
         "inertia@lower:factor=1.5",
         "center-of-mass@upper:x=0.01,z=-0.03",
         "center-of-mass@lower:x=0.01,z=-0.03",
+        "geometry@lower:x=0.02,z=-0.01,turn_x=0.1,turn_z=-0.05",
         "payload@lower:mass=0.2,moment_z=-0.02",
         "servo-stiffness@hold:factor=0.6",
         "servo-damping@hold:damping=0.2",

@@ -51,7 +51,7 @@ bitflags::bitflags! {
         const JOINT_LIMITS = 1 << 17;
         /// Masses, centres of mass and inertia can be parameters.
         const MASS_PARAMETERS = 1 << 18;
-        /// Anchors of joints can be parameters.
+        /// Anchors and axes of joints, and places of the bodies on them, can be parameters.
         const JOINT_ANCHORS = 1 << 19;
         /// A hook may change friction, damping and stiffness for a step.
         const LIVE_PARAMETERS = 1 << 20;

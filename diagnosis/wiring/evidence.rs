@@ -40,6 +40,9 @@ pub struct Settings {
     pub delay: f64,
     /// Probability from which on a fault is named.
     pub named: f64,
+    /// Probability below which whole replays, and what a diagnosis leaves, have the last word about a fault. Larger: more logs that are
+    /// wired as they should be are diagnosed both ways.
+    pub certain: f64,
 }
 
 impl Default for Settings {
@@ -57,6 +60,7 @@ impl Default for Settings {
             offset: 0.4,
             delay: 0.02,
             named: 0.5,
+            certain: 0.95,
         }
     }
 }

@@ -43,6 +43,13 @@ impl Fault {
             Self::Clock => "wiring-clock",
         }
     }
+
+    /// Whether effects can look like it: friction holds a drive back as a late clock does, and a load shifts it as another zero
+    /// does. Nothing looks like a sign, a unit or a swap.
+    #[must_use]
+    pub fn is_imitable(self) -> bool {
+        matches!(self, Self::Offset | Self::Clock)
+    }
 }
 
 /// One column of readings or commands.

@@ -10,7 +10,7 @@ use crate::study::Study;
 use super::evidence::Settings;
 use super::hypotheses::{Fault, Quantity, quantities, view_of};
 use super::record::Recorded;
-use super::search::{Outcome, Search};
+use super::search::{Found, Outcome, Search};
 use super::view::{View, mapping};
 use super::windows::{FEW, WINDOWS, Windows};
 
@@ -20,6 +20,8 @@ pub struct Mended {
     pub study: Study,
     /// What was found.
     pub wiring: Vec<WiringResult>,
+    /// Whether all of it may be nothing: each fault is one that effects can look like, or not certain.
+    pub doubted: bool,
     /// By which factor, as a logarithm, each shrinks what predictions miss, summed over columns.
     pub shrinkage: Vec<f64>,
     /// The fault nearest to being named.
@@ -61,6 +63,7 @@ pub fn mend(study: &Study, machine: &Machine, settings: &Settings) -> Result<Men
     let unchanged = || Mended {
         study: study.clone(),
         wiring: Vec::new(),
+        doubted: false,
         shrinkage: Vec::new(),
         nearest: None,
     };
@@ -124,9 +127,11 @@ pub fn mend(study: &Study, machine: &Machine, settings: &Settings) -> Result<Men
             }
         })
         .collect();
+    let in_doubt = |f: &Found| f.fault.is_imitable() || f.probability < settings.certain;
     Ok(Mended {
         study: mended,
         wiring,
+        doubted: found.iter().all(in_doubt),
         shrinkage: found.iter().map(|f| f.shrinkage).collect(),
         nearest,
     })

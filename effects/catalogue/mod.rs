@@ -2,7 +2,7 @@
 //!
 //! On the command: [`command`], [`delay`], [`hysteresis`], [`supply`]. Of servos: [`servo`]. Between a drive and
 //! its joint: [`backlash`], [`compliance`]. At a joint: [`joint_friction`], [`joint_force`], [`rotor`]. On bodies:
-//! [`mass`], [`payload`], [`body_force`], [`gravity`]. In contacts: [`contact_friction`], [`friction_field`], [`contact_softness`]. On
+//! [`mass`], [`payload`], [`geometry`], [`body_force`], [`gravity`]. In contacts: [`contact_friction`], [`friction_field`], [`contact_softness`]. On
 //! readings: [`sensor`], [`sensor_dynamics`]. A new family is a file here and its `mod` line
 //! (docs/add-an-effect.md has what else it needs); modules that are not public hold what several families share.
 //!
@@ -22,6 +22,7 @@ pub mod delay;
 mod drive;
 mod dry;
 pub mod friction_field;
+pub mod geometry;
 pub mod gravity;
 pub mod hysteresis;
 pub mod joint_force;

@@ -99,6 +99,7 @@ CASES = [
     Case("arm", ("mass@upper:factor=1.4",)),
     Case("arm", ("inertia@upper:factor=1.5",)),
     Case("arm", ("center-of-mass@lower:x=0.01,z=-0.03",)),
+    Case("arm", ("geometry@lower:x=0.02,z=-0.01,turn_x=0.1,turn_z=-0.05",)),
     Case("arm", ("payload@lower:mass=0.2,moment_z=-0.02",)),
     Case("arm", ("gravity-tilt:pitch=0.1,roll=-0.05",)),
     Case("arm", ("constant-force@lower:z=1.5",)),

@@ -148,6 +148,46 @@ fn moments_of_inertia_and_centres_of_mass_move_a_flap() {
     }
 }
 
+/// Two links: the outer one, a ball of 0.5 kg, turns about the vertical at 0.3 m of a hinge that weight turns.
+const LINKS: &str = r#"<mujoco><compiler angle="radian"/><option timestep="0.002" integrator="implicitfast"/>
+  <worldbody><body name="inner"><joint name="lift" axis="0 1 0"/>
+    <inertial pos="0.1 0 0" mass="0.3" diaginertia="0.001 0.002 0.002"/>
+    <body name="outer" pos="0.3 0 0"><joint name="turn" axis="0 0 1"/>
+      <inertial pos="0 0 0" mass="0.5" diaginertia="0.001 0.001 0.001"/></body></body></worldbody>
+  <sensor><jointvel name="w" joint="lift"/></sensor></mujoco>"#;
+
+#[test]
+fn a_longer_link_carries_what_follows_farther_out() {
+    let about = |x: f64| 0.002 + 0.3 * 0.01 + 0.001 + 0.5 * x * x;
+    let falls = |x: f64, along: f64| along * G * (0.3 * 0.1 + 0.5 * x) / about(x);
+    for (effect, wanted) in [
+        ("geometry@outer:x=0.05", falls(0.35, 1.0)),
+        // Of the inner link itself, which stands on the ground, nothing but its place changes.
+        ("geometry@inner:x=0.1,z=0.1", falls(0.3, 1.0)),
+    ] {
+        on_each(LINKS, &[effect], |bench| {
+            let w = bench.hold(1, &[])[0][0];
+            near(&bench.engine, w, wanted * DT, 2e-3 * wanted * DT);
+        });
+    }
+}
+
+#[test]
+fn an_axis_that_stands_askew_feels_the_part_of_the_weight_along_it() {
+    // Turned about x the axis is (0, 1, 0.45), before it has length 1; the moments about it are as about y.
+    let scene = LINKS.replace("0.001 0.002 0.002", "0.002 0.002 0.002");
+    let about = 0.002 + 0.3 * 0.01 + 0.001 + 0.5 * 0.09;
+    let torque = G * (0.3 * 0.1 + 0.5 * 0.3);
+    on_each(&scene, &["geometry@inner:turn_x=0.45"], |bench| {
+        let axis = [1.0 / 1.2025_f64.sqrt(), 0.45 / 1.2025_f64.sqrt()];
+        // The outer link keeps its own spin about the vertical: as a free ball it takes none of the turn about z.
+        let w = bench.hold(1, &[])[0][0];
+        let about = about - 0.001 * axis[1] * axis[1];
+        let wanted = axis[0] * torque / about;
+        near(&bench.engine, w, wanted * DT, 2e-3 * wanted * DT);
+    });
+}
+
 /// A plate of half sizes 50, 20 and 80 mm and 0.3 kg that hangs from a hinge, driven.
 const PLATE: &str = r#"<mujoco><option timestep="0.002" integrator="implicitfast"/>
   <worldbody><body name="flap"><joint name="hinge" axis="0 1 0"/>

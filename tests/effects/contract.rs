@@ -171,7 +171,7 @@ fn the_catalogue_is_complete() {
         rolling-friction friction-patch friction-drift friction-anisotropy contact-restitution \
         contact-stiffness mass center-of-mass inertia payload gravity-tilt constant-force linear-drag \
         quadratic-drag magnus servo-stiffness servo-damping actuator-hysteresis torque-speed-limit \
-        supply-drift";
+        supply-drift geometry";
     for name in wanted.split_whitespace() {
         assert!(names.contains(&name), "{name}");
     }

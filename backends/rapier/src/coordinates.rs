@@ -14,6 +14,7 @@ use crate::compiled::{Compiled, set_inertia};
 use crate::convert;
 use crate::slot::JointSlot;
 use crate::state::State;
+use crate::structure::Structure;
 use crate::tables::Tables;
 
 /// Index of the free axis of a hinge or slide in rapier's six coordinates.
@@ -233,7 +234,7 @@ impl State {
         }
     }
 
-    /// Rebuilds masses, places of geoms and anchors of joints where they differ from `tables`.
+    /// Rebuilds masses, places of geoms, and places and axes of joints where they differ from `tables`.
     pub fn rebuild(&mut self, compiled: &Compiled, tables: &Tables) {
         let wanted = &tables.structure;
         if self.structure == *wanted {
@@ -285,30 +286,40 @@ impl State {
                 collider.set_position_wrt_parent(pose);
             }
         }
-        if self.structure.anchors != wanted.anchors {
-            self.anchor(compiled, &wanted.anchors);
-        }
+        self.place_joints(compiled, wanted);
         self.structure = wanted.clone();
     }
 
-    /// Moves hinges' axes within their bodies; the joints' coordinates stay.
-    fn anchor(&mut self, compiled: &Compiled, wanted: &[Vector3<f64>]) {
+    /// Moves and turns joints' axes within their bodies, and bodies in their parents; the joints' coordinates stay.
+    fn place_joints(&mut self, compiled: &Compiled, wanted: &Structure) {
         for (i, joint) in compiled.joints.iter().enumerate() {
-            if self.structure.anchors[i] == wanted[i] {
+            let (is, body) = (&self.structure, joint.body);
+            let (anchor, axis) = (wanted.anchors[i], wanted.axes[i]);
+            let moved = wanted.places[body] - is.places[body];
+            if is.anchors[i] == anchor && is.axes[i] == axis && moved == Vector3::zeros() {
                 continue;
             }
+            let turn = UnitQuaternion::rotation_between(&is.axes[i], &axis);
             let Some((multibody, id)) = joint.handle.and_then(|h| self.multibodies.get_mut(h))
             else {
                 continue;
             };
             if let Some(link) = multibody.link_mut(id) {
-                let data = &mut link.joint.data;
-                let (parent, child) = (data.local_frame1, data.local_frame2);
-                let to = convert::to_vector(&wanted[i]);
+                let (parent, child) = (
+                    &mut link.joint.data.local_frame1,
+                    link.joint.data.local_frame2,
+                );
                 // With the joint at zero both frames are one place.
                 let parent_from_child = parent.rotation * child.rotation.inverse();
-                data.local_frame1.translation += parent_from_child * (to - child.translation);
-                data.local_frame2.translation = to;
+                let mut own = child;
+                own.translation = convert::to_vector(&anchor);
+                if let Some(turn) = turn {
+                    own.rotation = convert::to_rotation(&turn) * child.rotation;
+                }
+                parent.rotation = parent_from_child * own.rotation;
+                parent.translation += convert::to_vector(&moved)
+                    + parent_from_child * (own.translation - child.translation);
+                link.joint.data.local_frame2 = own;
             }
             multibody.forward_kinematics(&self.bodies, true);
             multibody.update_rigid_bodies(&mut self.bodies, true);

@@ -22,8 +22,12 @@ pub enum ParameterSlot {
     BodyCenter(usize, usize),
     /// `body/NAME/inertia/I`.
     BodyInertia(usize, usize),
+    /// `body/NAME/pos/I`.
+    BodyPlace(usize, usize),
     /// `joint/NAME/pos/I`.
     Anchor(usize, usize),
+    /// `joint/NAME/axis/I`.
+    Axis(usize, usize),
     /// `joint/NAME/damping`.
     Damping(usize),
     /// `joint/NAME/frictionloss`.
@@ -60,7 +64,9 @@ impl ParameterSlot {
             Self::BodyMass(b) => inertia(b).mass,
             Self::BodyCenter(b, i) => inertia(b).center[i],
             Self::BodyInertia(b, i) => inertia(b).moments[i],
+            Self::BodyPlace(b, i) => tables.structure.places[b][i],
             Self::Anchor(j, i) => tables.structure.anchors[j][i],
+            Self::Axis(j, i) => tables.structure.axes[j][i],
             Self::Damping(j) => tables.joints[j].damping,
             Self::Frictionloss(j) => tables.joints[j].frictionloss,
             Self::Stiffness(j) => tables.joints[j].stiffness,
@@ -81,7 +87,9 @@ impl ParameterSlot {
             Self::BodyMass(b) => tables.structure.bodies[b].mass = Some(value),
             Self::BodyCenter(b, i) => tables.structure.bodies[b].center[i] = Some(value),
             Self::BodyInertia(b, i) => tables.structure.bodies[b].inertia[i] = Some(value),
+            Self::BodyPlace(b, i) => tables.structure.places[b][i] = value,
             Self::Anchor(j, i) => tables.structure.anchors[j][i] = value,
+            Self::Axis(j, i) => tables.structure.axes[j][i] = value,
             Self::Damping(j) => tables.joints[j].damping = value,
             Self::Frictionloss(j) => tables.joints[j].frictionloss = value,
             Self::Stiffness(j) => tables.joints[j].stiffness = value,
@@ -110,7 +118,9 @@ impl ParameterSlot {
                 | Self::BodyMass(_)
                 | Self::BodyCenter(..)
                 | Self::BodyInertia(..)
+                | Self::BodyPlace(..)
                 | Self::Anchor(..)
+                | Self::Axis(..)
         )
     }
 
@@ -124,7 +134,9 @@ impl ParameterSlot {
         }
         match self {
             Self::GeomPosition(..)
+            | Self::BodyPlace(..)
             | Self::Anchor(..)
+            | Self::Axis(..)
             | Self::BodyCenter(..)
             | Self::Gravity(_)
             | Self::Gear(_) => {}

@@ -21,8 +21,12 @@ pub struct Structure {
     pub geoms: Vec<GeomValues>,
     /// What parameters set on each body directly.
     pub bodies: Vec<BodyValues>,
+    /// Place of each body in its parent, m.
+    pub places: Vec<Vector3<f64>>,
     /// Anchor of each joint in its body, m.
     pub anchors: Vec<Vector3<f64>>,
+    /// Axis of each joint in its body; only its direction counts.
+    pub axes: Vec<Vector3<f64>>,
 }
 
 /// Structural values of one geom.
@@ -81,15 +85,17 @@ impl MassModel {
             bound_mass: model.compiler.bound_mass,
             bound_inertia: model.compiler.bound_inertia,
         };
+        let joints = || model.bodies.iter().flat_map(|b| &b.body.joints);
         let mut structure = Structure {
             geoms: Vec::new(),
             bodies: vec![BodyValues::default(); model.bodies.len()],
-            anchors: model
+            places: model
                 .bodies
                 .iter()
-                .flat_map(|b| &b.body.joints)
-                .map(|j| Vector3::from(j.pos))
+                .map(|b| convert::parts(&b.body.pose).0)
                 .collect(),
+            anchors: joints().map(|j| Vector3::from(j.pos)).collect(),
+            axes: joints().map(|j| Vector3::from(j.axis)).collect(),
         };
         for entry in &model.bodies {
             let first = mass_model.geoms.len();

@@ -21,7 +21,7 @@ impl ParameterSlot {
         let slot = match target.element.as_str() {
             "option" if target.attribute == "gravity" => Self::Gravity(target.index),
             "geom" => of_geom(target, compiled)?,
-            "body" => of_body(target, &compiled.layout)?,
+            "body" => of_body(target, compiled)?,
             "joint" => of_joint(target, compiled)?,
             "actuator" => of_actuator(target, compiled)?,
             _ => return Err(bad(target, "this engine has no such parameter")),
@@ -38,7 +38,9 @@ impl ParameterSlot {
         match self {
             Self::GeomFriction(..)
             | Self::GeomPosition(..)
+            | Self::BodyPlace(..)
             | Self::Anchor(..)
+            | Self::Axis(..)
             | Self::BodyCenter(..)
             | Self::BodyInertia(..)
             | Self::Gravity(_) => 3,
@@ -87,16 +89,29 @@ fn of_geom(target: &Target, compiled: &Compiled) -> Result<ParameterSlot> {
     Ok(slot)
 }
 
-fn of_body(target: &Target, layout: &Layout) -> Result<ParameterSlot> {
-    let body = find(target, "body", layout.bodies.iter().map(String::as_str))?;
+fn of_body(target: &Target, compiled: &Compiled) -> Result<ParameterSlot> {
+    let names = compiled.layout.bodies.iter().map(String::as_str);
+    let body = find(target, "body", names)?;
     if body == 0 {
-        return Err(bad(target, "the world has no mass"));
+        return Err(bad(
+            target,
+            "the world has neither place nor mass properties",
+        ));
     }
+    let joints = compiled.joints.iter().filter(|j| j.body == body);
+    let joints: Vec<_> = joints.collect();
     match target.attribute.as_str() {
         "mass" => Ok(ParameterSlot::BodyMass(body)),
         "ipos" => Ok(ParameterSlot::BodyCenter(body, target.index)),
         "inertia" => Ok(ParameterSlot::BodyInertia(body, target.index)),
-        _ => Err(unknown(target, "mass, ipos, inertia")),
+        "pos" if joints.is_empty() => Err(incapable_of(target, "a body without joints")),
+        "pos" if joints.len() > 1 => Err(incapable_of(target, "a body with several joints")),
+        "pos" if joints[0].handle.is_none() => Err(bad(
+            target,
+            "the place of a free body is its state, and no parameter",
+        )),
+        "pos" => Ok(ParameterSlot::BodyPlace(body, target.index)),
+        _ => Err(unknown(target, "pos, mass, ipos, inertia")),
     }
 }
 
@@ -118,6 +133,12 @@ fn of_joint(target: &Target, compiled: &Compiled) -> Result<ParameterSlot> {
         }
         "pos" if !alone => Err(incapable_of(target, "a body with several joints")),
         "pos" => Ok(ParameterSlot::Anchor(joint, target.index)),
+        "axis" if !matches!(slot.kind, JointKind::Hinge | JointKind::Slide) => Err(bad(
+            target,
+            "only the `axis` of a hinge or slide can be changed",
+        )),
+        "axis" if !alone => Err(incapable_of(target, "a body with several joints")),
+        "axis" => Ok(ParameterSlot::Axis(joint, target.index)),
         "damping" => Ok(ParameterSlot::Damping(joint)),
         "frictionloss" => Ok(ParameterSlot::Frictionloss(joint)),
         "stiffness" if slot.kind.qvel_len() > 1 => Err(incapable_of(target, "a ball joint")),
@@ -125,7 +146,7 @@ fn of_joint(target: &Target, compiled: &Compiled) -> Result<ParameterSlot> {
         "armature" => Ok(ParameterSlot::Armature(joint)),
         _ => Err(unknown(
             target,
-            "pos, damping, frictionloss, stiffness, armature",
+            "pos, axis, damping, frictionloss, stiffness, armature",
         )),
     }
 }
