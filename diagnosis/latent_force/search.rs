@@ -15,7 +15,7 @@ use super::fit::Fitted;
 
 pub use breadth::{Breadth, FALSE_ALARMS};
 pub use round::{Round, Sight};
-pub use set::{Set, name_of};
+pub use set::{Set, log_prior, name_of};
 
 use round::Upon;
 use set::{free_what_is_given, from_starts_of, is_due};

@@ -1,6 +1,7 @@
 //! From a search by the missing force to what its decision rests on.
 
 use asid_core::Result;
+use asid_mjcf::Plant;
 use asid_results::evidence::{Evidence, Replayed, Screened, Tried};
 
 use crate::bench::{Bench, Explanation};
@@ -11,7 +12,7 @@ use crate::fit::cost;
 use crate::search::Findings;
 
 use super::estimate::LEAST_LEFT;
-use super::search::{Outcome, Set};
+use super::search::{Outcome, Set, log_prior};
 
 /// Root mean square of the missing force, relative to the inertial forces, up to which nothing is missing.
 const NOTHING: f64 = 0.01;
@@ -36,8 +37,13 @@ fn replayed(bench: &Bench, of: &Explanation) -> Replayed {
     }
 }
 
-/// What was screened upon a base and never fitted, with evidence over the model without effects to first order.
-fn screened(outcome: &Outcome, candidates: &[Candidate], tried: &[Tried]) -> Vec<Screened> {
+/// What was screened upon a base and never fitted, with evidence over the model without effects to first order and prior odds.
+fn screened(
+    plant: &Plant,
+    outcome: &Outcome,
+    candidates: &[Candidate],
+    tried: &[Tried],
+) -> Vec<Screened> {
     let none = outcome.none.evidence;
     let mut all: Vec<Screened> = Vec::new();
     for round in &outcome.rounds {
@@ -60,7 +66,7 @@ fn screened(outcome: &Outcome, candidates: &[Candidate], tried: &[Tried]) -> Vec
             all.push(Screened {
                 effects,
                 names: names + 1,
-                evidence: evidence - none + gain,
+                evidence: evidence - none + gain + log_prior(plant, candidates, &members),
             });
         }
     }
@@ -82,12 +88,14 @@ pub fn gather(
     findings: &Findings,
     candidates: &[Candidate],
 ) -> Result<Evidence> {
+    let plant = &bench.machine.plant;
     let tried = sets.iter().zip(&findings.found);
     let tried: Vec<Tried> = tried
         .map(|(set, found)| Tried {
             effects: labels(candidates, &set.candidates),
             names: set.names,
-            evidence: set.fitted.evidence - outcome.none.evidence,
+            evidence: set.fitted.evidence - outcome.none.evidence
+                + log_prior(plant, candidates, &set.candidates),
             replayed: replayed(bench, &found.explanation),
         })
         .collect();
@@ -113,7 +121,7 @@ pub fn gather(
         schema: 1,
         candidates: candidates.len(),
         none,
-        screened: screened(outcome, candidates, &tried),
+        screened: screened(plant, outcome, candidates, &tried),
         tried,
         found,
         known: place(known).filter(|_| !known.is_empty()),

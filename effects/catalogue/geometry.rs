@@ -55,6 +55,11 @@ impl Effect for Geometry {
         }]
     }
 
+    /// Lengths and axes are the first that a maker measures, and a drawing has them; forces, gains and masses nobody draws.
+    fn unusual_at(&self, _plant: &Plant, _site: &str) -> bool {
+        true
+    }
+
     fn acts(&self) -> Acts {
         Acts::Model
     }

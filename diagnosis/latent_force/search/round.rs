@@ -16,12 +16,10 @@ use crate::latent_force::smoother::Regression;
 
 use super::Untried;
 use super::breadth::Breadth;
-use super::set::{Set, name_of, pruned, refined_by, with, without};
+use super::set::{Set, log_prior, name_of, pruned, refined_by, with, without};
 
 /// Leading candidates that are compared pair by pair.
 const COMPARED: usize = 20;
-/// Prior odds against an effect at a site where it comes to mind only after others.
-const UNUSUAL: f64 = 10.0;
 
 /// What a screening could have seen.
 #[derive(Clone, Debug, Default)]
@@ -131,13 +129,8 @@ impl Upon<'_> {
 
     /// Evidence of a set, that of effects at unusual sites the lower.
     fn worth(&self, set: &Set) -> f64 {
-        let plant = self.context.plant();
-        let unusual = |c: &&usize| {
-            let c = &self.candidates[**c];
-            c.effect.unusual_at(plant, &c.spec.site)
-        };
-        let count = set.candidates.iter().filter(unusual).count();
-        set.fitted.evidence - UNUSUAL.ln() * count as f64
+        let prior = log_prior(self.context.plant(), self.candidates, &set.candidates);
+        set.fitted.evidence + prior
     }
 
     /// Candidates of a set of a screening.

@@ -2,6 +2,7 @@
 
 use asid_core::{Progress, Result};
 use asid_effects::Start;
+use asid_mjcf::Plant;
 use asid_results::naming::grouped;
 
 use crate::candidate::Candidate;
@@ -156,6 +157,17 @@ pub(super) fn free_what_is_given(
 pub fn name_of(candidates: &[Candidate], set: &[usize]) -> String {
     let labels: Vec<String> = set.iter().map(|&c| candidates[c].label()).collect();
     grouped(&labels).join(" + ")
+}
+
+/// Prior odds against an effect at a site where it comes to mind only after others.
+const UNUSUAL: f64 = 10.0;
+
+/// Logarithm of the prior odds of some candidates, natural: less by those that are unusual where they are.
+#[must_use]
+pub fn log_prior(plant: &Plant, candidates: &[Candidate], set: &[usize]) -> f64 {
+    let each = set.iter().map(|&c| &candidates[c]);
+    let unusual = each.filter(|c| c.effect.unusual_at(plant, &c.spec.site));
+    -UNUSUAL.ln() * unusual.count() as f64
 }
 
 /// The candidate that another one refines: the simpler law at the same site.
