@@ -109,6 +109,11 @@ impl Candidates<'_, '_> {
     }
 }
 
+/// Whether a cost is that of a motion that breaks a limit.
+pub(crate) fn breaks(cost: f64) -> bool {
+    cost >= BROKEN
+}
+
 /// Cost of plays that break limits; zero where all are kept.
 fn broken(plays: &[Played]) -> f64 {
     let mut excess = Excess::default();

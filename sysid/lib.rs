@@ -9,15 +9,19 @@
 //!   [`limits`], among [`candidates`]; it is a [`motion`] of a few numbers, simulated in batches by [`play`], and [`rehearse`]d in
 //!   simulated true machines.
 
+mod by_drive;
 pub mod candidates;
 pub mod dataset;
 pub mod design;
 pub mod fit;
 pub mod gap;
 pub mod limits;
+mod look;
+pub mod method;
 pub mod motion;
 pub mod play;
 pub mod rehearse;
+mod search;
 pub mod start;
 pub mod tells;
 
