@@ -1,10 +1,11 @@
 //! A start of the search that moves one drive after the other.
 //!
-//! Where all drives move at once at one size, the first that breaks a limit keeps all of them small. A joint that dry friction holds
-//! then never slips: its unknowns have no slope, and a search has nothing to follow. It slips where its command goes far,
-//! and keeps a limit of force or speed where it goes there slowly. So each drive in its turn gets curves of its own beside what those before it do: slow and
-//! fast, large and small. The one that makes the objective smallest and keeps the limits stays; where none is better, the drive
-//! rests. The largest that keeps the limits says how far the search may move this drive.
+//! Where all drives move at once at one size, the first that breaks a limit keeps all of them small. A joint that dry friction
+//! holds then never slips: its unknowns have no slope, and a search has nothing to follow. It slips where its command goes
+//! far, and keeps a limit of force or speed where it goes there slowly. So each drive in its turn gets curves of its own
+//! beside what those before it do: slow and fast, large and small. The one that makes the objective smallest and keeps the
+//! limits stays; where none is better, the drive rests. The largest that keeps the limits says how far the search may move
+//! this drive.
 
 use asid_core::error::Result;
 use asid_core::rng::Rng;
@@ -71,7 +72,7 @@ impl Designer<'_, '_> {
             }
             let mut costs = self.candidates(&places.far).costs(&trials, 1)?;
             let found = self.best(&trials, &mut costs, (LOOKS, cost), places)?;
-            // A curve too weak to tell something has a cost below that of a broken limit all the same.
+            // Curves that keep the limits, whether they tell something or not.
             let kept = sizes
                 .iter()
                 .zip(&costs)

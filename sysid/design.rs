@@ -1,7 +1,8 @@
 //! The search for the motion that tells the most and keeps all limits.
 //!
-//! A method ([`crate::method`]) gives the coefficients of a motion: by a search, by a draw, or by a rule. The motion is then played at the middle, the
-//! ends and corners of the ranges, with the limits looked at after every physics step, and made smaller until none is broken.
+//! A method ([`crate::method`]) gives the coefficients of a motion: by a search, by a draw, or by a rule. The motion is then
+//! played at the middle, the ends and corners of the ranges, with the limits looked at after every physics step, and made
+//! smaller until none is broken.
 
 use asid_algorithms::fisher::Objective;
 use asid_core::error::{Error, Result};

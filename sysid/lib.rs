@@ -5,8 +5,8 @@
 //!
 //! - [`fit`]: the unknowns are fitted to logs by least squares over open-loop replays, with the initial states of the
 //!   episodes marginalised ([`dataset`], [`start`]), and the gap on logs held out is measured ([`gap`]).
-//! - [`design`]: the motion is searched that tells the most about the unknowns ([`tells`]) and keeps all
-//!   [`limits`], among [`candidates`]; it is a [`motion`] of a few numbers, simulated in batches by [`play`], and [`rehearse`]d in
+//! - [`design`]: a [`method`] gives the motion that tells the most about the unknowns ([`tells`]) and keeps all
+//!   [`limits`], searched among [`candidates`]; it is a [`motion`] of a few numbers, simulated in batches by [`play`], and [`rehearse`]d in
 //!   simulated true machines.
 
 mod by_drive;

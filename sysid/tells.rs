@@ -20,10 +20,10 @@ use crate::play::{Played, Player};
 /// Half step of the differences, in prior deviations: straight for smooth machines, and far above rounding.
 const STEP: f64 = 0.02;
 
-/// Half step of the differences that a search ranks motions by, in prior deviations. A contact that comes a time step earlier or
-/// later, and a machine that doubles any small difference many times over, change readings by about as much however short the step is: divided by a
-/// short one that looks like information, and no identification finds it. Over this step, a seventh of the way to the end of a uniform range, it counts a
-/// twelfth as much, and what is smooth is still as straight.
+/// Half step of the differences that a search ranks motions by, in prior deviations. A contact that comes a time step earlier
+/// or later, and a machine that doubles any small difference many times over, change readings by about as much however
+/// short the step is: divided by a short one that looks like information, and no identification finds it. Over this step, a
+/// seventh of the way to the end of a uniform range, it counts a twelfth as much, and what is smooth is nearly as straight.
 const SEARCH_STEP: f64 = 0.25;
 
 /// Information along a direction below which the readings do not see it: less than a uniform prior's own, whose variance
