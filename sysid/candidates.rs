@@ -1,6 +1,6 @@
 //! Costs of candidate motions, with no more plays than their order needs.
 //!
-//! A candidate is played at the middle of the unknowns; where it keeps the limits there, a little up and down in each unknown, for what it
+//! A candidate is played at the middle of the unknowns; where it keeps the limits there, a step up and down in each unknown, for what it
 //! tells. In the order of that, candidates are played far from the middle too, with every physics step looked at, until as many
 //! keep the limits there as are wanted. The others keep their place behind these.
 
@@ -11,7 +11,7 @@ use asid_core::error::Result;
 use crate::limits::Excess;
 use crate::motion::Family;
 use crate::play::{Played, Player};
-use crate::tells::{Told, differences, of_plays};
+use crate::tells::{Told, of_plays, search_differences};
 
 /// Unknowns of whose ranges a search looks at all corners, at most: eight plays a candidate, where the ends are six.
 const FEW: usize = 3;
@@ -47,7 +47,7 @@ impl Candidates<'_, '_> {
     /// # Errors
     /// When the engine fails.
     pub fn costs(&mut self, candidates: &[Vec<f64>], wanted: usize) -> Result<Vec<f64>> {
-        let (near, widths) = differences(self.parameters, self.values);
+        let (near, widths) = search_differences(self.parameters, self.values);
         let commands = candidates.iter().map(|c| self.family.commands(c, 1.0));
         let commands: Vec<Vec<f64>> = commands.collect();
         let all: Vec<usize> = (0..candidates.len()).collect();
@@ -107,6 +107,11 @@ impl Candidates<'_, '_> {
             .map(<[Played]>::to_vec)
             .collect())
     }
+}
+
+/// Whether a cost is that of a motion that breaks a limit.
+pub(crate) fn breaks(cost: f64) -> bool {
+    cost >= BROKEN
 }
 
 /// Cost of plays that break limits; zero where all are kept.

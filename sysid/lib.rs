@@ -5,19 +5,23 @@
 //!
 //! - [`fit`]: the unknowns are fitted to logs by least squares over open-loop replays, with the initial states of the
 //!   episodes marginalised ([`dataset`], [`start`]), and the gap on logs held out is measured ([`gap`]).
-//! - [`design`]: the motion is searched that tells the most about the unknowns ([`tells`]) and keeps all
-//!   [`limits`], among [`candidates`]; it is a [`motion`] of a few numbers, simulated in batches by [`play`], and [`rehearse`]d in
+//! - [`design`]: a [`method`] gives the motion that tells the most about the unknowns ([`tells`]) and keeps all
+//!   [`limits`], searched among [`candidates`]; it is a [`motion`] of a few numbers, simulated in batches by [`play`], and [`rehearse`]d in
 //!   simulated true machines.
 
+mod by_drive;
 pub mod candidates;
 pub mod dataset;
 pub mod design;
 pub mod fit;
 pub mod gap;
 pub mod limits;
+mod look;
+pub mod method;
 pub mod motion;
 pub mod play;
 pub mod rehearse;
+mod search;
 pub mod start;
 pub mod tells;
 

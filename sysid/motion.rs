@@ -48,7 +48,7 @@ pub struct Family {
 
 impl Family {
     /// Coefficients of one actuator.
-    fn each(&self) -> usize {
+    pub(crate) fn each(&self) -> usize {
         match self.shape {
             Shape::Spline(knots) => knots,
             Shape::Fourier(harmonics) => 2 * harmonics,

@@ -20,6 +20,12 @@ use crate::play::{Played, Player};
 /// Half step of the differences, in prior deviations: straight for smooth machines, and far above rounding.
 const STEP: f64 = 0.02;
 
+/// Half step of the differences that a search ranks motions by, in prior deviations. A contact that comes a time step earlier
+/// or later, and a machine that doubles any small difference many times over, change readings by about as much however
+/// short the step is: divided by a short one that looks like information, and no identification finds it. Over this step, a
+/// seventh of the way to the end of a uniform range, it counts a twelfth as much, and what is smooth is nearly as straight.
+const SEARCH_STEP: f64 = 0.25;
+
 /// Information along a direction below which the readings do not see it: less than a uniform prior's own, whose variance
 /// is a twelfth of its range squared.
 const UNSEEN: f64 = 1.0 / 12.0;
@@ -135,12 +141,27 @@ impl Told {
 /// between up and down, in prior deviations.
 #[must_use]
 pub fn differences(parameters: &[Parameter], values: &[f64]) -> (Vec<Vec<f64>>, Vec<f64>) {
+    differences_over(parameters, values, STEP)
+}
+
+/// As [`differences`], over the wider step of a search.
+#[must_use]
+pub fn search_differences(parameters: &[Parameter], values: &[f64]) -> (Vec<Vec<f64>>, Vec<f64>) {
+    differences_over(parameters, values, SEARCH_STEP)
+}
+
+/// Differences of a half step in prior deviations.
+fn differences_over(
+    parameters: &[Parameter],
+    values: &[f64],
+    step: f64,
+) -> (Vec<Vec<f64>>, Vec<f64>) {
     let bound = Parameter::scaled_bound();
     let mut points = vec![values.to_vec()];
     let mut widths = Vec::with_capacity(parameters.len());
     for (i, parameter) in parameters.iter().enumerate() {
         let z = parameter.to_scaled(values[i]);
-        let ends = [(z + STEP).min(bound), (z - STEP).max(-bound)];
+        let ends = [(z + step).min(bound), (z - step).max(-bound)];
         widths.push(ends[0] - ends[1]);
         for end in ends {
             let mut point = values.to_vec();

@@ -8,8 +8,8 @@ use std::path::Path;
 use asid::cli::{MotionConfig, MotionSetup, Subject};
 use asid::core::Streams;
 use asid::core::progress::Silent;
-use asid::sysid::design::Method;
 use asid::sysid::fit::{fit, smooth};
+use asid::sysid::method::Method;
 
 /// A cart on a rail, and a pole that hangs from it.
 const CART: &str = r#"<mujoco model="hanging">
@@ -96,4 +96,64 @@ fn a_designed_motion_beats_a_multisine_in_true_machines() {
     );
     let ratio = baseline_actual / baseline;
     assert!((0.4..2.5).contains(&ratio), "{baseline_actual} {baseline}");
+}
+
+/// A servo that dry friction holds, and one beside it that may only creep.
+const HELD: &str = r#"<mujoco model="held">
+  <option timestep="0.005" gravity="0 0 0"/>
+  <worldbody>
+    <body name="held">
+      <joint name="held" type="slide" axis="1 0 0" range="-0.5 0.5" limited="true" frictionloss="10"/>
+      <geom type="box" size=".1 .1 .1" mass="1"/>
+    </body>
+    <body name="light" pos="0 1 0">
+      <joint name="light" type="slide" axis="1 0 0" range="-0.5 0.5" limited="true" damping="1"/>
+      <geom type="box" size=".1 .1 .1" mass="0.1"/>
+    </body>
+  </worldbody>
+  <actuator>
+    <position name="held" joint="held" kp="200"/>
+    <position name="light" joint="light" kp="100" kv="5"/>
+  </actuator>
+  <sensor><jointpos name="q" joint="held"/></sensor>
+</mujoco>"#;
+
+/// The servo of stiffness `k` slips where its command is `F / k` = 0.05 m away, and then follows at that distance: one reading of the
+/// noise 1 mm tells the friction `F` to 0.2 N. The other, at the same share of its range, may go a few millimetres only.
+#[test]
+fn a_joint_that_dry_friction_holds_is_made_to_slip() {
+    let folder = tempfile::tempdir().unwrap();
+    let (model, settings) = (
+        folder.path().join("held.xml"),
+        folder.path().join("held.toml"),
+    );
+    std::fs::write(&model, HELD).unwrap();
+    std::fs::write(
+        &settings,
+        r#"
+seconds = 2.0
+period = 0.02
+rest_seconds = 0.2
+settle = 0.0
+unknown = ["joint/held/frictionloss:5:15"]
+limit_speed = ["light:0.05"]
+limit_force = ["held:18"]
+[noise]
+q = 0.001
+[design]
+population = 16
+iterations = 8
+"#,
+    )
+    .unwrap();
+    let config = MotionConfig::of_file(&model, &settings).unwrap();
+    let subject = Subject::open(&model, Some("mujoco")).unwrap();
+    let mut setup = MotionSetup::new(&subject, &config, 2).unwrap();
+    let motion = setup
+        .design(&config, Method::FisherCem, 0, &Silent)
+        .unwrap();
+    assert!(motion.excess.is_none(), "{:?}", motion.excess.worst);
+    let of_one_reading = 0.001 * 200.0 / (10.0 / 12.0_f64.sqrt());
+    let found = motion.told.deviations()[0];
+    assert!(found < of_one_reading, "{found} {of_one_reading}");
 }

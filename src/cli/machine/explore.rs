@@ -11,7 +11,8 @@ use asid_core::posterior::Direction;
 use asid_core::signal::Signal;
 use asid_core::{Episode, Parameter};
 use asid_report::number::significant;
-use asid_sysid::design::{Designed, Method};
+use asid_sysid::design::Designed;
+use asid_sysid::method::Method;
 use asid_sysid::tells::Told;
 use serde::Serialize;
 

@@ -6,8 +6,8 @@ use std::path::Path;
 use anyhow::Result;
 use asid_core::parameter::Scale;
 use asid_core::{Error, Parameter};
-use asid_sysid::design::{DesignSettings, Method};
 use asid_sysid::limits::{LimitRequest, REST};
+use asid_sysid::method::{DesignSettings, Method};
 use serde::{Deserialize, Serialize};
 
 use super::Subject;

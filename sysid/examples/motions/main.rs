@@ -23,7 +23,7 @@ mod world;
 use std::error::Error;
 use std::path::{Path, PathBuf};
 
-use asid::sysid::design::Method;
+use asid::sysid::method::Method;
 
 use crate::machine::Machine;
 use crate::table::Row;

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use asid::cli::MotionSetup;
 use asid::core::progress::Silent;
-use asid::sysid::design::Method;
+use asid::sysid::method::Method;
 use serde::{Deserialize, Serialize};
 
 use crate::Outcome;

@@ -40,33 +40,42 @@ fn three(x: f64) -> String {
     format!("{x:.*}", digits.clamp(0, 7) as usize)
 }
 
+/// Geometric mean of ratios, with an interval where they are several.
+fn ratio(ratios: &[f64]) -> String {
+    let logs: Vec<f64> = ratios.iter().map(|r| r.ln()).collect();
+    let middle = three(mean(&logs).exp());
+    if logs.len() < 2 {
+        return middle;
+    }
+    let [low, high] = bootstrap(std::slice::from_ref(&logs), mean);
+    format!("{middle} ({} to {})", three(low.exp()), three(high.exp()))
+}
+
 /// Table of Markdown. Errors are interquartile means over the true machines with bootstrap intervals of 95 %; ratios are geometric
-/// means over the same true machines.
+/// means over the same true machines, those of expected figures over the motions that were drawn.
 pub fn markdown(rows: &[Row]) -> String {
     let mut text = String::from(
-        "\n| machine | motion by | expected | actual | fisher-cem's actual over it | design, s | processor, s | limits broken |\n\
-         |---|---|---|---|---|---|---|---|\n",
+        "\n| machine | motion by | expected | actual | fisher-cem's expected over it | its actual over it | design, s | processor, s | limits broken |\n\
+         |---|---|---|---|---|---|---|---|---|\n",
     );
     for row in rows {
         let errors = row.errors();
         let [low, high] = bootstrap(std::slice::from_ref(&errors), interquartile_mean);
         let best = rows.iter().find(|r| r.machine == row.machine);
-        let ratio = best.filter(|b| b.method != row.method).map(|best| {
+        let best = best.filter(|b| b.method != row.method);
+        let expected = best.map(|best| {
+            let figures = row.motions.iter().map(Motion::figure);
+            ratio(&figures.map(|f| best.expected() / f).collect::<Vec<_>>())
+        });
+        let actual = best.map(|best| {
             let pairs = best.errors().into_iter().zip(&errors);
-            let logs: Vec<f64> = pairs.map(|(a, b)| (a / b).ln()).collect();
-            let [low, high] = bootstrap(std::slice::from_ref(&logs), mean);
-            format!(
-                "{} ({} to {})",
-                three(mean(&logs).exp()),
-                three(low.exp()),
-                three(high.exp())
-            )
+            ratio(&pairs.map(|(a, b)| a / b).collect::<Vec<_>>())
         });
         let times = |of: fn(&Motion) -> f64| mean(&row.motions.iter().map(of).collect::<Vec<_>>());
         let broken = row.worlds.iter().filter(|w| w.broken.is_some()).count();
         let _ = writeln!(
             text,
-            "| {} ({} unknowns) | {} | {} | {} ({} to {}) | {} | {:.1} | {:.1} | {broken} of {} |",
+            "| {} ({} unknowns) | {} | {} | {} ({} to {}) | {} | {} | {:.1} | {:.1} | {broken} of {} |",
             row.machine,
             row.unknowns,
             row.method,
@@ -74,7 +83,8 @@ pub fn markdown(rows: &[Row]) -> String {
             three(interquartile_mean(&errors)),
             three(low),
             three(high),
-            ratio.unwrap_or_default(),
+            expected.unwrap_or_default(),
+            actual.unwrap_or_default(),
             times(|m| m.wall_s),
             times(|m| m.cpu_s),
             row.worlds.len()

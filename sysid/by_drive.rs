@@ -1,0 +1,116 @@
+//! A start of the search that moves one drive after the other.
+//!
+//! Where all drives move at once at one size, the first that breaks a limit keeps all of them small. A joint that dry friction
+//! holds then never slips: its unknowns have no slope, and a search has nothing to follow. It slips where its command goes
+//! far, and keeps a limit of force or speed where it goes there slowly. So each drive in its turn gets curves of its own
+//! beside what those before it do: slow and fast, large and small. The one that makes the objective smallest and keeps the
+//! limits stays; where none is better, the drive rests. The largest that keeps the limits says how far the search may move
+//! this drive.
+
+use asid_core::error::Result;
+use asid_core::rng::Rng;
+
+use crate::design::Designer;
+use crate::method::DesignSettings;
+use crate::motion::{Family, Shape};
+use crate::search::Places;
+
+/// Heights of a drive's curves, beside those of the search: one swing there and back, and two of them. A slow curve goes farthest
+/// before a limit of speed binds.
+const SLOW: [usize; 2] = [2, 4];
+
+/// Ratio of neighbouring sizes of a drive's curve: the largest that keeps the limits is found to this.
+const RATIO: f64 = 0.6;
+
+/// Sizes of a drive's curve: from the whole down to a hundredth.
+const SIZES: i32 = 10;
+
+/// Best curves of a drive that are looked at everywhere, at most.
+const LOOKS: usize = 6;
+
+/// Where a search begins.
+pub(crate) struct Start {
+    /// Coefficients.
+    pub coefficients: Vec<f64>,
+    /// Their cost.
+    pub cost: f64,
+    /// For each coefficient, the largest size at which its drive's curve kept the limits beside the others, of 1.
+    pub reach: Vec<f64>,
+}
+
+impl Designer<'_, '_> {
+    /// Moves one drive after the other, from all at rest.
+    ///
+    /// # Errors
+    /// When the engine fails.
+    pub(crate) fn by_drive(
+        &mut self,
+        settings: &DesignSettings,
+        places: &mut Places<'_>,
+        rng: &mut Rng,
+    ) -> Result<Start> {
+        let (n, each) = (self.family.len(), self.family.each());
+        let mut coefficients = vec![0.0; n];
+        let mut cost = self
+            .candidates(&places.far)
+            .costs(std::slice::from_ref(&coefficients), 1)?[0];
+        let mut reach = vec![0.0; n];
+        for drive in 0..n / each {
+            let own = drive * each..(drive + 1) * each;
+            let (mut trials, mut sizes) = (Vec::new(), Vec::new());
+            for knots in SLOW.into_iter().chain([settings.knots]) {
+                let curve = self.curve(knots, rng);
+                for k in 0..SIZES {
+                    let size = RATIO.powi(k);
+                    let mut trial = coefficients.clone();
+                    for (to, c) in trial[own.clone()].iter_mut().zip(&curve) {
+                        *to = size * c;
+                    }
+                    trials.push(trial);
+                    sizes.push(size);
+                }
+            }
+            let mut costs = self.candidates(&places.far).costs(&trials, 1)?;
+            let found = self.best(&trials, &mut costs, (LOOKS, cost), places)?;
+            // Curves that keep the limits, whether they tell something or not.
+            let kept = sizes
+                .iter()
+                .zip(&costs)
+                .filter(|(_, c)| !crate::candidates::breaks(**c));
+            let largest = kept.fold(RATIO.powi(SIZES), |most, (size, _)| most.max(*size));
+            reach[own].fill(largest);
+            if let Some(k) = found {
+                (coefficients, cost) = (trials.swap_remove(k), costs[k]);
+            }
+        }
+        Ok(Start {
+            coefficients,
+            cost,
+            reach,
+        })
+    }
+
+    /// Heights of a drive's curve of so many drawn knots, the largest of them 1 in magnitude.
+    fn curve(&self, knots: usize, rng: &mut Rng) -> Vec<f64> {
+        let one = Family {
+            base: vec![0.0],
+            amplitude: vec![1.0],
+            range: vec![None],
+            ..self.family.clone()
+        };
+        let drawn = Family {
+            shape: Shape::Spline(knots),
+            ..one.clone()
+        };
+        let heights = drawn.random(rng);
+        let heights = if knots == one.each() {
+            heights
+        } else {
+            one.near(&drawn, &heights)
+        };
+        let most = heights
+            .iter()
+            .fold(f64::MIN_POSITIVE, |m: f64, c| m.max(c.abs()));
+        heights.iter().map(|c| c / most).collect()
+    }
+}

@@ -1,0 +1,181 @@
+//! The limits, looked at along a trajectory and in the posture that it begins in.
+
+use asid_core::error::Result;
+use asid_mjcf::plant::Drive;
+
+use crate::columns;
+use crate::limits::{DIVERGED, Excess, STOP};
+use crate::play::{Played, Player, TOUCH};
+
+impl Player<'_> {
+    /// Looks at the posture that motions begin in, at values of the parameters. A joint that rests at the end of its range there, a hair
+    /// within it or beyond it as a stop gives way, may go on doing so: the names of such joints, and by how much other limits are passed.
+    ///
+    /// # Errors
+    /// As [`Player::play`].
+    pub fn look_at_begin(&mut self, point: &[f64]) -> Result<(Vec<String>, Excess)> {
+        self.begin(&[point])?;
+        let layout = &self.plant.layout;
+        let (nq, nv) = (layout.nq, layout.nv);
+        let mut row = vec![0.0; self.record.width()];
+        self.simulator.read(&[0], &self.record, &mut row)?;
+        let state = &row[self.readings..self.readings + nq + nv];
+        let at_stop = self.limits.joints.iter_mut().filter_map(|joint| {
+            let [low, high] = joint.position.as_mut()?;
+            let (at, hair) = (state[joint.qpos], STOP * (*high - *low));
+            let is_low = (at - *low).abs() <= hair;
+            let is_high = (at - *high).abs() <= hair;
+            if is_low {
+                *low -= hair;
+            }
+            if is_high {
+                *high += hair;
+            }
+            (is_low || is_high).then(|| joint.name.clone())
+        });
+        let at_stop = at_stop.collect();
+        let mut excess = Excess::default();
+        let drives = self.drives_at(point);
+        self.look_at_joints(&state[..nq], &state[nq..], 1, &mut excess);
+        self.look_at_drives(
+            &drives,
+            &self.base,
+            (&state[..nq], &state[nq..], 1),
+            &mut excess,
+        );
+        self.look_at_boxes(&state[..nq], 1, &mut excess);
+        Ok((at_stop, excess))
+    }
+
+    /// The drives at values of the parameters.
+    pub(crate) fn drives_at(&self, point: &[f64]) -> Vec<Option<Drive>> {
+        let values = columns(&self.parameters, point);
+        let mut drives = self.plant.drives.clone();
+        for d in &self.drives {
+            let drive = &mut drives[d.actuator];
+            let at = [d.nominal, values[d.column]];
+            *drive = drive.map(|law| law.with(&d.attribute, d.index, at));
+        }
+        drives
+    }
+
+    /// One trajectory beside the limits.
+    pub(crate) fn look(
+        &self,
+        rows: &[f64],
+        (commands, drives): (&[f64], &[Option<Drive>]),
+        frames: usize,
+    ) -> Played {
+        let layout = &self.plant.layout;
+        let (nq, nv, nu) = (layout.nq, layout.nv, layout.nu());
+        let width = self.record.width();
+        let mut excess = Excess::default();
+        let mut played = Played {
+            readings: Vec::with_capacity(frames * self.readings),
+            qpos: Vec::with_capacity(frames * nq),
+            excess: Excess::default(),
+        };
+        if rows.iter().any(|x| !x.is_finite()) {
+            excess.add(DIVERGED, 1, || "the simulation diverges".into());
+            played.excess = excess;
+            return played;
+        }
+        for (k, row) in rows.chunks_exact(width).enumerate() {
+            let q = &row[self.readings..self.readings + nq];
+            let v = &row[self.readings + nq..self.readings + nq + nv];
+            let contact = &row[self.readings + nq + nv..];
+            self.look_at_joints(q, v, frames, &mut excess);
+            let command = &commands[k * nu..(k + 1) * nu];
+            self.look_at_drives(drives, command, (q, v, frames), &mut excess);
+            let pairs = self.limits.apart.iter().zip(&self.touching);
+            for ((pair, touching), force) in pairs.zip(contact) {
+                if !touching && force.abs() > TOUCH {
+                    excess.add(1.0, frames, || {
+                        let [a, b] = pair.map(|b| &layout.bodies[b]);
+                        format!("`{a}` touches `{b}`")
+                    });
+                }
+            }
+            self.look_at_boxes(q, frames, &mut excess);
+            played.readings.extend_from_slice(&row[..self.readings]);
+            played.qpos.extend_from_slice(q);
+        }
+        if let (Some(rest), Some(last)) = (self.limits.rest, rows.chunks_exact(width).last()) {
+            let v = &last[self.readings + nq..self.readings + nq + nv];
+            let fastest = v.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+            excess.add(fastest / rest - 1.0, 1, || {
+                format!("speed at the end {fastest:.3}")
+            });
+        }
+        played.excess = excess;
+        played
+    }
+
+    fn look_at_joints(&self, q: &[f64], v: &[f64], frames: usize, excess: &mut Excess) {
+        for joint in &self.limits.joints {
+            if let Some([low, high]) = joint.position {
+                let at = q[joint.qpos];
+                let beyond = (low - at).max(at - high) / (high - low);
+                excess.add(beyond, frames, || {
+                    format!("position of `{}` {at:.3}", joint.name)
+                });
+            }
+            if let Some(limit) = joint.speed {
+                let speed = v[joint.dof].abs();
+                excess.add(speed / limit - 1.0, frames, || {
+                    format!("speed of `{}` {speed:.3}", joint.name)
+                });
+            }
+        }
+    }
+
+    /// Forces of the drives under a row of commands.
+    fn look_at_drives(
+        &self,
+        drives: &[Option<Drive>],
+        command: &[f64],
+        (q, v, frames): (&[f64], &[f64], usize),
+        excess: &mut Excess,
+    ) {
+        let layout = &self.plant.layout;
+        for limit in &self.limits.drives {
+            let Some(drive) = drives[limit.actuator] else {
+                continue;
+            };
+            let joint = &layout.joints[drive.joint];
+            let command = command[limit.actuator];
+            let force = drive.force(command, q[joint.qpos], v[joint.qvel]).abs();
+            excess.add(force / limit.force - 1.0, frames, || {
+                format!(
+                    "force of `{}` {force:.3}",
+                    layout.actuators[limit.actuator].name
+                )
+            });
+        }
+    }
+
+    fn look_at_boxes(&self, q: &[f64], frames: usize, excess: &mut Excess) {
+        if self.limits.boxes.is_empty() {
+            return;
+        }
+        let mut jacobian = vec![0.0; 6 * self.plant.layout.nv];
+        for limit in &self.limits.boxes {
+            let pose = self
+                .plant
+                .point_jacobian(q, limit.body, [0.0; 3], &mut jacobian);
+            let place = pose.translation.vector;
+            let [low, high] = limit.corners;
+            for k in 0..3 {
+                let beyond = (low[k] - place[k]).max(place[k] - high[k]) / (high[k] - low[k]);
+                excess.add(beyond, frames, || {
+                    format!(
+                        "`{}` at {:.3} m along {}",
+                        limit.name,
+                        place[k],
+                        ["x", "y", "z"][k]
+                    )
+                });
+            }
+        }
+    }
+}

@@ -1,0 +1,88 @@
+//! Methods that find a motion, and how widely they search.
+
+use asid_core::error::{Error, Result};
+
+use crate::motion::Shape;
+
+/// How a motion is found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Method {
+    /// Fisher information by the cross-entropy method over splines.
+    FisherCem,
+    /// Spline heights that are drawn.
+    Random,
+    /// A multisine with Schroeder's phases.
+    Multisine,
+    /// A Fourier series whose coefficients are drawn.
+    Fourier,
+}
+
+impl Method {
+    /// All, with their names on the command line.
+    pub const ALL: [(&'static str, Self); 4] = [
+        ("fisher-cem", Self::FisherCem),
+        ("random", Self::Random),
+        ("multisine", Self::Multisine),
+        ("fourier", Self::Fourier),
+    ];
+
+    /// The method of a name.
+    ///
+    /// # Errors
+    /// When there is none.
+    pub fn named(name: &str) -> Result<Self> {
+        let found = Self::ALL.iter().find(|(n, _)| *n == name);
+        found.map(|(_, m)| *m).ok_or_else(|| {
+            Error::unknown(
+                "explorer of any machine",
+                name,
+                Self::ALL.iter().map(|(n, _)| *n),
+            )
+        })
+    }
+
+    /// Name on the command line.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        let found = Self::ALL.iter().find(|(_, m)| *m == self);
+        found.map_or("", |(n, _)| n)
+    }
+
+    /// The curve that it moves.
+    #[must_use]
+    pub fn shape(self, settings: &DesignSettings) -> Shape {
+        match self {
+            Self::FisherCem | Self::Random => Shape::Spline(settings.knots),
+            Self::Multisine | Self::Fourier => Shape::Fourier(settings.harmonics),
+        }
+    }
+}
+
+/// How widely the search goes.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct DesignSettings {
+    /// Heights of a spline an actuator: more follow faster motions, and need a longer search.
+    pub knots: usize,
+    /// Harmonics of a Fourier series an actuator: five in the field's usual excitations (Swevers 1997).
+    pub harmonics: usize,
+    /// Rounds of the search at most.
+    pub iterations: usize,
+    /// Candidates a round.
+    pub population: usize,
+    /// Physics steps of the whole search, which bound its time: after them no round begins, of which 8 are kept. Two cores
+    /// take some 5e5 steps of an arm of six joints a second; those of a machine of more coordinates count for more.
+    pub physics_steps: f64,
+}
+
+impl Default for DesignSettings {
+    fn default() -> Self {
+        Self {
+            knots: 12,
+            harmonics: 5,
+            iterations: 40,
+            population: 40,
+            physics_steps: 3e7,
+        }
+    }
+}

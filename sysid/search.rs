@@ -1,0 +1,192 @@
+//! The cross-entropy search over the coefficients of a motion.
+//!
+//! It begins with one drive after the other ([`crate::by_drive`]), or at a draw of all drives where that tells more, and makes
+//! the objective small among the candidates that keep all limits; those that do not rank behind them, by how much they
+//! break ([`crate::candidates`]). A candidate that is better than all before it is played at the middle, the ends and corners of the ranges, with
+//! the limits looked at after every physics step; where it breaks one there, the search looks at that point from then on.
+
+use asid_algorithms::optimise::cem::{Cem, CemSettings};
+use asid_core::Progress;
+use asid_core::error::Result;
+use asid_core::rng::Rng;
+
+use crate::by_drive::Start;
+use crate::candidates::{BROKEN, breaks, far};
+use crate::design::{Designer, joined, worst_of};
+use crate::limits::Excess;
+use crate::method::DesignSettings;
+use crate::motion::{Family, Shape};
+
+/// Coordinates of the machine whose physics steps count once.
+const SIX_JOINTS: f64 = 6.0;
+
+/// Power of the number of coordinates that the time of a physics step grows with: between the linear one of a chain and the
+/// cubic one of its constraints.
+const GROWTH: f64 = 1.5;
+
+/// Share of a round's candidates that the next one is drawn about.
+const ELITE: f64 = 0.2;
+
+/// Rounds of the search at least.
+const FEWEST_ROUNDS: usize = 8;
+
+/// First deviation of the search in each coefficient, about its start, in units of what its drive may move.
+const SPREAD: f64 = 0.3;
+
+/// Smallest size of the draws of all drives, in units of what each may move alone: together they push a machine further.
+const SMALLEST: f64 = 1e-2;
+
+/// Sizes in which each round tries the best motion so far.
+const SIZES: [f64; 4] = [1.0, 0.9, 1.15, 1.4];
+
+/// Candidates of a round that are looked at everywhere, at most: each that breaks a limit shows the search a new point.
+const LOOKS: usize = 4;
+
+/// Points of the ranges at which limits are looked at.
+pub(crate) struct Places<'p> {
+    /// The middle, the ends and corners: where the answer keeps them.
+    pub all: &'p [Vec<f64>],
+    /// Those far from the middle at which each round looks.
+    pub far: Vec<Vec<f64>>,
+}
+
+impl Designer<'_, '_> {
+    /// The search; the best coefficients, and the best cost after each round.
+    ///
+    /// # Errors
+    /// When the engine fails.
+    pub(crate) fn search(
+        &mut self,
+        settings: &DesignSettings,
+        points: &[Vec<f64>],
+        rng: &mut Rng,
+        progress: &dyn Progress,
+    ) -> Result<(Vec<f64>, Vec<f64>)> {
+        // What a step counts.
+        let size = self.player.coordinates() as f64 / SIX_JOINTS;
+        let bound = settings.physics_steps / size.max(1.0).powf(GROWTH);
+        let begun = self.player.steps();
+        let rounds = settings.iterations.max(FEWEST_ROUNDS);
+        progress.begin("explore", rounds as u64 + 1);
+        let mut places = Places {
+            all: points,
+            far: far(self.parameters, &self.values),
+        };
+        let start = self.by_drive(settings, &mut places, rng)?;
+        let start = self.drawn(settings, start, &mut places, rng)?;
+        progress.advance(1);
+        let rule = CemSettings {
+            elite_fraction: ELITE,
+            ..CemSettings::default()
+        };
+        let n = self.family.len();
+        let spread: Vec<f64> = start.reach.iter().map(|r| SPREAD * r).collect();
+        let mut search = Cem::new(
+            rule,
+            &start.coefficients,
+            &spread,
+            &vec![-1.0; n],
+            &vec![1.0; n],
+        );
+        let mut course = vec![start.cost];
+        let mut best = (start.coefficients, start.cost);
+        for round in 0..rounds {
+            if round >= FEWEST_ROUNDS && (self.player.steps() - begun) as f64 >= bound {
+                break;
+            }
+            // The best so far, also larger and smaller: limits bind the size before the shape.
+            let mut candidates: Vec<Vec<f64>> = SIZES
+                .iter()
+                .map(|size| best.0.iter().map(|c| (c * size).clamp(-1.0, 1.0)).collect())
+                .collect();
+            let drawn = settings.population.saturating_sub(SIZES.len()).max(2);
+            candidates.extend(search.ask(drawn, rng));
+            let elite = (ELITE * candidates.len() as f64).round() as usize;
+            let mut costs = self
+                .candidates(&places.far)
+                .costs(&candidates, elite.max(2))?;
+            let below = (LOOKS, best.1);
+            if let Some(k) = self.best(&candidates, &mut costs, below, &mut places)? {
+                best = (candidates[k].clone(), costs[k]);
+            }
+            search.tell(&candidates, &costs);
+            course.push(best.1);
+            progress.note(&format!("explore, {:.3}", best.1));
+            progress.advance(1);
+        }
+        progress.end();
+        Ok((best.0, course))
+    }
+
+    /// Draws of all drives, and curves like those of the baselines, each drive in units of what it may move, at sizes
+    /// from the whole down: the best of them where it is better than the start, else the start.
+    fn drawn(
+        &mut self,
+        settings: &DesignSettings,
+        start: Start,
+        places: &mut Places<'_>,
+        rng: &mut Rng,
+    ) -> Result<Start> {
+        let fourier = Family {
+            shape: Shape::Fourier(settings.harmonics),
+            ..self.family.clone()
+        };
+        let (mut draws, mut sizes) = (Vec::new(), Vec::new());
+        while draws.len() < settings.population {
+            let along = draws.len() as f64 / (settings.population - 1) as f64;
+            let size = SMALLEST.powf(along);
+            let drawn = match draws.len() % 3 {
+                0 => self.family.random(rng),
+                1 => self.family.near(&fourier, &fourier.random(rng)),
+                _ => self.family.near(&fourier, &fourier.multisine()),
+            };
+            let pairs = drawn.iter().zip(&start.reach);
+            draws.push(pairs.map(|(c, reach)| c * reach * size).collect());
+            sizes.push(size);
+        }
+        let mut costs = self.candidates(&places.far).costs(&draws, 1)?;
+        let below = (draws.len(), start.cost);
+        let Some(k) = self.best(&draws, &mut costs, below, places)? else {
+            return Ok(start);
+        };
+        Ok(Start {
+            coefficients: draws.swap_remove(k),
+            cost: costs[k],
+            reach: start.reach.iter().map(|r| r * sizes[k]).collect(),
+        })
+    }
+
+    /// The best candidate below a cost that keeps all limits at all points, of so many that are looked at; where all break one, that
+    /// which does by the least. Points where better ones break a limit join those far from the middle, and their costs say so.
+    ///
+    /// # Errors
+    /// When the engine fails.
+    pub(crate) fn best(
+        &mut self,
+        candidates: &[Vec<f64>],
+        costs: &mut [f64],
+        (looks, below): (usize, f64),
+        places: &mut Places<'_>,
+    ) -> Result<Option<usize>> {
+        for _ in 0..looks {
+            let order = |&i: &usize, &j: &usize| costs[i].total_cmp(&costs[j]);
+            let best = (0..costs.len()).min_by(order);
+            let Some(k) = best.filter(|&k| costs[k] < below) else {
+                return Ok(None);
+            };
+            if breaks(costs[k]) {
+                return Ok(Some(k));
+            }
+            let all = self.excess_at(&candidates[k], 1.0, places.all)?;
+            if all.iter().all(Excess::is_none) {
+                return Ok(Some(k));
+            }
+            costs[k] = BROKEN * (1.0 + joined(&all).total);
+            let worst = places.all[worst_of(&all)].clone();
+            if !places.far.contains(&worst) {
+                places.far.push(worst);
+            }
+        }
+        Ok(None)
+    }
+}
