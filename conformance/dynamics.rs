@@ -169,8 +169,8 @@ fn thrown_arm(backend: &dyn Backend) -> Result<f64> {
     // Half of the mass moves at 2 m/s along y: the centre of mass at 1 m/s.
     let rows = rig.run(500, &[])?;
     let end = last(&rows)?;
-    let centre = |i: usize| 0.5 * (end[i] + end[3 + i]);
-    Ok(largest([centre(0), centre(1) - 1.0, centre(2)]))
+    let center = |i: usize| 0.5 * (end[i] + end[3 + i]);
+    Ok(largest([center(0), center(1) - 1.0, center(2)]))
 }
 
 /// Inertia of the pendulum about its axis, kg m²: 1 kg at 0.5 m, and that of its ball.

@@ -127,10 +127,10 @@ fn pushes(backend: &dyn Backend) -> Result<f64> {
     let hook = By(|_, view: &mut StepView<'_>| view.force.copy_from_slice(&both));
     let rows = rig.run_with(1, 1, &[], |extras| extras.hook = Some(&hook))?;
     let attitude = UnitQuaternion::from_quaternion(Quaternion::new(half, half, 0.0, 0.0));
-    let centre = Vector3::new(0.1, -0.05, 0.2);
-    let about_centre = torque - centre.cross(&(attitude.inverse() * force));
-    let turned = about_centre.component_div(&Vector3::new(0.1, 0.2, 0.25));
-    let moved = force / 2.0 - attitude * turned.cross(&centre);
+    let center = Vector3::new(0.1, -0.05, 0.2);
+    let about_center = torque - center.cross(&(attitude.inverse() * force));
+    let turned = about_center.component_div(&Vector3::new(0.1, 0.2, 0.25));
+    let moved = force / 2.0 - attitude * turned.cross(&center);
     let found = |from: usize| Vector3::from_column_slice(&rows[0][from..from + 3]);
     Ok(largest([
         (found(0) - moved * STEP).norm() / (moved * STEP).norm(),

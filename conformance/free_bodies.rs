@@ -122,13 +122,13 @@ fn damping(backend: &dyn Backend) -> Result<Option<f64>> {
 struct Push {
     force: f64,
     torque: f64,
-    centre: [f64; 2],
+    center: [f64; 2],
 }
 
 impl StepHook for Push {
     fn before_step(&self, row: usize, _: usize, view: &mut StepView<'_>) {
         view.force[1] = self.force;
-        view.force[5] = self.torque + self.centre[row] * self.force;
+        view.force[5] = self.torque + self.center[row] * self.force;
     }
 }
 
@@ -141,7 +141,7 @@ fn masses(backend: &dyn Backend) -> Result<Option<f64>> {
     }
     // What is claimed may not be refused.
     let claimed = capabilities.contains(MASS);
-    let centre = 0.2;
+    let center = 0.2;
     let nominal = [
         0.4 * 0.4 + 0.6 * 0.6,
         0.2 * 0.2 + 0.6 * 0.6,
@@ -150,17 +150,17 @@ fn masses(backend: &dyn Backend) -> Result<Option<f64>> {
     .map(|squares| 2.0 * squares / 12.0);
     let inside = format!(
         r#"<option gravity="0 0 0"/><worldbody><body name="b"><freejoint name="b"/>
-        <geom type="box" size=".1 .2 .3" pos="{centre} 0 0" mass="2"{GHOST}/></body></worldbody>"#
+        <geom type="box" size=".1 .2 .3" pos="{center} 0 0" mass="2"{GHOST}/></body></worldbody>"#
     );
     // A force through the centre of mass along y and a torque about it along z, from rest.
-    let ask = |target: &str, value: f64, force: f64, torque: f64, centre: [f64; 2]| {
+    let ask = |target: &str, value: f64, force: f64, torque: f64, center: [f64; 2]| {
         let mut rig = pair(backend, &inside, &["qvel.b"], &[(target, value)])?;
         let wrench = [0.0, force, 0.0, 0.0, 0.0, torque].repeat(2);
         // The same at the origin, as a hook acts.
         let hook = Push {
             force,
             torque,
-            centre,
+            center,
         };
         let rows = rig.run_with(1, 1, &[], |extras| {
             if wrenches {
@@ -192,8 +192,8 @@ fn masses(backend: &dyn Backend) -> Result<Option<f64>> {
         Ok::<(), Error>(())
     };
     ask_about("body/b/mass", &|| {
-        let pushed = ask("body/b/mass", 6.0, 3.0, 0.0, [centre; 2])?;
-        let turned = ask("body/b/mass", 6.0, 0.0, 0.5, [centre; 2])?;
+        let pushed = ask("body/b/mass", 6.0, 3.0, 0.0, [center; 2])?;
+        let turned = ask("body/b/mass", 6.0, 0.0, 0.5, [center; 2])?;
         let speeds = [3.0 / 2.0 * STEP, 3.0 / 6.0 * STEP];
         let rates = [0.5 / nominal[2] * STEP, 0.5 / (3.0 * nominal[2]) * STEP];
         Ok(largest([
@@ -202,16 +202,16 @@ fn masses(backend: &dyn Backend) -> Result<Option<f64>> {
         ]))
     })?;
     ask_about("body/b/inertia/2", &|| {
-        let turned = ask("body/b/inertia/2", 0.05, 0.0, 0.5, [centre; 2])?;
+        let turned = ask("body/b/inertia/2", 0.05, 0.0, 0.5, [center; 2])?;
         let rates = [0.5 / nominal[2] * STEP, 0.5 / 0.05 * STEP];
         Ok(both([turned[0][5], turned[1][5]], rates))
     })?;
     ask_about("body/b/ipos/0", &|| {
-        let centres = [centre, 0.35];
-        let turned = ask("body/b/ipos/0", 0.35, 0.0, 0.5, centres)?;
+        let centers = [center, 0.35];
+        let turned = ask("body/b/ipos/0", 0.35, 0.0, 0.5, centers)?;
         // The centre of mass stays, so the origin goes the other way.
-        let origin = centres.map(|c| -c * 0.5 / nominal[2] * STEP);
-        let pushed = ask("body/b/ipos/0", 0.35, 3.0, 0.0, centres)?;
+        let origin = centers.map(|c| -c * 0.5 / nominal[2] * STEP);
+        let pushed = ask("body/b/ipos/0", 0.35, 3.0, 0.0, centers)?;
         Ok(largest([
             both([turned[0][1], turned[1][1]], origin),
             both([pushed[0][1], pushed[1][1]], [3.0 / 2.0 * STEP; 2]),
@@ -234,7 +234,7 @@ fn origin_velocity(backend: &dyn Backend) -> Result<f64> {
         &[velocity.as_slice(), rate.as_slice()].concat(),
     )?;
     let read = rig.read()?.swap_remove(0);
-    let centre = velocity + attitude * rate.cross(&Vector3::new(0.3, -0.2, 0.1));
-    let theory = [centre.as_slice(), velocity.as_slice(), rate.as_slice()].concat();
+    let center = velocity + attitude * rate.cross(&Vector3::new(0.3, -0.2, 0.1));
+    let theory = [center.as_slice(), velocity.as_slice(), rate.as_slice()].concat();
     Ok(largest(read.iter().zip(&theory).map(|(a, b)| a - b)))
 }

@@ -45,7 +45,7 @@ pub const CHECKS: &[Check] = &[
         unit: "",
         tolerance: ROUNDING,
         reason: EXACT,
-        measure: Figure(body_centre),
+        measure: Figure(body_center),
     },
     Check {
         name: "parameters/body-inertia",
@@ -274,7 +274,7 @@ fn inertia_is(backend: &dyn Backend, parameter: (&str, f64), inertia: f64) -> Re
     Ok(both(rows.map(|r| r[1]), [time / INERTIA, time / inertia]))
 }
 
-fn body_centre(backend: &dyn Backend) -> Result<f64> {
+fn body_center(backend: &dyn Backend) -> Result<f64> {
     inertia_is(backend, ("body/wheel/ipos/0", 0.3), 0.08 + 2.0 * 0.09)
 }
 

@@ -8,7 +8,7 @@ use asid_core::log::{of_table, wanted};
 use asid_core::{Backend as _, Episode, Scene};
 use asid_logs::propose::propose;
 use asid_logs::ros::topics::{Described, Topics};
-use asid_logs::{Kind, LogSettings, Opener};
+use asid_logs::{LogFormat, LogSettings, Opener};
 use asid_mjcf::Plant;
 
 use crate::corpus::{Corpus, root};
@@ -246,7 +246,7 @@ fn import(path: &Path) -> Result<(), String> {
         .open(path, &LogSettings::default())
         .map_err(told)?;
     for log in logs.iter().take(EPISODES) {
-        let proposal = propose(scene, plant, (log, Kind::of(path)), &[]).map_err(told)?;
+        let proposal = propose(scene, plant, (log, LogFormat::of(path)), &[]).map_err(told)?;
         let mappings = proposal.mappings();
         let [commands, readings] = wanted(&plant.layout, &mappings);
         let (table, _) = log.table(&commands, &readings);

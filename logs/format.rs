@@ -1,6 +1,6 @@
 //! Kinds of log files, and `[log]` of a study, which names the kind and the topics.
 //!
-//! A recording of another stack needs a reader in this crate, a [`Kind`] here, and an arm in `open.rs`. The project's
+//! A recording of another stack needs a reader in this crate, a [`LogFormat`] here, and an arm in `open.rs`. The project's
 //! own tables are read by [`asid_core::log`]; a new format of these is a file and an arm there.
 
 use std::path::Path;
@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 /// What a log is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Kind {
+pub enum LogFormat {
     /// A table of text, one row a stamp.
     Csv,
     /// The same table as a Parquet file.
@@ -23,7 +23,7 @@ pub enum Kind {
     Lerobot,
 }
 
-impl Kind {
+impl LogFormat {
     /// The kind that a path looks like; a table of text where nothing else fits.
     #[must_use]
     pub fn of(path: &Path) -> Self {
@@ -66,9 +66,9 @@ impl Kind {
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LogSettings {
-    /// Kind of the files; by their looks where it is left out.
+    /// Format of the files; by their looks where it is left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub kind: Option<Kind>,
+    pub kind: Option<LogFormat>,
     /// Topics that are read; all where there are none.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub topics: Vec<String>,
@@ -77,8 +77,8 @@ pub struct LogSettings {
 impl LogSettings {
     /// The kind of a file.
     #[must_use]
-    pub fn kind_of(&self, path: &Path) -> Kind {
-        self.kind.unwrap_or_else(|| Kind::of(path))
+    pub fn kind_of(&self, path: &Path) -> LogFormat {
+        self.kind.unwrap_or_else(|| LogFormat::of(path))
     }
 }
 
@@ -90,16 +90,16 @@ mod tests {
     fn kinds_are_told_by_their_looks() {
         let folder = tempfile::tempdir().unwrap();
         std::fs::create_dir(folder.path().join("meta")).unwrap();
-        assert_eq!(Kind::of(folder.path()), Kind::Rosbag2);
+        assert_eq!(LogFormat::of(folder.path()), LogFormat::Rosbag2);
         std::fs::write(folder.path().join("meta/info.json"), "{}").unwrap();
-        assert_eq!(Kind::of(folder.path()), Kind::Lerobot);
+        assert_eq!(LogFormat::of(folder.path()), LogFormat::Lerobot);
         for (name, kind) in [
-            ("a.MCAP", Kind::Mcap),
-            ("a.db3", Kind::Rosbag2),
-            ("a.parquet", Kind::Parquet),
-            ("a.log", Kind::Csv),
+            ("a.MCAP", LogFormat::Mcap),
+            ("a.db3", LogFormat::Rosbag2),
+            ("a.parquet", LogFormat::Parquet),
+            ("a.log", LogFormat::Csv),
         ] {
-            assert_eq!(Kind::of(Path::new(name)), kind);
+            assert_eq!(LogFormat::of(Path::new(name)), kind);
         }
     }
 }

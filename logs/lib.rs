@@ -29,7 +29,7 @@ pub mod ros;
 pub mod series;
 mod table_file;
 
-pub use format::{Kind, LogSettings};
+pub use format::{LogFormat, LogSettings};
 pub use open::Opener;
 pub use raw::RawLog;
 pub use series::Series;

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use asid_core::{Error, Result};
 
 use crate::csv_file;
-use crate::format::{Kind, LogSettings};
+use crate::format::{LogFormat, LogSettings};
 use crate::raw::RawLog;
 
 /// What leads from a dataset's path to the number of an episode: `dataset#3`.
@@ -35,13 +35,13 @@ impl Opener {
         }
         let name = name_of(&file);
         match settings.kind_of(&file) {
-            Kind::Csv => Ok(vec![csv_file::read(&file, &name).map_err(failed)?]),
-            Kind::Parquet => Ok(vec![parquet(&file, &name).map_err(failed)?]),
-            kind @ (Kind::Mcap | Kind::Rosbag2) => {
+            LogFormat::Csv => Ok(vec![csv_file::read(&file, &name).map_err(failed)?]),
+            LogFormat::Parquet => Ok(vec![parquet(&file, &name).map_err(failed)?]),
+            kind @ (LogFormat::Mcap | LogFormat::Rosbag2) => {
                 let log = ros(&file, kind, &settings.topics, &name);
                 Ok(vec![log.map_err(failed)?])
             }
-            Kind::Lerobot => self.episodes(&file, episode, &name).map_err(failed),
+            LogFormat::Lerobot => self.episodes(&file, episode, &name).map_err(failed),
         }
     }
 
@@ -121,17 +121,17 @@ fn lerobot(_: &Path) -> Result<Vec<(usize, RawLog)>, String> {
 }
 
 #[cfg(feature = "ros")]
-fn ros(file: &Path, kind: Kind, chosen: &[String], name: &str) -> Result<RawLog, String> {
+fn ros(file: &Path, kind: LogFormat, chosen: &[String], name: &str) -> Result<RawLog, String> {
     let mut topics = crate::ros::topics::Topics::new(chosen);
     match kind {
-        Kind::Mcap => crate::mcap_file::read(file, &mut topics)?,
+        LogFormat::Mcap => crate::mcap_file::read(file, &mut topics)?,
         _ => crate::bag::read(file, &mut topics)?,
     }
     topics.finish(name)
 }
 
 #[cfg(not(feature = "ros"))]
-fn ros(_: &Path, _: Kind, _: &[String], _: &str) -> Result<RawLog, String> {
+fn ros(_: &Path, _: LogFormat, _: &[String], _: &str) -> Result<RawLog, String> {
     Err(lacking("a recording of ROS 2"))
 }
 

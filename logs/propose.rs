@@ -22,7 +22,7 @@ use speed::match_speed;
 use unit::Unit;
 use words::Measure;
 
-use crate::format::Kind;
+use crate::format::LogFormat;
 use crate::raw::RawLog;
 use crate::series::Series;
 
@@ -89,7 +89,7 @@ impl Proposal {
 pub fn propose(
     scene: &Scene,
     plant: &Plant,
-    (log, kind): (&RawLog, Kind),
+    (log, kind): (&RawLog, LogFormat),
     given: &[(String, String)],
 ) -> Result<Proposal> {
     let quantities = quantity::quantities(scene, plant)?;

@@ -192,7 +192,7 @@ mod tests {
     }
 
     #[test]
-    fn a_weight_off_the_middle_moves_the_centre() {
+    fn a_weight_off_the_middle_moves_the_center() {
         // 0.05 kg rod and a 0.15 kg weight at 0.08 m: the centre is at 3/4 of it.
         let geoms = [
             solid_box(0.05, [0.02, 0.15, 0.02], [0.0; 3]),

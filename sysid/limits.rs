@@ -117,9 +117,10 @@ impl Limits {
         }
         for (name, [low, high]) in &request.position {
             if low >= high {
-                return Err(wrong(format!(
-                    "position of `{name}`: {low} is not below {high}"
-                )));
+                return Err(wrong(
+                    "limit_position",
+                    format!("position of `{name}`: {low} is not below {high}"),
+                ));
             }
         }
         let joints = layout
@@ -156,9 +157,10 @@ impl Limits {
             .iter()
             .map(|(name, corners)| {
                 if (0..3).any(|k| corners[0][k] >= corners[1][k]) {
-                    return Err(wrong(format!(
-                        "box of `{name}`: its low corner is not below its high one"
-                    )));
+                    return Err(wrong(
+                        "limit_box",
+                        format!("box of `{name}`: its low corner is not below its high one"),
+                    ));
                 }
                 Ok(BodyBox {
                     name: name.clone(),
@@ -206,9 +208,9 @@ fn pairs_apart(plant: &Plant, may_touch: &[[usize; 2]]) -> Vec<[usize; 2]> {
     pairs
 }
 
-fn wrong(message: String) -> Error {
+fn wrong(key: &str, message: String) -> Error {
     Error::Config {
-        key: "limits".into(),
+        key: key.into(),
         message,
     }
 }

@@ -51,7 +51,7 @@ fn attempts(problem: &Problem<'_>, cases: &[(f64, f64)]) -> Vec<asid::core::task
 }
 
 #[test]
-fn a_rod_laid_down_at_its_centre_of_mass_stays_and_35_mm_off_it_falls() {
+fn a_rod_laid_down_at_its_center_of_mass_stays_and_35_mm_off_it_falls() {
     on_every_engine(0, |engine, problem| {
         // The ledge is 40 mm wide and the grip slips by at most 3 mm: 10 mm is well inside, 35 mm well outside.
         for offset in [-0.08, 0.0, 0.08] {

@@ -34,7 +34,10 @@ fn on_every_engine(
     parameters.extend(optional);
     for entry in all::<BackendEntry>() {
         let backend = (entry.make)().unwrap();
-        if !backend.capabilities().contains(task.requires() | needs) {
+        if !backend
+            .capabilities()
+            .contains(task.spec().requires | needs)
+        {
             println!("{}: not claimed", entry.name);
             continue;
         }
@@ -320,15 +323,15 @@ fn a_push_at_one_ball_touches_and_moves_it_alone() {
 #[test]
 fn visits_of_the_patches_can_be_counted() {
     let task = (find::<TaskEntry>("sphere-patches").unwrap().make)().unwrap();
-    let regions = task.regions();
+    let regions = &task.spec().regions;
     assert_eq!(regions.len(), 3);
     let down: Vec<[f64; 2]> = (0..90)
         .map(|k| [0.5, 0.3 - 0.0085 * f64::from(k)])
         .collect();
-    let shares = visits::shares(&down, &regions);
+    let shares = visits::shares(&down, regions);
     assert!((shares.iter().sum::<f64>() - 1.0).abs() < 1e-12);
     assert!(visits::coverage(&shares) > 0.95, "{shares:?}");
-    let still = visits::shares(&[[0.5, 0.2]; 50], &regions);
+    let still = visits::shares(&[[0.5, 0.2]; 50], regions);
     assert_eq!(visits::coverage(&still), 0.0);
 }
 

@@ -114,11 +114,11 @@ fn objects_are_tracked_and_regions_lie_apart() {
                 plant.layout.body(body).unwrap();
             }
         }
-        let regions = task.regions();
+        let regions = &task.spec().regions;
         for (i, region) in regions.iter().enumerate() {
             let n = region.corners.len() as f64;
             let middle = [0, 1].map(|k| region.corners.iter().map(|c| c[k]).sum::<f64>() / n);
-            let within: Vec<f64> = visits::shares(&[middle], &regions);
+            let within: Vec<f64> = visits::shares(&[middle], regions);
             assert_eq!(within.iter().sum::<f64>(), 1.0, "{}", region.label);
             assert_eq!(within[i], 1.0, "{}", region.label);
         }
@@ -163,7 +163,7 @@ fn a_slow_tracker_reads_at_each_control_step_and_not_between() {
 fn on(task: &dyn Task, parameters: &[Parameter], engine: &BackendEntry) {
     let backend = (engine.make)().unwrap();
     let row = format!("{:22} {:8}", task.name(), engine.name);
-    let lacking = task.requires() - backend.capabilities();
+    let lacking = task.spec().requires - backend.capabilities();
     if !lacking.is_empty() {
         let names: Vec<&str> = lacking.iter_names().map(|(n, _)| n).collect();
         println!("{row} left out: the engine lacks {}", names.join(", "));
@@ -296,7 +296,7 @@ fn seeded_episodes_are_identical(problem: &Problem<'_>) -> String {
 }
 
 fn observations_are_within_bounds(problem: &Problem<'_>) -> String {
-    let [low, high] = problem.task.bounds();
+    let [low, high] = problem.task.spec().bounds;
     let layout = problem.model.layout();
     let mut worst: f64 = 0.0;
     for seed in 0..3 {

@@ -32,7 +32,7 @@ pub struct Parameter {
     pub range: [f64; 2],
 }
 
-/// How an actuator is driven: a sum of sines of random phases about a center.
+/// How an actuator is driven: a sum of sines of random phases about a centre.
 #[derive(Clone, Copy, Debug)]
 pub struct Command {
     /// Actuator.
@@ -134,7 +134,7 @@ pub const fn sines(
     }
 }
 
-/// Where a joint starts: centers and spreads.
+/// Where a joint starts: centres and spreads.
 #[must_use]
 pub const fn start(
     joint: &'static str,

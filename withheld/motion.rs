@@ -8,7 +8,7 @@ use crate::machine::Command;
 
 /// Sines that a command is the sum of.
 const SINES: usize = 5;
-/// Time over which a command leaves its center, s: a servo is not told to jump.
+/// Time over which a command leaves its centre, s: a servo is not told to jump.
 const FADE: f64 = 0.15;
 
 /// A planned episode.

@@ -215,7 +215,7 @@ fn inertial<'a>(
 ) -> Option<Element> {
     use mujoco_rs::wrappers::mj_model::MjtObjBase;
     let id = engine::index(model, MjtObjBase::mjOBJ_BODY, name)?;
-    let (mut mass, mut centre) = (model.body_mass()[id], model.body_ipos()[id]);
+    let (mut mass, mut center) = (model.body_mass()[id], model.body_ipos()[id]);
     let [w, x, y, z] = model.body_iquat()[id];
     let turn = UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z)).to_rotation_matrix();
     let [a, b, c] = model.body_inertia()[id];
@@ -225,12 +225,12 @@ fn inertial<'a>(
         let factor = edit.mass * (mass * edit.mass + edit.payload) / (mass * edit.mass);
         mass *= factor;
         moments *= factor * edit.moments;
-        for (c, s) in centre.iter_mut().zip(edit.shift) {
+        for (c, s) in center.iter_mut().zip(edit.shift) {
             *c += s;
         }
     }
     let mut element = Element::new("inertial");
-    element.set_numbers("pos", &centre);
+    element.set_numbers("pos", &center);
     element.set_numbers("mass", &[mass]);
     let m = moments;
     let full = [

@@ -8,7 +8,7 @@ use serde::{Serialize, Serializer};
 
 /// How a simulated real world differs from the method's simulator.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub enum Kind {
+pub enum WorldKind {
     /// It is the simulator: same engine, same scene.
     #[default]
     Matched,
@@ -23,7 +23,7 @@ pub enum Kind {
     Custom,
 }
 
-impl Kind {
+impl WorldKind {
     /// All kinds, in the order of tables.
     pub const ALL: [Self; 5] = [
         Self::Matched,
@@ -46,13 +46,13 @@ impl Kind {
     }
 }
 
-impl fmt::Display for Kind {
+impl fmt::Display for WorldKind {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(self.name())
     }
 }
 
-impl FromStr for Kind {
+impl FromStr for WorldKind {
     type Err = Error;
 
     fn from_str(text: &str) -> Result<Self> {
@@ -62,7 +62,7 @@ impl FromStr for Kind {
     }
 }
 
-impl Serialize for Kind {
+impl Serialize for WorldKind {
     fn serialize<S: Serializer>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error> {
         serializer.serialize_str(self.name())
     }
@@ -74,10 +74,10 @@ mod tests {
 
     #[test]
     fn kinds_round_trip_and_a_wrong_name_lists_the_near_ones() {
-        for kind in Kind::ALL {
-            assert_eq!(kind.to_string().parse::<Kind>().unwrap(), kind);
+        for kind in WorldKind::ALL {
+            assert_eq!(kind.to_string().parse::<WorldKind>().unwrap(), kind);
         }
-        let error = "perturbd".parse::<Kind>().unwrap_err().to_string();
+        let error = "perturbd".parse::<WorldKind>().unwrap_err().to_string();
         assert!(error.contains("`perturbed`"), "{error}");
     }
 }

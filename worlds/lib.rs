@@ -4,11 +4,11 @@
 //! unknowns. Its errors there say nothing of a real world. So there are five kinds, and a result says
 //! which one it is from:
 //!
-//! - [`Kind::Matched`]: the simulator itself, with a hidden truth.
-//! - [`Kind::Crossed`]: the same scene in another engine.
-//! - [`Kind::Perturbed`]: many small errors of the model at once, drawn by the world's seed.
-//! - [`Kind::StandIn`]: the task's scene with another object.
-//! - [`Kind::Custom`]: an engine, a model file or effects that a user named one by one.
+//! - [`WorldKind::Matched`]: the simulator itself, with a hidden truth.
+//! - [`WorldKind::Crossed`]: the same scene in another engine.
+//! - [`WorldKind::Perturbed`]: many small errors of the model at once, drawn by the world's seed.
+//! - [`WorldKind::StandIn`]: the task's scene with another object.
+//! - [`WorldKind::Custom`]: an engine, a model file or effects that a user named one by one.
 //!
 //! A perturbed world comes about in three modules: `ranges` says how far off it may be, `drawn` has the
 //! values that its seed drew, and `applied` gives them to a scene.
@@ -25,6 +25,6 @@ mod simulated;
 pub use applied::{Perturbed, perturb};
 pub use crossed::other_engine;
 pub use drawn::{Perturbation, TrackerPerturbation};
-pub use kind::Kind;
+pub use kind::WorldKind;
 pub use ranges::PerturbationRanges;
 pub use simulated::{SimulatedWorld, TrackerErrors};

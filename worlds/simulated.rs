@@ -26,6 +26,7 @@ use asid_core::task::Task;
 use asid_core::tracker::ReadingFrames;
 use close_look::CloseLook;
 use pairs::{Pairs, note};
+use tracker::Tracker;
 pub use tracker::TrackerErrors;
 
 /// The simulation that is the world.
@@ -173,82 +174,9 @@ fn blank(layout: &Layout, channels: &[String]) -> Result<Episode> {
     })
 }
 
-/// Times of the start and of the ends of frames, s, without the dust of products.
-fn times(frames: usize, period: f64) -> Vec<f64> {
-    let at = |k| (k as f64 * period * 1e9).round() / 1e9;
-    (0..=frames).map(at).collect()
-}
-
 fn draw(coordinates: &[asid_core::task::Coordinate], rng: &mut Rng) -> Vec<f64> {
     use rand::Rng as _;
     coordinates.iter().map(|c| c.at(rng.random())).collect()
-}
-
-/// What the tracker says, frame by frame.
-struct Tracker<'a> {
-    signals: &'a SignalSet,
-    errors: &'a TrackerErrors,
-    rate: ReadingFrames,
-    /// Physics steps by which it is late, and those of a frame.
-    late: usize,
-    substeps: usize,
-    /// True readings of the signals after each physics step, the start first; all that a late
-    /// tracker may still report.
-    past: Vec<f64>,
-    frame: usize,
-    noise: Rng,
-    losses: Rng,
-}
-
-impl<'a> Tracker<'a> {
-    fn new(
-        (signals, errors): (&'a SignalSet, &'a TrackerErrors),
-        rate: ReadingFrames,
-        layout: &Layout,
-        substeps: usize,
-        [noise, losses]: [Rng; 2],
-    ) -> Self {
-        Self {
-            signals,
-            errors,
-            rate,
-            late: (errors.latency / layout.timestep).round() as usize,
-            substeps,
-            past: Vec::new(),
-            frame: 0,
-            noise,
-            losses,
-        }
-    }
-
-    /// Takes the start of an episode, a row that begins with the tracked signals.
-    fn begin(&mut self, start: &[f64]) {
-        self.past.extend_from_slice(&start[..self.signals.width()]);
-    }
-
-    /// Takes what was true after each physics step, rows that begin with the tracked signals.
-    fn look<'r>(&mut self, rows: impl Iterator<Item = &'r [f64]>) {
-        for row in rows {
-            self.past.extend_from_slice(&row[..self.signals.width()]);
-        }
-    }
-
-    /// Turns the next frame's true reading, which begins with the tracked signals, into what
-    /// is read. Returns whether the tracker read anything.
-    fn read(&mut self, row: &mut [f64]) -> bool {
-        let tracked = self.signals.width();
-        let seen = &mut row[..tracked];
-        if self.late > 0 {
-            let shown = (self.frame * self.substeps).saturating_sub(self.late);
-            seen.copy_from_slice(&self.past[shown * tracked..][..tracked]);
-        }
-        self.errors.shift(self.signals, seen);
-        self.signals
-            .add_noise(seen, || StandardNormal.sample(&mut self.noise));
-        let there = self.errors.reads(self.frame, &mut self.losses) && self.rate.has(self.frame);
-        self.frame += 1;
-        there
-    }
 }
 
 impl RealWorld for SimulatedWorld<'_> {
@@ -327,9 +255,7 @@ impl RealWorld for SimulatedWorld<'_> {
             pairs.count(&touched);
         }
         self.wear();
-        let last = episode.ctrl[episode.ctrl.len() - nu..].to_vec();
-        episode.ctrl.extend(last);
-        episode.time = times(protocol.frames(), protocol.frame_period);
+        episode.close(protocol.frame_period);
         let (contact_fraction, touched) = pairs.shares(protocol.horizon);
         Ok(RealEpisode {
             episode,
@@ -399,11 +325,8 @@ impl RealWorld for SimulatedWorld<'_> {
             episode.readings.extend_from_slice(seen);
         }
         self.wear();
-        let nu = layout.nu();
         episode.ctrl = ctrl;
-        let last = episode.ctrl[episode.ctrl.len() - nu..].to_vec();
-        episode.ctrl.extend(last);
-        episode.time = times(protocol.frames, protocol.frame_period);
+        episode.close(protocol.frame_period);
         Ok(Attempt {
             outcome: self.task.outcome(&readings),
             action,

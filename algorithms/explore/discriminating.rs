@@ -54,13 +54,10 @@ impl Discriminating {
     /// With fewer than two rivals.
     pub fn new(rivals: Vec<Rival>) -> Result<Self> {
         if rivals.len() < 2 {
-            return Err(Error::Config {
-                key: "rivals".into(),
-                message: format!(
-                    "{} cannot be told apart; at least two are needed",
-                    rivals.len()
-                ),
-            });
+            return Err(Error::Shape(format!(
+                "{} explanations cannot be told apart; at least two are needed",
+                rivals.len()
+            )));
         }
         Ok(Self {
             rivals,

@@ -144,17 +144,11 @@ impl BatchEnvironment for FisherEnvironment<'_> {
             .enumerate()
             .map(|(i, u)| protocol.action[i % a].at((u.clamp(-1.0, 1.0) + 1.0) / 2.0))
             .collect();
-        let mut readings = std::mem::take(&mut self.readings);
-        let stepped = self
-            .batch
-            .step(&scaled, &mut readings, &mut transition.reward);
-        self.readings = readings;
-        stepped?;
+        self.batch
+            .step(&scaled, &mut self.readings, &mut transition.reward)?;
         self.step += 1;
         let over = self.step == protocol.horizon;
-        let mut observation = std::mem::take(&mut transition.final_observation);
-        self.observe(&mut observation);
-        transition.final_observation = observation;
+        self.observe(&mut transition.final_observation);
         for (ended, alive) in self.ended.iter_mut().zip(self.batch.alive()) {
             *ended |= !alive;
         }
@@ -168,14 +162,11 @@ impl BatchEnvironment for FisherEnvironment<'_> {
         }
         transition.truncated.fill(false);
         if over {
-            let mut first = std::mem::take(&mut transition.observation);
-            self.reset(&mut first)?;
-            transition.observation = first;
-        } else {
-            transition
-                .observation
-                .copy_from_slice(&transition.final_observation);
+            return self.reset(&mut transition.observation);
         }
+        transition
+            .observation
+            .copy_from_slice(&transition.final_observation);
         Ok(())
     }
 }

@@ -6,24 +6,26 @@
 //! The network gives a Gaussian in prior-scaled coordinates, cut to the prior's box, for each
 //! unknown ([`crate::inference`]); its deviations are calibrated on held-out episodes.
 
+mod training;
+
 use std::path::Path;
 use std::sync::Arc;
-use std::time::Instant;
 
 use asid_algorithms::identify::Likelihood;
 use asid_core::identify::{Identified, Identifier};
-use asid_core::progress::Progress;
 use asid_core::registry::{self, ExplorerEntry, Settings, find};
+use asid_core::settings::require;
 use asid_core::{Episode, Error, Explorer, Parameter, Posterior, Problem, Result};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::collect::{Dataset, collect};
-use crate::file::{Description, ObservationEntry, Saved, Tensors, write_atomically};
+use crate::belief::Belief;
+use crate::file::{ObservationEntry, Saved, write_atomically};
 use crate::history::History;
-use crate::inference::{Belief, Inference};
+use crate::inference::Inference;
 use crate::learning::{Cache, SHIPPED, TRAIN, events_of, from_program, is_file};
-use crate::tensorboard::{Scalars, encode};
+use crate::tensorboard::encode;
+pub use training::{EstimatorTrainer, Fitted, Score, can_train, score};
 
 /// Name of the identifier.
 pub const NAME: &str = "estimator";
@@ -96,35 +98,6 @@ asid_core::register!(IdentifierEntry {
     },
 });
 
-/// What fitting a network to episodes gives.
-pub struct Fitted {
-    /// The network, not yet calibrated.
-    pub inference: Inference,
-    /// Losses over the epochs.
-    pub events: Vec<Scalars>,
-}
-
-/// Fits networks; a crate that can learn submits one through `inventory`.
-#[allow(clippy::type_complexity)] // its arguments are what it is
-pub struct EstimatorTrainer {
-    /// Fits to the first dataset, and keeps the epoch that is best on the second.
-    pub fit: fn(
-        settings: &Estimator,
-        parameters: &[Parameter],
-        data: [&Dataset; 2],
-        seed: u64,
-        progress: &dyn Progress,
-    ) -> Result<Fitted>,
-}
-
-inventory::collect!(EstimatorTrainer);
-
-/// Whether this program can train an estimator.
-#[must_use]
-pub fn can_train() -> bool {
-    inventory::iter::<EstimatorTrainer>().next().is_some()
-}
-
 /// Name under which an estimator of an explorer's episodes ships.
 #[must_use]
 pub fn shipped_name(explorer: &str) -> String {
@@ -133,7 +106,7 @@ pub fn shipped_name(explorer: &str) -> String {
 
 impl Estimator {
     fn check(&self) -> Result<()> {
-        let positive = [
+        let rules = [
             ("episodes", self.episodes >= 100, "at least 100"),
             (
                 "held_out",
@@ -160,83 +133,7 @@ impl Estimator {
             ),
             ("samples", self.samples > 1, "at least 2"),
         ];
-        match positive.into_iter().find(|p| !p.1) {
-            None => Ok(()),
-            Some((key, _, rule)) => Err(Error::Config {
-                key: format!("identifier.{key}"),
-                message: format!("must be {rule}"),
-            }),
-        }
-    }
-
-    /// Learns from episodes of an explorer.
-    fn learn(
-        &self,
-        problem: &Problem<'_>,
-        explorer: &dyn Explorer,
-    ) -> Result<(Saved, Vec<Scalars>)> {
-        let Some(trainer) = inventory::iter::<EstimatorTrainer>().next() else {
-            return Err(self.missing(problem, "training is asked for"));
-        };
-        let clock = Instant::now();
-        let data = collect(problem, explorer, self.episodes)?;
-        let seed = rand::Rng::random(&mut problem.streams.stream("estimator network"));
-        let (inference, figures, events) = self.fit(trainer, problem, &data, seed)?;
-        let mut tensors = Tensors::new();
-        inference.to_tensors(NETWORK, &mut tensors);
-        let settings = Self {
-            network: String::new(),
-            ..self.clone()
-        };
-        let settings =
-            serde_json::to_value(&settings).map_err(|e| Error::Failed(format!("settings: {e}")))?;
-        let horizon = problem.task.exploration().horizon;
-        let saved = Saved {
-            description: Description {
-                explorer: self.explorer.clone(),
-                observation: self.observation(problem)?,
-                training_steps: (data.episodes() * horizon) as u64,
-                seconds: clock.elapsed().as_secs_f64(),
-                figures: figures.into_iter().collect(),
-                ..Description::new(NAME, problem, settings)
-            },
-            tensors,
-        };
-        Ok((saved, events))
-    }
-
-    /// Fits, calibrates and scores.
-    #[allow(clippy::type_complexity)]
-    fn fit(
-        &self,
-        trainer: &EstimatorTrainer,
-        problem: &Problem<'_>,
-        data: &Dataset,
-        seed: u64,
-    ) -> Result<(Inference, Vec<(String, f64)>, Vec<Scalars>)> {
-        let held_out = ((data.episodes() as f64 * self.held_out) as usize).max(1);
-        let (scored, rest) = data.split(held_out);
-        let (calibrating, training) = rest.split(held_out);
-        let fitted = (trainer.fit)(
-            self,
-            problem.parameters,
-            [&training, &calibrating],
-            seed,
-            problem.progress,
-        )?;
-        let mut inference = fitted.inference;
-        inference.calibrate(&calibrating.histories, data.len, &calibrating.truths);
-        let mut figures = Vec::new();
-        for (i, p) in problem.parameters.iter().enumerate() {
-            let score = score(&inference, &scored, i, problem.parameters.len());
-            figures.push((
-                format!("{}.error_over_prior", p.name),
-                score.error_over_prior,
-            ));
-            figures.push((format!("{}.coverage95", p.name), score.coverage95));
-            figures.push((format!("{}.information_nats", p.name), score.information));
-        }
-        Ok((inference, figures, fitted.events))
+        require("identifier", &rules)
     }
 
     /// What the network takes, as a file says it.
@@ -257,10 +154,10 @@ impl Estimator {
     /// What keeps a file from being used.
     fn misfit(&self, problem: &Problem<'_>, saved: &Saved) -> Result<Option<String>> {
         let observation = self.observation(problem)?;
-        if let Some(why) = saved.misfit(NAME, problem, &observation) {
+        let d = &saved.description;
+        if let Some(why) = d.misfit(NAME, problem, &observation) {
             return Ok(Some(why));
         }
-        let d = &saved.description;
         if d.explorer != self.explorer {
             return Ok(Some(format!(
                 "learned from episodes of `{}`, not of `{}` (setting `explorer`)",
@@ -331,38 +228,6 @@ impl Estimator {
 fn merged(mut defaults: Settings, over: Settings) -> Settings {
     defaults.extend(over);
     defaults
-}
-
-/// How good a network is at one unknown, on episodes that it has not seen.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Score {
-    /// Root mean square error over that of the prior's mean.
-    pub error_over_prior: f64,
-    /// Share of the truths inside of the central 95 % (for a binary unknown: guessed right).
-    pub coverage95: f64,
-    /// Mean of `log q(truth) - log prior(truth)`, nats.
-    pub information: f64,
-}
-
-/// Scores a network at unknown `i` of `d`.
-#[must_use]
-pub fn score(inference: &Inference, data: &Dataset, i: usize, d: usize) -> Score {
-    let rows = data.histories.chunks_exact(data.len.max(1));
-    let truths: Vec<f64> = data.truths.iter().skip(i).step_by(d).copied().collect();
-    let (mut square, mut prior, mut inside, mut told) = (0.0, 0.0, 0.0, 0.0);
-    for (row, &z) in rows.zip(&truths) {
-        let belief = inference.beliefs(row)[i];
-        square += (belief.mean() - z).powi(2);
-        prior += z * z;
-        inside += f64::from(u8::from(belief.covers(z)));
-        told += belief.log_ratio(z);
-    }
-    let n = truths.len().max(1) as f64;
-    Score {
-        error_over_prior: (square / prior.max(f64::MIN_POSITIVE)).sqrt(),
-        coverage95: inside / n,
-        information: told / n,
-    }
 }
 
 impl Identifier for Estimator {
@@ -448,6 +313,7 @@ mod tests {
     use asid_core::registry::IdentifierEntry;
 
     use super::*;
+    use crate::file::{Description, Tensors};
     use crate::network::{Layer, Network};
     use crate::testing::with_problem;
 

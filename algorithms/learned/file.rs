@@ -5,15 +5,18 @@
 //! header's metadata: one key, because metadata has no order and the same training is to give the
 //! same bytes.
 
+mod description;
+
 use std::collections::{BTreeMap, HashMap};
 use std::fs;
 use std::io::Write as _;
 use std::path::Path;
 
-use asid_core::task::Coordinate;
-use asid_core::{Error, Parameter, Problem, Result};
+use asid_core::{Error, Result};
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
-use serde::{Deserialize, Serialize};
+
+use description::SCHEMA;
+pub use description::{ActionEntry, Description, ObservationEntry};
 
 /// Numbers of some shape, row-major, single precision.
 #[derive(Clone, Debug, PartialEq)]
@@ -38,112 +41,8 @@ impl Tensor {
 /// Tensors by name.
 pub type Tensors = BTreeMap<String, Tensor>;
 
-/// Some entries of an observation that belong together.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct ObservationEntry {
-    /// What they are.
-    pub name: String,
-    /// How many.
-    pub len: usize,
-}
-
-/// An entry of an action.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct ActionEntry {
-    /// What it is.
-    pub name: String,
-    /// SI unit.
-    pub unit: String,
-    /// What -1 and 1 of the network stand for.
-    pub range: [f64; 2],
-}
-
-impl ActionEntry {
-    /// The entry of a coordinate.
-    #[must_use]
-    pub fn of(coordinate: &Coordinate) -> Self {
-        Self {
-            name: coordinate.name.clone(),
-            unit: coordinate.unit.clone(),
-            range: coordinate.range,
-        }
-    }
-
-    /// Action in its unit for an output of the network.
-    #[must_use]
-    pub fn span(&self, output: f64) -> f64 {
-        let [low, high] = self.range;
-        low + (output + 1.0) / 2.0 * (high - low)
-    }
-}
-
-/// How what a file holds came about, and what it is for.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(default)]
-pub struct Description {
-    /// Layout version.
-    pub schema: u32,
-    /// Name of the explorer or identifier.
-    pub algorithm: String,
-    /// The task.
-    pub task: String,
-    /// Explorer whose episodes were learned from; empty for an explorer.
-    pub explorer: String,
-    /// Engine of the training, with its version.
-    pub engine: String,
-    /// Version of the program.
-    pub asid: String,
-    /// Its commit.
-    pub git: String,
-    /// Seed of the training.
-    pub seed: u64,
-    /// All settings.
-    pub settings: serde_json::Value,
-    /// What the network takes, in order.
-    pub observation: Vec<ObservationEntry>,
-    /// What it gives.
-    pub action: Vec<ActionEntry>,
-    /// The unknowns, with the priors that were drawn from.
-    pub parameters: Vec<Parameter>,
-    /// Control steps of simulated episodes.
-    pub training_steps: u64,
-    /// Wall-clock time of the training, s.
-    pub seconds: f64,
-    /// Figures of the training by name, such as the last mean return.
-    pub figures: BTreeMap<String, f64>,
-}
-
-/// Layout version of [`Description`].
-const SCHEMA: u32 = 1;
-
 /// Key of the description in the metadata.
 const KEY: &str = "asid";
-
-impl Description {
-    /// Of a training on `problem` that has just ended: names, versions, actions and unknowns.
-    #[must_use]
-    pub fn new(algorithm: &str, problem: &Problem<'_>, settings: serde_json::Value) -> Self {
-        Self {
-            schema: SCHEMA,
-            algorithm: algorithm.to_owned(),
-            task: problem.task.name().to_owned(),
-            engine: problem.model.engine(),
-            asid: env!("CARGO_PKG_VERSION").to_owned(),
-            git: crate::commit().to_owned(),
-            seed: problem.streams.seed(),
-            settings,
-            action: problem
-                .task
-                .exploration()
-                .action
-                .iter()
-                .map(ActionEntry::of)
-                .collect(),
-            parameters: problem.parameters.to_vec(),
-            ..Self::default()
-        }
-    }
-}
 
 /// What a file holds.
 #[derive(Clone, Debug, PartialEq)]
@@ -240,55 +139,6 @@ impl Saved {
         };
         let bytes = fs::read(path).map_err(|e| wrong(e.to_string()))?;
         Self::from_bytes(&bytes).map_err(wrong)
-    }
-
-    /// What keeps it from being used for `algorithm` on `problem` with these observations.
-    #[must_use]
-    pub fn misfit(
-        &self,
-        algorithm: &str,
-        problem: &Problem<'_>,
-        observation: &[ObservationEntry],
-    ) -> Option<String> {
-        let d = &self.description;
-        if d.algorithm != algorithm {
-            return Some(format!(
-                "was trained by `{}`, not `{algorithm}`",
-                d.algorithm
-            ));
-        }
-        let task = problem.task.name();
-        if d.task != task {
-            return Some(format!(
-                "was trained for the task `{}`, not `{task}`",
-                d.task
-            ));
-        }
-        let names =
-            |all: &[Parameter]| -> Vec<String> { all.iter().map(|p| p.name.clone()).collect() };
-        let (theirs, ours) = (names(&d.parameters), names(problem.parameters));
-        if theirs != ours {
-            return Some(format!(
-                "was trained for the unknowns {}, not {}",
-                theirs.join(", "),
-                ours.join(", ")
-            ));
-        }
-        if d.observation != observation {
-            let len = |all: &[ObservationEntry]| all.iter().map(|e| e.len).sum::<usize>();
-            return Some(format!(
-                "takes other observations ({} entries) than this task gives ({})",
-                len(&d.observation),
-                len(observation)
-            ));
-        }
-        let actions = &problem.task.exploration().action;
-        let same = d.action.len() == actions.len()
-            && d.action.iter().zip(actions).all(|(a, c)| a.name == c.name);
-        if !same {
-            return Some(format!("gives other actions than `{task}` takes"));
-        }
-        None
     }
 }
 

@@ -16,7 +16,8 @@ use asid_algorithms::explore::Observer;
 use asid_algorithms::fisher::Objective;
 use asid_algorithms::fisher::{FisherBatch, FisherSettings};
 use asid_core::explore::Explored;
-use asid_core::{Error, Problem, Result};
+use asid_core::settings::require;
+use asid_core::{Problem, Result};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -80,13 +81,10 @@ learned_explorer!(
 
 /// Checks a number of environments.
 pub(crate) fn check_environments(environments: usize) -> Result<()> {
-    if environments > 0 {
-        return Ok(());
-    }
-    Err(Error::Config {
-        key: "explorer.environments".into(),
-        message: "must be at least 1".into(),
-    })
+    require(
+        "explorer",
+        &[("environments", environments > 0, "at least 1")],
+    )
 }
 
 /// The entries of an observer as a file names them.

@@ -159,7 +159,7 @@ impl Cache {
 pub fn obtain<L: LearnedExplorer>(explorer: &L, problem: &Problem<'_>) -> Result<Arc<Saved>> {
     let cache = explorer.cache();
     let observation = explorer.observation(problem)?;
-    let misfit = |saved: &Saved| saved.misfit(L::NAME, problem, &observation);
+    let misfit = |saved: &Saved| saved.description.misfit(L::NAME, problem, &observation);
     let policy = explorer.policy();
     if is_file(policy) {
         let saved = Saved::load(Path::new(policy))?;

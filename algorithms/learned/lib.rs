@@ -5,6 +5,7 @@
 //! where it is linked, adds a [`Trainer`] for each. A network comes from a file that the user
 //! names, else from those that ship with the program, else it is trained on the spot.
 
+mod belief;
 mod collect;
 pub mod episodes;
 pub mod estimator;
@@ -28,13 +29,14 @@ mod testing;
 
 use std::sync::OnceLock;
 
+pub use belief::Belief;
 pub use collect::Dataset;
 pub use episodes::EpisodeBatch;
 pub use estimator::{Estimator, EstimatorTrainer};
 pub use file::{Description, Saved, Tensor, Tensors};
 pub use fisher_ppo::FisherPpo;
 pub use history::History;
-pub use inference::{Belief, Inference};
+pub use inference::Inference;
 pub use learning::{LearnedExplorer, Trainer, Training};
 pub use max::Max;
 pub use maxmi::MaxMi;

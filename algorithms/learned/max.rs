@@ -10,6 +10,7 @@ use std::sync::Arc;
 
 use asid_core::explore::Explored;
 use asid_core::layout::Recording;
+use asid_core::settings::require;
 use asid_core::signal::unit_quaternion;
 use asid_core::{Error, Problem, Result};
 use schemars::JsonSchema;
@@ -153,13 +154,7 @@ impl LearnedExplorer for Max {
                 "above 0",
             ),
         ];
-        match rules.into_iter().find(|r| !r.1) {
-            None => Ok(()),
-            Some((key, _, rule)) => Err(Error::Config {
-                key: format!("explorer.{key}"),
-                message: format!("must be {rule}"),
-            }),
-        }
+        require("explorer", &rules)
     }
 
     fn observation(&self, problem: &Problem<'_>) -> Result<Vec<ObservationEntry>> {

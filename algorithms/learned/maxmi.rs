@@ -18,14 +18,16 @@ use std::sync::Arc;
 
 use asid_algorithms::explore::Observer;
 use asid_core::explore::Explored;
+use asid_core::settings::require;
 use asid_core::{Error, Problem, Result};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::belief::Belief;
 use crate::file::{ObservationEntry, Saved};
 use crate::fisher_ppo::{FisherPpo, check_environments, entries};
 use crate::history::History;
-use crate::inference::{Belief, Inference};
+use crate::inference::Inference;
 use crate::learning::{Cache, LearnedExplorer, learned_explorer};
 use crate::play::{Observe, Playing};
 use crate::ppo_settings::PpoConfig;
@@ -159,13 +161,7 @@ impl LearnedExplorer for MaxMi {
             ("judges", p.judges > 0, "at least 1"),
             ("warm_up", p.warm_up > 1, "at least 2"),
         ];
-        match rules.into_iter().find(|r| !r.1) {
-            None => Ok(()),
-            Some((key, _, rule)) => Err(Error::Config {
-                key: format!("explorer.predictor.{key}"),
-                message: format!("must be {rule}"),
-            }),
-        }
+        require("explorer.predictor", &rules)
     }
 
     fn observation(&self, problem: &Problem<'_>) -> Result<Vec<ObservationEntry>> {

@@ -98,15 +98,20 @@ impl Network {
     /// What it gives for one row of inputs.
     #[must_use]
     pub fn forward(&self, input: &[f32]) -> Vec<f32> {
-        let (mut x, mut y) = (input.to_vec(), Vec::new());
-        for (i, layer) in self.layers.iter().enumerate() {
-            if i > 0 {
-                x.iter_mut().for_each(|v| *v = v.tanh());
-            }
-            layer.forward(&x, &mut y);
-            std::mem::swap(&mut x, &mut y);
-        }
+        let mut x = input.to_vec();
+        forward(&self.layers, &mut x, &mut Vec::new());
         x
+    }
+}
+
+/// Replaces the inputs `x` by what layers with tanh between them give; `y` is scratch.
+pub(crate) fn forward(layers: &[Layer], x: &mut Vec<f32>, y: &mut Vec<f32>) {
+    for (i, layer) in layers.iter().enumerate() {
+        if i > 0 {
+            x.iter_mut().for_each(|v| *v = v.tanh());
+        }
+        layer.forward(x, y);
+        std::mem::swap(x, y);
     }
 }
 

@@ -13,7 +13,7 @@ use rand_distr::{Distribution, StandardNormal};
 use serde::{Deserialize, Serialize};
 
 use crate::file::{Tensor, Tensors};
-use crate::network::Layer;
+use crate::network::{Layer, forward};
 use crate::normaliser::Normaliser;
 
 /// A Gaussian policy: normaliser, tanh layers, a standard deviation for each action.
@@ -174,13 +174,7 @@ impl Policy {
         for (row, out) in rows.zip(action.chunks_exact_mut(outputs)) {
             x.resize(inputs, 0.0);
             self.normaliser.normalise(row, &mut x);
-            for (i, layer) in self.layers.iter().enumerate() {
-                if i > 0 {
-                    x.iter_mut().for_each(|v| *v = v.tanh());
-                }
-                layer.forward(&x, &mut y);
-                std::mem::swap(&mut x, &mut y);
-            }
+            forward(&self.layers, &mut x, &mut y);
             for (a, &v) in out.iter_mut().zip(&x) {
                 *a = f64::from(v);
             }

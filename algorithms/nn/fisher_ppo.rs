@@ -7,10 +7,8 @@
 use asid_algorithms::explore::FisherEnvironment;
 use asid_core::registry::{self, Settings};
 use asid_core::{Problem, Result};
-use asid_learned::Tensors;
 use asid_learned::fisher_ppo::FisherPpo;
 use asid_learned::learning::{LearnedExplorer, Trainer, Training};
-use asid_learned::play::POLICY;
 use rand::Rng as _;
 
 use crate::training::learn_policy;
@@ -24,16 +22,7 @@ fn train(problem: &Problem<'_>, settings: &Settings) -> Result<Training> {
     let mut environment = FisherEnvironment::new(problem, &explorer.fisher, explorer.environments)?;
     let seed = problem.streams.stream("fisher-ppo").random();
     let learned = learn_policy(problem, &mut environment, &explorer.ppo, seed)?;
-    let mut tensors = Tensors::new();
-    learned.policy.to_tensors(POLICY, &mut tensors);
-    Ok(Training {
-        tensors,
-        observation: explorer.observation(problem)?,
-        steps: learned.curve.last().map_or(0, |p| p.x as u64),
-        figures: vec![("return", learned.last_return)],
-        curve: learned.curve,
-        events: learned.events,
-    })
+    Ok(learned.training(explorer.observation(problem)?))
 }
 
 #[cfg(test)]

@@ -9,9 +9,11 @@
 //!     the policy plays episodes in the world
 //! ```
 
+mod imagination;
+
 use std::time::Instant;
 
-use asid_core::environment::{BatchEnvironment, Transition};
+use asid_core::environment::BatchEnvironment;
 use asid_core::explore::CurvePoint;
 use asid_core::registry::{self, Settings};
 use asid_core::{Error, Problem, Result};
@@ -22,14 +24,12 @@ use asid_learned::tensorboard::Scalars;
 use asid_learned::{Policy, Tensors};
 use rand::{Rng as _, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use rand_distr::{Distribution, StandardNormal};
-use tch::Tensor;
 
-use crate::actor_critic::to_vec;
-use crate::ensemble::{Ensemble, Transitions, Widths, divergence};
+use crate::ensemble::{Ensemble, Widths};
 use crate::ppo::{PpoProgress, train as ppo};
 use crate::tracked::{Nothing, TrackedEnvironment};
 use crate::training::wall_time;
+use imagination::{Experience, Imagination};
 
 inventory::submit! {
     Trainer { algorithm: Max::NAME, train }
@@ -62,193 +62,6 @@ pub struct Round {
     pub steps: usize,
 }
 
-/// Writes the actions of the whole batch for its observations.
-type Act<'a> = &'a mut dyn FnMut(&[f64], &mut [f64]) -> Result<()>;
-
-/// All transitions with the states that imagination begins at.
-struct Experience {
-    shape: Shape,
-    transitions: Transitions,
-    /// First states of episodes, `n x state`.
-    starts: Vec<f32>,
-    /// Lowest and highest value of each place.
-    seen: Vec<[f32; 2]>,
-    steps: usize,
-}
-
-impl Experience {
-    fn new(shape: Shape) -> Self {
-        Self {
-            shape,
-            transitions: Transitions::default(),
-            starts: Vec::new(),
-            seen: vec![[f32::INFINITY, f32::NEG_INFINITY]; shape.places],
-            steps: 0,
-        }
-    }
-
-    /// Plays whole episodes, at least `episodes`, with actions by `act`.
-    fn play(
-        &mut self,
-        world: &mut dyn BatchEnvironment,
-        episodes: usize,
-        act: Act<'_>,
-    ) -> Result<()> {
-        let (n, len) = (world.batch_size(), world.observation_len());
-        let state = self.shape.state();
-        let mut transition = Transition::new(n, len);
-        let mut actions = vec![0.0; n * world.action_len()];
-        world.reset(&mut transition.observation)?;
-        for step in 0..episodes.div_ceil(n) * self.shape.horizon {
-            let before = transition.observation.clone();
-            act(&before, &mut actions)?;
-            world.step(&actions, &mut transition)?;
-            let single = |row: &[f64]| row.iter().map(|&x| x as f32).collect::<Vec<f32>>();
-            let rows = before.chunks_exact(len);
-            let after = transition.final_observation.chunks_exact(len);
-            let done = actions.chunks_exact(world.action_len());
-            for ((from, to), action) in rows.zip(after).zip(done) {
-                if from.iter().chain(to).any(|x| !x.is_finite()) {
-                    continue;
-                }
-                let change = (0..self.shape.places).map(|i| (to[i] - from[i]) as f32);
-                self.transitions.change.extend(change);
-                self.transitions.state.extend(single(&from[..state]));
-                let clipped: Vec<f64> = action.iter().map(|a| a.clamp(-1.0, 1.0)).collect();
-                self.transitions.action.extend(single(&clipped));
-                for (seen, x) in self.seen.iter_mut().zip(to) {
-                    *seen = [seen[0].min(*x as f32), seen[1].max(*x as f32)];
-                }
-                if step % self.shape.horizon == 0 {
-                    self.starts.extend(single(&from[..state]));
-                }
-            }
-            self.steps += n;
-        }
-        if self.starts.is_empty() {
-            return Err(Error::Failed("every episode of `max` diverged".into()));
-        }
-        Ok(())
-    }
-}
-
-/// Episodes that the ensemble makes up.
-struct Imagination<'a> {
-    ensemble: &'a Ensemble,
-    experience: &'a Experience,
-    state: Vec<f32>,
-    size: usize,
-    actions: usize,
-    step: usize,
-    rng: ChaCha8Rng,
-}
-
-impl Imagination<'_> {
-    fn observe(&self, observation: &mut [f64]) {
-        let shape = self.experience.shape;
-        let share = self.step as f64 / shape.horizon as f64;
-        let rows = observation.chunks_exact_mut(shape.state() + 1);
-        for (row, state) in rows.zip(self.state.chunks_exact(shape.state())) {
-            for (o, &s) in row.iter_mut().zip(state) {
-                *o = f64::from(s);
-            }
-            row[shape.state()] = share;
-        }
-    }
-}
-
-/// How far past what was seen imagination may go, as a share of the seen range.
-const BEYOND: f32 = 0.25;
-
-impl BatchEnvironment for Imagination<'_> {
-    fn batch_size(&self) -> usize {
-        self.size
-    }
-
-    fn observation_len(&self) -> usize {
-        self.experience.shape.state() + 1
-    }
-
-    fn action_len(&self) -> usize {
-        self.actions
-    }
-
-    fn reset(&mut self, observation: &mut [f64]) -> Result<()> {
-        let len = self.experience.shape.state();
-        let n = self.experience.starts.len() / len;
-        self.state.clear();
-        for _ in 0..self.size {
-            let at = self.rng.random_range(0..n) * len;
-            let start = &self.experience.starts[at..at + len];
-            self.state.extend_from_slice(start);
-        }
-        self.step = 0;
-        self.observe(observation);
-        Ok(())
-    }
-
-    fn step(&mut self, actions: &[f64], transition: &mut Transition) -> Result<()> {
-        let shape = self.experience.shape;
-        let (places, len) = (shape.places, shape.state());
-        let single: Vec<f32> = actions.iter().map(|a| a.clamp(-1.0, 1.0) as f32).collect();
-        let unfitted = || Error::Failed("imagination before a fit".into());
-        let prediction = self
-            .ensemble
-            .predict(&self.state, &single)
-            .ok_or_else(unfitted)?;
-        let utility: Vec<f64> = to_vec(&divergence(&prediction));
-        transition.reward.copy_from_slice(&utility);
-        // The next state is a draw from a member that is drawn, as of the mixture.
-        let models = prediction.mean.size()[0];
-        let member: Vec<i64> = (0..self.size)
-            .map(|_| self.rng.random_range(0..models))
-            .collect();
-        let noise: Vec<f32> = (0..self.size * places)
-            .map(|_| StandardNormal.sample(&mut self.rng))
-            .collect();
-        let index = Tensor::from_slice(&member)
-            .view([1, -1, 1])
-            .expand([1, self.size as i64, places as i64], false);
-        let pick = |all: &Tensor| all.gather(0, &index, false).squeeze_dim(0);
-        let noise = Tensor::from_slice(&noise).view([self.size as i64, places as i64]);
-        let drawn = pick(&prediction.mean) + pick(&prediction.variance).sqrt() * noise;
-        let change: Vec<f32> = to_vec(&self.ensemble.unscale(&drawn));
-        for (state, change) in self
-            .state
-            .chunks_exact_mut(len)
-            .zip(change.chunks_exact(places))
-        {
-            let (now, rest) = state.split_at_mut(places);
-            for (i, (x, d)) in now.iter_mut().zip(change).enumerate() {
-                let [low, high] = self.experience.seen[i];
-                let slack = BEYOND * (high - low);
-                let to = (*x + d).clamp(low - slack, high + slack);
-                if let Some(last) = rest.get_mut(i) {
-                    *last = to - *x;
-                }
-                *x = to;
-            }
-        }
-        self.step += 1;
-        let mut seen = std::mem::take(&mut transition.final_observation);
-        self.observe(&mut seen);
-        transition.final_observation = seen;
-        let over = self.step == shape.horizon;
-        transition.terminated.fill(over);
-        transition.truncated.fill(false);
-        if over {
-            let mut first = std::mem::take(&mut transition.observation);
-            let begun = self.reset(&mut first);
-            transition.observation = first;
-            return begun;
-        }
-        transition
-            .observation
-            .copy_from_slice(&transition.final_observation);
-        Ok(())
-    }
-}
-
 /// The rounds of MAX in a world whose observations have this shape; its rewards mean nothing.
 /// `told` sees every round and may end the work.
 ///
@@ -277,15 +90,9 @@ pub fn explore(
     let mut rounds = Vec::new();
     for number in 1..=settings.rounds {
         ensemble.fit(&experience.transitions, &settings.ensemble, &mut rng);
-        let mut imagination = Imagination {
-            ensemble: &ensemble,
-            experience: &experience,
-            state: Vec::new(),
-            size: settings.imagined,
-            actions: widths.action,
-            step: 0,
-            rng: ChaCha8Rng::seed_from_u64(rng.random()),
-        };
+        let chance = ChaCha8Rng::seed_from_u64(rng.random());
+        let (size, actions) = (settings.imagined, widths.action);
+        let mut imagination = Imagination::new(&ensemble, &experience, size, actions, chance);
         let (mut utility, mut utility_std) = (f64::NAN, f64::NAN);
         let carry_on = &mut |p: &PpoProgress| {
             utility = p.mean_return.unwrap_or(utility);
@@ -369,6 +176,7 @@ fn train(problem: &Problem<'_>, settings: &Settings) -> Result<Training> {
 #[cfg(test)]
 mod tests {
     use asid_core::Explorer as _;
+    use asid_core::environment::Transition;
     use asid_learned::PpoConfig;
 
     use super::*;

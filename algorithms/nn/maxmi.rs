@@ -20,8 +20,7 @@ use asid_learned::history::History;
 use asid_learned::inference::Inference;
 use asid_learned::learning::{LearnedExplorer, Trainer, Training};
 use asid_learned::maxmi::{MaxMi, PREDICTOR, Predicting};
-use asid_learned::play::POLICY;
-use asid_learned::{Dataset, Network as Plain, Tensors};
+use asid_learned::{Dataset, Network as Plain};
 use rand::Rng as _;
 
 use crate::predictor::Predictor;
@@ -183,24 +182,16 @@ fn train(problem: &Problem<'_>, settings: &Settings) -> Result<Training> {
         ..explorer.ppo.clone()
     };
     let learned = learn_policy(problem, &mut environment, &ppo, seed)?;
-    let mut tensors = Tensors::new();
-    learned.policy.to_tensors(POLICY, &mut tensors);
+    let mut training = learned.training(observation);
     let judged = &environment.pay.judged;
     let sum = |k: usize| judged.iter().map(|j| j[k]).sum::<f64>();
-    let figures = vec![
-        ("return", learned.last_return),
+    training.figures.extend([
         ("predictor_error_over_prior", (sum(0) / sum(1)).sqrt()),
         ("predictor_nats", sum(2) / judged.len() as f64),
-    ];
-    environment.pay.claims.to_tensors(PREDICTOR, &mut tensors);
-    Ok(Training {
-        tensors,
-        observation,
-        steps: learned.curve.last().map_or(0, |p| p.x as u64),
-        figures,
-        curve: learned.curve,
-        events: learned.events,
-    })
+    ]);
+    let predictor = &environment.pay.claims;
+    predictor.to_tensors(PREDICTOR, &mut training.tensors);
+    Ok(training)
 }
 
 /// Noises of a reading that a difference of two has to exceed for something to have moved: noise alone

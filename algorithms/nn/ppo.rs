@@ -293,8 +293,8 @@ fn update(
 fn loss(networks: &ActorCritic, part: &Samples, config: &PpoConfig) -> (Tensor, Losses) {
     let log_prob = networks.log_prob(&part.observation, &part.action);
     let advantage = if config.normalise_advantage && part.len() > 1 {
-        let centred: Tensor = &part.advantage - part.advantage.mean(None::<Kind>);
-        centred / (part.advantage.std(true) + 1e-8)
+        let centered: Tensor = &part.advantage - part.advantage.mean(None::<Kind>);
+        centered / (part.advantage.std(true) + 1e-8)
     } else {
         part.advantage.shallow_clone()
     };

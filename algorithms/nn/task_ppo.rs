@@ -2,9 +2,7 @@
 
 use asid_core::registry::{self, Settings};
 use asid_core::{Error, Problem, Result};
-use asid_learned::Tensors;
 use asid_learned::learning::{LearnedExplorer, Trainer, Training};
-use asid_learned::play::POLICY;
 use asid_learned::task_ppo::{Reading, TaskPpo};
 use rand::Rng as _;
 
@@ -66,16 +64,7 @@ fn train(problem: &Problem<'_>, settings: &Settings) -> Result<Training> {
     let mut environment = TrackedEnvironment::new(problem, sights, len, pay, "task-ppo episodes")?;
     let seed = problem.streams.stream("task-ppo").random();
     let learned = learn_policy(problem, &mut environment, &explorer.ppo, seed)?;
-    let mut tensors = Tensors::new();
-    learned.policy.to_tensors(POLICY, &mut tensors);
-    Ok(Training {
-        tensors,
-        observation,
-        steps: learned.curve.last().map_or(0, |p| p.x as u64),
-        figures: vec![("return", learned.last_return)],
-        curve: learned.curve,
-        events: learned.events,
-    })
+    Ok(learned.training(observation))
 }
 
 #[cfg(test)]

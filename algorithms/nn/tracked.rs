@@ -105,10 +105,7 @@ impl<S: Observe, P: Pay<S>> BatchEnvironment for TrackedEnvironment<'_, S, P> {
             .map(|(u, entry)| entry.span(u.clamp(-1.0, 1.0)))
             .collect();
         self.batch.step(&scaled)?;
-        let mut seen = std::mem::take(&mut transition.final_observation);
-        let observed = self.observe(&mut seen);
-        transition.final_observation = seen;
-        observed?;
+        self.observe(&mut transition.final_observation)?;
         for e in 0..self.batch.episodes() {
             let theta = self.theta(e).to_vec();
             let reading = self.batch.reading(e);
@@ -122,10 +119,7 @@ impl<S: Observe, P: Pay<S>> BatchEnvironment for TrackedEnvironment<'_, S, P> {
         transition.truncated.fill(false);
         if over {
             self.pay.ended(&mut self.sights, self.batch.theta())?;
-            let mut first = std::mem::take(&mut transition.observation);
-            let begun = self.reset(&mut first);
-            transition.observation = first;
-            return begun;
+            return self.reset(&mut transition.observation);
         }
         transition
             .observation

@@ -5,8 +5,11 @@ use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
 use asid_core::explore::CurvePoint;
 use asid_core::{BatchEnvironment, Problem, Result};
+use asid_learned::file::ObservationEntry;
+use asid_learned::learning::Training;
+use asid_learned::play::POLICY;
 use asid_learned::tensorboard::Scalars;
-use asid_learned::{Policy, PpoConfig};
+use asid_learned::{Policy, PpoConfig, Tensors};
 
 use crate::ppo::{PpoProgress, train};
 
@@ -17,6 +20,22 @@ pub struct Learned {
     pub events: Vec<Scalars>,
     /// Mean return of the last update in which an episode ended.
     pub last_return: f64,
+}
+
+impl Learned {
+    /// The training, with the policy among its tensors and its return among its figures.
+    pub fn training(self, observation: Vec<ObservationEntry>) -> Training {
+        let mut tensors = Tensors::new();
+        self.policy.to_tensors(POLICY, &mut tensors);
+        Training {
+            tensors,
+            observation,
+            steps: self.curve.last().map_or(0, |p| p.x as u64),
+            figures: vec![("return", self.last_return)],
+            curve: self.curve,
+            events: self.events,
+        }
+    }
 }
 
 /// Seconds since 1970.

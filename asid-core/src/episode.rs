@@ -54,6 +54,27 @@ impl InitialState {
 }
 
 impl Episode {
+    /// Commands alone, `frames x nu`, as a log: a row every `period` seconds from 0, the last command held.
+    #[must_use]
+    pub fn of_commands(layout: &Layout, ctrl: Vec<f64>, period: f64) -> Self {
+        let mut episode = Self {
+            actuators: layout.actuators.iter().map(|a| a.name.clone()).collect(),
+            ctrl,
+            ..Self::default()
+        };
+        episode.close(period);
+        episode
+    }
+
+    /// Gives a log of commands the times (s) of its start and of the ends of its frames, without the dust of products,
+    /// and its last row the last command.
+    pub fn close(&mut self, period: f64) {
+        let nu = self.actuators.len();
+        self.ctrl.extend_from_within(self.ctrl.len() - nu..);
+        let at = |k| (k as f64 * period * 1e9).round() / 1e9;
+        self.time = (0..self.ctrl.len() / nu).map(at).collect();
+    }
+
     /// Number of rows.
     #[must_use]
     pub fn rows(&self) -> usize {

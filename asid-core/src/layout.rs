@@ -6,9 +6,12 @@
 //! velocity in the world frame, angular velocity in the body frame), a ball
 //! joint four and three, a hinge (rad) or slide (m) one and one.
 
+mod recording;
+
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
+pub use recording::{Channel, Recording};
 
 /// What kind of motion a joint allows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -168,6 +171,17 @@ impl Layout {
         self.sensors.iter().map(|s| s.len).sum()
     }
 
+    /// First entry in `qpos` of each quaternion.
+    #[must_use]
+    pub fn quaternions(&self) -> Vec<usize> {
+        let of = |joint: &Joint| match joint.kind {
+            JointKind::Free => Some(joint.qpos + 3),
+            JointKind::Ball => Some(joint.qpos),
+            JointKind::Hinge | JointKind::Slide => None,
+        };
+        self.joints.iter().filter_map(of).collect()
+    }
+
     /// The joint of this name.
     ///
     /// # Errors
@@ -225,147 +239,5 @@ impl Layout {
             .ok_or_else(|| {
                 Error::unknown("keyframe", name, self.keyframes.iter().map(|k| &*k.name))
             })
-    }
-
-    /// Resolves channel names into what a simulator records; see [`Channel`].
-    ///
-    /// # Errors
-    /// When a name belongs to nothing in the scene.
-    pub fn recording<S: AsRef<str>>(&self, names: &[S]) -> Result<Recording> {
-        let mut channels = Vec::with_capacity(names.len());
-        let mut offsets = vec![0];
-        let mut width = 0;
-        for name in names {
-            let (channel, len) = self.channel(name.as_ref())?;
-            channels.push(channel);
-            width += len;
-            offsets.push(width);
-        }
-        Ok(Recording { channels, offsets })
-    }
-
-    fn channel(&self, name: &str) -> Result<(Channel, usize)> {
-        if let Some(joint) = name.strip_prefix("qpos.") {
-            let j = self.joint(joint)?;
-            let len = j.kind.qpos_len();
-            return Ok((Channel::Position { start: j.qpos, len }, len));
-        }
-        if let Some(joint) = name.strip_prefix("qvel.") {
-            let j = self.joint(joint)?;
-            let len = j.kind.qvel_len();
-            return Ok((Channel::Velocity { start: j.qvel, len }, len));
-        }
-        if let Some(pair) = name.strip_prefix("contact.") {
-            let (a, b) = pair.split_once('/').ok_or_else(|| Error::Config {
-                key: name.to_owned(),
-                message: "a contact channel is written contact.<body>/<body>".into(),
-            })?;
-            let channel = Channel::ContactForce {
-                bodies: [self.body(a)?, self.body(b)?],
-            };
-            return Ok((channel, 1));
-        }
-        let index = self
-            .sensors
-            .iter()
-            .position(|s| s.name == name)
-            .ok_or_else(|| Error::unknown("sensor", name, self.sensors.iter().map(|s| &*s.name)))?;
-        Ok((Channel::Sensor { index }, self.sensors[index].len))
-    }
-}
-
-/// Something a simulator can record.
-///
-/// By name: a sensor's name; `qpos.<joint>` and `qvel.<joint>`; or
-/// `contact.<body>/<body>`, the sum of the normal forces between the geoms of
-/// two bodies (N; their descendants are not counted).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Channel {
-    /// All entries of a sensor.
-    Sensor {
-        /// Index in [`Layout::sensors`].
-        index: usize,
-    },
-    /// Entries of `qpos`.
-    Position {
-        /// First entry.
-        start: usize,
-        /// Entries.
-        len: usize,
-    },
-    /// Entries of `qvel`.
-    Velocity {
-        /// First entry.
-        start: usize,
-        /// Entries.
-        len: usize,
-    },
-    /// Normal force between two bodies, N.
-    ContactForce {
-        /// Indices in [`Layout::bodies`].
-        bodies: [usize; 2],
-    },
-}
-
-/// Channels to record, one after the other in a row.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Recording {
-    channels: Vec<Channel>,
-    offsets: Vec<usize>,
-}
-
-impl Recording {
-    /// A recording of channels given by index.
-    ///
-    /// # Errors
-    /// [`Error::Shape`] where one lies outside the layout.
-    pub fn of(layout: &Layout, channels: &[Channel]) -> Result<Self> {
-        let mut offsets = vec![0];
-        let mut width = 0;
-        for channel in channels {
-            let within = |start: usize, len: usize, all: usize| {
-                start.checked_add(len).is_some_and(|end| end <= all)
-            };
-            let (fits, len) = match *channel {
-                Channel::Sensor { index } => (
-                    index < layout.sensors.len(),
-                    layout.sensors.get(index).map_or(0, |s| s.len),
-                ),
-                Channel::Position { start, len } => (within(start, len, layout.nq), len),
-                Channel::Velocity { start, len } => (within(start, len, layout.nv), len),
-                Channel::ContactForce { bodies } => {
-                    (bodies.iter().all(|&b| b < layout.bodies.len()), 1)
-                }
-            };
-            if !fits {
-                return Err(Error::Shape(format!(
-                    "channel {channel:?} lies outside the scene"
-                )));
-            }
-            width += len;
-            offsets.push(width);
-        }
-        Ok(Self {
-            channels: channels.to_vec(),
-            offsets,
-        })
-    }
-
-    /// The channels in order.
-    #[must_use]
-    pub fn channels(&self) -> &[Channel] {
-        &self.channels
-    }
-
-    /// Entries of one row.
-    #[must_use]
-    pub fn width(&self) -> usize {
-        self.offsets.last().copied().unwrap_or(0)
-    }
-
-    /// Where channel `i` lies in a row.
-    #[must_use]
-    pub fn range(&self, i: usize) -> std::ops::Range<usize> {
-        self.offsets[i]..self.offsets[i + 1]
     }
 }

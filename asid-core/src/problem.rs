@@ -89,8 +89,8 @@ pub fn substeps(layout: &Layout, frame_period: f64) -> Result<usize> {
     let ratio = frame_period / layout.timestep;
     let whole = ratio.round();
     if whole < 1.0 || (ratio - whole).abs() > 1e-6 * whole {
-        return Err(Error::Config {
-            key: "timestep".into(),
+        return Err(Error::Parameter {
+            parameter: "option/timestep".into(),
             message: format!(
                 "a frame of {frame_period} s is not a whole number of physics steps of {} s",
                 layout.timestep
@@ -163,5 +163,19 @@ impl Batch {
         let qvel = self.home.1.repeat(sims.len());
         debug_assert_eq!(qvel.len(), sims.len() * nv);
         self.simulator.set_state(sims, &qpos, &qvel)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Symptom: "config timestep", a key that no configuration has. Cause: the step is the model's.
+    #[test]
+    fn a_frame_that_no_steps_fill_names_the_models_option() {
+        let layout = crate::episode::tests::layout();
+        assert_eq!(substeps(&layout, 0.05).unwrap(), 5);
+        let error = substeps(&layout, 0.015).unwrap_err().to_string();
+        assert!(error.starts_with("parameter `option/timestep`"), "{error}");
     }
 }

@@ -40,6 +40,20 @@ fn check_finite(section: &str, table: &Settings) -> Result<()> {
     Ok(())
 }
 
+/// Checks rules that settings keep: each is a key below `section`, whether its value is good, and what it must be.
+///
+/// # Errors
+/// [`Error::Config`] naming the first key whose value is not good.
+pub fn require(section: &str, rules: &[(&str, bool, &str)]) -> Result<()> {
+    match rules.iter().find(|(_, good, _)| !good) {
+        None => Ok(()),
+        Some((key, _, rule)) => Err(Error::Config {
+            key: format!("{section}.{key}"),
+            message: format!("must be {rule}"),
+        }),
+    }
+}
+
 /// The default settings of an algorithm as a table.
 #[must_use]
 pub fn defaults<S: Default + serde::Serialize>() -> Settings {

@@ -9,12 +9,15 @@
 //! A *frame* is the interval at which commands change and readings are
 //! recorded; it takes one or more physics steps (`substeps`).
 
+mod checks;
+
 use std::any::Any;
 use std::sync::Arc;
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::layout::{Layout, Recording};
 use crate::target::Target;
+pub use checks::{check_copy, check_len, check_sims, check_state};
 
 /// State of one simulation.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -51,6 +54,17 @@ pub struct BatchConfig {
     pub targets: Vec<Target>,
 }
 
+impl BatchConfig {
+    /// How many threads are asked for: as given, or one a core.
+    #[must_use]
+    pub fn thread_count(&self) -> usize {
+        match self.threads {
+            0 => std::thread::available_parallelism().map_or(1, usize::from),
+            n => n,
+        }
+    }
+}
+
 /// States of some simulations, opaque and exact: restored, a simulation goes on
 /// to the bit. Valid in every batch made of the same compiled scene.
 #[derive(Clone)]
@@ -84,6 +98,28 @@ impl Snapshot {
     #[must_use]
     pub fn data<T: Any>(&self) -> Option<&T> {
         self.data.downcast_ref()
+    }
+
+    /// The data from which `rows` are to be restored into as many of `sims`; `is_own` says whether it is of the same
+    /// compiled scene.
+    ///
+    /// # Errors
+    /// [`Error::Shape`] where it is of another scene, or holds no such row.
+    pub fn restored<T: Any>(
+        &self,
+        rows: &[usize],
+        sims: &[usize],
+        is_own: impl FnOnce(&T) -> bool,
+    ) -> Result<&T> {
+        check_len("rows", rows.len(), sims.len())?;
+        if let Some(row) = rows.iter().find(|&&r| r >= self.rows) {
+            let all = self.rows;
+            return Err(Error::Shape(format!(
+                "row {row} of a snapshot with {all} rows"
+            )));
+        }
+        let own = self.data().filter(|data| is_own(data));
+        own.ok_or_else(|| Error::Shape("the snapshot is of another scene".into()))
     }
 }
 
@@ -192,98 +228,6 @@ impl<'a> Rollout<'a> {
             record,
         }
     }
-
-    /// Checks every array's length against the batch, for engines to call first.
-    ///
-    /// # Errors
-    /// [`crate::Error::Shape`], naming the array, or a body that has two forces.
-    pub fn check(
-        &self,
-        layout: &Layout,
-        batch_size: usize,
-        columns: usize,
-        out: &[f64],
-    ) -> Result<()> {
-        let n = self.sims.len();
-        check_sims(self.sims, batch_size)?;
-        let control = n_checked(match self.control {
-            Control::Shared(c) => (c.len(), self.frames * layout.nu()),
-            Control::PerSimulation(c) => (c.len(), n * self.frames * layout.nu()),
-        });
-        expect(control, "control")?;
-        if let Control::Shared(c) | Control::PerSimulation(c) = self.control
-            && c.iter().any(|x| !x.is_finite())
-        {
-            return Err(shape("control holds a value that is not finite".into()));
-        }
-        for (i, force) in self.forces.iter().enumerate() {
-            if self.forces[..i].iter().any(|f| f.body == force.body) {
-                return Err(shape(format!(
-                    "external forces name body {} twice",
-                    force.body
-                )));
-            }
-            if force.body == 0 || force.body >= layout.bodies.len() {
-                return Err(shape(format!(
-                    "external force on body {} of {}",
-                    force.body,
-                    layout.bodies.len()
-                )));
-            }
-            expect(
-                n_checked((force.wrench.len(), n * self.frames * 6)),
-                "external force",
-            )?;
-            if force.wrench.iter().any(|x| !x.is_finite()) {
-                return Err(shape(
-                    "external force holds a value that is not finite".into(),
-                ));
-            }
-        }
-        for change in self.changes {
-            if change.column >= columns || change.frame >= self.frames {
-                return Err(shape(format!(
-                    "parameter change of column {} at frame {}: there are {columns} columns and {} frames",
-                    change.column, change.frame, self.frames
-                )));
-            }
-            expect(n_checked((change.values.len(), n)), "parameter change")?;
-        }
-        expect(
-            n_checked((out.len(), n * self.frames * self.record.width())),
-            "output",
-        )
-    }
-}
-
-fn shape(message: String) -> crate::Error {
-    crate::Error::Shape(message)
-}
-
-fn n_checked((have, want): (usize, usize)) -> Option<(usize, usize)> {
-    (have != want).then_some((have, want))
-}
-
-fn expect(mismatch: Option<(usize, usize)>, what: &str) -> Result<()> {
-    match mismatch {
-        None => Ok(()),
-        Some((have, want)) => Err(shape(format!(
-            "{what} has {have} values where {want} are needed"
-        ))),
-    }
-}
-
-/// Checks that `sims` are strictly increasing and within the batch.
-///
-/// # Errors
-/// [`crate::Error::Shape`] otherwise.
-pub fn check_sims(sims: &[usize], batch_size: usize) -> Result<()> {
-    if sims.windows(2).any(|w| w[0] >= w[1]) || sims.last().is_some_and(|&s| s >= batch_size) {
-        return Err(shape(format!(
-            "simulations must be strictly increasing and below {batch_size}"
-        )));
-    }
-    Ok(())
 }
 
 /// A batch of `n` simulations of one scene, with their own states and parameters.

@@ -40,6 +40,19 @@ pub struct Target {
     pub index: usize,
 }
 
+impl Target {
+    /// A target by its parts.
+    #[must_use]
+    pub fn new(element: &str, name: &str, attribute: &str, index: usize) -> Self {
+        Self {
+            element: element.into(),
+            name: name.into(),
+            attribute: attribute.into(),
+            index,
+        }
+    }
+}
+
 impl FromStr for Target {
     type Err = Error;
 

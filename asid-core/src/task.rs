@@ -4,6 +4,9 @@
 //! same description, whatever the task, and the arrays they pass around are laid
 //! out by it.
 
+mod protocol;
+mod view;
+
 use std::collections::BTreeMap;
 
 use crate::backend::Capabilities;
@@ -14,195 +17,8 @@ use crate::parameter::Parameter;
 use crate::rng::Rng;
 use crate::scene::Scene;
 use crate::settings::Settings;
-use crate::signal::Signal;
-use crate::target::Target;
-
-/// A number with a name, a unit and a range: an entry of an action or of a start pose.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Coordinate {
-    /// Name, such as `x`.
-    pub name: String,
-    /// SI unit.
-    pub unit: String,
-    /// Smallest and largest value.
-    pub range: [f64; 2],
-}
-
-impl Coordinate {
-    /// A coordinate of this name, unit and range.
-    #[must_use]
-    pub fn new(name: &str, unit: &str, range: [f64; 2]) -> Self {
-        Self {
-            name: name.into(),
-            unit: unit.into(),
-            range,
-        }
-    }
-
-    /// Value at a fraction of the range.
-    #[must_use]
-    pub fn at(&self, fraction: f64) -> f64 {
-        self.range[0] + fraction * (self.range[1] - self.range[0])
-    }
-
-    /// Middle of the range.
-    #[must_use]
-    pub fn center(&self) -> f64 {
-        self.at(0.5)
-    }
-
-    /// Standard deviation of a uniform draw from the range.
-    #[must_use]
-    pub fn std(&self) -> f64 {
-        (self.range[1] - self.range[0]) / 12_f64.sqrt()
-    }
-}
-
-/// A named case that a task is tried in, such as `left`: true values, or a goal.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Condition {
-    /// Name in tables.
-    pub name: String,
-    /// Smallest and largest true value by parameter name, equal where the value is fixed;
-    /// they may lie outside the prior. Of a parameter without an entry the whole prior is drawn from.
-    pub truth: Vec<(String, [f64; 2])>,
-}
-
-impl Condition {
-    /// A condition of fixed true values.
-    #[must_use]
-    pub fn fixed(name: &str, truth: &[(&str, f64)]) -> Self {
-        Self {
-            name: name.into(),
-            truth: truth.iter().map(|&(n, v)| (n.to_owned(), [v, v])).collect(),
-        }
-    }
-
-    /// A condition whose true values are drawn from ranges, and from the prior where none is given.
-    #[must_use]
-    pub fn drawn(name: &str, ranges: &[(&str, [f64; 2])]) -> Self {
-        Self {
-            name: name.into(),
-            truth: ranges.iter().map(|&(n, r)| (n.to_owned(), r)).collect(),
-        }
-    }
-}
-
-/// How the unknowns are explored.
-#[derive(Clone, Debug, PartialEq)]
-pub struct ExplorationProtocol {
-    /// Control steps of an episode.
-    pub horizon: usize,
-    /// Frames (rows of commands and readings) of a control step.
-    pub frames_per_step: usize,
-    /// Length of a frame, s; a multiple of the physics time step.
-    pub frame_period: f64,
-    /// Entries of an action.
-    pub action: Vec<Coordinate>,
-    /// Start pose of the object, drawn uniformly.
-    pub start: Vec<Coordinate>,
-    /// What a tracker reads of the object: the likelihood's data.
-    pub signals: Vec<Signal>,
-    /// Sensors of the machine itself, for policies and logs.
-    pub proprioception: Vec<String>,
-    /// Pairs of bodies whose contact counts as interaction.
-    pub contact: Vec<[String; 2]>,
-}
-
-impl ExplorationProtocol {
-    /// Frames of an episode.
-    #[must_use]
-    pub fn frames(&self) -> usize {
-        self.horizon * self.frames_per_step
-    }
-
-    /// Names of all sensors of a reading's row: tracked signals, then proprioception.
-    #[must_use]
-    pub fn channels(&self) -> Vec<String> {
-        let tracked = self.signals.iter().map(|s| s.sensor.clone());
-        tracked.chain(self.proprioception.iter().cloned()).collect()
-    }
-}
-
-/// What is to be achieved, and how it is measured.
-#[derive(Clone, Debug, PartialEq)]
-pub struct DownstreamProtocol {
-    /// Name of the metric, such as `tilt_deg`.
-    pub metric: String,
-    /// Unit of the metric, as shown to people.
-    pub unit: String,
-    /// The rule of success, in words.
-    pub rule: String,
-    /// The metric's limit in the rule, where it has one.
-    pub threshold: Option<f64>,
-    /// Frames of an attempt.
-    pub frames: usize,
-    /// Length of a frame, s.
-    pub frame_period: f64,
-    /// Entries of a task action.
-    pub action: Vec<Coordinate>,
-    /// Start pose of the object, drawn uniformly.
-    pub start: Vec<Coordinate>,
-    /// Channels that the metric is computed from.
-    pub channels: Vec<String>,
-    /// Phases of an attempt: name, start and end in s, for plots.
-    pub phases: Vec<(String, f64, f64)>,
-}
-
-/// What came of an attempt.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Outcome {
-    /// The metric.
-    pub value: f64,
-    /// The task's own success rule.
-    pub success: bool,
-    /// What a solver minimises: the metric, with penalties that lead towards success.
-    pub cost: f64,
-}
-
-/// A shape seen from above or from the side, for pictures; m.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Outline {
-    /// What it is.
-    pub label: String,
-    /// Corners, in order.
-    pub corners: Vec<[f64; 2]>,
-}
-
-/// What a picture of the scene from above shows.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct TopView {
-    /// The object in its own frame.
-    pub object: Outline,
-    /// Things that stand still, in the world frame.
-    pub fixtures: Vec<Outline>,
-    /// Corners of the picture: low then high.
-    pub bounds: [[f64; 2]; 2],
-}
-
-/// A part whose pose is tracked.
-#[derive(Clone, Debug, PartialEq)]
-pub struct TrackedPart {
-    /// Sensor of its position.
-    pub position: String,
-    /// Sensor of its orientation.
-    pub orientation: String,
-}
-
-/// A thing that is tracked, as pictures and figures know it.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct TrackedObject {
-    /// What it is, and its shape in its own frame.
-    pub outline: Outline,
-    /// Sensor of its position, of which the first two entries are its place in the plane, m.
-    pub position: String,
-    /// Sensor of its orientation, where that is tracked.
-    pub orientation: Option<String>,
-    /// Pairs of bodies whose contact counts as the machine touching it.
-    pub contact: Vec<[String; 2]>,
-    /// Its mass in the scene, where one number sets it.
-    pub mass: Option<Target>,
-}
+pub use protocol::{Condition, Coordinate, DownstreamProtocol, ExplorationProtocol, Outcome};
+pub use view::{Outline, TopView, TrackedObject, TrackedPart};
 
 /// Turns exploration actions into commands of the actuators, feed-forward.
 pub trait Commander: Send {
@@ -363,17 +179,9 @@ pub trait Task: Send + Sync {
     fn name(&self) -> &str {
         &self.spec().name
     }
-    /// [`TaskSpec::about`].
-    fn about(&self) -> &str {
-        &self.spec().about
-    }
     /// [`TaskSpec::scene`].
     fn scene(&self) -> &Scene {
         &self.spec().scene
-    }
-    /// [`TaskSpec::requires`].
-    fn requires(&self) -> Capabilities {
-        self.spec().requires
     }
     /// [`TaskSpec::parameters`].
     fn parameters(&self) -> Vec<Parameter> {
@@ -391,10 +199,6 @@ pub trait Task: Send + Sync {
     fn difficulty(&self) -> Vec<Difficulty> {
         self.spec().difficulty.clone()
     }
-    /// [`TaskSpec::tracker_rate`].
-    fn tracker_rate(&self) -> Option<f64> {
-        self.spec().tracker_rate
-    }
     /// [`TaskSpec::exploration`].
     fn exploration(&self) -> &ExplorationProtocol {
         &self.spec().exploration
@@ -402,22 +206,6 @@ pub trait Task: Send + Sync {
     /// [`TaskSpec::downstream`].
     fn downstream(&self) -> &DownstreamProtocol {
         &self.spec().downstream
-    }
-    /// [`TaskSpec::bounds`].
-    fn bounds(&self) -> [[f64; 3]; 2] {
-        self.spec().bounds
-    }
-    /// [`TaskSpec::parts`].
-    fn parts(&self) -> Option<[TrackedPart; 2]> {
-        self.spec().parts.clone()
-    }
-    /// [`TaskSpec::top_view`].
-    fn top_view(&self) -> TopView {
-        self.spec().top_view.clone()
-    }
-    /// [`TaskSpec::regions`].
-    fn regions(&self) -> Vec<Outline> {
-        self.spec().regions.clone()
     }
     /// [`TaskSpec::objects`].
     fn objects(&self) -> Vec<TrackedObject> {

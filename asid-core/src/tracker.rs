@@ -16,7 +16,8 @@ impl ReadingFrames {
     #[must_use]
     pub fn of(task: &dyn Task, frame_period: f64) -> Self {
         let every = task
-            .tracker_rate()
+            .spec()
+            .tracker_rate
             .map_or(1, |rate| (1.0 / (rate * frame_period)).round() as usize);
         Self {
             every: every.max(1),

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use super::quantity::{Dimension, Quantity};
 use super::unit::{Unit, unit};
 use super::words::{Measure, Words};
-use crate::format::Kind;
+use crate::format::LogFormat;
 use crate::raw::RawLog;
 use crate::series::Series;
 
@@ -59,11 +59,11 @@ pub(super) struct Context<'a> {
     log: &'a RawLog,
     quantities: &'a [Quantity],
     named: Vec<Named>,
-    kind: Kind,
+    kind: LogFormat,
 }
 
 impl<'a> Context<'a> {
-    pub(super) fn new(log: &'a RawLog, quantities: &'a [Quantity], kind: Kind) -> Self {
+    pub(super) fn new(log: &'a RawLog, quantities: &'a [Quantity], kind: LogFormat) -> Self {
         let stem = |s: &Series| {
             let name = s.name.trim_end_matches(']');
             name.trim_end_matches(|c: char| c.is_ascii_digit())

@@ -30,7 +30,7 @@ fn series(stream: &str, name: &str, f: impl Fn(f64) -> f64) -> Series {
     }
 }
 
-fn proposed(series: Vec<Series>, kind: Kind) -> Proposal {
+fn proposed(series: Vec<Series>, kind: LogFormat) -> Proposal {
     let scene = Scene::from_xml("arm", ARM, &[]).unwrap();
     let plant = Plant::of(&scene).unwrap();
     let log = RawLog {
@@ -81,7 +81,7 @@ fn topics_of_ros_find_their_sensors_and_commands() {
         ));
     }
     all.push(series("/battery", ".voltage", |_| 12.0));
-    let found = proposed(all, Kind::Mcap);
+    let found = proposed(all, LogFormat::Mcap);
     for (name, column) in [
         ("ctrl.shoulder_pan", "/position_controller/commands.data.0"),
         ("ctrl.gripper", "/position_controller/commands.data.2"),
@@ -118,7 +118,7 @@ fn features_of_lerobot_are_in_degrees_and_the_gripper_in_parts_of_its_range() {
             50.0 + 10.0 * (t + late).sin()
         }));
     }
-    let found = proposed(all, Kind::Lerobot);
+    let found = proposed(all, LogFormat::Lerobot);
     assert_eq!(from(&found, "q_pan"), "observation.state.shoulder_pan.pos");
     assert_eq!(from(&found, "ctrl.elbow"), "action.elbow.pos");
     let mappings = found.mappings();
@@ -146,7 +146,7 @@ fn columns_of_a_script_are_told_by_words_units_and_the_displacement_that_they_ma
         series("", "pan_speed", turned),
         series("", "temperature", |_| 40.0),
     ];
-    let found = proposed(all, Kind::Csv);
+    let found = proposed(all, LogFormat::Csv);
     assert_eq!(from(&found, "ctrl.elbow"), "target_2");
     assert_eq!(from(&found, "q_pan"), "PanAngle");
     assert_eq!(from(&found, "q_elbow"), "elbow [deg]");
@@ -167,7 +167,7 @@ fn a_log_of_the_models_own_names_needs_no_mapping() {
         series("", "ctrl.shoulder_pan", |t| motion(0, t)),
         series("", "q_pan", |t| motion(0, t)),
     ];
-    let found = proposed(all, Kind::Csv);
+    let found = proposed(all, LogFormat::Csv);
     assert!(found.mappings().is_empty());
     assert_eq!(found.missing_commands(), ["elbow", "gripper"]);
     assert_eq!(found.readings(), 1);
@@ -183,7 +183,7 @@ fn what_is_known_is_taken_and_a_name_that_is_not_there_is_refused() {
     };
     let of = |column: &str| {
         let given = [("q_pan".to_owned(), column.to_owned())];
-        propose(&scene, &plant, (&log, Kind::Csv), &given)
+        propose(&scene, &plant, (&log, LogFormat::Csv), &given)
     };
     assert_eq!(from(&of("other").unwrap(), "q_pan"), "other");
     assert!(of("othr").unwrap_err().to_string().contains("`other`"));
@@ -208,7 +208,7 @@ fn a_unit_is_told_by_the_episode_that_moves_where_the_first_stands_still() {
     let unit = |log: &RawLog| {
         let scene = Scene::from_xml("arm", ARM, &[]).unwrap();
         let plant = Plant::of(&scene).unwrap();
-        let found = propose(&scene, &plant, (log, Kind::Csv), &[]).unwrap();
+        let found = propose(&scene, &plant, (log, LogFormat::Csv), &[]).unwrap();
         let own = found.matches.into_iter().find(|m| m.name == "q_elbow");
         own.unwrap().mapping.and_then(|m| m.unit)
     };

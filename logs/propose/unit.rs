@@ -9,7 +9,7 @@
 
 use super::quantity::{Dimension, Quantity};
 use super::words::{Measure, Words};
-use crate::format::Kind;
+use crate::format::LogFormat;
 use crate::series::Series;
 
 /// How far beyond a joint's range readings may lie, as a part of the range: stops give way, zeros are off.
@@ -69,7 +69,7 @@ fn percent(range: [f64; 2], reason: &str) -> Unit {
 
 /// The unit of a series that is to be a quantity.
 #[must_use]
-pub fn unit(quantity: &Quantity, series: &Series, words: &Words, kind: Kind) -> Unit {
+pub fn unit(quantity: &Quantity, series: &Series, words: &Words, kind: LogFormat) -> Unit {
     let per_second = |unit: &'static str| match (unit, quantity.measure) {
         ("deg", Some(Measure::Velocity)) => "deg/s",
         ("rad", Some(Measure::Velocity)) => "rad/s",
@@ -88,7 +88,7 @@ pub fn unit(quantity: &Quantity, series: &Series, words: &Words, kind: Kind) -> 
     let features = ["action.", "observation.state."];
     let named_so =
         series.name.ends_with(".pos") && features.iter().any(|f| series.name.starts_with(f));
-    let lerobot = kind == Kind::Lerobot || (kind.is_table() && named_so);
+    let lerobot = kind == LogFormat::Lerobot || (kind.is_table() && named_so);
     if lerobot && position && quantity.joint.is_some() {
         let gripper = words.own.iter().any(|w| w == "gripper");
         return match (quantity.dimension, quantity.range) {
@@ -105,7 +105,7 @@ pub fn unit(quantity: &Quantity, series: &Series, words: &Words, kind: Kind) -> 
         _ => return Unit::si(true),
     };
     // What is written by the rules of ROS is in SI (REP 103), whatever the values are.
-    if matches!(kind, Kind::Mcap | Kind::Rosbag2) {
+    if matches!(kind, LogFormat::Mcap | LogFormat::Rosbag2) {
         return Unit::si(allows(quantity, series, 1.0));
     }
     let fitting = candidates.iter().find(|name| {
@@ -169,19 +169,25 @@ mod tests {
         let unit = |q: &Quantity, values: &[f64], name: &str, kind| {
             unit(q, &series(values), &Words::of(name), kind)
         };
-        assert_eq!(unit(&joint, &[0.1, 1.2], "a", Kind::Csv).name, None);
-        assert_eq!(unit(&joint, &[5.0, 60.0], "a", Kind::Csv).name, Some("deg"));
+        assert_eq!(unit(&joint, &[0.1, 1.2], "a", LogFormat::Csv).name, None);
         assert_eq!(
-            unit(&joint, &[0.1, 1.2], "a_deg", Kind::Csv).name,
+            unit(&joint, &[5.0, 60.0], "a", LogFormat::Csv).name,
             Some("deg")
         );
-        assert!(!unit(&joint, &[900.0], "a", Kind::Csv).fits);
         assert_eq!(
-            unit(&joint, &[0.1], "a.pos", Kind::Lerobot).name,
+            unit(&joint, &[0.1, 1.2], "a_deg", LogFormat::Csv).name,
             Some("deg")
         );
-        let gripper = unit(&slide, &[0.0, 100.0], "gripper.pos", Kind::Lerobot);
+        assert!(!unit(&joint, &[900.0], "a", LogFormat::Csv).fits);
+        assert_eq!(
+            unit(&joint, &[0.1], "a.pos", LogFormat::Lerobot).name,
+            Some("deg")
+        );
+        let gripper = unit(&slide, &[0.0, 100.0], "gripper.pos", LogFormat::Lerobot);
         assert_eq!((gripper.name, gripper.scale), (Some("%"), 0.04));
-        assert_eq!(unit(&slide, &[0.0, 38.0], "a", Kind::Csv).name, Some("mm"));
+        assert_eq!(
+            unit(&slide, &[0.0, 38.0], "a", LogFormat::Csv).name,
+            Some("mm")
+        );
     }
 }

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use asid_core::log::{of_table, wanted};
 use asid_core::{Episode, Scene};
 use asid_logs::propose::propose;
-use asid_logs::{Kind, LogSettings, Opener};
+use asid_logs::{LogFormat, LogSettings, Opener};
 use asid_mjcf::Plant;
 use rand::{Rng as _, SeedableRng as _};
 
@@ -31,7 +31,7 @@ fn imported(paths: &[PathBuf]) -> Vec<Episode> {
     let one = |path: &PathBuf| {
         let settings = LogSettings::default();
         let log = opener.open(path, &settings).unwrap().remove(0);
-        let kind = Kind::of(&asid_logs::open::split(path).0);
+        let kind = LogFormat::of(&asid_logs::open::split(path).0);
         let proposal = propose(&scene, &plant, (&log, kind), &[]).unwrap();
         assert!(
             proposal.missing_commands().is_empty(),

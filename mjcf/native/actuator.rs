@@ -5,11 +5,12 @@
 //! shifted, `gain u + bias`, is then `g gain` and `b0 + g bias`. A short form that says all of it stays; else it becomes
 //! `<general>`.
 
+use asid_core::Target;
 use asid_core::error::Result;
 use roxmltree::Node;
 
 use super::elements::HISTORY_MARGIN;
-use super::{NativeActuator, Writer, target};
+use super::{NativeActuator, Writer};
 use crate::plant::DriveLaw;
 
 /// Attributes of short forms that `<general>` does not have.
@@ -56,22 +57,26 @@ impl Writer<'_, '_> {
             }
             return Ok(());
         };
-        let gear = self.value(&target("actuator", name, "gear", 0))?;
-        let declared = self.model.nominal(&target("actuator", name, "gear", 0))?;
+        let gear = self.value(&Target::new("actuator", name, "gear", 0))?;
+        let declared = self
+            .model
+            .nominal(&Target::new("actuator", name, "gear", 0))?;
         // Gain of the actuator and the bias' slopes in position and speed.
         let (gain, slopes) = match drive.law {
             DriveLaw::Motor => (drive.gear / declared, None),
             DriveLaw::Position { .. } => {
-                let kp = self.value(&target("actuator", name, "kp", 0))?;
+                let kp = self.value(&Target::new("actuator", name, "kp", 0))?;
                 // An engine has no `kv` of a servo that has none.
                 let kv = match kv {
                     Some(kv) => kv,
-                    None => self.model.nominal(&target("actuator", name, "kv", 0))?,
+                    None => self
+                        .model
+                        .nominal(&Target::new("actuator", name, "kv", 0))?,
                 };
                 (kp, Some([-kp, -kv]))
             }
             DriveLaw::Velocity { .. } => {
-                let kv = self.value(&target("actuator", name, "kv", 0))?;
+                let kv = self.value(&Target::new("actuator", name, "kv", 0))?;
                 (kv, Some([0.0, -kv]))
             }
         };

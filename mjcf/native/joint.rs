@@ -1,10 +1,11 @@
 //! Joints: damping, dry friction, rotor inertia, springs, limits, axes and anchors.
 
+use asid_core::Target;
 use asid_core::error::Result;
 use asid_core::layout::JointKind;
 use roxmltree::Node;
 
-use super::{NativeJoint, Spring, Writer, target};
+use super::{NativeJoint, Spring, Writer};
 
 /// Time constant of the constraint that holds a joint with dry friction, in time steps: the shortest that MuJoCo
 /// takes (`refsafe`). At its default of 20 ms a joint that should stand still glides.
@@ -59,7 +60,7 @@ impl Writer<'_, '_> {
         if own.is_none() && asked.friction == 0.0 {
             return Ok(());
         }
-        let now = self.value(&target("joint", name, "frictionloss", 0))?;
+        let now = self.value(&Target::new("joint", name, "frictionloss", 0))?;
         self.markup
             .set_numbers(node, "frictionloss", &[now + asked.friction]);
         if asked.friction > 0.0 && !node.has_attribute("solreffriction") {
@@ -78,8 +79,8 @@ impl Writer<'_, '_> {
         springs: &[Spring],
         unit: f64,
     ) -> Result<()> {
-        let stiffness = self.value(&target("joint", name, "stiffness", 0))?;
-        let rest = self.value(&target("joint", name, "springref", 0))?;
+        let stiffness = self.value(&Target::new("joint", name, "stiffness", 0))?;
+        let rest = self.value(&Target::new("joint", name, "springref", 0))?;
         let own = Spring {
             stiffness,
             rest,

@@ -1,10 +1,11 @@
 //! Mass properties of bodies: the `<inertial>` that a document has, or what its geoms make.
 
+use asid_core::Target;
 use asid_core::error::Result;
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 use roxmltree::Node;
 
-use super::{Writer, target};
+use super::Writer;
 use crate::mass::{GeomMass, MassProperties};
 
 impl Writer<'_, '_> {
@@ -47,7 +48,7 @@ impl Writer<'_, '_> {
         if let Some(center) = center {
             self.markup.set_numbers(node, "pos", &center);
         }
-        let old_mass = self.model.nominal(&target("body", name, "mass", 0))?;
+        let old_mass = self.model.nominal(&Target::new("body", name, "mass", 0))?;
         let scale = mass.map_or(1.0, |m| m / old_mass);
         if let Some(mass) = mass {
             self.markup.set_numbers(node, "mass", &[mass]);
@@ -56,7 +57,7 @@ impl Writer<'_, '_> {
         let mut factors = [scale; 3];
         let mut now = [0.0; 3];
         for (k, factor) in factors.iter_mut().enumerate() {
-            let moment = target("body", name, "inertia", k);
+            let moment = Target::new("body", name, "inertia", k);
             let old = self.model.nominal(&moment)?;
             if self.native.values.iter().any(|(t, _)| *t == moment) {
                 *factor = self.value(&moment)? / old;
@@ -131,7 +132,8 @@ impl Writer<'_, '_> {
         }
         if let Some(moments) = moments {
             // By their place in the order of size: the largest of the one is the largest of the other.
-            let old = [0, 1, 2].map(|k| self.model.nominal(&target("body", name, "inertia", k)));
+            let old =
+                [0, 1, 2].map(|k| self.model.nominal(&Target::new("body", name, "inertia", k)));
             let mut factors = Vec::with_capacity(3);
             for (old, new) in old.into_iter().zip(&moments) {
                 let old = old?;

@@ -208,16 +208,6 @@ struct Writer<'w, 'd> {
     left_out: Vec<String>,
 }
 
-/// A target by its parts.
-fn target(element: &str, name: &str, attribute: &str, index: usize) -> Target {
-    Target {
-        element: element.into(),
-        name: name.into(),
-        attribute: attribute.into(),
-        index,
-    }
-}
-
 impl Writer<'_, '_> {
     /// The value that is asked for, where one is and it is not what the document says.
     fn changed(&self, target: &Target) -> Result<Option<f64>> {
@@ -245,7 +235,7 @@ impl Writer<'_, '_> {
         len: usize,
     ) -> Result<Option<Vec<f64>>> {
         let targets: Vec<Target> = (0..len)
-            .map(|i| target(element, name, attribute, i))
+            .map(|i| Target::new(element, name, attribute, i))
             .collect();
         let asked = targets
             .iter()

@@ -6,11 +6,12 @@
 //! `dt` damps by `K dt`, and so does a position servo's `kp` at the rotor. What belongs to the sum of the two (damping, dry friction, the joint's own range, what its
 //! sensors read) moves to a fixed tendon over both.
 
+use asid_core::Target;
 use asid_core::error::Result;
 use asid_core::layout::JointKind;
 use roxmltree::Node;
 
-use super::{Series, Writer, target};
+use super::{Series, Writer};
 use crate::markup::{escaped, numbers};
 use crate::plant::DriveLaw;
 
@@ -44,10 +45,10 @@ impl Writer<'_, '_> {
         };
         let label = self.native.plant.layout.actuators[actuator].name.clone();
         let timestep = self.native.plant.layout.timestep;
-        let get = |w: &Self, attribute: &str| w.value(&target("joint", &name, attribute, 0));
+        let get = |w: &Self, attribute: &str| w.value(&Target::new("joint", &name, attribute, 0));
         let (damping, friction) = (get(self, "damping")?, get(self, "frictionloss")?);
         let friction = friction + self.native.joints.get(&i).map_or(0.0, |j| j.friction);
-        let value = |w: &Self, gain: &str| w.value(&target("actuator", &label, gain, 0));
+        let value = |w: &Self, gain: &str| w.value(&Target::new("actuator", &label, gain, 0));
         let (kp, kv) = match drive.law {
             DriveLaw::Position { .. } => (value(self, "kp")?, value(self, "kv")?),
             DriveLaw::Velocity { .. } => (0.0, value(self, "kv")?),
@@ -120,7 +121,7 @@ impl Writer<'_, '_> {
     /// The range of the joint as one of the tendon; the joint loses it.
     fn move_range(&mut self, name: &str, node: Node<'_, '_>) -> Result<String> {
         let limits: Result<Vec<f64>> = (0..2)
-            .map(|k| self.value(&target("joint", name, "range", k)))
+            .map(|k| self.value(&Target::new("joint", name, "range", k)))
             .collect();
         // An engine has no range of a joint that is not limited.
         let Ok(range) = limits else {

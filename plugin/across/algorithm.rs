@@ -1,5 +1,6 @@
 //! Explorers, identifiers, solvers, effects, and what they make.
 
+use std::ops::Deref;
 use std::path::Path;
 
 use asid_core::episode::Episode;
@@ -59,28 +60,11 @@ impl<'a> Handed<'a> {
     }
 }
 
-impl Explorer for Across<Box<dyn Explorer>> {
-    fn explore<'a>(
-        &'a self,
-        problem: &'a Problem<'a>,
-        start: Option<&[f64]>,
-    ) -> Result<Explored<'a>> {
-        let problem = Handed::kept(problem, self.border.back());
-        let explored = self.border.try_run(|| self.inner.explore(problem, start))?;
-        Ok(Explored {
-            policy: Box::new(Across::new(explored.policy, self.border)),
-            ..explored
-        })
-    }
-
-    fn train(&self, problem: &Problem<'_>, file: &Path) -> Result<bool> {
-        let handed = Handed::new(problem, self.border.back());
-        let problem = handed.problem(problem);
-        self.try_run(|explorer| explorer.train(&problem, file))
-    }
-}
-
-impl Explorer for Across<&dyn Explorer> {
+impl<T> Explorer for Across<T>
+where
+    T: Deref + Send + Sync,
+    T::Target: Explorer,
+{
     fn explore<'a>(
         &'a self,
         problem: &'a Problem<'a>,

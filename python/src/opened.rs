@@ -96,7 +96,7 @@ impl Opened {
 fn backend(name: Option<&str>, task: &dyn Task) -> Result<Box<dyn Backend>> {
     let name = name.unwrap_or(DEFAULT);
     let backend = (find::<BackendEntry>(name)?.make)()?;
-    let lacking = task.requires() - backend.capabilities();
+    let lacking = task.spec().requires - backend.capabilities();
     if lacking.is_empty() {
         return Ok(backend);
     }

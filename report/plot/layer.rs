@@ -119,18 +119,6 @@ impl Layer {
         Self::new(Mark::Bars(bars)).opacity(0.8)
     }
 
-    /// A histogram: counts `y[i]` between `edges[i]` and `edges[i + 1]`.
-    #[must_use]
-    pub fn histogram(edges: &[f64], y: &[f64]) -> Self {
-        Self::bars(
-            edges
-                .windows(2)
-                .zip(y)
-                .map(|(e, &y)| [e[0], e[1], y])
-                .collect(),
-        )
-    }
-
     /// A vertical line at `x`; its label stands above the plot.
     #[must_use]
     pub fn vertical(x: f64) -> Self {

@@ -47,10 +47,10 @@ impl Outline {
 
     /// A circle.
     #[must_use]
-    pub fn circle(centre: [f64; 2], radius: f64) -> Self {
+    pub fn circle(center: [f64; 2], radius: f64) -> Self {
         Self {
             circle: Some(radius.abs()),
-            ..Self::new(vec![centre])
+            ..Self::new(vec![center])
         }
     }
 

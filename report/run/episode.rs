@@ -110,7 +110,7 @@ fn plan(episode: &Episode, title: &str) -> Plan {
 /// The shape in the colours of its kind.
 pub(super) fn outline_of(shape: &Shape) -> Outline {
     let outline = match (shape.radius, shape.points.first()) {
-        (Some(radius), Some(&centre)) => Outline::circle(centre, radius),
+        (Some(radius), Some(&center)) => Outline::circle(center, radius),
         _ => Outline::polygon(shape.points.clone()),
     };
     let outline = match shape.kind {

@@ -168,16 +168,16 @@ fn domain(
     weighted: Option<&Weighted>,
     range: Option<[f64; 2]>,
 ) -> Option<[f64; 2]> {
-    let (centre, std) = match weighted {
+    let (center, std) = match weighted {
         Some(weighted) => (weighted.mean(), weighted.std()),
         None => (axis.from(p.estimate), axis.std(p)),
     };
-    if !centre.is_finite() || !std.is_finite() {
+    if !center.is_finite() || !std.is_finite() {
         return None;
     }
-    let least = range.map_or(1e-3 * centre.abs().max(1e-6), |r| 1e-3 * (r[1] - r[0]));
+    let least = range.map_or(1e-3 * center.abs().max(1e-6), |r| 1e-3 * (r[1] - r[0]));
     let reach = (4.5 * std).max(least);
-    let mut close = [centre - reach, centre + reach];
+    let mut close = [center - reach, center + reach];
     let marks = p
         .truth
         .into_iter()

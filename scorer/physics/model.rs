@@ -127,12 +127,7 @@ impl Engine {
                 if matches!(p.start, Start::Choice(_) | Start::Given | Start::Set(..)) {
                     continue;
                 }
-                let target = Target {
-                    element: "effect".into(),
-                    name: spec.label(),
-                    attribute: p.name.into(),
-                    index: 0,
-                };
+                let target = Target::new("effect", &spec.label(), p.name, 0);
                 let parameter = Parameter {
                     name: format!("{}.{}", spec.label(), p.name),
                     targets: vec![target],

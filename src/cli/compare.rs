@@ -18,6 +18,7 @@ pub mod arm;
 mod cell;
 mod folder;
 mod merge;
+mod methods;
 pub mod page;
 mod progress;
 mod request;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
 use anyhow::Result;
-use asid_conformance::{Event, Outcome, Row, run_checks, table};
+use asid_conformance::{Event, run_checks, table};
 use asid_core::registry::{self, BackendEntry, Origin};
 use asid_core::{Backend, Error, Progress as _};
 use serde::Serialize;
@@ -14,10 +14,12 @@ use super::output::{OutFolder, write_json, write_text};
 use super::progress::Bars;
 use super::settings;
 use super::{failure, plugins, session};
+use result::{ConformanceResult, Count, Engine, Versions, sentence, verdict};
 
 mod cell;
 mod choice;
 mod page;
+mod result;
 
 /// Arguments of `conformance`.
 #[derive(clap::Args)]
@@ -55,58 +57,6 @@ pub struct Arguments {
 struct Asked {
     entry: &'static BackendEntry,
     backend: Box<dyn Backend>,
-}
-
-/// What is said of an engine beside its rows.
-#[derive(Serialize)]
-struct Engine {
-    name: String,
-    version: String,
-    origin: String,
-    claims: Vec<&'static str>,
-    lacks: Vec<&'static str>,
-    #[serde(flatten)]
-    count: Count,
-}
-
-/// Rows of an engine by outcome.
-#[derive(Clone, Copy, Default, Serialize)]
-#[serde(rename_all = "kebab-case")]
-struct Count {
-    pass: usize,
-    fail: usize,
-    known_deviation: usize,
-    not_claimed: usize,
-}
-
-impl Count {
-    fn of<'a>(rows: impl Iterator<Item = &'a Row>) -> Self {
-        let mut count = Self::default();
-        for row in rows {
-            *match row.outcome {
-                Outcome::Pass => &mut count.pass,
-                Outcome::Fail => &mut count.fail,
-                Outcome::KnownDeviation => &mut count.known_deviation,
-                Outcome::NotClaimed => &mut count.not_claimed,
-            } += 1;
-        }
-        count
-    }
-}
-
-/// `result.json`.
-#[derive(Serialize)]
-struct ConformanceResult {
-    schema: u32,
-    rows: Vec<Row>,
-    engines: Vec<Engine>,
-    versions: Versions,
-}
-
-#[derive(Serialize)]
-struct Versions {
-    asid: &'static str,
-    git: &'static str,
 }
 
 /// `config.toml`.
@@ -155,8 +105,8 @@ pub fn conformance(arguments: &Arguments) -> Result<()> {
             name: asked.entry.name.to_owned(),
             version: asked.backend.version(),
             origin: asked.entry.origin.to_string(),
-            claims: bits(asked.backend.capabilities()),
-            lacks: bits(!asked.backend.capabilities()),
+            claims: names(asked.backend.capabilities()),
+            lacks: names(!asked.backend.capabilities()),
             count: Count::of(own.iter()),
         });
         rows.extend(own);
@@ -179,6 +129,11 @@ pub fn conformance(arguments: &Arguments) -> Result<()> {
     verdict(&result)
 }
 
+/// Names of capabilities, in the order of their bits.
+fn names(capabilities: asid_core::Capabilities) -> Vec<&'static str> {
+    capabilities.iter_names().map(|(name, _)| name).collect()
+}
+
 /// Shows how far an engine is, with the check that has been running for longest.
 fn told<'a>(bars: &'a Bars, engine: &'a str) -> impl Fn(Event<'_>) + Sync + 'a {
     let running = Mutex::new(Vec::<String>::new());
@@ -198,11 +153,6 @@ fn told<'a>(bars: &'a Bars, engine: &'a str) -> impl Fn(Event<'_>) + Sync + 'a {
             None => engine.to_owned(),
         });
     }
-}
-
-/// Names of capabilities, in the order of their bits.
-fn bits(capabilities: asid_core::Capabilities) -> Vec<&'static str> {
-    capabilities.iter_names().map(|(name, _)| name).collect()
 }
 
 /// Engines and parts of checks' names, from the options, else from the configuration.
@@ -310,46 +260,4 @@ fn print(arguments: &Arguments, result: &ConformanceResult, out: Option<&Path>) 
         writeln!(stdout, "report: {}", out.join("report.html").display())?;
     }
     Ok(())
-}
-
-/// An engine's rows in numbers.
-fn sentence(engine: &Engine) -> String {
-    let count = engine.count;
-    format!(
-        "{}: {} pass, {} fail, {} known deviations, {} not claimed",
-        engine.name, count.pass, count.fail, count.known_deviation, count.not_claimed
-    )
-}
-
-/// An error where a row fails.
-fn verdict(result: &ConformanceResult) -> Result<()> {
-    let failing: Vec<&Row> = result.rows.iter().filter(|row| row.is_failure()).collect();
-    let failed: Vec<String> = failing
-        .iter()
-        .map(|row| format!("{} on {}", row.check, row.engine))
-        .collect();
-    if failed.is_empty() {
-        return Ok(());
-    }
-    let shown = failed
-        .iter()
-        .take(5)
-        .cloned()
-        .collect::<Vec<_>>()
-        .join(", ");
-    let more = match failed.len().saturating_sub(5) {
-        0 => String::new(),
-        more => format!(" and {more} more"),
-    };
-    if let [row] = &failing[..]
-        && !row.note.is_empty()
-    {
-        return Err(Error::Failed(format!("1 check fails: {shown}: {}", row.note)).into());
-    }
-    let word = if failed.len() == 1 {
-        "check fails"
-    } else {
-        "checks fail"
-    };
-    Err(Error::Failed(format!("{} {word}: {shown}{more}", failed.len())).into())
 }

@@ -3,8 +3,8 @@
 mod config;
 mod live;
 mod real_world;
+mod terminal;
 
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -14,10 +14,8 @@ use asid_diagnosis::diagnose::{Diagnosis, diagnose as diagnose_study};
 use asid_diagnosis::machine::Machine;
 use asid_diagnosis::study::Study;
 use asid_effects::refined_model::RefinedModel;
-use asid_report::diagnosis::{page, real_world_lines};
-use asid_report::number::{Precision, round};
-use asid_results::diagnosis::{DiagnosisResult, NotTried, RealWorld};
-use asid_results::naming::grouped;
+use asid_report::diagnosis::page;
+use asid_results::diagnosis::{NotTried, RealWorld};
 use asid_results::trace::{DiagnosisTrace, NamedText};
 
 use super::failure;
@@ -226,19 +224,8 @@ pub fn diagnose(arguments: &Arguments) -> Result<()> {
         copy_logs(&study, folder)?;
         Ok(())
     })?;
-    let mut stdout = std::io::stdout().lock();
-    if common.json {
-        writeln!(stdout, "{}", serde_json::to_string_pretty(result)?)?;
-    } else {
-        for line in lines(result, &engine, progress.seconds()) {
-            writeln!(stdout, "{line}")?;
-        }
-        for line in result.real_world.iter().flat_map(real_world_lines) {
-            writeln!(stdout, "{line}")?;
-        }
-        writeln!(stdout, "results: {}", out.path().display())?;
-    }
-    drop(stdout);
+    let lines = terminal::lines(result, &engine, progress.seconds());
+    out.tell(common.json, result, &lines)?;
     for check in result.checks.iter().filter(|c| !c.ok) {
         failure::warn(&format!("check {}: {}", check.check, check.detail));
     }
@@ -295,86 +282,4 @@ fn copy_logs(study: &Study, folder: &Path) -> Result<()> {
         }
     }
     Ok(())
-}
-
-/// The answer on the terminal.
-fn lines(result: &DiagnosisResult, engine: &str, seconds: f64) -> Vec<String> {
-    let mut all = Vec::new();
-    let mut line = |text: &str| all.push(text.to_owned());
-    line(&result.sentence);
-    let mut mends: Vec<&str> = result.wiring.iter().map(|w| &*w.mend).collect();
-    mends.dedup();
-    for text in mends.iter().flat_map(|m| m.lines()) {
-        line(&format!("  {text}"));
-    }
-    let gap = &result.gap;
-    line(&format!(
-        "gap on logs held out, in units of the noise: {:.2} as given, {:.2} identified, {:.2} refined",
-        gap.nominal, gap.identified, gap.refined
-    ));
-    for h in result
-        .hypotheses
-        .iter()
-        .take(4)
-        .filter(|h| h.probability > 0.001)
-    {
-        line(&format!(
-            "  {:5.1} %  {}",
-            100.0 * h.probability,
-            grouped(&h.effects).join(" + ")
-        ));
-    }
-    for e in result
-        .effects
-        .iter()
-        .filter(|e| result.verdict.effects.contains(&e.label()))
-    {
-        let values = e.parameters.iter().filter(|(_, v)| **v != 0.0);
-        let text: Vec<String> = values
-            .map(|(n, v)| match e.intervals95.get(n) {
-                Some(ends) => {
-                    let precision = Precision::of(*v, (ends[1] - ends[0]) / 4.0);
-                    format!(
-                        "{n} = {} ({})",
-                        precision.show(*v),
-                        precision.interval(*ends)
-                    )
-                }
-                None => format!("{n} = {}", round(*v, 4)),
-            })
-            .collect();
-        line(&format!("  {} {}: {}", e.effect, e.site, text.join(", ")));
-    }
-    for p in &result.parameters {
-        let estimate = Precision::of(p.estimate, p.std).with_uncertainty(p.estimate, p.std);
-        line(&format!("  {} = {estimate}", p.name));
-    }
-    if let Some(c) = &result.calibration {
-        line(&format!("calibration on simulated logs, {} runs:", c.runs));
-        for r in c.rows.iter().filter(|r| r.runs > 0) {
-            let lacks = if r.effects.is_empty() {
-                "nothing".to_owned()
-            } else {
-                grouped(&r.effects).join(" + ")
-            };
-            line(&format!(
-                "  lacking {lacks}: {} of {} right",
-                r.right, r.runs
-            ));
-        }
-        if let Some(p) = c.probability {
-            line(&format!(
-                "  by these runs the answer is right with probability {:.0} %",
-                100.0 * p
-            ));
-        }
-    }
-    for left in &result.not_tried {
-        line(&format!("not tried: {}", left.stage));
-    }
-    if !result.next_experiment.how.is_empty() {
-        line(&format!("next: {}", result.next_experiment.how));
-    }
-    line(&format!("{engine}, {seconds:.1} s"));
-    all
 }

@@ -52,7 +52,7 @@ mod with_mcap {
     use asid_diagnosis::study::Study;
     use asid_effects::RefinedModel;
     use asid_logs::mcap_out::{JointColumns, write};
-    use asid_logs::{Kind, LogSettings, Opener, RawLog, Series};
+    use asid_logs::{LogFormat, LogSettings, Opener, RawLog, Series};
     use asid_mjcf::Plant;
     use asid_mjcf::plant::Reads;
 
@@ -117,7 +117,7 @@ mod with_mcap {
         files.retain(|p| p.is_file() && p.extension().is_some_and(|e| e == "csv"));
         files.sort();
         let settings = LogSettings {
-            kind: Some(Kind::Csv),
+            kind: Some(LogFormat::Csv),
             ..LogSettings::default()
         };
         let mut logs = Vec::new();

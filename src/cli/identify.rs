@@ -20,7 +20,7 @@ use super::result::{
     parameter_line,
 };
 use super::session::Session;
-use super::settings::Stage;
+use super::settings::{Stage, wrong};
 use super::{failure, machine, stage, trace, train};
 
 /// A residual above this many standard deviations of the noise is more than chance and
@@ -156,12 +156,7 @@ pub fn identify(arguments: &Arguments) -> Result<()> {
         backend: config.backend.clone(),
         identifier: config.identifier.name.clone(),
         seed: config.seed,
-        parameters: found
-            .posterior
-            .marginals
-            .iter()
-            .map(|m| ParameterResult::new(m, None))
-            .collect(),
+        parameters: ParameterResult::all(&found.posterior, None),
         unseen: found.posterior.unseen.clone(),
         articulation: articulation(&session, &episodes)?,
         residual: found.residual,
@@ -211,14 +206,6 @@ pub fn identify(arguments: &Arguments) -> Result<()> {
         failure::warn(&unexplained(found.residual));
     }
     Ok(())
-}
-
-fn wrong(key: &str, message: &str) -> anyhow::Error {
-    Error::Config {
-        key: key.into(),
-        message: message.into(),
-    }
-    .into()
 }
 
 /// Names of the logs' copies in the folder, of the same format as the logs.

@@ -12,7 +12,7 @@ use anyhow::Result;
 use asid_core::log::{ColumnMapping, of_table, wanted};
 use asid_core::{Episode, Error, Layout};
 use asid_logs::propose::{Proposal, propose};
-use asid_logs::{Kind, LogSettings, Opener, RawLog};
+use asid_logs::{LogFormat, LogSettings, Opener, RawLog};
 
 use super::failure;
 use super::machine::{Subject, sensors};
@@ -94,7 +94,7 @@ pub fn import(arguments: &Arguments) -> Result<()> {
     let bare = subject.plant.layout.sensors.is_empty();
     let subject = sensors::with_sensors(subject, &mut notes)?;
     let (raw, settings) = open(arguments)?;
-    let kind = settings.kind.unwrap_or(Kind::Csv);
+    let kind = settings.kind.unwrap_or(LogFormat::Csv);
     let given = given(&arguments.map)?;
     let Some((_, first, _)) = raw.first() else {
         return Err(Error::Failed("no log holds an episode".into()).into());
@@ -162,7 +162,7 @@ fn open(arguments: &Arguments) -> Result<(Vec<Opened>, LogSettings)> {
     let fitted = arguments.logs.iter().map(|p| (p, false));
     for (path, test) in fitted.chain(arguments.test.iter().map(|p| (p, true))) {
         let (file, episode) = asid_logs::open::split(path);
-        let kind = Kind::of(&file);
+        let kind = LogFormat::of(&file);
         if *settings.kind.get_or_insert(kind) != kind {
             return Err(Error::Log {
                 path: path.clone(),
@@ -173,7 +173,7 @@ fn open(arguments: &Arguments) -> Result<(Vec<Opened>, LogSettings)> {
         for log in opener.open(path, &settings)? {
             // Episodes of a dataset are named by their number.
             let own = match (kind, episode) {
-                (Kind::Lerobot, None) => match log.name.rsplit_once('#') {
+                (LogFormat::Lerobot, None) => match log.name.rsplit_once('#') {
                     Some((_, number)) => PathBuf::from(format!("{}#{number}", file.display())),
                     None => path.clone(),
                 },

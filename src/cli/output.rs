@@ -8,11 +8,12 @@
 //! What a call that was killed leaves is taken away by the next one with the same `--out`.
 
 use std::cell::RefCell;
-use std::io::ErrorKind;
+use std::io::{ErrorKind, Write as _};
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use asid_core::Error;
+use serde::Serialize;
 
 use staging::Staging;
 
@@ -110,6 +111,19 @@ impl OutFolder {
         })
     }
 
+    /// Says on standard output what was written: the result as JSON and nothing else, or lines of text and where it is.
+    pub fn tell(&self, json: bool, result: &impl Serialize, lines: &[String]) -> Result<()> {
+        let mut stdout = std::io::stdout().lock();
+        if json {
+            writeln!(stdout, "{}", serde_json::to_string_pretty(result)?)?;
+            return Ok(());
+        }
+        for line in lines {
+            writeln!(stdout, "{line}")?;
+        }
+        Ok(writeln!(stdout, "results: {}", self.path().display())?)
+    }
+
     /// Writes the result: `fill` gets a fresh folder; it takes its name when all went well.
     pub fn write(&self, fill: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
         let path = self.path();
@@ -175,7 +189,7 @@ pub fn write_text(path: &Path, text: &str) -> Result<()> {
 }
 
 /// Writes a value as indented JSON.
-pub fn write_json(path: &Path, value: &impl serde::Serialize) -> Result<()> {
+pub fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
     write_text(path, &(serde_json::to_string_pretty(value)? + "\n"))
 }
 

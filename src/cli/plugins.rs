@@ -9,6 +9,8 @@ use asid_core::registry::{Entry, Origin, find};
 use asid_plugin::search;
 use sha2::{Digest as _, Sha256};
 
+use super::settings::{read_table, texts};
+
 /// A plugin that was found in a folder and cannot be used.
 #[derive(Clone, Debug)]
 pub struct Refused {
@@ -76,7 +78,7 @@ pub fn of_config(path: Option<&Path>, named: &[PathBuf], trusted: bool) -> Resul
     let Some(config) = path else {
         return Ok(Vec::new());
     };
-    let recorded: Vec<Recorded> = super::settings::plugins(config)?
+    let recorded: Vec<Recorded> = texts(&read_table(config)?, "plugins")?
         .iter()
         .map(|text| Recorded::of(text))
         .collect();

@@ -42,7 +42,15 @@ pub struct ParameterResult {
 }
 
 impl ParameterResult {
-    pub fn new(marginal: &Marginal, truth: Option<f64>) -> Self {
+    /// One for each unknown of a posterior, with its true value where that is known.
+    pub fn all(posterior: &Posterior, truth: Option<&[f64]>) -> Vec<Self> {
+        let marginals = posterior.marginals.iter().enumerate();
+        marginals
+            .map(|(i, m)| Self::new(m, truth.map(|t| t[i])))
+            .collect()
+    }
+
+    fn new(marginal: &Marginal, truth: Option<f64>) -> Self {
         Self {
             name: marginal.name.clone(),
             unit: marginal.unit.clone(),
@@ -163,13 +171,7 @@ impl RunResult {
             solver: config.solver.name.clone(),
             seed: config.seed,
             real: RealResult::of(session),
-            parameters: outcome
-                .belief
-                .marginals
-                .iter()
-                .zip(truth)
-                .map(|(m, &t)| ParameterResult::new(m, Some(t)))
-                .collect(),
+            parameters: ParameterResult::all(&outcome.belief, Some(truth)),
             unseen: outcome.belief.unseen.clone(),
             exploration: ExplorationResult::new(
                 &outcome.objective,

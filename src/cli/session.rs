@@ -64,7 +64,7 @@ impl Session {
             task = other;
         }
         let backend = backend(&config.backend)?;
-        require(&*backend, task.requires())?;
+        require(&*backend, task.spec().requires)?;
         let scene = backend.load(task.scene())?;
         for target in parameters.iter().flat_map(|p| &p.targets) {
             scene.nominal(target)?;

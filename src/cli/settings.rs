@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
-use asid_core::task::{Condition, Coordinate};
+use asid_core::task::Condition;
 use asid_core::{Error, Parameter, Task, registry};
 use asid_effects::EffectSpec;
 use asid_effects::refined_model::RefinedModel;
@@ -17,8 +17,10 @@ use super::plugins::{file_of, recorded, used};
 use component::{Component, component};
 use expected::ExpectedConfig;
 pub use real::RealConfig;
-use table::{check_keys, numbers, section, text, wrong};
-pub use table::{read_table, set};
+pub use stage::Stage;
+use stage::start;
+use table::section;
+pub use table::{configured, given, parsed, read, read_table, seed, set, text, texts, wrong};
 pub use unknowns::ParameterConfig;
 use unknowns::{noise, unknowns};
 
@@ -26,47 +28,9 @@ mod component;
 pub mod difficulty;
 mod expected;
 mod real;
+mod stage;
 mod table;
 mod unknowns;
-
-/// What settings are resolved for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Stage {
-    /// The whole pipeline, or many of them.
-    Run,
-    /// Exploration alone.
-    Explore,
-    /// Identification alone.
-    Identify,
-    /// Solving alone.
-    Solve,
-}
-
-impl Stage {
-    /// Name on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Run => "run",
-            Self::Explore => "explore",
-            Self::Identify => "identify",
-            Self::Solve => "solve",
-        }
-    }
-
-    /// Coordinates of the start pose that the stage is told.
-    pub fn start(self, task: &dyn Task) -> &[Coordinate] {
-        match self {
-            Self::Run | Self::Identify => &[],
-            Self::Explore => &task.exploration().start,
-            Self::Solve => &task.downstream().start,
-        }
-    }
-
-    fn is_run(&self) -> bool {
-        *self == Self::Run
-    }
-}
 
 /// Everything that decides the result of a command.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
@@ -168,10 +132,7 @@ impl Config {
         worlds: &Worlds,
     ) -> Result<(Self, Vec<Parameter>)> {
         let Worlds { simulator, real } = worlds;
-        let mut table = match &common.config {
-            Some(path) => read_table(path)?,
-            None => common.base.clone(),
-        };
+        let mut table = configured(common)?;
         difficulty::forget_noise(task, &mut table)?;
         // A start pose in the settings of one stage means nothing to another.
         if text(&table, "command")?.is_some_and(|c| c != stage.name()) {
@@ -216,16 +177,7 @@ impl Config {
             task: task.name().to_owned(),
             model: model_file(&simulator.model, &table)?,
             condition,
-            seed: match (common.seed, table.get("seed")) {
-                (Some(seed), _) => seed,
-                (None, None) => 0,
-                (None, Some(value)) => value
-                    .as_integer()
-                    .and_then(|s| u64::try_from(s).ok())
-                    .ok_or_else(|| {
-                        wrong("seed", format!("{value} is not a whole number from 0 up"))
-                    })?,
-            },
+            seed: common.seed.or(seed(&table)?).unwrap_or(0),
             plugins: Vec::new(),
             start,
             assumed,
@@ -326,35 +278,6 @@ pub fn check_condition(all: &[Condition], name: &str) -> Result<()> {
     Err(Error::unknown("condition", name, known()).into())
 }
 
-/// Plugins that a configuration file names.
-pub fn plugins(path: &Path) -> Result<Vec<String>> {
-    match read_table(path)?.get("plugins") {
-        None => Ok(Vec::new()),
-        Some(value) => value
-            .as_array()
-            .and_then(|a| a.iter().map(|v| v.as_str().map(str::to_owned)).collect())
-            .ok_or_else(|| wrong("plugins", format!("{value} is not a list of files"))),
-    }
-}
-
-/// The settings of a file that may have these keys and no others.
-pub fn read(path: &Path, known: &[&'static str]) -> Result<toml::Table> {
-    let table = read_table(path)?;
-    check_keys(&path.display().to_string(), &table, known)?;
-    Ok(table)
-}
-
-/// A list of texts; none where the key is not there.
-pub fn texts(table: &toml::Table, key: &str) -> Result<Vec<String>> {
-    match table.get(key) {
-        None => Ok(Vec::new()),
-        Some(value) => value
-            .as_array()
-            .and_then(|a| a.iter().map(|v| v.as_str().map(str::to_owned)).collect())
-            .ok_or_else(|| wrong(key, format!("{value} is not a list of texts"))),
-    }
-}
-
 /// The file of a model: as given, else as a section says.
 fn model_file(given: &Option<PathBuf>, table: &toml::Table) -> Result<Option<PathBuf>> {
     let set = text(table, "model")?.map(PathBuf::from);
@@ -369,54 +292,4 @@ pub fn default_backend() -> String {
     rapier
         .or(all.first())
         .map_or_else(String::new, |e| e.name.to_owned())
-}
-
-/// The start pose of a stage that is told it, and the names of the coordinates that
-/// were not given and took the middle of their range.
-fn start(
-    stage: Stage,
-    task: &dyn Task,
-    table: &toml::Table,
-) -> Result<(BTreeMap<String, f64>, Vec<String>)> {
-    let given = numbers("start", table)?;
-    let coordinates = stage.start(task);
-    for (name, &value) in &given {
-        if coordinates.is_empty() {
-            return Err(wrong(
-                &format!("start.{name}"),
-                format!(
-                    "`{}` takes no start pose; `explore` and `solve` do",
-                    stage.name()
-                ),
-            ));
-        }
-        let Some(c) = coordinates.iter().find(|c| &c.name == name) else {
-            let known = coordinates.iter().map(|c| &*c.name);
-            return Err(Error::unknown("start coordinate", name, known).into());
-        };
-        // A tracker may show an object a little outside; further off it is another unit or frame.
-        let [low, high] = c.range;
-        let slack = high - low;
-        if !(low - slack..=high + slack).contains(&value) {
-            return Err(wrong(
-                &format!("start.{name}"),
-                format!(
-                    "{value} {} is far outside the task's range, {low} to {high}",
-                    c.unit
-                ),
-            ));
-        }
-    }
-    let missing = coordinates.iter().filter(|c| !given.contains_key(&c.name));
-    let assumed = missing.map(|c| c.name.clone()).collect();
-    let all = coordinates
-        .iter()
-        .map(|c| {
-            (
-                c.name.clone(),
-                given.get(&c.name).copied().unwrap_or(c.center()),
-            )
-        })
-        .collect();
-    Ok((all, assumed))
 }

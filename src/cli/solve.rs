@@ -164,11 +164,7 @@ pub fn solve(arguments: &Arguments) -> Result<()> {
         solver: config.solver.name.clone(),
         seed: config.seed,
         posterior: arguments.posterior.display().to_string(),
-        parameters: belief
-            .marginals
-            .iter()
-            .map(|m| ParameterResult::new(m, None))
-            .collect(),
+        parameters: ParameterResult::all(&belief, None),
         start: config.start.clone(),
         action: stage::named(&protocol.action, &action),
         expected,
@@ -177,7 +173,7 @@ pub fn solve(arguments: &Arguments) -> Result<()> {
     };
     stage::finish(&session, common, &out, &result, &report, &lines, |folder| {
         write_json(&folder.join("action.json"), &record)?;
-        stage::commands(&session, ctrl, protocol.frame_period)
+        Episode::of_commands(session.model.layout(), ctrl, protocol.frame_period)
             .write_csv(&folder.join("commands.csv"))?;
         Ok(())
     })

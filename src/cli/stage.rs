@@ -5,11 +5,9 @@
 //! gives the commands of the task.
 
 use std::collections::BTreeMap;
-use std::io::Write as _;
 use std::path::Path;
 
 use anyhow::Result;
-use asid_core::Episode;
 use asid_core::task::Coordinate;
 use asid_report::run::RunReport;
 use serde::Serialize;
@@ -86,28 +84,6 @@ pub fn check_start(session: &Session) {
     }
 }
 
-/// Commands alone as a log: rows every `period` seconds from 0, the last one held.
-pub fn commands(session: &Session, mut ctrl: Vec<f64>, period: f64) -> Episode {
-    let actuators: Vec<String> = session
-        .model
-        .layout()
-        .actuators
-        .iter()
-        .map(|a| a.name.clone())
-        .collect();
-    let nu = actuators.len();
-    let last = ctrl[ctrl.len() - nu..].to_vec();
-    ctrl.extend(last);
-    Episode {
-        time: (0..ctrl.len() / nu)
-            .map(|k| (k as f64 * period * 1e9).round() / 1e9)
-            .collect(),
-        actuators,
-        ctrl,
-        ..Episode::default()
-    }
-}
-
 /// The report of a stage, still without what it did.
 pub fn report(session: &Session, wall_s: f64, files: &[(&str, &str)]) -> RunReport {
     let config = &session.config;
@@ -158,14 +134,5 @@ pub fn finish(
         report.write(folder)?;
         Ok(())
     })?;
-    let mut stdout = std::io::stdout().lock();
-    if common.json {
-        writeln!(stdout, "{}", serde_json::to_string_pretty(result)?)?;
-        return Ok(());
-    }
-    for line in lines {
-        writeln!(stdout, "{line}")?;
-    }
-    writeln!(stdout, "results: {}", out.path().display())?;
-    Ok(())
+    out.tell(common.json, result, lines)
 }

@@ -8,7 +8,7 @@ use asid_effects::EffectSpec;
 use asid_effects::refined_model::RefinedModel;
 use asid_mjcf::Plant;
 use asid_worlds::TrackerErrors;
-use asid_worlds::{Kind, Perturbation};
+use asid_worlds::{Perturbation, WorldKind};
 use serde::Serialize;
 
 use super::model::{self, Needs};
@@ -37,7 +37,7 @@ pub struct PerturbedResult {
 #[schemars(rename = "World")]
 pub struct RealResult {
     #[schemars(with = "String")]
-    world: Kind,
+    world: WorldKind,
     backend: String,
     #[serde(skip_serializing_if = "Option::is_none")]
     perturbation: Option<PerturbedResult>,
@@ -70,19 +70,19 @@ impl World {
             tracker: TrackerErrors::default(),
             perturbed: None,
         };
-        if real.world == Kind::Matched {
+        if real.world == WorldKind::Matched {
             return Ok(plain(Arc::clone(simulator)));
         }
         let engine = backend(&real.backend)?;
-        require(&*engine, session.task.requires())?;
+        require(&*engine, session.task.spec().requires)?;
         let needs = Needs {
             task: &*session.task,
             layout: simulator.layout(),
             parameters: &session.parameters,
         };
         let source = match (&real.model, real.world) {
-            (_, Kind::StandIn) => stand_in(session)?,
-            (Some(path), Kind::Perturbed) => RefinedModel::open(path)?,
+            (_, WorldKind::StandIn) => stand_in(session)?,
+            (Some(path), WorldKind::Perturbed) => RefinedModel::open(path)?,
             (Some(path), _) => {
                 return Ok(plain(needs.open(&*engine, path, "real world", &effects)?.1));
             }
@@ -92,12 +92,12 @@ impl World {
             effects: [source.effects, effects].concat(),
             ..source
         };
-        let world = if real.world == Kind::Perturbed {
+        let world = if real.world == WorldKind::Perturbed {
             perturbed(session, &*engine, &source, streams)?
         } else {
             plain(model::compile(&*engine, &source)?)
         };
-        if real.world != Kind::Custom {
+        if real.world != WorldKind::Custom {
             needs.check(&*world.model).map_err(|e| Error::Scene {
                 scene: source.scene.name().to_owned(),
                 message: format!("cannot stand for the task's real world: {e}"),

@@ -27,7 +27,7 @@ fn main() -> asid_core::Result<()> {
 
 /// x to the right and y up, as seen from above.
 fn svg(task: &dyn Task) -> String {
-    let view = task.top_view();
+    let view = &task.spec().top_view;
     let [low, high] = view.bounds;
     let scale = WIDTH / (high[0] - low[0]);
     let height = scale * (high[1] - low[1]);

@@ -260,18 +260,7 @@ impl Task for LaptopArticulation {
     }
 
     fn place(&self, layout: &Layout, start: &[f64], qpos: &mut [f64]) -> Result<()> {
-        let at = layout.joint("base_free")?.qpos;
-        let half = start[2] / 2.0;
-        let pose = [
-            start[0],
-            start[1],
-            PLATE_HALF[2],
-            half.cos(),
-            0.0,
-            0.0,
-            half.sin(),
-        ];
-        qpos[at..at + 7].copy_from_slice(&pose);
+        crate::lay(layout, "base_free", start, PLATE_HALF[2], qpos)?;
         qpos[layout.joint("hinge")?.qpos] = 0.0;
         qpos[layout.joint("mount")?.qpos] = start[3];
         Ok(())

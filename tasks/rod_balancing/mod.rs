@@ -205,19 +205,7 @@ impl Task for RodBalancing {
     }
 
     fn place(&self, layout: &Layout, start: &[f64], qpos: &mut [f64]) -> Result<()> {
-        let at = layout.joint("rod_free")?.qpos;
-        let half = start[2] / 2.0;
-        let pose = [
-            start[0],
-            start[1],
-            ROD_REST_HEIGHT,
-            half.cos(),
-            0.0,
-            0.0,
-            half.sin(),
-        ];
-        qpos[at..at + 7].copy_from_slice(&pose);
-        Ok(())
+        crate::lay(layout, "rod_free", start, ROD_REST_HEIGHT, qpos)
     }
 
     fn locate(&self, signals: &[f64]) -> Vec<f64> {

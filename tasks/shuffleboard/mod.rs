@@ -214,10 +214,6 @@ fn frictions() -> Vec<Parameter> {
 
 /// Puck, board and zones from above.
 fn top_view(zone_length: f64) -> TopView {
-    let circle = (0..24).map(|i| {
-        let (sin, cos) = (f64::from(i) * std::f64::consts::TAU / 24.0).sin_cos();
-        [PUCK_RADIUS * cos, PUCK_RADIUS * sin]
-    });
     let zone = |z: Zone| Outline {
         label: format!("{} zone", z.name()),
         corners: crate::rectangle([z.middle(), 0.0], [0.5 * zone_length, LANE_HALF[1]]),
@@ -225,7 +221,7 @@ fn top_view(zone_length: f64) -> TopView {
     TopView {
         object: Outline {
             label: "puck".into(),
-            corners: circle.collect(),
+            corners: crate::circle([0.0, 0.0], PUCK_RADIUS),
         },
         fixtures: vec![
             Outline {
@@ -299,19 +295,7 @@ impl Task for Shuffleboard {
     }
 
     fn place(&self, layout: &Layout, start: &[f64], qpos: &mut [f64]) -> Result<()> {
-        let at = layout.joint("puck_free")?.qpos;
-        let half = start[2] / 2.0;
-        let pose = [
-            start[0],
-            start[1],
-            PUCK_REST_HEIGHT,
-            half.cos(),
-            0.0,
-            0.0,
-            half.sin(),
-        ];
-        qpos[at..at + 7].copy_from_slice(&pose);
-        Ok(())
+        crate::lay(layout, "puck_free", start, PUCK_REST_HEIGHT, qpos)
     }
 
     fn locate(&self, signals: &[f64]) -> Vec<f64> {

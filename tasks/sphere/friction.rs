@@ -15,12 +15,7 @@ const OUT_OF_RANGE: [f64; 2] = [5.2e-3, 6e-3];
 pub fn rolling_friction(geom: &str) -> Parameter {
     Parameter {
         name: "rolling_friction".into(),
-        targets: vec![Target {
-            element: "geom".into(),
-            name: geom.into(),
-            attribute: "friction".into(),
-            index: 2,
-        }],
+        targets: vec![Target::new("geom", geom, "friction", 2)],
         range: RANGE,
         scale: Scale::Linear,
         unit: "m".into(),

@@ -7,23 +7,26 @@
 
 mod friction;
 mod metric;
+mod outline;
+mod spec;
 mod strike;
 
 use std::collections::BTreeMap;
 
-use asid_core::parameter::Parameter;
 use asid_core::registry::Settings;
 use asid_core::task::{
-    Commander, Condition, Coordinate, DownstreamProtocol, ExplorationProtocol, Outcome, Outline,
-    Task, TaskSpec, TopView, TrackedObject,
+    Commander, Coordinate, DownstreamProtocol, ExplorationProtocol, Outcome, Outline, Task,
+    TaskSpec, TopView, TrackedObject,
 };
 use asid_core::{Capabilities, Difficulty, Layout, Levels, Result, Target};
 
-use crate::difficulty;
 use crate::panda;
 use crate::steering::{self, Steering};
+use crate::{circle, difficulty};
 
 pub use friction::{conditions, rolling_friction};
+pub use outline::{rectangle, walls};
+pub use spec::{Area, Number, Setting, Spec};
 
 /// Radius of the ball, m.
 const BALL_RADIUS: f64 = 0.03;
@@ -48,71 +51,6 @@ const GOAL_RADIUS: f64 = 0.05;
 
 /// Time constant of the contact of ball and paddle unless the difficulty says otherwise, s.
 const CONTACT_TIME: f64 = 0.03;
-
-/// A place in the plane: ranges of x and y, m.
-pub type Area = [[f64; 2]; 2];
-
-/// What is a task's own.
-#[derive(Clone)]
-pub struct Spec {
-    /// Name on the command line.
-    pub name: &'static str,
-    /// One line for `asid list`.
-    pub about: &'static str,
-    /// The scene's document; it includes `../panda.xml`.
-    pub xml: &'static str,
-    /// The unknowns.
-    pub parameters: Vec<Parameter>,
-    /// Unknowns that can be switched on.
-    pub optional: Vec<Parameter>,
-    /// Named truths.
-    pub conditions: Vec<Condition>,
-    /// Where the hand may go.
-    pub steering: Steering,
-    /// Control steps of exploration.
-    pub horizon: usize,
-    /// Where the ball lies when exploration begins.
-    pub explored_from: Area,
-    /// Where the ball lies when it is struck.
-    pub struck_from: Area,
-    /// Where it is to come to rest, m.
-    pub goal: [f64; 2],
-    /// A y behind the goal past which a ball has been struck too hard, m; see the metric.
-    pub line: Option<f64>,
-    /// Range of the paddle's speed, m/s.
-    pub speed: [f64; 2],
-    /// Length of an attempt, s.
-    pub seconds: f64,
-    /// Things that stand still, for pictures.
-    pub fixtures: Vec<Outline>,
-    /// Parts of the floor whose visits are counted.
-    pub regions: Vec<Outline>,
-    /// Further balls that are tracked, by the names of their bodies.
-    pub distractors: &'static [&'static str],
-    /// Numbers of algorithms that suit the task better than their defaults.
-    pub settings: &'static [Setting],
-}
-
-/// A number among an algorithm's settings.
-pub struct Setting {
-    /// `explorer`, `identifier` or `solver`.
-    pub section: &'static str,
-    /// Name of the algorithm.
-    pub algorithm: &'static str,
-    /// Name of the setting.
-    pub key: &'static str,
-    /// Its value.
-    pub value: Number,
-}
-
-/// Value of a setting.
-#[derive(Clone, Copy, Debug)]
-pub enum Number {
-    /// Of something that is counted.
-    Whole(i64),
-    /// Of something that is measured.
-    Real(f64),
-}
 
 /// A task of the family.
 pub struct Sphere {
@@ -275,13 +213,13 @@ impl Task for Sphere {
 
     fn settings(&self, section: &str, algorithm: &str) -> Settings {
         let all = self.spec.settings.iter();
-        all.filter(|s| s.section == section && s.algorithm == algorithm)
-            .map(|s| {
-                let value = match s.value {
+        all.filter(|s| (s.0, s.1) == (section, algorithm))
+            .map(|&(_, _, key, value)| {
+                let value = match value {
                     Number::Whole(n) => n.into(),
                     Number::Real(x) => x.into(),
                 };
-                (s.key.to_owned(), value)
+                (key.to_owned(), value)
             })
             .collect()
     }
@@ -337,36 +275,6 @@ impl Task for Sphere {
     fn goal_reward(&self, reading: &[f64]) -> Option<f64> {
         Some(-metric::distance(reading, self.spec.goal))
     }
-}
-
-/// A circle as a polygon.
-fn circle([x, y]: [f64; 2], radius: f64) -> Vec<[f64; 2]> {
-    (0..24)
-        .map(|k| {
-            let (sin, cos) = (f64::from(k) * std::f64::consts::TAU / 24.0).sin_cos();
-            [x + radius * cos, y + radius * sin]
-        })
-        .collect()
-}
-
-/// An axis-aligned rectangle between two corners.
-#[must_use]
-pub fn rectangle(label: &str, [x, y]: Area) -> Outline {
-    Outline {
-        label: label.into(),
-        corners: vec![[x[0], y[0]], [x[1], y[0]], [x[1], y[1]], [x[0], y[1]]],
-    }
-}
-
-/// The four walls of the arena.
-#[must_use]
-pub fn walls() -> Vec<Outline> {
-    vec![
-        rectangle("wall", [[0.18, 0.20], [-0.58, 0.38]]),
-        rectangle("wall", [[0.80, 0.82], [-0.58, 0.38]]),
-        rectangle("wall", [[0.20, 0.80], [-0.58, -0.56]]),
-        rectangle("wall", [[0.20, 0.80], [0.36, 0.38]]),
-    ]
 }
 
 /// The target of a parameter that is built in.

@@ -5,7 +5,7 @@
 //!
 //! Source: ASID (Memmel et al., ICLR 2024), appendix.
 
-use crate::sphere::{STEERING, Spec, Sphere, conditions, rolling_friction, walls};
+use crate::sphere::{Spec, Sphere, rolling_friction};
 
 /// Name on the command line.
 const NAME: &str = "sphere-distractors";
@@ -20,23 +20,9 @@ asid_core::register!(TaskEntry {
 
 fn spec() -> Spec {
     Spec {
-        name: NAME,
-        about: ABOUT,
-        xml: include_str!("scene.xml"),
         parameters: vec![rolling_friction("ball")],
-        optional: Vec::new(),
-        conditions: conditions(),
-        steering: STEERING,
-        horizon: 20,
         explored_from: [[0.43, 0.65], [-0.2, 0.2]],
-        struck_from: [[0.55, 0.65], [0.03, 0.05]],
-        goal: [0.65, -0.40],
-        line: None,
-        speed: [0.3, 1.4],
-        seconds: 4.5,
-        fixtures: walls(),
-        regions: Vec::new(),
         distractors: &["distractor_1", "distractor_2", "distractor_3"],
-        settings: &[],
+        ..Spec::published([NAME, ABOUT], include_str!("scene.xml"))
     }
 }

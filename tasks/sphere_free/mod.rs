@@ -2,7 +2,7 @@
 //!
 //! Source: ASID (Memmel et al., ICLR 2024), appendix.
 
-use crate::sphere::{STEERING, Spec, Sphere, conditions, rolling_friction};
+use crate::sphere::{Spec, Sphere};
 
 /// Name on the command line.
 const NAME: &str = "sphere-free";
@@ -17,23 +17,7 @@ asid_core::register!(TaskEntry {
 
 fn spec() -> Spec {
     Spec {
-        name: NAME,
-        about: ABOUT,
-        xml: include_str!("scene.xml"),
-        parameters: vec![rolling_friction("floor")],
-        optional: Vec::new(),
-        conditions: conditions(),
-        steering: STEERING,
-        horizon: 20,
-        explored_from: [[0.43, 0.65], [-0.2, 0.23]],
-        struck_from: [[0.55, 0.65], [0.03, 0.05]],
-        goal: [0.65, -0.40],
-        line: None,
-        speed: [0.3, 1.4],
-        seconds: 4.5,
         fixtures: Vec::new(),
-        regions: Vec::new(),
-        distractors: &[],
-        settings: &[],
+        ..Spec::published([NAME, ABOUT], include_str!("scene.xml"))
     }
 }

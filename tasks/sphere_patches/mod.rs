@@ -6,7 +6,7 @@
 use asid_core::parameter::{Parameter, Scale};
 use asid_core::task::{Condition, Outline};
 
-use crate::sphere::Number::{self, Real, Whole};
+use crate::sphere::Number::{Real, Whole};
 use crate::sphere::{Area, STEERING, Setting, Spec, Sphere, rectangle, target, walls};
 use crate::steering::Steering;
 
@@ -34,28 +34,14 @@ pub const PATCHES: [Area; 3] = [
 /// value of the unknowns. So is that for a strike: slow balls stop at a seam of two patches, whatever
 /// their speed, and a search that begins with few strikes can settle there.
 const SETTINGS: [Setting; 7] = [
-    setting("explorer", "fisher-cem", "hold", Whole(15)),
-    setting("explorer", "fisher-cem", "iterations", Whole(3)),
-    setting("explorer", "fisher-cem", "population", Whole(24)),
-    setting("explorer", "fisher-cem", "prior_samples", Whole(1)),
-    setting("explorer", "fisher-cem", "std", Real(0.2)),
-    setting("solver", "cem", "population", Whole(24)),
-    setting("solver", "cem", "belief_samples", Whole(2)),
+    ("explorer", "fisher-cem", "hold", Whole(15)),
+    ("explorer", "fisher-cem", "iterations", Whole(3)),
+    ("explorer", "fisher-cem", "population", Whole(24)),
+    ("explorer", "fisher-cem", "prior_samples", Whole(1)),
+    ("explorer", "fisher-cem", "std", Real(0.2)),
+    ("solver", "cem", "population", Whole(24)),
+    ("solver", "cem", "belief_samples", Whole(2)),
 ];
-
-const fn setting(
-    section: &'static str,
-    algorithm: &'static str,
-    key: &'static str,
-    value: Number,
-) -> Setting {
-    Setting {
-        section,
-        algorithm,
-        key,
-        value,
-    }
-}
 
 asid_core::register!(TaskEntry {
     name: NAME,
@@ -77,9 +63,6 @@ fn spec() -> Spec {
     let mut fixtures = walls();
     fixtures.extend(regions.iter().cloned());
     Spec {
-        name: NAME,
-        about: ABOUT,
-        xml: include_str!("scene.xml"),
         parameters: (1..=3)
             .map(|patch| Parameter {
                 name: unknown(patch),
@@ -89,7 +72,6 @@ fn spec() -> Spec {
                 unit: "m".into(),
             })
             .collect(),
-        optional: Vec::new(),
         conditions: vec![
             Condition::drawn("in-range", &[]),
             Condition {
@@ -110,7 +92,7 @@ fn spec() -> Spec {
         seconds: 7.0,
         fixtures,
         regions,
-        distractors: &[],
         settings: &SETTINGS,
+        ..Spec::published([NAME, ABOUT], include_str!("scene.xml"))
     }
 }

@@ -9,7 +9,7 @@
 
 use asid_core::parameter::{Parameter, Scale};
 
-use crate::sphere::{STEERING, Spec, Sphere, conditions, rolling_friction, target, walls};
+use crate::sphere::{Spec, Sphere, target};
 
 /// Name on the command line.
 const NAME: &str = "sphere-striking";
@@ -25,10 +25,6 @@ asid_core::register!(TaskEntry {
 /// The task with its published ranges.
 fn spec() -> Spec {
     Spec {
-        name: NAME,
-        about: ABOUT,
-        xml: include_str!("scene.xml"),
-        parameters: vec![rolling_friction("floor")],
         optional: vec![
             Parameter {
                 name: "sliding_friction".into(),
@@ -46,18 +42,6 @@ fn spec() -> Spec {
                 unit: "s".into(),
             },
         ],
-        conditions: conditions(),
-        steering: STEERING,
-        horizon: 20,
-        explored_from: [[0.43, 0.65], [-0.2, 0.23]],
-        struck_from: [[0.55, 0.65], [0.03, 0.05]],
-        goal: [0.65, -0.40],
-        line: None,
-        speed: [0.3, 1.4],
-        seconds: 4.5,
-        fixtures: walls(),
-        regions: Vec::new(),
-        distractors: &[],
-        settings: &[],
+        ..Spec::published([NAME, ABOUT], include_str!("scene.xml"))
     }
 }

@@ -74,7 +74,7 @@ pub enum Fault {
     /// The axes of a body's inertia are those of the body.
     InertiaTurnIgnored,
     /// A hook's force on a free joint acts at the centre of mass.
-    HookForceAtCentre,
+    HookForceAtCenter,
     /// A mass that is set leaves the inertia as it was.
     MassWithoutInertia,
     /// A mass may be set, and does nothing.
@@ -132,7 +132,7 @@ impl Fault {
     /// What an engine of free bodies can have wrong about a body.
     pub const OF_FREE_BODIES: [Self; 12] = [
         Self::InertiaTurnIgnored,
-        Self::HookForceAtCentre,
+        Self::HookForceAtCenter,
         Self::MassWithoutInertia,
         Self::MassUnused,
         Self::NegativeMass,
@@ -180,7 +180,7 @@ pub struct SpoiltHook<'a> {
     /// Length of a physics step, s.
     pub timestep: f64,
     /// Centre of mass in the first body's frame, m.
-    pub centre: Vector3<f64>,
+    pub center: Vector3<f64>,
     /// State of each row a step ago.
     pub before: Mutex<HashMap<usize, [Vec<f64>; 2]>>,
 }
@@ -214,11 +214,11 @@ impl StepHook for SpoiltHook<'_> {
                 parameters: view.parameters,
             },
         );
-        if self.fault == Fault::HookForceAtCentre && qpos.len() == 7 {
+        if self.fault == Fault::HookForceAtCenter && qpos.len() == 7 {
             let q = Quaternion::new(qpos[3], qpos[4], qpos[5], qpos[6]);
             let force = Vector3::from_column_slice(&view.force[..3]);
             let own = UnitQuaternion::from_quaternion(q).inverse() * force;
-            let torque = self.centre.cross(&own);
+            let torque = self.center.cross(&own);
             for (f, t) in view.force[3..6].iter_mut().zip(torque.iter()) {
                 *f += t;
             }

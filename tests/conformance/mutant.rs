@@ -113,7 +113,7 @@ impl Backend for Mutant<'_> {
                 .inner
                 .load(&Scene::from_xml(scene.name(), &xml, &[])?)?,
             fault: self.fault,
-            centre: centre(&xml),
+            center: center(&xml),
         }))
     }
 }
@@ -143,7 +143,7 @@ fn upright(xml: &str, element: &str) -> String {
 }
 
 /// Centre of mass of the first body that states one.
-fn centre(xml: &str) -> Vector3<f64> {
+fn center(xml: &str) -> Vector3<f64> {
     let place = xml.split_once("<inertial pos=\"").unwrap_or_default().1;
     let place = place.split('"').next().unwrap_or_default();
     let numbers: Vec<f64> = (place.split_whitespace().map(|x| x.parse().unwrap())).collect();
@@ -156,7 +156,7 @@ fn centre(xml: &str) -> Vector3<f64> {
 struct MutantModel {
     inner: Arc<dyn Model>,
     fault: Fault,
-    centre: Vector3<f64>,
+    center: Vector3<f64>,
 }
 
 impl Model for MutantModel {
@@ -188,7 +188,7 @@ impl Model for MutantModel {
         let config = &config;
         Ok(Box::new(MutantSimulator {
             inner: self.inner.simulator(config)?,
-            centre: self.centre,
+            center: self.center,
             masses,
             more,
             fault: self.fault,
@@ -204,7 +204,7 @@ struct MutantSimulator {
     threads: usize,
     running: Vec<Status>,
     /// Centre of mass of the first body.
-    centre: Vector3<f64>,
+    center: Vector3<f64>,
     /// Nominal value of each parameter that is a mass.
     masses: Vec<Option<f64>>,
     /// Values of parameters that the caller does not know of.
@@ -412,7 +412,7 @@ impl Simulator for MutantSimulator {
             fault: self.fault,
             sims: rollout.sims,
             timestep: self.layout().timestep,
-            centre: self.centre,
+            center: self.center,
             before: Mutex::default(),
         });
         let sims = self.order(rollout.sims);

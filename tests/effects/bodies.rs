@@ -75,7 +75,7 @@ fn magnus_force_bends_a_path_to_a_circle() {
 }
 
 #[test]
-fn a_constant_force_pushes_at_the_centre_of_mass() {
+fn a_constant_force_pushes_at_the_center_of_mass() {
     on_each(
         &weightless(),
         &["constant-force@stone:x=1,y=-2,z=0.5"],
@@ -131,7 +131,7 @@ fn masses_resist_a_known_force() {
 }
 
 #[test]
-fn moments_of_inertia_and_centres_of_mass_move_a_flap() {
+fn moments_of_inertia_and_centers_of_mass_move_a_flap() {
     for (effect, moment, center) in [
         ("inertia@flap:factor=1.5", 0.03, [0.0, -0.1]),
         ("center-of-mass@flap:x=0.05,z=-0.1", 0.02, [0.05, -0.2]),
@@ -196,7 +196,7 @@ const PLATE: &str = r#"<mujoco><option timestep="0.002" integrator="implicitfast
   <sensor><jointvel name="w" joint="hinge"/></sensor></mujoco>"#;
 
 #[test]
-fn mass_of_a_geom_composes_with_inertia_and_centre_of_its_body() {
+fn mass_of_a_geom_composes_with_inertia_and_center_of_its_body() {
     // A study that fits the mass of a geom can miss the inertia of its body.
     let effects = [
         "mass@plate:factor=2",

@@ -23,7 +23,7 @@ pub(super) struct Mover {
     world: PhysicsWorld,
     body: RigidBodyHandle,
     /// Centre of mass in the body's frame, m.
-    centre: Vector3<f64>,
+    center: Vector3<f64>,
 }
 
 fn vector(v: &[f64]) -> Vector {
@@ -64,13 +64,13 @@ impl Mover {
             friction_model: FrictionModel::Coulomb,
             ..IntegrationParameters::default()
         };
-        let centre = Vector3::from(model.body_ipos()[1]);
+        let center = Vector3::from(model.body_ipos()[1]);
         let turn =
             UnitQuaternion::from_quaternion(Quaternion::new(qpos[3], qpos[4], qpos[5], qpos[6]));
         let spin = turn * Vector3::new(qvel[3], qvel[4], qvel[5]);
-        let velocity = Vector3::new(qvel[0], qvel[1], qvel[2]) + spin.cross(&(turn * centre));
+        let velocity = Vector3::new(qvel[0], qvel[1], qvel[2]) + spin.cross(&(turn * center));
         let mass = MassProperties::with_principal_inertia_frame(
-            vector(centre.as_slice()),
+            vector(center.as_slice()),
             model.body_mass()[1] as f32,
             vector(&model.body_inertia()[1]),
             rotation(&model.body_iquat()[1]),
@@ -91,7 +91,7 @@ impl Mover {
         Self {
             world,
             body,
-            centre,
+            center,
         }
     }
 
@@ -106,7 +106,7 @@ impl Mover {
         let body = &self.world.bodies[self.body];
         let (place, turn) = (wide(body.translation()), wide_rotation(*body.rotation()));
         let spin = wide(body.angvel());
-        let velocity = wide(body.linvel()) - spin.cross(&(turn * self.centre));
+        let velocity = wide(body.linvel()) - spin.cross(&(turn * self.center));
         let own = turn.inverse() * spin;
         let q = turn.quaternion();
         (

@@ -1,11 +1,14 @@
-//! Errors of a tracker that do not average out: it is late, it is off, it misses readings.
+//! What a tracker says of a world: with noise, and with errors that do not average out.
 //!
-//! Noise is what a method is told of; these it is not. They act on what a world says and never on what
-//! happens in it.
+//! Noise is what a method is told of. That a tracker is late, is off or misses readings it is not told. Both act on
+//! what a world says and never on what happens in it.
 
 use asid_core::error::{Error, Result};
+use asid_core::layout::Layout;
 use asid_core::rng::Rng;
 use asid_core::signal::SignalSet;
+use asid_core::tracker::ReadingFrames;
+use rand_distr::{Distribution, StandardNormal};
 
 /// Systematic errors of the tracker of a [`SimulatedWorld`](super::SimulatedWorld); without any by default.
 #[derive(Clone, Debug, PartialEq)]
@@ -77,5 +80,73 @@ impl TrackerErrors {
         use rand::Rng as _;
         let lost = chance.random::<f64>() < self.dropout;
         frame == 0 || (frame.is_multiple_of(self.every) && !lost)
+    }
+}
+
+/// What the tracker says, frame by frame.
+pub(super) struct Tracker<'a> {
+    signals: &'a SignalSet,
+    errors: &'a TrackerErrors,
+    rate: ReadingFrames,
+    /// Physics steps by which it is late.
+    pub(super) late: usize,
+    /// Physics steps of a frame.
+    substeps: usize,
+    /// True readings of the signals after each physics step, the start first; all that a late
+    /// tracker may still report.
+    past: Vec<f64>,
+    frame: usize,
+    noise: Rng,
+    losses: Rng,
+}
+
+impl<'a> Tracker<'a> {
+    pub(super) fn new(
+        (signals, errors): (&'a SignalSet, &'a TrackerErrors),
+        rate: ReadingFrames,
+        layout: &Layout,
+        substeps: usize,
+        [noise, losses]: [Rng; 2],
+    ) -> Self {
+        Self {
+            signals,
+            errors,
+            rate,
+            late: (errors.latency / layout.timestep).round() as usize,
+            substeps,
+            past: Vec::new(),
+            frame: 0,
+            noise,
+            losses,
+        }
+    }
+
+    /// Takes the start of an episode, a row that begins with the tracked signals.
+    pub(super) fn begin(&mut self, start: &[f64]) {
+        self.past.extend_from_slice(&start[..self.signals.width()]);
+    }
+
+    /// Takes what was true after each physics step, rows that begin with the tracked signals.
+    pub(super) fn look<'r>(&mut self, rows: impl Iterator<Item = &'r [f64]>) {
+        for row in rows {
+            self.past.extend_from_slice(&row[..self.signals.width()]);
+        }
+    }
+
+    /// Turns the next frame's true reading, which begins with the tracked signals, into what
+    /// is read. Returns whether the tracker read anything.
+    pub(super) fn read(&mut self, row: &mut [f64]) -> bool {
+        let tracked = self.signals.width();
+        let seen = &mut row[..tracked];
+        if self.late > 0 {
+            let shown = (self.frame * self.substeps).saturating_sub(self.late);
+            seen.copy_from_slice(&self.past[shown * tracked..][..tracked]);
+        }
+        self.errors.shift(self.signals, seen);
+        self.signals
+            .add_noise(seen, || StandardNormal.sample(&mut self.noise));
+        let there = self.errors.reads(self.frame, &mut self.losses) && self.rate.has(self.frame);
+        self.frame += 1;
+        there
     }
 }

@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 
-use crate::stage::{ALL_FEATURES, Stages};
+use crate::stage::{ALL_FEATURES, SHARED, Stages};
 
 /// Runs all lints and prints the summary.
 pub fn run() -> Result<bool> {
@@ -18,7 +18,7 @@ pub fn stages_of_lint(stages: &mut Stages) -> Result<()> {
     let deny = ["--", "-D", "warnings"];
     stages.cargo("clippy", &[&clippy[..], &deny].concat(), &[])?;
     // The default features are pure Rust and must build by themselves.
-    let pure = ["clippy", "--package=asid", "--all-targets"];
+    let pure = ["clippy", "--package=asid", SHARED, "--all-targets"];
     stages.cargo(
         "clippy, default features",
         &[&pure[..], &deny].concat(),

@@ -7,6 +7,7 @@
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
 mod bench;
+mod deny;
 mod environment;
 mod fuzz;
 mod library;
@@ -30,7 +31,8 @@ Usage: cargo xtask <subcommand>
 
   setup [--only mujoco|torch]  fetches the native libraries into .native/ (quick when all is there)
   lint                         formatting, clippy and rustdoc over the workspace, all features
-  test                         setup, lint and every test: what CI runs
+  deny                         licences, versions and sources of the dependencies, where `cargo deny` is there
+  test                         setup, lint, deny and every test: what CI runs
   wheel                        the Python package as a wheel, into target/wheels/release
   python [--release]           the Python package's tests, on a wheel in a fresh virtual environment
   miri                         the engine ABI's unsafe code under Miri, where a toolchain has it
@@ -71,6 +73,7 @@ fn run(arguments: &[String]) -> Result<bool> {
     match subcommand.as_str() {
         "setup" => setup::run(&setup::selection(rest)?).map(|()| true),
         "lint" => without_arguments(rest).and_then(|()| lint::run()),
+        "deny" => without_arguments(rest).and_then(|()| deny::run()),
         "test" => without_arguments(rest).and_then(|()| test::run()),
         "miri" => without_arguments(rest).and_then(|()| miri::run()),
         "wheel" => python::wheel(rest),
@@ -85,7 +88,7 @@ fn run(arguments: &[String]) -> Result<bool> {
             Ok(true)
         }
         other => bail!(
-            "unknown subcommand `{other}`; known: setup, lint, test, wheel, python, miri, slurm, bench, fuzz, kill, help"
+            "unknown subcommand `{other}`; known: setup, lint, deny, test, wheel, python, miri, slurm, same, bench, fuzz, kill, help"
         ),
     }
 }
@@ -109,7 +112,7 @@ mod tests {
     #[test]
     fn wrong_calls_say_what_is_known() {
         assert!(error_of(&[]).starts_with("no subcommand"));
-        assert!(error_of(&["tset"]).contains("known: setup, lint, test"));
+        assert!(error_of(&["tset"]).contains("known: setup, lint, deny, test"));
         assert!(error_of(&["test", "--fast"]).contains("`--fast`"));
         assert!(error_of(&["setup", "--only", "bullet"]).contains("known: mujoco, torch"));
     }

@@ -12,7 +12,7 @@ use std::process::Command;
 use anyhow::{Context, Result, bail};
 
 use crate::library::{MUJOCO, repository, target};
-use crate::stage::Stages;
+use crate::stage::{SHARED, Stages};
 use crate::{environment, setup};
 
 /// How the code is optimised.
@@ -144,10 +144,9 @@ fn build(profile: Profile) -> Result<PathBuf> {
 /// Builds the program, and puts it with MuJoCo's library where the wheel has them.
 fn program(profile: Profile) -> Result<()> {
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
-    // The features of the tests but for libtorch, whose 500 MB no wheel is to carry. The module is named beside the
-    // program, though maturin builds it, so that crates have the features that both ask for, and are built once.
+    // The features of the tests but for libtorch, whose 500 MB no wheel is to carry.
     let status = Command::new(cargo)
-        .args(["build", "--package=asid", "--package=asid-python"])
+        .args(["build", "--package=asid", "--package=asid-python", SHARED])
         .args(["--bin=asid", "--features=mujoco,logs", "--locked"])
         .args(["--profile", profile.name()])
         .env("ASID_RELOCATABLE", "1")

@@ -10,6 +10,9 @@ use crate::library::repository;
 /// Features that bring in every engine and the networks.
 pub const ALL_FEATURES: &str = "--features=mujoco,torch,logs";
 
+/// Named beside a part of the workspace, it gives the part the third-party crates of the whole, which are built once.
+pub const SHARED: &str = "--package=asid-third-party";
+
 /// How a stage ended.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Outcome {

@@ -1,16 +1,21 @@
-//! `cargo xtask test`: set-up, lints, every test, a real Slurm, Miri, and the Python package, with one summary. CI runs this.
+//! `cargo xtask test`: set-up, lints, dependencies, every test, the pure Rust build, a real Slurm, Miri, and the Python
+//! package, with one summary. CI runs this.
 
 use anyhow::Result;
 
 use crate::lint::stages_of_lint;
-use crate::stage::{ALL_FEATURES, Stages};
-use crate::{library, miri, python, setup, slurm};
+use crate::stage::{ALL_FEATURES, SHARED, Stages};
+use crate::{deny, library, miri, python, setup, slurm};
+
+/// Tests of the command line that call every stage of the pipeline, and what this build refuses.
+const PURE: [&str; 2] = ["--test=cli_run", "--test=cli_refusals"];
 
 /// Runs everything; without the native libraries nothing else can be built.
 pub fn run() -> Result<bool> {
     let mut stages = Stages::default();
     stages.run("setup", || setup::run(&library::ALL).map(|()| true))?;
     stages_of_lint(&mut stages)?;
+    deny::stage(&mut stages)?;
     stages.cargo(
         "tests",
         &["test", "--workspace", "--no-fail-fast", ALL_FEATURES],
@@ -19,6 +24,9 @@ pub fn run() -> Result<bool> {
     // The program that the tests have built: alone it would be built anew, with other features of its dependencies.
     let program = library::target()?.join("debug/asid");
     slurm::stage(&mut stages, Some(&program))?;
+    // After what calls the program that the tests have built, whose place this one takes.
+    let pure = ["test", "--package=asid", SHARED, "--no-fail-fast"];
+    stages.cargo("tests, default features", &[&pure[..], &PURE].concat(), &[])?;
     miri::stage(&mut stages)?;
     python::stage(&mut stages, python::Profile::Dev)?;
     Ok(stages.finish())

@@ -3,7 +3,8 @@
 use std::io::{BufRead as _, BufReader, Read as _};
 use std::path::Path;
 
-use super::{ColumnMapping, LogNotes, Reader};
+use super::reader::Reader;
+use super::{ColumnMapping, LogNotes};
 use crate::episode::Episode;
 use crate::layout::Layout;
 use crate::scene::one_line;

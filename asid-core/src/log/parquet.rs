@@ -11,7 +11,8 @@ use parquet::record::Field;
 
 pub use file::ParquetFile;
 
-use super::{ColumnMapping, LogNotes, Reader};
+use super::reader::Reader;
+use super::{ColumnMapping, LogNotes};
 use crate::episode::Episode;
 use crate::guard::guarded;
 use crate::layout::Layout;

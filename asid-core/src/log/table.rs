@@ -6,7 +6,8 @@
 use std::path::Path;
 
 use super::mapping::Source;
-use super::{ColumnMapping, LogNotes, Reader, entry_name};
+use super::reader::Reader;
+use super::{ColumnMapping, LogNotes, entry_name};
 use crate::episode::Episode;
 use crate::error::{Error, Result};
 use crate::layout::Layout;

@@ -8,6 +8,7 @@
 mod batch;
 mod handles;
 mod model;
+mod rollout;
 
 use std::ffi::{c_char, c_void};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -103,8 +104,8 @@ pub fn table<E: Export>(about: &str) -> table::Backend {
         set_parameters: Some(batch::set_parameters),
         reset: Some(batch::reset),
         set_state: Some(batch::set_state),
-        rollout: Some(batch::rollout),
-        read: Some(batch::read),
+        rollout: Some(rollout::rollout),
+        read: Some(rollout::read),
         save: Some(batch::save),
         restore: Some(batch::restore),
         destroy_snapshot: Some(batch::destroy_snapshot),

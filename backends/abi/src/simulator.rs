@@ -10,8 +10,8 @@
 use std::ptr::NonNull;
 use std::sync::Arc;
 
-use asid_core::layout::{JointKind, Layout, Recording};
-use asid_core::simulator::check_sims;
+use asid_core::layout::{Layout, Recording};
+use asid_core::simulator::{check_copy, check_len, check_sims, check_state};
 use asid_core::{BatchConfig, Capabilities, Error, Result, Rollout, Simulator, Snapshot, Status};
 
 use crate::batch::BatchHandle;
@@ -34,31 +34,12 @@ impl LoadedSimulator {
     /// # Errors
     /// [`Error::Config`] for no simulations; the engine's own errors.
     pub fn new(model: Arc<ModelHandle>, config: &BatchConfig) -> Result<Self> {
-        let quaternions = model
-            .layout()
-            .joints
-            .iter()
-            .filter_map(|j| match j.kind {
-                JointKind::Free => Some(j.qpos + 3),
-                JointKind::Ball => Some(j.qpos),
-                JointKind::Hinge | JointKind::Slide => None,
-            })
-            .collect();
         Ok(Self {
+            quaternions: model.layout().quaternions(),
             batch: BatchHandle::new(model, config)?,
             status: vec![Status::Running; config.size],
-            quaternions,
         })
     }
-}
-
-fn expect(what: &str, have: usize, want: usize) -> Result<()> {
-    if have == want {
-        return Ok(());
-    }
-    Err(Error::Shape(format!(
-        "{what} has {have} values where {want} are needed"
-    )))
 }
 
 fn finite(what: &str, values: &[f64]) -> Result<()> {
@@ -81,7 +62,7 @@ impl Simulator for LoadedSimulator {
 
     fn set_parameters(&mut self, sims: &[usize], values: &[f64]) -> Result<()> {
         check_sims(sims, self.batch_size())?;
-        expect(
+        check_len(
             "parameters",
             values.len(),
             sims.len() * self.batch.columns.len(),
@@ -114,12 +95,8 @@ impl Simulator for LoadedSimulator {
 
     fn set_state(&mut self, sims: &[usize], qpos: &[f64], qvel: &[f64]) -> Result<()> {
         check_sims(sims, self.batch_size())?;
-        let (nq, nv) = (self.layout().nq, self.layout().nv);
-        expect("qpos", qpos.len(), sims.len() * nq)?;
-        expect("qvel", qvel.len(), sims.len() * nv)?;
-        finite("qpos", qpos)?;
-        finite("qvel", qvel)?;
-        for row in qpos.chunks_exact(nq.max(1)) {
+        check_state(self.layout(), sims.len(), qpos, qvel)?;
+        for row in qpos.chunks_exact(self.layout().nq.max(1)) {
             let length = |at: usize| row[at..at + 4].iter().map(|x| x * x).sum::<f64>().sqrt();
             if self.quaternions.iter().any(|&at| length(at) < 1e-9) {
                 return Err(Error::Shape("a quaternion of the state is zero".into()));
@@ -190,7 +167,7 @@ impl Simulator for LoadedSimulator {
     fn read(&mut self, sims: &[usize], record: &Recording, out: &mut [f64]) -> Result<()> {
         check_sims(sims, self.batch_size())?;
         let width = record.width();
-        expect("output", out.len(), sims.len() * width)?;
+        check_len("output", out.len(), sims.len() * width)?;
         readings::require(&self.batch, record)?;
         let channels = readings::channels(record);
         let read = self.batch.engine().table.read;
@@ -246,17 +223,8 @@ impl Simulator for LoadedSimulator {
 
     fn load(&mut self, snapshot: &Snapshot, rows: &[usize], sims: &[usize]) -> Result<()> {
         check_sims(sims, self.batch_size())?;
-        expect("rows", rows.len(), sims.len())?;
-        let saved = snapshot
-            .data::<SavedStates>()
-            .filter(|s| Arc::ptr_eq(&s.model, &self.batch.model))
-            .ok_or_else(|| Error::Shape("the snapshot is of another scene".into()))?;
-        if let Some(row) = rows.iter().find(|&&r| r >= snapshot.rows()) {
-            return Err(Error::Shape(format!(
-                "row {row} of a snapshot with {} rows",
-                snapshot.rows()
-            )));
-        }
+        let is_own = |s: &SavedStates| Arc::ptr_eq(&s.model, &self.batch.model);
+        let saved = snapshot.restored(rows, sims, is_own)?;
         let restore = self.batch.engine().table.restore;
         self.batch.call("restore", restore, |f, batch, error| {
             // SAFETY: the snapshot is of this model and lives; indices are checked.
@@ -275,17 +243,7 @@ impl Simulator for LoadedSimulator {
     }
 
     fn copy_state(&mut self, from: &[usize], to: &[usize]) -> Result<()> {
-        let size = self.batch_size();
-        check_sims(to, size)?;
-        expect("from", from.len(), to.len())?;
-        if let Some(sim) = from.iter().find(|&&s| s >= size) {
-            return Err(Error::Shape(format!("simulation {sim} of {size}")));
-        }
-        if let Some(sim) = from.iter().find(|s| to.binary_search(s).is_ok()) {
-            return Err(Error::Shape(format!(
-                "simulation {sim} is copied from and to"
-            )));
-        }
+        check_copy(from, to, self.batch_size())?;
         let Some(copy) = self.batch.engine().table.copy_state else {
             let mut sources = from.to_vec();
             sources.sort_unstable();

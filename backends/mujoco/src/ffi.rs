@@ -11,8 +11,11 @@
 //! inside a [`Sim`] method. A fatal error anywhere else ends the process, so
 //! arguments are checked in Rust before they get here.
 
+mod mjbatch;
+mod quiet;
 mod sim;
 
+pub use quiet::{disable_autoreset, silence_log};
 pub use sim::{BadNumber, Sim, is_bad};
 
 use std::any::Any;
@@ -20,99 +23,17 @@ use std::ffi::{CStr, c_char, c_int, c_void};
 use std::ops::Range;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::ptr::NonNull;
-use std::sync::{Mutex, Once, PoisonError};
+use std::sync::{Mutex, PoisonError};
 
-use mujoco_rs::mujoco_c::{
-    mjData, mjLogMessage, mjModel, mjWarningStat, mjtDisableBit, mju_setLogHandler,
+use mjbatch::{
+    BatchConfig, RawBatch, mjb_apply, mjb_deleteBatch, mjb_error, mjb_expand, mjb_makeBatch,
+    mjb_nstate, mjb_reset, mjb_setConst, mjb_state, mjb_stateComponent, mjb_status, mjb_warning,
 };
+use mujoco_rs::mujoco_c::{mjData, mjModel};
 use mujoco_rs::wrappers::mj_model::MjModel;
-
-/// `mjBatch` of `mjbatch.h`, opaque.
-#[repr(C)]
-struct RawBatch {
-    _opaque: [u8; 0],
-}
-
-/// `mjBatchConfig`.
-#[repr(C)]
-struct BatchConfig {
-    nthread: c_int,
-    persistent: bool,
-}
-
-type BatchFunction = unsafe extern "C" fn(*const mjModel, *mut mjData, c_int, *mut c_void);
-
-unsafe extern "C" {
-    fn mjb_makeBatch(
-        m: *const mjModel,
-        nsim: c_int,
-        config: *const BatchConfig,
-        error: *mut c_char,
-        error_sz: c_int,
-    ) -> *mut RawBatch;
-    fn mjb_deleteBatch(b: *mut RawBatch);
-    fn mjb_nstate(b: *const RawBatch) -> c_int;
-    fn mjb_state(b: *mut RawBatch) -> *mut f64;
-    fn mjb_stateComponent(b: *mut RawBatch, component: c_int, size: *mut c_int) -> *mut f64;
-    fn mjb_warning(b: *mut RawBatch) -> *mut mjWarningStat;
-    fn mjb_reset(
-        b: *mut RawBatch,
-        ids: *const c_int,
-        nid: c_int,
-        key: *const c_int,
-        stage: c_int,
-    ) -> c_int;
-    fn mjb_status(b: *const RawBatch) -> *const c_int;
-    fn mjb_error(b: *const RawBatch, sim: c_int) -> *const c_char;
-    fn mjb_expand(
-        b: *mut RawBatch,
-        name: *const c_char,
-        size: *mut c_int,
-        elemsize: *mut c_int,
-    ) -> *mut c_void;
-    fn mjb_setConst(b: *mut RawBatch, ids: *const c_int, nid: c_int) -> c_int;
-    fn mjb_apply(
-        b: *mut RawBatch,
-        ids: *const c_int,
-        nid: c_int,
-        func: BatchFunction,
-        arg: *mut c_void,
-        save: c_int,
-    ) -> c_int;
-}
 
 /// Entries of `mjData.warning` (`mjtWarning`).
 const WARNINGS: usize = 7;
-/// Routes MuJoCo's messages away from the console and from `MUJOCO_LOG.TXT` in
-/// the working directory. Warnings are dropped: what they say is in the
-/// counters of each simulation. A fatal error outside a batch aborts with its
-/// text, as the C library allows no return from one.
-pub fn silence_log() {
-    static ONCE: Once = Once::new();
-    unsafe extern "C" fn handler(message: *const mjLogMessage) {
-        // SAFETY: MuJoCo passes a message that lives for this call.
-        let Some(message) = (unsafe { message.as_ref() }) else {
-            return;
-        };
-        assert!(
-            message.level() != mujoco_rs::mujoco_c::mjtLogLevel::mjLOG_ERROR,
-            "MuJoCo stopped: {}",
-            message.subject()
-        );
-    }
-    ONCE.call_once(|| {
-        // SAFETY: the handler is a plain function that lives as long as the program.
-        unsafe { mju_setLogHandler(Some(handler)) };
-    });
-}
-
-/// Turns off the silent restart of a simulation whose state went bad.
-pub fn disable_autoreset(model: &mut MjModel) {
-    // SAFETY: a flag of the options; no size or index table is touched.
-    let raw = unsafe { model.ffi_mut() };
-    raw.opt.disableflags |= mjtDisableBit::mjDSBL_AUTORESET as c_int;
-}
-
 /// A model field with values of its own in each simulation; see [`Batch::expand`].
 #[derive(Clone, Copy, Debug)]
 pub struct Expanded(usize);

@@ -1,18 +1,19 @@
 //! A batch of simulations.
 
+mod rollout;
+
 use std::ffi::c_int;
-use std::ops::Range;
 use std::sync::Arc;
 
-use asid_core::layout::{JointKind, Layout, Recording};
-use asid_core::simulator::check_sims;
-use asid_core::{BatchConfig, Control, Error, Result, Rollout, Simulator, Snapshot, Status};
+use asid_core::layout::{Layout, Recording};
+use asid_core::simulator::{check_copy, check_len, check_sims, check_state};
+use asid_core::{BatchConfig, Error, Result, Rollout, Simulator, Snapshot, Status};
 
 use crate::compiled::{Compiled, compile};
-use crate::ffi::{BadNumber, Batch};
+use crate::ffi::Batch;
 use crate::history::CommandMemory;
 use crate::parameter::{Fields, Plan};
-use crate::rollout::{Frames, Job, Stage, has_halves, prepare, read, run};
+use crate::rollout::{Stage, has_halves, prepare, read};
 use crate::state::{SavedStates, StateLayout};
 
 /// Largest memory for the state rows of a batch, bytes. Beyond it the C++
@@ -64,11 +65,7 @@ impl MujocoSimulator {
                 MAX_STATE_BYTES >> 30
             )));
         }
-        let threads = match config.threads {
-            0 => std::thread::available_parallelism().map_or(1, usize::from),
-            n => n,
-        };
-        let threads = threads.min(size).min(1024);
+        let threads = config.thread_count().min(size).min(1024);
         let mut batch = if plan.moves_mass() {
             Batch::new(&compile(&compiled.scene, false)?, size, threads)
         } else {
@@ -77,15 +74,6 @@ impl MujocoSimulator {
         .map_err(Error::Failed)?;
         let fields = plan.expand(&mut batch)?;
         let states = StateLayout::of(&mut batch);
-        let quaternions = layout
-            .joints
-            .iter()
-            .filter_map(|j| match j.kind {
-                JointKind::Free => Some(j.qpos + 3),
-                JointKind::Ball => Some(j.qpos),
-                JointKind::Hinge | JointKind::Slide => None,
-            })
-            .collect();
         let all: Vec<c_int> = ids(0..size);
         if plan.derives() {
             batch.set_const(&all).map_err(Error::Failed)?;
@@ -109,82 +97,11 @@ impl MujocoSimulator {
             status: vec![Status::Running; size],
             begun: vec![true; size],
             memory,
-            quaternions,
+            quaternions: layout.quaternions(),
             steps: 0,
             plan,
             compiled,
         })
-    }
-
-    /// Writes parameters that are checked, and what follows from them.
-    fn write_parameters(&mut self, sims: &[usize], values: &[f64]) -> Result<()> {
-        let columns = self.plan.len();
-        let mut derived: Vec<c_int> = Vec::new();
-        for (i, &sim) in sims.iter().enumerate() {
-            let new = &values[i * columns..(i + 1) * columns];
-            let old = &mut self.values[sim * columns..(sim + 1) * columns];
-            if self
-                .plan
-                .write(&mut self.batch, &self.fields, sim, old, new)
-            {
-                derived.push(sim as c_int);
-            }
-            old.copy_from_slice(new);
-        }
-        self.batch.set_const(&derived).map_err(Error::Failed)
-    }
-
-    /// Values of the rollout's parameters with the changes at a frame.
-    fn changed(&self, rollout: &Rollout<'_>, frame: usize, values: &mut [f64]) {
-        let columns = self.plan.len();
-        for change in rollout.changes.iter().filter(|c| c.frame == frame) {
-            for (row, &value) in change.values.iter().enumerate() {
-                values[row * columns + change.column] = value;
-            }
-        }
-    }
-
-    /// Present parameter values of some simulations.
-    fn present(&self, sims: &[usize]) -> Vec<f64> {
-        let columns = self.plan.len();
-        sims.iter()
-            .flat_map(|&s| &self.values[s * columns..(s + 1) * columns])
-            .copied()
-            .collect()
-    }
-
-    fn check_values(&self, values: &[f64]) -> Result<()> {
-        let columns = self.plan.len().max(1);
-        values
-            .chunks_exact(columns)
-            .try_for_each(|row| self.plan.check(row))
-    }
-
-    /// Marks simulations that stopped, and those that MuJoCo raised an error in.
-    fn settle(&mut self, sims: &[usize], jobs: &[Job<'_>]) {
-        for (&sim, job) in sims.iter().zip(jobs) {
-            let stopped = match (self.batch.failure(sim), job.stopped) {
-                (Some(message), _) => {
-                    let done = job.steps as f64 * self.compiled.layout.timestep;
-                    let at = self.states.time.start;
-                    Some((self.batch.state(sim)[at] + done, message))
-                }
-                (None, Some((time, bad))) => Some((time, describe(bad).to_owned())),
-                (None, None) => None,
-            };
-            if let Some((time, message)) = stopped {
-                // What a hook changed is still in the model.
-                let columns = self.plan.len();
-                let set = &self.values[sim * columns..(sim + 1) * columns];
-                let unknown = vec![f64::NAN; columns];
-                let (batch, fields) = (&mut self.batch, &self.fields);
-                self.plan.write(batch, fields, sim, &unknown, set);
-                self.status[sim] = Status::Diverged {
-                    time,
-                    message: format!("{message} at {time:.6} s"),
-                };
-            }
-        }
     }
 
     fn running(&self, sims: &[usize]) -> Vec<usize> {
@@ -193,37 +110,9 @@ impl MujocoSimulator {
     }
 }
 
-fn describe(bad: BadNumber) -> &'static str {
-    match bad {
-        BadNumber::Position => "a position is not finite or beyond 1e10",
-        BadNumber::Velocity => "a velocity is not finite or beyond 1e10",
-        BadNumber::Acceleration => "an acceleration is not finite or beyond 1e10",
-        BadNumber::Command => "a command or applied force is not finite or beyond 1e10",
-    }
-}
-
 fn ids(sims: impl IntoIterator<Item = usize>) -> Vec<c_int> {
     // Sizes are limited far below what the integer holds.
     sims.into_iter().map(|s| s as c_int).collect()
-}
-
-fn expect(what: &str, have: usize, want: usize) -> Result<()> {
-    if have == want {
-        return Ok(());
-    }
-    Err(Error::Shape(format!(
-        "{what} has {have} values where {want} are needed"
-    )))
-}
-
-/// Frames between parameter changes, in order.
-fn segments(rollout: &Rollout<'_>) -> Vec<Range<usize>> {
-    let mut starts: Vec<usize> = rollout.changes.iter().map(|c| c.frame).collect();
-    starts.push(0);
-    starts.sort_unstable();
-    starts.dedup();
-    let ends = starts[1..].iter().copied().chain([rollout.frames]);
-    starts.iter().zip(ends).map(|(&a, b)| a..b).collect()
 }
 
 impl Simulator for MujocoSimulator {
@@ -237,7 +126,7 @@ impl Simulator for MujocoSimulator {
 
     fn set_parameters(&mut self, sims: &[usize], values: &[f64]) -> Result<()> {
         check_sims(sims, self.batch_size())?;
-        expect("parameters", values.len(), sims.len() * self.plan.len())?;
+        check_len("parameters", values.len(), sims.len() * self.plan.len())?;
         self.check_values(values)?;
         self.write_parameters(sims, values)
     }
@@ -257,13 +146,7 @@ impl Simulator for MujocoSimulator {
     fn set_state(&mut self, sims: &[usize], qpos: &[f64], qvel: &[f64]) -> Result<()> {
         check_sims(sims, self.batch_size())?;
         let (nq, nv) = (self.compiled.layout.nq, self.compiled.layout.nv);
-        expect("qpos", qpos.len(), sims.len() * nq)?;
-        expect("qvel", qvel.len(), sims.len() * nv)?;
-        if qpos.iter().chain(qvel).any(|x| !x.is_finite()) {
-            return Err(Error::Shape(
-                "the state holds a value that is not finite".into(),
-            ));
-        }
+        check_state(&self.compiled.layout, sims.len(), qpos, qvel)?;
         let norm = |row: &[f64], at: usize| {
             let q = &row[at..at + 4];
             q.iter().map(|x| x * x).sum::<f64>().sqrt()
@@ -292,107 +175,13 @@ impl Simulator for MujocoSimulator {
     }
 
     fn rollout(&mut self, rollout: &Rollout<'_>, out: &mut [f64]) -> Result<()> {
-        let layout = &self.compiled.layout;
-        rollout.check(layout, self.batch_size(), self.plan.len(), out)?;
-        if rollout.substeps == 0 {
-            return Err(Error::Shape(
-                "a frame needs at least one physics step".into(),
-            ));
-        }
-        let segments = segments(rollout);
-        // All values are checked before the first step.
-        if !rollout.changes.is_empty() {
-            let mut values = self.present(rollout.sims);
-            for segment in &segments {
-                self.changed(rollout, segment.start, &mut values);
-                self.check_values(&values)?;
-            }
-        }
-        let nu = layout.nu();
-        let width = rollout.record.width();
-        let stage = Stage::of(rollout.record, &self.compiled.model);
-        let length = rollout.frames * width;
-        let mut rest = &mut *out;
-        let mut jobs = Vec::with_capacity(rollout.sims.len());
-        let mut sims = Vec::with_capacity(rollout.sims.len());
-        for (row, &sim) in rollout.sims.iter().enumerate() {
-            let (mine, others) = rest.split_at_mut(length);
-            rest = others;
-            if !self.status[sim].is_running() {
-                mine.fill(f64::NAN);
-                continue;
-            }
-            if std::mem::take(&mut self.begun[sim]) && rollout.frames > 0 && !self.memory.is_empty()
-            {
-                let first = match rollout.control {
-                    Control::Shared(all) => &all[..nu],
-                    Control::PerSimulation(all) => &all[row * rollout.frames * nu..][..nu],
-                };
-                self.memory.hold(self.batch.state(sim), first);
-            }
-            sims.push(sim);
-            jobs.push(Job {
-                row,
-                out: mine,
-                frames: 0,
-                steps: 0,
-                stopped: None,
-                parameters: std::array::from_fn(|_| Vec::new()),
-            });
-        }
-        for range in segments {
-            if !rollout.changes.is_empty() {
-                let mut values = self.present(rollout.sims);
-                self.changed(rollout, range.start, &mut values);
-                self.write_parameters(rollout.sims, &values)?;
-            }
-            let frames = Frames {
-                rollout,
-                range,
-                nu,
-                stage,
-                sensors: &self.sensors,
-                halves: self.halves,
-                columns: self.plan.columns(),
-            };
-            if rollout.hook.is_some() {
-                let columns = self.plan.len();
-                for (&sim, job) in sims.iter().zip(&mut jobs) {
-                    let set = &self.values[sim * columns..(sim + 1) * columns];
-                    job.parameters = std::array::from_fn(|_| set.to_vec());
-                }
-            }
-            let numbers = ids(sims.iter().copied());
-            for job in &mut jobs {
-                job.steps = 0;
-            }
-            self.batch.apply(
-                &numbers,
-                &mut jobs,
-                &|job, sim| run(job, sim, &frames),
-                true,
-            );
-            self.steps += jobs.iter().map(|j| j.steps).sum::<u64>();
-            self.settle(&sims, &jobs);
-            let mut row = 0;
-            let status = &self.status;
-            jobs.retain_mut(|job| {
-                let runs = status[sims[row]].is_running();
-                row += 1;
-                if !runs {
-                    job.out[job.frames * width..].fill(f64::NAN);
-                }
-                runs
-            });
-            sims.retain(|&s| status[s].is_running());
-        }
-        Ok(())
+        self.roll_out(rollout, out)
     }
 
     fn read(&mut self, sims: &[usize], record: &Recording, out: &mut [f64]) -> Result<()> {
         check_sims(sims, self.batch_size())?;
         let width = record.width();
-        expect("output", out.len(), sims.len() * width)?;
+        check_len("output", out.len(), sims.len() * width)?;
         out.fill(f64::NAN);
         let running = ids(self.running(sims));
         if width == 0 {
@@ -436,17 +225,8 @@ impl Simulator for MujocoSimulator {
 
     fn load(&mut self, snapshot: &Snapshot, rows: &[usize], sims: &[usize]) -> Result<()> {
         check_sims(sims, self.batch_size())?;
-        expect("rows", rows.len(), sims.len())?;
-        let saved = snapshot
-            .data::<SavedStates>()
-            .filter(|s| Arc::ptr_eq(&s.compiled, &self.compiled))
-            .ok_or_else(|| Error::Shape("the snapshot is of another scene".into()))?;
-        if let Some(row) = rows.iter().find(|&&r| r >= snapshot.rows()) {
-            return Err(Error::Shape(format!(
-                "row {row} of a snapshot with {} rows",
-                snapshot.rows()
-            )));
-        }
+        let is_own = |s: &SavedStates| Arc::ptr_eq(&s.compiled, &self.compiled);
+        let saved = snapshot.restored(rows, sims, is_own)?;
         let width = self.batch.nstate();
         for (&row, &sim) in rows.iter().zip(sims) {
             let state = &saved.rows[row * width..(row + 1) * width];
@@ -459,17 +239,7 @@ impl Simulator for MujocoSimulator {
     }
 
     fn copy_state(&mut self, from: &[usize], to: &[usize]) -> Result<()> {
-        let size = self.batch_size();
-        check_sims(to, size)?;
-        expect("from", from.len(), to.len())?;
-        if let Some(sim) = from.iter().find(|&&s| s >= size) {
-            return Err(Error::Shape(format!("simulation {sim} of {size}")));
-        }
-        if let Some(sim) = from.iter().find(|s| to.binary_search(s).is_ok()) {
-            return Err(Error::Shape(format!(
-                "simulation {sim} is copied from and to"
-            )));
-        }
+        check_copy(from, to, self.batch_size())?;
         for (&source, &sim) in from.iter().zip(to) {
             self.batch.copy_state(source, sim);
             self.batch.clear_warnings(sim);

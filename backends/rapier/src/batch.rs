@@ -6,9 +6,9 @@
 use std::sync::Arc;
 
 use asid_core::layout::{Channel, Layout};
-use asid_core::simulator::{ParameterChange, check_sims};
+use asid_core::simulator::{ParameterChange, check_copy, check_len, check_sims, check_state};
 use asid_core::{
-    BatchConfig, Control, Error, Recording, Result, Rollout, Simulator, Snapshot, Status, Target,
+    BatchConfig, Control, Recording, Result, Rollout, Simulator, Snapshot, Status, Target,
 };
 use rayon::ThreadPool;
 use rayon::prelude::*;
@@ -34,19 +34,6 @@ struct Saved {
     states: Vec<State>,
 }
 
-fn shape(message: String) -> Error {
-    Error::Shape(message)
-}
-
-fn expect(have: usize, want: usize, what: &str) -> Result<()> {
-    if have != want {
-        return Err(shape(format!(
-            "{what} has {have} values where {want} are needed"
-        )));
-    }
-    Ok(())
-}
-
 impl Batch {
     /// Makes a batch, every simulation reset and with nominal parameters.
     ///
@@ -57,10 +44,7 @@ impl Batch {
         for target in &config.targets {
             columns.push((target.clone(), ParameterSlot::resolve(target, &compiled)?));
         }
-        let threads = match config.threads {
-            0 => std::thread::available_parallelism().map_or(1, usize::from),
-            n => n,
-        };
+        let threads = config.thread_count();
         let pool = if threads.min(config.size) > 1 {
             Some(pool::of(threads)?)
         } else {
@@ -140,7 +124,7 @@ impl Simulator for Batch {
     fn set_parameters(&mut self, sims: &[usize], values: &[f64]) -> Result<()> {
         check_sims(sims, self.worlds.len())?;
         let columns = self.columns.len();
-        expect(values.len(), sims.len() * columns, "parameters")?;
+        check_len("parameters", values.len(), sims.len() * columns)?;
         for row in values.chunks_exact(columns.max(1)) {
             for ((target, slot), &value) in self.columns.iter().zip(row) {
                 slot.check(target, value)?;
@@ -168,11 +152,7 @@ impl Simulator for Batch {
     fn set_state(&mut self, sims: &[usize], qpos: &[f64], qvel: &[f64]) -> Result<()> {
         check_sims(sims, self.worlds.len())?;
         let (nq, nv) = (self.compiled.layout.nq, self.compiled.layout.nv);
-        expect(qpos.len(), sims.len() * nq, "qpos")?;
-        expect(qvel.len(), sims.len() * nv, "qvel")?;
-        if qpos.iter().chain(qvel).any(|x| !x.is_finite()) {
-            return Err(shape("the state holds a value that is not finite".into()));
-        }
+        check_state(&self.compiled.layout, sims.len(), qpos, qvel)?;
         let rows = vec![(); sims.len()];
         self.for_each(sims, rows, |compiled, row, world, ()| {
             let time = world.state.time;
@@ -248,7 +228,7 @@ impl Simulator for Batch {
     fn read(&mut self, sims: &[usize], record: &Recording, out: &mut [f64]) -> Result<()> {
         check_sims(sims, self.worlds.len())?;
         let width = record.width();
-        expect(out.len(), sims.len() * width, "output")?;
+        check_len("output", out.len(), sims.len() * width)?;
         self.check_recording(record)?;
         for (row, &sim) in sims.iter().enumerate() {
             let out = &mut out[row * width..(row + 1) * width];
@@ -268,17 +248,8 @@ impl Simulator for Batch {
 
     fn load(&mut self, snapshot: &Snapshot, rows: &[usize], sims: &[usize]) -> Result<()> {
         check_sims(sims, self.worlds.len())?;
-        expect(rows.len(), sims.len(), "rows")?;
-        let saved = snapshot
-            .data::<Saved>()
-            .filter(|s| Arc::ptr_eq(&s.compiled, &self.compiled))
-            .ok_or_else(|| shape("the snapshot is of another scene or engine".into()))?;
-        if let Some(row) = rows.iter().find(|&&r| r >= saved.states.len()) {
-            return Err(shape(format!(
-                "row {row} of a snapshot of {}",
-                saved.states.len()
-            )));
-        }
+        let is_own = |s: &Saved| Arc::ptr_eq(&s.compiled, &self.compiled);
+        let saved = snapshot.restored(rows, sims, is_own)?;
         self.for_each(sims, rows.to_vec(), |compiled, _, world, row| {
             world.adopt(compiled, &saved.states[row]);
         });
@@ -286,14 +257,7 @@ impl Simulator for Batch {
     }
 
     fn copy_state(&mut self, from: &[usize], to: &[usize]) -> Result<()> {
-        check_sims(to, self.worlds.len())?;
-        expect(from.len(), to.len(), "from")?;
-        if let Some(i) = from
-            .iter()
-            .find(|&&f| f >= self.worlds.len() || to.binary_search(&f).is_ok())
-        {
-            return Err(shape(format!("simulation {i} cannot be copied from")));
-        }
+        check_copy(from, to, self.worlds.len())?;
         for (&source, &target) in from.iter().zip(to) {
             let (low, high) = self.worlds.split_at_mut(source.max(target));
             let (source, world) = if source < target {

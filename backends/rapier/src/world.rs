@@ -1,8 +1,11 @@
 //! One simulation: a state, its parameters, and rapier's pipeline to step it.
 
+mod divergence;
+mod forces;
+
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use asid_core::layout::{Channel, JointKind};
+use asid_core::layout::Channel;
 use asid_core::simulator::StepHook;
 use asid_core::{Recording, Status};
 use nalgebra::Vector3;
@@ -11,23 +14,12 @@ use rapier3d::math::{Rotation, Vector};
 use rapier3d::pipeline::PhysicsPipeline;
 
 use crate::compiled::Compiled;
-use crate::contact::{self, Touching};
-use crate::convert;
+use crate::contact;
 use crate::pairs::Hooks;
 use crate::parameter::ParameterSlot;
-use crate::settings::MAX_SPEED;
 use crate::state::State;
 use crate::tables::Tables;
-
-/// Position beyond which a simulation counts as diverged, m.
-const MAX_POSITION: f32 = 1e4;
-
-/// Angular or joint velocity beyond which a simulation counts as diverged, rad/s.
-const MAX_RATE: f32 = 1e4;
-
-/// Largest force (N) or torque (N m) on a body. What it does to a velocity can
-/// still be squared in single precision; beyond that rapier takes it for nothing.
-const MAX_FORCE: f64 = 1e15;
+use forces::MAX_FORCE;
 
 /// One simulation of a batch.
 pub struct World {
@@ -253,121 +245,6 @@ impl World {
                 *wanted = set;
             }
         }
-    }
-
-    /// Adds a force (N) and a torque (N m) at a body's centre of mass for this step.
-    fn push(
-        &mut self,
-        compiled: &Compiled,
-        body: usize,
-        force: &Vector3<f64>,
-        torque: &Vector3<f64>,
-    ) {
-        let Some(handle) = compiled.bodies[body] else {
-            return;
-        };
-        if force.amax().max(torque.amax()) > MAX_FORCE {
-            self.excess = Some(body);
-            return;
-        }
-        if let Some(rigid) = self.state.bodies.get_mut(handle)
-            && rigid.is_dynamic()
-        {
-            rigid.add_force(convert::to_vector(force), false);
-            rigid.add_torque(convert::to_vector(torque), false);
-            self.pushed.push(handle);
-        }
-    }
-
-    /// Adds the generalised forces of free and ball joints; those of hinges and
-    /// slides go through their drives.
-    fn push_generalised(&mut self, compiled: &Compiled) {
-        for joint in &compiled.joints {
-            let f = &self.force[joint.qvel..joint.qvel + joint.kind.qvel_len()];
-            if f.iter().all(|&x| x == 0.0) {
-                continue;
-            }
-            let motion = self.state.motion(compiled, joint.body);
-            match joint.kind {
-                JointKind::Free => {
-                    let force = Vector3::new(f[0], f[1], f[2]);
-                    let torque = motion.rotation * Vector3::new(f[3], f[4], f[5]);
-                    let moved = torque + (motion.position - motion.center).cross(&force);
-                    self.push(compiled, joint.body, &force, &moved);
-                }
-                JointKind::Ball => {
-                    let torque = motion.rotation * Vector3::new(f[0], f[1], f[2]);
-                    self.push(compiled, joint.body, &Vector3::zeros(), &torque);
-                    self.push(compiled, joint.parent, &Vector3::zeros(), &-torque);
-                }
-                JointKind::Hinge | JointKind::Slide => {}
-            }
-        }
-    }
-
-    /// Adds the rolling and torsional resistance of contacts.
-    fn resist(&mut self, compiled: &Compiled) {
-        let mut torques = std::mem::take(&mut self.torques);
-        torques.clear();
-        let mut resistance = std::mem::take(&mut self.state.resistance);
-        let state = &self.state;
-        resistance.torques(
-            &compiled.pairs,
-            &self.tables.friction,
-            &Touching {
-                narrow_phase: &state.narrow_phase,
-                colliders: &state.colliders,
-                body_of: &compiled.body_of_geom,
-                body: &|i| state.body(compiled, i),
-            },
-            compiled.layout.timestep as f32,
-            &mut torques,
-        );
-        self.state.resistance = resistance;
-        for (body, torque) in &torques {
-            self.push(
-                compiled,
-                *body,
-                &Vector3::zeros(),
-                &convert::vector(*torque),
-            );
-        }
-        self.torques = torques;
-    }
-
-    /// Why the state is out of the plausible range, if it is.
-    fn complaint(&self, compiled: &Compiled) -> Option<String> {
-        let quarantine = self.pipeline.quarantine();
-        if !quarantine.is_empty() {
-            return Some("a body's position is not finite".into());
-        }
-        for multibody in self.state.multibodies.multibodies() {
-            let fast = multibody
-                .generalized_velocity()
-                .iter()
-                .any(|v| !v.is_finite() || v.abs() > MAX_RATE);
-            if fast {
-                return Some(format!("a joint moves faster than {MAX_RATE} rad/s"));
-            }
-        }
-        for (index, handle) in compiled.bodies.iter().enumerate() {
-            let Some(body) = handle.and_then(|h| self.state.bodies.get(h)) else {
-                continue;
-            };
-            let name = &compiled.layout.bodies[index];
-            let position = body.translation();
-            if !position.is_finite() || position.abs().max_element() > MAX_POSITION {
-                return Some(format!("body `{name}` is farther than {MAX_POSITION} m"));
-            }
-            let (linear, angular) = (body.linvel(), body.angvel());
-            if !linear.is_finite() || linear.length() > 0.99 * MAX_SPEED {
-                return Some(format!("body `{name}` moves faster than {MAX_SPEED} m/s"));
-            }
-            if !angular.is_finite() || angular.length() > MAX_RATE {
-                return Some(format!("body `{name}` turns faster than {MAX_RATE} rad/s"));
-            }
-        }
-        None
     }
 
     /// Reads channels into a row; NaN where the simulation has diverged.

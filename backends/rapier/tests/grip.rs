@@ -106,7 +106,7 @@ fn a_grip_carries_its_weight_without_slip() {
 }
 
 #[test]
-fn a_rod_balances_only_over_its_centre_of_mass() {
+fn a_rod_balances_only_over_its_center_of_mass() {
     // The ledge is 0.04 m wide: 10 mm off stays, 30 mm off falls, either way.
     for (pick, stays) in [(-0.01, true), (0.01, true), (-0.03, false), (0.03, false)] {
         let (_, _, end) = lay_down(0.06, pick);

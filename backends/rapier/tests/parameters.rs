@@ -148,7 +148,7 @@ fn a_change_acts_from_its_frame_on() {
 }
 
 #[test]
-fn a_moved_centre_keeps_the_origins_velocity() {
+fn a_moved_center_keeps_the_origins_velocity() {
     let mut bench = Bench::with(&scene(SCENE), &["qvel.crate"], 1, 1, &["body/crate/ipos/0"]);
     let layout = bench.simulator.layout().clone();
     let mut qpos = vec![0.0; layout.nq];

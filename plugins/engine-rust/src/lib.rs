@@ -9,7 +9,8 @@
 pub mod flight;
 pub mod model;
 pub mod refusal;
-pub mod simulator;
+pub mod simulation;
+mod simulator;
 
 use std::sync::Arc;
 

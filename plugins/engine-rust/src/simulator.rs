@@ -2,39 +2,18 @@
 
 use std::sync::Arc;
 
-use asid_core::layout::{Channel, Layout, Recording};
-use asid_core::nalgebra::Vector3;
-use asid_core::simulator::{StepView, check_sims};
+use asid_core::layout::{Layout, Recording};
+use asid_core::simulator::{check_copy, check_len, check_sims, check_state};
 use asid_core::{BatchConfig, Control, Error, Result, Rollout, Simulator, Snapshot, Status};
 
-use crate::flight::{Body, Load, Motion, step};
 use crate::model::{Column, Compiled};
-
-/// Largest number that counts as a state.
-const HUGE: f64 = 1e10;
-
-/// One simulation: its state, and the world as its parameters make it.
-#[derive(Clone)]
-struct Sim {
-    state: State,
-    bodies: Vec<Body>,
-    gravity: Vector3<f64>,
-}
-
-/// What a snapshot keeps.
-#[derive(Clone)]
-struct State {
-    time: f64,
-    qpos: Vec<f64>,
-    qvel: Vec<f64>,
-    status: Status,
-}
+use crate::simulation::{Simulation, State};
 
 /// A batch of simulations.
 pub struct FlightSimulator {
     compiled: Arc<Compiled>,
     columns: Vec<Column>,
-    sims: Vec<Sim>,
+    sims: Vec<Simulation>,
     status: Vec<Status>,
     threads: usize,
     steps: u64,
@@ -61,24 +40,10 @@ impl FlightSimulator {
         }
         let columns = config.targets.iter().map(|t| Ok(compiled.resolve(t)?.0));
         let columns = columns.collect::<Result<Vec<_>>>()?;
-        let sim = Sim {
-            state: State {
-                time: 0.0,
-                qpos: compiled.start.clone(),
-                qvel: vec![0.0; compiled.layout.nv],
-                status: Status::Running,
-            },
-            bodies: compiled.bodies.clone(),
-            gravity: compiled.gravity,
-        };
-        let threads = match config.threads {
-            0 => std::thread::available_parallelism().map_or(1, usize::from),
-            n => n,
-        };
         let mut batch = Self {
-            sims: vec![sim; config.size],
+            sims: vec![Simulation::new(&compiled); config.size],
             status: vec![Status::Running; config.size],
-            threads: threads.min(config.size),
+            threads: config.thread_count().min(config.size),
             steps: 0,
             columns,
             compiled,
@@ -96,15 +61,6 @@ impl FlightSimulator {
     }
 }
 
-fn expect(what: &str, have: usize, want: usize) -> Result<()> {
-    if have == want {
-        return Ok(());
-    }
-    Err(Error::Shape(format!(
-        "{what} has {have} values where {want} are needed"
-    )))
-}
-
 /// A value that a parameter can take.
 fn check_value(column: Column, value: f64) -> Result<()> {
     let (parameter, fits) = match column {
@@ -120,146 +76,6 @@ fn check_value(column: Column, value: f64) -> Result<()> {
     })
 }
 
-impl Sim {
-    fn set(&mut self, compiled: &Compiled, column: Column, value: f64) {
-        match column {
-            Column::Gravity(i) => self.gravity[i] = value,
-            Column::Mass(i) => {
-                let nominal = &compiled.bodies[i];
-                let ratio = value / nominal.mass;
-                self.bodies[i].mass = value;
-                self.bodies[i].inertia = nominal.inertia * ratio;
-                self.bodies[i].inverse = nominal.inverse / ratio;
-            }
-        }
-    }
-
-    /// Readings of the present state.
-    fn record(&self, compiled: &Compiled, record: &Recording, out: &mut [f64]) {
-        for (i, channel) in record.channels().iter().enumerate() {
-            let out = &mut out[record.range(i)];
-            match *channel {
-                Channel::Position { start, len } => {
-                    out.copy_from_slice(&self.state.qpos[start..start + len]);
-                }
-                Channel::Velocity { start, len } => {
-                    out.copy_from_slice(&self.state.qvel[start..start + len]);
-                }
-                Channel::ContactForce { .. } => out.fill(f64::NAN), // refused before
-                Channel::Sensor { index } => self.sense(compiled, index, out),
-            }
-        }
-    }
-
-    fn sense(&self, compiled: &Compiled, sensor: usize, out: &mut [f64]) {
-        let Some(frame) = &compiled.frames[sensor] else {
-            return out.fill(f64::NAN); // refused before
-        };
-        let motion = self.motion(frame.body);
-        match compiled.layout.sensors[sensor].kind.as_str() {
-            "framepos" => {
-                let position = motion.position + motion.rotation * frame.position;
-                out.copy_from_slice(position.as_slice());
-            }
-            "framelinvel" => out.copy_from_slice(motion.velocity_of(&frame.position).as_slice()),
-            "frameangvel" => out.copy_from_slice((motion.rotation * motion.spin).as_slice()),
-            _ => {
-                let q = motion.rotation * frame.rotation;
-                out.copy_from_slice(&[q.w, q.i, q.j, q.k]);
-            }
-        }
-    }
-
-    fn motion(&self, body: usize) -> Motion {
-        Motion::read(&self.state.qpos[7 * body..], &self.state.qvel[6 * body..])
-    }
-
-    /// Runs row `row` of a rollout and writes its readings.
-    fn run(
-        &mut self,
-        compiled: &Compiled,
-        columns: &[Column],
-        rollout: &Rollout<'_>,
-        row: usize,
-        out: &mut [f64],
-    ) -> u64 {
-        let width = rollout.record.width();
-        let mut steps = 0;
-        let mut generalised = vec![0.0; compiled.layout.nv];
-        for frame in 0..rollout.frames {
-            for change in rollout.changes.iter().filter(|c| c.frame == frame) {
-                self.set(compiled, columns[change.column], change.values[row]);
-            }
-            for substep in 0..rollout.substeps {
-                if !self.state.status.is_running() {
-                    break;
-                }
-                generalised.fill(0.0);
-                if let Some(hook) = rollout.hook {
-                    let mut view = StepView {
-                        time: self.state.time,
-                        qpos: &self.state.qpos,
-                        qvel: &self.state.qvel,
-                        ctrl: &mut [],
-                        force: &mut generalised,
-                        parameters: &mut [],
-                    };
-                    hook.before_step(row, frame * rollout.substeps + substep, &mut view);
-                }
-                self.step(compiled, rollout, row, frame, &generalised);
-                steps += 1;
-            }
-            let out = &mut out[frame * width..(frame + 1) * width];
-            if self.state.status.is_running() {
-                self.record(compiled, rollout.record, out);
-            } else {
-                out.fill(f64::NAN);
-            }
-        }
-        steps
-    }
-
-    fn step(
-        &mut self,
-        compiled: &Compiled,
-        rollout: &Rollout<'_>,
-        row: usize,
-        frame: usize,
-        generalised: &[f64],
-    ) {
-        let dt = compiled.layout.timestep;
-        for (i, body) in self.bodies.iter().enumerate() {
-            let mut load = Load {
-                force: Vector3::zeros(),
-                torque: Vector3::zeros(),
-                joint: [0.0; 6],
-            };
-            load.joint.copy_from_slice(&generalised[6 * i..6 * i + 6]);
-            let pushes = rollout.forces.iter();
-            for push in pushes.filter(|f| f.body == compiled.places[i]) {
-                let at = (row * rollout.frames + frame) * 6;
-                load.force += Vector3::from_column_slice(&push.wrench[at..at + 3]);
-                load.torque += Vector3::from_column_slice(&push.wrench[at + 3..at + 6]);
-            }
-            let (qpos, qvel) = (&mut self.state.qpos[7 * i..], &mut self.state.qvel[6 * i..]);
-            let mut motion = Motion::read(qpos, qvel);
-            step(body, &mut motion, &load, &self.gravity, dt);
-            motion.write(qpos, qvel);
-        }
-        self.state.time += dt;
-        let numbers = self.state.qpos.iter().chain(&self.state.qvel);
-        if numbers.clone().any(|x| x.is_nan() || x.abs() > HUGE) {
-            let time = self.state.time;
-            self.state.status = Status::Diverged {
-                time,
-                message: format!(
-                    "a position or velocity is not finite or beyond {HUGE:e} at {time} s"
-                ),
-            };
-        }
-    }
-}
-
 impl Simulator for FlightSimulator {
     fn layout(&self) -> &Layout {
         &self.compiled.layout
@@ -271,7 +87,7 @@ impl Simulator for FlightSimulator {
 
     fn set_parameters(&mut self, sims: &[usize], values: &[f64]) -> Result<()> {
         check_sims(sims, self.batch_size())?;
-        expect("parameters", values.len(), sims.len() * self.columns.len())?;
+        check_len("parameters", values.len(), sims.len() * self.columns.len())?;
         let columns = self.columns.iter().cycle();
         for (&column, &value) in columns.zip(values) {
             check_value(column, value)?;
@@ -304,13 +120,7 @@ impl Simulator for FlightSimulator {
     fn set_state(&mut self, sims: &[usize], qpos: &[f64], qvel: &[f64]) -> Result<()> {
         check_sims(sims, self.batch_size())?;
         let (nq, nv) = (self.compiled.layout.nq, self.compiled.layout.nv);
-        expect("qpos", qpos.len(), sims.len() * nq)?;
-        expect("qvel", qvel.len(), sims.len() * nv)?;
-        if qpos.iter().chain(qvel).any(|x| !x.is_finite()) {
-            return Err(Error::Shape(
-                "the state holds a value that is not finite".into(),
-            ));
-        }
+        check_state(&self.compiled.layout, sims.len(), qpos, qvel)?;
         let length = |q: &[f64]| q[3..7].iter().map(|x| x * x).sum::<f64>().sqrt();
         if qpos.chunks(7).any(|q| length(q) < 1e-9) {
             return Err(Error::Shape("a quaternion of the state is zero".into()));
@@ -355,7 +165,7 @@ impl Simulator for FlightSimulator {
         }
         let share = jobs.len().div_ceil(self.threads).max(1);
         let (compiled, columns) = (&*self.compiled, &self.columns[..]);
-        let run = |jobs: &mut [(usize, &mut Sim, &mut [f64])]| -> u64 {
+        let run = |jobs: &mut [(usize, &mut Simulation, &mut [f64])]| -> u64 {
             jobs.iter_mut()
                 .map(|(row, sim, out)| sim.run(compiled, columns, rollout, *row, out))
                 .sum()
@@ -382,7 +192,7 @@ impl Simulator for FlightSimulator {
     fn read(&mut self, sims: &[usize], record: &Recording, out: &mut [f64]) -> Result<()> {
         check_sims(sims, self.batch_size())?;
         let width = record.width();
-        expect("output", out.len(), sims.len() * width)?;
+        check_len("output", out.len(), sims.len() * width)?;
         self.compiled.check_readings(record)?;
         for (&sim, row) in sims.iter().zip(out.chunks_mut(width.max(1))) {
             if self.status[sim].is_running() {
@@ -405,17 +215,8 @@ impl Simulator for FlightSimulator {
 
     fn load(&mut self, snapshot: &Snapshot, rows: &[usize], sims: &[usize]) -> Result<()> {
         check_sims(sims, self.batch_size())?;
-        expect("rows", rows.len(), sims.len())?;
-        let saved = snapshot
-            .data::<Saved>()
-            .filter(|s| Arc::ptr_eq(&s.compiled, &self.compiled))
-            .ok_or_else(|| Error::Shape("the snapshot is of another scene".into()))?;
-        if let Some(row) = rows.iter().find(|&&r| r >= snapshot.rows()) {
-            return Err(Error::Shape(format!(
-                "row {row} of a snapshot with {} rows",
-                snapshot.rows()
-            )));
-        }
+        let is_own = |s: &Saved| Arc::ptr_eq(&s.compiled, &self.compiled);
+        let saved = snapshot.restored(rows, sims, is_own)?;
         for (&row, &sim) in rows.iter().zip(sims) {
             self.sims[sim].state.clone_from(&saved.states[row]);
         }
@@ -424,16 +225,7 @@ impl Simulator for FlightSimulator {
     }
 
     fn copy_state(&mut self, from: &[usize], to: &[usize]) -> Result<()> {
-        check_sims(to, self.batch_size())?;
-        expect("from", from.len(), to.len())?;
-        if let Some(&sim) = from
-            .iter()
-            .find(|s| **s >= self.sims.len() || to.contains(s))
-        {
-            return Err(Error::Shape(format!(
-                "simulation {sim} is not there, or is copied from and to"
-            )));
-        }
+        check_copy(from, to, self.batch_size())?;
         for (&source, &sim) in from.iter().zip(to) {
             let state = self.sims[source].state.clone();
             self.sims[sim].state = state;

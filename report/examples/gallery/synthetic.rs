@@ -72,16 +72,16 @@ pub fn crowded_run() -> RunReport {
     report.explorer = "fisher-ppo".into();
     report.notes = vec!["2 of 512 simulations diverged and were left out.".into()];
     let logarithmic = (1..=3).map(|i| {
-        let centre = [2e-5f64, 1.7e-4, 8e-4][i - 1];
-        let draw = |z: f64, spread: f64| (centre * (spread * z).exp()).clamp(1e-5, 1e-3);
+        let center = [2e-5f64, 1.7e-4, 8e-4][i - 1];
+        let draw = |z: f64, spread: f64| (center * (spread * z).exp()).clamp(1e-5, 1e-3);
         ParameterReport {
             name: format!("rolling_friction_{i}"),
             unit: "m".into(),
             target: format!("geom/patch_{i}/friction/2"),
             log_scale: true,
-            truth: Some(centre * 1.05),
-            estimate: centre,
-            std: 0.12 * centre,
+            truth: Some(center * 1.05),
+            estimate: center,
+            std: 0.12 * center,
             interval95: [draw(-1.96, 0.12), draw(1.96, 0.12)],
             prior: Some(Prior::LogUniform {
                 low: 1e-5,
@@ -156,7 +156,7 @@ pub fn crowded_run() -> RunReport {
 fn parameter(noise: &mut Noise) -> ParameterReport {
     let narrowing = (0..=8).map(|iteration| {
         let spread = 0.055 * 0.55f64.powi(iteration) + STD;
-        let centre = ESTIMATE * (1.0 - 0.5f64.powi(iteration));
+        let center = ESTIMATE * (1.0 - 0.5f64.powi(iteration));
         let z = if iteration == 0 {
             [-1.7, -0.9, 0.0, 0.9, 1.7]
         } else {
@@ -164,7 +164,7 @@ fn parameter(noise: &mut Noise) -> ParameterReport {
         };
         Narrowing {
             iteration: iteration as u32,
-            quantiles: z.map(|z| (centre + z * spread).clamp(-0.1, 0.1)),
+            quantiles: z.map(|z| (center + z * spread).clamp(-0.1, 0.1)),
         }
     });
     ParameterReport {
@@ -330,12 +330,12 @@ fn downstream(noise: &mut Noise) -> Downstream {
     ];
     let mut trials = Vec::new();
     for iteration in 0..6 {
-        let (centre, spread) = (
+        let (center, spread) = (
             ESTIMATE * (1.0 - 0.4f64.powi(iteration)),
             0.05 * 0.5f64.powi(iteration),
         );
         for _ in 0..40 {
-            let action = centre + spread * noise.normal();
+            let action = center + spread * noise.normal();
             let cost = if (action - TRUTH).abs() > 0.045 {
                 18.0 + noise.normal()
             } else {

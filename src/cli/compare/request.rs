@@ -2,27 +2,21 @@
 
 use anyhow::Result;
 use asid_comparison::document::Document;
-use asid_comparison::method::{BY_DEFAULT, Method};
+use asid_comparison::method::Method;
 use asid_comparison::plan::{MATCHED, Plan, TaskPlan};
 use asid_comparison::preset;
-use asid_core::Error;
 use asid_core::registry::{
-    self, BackendEntry, Entry, ExplorerEntry, IdentifierEntry, Origin, SolverEntry, TaskEntry, find,
+    self, BackendEntry, Entry as _, ExplorerEntry, IdentifierEntry, Origin, SolverEntry, TaskEntry,
+    find,
 };
 use asid_effects::EffectSpec;
 
 use super::Arguments;
-use crate::cli::list;
+use super::methods::methods;
 use crate::cli::plugins::{file_of, recorded, used};
-use crate::cli::settings::{PRIOR, check_condition, default_backend, read_table, set};
-
-fn wrong(key: &str, message: impl Into<String>) -> anyhow::Error {
-    Error::Config {
-        key: key.to_owned(),
-        message: message.into(),
-    }
-    .into()
-}
+use crate::cli::settings::{
+    PRIOR, check_condition, default_backend, read_table, seed, set, text, wrong,
+};
 
 /// What is asked for: the command line over the configuration over a table of the paper over
 /// the defaults.
@@ -231,21 +225,13 @@ struct OfRun {
 impl OfRun {
     fn take(settings: &mut toml::Table) -> Result<Self> {
         let text = |table: &mut toml::Table, key: &str| -> Result<Option<String>> {
-            match table.remove(key) {
-                None => Ok(None),
-                Some(toml::Value::String(text)) => Ok(Some(text)),
-                Some(other) => Err(wrong(key, format!("{other} is not a text in quotes"))),
-            }
+            let found = text(table, key);
+            table.remove(key);
+            found
         };
         text(settings, "command")?;
-        let seed = match settings.remove("seed") {
-            None => None,
-            Some(value) => {
-                let whole = value.as_integer().and_then(|s| u64::try_from(s).ok());
-                let wrong = || wrong("seed", format!("{value} is not a whole number from 0 up"));
-                Some(whole.ok_or_else(wrong)?)
-            }
-        };
+        let seed = seed(settings)?;
+        settings.remove("seed");
         let backend = text(settings, "backend")?;
         let world = match settings.get_mut("real").and_then(toml::Value::as_table_mut) {
             None => None,
@@ -310,61 +296,4 @@ fn tasks(
             Ok(TaskPlan { name, conditions })
         })
         .collect()
-}
-
-/// The methods; parts of those that are no named method must exist.
-fn methods(given: &[String], base: Option<&Plan>) -> Result<Vec<Method>> {
-    let methods = match (given, base) {
-        ([], Some(base)) => base.methods.clone(),
-        ([], None) => BY_DEFAULT
-            .iter()
-            .map(|m| Method::named(m))
-            .collect::<asid_core::Result<_>>()?,
-        (given, _) => given
-            .iter()
-            .map(|m| Method::parse(m))
-            .collect::<asid_core::Result<_>>()?,
-    };
-    for method in methods.iter().filter(|m| Method::named(&m.name).is_err()) {
-        // What this build could have is told of in the table; what nobody knows is a mistake.
-        if let Some((_, error @ Error::UnknownName { .. })) = lacking(method) {
-            return Err(error.into());
-        }
-    }
-    Ok(methods)
-}
-
-/// Why a method cannot be run in this build.
-pub fn missing_part(method: &Method) -> Option<Error> {
-    let (part, error) = lacking(method)?;
-    Some(match error {
-        Error::UnknownName { .. } => Error::Missing {
-            what: part,
-            message: "this build is without it".into(),
-        },
-        other => other,
-    })
-}
-
-/// The first part of a method that is not registered, and what is known of it.
-fn lacking(method: &Method) -> Option<(String, Error)> {
-    fn of<E: Entry>(name: &str) -> Option<(String, Error)> {
-        let unknown = find::<E>(name).err()?;
-        let error = list::missing(E::KIND, name).unwrap_or(unknown);
-        Some((format!("{} `{name}`", E::KIND), error))
-    }
-    let explorer = || {
-        method
-            .explores()
-            .then(|| of::<ExplorerEntry>(&method.explorer))
-    };
-    let identifier = || {
-        method
-            .identifies()
-            .then(|| of::<IdentifierEntry>(&method.identifier))
-    };
-    explorer()
-        .flatten()
-        .or_else(|| identifier().flatten())
-        .or_else(|| of::<SolverEntry>(&method.solver))
 }

@@ -11,7 +11,8 @@ use asid_core::Error;
 
 use super::arm::Arm;
 use super::folder::{SummedUp, claim, contents, sum_up};
-use super::request::{document, missing_part};
+use super::methods::missing_part;
+use super::request::document;
 use super::resume::{pending, same_comparison};
 use super::signals::{how_to_go_on, watch};
 use super::train::Trainer;

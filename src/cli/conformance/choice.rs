@@ -7,7 +7,7 @@ use asid_conformance::{Check, FAMILIES, checks};
 use asid_core::{Backend, Error};
 use serde::Serialize;
 
-use super::bits;
+use super::names;
 
 /// The checks whose names hold one of some texts, all where there is none.
 pub fn chosen(patterns: &[String]) -> Result<Vec<&'static Check>> {
@@ -70,7 +70,7 @@ pub fn list(checks: &[&Check], json: bool) -> Result<()> {
     let listed: Vec<Listed> = (checks.iter())
         .map(|check| Listed {
             name: check.name,
-            needs: bits(check.needs),
+            needs: names(check.needs),
             unit: check.unit,
             reason: check.reason,
         })

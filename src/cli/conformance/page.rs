@@ -4,7 +4,7 @@ use asid_conformance::{FAMILIES, Outcome, Row, checks};
 use asid_report::page::{Cell, Column, Page, Section, Table, Tone};
 
 use super::cell::{cell, limit};
-use super::{ConformanceResult, Count, Engine};
+use super::result::{ConformanceResult, Count, Engine};
 
 /// The page: each engine in a sentence, what is wrong, then family after family.
 pub fn html(result: &ConformanceResult, command: &str) -> String {

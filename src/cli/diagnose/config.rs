@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use asid_core::registry::{self, BackendEntry, TaskEntry, find};
-use asid_core::{Capabilities, Episode, Error};
+use asid_core::{Capabilities, Episode};
 use asid_diagnosis::diagnose::{Contact, Settings};
 use asid_diagnosis::latent_force::search::FALSE_ALARMS;
 use asid_diagnosis::search::Breadth;
@@ -19,7 +19,7 @@ use super::super::model::{self, Needs};
 use super::super::options::Common;
 use super::super::plugins::{file_of, recorded, used};
 use super::super::session::backend;
-use super::super::settings::{self, difficulty};
+use super::super::settings::{difficulty, given, parsed, wrong};
 use super::Arguments;
 
 /// `config.toml` of a diagnosis.
@@ -184,18 +184,13 @@ impl Default for SearchConfig {
 impl Config {
     /// The settings of a study where nothing but the configuration file and `--set` says more.
     pub fn of_study(study: &Path, common: &Common) -> Result<Self> {
-        let mut config = Self::of_table(given(common)?)?;
+        let mut config = parsed::<Self>(given(common)?)?;
         config.study = Some(study.to_owned());
         if let Some(name) = &common.backend {
             config.backend.clone_from(name);
         }
         config.minutes = config.minutes.or(Some(MINUTES));
         Ok(config)
-    }
-
-    fn of_table(table: toml::Table) -> Result<Self> {
-        let read = table.try_into();
-        read.map_err(|e: toml::de::Error| wrong("config", e.message().replace('\n', " ")))
     }
 
     /// The configuration file, `--set`, then the command line; and apart from it the settings of
@@ -215,7 +210,7 @@ impl Config {
                 of_run.extend(table.remove_entry(&key));
             }
         }
-        let mut config = Self::of_table(table)?;
+        let mut config: Self = parsed(table)?;
         if arguments.study.is_some() || arguments.task.is_some() {
             config.study.clone_from(&arguments.study);
             config.task.clone_from(&arguments.task);
@@ -343,18 +338,6 @@ impl Config {
     }
 }
 
-/// What the configuration file and `--set` say.
-fn given(common: &Common) -> Result<toml::Table> {
-    let mut table = match &common.config {
-        Some(path) => settings::read_table(path)?,
-        None => toml::Table::new(),
-    };
-    for setting in &common.set {
-        settings::set(&mut table, setting)?;
-    }
-    Ok(table)
-}
-
 /// Logs to fit to and logs held out, with their names.
 pub type Logs = (Vec<(String, Episode)>, Vec<(String, Episode)>);
 
@@ -382,12 +365,4 @@ pub fn default_backend() -> String {
     };
     let found = all.iter().find(double).or(all.first());
     found.map_or_else(String::new, |e| e.name.to_owned())
-}
-
-fn wrong(key: &str, message: impl Into<String>) -> anyhow::Error {
-    Error::Config {
-        key: key.into(),
-        message: message.into(),
-    }
-    .into()
 }

@@ -231,7 +231,7 @@ impl Machine {
         let counted = &before[..before.len().min(n as usize)];
         let mut trials = Vec::new();
         let real = &session.config.real;
-        if real.world != asid_worlds::Kind::Matched {
+        if real.world != asid_worlds::WorldKind::Matched {
             progress.begin("without the effect", n);
             let plain = Worlds {
                 real: Real {

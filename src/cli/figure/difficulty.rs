@@ -12,6 +12,7 @@ use asid_core::difficulty::Difficulty;
 use asid_core::{Error, Task};
 
 use super::{Data, Drawing, Request, share, task};
+use crate::cli::settings::wrong;
 use shown::{claims, metric, success, table};
 
 /// The task that is shown where none is named.
@@ -103,14 +104,6 @@ pub fn draw(request: &Request<'_>, kept: &Path) -> Result<Drawing> {
         }));
     }
     Ok(drawing)
-}
-
-fn wrong(key: &str, message: impl Into<String>) -> anyhow::Error {
-    Error::Config {
-        key: key.to_owned(),
-        message: message.into(),
-    }
-    .into()
 }
 
 /// The difficulty and its levels: as asked for, else the task's own. A quick look has the first, the middle

@@ -146,7 +146,7 @@ fn outside(
     count: u64,
 ) -> Vec<Wanted> {
     let start = &task.exploration().start;
-    let bounds = task.top_view().bounds;
+    let bounds = task.spec().top_view.bounds;
     let range = |i: usize| {
         let low = (start[i].range[0] - BEYOND).max(bounds[0][i] + MARGIN);
         let high = (start[i].range[1] + BEYOND).min(bounds[1][i] - MARGIN);

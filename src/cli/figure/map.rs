@@ -67,8 +67,8 @@ impl Grid {
 
 /// Adds what stands still in a task's scene.
 pub fn with_fixtures(mut plan: Plan, task: &dyn Task) -> Plan {
-    for fixture in task.top_view().fixtures {
-        let outline = Outline::polygon(fixture.corners).colour(Colour::Muted);
+    for fixture in &task.spec().top_view.fixtures {
+        let outline = Outline::polygon(fixture.corners.clone()).colour(Colour::Muted);
         plan = plan.outline(outline.strength(0.05, 0.8));
     }
     plan

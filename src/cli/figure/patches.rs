@@ -26,8 +26,8 @@ pub fn draw(request: &Request<'_>) -> Result<Drawing> {
     let episodes = request.episodes(4, EPISODES);
     let wanted = of_each(TASK, &explorers, &[], request.seed(), episodes);
     let played = play(&request.common, wanted)?;
-    let grid = Grid::over(task.top_view().bounds, SIDE);
-    let regions = task.regions();
+    let grid = Grid::over(task.spec().top_view.bounds, SIDE);
+    let regions = &task.spec().regions;
     let mut drawing = Drawing {
         data: vec![Data::new(
             "visits.csv",

@@ -1,19 +1,19 @@
 //! `asid explore STUDY`: the motion of any machine that tells the most, as a command file.
 
+mod unknown;
+
 use std::collections::BTreeMap;
-use std::io::Write as _;
 use std::path::Path;
 use std::time::Instant;
 
 use anyhow::Result;
 use asid_algorithms::fisher::Objective;
+use asid_core::Episode;
 use asid_core::posterior::Direction;
 use asid_core::signal::Signal;
-use asid_core::{Episode, Parameter};
 use asid_report::number::significant;
 use asid_sysid::design::Designed;
 use asid_sysid::method::Method;
-use asid_sysid::tells::Told;
 use serde::Serialize;
 
 use super::motion_config::Config;
@@ -25,31 +25,7 @@ use crate::cli::output::{OutFolder, write_json, write_text};
 use crate::cli::progress::Bars;
 use crate::cli::result::{CostResult, SCHEMA, figure};
 use crate::cli::view;
-
-/// Most repeats that are counted: who would play more looks for another motion.
-const MOST_REPEATS: usize = 1000;
-
-/// What is known of an unknown, in its unit.
-#[derive(Clone, Debug, Serialize, schemars::JsonSchema)]
-#[schemars(rename = "MotionUnknown")]
-pub struct UnknownResult {
-    pub name: String,
-    pub unit: String,
-    /// The value about which the motion was designed.
-    pub value: f64,
-    /// What shares are taken of: the value, or the middle of the range where it is zero.
-    pub reference: f64,
-    /// Standard deviations: of the prior, by the logs so far, by this motion, by both.
-    pub prior: f64,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub logs: Option<f64>,
-    pub motion: f64,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub both: Option<f64>,
-    /// Plays of the motion until it is known to the precision asked for, with the logs; null where no number of them
-    /// suffices.
-    pub repeats: Option<usize>,
-}
+use unknown::{UnknownResult, unknown_results};
 
 /// `result.json`.
 #[derive(Serialize, schemars::JsonSchema)]
@@ -147,7 +123,8 @@ pub fn explore(path: &Path, common: &Common, given: &super::motion_config::Optio
     out.write(|folder| {
         write_json(&folder.join("result.json"), &result)?;
         write_text(&folder.join("config.toml"), &toml::to_string(&config)?)?;
-        commands(&subject, &found, period).write_csv(&folder.join("commands.csv"))?;
+        Episode::of_commands(&subject.plant.layout, found.commands.clone(), period)
+            .write_csv(&folder.join("commands.csv"))?;
         predicted(&subject, &found, &setup.signals, period)
             .write_csv(&folder.join("predicted.csv"))?;
         write_text(&folder.join("report.html"), &page)?;
@@ -156,16 +133,7 @@ pub fn explore(path: &Path, common: &Common, given: &super::motion_config::Optio
         }
         Ok(())
     })?;
-    let mut stdout = std::io::stdout().lock();
-    if common.json {
-        writeln!(stdout, "{}", serde_json::to_string_pretty(&result)?)?;
-    } else {
-        for line in lines(&result) {
-            writeln!(stdout, "{line}")?;
-        }
-        writeln!(stdout, "results: {}", out.path().display())?;
-    }
-    drop(stdout);
+    out.tell(common.json, &result, &lines(&result))?;
     if let Some(what) = &result.broken {
         failure::warn(&format!(
             "no motion of this kind keeps all limits, not even the smallest: {what}; do not play it, and look at the limits \
@@ -175,96 +143,10 @@ pub fn explore(path: &Path, common: &Common, given: &super::motion_config::Optio
     Ok(())
 }
 
-/// What a deviation is measured by: the value, or the middle of the range where the value is zero.
-fn reference(parameter: &Parameter, value: f64) -> f64 {
-    if value == 0.0 {
-        parameter.center().abs()
-    } else {
-        value.abs()
-    }
-}
-
-/// What is known of the unknowns, before and after.
-fn unknown_results(
-    unknowns: &[Parameter],
-    values: &[f64],
-    logs: Option<&Told>,
-    motion: &Told,
-    precision: f64,
-) -> Vec<UnknownResult> {
-    let nothing = Told::nothing(motion.sought, motion.matrix.nrows());
-    let known = logs.unwrap_or(&nothing);
-    let alone = motion.deviations();
-    let so_far = known.deviations();
-    let both = motion.and(1.0, known).deviations();
-    unknowns
-        .iter()
-        .enumerate()
-        .map(|(i, p)| {
-            let unit = |scaled: f64| p.unscale_std(values[i], scaled);
-            let wanted = precision * reference(p, values[i]);
-            let enough = |n: usize| unit(motion.and(n as f64, known).deviations()[i]) <= wanted;
-            let repeats = if wanted > 0.0 && enough(MOST_REPEATS) {
-                // Information only grows: halving finds the fewest.
-                let (mut low, mut high) = (0, MOST_REPEATS);
-                while low < high {
-                    let middle = usize::midpoint(low, high);
-                    if enough(middle) {
-                        high = middle
-                    } else {
-                        low = middle + 1
-                    }
-                }
-                Some(low)
-            } else {
-                None
-            };
-            UnknownResult {
-                name: p.name.clone(),
-                unit: p.unit.clone(),
-                value: values[i],
-                reference: reference(p, values[i]),
-                prior: unit(1.0),
-                logs: logs.map(|_| unit(so_far[i])),
-                motion: unit(alone[i]),
-                both: logs.map(|_| unit(both[i])),
-                repeats,
-            }
-        })
-        .collect()
-}
-
-/// Times of `rows` frames, s, rounded to the nanosecond.
-fn times(rows: usize, period: f64) -> Vec<f64> {
-    (0..rows)
-        .map(|k| (k as f64 * period * 1e9).round() / 1e9)
-        .collect()
-}
-
-/// The commands as a log, the last one held.
-fn commands(subject: &Subject, found: &Designed, period: f64) -> Episode {
-    let actuators: Vec<String> = subject
-        .plant
-        .layout
-        .actuators
-        .iter()
-        .map(|a| a.name.clone())
-        .collect();
-    let nu = actuators.len();
-    let mut ctrl = found.commands.clone();
-    ctrl.extend_from_slice(&found.commands[found.commands.len() - nu..]);
-    Episode {
-        time: times(ctrl.len() / nu, period),
-        actuators,
-        ctrl,
-        ..Episode::default()
-    }
-}
-
 /// The log that the simulator expects, without noise; its first row is the first that was recorded.
 fn predicted(subject: &Subject, found: &Designed, signals: &[Signal], period: f64) -> Episode {
-    let mut episode = commands(subject, found, period);
     let layout = &subject.plant.layout;
+    let mut episode = Episode::of_commands(layout, found.commands.clone(), period);
     let channels = signals.iter().filter_map(|s| layout.sensor(&s.sensor).ok());
     episode.channels = channels
         .map(|s| asid_core::episode::ChannelColumns {

@@ -1,13 +1,12 @@
 //! `asid identify STUDY`: the parameters of a study from its logs.
 
-use std::io::Write as _;
 use std::path::Path;
 use std::time::Instant;
 
 use anyhow::Result;
 use asid_algorithms::optimise::GaussNewtonSettings;
 use asid_core::posterior::Direction;
-use asid_core::{Error, Parameter, Streams, Target};
+use asid_core::{Parameter, Streams, Target};
 use asid_effects::RefinedModel;
 use asid_report::run::{NamedText, RealWorld, RunReport};
 use asid_sysid::dataset::Dataset;
@@ -21,7 +20,7 @@ use crate::cli::options::Common;
 use crate::cli::output::{OutFolder, write_json, write_text};
 use crate::cli::progress::Bars;
 use crate::cli::result::{CostResult, ParameterResult, SCHEMA, caveats, parameter_line};
-use crate::cli::settings::{read_table, set};
+use crate::cli::settings::{given, parsed};
 use crate::cli::{run, trace};
 
 /// `config.toml`.
@@ -81,20 +80,9 @@ pub struct IdentifyResult {
 
 /// The settings: a file, then single values, then options.
 fn resolve(path: &Path, common: &Common) -> Result<Config> {
-    let mut table = match &common.config {
-        Some(path) => read_table(path)?,
-        None => toml::Table::new(),
-    };
-    for setting in &common.set {
-        set(&mut table, setting)?;
-    }
+    let mut table = given(common)?;
     table.insert("study".into(), path.display().to_string().into());
-    let mut config: Config = table
-        .try_into()
-        .map_err(|e: toml::de::Error| Error::Config {
-            key: "config".into(),
-            message: e.message().replace('\n', " "),
-        })?;
+    let mut config: Config = parsed(table)?;
     config.backend = common.backend.clone().or(config.backend);
     config.seed = common.seed.unwrap_or(config.seed);
     config.gauss_newton.check("gauss_newton")?;
@@ -138,12 +126,7 @@ pub fn identify(path: &Path, common: &Common) -> Result<()> {
         backend: subject.backend.name().to_owned(),
         identifier: "gauss-newton",
         seed: config.seed,
-        parameters: found
-            .posterior
-            .marginals
-            .iter()
-            .map(|m| ParameterResult::new(m, None))
-            .collect(),
+        parameters: ParameterResult::all(&found.posterior, None),
         unseen: found.posterior.unseen.clone(),
         residual: found.residual,
         gap,
@@ -192,16 +175,7 @@ pub fn identify(path: &Path, common: &Common) -> Result<()> {
         report.write(folder)?;
         Ok(())
     })?;
-    let mut stdout = std::io::stdout().lock();
-    if common.json {
-        writeln!(stdout, "{}", serde_json::to_string_pretty(&result)?)?;
-    } else {
-        for line in lines {
-            writeln!(stdout, "{line}")?;
-        }
-        writeln!(stdout, "results: {}", out.path().display())?;
-    }
-    drop(stdout);
+    out.tell(common.json, &result, &lines)?;
     if result.gap.identified > result.gap.nominal {
         failure::warn(
             "the fitted model replays the logs held out worse than the model as given: something else differs; \

@@ -1,18 +1,23 @@
 //! The settings of a motion's design: what is unknown, what must be kept, how it is searched.
 
+mod options;
+mod text;
+
 use std::collections::BTreeMap;
 use std::path::Path;
 
 use anyhow::Result;
+use asid_core::Parameter;
 use asid_core::parameter::Scale;
-use asid_core::{Error, Parameter};
 use asid_sysid::limits::{LimitRequest, REST};
 use asid_sysid::method::{DesignSettings, Method};
 use serde::{Deserialize, Serialize};
 
 use super::Subject;
 use crate::cli::options::Common;
-use crate::cli::settings::{read_table, set};
+use crate::cli::settings::{given, parsed, wrong};
+pub use options::Options;
+use text::{maybe_name, name_and};
 
 /// Length of a motion where nothing is said, s: some swings of an arm.
 const SECONDS: f64 = 5.0;
@@ -25,69 +30,6 @@ const SETTLE: f64 = 1.0;
 
 /// Relative precision that repeats are counted for.
 const PRECISION: f64 = 0.01;
-
-/// Options of `explore` that go with any machine.
-#[derive(clap::Args, Clone, Debug, Default)]
-pub struct Options {
-    /// Seek this unknown of any machine, beside those of the study; a fourth part `log` has it on a logarithmic scale
-    /// (repeatable)
-    #[arg(long, value_name = "TARGET:LOW:HIGH", help_heading = "Any machine")]
-    pub unknown: Vec<String>,
-    /// Know this one as little, but do not seek it: it is estimated along (repeatable)
-    #[arg(long, value_name = "TARGET:LOW:HIGH", help_heading = "Any machine")]
-    pub nuisance: Vec<String>,
-    /// Make this small: a-optimal (sum of variances), d-optimal (their volume), trace (of the information, to be large)
-    #[arg(long, value_name = "NAME", help_heading = "Any machine")]
-    pub objective: Option<String>,
-    /// Move for so long, s
-    #[arg(long, value_name = "S", help_heading = "Any machine")]
-    pub seconds: Option<f64>,
-    /// Command and read at this period, s
-    #[arg(long, value_name = "S", help_heading = "Any machine")]
-    pub period: Option<f64>,
-    /// Keep a joint here, rad or m [default: its range in the model, less 2 % at either end] (repeatable)
-    #[arg(long, value_name = "JOINT:LOW:HIGH", help_heading = "Any machine")]
-    pub limit_position: Vec<String>,
-    /// Keep a joint below this speed, rad/s or m/s; without a joint all (repeatable)
-    #[arg(long, value_name = "[JOINT:]SPEED", help_heading = "Any machine")]
-    pub limit_speed: Vec<String>,
-    /// Keep a drive's force on its joint below this, N or N m; without an actuator all (repeatable)
-    #[arg(long, value_name = "[ACTUATOR:]FORCE", help_heading = "Any machine")]
-    pub limit_force: Vec<String>,
-    /// Keep the origin of a body's frame in this box of the world, m, along the whole motion (repeatable)
-    #[arg(
-        long,
-        value_name = "BODY:X0:X1:Y0:Y1:Z0:Z1",
-        help_heading = "Any machine"
-    )]
-    pub limit_box: Vec<String>,
-    /// Let two bodies touch (repeatable)
-    #[arg(long, value_name = "BODY:BODY", help_heading = "Any machine")]
-    pub may_touch: Vec<String>,
-    /// Take this standard deviation for a sensor's noise (repeatable)
-    #[arg(long, value_name = "SENSOR:STD", help_heading = "Any machine")]
-    pub noise: Vec<String>,
-}
-
-impl Options {
-    /// Whether any is given.
-    pub fn any(&self) -> bool {
-        let lists = [
-            &self.unknown,
-            &self.nuisance,
-            &self.limit_position,
-            &self.limit_speed,
-            &self.limit_force,
-            &self.limit_box,
-            &self.may_touch,
-            &self.noise,
-        ];
-        lists.iter().any(|l| !l.is_empty())
-            || self.objective.is_some()
-            || self.seconds.is_some()
-            || self.period.is_some()
-    }
-}
 
 /// `config.toml`.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -166,48 +108,6 @@ impl Default for Config {
     }
 }
 
-fn wrong(key: &str, message: impl Into<String>) -> anyhow::Error {
-    Error::Config {
-        key: key.into(),
-        message: message.into(),
-    }
-    .into()
-}
-
-fn number(key: &str, text: &str) -> Result<f64> {
-    let parsed: Option<f64> = text.trim().parse().ok().filter(|x: &f64| x.is_finite());
-    parsed.ok_or_else(|| wrong(key, format!("`{text}` is not a finite number")))
-}
-
-/// A name, which may hold colons, and `N` numbers behind it.
-fn name_and<const N: usize>(key: &str, text: &str) -> Result<(String, [f64; N])> {
-    let parts: Vec<&str> = text.rsplitn(N + 1, ':').collect();
-    let form = || {
-        wrong(
-            key,
-            format!("`{text}` is not a name and {N} numbers, with colons between"),
-        )
-    };
-    let Some((name, numbers)) = parts.split_last().filter(|(_, n)| n.len() == N) else {
-        return Err(form());
-    };
-    let mut values = [0.0; N];
-    for (to, part) in values.iter_mut().rev().zip(numbers) {
-        *to = number(key, part)?;
-    }
-    Ok(((*name).to_owned(), values))
-}
-
-/// A name, or none, and a number above zero.
-fn maybe_name(key: &str, text: &str) -> Result<(String, f64)> {
-    let (name, value) = text.rsplit_once(':').unwrap_or(("", text));
-    let value = number(key, value)?;
-    if value <= 0.0 {
-        return Err(wrong(key, format!("`{text}`: must be above 0")));
-    }
-    Ok((name.to_owned(), value))
-}
-
 impl Config {
     /// The settings of a file alone, for a machine.
     ///
@@ -222,38 +122,29 @@ impl Config {
     }
 
     /// The configuration file, `--set`, then the options.
-    pub fn resolve(path: &Path, common: &Common, given: &Options) -> Result<Self> {
-        let mut table = match &common.config {
-            Some(path) => read_table(path)?,
-            None => toml::Table::new(),
-        };
-        for setting in &common.set {
-            set(&mut table, setting)?;
-        }
-        let mut config: Self = table
-            .try_into()
-            .map_err(|e: toml::de::Error| wrong("config", e.message().replace('\n', " ")))?;
+    pub fn resolve(path: &Path, common: &Common, options: &Options) -> Result<Self> {
+        let mut config: Self = parsed(given(common)?)?;
         config.machine = path.display().to_string();
         config.backend = common.backend.clone().or(config.backend);
         config.seed = common.seed.unwrap_or(config.seed);
         for (to, from) in [
-            (&mut config.unknown, &given.unknown),
-            (&mut config.nuisance, &given.nuisance),
-            (&mut config.limit_position, &given.limit_position),
-            (&mut config.limit_speed, &given.limit_speed),
-            (&mut config.limit_force, &given.limit_force),
-            (&mut config.limit_box, &given.limit_box),
-            (&mut config.may_touch, &given.may_touch),
+            (&mut config.unknown, &options.unknown),
+            (&mut config.nuisance, &options.nuisance),
+            (&mut config.limit_position, &options.limit_position),
+            (&mut config.limit_speed, &options.limit_speed),
+            (&mut config.limit_force, &options.limit_force),
+            (&mut config.limit_box, &options.limit_box),
+            (&mut config.may_touch, &options.may_touch),
         ] {
             to.extend(from.iter().cloned());
         }
-        for text in &given.noise {
+        for text in &options.noise {
             let (name, [std]) = name_and("--noise", text)?;
             config.noise.insert(name, std);
         }
-        config.objective = given.objective.clone().unwrap_or(config.objective);
-        config.seconds = given.seconds.unwrap_or(config.seconds);
-        config.period = given.period.unwrap_or(config.period);
+        config.objective = options.objective.clone().unwrap_or(config.objective);
+        config.seconds = options.seconds.unwrap_or(config.seconds);
+        config.period = options.period.unwrap_or(config.period);
         config.check()?;
         Ok(config)
     }
@@ -387,20 +278,5 @@ impl Config {
             request.touch.push([a.to_owned(), b.to_owned()]);
         }
         Ok(request)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn names_may_hold_colons() {
-        let (name, range) = name_and::<2>("k", "joint/robot:elbow/damping:0.1:2").unwrap();
-        assert_eq!((&*name, range), ("joint/robot:elbow/damping", [0.1, 2.0]));
-        assert!(name_and::<2>("k", "a:1").is_err());
-        assert!(name_and::<1>("k", "a:x").is_err());
-        assert_eq!(maybe_name("k", "2.5").unwrap(), (String::new(), 2.5));
-        assert!(maybe_name("k", "a:-1").is_err());
     }
 }

@@ -231,7 +231,7 @@ fn settle(
             "the machine begins beyond one: {what}; move its first keyframe within the limits, or widen this one"
         );
         return Err(Error::Config {
-            key: "limits".into(),
+            key: "limit_position, limit_speed, limit_force, limit_box".into(),
             message,
         }
         .into());

@@ -8,16 +8,13 @@ use std::collections::BTreeMap;
 use anyhow::Result;
 use asid_core::{Levels, Task};
 
-use super::table::{numbers, read_table, section, set, text, wrong};
+use super::table::{configured, numbers, section, set, text, wrong};
 use crate::cli::options::Common;
 
 /// Values of a task's difficulties, by name: those of the file, unless the command line names a
 /// preset, then those of `--set`.
 pub fn levels(task: &dyn Task, common: &Common) -> Result<BTreeMap<String, f64>> {
-    let file = match &common.config {
-        Some(path) => read_table(path)?,
-        None => common.base.clone(),
-    };
+    let file = configured(common)?;
     let mut given = toml::Table::new();
     for assignment in &common.set {
         set(&mut given, assignment)?;

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use anyhow::Result;
 use asid_core::{Error, Parameter, Task};
 use asid_effects::EffectSpec;
-use asid_worlds::{Kind, PerturbationRanges};
+use asid_worlds::{PerturbationRanges, WorldKind};
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -20,7 +20,7 @@ pub struct RealConfig {
     /// Kind; not written where it follows from the rest.
     #[serde(skip_serializing_if = "follows")]
     #[schemars(with = "String")]
-    pub world: Kind,
+    pub world: WorldKind,
     /// Engine.
     pub backend: String,
     /// Model file, MJCF or TOML; empty for the task's scene.
@@ -39,14 +39,14 @@ pub struct RealConfig {
 
 /// Whether a kind follows from the engine, the model and the effects.
 #[allow(clippy::trivially_copy_pass_by_ref)] // as serde calls it
-fn follows(kind: &Kind) -> bool {
-    matches!(kind, Kind::Matched | Kind::Custom)
+fn follows(kind: &WorldKind) -> bool {
+    matches!(kind, WorldKind::Matched | WorldKind::Custom)
 }
 
 impl RealConfig {
     /// Whether nothing is said of a real world other than the simulator.
     pub fn is_simulator(&self) -> bool {
-        self.world == Kind::Matched && self.truth.is_empty()
+        self.world == WorldKind::Matched && self.truth.is_empty()
     }
 }
 
@@ -78,36 +78,38 @@ pub fn resolve(
     let made = real.model.is_some() || !real.effects.is_empty();
     real.world = match options.world.clone().or(text(table, "world")?) {
         Some(name) => name.parse()?,
-        None if other || made => Kind::Custom,
-        None => Kind::Matched,
+        None if other || made => WorldKind::Custom,
+        None => WorldKind::Matched,
     };
     let kind = real.world;
-    if kind == Kind::Matched && (other || made) {
+    if kind == WorldKind::Matched && (other || made) {
         return Err(wrong(
             "real.world",
             "a matched world is the simulator itself and has no engine, model or effects of its own; \
              leave them out, or choose another --world",
         ));
     }
-    if kind == Kind::StandIn && real.model.is_some() {
+    if kind == WorldKind::StandIn && real.model.is_some() {
         return Err(wrong(
             "real.world",
             "a stand-in is the task's own other scene; it goes with no --real-model",
         ));
     }
     real.backend = match named {
-        Some(name) if kind == Kind::Crossed && !other => {
+        Some(name) if kind == WorldKind::Crossed && !other => {
             let message =
                 format!("a crossed world has another engine than the simulator's, `{name}`");
             return Err(wrong("real.backend", message));
         }
         Some(name) => name,
-        None if kind == Kind::Crossed => asid_worlds::other_engine(simulator, task.requires())?,
+        None if kind == WorldKind::Crossed => {
+            asid_worlds::other_engine(simulator, task.spec().requires)?
+        }
         None => simulator.to_owned(),
     };
     // Checked also where it is for other runs that share the settings.
     let ranges = PerturbationRanges::read(&section(table, "perturbation")?)?;
-    real.perturbation = (kind == Kind::Perturbed).then_some(ranges);
+    real.perturbation = (kind == WorldKind::Perturbed).then_some(ranges);
     Ok(real)
 }
 

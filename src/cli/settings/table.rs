@@ -5,7 +5,11 @@ use std::path::Path;
 
 use anyhow::Result;
 use asid_core::{Error, toml_text};
+use serde::de::DeserializeOwned;
 
+use crate::cli::options::Common;
+
+/// An error about the setting or the option `key`.
 pub fn wrong(key: &str, message: impl Into<String>) -> anyhow::Error {
     Error::Config {
         key: key.to_owned(),
@@ -14,6 +18,7 @@ pub fn wrong(key: &str, message: impl Into<String>) -> anyhow::Error {
     .into()
 }
 
+/// The table of a TOML file.
 pub fn read_table(path: &Path) -> Result<toml::Table> {
     let file = |message: String| Error::File {
         path: path.to_owned(),
@@ -26,6 +31,47 @@ pub fn read_table(path: &Path) -> Result<toml::Table> {
         });
         file(format!("line {line}: {}", e.message()))
     })?)
+}
+
+/// The configuration file of a command, or what stands for one.
+pub fn configured(common: &Common) -> Result<toml::Table> {
+    match &common.config {
+        Some(path) => read_table(path),
+        None => Ok(common.base.clone()),
+    }
+}
+
+/// The configuration file of a command, then its `--set`.
+pub fn given(common: &Common) -> Result<toml::Table> {
+    let mut table = configured(common)?;
+    for assignment in &common.set {
+        set(&mut table, assignment)?;
+    }
+    Ok(table)
+}
+
+/// Settings of a type that names the keys.
+pub fn parsed<T: DeserializeOwned>(table: toml::Table) -> Result<T> {
+    let wrong = |e: toml::de::Error| wrong("--config, --set", e.message().replace('\n', " "));
+    table.try_into().map_err(wrong)
+}
+
+/// The settings of a file that may have these keys and no others.
+pub fn read(path: &Path, known: &[&'static str]) -> Result<toml::Table> {
+    let table = read_table(path)?;
+    check_keys(&path.display().to_string(), &table, known)?;
+    Ok(table)
+}
+
+/// A list of texts; none where the key is not there.
+pub fn texts(table: &toml::Table, key: &str) -> Result<Vec<String>> {
+    match table.get(key) {
+        None => Ok(Vec::new()),
+        Some(value) => value
+            .as_array()
+            .and_then(|a| a.iter().map(|v| v.as_str().map(str::to_owned)).collect())
+            .ok_or_else(|| wrong(key, format!("{value} is not a list of texts"))),
+    }
 }
 
 /// Applies `key.key=value`; a value that is no TOML is taken as text.
@@ -65,6 +111,15 @@ pub fn text(table: &toml::Table, key: &str) -> Result<Option<String>> {
                 .ok_or_else(|| wrong(key, format!("{v} is not a text in quotes")))
         })
         .transpose()
+}
+
+/// The seed that a table states.
+pub fn seed(table: &toml::Table) -> Result<Option<u64>> {
+    let whole = |value: &toml::Value| {
+        let seed = value.as_integer().and_then(|s| u64::try_from(s).ok());
+        seed.ok_or_else(|| wrong("seed", format!("{value} is not a whole number from 0 up")))
+    };
+    table.get("seed").map(whole).transpose()
 }
 
 pub fn section(table: &toml::Table, key: &str) -> Result<toml::Table> {

@@ -42,7 +42,7 @@ fn track(object: &TrackedObject, log: &asid_core::Episode) -> Option<r::ObjectTr
 
 /// The real episode from above; none where no position of an object is tracked.
 pub fn episode(session: &Session, log: &asid_core::Episode) -> Option<r::Episode> {
-    let view = session.task.top_view();
+    let view = &session.task.spec().top_view;
     let protocol = session.task.exploration();
     let objects = session.task.objects();
     let objects: Vec<r::ObjectTrack> = objects.iter().filter_map(|o| track(o, log)).collect();

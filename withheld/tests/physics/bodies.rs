@@ -24,7 +24,7 @@ fn larger_moments_slow_a_wheel_down() {
 }
 
 #[test]
-fn a_pendulum_whose_centre_lies_aside_hangs_askew() {
+fn a_pendulum_whose_center_lies_aside_hangs_askew() {
     // A body whose frame is that of its inertia: MuJoCo's shortcut for those must be off.
     let mut setup = Setup::new(PENDULUM, "center-of-mass", "bob", 0.05).drawn(AHEAD);
     setup.causes.push(("viscous-friction", "pivot", 3.0));
@@ -35,7 +35,7 @@ fn a_pendulum_whose_centre_lies_aside_hangs_askew() {
 }
 
 #[test]
-fn a_centre_further_down_swings_more_slowly() {
+fn a_center_further_down_swings_more_slowly() {
     let run = Setup::new(PENDULUM, "center-of-mass", "bob", 0.3)
         .drawn([0.0, 0.0, 0.0, 0.0])
         .from(&[0.01], &[0.0])

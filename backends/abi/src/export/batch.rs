@@ -1,15 +1,11 @@
 //! Functions of the table that work on a batch.
 
-use std::ffi::c_void;
-
-use asid_core::layout::{Channel, Layout, Recording};
-use asid_core::simulator::{ExternalForce, ParameterChange, StepHook, StepView};
-use asid_core::{Control, Error, Result, Rollout, Status};
+use asid_core::{Error, Result, Status};
 
 use super::guard;
 use super::handles::{BATCHES, Held, SNAPSHOTS};
 use crate::slices;
-use crate::table::{self, Code, channel_kind};
+use crate::table::{self, Code};
 use crate::text;
 
 /// `destroy_batch`.
@@ -26,13 +22,13 @@ pub unsafe extern "C" fn destroy(batch: *mut table::Batch) {
 ///
 /// # Safety
 /// As [`slices::read`].
-unsafe fn indices<'a>(list: *const u64, count: u64) -> Result<&'a [usize]> {
+pub(super) unsafe fn indices<'a>(list: *const u64, count: u64) -> Result<&'a [usize]> {
     // SAFETY: as the caller promises; the two types have one size (see `slices`).
     unsafe { slices::read(list.cast::<usize>(), count, "the simulations") }
 }
 
 /// `count` rows of `width` numbers: how many there are.
-fn numbers(count: u64, width: usize) -> Result<u64> {
+pub(super) fn numbers(count: u64, width: usize) -> Result<u64> {
     count
         .checked_mul(width as u64)
         .ok_or_else(|| Error::Shape(format!("{count} rows of {width} values")))
@@ -100,161 +96,6 @@ pub unsafe extern "C" fn set_state(
             )
         };
         held.run(|s| s.set_state(sims, qpos, qvel))
-    };
-    // SAFETY: the host's error structure.
-    unsafe { guard(error, body) }
-}
-
-/// A recording from channels of the other side, which must be as wide as it says.
-///
-/// # Safety
-/// As [`slices::read`].
-unsafe fn recording(
-    layout: &Layout,
-    list: *const table::Channel,
-    count: u64,
-    width: u64,
-) -> Result<Recording> {
-    // SAFETY: as the caller promises.
-    let channels = unsafe { slices::read(list, count, "the channels")? }
-        .iter()
-        .map(|c| {
-            let number = |n: u64| usize::try_from(n).unwrap_or(usize::MAX);
-            let (a, b) = (number(c.a), number(c.b));
-            Ok(match c.kind {
-                channel_kind::SENSOR => Channel::Sensor { index: a },
-                channel_kind::QPOS => Channel::Position { start: a, len: b },
-                channel_kind::QVEL => Channel::Velocity { start: a, len: b },
-                channel_kind::CONTACT => Channel::ContactForce { bodies: [a, b] },
-                other => return Err(Error::Shape(format!("a channel is of kind {other}"))),
-            })
-        })
-        .collect::<Result<Vec<_>>>()?;
-    let recording = Recording::of(layout, &channels)?;
-    if recording.width() as u64 != width {
-        return Err(Error::Shape(format!(
-            "a row of the channels has {} entries, not {width}",
-            recording.width()
-        )));
-    }
-    Ok(recording)
-}
-
-/// The host's hook as this side calls it.
-struct ForeignHook {
-    call: table::StepHook,
-    context: *mut c_void,
-}
-
-// SAFETY: the header lets the hook be called from several threads at once.
-unsafe impl Sync for ForeignHook {}
-
-impl StepHook for ForeignHook {
-    fn before_step(&self, row: usize, step: usize, view: &mut StepView<'_>) {
-        let mut theirs = table::StepView {
-            time: view.time,
-            qpos: view.qpos.as_ptr(),
-            qvel: view.qvel.as_ptr(),
-            ctrl: view.ctrl.as_mut_ptr(),
-            force: view.force.as_mut_ptr(),
-        };
-        // SAFETY: the arrays have the scene's lengths, as the header asks, and
-        // live until the call returns.
-        unsafe { (self.call)(self.context, row as u64, step as u64, &mut theirs) }
-    }
-}
-
-/// `rollout`.
-pub unsafe extern "C" fn rollout(
-    batch: *mut table::Batch,
-    rollout: *const table::Rollout,
-    out: *mut f64,
-    error: *mut table::Error,
-) -> Code {
-    let body = || {
-        let held = Held::new(batch)?;
-        let layout = &held.entry().layout;
-        // SAFETY: the host passes a rollout as the header describes it, whose
-        // arrays have the lengths that follow from its counts.
-        unsafe {
-            let r = &*rollout;
-            let sims = indices(r.sims, r.count)?;
-            let frames = usize::try_from(r.frames).unwrap_or(usize::MAX);
-            let rows = numbers(r.count, frames)?;
-            let nu = layout.nu();
-            let control = match r.shared_control {
-                0 => {
-                    Control::PerSimulation(slices::read(r.control, numbers(rows, nu)?, "control")?)
-                }
-                _ => Control::Shared(slices::read(r.control, numbers(r.frames, nu)?, "control")?),
-            };
-            let forces = slices::read(r.forces, r.force_count, "the forces")?
-                .iter()
-                .map(|f| {
-                    Ok(ExternalForce {
-                        body: usize::try_from(f.body).unwrap_or(usize::MAX),
-                        wrench: slices::read(f.wrench, numbers(rows, 6)?, "a wrench")?,
-                    })
-                })
-                .collect::<Result<Vec<_>>>()?;
-            let changes = slices::read(r.changes, r.change_count, "the changes")?
-                .iter()
-                .map(|c| {
-                    Ok(ParameterChange {
-                        frame: usize::try_from(c.frame).unwrap_or(usize::MAX),
-                        column: usize::try_from(c.column).unwrap_or(usize::MAX),
-                        values: slices::read(c.values, r.count, "a change's values")?,
-                    })
-                })
-                .collect::<Result<Vec<_>>>()?;
-            let record = recording(layout, r.channels, r.channel_count, r.width)?;
-            let hook = r.hook.map(|call| ForeignHook {
-                call,
-                context: r.hook_context,
-            });
-            let ours = Rollout {
-                sims,
-                frames,
-                substeps: usize::try_from(r.substeps).unwrap_or(usize::MAX),
-                control,
-                forces: &forces,
-                changes: &changes,
-                hook: hook.as_ref().map(|h| h as &dyn StepHook),
-                record: &record,
-            };
-            let out = slices::write(out, numbers(rows, record.width())?, "output")?;
-            held.run(|s| s.rollout(&ours, out))
-        }
-    };
-    // SAFETY: the host's error structure.
-    unsafe { guard(error, body) }
-}
-
-/// `read`.
-#[allow(clippy::too_many_arguments, reason = "the header has them")]
-pub unsafe extern "C" fn read(
-    batch: *mut table::Batch,
-    sims: *const u64,
-    count: u64,
-    channels: *const table::Channel,
-    channel_count: u64,
-    width: u64,
-    out: *mut f64,
-    error: *mut table::Error,
-) -> Code {
-    let body = || {
-        let held = Held::new(batch)?;
-        // SAFETY: the host passes arrays of these lengths.
-        let (sims, record, out) = unsafe {
-            let record = recording(&held.entry().layout, channels, channel_count, width)?;
-            let n = numbers(count, record.width())?;
-            (
-                indices(sims, count)?,
-                record,
-                slices::write(out, n, "output")?,
-            )
-        };
-        held.run(|s| s.read(sims, &record, out))
     };
     // SAFETY: the host's error structure.
     unsafe { guard(error, body) }

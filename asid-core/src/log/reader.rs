@@ -1,0 +1,274 @@
+//! From rows of cells to an episode: which column holds what, and what is mended.
+
+use super::mapping::{ColumnMapping, Source};
+use super::notes::LogNotes;
+use super::{clock, delay};
+use crate::episode::{ChannelColumns, Episode, InitialState};
+use crate::error::{Error, Result};
+use crate::layout::Layout;
+
+/// A column of the log, and how a quantity is read from it.
+#[derive(Clone, Copy, Debug)]
+struct Column {
+    place: usize,
+    factor: f64,
+    offset: f64,
+    delay: f64,
+}
+
+/// A log that is being read, row by row.
+pub(super) struct Reader<'a> {
+    layout: &'a Layout,
+    header: Vec<String>,
+    time: usize,
+    /// Factor of the stamps, where the study states their unit.
+    pub(super) time_factor: Option<f64>,
+    ctrl: Vec<Column>,
+    readings: Vec<Column>,
+    /// Column, whether it is a velocity, and its place in `qpos` or `qvel`.
+    state: Vec<(usize, bool, usize)>,
+    episode: Episode,
+    notes: LogNotes,
+}
+
+impl<'a> Reader<'a> {
+    /// Finds what each column holds.
+    pub(super) fn new(
+        layout: &'a Layout,
+        mappings: &[ColumnMapping],
+        header: Vec<String>,
+    ) -> Result<Self, String> {
+        let column = |name: &str| header.iter().position(|h| h == name);
+        let find = |name: &str, entry: Option<usize>| -> (Option<Column>, String) {
+            let source = Source::of(mappings, name, entry);
+            let found = column(&source.column).map(|place| Column {
+                place,
+                factor: source.factor,
+                offset: source.offset,
+                delay: source.delay,
+            });
+            (found, source.column)
+        };
+        let stamps = Source::of(mappings, "time", None).column;
+        let time = column(&stamps).ok_or_else(|| format!("has no column `{stamps}`"))?;
+        let stated = mappings.iter().find(|m| m.name == "time");
+        let time_factor = stated
+            .filter(|m| m.unit.is_some() || m.scale != 1.0)
+            .map(ColumnMapping::factor);
+        let mut ctrl = Vec::with_capacity(layout.nu());
+        for a in &layout.actuators {
+            let (found, name) = find(&format!("ctrl.{}", a.name), None);
+            let missing = || {
+                let near = near_column(&header, &name);
+                format!("has no column `{name}`, the command of an actuator{near}")
+            };
+            ctrl.push(found.ok_or_else(missing)?);
+        }
+        let mut channels = Vec::new();
+        let mut readings = Vec::new();
+        for s in &layout.sensors {
+            let entry = |i: usize| (s.len > 1).then_some(i);
+            let found: Vec<_> = (0..s.len).map(|i| find(&s.name, entry(i))).collect();
+            let mapped = mappings.iter().any(|m| m.name == s.name);
+            if found.iter().all(|(c, _)| c.is_none()) && !mapped {
+                continue;
+            }
+            if let Some((_, missing)) = found.iter().find(|(c, _)| c.is_none()) {
+                return Err(format!(
+                    "sensor `{}` has {} entries but column `{missing}` is missing",
+                    s.name, s.len,
+                ));
+            }
+            channels.push(ChannelColumns {
+                name: s.name.clone(),
+                len: s.len,
+            });
+            readings.extend(found.into_iter().filter_map(|(c, _)| c));
+        }
+        let state = state_columns(layout, &header);
+        let known = |i: usize| {
+            i == time
+                || ctrl.iter().chain(&readings).any(|c| c.place == i)
+                || state.iter().any(|(c, _, _)| *c == i)
+        };
+        let mut notes = LogNotes {
+            passed_over: (0..header.len())
+                .filter(|&i| !known(i))
+                .map(|i| header[i].clone())
+                .collect(),
+            ..LogNotes::default()
+        };
+        for s in &layout.sensors {
+            if channels.iter().any(|c| c.name == s.name) {
+                continue;
+            }
+            let stems = notes
+                .passed_over
+                .iter()
+                .map(|name| match name.strip_suffix(".0") {
+                    Some(stem) if s.len > 1 => stem,
+                    _ => name,
+                });
+            if let Some(near) = Error::nearest(&s.name, stems) {
+                notes.misspelt.push((near, s.name.clone()));
+            }
+        }
+        if channels.is_empty() {
+            let near = notes.misspelt.first();
+            let near = near.map_or_else(String::new, |(a, b)| format!("; is `{a}` its `{b}`?"));
+            return Err(format!("has no column of a sensor of the scene{near}"));
+        }
+        Ok(Self {
+            layout,
+            time,
+            time_factor,
+            ctrl,
+            readings,
+            state,
+            episode: Episode {
+                actuators: layout.actuators.iter().map(|a| a.name.clone()).collect(),
+                channels,
+                ..Episode::default()
+            },
+            notes,
+            header,
+        })
+    }
+
+    /// Takes the next row. `cell` gives the number in a column, NaN where it is empty, or else
+    /// what stands there.
+    pub(super) fn row(
+        &mut self,
+        cell: impl Fn(usize) -> Result<f64, String>,
+    ) -> Result<(), String> {
+        let episode = &mut self.episode;
+        let row = episode.rows() + 2;
+        let header = &self.header;
+        let number = |c: usize| -> Result<f64, String> {
+            cell(c).map_err(|text| {
+                let name = &header[c];
+                format!("row {row}, column `{name}`: `{text}` is not a finite number")
+            })
+        };
+        let time = number(self.time)?;
+        if time.is_nan() {
+            return Err(format!("row {row}: the time is missing"));
+        }
+        if episode.time.is_empty() && !self.state.is_empty() {
+            let mut state = InitialState {
+                qpos: vec![f64::NAN; self.layout.nq],
+                qvel: vec![f64::NAN; self.layout.nv],
+            };
+            for &(c, velocity, at) in &self.state {
+                let part = if velocity {
+                    &mut state.qvel
+                } else {
+                    &mut state.qpos
+                };
+                part[at] = number(c)?;
+            }
+            episode.initial = Some(state);
+        }
+        episode.time.push(time);
+        for c in &self.ctrl {
+            episode.ctrl.push(c.factor * number(c.place)? + c.offset);
+        }
+        for c in &self.readings {
+            episode
+                .readings
+                .push(c.factor * number(c.place)? + c.offset);
+        }
+        Ok(())
+    }
+
+    /// The episode: stamps in seconds, rows in order, commands held, late columns moved.
+    pub(super) fn finish(mut self) -> Result<(Episode, LogNotes), String> {
+        let episode = &mut self.episode;
+        clock::to_seconds(&mut episode.time, self.time_factor, &mut self.notes);
+        let rows = clock::order(&episode.time, &mut self.notes)?;
+        if self.notes.doubled + self.notes.reordered > 0 {
+            let (nu, width) = (episode.actuators.len(), episode.width());
+            let gather = |values: &[f64], width: usize| -> Vec<f64> {
+                let rows = rows
+                    .iter()
+                    .flat_map(|&k| &values[k * width..(k + 1) * width]);
+                rows.copied().collect()
+            };
+            episode.time = gather(&episode.time, 1);
+            episode.ctrl = gather(&episode.ctrl, nu);
+            episode.readings = gather(&episode.readings, width);
+        }
+        if episode.rows() < 2 {
+            return Err(format!(
+                "has {} rows of data at different times; at least 2 are needed",
+                episode.rows()
+            ));
+        }
+        clock::check_duration(&episode.time, self.layout.timestep)?;
+        if episode.readings.iter().all(|x| x.is_nan()) {
+            return Err("every reading is missing".into());
+        }
+        for (a, column) in self.ctrl.iter().enumerate() {
+            let held = hold(&mut episode.ctrl, self.ctrl.len(), a).ok_or_else(|| {
+                let name = &self.header[column.place];
+                format!("column `{name}`: every command is missing")
+            })?;
+            self.notes.held += held;
+        }
+        let delays = |columns: &[Column]| columns.iter().map(|c| c.delay).collect::<Vec<_>>();
+        delay::readings(episode, self.layout, &delays(&self.readings));
+        delay::commands(episode, &delays(&self.ctrl));
+        Ok((self.episode, self.notes))
+    }
+}
+
+/// Holds the commands of one actuator where they are missing, before the first as it; how many were, `None` where all are.
+fn hold(ctrl: &mut [f64], nu: usize, actuator: usize) -> Option<usize> {
+    let column = || (actuator..ctrl.len()).step_by(nu);
+    let mut last = ctrl[column().find(|&i| ctrl[i].is_finite())?];
+    let mut held = 0;
+    for i in column() {
+        if ctrl[i].is_finite() {
+            last = ctrl[i];
+        } else {
+            ctrl[i] = last;
+            held += 1;
+        }
+    }
+    Some(held)
+}
+
+/// A column that is nearly this one, in words.
+fn near_column(header: &[String], name: &str) -> String {
+    let near = Error::nearest(name, header.iter().map(|h| &**h));
+    near.map_or_else(String::new, |near| format!("; is it `{near}`?"))
+}
+
+/// Columns of the state at the first row: column, whether it is a velocity, and its place in
+/// `qpos` or `qvel`.
+fn state_columns(layout: &Layout, header: &[String]) -> Vec<(usize, bool, usize)> {
+    let mut found = Vec::new();
+    for (i, name) in header.iter().enumerate() {
+        let (rest, velocity) = match (name.strip_prefix("qpos."), name.strip_prefix("qvel.")) {
+            (Some(rest), _) => (rest, false),
+            (_, Some(rest)) => (rest, true),
+            _ => continue,
+        };
+        let place = layout.joints.iter().find_map(|j| {
+            let (first, len) = if velocity {
+                (j.qvel, j.kind.qvel_len())
+            } else {
+                (j.qpos, j.kind.qpos_len())
+            };
+            match rest.strip_prefix(&*j.name)? {
+                "" if len == 1 => Some(first),
+                entry => {
+                    let entry: usize = entry.strip_prefix('.')?.parse().ok()?;
+                    (entry < len).then_some(first + entry)
+                }
+            }
+        });
+        found.extend(place.map(|place| (i, velocity, place)));
+    }
+    found
+}

@@ -1,0 +1,37 @@
+//! What MuJoCo does unasked: it writes to the console, and restarts simulations.
+
+use std::ffi::c_int;
+use std::sync::Once;
+
+use mujoco_rs::mujoco_c::{mjLogMessage, mjtDisableBit, mju_setLogHandler};
+use mujoco_rs::wrappers::mj_model::MjModel;
+
+/// Routes MuJoCo's messages away from the console and from `MUJOCO_LOG.TXT` in
+/// the working directory. Warnings are dropped: what they say is in the
+/// counters of each simulation. A fatal error outside a batch aborts with its
+/// text, as the C library allows no return from one.
+pub fn silence_log() {
+    static ONCE: Once = Once::new();
+    unsafe extern "C" fn handler(message: *const mjLogMessage) {
+        // SAFETY: MuJoCo passes a message that lives for this call.
+        let Some(message) = (unsafe { message.as_ref() }) else {
+            return;
+        };
+        assert!(
+            message.level() != mujoco_rs::mujoco_c::mjtLogLevel::mjLOG_ERROR,
+            "MuJoCo stopped: {}",
+            message.subject()
+        );
+    }
+    ONCE.call_once(|| {
+        // SAFETY: the handler is a plain function that lives as long as the program.
+        unsafe { mju_setLogHandler(Some(handler)) };
+    });
+}
+
+/// Turns off the silent restart of a simulation whose state went bad.
+pub fn disable_autoreset(model: &mut MjModel) {
+    // SAFETY: a flag of the options; no size or index table is touched.
+    let raw = unsafe { model.ffi_mut() };
+    raw.opt.disableflags |= mjtDisableBit::mjDSBL_AUTORESET as c_int;
+}

@@ -1,0 +1,308 @@
+//! A batch whose simulations have effects, each with values and a memory of its own.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use asid_core::error::{Error, Result};
+use asid_core::layout::{Channel, Layout, Recording};
+use asid_core::simulator::{
+    Rollout, Simulator, Snapshot, Status, StepHook, StepView, check_len, check_sims,
+};
+use asid_mjcf::plant::Plant;
+
+use super::Placed;
+use crate::{Acting, Acts, Site};
+
+/// What a column of a batch sets.
+#[derive(Clone, Copy, Debug)]
+pub enum Column {
+    /// A column of the engine's batch.
+    Model(usize),
+    /// A parameter of an effect.
+    Effect(usize, usize),
+}
+
+/// Effects at work in one simulation; `None` where one has its null values.
+type Row = Vec<Option<Box<dyn Acting>>>;
+
+/// A batch whose simulations have effects.
+pub struct RefinedSimulator {
+    inner: Box<dyn Simulator>,
+    plant: Arc<Plant>,
+    placed: Arc<Vec<Placed>>,
+    /// Columns of the engine's batch that each effect's targets are.
+    places: Vec<Vec<usize>>,
+    columns: Vec<Column>,
+    /// Values of the engine's columns before any effect.
+    base: Vec<f64>,
+    /// Physics steps of each simulation since its episode began.
+    steps: Vec<u64>,
+    rows: Vec<Mutex<Row>>,
+}
+
+/// Memories of a simulation's effects, and its steps.
+#[derive(Clone)]
+struct Memory {
+    steps: u64,
+    effects: Vec<Vec<f64>>,
+}
+
+/// The engine's snapshot, and a memory for each of its rows.
+struct Saved {
+    inner: Snapshot,
+    memories: Vec<Memory>,
+}
+
+fn lock(row: &Mutex<Row>) -> std::sync::MutexGuard<'_, Row> {
+    row.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl RefinedSimulator {
+    /// Gives the engine's batch `inner` the effects `placed`. `places` are the columns of `inner` that each effect's
+    /// targets are, `base` the values of these columns before any effect, and `columns` what the caller sets.
+    pub fn new(
+        inner: Box<dyn Simulator>,
+        (plant, placed): (Arc<Plant>, Arc<Vec<Placed>>),
+        (places, base): (Vec<Vec<usize>>, Vec<f64>),
+        columns: Vec<Column>,
+    ) -> Self {
+        let size = inner.batch_size();
+        Self {
+            inner,
+            plant,
+            placed,
+            places,
+            columns,
+            base,
+            steps: vec![0; size],
+            rows: (0..size).map(|_| Mutex::default()).collect(),
+        }
+    }
+
+    fn memory(&self, sim: usize) -> Memory {
+        let row = lock(&self.rows[sim]);
+        let effects = row.iter().map(|acting| {
+            let mut memory = Vec::new();
+            if let Some(acting) = acting {
+                acting.save(&mut memory);
+            }
+            memory
+        });
+        Memory {
+            steps: self.steps[sim],
+            effects: effects.collect(),
+        }
+    }
+
+    fn remember(&mut self, sim: usize, memory: &Memory) {
+        self.steps[sim] = memory.steps;
+        let mut row = lock(&self.rows[sim]);
+        for (acting, memory) in row.iter_mut().zip(&memory.effects) {
+            if let Some(acting) = acting {
+                if memory.is_empty() {
+                    acting.restart();
+                } else {
+                    acting.load(memory);
+                }
+            }
+        }
+    }
+
+    /// Lets the sensors' effects change `frames` rows of a simulation's readings, the first
+    /// after `first` physics steps of its episode and each `substeps` later than the one before.
+    fn measure(
+        &self,
+        sim: usize,
+        record: &Recording,
+        (first, substeps): (u64, u64),
+        readings: &mut [f64],
+    ) {
+        if self.placed.iter().all(|p| p.sensor.is_none()) {
+            return;
+        }
+        let mut row = lock(&self.rows[sim]);
+        for (acting, placed) in row.iter_mut().zip(self.placed.iter()) {
+            let (Some(acting), Some(sensor)) = (acting, placed.sensor) else {
+                continue;
+            };
+            let channels = record.channels().iter().enumerate();
+            for (i, _) in
+                channels.filter(|(_, c)| matches!(c, Channel::Sensor { index } if *index == sensor))
+            {
+                let range = record.range(i);
+                for (k, frame) in readings.chunks_exact_mut(record.width()).enumerate() {
+                    let steps = first + k as u64 * substeps;
+                    let time = steps as f64 * self.inner.layout().timestep;
+                    acting.read(time, &mut frame[range.clone()]);
+                }
+            }
+        }
+    }
+}
+
+/// The hook of a rollout: effects of each row, then what the caller brought.
+struct RowHook<'a> {
+    rows: &'a [Mutex<Row>],
+    sims: &'a [usize],
+    then: Option<&'a dyn StepHook>,
+}
+
+impl StepHook for RowHook<'_> {
+    fn before_step(&self, row: usize, step: usize, view: &mut StepView<'_>) {
+        for acting in lock(&self.rows[self.sims[row]]).iter_mut().flatten() {
+            acting.before_step(view);
+        }
+        if let Some(hook) = self.then {
+            hook.before_step(row, step, view);
+        }
+    }
+}
+
+impl Simulator for RefinedSimulator {
+    fn layout(&self) -> &Layout {
+        self.inner.layout()
+    }
+
+    fn batch_size(&self) -> usize {
+        self.inner.batch_size()
+    }
+
+    fn set_parameters(&mut self, sims: &[usize], values: &[f64]) -> Result<()> {
+        check_sims(sims, self.batch_size())?;
+        let d = self.columns.len();
+        check_len("parameters", values.len(), sims.len() * d)?;
+        let mut engine = Vec::with_capacity(sims.len() * self.base.len());
+        let mut rows = Vec::with_capacity(sims.len());
+        let mut given: Vec<Vec<f64>> = self.placed.iter().map(|p| p.values.clone()).collect();
+        for i in 0..sims.len() {
+            let first = engine.len();
+            engine.extend_from_slice(&self.base);
+            for (column, &value) in self.columns.iter().zip(&values[i * d..]) {
+                match *column {
+                    Column::Model(at) => engine[first + at] = value,
+                    Column::Effect(effect, parameter) => given[effect][parameter] = value,
+                }
+            }
+            let mut row = Row::with_capacity(given.len());
+            for ((placed, values), columns) in self.placed.iter().zip(&given).zip(&self.places) {
+                let null = placed.effect.parameters().iter().map(|p| p.null);
+                if !values.is_empty() && null.eq(values.iter().copied()) {
+                    row.push(None);
+                    continue;
+                }
+                let acting = placed.effect.attach(&Site {
+                    plant: &self.plant,
+                    name: &placed.site,
+                    values,
+                    columns,
+                })?;
+                row.push(Some(acting));
+            }
+            // What the model is comes first: other effects may depend on it, or take it over.
+            for of_model in [true, false] {
+                for (acting, placed) in row.iter().zip(self.placed.iter()) {
+                    if let Some(acting) = acting
+                        && (placed.effect.acts() == Acts::Model) == of_model
+                    {
+                        acting.set(&mut engine[first..]);
+                    }
+                }
+            }
+            rows.push(row);
+        }
+        self.inner.set_parameters(sims, &engine)?;
+        for (&sim, row) in sims.iter().zip(rows) {
+            let memory = self.memory(sim);
+            *lock(&self.rows[sim]) = row;
+            self.remember(sim, &memory);
+        }
+        Ok(())
+    }
+
+    fn reset(&mut self, sims: &[usize]) -> Result<()> {
+        self.inner.reset(sims)?;
+        for &sim in sims {
+            self.steps[sim] = 0;
+            lock(&self.rows[sim])
+                .iter_mut()
+                .flatten()
+                .for_each(|a| a.restart());
+        }
+        Ok(())
+    }
+
+    fn set_state(&mut self, sims: &[usize], qpos: &[f64], qvel: &[f64]) -> Result<()> {
+        self.inner.set_state(sims, qpos, qvel)
+    }
+
+    fn rollout(&mut self, rollout: &Rollout<'_>, out: &mut [f64]) -> Result<()> {
+        check_sims(rollout.sims, self.batch_size())?;
+        let hook = RowHook {
+            rows: &self.rows,
+            sims: rollout.sims,
+            then: rollout.hook,
+        };
+        let mut with = *rollout;
+        let busy = rollout
+            .sims
+            .iter()
+            .any(|&s| lock(&self.rows[s]).iter().any(Option::is_some));
+        if busy && self.placed.iter().any(|p| p.effect.steps()) {
+            with.hook = Some(&hook);
+        }
+        self.inner.rollout(&with, out)?;
+        let substeps = rollout.substeps as u64;
+        let row = rollout.frames * rollout.record.width();
+        for (&sim, readings) in rollout.sims.iter().zip(out.chunks_exact_mut(row.max(1))) {
+            let first = self.steps[sim] + substeps;
+            self.measure(sim, rollout.record, (first, substeps), readings);
+        }
+        for &sim in rollout.sims {
+            self.steps[sim] += rollout.frames as u64 * substeps;
+        }
+        Ok(())
+    }
+
+    fn read(&mut self, sims: &[usize], record: &Recording, out: &mut [f64]) -> Result<()> {
+        self.inner.read(sims, record, out)?;
+        for (&sim, row) in sims.iter().zip(out.chunks_exact_mut(record.width().max(1))) {
+            self.measure(sim, record, (self.steps[sim], 0), row);
+        }
+        Ok(())
+    }
+
+    fn save(&mut self, sims: &[usize]) -> Result<Snapshot> {
+        let saved = Saved {
+            inner: self.inner.save(sims)?,
+            memories: sims.iter().map(|&s| self.memory(s)).collect(),
+        };
+        Ok(Snapshot::new(saved, sims.len()))
+    }
+
+    fn load(&mut self, snapshot: &Snapshot, rows: &[usize], sims: &[usize]) -> Result<()> {
+        let saved = snapshot
+            .data::<Saved>()
+            .ok_or_else(|| Error::Shape("the snapshot is of another scene".into()))?;
+        self.inner.load(&saved.inner, rows, sims)?;
+        for (&row, &sim) in rows.iter().zip(sims) {
+            self.remember(sim, &saved.memories[row]);
+        }
+        Ok(())
+    }
+
+    fn copy_state(&mut self, from: &[usize], to: &[usize]) -> Result<()> {
+        self.inner.copy_state(from, to)?;
+        for (&source, &sim) in from.iter().zip(to) {
+            let memory = self.memory(source);
+            self.remember(sim, &memory);
+        }
+        Ok(())
+    }
+
+    fn status(&self) -> &[Status] {
+        self.inner.status()
+    }
+
+    fn steps_taken(&self) -> u64 {
+        self.inner.steps_taken()
+    }
+}

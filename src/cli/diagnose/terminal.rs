@@ -1,0 +1,89 @@
+//! The answer of a diagnosis on the terminal.
+
+use asid_report::diagnosis::real_world_lines;
+use asid_report::number::{Precision, round};
+use asid_results::diagnosis::DiagnosisResult;
+use asid_results::naming::grouped;
+
+/// The answer on the terminal.
+pub fn lines(result: &DiagnosisResult, engine: &str, seconds: f64) -> Vec<String> {
+    let mut all = Vec::new();
+    let mut line = |text: &str| all.push(text.to_owned());
+    line(&result.sentence);
+    let mut mends: Vec<&str> = result.wiring.iter().map(|w| &*w.mend).collect();
+    mends.dedup();
+    for text in mends.iter().flat_map(|m| m.lines()) {
+        line(&format!("  {text}"));
+    }
+    let gap = &result.gap;
+    line(&format!(
+        "gap on logs held out, in units of the noise: {:.2} as given, {:.2} identified, {:.2} refined",
+        gap.nominal, gap.identified, gap.refined
+    ));
+    for h in result
+        .hypotheses
+        .iter()
+        .take(4)
+        .filter(|h| h.probability > 0.001)
+    {
+        line(&format!(
+            "  {:5.1} %  {}",
+            100.0 * h.probability,
+            grouped(&h.effects).join(" + ")
+        ));
+    }
+    for e in result
+        .effects
+        .iter()
+        .filter(|e| result.verdict.effects.contains(&e.label()))
+    {
+        let values = e.parameters.iter().filter(|(_, v)| **v != 0.0);
+        let text: Vec<String> = values
+            .map(|(n, v)| match e.intervals95.get(n) {
+                Some(ends) => {
+                    let precision = Precision::of(*v, (ends[1] - ends[0]) / 4.0);
+                    format!(
+                        "{n} = {} ({})",
+                        precision.show(*v),
+                        precision.interval(*ends)
+                    )
+                }
+                None => format!("{n} = {}", round(*v, 4)),
+            })
+            .collect();
+        line(&format!("  {} {}: {}", e.effect, e.site, text.join(", ")));
+    }
+    for p in &result.parameters {
+        let estimate = Precision::of(p.estimate, p.std).with_uncertainty(p.estimate, p.std);
+        line(&format!("  {} = {estimate}", p.name));
+    }
+    if let Some(c) = &result.calibration {
+        line(&format!("calibration on simulated logs, {} runs:", c.runs));
+        for r in c.rows.iter().filter(|r| r.runs > 0) {
+            let lacks = if r.effects.is_empty() {
+                "nothing".to_owned()
+            } else {
+                grouped(&r.effects).join(" + ")
+            };
+            line(&format!(
+                "  lacking {lacks}: {} of {} right",
+                r.right, r.runs
+            ));
+        }
+        if let Some(p) = c.probability {
+            line(&format!(
+                "  by these runs the answer is right with probability {:.0} %",
+                100.0 * p
+            ));
+        }
+    }
+    for left in &result.not_tried {
+        line(&format!("not tried: {}", left.stage));
+    }
+    if !result.next_experiment.how.is_empty() {
+        line(&format!("next: {}", result.next_experiment.how));
+    }
+    line(&format!("{engine}, {seconds:.1} s"));
+    all.extend(result.real_world.iter().flat_map(real_world_lines));
+    all
+}
