@@ -1,6 +1,7 @@
 //! Forward selection of effects by evidence, with a look back after each.
 
 mod breadth;
+mod prune;
 mod round;
 mod set;
 

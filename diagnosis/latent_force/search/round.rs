@@ -16,7 +16,8 @@ use crate::latent_force::smoother::Regression;
 
 use super::Untried;
 use super::breadth::Breadth;
-use super::set::{Set, log_prior, name_of, pruned, refined_by, with, without};
+use super::prune::{pruned, pruned_at_once};
+use super::set::{Set, log_prior, name_of, refined_by, with, without};
 
 /// Leading candidates that are compared pair by pair.
 const COMPARED: usize = 20;
@@ -272,6 +273,7 @@ impl Upon<'_> {
             }
             if progress.is_stopped() {
                 fits.left_out.push(set.candidates.clone());
+                set = pruned_at_once(self.candidates, set);
             } else {
                 let least = (breadth, self.at_first);
                 set = pruned(context, self.candidates, set, least, progress)?;

@@ -8,7 +8,6 @@ use asid_results::naming::grouped;
 use crate::candidate::Candidate;
 use crate::latent_force::columns::{Columns, Form};
 use crate::latent_force::context::Context;
-use crate::latent_force::estimate::Missing;
 use crate::latent_force::fit::{Fitted, Hypothesis, Slopes, fit};
 use crate::latent_force::screen::Screened;
 
@@ -84,6 +83,9 @@ pub(super) fn from_starts_of(
     again.fit(context, breadth.rounds[1], progress)?;
     Ok(again)
 }
+
+/// Deviations from null up to which a value counts as nothing.
+pub(super) const IDLE: f64 = 2.0;
 
 /// Fits what no search tries (an offset of friction between the directions) of the effects that were named, all of it at
 /// once; nothing where it does not earn its place. What is no larger than its uncertainty goes back to where it was.
@@ -202,102 +204,4 @@ pub(super) fn without(set: &Set, candidates: &[Candidate], out: usize) -> Set {
     fitted.slopes = Slopes::default();
     set.candidates.remove(place);
     set
-}
-
-/// Deviations from null up to which a value counts as nothing, and the evidence that a set may lose when it is left out.
-const IDLE: f64 = 2.0;
-const IDLE_LOSS: f64 = 1.0;
-/// Size, relative to the largest of the same law, below which a member of a group may stand in for something else: a law that joints
-/// have in common is not much smaller at one of them, unless it makes up for its share of what is missing.
-const SLIGHT: f64 = 1.0 / 3.0;
-
-/// What a member of a set does: by how many deviations it is off its null values, and by how much.
-struct Deed {
-    candidate: usize,
-    law: String,
-    strength: f64,
-    size: f64,
-}
-
-/// What each member of a set does; those that have no size are left out.
-fn deeds(candidates: &[Candidate], set: &Set) -> Vec<Deed> {
-    let fitted = &set.fitted;
-    let free = fitted.hypothesis.free();
-    let parameters = |c: usize| candidates[c].parameters().len();
-    let mut at = fitted.theta.len() - set.candidates.iter().map(|&c| parameters(c)).sum::<usize>();
-    let mut all = Vec::new();
-    for &c in &set.candidates {
-        let range = at..at + parameters(c);
-        at = range.end;
-        // A speed at which a law changes is no size of it; a delay, which no slope is taken in, is.
-        let all_of = candidates[c].parameters();
-        let has_slopes = all_of.iter().any(|p| p.start == Start::Slope);
-        let sizes = range.clone().filter_map(|i| {
-            let p = &candidates[c].parameters()[i - range.start];
-            let k = free.iter().position(|&f| f == i)?;
-            let is_slope = p.start == Start::Slope;
-            if !is_slope
-                && (has_slopes || !matches!(p.start, Start::Values(_) | Start::Multiples(..)))
-            {
-                return None;
-            }
-            let deviation = fitted.covariance[(k, k)].max(0.0).sqrt();
-            let size = (fitted.theta[i] - p.null).abs();
-            Some((size / deviation, size))
-        });
-        let largest = sizes.reduce(|a, b| (a.0.max(b.0), a.1.max(b.1)));
-        all.extend(largest.map(|(strength, size)| Deed {
-            candidate: c,
-            law: candidates[c].spec.name.clone(),
-            strength,
-            size,
-        }));
-    }
-    all
-}
-
-/// A set without the members that do nothing in it: those of a group that are as the model has them or next to it, and those
-/// that a later effect has taken the place of. A slight member of a group must make up for the share of what was missing `at_first`
-/// that any further effect must.
-pub(super) fn pruned(
-    context: &Context<'_>,
-    candidates: &[Candidate],
-    set: Set,
-    (breadth, at_first): (Breadth, Missing),
-    progress: &dyn Progress,
-) -> Result<Set> {
-    let deeds = deeds(candidates, &set);
-    let is_idle = |d: &&Deed| d.strength < IDLE;
-    let is_slight = |d: &&Deed| {
-        let like = deeds.iter().filter(|o| o.law == d.law);
-        d.size < SLIGHT * like.map(|o| o.size).fold(0.0, f64::max)
-    };
-    let places = |which: &dyn Fn(&&Deed) -> bool| -> Vec<usize> {
-        deeds.iter().filter(which).map(|d| d.candidate).collect()
-    };
-    let left = |s: &Set| s.fitted.estimate.missing(context).relative_to(at_first);
-    let (idle, slight) = (places(&is_idle), places(&is_slight));
-    let mut set = set;
-    for (out, slight) in [(idle, false), (slight, true)] {
-        let out: Vec<usize> = (out.into_iter())
-            .filter(|c| set.candidates.contains(c))
-            .collect();
-        if out.is_empty() || out.len() == set.candidates.len() {
-            continue;
-        }
-        let mut smaller = set.clone();
-        for &c in &out {
-            smaller = without(&smaller, candidates, c);
-        }
-        smaller.fit(context, breadth.rounds[1], progress)?;
-        let stands = if slight {
-            left(&smaller) - left(&set) < breadth.shrinks * out.len() as f64
-        } else {
-            smaller.fitted.evidence > set.fitted.evidence - IDLE_LOSS
-        };
-        if stands {
-            set = smaller;
-        }
-    }
-    Ok(set)
 }
