@@ -151,6 +151,12 @@ impl Acting for LagAt {
 }
 
 impl Effect for Lag {
+    /// Every bus and every control loop delays, by a step at least; the current loop of a drive settles within one. Where the two cannot be
+    /// told apart, a delay comes to mind first.
+    fn unusual_at(&self, _plant: &Plant, _site: &str) -> bool {
+        true
+    }
+
     fn acts(&self) -> Acts {
         Acts::Command
     }

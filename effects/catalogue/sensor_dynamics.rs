@@ -201,6 +201,12 @@ impl Acting for FilterAt {
 }
 
 impl Effect for Filter {
+    /// Every reading is late by the time that it takes to arrive; which readings are filtered is known as a rule. Where the two cannot be
+    /// told apart, a delay comes to mind first.
+    fn unusual_at(&self, _plant: &Plant, _site: &str) -> bool {
+        true
+    }
+
     fn acts(&self) -> Acts {
         Acts::Measurement
     }
