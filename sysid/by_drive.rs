@@ -13,7 +13,7 @@ use asid_core::rng::Rng;
 use crate::design::Designer;
 use crate::method::DesignSettings;
 use crate::motion::{Family, Shape};
-use crate::search::Places;
+use crate::places::Places;
 
 /// Heights of a drive's curves, beside those of the search: one swing there and back, and two of them. A slow curve goes farthest
 /// before a limit of speed binds.

@@ -19,6 +19,7 @@ pub mod limits;
 mod look;
 pub mod method;
 pub mod motion;
+mod places;
 pub mod play;
 pub mod rehearse;
 mod search;

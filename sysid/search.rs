@@ -11,11 +11,11 @@ use asid_core::error::Result;
 use asid_core::rng::Rng;
 
 use crate::by_drive::Start;
-use crate::candidates::{BROKEN, breaks, far};
-use crate::design::{Designer, joined, worst_of};
-use crate::limits::Excess;
+use crate::candidates::far;
+use crate::design::Designer;
 use crate::method::DesignSettings;
 use crate::motion::{Family, Shape};
+use crate::places::Places;
 
 /// Coordinates of the machine whose physics steps count once.
 const SIX_JOINTS: f64 = 6.0;
@@ -41,14 +41,6 @@ const SIZES: [f64; 4] = [1.0, 0.9, 1.15, 1.4];
 
 /// Candidates of a round that are looked at everywhere, at most: each that breaks a limit shows the search a new point.
 const LOOKS: usize = 4;
-
-/// Points of the ranges at which limits are looked at.
-pub(crate) struct Places<'p> {
-    /// The middle, the ends and corners: where the answer keeps them.
-    pub all: &'p [Vec<f64>],
-    /// Those far from the middle at which each round looks.
-    pub far: Vec<Vec<f64>>,
-}
 
 impl Designer<'_, '_> {
     /// The search; the best coefficients, and the best cost after each round.
@@ -154,39 +146,5 @@ impl Designer<'_, '_> {
             cost: costs[k],
             reach: start.reach.iter().map(|r| r * sizes[k]).collect(),
         })
-    }
-
-    /// The best candidate below a cost that keeps all limits at all points, of so many that are looked at; where all break one, that
-    /// which does by the least. Points where better ones break a limit join those far from the middle, and their costs say so.
-    ///
-    /// # Errors
-    /// When the engine fails.
-    pub(crate) fn best(
-        &mut self,
-        candidates: &[Vec<f64>],
-        costs: &mut [f64],
-        (looks, below): (usize, f64),
-        places: &mut Places<'_>,
-    ) -> Result<Option<usize>> {
-        for _ in 0..looks {
-            let order = |&i: &usize, &j: &usize| costs[i].total_cmp(&costs[j]);
-            let best = (0..costs.len()).min_by(order);
-            let Some(k) = best.filter(|&k| costs[k] < below) else {
-                return Ok(None);
-            };
-            if breaks(costs[k]) {
-                return Ok(Some(k));
-            }
-            let all = self.excess_at(&candidates[k], 1.0, places.all)?;
-            if all.iter().all(Excess::is_none) {
-                return Ok(Some(k));
-            }
-            costs[k] = BROKEN * (1.0 + joined(&all).total);
-            let worst = places.all[worst_of(&all)].clone();
-            if !places.far.contains(&worst) {
-                places.far.push(worst);
-            }
-        }
-        Ok(None)
     }
 }

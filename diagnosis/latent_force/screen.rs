@@ -19,7 +19,7 @@ const GROUP: f64 = 3.0;
 pub struct Screened {
     /// Forms of the candidates; see [`Columns::forms`].
     pub forms: Vec<usize>,
-    /// Evidence over the present model, natural logarithm.
+    /// Evidence over the present model, natural logarithm; a round adds the prior odds.
     pub gain: f64,
     /// Coefficients of the present model's unknowns.
     pub base: Vec<f64>,

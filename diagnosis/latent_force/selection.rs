@@ -66,7 +66,7 @@ fn screened(
             all.push(Screened {
                 effects,
                 names: names + 1,
-                evidence: evidence - none + gain + log_prior(plant, candidates, &members),
+                evidence: evidence - none + gain + log_prior(plant, candidates, &round.base),
             });
         }
     }

@@ -150,13 +150,11 @@ impl Upon<'_> {
         let columns = Columns::of(self.context, model, &fitted.estimate, &some, self.progress)?;
         let sums = regressions(self.context, &fitted.estimate, &columns);
         let mut ranked = rank(&sums, &columns, &some);
-        let worth = |s: &Screened| {
-            let members: Vec<usize> = (s.forms.iter())
-                .map(|&f| columns.forms[f].candidate)
-                .collect();
-            s.gain + log_prior(self.context.plant(), &some, &members)
-        };
-        ranked.sort_by(|a, b| worth(b).total_cmp(&worth(a)));
+        for s in &mut ranked {
+            let members = s.forms.iter().map(|&f| columns.forms[f].candidate);
+            s.gain += log_prior(self.context.plant(), &some, &members.collect::<Vec<_>>());
+        }
+        ranked.sort_by(|a, b| b.gain.total_cmp(&a.gain));
         let singles = ranked.iter().filter(|s| s.forms.len() == 1);
         let leading: Vec<usize> = singles.map(|s| s.forms[0]).take(COMPARED).collect();
         let candidate = |&f: &usize| self.open[columns.forms[f].candidate];

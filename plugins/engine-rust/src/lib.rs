@@ -3,7 +3,7 @@
 //! The smallest engine that is still worth simulating with: bodies on free joints
 //! under gravity, pushes and hooks, without contact. It is here to be copied: a
 //! [`Backend`] that loads scenes ([`model`]) and refuses what it lacks ([`refusal`]),
-//! a [`simulator`] of whole-batch calls on as many threads as there are, the physics
+//! a simulator (`simulator.rs`) of whole-batch calls on as many threads as there are, the physics
 //! of one body ([`flight`]), and one line that makes it a library for `asid --plugin`.
 
 pub mod flight;
