@@ -383,15 +383,14 @@ fn a_policy_is_a_file_of_the_explorer_that_plays_it() {
 #[cfg(not(feature = "torch"))]
 #[test]
 fn an_explorer_left_out_says_how_to_get_it() {
-    let place = Workplace::new();
-    refused_run(
-        &place,
-        &[
-            "--explorer",
-            "fisher-ppo",
-            "--set",
-            "explorer.policy=\"train\"",
-        ],
-        &["fisher-ppo", "cargo xtask setup", "--features torch"],
-    );
+    let arguments = [
+        "run",
+        "rod-balancing",
+        "--explorer",
+        "fisher-ppo",
+        "--set",
+        "explorer.policy=\"train\"",
+    ];
+    let says = ["fisher-ppo", "cargo xtask setup", "--features torch"];
+    refused(&Workplace::new(), &arguments, &says);
 }

@@ -176,9 +176,9 @@ fn targets_that_make_no_sense_are_refused() {
         ("geom/weight/friction/0", "no contact"),
         ("geom/floor/mass", "no primitive"),
         ("geom/crate/colour", "known: friction, pos, mass"),
-        ("joint/arm/ref", "known: pos, damping"),
+        ("joint/arm/ref", "known: pos, axis, damping"),
         ("actuator/servo/gain", "known: kp"),
-        ("body/world/mass", "no mass"),
+        ("body/world/mass", "neither place nor mass"),
         ("option/wind/0", "no such parameter"),
     ] {
         let error = refused(target);
