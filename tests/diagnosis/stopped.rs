@@ -110,12 +110,11 @@ fn stopped_after_the_screening_it_ranks_what_was_screened_and_says_what_was_not_
         }
     }
     // Nothing of it hangs on the clock; the study is named after its folder.
-    let again = run(&Until::ranking_number(1)).result;
-    let study = r.study.clone();
-    assert_eq!(
-        asid::results::diagnosis::DiagnosisResult { study, ..again },
-        r
-    );
+    let mut again = run(&Until::ranking_number(1)).result;
+    again.study.clone_from(&r.study);
+    // As text, in which a limit beyond the range, no number, is null.
+    let [first, second] = [&r, &again].map(|r| serde_json::to_string(r).unwrap());
+    assert_eq!(first, second);
 }
 
 #[test]
