@@ -342,7 +342,7 @@ mod tests {
         std::fs::write(&path, format!("time,place\n{}\n", rows.join("\n"))).unwrap();
         (
             name.to_owned(),
-            Episode::read(&path, &plant().layout).unwrap(),
+            asid_logs::episode::read(&path, &plant().layout).unwrap(),
         )
     }
 

@@ -88,10 +88,4 @@ impl Machine {
     pub fn given_effects(&self) -> &[EffectSpec] {
         &self.effects
     }
-
-    /// Values that the study's model sets.
-    #[must_use]
-    pub fn given_values(&self) -> &[(Target, f64)] {
-        &self.fixed
-    }
 }

@@ -180,7 +180,7 @@ mod tests {
 
     #[test]
     fn a_lag_finer_than_the_time_step_is_no_gap() {
-        use asid_core::{Episode, Scene};
+        use asid_core::Scene;
         use asid_mjcf::Plant;
         let scene = r#"<mujoco><option timestep="0.002"/><worldbody><body>
             <joint name="slide" type="slide"/><geom size="0.1" mass="1"/></body></worldbody>
@@ -194,7 +194,7 @@ mod tests {
         std::fs::write(&path, format!("time,place\n{rows}")).unwrap();
         let log = (
             "log".to_owned(),
-            Episode::read(&path, &plant.layout).unwrap(),
+            asid_logs::episode::read(&path, &plant.layout).unwrap(),
         );
         let mut logs = Logs::new(&plant, &["place".to_owned()], vec![log]).unwrap();
         logs.set_noise(&[1e-4]);

@@ -6,12 +6,12 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use asid_core::episode::InitialState;
-use asid_core::log::{ColumnMapping, LogNotes};
 use asid_core::parameter::Scale;
 use asid_core::problem::home;
 use asid_core::{Episode, Error, Layout, Parameter, Result, Scene, Target, Task};
 use asid_effects::EffectSpec;
 use asid_logs::LogSettings;
+use asid_logs::episode::{ColumnMapping, LogNotes};
 use asid_mjcf::Plant;
 use serde::Deserialize;
 

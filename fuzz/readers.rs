@@ -4,8 +4,8 @@ use std::path::Path;
 use std::sync::OnceLock;
 
 use anyhow::{Context, Result, bail};
-use asid_core::log::{of_table, wanted};
-use asid_core::{Backend as _, Episode, Scene};
+use asid_core::{Backend as _, Scene};
+use asid_logs::episode::{of_table, wanted};
 use asid_logs::propose::propose;
 use asid_logs::ros::topics::{Described, Topics};
 use asid_logs::{LogFormat, LogSettings, Opener};
@@ -233,7 +233,7 @@ fn machine() -> &'static (Scene, Plant) {
 
 /// A table as a log of ASID, and as one of another stack.
 fn table(path: &Path) -> Result<(), String> {
-    let own = Episode::read(path, &machine().1.layout);
+    let own = asid_logs::episode::read(path, &machine().1.layout);
     let other = import(path);
     told(own.map(drop)).and(other)
 }

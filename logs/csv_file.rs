@@ -1,13 +1,12 @@
 //! Tables of text with any names: CSV, with commas, semicolons or tabs.
 //!
-//! [`asid_core::log`] reads CSV files too. It knows the model and what each column is, and refuses a cell that is no
+//! [`crate::episode`] reads CSV files too. It knows the model and what each column is, and refuses a cell that is no
 //! number. Here neither is known yet: every column with numbers becomes a series, and [`propose`](crate::propose) finds
 //! out what it is. What divides cells and what is a number in one is the same for both.
 
 use std::path::Path;
 
-use asid_core::log::{cell_number, delimiter};
-
+use crate::episode::{cell_number, delimiter};
 use crate::raw::RawLog;
 use crate::table_file;
 

@@ -1,7 +1,7 @@
 //! Kinds of log files, and `[log]` of a study, which names the kind and the topics.
 //!
 //! A recording of another stack needs a reader in this crate, a [`LogFormat`] here, and an arm in `open.rs`. The project's
-//! own tables are read by [`asid_core::log`]; a new format of these is a file and an arm there.
+//! own tables are read by [`crate::episode`]; a new format of these is a file and an arm there.
 
 use std::path::Path;
 

@@ -1,9 +1,10 @@
-//! Logs of other stacks as episodes of this one.
+//! Logs as episodes: tables of this program's own, and recordings of other stacks.
 //!
-//! Robots are logged by ROS 2 (MCAP, or bags of SQLite), LeRobot, and scripts that write CSV. Their names, units and rates are
-//! their own. A log is read here as [series] of numbers, each with the stamps of its own stream and named by the way to the
-//! number. What each series is on a model's machine is said by the `[[column]]` of a study, and
-//! [proposed](propose) by names, units, ranges and fit. The tables that come of it, with streams [aligned](align), are read by [`asid_core::log::of_table`].
+//! - [`episode`] reads a table whose columns are named after the model, and checks it.
+//! - Recordings of ROS 2 (MCAP, or bags of SQLite), of LeRobot, and CSV of any names have names, units and rates of their own.
+//!   Each is read as [series] of numbers, with the stamps of its own stream and named by the way to the number. The
+//!   `[[column]]` of a study say what each series is on a model's machine; [`propose`] suggests them by names, units, ranges
+//!   and fit. Streams are [aligned](align), and [`episode::of_table`] checks the table that comes of it.
 //!
 //! Readers believe nothing: a damaged or cut file is one line of error, whatever its bytes. The formats that need more
 //! than the default build has (SQLite, compression) are behind the features `ros` and `parquet`.
@@ -12,6 +13,7 @@ pub mod align;
 #[cfg(feature = "ros")]
 pub mod bag;
 mod csv_file;
+pub mod episode;
 pub mod format;
 #[cfg(feature = "parquet")]
 pub mod lerobot;

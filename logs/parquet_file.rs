@@ -3,15 +3,14 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use asid_core::guard::guarded;
 use parquet::basic::Type as Physical;
 use parquet::errors::ParquetError;
 use parquet::file::reader::FileReader as _;
 use parquet::record::Field;
 use parquet::schema::types::Type;
 
-use asid_core::guard::guarded;
-use asid_core::log::ParquetFile;
-
+use crate::episode::ParquetFile;
 use crate::raw::RawLog;
 use crate::table_file;
 

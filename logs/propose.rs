@@ -12,7 +12,6 @@ mod speed;
 mod unit;
 mod words;
 
-use asid_core::log::{ColumnMapping, unit_factor};
 use asid_core::{Error, Result, Scene};
 use asid_mjcf::Plant;
 
@@ -22,6 +21,7 @@ use speed::match_speed;
 use unit::Unit;
 use words::Measure;
 
+use crate::episode::{ColumnMapping, unit_factor};
 use crate::format::LogFormat;
 use crate::raw::RawLog;
 use crate::series::Series;

@@ -2,9 +2,8 @@
 
 use std::collections::HashMap;
 
-use asid_core::log::{LogNotes, Table};
-
 use crate::align;
+use crate::episode::{LogNotes, Table};
 use crate::series::Series;
 
 /// A log of one episode.

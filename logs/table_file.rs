@@ -1,7 +1,6 @@
 //! A table of any names as a log: which column has the stamps.
 
-use asid_core::log::seconds;
-
+use crate::episode::seconds;
 use crate::raw::RawLog;
 use crate::series::Series;
 

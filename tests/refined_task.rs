@@ -4,7 +4,6 @@
 
 mod cli_support;
 
-use asid_core::Episode;
 use cli_support::{Workplace, tiny};
 use serde_json::Value;
 
@@ -101,7 +100,7 @@ fn the_episode_of_a_refined_real_world_is_played_and_explained_by_the_same_model
     let log = place.path("real/real.csv");
     let task = asid_tasks::shuffleboard::Shuffleboard::new(asid_tasks::shuffleboard::Zone::Near);
     let plant = asid_mjcf::Plant::of(asid_core::Task::scene(&task.unwrap())).unwrap();
-    let episode = Episode::read(&log, &plant.layout).unwrap();
+    let episode = asid::logs::episode::read(&log, &plant.layout).unwrap();
     assert_eq!(episode.rows(), 101);
     let log = log.display().to_string();
     let identify = |out: &str, more: &[&str]| {

@@ -12,6 +12,12 @@ pub fn guarded<T>(what: &str, read: impl FnOnce() -> Result<T, String>) -> Resul
     read.unwrap_or_else(|_| Err(format!("is {what} that is damaged, or none")))
 }
 
+/// A message of another crate, folded to one line.
+#[must_use]
+pub fn one_line(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -19,7 +19,6 @@ pub mod explore;
 pub mod guard;
 pub mod identify;
 pub mod layout;
-pub mod log;
 pub mod parameter;
 pub mod posterior;
 pub mod problem;

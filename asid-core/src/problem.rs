@@ -173,7 +173,17 @@ mod tests {
     /// Symptom: "config timestep", a key that no configuration has. Cause: the step is the model's.
     #[test]
     fn a_frame_that_no_steps_fill_names_the_models_option() {
-        let layout = crate::episode::tests::layout();
+        let layout = Layout {
+            timestep: 0.01,
+            nq: 0,
+            nv: 0,
+            bodies: Vec::new(),
+            geoms: Vec::new(),
+            joints: Vec::new(),
+            actuators: Vec::new(),
+            sensors: Vec::new(),
+            keyframes: Vec::new(),
+        };
         assert_eq!(substeps(&layout, 0.05).unwrap(), 5);
         let error = substeps(&layout, 0.015).unwrap_err().to_string();
         assert!(error.starts_with("parameter `option/timestep`"), "{error}");

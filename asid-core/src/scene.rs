@@ -11,8 +11,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
 use crate::error::{Error, Result};
-use crate::guard::guarded;
-pub(crate) use xml::one_line;
+use crate::guard::{guarded, one_line};
 use xml::{parse, spliced, wrong_eulerseq};
 
 /// One MJCF document with its includes spliced in.

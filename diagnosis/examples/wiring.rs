@@ -10,11 +10,11 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::time::Instant;
 
-use asid::core::log::ColumnMapping;
 use asid::core::{Episode, Layout, Streams};
 use asid::diagnosis::machine::Machine;
 use asid::diagnosis::study::Study;
 use asid::diagnosis::wiring::{Settings, hypotheses, mend};
+use asid::logs::episode::{self, ColumnMapping};
 use rand::Rng as _;
 use rand::seq::IndexedRandom as _;
 use serde_json::Value;
@@ -257,7 +257,7 @@ fn remapped(
     layout: &Layout,
     mappings: &[ColumnMapping],
 ) -> Result<Episode, asid::core::Error> {
-    let mut spoilt = episode.remapped(layout, mappings)?;
+    let mut spoilt = episode::remapped(episode, layout, mappings)?;
     let width = spoilt.width();
     let late = mappings.iter().map(|m| -m.delay).fold(0.0, f64::max);
     for k in 0..spoilt.rows() {

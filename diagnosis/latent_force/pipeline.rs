@@ -7,7 +7,9 @@ mod told;
 
 use asid_core::{Progress, Result};
 
+use crate::bench::Bench;
 use crate::candidate::enumerate;
+use crate::data::Logs;
 use crate::decision::{Rules, decide};
 use crate::diagnose::{Contact, Settings};
 use crate::machine::Machine;
@@ -15,17 +17,18 @@ use crate::prepare::{dataset, set_reading_noise};
 use crate::study::Study;
 use crate::work::Work;
 
-use super::context::begin;
-use super::fit::{Hypothesis, Slopes, fit, settle_noise};
+use super::context::{Context, begin};
+use super::fit::{Fitted, Hypothesis, Slopes, fit, settle_noise};
 use super::fitted_value::Unknown;
 use super::left::left;
 use super::picture::forces;
 use super::search::{Breadth, search};
+use super::segments::DURATIONS;
 use super::selection::gather;
 use super::steps::{beside, known, noise_with_steps, shown};
 
 use replays::replay;
-use rows::{along, replays_are_affordable, take};
+use rows::{Rows, along, replays_are_affordable};
 pub use shooting::Handover;
 use shooting::shoot;
 
@@ -33,6 +36,8 @@ use shooting::shoot;
 const FIRST: (usize, usize) = (4, 8);
 /// Most linearisations of the fit without effects.
 const ROUNDS: usize = 15;
+/// Share of the segments' rows whose slopes keep no promise from which on shorter segments are taken.
+const MISLED: f64 = 0.3;
 
 /// Diagnoses a study; hands it over where bodies touch and whole replays are to decide there.
 ///
@@ -62,12 +67,12 @@ pub fn diagnose(
         specs: Vec::new(),
         unknowns: unknowns.map(|(p, n)| Unknown::of_study(p, *n)).collect(),
     };
-    let (taken, shown) = take(study, &bench, &nominal)?;
-    let segments = taken.walks.iter().any(|w| w.segment.is_some());
-    let affordable = || replays_are_affordable(&bench, &shown, without);
-    if segments && (contact == Contact::Replays || contact == Contact::Auto && affordable()) {
+    let rows = Rows::of(&bench, &nominal)?;
+    let affordable = || replays_are_affordable(&bench, &rows.shown, without);
+    if rows.touch() && (contact == Contact::Replays || contact == Contact::Auto && affordable()) {
         let shot = {
             let parameters = (&study.parameters[..], &nominal[..]);
+            let taken = rows.cut(study, &bench, DURATIONS[DURATIONS.len() - 1]);
             let (context, estimate) = begin(&bench.machine, &logs, taken, parameters)?;
             shoot(&context, (&hypothesis, &nominal), estimate, progress)?
         };
@@ -78,19 +83,9 @@ pub fn diagnose(
         }));
     }
     let (outcome, candidates, left_out, firsts, drawn, members) = {
-        let parameters = (&study.parameters[..], &nominal[..]);
-        let (context, mut estimate) = begin(&bench.machine, &logs, taken, parameters)?;
-        settle_noise(
-            &context,
-            &hypothesis,
-            &nominal,
-            &mut estimate,
-            FIRST,
-            progress,
-        )?;
-        let begin = (&estimate, &Slopes::default());
+        let at = (&hypothesis, &nominal[..]);
+        let (context, mut none) = without_effects(study, &bench, (&rows, &logs), at, progress)?;
         let rounds = (ROUNDS, progress);
-        let mut none = fit(&context, &hypothesis, &nominal, begin, rounds)?;
         if none.estimate.missing(&context).share < 1.0 {
             none.estimate.free_at_rest(&context);
             none.estimate.set_resolution(&context);
@@ -135,4 +130,57 @@ pub fn diagnose(
         judgement,
         nominal,
     }))
+}
+
+/// The model without effects, fitted in the longest segments that are nearly linear in their starts.
+fn without_effects<'a>(
+    study: &Study,
+    bench: &'a Bench,
+    (rows, logs): (&Rows, &'a Logs),
+    (hypothesis, nominal): (&Hypothesis, &[f64]),
+    progress: &dyn Progress,
+) -> Result<(Context<'a>, Fitted)> {
+    let shortest = DURATIONS[DURATIONS.len() - 1];
+    let parameters = (&study.parameters[..], nominal);
+    for duration in DURATIONS {
+        let taken = rows.cut(study, bench, duration);
+        let (context, mut estimate) = begin(&bench.machine, logs, taken, parameters)?;
+        let rounds = (FIRST, progress);
+        settle_noise(
+            &context,
+            hypothesis,
+            nominal,
+            &mut estimate,
+            rounds.0,
+            progress,
+        )?;
+        let begin = (&estimate, &Slopes::default());
+        let none = fit(&context, hypothesis, nominal, begin, (ROUNDS, progress))?;
+        if std::env::var("SEG").is_ok() {
+            let m: Vec<f64> = context
+                .walks
+                .iter()
+                .zip(&none.estimate.misled)
+                .filter(|(w, _)| w.segment.is_some())
+                .map(|(_, m)| (*m * 100.0).round() / 100.0)
+                .collect();
+            let x: Vec<f64> = context
+                .walks
+                .iter()
+                .zip(&none.estimate.excess)
+                .filter(|(w, _)| w.segment.is_some())
+                .map(|(_, m)| (*m * 100.0).round() / 100.0)
+                .collect();
+            eprintln!(
+                "SEG {duration} of {} walks {} misled {:.2} {m:?} excess {x:?}",
+                context.walks.len(),
+                m.len(),
+                none.estimate.misled_share(&context)
+            );
+        }
+        if duration == shortest || none.estimate.misled_share(&context) < MISLED {
+            return Ok((context, none));
+        }
+    }
+    unreachable!()
 }

@@ -1,18 +1,23 @@
 //! Where bodies touch, a log is taken in short segments.
 //!
 //! A missing force of any size and direction is no model of a lasting contact: pressed together by it, two bodies rub by any
-//! force. Over a quarter of a second a model that is nearly right is right without such a force. So a stretch with contact is cut
-//! into short segments, each a replay from a start of its own (multiple shooting, Bock and Plitt 1984), and what a
-//! segment leaves of its readings is a variance of its own. Elsewhere the missing force is smoothed.
+//! force. So a stretch with contact is cut into segments, each a replay from a start of its own (multiple shooting, Bock and Plitt
+//! 1984), and what a segment leaves of its readings is a variance of its own. Elsewhere the missing force is smoothed.
+//!
+//! A long segment tells more, for a small force moves a body the further the longer it acts, and has fewer starts to find. A short
+//! one is nearer to linear in its start: over a quarter of a second even a model with impacts is. So a segment is [as long
+//! as](DURATIONS) its slopes keep their promise.
 //!
 //! A segment begins some rows before its readings count. Over these rows the contact settles, and what the start may be off in a
 //! direction that a contact blocks dies away as it does in the machine; and what effects remember is there.
 
 use super::walk::Walk;
 
-/// Duration of a segment, s: a few times a contact's time constant (0.02 s by default in MuJoCo), short enough that a few per
-/// cent of a force move a body by about what sensors tell: 1 m/s^2 makes 30 mm, a hundredth of it 0.3 mm.
-const DURATION: f64 = 0.25;
+/// Durations of segments, s, the longest first: a whole stretch of contact; a few impacts; and a few times a contact's time
+/// constant (0.02 s by default in MuJoCo), over which a few per cent of a force move a body by about what sensors tell.
+pub const DURATIONS: [f64; 3] = [f64::INFINITY, 1.0, 0.25];
+/// Longest stretch without contact between two with it that is part of them, s: what it lacks is told as well by their readings.
+const BETWEEN: f64 = 0.5;
 /// Time for which a segment runs before its readings count, s: five time constants of a contact.
 const LEAD: f64 = 0.1;
 /// Time about a row with contact that counts as with it, s: readings are noisy, and a bounce is shorter than a row.
@@ -20,9 +25,9 @@ const ABOUT: f64 = 0.1;
 /// Fewest rows of a segment that count.
 const FEWEST: usize = 4;
 
-/// Cuts a walk: where something touches (one flag a row) into segments, the rest as it is.
+/// Cuts a walk: where something touches (one flag a row) into segments of a duration, s, the rest as it is.
 #[must_use]
-pub fn cut(walk: &Walk, touches: &[bool]) -> Vec<Walk> {
+pub fn cut(walk: &Walk, touches: &[bool], duration: f64) -> Vec<Walk> {
     let n = walk.len();
     if !touches.contains(&true) {
         return vec![walk.clone()];
@@ -38,7 +43,7 @@ pub fn cut(walk: &Walk, touches: &[bool]) -> Vec<Walk> {
     let mut out = Vec::new();
     for (range, touching) in runs {
         if touching {
-            segments(walk, range, &mut out);
+            segments(walk, range, duration, &mut out);
         } else {
             out.push(walk.part(range));
         }
@@ -59,12 +64,12 @@ fn runs_of(flags: &[bool]) -> Vec<Run> {
     runs
 }
 
-/// Runs without contact that are no longer than two segments become part of those with it.
+/// Short runs without contact become part of those with it.
 fn merged(walk: &Walk, runs: Vec<Run>) -> Vec<Run> {
     let mut out: Vec<Run> = Vec::new();
     for (range, touching) in runs {
         let seconds = walk.time[range.end - 1] - walk.time[range.start];
-        let touching = touching || seconds < 2.0 * DURATION;
+        let touching = touching || seconds < BETWEEN;
         match out.last_mut() {
             Some((before, last)) if *last == touching => before.end = range.end,
             _ => out.push((range, touching)),
@@ -74,10 +79,10 @@ fn merged(walk: &Walk, runs: Vec<Run>) -> Vec<Run> {
 }
 
 /// Cuts some rows into segments of about the same duration.
-fn segments(walk: &Walk, range: std::ops::Range<usize>, out: &mut Vec<Walk>) {
+fn segments(walk: &Walk, range: std::ops::Range<usize>, duration: f64, out: &mut Vec<Walk>) {
     let rows = range.len();
     let seconds = walk.time[range.end - 1] - walk.time[range.start];
-    let pieces = (seconds / DURATION).round() as usize;
+    let pieces = (seconds / duration).round() as usize;
     let pieces = pieces.clamp(1, (rows / FEWEST).max(1));
     for i in 0..pieces {
         let first = range.start + i * rows / pieces;
@@ -118,14 +123,14 @@ mod tests {
     #[test]
     fn without_contact_a_walk_stays_whole() {
         let walk = walk(300);
-        assert_eq!(cut(&walk, &[false; 300]), [walk]);
+        assert_eq!(cut(&walk, &[false; 300], 0.25), [walk]);
     }
 
     #[test]
     fn every_row_counts_once() {
         let walk = walk(400);
         let touches: Vec<bool> = (0..400).map(|k| (150..230).contains(&k)).collect();
-        let parts = cut(&walk, &touches);
+        let parts = cut(&walk, &touches, 0.25);
         let mut next = 0;
         for part in &parts {
             assert_eq!(counted(part).start, next);
@@ -143,8 +148,17 @@ mod tests {
     #[test]
     fn a_log_that_begins_with_contact_has_no_lead() {
         let walk = walk(100);
-        let parts = cut(&walk, &[true; 100]);
+        let parts = cut(&walk, &[true; 100], 0.25);
         assert_eq!(parts[0].segment, Some(0));
         assert_eq!(parts.len(), 4);
+    }
+
+    #[test]
+    fn a_stretch_of_contact_can_be_one_segment() {
+        let walk = walk(400);
+        let touches: Vec<bool> = (0..400).map(|k| (150..230).contains(&k)).collect();
+        let parts = cut(&walk, &touches, f64::INFINITY);
+        assert_eq!(parts.len(), 3);
+        assert_eq!(counted(&parts[1]), 140..240);
     }
 }

@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use asid_core::log::{ColumnMapping, LogNotes, of_table, wanted};
 use asid_core::{Episode, Error, Layout, Result};
+use asid_logs::episode::{ColumnMapping, LogNotes, of_table, wanted};
 use asid_logs::{LogSettings, Opener};
 
 /// Reads the logs of a study.
@@ -76,7 +76,8 @@ impl<'a> Logs<'a> {
         // An episode of a dataset (`dataset#3`) is no file.
         let (at, _) = asid_logs::open::split(file);
         if self.settings.kind_of(&at).is_table() {
-            let (episode, notes) = asid_core::log::read(file, self.layout, self.columns)?;
+            let (episode, notes) =
+                asid_logs::episode::read_mapped(file, self.layout, self.columns)?;
             return Ok(vec![(name(file), episode, notes)]);
         }
         let logs = self.opener.open(file, self.settings)?;

@@ -1,7 +1,7 @@
 //! A study with the wiring that its logs show, and the lines that say so.
 
-use asid_core::log::ColumnMapping;
 use asid_core::{Episode, Result};
+use asid_logs::episode::{ColumnMapping, remapped};
 
 use crate::machine::Machine;
 use crate::result::WiringResult;
@@ -101,7 +101,7 @@ pub fn mend(study: &Study, machine: &Machine, settings: &Settings) -> Result<Men
     let mappings = mappings(&all, &view);
     let remapped = |logs: &[(String, Episode)]| -> Result<Vec<(String, Episode)>> {
         let one =
-            |(name, e): &(String, Episode)| Ok((name.clone(), e.remapped(layout, &mappings)?));
+            |(name, e): &(String, Episode)| Ok((name.clone(), remapped(e, layout, &mappings)?));
         logs.iter().map(one).collect()
     };
     let mut mended = study.clone();

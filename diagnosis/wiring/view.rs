@@ -1,6 +1,6 @@
 //! What the columns of a log are taken to mean: one view of all of them is one hypothesis on the wiring.
 
-use asid_core::log::ColumnMapping;
+use asid_logs::episode::ColumnMapping;
 
 /// How one quantity of the model is read from the log.
 #[derive(Clone, Copy, Debug, PartialEq)]

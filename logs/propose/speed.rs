@@ -4,10 +4,9 @@
 //! displacement of the position, in the position's unit. Once the positions are placed, the factor between the two
 //! names the unit of a speed whose name does not, and its sign.
 
-use asid_core::log::unit_factor;
-
 use super::quantity::Dimension;
 use super::{Match, fit, source, values};
+use crate::episode::unit_factor;
 use crate::raw::RawLog;
 use crate::series::Series;
 

@@ -109,7 +109,7 @@ pub fn unit(quantity: &Quantity, series: &Series, words: &Words, kind: LogFormat
         return Unit::si(allows(quantity, series, 1.0));
     }
     let fitting = candidates.iter().find(|name| {
-        let factor = asid_core::log::unit_factor(name).unwrap_or(1.0);
+        let factor = crate::episode::unit_factor(name).unwrap_or(1.0);
         allows(quantity, series, factor)
     });
     match fitting {

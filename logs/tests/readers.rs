@@ -5,8 +5,8 @@
 
 use std::path::{Path, PathBuf};
 
-use asid_core::log::{of_table, wanted};
-use asid_core::{Episode, Scene};
+use asid_core::Scene;
+use asid_logs::episode::{of_table, wanted};
 use asid_logs::propose::propose;
 use asid_logs::{LogFormat, LogSettings, Opener};
 use asid_mjcf::Plant;
@@ -24,7 +24,7 @@ fn scene() -> Scene {
 }
 
 /// The episodes at some paths, under the mapping that is proposed for them.
-fn imported(paths: &[PathBuf]) -> Vec<Episode> {
+fn imported(paths: &[PathBuf]) -> Vec<asid_core::Episode> {
     let scene = scene();
     let plant = Plant::of(&scene).unwrap();
     let mut opener = Opener::default();
@@ -51,7 +51,7 @@ fn assert_same(paths: &[PathBuf], off: f64) {
     let plant = Plant::of(&scene()).unwrap();
     for (episode, name) in imported(paths).iter().zip(EPISODES) {
         let csv = fixtures().join("csv").join(name).with_extension("csv");
-        let wanted = Episode::read(&csv, &plant.layout).unwrap();
+        let wanted = asid_logs::episode::read(&csv, &plant.layout).unwrap();
         assert_eq!(episode.channels, wanted.channels, "{name}");
         assert_eq!(episode.rows(), wanted.rows(), "{name}");
         for (got, want, off) in [
@@ -178,7 +178,7 @@ fn a_parquet_file_that_states_more_than_there_is_is_refused_at_once() {
     let path = fixtures().join("skips.parquet");
     let began = std::time::Instant::now();
     let plant = Plant::of(&scene()).unwrap();
-    let own = Episode::read(&path, &plant.layout).unwrap_err();
+    let own = asid_logs::episode::read(&path, &plant.layout).unwrap_err();
     let other = Opener::default().open(&path, &LogSettings::default());
     for error in [own.to_string(), other.unwrap_err().to_string()] {
         assert!(

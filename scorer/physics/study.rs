@@ -89,7 +89,9 @@ impl Study {
             for pattern in patterns {
                 files.extend(matching(folder, pattern)?);
             }
-            let logs = files.iter().map(|f| Episode::read(f, &plant.layout));
+            let logs = files
+                .iter()
+                .map(|f| asid_logs::episode::read(f, &plant.layout));
             logs.collect()
         };
         let (mut train, mut test) = (read(&document.train)?, read(&document.test)?);

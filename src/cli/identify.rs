@@ -234,7 +234,7 @@ fn unexplained(residual: f64) -> String {
 /// Reads a log and checks that it can be identified from.
 fn read(session: &Session, path: &Path) -> Result<Episode> {
     let layout = session.model.layout();
-    let episode = Episode::read(path, layout)?;
+    let episode = asid_logs::episode::read(path, layout)?;
     let fail = |message: String| Error::Log {
         path: path.to_owned(),
         message,

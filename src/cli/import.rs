@@ -9,8 +9,8 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
-use asid_core::log::{ColumnMapping, of_table, wanted};
 use asid_core::{Episode, Error, Layout};
+use asid_logs::episode::{ColumnMapping, of_table, wanted};
 use asid_logs::propose::{Proposal, propose};
 use asid_logs::{LogFormat, LogSettings, Opener, RawLog};
 
@@ -257,7 +257,7 @@ fn episode(
     mappings: &[ColumnMapping],
 ) -> Result<Episode> {
     if raw.stamps.is_some() {
-        return Ok(asid_core::log::read(path, layout, mappings)?.0);
+        return Ok(asid_logs::episode::read_mapped(path, layout, mappings)?.0);
     }
     let [commands, readings] = wanted(layout, mappings);
     let (table, _) = raw.table(&commands, &readings);

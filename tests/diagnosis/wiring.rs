@@ -2,10 +2,10 @@
 //! mended, all but an offset with and without the start in the log, and none is seen where there is none.
 
 use asid::core::Episode;
-use asid::core::log::ColumnMapping;
 use asid::diagnosis::machine::Machine;
 use asid::diagnosis::study::Study;
 use asid::diagnosis::wiring::{Mended, Settings, mend};
+use asid::logs::episode::{ColumnMapping, remapped};
 
 use super::arm;
 use super::diagnosis_support::engine;
@@ -35,7 +35,7 @@ fn spoilt(study: &Study, mappings: &[ColumnMapping]) -> Study {
     let layout = &machine(study).plant.layout.clone();
     let mut spoilt = study.clone();
     for (_, episode) in spoilt.train.iter_mut().chain(&mut spoilt.test) {
-        *episode = episode.remapped(layout, mappings).unwrap();
+        *episode = remapped(episode, layout, mappings).unwrap();
     }
     spoilt
 }

@@ -1,6 +1,7 @@
 //! The document as XML: includes spliced in by text, and what would end a parser refused first.
 
 use crate::error::{Error, Result};
+use crate::guard::one_line;
 
 /// Deepest chain of `<include>` that is followed.
 const MAX_INCLUDE_DEPTH: usize = 8;
@@ -132,11 +133,6 @@ fn splice(
     }
     out.push_str(&xml[copied..]);
     Ok(out)
-}
-
-/// Error texts of parsers folded to one line.
-pub(crate) fn one_line(text: &str) -> String {
-    text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
 #[cfg(test)]

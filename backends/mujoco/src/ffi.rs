@@ -217,7 +217,7 @@ impl Batch {
             let status = *mjb_status(self.raw.as_ptr()).add(sim);
             (status != 0).then(|| {
                 let text = CStr::from_ptr(mjb_error(self.raw.as_ptr(), sim as c_int));
-                one_line(&text.to_string_lossy())
+                asid_core::guard::one_line(&text.to_string_lossy())
             })
         }
     }
@@ -284,12 +284,6 @@ impl Drop for Batch {
         // SAFETY: made by mjb_makeBatch and deleted only here.
         unsafe { mjb_deleteBatch(self.raw.as_ptr()) };
     }
-}
-
-/// MuJoCo's texts folded to one line.
-#[must_use]
-pub fn one_line(text: &str) -> String {
-    text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
 /// What [`run`] gets: the function, its jobs, and where a panic of it waits.

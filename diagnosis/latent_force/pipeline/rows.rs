@@ -1,6 +1,6 @@
 //! Which rows of the logs are smoothed, and which are taken in segments.
 
-use asid_core::Result;
+use asid_core::{Layout, Result};
 
 use crate::bench::Bench;
 use crate::candidate::enumerate;
@@ -49,35 +49,66 @@ pub(super) fn replays_are_affordable(
     steps * enumerate(&bench.machine, shown, without).0.len() < AFFORDABLE
 }
 
-/// Takes the training logs within the budget, in segments where something touches; with the contacts along them.
-pub(super) fn take(study: &Study, bench: &Bench, nominal: &[f64]) -> Result<(Taken, Trajectory)> {
-    let layout = bench.layout();
-    let plant = &bench.machine.plant;
-    let logs = &bench.train.logs;
-    let whole = |e| Walk::new(logs, e, layout.timestep);
-    let whole = within_budget((0..logs.episodes.len()).map(whole).collect(), layout.nv);
+/// Rows of the training logs that are taken, and what touches in them.
+pub(super) struct Rows {
+    /// One walk a log.
+    walks: Vec<Walk>,
+    /// Whether something touches, one flag a row.
+    touches: Vec<Vec<bool>>,
+    /// Largest magnitude of each tangent coordinate.
+    scale: Vec<f64>,
+    /// What the model does along the states that are read, with its contacts.
+    pub(super) shown: Trajectory,
+}
+
+impl Rows {
+    /// Takes rows within the budget.
+    pub(super) fn of(bench: &Bench, nominal: &[f64]) -> Result<Self> {
+        let layout = bench.layout();
+        let plant = &bench.machine.plant;
+        let logs = &bench.train.logs;
+        let whole = |e| Walk::new(logs, e, layout.timestep);
+        let walks = within_budget((0..logs.episodes.len()).map(whole).collect(), layout.nv);
+        let first = from_readings(plant, logs, &walks, &at_home(layout, &walks));
+        let shown = along(bench, &walks, nominal, &first)?;
+        Ok(Self {
+            touches: touching(plant, logs, &shown),
+            scale: scales(plant, &first),
+            walks,
+            shown,
+        })
+    }
+
+    /// Whether something touches in any of them.
+    pub(super) fn touch(&self) -> bool {
+        self.touches.iter().flatten().any(|t| *t)
+    }
+
+    /// Them in segments of a duration, s, where something touches.
+    pub(super) fn cut(&self, study: &Study, bench: &Bench, duration: f64) -> Taken {
+        let plant = &bench.machine.plant;
+        let each = self.walks.iter().zip(&self.touches);
+        let walks: Vec<Walk> = each.flat_map(|(walk, t)| cut(walk, t, duration)).collect();
+        let given = |w: &Walk| {
+            let episode = &study.train[w.episode].1;
+            let known = w.rows[0] == 0 && episode.initial.is_some();
+            known.then(|| given_start(plant, episode))
+        };
+        Taken {
+            given: walks.iter().map(given).collect(),
+            open: bench.open.clone(),
+            otherwise: at_home(bench.layout(), &walks),
+            scale: self.scale.clone(),
+            walks,
+        }
+    }
+}
+
+/// The first keyframe at rest in each row of some walks.
+fn at_home(layout: &Layout, walks: &[Walk]) -> Vec<Vec<f64>> {
     let home = asid_core::problem::home(layout);
     let still = [&home.0[..], &home.1[..]].concat();
-    let at_home =
-        |walks: &[Walk]| -> Vec<Vec<f64>> { walks.iter().map(|w| still.repeat(w.len())).collect() };
-    let first = from_readings(plant, logs, &whole, &at_home(&whole));
-    let shown = along(bench, &whole, nominal, &first)?;
-    let touches = touching(plant, logs, &shown);
-    let each = whole.iter().zip(&touches);
-    let walks: Vec<Walk> = each.flat_map(|(walk, t)| cut(walk, t)).collect();
-    let given = |w: &Walk| {
-        let episode = &study.train[w.episode].1;
-        let known = w.rows[0] == 0 && episode.initial.is_some();
-        known.then(|| given_start(plant, episode))
-    };
-    let taken = Taken {
-        given: walks.iter().map(given).collect(),
-        open: bench.open.clone(),
-        otherwise: at_home(&walks),
-        scale: scales(plant, &first),
-        walks,
-    };
-    Ok((taken, shown))
+    walks.iter().map(|w| still.repeat(w.len())).collect()
 }
 
 /// The first rows of each walk, as many as the budget of physics steps allows: a screening takes all of them once a column.

@@ -349,7 +349,7 @@ const SEEDS: u64 = 5;
 fn read(files: &[PathBuf], model: &RefinedModel) -> Result<Vec<(String, Episode)>> {
     let layout = asid_mjcf::Plant::of(&model.scene)?.layout;
     let one = |file: &PathBuf| -> Result<(String, Episode)> {
-        let episode = Episode::read(Path::new(file), &layout)?;
+        let episode = asid_logs::episode::read(Path::new(file), &layout)?;
         Ok((file.display().to_string(), episode))
     };
     files.iter().map(one).collect()

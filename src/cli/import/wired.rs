@@ -3,10 +3,10 @@
 use std::collections::BTreeMap;
 
 use anyhow::Result;
-use asid_core::log::ColumnMapping;
 use asid_diagnosis::machine::Machine;
 use asid_diagnosis::study::Study;
 use asid_diagnosis::wiring::{Settings, mend};
+use asid_logs::episode::ColumnMapping;
 use asid_logs::propose::Proposal;
 use serde::Deserialize;
 

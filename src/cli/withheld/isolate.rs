@@ -113,7 +113,7 @@ fn treat(study: &Path, treatment: Treatment) -> Result<()> {
             .into_iter()
             .filter(|f| f.extension().is_some_and(|e| e == "csv"));
         for (i, log) in logs.enumerate() {
-            let mut episode = Episode::read(&log, &plant.layout)?;
+            let mut episode = asid_logs::episode::read(&log, &plant.layout)?;
             let mut random = Streams::new(seed).indexed("noise for a log", i as u64);
             turn_to_noise(&mut episode, &mut random);
             episode.write_csv(&log)?;

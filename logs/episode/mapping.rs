@@ -3,10 +3,9 @@
 //! A log of another stack has names, units, signs and zeros of its own. A mapping states them once, and every
 //! reader applies it, so that logs are used as they were recorded.
 
+use asid_core::layout::Layout;
+use asid_core::{Error, Result};
 use serde::{Deserialize, Serialize};
-
-use crate::error::{Error, Result};
-use crate::layout::Layout;
 
 /// Units by name, with the factor that brings them to SI (NIST SP 811, appendix B).
 const UNITS: [(&str, f64); 24] = [

@@ -4,13 +4,13 @@ use std::fs::File;
 use std::io::{BufReader, Cursor, Read as _, Seek as _, SeekFrom};
 use std::path::Path;
 
+use asid_core::guard::one_line;
 use bytes::Bytes;
 use parquet::errors::{ParquetError, Result as ParquetResult};
 use parquet::file::reader::{ChunkReader, Length, SerializedFileReader};
 
 use super::layouts::{FILE_META_DATA, PAGE_HEADER};
 use super::thrift::Walk;
-use crate::scene::one_line;
 
 /// Length of what stands behind the footer: the footer's length in four bytes, and `PAR1`.
 const TAIL: u64 = 8;

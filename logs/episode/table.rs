@@ -5,12 +5,12 @@
 
 use std::path::Path;
 
+use asid_core::layout::Layout;
+use asid_core::{Episode, Error, Result};
+
 use super::mapping::Source;
 use super::reader::Reader;
 use super::{ColumnMapping, LogNotes, entry_name};
-use crate::episode::Episode;
-use crate::error::{Error, Result};
-use crate::layout::Layout;
 
 /// Columns of numbers over time.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -94,7 +94,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("log.csv");
         std::fs::write(&path, "time,ctrl.servo,angle\n0,1,0.25\n0.5,,\n1,3,-0.5\n").unwrap();
-        let from_csv = Episode::read(&path, &layout()).unwrap();
+        let from_csv = crate::episode::read(&path, &layout()).unwrap();
         let nan = f64::NAN;
         let table = Table {
             time: vec![0.0, 0.5, 1.0],

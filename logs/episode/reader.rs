@@ -1,11 +1,12 @@
 //! From rows of cells to an episode: which column holds what, and what is mended.
 
+use asid_core::episode::{ChannelColumns, Episode, InitialState};
+use asid_core::layout::Layout;
+use asid_core::{Error, Result};
+
 use super::mapping::{ColumnMapping, Source};
 use super::notes::LogNotes;
 use super::{clock, delay};
-use crate::episode::{ChannelColumns, Episode, InitialState};
-use crate::error::{Error, Result};
-use crate::layout::Layout;
 
 /// A column of the log, and how a quantity is read from it.
 #[derive(Clone, Copy, Debug)]

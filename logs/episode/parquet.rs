@@ -6,6 +6,9 @@ mod thrift;
 
 use std::path::Path;
 
+use asid_core::Episode;
+use asid_core::guard::{guarded, one_line};
+use asid_core::layout::Layout;
 use parquet::file::reader::FileReader as _;
 use parquet::record::Field;
 
@@ -13,10 +16,6 @@ pub use file::ParquetFile;
 
 use super::reader::Reader;
 use super::{ColumnMapping, LogNotes};
-use crate::episode::Episode;
-use crate::guard::guarded;
-use crate::layout::Layout;
-use crate::scene::one_line;
 
 /// Reads a Parquet file.
 pub(super) fn read(
@@ -112,7 +111,7 @@ mod tests {
             &[Some(0.25), None, Some(-0.5)],
         );
         std::fs::write(&b, "time,ctrl.servo,angle\n0,1,0.25\n0.5,2,\n1,3,-0.5\n").unwrap();
-        let [a, b] = [a, b].map(|path| Episode::read(&path, &layout()).unwrap());
+        let [a, b] = [a, b].map(|path| crate::episode::read(&path, &layout()).unwrap());
         assert_eq!((&a.time, &a.ctrl), (&b.time, &b.ctrl));
         assert!(a.readings[1].is_nan() && b.readings[1].is_nan());
         assert_eq!(
@@ -127,10 +126,14 @@ mod tests {
         let path = folder.path().join("log.parquet");
         let infinite = [Some(f64::INFINITY), None];
         write(&path, &[0.0, 1.0], &[1.0, 2.0], &infinite);
-        let error = Episode::read(&path, &layout()).unwrap_err().to_string();
+        let error = crate::episode::read(&path, &layout())
+            .unwrap_err()
+            .to_string();
         assert!(error.contains("row 2, column `angle`"), "{error}");
         std::fs::write(&path, "time,angle\n").unwrap();
-        let error = Episode::read(&path, &layout()).unwrap_err().to_string();
+        let error = crate::episode::read(&path, &layout())
+            .unwrap_err()
+            .to_string();
         assert!(
             error.contains("log.parquet") && error.lines().count() == 1,
             "{error}"
@@ -145,7 +148,9 @@ mod tests {
         let mut bytes = std::fs::read(&path).unwrap();
         bytes[4..4 + head.len()].copy_from_slice(head);
         std::fs::write(&path, bytes).unwrap();
-        let error = Episode::read(&path, &layout()).unwrap_err().to_string();
+        let error = crate::episode::read(&path, &layout())
+            .unwrap_err()
+            .to_string();
         assert_eq!(error.lines().count(), 1, "{error}");
         error
     }

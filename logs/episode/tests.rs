@@ -1,13 +1,46 @@
 //! A log of another stack, with the mapping that mends it, is the log as the model has it.
 
+use asid_core::episode::ChannelColumns;
+use asid_core::layout::{Actuator, Sensor};
+
 use super::*;
-use crate::episode::tests::layout;
+
+/// A servo with its angle and the place of its tip.
+pub(super) fn layout() -> Layout {
+    Layout {
+        timestep: 0.01,
+        nq: 0,
+        nv: 0,
+        bodies: vec!["world".into()],
+        geoms: vec![],
+        joints: vec![],
+        actuators: vec![Actuator {
+            name: "servo".into(),
+            ctrl_range: None,
+        }],
+        sensors: vec![
+            Sensor {
+                name: "angle".into(),
+                kind: "jointpos".into(),
+                address: 0,
+                len: 1,
+            },
+            Sensor {
+                name: "tip".into(),
+                kind: "framepos".into(),
+                address: 1,
+                len: 3,
+            },
+        ],
+        keyframes: vec![],
+    }
+}
 
 fn read_text(text: &str, mappings: &[ColumnMapping]) -> Result<(Episode, LogNotes)> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("log.csv");
     std::fs::write(&path, text).unwrap();
-    read(&path, &layout(), mappings)
+    read_mapped(&path, &layout(), mappings)
 }
 
 /// A log at 100 Hz: the angle is a cubic of time, the tip runs on lines.
@@ -107,7 +140,7 @@ fn a_delayed_command_keeps_its_integral() {
         delay: 0.025,
         ..ColumnMapping::of("ctrl.servo")
     };
-    let late = episode.remapped(&layout(), &[delay]).unwrap();
+    let late = remapped(&episode, &layout(), &[delay]).unwrap();
     // Command k / 7 in row k: the first step arrives in the middle of row 9.
     for (got, want) in late.ctrl[8..11].iter().zip([0.0, 0.5, 1.0]) {
         assert!((got - want).abs() < 1e-9, "{got} {want}");
@@ -132,7 +165,7 @@ fn a_mapping_of_an_episode_is_the_mapping_of_its_file() {
     ];
     let (of_file, _) = read_text(&text, &mappings).unwrap();
     let (plain, _) = read_text(&text, &[]).unwrap();
-    assert_same(&plain.remapped(&layout(), &mappings).unwrap(), &of_file);
+    assert_same(&remapped(&plain, &layout(), &mappings).unwrap(), &of_file);
 }
 
 #[test]
@@ -164,5 +197,113 @@ fn stamps_in_nanoseconds_give_a_log_of_seconds() {
     assert_eq!(notes.time_unit, Some("ns"));
     for (k, t) in episode.time.iter().enumerate() {
         assert!((t - 0.01 * k as f64).abs() < 1e-6, "{t}");
+    }
+}
+
+#[test]
+fn logs_round_trip_to_the_bit() {
+    let episode = Episode {
+        time: vec![0.0, 0.1, 0.2],
+        actuators: vec!["servo".into()],
+        ctrl: vec![1.0 / 3.0, -2e-7, 1e20],
+        channels: vec![
+            ChannelColumns {
+                name: "angle".into(),
+                len: 1,
+            },
+            ChannelColumns {
+                name: "tip".into(),
+                len: 3,
+            },
+        ],
+        readings: vec![
+            0.1,
+            1.0,
+            f64::NAN,
+            3.0,
+            0.2,
+            1.5,
+            2.0,
+            3.5,
+            -0.3,
+            1.0,
+            2.0,
+            std::f64::consts::PI,
+        ],
+        initial: None,
+    };
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("log.csv");
+    episode.write_csv(&path).unwrap();
+    let back = read(&path, &layout()).unwrap();
+    assert_eq!(back.time, episode.time);
+    assert_eq!(back.ctrl, episode.ctrl);
+    for (a, b) in back.readings.iter().zip(&episode.readings) {
+        assert!(a == b || (a.is_nan() && b.is_nan()));
+    }
+}
+
+#[test]
+fn names_with_commas_and_quotes_read_back() {
+    let mut layout = layout();
+    for (name, odd) in [("servo", "a, \"b\""), ("angle", "l,ed")] {
+        for a in layout.actuators.iter_mut().filter(|a| a.name == name) {
+            a.name = odd.into();
+        }
+        for s in layout.sensors.iter_mut().filter(|s| s.name == name) {
+            s.name = odd.into();
+        }
+    }
+    let actuators = vec![layout.actuators[0].name.clone()];
+    let sensor = layout.sensors.iter().find(|s| s.len == 1).unwrap();
+    let episode = Episode {
+        time: vec![0.0, 0.1],
+        actuators,
+        ctrl: vec![1.0, 2.0],
+        channels: vec![ChannelColumns {
+            name: sensor.name.clone(),
+            len: 1,
+        }],
+        readings: vec![0.5, 0.25],
+        ..Episode::default()
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("log.csv");
+    episode.write_csv(&path).unwrap();
+    let header = std::fs::read_to_string(&path).unwrap();
+    assert!(
+        header.starts_with("time,\"ctrl.a, \"\"b\"\"\","),
+        "{header}"
+    );
+    let back = read(&path, &layout);
+    assert_eq!(
+        back.map(|b| b.readings).map_err(|e| e.to_string()),
+        Ok(episode.readings)
+    );
+}
+
+#[test]
+fn bad_logs_name_row_and_column() {
+    let cases = [
+        ("t,ctrl.servo,angle\n0,1,2\n", "no column `time`"),
+        ("time,angle\n0,1\n", "`ctrl.servo`"),
+        ("time,ctrl.servo,angel\n0,1,2\n1,1,2\n", "`angel`"),
+        ("time,ctrl.servo,tip.0,tip.1\n0,1,2,3\n", "`tip.2`"),
+        ("time,ctrl.servo,angle\n0,1,2\n0,1,2\n", "1 rows"),
+        (
+            "time,ctrl.servo,angle\n0,1,2\n1,1,abc\n",
+            "row 3, column `angle`: `abc`",
+        ),
+        (
+            "time,ctrl.servo,angle\n0,,2\n1,,2\n",
+            "column `ctrl.servo`: every command is missing",
+        ),
+        ("time,ctrl.servo,angle\n0,1,2\n", "1 rows"),
+        ("time,ctrl.servo,angle\n0,1,\n1,1,\n", "every reading"),
+        ("time,ctrl.servo,angle\n0,1,2\n1,1\n", "row 3"),
+    ];
+    for (text, expected) in cases {
+        let error = read_text(text, &[]).unwrap_err().to_string();
+        assert!(error.contains(expected), "{error}");
     }
 }

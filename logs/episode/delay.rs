@@ -1,7 +1,7 @@
 //! Readings and commands that are late are given to the times that they tell of.
 
-use crate::episode::Episode;
-use crate::layout::Layout;
+use asid_core::Episode;
+use asid_core::layout::Layout;
 
 /// Rows over which a late reading is interpolated, at most: beyond them the motion between is not a line.
 const SPAN: usize = 2;

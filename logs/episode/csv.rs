@@ -3,11 +3,12 @@
 use std::io::{BufRead as _, BufReader, Read as _};
 use std::path::Path;
 
+use asid_core::Episode;
+use asid_core::guard::one_line;
+use asid_core::layout::Layout;
+
 use super::reader::Reader;
 use super::{ColumnMapping, LogNotes};
-use crate::episode::Episode;
-use crate::layout::Layout;
-use crate::scene::one_line;
 
 /// How writers of CSV files put a missing number, besides an empty cell: NumPy and pandas, R, SQL, JSON.
 const MISSING: [&str; 6] = ["nan", "na", "n/a", "null", "none", "-"];

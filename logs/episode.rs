@@ -1,0 +1,81 @@
+//! Reads logs: one file an episode, CSV or (with the feature `parquet`) Parquet, with the same columns.
+//!
+//! A log is checked as it is read: whatever is wrong is told with its file, row and column, and what is ordinary
+//! (other columns, other units of time, doubled stamps, commands at a lower rate) is mended and noted.
+//! The first row of data is row 2, as a spreadsheet of the CSV file counts it; a Parquet file's
+//! rows are counted the same way.
+
+mod clock;
+mod csv;
+mod delay;
+mod mapping;
+mod notes;
+#[cfg(feature = "parquet")]
+mod parquet;
+mod reader;
+mod remapped;
+mod table;
+
+use std::path::Path;
+
+use asid_core::layout::Layout;
+use asid_core::{Episode, Error, Result};
+
+pub use self::csv::{cell_number, delimiter};
+#[cfg(feature = "parquet")]
+pub use self::parquet::ParquetFile;
+pub use clock::seconds;
+pub use mapping::{ColumnMapping, unit_factor};
+pub use notes::LogNotes;
+pub use remapped::remapped;
+pub use table::{Table, of_table, quantities, wanted};
+
+/// Reads a log of a scene with this layout; a name that ends in `.parquet` is a Parquet
+/// file, any other CSV. Columns may come in any order, sensors may be missing, and columns that the scene does
+/// not know are passed over; columns `qpos.*` and `qvel.*` hold the state at the first row.
+///
+/// # Errors
+/// When the file cannot be read or a row or column is wrong; the message names both.
+pub fn read(path: &Path, layout: &Layout) -> Result<Episode> {
+    read_mapped(path, layout, &[]).map(|(episode, _)| episode)
+}
+
+/// Name of an entry of a sensor, as its column has it.
+fn entry_name(sensor: &str, len: usize, entry: usize) -> String {
+    if len == 1 {
+        sensor.to_owned()
+    } else {
+        format!("{sensor}.{entry}")
+    }
+}
+
+/// Reads a log whose columns mean what `mappings` say, as [`read`] does; with what was passed over or mended.
+///
+/// # Errors
+/// When the file cannot be read, or a row, a column or a mapping is wrong; the message names it.
+pub fn read_mapped(
+    path: &Path,
+    layout: &Layout,
+    mappings: &[ColumnMapping],
+) -> Result<(Episode, LogNotes)> {
+    mappings.iter().try_for_each(|m| m.check(layout))?;
+    let ending = path.extension().map(|e| e.to_ascii_lowercase());
+    let read = |path: &Path| match ending.as_deref().and_then(|e| e.to_str()) {
+        #[cfg(feature = "parquet")]
+        Some("parquet") => parquet::read(path, layout, mappings),
+        #[cfg(not(feature = "parquet"))]
+        Some("parquet") => Err(
+            "is a Parquet file, which this build cannot read: build with `--features parquet`, \
+                 or convert it to CSV"
+                .to_owned(),
+        ),
+        _ => csv::read(path, layout, mappings),
+    };
+    read(path).map_err(|message| Error::Log {
+        path: path.to_owned(),
+        message,
+    })
+}
+
+#[cfg(test)]
+mod tests;
