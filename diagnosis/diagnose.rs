@@ -31,13 +31,13 @@ pub use crate::work::Work;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Contact {
-    /// By whole replays where one of each candidate is affordable, else in short segments.
+    /// In segments as long as their slopes keep their promise.
     #[default]
-    Auto,
+    Segments,
     /// By whole replays.
     Replays,
-    /// In short segments.
-    Segments,
+    /// By whole replays where one of each candidate is affordable, else in segments.
+    Auto,
 }
 
 /// Settings of a diagnosis.

@@ -140,47 +140,28 @@ fn without_effects<'a>(
     (hypothesis, nominal): (&Hypothesis, &[f64]),
     progress: &dyn Progress,
 ) -> Result<(Context<'a>, Fitted)> {
-    let shortest = DURATIONS[DURATIONS.len() - 1];
-    let parameters = (&study.parameters[..], nominal);
-    for duration in DURATIONS {
+    let fitted = |duration: f64| -> Result<(Context<'a>, Fitted)> {
         let taken = rows.cut(study, bench, duration);
+        let parameters = (&study.parameters[..], nominal);
         let (context, mut estimate) = begin(&bench.machine, logs, taken, parameters)?;
-        let rounds = (FIRST, progress);
         settle_noise(
             &context,
             hypothesis,
             nominal,
             &mut estimate,
-            rounds.0,
+            FIRST,
             progress,
         )?;
         let begin = (&estimate, &Slopes::default());
         let none = fit(&context, hypothesis, nominal, begin, (ROUNDS, progress))?;
-        if std::env::var("SEG").is_ok() {
-            let m: Vec<f64> = context
-                .walks
-                .iter()
-                .zip(&none.estimate.misled)
-                .filter(|(w, _)| w.segment.is_some())
-                .map(|(_, m)| (*m * 100.0).round() / 100.0)
-                .collect();
-            let x: Vec<f64> = context
-                .walks
-                .iter()
-                .zip(&none.estimate.excess)
-                .filter(|(w, _)| w.segment.is_some())
-                .map(|(_, m)| (*m * 100.0).round() / 100.0)
-                .collect();
-            eprintln!(
-                "SEG {duration} of {} walks {} misled {:.2} {m:?} excess {x:?}",
-                context.walks.len(),
-                m.len(),
-                none.estimate.misled_share(&context)
-            );
-        }
-        if duration == shortest || none.estimate.misled_share(&context) < MISLED {
+        Ok((context, none))
+    };
+    let [longer @ .., shortest] = DURATIONS;
+    for duration in longer {
+        let (context, none) = fitted(duration)?;
+        if none.estimate.misled_share(&context) < MISLED {
             return Ok((context, none));
         }
     }
-    unreachable!()
+    fitted(shortest)
 }
