@@ -31,13 +31,13 @@ pub use crate::work::Work;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Contact {
-    /// In segments as long as their slopes keep their promise.
+    /// By whole replays where one of each candidate is affordable, else in segments.
     #[default]
-    Segments,
+    Auto,
     /// By whole replays.
     Replays,
-    /// By whole replays where one of each candidate is affordable, else in segments.
-    Auto,
+    /// In segments as long as their slopes keep their promise.
+    Segments,
 }
 
 /// Settings of a diagnosis.
