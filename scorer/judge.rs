@@ -13,6 +13,7 @@ use crate::answer::Answer;
 use crate::dirt;
 use crate::label::{Label, name_of};
 use crate::sites::Sites;
+use crate::wiring::named_by_mending;
 
 /// How an answer stands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -116,6 +117,7 @@ impl Judge<'_> {
     #[must_use]
     pub fn of_set(&self, set: &[String], answer: &Answer) -> Standing {
         let label = self.label;
+        let set = &self.with_mended(set, answer)[..];
         if label.must_not.iter().any(|e| self.sites.holds(set, e)) {
             return Standing::Wrong;
         }
@@ -136,6 +138,17 @@ impl Judge<'_> {
             return Standing::Dirt;
         }
         Standing::Wrong
+    }
+
+    /// A set with the causes that the answer has named by mending columns.
+    fn with_mended(&self, set: &[String], answer: &Answer) -> Vec<String> {
+        let mended: Vec<String> = named_by_mending(self.label, answer).cloned().collect();
+        if mended.is_empty() || is(set, "unknown") {
+            return set.to_vec();
+        }
+        let named = set.iter().filter(|e| *e != "none").cloned();
+        let set: BTreeSet<String> = named.chain(mended).collect();
+        set.into_iter().collect()
     }
 
     /// Whether `set` is `wanted`, but for listed dirt beside it.

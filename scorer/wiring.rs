@@ -1,9 +1,12 @@
 //! Faults of wiring: judged apart from the verdict, which is of the study after the mending.
+//!
+//! A reading that is shifted by a constant has two descriptions, a wrong zero of its column and a bias of its sensor: the same
+//! physics. Where the label has the bias, an answer that mends the zero has named it.
 
 use serde::Serialize;
 
 use crate::answer::{Answer, WiringFound};
-use crate::label::{Label, WiringTruth};
+use crate::label::{Label, WiringTruth, name_of, site_of};
 
 /// Faults of wiring of one case.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -25,13 +28,53 @@ fn same(found: &WiringFound, truth: &WiringTruth) -> bool {
     found.fault == truth.fault && (columns || clock)
 }
 
+/// The effect that is the same physics as [`SHIFT`] of a column of its sensor.
+const BIAS: &str = "sensor-bias";
+/// The fault that is a constant shift of a column.
+const SHIFT: &str = "wiring-offset";
+
+/// Causes of a label that an answer has named by the zero of a column which it mends.
+pub fn named_by_mending<'a>(label: &'a Label, answer: &Answer) -> impl Iterator<Item = &'a String> {
+    let mended = |cause: &&String| {
+        name_of(cause) == BIAS && answer.named_wiring().any(|f| is_bias_at(f, site_of(cause)))
+    };
+    let given = |cause: &&String| {
+        let at = |t: &WiringTruth| t.columns.iter().any(|c| sensor_of(c) == site_of(cause));
+        !label.wiring.iter().any(|t| t.fault == SHIFT && at(t))
+    };
+    let causes: Vec<&String> = label.effects.iter().filter(given).filter(mended).collect();
+    causes.into_iter()
+}
+
+/// Whether a fault is the shift of a sensor.
+fn is_bias_at(found: &WiringFound, sensor: &str) -> bool {
+    let all = found
+        .columns
+        .iter()
+        .all(|c| c == sensor || sensor_of(c) == sensor);
+    found.fault == SHIFT && !found.columns.is_empty() && all
+}
+
+/// Sensor of a column: `NAME`, or `NAME.0` of an entry.
+fn sensor_of(column: &str) -> &str {
+    match column.rsplit_once('.') {
+        Some((sensor, entry)) if entry.parse::<usize>().is_ok() => sensor,
+        _ => column,
+    }
+}
+
 impl Wiring {
     /// Of a case; `answer` is missing where there was none.
     #[must_use]
     pub fn of(label: &Label, answer: Option<&Answer>) -> Self {
         let named: Vec<&WiringFound> = answer.into_iter().flat_map(Answer::named_wiring).collect();
         let is_found = |t: &&WiringTruth| named.iter().any(|f| same(f, t));
-        let is_true = |f: &&&WiringFound| label.wiring.iter().any(|t| same(f, t));
+        let causes: Vec<&String> =
+            answer.map_or_else(Vec::new, |a| named_by_mending(label, a).collect());
+        let is_true = |f: &&&WiringFound| {
+            let cause = |c: &&String| is_bias_at(f, site_of(c));
+            label.wiring.iter().any(|t| same(f, t)) || causes.iter().any(cause)
+        };
         Self {
             faults: label.wiring.len(),
             found: label.wiring.iter().filter(is_found).count(),
@@ -82,5 +125,38 @@ mod tests {
             }
         );
         assert_eq!(Wiring::of(&label, None).found, 0);
+    }
+
+    /// Symptom: a bias of a reading that was mended as a wrong zero counted as wrong, and as a false alarm of wiring.
+    #[test]
+    fn a_column_whose_zero_is_mended_names_the_bias_of_its_sensor() {
+        let shift = |column: &str| Answer {
+            wiring: vec![WiringFound {
+                fault: SHIFT.into(),
+                columns: vec![column.into()],
+                probability: Some(0.9),
+            }],
+            ..Answer::default()
+        };
+        let label = Label {
+            effects: vec!["sensor-bias@tip".into(), "armature@hip".into()],
+            ..Label::default()
+        };
+        let named = |answer: &Answer| named_by_mending(&label, answer).count();
+        assert_eq!(named(&shift("tip")), 1);
+        assert_eq!(named(&shift("tip.2")), 1);
+        assert_eq!(named(&shift("angle")), 0);
+        assert_eq!(Wiring::of(&label, Some(&shift("tip.2"))).false_alarms, 0);
+        assert_eq!(Wiring::of(&label, Some(&shift("angle"))).false_alarms, 1);
+        // Where the wiring is wrong as well, the mending says nothing of the bias.
+        let both = Label {
+            wiring: vec![WiringTruth {
+                fault: SHIFT.into(),
+                columns: vec!["tip.0".into()],
+                value: 0.1,
+            }],
+            ..label.clone()
+        };
+        assert_eq!(named_by_mending(&both, &shift("tip.0")).count(), 0);
     }
 }
