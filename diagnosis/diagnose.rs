@@ -1,24 +1,22 @@
 //! A diagnosis from a study to its result.
 
+mod cost;
+
 use asid_core::progress::UntilLate;
 use asid_core::{Progress, Result, Streams};
 use asid_effects::EffectSpec;
 use asid_results::evidence::Evidence;
 
-use crate::bench::{Bench, Explanation, Trial};
 use crate::calibration::calibrate;
 use crate::candidate::{Candidate, enumerate};
 use crate::confidence::{Confidence, Untried};
-use crate::fit::cost;
 use crate::intake::Intake;
 use crate::latent_force;
 use crate::latent_force::search::FALSE_ALARMS;
 use crate::machine::Machine;
-use crate::predict::{Point, State};
 use crate::prepare::{Prepared, plain_residuals, prepare};
-use crate::record::Record;
 use crate::result::{DiagnosisResult, NotTried};
-use crate::search::{Breadth, Findings, Search, trials};
+use crate::search::{Breadth, Findings, Search};
 use crate::study::Study;
 use crate::telling::Telling;
 use crate::trace::DiagnosisTrace;
@@ -26,6 +24,7 @@ use crate::trajectory::Trajectory;
 use crate::verdict::judge;
 
 pub use crate::work::Work;
+use cost::{cost_scatter, final_noise};
 
 /// How logs are taken in which bodies touch.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -254,83 +253,4 @@ fn tell(
     diagnosis.evidence = work.evidence.clone();
     progress.end();
     Ok((diagnosis, work))
-}
-
-/// Takes the noise from the residuals of the best explanation, which hide least of it, and
-/// computes all sums of squares with it.
-fn final_noise(
-    bench: &mut Bench,
-    study: &Study,
-    candidates: &[Candidate],
-    mut findings: Findings,
-) -> Result<Findings> {
-    let best = findings
-        .found
-        .iter()
-        .min_by(|a, b| a.explanation.fit.cost.total_cmp(&b.explanation.fit.cost))
-        .filter(|f| f.explanation.fit.cost < findings.none.fit.cost);
-    let (members, explanation) = match best {
-        Some(f) => (
-            trials(candidates, &f.candidates, &f.explanation),
-            &f.explanation,
-        ),
-        None => (Vec::new(), &findings.none),
-    };
-    let residuals = plain_residuals(bench, &bench.train, &members, &explanation.fit.point)?;
-    let estimated = crate::noise::estimate(&bench.train.logs, &residuals);
-    let noise: Vec<f64> = bench
-        .train
-        .logs
-        .sensors
-        .iter()
-        .zip(estimated)
-        .map(|(s, x)| match study.noise.get(&s.name) {
-            Some(given) => *given,
-            None => x.min(s.noise),
-        })
-        .collect();
-    bench.set_noise(&noise);
-    rescore(bench, &[], &mut findings.none)?;
-    for found in &mut findings.found {
-        let trials = trials(candidates, &found.candidates, &found.explanation);
-        rescore(bench, &trials, &mut found.explanation)?;
-    }
-    Ok(findings)
-}
-
-fn rescore(bench: &Bench, trials: &[Trial<'_>], of: &mut Explanation) -> Result<()> {
-    let mut predictor = bench.predictor(trials, &bench.train)?;
-    let mut residuals = predictor.residuals(std::slice::from_ref(&of.fit.point))?;
-    of.fit.residuals = residuals.pop().unwrap_or_default();
-    of.fit.cost = cost(&of.fit.residuals);
-    bench.score_held_out(trials, of)
-}
-
-/// Deviation of the sum of squares over all logs that next to nothing at the starts makes.
-fn cost_scatter(bench: &Bench, none: &Explanation) -> Result<f64> {
-    if !bench.is_rough() {
-        return Ok(0.0);
-    }
-    let of = |record: &Record, starts: &[State]| -> Result<f64> {
-        let mut predictor = bench.predictor(&[], record)?;
-        let point = |k: i32| {
-            let mut point = Point {
-                theta: none.fit.point.theta.clone(),
-                starts: starts.to_vec(),
-            };
-            for start in &mut point.starts {
-                start.shift(bench.layout(), 0, f64::from(k) * crate::linearise::PROBE);
-            }
-            point
-        };
-        let points: Vec<Point> = (1..=8).map(point).collect();
-        let residuals = predictor.residuals(&points)?;
-        let costs: Vec<f64> = residuals.iter().map(|r| cost(r)).collect();
-        let n = costs.len() as f64;
-        let mean = costs.iter().sum::<f64>() / n;
-        Ok(costs.iter().map(|c| (c - mean).powi(2)).sum::<f64>() / (n - 1.0))
-    };
-    let train = of(&bench.train, &none.fit.point.starts)?;
-    let test = of(&bench.test, &none.held_starts)?;
-    Ok((train + test).sqrt())
 }

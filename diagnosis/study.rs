@@ -1,60 +1,23 @@
 //! A study: a model, logs of the real machine, and what the user fits already.
 
+mod document;
 mod files;
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use asid_core::episode::InitialState;
-use asid_core::parameter::Scale;
 use asid_core::problem::home;
 use asid_core::{Episode, Error, Layout, Parameter, Result, Scene, Target, Task};
 use asid_effects::EffectSpec;
-use asid_logs::LogSettings;
+use asid_effects::refined_model::RefinedModel;
 use asid_logs::episode::{ColumnMapping, LogNotes};
 use asid_mjcf::Plant;
-use serde::Deserialize;
-
-use asid_effects::refined_model::RefinedModel;
 
 /// What counts as noise of a task's own sensors, rad or m: the repeatability of the arm, 0.1 mm
 /// (Franka Emika's data sheet). Simulated they have none, and a push that differs by the width of an atom
 /// would be a gap.
 const PROPRIOCEPTION: f64 = 1e-4;
-
-/// The file, as written.
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Document {
-    model: PathBuf,
-    train: Vec<String>,
-    #[serde(default)]
-    test: Vec<String>,
-    #[serde(default)]
-    parameter: Vec<StudyParameter>,
-    #[serde(default)]
-    noise: BTreeMap<String, f64>,
-    #[serde(default)]
-    log: LogSettings,
-    #[serde(default)]
-    column: Vec<ColumnMapping>,
-}
-
-/// A parameter, as written.
-#[derive(Clone, Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct StudyParameter {
-    name: String,
-    #[serde(default)]
-    target: Option<Target>,
-    #[serde(default)]
-    targets: Vec<Target>,
-    range: [f64; 2],
-    #[serde(default)]
-    scale: Scale,
-    #[serde(default)]
-    unit: String,
-}
 
 /// A study, read and checked.
 #[derive(Clone, Debug)]
@@ -86,108 +49,6 @@ pub struct Study {
 }
 
 impl Study {
-    /// Reads a study file, or a folder with `study.toml`.
-    ///
-    /// # Errors
-    /// When a file is missing or wrong; the message names file, row and column.
-    pub fn read(path: &Path) -> Result<Self> {
-        let file = if path.is_dir() {
-            path.join("study.toml")
-        } else {
-            path.to_owned()
-        };
-        let fail = |message: String| Error::File {
-            path: file.clone(),
-            message,
-        };
-        let text = std::fs::read_to_string(&file).map_err(|e| {
-            fail(match e.kind() {
-                std::io::ErrorKind::NotFound => {
-                    "no such file: a study is a TOML file, or a folder with study.toml".into()
-                }
-                _ => e.to_string(),
-            })
-        })?;
-        let document: Document =
-            asid_core::toml_text::read(&text).map_err(|e| fail(one_line(&e)))?;
-        let folder = file.parent().map(Path::to_path_buf).unwrap_or_default();
-        let model = folder.join(&document.model);
-        let source = RefinedModel::open(&model)?;
-        let plant = Plant::of(&source.scene)?;
-        let parameters = document
-            .parameter
-            .iter()
-            .map(|p| parameter(p).map_err(&fail))
-            .collect::<Result<Vec<_>>>()?;
-        for (i, p) in parameters.iter().enumerate() {
-            p.check()?;
-            if parameters[..i].iter().any(|q| q.name == p.name) {
-                return Err(fail(format!("two parameters are named `{}`", p.name)));
-            }
-        }
-        for (sensor, &noise) in &document.noise {
-            plant
-                .layout
-                .sensor(sensor)
-                .map_err(|e| fail(format!("[noise] {e}")))?;
-            if !(noise.is_finite() && noise > 0.0) {
-                return Err(fail(format!(
-                    "[noise] {sensor} = {noise}: a standard deviation is above 0"
-                )));
-            }
-        }
-        for (i, mapping) in document.column.iter().enumerate() {
-            mapping.check(&plant.layout).map_err(|e| match e {
-                Error::Config { message, .. } => fail(message),
-                other => other,
-            })?;
-            let before = &document.column[..i];
-            if before.iter().any(|m| m.name == mapping.name) {
-                return Err(fail(format!("two [[column]] are named `{}`", mapping.name)));
-            }
-        }
-        let mut notes = Vec::new();
-        let mut logs = files::Logs::new(&folder, &plant.layout, &document.column, &document.log);
-        let mut read = |patterns: &[String], key: &str| -> Result<Vec<(String, Episode)>> {
-            let read = logs.read(patterns, key).map_err(|e| match e {
-                Error::Config { message, .. } => fail(message),
-                other => other,
-            })?;
-            let each = read.into_iter().map(|(name, episode, noted)| {
-                notes.push((name.clone(), noted));
-                (name, episode)
-            });
-            Ok(each.collect())
-        };
-        let train = read(&document.train, "train")?;
-        let test = read(&document.test, "test")?;
-        if let Some((name, _)) = test.iter().find(|(n, _)| train.iter().any(|(m, _)| m == n)) {
-            return Err(fail(format!(
-                "{name} is among `train` and among `test`: what is held out must not be fitted"
-            )));
-        }
-        let name = if path.is_dir() {
-            path.file_name()
-        } else {
-            path.file_stem()
-        };
-        Self {
-            name: name.map_or_else(|| "study".into(), |n| n.to_string_lossy().into_owned()),
-            model,
-            scene: source.scene,
-            fixed: source.parameters,
-            effects: source.effects,
-            parameters,
-            train,
-            test,
-            noise: document.noise,
-            columns: document.column,
-            notes,
-            wired: false,
-        }
-        .with_test()
-    }
-
     /// A built-in task as a study: its unknowns and the noise of its trackers, in a model: its
     /// scene, or one that fits the task. The machine begins where the model's first keyframe has
     /// it; where the object begins is estimated.
@@ -304,27 +165,4 @@ fn task_start(task: &dyn Task, layout: &Layout) -> Result<InitialState> {
         .map(open)
         .collect();
     Ok(InitialState { qpos, qvel })
-}
-
-fn one_line(error: &toml::de::Error) -> String {
-    error
-        .message()
-        .split_whitespace()
-        .collect::<Vec<_>>()
-        .join(" ")
-}
-
-fn parameter(written: &StudyParameter) -> Result<Parameter, String> {
-    let mut targets = written.targets.clone();
-    targets.extend(written.target.clone());
-    if targets.is_empty() {
-        return Err(format!("parameter `{}` has no `target`", written.name));
-    }
-    Ok(Parameter {
-        name: written.name.clone(),
-        targets,
-        range: written.range,
-        scale: written.scale,
-        unit: written.unit.clone(),
-    })
 }

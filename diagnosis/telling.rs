@@ -1,39 +1,35 @@
 //! What a search found, told as a result: gaps, probabilities, places, pictures.
 
-use asid_core::{Result, Streams};
+use asid_core::Result;
 
 use crate::bench::{Bench, Explanation, Trial};
 use crate::candidate::{Candidate, LeftOut};
 use crate::checks;
 use crate::diagnose::{Diagnosis, Settings};
 use crate::experiment;
-use crate::forces::{self, Short};
+use crate::forces::Short;
 use crate::judgement::Judgement;
 use crate::localise::localise;
 use crate::predict::{Point, State};
 use crate::record::Record;
-use crate::result::{
-    DiagnosisResult, Gap, Kind, MissingForce, NextExperiment, NotTried, SignalGap,
-};
+use crate::result::{DiagnosisResult, Kind, NextExperiment, NotTried};
 use crate::search::{Findings, Found, trials};
 use crate::study::Study;
 use crate::trajectory::Trajectory;
 use crate::whitening::Scattering;
-use crate::windows;
 
 mod answer;
+mod gap;
 mod remainder;
 mod trace;
+mod unexplained;
 mod values;
 mod view;
 
 use answer::groups;
+use gap::NO_GAP;
 use remainder::shares;
-
-/// Samples of the bootstrap.
-const RESAMPLES: usize = 2000;
-/// Identified gap up to which there is nothing to close.
-const NO_GAP: f64 = 1.05;
+use unexplained::{least_explained, least_made_up};
 
 /// All that a result is told from.
 pub(crate) struct Telling<'a> {
@@ -47,39 +43,6 @@ pub(crate) struct Telling<'a> {
     pub(crate) settings: Settings,
     /// Whether only what the answer needs is to be computed.
     pub(crate) stopped: bool,
-}
-
-/// Share of the force that the model lacks at a joint from which on it counts as unexplained.
-const UNEXPLAINED: f64 = 0.7;
-
-/// The joint at which most of the force that the model lacks is left, in words.
-fn least_explained(before: &Short, after: &Short) -> Option<String> {
-    let pairs = before.joints.iter().zip(&after.joints);
-    let shares = pairs.map(|(a, b)| (b.force / a.force, a, b));
-    let (share, a, b) = shares
-        .filter(|(share, ..)| share.is_finite())
-        .max_by(|x, y| x.0.total_cmp(&y.0))?;
-    (share > UNEXPLAINED).then(|| {
-        format!(
-            "at {}, {:.2} of the {:.2} {} that the model lacks over short windows are left",
-            a.joint, b.force, a.force, a.unit
-        )
-    })
-}
-
-/// The same where the force was estimated moment by moment.
-fn least_made_up(missing: &[MissingForce]) -> Option<String> {
-    let share = |m: &MissingForce| m.refined / m.identified;
-    let worst = missing
-        .iter()
-        .filter(|m| share(m).is_finite())
-        .max_by(|a, b| share(a).total_cmp(&share(b)))?;
-    (share(worst) > UNEXPLAINED).then(|| {
-        format!(
-            "at {}, {:.2} of the {:.2} {} that the model lacks are left",
-            worst.dof, worst.refined, worst.identified, worst.unit
-        )
-    })
 }
 
 /// Predictions of the held-out logs by one model: readings and plain residuals in units of
@@ -126,6 +89,7 @@ impl Telling<'_> {
         })
     }
 
+    /// The whole result.
     pub(crate) fn tell(&self) -> Result<Diagnosis> {
         let j = self.judgement;
         let best = self.found(j.best);
@@ -197,91 +161,6 @@ impl Telling<'_> {
         })
     }
 
-    /// Root mean square of some of the residuals that have a reading, capped where a
-    /// simulation diverged.
-    fn rms(&self, residuals: &[f64], sensor: Option<usize>, episode: Option<usize>) -> (f64, f64) {
-        let logs = &self.bench.test.logs;
-        let n = logs.entries.len();
-        let present = logs.present();
-        let (mut square, mut count) = (0.0, 0.0);
-        for e in 0..logs.episodes.len() {
-            if episode.is_some_and(|x| x != e) {
-                continue;
-            }
-            let head = if self.bench.open.is_empty() {
-                0
-            } else {
-                self.bench.head.logs.episodes[e].plan.rows() * n
-            };
-            for k in logs.offset(e) + head..logs.offset(e + 1) {
-                if present[k] && sensor.is_none_or(|s| logs.entries[k % n].sensor == s) {
-                    let r = residuals[k];
-                    square += if r.is_finite() { r * r } else { 1e12 };
-                    count += 1.0;
-                }
-            }
-        }
-        (square, count)
-    }
-
-    fn gap(&self, nominal: &HeldOut, identified: &HeldOut, refined: &HeldOut) -> Gap {
-        let logs = &self.bench.test.logs;
-        let root = |(square, count): (f64, f64)| (square / f64::max(count, 1.0)).sqrt();
-        let of = |h: &HeldOut, sensor| root(self.rms(&h.residuals, sensor, None));
-        let (i, r) = (of(identified, None), of(refined, None));
-        let closed = |i2: f64, r2: f64| (1.0 - (r2 - 1.0) / (i2 - 1.0)).min(1.0);
-        let has_gap = i > NO_GAP;
-        let interval = has_gap.then(|| {
-            let episodes: Vec<_> = (0..logs.episodes.len())
-                .map(|e| {
-                    let part = |h: &HeldOut| self.rms(&h.residuals, None, Some(e));
-                    (part(identified), part(refined))
-                })
-                .collect();
-            let mut rng = Streams::new(self.settings.seed).stream("bootstrap");
-            let mut all: Vec<f64> = (0..RESAMPLES)
-                .map(|_| {
-                    let (mut a, mut b, mut n) = (0.0, 0.0, 0.0);
-                    for _ in 0..episodes.len() {
-                        use rand::Rng as _;
-                        let ((x, count), (y, _)) = episodes[rng.random_range(0..episodes.len())];
-                        a += x;
-                        b += y;
-                        n += count;
-                    }
-                    let (a, b) = (a / f64::max(n, 1.0), b / f64::max(n, 1.0));
-                    if a > 1.0 { closed(a, b) } else { 0.0 }
-                })
-                .collect();
-            all.sort_by(f64::total_cmp);
-            let pick = |q: f64| all[(q * (RESAMPLES - 1) as f64).round() as usize];
-            [pick(0.025), pick(0.975)]
-        });
-        Gap {
-            noise_floor: 1.0,
-            nominal: of(nominal, None),
-            identified: i,
-            refined: r,
-            closed: has_gap.then(|| closed(i * i, r * r)),
-            closed_interval95: interval,
-            shares: None,
-            p_value: None,
-            signals: logs
-                .sensors
-                .iter()
-                .enumerate()
-                .map(|(s, sensor)| SignalGap {
-                    signal: sensor.name.clone(),
-                    noise: sensor.noise,
-                    unit: sensor.unit.clone(),
-                    nominal: of(nominal, Some(s)),
-                    identified: of(identified, Some(s)),
-                    refined: of(refined, Some(s)),
-                })
-                .collect(),
-        }
-    }
-
     /// Where the gap of the identified model lies, in the training logs.
     fn places(&self, none: &Explanation) -> Result<Vec<crate::result::Where>> {
         let record = &self.bench.train;
@@ -302,30 +181,6 @@ impl Telling<'_> {
             &none.fit.point,
             self.bench.machine.threads,
         )
-    }
-
-    /// What short replays tell, where the logs allow them: without any effect, with those of the
-    /// best explanation, and how long they are, s.
-    fn short(
-        &self,
-        none: &Explanation,
-        (members, best): (&[Trial<'_>], &Explanation),
-    ) -> Result<Option<(Short, Short, f64)>> {
-        let bench = self.bench;
-        let plant = &bench.machine.plant;
-        if !self.findings.missing.is_empty() {
-            return Ok(None);
-        }
-        let Some(rows) = windows::rows(plant, &bench.train.logs, &bench.open) else {
-            return Ok(None);
-        };
-        let record = windows::cut(plant, &bench.train, rows);
-        let study = bench.parameters.len();
-        let of = |trials: &[Trial<'_>], e: &Explanation| {
-            forces::missing(bench, &record, trials, &e.fit.point.theta[..study])
-        };
-        let seconds = record.logs.longest();
-        Ok(Some((of(&[], none)?, of(members, best)?, seconds)))
     }
 
     fn checks(

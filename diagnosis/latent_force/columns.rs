@@ -5,7 +5,10 @@
 //! that the effect says a search begins with. Sizes come from the logs: an effect may make up for forces as large as
 //! those that are missing, and for readings that are off by a part of their spread.
 
+mod force_response;
 mod form;
+mod group;
+mod null_model;
 mod sizes;
 mod source;
 mod together;
@@ -19,10 +22,11 @@ use super::estimate::Estimate;
 use super::fit::Hypothesis;
 use super::step_map::{Derivatives, LinearEpisode, Variation};
 
+use force_response::ForceSlopes;
 pub use form::Form;
+use null_model::All;
 use sizes::{REPLAY_TRIAL, sizes, sizes_by_replay};
-use source::{All, Source, Wanted};
-use together::ForceSlopes;
+use source::{Source, Wanted};
 
 /// Share of a deviation of the prior that slopes of the present model are taken over.
 const BASE_SHARE: f64 = 0.01;

@@ -3,26 +3,22 @@
 //! Everything is linearised anew about the smoothed trajectory until the evidence stands. An effect that is right
 //! makes the missing force small: each round the evidence is compared over common scales of `q`, so that it is seen.
 
+mod regression;
 mod slopes;
 
 use asid_core::{Parameter, Progress, Result};
 use asid_effects::EffectSpec;
-use nalgebra::{DMatrix, DVector};
-use rayon::prelude::*;
+use nalgebra::DMatrix;
 
 use super::context::Context;
 use super::estimate::Estimate;
-use super::evidence::{Evidence, evidence};
 use super::fitted_value::Unknown;
-use super::smoother::{Regression, regress};
-use super::step_map::{Derivatives, LinearEpisode, Variation};
+use super::step_map::{Derivatives, LinearEpisode, StepMap};
 
+use regression::{Compared, compare, in_units, shift, variations};
+pub use regression::{SCALES, regression};
 pub use slopes::Slopes;
 
-/// Common factors of `q` at which models are compared.
-pub const SCALES: [f64; 6] = [1.0, 0.3, 0.1, 0.03, 0.01, 0.003];
-/// Share of a prior's deviation that a slope is taken over.
-const SLOPE_STEP: f64 = 0.01;
 /// Largest step of a value, in deviations of its prior: a tangent reaches no further.
 const LARGEST_STEP: f64 = 1.0;
 /// Part of a step that is tried where the whole made things worse.
@@ -35,8 +31,9 @@ const AGAIN: usize = 2;
 /// Evidence that no longer counts as a rise.
 const RISE: f64 = 0.5;
 /// Rounds without a rise that are gone on with (a watchdog: Chamberlain and others 1982), for a narrow valley bends away
-/// from its tangent, and how often a shorter step is tried after that.
+/// from its tangent.
 const PATIENCE: usize = 2;
+/// Shorter steps that are tried, at most.
 const FAILURES: usize = 2;
 
 /// A model: the study's parameters and effects, with priors.
@@ -83,59 +80,20 @@ pub struct Fitted {
     pub slopes: Slopes,
 }
 
-/// The regression of all walks.
-pub fn regression(
-    context: &Context<'_>,
-    estimate: &Estimate,
-    linear: &[LinearEpisode],
-    scale: f64,
-    m: usize,
-) -> Regression {
-    let starts = context.starts(&estimate.trajectory);
-    let parts: Vec<Regression> = estimate
-        .problems(context, linear, &starts)
-        .enumerate()
-        .map(|(w, p)| regress(p, &estimate.noise_along(context, w, scale), m))
-        .collect();
-    let mut sum = Regression {
-        log_likelihood: 0.0,
-        gram: DMatrix::zeros(m, m),
-        moment: DVector::zeros(m),
-    };
-    parts.iter().for_each(|p| sum.add(p));
-    sum
-}
-
-/// Half the logarithm of the determinant of the posterior covariance, in units of the prior.
-fn determinant_of(found: &Evidence) -> f64 {
-    let factor = found.covariance.clone().cholesky();
-    factor.map_or(0.0, |c| c.l_dirty().diagonal().iter().map(|x| x.ln()).sum())
-}
-
-/// Moves a linearisation by changes of the values that its columns are for.
-fn shift(linear: &mut [LinearEpisode], changes: &[f64]) {
-    let m = changes.len();
-    if m == 0 {
-        return;
-    }
-    let sum = |row: &[f64]| -> f64 { row.iter().zip(changes).map(|(c, x)| c * x).sum() };
-    for episode in linear {
-        let columns = episode.state_columns.chunks_exact(m);
-        for (d, row) in episode.defect.iter_mut().zip(columns) {
-            *d += sum(row);
-        }
-        let columns = episode.reading_columns.chunks_exact(m);
-        for (r, row) in episode.residual.iter_mut().zip(columns) {
-            *r -= sum(row);
-        }
-    }
-}
-
 /// A point from which steps are taken: what it and its step promise, and where that leads.
 struct Anchor {
     hoped: f64,
     from: (Vec<f64>, Estimate),
     to: (Vec<f64>, Estimate),
+}
+
+impl Anchor {
+    /// Values and estimate after a part of the step.
+    fn along(&self, context: &Context<'_>, part: f64) -> (Vec<f64>, Estimate) {
+        let (from, to) = (&self.from, &self.to);
+        let values = from.0.iter().zip(&to.0).map(|(a, b)| a + part * (b - a));
+        (values.collect(), from.1.towards(context, &to.1, part))
+    }
 }
 
 /// Fits a model from some values, an estimate and the slopes of a like model on, over at most `rounds` linearisations;
@@ -155,10 +113,6 @@ pub fn fit(
     let m = free.len();
     let nx = 2 * context.plant().layout.nv;
     let mut map = context.map(&hypothesis.specs, &hypothesis.parameters(), 2 * nx + m + 1)?;
-    let want = Derivatives {
-        state: true,
-        ..Derivatives::default()
-    };
     let steps = context.start_steps();
     let mut theta = theta.to_vec();
     let mut estimate = estimate.clone();
@@ -168,58 +122,24 @@ pub fn fit(
     let mut part = 1.0;
     let (mut waited, mut failed) = (0, 0);
     for round in 0..rounds.max(1) {
-        let variations: Vec<Variation> = free
-            .iter()
-            .map(|&i| {
-                let u = &unknowns[i];
-                let step = SLOPE_STEP * u.deviation;
-                let up = theta[i] + step <= u.bounds[1];
-                let mut other = theta.clone();
-                other[i] += if up { step } else { -step };
-                Variation {
-                    theta: other,
-                    scale: if up { SLOPE_STEP } else { -SLOPE_STEP },
-                }
-            })
-            .collect();
+        let variations = variations(unknowns, &free, &theta);
         let mut linear = slopes.linearise(
             (context, &mut map),
             (&theta, unknowns),
             &estimate,
             &variations,
         )?;
-        let places: Vec<usize> = (0..m).collect();
-        let center: Vec<f64> = free
-            .iter()
-            .map(|&i| -unknowns[i].distance(theta[i]))
-            .collect();
-        let bounds: Vec<[f64; 2]> = free
-            .iter()
-            .map(|&i| {
-                let u = &unknowns[i];
-                u.bounds.map(|b| (b - theta[i]) / u.deviation)
-            })
-            .collect();
-        let prior: f64 = center.iter().map(|c| c * c).sum();
-        let mut chosen: Option<(f64, f64, Evidence)> = None;
-        for scale in SCALES {
-            let sum = regression(context, &estimate, &linear, scale, m);
-            let found = evidence(&sum.gram, &sum.moment, &places, &center, &bounds);
-            // Of the present values, not of where a step would lead.
-            let here = sum.log_likelihood - 0.5 * prior + determinant_of(&found);
-            if chosen.as_ref().is_none_or(|(best, ..)| here > *best) {
-                chosen = Some((here, scale, found));
-            }
-        }
-        let Some((here, scale, found)) = chosen else {
+        let model = (&unknowns[..], &free[..], &theta[..]);
+        let Some(Compared {
+            scale,
+            here,
+            promised,
+            found,
+        }) = compare(context, &estimate, &linear, model)
+        else {
             break;
         };
         estimate.rescale(scale);
-        let covariance = DMatrix::from_fn(m, m, |i, j| {
-            let d = |k: usize| unknowns[free[k]].deviation;
-            found.covariance[(i, j)] * d(i) * d(j)
-        });
-        let promised = found.gain - determinant_of(&found) + 0.5 * prior;
         let hoped = here + promised;
         let rose = best.as_ref().is_none_or(|b| here > b.evidence + RISE)
             || anchor.as_ref().is_none_or(|a| hoped > a.hoped + RISE);
@@ -230,7 +150,7 @@ pub fn fit(
                 theta: theta.clone(),
                 evidence: here,
                 promised,
-                covariance,
+                covariance: in_units(&found.covariance, unknowns, &free),
                 estimate: estimate.clone(),
                 slopes: Slopes::default(),
             });
@@ -241,16 +161,13 @@ pub fn fit(
         }
         if waited > PATIENCE {
             // The tangents led astray: less of the way.
-            let Some(Anchor { from, to, .. }) = &anchor else {
+            let Some(anchor) = &anchor else {
                 break;
             };
             part *= SHORTER;
             failed += 1;
             waited = 0;
-            for (x, (a, b)) in theta.iter_mut().zip(from.0.iter().zip(&to.0)) {
-                *x = a + part * (b - a);
-            }
-            estimate = from.1.towards(context, &to.1, part);
+            (theta, estimate) = anchor.along(context, part);
             let before = estimate.trajectory.clone();
             estimate.roll(context, &mut map, &theta, &before)?;
             continue;
@@ -266,16 +183,7 @@ pub fn fit(
             theta[i] = (theta[i] + moves[k] * unknowns[i].deviation).clamp(low, high);
         }
         shift(&mut linear, &moves);
-        let before = estimate.trajectory.clone();
-        estimate.improve(context, &linear, EM_ROUNDS);
-        estimate.roll(context, &mut map, &theta, &before)?;
-        let again = map.reads() && !map.is_all_segments();
-        for _ in 0..if again { AGAIN } else { 0 } {
-            let linear = map.linearise(&theta, &estimate.trajectory, want, &steps, &[])?;
-            let before = estimate.trajectory.clone();
-            estimate.improve(context, &linear, 1);
-            estimate.roll(context, &mut map, &theta, &before)?;
-        }
+        smooth(context, &mut map, &theta, (&linear, &steps), &mut estimate)?;
         if let Some(from) = from {
             part = 1.0;
             anchor = Some(Anchor {
@@ -289,6 +197,32 @@ pub fn fit(
         best.ok_or_else(|| asid_core::Error::Failed("no round of the fit was finite".into()))?;
     best.slopes = slopes;
     Ok(best)
+}
+
+/// Smooths the logs again after a step of the values: once about the moved linearisation, and where readings remember about
+/// further ones.
+fn smooth(
+    context: &Context<'_>,
+    map: &mut StepMap<'_>,
+    theta: &[f64],
+    (linear, steps): (&[LinearEpisode], &[f64]),
+    estimate: &mut Estimate,
+) -> Result<()> {
+    let want = Derivatives {
+        state: true,
+        ..Derivatives::default()
+    };
+    let before = estimate.trajectory.clone();
+    estimate.improve(context, linear, EM_ROUNDS);
+    estimate.roll(context, map, theta, &before)?;
+    let again = map.reads() && !map.is_all_segments();
+    for _ in 0..if again { AGAIN } else { 0 } {
+        let linear = map.linearise(theta, &estimate.trajectory, want, steps, &[])?;
+        let before = estimate.trajectory.clone();
+        estimate.improve(context, &linear, 1);
+        estimate.roll(context, map, theta, &before)?;
+    }
+    Ok(())
 }
 
 /// Smooths the logs in a model for the first time: linearises and fits the noise until both stand.

@@ -8,8 +8,12 @@
 //! own simulation, so that their memory at a row is that of the trajectory before it.
 
 mod late;
+mod linear_episode;
 mod pass;
+mod reading;
+mod role;
 mod roll;
+mod shares;
 mod step;
 
 use asid_core::layout::{Layout, Recording};
@@ -23,59 +27,12 @@ use crate::machine::Machine;
 use super::walk::Walk;
 
 pub use late::retime_columns;
+pub use linear_episode::{Derivatives, LinearEpisode, Variation};
 use pass::Part;
+use shares::share_out;
 
 /// Most simulations in one batch; each takes 50 to 500 kB.
 const MOST_SIMULATIONS: usize = 1024;
-
-/// A value of the parameters at which the model is evaluated besides the present one: the column is the
-/// change from there to here, divided by `scale`.
-#[derive(Clone, Debug)]
-pub struct Variation {
-    /// All parameters.
-    pub theta: Vec<f64>,
-    /// What the change is divided by.
-    pub scale: f64,
-}
-
-/// What a pass computes besides the defects and residuals.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Derivatives {
-    /// Slopes in the state.
-    pub state: bool,
-    /// Slopes in generalized forces, with the size of each force (N or N m) that differences are taken over.
-    pub force: bool,
-    /// Slopes in such forces that act in the first physics step of a row.
-    pub jolt: bool,
-}
-
-/// One episode, linearised about a trajectory. Matrices are row-major, one a row of the log; states are counted
-/// in tangent coordinates (`nx = 2 nv`), readings in the sensors' units.
-#[derive(Clone, Debug, Default)]
-pub struct LinearEpisode {
-    /// Number of rows.
-    pub rows: usize,
-    /// `f(x_k) - x_{k+1}`, `(rows - 1) x nx`; not finite where the engine failed.
-    pub defect: Vec<f64>,
-    /// Slope of `f` in the state, `(rows - 1) x nx x nx`.
-    pub a: Vec<f64>,
-    /// Slope of `f` in a generalized force held over the row, `(rows - 1) x nx x nv`.
-    pub b: Vec<f64>,
-    /// The same of a force in the first physics step of the row.
-    pub jolt: Vec<f64>,
-    /// `y_k - h(x_k)`, `rows x ns`; NaN where a reading is missing.
-    pub residual: Vec<f64>,
-    /// Slope of `h` in the state, `rows x ns x nx`; of a segment the slope in its start.
-    pub h: Vec<f64>,
-    /// Readings of each entry that tell of before the first row, where a sensor is late; `ns`, or empty for none.
-    pub early: Vec<f64>,
-    /// How late the readings of each entry are, s; `ns`, or empty for none.
-    pub late: Vec<f64>,
-    /// Change of `f` by each variation, `(rows - 1) x nx x m`.
-    pub state_columns: Vec<f64>,
-    /// Change of `h` by each variation, `rows x ns x m`; of a segment that of its whole replay.
-    pub reading_columns: Vec<f64>,
-}
 
 /// The model with some effects on some logs.
 pub struct StepMap<'a> {
@@ -318,47 +275,5 @@ impl<'a> StepMap<'a> {
             }
         }
         Ok(out)
-    }
-}
-
-/// Shares walks out among cores, the longest first, each to the one that has least.
-fn share_out(walks: &[Walk], cores: usize) -> Vec<Vec<usize>> {
-    let mut order: Vec<usize> = (0..walks.len()).collect();
-    order.sort_by_key(|&w| std::cmp::Reverse(walks[w].len()));
-    let mut shares = vec![(0, Vec::new()); cores.max(1)];
-    for w in order {
-        if let Some(least) = shares.iter_mut().min_by_key(|s| s.0) {
-            least.0 += walks[w].len();
-            least.1.push(w);
-        }
-    }
-    let shares = shares.into_iter().map(|(_, mut walks)| {
-        walks.sort_unstable();
-        walks
-    });
-    shares.filter(|s: &Vec<usize>| !s.is_empty()).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn walks_are_shared_out_so_that_the_longest_share_is_short() {
-        let walk = |rows: usize| Walk {
-            episode: 0,
-            rows: (0..rows).collect(),
-            time: Vec::new(),
-            substeps: Vec::new(),
-            ctrl: Vec::new(),
-            segment: None,
-        };
-        let walks: Vec<Walk> = [3, 9, 4, 5, 2].map(walk).into();
-        // 9 and 3 rows against 5, 4 and 2.
-        assert_eq!(share_out(&walks, 2), [vec![0, 1], vec![2, 3, 4]]);
-        // No core without a walk, and every walk once.
-        assert_eq!(share_out(&walks, 8).concat().len(), 5);
-        assert_eq!(share_out(&walks, 8).len(), 5);
-        assert_eq!(share_out(&walks, 0), [vec![0, 1, 2, 3, 4]]);
     }
 }

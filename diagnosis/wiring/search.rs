@@ -2,12 +2,14 @@
 //!
 //! Hypotheses are looked at with few windows first, and those that lead with all.
 
+mod clock;
+mod offset;
+
 use asid_core::Result;
 
 use super::evidence::Settings;
-use super::hypotheses::{self, Fault, Hypothesis, Quantity, view_of, with};
-use super::record::{Recorded, Series};
-use super::size::{self, Fit};
+use super::hypotheses::{self, Fault, Hypothesis, Quantity, view_of};
+use super::record::Recorded;
 use super::view::View;
 use super::windows::{Misses, Windows};
 
@@ -15,14 +17,6 @@ use super::windows::{Misses, Windows};
 const MOST: usize = 4;
 /// Hypotheses of a round that are evaluated with all windows.
 const LEADING: usize = 3;
-/// Share of a column's deviation that the slope in its offset is taken over.
-const OFFSET_PROBE: f64 = 0.05;
-/// Longest step of an offset, in the column's deviation.
-const OFFSET_STEP: f64 = 1.0;
-/// Time that the slope in a delay is taken over, s.
-const DELAY_PROBE: f64 = 2e-3;
-/// Longest step of a delay, s: that of the first scan.
-const DELAY_STEP: f64 = 0.02;
 
 /// A fault, with what speaks for it.
 #[derive(Clone, Debug)]
@@ -51,11 +45,13 @@ pub struct Outcome {
 /// One hypothesis, evaluated.
 struct Tried {
     hypothesis: Hypothesis,
+    /// See [`Found::shrinkage`].
     shrinkage: f64,
     probability: f64,
 }
 
 impl Tried {
+    /// The fault, as it is told.
     fn found(&self) -> Found {
         Found {
             fault: self.hypothesis.fault,
@@ -191,6 +187,7 @@ impl Search<'_> {
         Ok(shrinkage < -self.settings.scale)
     }
 
+    /// A hypothesis with how far it shrinks misses, and its probability.
     fn judged(&self, hypothesis: Hypothesis, given: &Misses, misses: &Misses) -> Tried {
         let shrinkage = self.settings.shrinkage(given, misses);
         let command = hypothesis
@@ -212,151 +209,12 @@ impl Search<'_> {
         }
     }
 
-    /// Deviation of a column over all logs, in the quantity's unit.
-    fn spread(&self, view: &View, quantity: &Quantity) -> f64 {
-        let own = view_of(view, quantity);
-        let all = self.record.iter().map(|r| &r.readings[own.from]);
-        own.factor.abs() * Series::joined(all).spread()
-    }
-
-    /// Another zero of a column, of the size that shrinks misses most; `None` where it is small.
-    fn offset(&mut self, view: &View, index: usize, given: &Misses) -> Result<Option<Tried>> {
-        let quantity = &self.quantities[index];
-        // The zero of a frame in space is no column's, and where bodies touch any shift of it changes what they do.
-        if quantity.command || quantity.name != quantity.whole {
-            return Ok(None);
-        }
-        let spread = self.spread(view, quantity);
-        let at = |size: f64| shifted(view, quantity, size);
-        // A start that the log gives tells it at once, and without the model's own faults.
-        let told = self.few.start_shift(view, quantity.place)?;
-        let size = match told {
-            Some(size) => size,
-            None => size::fit(&mut self.few, &at, offset_fit(spread, 0.0))?.0,
-        };
-        if size.abs() < self.settings.offset * spread {
-            return Ok(None);
-        }
-        let misses = self.few.misses(&at(size))?;
-        let hypothesis = Hypothesis {
-            fault: Fault::Offset,
-            quantities: vec![index],
-            rare: false,
-            view: at(size),
-        };
-        Ok(Some(self.judged(hypothesis, given, &misses)))
-    }
-
-    /// Readings that are all late by the time that shrinks misses most; `None` where it is small.
-    fn clock(&mut self, view: &View, given: &Misses) -> Result<Option<Tried>> {
-        let at = |delay: f64| hypotheses::delayed(view, delay);
-        let mut best = (0.0, 0.0);
-        for delay in hypotheses::delays() {
-            let misses = self.few.misses(&at(delay))?;
-            let shrinkage = self.settings.shrinkage(given, &misses);
-            if shrinkage > best.1 {
-                best = (delay, shrinkage);
-            }
-        }
-        if best.1 <= 0.0 {
-            return Ok(None);
-        }
-        let (delay, misses) = size::fit(&mut self.few, &at, delay_fit(best.0, false))?;
-        if !self.is_a_clocks(delay) {
-            return Ok(None);
-        }
-        let readings = self.quantities.iter().enumerate();
-        let hypothesis = Hypothesis {
-            fault: Fault::Clock,
-            quantities: readings
-                .filter(|(_, q)| !q.command)
-                .map(|(i, _)| i)
-                .collect(),
-            rare: false,
-            view: at(delay),
-        };
-        Ok(Some(self.judged(hypothesis, given, &misses)))
-    }
-
-    fn is_a_clocks(&self, delay: f64) -> bool {
-        let within = (hypotheses::EARLIEST..=hypotheses::LATEST).contains(&delay);
-        within && delay.abs() >= self.settings.delay
-    }
-
-    /// A clock with its delay fitted to all windows, and the study's parameters beside it; improbable where a delay of all
-    /// commands says as much: then it is the drives' own. Of a machine with one drive nothing but a start in motion can tell
-    /// the two apart; of one with several, all drives are seldom late alike.
-    fn clock_or_drive(&mut self, view: &View, found: Tried, given: &Misses) -> Result<Tried> {
-        let quantity = &self.quantities[found.hypothesis.quantities[0]];
-        let start = view_of(&found.hypothesis.view, quantity).delay - view_of(view, quantity).delay;
-        let nominal = self.all.theta().to_vec();
-        let late_readings = |delay: f64| hypotheses::delayed(view, delay);
-        let late_commands = |delay: f64| hypotheses::commanded_later(view, delay);
-        let (delay, clock) = size::fit(&mut self.all, &late_readings, delay_fit(start, true))?;
-        self.all.set_theta(&nominal);
-        let (_, drive) = size::fit(&mut self.all, &late_commands, delay_fit(start, true))?;
-        self.all.set_theta(&nominal);
-        let handicap = self.settings.drive[usize::from(view.commands.len() > 1)];
-        let beats = self.settings.shrinkage(&drive, &clock);
-        let hypothesis = Hypothesis {
-            view: late_readings(delay),
-            ..found.hypothesis
-        };
-        let mut judged = self.judged(hypothesis, given, &clock);
-        if beats < handicap {
-            judged.probability = judged.probability.min(self.settings.named / 2.0);
-        }
-        Ok(judged)
-    }
-
     /// The same fault with its size fitted to all windows.
     fn refined(&mut self, view: &View, found: Tried, given: &Misses) -> Result<Tried> {
-        let hypothesis = found.hypothesis.clone();
-        let index = hypothesis.quantities[0];
-        let quantity = &self.quantities[index];
-        let (view, misses) = match hypothesis.fault {
-            // Given starts have told it.
-            Fault::Offset if self.all.start_shift(view, quantity.place)?.is_some() => {
-                return Ok(found);
-            }
-            Fault::Offset => {
-                let spread = self.spread(view, quantity);
-                let start =
-                    view_of(&hypothesis.view, quantity).offset - view_of(view, quantity).offset;
-                let at = |size: f64| shifted(view, quantity, size);
-                let (size, misses) = size::fit(&mut self.all, &at, offset_fit(spread, start))?;
-                (at(size), misses)
-            }
-            Fault::Clock => return self.clock_or_drive(view, found, given),
-            _ => return Ok(found),
-        };
-        Ok(self.judged(Hypothesis { view, ..hypothesis }, given, &misses))
+        match found.hypothesis.fault {
+            Fault::Offset => self.refined_offset(view, found, given),
+            Fault::Clock => self.clock_or_drive(view, found, given),
+            _ => Ok(found),
+        }
     }
-}
-
-/// How an offset is fitted to a column with some deviation.
-fn offset_fit(spread: f64, start: f64) -> Fit {
-    Fit {
-        start,
-        probe: OFFSET_PROBE * spread,
-        longest: OFFSET_STEP * spread,
-        parameters: false,
-    }
-}
-
-/// How a delay is fitted.
-fn delay_fit(start: f64, parameters: bool) -> Fit {
-    Fit {
-        start,
-        probe: DELAY_PROBE,
-        longest: DELAY_STEP,
-        parameters,
-    }
-}
-
-/// A view with the zero of one quantity moved.
-fn shifted(view: &View, quantity: &Quantity, by: f64) -> View {
-    let mut own = view_of(view, quantity);
-    own.offset += by;
-    with(view, quantity, own)
 }

@@ -4,8 +4,8 @@
 use asid_core::Result;
 use nalgebra::DMatrix;
 
+use super::force_response::ForceSlopes;
 use super::source::{Source, Wanted};
-use super::together::ForceSlopes;
 use crate::latent_force::context::Context;
 use crate::latent_force::estimate::Estimate;
 

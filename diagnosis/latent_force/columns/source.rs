@@ -1,75 +1,20 @@
 //! Where columns come from: the engine, or a trace of the forces.
 
-use asid_core::{Parameter, Progress, Result};
-use asid_effects::EffectSpec;
+use asid_core::{Progress, Result};
 
 use crate::candidate::Candidate;
 use crate::latent_force::context::Context;
-use crate::latent_force::fit::Hypothesis;
 use crate::latent_force::step_map::{Derivatives, Variation, retime_columns};
-use crate::latent_force::trace::{is_traceable, trace};
+use crate::latent_force::trace::trace;
 
-use super::together::{Account, Entries, ForceSlopes, Group, Row, grouped};
+use super::force_response::{ForceSlopes, Row};
+use super::group::{Group, grouped};
+use super::null_model::All;
+use super::together::{Account, Entries};
 
 /// Variations that one walk of the engine takes, at most: between two of them work can be stopped, and of all at once the memory
 /// would grow with the candidates.
 const SLICE: usize = 64;
-
-/// The present model with all candidates that need the engine at their nulls: effects, parameters and values.
-#[derive(Clone)]
-pub(super) struct All<'c> {
-    pub(super) specs: Vec<EffectSpec>,
-    pub(super) parameters: Vec<Parameter>,
-    pub(super) theta: Vec<f64>,
-    pub(super) candidates: &'c [Candidate],
-    /// First parameter of each candidate.
-    pub(super) first: Vec<usize>,
-    traces: bool,
-}
-
-impl<'c> All<'c> {
-    pub(super) fn new(
-        context: &Context<'_>,
-        base: &Hypothesis,
-        theta: &[f64],
-        candidates: &'c [Candidate],
-    ) -> Self {
-        let mut all = Self {
-            specs: base.specs.clone(),
-            parameters: base.parameters(),
-            theta: theta.to_vec(),
-            candidates,
-            first: Vec::with_capacity(candidates.len()),
-            traces: context.walks.iter().all(|w| w.segment.is_none()),
-        };
-        for c in candidates {
-            all.first.push(all.theta.len());
-            if all.is_traced(context, c) {
-                continue;
-            }
-            all.specs.push(c.spec.clone());
-            all.parameters
-                .extend(c.unknowns().into_iter().map(|(p, _)| p));
-            all.theta.extend(c.parameters().iter().map(|p| p.null));
-        }
-        all
-    }
-
-    /// Whether a candidate needs no engine: it acts through forces alone, and no walk is a replay.
-    fn is_traced(&self, context: &Context<'_>, candidate: &Candidate) -> bool {
-        self.traces && is_traceable(context.plant(), candidate)
-    }
-
-    /// All values with those of some candidates.
-    fn with_all<'w>(&self, wanted: impl Iterator<Item = &'w Wanted>) -> Vec<f64> {
-        let mut theta = self.theta.clone();
-        for w in wanted {
-            let first = self.first[w.candidate];
-            theta[first..first + w.values.len()].copy_from_slice(&w.values);
-        }
-        theta
-    }
-}
 
 /// A column that is wanted: a candidate with some values, and what its change is divided by.
 pub(super) struct Wanted {

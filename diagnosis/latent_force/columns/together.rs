@@ -5,13 +5,13 @@
 //! effects reach different joints, or different sensors: the grouping of Curtis, Powell and Reid (1974) for sparse
 //! Jacobians, with the force as the space in which the matrix is sparse.
 
-use std::ops::Range;
-
 use asid_effects::Reach;
-use nalgebra::{DMatrix, DVector, Dyn, LU};
+use nalgebra::DVector;
 
 use crate::latent_force::context::Context;
-use crate::latent_force::step_map::LinearEpisode;
+
+use super::force_response::Row;
+use super::group::Group;
 
 /// Share of the force of a group, by magnitude, that may come up where no member reaches: more, and one reaches further than
 /// it says. Differences are right to a thousandth of it.
@@ -23,111 +23,6 @@ const NO_CHANGE: f64 = 1e-6;
 /// Change of a coordinate of the state, relative to its largest, that is none, for the same reason.
 const NO_MOTION: f64 = 1e-12;
 
-/// Columns that are walked together, by their places in a list, with what each reaches.
-#[derive(Clone, Debug)]
-pub(super) struct Group {
-    pub(super) members: Vec<usize>,
-    reaches: Vec<Reach>,
-}
-
-impl Group {
-    /// A column by itself.
-    pub(super) fn single(member: usize, reach: Reach) -> Self {
-        Self {
-            members: vec![member],
-            reaches: vec![reach],
-        }
-    }
-
-    /// The columns, each by itself.
-    pub(super) fn apart(self) -> impl Iterator<Item = Self> {
-        let each = self.members.into_iter().zip(self.reaches);
-        each.map(|(member, reach)| Self::single(member, reach))
-    }
-
-    /// Whether its columns are of readings alone.
-    pub(super) fn is_of_sensors(&self) -> bool {
-        matches!(self.reaches[0], Reach::Sensor(_))
-    }
-
-    fn takes(&self, reach: &Reach) -> bool {
-        self.reaches.iter().all(|own| own.is_apart_from(reach))
-    }
-}
-
-/// Groups of columns, given with what they reach; each comes into the first that takes it.
-pub(super) fn grouped(columns: impl Iterator<Item = (usize, Reach)>) -> Vec<Group> {
-    let mut groups: Vec<Group> = Vec::new();
-    for (member, reach) in columns {
-        match groups.iter_mut().find(|g| g.takes(&reach)) {
-            Some(group) => {
-                group.members.push(member);
-                group.reaches.push(reach);
-            }
-            None => groups.push(Group::single(member, reach)),
-        }
-    }
-    groups
-}
-
-/// Slopes of the state after a row in generalized forces, `rows x nx x nv` along a walk.
-#[derive(Clone, Debug, Default)]
-pub(super) struct ForceSlopes {
-    /// In a force held over the row.
-    pub(super) held: Vec<f64>,
-    /// In one that acts in the first physics step alone.
-    jolt: Vec<f64>,
-}
-
-impl ForceSlopes {
-    /// Those of a linearised walk, which are taken out of it.
-    pub(super) fn take(from: &mut LinearEpisode) -> Self {
-        Self {
-            held: std::mem::take(&mut from.b),
-            jolt: std::mem::take(&mut from.jolt),
-        }
-    }
-
-    /// Those of some rows, each `size` numbers.
-    pub(super) fn part(&self, rows: Range<usize>, size: usize) -> Self {
-        let own = rows.start * size..rows.end * size;
-        let of = |all: &[f64]| all.get(own.clone()).map_or_else(Vec::new, <[f64]>::to_vec);
-        Self {
-            held: of(&self.held),
-            jolt: of(&self.jolt),
-        }
-    }
-}
-
-/// What the change of the state over a row says of the forces behind it: one held over the row and one at its beginning, at
-/// each joint. Two, since places and speeds are two numbers a joint, and a force that fades, as of a late command, moves a
-/// place further than one that is held.
-///
-/// Over a row of a single physics step the two are one, and the speeds say it all.
-pub(super) struct Row {
-    /// Change of the state by a unit of each force, `nx x nx`: the held ones, then those at the beginning; or `nx x nv`.
-    response: DMatrix<f64>,
-    /// Of as many of its last rows as it has columns.
-    factors: LU<f64, Dyn, Dyn>,
-}
-
-impl Row {
-    /// Of a row of some physics steps with these slopes.
-    pub(super) fn of(slopes: &ForceSlopes, nv: usize, steps: usize) -> Self {
-        let half = |from: &[f64]| DMatrix::from_row_slice(2 * nv, nv, from);
-        let mut response = half(&slopes.held);
-        if steps > 1 {
-            response = response.resize_horizontally(2 * nv, 0.0);
-            response.columns_mut(nv, nv).copy_from(&half(&slopes.jolt));
-        }
-        let n = response.ncols();
-        Self {
-            factors: response.rows(2 * nv - n, n).into_owned().lu(),
-            response,
-        }
-    }
-}
-
 /// The entries of a row of readings.
 pub(super) struct Entries {
     /// The sensor of each, by index in the layout.
@@ -137,6 +32,7 @@ pub(super) struct Entries {
 }
 
 impl Entries {
+    /// Of the logs that are compared.
     pub(super) fn of(context: &Context<'_>) -> Self {
         let layout = &context.plant().layout.sensors;
         let logs = context.logs;
@@ -239,28 +135,10 @@ impl Account {
 
 #[cfg(test)]
 mod tests {
+    use super::super::force_response::ForceSlopes;
+    use super::super::group::grouped;
+    use super::super::group::tests::dofs;
     use super::*;
-
-    fn dofs(own: &[usize]) -> Reach {
-        Reach::Dofs(own.iter().copied().collect())
-    }
-
-    #[test]
-    fn columns_of_a_group_reach_different_things() {
-        let reaches = [
-            dofs(&[0]),
-            dofs(&[1]),
-            dofs(&[0, 1]),
-            Reach::Sensor(0),
-            Reach::Sensor(1),
-            Reach::Everything,
-            dofs(&[2]),
-            Reach::Everything,
-        ];
-        let groups = grouped(reaches.into_iter().enumerate());
-        let members: Vec<_> = groups.iter().map(|g| &g.members[..]).collect();
-        assert_eq!(members, [&[0, 1, 6][..], &[2], &[3, 4], &[5], &[7]]);
-    }
 
     /// Two coupled joints, as of an arm: a force at one moves both.
     fn coupled() -> Row {

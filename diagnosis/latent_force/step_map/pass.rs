@@ -7,43 +7,13 @@ use crate::latent_force::walk::{Walk, by_substeps};
 use crate::predict::columns_of;
 
 use super::late::retime;
+use super::role::Role;
 use super::step::{RowBuffers, Stepped};
 use super::{Common, LinearEpisode, Request};
 
 /// Change of a coordinate of the state that derivatives are taken over, rad, m, rad/s or m/s: forward
 /// differences of smooth dynamics in double precision are right to about six digits.
 pub(super) const STATE_STEP: f64 = 1e-6;
-
-/// What one simulation an episode is for.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Role {
-    /// The model as it is.
-    Nominal,
-    /// A coordinate of the state is moved, for `f` and `h`.
-    State(usize),
-    /// A coordinate of the state is moved all along, for `h` alone: a position by a constant, a speed by a constant and its
-    /// position by a ramp. A reading that remembers (a delay, a filter) sees the past of a speed as its position; what the
-    /// ramp has reached now is taken off again.
-    Reading(usize),
-    /// A speed is moved by a ramp, for how late a sensor of speeds is.
-    Ramp(usize),
-    /// A generalized force acts all along the row.
-    Force(usize),
-    /// It acts in the first physics step of the row.
-    Jolt(usize),
-    /// A variation of the parameters.
-    Varied(usize),
-}
-
-impl Role {
-    /// The coordinate of the state that it moves for `f`.
-    pub(super) fn coordinate(self) -> Option<usize> {
-        match self {
-            Self::State(i) => Some(i),
-            _ => None,
-        }
-    }
-}
 
 /// Some of the walks on a core of their own: a row is too little work to share out.
 pub(super) struct Part {
@@ -65,22 +35,12 @@ impl Part {
         let nx = 2 * nv;
         let all = vec![true; self.walks.len()];
         let due: Vec<bool> = self.walks.iter().map(|&w| request.due(w)).collect();
+        let only_replays = self.walks.iter().all(|&w| c.rolls(w, want));
         let mut in_state = Vec::new();
         if want.state {
-            in_state.extend((0..nx).map(Role::State));
-            if c.reads && !self.walks.iter().all(|&w| c.rolls(w, want)) {
-                in_state.extend((0..nx).map(Role::Reading));
-                in_state.extend((0..nv).map(Role::Ramp));
-            }
+            in_state = Role::in_state(nv, c.reads && !only_replays);
         }
-        let mut others = Vec::new();
-        if want.force {
-            others.extend((0..nv).map(Role::Force));
-        }
-        if want.jolt {
-            others.extend((0..nv).map(Role::Jolt));
-        }
-        others.extend((0..variations.len()).map(Role::Varied));
+        let mut others = Role::others(nv, want, variations.len());
         if due == all {
             in_state.append(&mut others);
         }
@@ -88,24 +48,7 @@ impl Part {
         let mut episodes: Vec<LinearEpisode> = self
             .walks
             .iter()
-            .map(|&w| {
-                let n = c.walks[w].len();
-                let segment = c.rolls(w, want);
-                let (steps, state) = (n - 1, usize::from(want.state && !segment));
-                LinearEpisode {
-                    rows: n,
-                    defect: vec![0.0; steps * nx],
-                    a: vec![0.0; state * steps * nx * nx],
-                    b: vec![0.0; usize::from(want.force) * steps * nx * nv],
-                    jolt: vec![0.0; usize::from(want.jolt) * steps * nx * nv],
-                    residual: vec![f64::NAN; n * ns],
-                    h: vec![0.0; usize::from(want.state) * n * ns * nx],
-                    early: Vec::new(),
-                    late: Vec::new(),
-                    state_columns: vec![0.0; usize::from(!segment) * steps * nx * m],
-                    reading_columns: vec![0.0; n * ns * m],
-                }
-            })
+            .map(|&w| LinearEpisode::empty(c.walks[w].len(), (nv, ns, m), want, c.rolls(w, want)))
             .collect();
         let late = usize::from(want.state && c.reads);
         let mut ramps: Vec<Vec<f64>> = episodes
@@ -248,83 +191,5 @@ impl Part {
         // A simulation that failed at the row before begins anew.
         self.begin_anew(&row.sims)?;
         self.simulator.set_state(&row.sims, &row.qpos, &row.qvel)
-    }
-
-    /// Reads the sensors at row `k`.
-    fn read_row(
-        &mut self,
-        c: &Common<'_>,
-        roles: &[Role],
-        (here, k): (&[usize], usize),
-        request: Request<'_>,
-        (out, ramps): (&mut [LinearEpisode], &mut [Vec<f64>]),
-        row: &mut RowBuffers,
-    ) -> Result<()> {
-        let variations = request.variations;
-        let (n, ns, nx) = (self.walks.len(), c.logs.entries.len(), 2 * c.layout.nv);
-        row.sims.clear();
-        for v in 0..roles.len() {
-            row.sims.extend(here.iter().map(|e| v * n + e));
-        }
-        let width = c.readings.width();
-        row.read.resize(row.sims.len() * width, 0.0);
-        self.simulator.read(&row.sims, &c.readings, &mut row.read)?;
-        let m = variations.len();
-        let mut differ = vec![0.0; ns];
-        for (i, &e) in here.iter().enumerate() {
-            let nominal = &row.read[i * width..(i + 1) * width];
-            let walk = &c.walks[self.walks[e]];
-            let log_row = walk.rows[k];
-            let readings = &c.logs.episodes[walk.episode].readings;
-            let logged = &readings[log_row * width..(log_row + 1) * width];
-            let residual = &mut out[e].residual[k * ns..(k + 1) * ns];
-            c.logs.reading_difference(logged, nominal, residual);
-            if walk.segment.is_some_and(|lead| k < lead) {
-                residual.fill(f64::NAN);
-            }
-            for (v, role) in roles.iter().enumerate().skip(1) {
-                let place = v * here.len() + i;
-                let other = &row.read[place * width..(place + 1) * width];
-                c.logs.reading_difference(other, nominal, &mut differ);
-                let segment = c.rolls(self.walks[e], request.want);
-                match *role {
-                    Role::State(i) if segment => {
-                        for (s, d) in differ.iter().enumerate() {
-                            let value = d / request.push[i];
-                            out[e].h[(k * ns + s) * nx + i] =
-                                if value.is_finite() { value } else { 0.0 };
-                        }
-                    }
-                    Role::Reading(_) | Role::Ramp(_) if segment => {}
-                    Role::State(i) if !c.reads => {
-                        for (s, d) in differ.iter().enumerate() {
-                            out[e].h[(k * ns + s) * nx + i] = d / STATE_STEP;
-                        }
-                    }
-                    Role::Reading(i) => {
-                        let time = walk.time[k];
-                        for (s, d) in differ.iter().enumerate() {
-                            let row = &mut out[e].h[(k * ns + s) * nx..(k * ns + s + 1) * nx];
-                            let place = i.checked_sub(nx / 2).map_or(0.0, |place| row[place]);
-                            row[i] = d / STATE_STEP - time * place;
-                        }
-                    }
-                    Role::Ramp(i) => {
-                        for (s, d) in differ.iter().enumerate() {
-                            ramps[e][(k * ns + s) * (nx / 2) + i] = d / STATE_STEP;
-                        }
-                    }
-                    Role::Varied(i) => {
-                        for (s, d) in differ.iter().enumerate() {
-                            let value = d / variations[i].scale;
-                            out[e].reading_columns[(k * ns + s) * m + i] =
-                                if value.is_finite() { value } else { 0.0 };
-                        }
-                    }
-                    _ => {}
-                }
-            }
-        }
-        Ok(())
     }
 }

@@ -11,7 +11,8 @@ use nalgebra::DMatrix;
 
 use crate::latent_force::tangent::{difference, retract};
 
-use super::pass::{Part, Role, STATE_STEP};
+use super::pass::{Part, STATE_STEP};
+use super::role::Role;
 use super::{Common, LinearEpisode, Request};
 
 /// Fewest physics steps of a row whose slopes are those of one of them: placing a simulation costs about as much as a step.

@@ -1,26 +1,27 @@
-//! The settings of a diagnosis, and the study they lead to.
+//! The settings of a diagnosis.
+
+mod search;
+mod study;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
+use asid_core::Capabilities;
 use asid_core::registry::{self, BackendEntry, TaskEntry, find};
-use asid_core::{Capabilities, Episode};
-use asid_diagnosis::diagnose::{Contact, Settings};
+use asid_diagnosis::diagnose::Settings;
 use asid_diagnosis::latent_force::search::FALSE_ALARMS;
-use asid_diagnosis::search::Breadth;
-use asid_diagnosis::study::Study;
 use asid_effects::EffectEntry;
-use asid_effects::refined_model::RefinedModel;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::super::model::{self, Needs};
 use super::super::options::Common;
 use super::super::plugins::{file_of, recorded, used};
-use super::super::session::backend;
 use super::super::settings::{difficulty, given, parsed, wrong};
 use super::Arguments;
+use search::SearchConfig;
+
+pub use study::Logs;
 
 /// `config.toml` of a diagnosis.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
@@ -100,10 +101,12 @@ pub enum RunLogs {
 }
 
 impl RunLogs {
+    /// Whether logs of exploration are among them.
     pub fn exploration(self) -> bool {
         self != Self::Attempt
     }
 
+    /// Whether logs of the attempt are among them.
     pub fn attempt(self) -> bool {
         self != Self::Exploration
     }
@@ -139,46 +142,6 @@ pub const MINUTES: f64 = 1.75;
 /// Rate of false alarms where none is stated.
 fn false_alarms() -> f64 {
     FALSE_ALARMS
-}
-
-/// How widely to search.
-#[derive(Clone, Copy, Debug, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-struct SearchConfig {
-    /// Effects that the replay search fits on its first, shortest stage. More take longer and miss less.
-    first: usize,
-    /// Of these, those that it follows to whole logs.
-    last: usize,
-    /// Single effects that it follows to whole logs whatever sets of more do.
-    singles: usize,
-    /// Explanations that it tries a further effect upon.
-    beam: usize,
-    /// Most effects that it joins.
-    depth: usize,
-    /// How logs are taken in which bodies touch: by whole replays, in short segments, or by what is affordable. One of auto,
-    /// replays, segments.
-    #[schemars(with = "String")]
-    contact: Contact,
-}
-
-impl Default for SearchConfig {
-    fn default() -> Self {
-        let Breadth {
-            first,
-            last,
-            singles,
-            beam,
-            depth,
-        } = Breadth::default();
-        Self {
-            first,
-            last,
-            singles,
-            beam,
-            depth,
-            contact: Contact::default(),
-        }
-    }
 }
 
 impl Config {
@@ -253,10 +216,7 @@ impl Config {
         for name in &config.without {
             find::<EffectEntry>(name)?;
         }
-        let SearchConfig {
-            first, last, depth, ..
-        } = config.search;
-        if first == 0 || last == 0 || depth == 0 || config.search.beam == 0 {
+        if config.search.has_a_zero() {
             return Err(wrong("search", "every number is at least 1"));
         }
         if runs_task {
@@ -283,77 +243,23 @@ impl Config {
         Ok((config, runs_task.then_some(of_run)))
     }
 
+    /// The settings of the diagnosis itself.
     pub fn settings(&self) -> Settings {
-        let SearchConfig {
-            first,
-            last,
-            singles,
-            beam,
-            depth,
-            contact,
-        } = self.search;
         Settings {
             seed: self.seed,
-            breadth: Breadth {
-                first,
-                last,
-                singles,
-                beam,
-                depth,
-            },
+            breadth: self.search.breadth(),
             without: self.without.clone(),
-            contact,
+            contact: self.search.contact,
             false_alarms: self.false_alarms,
             calibrate: self.calibrate,
         }
     }
-
-    /// The study: as written, or of a task with the logs that the settings name or `played`.
-    pub fn study(&self, played: Option<Logs>) -> Result<Study> {
-        match (&self.study, &self.task) {
-            (Some(path), _) => Ok(Study::read(path)?),
-            (None, Some(name)) => {
-                let task = difficulty::at((find::<TaskEntry>(name)?.make)()?, &self.difficulty)?;
-                let model = match &self.model {
-                    None => model::of_task(&*task),
-                    Some(path) => {
-                        let backend = backend(&self.backend)?;
-                        let scene = backend.load(task.scene())?;
-                        let needs = Needs {
-                            task: &*task,
-                            layout: scene.layout(),
-                            parameters: &task.parameters(),
-                        };
-                        needs.open(&*backend, path, "simulator", &[])?.0
-                    }
-                };
-                let (train, test) = match played {
-                    Some(logs) => logs,
-                    None => (read(&self.train, &model)?, read(&self.test, &model)?),
-                };
-                Ok(Study::of_task(&*task, model, train, test)?)
-            }
-            (None, None) => Err(wrong("study", "is missing")),
-        }
-    }
 }
-
-/// Logs to fit to and logs held out, with their names.
-pub type Logs = (Vec<(String, Episode)>, Vec<(String, Episode)>);
 
 /// Runs whose logs are diagnosed where nothing is said: four to fit to, two held out.
 const RUNS: usize = 6;
 /// Seeds that the task is tried with where nothing is said.
 const SEEDS: u64 = 5;
-
-fn read(files: &[PathBuf], model: &RefinedModel) -> Result<Vec<(String, Episode)>> {
-    let layout = asid_mjcf::Plant::of(&model.scene)?.layout;
-    let one = |file: &PathBuf| -> Result<(String, Episode)> {
-        let episode = asid_logs::episode::read(Path::new(file), &layout)?;
-        Ok((file.display().to_string(), episode))
-    };
-    files.iter().map(one).collect()
-}
 
 /// The engine that is used where none is named: the first built in that computes in double
 /// precision, for which replays of logs are smooth in every parameter; else the first.

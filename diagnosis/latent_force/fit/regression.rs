@@ -1,0 +1,145 @@
+//! The regression on small changes of the values: its columns, its prior, and the evidence at common scales of `q`.
+
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+use crate::latent_force::context::Context;
+use crate::latent_force::estimate::Estimate;
+use crate::latent_force::evidence::{Evidence, evidence};
+use crate::latent_force::fitted_value::Unknown;
+use crate::latent_force::smoother::{Regression, regress};
+use crate::latent_force::step_map::{LinearEpisode, Variation};
+
+/// Common factors of `q` at which models are compared.
+pub const SCALES: [f64; 6] = [1.0, 0.3, 0.1, 0.03, 0.01, 0.003];
+/// Share of a prior's deviation that a slope is taken over.
+const SLOPE_STEP: f64 = 0.01;
+
+/// The regression of all walks.
+pub fn regression(
+    context: &Context<'_>,
+    estimate: &Estimate,
+    linear: &[LinearEpisode],
+    scale: f64,
+    m: usize,
+) -> Regression {
+    let starts = context.starts(&estimate.trajectory);
+    let parts: Vec<Regression> = estimate
+        .problems(context, linear, &starts)
+        .enumerate()
+        .map(|(w, p)| regress(p, &estimate.noise_along(context, w, scale), m))
+        .collect();
+    let mut sum = Regression {
+        log_likelihood: 0.0,
+        gram: DMatrix::zeros(m, m),
+        moment: DVector::zeros(m),
+    };
+    parts.iter().for_each(|p| sum.add(p));
+    sum
+}
+
+/// The values at which slopes are taken: each a little up, or down where up leaves its bounds.
+pub(super) fn variations(unknowns: &[Unknown], free: &[usize], theta: &[f64]) -> Vec<Variation> {
+    free.iter()
+        .map(|&i| {
+            let u = &unknowns[i];
+            let step = SLOPE_STEP * u.deviation;
+            let up = theta[i] + step <= u.bounds[1];
+            let mut other = theta.to_vec();
+            other[i] += if up { step } else { -step };
+            Variation {
+                theta: other,
+                scale: if up { SLOPE_STEP } else { -SLOPE_STEP },
+            }
+        })
+        .collect()
+}
+
+/// The evidence at the common scale of `q` at which it is largest.
+pub(super) struct Compared {
+    /// The scale.
+    pub(super) scale: f64,
+    /// Evidence of the present values, not of where a step would lead.
+    pub(super) here: f64,
+    /// What a step promises beyond it, to first order.
+    pub(super) promised: f64,
+    /// The regression, in deviations of the priors.
+    pub(super) found: Evidence,
+}
+
+/// Compares the common scales of `q` for a model (its unknowns, the places of those that are fitted, and all values); `None` where
+/// there is no scale.
+pub(super) fn compare(
+    context: &Context<'_>,
+    estimate: &Estimate,
+    linear: &[LinearEpisode],
+    (unknowns, free, theta): (&[Unknown], &[usize], &[f64]),
+) -> Option<Compared> {
+    let m = free.len();
+    let places: Vec<usize> = (0..m).collect();
+    let center: Vec<f64> = free
+        .iter()
+        .map(|&i| -unknowns[i].distance(theta[i]))
+        .collect();
+    let bounds: Vec<[f64; 2]> = free
+        .iter()
+        .map(|&i| {
+            let u = &unknowns[i];
+            u.bounds.map(|b| (b - theta[i]) / u.deviation)
+        })
+        .collect();
+    let prior: f64 = center.iter().map(|c| c * c).sum();
+    let mut best: Option<Compared> = None;
+    for scale in SCALES {
+        let sum = regression(context, estimate, linear, scale, m);
+        let found = evidence(&sum.gram, &sum.moment, &places, &center, &bounds);
+        let determinant = determinant_of(&found);
+        let here = sum.log_likelihood - 0.5 * prior + determinant;
+        if best.as_ref().is_none_or(|b| here > b.here) {
+            best = Some(Compared {
+                scale,
+                here,
+                promised: found.gain - determinant + 0.5 * prior,
+                found,
+            });
+        }
+    }
+    best
+}
+
+/// A covariance in deviations of the priors in the values' units.
+pub(super) fn in_units(
+    covariance: &DMatrix<f64>,
+    unknowns: &[Unknown],
+    free: &[usize],
+) -> DMatrix<f64> {
+    let deviation = |k: usize| unknowns[free[k]].deviation;
+    DMatrix::from_fn(free.len(), free.len(), |i, j| {
+        covariance[(i, j)] * deviation(i) * deviation(j)
+    })
+}
+
+/// Half the logarithm of the determinant of the posterior covariance, in units of the prior.
+fn determinant_of(found: &Evidence) -> f64 {
+    let factor = found.covariance.clone().cholesky();
+    factor.map_or(0.0, |c| c.l_dirty().diagonal().iter().map(|x| x.ln()).sum())
+}
+
+/// Moves a linearisation by changes of the values that its columns are for.
+pub(super) fn shift(linear: &mut [LinearEpisode], changes: &[f64]) {
+    let m = changes.len();
+    if m == 0 {
+        return;
+    }
+    let sum = |row: &[f64]| -> f64 { row.iter().zip(changes).map(|(c, x)| c * x).sum() };
+    for episode in linear {
+        let columns = episode.state_columns.chunks_exact(m);
+        for (d, row) in episode.defect.iter_mut().zip(columns) {
+            *d += sum(row);
+        }
+        let columns = episode.reading_columns.chunks_exact(m);
+        for (r, row) in episode.residual.iter_mut().zip(columns) {
+            *r -= sum(row);
+        }
+    }
+}

@@ -1,0 +1,88 @@
+//! Readings at a row, and their slopes.
+
+use asid_core::Result;
+
+use super::pass::{Part, STATE_STEP};
+use super::role::Role;
+use super::step::RowBuffers;
+use super::{Common, LinearEpisode, Request};
+
+impl Part {
+    /// Reads the sensors at row `k`.
+    pub(super) fn read_row(
+        &mut self,
+        c: &Common<'_>,
+        roles: &[Role],
+        (here, k): (&[usize], usize),
+        request: Request<'_>,
+        (out, ramps): (&mut [LinearEpisode], &mut [Vec<f64>]),
+        row: &mut RowBuffers,
+    ) -> Result<()> {
+        let variations = request.variations;
+        let (n, ns, nx) = (self.walks.len(), c.logs.entries.len(), 2 * c.layout.nv);
+        row.sims.clear();
+        for v in 0..roles.len() {
+            row.sims.extend(here.iter().map(|e| v * n + e));
+        }
+        let width = c.readings.width();
+        row.read.resize(row.sims.len() * width, 0.0);
+        self.simulator.read(&row.sims, &c.readings, &mut row.read)?;
+        let m = variations.len();
+        let mut differ = vec![0.0; ns];
+        for (i, &e) in here.iter().enumerate() {
+            let nominal = &row.read[i * width..(i + 1) * width];
+            let walk = &c.walks[self.walks[e]];
+            let log_row = walk.rows[k];
+            let readings = &c.logs.episodes[walk.episode].readings;
+            let logged = &readings[log_row * width..(log_row + 1) * width];
+            let residual = &mut out[e].residual[k * ns..(k + 1) * ns];
+            c.logs.reading_difference(logged, nominal, residual);
+            if walk.segment.is_some_and(|lead| k < lead) {
+                residual.fill(f64::NAN);
+            }
+            for (v, role) in roles.iter().enumerate().skip(1) {
+                let place = v * here.len() + i;
+                let other = &row.read[place * width..(place + 1) * width];
+                c.logs.reading_difference(other, nominal, &mut differ);
+                let segment = c.rolls(self.walks[e], request.want);
+                match *role {
+                    Role::State(i) if segment => {
+                        for (s, d) in differ.iter().enumerate() {
+                            let value = d / request.push[i];
+                            out[e].h[(k * ns + s) * nx + i] =
+                                if value.is_finite() { value } else { 0.0 };
+                        }
+                    }
+                    Role::Reading(_) | Role::Ramp(_) if segment => {}
+                    Role::State(i) if !c.reads => {
+                        for (s, d) in differ.iter().enumerate() {
+                            out[e].h[(k * ns + s) * nx + i] = d / STATE_STEP;
+                        }
+                    }
+                    Role::Reading(i) => {
+                        let time = walk.time[k];
+                        for (s, d) in differ.iter().enumerate() {
+                            let row = &mut out[e].h[(k * ns + s) * nx..(k * ns + s + 1) * nx];
+                            let place = i.checked_sub(nx / 2).map_or(0.0, |place| row[place]);
+                            row[i] = d / STATE_STEP - time * place;
+                        }
+                    }
+                    Role::Ramp(i) => {
+                        for (s, d) in differ.iter().enumerate() {
+                            ramps[e][(k * ns + s) * (nx / 2) + i] = d / STATE_STEP;
+                        }
+                    }
+                    Role::Varied(i) => {
+                        for (s, d) in differ.iter().enumerate() {
+                            let value = d / variations[i].scale;
+                            out[e].reading_columns[(k * ns + s) * m + i] =
+                                if value.is_finite() { value } else { 0.0 };
+                        }
+                    }
+                    _ => {}
+                }
+            }
+        }
+        Ok(())
+    }
+}

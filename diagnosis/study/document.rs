@@ -1,0 +1,200 @@
+//! The study file: what is written in it, its checks, and the study that it makes.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use asid_core::parameter::Scale;
+use asid_core::{Episode, Error, Layout, Parameter, Result, Target};
+use asid_effects::refined_model::RefinedModel;
+use asid_logs::LogSettings;
+use asid_logs::episode::ColumnMapping;
+use asid_mjcf::Plant;
+use serde::Deserialize;
+
+use super::{Study, files};
+
+/// The file, as written.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Document {
+    model: PathBuf,
+    train: Vec<String>,
+    #[serde(default)]
+    test: Vec<String>,
+    #[serde(default)]
+    parameter: Vec<StudyParameter>,
+    #[serde(default)]
+    noise: BTreeMap<String, f64>,
+    #[serde(default)]
+    log: LogSettings,
+    #[serde(default)]
+    column: Vec<ColumnMapping>,
+}
+
+/// A parameter, as written.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct StudyParameter {
+    name: String,
+    #[serde(default)]
+    target: Option<Target>,
+    #[serde(default)]
+    targets: Vec<Target>,
+    range: [f64; 2],
+    #[serde(default)]
+    scale: Scale,
+    #[serde(default)]
+    unit: String,
+}
+
+/// Makes a message an error of the file.
+type Fail<'a> = &'a dyn Fn(String) -> Error;
+
+impl Document {
+    /// The parameters, each checked and with a name of its own.
+    fn parameters(&self, fail: Fail<'_>) -> Result<Vec<Parameter>> {
+        let parameters = (self.parameter.iter())
+            .map(|p| parameter(p).map_err(fail))
+            .collect::<Result<Vec<_>>>()?;
+        for (i, p) in parameters.iter().enumerate() {
+            p.check()?;
+            if parameters[..i].iter().any(|q| q.name == p.name) {
+                return Err(fail(format!("two parameters are named `{}`", p.name)));
+            }
+        }
+        Ok(parameters)
+    }
+
+    /// Whether every noise is that of a sensor, and above 0.
+    fn check_noise(&self, layout: &Layout, fail: Fail<'_>) -> Result<()> {
+        for (sensor, &noise) in &self.noise {
+            layout
+                .sensor(sensor)
+                .map_err(|e| fail(format!("[noise] {e}")))?;
+            if !(noise.is_finite() && noise > 0.0) {
+                return Err(fail(format!(
+                    "[noise] {sensor} = {noise}: a standard deviation is above 0"
+                )));
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether every mapping of a column fits the machine, and has a name of its own.
+    fn check_columns(&self, layout: &Layout, fail: Fail<'_>) -> Result<()> {
+        for (i, mapping) in self.column.iter().enumerate() {
+            mapping.check(layout).map_err(|e| of_file(e, fail))?;
+            let before = &self.column[..i];
+            if before.iter().any(|m| m.name == mapping.name) {
+                return Err(fail(format!("two [[column]] are named `{}`", mapping.name)));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// An error of a setting as one of the file.
+fn of_file(error: Error, fail: Fail<'_>) -> Error {
+    match error {
+        Error::Config { message, .. } => fail(message),
+        other => other,
+    }
+}
+
+impl Study {
+    /// Reads a study file, or a folder with `study.toml`.
+    ///
+    /// # Errors
+    /// When a file is missing or wrong; the message names file, row and column.
+    pub fn read(path: &Path) -> Result<Self> {
+        let file = if path.is_dir() {
+            path.join("study.toml")
+        } else {
+            path.to_owned()
+        };
+        let fail = |message: String| Error::File {
+            path: file.clone(),
+            message,
+        };
+        let text = std::fs::read_to_string(&file).map_err(|e| {
+            fail(match e.kind() {
+                std::io::ErrorKind::NotFound => {
+                    "no such file: a study is a TOML file, or a folder with study.toml".into()
+                }
+                _ => e.to_string(),
+            })
+        })?;
+        let document: Document =
+            asid_core::toml_text::read(&text).map_err(|e| fail(one_line(&e)))?;
+        let folder = file.parent().map(Path::to_path_buf).unwrap_or_default();
+        let model = folder.join(&document.model);
+        let source = RefinedModel::open(&model)?;
+        let plant = Plant::of(&source.scene)?;
+        let parameters = document.parameters(&fail)?;
+        document.check_noise(&plant.layout, &fail)?;
+        document.check_columns(&plant.layout, &fail)?;
+        let mut notes = Vec::new();
+        let mut logs = files::Logs::new(&folder, &plant.layout, &document.column, &document.log);
+        let mut read = |patterns: &[String], key: &str| -> Result<Vec<(String, Episode)>> {
+            let read = logs.read(patterns, key);
+            let read = read.map_err(|e| of_file(e, &fail))?;
+            let each = read.into_iter().map(|(name, episode, noted)| {
+                notes.push((name.clone(), noted));
+                (name, episode)
+            });
+            Ok(each.collect())
+        };
+        let train = read(&document.train, "train")?;
+        let test = read(&document.test, "test")?;
+        if let Some((name, _)) = test.iter().find(|(n, _)| train.iter().any(|(m, _)| m == n)) {
+            return Err(fail(format!(
+                "{name} is among `train` and among `test`: what is held out must not be fitted"
+            )));
+        }
+        let name = if path.is_dir() {
+            path.file_name()
+        } else {
+            path.file_stem()
+        };
+        Self {
+            name: name.map_or_else(|| "study".into(), |n| n.to_string_lossy().into_owned()),
+            model,
+            scene: source.scene,
+            fixed: source.parameters,
+            effects: source.effects,
+            parameters,
+            train,
+            test,
+            noise: document.noise,
+            columns: document.column,
+            notes,
+            wired: false,
+        }
+        .with_test()
+    }
+}
+
+/// The message of a reader of TOML on one line.
+fn one_line(error: &toml::de::Error) -> String {
+    error
+        .message()
+        .split_whitespace()
+        .collect::<Vec<_>>()
+        .join(" ")
+}
+
+/// The parameter that an entry describes.
+fn parameter(written: &StudyParameter) -> Result<Parameter, String> {
+    let mut targets = written.targets.clone();
+    targets.extend(written.target.clone());
+    if targets.is_empty() {
+        return Err(format!("parameter `{}` has no `target`", written.name));
+    }
+    Ok(Parameter {
+        name: written.name.clone(),
+        targets,
+        range: written.range,
+        scale: written.scale,
+        unit: written.unit.clone(),
+    })
+}

@@ -1,0 +1,94 @@
+//! Readings on another clock: all are late by the time that shrinks misses most, and no drive is.
+
+use asid_core::Result;
+
+use super::{Search, Tried};
+use crate::wiring::hypotheses::{self, Fault, Hypothesis, view_of};
+use crate::wiring::size::{self, Fit};
+use crate::wiring::view::View;
+use crate::wiring::windows::Misses;
+
+/// Time that the slope in a delay is taken over, s.
+const DELAY_PROBE: f64 = 2e-3;
+/// Longest step of a delay, s: that of the first scan.
+const DELAY_STEP: f64 = 0.02;
+
+impl Search<'_> {
+    /// Readings that are all late by the time that shrinks misses most; `None` where it is small.
+    pub(super) fn clock(&mut self, view: &View, given: &Misses) -> Result<Option<Tried>> {
+        let at = |delay: f64| hypotheses::delayed(view, delay);
+        let mut best = (0.0, 0.0);
+        for delay in hypotheses::delays() {
+            let misses = self.few.misses(&at(delay))?;
+            let shrinkage = self.settings.shrinkage(given, &misses);
+            if shrinkage > best.1 {
+                best = (delay, shrinkage);
+            }
+        }
+        if best.1 <= 0.0 {
+            return Ok(None);
+        }
+        let (delay, misses) = size::fit(&mut self.few, &at, delay_fit(best.0, false))?;
+        if !self.is_a_clocks(delay) {
+            return Ok(None);
+        }
+        let readings = self.quantities.iter().enumerate();
+        let hypothesis = Hypothesis {
+            fault: Fault::Clock,
+            quantities: readings
+                .filter(|(_, q)| !q.command)
+                .map(|(i, _)| i)
+                .collect(),
+            rare: false,
+            view: at(delay),
+        };
+        Ok(Some(self.judged(hypothesis, given, &misses)))
+    }
+
+    /// Whether a delay is one that a clock may have.
+    fn is_a_clocks(&self, delay: f64) -> bool {
+        let within = (hypotheses::EARLIEST..=hypotheses::LATEST).contains(&delay);
+        within && delay.abs() >= self.settings.delay
+    }
+
+    /// A clock with its delay fitted to all windows, and the study's parameters beside it; improbable where a delay of all
+    /// commands says as much: then it is the drives' own. Of a machine with one drive nothing but a start in motion can tell
+    /// the two apart; of one with several, all drives are seldom late alike.
+    pub(super) fn clock_or_drive(
+        &mut self,
+        view: &View,
+        found: Tried,
+        given: &Misses,
+    ) -> Result<Tried> {
+        let quantity = &self.quantities[found.hypothesis.quantities[0]];
+        let start = view_of(&found.hypothesis.view, quantity).delay - view_of(view, quantity).delay;
+        let nominal = self.all.theta().to_vec();
+        let late_readings = |delay: f64| hypotheses::delayed(view, delay);
+        let late_commands = |delay: f64| hypotheses::commanded_later(view, delay);
+        let (delay, clock) = size::fit(&mut self.all, &late_readings, delay_fit(start, true))?;
+        self.all.set_theta(&nominal);
+        let (_, drive) = size::fit(&mut self.all, &late_commands, delay_fit(start, true))?;
+        self.all.set_theta(&nominal);
+        let handicap = self.settings.drive[usize::from(view.commands.len() > 1)];
+        let beats = self.settings.shrinkage(&drive, &clock);
+        let hypothesis = Hypothesis {
+            view: late_readings(delay),
+            ..found.hypothesis
+        };
+        let mut judged = self.judged(hypothesis, given, &clock);
+        if beats < handicap {
+            judged.probability = judged.probability.min(self.settings.named / 2.0);
+        }
+        Ok(judged)
+    }
+}
+
+/// How a delay is fitted.
+fn delay_fit(start: f64, parameters: bool) -> Fit {
+    Fit {
+        start,
+        probe: DELAY_PROBE,
+        longest: DELAY_STEP,
+        parameters,
+    }
+}

@@ -1,0 +1,98 @@
+//! A column with another zero: of the size that shrinks misses most.
+
+use asid_core::Result;
+
+use super::{Search, Tried};
+use crate::wiring::hypotheses::{Fault, Hypothesis, Quantity, view_of, with};
+use crate::wiring::record::Series;
+use crate::wiring::size::{self, Fit};
+use crate::wiring::view::View;
+use crate::wiring::windows::Misses;
+
+/// Share of a column's deviation that the slope in its offset is taken over.
+const OFFSET_PROBE: f64 = 0.05;
+/// Longest step of an offset, in the column's deviation.
+const OFFSET_STEP: f64 = 1.0;
+
+impl Search<'_> {
+    /// Deviation of a column over all logs, in the quantity's unit.
+    fn spread(&self, view: &View, quantity: &Quantity) -> f64 {
+        let own = view_of(view, quantity);
+        let all = self.record.iter().map(|r| &r.readings[own.from]);
+        own.factor.abs() * Series::joined(all).spread()
+    }
+
+    /// Another zero of a column, of the size that shrinks misses most; `None` where it is small.
+    pub(super) fn offset(
+        &mut self,
+        view: &View,
+        index: usize,
+        given: &Misses,
+    ) -> Result<Option<Tried>> {
+        let quantity = &self.quantities[index];
+        // The zero of a frame in space is no column's, and where bodies touch any shift of it changes what they do.
+        if quantity.command || quantity.name != quantity.whole {
+            return Ok(None);
+        }
+        let spread = self.spread(view, quantity);
+        let at = |size: f64| shifted(view, quantity, size);
+        // A start that the log gives tells it at once, and without the model's own faults.
+        let told = self.few.start_shift(view, quantity.place)?;
+        let size = match told {
+            Some(size) => size,
+            None => size::fit(&mut self.few, &at, offset_fit(spread, 0.0))?.0,
+        };
+        if size.abs() < self.settings.offset * spread {
+            return Ok(None);
+        }
+        let misses = self.few.misses(&at(size))?;
+        let hypothesis = Hypothesis {
+            fault: Fault::Offset,
+            quantities: vec![index],
+            rare: false,
+            view: at(size),
+        };
+        Ok(Some(self.judged(hypothesis, given, &misses)))
+    }
+
+    /// The same offset, fitted to all windows.
+    pub(super) fn refined_offset(
+        &mut self,
+        view: &View,
+        found: Tried,
+        given: &Misses,
+    ) -> Result<Tried> {
+        let quantity = &self.quantities[found.hypothesis.quantities[0]];
+        // Given starts have told it.
+        if self.all.start_shift(view, quantity.place)?.is_some() {
+            return Ok(found);
+        }
+        let spread = self.spread(view, quantity);
+        let before = view_of(view, quantity).offset;
+        let start = view_of(&found.hypothesis.view, quantity).offset - before;
+        let at = |size: f64| shifted(view, quantity, size);
+        let (size, misses) = size::fit(&mut self.all, &at, offset_fit(spread, start))?;
+        let hypothesis = Hypothesis {
+            view: at(size),
+            ..found.hypothesis
+        };
+        Ok(self.judged(hypothesis, given, &misses))
+    }
+}
+
+/// How an offset is fitted to a column with some deviation.
+fn offset_fit(spread: f64, start: f64) -> Fit {
+    Fit {
+        start,
+        probe: OFFSET_PROBE * spread,
+        longest: OFFSET_STEP * spread,
+        parameters: false,
+    }
+}
+
+/// A view with the zero of one quantity moved.
+fn shifted(view: &View, quantity: &Quantity, by: f64) -> View {
+    let mut own = view_of(view, quantity);
+    own.offset += by;
+    with(view, quantity, own)
+}

@@ -1,0 +1,141 @@
+//! What predictions miss: residuals of the windows, and their means in motions.
+
+use super::{LOCAL, Windows};
+use crate::wiring::view::View;
+
+/// A prediction that is off by more than so many motions tells no more than that it is wrong.
+const FARTHEST: f64 = 10.0;
+
+/// What predictions under a view miss.
+#[derive(Clone, Debug)]
+pub struct Misses {
+    /// `reading - prediction`, `windows x frames x width`; NaN where nothing was read, infinite where the engine failed.
+    pub residual: Vec<f64>,
+    /// Mean distance of each quantity from its straight line, over the windows that begin at states read off the log.
+    pub motion: Vec<f64>,
+    /// Mean magnitude of each quantity's residual over those windows, in motions.
+    pub miss: Vec<f64>,
+    /// The same at given starts; 0 where there are none.
+    pub start_miss: Vec<f64>,
+}
+
+impl Windows<'_> {
+    /// `reading - prediction` in the windows from one on.
+    pub(super) fn residuals(&self, view: &View, told: &[f64], first: usize) -> Vec<f64> {
+        let (rows, width) = (self.frames + 1, self.width);
+        let frame = self.duration / self.frames as f64;
+        let mut residual = vec![f64::NAN; told.len()];
+        for (i, window) in self.windows[first..].iter().enumerate() {
+            let record = &self.record[window.episode];
+            for k in 0..rows {
+                let time = window.start + k as f64 * frame;
+                let row = (i * rows + k) * width;
+                let Some(told) = told.get(row..row + width) else {
+                    continue;
+                };
+                let mut read: Vec<f64> = view
+                    .readings
+                    .iter()
+                    .map(|v| record.reading(*v, time, 0.5 * self.duration))
+                    .collect();
+                self.nearer_signs(&mut read, told);
+                let out = &mut residual[row..row + width];
+                for ((miss, read), told) in out.iter_mut().zip(read).zip(told) {
+                    if read.is_finite() {
+                        *miss = if told.is_finite() {
+                            read - told
+                        } else {
+                            f64::INFINITY
+                        };
+                    }
+                }
+            }
+        }
+        residual
+    }
+
+    /// The two signs of a quaternion are one orientation: the nearer one is compared.
+    fn nearer_signs(&self, read: &mut [f64], told: &[f64]) {
+        for &(index, at) in &self.sensors {
+            if self.plant.layout.sensors[index].len != 4 {
+                continue;
+            }
+            let (read, told) = (&mut read[at..at + 4], &told[at..at + 4]);
+            if read.iter().zip(told).map(|(a, b)| a * b).sum::<f64>() < 0.0 {
+                read.iter_mut().for_each(|x| *x = -*x);
+            }
+        }
+    }
+
+    /// Means over the windows.
+    pub(super) fn summed_up(&self, view: &View, residual: Vec<f64>) -> Misses {
+        let (rows, width) = (self.frames + 1, self.width);
+        let frame = self.duration / self.frames as f64;
+        let half = LOCAL * self.duration;
+        let mut motion = vec![0.0; width];
+        let (mut miss, mut start_miss) = (vec![0.0; width], vec![0.0; width]);
+        for entry in 0..width {
+            let view = view.readings[entry];
+            let straight = self.is_place(entry);
+            let of_window = |w: usize| -> Option<f64> {
+                let own = (0..rows).map(|k| residual[(w * rows + k) * width + entry]);
+                rms(own.filter(|r| !r.is_nan()))
+            };
+            let mut moved = Vec::new();
+            for window in self.windows.iter().filter(|w| !w.given) {
+                let record = &self.record[window.episode];
+                let Some((value, slope)) = record.local(view, window.start, half) else {
+                    continue;
+                };
+                let slope = if straight { slope } else { 0.0 };
+                let away = (1..rows).map(|k| {
+                    let s = k as f64 * frame;
+                    record.reading(view, window.start + s, 0.5 * self.duration) - value - slope * s
+                });
+                moved.extend(rms(away.filter(|x| x.is_finite())));
+            }
+            motion[entry] = mean(&moved).unwrap_or(0.0).max(f64::MIN_POSITIVE);
+            let of = |given: bool| -> f64 {
+                let own = (0..self.windows.len()).filter(|&w| self.windows[w].given == given);
+                let each: Vec<f64> = own
+                    .filter_map(of_window)
+                    .map(|r| (r / motion[entry]).min(FARTHEST))
+                    .collect();
+                mean(&each).unwrap_or(0.0)
+            };
+            miss[entry] = of(false);
+            start_miss[entry] = of(true);
+        }
+        Misses {
+            residual,
+            motion,
+            miss,
+            start_miss,
+        }
+    }
+
+    /// Whether a quantity is a place or an angle, which runs on along its slope, and no speed or force.
+    fn is_place(&self, entry: usize) -> bool {
+        let sensors = self.sensors.iter().rev();
+        let found = sensors.clone().find(|(_, first)| *first <= entry);
+        found.is_some_and(|(index, _)| {
+            let kind = &*self.plant.layout.sensors[*index].kind;
+            kind.ends_with("pos") || kind.ends_with("quat")
+        })
+    }
+}
+
+/// Root mean square; `None` of nothing.
+fn rms(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let (mut sum, mut count) = (0.0, 0.0);
+    for x in values {
+        sum += x * x;
+        count += 1.0;
+    }
+    (count > 0.0).then(|| (sum / count).sqrt())
+}
+
+/// Mean; `None` of nothing.
+pub(super) fn mean(values: &[f64]) -> Option<f64> {
+    (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
+}

@@ -1,0 +1,58 @@
+//! The study that the settings lead to.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::Result;
+use asid_core::Episode;
+use asid_core::registry::{TaskEntry, find};
+use asid_diagnosis::study::Study;
+use asid_effects::refined_model::RefinedModel;
+
+use super::super::super::model::{self, Needs};
+use super::super::super::session::backend;
+use super::super::super::settings::{difficulty, wrong};
+use super::Config;
+
+impl Config {
+    /// The study: as written, or of a task with the logs that the settings name or `played`.
+    pub fn study(&self, played: Option<Logs>) -> Result<Study> {
+        match (&self.study, &self.task) {
+            (Some(path), _) => Ok(Study::read(path)?),
+            (None, Some(name)) => {
+                let task = difficulty::at((find::<TaskEntry>(name)?.make)()?, &self.difficulty)?;
+                let model = match &self.model {
+                    None => model::of_task(&*task),
+                    Some(path) => {
+                        let backend = backend(&self.backend)?;
+                        let scene = backend.load(task.scene())?;
+                        let needs = Needs {
+                            task: &*task,
+                            layout: scene.layout(),
+                            parameters: &task.parameters(),
+                        };
+                        needs.open(&*backend, path, "simulator", &[])?.0
+                    }
+                };
+                let (train, test) = match played {
+                    Some(logs) => logs,
+                    None => (read(&self.train, &model)?, read(&self.test, &model)?),
+                };
+                Ok(Study::of_task(&*task, model, train, test)?)
+            }
+            (None, None) => Err(wrong("study", "is missing")),
+        }
+    }
+}
+
+/// Logs to fit to and logs held out, with their names.
+pub type Logs = (Vec<(String, Episode)>, Vec<(String, Episode)>);
+
+/// Reads logs of a machine, with their names.
+fn read(files: &[PathBuf], model: &RefinedModel) -> Result<Vec<(String, Episode)>> {
+    let layout = asid_mjcf::Plant::of(&model.scene)?.layout;
+    let one = |file: &PathBuf| -> Result<(String, Episode)> {
+        let episode = asid_logs::episode::read(Path::new(file), &layout)?;
+        Ok((file.display().to_string(), episode))
+    };
+    files.iter().map(one).collect()
+}
