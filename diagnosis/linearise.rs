@@ -88,10 +88,11 @@ pub struct Linearisation {
 /// Coordinates of the starts that are not known: the same for all episodes of a set.
 pub type Open = Vec<usize>;
 
-/// First difference of a start's coordinates, m or rad or per second; where predictions scatter;
-/// smallest and largest.
+/// First difference of a start's coordinates, m or rad or per second.
 const START_STEP: f64 = 1e-5;
+/// The same where predictions scatter: above what the scatter of two replays hides.
 const ROUGH_START_STEP: f64 = 1e-3;
+/// Smallest and largest difference of a start's coordinates, m or rad or per second.
 const START_STEPS: [f64; 2] = [1e-6, 1e-2];
 
 /// Linearises the predictions.

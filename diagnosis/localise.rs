@@ -18,9 +18,9 @@ const BEGINNING: f64 = 0.03;
 const SLOW: f64 = 0.03;
 /// Rows over which the growth of a residual is taken.
 const WINDOW: usize = 5;
-/// A condition must hold for at most this share of the rows, and for at least this share
-/// of the growth.
+/// Largest share of the rows for which a condition may hold.
 const FEW: f64 = 0.6;
+/// Smallest share of the growth that a condition must hold for.
 const MOST: f64 = 0.8;
 /// Cells that are listed.
 const LISTED: usize = 8;

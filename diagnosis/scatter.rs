@@ -20,10 +20,10 @@ const INTEGRATOR: f64 = 3.0;
 /// Share of the clocks and of what half the time step changes that is each episode's own: another
 /// program's integrator errs otherwise, and not in the same proportion everywhere.
 const OWN: f64 = 0.3;
-/// Share of the gap up to which what is open of the starts is small.
 /// Deviation of the integrator's error, in units of the noise, from which on a prediction tells
 /// nothing: that part of it which is not proportional to the time step.
 const HORIZON: f64 = 30.0;
+/// Share of the gap up to which what is open of the starts is small.
 const SMALL: f64 = 0.3;
 /// Deviation of a start, m or rad or per second, that no record is too short to tell.
 const VAGUE: f64 = 0.1;

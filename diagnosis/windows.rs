@@ -19,8 +19,9 @@ use crate::predict::{Point, State};
 use crate::record::Record;
 use crate::starts::given_start;
 
-/// Share of the longest log that a window is, and its fewest rows.
+/// Share of the longest log that a window is.
 const SHARE: f64 = 0.1;
+/// Fewest rows of a window: a start and a speed are not told by less.
 const ROWS: usize = 10;
 
 /// Rows of a window; `None` where the logs give starts, or do not show where the machine is.

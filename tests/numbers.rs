@@ -6,8 +6,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Folders of the crates whose numbers are looked at. The C ABI's are those of its header, which explains them.
-const CRATES: [&str; 17] = [
+const CRATES: [&str; 18] = [
     "asid-core",
+    "diagnosis",
     "mjcf",
     "effects",
     "plugin",

@@ -50,8 +50,9 @@ pub fn evidence(
     }
 }
 
-/// Sweeps of coordinate descent, and the largest move of a sweep at which it stands.
+/// Most sweeps of coordinate descent.
 const SWEEPS: usize = 400;
+/// Largest move of a sweep at which it stands, in deviations of the prior.
 const STANDS: f64 = 1e-9;
 
 /// The `c` within bounds that maximises `b'c - c'Ac/2`: without bounds where that lies within them, else by

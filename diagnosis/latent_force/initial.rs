@@ -20,9 +20,10 @@ const GIVEN: f64 = 1e-4;
 /// Deviation of a start that the log does not give, relative to the largest value of its coordinate.
 const OPEN: f64 = 2.0;
 
-/// Deviation of where a segment begins, in deviations of the reading of its position, and the time over which that makes the
-/// deviation of its speed, s: half the window that a speed is taken over at 100 Hz, so that a bounce within it is allowed for.
+/// Deviation of where a segment begins, in deviations of the reading of its position.
 const READ: f64 = 5.0;
+/// Time over which that makes the deviation of its speed, s: half the window that a speed is taken over at 100 Hz, so that a bounce
+/// within it is allowed for.
 const READ_TIME: f64 = 0.02;
 
 /// Fills missing values of a series linearly between their neighbours; false where there is none.

@@ -12,9 +12,9 @@ use super::{Found, NEAR_BEST, NEGLIGIBLE, Search, excess, trials};
 use crate::bench::Bench;
 use crate::fit::Effort;
 
-/// Most often that the scatter is estimated anew on a stage, and the share of a gap that it must
-/// bring it below to be the cause of it.
+/// Most often that the scatter is estimated anew on a stage.
 const SETTLINGS: usize = 4;
+/// Share of a gap that the scatter must bring it below to be the cause of it.
 const SETTLED: f64 = 0.7;
 
 impl Search<'_> {

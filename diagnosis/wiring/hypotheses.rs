@@ -14,6 +14,7 @@ const DELAY_STEP: f64 = 0.02;
 /// Earliest: stamps of commands may be late as well, s.
 pub const EARLIEST: f64 = -0.06;
 
+/// A degree, rad.
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 
 /// Kinds of wiring faults, by the names of the result.

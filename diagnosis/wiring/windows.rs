@@ -29,7 +29,7 @@ pub const FEW: usize = 12;
 /// Physics steps of one evaluation at most, times degrees of freedom: beyond it there are fewer windows, so that some hundred
 /// evaluations take about a second.
 const BUDGET: usize = 60_000;
-/// Fewest windows.
+/// Fewest windows, however dear one is.
 const FEWEST: usize = 6;
 /// Frames of a window at most.
 const FRAMES: f64 = 24.0;

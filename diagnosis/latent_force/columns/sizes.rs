@@ -25,8 +25,9 @@ const LEAST_MISSING: f64 = 0.1;
 const QUANTILE: f64 = 0.99;
 /// Share of a reading's spread that an effect on it may make up for.
 const READING_SHARE: f64 = 0.1;
-/// Rows of the parts that sizes are felt for on, and how many parts.
+/// Rows of each part that sizes are felt for on.
 const PART: usize = 6;
+/// How many such parts there are, spread over all walks.
 const PARTS: usize = 24;
 
 /// A context of some short parts of the logs, evenly spread, with the trajectory there.

@@ -15,10 +15,10 @@ use super::Estimate;
 
 /// What a step of a segment's start may leave of its readings, relative to what its slopes promised.
 const KEPT_PROMISE: f64 = 1.1;
-/// Starts that are drawn where no step keeps its promise: widths in deviations of the start's posterior, which has the shape of
-/// the valley where the slopes are right, and in deviations of what its readings leave open, for where they are not. A touch that begins a
-/// row earlier or later is another valley, and no slope leads there.
+/// Widths of the starts that are drawn where no step keeps its promise, in deviations of the start's posterior, which has the shape of
+/// the valley where the slopes are right. A touch that begins a row earlier or later is another valley, and no slope leads there.
 const BY_POSTERIOR: [f64; 3] = [0.5, 2.0, 8.0];
+/// The same in deviations of what its readings leave open, for where the slopes are wrong.
 const BY_READING: [f64; 3] = [0.03, 0.1, 0.3];
 /// Draws of each width.
 const DRAWS: usize = 4;

@@ -4,8 +4,9 @@ use crate::latent_force::context::Context;
 
 use super::Estimate;
 
-/// Speed up to which a joint counts as at rest: in deviations of its estimate, and relative to its largest.
+/// Speed up to which a joint counts as at rest, in deviations of its estimate.
 const REST_DEVIATIONS: f64 = 3.0;
+/// The same relative to its largest speed.
 const REST_SHARE: f64 = 0.02;
 
 impl Estimate {

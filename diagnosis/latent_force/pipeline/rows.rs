@@ -13,11 +13,13 @@ use crate::starts::given_start;
 use crate::study::Study;
 use crate::trajectory::Trajectory;
 
-/// Physics steps of one walk along all logs times degrees of freedom, and times their square, at most, and rows of a log that
-/// are walked in any case. A walk is taken once a coordinate and once a candidate, and both grow with the degrees of freedom, as
-/// from some six on the time of a step does: a screening of a machine of 22 takes 500 walks at 50 us a step.
+/// Physics steps of one walk along all logs times degrees of freedom, at most: a walk is taken once a coordinate and once a
+/// candidate, and both grow with the degrees of freedom.
 const BUDGET: f64 = 72_000.0;
+/// The same times the square of the degrees of freedom, for from some six on the time of a step grows with them too: a screening of
+/// a machine of 22 takes 500 walks at 50 us a step.
 const SQUARE_BUDGET: f64 = 432_000.0;
+/// Rows of a log that are walked in any case.
 const FEWEST: usize = 150;
 /// Physics steps of a replay of all logs for each candidate up to which machines that touch something go by whole replays: a search
 /// by them takes some twenty such rounds, and a core 10^5 to 3 x 10^5 steps a second.

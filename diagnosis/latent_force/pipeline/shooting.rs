@@ -13,8 +13,9 @@ use crate::machine::Machine;
 use crate::predict::State;
 use crate::shot::Shot;
 
-/// Linearisations and rounds of EM before the fit, and most linearisations of the fit: replays take it further.
+/// Linearisations and rounds of EM before the fit.
 const FIRST: (usize, usize) = (2, 8);
+/// Most linearisations of the fit: replays take it further.
 const ROUNDS: usize = 6;
 /// Mean square of what segments leave beyond their noise, in units of it, from which on something is missing: a gap of 1.5.
 const SEEN: f64 = 1.25;
