@@ -235,6 +235,7 @@ pub fn begin<'a>(
             r: context.reading_variance.clone(),
         },
         free: vec![Vec::new(); trajectory.len()],
+        scatter: vec![Vec::new(); trajectory.len()],
         excess: vec![1.0; trajectory.len()],
         misled: vec![1.0; trajectory.len()],
         rolls: 0,

@@ -9,6 +9,7 @@ mod replay;
 mod rest;
 mod variances;
 
+use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use super::context::Context;
@@ -32,6 +33,8 @@ pub struct Estimate {
     pub b: Vec<Vec<f64>>,
     /// Variance of the force that may hold a joint at rest, `rows x nv`, one a walk; empty for none.
     pub free: Vec<Vec<f64>>,
+    /// Directions in which the replays of each segment scatter, `rows x ns x directions`; empty for none.
+    pub scatter: Vec<Vec<f64>>,
     /// Least variance of the white part of each force.
     pub least_white: Vec<f64>,
     /// Of each segment: variance of what is left of its readings, relative to that of the readings; 1 for other walks.
@@ -62,12 +65,14 @@ impl Estimate {
             .zip(&self.b)
             .zip(starts)
             .zip(&self.free)
-            .map(|((((walk, linear), b), start), free)| Problem {
+            .zip(&self.scatter)
+            .map(|(((((walk, linear), b), start), free), scatter)| Problem {
                 walk,
                 linear,
                 b,
                 start,
                 free,
+                scatter,
             })
     }
 
@@ -93,6 +98,29 @@ impl Estimate {
         self.excess
             .iter_mut()
             .for_each(|x| *x = (scale * *x).max(1.0));
+    }
+
+    /// Roots of the posterior covariance of where each segment begins, `nx` rows, by the noise of the readings alone: as well as a right
+    /// model would know it. Empty for other walks.
+    #[must_use]
+    pub fn start_roots(
+        &self,
+        context: &Context<'_>,
+        linear: &[LinearEpisode],
+    ) -> Vec<DMatrix<f64>> {
+        let starts = context.starts(&self.trajectory);
+        let right = Self {
+            excess: vec![1.0; self.excess.len()],
+            scatter: vec![Vec::new(); self.scatter.len()],
+            ..self.clone()
+        };
+        let problems = right.problems(context, linear, &starts).enumerate();
+        problems
+            .map(|(w, p)| match context.walks[w].segment {
+                Some(_) => smooth(p, &right.noise_along(context, w, 1.0)).root,
+                None => DMatrix::zeros(0, 0),
+            })
+            .collect()
     }
 
     /// Smooths about the present trajectory, fits the noise over some rounds, and moves the trajectory.

@@ -10,6 +10,8 @@ use asid_core::{Parameter, Progress, Result};
 use asid_effects::EffectSpec;
 use nalgebra::DMatrix;
 
+use crate::noise::median;
+
 use super::context::Context;
 use super::estimate::Estimate;
 use super::fitted_value::Unknown;
@@ -28,7 +30,7 @@ const EM_ROUNDS: usize = 4;
 /// Further smoothings between two steps of the values where readings remember: their slope in the past of the state is
 /// right to first order only.
 const AGAIN: usize = 2;
-/// Evidence that no longer counts as a rise.
+/// Evidence that no longer counts as a rise; where there are segments, of each, as errors that are independent add up.
 const RISE: f64 = 0.5;
 /// Rounds without a rise that are gone on with (a watchdog: Chamberlain and others 1982), for a narrow valley bends away
 /// from its tangent.
@@ -70,6 +72,9 @@ pub struct Fitted {
     pub theta: Vec<f64>,
     /// Logarithm of its marginal likelihood, natural.
     pub evidence: f64,
+    /// Median of how far that evidence fell where a linearisation did not raise it: about each start of a segment that leaves as
+    /// little of the readings, slopes are others. 0 where there are no segments.
+    pub wander: f64,
     /// What a further step of the values promises, to first order.
     pub promised: f64,
     /// Posterior covariance of the fitted values, in their units.
@@ -121,6 +126,9 @@ pub fn fit(
     let mut anchor: Option<Anchor> = None;
     let mut part = 1.0;
     let (mut waited, mut failed) = (0, 0);
+    let segments = context.walks.iter().filter(|w| w.segment.is_some()).count();
+    let rise = RISE * (segments.max(1) as f64).sqrt();
+    let mut drops = Vec::new();
     for round in 0..rounds.max(1) {
         let variations = variations(unknowns, &free, &theta);
         let mut linear = slopes.linearise(
@@ -141,21 +149,25 @@ pub fn fit(
         };
         estimate.rescale(scale);
         let hoped = here + promised;
-        let rose = best.as_ref().is_none_or(|b| here > b.evidence + RISE)
-            || anchor.as_ref().is_none_or(|a| hoped > a.hoped + RISE);
+        let rose = best.as_ref().is_none_or(|b| here > b.evidence + rise)
+            || anchor.as_ref().is_none_or(|a| hoped > a.hoped + rise);
         waited = if rose { 0 } else { waited + 1 };
+        if let Some(best) = best.as_ref().filter(|b| here < b.evidence) {
+            drops.push(best.evidence - here);
+        }
         if best.as_ref().is_none_or(|b| here > b.evidence) {
             best = Some(Fitted {
                 hypothesis: hypothesis.clone(),
                 theta: theta.clone(),
                 evidence: here,
+                wander: 0.0,
                 promised,
                 covariance: in_units(&found.covariance, unknowns, &free),
                 estimate: estimate.clone(),
                 slopes: Slopes::default(),
             });
         }
-        let stands = round > 0 && !rose && promised < RISE;
+        let stands = round > 0 && !rose && promised < rise;
         if stands || failed == FAILURES || round + 1 == rounds || progress.is_stopped() {
             break;
         }
@@ -196,6 +208,9 @@ pub fn fit(
     let mut best =
         best.ok_or_else(|| asid_core::Error::Failed("no round of the fit was finite".into()))?;
     best.slopes = slopes;
+    if segments > 0 {
+        best.wander = median(&mut drops).unwrap_or(0.0);
+    }
     Ok(best)
 }
 

@@ -23,6 +23,7 @@ mod one_step;
 mod picture;
 pub mod pipeline;
 pub mod rehearsal;
+pub mod scatter;
 pub mod screen;
 pub mod search;
 pub mod segments;

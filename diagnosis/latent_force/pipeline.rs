@@ -1,5 +1,6 @@
 //! From a study to what its result is told from, by the missing force.
 
+mod null;
 mod replays;
 mod rows;
 mod shooting;
@@ -9,7 +10,6 @@ use asid_core::{Progress, Result};
 
 use crate::bench::Bench;
 use crate::candidate::enumerate;
-use crate::data::Logs;
 use crate::decision::{Rules, decide};
 use crate::diagnose::{Contact, Settings};
 use crate::machine::Machine;
@@ -17,8 +17,8 @@ use crate::prepare::{dataset, set_reading_noise};
 use crate::study::Study;
 use crate::work::Work;
 
-use super::context::{Context, begin};
-use super::fit::{Fitted, Hypothesis, Slopes, fit, settle_noise};
+use super::context::begin;
+use super::fit::{Hypothesis, fit};
 use super::fitted_value::Unknown;
 use super::left::left;
 use super::picture::forces;
@@ -27,18 +27,14 @@ use super::segments::DURATIONS;
 use super::selection::gather;
 use super::steps::{beside, known, noise_with_steps, shown};
 
+use null::Null;
 use replays::replay;
 use rows::{Rows, along, replays_are_affordable};
 pub use shooting::Handover;
 use shooting::shoot;
 
-/// Linearisations and rounds of EM of the first smoothing.
-const FIRST: (usize, usize) = (4, 8);
 /// Most linearisations of the fit without effects.
 const ROUNDS: usize = 15;
-/// Share of the segments' rows whose slopes keep no promise from which on shorter segments are taken.
-const MISLED: f64 = 0.3;
-
 /// Diagnoses a study; hands it over where bodies touch and whole replays are to decide there.
 ///
 /// # Errors
@@ -69,10 +65,10 @@ pub fn diagnose(
     };
     let rows = Rows::of(&bench, &nominal)?;
     let affordable = || replays_are_affordable(&bench, &rows.shown, without);
-    if rows.touch() && (contact == Contact::Replays || contact == Contact::Auto && affordable()) {
+    if rows.touch() && (contact == Contact::Replays || contact == Contact::Auto && false && affordable()) {
         let shot = {
             let parameters = (&study.parameters[..], &nominal[..]);
-            let taken = rows.cut(study, &bench, DURATIONS[DURATIONS.len() - 1]);
+            let taken = rows.cut(study, &bench, DURATIONS[0]);
             let (context, estimate) = begin(&bench.machine, &logs, taken, parameters)?;
             shoot(&context, (&hypothesis, &nominal), estimate, progress)?
         };
@@ -83,8 +79,16 @@ pub fn diagnose(
         }));
     }
     let (outcome, candidates, left_out, firsts, drawn, members) = {
-        let at = (&hypothesis, &nominal[..]);
-        let (context, mut none) = without_effects(study, &bench, (&rows, &logs), at, progress)?;
+        let null = Null {
+            study,
+            bench: &bench,
+            rows: &rows,
+            logs: &logs,
+            hypothesis: &hypothesis,
+            nominal: &nominal,
+            progress,
+        };
+        let (context, mut none) = null.fit()?;
         let rounds = (ROUNDS, progress);
         if none.estimate.missing(&context).share < 1.0 {
             none.estimate.free_at_rest(&context);
@@ -130,38 +134,4 @@ pub fn diagnose(
         judgement,
         nominal,
     }))
-}
-
-/// The model without effects, fitted in the longest segments that are nearly linear in their starts.
-fn without_effects<'a>(
-    study: &Study,
-    bench: &'a Bench,
-    (rows, logs): (&Rows, &'a Logs),
-    (hypothesis, nominal): (&Hypothesis, &[f64]),
-    progress: &dyn Progress,
-) -> Result<(Context<'a>, Fitted)> {
-    let fitted = |duration: f64| -> Result<(Context<'a>, Fitted)> {
-        let taken = rows.cut(study, bench, duration);
-        let parameters = (&study.parameters[..], nominal);
-        let (context, mut estimate) = begin(&bench.machine, logs, taken, parameters)?;
-        settle_noise(
-            &context,
-            hypothesis,
-            nominal,
-            &mut estimate,
-            FIRST,
-            progress,
-        )?;
-        let begin = (&estimate, &Slopes::default());
-        let none = fit(&context, hypothesis, nominal, begin, (ROUNDS, progress))?;
-        Ok((context, none))
-    };
-    let [longer @ .., shortest] = DURATIONS;
-    for duration in longer {
-        let (context, none) = fitted(duration)?;
-        if none.estimate.misled_share(&context) < MISLED {
-            return Ok((context, none));
-        }
-    }
-    fitted(shortest)
 }

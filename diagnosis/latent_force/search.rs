@@ -21,6 +21,9 @@ pub use set::{Set, log_prior, name_of};
 use round::Upon;
 use set::{free_what_is_given, from_starts_of, is_due};
 
+/// Deviations of the evidence about its plateaus by which a further effect must rise above the threshold: 95 %.
+const WANDER: f64 = 2.0;
+
 /// A stage that was cut short, and the sets that it left out.
 #[derive(Clone, Debug)]
 pub struct Untried {
@@ -111,7 +114,8 @@ pub fn search(
             // A first fit that was cut short has not told yet how much of the force it makes up for.
             let cut_short = stopped && best.candidates.is_empty();
             let shrinks = cut_short || left(&best) - left(n) > breadth.shrinks;
-            shrinks && n.fitted.evidence - best.fitted.evidence > threshold
+            let unsure = WANDER * n.fitted.wander.hypot(best.fitted.wander);
+            shrinks && n.fitted.evidence - best.fitted.evidence > threshold + unsure
         });
         if let Some(own) = freed.take() {
             let evidence = own.fitted.evidence + threshold;

@@ -13,9 +13,9 @@
 
 use super::walk::Walk;
 
-/// Durations of segments, s, the longest first: a whole stretch of contact; a few impacts; and a few times a contact's time
-/// constant (0.02 s by default in MuJoCo), over which a few per cent of a force move a body by about what sensors tell.
-pub const DURATIONS: [f64; 3] = [f64::INFINITY, 1.0, 0.25];
+/// Durations of segments, s, the shortest first: a few times a contact's time constant (0.02 s by default in MuJoCo), over which a
+/// few per cent of a force move a body by about what sensors tell; a few impacts; and a whole stretch of contact.
+pub const DURATIONS: [f64; 3] = [0.25, 1.0, f64::INFINITY];
 /// Longest stretch without contact between two with it that is part of them, s: what it lacks is told as well by their readings.
 const BETWEEN: f64 = 0.5;
 /// Time for which a segment runs before its readings count, s: five time constants of a contact.

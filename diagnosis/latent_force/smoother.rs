@@ -81,6 +81,8 @@ pub struct Problem<'a> {
     pub start: &'a Start,
     /// Variance of the force that is free in a row, `rows x nv`; empty where there is none.
     pub free: &'a [f64],
+    /// Of a segment: directions in which its replays scatter, `rows x ns x directions`; empty for none.
+    pub scatter: &'a [f64],
 }
 
 /// Sums that the noise model is estimated from.
@@ -130,7 +132,9 @@ pub struct Smoothed {
     pub change: Vec<f64>,
     /// Of a segment: shorter changes of its start, each `nx`, where the whole goes too far.
     pub damped: Vec<Vec<f64>>,
-    /// Of a segment: a root of the posterior covariance of its start, `nx x nx`; empty for other walks.
+    /// Of a segment: sum of squares that a replay from the changed start should leave of each entry, where slopes tell.
+    pub promised: Vec<f64>,
+    /// Of a segment: a root of the posterior covariance of its start, `nx` rows; empty for other walks.
     pub root: DMatrix<f64>,
     /// Its variances, `rows x nx`.
     pub change_variance: Vec<f64>,

@@ -72,6 +72,15 @@ impl Walk {
         }
     }
 
+    /// The same rows at half the physics time step.
+    #[must_use]
+    pub fn halved(&self) -> Self {
+        Self {
+            substeps: self.substeps.iter().map(|n| 2 * n).collect(),
+            ..self.clone()
+        }
+    }
+
     /// Some of its rows, as a walk of their own.
     #[must_use]
     pub fn part(&self, range: std::ops::Range<usize>) -> Self {

@@ -7,6 +7,7 @@ mod arm;
 #[path = "../diagnosis_support/mod.rs"]
 mod diagnosis_support;
 mod row_slopes;
+mod scatter;
 mod small;
 mod steps;
 mod stopped;

@@ -64,19 +64,6 @@ impl Estimate {
         }
     }
 
-    /// Share of the segments' rows whose slopes did not keep their promise in the last replay.
-    #[must_use]
-    pub fn misled_share(&self, context: &Context<'_>) -> f64 {
-        let (mut misled, mut rows) = (0, 0);
-        for (walk, ratio) in context.walks.iter().zip(&self.misled) {
-            if walk.segment.is_some() {
-                rows += walk.len();
-                misled += if *ratio > 1.0 { walk.len() } else { 0 };
-            }
-        }
-        misled as f64 / rows.max(1) as f64
-    }
-
     /// From here on nothing finer than a part of the force that is missing now decides.
     pub fn set_resolution(&mut self, context: &Context<'_>) {
         let nv = context.plant().layout.nv;

@@ -10,6 +10,7 @@ use crate::latent_force::context::Context;
 use crate::latent_force::initial::open_by_reading;
 use crate::latent_force::step_map::StepMap;
 use crate::latent_force::tangent::retract;
+use crate::latent_force::walk::Walk;
 
 use super::Estimate;
 
@@ -24,6 +25,25 @@ const BY_READING: [f64; 3] = [0.03, 0.1, 0.3];
 const DRAWS: usize = 4;
 
 impl Estimate {
+    /// Begins each segment where another estimate, of the same logs in other segments, has its first row.
+    pub fn begin_at(&mut self, context: &Context<'_>, (others, other): (&Context<'_>, &Self)) {
+        let layout = &context.plant().layout;
+        let width = layout.nq + layout.nv;
+        for (walk, states) in context.walks.iter().zip(&mut self.trajectory) {
+            let first = walk.rows[0];
+            let place = |w: &Walk| w.rows.iter().position(|&row| row == first);
+            // Of several, the one that has gone furthest from its start knows the row best.
+            let found = others.walks.iter().zip(&other.trajectory);
+            let found = found
+                .filter(|(w, _)| w.episode == walk.episode && w.segment.is_some())
+                .filter_map(|(w, states)| place(w).map(|at| (at, states)))
+                .max_by_key(|(at, _)| *at);
+            if let Some((at, from)) = found.filter(|_| walk.segment.is_some()) {
+                states[..width].copy_from_slice(&from[at * width..(at + 1) * width]);
+            }
+        }
+    }
+
     /// Replays the segments from their starts, which have just been moved from those `before`: each takes the step, of those
     /// offered and none, that leaves least of its readings; where that is more than was promised, starts about it are drawn.
     ///
@@ -45,8 +65,8 @@ impl Estimate {
             .smoothed
             .iter()
             .map(|s| {
-                let sums = s.sums.reading.iter().zip(&self.noise.r);
-                sums.map(|([sum, _], r)| sum / r).sum::<f64>()
+                let sums = s.promised.iter().zip(&self.noise.r);
+                sums.map(|(sum, r)| sum / r).sum::<f64>()
             })
             .collect();
         let offered = self.smoothed.iter().map(|s| s.damped.len()).max();
@@ -61,12 +81,16 @@ impl Estimate {
             for (posterior, reading) in BY_POSTERIOR.into_iter().zip(BY_READING) {
                 let from = self.trajectory.clone();
                 let nx = context.scale.len();
-                let normal = DVector::from_fn(nx, |_, _| random.sample::<f64, _>(StandardNormal));
+                let most = self.smoothed.iter().map(|s| s.root.ncols()).max();
+                let normal = DVector::from_fn(most.unwrap_or(0).max(nx), |_, _| {
+                    random.sample::<f64, _>(StandardNormal)
+                });
                 let wide =
                     DVector::from_fn(nx, |i, _| reading * normal[i] * open_by_reading(i, scales));
                 let along = |s: &Self, w: usize| {
                     let root = &s.smoothed[w].root;
-                    (root.ncols() == nx).then(|| (posterior * root * &normal).as_slice().to_vec())
+                    let change = || posterior * root * normal.rows(0, root.ncols());
+                    (root.ncols() > 0).then(|| change().as_slice().to_vec())
                 };
                 self.offer(map, theta, (&from, &promised, &mut left), along)?;
                 let from = self.trajectory.clone();

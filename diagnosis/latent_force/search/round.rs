@@ -17,7 +17,7 @@ use crate::latent_force::smoother::Regression;
 use super::Untried;
 use super::breadth::Breadth;
 use super::prune::{pruned, pruned_at_once};
-use super::set::{Set, log_prior, name_of, refined_by, with, without};
+use super::set::{Set, from_starts_of, log_prior, name_of, refined_by, with, without};
 
 /// Leading candidates that are compared pair by pair.
 const COMPARED: usize = 20;
@@ -202,7 +202,8 @@ impl Upon<'_> {
         let (breadth, progress) = (self.breadth, self.progress);
         let ranked = &screening.ranked;
         let lead = ranked.first().map_or(0.0, |s| s.gain);
-        let least = (breadth.share * lead).max(breadth.least);
+        let wander = self.base.fitted.wander;
+        let least = (breadth.share * lead).max(breadth.least).max(wander);
         let due = ranked.iter().take(breadth.raced).filter(|s| s.gain > least);
         let due: Vec<&Screened> = due.collect();
         progress.begin("confirming", due.len() as u64);
@@ -285,6 +286,27 @@ impl Upon<'_> {
             }
             fits.sets.push(set);
         }
+        if context.has_segments() {
+            self.level(&mut fits.sets)?;
+        }
         Ok(fits)
+    }
+
+    /// Fits those behind the best once more from where that one has put the starts of segments.
+    fn level(&self, sets: &mut [Set]) -> Result<()> {
+        sets.sort_by(|a, b| b.fitted.evidence.total_cmp(&a.fitted.evidence));
+        let Some((best, others)) = sets.split_first_mut() else {
+            return Ok(());
+        };
+        for set in others {
+            if self.progress.is_stopped() {
+                break;
+            }
+            let again = from_starts_of(self.context, (set, best), self.breadth, self.progress)?;
+            if again.fitted.evidence > set.fitted.evidence {
+                *set = again;
+            }
+        }
+        Ok(())
     }
 }

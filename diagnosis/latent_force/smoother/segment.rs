@@ -17,7 +17,7 @@ struct Rows {
     entry: Vec<usize>,
     /// Readings.
     left: DVector<f64>,
-    /// Slopes in the change of the start, `readings x nx`.
+    /// Slopes in the change of the start, then directions of scatter, `readings x (nx + directions)`.
     start: DMatrix<f64>,
     /// Slopes in the columns, `readings x m`.
     columns: DMatrix<f64>,
@@ -29,6 +29,7 @@ impl Rows {
     fn of(problem: Problem<'_>, noise: &NoiseModel, m: usize) -> Self {
         let linear = problem.linear;
         let (nx, ns) = (problem.start.mean.len(), noise.r.len());
+        let scattered = problem.scatter.len() / (linear.rows * ns).max(1);
         let (mut entry, mut left) = (Vec::new(), Vec::new());
         let (mut start, mut columns) = (Vec::new(), Vec::new());
         let mut log_deviation = 0.0;
@@ -42,6 +43,8 @@ impl Rows {
                 let deviation = noise.r[i].sqrt();
                 let own = &linear.h[at * nx..(at + 1) * nx];
                 start.extend(own.iter().map(|x| x / deviation));
+                let own = &problem.scatter[at * scattered..(at + 1) * scattered];
+                start.extend(own.iter().map(|x| x / deviation));
                 let own = &linear.reading_columns[at * m..(at + 1) * m];
                 columns.extend(own.iter().map(|x| x / deviation));
                 left.push(reading / deviation);
@@ -53,30 +56,32 @@ impl Rows {
         Self {
             entry,
             left: DVector::from_vec(left),
-            start: DMatrix::from_row_slice(n, nx, &start),
+            start: DMatrix::from_row_slice(n, nx + scattered, &start),
             columns: DMatrix::from_row_slice(n, m, &columns),
             log_deviation,
         }
     }
 
-    /// Normal equations of the start, in units of its prior's deviations: slopes, factor and right side. The diagonal is
-    /// lengthened by a share `damping` of itself (Marquardt 1963).
+    /// Normal equations of the start and of the scatter, in units of their priors' deviations: slopes, factor and right side. The
+    /// diagonal is lengthened by a share `damping` of itself (Marquardt 1963).
     fn normal(
         &self,
         problem: Problem<'_>,
         damping: f64,
     ) -> (DMatrix<f64>, Option<Cholesky<f64, Dyn>>, DVector<f64>) {
         let start = problem.start;
-        let nx = start.mean.len();
+        let n = self.start.ncols();
         let deviation: Vec<f64> = start.variance.iter().map(|v| v.sqrt()).collect();
         let mut scaled = self.start.clone();
         for (mut column, d) in scaled.column_iter_mut().zip(&deviation) {
             column *= *d;
         }
-        let mut gram = scaled.transpose() * &scaled + DMatrix::identity(nx, nx);
-        (0..nx).for_each(|i| gram[(i, i)] *= 1.0 + damping);
-        let prior = start.mean.iter().zip(&deviation).map(|(m, d)| m / d);
-        let right = scaled.transpose() * &self.left + DVector::from_iterator(nx, prior);
+        let mut gram = scaled.transpose() * &scaled + DMatrix::identity(n, n);
+        (0..n).for_each(|i| gram[(i, i)] *= 1.0 + damping);
+        let mut right = scaled.transpose() * &self.left;
+        for (i, (mean, deviation)) in start.mean.iter().zip(&deviation).enumerate() {
+            right[i] += mean / deviation;
+        }
         (scaled, gram.cholesky(), right)
     }
 }
@@ -89,6 +94,7 @@ pub(super) fn smooth(problem: Problem<'_>, noise: &NoiseModel) -> Smoothed {
     let (scaled, factor, right) = rows.normal(problem, 0.0);
     let mut out = Smoothed {
         log_likelihood: f64::NAN,
+        promised: vec![0.0; noise.r.len()],
         ..Smoothed::unmoved(problem.linear.rows, noise)
     };
     let Some(factor) = factor else {
@@ -99,6 +105,8 @@ pub(super) fn smooth(problem: Problem<'_>, noise: &NoiseModel) -> Smoothed {
         out.change[i] = change[i] * v.sqrt();
     }
     let left = &rows.left - &scaled * &change;
+    // What a replay leaves has the scatter in it.
+    let replayed = &rows.left - scaled.columns(0, nx) * change.rows(0, nx);
     // Variance of each prediction: the squared length of `L^-1 x`.
     let lower = factor.l();
     let spread = lower.solve_lower_triangular(&scaled.transpose());
@@ -107,12 +115,13 @@ pub(super) fn smooth(problem: Problem<'_>, noise: &NoiseModel) -> Smoothed {
         let sums = &mut out.sums.reading[entry];
         sums[0] += (left[k] * left[k] + variance) * noise.r[entry];
         sums[1] += 1.0;
+        out.promised[entry] += (replayed[k] * replayed[k] + variance) * noise.r[entry];
     }
     out.log_likelihood = log_likelihood(&rows, problem, &factor, &right);
     let deviations = start.variance.iter().map(|v| v.sqrt());
     let units = DMatrix::from_diagonal(&DVector::from_iterator(nx, deviations));
     if let Some(inverse) = lower.transpose().try_inverse() {
-        out.root = units * inverse;
+        out.root = units * inverse.rows(0, nx);
     }
     for damping in DAMPINGS {
         if let (_, Some(factor), right) = rows.normal(problem, damping) {
@@ -226,6 +235,7 @@ mod tests {
                 b: &[],
                 start: &self.start,
                 free: &[],
+                scatter: &[],
             }
         }
 

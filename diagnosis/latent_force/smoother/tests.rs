@@ -134,6 +134,7 @@ impl Case {
             b: &self.b,
             start: &self.start,
             free: &self.free,
+            scatter: &[],
         }
     }
 

@@ -1,0 +1,94 @@
+//! What replays of a segment scatter by.
+
+use asid::core::episode::ChannelColumns;
+use asid::core::{Episode, Scene};
+use asid::diagnosis::data::Logs;
+use asid::diagnosis::latent_force::context::{Taken, begin};
+use asid::diagnosis::latent_force::fit::Hypothesis;
+use asid::diagnosis::latent_force::scatter::Scatter;
+use asid::diagnosis::latent_force::walk::Walk;
+use asid::diagnosis::machine::Machine;
+
+use crate::diagnosis_support::engine;
+
+/// Rows of a log, their physics steps, and the duration of a step, s.
+const ROWS: usize = 20;
+const STEPS: usize = 10;
+const DT: f64 = 0.002;
+/// Deviation of a reading, m.
+const NOISE: f64 = 1e-3;
+/// Where the slide begins, m, its speed, m/s, and its acceleration, m/s².
+const START: [f64; 3] = [0.01, 0.3, 0.5];
+
+/// Scatter of a slide that moves freely but for what `joint` says of it, as one segment: power of each row in units of the noise, of draws
+/// and of half the time step, with the share of rows that is lost.
+fn scatter(joint: &str) -> (Vec<[f64; 2]>, f64) {
+    let [place, speed, acceleration] = START;
+    let xml = format!(
+        r#"<mujoco><option timestep="{DT}" gravity="{acceleration} 0 0"/><worldbody><body>
+        <joint name="slide" type="slide" axis="1 0 0" {joint}/>
+        <geom size="0.1" mass="1" contype="0" conaffinity="0"/></body></worldbody>
+        <sensor><jointpos name="x" joint="slide"/></sensor></mujoco>"#
+    );
+    let scene = Scene::from_xml("slide", &xml, &[]).unwrap();
+    let machine = Machine::new(engine(), &scene, &[], &[], 1).unwrap();
+    let time: Vec<f64> = (0..ROWS).map(|k| (k * STEPS) as f64 * DT).collect();
+    let at = |t: &f64| place + speed * t + 0.5 * acceleration * t * t;
+    let episode = Episode {
+        readings: time.iter().map(at).collect(),
+        channels: vec![ChannelColumns {
+            name: "x".into(),
+            len: 1,
+        }],
+        time,
+        ..Episode::default()
+    };
+    let named = vec![("log".into(), episode)];
+    let mut logs = Logs::new(&machine.plant, &["x".into()], named).unwrap();
+    logs.set_noise(&[NOISE]);
+    let taken = Taken {
+        walks: vec![Walk {
+            segment: Some(0),
+            ..Walk::new(&logs, 0, DT)
+        }],
+        given: vec![None],
+        open: Vec::new(),
+        otherwise: vec![vec![0.0; 2 * ROWS]],
+        scale: vec![0.2, 0.5],
+    };
+    let (context, estimate) = begin(&machine, &logs, taken, (&[], &[])).unwrap();
+    let finer = machine.halved().unwrap();
+    let model = (&Hypothesis::default(), &[][..]);
+    let found = Scatter::of(&context, model, &estimate, Some(&finer)).unwrap();
+    let directions = found.directions[0].len() / ROWS;
+    let rows = found.directions[0].chunks(directions).map(|row| {
+        let power = |d: &[f64]| d.iter().map(|x| (x / NOISE).powi(2)).sum::<f64>();
+        [power(&row[..directions - 1]), power(&row[directions - 1..])]
+    });
+    (rows.collect(), found.lost)
+}
+
+#[test]
+fn a_motion_that_is_linear_in_its_start_scatters_by_the_integrator_alone() {
+    let (rows, lost) = scatter("");
+    let [_, _, acceleration] = START;
+    for (k, [draws, integrator]) in rows.into_iter().enumerate() {
+        assert!(draws < 1e-10, "{k}: {draws}");
+        // The semi-implicit Euler method is a t dt / 2 ahead, half of which goes with half the step; three tenths of that are a segment's own.
+        let time = (k * STEPS) as f64 * DT;
+        let own = 0.3 * 0.25 * acceleration * time * DT / NOISE;
+        assert!((integrator - own * own).abs() < 1e-6, "{k}: {integrator}");
+    }
+    assert_eq!(lost, 0.0);
+}
+
+#[test]
+fn behind_a_stop_replays_scatter_and_before_it_they_do_not() {
+    // At 0.06 m, which is reached after 0.15 s.
+    let (rows, lost) = scatter(r#"range="-1 0.06" limited="true""#);
+    for (k, [draws, _]) in rows.iter().enumerate().take(6) {
+        assert!(*draws < 0.01, "{k}: {draws}");
+    }
+    assert!(rows[8..].iter().any(|[draws, _]| *draws > 0.01));
+    assert!(lost < 0.7, "{lost}");
+}
