@@ -1,5 +1,4 @@
-//! The bench on which explanations are tried: the machine, the logs, their noise and
-//! scatter, and the starts of the episodes.
+//! The bench on which explanations are tried: the machine, the logs, their noise, and the starts of the episodes.
 
 use asid_core::layout::Layout;
 use asid_core::progress::Silent;
@@ -12,7 +11,6 @@ use crate::linearise::Open;
 use crate::machine::Machine;
 use crate::predict::{Point, Predictor, State};
 use crate::record::Record;
-use crate::whitening::Scattering;
 
 /// Points that one batch takes.
 pub const CAPACITY: usize = 8;
@@ -26,10 +24,8 @@ pub struct Explanation {
     pub unknowns: Vec<Unknown>,
     /// The fit to the training logs.
     pub fit: Fit,
-    /// Sum of squares of the whitened residuals of the logs held out; NaN before the last stage.
+    /// Sum of squares of the residuals of the logs held out.
     pub held_out: f64,
-    /// The same without whitening.
-    pub held_plain: f64,
     /// Starts of the held-out episodes under it.
     pub held_starts: Vec<State>,
     /// Variances of the unknowns by a fit that allows for a missing force, in their units; 0 where they were not fitted so.
@@ -50,12 +46,6 @@ impl Explanation {
     pub fn parameters(&self) -> Vec<Parameter> {
         self.unknowns.iter().map(|u| u.parameter.clone()).collect()
     }
-
-    /// Sum of squares over all logs.
-    #[must_use]
-    pub fn cost(&self) -> f64 {
-        self.fit.cost + self.held_out
-    }
 }
 
 /// The bench.
@@ -70,55 +60,8 @@ pub struct Bench {
     pub parameters: Vec<Parameter>,
     /// Coordinates of the starts that the logs do not give.
     pub open: Open,
-    /// Those of them that are fitted together with the parameters; the others stay as the first
-    /// tenth of their episode has them.
-    pub fitted: Open,
     /// The first tenth of the logs held out, on which open starts are fitted.
     pub head: Record,
-    /// The training logs in growing parts, the last of which is the whole.
-    pub stages: Vec<Stage>,
-}
-
-/// Part of the training logs.
-///
-/// Over a long episode a wrong model drifts so far off that its gradient says nothing, and
-/// a chaotic one has none. Over a short one every model is nearly linear: fits begin there
-/// and follow the episode as it grows. Where contacts make a rollout dear, fits begin with
-/// some of the episodes.
-#[derive(Clone, Debug)]
-pub struct Stage {
-    /// The logs.
-    pub record: Record,
-    /// Which of the starts of a point are theirs: those of the training episodes come first, then
-    /// those of their windows.
-    pub episodes: Vec<usize>,
-    /// Coordinates of the starts that are fitted together with the parameters.
-    pub open: Open,
-}
-
-impl Stage {
-    /// Whether it is windows and not episodes from their start on.
-    #[must_use]
-    pub fn is_windows(&self, bench: &Bench) -> bool {
-        self.episodes.iter().any(|&e| e >= bench.train.starts.len())
-    }
-
-    /// How finely a fit to it searches.
-    fn effort(&self, bench: &Bench, effort: Effort) -> Effort {
-        Effort {
-            chord: self.is_windows(bench),
-            ..effort
-        }
-    }
-
-    /// A point of the whole as it is for this stage.
-    #[must_use]
-    pub fn point(&self, theta: Vec<f64>, starts: &[State]) -> Point {
-        Point {
-            theta,
-            starts: self.episodes.iter().map(|&e| starts[e].clone()).collect(),
-        }
-    }
 }
 
 /// An effect to be tried: a candidate, and values to start from.
@@ -167,43 +110,37 @@ impl Bench {
         let model = self.machine.with(&specs(trials))?;
         let parameters = self.all_parameters(trials);
         let threads = self.machine.threads;
-        let mut predictor = Predictor::new(&*model, &parameters, &record.logs, CAPACITY, threads)?;
-        predictor.set_scattering(record.scattering.clone());
-        Ok(predictor)
+        Predictor::new(&*model, &parameters, &record.logs, CAPACITY, threads)
     }
 
-    /// Fits the study's parameters, from `theta` on, together with some effects', to one
-    /// stage; at the last stage it looks at the logs held out.
+    /// Fits the study's parameters, from `theta` on, together with some effects' and the coordinates of the starts that are `open` to
+    /// the training logs, and looks at the logs held out.
     ///
     /// # Errors
     /// As [`Bench::predictor`], and when a rollout fails.
     pub fn explain(
         &self,
-        stage: usize,
         trials: &[Trial<'_>],
         theta: &[f64],
-        starts: &[State],
+        (starts, open): (&[State], &Open),
         (effort, progress): (Effort, &dyn Progress),
     ) -> Result<Explanation> {
         let unknowns = self.unknowns(trials);
         let mut values = theta.to_vec();
         trials.iter().for_each(|(_, v)| values.extend(v));
-        let part = &self.stages[stage];
-        let point = part.point(values, starts);
-        let mut predictor = self.predictor(trials, &part.record)?;
-        let mut fit = fit(
+        let point = Point {
+            theta: values,
+            starts: starts.to_vec(),
+        };
+        let mut predictor = self.predictor(trials, &self.train)?;
+        let fit = fit(
             &mut predictor,
             self.layout(),
             &unknowns,
             point,
-            &part.open,
-            (part.effort(self, effort), progress),
+            open,
+            (effort, progress),
         )?;
-        let mut all = starts.to_vec();
-        for (&e, start) in part.episodes.iter().zip(&fit.point.starts) {
-            all[e] = start.clone();
-        }
-        fit.point.starts = all;
         let mut at = self.parameters.len();
         let effects = trials
             .iter()
@@ -224,12 +161,9 @@ impl Bench {
             unknowns,
             fit,
             held_out: f64::NAN,
-            held_plain: f64::NAN,
             held_starts: self.test.starts.clone(),
         };
-        if stage + 1 == self.stages.len() {
-            self.hold_out(trials, &mut explanation)?;
-        }
+        self.hold_out(trials, &mut explanation)?;
         Ok(explanation)
     }
 
@@ -238,54 +172,6 @@ impl Bench {
         for record in [&mut self.train, &mut self.test, &mut self.head] {
             record.logs.set_noise(noise);
         }
-    }
-
-    /// Whether predictions scatter in some episode.
-    #[must_use]
-    pub fn is_rough(&self) -> bool {
-        self.train.scattering.is_rough()
-    }
-
-    /// Sets the scatter of a stage, and at the last one also that of the logs held out. With what
-    /// they were.
-    pub(crate) fn set_scatter(
-        &mut self,
-        stage: usize,
-        [of_stage, held_out]: [Scattering; 2],
-    ) -> [Scattering; 2] {
-        if stage + 1 < self.stages.len() {
-            let before = self.stages[stage].record.set_scattering(of_stage);
-            return [before, held_out];
-        }
-        self.train.set_scattering(of_stage.clone());
-        [
-            self.stages[stage].record.set_scattering(of_stage),
-            self.test.set_scattering(held_out),
-        ]
-    }
-
-    /// Sum of squares that an explanation leaves of a stage.
-    ///
-    /// # Errors
-    /// When a rollout fails.
-    pub fn left(
-        &self,
-        stage: usize,
-        trials: &[Trial<'_>],
-        explanation: &Explanation,
-    ) -> Result<f64> {
-        let point = &explanation.fit.point;
-        let part = &self.stages[stage];
-        let mut predictor = self.predictor(trials, &part.record)?;
-        let point = part.point(point.theta.clone(), &point.starts);
-        let residuals = predictor.residuals(std::slice::from_ref(&point))?;
-        Ok(cost(&residuals[0]))
-    }
-
-    /// Number of readings of a stage.
-    #[must_use]
-    pub fn readings(&self, stage: usize) -> f64 {
-        self.stages[stage].record.readings as f64
     }
 
     /// Replays the logs held out at an explanation's parameters and sets what it leaves of them;
@@ -305,16 +191,11 @@ impl Bench {
     pub fn score_held_out(&self, trials: &[Trial<'_>], of: &mut Explanation) -> Result<()> {
         let theta = of.fit.point.theta.clone();
         let mut predictor = self.predictor(trials, &self.test)?;
-        predictor.set_scattering(Scattering::default());
         let point = Point {
             theta,
             starts: of.held_starts.clone(),
         };
         let mut residuals = predictor.residuals(&[point])?.pop().unwrap_or_default();
-        let mut plain = residuals.clone();
-        self.mask_head(&mut plain);
-        of.held_plain = cost(&plain);
-        self.test.scattering.apply(&self.test.logs, &mut residuals);
         self.mask_head(&mut residuals);
         of.held_out = cost(&residuals);
         Ok(())

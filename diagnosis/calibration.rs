@@ -9,12 +9,11 @@ use rand_distr::StandardNormal;
 
 use crate::data::Logs;
 use crate::diagnose::{Diagnosis, Settings, diagnose_physics};
+use crate::findings::{Found, trials};
 use crate::machine::Machine;
 use crate::predict::Point;
 use crate::result::{Calibration, CalibrationRow, Kind};
-use crate::search::{Found, trials};
 use crate::study::Study;
-use crate::whitening::Scattering;
 use crate::work::Work;
 
 /// Most explanations that are played, beside that without effects: each needs several runs.
@@ -116,7 +115,6 @@ fn played(study: &Study, work: &Work, found: Option<&Found>, seed: u64) -> Resul
             (&mut study.train, &bench.train)
         };
         let mut predictor = bench.predictor(&members, record)?;
-        predictor.set_scattering(Scattering::default());
         let point = Point {
             theta: explanation.fit.point.theta.clone(),
             starts: starts[..record.logs.episodes.len()].to_vec(),
@@ -207,15 +205,16 @@ pub fn calibrate(
         if progress.is_stopped() || idle == worlds.len() {
             break;
         }
-        let seed = settings.seed.wrapping_add(1 + run / worlds.len() as u64);
+        let seed = settings
+            .breadth
+            .seed
+            .wrapping_add(1 + run / worlds.len() as u64);
         let Some(other) = played(study, work, *found, seed)? else {
             idle += 1;
             continue;
         };
-        let settings = Settings {
-            seed,
-            ..settings.clone()
-        };
+        let mut settings = settings.clone();
+        settings.breadth.seed = seed;
         progress.note(&format!("run {}", run + 1));
         let (found, _) = diagnose_physics(&other, machine.clone(), settings, &Within(progress))?;
         // One that was cut short is no answer.

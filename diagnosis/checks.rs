@@ -8,6 +8,7 @@ use asid_core::Result;
 
 use crate::bench::{Bench, Explanation};
 use crate::data::Logs;
+use crate::findings::Repeats;
 use crate::fit::cost;
 use crate::machine::Machine;
 use crate::predict::Predictor;
@@ -80,16 +81,25 @@ pub fn whiteness(logs: &Logs, residuals: &[Vec<f64>]) -> CheckResult {
     check("noise", true, detail)
 }
 
-/// How far predictions of the held-out logs scatter by what nobody can repeat.
+/// How far replays can be repeated where bodies touch.
 #[must_use]
-pub fn repeatability(bench: &Bench) -> CheckResult {
-    let variance = bench.test.scattering.variance();
-    let scatter = (variance / bench.test.readings.max(1) as f64).sqrt();
+pub fn repeatability(repeats: Repeats) -> CheckResult {
+    let segments = if repeats.duration.is_finite() {
+        format!("segments of {} s", repeats.duration)
+    } else {
+        "whole stretches of contact".into()
+    };
+    let lost = 100.0 * repeats.lost;
+    let so = if repeats.scatters {
+        "what longer replays miss there is no effect"
+    } else {
+        "longer replays tell effects there"
+    };
     check(
         "repeatability",
         true,
         format!(
-            "on the logs held out predictions scatter by {scatter:.1} of the noise by differences that nobody controls (starts, contacts, the integrator): a gap of that size is no effect"
+            "replays of {segments} from starts that the readings leave open scatter by more than the noise in {lost:.0} % of their rows: {so}"
         ),
     )
 }
@@ -117,18 +127,15 @@ pub fn change_by_step(bench: &Bench, none: &Explanation, halved: &Machine) -> Re
 /// # Errors
 /// When a rollout fails.
 pub fn time_step(bench: &Bench, none: &Explanation, halved: &Machine) -> Result<CheckResult> {
-    let mut change = change_by_step(bench, none, halved)?;
-    let rms = |r: &[f64]| (cost(r) / bench.train.readings.max(1) as f64).sqrt();
-    let plain = rms(&change);
-    bench.train.scattering.apply(&bench.train.logs, &mut change);
-    let left = rms(&change);
+    let change = change_by_step(bench, none, halved)?;
+    let left = (cost(&change) / bench.train.readings.max(1) as f64).sqrt();
     let gap = (none.fit.cost / bench.train.readings.max(1) as f64).sqrt();
     let ok = left < FINE || left < 0.5 * gap;
     Ok(check(
         "time-step",
         ok,
         format!(
-            "halving the time step changes the predictions by {plain:.2} standard deviations of the noise, {left:.2} of them beyond the integrator's own error; the gap is {gap:.2}{}",
+            "halving the time step changes the predictions by {left:.2} standard deviations of the noise; the gap is {gap:.2}{}",
             if ok {
                 ""
             } else {

@@ -4,8 +4,8 @@
 //! than they say. What a verdict's probability is was counted instead, on training worlds: a logistic regression of whether what is named is
 //! among the true causes. It says by how much a verdict is less sure where a search was cut short, and where a gap is left beside what is named.
 
+use crate::findings::LEAST_GAP;
 use crate::judgement::{Hypothesis, Judgement};
-use crate::search::LEAST_GAP;
 
 /// What a verdict's probability goes with. The first four are the maximum of the likelihood with normal priors of deviation 2 over the 37 named
 /// verdicts of 82 training worlds (seed 3141; docs/diagnosis.md); left out one by one, they give a mean log score of -0.53, a constant -0.69, and

@@ -5,8 +5,8 @@ mod rules;
 use asid_results::evidence::{Evidence, Replayed, Screened, Tried};
 
 use crate::confidence::{Untried, sigmoid};
+use crate::findings::{LEAST_GAP, NEGLIGIBLE, excess};
 use crate::judgement::{Hypothesis, Judgement};
-use crate::search::{LEAST_GAP, NEGLIGIBLE, excess};
 
 pub use rules::{Rule, Rules};
 

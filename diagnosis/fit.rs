@@ -45,12 +45,6 @@ pub struct Effort {
 }
 
 impl Effort {
-    /// To the end.
-    pub const FULL: Self = Self {
-        iterations: 25,
-        tolerance: 1e-4,
-        chord: false,
-    };
     /// Where it stands, with its slopes.
     pub const LOOK: Self = Self {
         iterations: 0,
@@ -69,18 +63,6 @@ impl Effort {
         tolerance: 1e-3,
         chord: false,
     };
-}
-
-impl Effort {
-    /// The same where predictions scatter: no step is finer than the scatter, and each is dear.
-    #[must_use]
-    pub fn rough(self) -> Self {
-        Self {
-            iterations: self.iterations.min(6),
-            tolerance: self.tolerance.max(3e-3),
-            ..self
-        }
-    }
 }
 
 /// What a fit found.
@@ -107,39 +89,6 @@ pub fn cost(residuals: &[f64]) -> f64 {
     residuals.iter().map(|r| r * r).sum()
 }
 
-/// Looks over the range of each free parameter in turn for a better point to start from:
-/// `n` values of each, evenly on its scale.
-///
-/// # Errors
-/// As [`Predictor::residuals`].
-pub fn scan(
-    predictor: &mut Predictor<'_>,
-    unknowns: &[Unknown],
-    point: Point,
-    n: usize,
-) -> Result<Point> {
-    let mut point = point;
-    for (i, unknown) in unknowns.iter().enumerate() {
-        if !unknown.free || n == 0 {
-            continue;
-        }
-        let mut points = vec![point.clone()];
-        for k in 0..n {
-            let mut other = point.clone();
-            other.theta[i] = unknown.parameter.from_unit((k as f64 + 0.5) / n as f64);
-            points.push(other);
-        }
-        let costs: Vec<f64> = predictor
-            .residuals(&points)?
-            .iter()
-            .map(|r| cost(r))
-            .collect();
-        let lowest = (0..costs.len()).min_by(|&a, &b| costs[a].total_cmp(&costs[b]));
-        point = points.swap_remove(lowest.unwrap_or(0));
-    }
-    Ok(point)
-}
-
 /// Places of the episodes in a residual vector.
 fn bounds(predictor: &Predictor<'_>) -> Vec<std::ops::Range<usize>> {
     let logs = predictor.logs();
@@ -162,14 +111,7 @@ pub fn fit(
 ) -> Result<Fit> {
     let free: Vec<usize> = (0..unknowns.len()).filter(|&i| unknowns[i].free).collect();
     let bounds = bounds(predictor);
-    let (mut differences, effort) = if predictor.is_rough() {
-        (
-            Differences::rough(unknowns.len(), open.len()),
-            effort.rough(),
-        )
-    } else {
-        (Differences::new(unknowns.len(), open.len()), effort)
-    };
+    let mut differences = Differences::new(unknowns.len(), open.len());
     let mut point = point;
     let mut damping = 1e-3;
     let mut line = linearise(predictor, layout, unknowns, &point, open, &mut differences)?;

@@ -3,9 +3,8 @@
 //!
 //! - [`study`] is what the user brings: a model, logs of the real machine, what is fitted already.
 //! - [`intake`] looks at its logs before any physics: outliers, and [`wiring`].
-//! - [`latent_force`] asks which force is missing at each moment, and which effects make up for it: for machines that
-//!   touch nothing in their logs, and for those whose replays would take too long.
-//! - [`search`] asks whether whole replays land on the logs: for the others.
+//! - [`latent_force`] asks which force is missing at each moment, or where bodies touch what short replays leave, and which effects
+//!   make up for it.
 //! - [`predict`] replays the logs in a model, for many parameter values at once; [`fit`]
 //!   is least squares over such replays.
 
@@ -20,6 +19,7 @@ pub mod data;
 pub mod decision;
 pub mod diagnose;
 pub mod experiment;
+pub mod findings;
 pub mod fit;
 pub mod forces;
 pub mod intake;
@@ -30,23 +30,15 @@ pub mod localise;
 pub mod machine;
 pub mod noise;
 mod normal;
-pub mod nuisance;
 pub mod outliers;
 pub mod predict;
 pub mod prepare;
 pub mod record;
-pub mod roughness;
-mod scatter;
-pub mod screen;
-pub mod search;
 pub mod sentence;
-pub mod shot;
 mod starts;
 pub mod study;
 mod telling;
 pub mod trajectory;
-pub mod verdict;
-pub mod whitening;
 pub mod windows;
 pub mod wiring;
 mod work;

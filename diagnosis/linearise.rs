@@ -1,8 +1,7 @@
 //! Derivatives of predictions: differences of rollouts, all columns of a Jacobian in one batch. A start acts on
 //! its own episode only, so that one rollout of all episodes moves all of them at once.
 //!
-//! A difference aims at a response that is seen and small: it adapts from one linearisation to
-//! the next. Where contacts make predictions scatter it is well above the scatter and taken to both sides.
+//! A difference aims at a response that is seen and small: it adapts from one linearisation to the next.
 
 use asid_core::layout::Layout;
 use asid_core::parameter::Scale;
@@ -12,20 +11,12 @@ use crate::fit::Unknown;
 use crate::predict::{Point, Predictor};
 
 /// Response of the residuals, root mean square, that a difference aims at.
-pub const AIM: f64 = 0.3;
-/// The least multiple of what scatter alone makes that a difference aims at.
-pub const ABOVE_SCATTER: f64 = 5.0;
-/// First difference where predictions scatter, as a share of the range.
-pub const ROUGH_START: f64 = 1e-2;
-/// Multiples of the difference that a derivative is taken over where predictions scatter.
-const STENCIL: [f64; 2] = [-1.0, 1.0];
+const AIM: f64 = 0.3;
 /// Response to the whole range, root mean square in units of the noise, below which a
 /// parameter does nothing here, and is left where it is.
 pub const NOTHING: f64 = 0.05;
-/// Shift of a start that shows how predictions scatter, m or rad.
-pub const PROBE: f64 = 1e-9;
-/// Smallest and largest difference, as a share of the range; the last where predictions scatter.
-const STEPS: [f64; 3] = [1e-8, 0.02, 0.1];
+/// Smallest and largest difference, as a share of the range.
+const STEPS: [f64; 2] = [1e-8, 0.02];
 
 /// Differences to take derivatives with; they adapt.
 #[derive(Clone, Debug)]
@@ -48,22 +39,11 @@ impl Differences {
             kept: None,
         }
     }
-
-    /// A first guess where predictions scatter.
-    #[must_use]
-    pub fn rough(n: usize, open: usize) -> Self {
-        Self {
-            shares: vec![ROUGH_START; n],
-            starts: vec![ROUGH_START_STEP; open],
-            kept: None,
-        }
-    }
 }
 
 /// Value moved by a share of the range, to whichever side there is room; and the share
 /// that it was really moved by.
-#[must_use]
-pub fn nudged(parameter: &Parameter, value: f64, share: f64) -> (f64, f64) {
+fn nudged(parameter: &Parameter, value: f64, share: f64) -> (f64, f64) {
     let u = parameter.to_unit(value).clamp(0.0, 1.0);
     let to = if (0.0..=1.0).contains(&(u + share)) {
         u + share
@@ -90,8 +70,6 @@ pub type Open = Vec<usize>;
 
 /// First difference of a start's coordinates, m or rad or per second.
 const START_STEP: f64 = 1e-5;
-/// The same where predictions scatter: above what the scatter of two replays hides.
-const ROUGH_START_STEP: f64 = 1e-3;
 /// Smallest and largest difference of a start's coordinates, m or rad or per second.
 const START_STEPS: [f64; 2] = [1e-6, 1e-2];
 
@@ -108,26 +86,18 @@ pub fn linearise(
     differences: &mut Differences,
 ) -> Result<Linearisation> {
     let free: Vec<usize> = (0..unknowns.len()).filter(|&i| unknowns[i].free).collect();
-    let rough = predictor.is_rough();
-    let stencil: &[f64] = if rough { &STENCIL } else { &[1.0] };
     let mut points = vec![point.clone()];
-    if rough {
-        let mut other = point.clone();
-        for start in &mut other.starts {
-            (0..2 * layout.nv).for_each(|c| start.shift(layout, c, PROBE));
-        }
-        points.push(other);
-    }
-    let mut moved = Vec::with_capacity(free.len() * stencil.len());
+    let mut moved = Vec::with_capacity(free.len());
     for &i in &free {
-        for by in stencil {
-            let mut other = point.clone();
-            let share = by * differences.shares[i];
-            let (value, share) = nudged(&unknowns[i].parameter, point.theta[i], share);
-            other.theta[i] = value;
-            moved.push(share);
-            points.push(other);
-        }
+        let mut other = point.clone();
+        let (value, share) = nudged(
+            &unknowns[i].parameter,
+            point.theta[i],
+            differences.shares[i],
+        );
+        other.theta[i] = value;
+        moved.push(share);
+        points.push(other);
     }
     let mut start_steps = differences.starts.clone();
     if differences.kept.is_some() {
@@ -160,40 +130,24 @@ pub fn linearise(
             .collect();
         (change, (square / present).sqrt())
     };
-    let aim = if rough {
-        AIM.max(ABOVE_SCATTER * next().1)
-    } else {
-        AIM
-    };
     let mut columns = Vec::with_capacity(free.len());
-    for (k, &i) in free.iter().enumerate() {
-        // Least squares over the stencil, through the point itself.
-        let shares = &moved[k * stencil.len()..(k + 1) * stencil.len()];
-        let square: f64 = shares.iter().map(|s| s * s).sum();
-        let mut column = vec![0.0; base.len()];
-        let mut response: f64 = 0.0;
-        for &share in shares {
-            let (change, size) = next();
-            response = response.max(size);
-            for (c, d) in column.iter_mut().zip(&change) {
-                *c += d * share / square;
-            }
-        }
-        columns.push(column);
+    for (&i, share) in free.iter().zip(&moved) {
+        let (change, response) = next();
+        columns.push(change.iter().map(|d| d / share).collect());
         let h = &mut differences.shares[i];
         *h = if response > 0.0 {
-            *h * (aim / response).clamp(1e-3, 1e3)
+            *h * (AIM / response).clamp(1e-3, 1e3)
         } else {
             *h * 100.0
         }
-        .clamp(STEPS[0], if rough { STEPS[2] } else { STEPS[1] });
+        .clamp(STEPS[0], STEPS[1]);
     }
     let mut start_columns = differences.kept.clone().unwrap_or_default();
     for (h, step) in differences.starts.iter_mut().zip(&start_steps) {
         let (change, response) = next();
         start_columns.push(change.iter().map(|d| d / step).collect());
         let factor = if response > 0.0 {
-            aim / response
+            AIM / response
         } else {
             100.0
         };

@@ -7,7 +7,6 @@ use asid_core::{Model, Parameter, Result};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 use crate::data::Logs;
-use crate::whitening::Scattering;
 
 /// State at the start of an episode.
 #[derive(Clone, Debug, PartialEq)]
@@ -19,16 +18,8 @@ pub struct State {
 }
 
 impl State {
-    /// The state moved along a coordinate: of the `nv` positions (`< nv`), then of the `nv`
-    /// velocities. Orientations turn about the body's own axes.
-    #[must_use]
-    pub fn moved(&self, layout: &Layout, coordinate: usize, by: f64) -> Self {
-        let mut state = self.clone();
-        state.shift(layout, coordinate, by);
-        state
-    }
-
-    /// Moves it; see [`State::moved`].
+    /// Moves it along a coordinate: of the `nv` positions (`< nv`), then of the `nv` velocities. Orientations turn about the body's
+    /// own axes.
     pub fn shift(&mut self, layout: &Layout, coordinate: usize, by: f64) {
         if coordinate >= layout.nv {
             self.qvel[coordinate - layout.nv] += by;
@@ -97,7 +88,6 @@ pub struct Predictor<'a> {
     groups: Vec<Group>,
     capacity: usize,
     present: Vec<bool>,
-    scattering: Scattering,
 }
 
 impl<'a> Predictor<'a> {
@@ -126,18 +116,11 @@ impl<'a> Predictor<'a> {
             quaternions: quaternions(layout, &recording, &channels),
             groups: groups(logs, layout.nu(), capacity),
             present: logs.present(),
-            scattering: Scattering::default(),
             logs,
             simulator,
             recording,
             capacity,
         })
-    }
-
-    /// Physics steps so far.
-    #[must_use]
-    pub fn steps(&self) -> u64 {
-        self.simulator.steps_taken()
     }
 
     /// The logs.
@@ -217,17 +200,6 @@ impl<'a> Predictor<'a> {
         Ok(())
     }
 
-    /// Whitens residuals with the scatter of predictions.
-    pub fn set_scattering(&mut self, scattering: Scattering) {
-        self.scattering = scattering;
-    }
-
-    /// Whether predictions scatter by more than the noise in some direction.
-    #[must_use]
-    pub fn is_rough(&self) -> bool {
-        self.scattering.is_rough()
-    }
-
     /// Residuals `(logged - predicted) / noise` at some points, one vector a point over all
     /// episodes, rows and entries; 0 where a reading is missing, infinite where the
     /// simulation diverged.
@@ -255,7 +227,6 @@ impl<'a> Predictor<'a> {
                         (true, false) => f64::INFINITY,
                     };
                 }
-                self.scattering.apply(self.logs, &mut all);
                 all
             })
             .collect())

@@ -1,22 +1,22 @@
 //! What a search found, told as a result: gaps, probabilities, places, pictures.
 
 use asid_core::Result;
+use asid_results::evidence::Evidence;
 
 use crate::bench::{Bench, Explanation, Trial};
 use crate::candidate::{Candidate, LeftOut};
 use crate::checks;
 use crate::diagnose::{Diagnosis, Settings};
 use crate::experiment;
+use crate::findings::{Findings, Found, trials};
 use crate::forces::Short;
 use crate::judgement::Judgement;
 use crate::localise::localise;
 use crate::predict::{Point, State};
 use crate::record::Record;
 use crate::result::{DiagnosisResult, Kind, NextExperiment, NotTried};
-use crate::search::{Findings, Found, trials};
 use crate::study::Study;
 use crate::trajectory::Trajectory;
-use crate::whitening::Scattering;
 
 mod answer;
 mod gap;
@@ -38,6 +38,7 @@ pub(crate) struct Telling<'a> {
     pub(crate) candidates: &'a [Candidate],
     pub(crate) left_out: &'a [LeftOut],
     pub(crate) findings: &'a Findings,
+    pub(crate) evidence: &'a Evidence,
     pub(crate) judgement: &'a Judgement,
     pub(crate) nominal: &'a [f64],
     pub(crate) settings: Settings,
@@ -74,7 +75,6 @@ impl Telling<'_> {
         let bench = self.bench;
         let starts = bench.head_starts(trials, theta, &bench.test.starts)?;
         let mut predictor = bench.predictor(trials, &bench.test)?;
-        predictor.set_scattering(Scattering::default());
         let point = Point {
             theta: theta.to_vec(),
             starts: starts.clone(),
@@ -155,7 +155,7 @@ impl Telling<'_> {
         Ok(Diagnosis {
             result,
             trace,
-            evidence: None,
+            evidence: self.evidence.clone(),
             effects: explanation.effects.clone(),
             values: explanation.fit.point.theta[..study].to_vec(),
         })
@@ -165,7 +165,6 @@ impl Telling<'_> {
     fn places(&self, none: &Explanation) -> Result<Vec<crate::result::Where>> {
         let record = &self.bench.train;
         let mut predictor = self.bench.predictor(&[], record)?;
-        predictor.set_scattering(Scattering::default());
         let residuals = predictor.residuals(std::slice::from_ref(&none.fit.point))?;
         let shown = self.shown(record, none)?;
         let plant = &self.bench.machine.plant;
@@ -195,11 +194,13 @@ impl Telling<'_> {
             checks::units(bench, self.nominal)?,
         ];
         all.extend(checks::identifiability(&bench.parameters, none, best));
-        if self.findings.missing.is_empty() {
-            all.push(checks::repeatability(bench));
-        }
+        let repeats = self.findings.repeats;
+        all.extend(repeats.map(checks::repeatability));
+        // What nobody can repeat changes with the time step as well.
+        let scatters = repeats.is_some_and(|r| r.scatters);
         if let Ok(halved) = bench.machine.halved()
             && !self.stopped
+            && !scatters
         {
             all.push(checks::time_step(bench, none, &halved)?);
         }

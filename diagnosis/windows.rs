@@ -12,7 +12,7 @@ use asid_core::progress::Silent;
 use asid_mjcf::Plant;
 use asid_mjcf::plant::Reads;
 
-use crate::bench::{Bench, Stage, Trial};
+use crate::bench::{Bench, Trial};
 use crate::data::Logs;
 use crate::fit::{Effort, fit};
 use crate::predict::{Point, State};
@@ -94,29 +94,6 @@ pub fn settle(
         (effort, &Silent),
     )?;
     Ok(found.point.starts)
-}
-
-/// The windows of the training logs as a stage, and a point with their starts behind those of the
-/// training logs.
-///
-/// # Errors
-/// When a rollout fails.
-pub fn stage(bench: &Bench, rows: usize, point: &Point) -> Result<(Stage, Point)> {
-    let record = cut(&bench.machine.plant, &bench.train, rows);
-    let (n, m) = (bench.train.logs.episodes.len(), record.logs.episodes.len());
-    let mut point = point.clone();
-    if point.starts.len() != n + m {
-        point.starts.truncate(n);
-        point
-            .starts
-            .extend(settle(bench, &record, &[], &point.theta)?);
-    }
-    let stage = Stage {
-        record,
-        episodes: (n..n + m).collect(),
-        open: bench.open.clone(),
-    };
-    Ok((stage, point))
 }
 
 #[cfg(test)]

@@ -2,10 +2,10 @@
 
 use asid_results::evidence::Evidence;
 
-use crate::bench::{Bench, Explanation};
+use crate::bench::Bench;
 use crate::candidate::{Candidate, LeftOut};
+use crate::findings::Findings;
 use crate::judgement::Judgement;
-use crate::search::Findings;
 
 /// What a diagnosis has worked with, for what comes after it.
 pub struct Work {
@@ -17,10 +17,8 @@ pub struct Work {
     pub left_out: Vec<LeftOut>,
     /// What the search found.
     pub findings: Findings,
-    /// Fits without any effect, one a stage.
-    pub none: Vec<Explanation>,
-    /// What the decision rests on; `None` where replays decide.
-    pub evidence: Option<Evidence>,
+    /// What the decision rests on.
+    pub evidence: Evidence,
     /// What was made of it.
     pub judgement: Judgement,
     /// Values of the study's parameters in the model as given.

@@ -58,14 +58,14 @@ fn settings_stand_under_their_meanings_and_follow_the_options() {
 fn what_is_printed_for_a_study_is_read_back_as_the_same() {
     let place = Workplace::new();
     place.write("study.toml", "model = \"robot.xml\"\ntrain = [\"*.csv\"]\n");
-    let options = ["--set", "search.contact=segments", "--set", "minutes=3.0"];
+    let options = ["--set", "search.depth=2", "--set", "minutes=3.0"];
     let page = printed(&place, &[&["study.toml"], &options[..]].concat());
     assert_tells(
         &page,
         &[
             "study = \"study.toml\"",
             "minutes = 3.0",
-            "contact = \"segments\"",
+            "depth = 2",
             "false_alarms = 0.01",
         ],
     );

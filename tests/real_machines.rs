@@ -8,8 +8,8 @@ use std::path::Path;
 
 use asid::core::progress::Silent;
 use asid::diagnosis::diagnose::{Diagnosis, Settings, diagnose};
+use asid::diagnosis::latent_force::search::Breadth;
 use asid::diagnosis::machine::Machine;
-use asid::diagnosis::search::Breadth;
 use asid::diagnosis::study::Study;
 use diagnosis_support::engine;
 
@@ -28,9 +28,6 @@ fn singles(study: &str, train: &[&str], test: &[&str]) -> Diagnosis {
     let machine = Machine::new(engine(), &study.scene, &study.fixed, &study.effects, 0).unwrap();
     let settings = Settings {
         breadth: Breadth {
-            first: 10,
-            last: 4,
-            singles: 4,
             depth: 1,
             ..Breadth::default()
         },

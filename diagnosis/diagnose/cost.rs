@@ -1,14 +1,12 @@
-//! Sums of squares of explanations, in units of the final noise, and how far they scatter by next to nothing.
+//! Sums of squares of explanations, in units of the final noise.
 
 use asid_core::Result;
 
 use crate::bench::{Bench, Explanation, Trial};
 use crate::candidate::Candidate;
+use crate::findings::{Findings, trials};
 use crate::fit::cost;
-use crate::predict::{Point, State};
 use crate::prepare::plain_residuals;
-use crate::record::Record;
-use crate::search::{Findings, trials};
 use crate::study::Study;
 
 /// Takes the noise from the residuals of the best explanation, which hide least of it, and
@@ -60,33 +58,4 @@ fn rescore(bench: &Bench, trials: &[Trial<'_>], of: &mut Explanation) -> Result<
     of.fit.residuals = residuals.pop().unwrap_or_default();
     of.fit.cost = cost(&of.fit.residuals);
     bench.score_held_out(trials, of)
-}
-
-/// Deviation of the sum of squares over all logs that next to nothing at the starts makes.
-pub(super) fn cost_scatter(bench: &Bench, none: &Explanation) -> Result<f64> {
-    if !bench.is_rough() {
-        return Ok(0.0);
-    }
-    let of = |record: &Record, starts: &[State]| -> Result<f64> {
-        let mut predictor = bench.predictor(&[], record)?;
-        let point = |k: i32| {
-            let mut point = Point {
-                theta: none.fit.point.theta.clone(),
-                starts: starts.to_vec(),
-            };
-            for start in &mut point.starts {
-                start.shift(bench.layout(), 0, f64::from(k) * crate::linearise::PROBE);
-            }
-            point
-        };
-        let points: Vec<Point> = (1..=8).map(point).collect();
-        let residuals = predictor.residuals(&points)?;
-        let costs: Vec<f64> = residuals.iter().map(|r| cost(r)).collect();
-        let n = costs.len() as f64;
-        let mean = costs.iter().sum::<f64>() / n;
-        Ok(costs.iter().map(|c| (c - mean).powi(2)).sum::<f64>() / (n - 1.0))
-    };
-    let train = of(&bench.train, &none.fit.point.starts)?;
-    let test = of(&bench.test, &none.held_starts)?;
-    Ok((train + test).sqrt())
 }

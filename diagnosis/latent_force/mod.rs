@@ -4,7 +4,7 @@
 //! local: which force is missing *now*? It is a hidden state beside position and speed, estimated by smoothing; effects are
 //! columns of one linear regression on its innovations; the few that lead are put into the model and fitted anew.
 //!
-//! From below: [`tangent`] (states), [`walk`] (rows), [`segments`] (where bodies touch), [`step_map`] (the model over a row and its derivatives),
+//! From below: [`tangent`] (states), [`walk`] (rows), [`segments`] (where bodies touch) and [`scatter`] (how far their replays can be repeated), [`step_map`] (the model over a row and its derivatives),
 //! [`smoother`], [`initial`], `one_step` (how slopes are taken), [`context`] and [`estimate`] (trajectory, force and noise), [`fitted_value`] and [`fit`] (a model with its values),
 //! [`evidence`], [`trace`], [`columns`], [`screen`], [`search`], [`selection`],
 //! [`detection`] (what could have been seen), [`rehearsal`] (what a screening would say of machines like this one), `steps` (encoder steps), `picture` (what the report draws of the force), `left` (what could

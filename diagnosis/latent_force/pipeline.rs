@@ -3,39 +3,51 @@
 mod null;
 mod replays;
 mod rows;
-mod shooting;
 mod told;
 
 use asid_core::{Progress, Result};
 
-use crate::bench::Bench;
-use crate::candidate::enumerate;
+use crate::candidate::{Candidate, LeftOut, enumerate};
+use crate::ceiling::Left;
 use crate::decision::{Rules, decide};
-use crate::diagnose::{Contact, Settings};
+use crate::diagnose::Settings;
+use crate::findings::Repeats;
 use crate::machine::Machine;
 use crate::prepare::{dataset, set_reading_noise};
 use crate::study::Study;
+use crate::trace::ForceTrace;
 use crate::work::Work;
 
-use super::context::begin;
 use super::fit::{Hypothesis, fit};
 use super::fitted_value::Unknown;
 use super::left::left;
 use super::picture::forces;
-use super::search::{Breadth, search};
-use super::segments::DURATIONS;
+use super::search::{Outcome, search};
 use super::selection::gather;
 use super::steps::{beside, known, noise_with_steps, shown};
 
-use null::Null;
+use null::{Null, Stands};
 use replays::replay;
-use rows::{Rows, along, replays_are_affordable};
-pub use shooting::Handover;
-use shooting::shoot;
+use rows::{Rows, along};
 
 /// Most linearisations of the fit without effects.
 const ROUNDS: usize = 15;
-/// Diagnoses a study; hands it over where bodies touch and whole replays are to decide there.
+
+/// What is kept of a search once the logs are let go of.
+struct Searched {
+    outcome: Outcome,
+    candidates: Vec<Candidate>,
+    left_out: Vec<LeftOut>,
+    /// Candidates that the logs show by themselves.
+    members: Vec<usize>,
+    /// Walks that begin an episode.
+    firsts: Vec<usize>,
+    repeats: Option<Repeats>,
+    /// The missing force along the logs, and what is left of it.
+    drawn: (Vec<ForceTrace>, Vec<Left>),
+}
+
+/// Diagnoses a study.
 ///
 /// # Errors
 /// When a parameter cannot be set or the engine fails.
@@ -44,14 +56,9 @@ pub fn diagnose(
     machine: Machine,
     settings: &Settings,
     progress: &dyn Progress,
-) -> Result<std::result::Result<Work, Handover>> {
+) -> Result<Work> {
     progress.begin("smoothing the logs", 1);
-    let (without, contact) = (&settings.without[..], settings.contact);
-    let breadth = Breadth {
-        false_alarms: settings.false_alarms,
-        seed: settings.seed,
-        ..Breadth::default()
-    };
+    let (without, breadth) = (&settings.without[..], settings.breadth);
     let (mut bench, nominal) = dataset(study, machine)?;
     set_reading_noise(&mut bench, &study.noise);
     let shown_steps = shown(&bench.train.logs);
@@ -64,21 +71,15 @@ pub fn diagnose(
         unknowns: unknowns.map(|(p, n)| Unknown::of_study(p, *n)).collect(),
     };
     let rows = Rows::of(&bench, &nominal)?;
-    let affordable = || replays_are_affordable(&bench, &rows.shown, without);
-    if rows.touch() && (contact == Contact::Replays || contact == Contact::Auto && false && affordable()) {
-        let shot = {
-            let parameters = (&study.parameters[..], &nominal[..]);
-            let taken = rows.cut(study, &bench, DURATIONS[0]);
-            let (context, estimate) = begin(&bench.machine, &logs, taken, parameters)?;
-            shoot(&context, (&hypothesis, &nominal), estimate, progress)?
-        };
-        progress.end();
-        return Ok(Err(Handover {
-            machine: bench.machine,
-            shot: Some(shot),
-        }));
-    }
-    let (outcome, candidates, left_out, firsts, drawn, members) = {
+    let Searched {
+        outcome,
+        candidates,
+        left_out,
+        members,
+        firsts,
+        repeats,
+        drawn,
+    } = {
         let null = Null {
             study,
             bench: &bench,
@@ -88,7 +89,11 @@ pub fn diagnose(
             nominal: &nominal,
             progress,
         };
-        let (context, mut none) = null.fit()?;
+        let Stands {
+            context,
+            mut none,
+            repeats,
+        } = null.fit()?;
         let rounds = (ROUNDS, progress);
         if none.estimate.missing(&context).share < 1.0 {
             none.estimate.free_at_rest(&context);
@@ -115,23 +120,30 @@ pub fn diagnose(
             left(&context, &outcome),
         );
         let outcome = beside(outcome, &steps, &candidates);
-        (outcome, candidates, left_out, firsts, drawn, members)
+        Searched {
+            outcome,
+            candidates,
+            left_out,
+            members,
+            firsts,
+            repeats,
+            drawn,
+        }
     };
     progress.begin("replaying", 1);
     let parts = (&candidates[..], &outcome, &members[..]);
-    let (mut findings, sets) = replay(&mut bench, parts, &firsts, progress)?;
+    let (mut findings, sets) = replay(&bench, parts, (&firsts, repeats), progress)?;
     (findings.forces, findings.left) = drawn;
     progress.end();
     let evidence = gather(&bench, &outcome, (&sets, &members), &findings, &candidates)?;
     let judgement = decide(&evidence, &Rules::default());
-    Ok(Ok(Work {
-        none: vec![findings.none.clone()],
+    Ok(Work {
         bench,
         candidates,
         left_out,
         findings,
-        evidence: Some(evidence),
+        evidence,
         judgement,
         nominal,
-    }))
+    })
 }

@@ -6,7 +6,7 @@
 //!
 //! A long segment tells more, for a small force moves a body the further the longer it acts, and has fewer starts to find. A short
 //! one is nearer to linear in its start: over a quarter of a second even a model with impacts is. So a segment is [as long
-//! as](DURATIONS) its slopes keep their promise.
+//! as](DURATIONS) its replays can be repeated ([`super::scatter`]).
 //!
 //! A segment begins some rows before its readings count. Over these rows the contact settles, and what the start may be off in a
 //! direction that a contact blocks dies away as it does in the machine; and what effects remember is there.

@@ -8,8 +8,8 @@ use crate::bench::{Bench, Explanation};
 use crate::candidate::Candidate;
 use crate::checks::change_by_step;
 use crate::decision::is_small;
+use crate::findings::Findings;
 use crate::fit::cost;
-use crate::search::Findings;
 
 use super::estimate::LEAST_LEFT;
 use super::search::{Outcome, Set, log_prior};
@@ -33,7 +33,7 @@ fn labels(candidates: &[Candidate], set: &[usize]) -> Vec<String> {
 fn replayed(bench: &Bench, of: &Explanation) -> Replayed {
     Replayed {
         train: of.fit.cost / bench.train.readings.max(1) as f64,
-        held_out: of.held_plain / bench.held_readings().max(1.0),
+        held_out: of.held_out / bench.held_readings().max(1.0),
     }
 }
 

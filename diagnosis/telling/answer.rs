@@ -5,8 +5,8 @@ use asid_core::Result;
 use super::remainder::remainder;
 use super::{NO_GAP, Telling};
 use crate::ceiling::Left;
+use crate::findings::trials;
 use crate::result::{EffectResult, Gap, Group, HypothesisResult, Kind, Verdict};
-use crate::search::trials;
 
 /// Effects of a verdict that are one law at several sites.
 pub(super) fn groups(labels: &[String]) -> Vec<Group> {

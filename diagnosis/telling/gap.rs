@@ -58,7 +58,7 @@ impl Telling<'_> {
                     (part(identified), part(refined))
                 })
                 .collect();
-            let mut rng = Streams::new(self.settings.seed).stream("bootstrap");
+            let mut rng = Streams::new(self.settings.breadth.seed).stream("bootstrap");
             let mut all: Vec<f64> = (0..RESAMPLES)
                 .map(|_| {
                     let (mut a, mut b, mut n) = (0.0, 0.0, 0.0);

@@ -6,9 +6,9 @@ use super::{NO_GAP, Telling};
 use crate::bench::Explanation;
 use crate::bench::Trial;
 use crate::ceiling::{Course, Left, Variable, learn, learnable, most};
+use crate::findings::LEAST_GAP;
 use crate::prepare::plain_residuals;
 use crate::result::{Gap, Kind, Remainder, Shares};
-use crate::search::LEAST_GAP;
 
 /// Most rows of a sensor's entry that are learned from.
 const ROWS: usize = 6000;

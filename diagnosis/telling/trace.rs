@@ -7,8 +7,8 @@ use asid_core::registry::find;
 use asid_effects::EffectEntry;
 
 use super::{HeldOut, Telling};
+use crate::findings::trials;
 use crate::result::EffectResult;
-use crate::search::trials;
 use crate::trace::{
     DiagnosisTrace, EffectWords, Map, NamedText, ParameterWords, Rung, SignalTrace,
 };

@@ -7,15 +7,35 @@
 use std::collections::BTreeMap;
 
 use super::Telling;
-use crate::bench::Explanation;
+use crate::bench::{Bench, Explanation};
 use crate::linearise::NOTHING;
 use crate::result::ParameterResult;
-use crate::verdict::correlation;
 
 /// Deviations of a normal distribution that hold 95 %, to either side.
 const DEVIATIONS: f64 = 1.959_964;
+/// Largest correlation that is believed: beyond it a log is one reading.
+const MOST_CORRELATED: f64 = 0.98;
 /// Share of its range up to which a value is at the end of it: what a fit stops at.
 const AT_END: f64 = 1e-6;
+
+/// Correlation of neighbouring residuals, averaged over entries and episodes by their size.
+fn correlation(bench: &Bench, residuals: &[f64]) -> f64 {
+    let logs = &bench.train.logs;
+    let n = logs.entries.len();
+    let (mut product, mut square) = (0.0, 0.0);
+    for e in 0..logs.episodes.len() {
+        let part = &residuals[logs.offset(e)..logs.offset(e + 1)];
+        for k in n..part.len() {
+            product += part[k] * part[k - n];
+            square += part[k] * part[k];
+        }
+    }
+    if square > 0.0 {
+        (product / square).clamp(0.0, MOST_CORRELATED)
+    } else {
+        0.0
+    }
+}
 
 /// A value with its uncertainty.
 pub(super) struct Fitted {

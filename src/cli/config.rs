@@ -63,7 +63,7 @@ fn of_study(study: &Path, common: &Common) -> Result<String> {
     let config = diagnose::Config::of_study(study, common)?;
     let mut page = format!(
         "# Settings of `asid diagnose {}`. A setting is changed by --set KEY=VALUE, with the section before\n\
-         # its name, such as --set search.contact=segments; this text in a file is read by --config FILE.\n",
+         # its name, such as --set search.depth=2; this text in a file is read by --config FILE.\n",
         study.display()
     );
     let table = toml::Table::try_from(&config)?;

@@ -204,17 +204,13 @@ pub fn diagnose(arguments: &Arguments) -> Result<()> {
     diagnosis.result.seconds = Some(progress.seconds());
     diagnosis.result.seconds_to_first_table = progress.seconds_to_first_table();
     tell_origin(&mut diagnosis.trace, &engine, config.seed);
-    if diagnosis.evidence.is_some() {
-        let more = files(&[("evidence.json", "what the decision rests on")]);
-        diagnosis.trace.files.extend(more);
-    }
+    let more = files(&[("evidence.json", "what the decision rests on")]);
+    diagnosis.trace.files.extend(more);
     let result = &diagnosis.result;
     out.write(|folder| {
         write_json(&folder.join("result.json"), result)?;
         write_json(&folder.join("trace.json"), &diagnosis.trace)?;
-        if let Some(evidence) = &diagnosis.evidence {
-            write_json(&folder.join("evidence.json"), evidence)?;
-        }
+        write_json(&folder.join("evidence.json"), &diagnosis.evidence)?;
         write_text(&folder.join("report.html"), &page(result, &diagnosis.trace))?;
         write_text(&folder.join("config.toml"), &toml::to_string(&settings)?)?;
         write_text(

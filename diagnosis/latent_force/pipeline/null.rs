@@ -1,9 +1,10 @@
 //! The model without effects, in the longest segments whose replays do not scatter.
 
-use asid_core::{Progress, Result};
+use asid_core::{Error, Progress, Result};
 
 use crate::bench::Bench;
 use crate::data::Logs;
+use crate::findings::Repeats;
 use crate::latent_force::context::{Context, begin};
 use crate::latent_force::fit::{Fitted, Hypothesis, Slopes, fit, settle_noise};
 use crate::latent_force::scatter::Scatter;
@@ -20,8 +21,21 @@ const FIRST: (usize, usize) = (4, 8);
 /// length is lost where nothing can be repeated.
 const LOST: f64 = 0.3;
 
-/// The model without effects in segments of one duration, and whether longer ones may be tried.
-type Stands<'a> = (Context<'a>, Fitted, bool);
+/// The model without effects, as it stands.
+pub(super) struct Stands<'a> {
+    /// What it explains.
+    pub(super) context: Context<'a>,
+    /// The fit.
+    pub(super) none: Fitted,
+    /// How far replays of the longest segments that were tried can be repeated; `None` where nothing touches.
+    pub(super) repeats: Option<Repeats>,
+}
+
+/// A fit in segments of some duration, or how their replays scatter where they are too long.
+enum Tried<'a> {
+    Stands(Box<Stands<'a>>),
+    Scatters(Repeats),
+}
 
 /// What is fitted.
 #[derive(Clone, Copy)]
@@ -44,54 +58,64 @@ impl<'a> Null<'a> {
     ///
     /// # Errors
     /// When the engine fails.
-    pub(super) fn fit(self) -> Result<(Context<'a>, Fitted)> {
+    pub(super) fn fit(self) -> Result<Stands<'a>> {
         let finer = self.bench.machine.halved().ok();
-        let [shortest, longer @ ..] = DURATIONS;
-        let first = self.fit_in(shortest, finer.as_ref(), None)?;
-        let Some(mut stands) = first else {
-            return Err(asid_core::Error::Failed("the logs have no row".into()));
-        };
-        for duration in longer {
-            let may_be_longer = stands.2 && !self.progress.is_stopped();
-            let longer = may_be_longer
-                .then(|| self.fit_in(duration, finer.as_ref(), Some(&stands)))
-                .transpose()?;
-            match longer.flatten() {
-                Some(longer) => stands = longer,
-                None => break,
+        let mut stands: Option<Stands<'a>> = None;
+        for duration in DURATIONS {
+            let is_enough =
+                |s: &Stands<'_>| s.repeats.is_none_or(|r| r.scatters) || self.progress.is_stopped();
+            if stands.as_ref().is_some_and(is_enough) {
+                break;
+            }
+            match self.fit_in(duration, finer.as_ref(), stands.as_ref())? {
+                Tried::Stands(longer) => stands = Some(*longer),
+                Tried::Scatters(repeats) => {
+                    if let Some(shorter) = &mut stands {
+                        shorter.repeats = Some(repeats);
+                    }
+                }
             }
         }
-        Ok((stands.0, stands.1))
+        stands.ok_or_else(|| Error::Failed("there is no duration of segments".into()))
     }
 
-    /// Fits it in segments of a duration, s; `None` where their replays scatter and shorter ones stand.
+    /// Fits it in segments of a duration, s, unless their replays scatter and shorter ones stand.
     fn fit_in(
         self,
         duration: f64,
         finer: Option<&Machine>,
         shorter: Option<&Stands<'a>>,
-    ) -> Result<Option<Stands<'a>>> {
+    ) -> Result<Tried<'a>> {
         let (hypothesis, progress) = (self.hypothesis, self.progress);
         let taken = self.rows.cut(self.study, self.bench, duration);
         let parameters = (&self.study.parameters[..], self.nominal);
         let (context, mut estimate) = begin(&self.bench.machine, self.logs, taken, parameters)?;
         let mut theta = self.nominal;
-        if let Some((of_shorter, none, _)) = shorter {
-            estimate.begin_at(&context, (of_shorter, &none.estimate));
-            theta = &none.theta;
+        if let Some(shorter) = shorter {
+            estimate.begin_at(&context, (&shorter.context, &shorter.none.estimate));
+            theta = &shorter.none.theta;
         }
         settle_noise(&context, hypothesis, theta, &mut estimate, FIRST, progress)?;
-        let mut may_be_longer = false;
+        let mut repeats = None;
         if context.has_segments() {
             let scatter = Scatter::of(&context, (hypothesis, theta), &estimate, finer)?;
-            may_be_longer = scatter.lost < LOST;
-            if shorter.is_some() && !may_be_longer {
-                return Ok(None);
+            let found = Repeats {
+                duration,
+                lost: scatter.lost,
+                scatters: scatter.lost >= LOST,
+            };
+            if shorter.is_some() && found.scatters {
+                return Ok(Tried::Scatters(found));
             }
+            repeats = Some(found);
             estimate.scatter = scatter.directions;
         }
         let from = (&estimate, &Slopes::default());
         let none = fit(&context, hypothesis, theta, from, (ROUNDS, progress))?;
-        Ok(Some((context, none, may_be_longer)))
+        Ok(Tried::Stands(Box::new(Stands {
+            context,
+            none,
+            repeats,
+        })))
     }
 }

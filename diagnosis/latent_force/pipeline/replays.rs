@@ -3,14 +3,14 @@
 use asid_core::progress::UntilLate;
 use asid_core::{Progress, Result};
 
-use crate::bench::{Bench, Explanation, Stage};
+use crate::bench::{Bench, Explanation};
 use crate::candidate::Candidate;
+use crate::findings::{Findings, Found, Repeats};
 use crate::fit::Effort;
 use crate::latent_force::fit::Fitted;
 use crate::latent_force::search::{Outcome, Set, name_of};
 use crate::predict::State;
 use crate::result::NotTried;
-use crate::search::{Findings, Found};
 
 use super::told::{detection_limits, isolability, missing_forces, p_value, ranking};
 
@@ -60,23 +60,19 @@ fn all_sets(outcome: &Outcome) -> Vec<Set> {
 /// Replays the model without effects, the set that stands and its nearest rivals, open loop; with the sets behind the
 /// findings. The set of the `known` candidates is always among them.
 pub(super) fn replay(
-    bench: &mut Bench,
+    bench: &Bench,
     (candidates, outcome, known): (&[Candidate], &Outcome, &[usize]),
-    firsts: &[usize],
+    (firsts, repeats): (&[usize], Option<Repeats>),
     progress: &dyn Progress,
 ) -> Result<(Findings, Vec<Set>)> {
     let episodes = &bench.train.logs.episodes;
     let steps: usize = episodes.iter().map(|e| e.plan.physics_steps()).sum();
     let stopped = progress.is_stopped();
-    bench.stages = vec![Stage {
-        record: bench.train.clone(),
-        episodes: (0..episodes.len()).collect(),
-        open: if stopped || steps * bench.fitted.len() > REPLAYED {
-            Vec::new()
-        } else {
-            bench.fitted.clone()
-        },
-    }];
+    let open = if stopped || steps * bench.open.len() > REPLAYED {
+        Vec::new()
+    } else {
+        bench.open.clone()
+    };
     let study = bench.parameters.len();
     let of = |fitted: &Fitted, members: &[usize], effort: Effort| -> Result<Explanation> {
         let mut at = study;
@@ -91,10 +87,9 @@ pub(super) fn replay(
             .collect();
         let starts = smoothed_starts(bench, fitted, firsts);
         let mut of = bench.explain(
-            0,
             &chosen,
             &fitted.theta[..study],
-            &starts,
+            (&starts, &open),
             (effort, &UntilLate(progress)),
         )?;
         for (k, i) in fitted.hypothesis.free().into_iter().enumerate() {
@@ -114,18 +109,23 @@ pub(super) fn replay(
             effects: Vec::new(),
         });
     };
+    // Whole replays that nobody can repeat tell nothing of values.
+    let values = match repeats {
+        Some(Repeats { scatters: true, .. }) => Effort::LOOK,
+        _ => Effort::BRIEF,
+    };
     // A stopped search fits the values of what stands alone.
     let (of_none, rivals) = if stopped {
         cut("replays of rivals");
         (Effort::LOOK, 0)
     } else {
-        (Effort::BRIEF, RIVALS)
+        (values, RIVALS)
     };
     let of_best = if progress.is_late() {
         cut("fit of the values to whole replays");
         Effort::LOOK
     } else {
-        Effort::BRIEF
+        values
     };
     let none = of(&outcome.none, &[], of_none)?;
     let mut sets = all_sets(outcome);
@@ -154,7 +154,6 @@ pub(super) fn replay(
     }
     let findings = Findings {
         none,
-        short: None,
         found,
         missing: missing_forces(bench.layout(), outcome),
         forces: Vec::new(),
@@ -163,8 +162,8 @@ pub(super) fn replay(
         detection_limits: detection_limits(candidates, outcome),
         p_value: p_value(outcome),
         left: Vec::new(),
+        repeats,
         not_tried,
-        screened: Vec::new(),
     };
     Ok((findings, sets))
 }

@@ -3,7 +3,6 @@
 use asid_core::{Layout, Result};
 
 use crate::bench::Bench;
-use crate::candidate::enumerate;
 use crate::latent_force::context::Taken;
 use crate::latent_force::initial::{from_readings, scales};
 use crate::latent_force::segments::cut;
@@ -21,9 +20,6 @@ const BUDGET: f64 = 72_000.0;
 const SQUARE_BUDGET: f64 = 432_000.0;
 /// Rows of a log that are walked in any case.
 const FEWEST: usize = 150;
-/// Physics steps of a replay of all logs for each candidate up to which machines that touch something go by whole replays: a search
-/// by them takes some twenty such rounds, and a core 10^5 to 3 x 10^5 steps a second.
-const AFFORDABLE: usize = 1_500_000;
 
 /// What the model does along some states.
 pub(super) fn along(
@@ -39,18 +35,6 @@ pub(super) fn along(
     Trajectory::along(&*model, plant, values, &bench.train.logs, states, &rows)
 }
 
-/// Whether a machine that touches something goes by whole replays: where one of all training logs for each candidate is
-/// affordable.
-pub(super) fn replays_are_affordable(
-    bench: &Bench,
-    shown: &Trajectory,
-    without: &[String],
-) -> bool {
-    let episodes = &bench.train.logs.episodes;
-    let steps: usize = episodes.iter().map(|e| e.plan.physics_steps()).sum();
-    steps * enumerate(&bench.machine, shown, without).0.len() < AFFORDABLE
-}
-
 /// Rows of the training logs that are taken, and what touches in them.
 pub(super) struct Rows {
     /// One walk a log.
@@ -59,8 +43,6 @@ pub(super) struct Rows {
     touches: Vec<Vec<bool>>,
     /// Largest magnitude of each tangent coordinate.
     scale: Vec<f64>,
-    /// What the model does along the states that are read, with its contacts.
-    pub(super) shown: Trajectory,
 }
 
 impl Rows {
@@ -77,13 +59,7 @@ impl Rows {
             touches: touching(plant, logs, &shown),
             scale: scales(plant, &first),
             walks,
-            shown,
         })
-    }
-
-    /// Whether something touches in any of them.
-    pub(super) fn touch(&self) -> bool {
-        self.touches.iter().flatten().any(|t| *t)
     }
 
     /// Them in segments of a duration, s, where something touches.

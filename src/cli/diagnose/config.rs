@@ -10,7 +10,7 @@ use anyhow::Result;
 use asid_core::Capabilities;
 use asid_core::registry::{self, BackendEntry, TaskEntry, find};
 use asid_diagnosis::diagnose::Settings;
-use asid_diagnosis::latent_force::search::FALSE_ALARMS;
+use asid_diagnosis::latent_force::search::{Breadth, FALSE_ALARMS};
 use asid_effects::EffectEntry;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -82,7 +82,7 @@ pub struct Config {
     /// Plugins that are loaded first, with the SHA-256 of each.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     plugins: Vec<PathBuf>,
-    /// How machines that touch something are searched.
+    /// How widely effects are searched.
     #[serde(default)]
     search: SearchConfig,
 }
@@ -246,11 +246,12 @@ impl Config {
     /// The settings of the diagnosis itself.
     pub fn settings(&self) -> Settings {
         Settings {
-            seed: self.seed,
-            breadth: self.search.breadth(),
+            breadth: Breadth {
+                seed: self.seed,
+                false_alarms: self.false_alarms,
+                ..self.search.breadth()
+            },
             without: self.without.clone(),
-            contact: self.search.contact,
-            false_alarms: self.false_alarms,
             calibrate: self.calibrate,
         }
     }

@@ -8,7 +8,7 @@ use anyhow::Result;
 use asid_algorithms::explore::{Discriminating, Rival};
 use asid_core::{Episode, Explorer as _, Progress, RealWorld as _};
 use asid_diagnosis::diagnose::Work;
-use asid_diagnosis::search::trials;
+use asid_diagnosis::findings::trials;
 use asid_effects::EffectSpec;
 use asid_effects::refined_model::RefinedModel;
 use asid_results::diagnosis::{RealWorld, TaskTrial};
