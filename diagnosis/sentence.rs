@@ -2,10 +2,32 @@
 
 use asid_results::naming::grouped;
 
+use crate::findings::Repeats;
 use crate::result::{DiagnosisResult, Kind};
 
 /// Share of the gap from which on what is left beside a verdict is worth a word in the sentence.
 const WORTH_A_WORD: f64 = 0.05;
+
+/// Gap on the logs held out up to which it is that of the noise: its deviation is estimated.
+const OF_NOISE: f64 = 1.2;
+
+/// Where no effect is missing.
+fn none(gap: f64, repeats: Option<Repeats>) -> String {
+    let fitted = "once the study's parameters are fitted";
+    if gap <= OF_NOISE {
+        return format!(
+            "No gap is left beyond the sensors' noise, {fitted} (gap {gap:.2} on the logs held out)."
+        );
+    }
+    if repeats.is_some_and(|r| r.scatters) {
+        return format!(
+            "No effect is missing: short replays leave no more than the sensors' noise, {fitted}. Whole replays leave a gap of {gap:.2} on the logs held out, by which contacts scatter: see the check `repeatability`."
+        );
+    }
+    format!(
+        "No effect is found, {fitted}: the gap of {gap:.2} on the logs held out is no more than another program's version of the same physics leaves."
+    )
+}
 
 /// What is left beside the effects that are named; empty where it is little.
 fn beside(result: &DiagnosisResult) -> String {
@@ -22,9 +44,14 @@ fn beside(result: &DiagnosisResult) -> String {
 }
 
 /// Says what a result means, in one sentence; `labels` are the effects of the best
-/// explanation, whether or not it is the verdict, and `rest` what they leave, where one knows.
+/// explanation, whether or not it is the verdict, `rest` what they leave, where one knows, and `repeats` how far contacts can be
+/// repeated.
 #[must_use]
-pub fn sentence(result: &DiagnosisResult, labels: &[String], rest: Option<&str>) -> String {
+pub fn sentence(
+    result: &DiagnosisResult,
+    (labels, rest): (&[String], Option<&str>),
+    repeats: Option<Repeats>,
+) -> String {
     let place = result.places.first().map_or_else(String::new, |w| {
         let condition = w
             .condition
@@ -62,21 +89,7 @@ pub fn sentence(result: &DiagnosisResult, labels: &[String], rest: Option<&str>)
         _ => "what there is of it".into(),
     };
     let body = match result.verdict.kind {
-        Kind::None => {
-            let scatter = match (result.gap.identified > 1.2, result.missing_force.is_empty()) {
-                (true, true) => {
-                    ", all of it within what the simulation itself cannot repeat: see the check `repeatability`"
-                }
-                (true, false) => {
-                    ", no more than another program's version of the same physics leaves"
-                }
-                _ => "",
-            };
-            format!(
-                "No gap is left beyond the sensors' noise and what nobody can repeat, once the study's parameters are fitted (gap {:.2} on the logs held out{scatter}).",
-                result.gap.identified
-            )
-        }
+        Kind::None => none(result.gap.identified, repeats),
         Kind::Effects => {
             let ambiguous = if result.verdict.ambiguous_with.is_empty() {
                 String::new()
@@ -105,7 +118,7 @@ pub fn sentence(result: &DiagnosisResult, labels: &[String], rest: Option<&str>)
             "{place}nothing in the catalogue explains it, nor a part of it that would count (see the check `forces`)."
         ),
         Kind::Unknown if labels.is_empty() => format!(
-            "{place}nothing in the catalogue explains it, and no part of it that long replays tell (see the check `repeatability`)."
+            "{place}nothing in the catalogue explains it, nor a part of it that would count (see the check `repeatability`)."
         ),
         Kind::Unknown => format!(
             "{place}nothing in the catalogue explains it: {} comes nearest, with {}.",

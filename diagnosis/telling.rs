@@ -148,7 +148,9 @@ impl Telling<'_> {
         let rest = short
             .and_then(|(before, after, _)| least_explained(&before, &after))
             .or_else(|| least_made_up(&result.missing_force));
-        result.sentence = crate::sentence::sentence(&result, &labels, rest.as_deref());
+        let repeats = self.findings.repeats;
+        let best = (&labels[..], rest.as_deref());
+        result.sentence = crate::sentence::sentence(&result, best, repeats);
         let mut trace = self.trace(&nominal, &identified, &refined, &result.effects)?;
         trace.view = Some(self.view([&nominal, &identified, &refined], &explanation)?);
         let study = self.bench.parameters.len();

@@ -4,6 +4,7 @@
 #![allow(clippy::unwrap_used)]
 
 mod arm;
+mod ball;
 #[path = "../diagnosis_support/mod.rs"]
 mod diagnosis_support;
 mod row_slopes;

@@ -17,6 +17,8 @@ use super::rows::Rows;
 
 /// Linearisations and rounds of EM of a first smoothing.
 const FIRST: (usize, usize) = (4, 8);
+/// The same of segments, whose noise is known but for what they leave: the fit goes on from there.
+const FIRST_OF_SEGMENTS: (usize, usize) = (2, 8);
 /// Share of the segments' rows that scatter by more than their noise, from which on segments are not made longer: what is gained by
 /// length is lost where nothing can be repeated.
 const LOST: f64 = 0.3;
@@ -95,7 +97,12 @@ impl<'a> Null<'a> {
             estimate.begin_at(&context, (&shorter.context, &shorter.none.estimate));
             theta = &shorter.none.theta;
         }
-        settle_noise(&context, hypothesis, theta, &mut estimate, FIRST, progress)?;
+        let first = if context.has_segments() {
+            FIRST_OF_SEGMENTS
+        } else {
+            FIRST
+        };
+        settle_noise(&context, hypothesis, theta, &mut estimate, first, progress)?;
         let mut repeats = None;
         if context.has_segments() {
             let scatter = Scatter::of(&context, (hypothesis, theta), &estimate, finer)?;

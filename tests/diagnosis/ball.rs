@@ -1,0 +1,117 @@
+//! A ball that bounces: bodies touch, and short replays decide.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use asid::core::{BatchConfig, Capabilities, Control, Rollout, Scene};
+use asid::diagnosis::result::{DiagnosisResult, Kind};
+use rand::{Rng as _, SeedableRng as _};
+use rand_chacha::ChaCha8Rng;
+
+use super::run_on;
+use crate::diagnosis_support::engine;
+
+/// Rows of a log, and the time between them, s.
+const ROWS: usize = 90;
+const ROW: f64 = 0.02;
+/// Deviation of a reading, m.
+const NOISE: f64 = 1e-3;
+/// Time steps of the model and of the real ball, s.
+const STEPS: [f64; 2] = [0.001, 0.0005];
+
+/// The ball above a floor that gives way, with gravity `down` the floor and along it.
+fn scene(timestep: f64, [along, down]: [f64; 2]) -> String {
+    format!(
+        r#"<mujoco model="ball"><option timestep="{timestep}" gravity="{along} 0 -{down}" cone="elliptic"/>
+        <worldbody><geom name="floor" type="plane" size="20 20 0.1" friction="0.4 0.005 0.0001" solref="-40000 -18"/>
+        <body name="ball" pos="0 0 1"><freejoint name="ball_free"/>
+        <geom name="ball" type="sphere" size="0.05" mass="0.06" friction="0.4 0.005 0.0001" condim="6" solref="-40000 -18"/></body>
+        </worldbody><sensor><framepos name="place" objtype="xbody" objname="ball"/></sensor></mujoco>"#
+    )
+}
+
+/// Writes logs of a ball on a floor that is tilted by an angle, rad, and the model that does not know of it.
+fn write_study(folder: &Path, tilt: f64) {
+    let (sin, cos) = tilt.sin_cos();
+    let real = scene(STEPS[1], [9.81 * sin, 9.81 * cos]);
+    let scene_of = |xml: &str| Scene::from_xml("ball", xml, &[]).unwrap();
+    let model = engine().load(&scene_of(&real)).unwrap();
+    let mut simulator = model
+        .simulator(&BatchConfig {
+            size: 1,
+            threads: 1,
+            targets: Vec::new(),
+        })
+        .unwrap();
+    let recording = model.layout().recording(&["place"]).unwrap();
+    let substeps = (ROW / STEPS[1]).round() as usize;
+    for episode in 0..5_u32 {
+        let mut random = ChaCha8Rng::seed_from_u64(u64::from(episode));
+        let k = f64::from(episode);
+        let qpos = [0.0, 0.0, 0.3 + 0.1 * k, 1.0, 0.0, 0.0, 0.0];
+        let qvel = [0.4 - 0.2 * k, 0.1 * k, 0.0, 0.0, 0.0, 0.0];
+        simulator.reset(&[0]).unwrap();
+        simulator.set_state(&[0], &qpos, &qvel).unwrap();
+        let mut out = vec![0.0; 3 * (ROWS - 1)];
+        let rollout = Rollout::new(&[0], ROWS - 1, substeps, Control::Shared(&[]), &recording);
+        simulator.rollout(&rollout, &mut out).unwrap();
+        let mut places = qpos[..3].to_vec();
+        places.extend(out);
+        let mut text = "time,place.0,place.1,place.2".to_owned();
+        (0..7).for_each(|i| write!(text, ",qpos.ball_free.{i}").unwrap());
+        (0..6).for_each(|i| write!(text, ",qvel.ball_free.{i}").unwrap());
+        text.push('\n');
+        for (row, place) in places.chunks(3).enumerate() {
+            write!(text, "{:.2}", row as f64 * ROW).unwrap();
+            for x in place {
+                let noise = (0..12).map(|_| random.random::<f64>()).sum::<f64>() - 6.0;
+                write!(text, ",{}", x + NOISE * noise).unwrap();
+            }
+            for x in qpos.iter().chain(&qvel) {
+                match row {
+                    0 => write!(text, ",{x}").unwrap(),
+                    _ => text.push(','),
+                }
+            }
+            text.push('\n');
+        }
+        let name = if episode < 4 { "train" } else { "test" };
+        std::fs::write(folder.join(format!("{name}_{episode}.csv")), text).unwrap();
+    }
+    std::fs::write(folder.join("nominal.xml"), scene(STEPS[0], [0.0, 9.81])).unwrap();
+    let study = "model = \"nominal.xml\"\ntrain = [\"train_*.csv\"]\ntest = [\"test_*.csv\"]\n";
+    std::fs::write(folder.join("study.toml"), study).unwrap();
+}
+
+fn diagnosed(tilt: f64) -> Option<DiagnosisResult> {
+    // A floor that gives way is MuJoCo's.
+    let needed = Capabilities::CONTACT | Capabilities::DOUBLE_PRECISION;
+    if !engine().capabilities().contains(needed) {
+        return None;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    write_study(folder.path(), tilt);
+    Some(run_on(folder.path(), &[]).0.result)
+}
+
+#[test]
+fn a_tilt_is_told_from_bounces_and_what_bounces_scatter_by_is_stated() {
+    let Some(r) = diagnosed(0.05) else { return };
+    assert_eq!(r.verdict.effects, ["gravity-tilt"], "{}", r.sentence);
+    assert!(
+        r.gap.identified > 10.0 && r.gap.refined < 1.5,
+        "{:?}",
+        r.gap
+    );
+    let pitch = r.effects[0].parameters["pitch"];
+    assert!((pitch - 0.05).abs() < 0.002, "{pitch}");
+    let repeats = r.checks.iter().find(|c| c.check == "repeatability");
+    assert!(repeats.is_some_and(|c| c.detail.contains("scatter by more than the noise")));
+}
+
+#[test]
+fn a_ball_that_lacks_nothing_is_accused_of_nothing() {
+    let Some(r) = diagnosed(0.0) else { return };
+    assert_eq!(r.verdict.kind, Kind::None, "{}", r.sentence);
+    assert!(r.gap.identified < 1.5, "{:?}", r.gap);
+}
