@@ -50,93 +50,113 @@ impl Scatter {
     ) -> Result<Self> {
         let parameters = hypothesis.parameters();
         let specs = &hypothesis.specs;
-        let layout = &context.plant().layout;
-        let (nx, width) = (2 * layout.nv, layout.nq + layout.nv);
+        let nx = 2 * context.plant().layout.nv;
         let mut map = context.map(specs, &parameters, nx + 1)?;
         let slopes = Derivatives {
             state: true,
             ..Derivatives::default()
         };
-        let at = |map: &mut StepMap<'_>, trajectory: &[Vec<f64>], want| {
-            map.linearise(theta, trajectory, want, &context.start_steps(), &[])
-        };
-        let here = at(&mut map, &estimate.trajectory, slopes)?;
-        let roots = estimate.start_roots(context, &here);
-        let mut random = Streams::new(estimate.rolls).stream("scatter of segments");
-        let mut directions = vec![Vec::new(); here.len()];
-        for _ in 0..DRAWS {
-            let mut trajectory = estimate.trajectory.clone();
-            let mut changes = Vec::with_capacity(here.len());
-            for (states, root) in trajectory.iter_mut().zip(&roots) {
-                let normal =
-                    DVector::from_fn(root.ncols(), |_, _| random.sample::<f64, _>(StandardNormal));
-                let change = if root.ncols() == 0 {
-                    DVector::zeros(nx)
-                } else {
-                    root * normal
-                };
-                retract(layout, &mut states[..width], change.as_slice());
-                changes.push(change);
-            }
-            let there = at(&mut map, &trajectory, Derivatives::default())?;
-            let share = (DRAWS as f64).sqrt().recip();
-            for (w, change) in changes.iter().enumerate() {
-                let beyond = beyond_slopes(&here[w], &there[w], change);
-                directions[w].push(beyond.iter().map(|x| share * x).collect());
-            }
-        }
+        let (states, steps) = (&estimate.trajectory, context.start_steps());
+        let here = map.linearise(theta, states, slopes, &steps, &[])?;
+        let mut all = drawn(context, (&mut map, theta), estimate, &here)?;
         if let Some(finer) = finer {
             let walks: Vec<Walk> = context.walks.iter().map(Walk::halved).collect();
             let rows = (context.logs, &walks[..]);
             let mut map = StepMap::new(finer, specs, &parameters, rows, 1)?;
-            let there = at(&mut map, &estimate.trajectory, Derivatives::default())?;
-            let still = DVector::zeros(nx);
-            for (w, there) in there.iter().enumerate() {
-                let change = beyond_slopes(&here[w], there, &still);
-                directions[w].push(change.iter().map(|x| OWN_INTEGRATOR * x).collect());
-            }
+            let there = map.linearise(theta, states, Derivatives::default(), &[], &[])?;
+            let still = vec![DVector::zeros(nx); here.len()];
+            all.push(scaled(OWN_INTEGRATOR, beyond_slopes(&here, &there, &still)));
         }
-        let mut lost = (0, 0);
-        for (walk, directions) in context.walks.iter().zip(&mut directions) {
+        let directions = context.walks.iter().enumerate().map(|(w, walk)| {
             if walk.segment.is_none() {
-                directions.clear();
-                continue;
+                return Vec::new();
             }
-            let ns = estimate.noise.r.len();
-            for row in 0..walk.len() {
-                let square = |d: &Vec<f64>| -> f64 {
-                    let own = d[row * ns..(row + 1) * ns].iter().zip(&estimate.noise.r);
-                    own.map(|(x, r)| x * x / r).sum()
-                };
-                let power: f64 = directions.iter().map(square).sum();
-                lost.0 += usize::from(power > ns as f64);
-                lost.1 += 1;
-            }
-        }
+            // Side by side, the columns of one array.
+            let readings = 0..here[w].residual.len();
+            let row = |at: usize| all.iter().map(move |d| d[w][at]);
+            readings.flat_map(row).collect()
+        });
+        let directions: Vec<Vec<f64>> = directions.collect();
         Ok(Self {
-            directions: directions.into_iter().map(side_by_side).collect(),
-            lost: lost.0 as f64 / f64::max(lost.1 as f64, 1.0),
+            lost: lost(&directions, all.len(), &estimate.noise.r),
+            directions,
         })
     }
 }
 
-/// What the readings of a replay from a start moved by a change do beyond what slopes say; zero where one of them is missing.
-fn beyond_slopes(here: &LinearEpisode, there: &LinearEpisode, change: &DVector<f64>) -> Vec<f64> {
-    let nx = change.len();
-    let each = here.residual.iter().zip(&there.residual).enumerate();
-    each.map(|(at, (a, b))| {
-        let slopes = &here.h[at * nx..(at + 1) * nx];
-        let linear: f64 = slopes.iter().zip(change.iter()).map(|(h, c)| h * c).sum();
-        let beyond = a - b - linear;
-        if beyond.is_finite() { beyond } else { 0.0 }
-    })
-    .collect()
+/// What the readings of each walk do beyond slopes, along one direction.
+type Beyond = Vec<Vec<f64>>;
+
+/// Directions of replays from starts that are drawn of the posterior.
+fn drawn(
+    context: &Context<'_>,
+    (map, theta): (&mut StepMap<'_>, &[f64]),
+    estimate: &Estimate,
+    here: &[LinearEpisode],
+) -> Result<Vec<Beyond>> {
+    let layout = &context.plant().layout;
+    let roots = estimate.start_roots(context, here);
+    let mut random = Streams::new(estimate.rolls).stream("scatter of segments");
+    let share = (DRAWS as f64).sqrt().recip();
+    let mut all = Vec::with_capacity(DRAWS);
+    for _ in 0..DRAWS {
+        let mut states = estimate.trajectory.clone();
+        let mut changes = Vec::with_capacity(here.len());
+        for (states, root) in states.iter_mut().zip(&roots) {
+            let mut normal = || random.sample::<f64, _>(StandardNormal);
+            let change = if root.ncols() == 0 {
+                DVector::zeros(2 * layout.nv)
+            } else {
+                root * DVector::from_fn(root.ncols(), |_, _| normal())
+            };
+            retract(
+                layout,
+                &mut states[..layout.nq + layout.nv],
+                change.as_slice(),
+            );
+            changes.push(change);
+        }
+        let there = map.linearise(theta, &states, Derivatives::default(), &[], &[])?;
+        all.push(scaled(share, beyond_slopes(here, &there, &changes)));
+    }
+    Ok(all)
 }
 
-/// Directions as the columns of one array.
-fn side_by_side(directions: Vec<Vec<f64>>) -> Vec<f64> {
-    let n = directions.first().map_or(0, Vec::len);
-    (0..n)
-        .flat_map(|at| directions.iter().map(move |d| d[at]).collect::<Vec<_>>())
+/// What the readings of replays from starts moved by some changes do beyond what slopes say; zero where one of them is missing.
+fn beyond_slopes(
+    here: &[LinearEpisode],
+    there: &[LinearEpisode],
+    changes: &[DVector<f64>],
+) -> Beyond {
+    let of_walk = |((here, there), change): ((&LinearEpisode, &LinearEpisode), &DVector<f64>)| {
+        let nx = change.len();
+        let each = here.residual.iter().zip(&there.residual).enumerate();
+        each.map(|(at, (a, b))| {
+            let slopes = &here.h[at * nx..(at + 1) * nx];
+            let linear: f64 = slopes.iter().zip(change.iter()).map(|(h, c)| h * c).sum();
+            let beyond = a - b - linear;
+            if beyond.is_finite() { beyond } else { 0.0 }
+        })
         .collect()
+    };
+    here.iter().zip(there).zip(changes).map(of_walk).collect()
+}
+
+fn scaled(by: f64, mut beyond: Beyond) -> Beyond {
+    beyond.iter_mut().flatten().for_each(|x| *x *= by);
+    beyond
+}
+
+/// Share of the rows, over all segments, in which readings of the variances `r` scatter by more than their noise.
+fn lost(directions: &[Vec<f64>], n: usize, r: &[f64]) -> f64 {
+    let (mut lost, mut rows) = (0_u32, 0_u32);
+    for row in directions.iter().flat_map(|d| d.chunks_exact(n * r.len())) {
+        let each = row.chunks_exact(n).zip(r);
+        let power: f64 = each
+            .map(|(x, r)| x.iter().map(|x| x * x).sum::<f64>() / r)
+            .sum();
+        lost += u32::from(power > r.len() as f64);
+        rows += 1;
+    }
+    f64::from(lost) / f64::from(rows.max(1))
 }
