@@ -1,16 +1,12 @@
 //! Explanations with their probabilities, and which of them is the verdict.
 
-/// A set of effects with its probability and what it costs.
+/// A set of effects with its probability.
 #[derive(Clone, Debug, Default)]
 pub struct Hypothesis {
     /// Place in the findings of what was fitted; `None` for no effect, and for a set that was screened only.
     pub found: Option<usize>,
     /// Labels, sorted.
     pub labels: Vec<String>,
-    /// Sum of squares over all logs, where replays decide.
-    pub cost: f64,
-    /// Free parameters of its effects that do something, where replays decide.
-    pub size: usize,
     /// Probability.
     pub probability: f64,
 }

@@ -118,13 +118,13 @@ pub struct DiagnosisResult {
     /// The force that is missing at each degree of freedom; empty where contact lasts, and it is not estimated.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub missing_force: Vec<MissingForce>,
-    /// Sets of effects by their evidence, the best first, at most 20; empty where replays decide.
+    /// Sets of effects by their evidence, the best first, at most 20.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub ranking: Vec<RankedSet>,
-    /// Which of the leading effects these logs tell apart; `None` where replays decide.
+    /// Which of the leading effects these logs tell apart; `None` where none leads.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub isolability: Option<Isolability>,
-    /// The smallest size of each effect that these logs could have shown; empty where replays decide.
+    /// The smallest size of each effect that these logs could have shown.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub detection_limits: Vec<DetectionLimit>,
     /// What the diagnosis says of simulated logs; `None` where that was not asked.

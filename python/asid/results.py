@@ -403,7 +403,7 @@ class Gap(Record):
     signals: list[SignalGap]
     """By sensor."""
     p_value: float | None = None
-    """Probability that a machine that lacks nothing shows as much evidence for its best candidate; `None` where replays decide."""
+    """Probability that a machine that lacks nothing shows as much evidence for its best candidate; `None` where that is not known."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -665,13 +665,13 @@ class Diagnosis(Result):
     calibration: Calibration | None = None
     """What the diagnosis says of simulated logs; `None` where that was not asked."""
     detection_limits: list[DetectionLimit] = dataclasses.field(default_factory=list)
-    """The smallest size of each effect that these logs could have shown; empty where replays decide."""
+    """The smallest size of each effect that these logs could have shown."""
     isolability: Isolability | None = None
-    """Which of the leading effects these logs tell apart; `None` where replays decide."""
+    """Which of the leading effects these logs tell apart; `None` where none leads."""
     missing_force: list[MissingForce] = dataclasses.field(default_factory=list)
     """The force that is missing at each degree of freedom; empty where contact lasts, and it is not estimated."""
     ranking: list[RankedSet] = dataclasses.field(default_factory=list)
-    """Sets of effects by their evidence, the best first, at most 20; empty where replays decide."""
+    """Sets of effects by their evidence, the best first, at most 20."""
     real_world: RealWorldTrials | None = None
     """The task in the real world, before and after; `None` for a study."""
     seconds: float | None = None

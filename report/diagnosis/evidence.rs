@@ -12,7 +12,7 @@ const MOST: usize = 12;
 /// Evidence from which on a set is shown, natural logarithm: less is against it.
 const LEAST: f64 = 0.0;
 
-/// The pictures; none where replays decided.
+/// The pictures.
 pub(super) fn figures(d: &DiagnosisResult) -> Vec<Figure> {
     let ranking = (!d.ranking.is_empty()).then(|| ranking(d));
     let table = d.isolability.as_ref().filter(|i| i.effects.len() > 1);

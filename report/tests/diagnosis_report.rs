@@ -159,7 +159,7 @@ fn the_missing_force_is_drawn_with_the_law_and_an_early_end_says_what_was_left_o
     ] {
         assert!(html.contains(told), "{told}");
     }
-    // A machine that was diagnosed by replays shows none of it.
+    // What was not estimated is not shown.
     let html = page(&diagnosed::patch());
     for untold in [
         "that is missing",

@@ -47,7 +47,7 @@ pub struct Gap {
     /// By what it goes with; `None` where there is none.
     #[serde(default)]
     pub shares: Option<Shares>,
-    /// Probability that a machine that lacks nothing shows as much evidence for its best candidate; `None` where replays decide.
+    /// Probability that a machine that lacks nothing shows as much evidence for its best candidate; `None` where that is not known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub p_value: Option<f64>,
     /// By sensor.

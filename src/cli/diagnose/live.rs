@@ -115,10 +115,10 @@ impl Progress for Live {
         if self.quiet || rows.is_empty() {
             return;
         }
-        let stage = match (first, stage.starts_with("gap")) {
-            (true, true) => format!("first table, {stage} (in units of the noise)"),
-            (true, false) => format!("first table, {stage} (evidence, natural logarithm)"),
-            (false, _) => stage.to_owned(),
+        let stage = if first {
+            format!("first table, {stage} (evidence, natural logarithm)")
+        } else {
+            stage.to_owned()
         };
         self.bars.line(&table(&stage, seconds, rows));
     }

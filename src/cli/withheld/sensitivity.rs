@@ -55,7 +55,7 @@ struct Output {
 }
 
 impl<'a> Stored<'a> {
-    /// The stored answer of a case; `None` where replays decided, or there is none.
+    /// The stored answer of a case; `None` where there is none.
     pub fn read(folder: &Path, study: &Path, label: &'a Label) -> Option<Self> {
         let text = std::fs::read_to_string(folder.join("evidence.json")).ok()?;
         Some(Self {
