@@ -162,7 +162,6 @@ mod tests {
             found: (!labels.is_empty()).then_some(i),
             labels: labels.iter().map(|&l| l.to_owned()).collect(),
             probability: *probability,
-            ..Hypothesis::default()
         };
         Judgement {
             hypotheses: sets.iter().enumerate().map(hypothesis).collect(),

@@ -21,7 +21,7 @@ pub use crate::work::Work;
 use cost::final_noise;
 
 /// Settings of a diagnosis.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Settings {
     /// How widely to search, with the seed of all chance and the rate of false alarms.
     pub breadth: Breadth,
@@ -29,16 +29,6 @@ pub struct Settings {
     pub without: Vec<String>,
     /// Whether the diagnosis is repeated on simulated logs for as long as there is time.
     pub calibrate: bool,
-}
-
-impl Default for Settings {
-    fn default() -> Self {
-        Self {
-            breadth: Breadth::default(),
-            without: Vec::new(),
-            calibrate: false,
-        }
-    }
 }
 
 /// A finished diagnosis.

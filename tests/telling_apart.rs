@@ -160,6 +160,7 @@ fn a_task_is_run_diagnosed_and_run_again() {
         names(&place.path("a")),
         [
             "config.toml",
+            "evidence.json",
             "model.xml",
             "refined.toml",
             "report.html",
