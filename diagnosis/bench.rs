@@ -6,8 +6,8 @@ use asid_core::{Parameter, Progress, Result};
 use asid_effects::EffectSpec;
 
 use crate::candidate::Candidate;
-use crate::fit::{Effort, Fit, Unknown, cost, fit};
-use crate::linearise::Open;
+use crate::fit::{Effort, Fit, cost, fit};
+use crate::linearise::{Open, Unknown};
 use crate::machine::Machine;
 use crate::predict::{Point, Predictor, State};
 use crate::record::Record;

@@ -8,12 +8,14 @@ use asid_core::{Episode, Progress, Result, Streams};
 use rand_distr::StandardNormal;
 
 use crate::data::Logs;
-use crate::diagnose::{Diagnosis, Settings, diagnose_physics};
 use crate::findings::{Found, trials};
 use crate::machine::Machine;
+use crate::physics::diagnose_physics;
 use crate::predict::Point;
 use crate::result::{Calibration, CalibrationRow, Kind};
+use crate::settings::Settings;
 use crate::study::Study;
+use crate::telling::Diagnosis;
 use crate::work::Work;
 
 /// Most explanations that are played, beside that without effects: each needs several runs.

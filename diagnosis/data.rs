@@ -238,14 +238,14 @@ impl Logs {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use asid_core::Scene;
     use asid_mjcf::Plant;
 
     use super::*;
 
     /// Readings of a slide at 0, 0.1, … s.
-    pub(super) fn log(name: &str, readings: &[f64]) -> (String, Episode) {
+    pub(crate) fn log(name: &str, readings: &[f64]) -> (String, Episode) {
         let rows: Vec<String> = readings
             .iter()
             .enumerate()
@@ -261,7 +261,7 @@ mod tests {
     }
 
     /// A machine of one slide.
-    pub(super) fn plant() -> Plant {
+    pub(crate) fn plant() -> Plant {
         let scene = r#"<mujoco><worldbody><body name="b">
             <joint name="slide" type="slide"/><geom size="0.1" mass="1"/></body></worldbody>
             <sensor><jointpos name="place" joint="slide"/></sensor></mujoco>"#;

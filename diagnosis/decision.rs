@@ -30,6 +30,13 @@ fn closes_a_small_gap(evidence: &Evidence, set: Replayed, rules: &Rules) -> bool
         && own_error(evidence) < kept * train
 }
 
+/// Whether replays of the logs held out come nearer to the readings with a set than without it, and than the readings' own mean
+/// ([`crate::skill`]): by what does not, nothing is explained.
+fn has_skill(evidence: &Evidence, set: Replayed) -> bool {
+    let worse_than = |other: f64| set.held_out >= other;
+    !worse_than(evidence.none.held_out) && !worse_than(evidence.mean.held_out)
+}
+
 /// Mean square of the engine's own error; 0 where it is not known, for the larger of 0 and NaN is 0.
 fn own_error(evidence: &Evidence) -> f64 {
     evidence.own_error.max(0.0)
@@ -84,7 +91,9 @@ pub fn decide(evidence: &Evidence, rules: &Rules) -> Judgement {
     // What stands without a search: no effect, or the known ones.
     let least = evidence.known.map_or(0, |i| i + 1);
     let stands = evidence.found.filter(|&i| {
-        !is_small(evidence.none) || closes_a_small_gap(evidence, evidence.tried[i].replayed, rules)
+        let set = evidence.tried[i].replayed;
+        has_skill(evidence, set)
+            && (!is_small(evidence.none) || closes_a_small_gap(evidence, set, rules))
     });
     let best = stands.map_or(least, |i| i + 1);
     // What parsimony passes over is not more probable than what it picks.
@@ -106,7 +115,8 @@ pub fn decide(evidence: &Evidence, rules: &Rules) -> Judgement {
     // What is named may make up for most of the gap and leave much of what is missing from row to row, or the other way round.
     let rest = evidence.left.min(open_loop).clamp(0.0, 1.0);
     let unknown = if best == least {
-        if evidence.is_missing {
+        // A gap that no force makes up for is one of the readings, where replays can be repeated.
+        if evidence.is_missing || evidence.repeatable && !is_small(evidence.none) {
             seen.clamp(0.02, 0.999)
         } else {
             0.02
@@ -160,6 +170,8 @@ mod tests {
             schema: 1,
             candidates: 50,
             none: replayed(none, none),
+            mean: replayed(1e4, 1e4),
+            repeatable: true,
             found: (!tried.is_empty()).then_some(0),
             tried,
             known: None,
@@ -222,6 +234,24 @@ mod tests {
         assert!(
             !named(1.1, 1.5),
             "the engine's own error is as large as the gap"
+        );
+    }
+
+    #[test]
+    fn what_predicts_the_logs_held_out_no_better_than_their_mean_or_no_effect_is_not_named() {
+        let named = |mean: f64, left: Replayed| {
+            let mut e = evidence(91.0, vec![tried(&["a"], 1, 300.0, 1.0)], 0.1);
+            e.mean.held_out = mean;
+            e.tried[0].replayed = left;
+            let found = decided(&e);
+            found.is_unknown == found.best_explanation().labels.is_empty() && !found.is_unknown
+        };
+        assert!(named(1e4, replayed(30.0, 30.0)));
+        assert!(!named(30.0, replayed(30.0, 30.0)), "the mean does as well");
+        assert!(!named(1e4, replayed(30.0, 92.0)), "worse than without it");
+        assert!(
+            named(f64::NAN, replayed(30.0, 30.0)),
+            "the mean is not known"
         );
     }
 

@@ -1,49 +1,18 @@
 //! A diagnosis from a study to its result.
 
-mod cost;
-
 use asid_core::{Progress, Result};
-use asid_effects::EffectSpec;
-use asid_results::evidence::Evidence;
 
 use crate::calibration::calibrate;
 use crate::intake::Intake;
-use crate::latent_force;
-use crate::latent_force::search::Breadth;
 use crate::machine::Machine;
+use crate::physics::diagnose_physics;
 use crate::prepare::plain_residuals;
-use crate::result::{DiagnosisResult, NotTried};
+use crate::result::NotTried;
 use crate::study::Study;
-use crate::telling::Telling;
-use crate::trace::DiagnosisTrace;
 
+pub use crate::settings::Settings;
+pub use crate::telling::Diagnosis;
 pub use crate::work::Work;
-use cost::final_noise;
-
-/// Settings of a diagnosis.
-#[derive(Clone, Debug, Default)]
-pub struct Settings {
-    /// How widely to search, with the seed of all chance and the rate of false alarms.
-    pub breadth: Breadth,
-    /// Effects of the catalogue that are left out, by name.
-    pub without: Vec<String>,
-    /// Whether the diagnosis is repeated on simulated logs for as long as there is time.
-    pub calibrate: bool,
-}
-
-/// A finished diagnosis.
-pub struct Diagnosis {
-    /// `result.json`.
-    pub result: DiagnosisResult,
-    /// What the report shows besides.
-    pub trace: DiagnosisTrace,
-    /// What the decision rests on.
-    pub evidence: Evidence,
-    /// Effects of the verdict, with their values; empty for none.
-    pub effects: Vec<EffectSpec>,
-    /// Values of the study's parameters that go with them.
-    pub values: Vec<f64>,
-}
 
 /// Gap in units of the noise from which on a verdict leaves so much that the other way to take the wiring is tried as well: the right
 /// wiring and the right effect leave the noise.
@@ -98,42 +67,5 @@ pub fn diagnose(
         diagnosis.result.calibration = Some(found);
     }
     intake.tell(&mut diagnosis.result, whiteness);
-    Ok((diagnosis, work))
-}
-
-/// Diagnoses a study whose logs are in order.
-pub(crate) fn diagnose_physics(
-    study: &Study,
-    machine: Machine,
-    settings: Settings,
-    progress: &dyn Progress,
-) -> Result<(Diagnosis, Work)> {
-    let mut work = latent_force::pipeline::diagnose(study, machine, &settings, progress)?;
-    work.findings = final_noise(&mut work.bench, study, &work.candidates, work.findings)?;
-    tell(study, work, settings, progress)
-}
-
-/// Tells what was found.
-fn tell(
-    study: &Study,
-    work: Work,
-    settings: Settings,
-    progress: &dyn Progress,
-) -> Result<(Diagnosis, Work)> {
-    progress.begin("telling", 1);
-    let diagnosis = Telling {
-        study,
-        bench: &work.bench,
-        candidates: &work.candidates,
-        left_out: &work.left_out,
-        findings: &work.findings,
-        evidence: &work.evidence,
-        judgement: &work.judgement,
-        nominal: &work.nominal,
-        settings,
-        stopped: progress.is_stopped(),
-    }
-    .tell()?;
-    progress.end();
     Ok((diagnosis, work))
 }

@@ -5,32 +5,12 @@
 //! dampings are one batch.
 
 use asid_core::layout::Layout;
-use asid_core::{Parameter, Progress, Result};
+use asid_core::{Progress, Result};
 use nalgebra::DMatrix;
 
-use crate::linearise::{Differences, Linearisation, NOTHING, Open, linearise, slope};
+use crate::linearise::{Differences, Linearisation, NOTHING, Open, Unknown, linearise, slope};
 use crate::normal::{Normal, inverse};
 use crate::predict::{Point, Predictor};
-
-/// A value to fit.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Unknown {
-    /// The parameter: name, range, scale.
-    pub parameter: Parameter,
-    /// Whether it may move; one that may not keeps its start value.
-    pub free: bool,
-}
-
-impl Unknown {
-    /// A parameter that may move.
-    #[must_use]
-    pub fn free(parameter: Parameter) -> Self {
-        Self {
-            parameter,
-            free: true,
-        }
-    }
-}
 
 /// How long and how finely to search.
 #[derive(Clone, Copy, Debug)]

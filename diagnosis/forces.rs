@@ -5,27 +5,24 @@
 //! joint that explains most of what the window leaves is a linear fit, for which a
 //! replay a joint tells all slopes at once.
 
+mod linear;
+
 use asid_core::Result;
 use asid_core::layout::JointKind;
 use asid_core::registry::find;
 use asid_effects::EffectEntry;
 use asid_effects::EffectSpec;
-use nalgebra::{DMatrix, DVector};
 
 use crate::bench::{Bench, Trial};
 use crate::candidate::Candidate;
-use crate::fit::Unknown;
-use crate::linearise::{Differences, linearise};
 use crate::noise::{NORMAL, median};
-use crate::normal::inverse;
-use crate::predict::Point;
 use crate::record::Record;
 use crate::trajectory::Trajectory;
-use crate::windows::settle;
+
+use linear::Linear;
 
 /// The effect whose parameter is a constant force on a joint.
 const EFFECT: &str = asid_effects::catalogue::joint_friction::COULOMB;
-const FORCE: &str = "offset";
 
 /// What one model lacks at a joint in some of the windows.
 #[derive(Clone, Debug, PartialEq)]
@@ -89,96 +86,41 @@ pub fn missing(
     let joints: Vec<_> = layout.joints.iter().filter(|j| scalar(j.kind)).collect();
     let forces = joints.iter().map(|j| candidate(&j.name));
     let forces = forces.collect::<Result<Vec<_>>>()?;
-    // A joint that has the effect already has its force among the parameters.
-    let mut all: Vec<Trial<'_>> = trials.to_vec();
-    for force in &forces {
-        if !trials.iter().any(|(c, _)| c.label() == force.label()) {
-            let nulls = force.parameters().iter().map(|p| p.null).collect();
-            all.push((force, nulls));
-        }
-    }
-    let starts = settle(bench, windows, trials, theta)?;
-    let mut point = Point {
-        theta: theta.to_vec(),
-        starts,
-    };
-    all.iter().for_each(|(_, v)| point.theta.extend(v));
-    let mut unknowns = bench.unknowns(&all);
-    unknowns.iter_mut().for_each(|u| u.free = false);
-    let name = |f: &Candidate| format!("{}.{FORCE}", f.label());
-    let place =
-        |f: &Candidate, all: &[Unknown]| all.iter().position(|u| u.parameter.name == name(f));
-    let places: Vec<usize> = forces.iter().filter_map(|f| place(f, &unknowns)).collect();
-    places.iter().for_each(|&i| unknowns[i].free = true);
-    let mut differences = Differences::new(unknowns.len(), bench.open.len());
-    let mut predictor = bench.predictor(&all, windows)?;
-    let mut line = || {
-        linearise(
-            &mut predictor,
-            layout,
-            &unknowns,
-            &point,
-            &bench.open,
-            &mut differences,
-        )
-    };
-    // Twice for the size of the differences.
-    line()?;
-    line()?;
-    let line = line()?;
-    // Columns come in the order of the parameters; forces in that of the joints.
-    let mut order = places.clone();
-    order.sort_unstable();
-    let column = |i: usize| &line.columns[order.iter().position(|&o| o == i).unwrap_or(0)];
-    let columns: Vec<&Vec<f64>> = places.iter().map(|&i| column(i)).collect();
-    let columns: Vec<&Vec<f64>> = columns.into_iter().chain(&line.start_columns).collect();
-    let (n, m) = (columns.len(), places.len());
+    let linear = Linear::of(bench, windows, (trials, theta), &forces)?;
     let logs = &windows.logs;
     let shown = Trajectory::of(
         &*bench.machine.with(&[])?,
         &bench.machine.plant,
         &bench.parameters,
         logs,
-        &point,
+        &linear.point,
         bench.machine.threads,
     )?;
-    let mut sums = vec![<[Sum; 2]>::default(); m];
+    let mut sums = vec![<[Sum; 2]>::default(); joints.len()];
     let mut gaps = [Vec::new(), Vec::new()];
-    let present = predictor.present();
     for (e, path) in shown.episodes.iter().enumerate() {
-        let touching = path.contact.iter().any(|f| *f > 0.0);
-        let range = logs.offset(e)..logs.offset(e + 1);
-        let readings = range.clone().filter(|&k| present[k]);
-        let squares: Vec<f64> = readings.map(|k| line.residuals[k].powi(2)).collect();
-        let mean = squares.iter().sum::<f64>() / squares.len().max(1) as f64;
-        gaps[usize::from(touching)].push(mean.sqrt());
-        let part = |i: usize| &columns[i][range.clone()];
-        let normal = DMatrix::from_fn(n, n, |i, j| dot(part(i), part(j)));
-        let covariance = inverse(&normal, 1e-12);
-        let along = DVector::from_fn(n, |i, _| dot(part(i), &line.residuals[range.clone()]));
-        let found = &covariance * along;
-        for (k, joint) in joints.iter().enumerate() {
-            // From shares of the range to the unit.
-            let [low, high] = unknowns[places[k]].parameter.range;
-            let force = -found[k] * (high - low);
-            let variance = covariance[(k, k)] * (high - low).powi(2);
+        let touching = usize::from(path.contact.iter().any(|f| *f > 0.0));
+        let rows = logs.offset(e)..logs.offset(e + 1);
+        gaps[touching].push(linear.gap(rows.clone()));
+        let found = linear.forces(rows);
+        for ((joint, sums), (force, variance)) in joints.iter().zip(&mut sums).zip(found) {
             let speeds = path.qvel.iter().skip(joint.qvel).step_by(layout.nv);
-            let motion: f64 = speeds.sum();
-            sums[k][usize::from(touching)].add(force, variance, motion);
+            sums[touching].add(force, variance, speeds.sum());
         }
     }
     let mut all = Vec::new();
     for (joint, sums) in joints.iter().zip(sums) {
+        let unit = if joint.kind == JointKind::Slide {
+            "N"
+        } else {
+            "N m"
+        };
         for (touching, sum) in [false, true].into_iter().zip(sums) {
             let windows = sum.against.len();
             if windows > 0 {
                 all.push(Missing {
                     joint: joint.name.clone(),
-                    unit: if joint.kind == JointKind::Slide {
-                        "N"
-                    } else {
-                        "N m"
-                    },
+                    unit,
                     touching,
                     windows,
                     force: (sum.excess / windows as f64).max(0.0).sqrt(),
@@ -231,10 +173,6 @@ impl Sum {
         let n = sorted.len().max(1) as f64;
         [middle, loss * factor * n.sqrt() / weight.max(least)]
     }
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(x, y)| x * y).sum()
 }
 
 #[cfg(test)]

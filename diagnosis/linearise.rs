@@ -7,7 +7,6 @@ use asid_core::layout::Layout;
 use asid_core::parameter::Scale;
 use asid_core::{Parameter, Result};
 
-use crate::fit::Unknown;
 use crate::predict::{Point, Predictor};
 
 /// Response of the residuals, root mean square, that a difference aims at.
@@ -17,6 +16,26 @@ const AIM: f64 = 0.3;
 pub const NOTHING: f64 = 0.05;
 /// Smallest and largest difference, as a share of the range.
 const STEPS: [f64; 2] = [1e-8, 0.02];
+
+/// A value to fit.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Unknown {
+    /// The parameter: name, range, scale.
+    pub parameter: Parameter,
+    /// Whether it may move; one that may not keeps its start value.
+    pub free: bool,
+}
+
+impl Unknown {
+    /// A parameter that may move.
+    #[must_use]
+    pub fn free(parameter: Parameter) -> Self {
+        Self {
+            parameter,
+            free: true,
+        }
+    }
+}
 
 /// Differences to take derivatives with; they adapt.
 #[derive(Clone, Debug)]

@@ -36,16 +36,19 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
 }
 
 impl Normal {
+    /// Of the rows before a replay diverges: after it residuals are infinite, and columns 0.
     pub(crate) fn new(
         line: &Linearisation,
         bounds: &[std::ops::Range<usize>],
         damping: f64,
     ) -> Self {
+        let finite = |x: &f64| if x.is_finite() { *x } else { 0.0 };
+        let residuals: Vec<f64> = line.residuals.iter().map(finite).collect();
         let p = line.columns.len();
         let mut information = DMatrix::zeros(p, p);
         let mut gradient = DVector::zeros(p);
         for i in 0..p {
-            gradient[i] = dot(&line.columns[i], &line.residuals);
+            gradient[i] = dot(&line.columns[i], &residuals);
             for j in 0..=i {
                 let x = dot(&line.columns[i], &line.columns[j]);
                 information[(i, j)] = x;
@@ -59,7 +62,7 @@ impl Normal {
                 let part = |c: &Vec<f64>| c[range.clone()].to_vec();
                 let starts: Vec<Vec<f64>> = line.start_columns.iter().map(part).collect();
                 let columns: Vec<Vec<f64>> = line.columns.iter().map(part).collect();
-                let r = &line.residuals[range.clone()];
+                let r = &residuals[range.clone()];
                 let mut block = DMatrix::from_fn(m, m, |i, j| dot(&starts[i], &starts[j]));
                 let coupling = DMatrix::from_fn(p, m, |i, j| dot(&columns[i], &starts[j]));
                 let g = DVector::from_fn(m, |i, _| dot(&starts[i], r));
@@ -106,5 +109,25 @@ impl Normal {
     pub(crate) fn start_step(&self, episode: usize, step: &DVector<f64>) -> DVector<f64> {
         let (inverse, coupling, g) = &self.episodes[episode];
         inverse * (g - coupling.transpose() * step)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A fish whose smoothed start made the replay diverge: the step was not a number, and the engine refused it.
+    #[test]
+    fn a_replay_that_diverges_steps_by_the_rows_before_it() {
+        let line = Linearisation {
+            residuals: vec![1.0, 2.0, f64::INFINITY],
+            columns: vec![vec![2.0, 0.0, 0.0]],
+            start_columns: vec![vec![0.0, 4.0, 0.0]],
+        };
+        let normal = Normal::new(&line, &[0..3], 0.0);
+        let step = normal.step(0.0, &[false]);
+        assert!((step[0] - 0.5).abs() < 1e-9, "{step}");
+        let start = normal.start_step(0, &step);
+        assert!((start[0] - 0.5).abs() < 1e-9, "{start}");
     }
 }

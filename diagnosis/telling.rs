@@ -1,12 +1,12 @@
 //! What a search found, told as a result: gaps, probabilities, places, pictures.
 
 use asid_core::Result;
+use asid_effects::EffectSpec;
 use asid_results::evidence::Evidence;
 
 use crate::bench::{Bench, Explanation, Trial};
 use crate::candidate::{Candidate, LeftOut};
 use crate::checks;
-use crate::diagnose::{Diagnosis, Settings};
 use crate::experiment;
 use crate::findings::{Findings, Found, trials};
 use crate::forces::Short;
@@ -15,7 +15,9 @@ use crate::localise::localise;
 use crate::predict::{Point, State};
 use crate::record::Record;
 use crate::result::{DiagnosisResult, Kind, NextExperiment, NotTried};
+use crate::settings::Settings;
 use crate::study::Study;
+use crate::trace::DiagnosisTrace;
 use crate::trajectory::Trajectory;
 
 mod answer;
@@ -30,6 +32,20 @@ use answer::groups;
 use gap::NO_GAP;
 use remainder::shares;
 use unexplained::{least_explained, least_made_up};
+
+/// A finished diagnosis.
+pub struct Diagnosis {
+    /// `result.json`.
+    pub result: DiagnosisResult,
+    /// What the report shows besides.
+    pub trace: DiagnosisTrace,
+    /// What the decision rests on.
+    pub evidence: Evidence,
+    /// Effects of the verdict, with their values; empty for none.
+    pub effects: Vec<EffectSpec>,
+    /// Values of the study's parameters that go with them.
+    pub values: Vec<f64>,
+}
 
 /// All that a result is told from.
 pub(crate) struct Telling<'a> {

@@ -17,6 +17,15 @@ pub struct Replayed {
     pub held_out: f64,
 }
 
+impl Default for Replayed {
+    fn default() -> Self {
+        Self {
+            train: f64::NAN,
+            held_out: f64::NAN,
+        }
+    }
+}
+
 /// A set of effects that was put into the model and fitted.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Tried {
@@ -43,6 +52,10 @@ pub struct Screened {
     pub evidence: f64,
 }
 
+fn yes() -> bool {
+    true
+}
+
 /// All that a decision rests on.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Evidence {
@@ -52,6 +65,12 @@ pub struct Evidence {
     pub candidates: usize,
     /// Whole replays without effects.
     pub none: Replayed,
+    /// The readings about their own mean over each log: what a replay without any skill leaves.
+    #[serde(default)]
+    pub mean: Replayed,
+    /// Whether whole replays can be repeated: false where contacts scatter.
+    #[serde(default = "yes")]
+    pub repeatable: bool,
     /// Sets that were fitted, those of the decision's hypotheses.
     pub tried: Vec<Tried>,
     /// Place in `tried` of the set that the search ended with; `None` for no effect.

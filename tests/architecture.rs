@@ -202,8 +202,8 @@ fn circles(mut graph: BTreeMap<String, Names>) -> BTreeMap<String, Names> {
 
 #[test]
 fn modules_of_a_crate_use_each_other_in_one_direction() {
-    for (folder, _) in page().iter().filter(|(folder, _)| folder != "diagnosis") {
-        let circles = circles(modules(folder));
+    for (folder, _) in page() {
+        let circles = circles(modules(&folder));
         assert!(circles.is_empty(), "circles in `{folder}`: {circles:#?}");
     }
 }

@@ -8,8 +8,8 @@ use std::path::Path;
 
 use asid::core::progress::Silent;
 use asid::diagnosis::diagnose::{Diagnosis, Settings, diagnose};
-use asid::diagnosis::latent_force::search::Breadth;
 use asid::diagnosis::machine::Machine;
+use asid::diagnosis::settings::Breadth;
 use asid::diagnosis::study::Study;
 use diagnosis_support::engine;
 

@@ -5,6 +5,7 @@
 //! that the effect says a search begins with. Sizes come from the logs: an effect may make up for forces as large as
 //! those that are missing, and for readings that are off by a part of their spread.
 
+mod asked;
 mod force_response;
 mod form;
 mod group;
@@ -20,13 +21,14 @@ use crate::candidate::Candidate;
 use super::context::{Context, PUSH};
 use super::estimate::Estimate;
 use super::fit::Hypothesis;
-use super::step_map::{Derivatives, LinearEpisode, Variation};
+use super::step_map::{Derivatives, LinearEpisode};
 
+use asked::{Asked, Trial, bounds, trials};
 use force_response::ForceSlopes;
 pub use form::Form;
 use null_model::All;
 use sizes::{REPLAY_TRIAL, sizes, sizes_by_replay};
-use source::{Source, Wanted};
+use source::Source;
 
 /// Share of a deviation of the prior that slopes of the present model are taken over.
 const BASE_SHARE: f64 = 0.01;
@@ -71,7 +73,7 @@ fn resize(
     candidates: &[Candidate],
     (factors, base): (&[f64], usize),
     found: &mut [(Vec<f64>, Vec<f64>)],
-    bounds: &mut [[f64; 2]],
+    all_bounds: &mut [[f64; 2]],
 ) {
     let m = factors.len();
     let columns = form.columns();
@@ -79,14 +81,10 @@ fn resize(
         let Some((p, size)) = slope else { continue };
         let candidate = &candidates[form.candidate];
         let [low, high] = candidate.ranges[*p];
-        let null = candidate.parameters()[*p].null;
         let most = 0.5 * (high - low) / *size;
         let factor = factors[column - base].min(most);
         *size *= factor;
-        bounds[column] = [
-            ((low - null) / *size).max(-MOST),
-            ((high - null) / *size).min(MOST),
-        ];
+        all_bounds[column] = bounds(candidate, *p, *size);
         for (states, readings) in found.iter_mut() {
             for all in [states, readings] {
                 all.iter_mut()
@@ -96,6 +94,32 @@ fn resize(
             }
         }
     }
+}
+
+/// What the linearisation of the present model has to tell, and the steps of the states that it is taken with. Columns are told
+/// apart by slopes in forces at the very point that they are taken at; replays of segments have none.
+fn slopes_wanted(context: &Context<'_>) -> (Derivatives, Vec<f64>) {
+    let replayed = context.has_segments();
+    let want = Derivatives {
+        state: true,
+        force: !replayed,
+        jolt: !replayed,
+    };
+    let steps = if replayed {
+        context.start_steps()
+    } else {
+        vec![PUSH; context.plant().layout.nv]
+    };
+    (want, steps)
+}
+
+/// Deviations of the priors of some trials where segments are replayed, before their columns are known: shares of the ranges.
+fn sizes_by_range(candidates: &[Candidate], trials: &[Trial]) -> Vec<f64> {
+    let size = |&(c, _, p): &Trial| {
+        let [low, high] = candidates[c].ranges[p];
+        REPLAY_TRIAL / SHARE * (high - low)
+    };
+    trials.iter().map(size).collect()
 }
 
 impl Columns {
@@ -112,40 +136,11 @@ impl Columns {
         progress: &dyn Progress,
     ) -> Result<Self> {
         let all = All::new(context, base, theta, candidates);
-        let free = base.free();
-        let (mut center, mut bounds) = (Vec::new(), Vec::new());
-        let variations: Vec<Variation> = free
-            .iter()
-            .map(|&i| {
-                let u = &base.unknowns[i];
-                let up = theta[i] + BASE_SHARE * u.deviation <= u.bounds[1];
-                let share = if up { BASE_SHARE } else { -BASE_SHARE };
-                let mut other = theta.to_vec();
-                other[i] += share * u.deviation;
-                center.push(-u.distance(theta[i]));
-                bounds.push(u.bounds.map(|b| (b - theta[i]) / u.deviation));
-                Variation {
-                    theta: other,
-                    scale: share,
-                }
-            })
-            .collect();
-        let nv = context.plant().layout.nv;
-        let roles = 8 * nv + free.len() + 1;
+        let (mut asked, variations) = Asked::of_model(base, theta);
+        let roles = 8 * context.plant().layout.nv + asked.base + 1;
         let mut map = context.map(&base.specs, &base.parameters(), roles)?;
-        let replayed = context.has_segments();
-        let want = Derivatives {
-            state: true,
-            // Columns are told apart by slopes in forces at the very point that they are taken at.
-            force: !replayed,
-            jolt: !replayed,
-        };
-        let push = if replayed {
-            context.start_steps()
-        } else {
-            vec![PUSH; nv]
-        };
-        let mut linear = map.linearise(theta, &estimate.trajectory, want, &push, &variations)?;
+        let (want, steps) = slopes_wanted(context);
+        let mut linear = map.linearise(theta, &estimate.trajectory, want, &steps, &variations)?;
         let late: Vec<Vec<f64>> = linear.iter().map(|l| l.late.clone()).collect();
         let slopes = linear.iter_mut().map(ForceSlopes::take);
         let slopes: Vec<ForceSlopes> = slopes.collect();
@@ -156,76 +151,23 @@ impl Columns {
             together: true,
             progress,
         };
-        // Every start of a candidate, with the slopes at it.
-        let mut trials = Vec::new();
-        for (c, candidate) in candidates.iter().enumerate() {
-            for begin in &candidate.starts {
-                trials.extend(
-                    candidate
-                        .slopes()
-                        .into_iter()
-                        .map(|p| (c, begin.clone(), p)),
-                );
-            }
-        }
-        let (sizes, felt) = if replayed {
-            let range = |&(c, _, p): &(usize, Vec<f64>, usize)| {
-                let [low, high]: [f64; 2] = candidates[c].ranges[p];
-                high - low
-            };
-            let range = |t| REPLAY_TRIAL / SHARE * range(t);
-            (trials.iter().map(range).collect(), true)
+        let trials = trials(candidates);
+        let (sizes, felt) = if context.has_segments() {
+            (sizes_by_range(candidates, &trials), true)
         } else {
             sizes(context, estimate, &source, &trials)?
         };
-        let mut wanted = Vec::new();
-        let mut forms = Vec::new();
-        let mut next = 0;
-        for (c, candidate) in candidates.iter().enumerate() {
-            for begin in &candidate.starts {
-                let first = free.len() + wanted.len();
-                let mut slopes = Vec::new();
-                if candidate.slopes().is_empty() {
-                    wanted.push(Wanted {
-                        candidate: c,
-                        values: begin.clone(),
-                        scale: 1.0,
-                    });
-                    center.push(0.0);
-                    bounds.push([0.0, SECANT]);
-                    slopes.push(None);
-                }
-                for p in candidate.slopes() {
-                    let size = sizes[next];
-                    next += 1;
-                    if size <= 0.0 {
-                        continue;
-                    }
-                    let mut slope = Wanted::slope(candidates, c, begin, p, SHARE * size);
-                    slope.scale /= size;
-                    wanted.push(slope);
-                    let null = candidate.parameters()[p].null;
-                    let [low, high] = candidate.ranges[p];
-                    center.push(0.0);
-                    bounds.push([
-                        ((low - null) / size).max(-MOST),
-                        ((high - null) / size).min(MOST),
-                    ]);
-                    slopes.push(Some((p, size)));
-                }
-                if !slopes.is_empty() {
-                    forms.push(Form {
-                        candidate: c,
-                        begin: begin.clone(),
-                        slopes,
-                        first,
-                    });
-                }
-            }
-        }
-        let (mut found, walked) = source.columns(context, &estimate.trajectory, &wanted)?;
-        let (base, more) = (free.len(), wanted.len());
-        if replayed {
+        asked.add(candidates, &sizes);
+        let (mut found, walked) = source.columns(context, &estimate.trajectory, &asked.wanted)?;
+        let Asked {
+            center,
+            mut bounds,
+            base,
+            wanted,
+            mut forms,
+        } = asked;
+        let more = wanted.len();
+        if context.has_segments() {
             let sizes = sizes_by_replay(context, estimate, &found, more);
             for form in &mut forms {
                 resize(form, candidates, (&sizes, base), &mut found, &mut bounds);

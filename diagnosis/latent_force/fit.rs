@@ -185,15 +185,7 @@ pub fn fit(
             continue;
         }
         let from = rose.then(|| (theta.clone(), estimate.clone()));
-        let moves: Vec<f64> = found
-            .coefficients
-            .iter()
-            .map(|c| c.clamp(-LARGEST_STEP, LARGEST_STEP))
-            .collect();
-        for (k, &i) in free.iter().enumerate() {
-            let [low, high] = unknowns[i].bounds;
-            theta[i] = (theta[i] + moves[k] * unknowns[i].deviation).clamp(low, high);
-        }
+        let moves = step(unknowns, &free, &found.coefficients, &mut theta);
         shift(&mut linear, &moves);
         smooth(context, &mut map, &theta, (&linear, &steps), &mut estimate)?;
         if let Some(from) = from {
@@ -212,6 +204,17 @@ pub fn fit(
         best.wander = median(&mut drops).unwrap_or(0.0);
     }
     Ok(best)
+}
+
+/// Moves the free values by coefficients in deviations of their priors, within their bounds and the reach of a tangent; returns the moves.
+fn step(unknowns: &[Unknown], free: &[usize], coefficients: &[f64], theta: &mut [f64]) -> Vec<f64> {
+    let limited = |c: &f64| c.clamp(-LARGEST_STEP, LARGEST_STEP);
+    let moves: Vec<f64> = coefficients.iter().map(limited).collect();
+    for (by, &i) in moves.iter().zip(free) {
+        let [low, high] = unknowns[i].bounds;
+        theta[i] = (theta[i] + by * unknowns[i].deviation).clamp(low, high);
+    }
+    moves
 }
 
 /// Smooths the logs again after a step of the values: once about the moved linearisation, and where readings remember about

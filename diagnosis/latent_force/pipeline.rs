@@ -10,10 +10,10 @@ use asid_core::{Progress, Result};
 use crate::candidate::{Candidate, LeftOut, enumerate};
 use crate::ceiling::Left;
 use crate::decision::{Rules, decide};
-use crate::diagnose::Settings;
 use crate::findings::Repeats;
 use crate::machine::Machine;
 use crate::prepare::{dataset, set_reading_noise};
+use crate::settings::Settings;
 use crate::study::Study;
 use crate::trace::ForceTrace;
 use crate::work::Work;
@@ -24,7 +24,7 @@ use super::left::left;
 use super::picture::forces;
 use super::search::{Outcome, search};
 use super::selection::gather;
-use super::steps::{beside, known, noise_with_steps, shown};
+use super::steps::{Shown, beside, known, noise_with_steps, shown};
 
 use null::{Null, Stands};
 use replays::replay;
@@ -47,6 +47,56 @@ struct Searched {
     drawn: (Vec<ForceTrace>, Vec<Left>),
 }
 
+/// Fits the model without effects, and searches for what is missing.
+fn searched(null: Null<'_>, shown_steps: &[Shown], settings: &Settings) -> Result<Searched> {
+    let Null {
+        bench,
+        hypothesis,
+        progress,
+        ..
+    } = null;
+    let Stands {
+        context,
+        mut none,
+        repeats,
+    } = null.fit()?;
+    let rounds = (ROUNDS, progress);
+    if none.estimate.missing(&context).share < 1.0 {
+        none.estimate.free_at_rest(&context);
+        none.estimate.set_resolution(&context);
+        let from = (&none.estimate, &none.slopes);
+        none = fit(&context, hypothesis, &none.theta, from, rounds)?;
+    }
+    progress.end();
+    let shown = along(
+        bench,
+        &context.walks,
+        &none.theta,
+        &none.estimate.trajectory,
+    )?;
+    let (candidates, left_out) = enumerate(&bench.machine, &shown, &settings.without);
+    let steps = known(shown_steps, &candidates);
+    let members: Vec<usize> = steps.iter().map(|s| s.candidate).collect();
+    let offered = (&candidates[..], &members[..]);
+    let outcome = search(&context, &none, offered, settings.breadth, progress)?;
+    let firsts = (0..context.walks.len()).filter(|&w| context.walks[w].rows[0] == 0);
+    let firsts = firsts.collect::<Vec<_>>();
+    let drawn = (
+        forces(&context, &outcome, &candidates)?,
+        left(&context, &outcome),
+    );
+    let outcome = beside(outcome, &steps, &candidates);
+    Ok(Searched {
+        outcome,
+        candidates,
+        left_out,
+        members,
+        firsts,
+        repeats,
+        drawn,
+    })
+}
+
 /// Diagnoses a study.
 ///
 /// # Errors
@@ -58,7 +108,6 @@ pub fn diagnose(
     progress: &dyn Progress,
 ) -> Result<Work> {
     progress.begin("smoothing the logs", 1);
-    let (without, breadth) = (&settings.without[..], settings.breadth);
     let (mut bench, nominal) = dataset(study, machine)?;
     set_reading_noise(&mut bench, &study.noise);
     let shown_steps = shown(&bench.train.logs);
@@ -71,76 +120,29 @@ pub fn diagnose(
         unknowns: unknowns.map(|(p, n)| Unknown::of_study(p, *n)).collect(),
     };
     let rows = Rows::of(&bench, &nominal)?;
-    let Searched {
-        outcome,
-        candidates,
-        left_out,
-        members,
-        firsts,
-        repeats,
-        drawn,
-    } = {
-        let null = Null {
-            study,
-            bench: &bench,
-            rows: &rows,
-            logs: &logs,
-            hypothesis: &hypothesis,
-            nominal: &nominal,
-            progress,
-        };
-        let Stands {
-            context,
-            mut none,
-            repeats,
-        } = null.fit()?;
-        let rounds = (ROUNDS, progress);
-        if none.estimate.missing(&context).share < 1.0 {
-            none.estimate.free_at_rest(&context);
-            none.estimate.set_resolution(&context);
-            let from = (&none.estimate, &none.slopes);
-            none = fit(&context, &hypothesis, &none.theta, from, rounds)?;
-        }
-        progress.end();
-        let shown = along(
-            &bench,
-            &context.walks,
-            &none.theta,
-            &none.estimate.trajectory,
-        )?;
-        let (candidates, left_out) = enumerate(&bench.machine, &shown, without);
-        let steps = known(&shown_steps, &candidates);
-        let members: Vec<usize> = steps.iter().map(|s| s.candidate).collect();
-        let offered = (&candidates[..], &members[..]);
-        let outcome = search(&context, &none, offered, breadth, progress)?;
-        let firsts = (0..context.walks.len()).filter(|&w| context.walks[w].rows[0] == 0);
-        let firsts = firsts.collect::<Vec<_>>();
-        let drawn = (
-            forces(&context, &outcome, &candidates)?,
-            left(&context, &outcome),
-        );
-        let outcome = beside(outcome, &steps, &candidates);
-        Searched {
-            outcome,
-            candidates,
-            left_out,
-            members,
-            firsts,
-            repeats,
-            drawn,
-        }
+    let null = Null {
+        study,
+        bench: &bench,
+        rows: &rows,
+        logs: &logs,
+        hypothesis: &hypothesis,
+        nominal: &nominal,
+        progress,
     };
+    let found = searched(null, &shown_steps, settings)?;
+    let (candidates, outcome, members) = (found.candidates, found.outcome, found.members);
     progress.begin("replaying", 1);
     let parts = (&candidates[..], &outcome, &members[..]);
-    let (mut findings, sets) = replay(&bench, parts, (&firsts, repeats), progress)?;
-    (findings.forces, findings.left) = drawn;
+    let segments = (&found.firsts[..], found.repeats);
+    let (mut findings, sets) = replay(&bench, parts, segments, progress)?;
+    (findings.forces, findings.left) = found.drawn;
     progress.end();
     let evidence = gather(&bench, &outcome, (&sets, &members), &findings, &candidates)?;
     let judgement = decide(&evidence, &Rules::default());
     Ok(Work {
         bench,
         candidates,
-        left_out,
+        left_out: found.left_out,
         findings,
         evidence,
         judgement,

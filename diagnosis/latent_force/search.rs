@@ -1,6 +1,5 @@
 //! Forward selection of effects by evidence, with a look back after each.
 
-mod breadth;
 mod prune;
 mod round;
 mod set;
@@ -9,12 +8,12 @@ use asid_core::{Progress, Result};
 
 use crate::candidate::Candidate;
 use crate::chance::threshold;
+use crate::settings::Breadth;
 
 use super::context::Context;
 use super::estimate::Missing;
 use super::fit::Fitted;
 
-pub use breadth::{Breadth, FALSE_ALARMS};
 pub use round::{Round, Sight};
 pub use set::{Set, log_prior, name_of};
 

@@ -10,6 +10,7 @@ use crate::checks::change_by_step;
 use crate::decision::is_small;
 use crate::findings::Findings;
 use crate::fit::cost;
+use crate::skill::about_the_mean;
 
 use super::estimate::LEAST_LEFT;
 use super::search::{Outcome, Set, log_prior};
@@ -113,7 +114,11 @@ pub fn gather(
     };
     let own_error = if is_asked {
         let change = change_by_step(bench, &findings.none, &bench.machine.halved()?)?;
-        RICHARDSON.powi(2) * cost(&change) / bench.train.readings.max(1) as f64
+        // A replay that diverges tells nothing of it.
+        let finite = Some(cost(&change)).filter(|c| c.is_finite());
+        finite.map_or(f64::NAN, |c| {
+            RICHARDSON.powi(2) * c / bench.train.readings.max(1) as f64
+        })
     } else {
         f64::NAN
     };
@@ -121,6 +126,11 @@ pub fn gather(
         schema: 1,
         candidates: candidates.len(),
         none,
+        mean: Replayed {
+            train: about_the_mean(&bench.train.logs),
+            held_out: about_the_mean(&bench.test.logs),
+        },
+        repeatable: !findings.repeats.is_some_and(|r| r.scatters),
         screened: screened(plant, outcome, candidates, &tried),
         tried,
         found,

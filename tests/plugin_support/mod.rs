@@ -3,6 +3,23 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+/// Features of the root package that bring in native libraries, and the whole workspace with them.
+const NATIVE: [(&str, bool); 3] = [
+    ("mujoco", cfg!(feature = "mujoco")),
+    ("torch", cfg!(feature = "torch")),
+    ("logs", cfg!(feature = "logs")),
+];
+
+/// What cargo is to build. With all features it is what these tests are a part of, of which every crate is there already: packages by
+/// themselves would compile all of them once more, with other features.
+fn selection(packages: &[&str]) -> Vec<String> {
+    if NATIVE.iter().all(|(_, is_on)| *is_on) {
+        let names = NATIVE.map(|(name, _)| name).join(",");
+        return vec!["--workspace".into(), format!("--features={names}")];
+    }
+    packages.iter().map(|p| format!("--package={p}")).collect()
+}
+
 /// Builds packages of this workspace as their authors would, next to the program under
 /// test, and returns what they make: shared libraries and programs, in the order of `packages`.
 pub fn build(packages: &[&str]) -> Vec<PathBuf> {
@@ -16,10 +33,7 @@ pub fn build(packages: &[&str]) -> Vec<PathBuf> {
     if !cfg!(debug_assertions) {
         cargo.arg("--release");
     }
-    for package in packages {
-        cargo.args(["--package", package]);
-    }
-    let output = cargo.output().unwrap();
+    let output = cargo.args(selection(packages)).output().unwrap();
     let said = String::from_utf8_lossy(&output.stderr);
     assert!(
         output.status.success(),

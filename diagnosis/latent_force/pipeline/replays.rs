@@ -57,52 +57,52 @@ fn all_sets(outcome: &Outcome) -> Vec<Set> {
     sets
 }
 
-/// Replays the model without effects, the set that stands and its nearest rivals, open loop; with the sets behind the
-/// findings. The set of the `known` candidates is always among them.
-pub(super) fn replay(
-    bench: &Bench,
-    (candidates, outcome, known): (&[Candidate], &Outcome, &[usize]),
-    (firsts, repeats): (&[usize], Option<Repeats>),
-    progress: &dyn Progress,
-) -> Result<(Findings, Vec<Set>)> {
-    let episodes = &bench.train.logs.episodes;
-    let steps: usize = episodes.iter().map(|e| e.plan.physics_steps()).sum();
-    let stopped = progress.is_stopped();
-    let open = if stopped || steps * bench.open.len() > REPLAYED {
-        Vec::new()
-    } else {
-        bench.open.clone()
-    };
-    let study = bench.parameters.len();
-    let of = |fitted: &Fitted, members: &[usize], effort: Effort| -> Result<Explanation> {
+/// Replays of fitted sets: from where their starts were smoothed, with the values fitted once more to whole logs.
+struct Replays<'a> {
+    bench: &'a Bench,
+    candidates: &'a [Candidate],
+    /// Walks that begin an episode.
+    firsts: &'a [usize],
+    /// Coordinates of the starts that are fitted with the values.
+    open: Vec<usize>,
+    progress: &'a dyn Progress,
+}
+
+impl Replays<'_> {
+    /// Replays a fitted set of candidates.
+    fn of(&self, fitted: &Fitted, members: &[usize], effort: Effort) -> Result<Explanation> {
+        let study = self.bench.parameters.len();
         let mut at = study;
         let chosen: Vec<_> = members
             .iter()
             .map(|&c| {
-                let n = candidates[c].parameters().len();
+                let n = self.candidates[c].parameters().len();
                 let values = fitted.theta[at..at + n].to_vec();
                 at += n;
-                (&candidates[c], values)
+                (&self.candidates[c], values)
             })
             .collect();
-        let starts = smoothed_starts(bench, fitted, firsts);
-        let mut of = bench.explain(
+        let starts = smoothed_starts(self.bench, fitted, self.firsts);
+        let mut of = self.bench.explain(
             &chosen,
             &fitted.theta[..study],
-            (&starts, &open),
-            (effort, &UntilLate(progress)),
+            (&starts, &self.open),
+            (effort, &UntilLate(self.progress)),
         )?;
         for (k, i) in fitted.hypothesis.free().into_iter().enumerate() {
             of.local_variances[i] = fitted.covariance[(k, k)];
         }
         Ok(of)
-    };
-    let mut not_tried: Vec<NotTried> = (outcome.untried.iter())
-        .map(|u| NotTried {
-            stage: u.stage.to_owned(),
-            effects: u.sets.iter().map(|s| name_of(candidates, s)).collect(),
-        })
-        .collect();
+    }
+}
+
+/// How much the values are fitted to whole replays, without effects and of the set that stands; and how many rivals are
+/// replayed. What there was no time for goes to `not_tried`.
+fn efforts(
+    repeats: Option<Repeats>,
+    progress: &dyn Progress,
+    not_tried: &mut Vec<NotTried>,
+) -> (Effort, Effort, usize) {
     let mut cut = |stage: &str| {
         not_tried.push(NotTried {
             stage: stage.into(),
@@ -115,7 +115,7 @@ pub(super) fn replay(
         _ => Effort::BRIEF,
     };
     // A stopped search fits the values of what stands alone.
-    let (of_none, rivals) = if stopped {
+    let (of_none, rivals) = if progress.is_stopped() {
         cut("replays of rivals");
         (Effort::LOOK, 0)
     } else {
@@ -127,9 +127,16 @@ pub(super) fn replay(
     } else {
         values
     };
-    let none = of(&outcome.none, &[], of_none)?;
-    let mut sets = all_sets(outcome);
-    let ranking = ranking(candidates, outcome, &sets);
+    (of_none, of_best, rivals)
+}
+
+/// The set that stands, where it is one of those fitted, `rivals` by their evidence, and the set of the `known` candidates; and
+/// whether the first is the one that stands.
+fn replayed_sets(
+    outcome: &Outcome,
+    mut sets: Vec<Set>,
+    (known, rivals): (&[usize], usize),
+) -> (Vec<Set>, bool) {
     let best = &outcome.best.candidates;
     let stands = sets.iter().position(|s| s.candidates == *best);
     if let Some(place) = stands {
@@ -140,16 +147,48 @@ pub(super) fn replay(
     let of_known = of_known.filter(|i| *i > rivals).map(|i| sets.remove(i));
     sets.truncate(1 + rivals);
     sets.extend(of_known);
+    (sets, stands.is_some())
+}
+
+/// Replays the model without effects, the set that stands and its nearest rivals, open loop; with the sets behind the
+/// findings. The set of the `known` candidates is always among them.
+pub(super) fn replay(
+    bench: &Bench,
+    (candidates, outcome, known): (&[Candidate], &Outcome, &[usize]),
+    (firsts, repeats): (&[usize], Option<Repeats>),
+    progress: &dyn Progress,
+) -> Result<(Findings, Vec<Set>)> {
+    let episodes = &bench.train.logs.episodes;
+    let steps: usize = episodes.iter().map(|e| e.plan.physics_steps()).sum();
+    let few = steps * bench.open.len() <= REPLAYED && !progress.is_stopped();
+    let replays = Replays {
+        bench,
+        candidates,
+        firsts,
+        open: bench.open.iter().copied().filter(|_| few).collect(),
+        progress,
+    };
+    let mut not_tried: Vec<NotTried> = (outcome.untried.iter())
+        .map(|u| NotTried {
+            stage: u.stage.to_owned(),
+            effects: u.sets.iter().map(|s| name_of(candidates, s)).collect(),
+        })
+        .collect();
+    let (of_none, of_best, rivals) = efforts(repeats, progress, &mut not_tried);
+    let none = replays.of(&outcome.none, &[], of_none)?;
+    let sets = all_sets(outcome);
+    let ranking = ranking(candidates, outcome, &sets);
+    let (sets, stands) = replayed_sets(outcome, sets, (known, rivals));
     let mut found = Vec::new();
     for (i, set) in sets.iter().enumerate() {
-        let effort = if i == 0 && stands.is_some() {
+        let effort = if i == 0 && stands {
             of_best
         } else {
             Effort::LOOK
         };
         found.push(Found {
             candidates: set.candidates.clone(),
-            explanation: of(&set.fitted, &set.candidates, effort)?,
+            explanation: replays.of(&set.fitted, &set.candidates, effort)?,
         });
     }
     let findings = Findings {

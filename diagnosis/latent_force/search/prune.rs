@@ -7,8 +7,8 @@ use nalgebra::{DMatrix, DVector};
 use crate::candidate::Candidate;
 use crate::latent_force::context::Context;
 use crate::latent_force::estimate::Missing;
+use crate::settings::Breadth;
 
-use super::breadth::Breadth;
 use super::set::{IDLE, Set, without};
 
 /// Evidence, natural logarithm, that a set may lose when what counts as nothing is left out.

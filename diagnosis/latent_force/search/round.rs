@@ -13,9 +13,9 @@ use crate::latent_force::fit::{Fitted, Slopes};
 use crate::latent_force::rehearsal::{Rehearsal, rehearse};
 use crate::latent_force::screen::{Screened, isolability, rank, regressions};
 use crate::latent_force::smoother::Regression;
+use crate::settings::Breadth;
 
 use super::Untried;
-use super::breadth::Breadth;
 use super::prune::{pruned, pruned_at_once};
 use super::set::{Set, from_starts_of, log_prior, name_of, refined_by, with, without};
 

@@ -12,8 +12,7 @@ use crate::latent_force::columns::{Columns, Form};
 use crate::latent_force::context::Context;
 use crate::latent_force::fit::{Fitted, Hypothesis, Slopes, fit};
 use crate::latent_force::screen::Screened;
-
-use super::breadth::Breadth;
+use crate::settings::Breadth;
 
 /// A set of effects, fitted.
 #[derive(Clone, Debug)]

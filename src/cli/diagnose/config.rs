@@ -10,7 +10,7 @@ use anyhow::Result;
 use asid_core::Capabilities;
 use asid_core::registry::{self, BackendEntry, TaskEntry, find};
 use asid_diagnosis::diagnose::Settings;
-use asid_diagnosis::latent_force::search::{Breadth, FALSE_ALARMS};
+use asid_diagnosis::settings::{Breadth, FALSE_ALARMS};
 use asid_effects::EffectEntry;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -1,6 +1,6 @@
 //! How widely a diagnosis searches: the keys `search.KEY`.
 
-use asid_diagnosis::latent_force::search::Breadth;
+use asid_diagnosis::settings::Breadth;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -1,0 +1,118 @@
+//! Which columns are asked for: one a parameter of the present model, and those of each way to take a candidate.
+
+use crate::candidate::Candidate;
+use crate::latent_force::fit::Hypothesis;
+use crate::latent_force::step_map::Variation;
+
+use super::form::Form;
+use super::source::Wanted;
+use super::{BASE_SHARE, MOST, SECANT, SHARE};
+
+/// A parameter that acts in proportion, at one of the starts of its candidate: candidate, values to begin with, parameter.
+pub(super) type Trial = (usize, Vec<f64>, usize);
+
+/// Columns that are asked for.
+#[derive(Default)]
+pub(super) struct Asked {
+    /// Where the prior's center lies from the present point, in deviations; one a column.
+    pub(super) center: Vec<f64>,
+    /// Bounds about the present point, in deviations.
+    pub(super) bounds: Vec<[f64; 2]>,
+    /// Columns of the present model's own unknowns, which come first.
+    pub(super) base: usize,
+    /// What stands behind the others.
+    pub(super) wanted: Vec<Wanted>,
+    /// The ways to take the candidates.
+    pub(super) forms: Vec<Form>,
+}
+
+/// Bounds of a slope with a prior of deviation `size`, in deviations about its null.
+pub(super) fn bounds(candidate: &Candidate, parameter: usize, size: f64) -> [f64; 2] {
+    let [low, high] = candidate.ranges[parameter];
+    let null = candidate.parameters()[parameter].null;
+    [
+        ((low - null) / size).max(-MOST),
+        ((high - null) / size).min(MOST),
+    ]
+}
+
+/// Every start of every candidate, with the slopes at it.
+pub(super) fn trials(candidates: &[Candidate]) -> Vec<Trial> {
+    let mut trials = Vec::new();
+    for (c, candidate) in candidates.iter().enumerate() {
+        for begin in &candidate.starts {
+            let slopes = candidate.slopes().into_iter();
+            trials.extend(slopes.map(|p| (c, begin.clone(), p)));
+        }
+    }
+    trials
+}
+
+impl Asked {
+    /// Columns of a model's own unknowns at `theta`, and the points that they are taken at.
+    pub(super) fn of_model(model: &Hypothesis, theta: &[f64]) -> (Self, Vec<Variation>) {
+        let mut asked = Self::default();
+        let free = model.free();
+        let variation = |&i: &usize| {
+            let u = &model.unknowns[i];
+            let up = theta[i] + BASE_SHARE * u.deviation <= u.bounds[1];
+            let share = if up { BASE_SHARE } else { -BASE_SHARE };
+            let mut other = theta.to_vec();
+            other[i] += share * u.deviation;
+            asked.center.push(-u.distance(theta[i]));
+            let bounds = u.bounds.map(|b| (b - theta[i]) / u.deviation);
+            asked.bounds.push(bounds);
+            Variation {
+                theta: other,
+                scale: share,
+            }
+        };
+        let variations = free.iter().map(variation).collect();
+        asked.base = free.len();
+        (asked, variations)
+    }
+
+    /// Adds those of all candidates; `sizes` are the deviations of the priors of their [`trials`], 0 for what does nothing.
+    pub(super) fn add(&mut self, candidates: &[Candidate], sizes: &[f64]) {
+        let mut sizes = sizes.iter();
+        for (c, candidate) in candidates.iter().enumerate() {
+            for begin in &candidate.starts {
+                let first = self.base + self.wanted.len();
+                let mut slopes = Vec::new();
+                if candidate.slopes().is_empty() {
+                    let secant = Wanted {
+                        candidate: c,
+                        values: begin.clone(),
+                        scale: 1.0,
+                    };
+                    self.push(secant, [0.0, SECANT]);
+                    slopes.push(None);
+                }
+                for p in candidate.slopes() {
+                    let size = sizes.next().copied().unwrap_or(0.0);
+                    if size <= 0.0 {
+                        continue;
+                    }
+                    let mut slope = Wanted::slope(candidates, c, begin, p, SHARE * size);
+                    slope.scale /= size;
+                    self.push(slope, bounds(candidate, p, size));
+                    slopes.push(Some((p, size)));
+                }
+                if !slopes.is_empty() {
+                    self.forms.push(Form {
+                        candidate: c,
+                        begin: begin.clone(),
+                        slopes,
+                        first,
+                    });
+                }
+            }
+        }
+    }
+
+    fn push(&mut self, wanted: Wanted, bounds: [f64; 2]) {
+        self.wanted.push(wanted);
+        self.center.push(0.0);
+        self.bounds.push(bounds);
+    }
+}

@@ -1,0 +1,51 @@
+//! A diagnosis of logs whose wiring is in order: what the machine does that its model does not.
+
+mod final_noise;
+
+use asid_core::{Progress, Result};
+
+use crate::latent_force;
+use crate::machine::Machine;
+use crate::settings::Settings;
+use crate::study::Study;
+use crate::telling::{Diagnosis, Telling};
+use crate::work::Work;
+
+use final_noise::final_noise;
+
+/// Diagnoses a study whose logs are in order.
+pub(crate) fn diagnose_physics(
+    study: &Study,
+    machine: Machine,
+    settings: Settings,
+    progress: &dyn Progress,
+) -> Result<(Diagnosis, Work)> {
+    let mut work = latent_force::pipeline::diagnose(study, machine, &settings, progress)?;
+    work.findings = final_noise(&mut work.bench, study, &work.candidates, work.findings)?;
+    tell(study, work, settings, progress)
+}
+
+/// Tells what was found.
+fn tell(
+    study: &Study,
+    work: Work,
+    settings: Settings,
+    progress: &dyn Progress,
+) -> Result<(Diagnosis, Work)> {
+    progress.begin("telling", 1);
+    let diagnosis = Telling {
+        study,
+        bench: &work.bench,
+        candidates: &work.candidates,
+        left_out: &work.left_out,
+        findings: &work.findings,
+        evidence: &work.evidence,
+        judgement: &work.judgement,
+        nominal: &work.nominal,
+        settings,
+        stopped: progress.is_stopped(),
+    }
+    .tell()?;
+    progress.end();
+    Ok((diagnosis, work))
+}
