@@ -7,7 +7,7 @@ use crate::TrackerErrors;
 use asid_core::registry::find;
 use asid_core::signal::Signal;
 use asid_core::{Backend, Capabilities, Model, Parameter, Result, Scene, Target};
-use asid_effects::catalogue::{delay, mass};
+use asid_effects::catalogue::{command_dynamics, mass};
 use asid_effects::refined::{Refined, needs};
 use asid_effects::{EffectEntry, EffectSpec};
 use asid_mjcf::Plant;
@@ -15,7 +15,7 @@ use asid_mjcf::Plant;
 use crate::Perturbation;
 
 /// Effect on the command of a servo, and its parameter.
-const LAG: [&str; 2] = [delay::LAG, "time_constant"];
+const LAG: [&str; 2] = [command_dynamics::LAG, "time_constant"];
 
 /// Effect on a mass, and its parameter.
 const MASS: [&str; 2] = [mass::MASS, "factor"];

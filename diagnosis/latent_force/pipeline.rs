@@ -1,9 +1,9 @@
 //! From a study to what its result is told from, by the missing force.
 
-mod null;
 mod replays;
 mod rows;
 mod told;
+mod without_effects;
 
 use asid_core::{Progress, Result};
 
@@ -26,9 +26,9 @@ use super::search::{Outcome, search};
 use super::selection::gather;
 use super::steps::{Shown, beside, known, noise_with_steps, shown};
 
-use null::{Null, Stands};
 use replays::replay;
 use rows::{Rows, along};
+use without_effects::{Null, Stands};
 
 /// Most linearisations of the fit without effects.
 const ROUNDS: usize = 15;

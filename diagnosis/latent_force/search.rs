@@ -1,5 +1,6 @@
 //! Forward selection of effects by evidence, with a look back after each.
 
+mod prior;
 mod prune;
 mod round;
 mod set;
@@ -14,8 +15,9 @@ use super::context::Context;
 use super::estimate::Missing;
 use super::fit::Fitted;
 
+pub use prior::log_prior;
 pub use round::{Round, Sight};
-pub use set::{Set, log_prior, name_of};
+pub use set::{Set, name_of};
 
 use round::Upon;
 use set::{free_what_is_given, from_starts_of, is_due};

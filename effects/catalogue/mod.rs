@@ -15,10 +15,10 @@
 pub mod backlash;
 pub mod body_force;
 pub mod command;
+pub mod command_dynamics;
 pub mod compliance;
 pub mod contact_friction;
 pub mod contact_softness;
-pub mod delay;
 mod drive;
 mod dry;
 pub mod friction_field;

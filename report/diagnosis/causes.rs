@@ -20,8 +20,9 @@ const MOST: usize = 10;
 const LITTLE: f64 = 0.01;
 
 pub(super) fn section(d: &DiagnosisResult, t: &DiagnosisTrace) -> Section {
-    let lead = "An effect is written name@site, the site being the part of the scene that it acts on. A hypothesis is a set of effects of the catalogue, refitted together with the study's parameters. The probability of a hypothesis \
-                comes from its evidence (marginal likelihood); the probability of an effect is the sum over the hypotheses that contain it.";
+    let lead = "An effect is written name@site, the site being the part of the scene that it acts on. A hypothesis is a set of effects of the catalogue, refitted together with the study's parameters. The probability of a verdict that \
+                names effects was calibrated on training worlds: by its evidence (marginal likelihood), the gap that it leaves, and whether the search was cut short. Its rivals share the rest by their evidence, \
+                and a part goes to `unknown`. The probability of an effect is the sum over the hypotheses that contain it.";
     let mut section = Section::new("Which effect").lead(lead);
     section = explanation(d, t).into_iter().fold(section, Section::text);
     section = section.figures(vec![figure(d)]);

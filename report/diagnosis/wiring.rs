@@ -23,8 +23,8 @@ pub(super) fn section(d: &DiagnosisResult) -> Option<Section> {
     });
     let section = Section::new("Wiring")
         .lead(
-            "Columns of the logs that do not mean what their names say. The rest of this page is said with these mended; \
-             the lines below mend them in the study file.",
+            "Columns of the logs that do not mean what their names say. All other results on this page are computed with these faults corrected. \
+             The lines below make the same corrections in the study file.",
         )
         .table(table);
     let mut shown: Vec<&str> = Vec::new();

@@ -110,7 +110,7 @@ fn over_time(d: &Downstream) -> Figure {
         "; shades are the phases of the motion"
     };
     let caption = format!(
-        "At most {}, {} at the end{phases}.",
+        "Peak {}; final value {}{phases}.",
         quantity(&significant(peak, 2), &d.unit),
         metric_value(d)
     );

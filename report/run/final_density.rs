@@ -17,7 +17,7 @@ pub(super) fn figure(p: &ParameterReport) -> Option<Figure> {
         return Some(Figure::new(
             title,
             binary(p, probability)?,
-            "Probability of 0 and of 1, before and after.",
+            "Probability of the values 0 and 1: prior and posterior.",
         ));
     }
     // All that follows happens on the axis' own scale: `u` is the logarithm for a parameter drawn on a log axis.

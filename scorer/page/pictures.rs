@@ -46,8 +46,8 @@ pub(super) fn power(score: &Score) -> Section {
             .layer(Layer::dots(points.clone()).colour(colour))
             .layer(Layer::line(points).colour(colour).label(label));
     }
-    let caption = "How often the answer is right, and how often anything is said to be missing, by how far the world \
-                   with its causes is from its model after the study's parameters are fitted. Bars: 95 %.";
+    let caption = "Share of cases with a right answer, and share in which anything is said to be missing, against the excess gap of \
+                   the causes alone, after the study's parameters are refitted. Bars: intervals of 95 %.";
     Section::new("Power").figures(vec![Drawing::new(
         "Share right against the true excess gap",
         chart.description(caption),

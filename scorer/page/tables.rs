@@ -60,7 +60,7 @@ pub(super) fn methods(scores: &[Score]) -> Section {
         }
     }
     Section::new("Methods")
-        .lead("The same cases, answered by baselines: what the diagnosis is worth is what it is better than these.")
+        .lead("Each method answers the same cases. The value of the diagnosis is its margin over the baselines.")
         .table(all)
 }
 

@@ -32,9 +32,9 @@ use live::Live;
 A study is a TOML file, or a folder with study.toml: the model, logs to fit to and logs held out, and what \
 is fitted already. docs/diagnosis.md tells how to write one, and how to read the answer.
 
-With --task a built-in task takes the study's place. Without --train it is run some times in its simulated \
-real world (--real-effect and the like); the logs of these runs are diagnosed, the answer is added to the \
-simulator, and the task is run again.
+With --task a built-in task takes the study's place. Without --train the task is first run --runs times in its \
+simulated real world (--real-effect and the like). The logs of these runs are diagnosed; the last third is held out. \
+Where effects are found, the task is then played with the refined model, --seeds times, to count successes.
 
 The folder holds result.json, refined.toml (the model with the diagnosed effects added, for a study's \
 `model`), config.toml, copies of the logs, report.html, trace.json and \

@@ -34,7 +34,7 @@ pub struct Common {
     /// Seed all random numbers with this
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = seed)]
     pub seed: Option<u64>,
-    /// Use this many threads; results do not depend on it [default: one a core]
+    /// Use this many threads; results do not depend on it, but where --minutes or --limit ends the work [default: one a core]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = threads)]
     pub threads: Option<usize>,
     /// Settings below those of `config`, from elsewhere than the command line.

@@ -35,8 +35,8 @@ and nothing else; then the labels are read, once, and the answers scored: right 
 false alarms, the gap closed, by machine, cause, magnitude and fault of the log (docs/withheld.md). A case without an \
 answer, by an error or by --limit, counts as wrong. Cases that the engine cannot simulate are left out, with the reason.
 
-Answers are kept in OUT/answers, bound to program, call and study: the same call goes on where it was interrupted, and \
-scores anew. With --shard i/n a call answers its share and scores nothing; the same call without it, in the same OUT, \
+OUT/answers keeps each answer with a hash of program, study and settings of the diagnosis. Repeating the command skips \
+the answers whose hash is the same, and scores again. With --shard i/n a call answers its share and scores nothing; the same call without it, in the same OUT, \
 scores all.
 
 With --make a folder of new cases is written instead: DIR/studies, which is for --cases, and apart from it \

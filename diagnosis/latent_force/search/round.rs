@@ -16,8 +16,9 @@ use crate::latent_force::smoother::Regression;
 use crate::settings::Breadth;
 
 use super::Untried;
+use super::prior::log_prior;
 use super::prune::{pruned, pruned_at_once};
-use super::set::{Set, from_starts_of, log_prior, name_of, refined_by, with, without};
+use super::set::{Set, from_starts_of, name_of, refined_by, with, without};
 
 /// Leading candidates that are compared pair by pair.
 const COMPARED: usize = 20;

@@ -46,8 +46,8 @@ pub fn draw(request: &Request<'_>) -> Result<Drawing> {
         ..Drawing::new(
             "How often the lid is moved",
             format!(
-                "{episodes} exploration episodes of each explorer on {TASK}, whose lid turns. The lid was moved where \
-             it turned against the base by more than {MOVED} rad; dots show where the laptop stood."
+                "{episodes} exploration episodes of each explorer on {TASK}, whose lid turns. The lid counts as moved if \
+             it turns relative to the base by more than {MOVED} rad. Dots show where the laptop stood."
             ),
         )
     };

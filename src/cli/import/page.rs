@@ -44,7 +44,7 @@ fn mapping(matches: &[Match], notes: &[String], unused: &[String]) -> Section {
         Column::number("Hz"),
         Column::text("values"),
     ])
-    .caption("Values after the unit, in the unit of the model.");
+    .caption("Range of the values after the conversion of units, in the unit of the model.");
     for found in matches {
         let [column, read, rate, values, why] = cells(found);
         table = table.row(vec![
