@@ -1,12 +1,14 @@
 //! The bench on which explanations are tried: the machine, the logs, their noise, and the starts of the episodes.
 
+mod held_out;
+
 use asid_core::layout::Layout;
 use asid_core::progress::Silent;
 use asid_core::{Parameter, Progress, Result};
 use asid_effects::EffectSpec;
 
 use crate::candidate::Candidate;
-use crate::fit::{Effort, Fit, cost, fit};
+use crate::fit::{Effort, Fit, fit};
 use crate::linearise::{Open, Unknown};
 use crate::machine::Machine;
 use crate::predict::{Point, Predictor, State};
@@ -24,7 +26,7 @@ pub struct Explanation {
     pub unknowns: Vec<Unknown>,
     /// The fit to the training logs.
     pub fit: Fit,
-    /// Sum of squares of the residuals of the logs held out.
+    /// Sum of squares of the residuals of the logs held out, beyond what their starts leave open.
     pub held_out: f64,
     /// Starts of the held-out episodes under it.
     pub held_starts: Vec<State>,
@@ -174,30 +176,18 @@ impl Bench {
         }
     }
 
-    /// Replays the logs held out at an explanation's parameters and sets what it leaves of them;
+    /// Replays the logs held out at an explanation's parameters and sets what it leaves of them beyond what their starts leave open;
     /// where starts are open they are fitted on the first tenth, which then does not count.
     ///
     /// # Errors
     /// When a rollout fails.
     pub fn hold_out(&self, trials: &[Trial<'_>], of: &mut Explanation) -> Result<()> {
         of.held_starts = self.head_starts(trials, &of.fit.point.theta, &of.held_starts)?;
-        self.score_held_out(trials, of)
-    }
-
-    /// Replays the logs held out at an explanation's parameters, from the starts that it has, and sets what it leaves of them.
-    ///
-    /// # Errors
-    /// When a rollout fails.
-    pub fn score_held_out(&self, trials: &[Trial<'_>], of: &mut Explanation) -> Result<()> {
-        let theta = of.fit.point.theta.clone();
-        let mut predictor = self.predictor(trials, &self.test)?;
         let point = Point {
-            theta,
+            theta: of.fit.point.theta.clone(),
             starts: of.held_starts.clone(),
         };
-        let mut residuals = predictor.residuals(&[point])?.pop().unwrap_or_default();
-        self.mask_head(&mut residuals);
-        of.held_out = cost(&residuals);
+        of.held_out = held_out::misfit(self, trials, &point)?;
         Ok(())
     }
 

@@ -36,26 +36,34 @@ pub fn diagnose(
     let mut intake = Intake::of(study, &machine)?;
     progress.end();
     let (first, second) = intake.ways();
-    let again = second.map(|_| (machine.clone(), settings.clone()));
-    let rehearsed = (settings.calibrate).then(|| (machine.clone(), settings.clone()));
-    let (mut diagnosis, mut work) = diagnose_physics(first, machine, settings, progress)?;
+    let physics =
+        |study: &Study| diagnose_physics(study, machine.clone(), settings.clone(), progress);
+    let (mut diagnosis, mut work) = physics(first)?;
     let left = diagnosis.result.gap.refined;
-    if let (Some((machine, settings)), Some(second)) = (again, second)
+    if let Some(second) = second
         && left > DOUBTFUL
         && !progress.is_stopped()
     {
         progress.note("the wiring taken the other way");
-        let other = diagnose_physics(second, machine, settings, progress)?;
+        let other = physics(second)?;
         if other.0.result.gap.refined < BETTER * left {
             (diagnosis, work) = other;
             intake.turn();
         }
     }
     intake.settle();
+    // A clock is estimated over short windows; whole logs tell it better.
+    if let Some(short) = intake.clock_short(&diagnosis.effects)
+        && !progress.is_stopped()
+    {
+        progress.note("the clock was estimated short");
+        intake.delay_clock(short, &machine.plant.layout)?;
+        (diagnosis, work) = physics(&intake.study)?;
+    }
     let (bench, point) = (&work.bench, &work.findings.none.fit.point);
     let residuals = plain_residuals(bench, &bench.train, &[], point)?;
     let whiteness = crate::checks::whiteness(&bench.train.logs, &residuals);
-    if let Some((machine, settings)) = rehearsed {
+    if settings.calibrate {
         let parts = (&diagnosis, &work);
         let found = calibrate(&intake.study, &machine, parts, &settings, progress)?;
         if found.runs == 0 {

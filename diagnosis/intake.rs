@@ -1,6 +1,9 @@
 //! What happens to logs before any physics: outliers are left out, wiring is mended, and both are said.
 
-use asid_core::Result;
+use asid_core::{Layout, Result};
+use asid_effects::EffectSpec;
+use asid_effects::catalogue::sensor_dynamics::DELAY;
+use asid_logs::episode::ColumnMapping;
 
 use crate::machine::Machine;
 use crate::outliers::{self, LeftOut};
@@ -14,6 +17,9 @@ use crate::wiring::{self, Settings};
 /// such a fault is the more probable cause: what is left is then less than what the fault explains.
 const HALF: f64 = 0.5;
 
+/// Name of the fault that all readings are late or early.
+const CLOCK: &str = "wiring-clock";
+
 /// A study whose logs are ready for a diagnosis.
 pub struct Intake {
     /// The study, with outliers left out of its logs and its wiring as it is taken.
@@ -24,6 +30,8 @@ pub struct Intake {
     is_mended: bool,
     /// Faults of wiring that can be mended.
     wiring: Vec<WiringResult>,
+    /// The mappings that mend them.
+    mappings: Vec<ColumnMapping>,
     left_out: Vec<LeftOut>,
 }
 
@@ -44,6 +52,7 @@ impl Intake {
             other: None,
             is_mended: false,
             wiring: Vec::new(),
+            mappings: Vec::new(),
             left_out,
         };
         if intake.study.wired {
@@ -55,6 +64,7 @@ impl Intake {
         }
         let as_given = std::mem::replace(&mut intake.study, mended.study);
         (intake.wiring, intake.is_mended) = (mended.wiring, true);
+        intake.mappings = mended.mappings;
         if mended.doubted {
             let share = share_left(&intake, &as_given, machine)?;
             let is_most = share < HALF;
@@ -86,6 +96,46 @@ impl Intake {
         if !self.is_mended {
             self.wiring.clear();
         }
+    }
+
+    /// What a mended clock was estimated short by, s: the mean delay of a verdict that has every sensor late. `None` where no clock was
+    /// mended, or some sensor is not late.
+    #[must_use]
+    pub fn clock_short(&self, effects: &[EffectSpec]) -> Option<f64> {
+        let clock = self.wiring.iter().find(|w| w.fault == CLOCK)?;
+        let late = |sensor: &String| {
+            let own = effects
+                .iter()
+                .find(|e| e.name == DELAY && e.site == *sensor)?;
+            own.values.first().map(|(_, seconds)| *seconds)
+        };
+        let delays: Vec<f64> = clock.columns.iter().map(late).collect::<Option<_>>()?;
+        Some(delays.iter().sum::<f64>() / delays.len().max(1) as f64)
+    }
+
+    /// Mends a clock by further seconds, in the logs and in the lines for the study's file.
+    ///
+    /// # Errors
+    /// When the logs are too short for it.
+    pub fn delay_clock(&mut self, seconds: f64, layout: &Layout) -> Result<()> {
+        let Some(clock) = self.wiring.iter().position(|w| w.fault == CLOCK) else {
+            return Ok(());
+        };
+        let further = |name: &String| ColumnMapping {
+            delay: seconds,
+            ..ColumnMapping::of(name)
+        };
+        let further: Vec<ColumnMapping> = self.wiring[clock].columns.iter().map(further).collect();
+        wiring::mend::apply(&mut self.study, layout, &further)?;
+        for mapping in &mut self.mappings {
+            if wiring::mend::concerns_any(mapping, &self.wiring[clock].columns) {
+                mapping.delay += seconds;
+            }
+        }
+        for w in &mut self.wiring {
+            w.mend = wiring::mend::lines(&self.study, &self.mappings, &w.columns);
+        }
+        Ok(())
     }
 
     /// Says in a result what was done, and what the noise is like.
@@ -230,7 +280,7 @@ fn in_words(wiring: &WiringResult) -> String {
         "wiring-sign" => "counts the other way",
         "wiring-unit" => "is in another unit",
         "wiring-offset" => "has another zero",
-        "wiring-clock" => "are late or early against the commands",
+        CLOCK => "are late or early against the commands",
         _ => "are wired otherwise",
     };
     format!("{columns} {what} (probability {:.2})", wiring.probability)

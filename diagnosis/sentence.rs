@@ -11,12 +11,17 @@ const WORTH_A_WORD: f64 = 0.05;
 /// Gap on the logs held out up to which it is that of the noise: its deviation is estimated.
 const OF_NOISE: f64 = 1.2;
 
-/// Where no effect is missing.
-fn none(gap: f64, repeats: Option<Repeats>) -> String {
+/// Where no effect is missing; `beyond` is the gap beyond what the starts of the logs held out leave open.
+fn none(gap: f64, beyond: f64, repeats: Option<Repeats>) -> String {
     let fitted = "once the study's parameters are fitted";
     if gap <= OF_NOISE {
         return format!(
             "No gap is left beyond the sensors' noise, {fitted} (gap {gap:.2} on the logs held out)."
+        );
+    }
+    if beyond <= OF_NOISE {
+        return format!(
+            "No effect is missing, {fitted}: the gap of {gap:.2} on the logs held out is within what their initial states leave open, which are fitted on the first tenth."
         );
     }
     if repeats.is_some_and(|r| r.scatters) {
@@ -44,13 +49,13 @@ fn beside(result: &DiagnosisResult) -> String {
 }
 
 /// Says what a result means, in one sentence; `labels` are the effects of the best
-/// explanation, whether or not it is the verdict, `rest` what they leave, where one knows, and `repeats` how far contacts can be
-/// repeated.
+/// explanation, whether or not it is the verdict, `rest` what they leave, where one knows, `repeats` how far contacts can be
+/// repeated, and `beyond` the gap without effects beyond what the starts of the logs held out leave open.
 #[must_use]
 pub fn sentence(
     result: &DiagnosisResult,
     (labels, rest): (&[String], Option<&str>),
-    repeats: Option<Repeats>,
+    (repeats, beyond): (Option<Repeats>, f64),
 ) -> String {
     let place = result.places.first().map_or_else(String::new, |w| {
         let condition = w
@@ -89,7 +94,7 @@ pub fn sentence(
         _ => "what there is of it".into(),
     };
     let body = match result.verdict.kind {
-        Kind::None => none(result.gap.identified, repeats),
+        Kind::None => none(result.gap.identified, beyond, repeats),
         Kind::Effects => {
             let ambiguous = if result.verdict.ambiguous_with.is_empty() {
                 String::new()

@@ -164,9 +164,9 @@ impl Telling<'_> {
         let rest = short
             .and_then(|(before, after, _)| least_explained(&before, &after))
             .or_else(|| least_made_up(&result.missing_force));
-        let repeats = self.findings.repeats;
+        let beyond = self.evidence.none.held_out.sqrt();
         let best = (&labels[..], rest.as_deref());
-        result.sentence = crate::sentence::sentence(&result, best, repeats);
+        result.sentence = crate::sentence::sentence(&result, best, (self.findings.repeats, beyond));
         let mut trace = self.trace(&nominal, &identified, &refined, &result.effects)?;
         trace.view = Some(self.view([&nominal, &identified, &refined], &explanation)?);
         let study = self.bench.parameters.len();

@@ -12,7 +12,7 @@ pub struct Replayed {
     /// Of the logs that were fitted to.
     #[serde(deserialize_with = "nullable::scalar")]
     pub train: f64,
-    /// Of the logs held out.
+    /// Of the logs held out, by the noise and by the covariance of starts that were fitted on their first tenth.
     #[serde(deserialize_with = "nullable::scalar")]
     pub held_out: f64,
 }

@@ -1,6 +1,6 @@
 //! A study with the wiring that its logs show, and the lines that say so.
 
-use asid_core::{Episode, Result};
+use asid_core::{Layout, Result};
 use asid_logs::episode::{ColumnMapping, remapped};
 
 use crate::machine::Machine;
@@ -20,6 +20,8 @@ pub struct Mended {
     pub study: Study,
     /// What was found.
     pub wiring: Vec<WiringResult>,
+    /// The mappings that mend it, of the columns as the study takes them.
+    pub mappings: Vec<ColumnMapping>,
     /// Whether all of it may be nothing: each fault is one that effects can look like, or not certain.
     pub doubted: bool,
     /// By which factor, as a logarithm, each shrinks what predictions miss, summed over columns.
@@ -63,6 +65,7 @@ pub fn mend(study: &Study, machine: &Machine, settings: &Settings) -> Result<Men
     let unchanged = || Mended {
         study: study.clone(),
         wiring: Vec::new(),
+        mappings: Vec::new(),
         doubted: false,
         shrinkage: Vec::new(),
         nearest: None,
@@ -99,14 +102,8 @@ pub fn mend(study: &Study, machine: &Machine, settings: &Settings) -> Result<Men
         });
     }
     let mappings = mappings(&all, &view);
-    let remapped = |logs: &[(String, Episode)]| -> Result<Vec<(String, Episode)>> {
-        let one =
-            |(name, e): &(String, Episode)| Ok((name.clone(), remapped(e, layout, &mappings)?));
-        logs.iter().map(one).collect()
-    };
     let mut mended = study.clone();
-    mended.train = remapped(&study.train)?;
-    mended.test = remapped(&study.test)?;
+    apply(&mut mended, layout, &mappings)?;
     let wiring = found
         .iter()
         .map(|f| {
@@ -114,16 +111,11 @@ pub fn mend(study: &Study, machine: &Machine, settings: &Settings) -> Result<Men
                 Fault::Clock => sensors.clone(),
                 _ => f.quantities.iter().map(|&q| all[q].name.clone()).collect(),
             };
-            let lines: Vec<String> = mappings
-                .iter()
-                .filter(|m| columns.iter().any(|c| concerns(m, c)))
-                .map(|m| study.composed(m).lines())
-                .collect();
             WiringResult {
                 fault: f.fault.name().to_owned(),
+                mend: lines(study, &mappings, &columns),
                 columns,
                 probability: f.probability,
-                mend: lines.join("\n"),
             }
         })
         .collect();
@@ -131,10 +123,34 @@ pub fn mend(study: &Study, machine: &Machine, settings: &Settings) -> Result<Men
     Ok(Mended {
         study: mended,
         wiring,
+        mappings,
         doubted: found.iter().all(in_doubt),
         shrinkage: found.iter().map(|f| f.shrinkage).collect(),
         nearest,
     })
+}
+
+/// Reads the logs of a study by further mappings.
+///
+/// # Errors
+/// When a mapping does not fit the logs.
+pub fn apply(study: &mut Study, layout: &Layout, mappings: &[ColumnMapping]) -> Result<()> {
+    for (_, episode) in study.train.iter_mut().chain(&mut study.test) {
+        *episode = remapped(episode, layout, mappings)?;
+    }
+    Ok(())
+}
+
+/// The lines of the mappings that concern some columns, for the study's file.
+pub fn lines(study: &Study, mappings: &[ColumnMapping], columns: &[String]) -> String {
+    let own = mappings.iter().filter(|m| concerns_any(m, columns));
+    let lines: Vec<String> = own.map(|m| study.composed(m).lines()).collect();
+    lines.join("\n")
+}
+
+/// Whether a mapping is of some of these columns.
+pub fn concerns_any(mapping: &ColumnMapping, columns: &[String]) -> bool {
+    columns.iter().any(|c| concerns(mapping, c))
 }
 
 /// Whether a mapping is of a column, or of an entry of it, or of the vector that it is an entry of.

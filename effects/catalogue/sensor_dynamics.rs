@@ -13,8 +13,11 @@ use asid_mjcf::native::NativeModel;
 use super::sensor::sensors;
 use super::{at_least, values};
 
+/// Name of the effect by which a reading is late.
+pub const DELAY: &str = "sensor-delay";
+
 crate::register!(EffectEntry {
-    name: "sensor-delay",
+    name: DELAY,
     about: "a reading is old",
     make: || Box::new(Delay),
 });

@@ -32,6 +32,30 @@ pub(super) struct Reader<'a> {
     notes: LogNotes,
 }
 
+/// The columns that are passed over, and the sensors whose names they nearly are.
+fn noted(layout: &Layout, channels: &[ChannelColumns], passed_over: Vec<String>) -> LogNotes {
+    let mut notes = LogNotes {
+        passed_over,
+        ..LogNotes::default()
+    };
+    for s in &layout.sensors {
+        if channels.iter().any(|c| c.name == s.name) {
+            continue;
+        }
+        let stems = notes
+            .passed_over
+            .iter()
+            .map(|name| match name.strip_suffix(".0") {
+                Some(stem) if s.len > 1 => stem,
+                _ => name,
+            });
+        if let Some(near) = Error::nearest(&s.name, stems) {
+            notes.misspelt.push((near, s.name.clone()));
+        }
+    }
+    notes
+}
+
 impl<'a> Reader<'a> {
     /// Finds what each column holds.
     pub(super) fn new(
@@ -92,28 +116,12 @@ impl<'a> Reader<'a> {
                 || ctrl.iter().chain(&readings).any(|c| c.place == i)
                 || state.iter().any(|(c, _, _)| *c == i)
         };
-        let mut notes = LogNotes {
-            passed_over: (0..header.len())
-                .filter(|&i| !known(i))
-                .map(|i| header[i].clone())
-                .collect(),
-            ..LogNotes::default()
-        };
-        for s in &layout.sensors {
-            if channels.iter().any(|c| c.name == s.name) {
-                continue;
-            }
-            let stems = notes
-                .passed_over
-                .iter()
-                .map(|name| match name.strip_suffix(".0") {
-                    Some(stem) if s.len > 1 => stem,
-                    _ => name,
-                });
-            if let Some(near) = Error::nearest(&s.name, stems) {
-                notes.misspelt.push((near, s.name.clone()));
-            }
-        }
+        let places = (0..header.len()).filter(|&i| !known(i));
+        let notes = noted(
+            layout,
+            &channels,
+            places.map(|i| header[i].clone()).collect(),
+        );
         if channels.is_empty() {
             let near = notes.misspelt.first();
             let near = near.map_or_else(String::new, |(a, b)| format!("; is `{a}` its `{b}`?"));

@@ -56,54 +56,21 @@ pub(super) fn draw(layer: &Layer, frame: &Frame) -> String {
             fill(&ribbon(&edges.collect::<Vec<_>>()))
         }
         Mark::Dots(points, radius) => {
-            let dots: String = points
-                .iter()
-                .map(at)
-                .filter(|p| p.iter().all(|c| c.is_finite()))
-                .map(|[cx, cy]| {
-                    format!(
-                        "<circle cx=\"{}\" cy=\"{}\" r=\"{}\"/>",
-                        coordinate(cx),
-                        coordinate(cy),
-                        coordinate(*radius)
-                    )
-                })
-                .collect();
+            let dots = dots(points.iter().map(at), *radius);
             format!("<g class=\"fill {class}\"{name} fill-opacity=\"{opacity}\">{dots}</g>")
         }
         Mark::Whiskers(points) => {
-            let strokes: String = points
-                .iter()
-                .map(|p| [x.map(p[0]), y.map(p[1]), y.map(p[2])])
-                .filter(|p| p.iter().all(|c| c.is_finite()))
-                .map(|p| {
-                    format!(
-                        "M{} {}V{}",
-                        coordinate(p[0]),
-                        coordinate(p[1]),
-                        coordinate(p[2])
-                    )
-                })
-                .collect();
-            stroke(&strokes)
+            let places = points.iter();
+            stroke(&whiskers(
+                places.map(|p| [x.map(p[0]), y.map(p[1]), y.map(p[2])]),
+            ))
         }
         Mark::Bars(bars) => {
-            let rectangles: String = bars
-                .iter()
-                .map(|b| [x.map(b[0]), x.map(b[1]), y.map(b[2])])
-                .filter(|b| b.iter().all(|c| c.is_finite()))
-                .map(|[x0, x1, y1]| {
-                    let gap = if (x1 - x0).abs() > 4.0 { 0.6 } else { 0.0 };
-                    format!(
-                        "M{} {}V{}H{}V{}Z",
-                        coordinate(x0 + gap),
-                        coordinate(zero),
-                        coordinate(y1),
-                        coordinate(x1 - gap),
-                        coordinate(zero)
-                    )
-                })
-                .collect();
+            let places = bars.iter();
+            let rectangles = rectangles(
+                places.map(|b| [x.map(b[0]), x.map(b[1]), y.map(b[2])]),
+                zero,
+            );
             fill(&rectangles)
         }
         Mark::Vertical(value) if x.map(*value).is_finite() => stroke(&format!(
@@ -132,6 +99,49 @@ pub(super) fn draw(layer: &Layer, frame: &Frame) -> String {
         }
         Mark::Vertical(_) | Mark::Horizontal(_) | Mark::Span(..) => String::new(),
     }
+}
+
+fn is_finite(place: &[f64; 3]) -> bool {
+    place.iter().all(|c| c.is_finite())
+}
+
+/// Circles about some places.
+fn dots(places: impl Iterator<Item = [f64; 2]>, radius: f64) -> String {
+    let seen = places.filter(|p| p.iter().all(|c| c.is_finite()));
+    seen.map(|[cx, cy]| {
+        format!(
+            "<circle cx=\"{}\" cy=\"{}\" r=\"{}\"/>",
+            coordinate(cx),
+            coordinate(cy),
+            coordinate(radius)
+        )
+    })
+    .collect()
+}
+
+/// A path of vertical strokes: at `x`, from one `y` to another.
+fn whiskers(places: impl Iterator<Item = [f64; 3]>) -> String {
+    let stroke = |p: [f64; 3]| {
+        let [x, from, to] = p.map(coordinate);
+        format!("M{x} {from}V{to}")
+    };
+    places.filter(is_finite).map(stroke).collect()
+}
+
+/// A path of rectangles that stand on `zero`: from one `x` to another, up to `y`.
+fn rectangles(places: impl Iterator<Item = [f64; 3]>, zero: f64) -> String {
+    let rectangle = |[x0, x1, y1]: [f64; 3]| {
+        let gap = if (x1 - x0).abs() > 4.0 { 0.6 } else { 0.0 };
+        format!(
+            "M{} {}V{}H{}V{}Z",
+            coordinate(x0 + gap),
+            coordinate(zero),
+            coordinate(y1),
+            coordinate(x1 - gap),
+            coordinate(zero)
+        )
+    };
+    places.filter(is_finite).map(rectangle).collect()
 }
 
 /// An SVG path through `points`, interrupted where one is not finite.

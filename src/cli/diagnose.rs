@@ -194,13 +194,7 @@ pub fn diagnose(arguments: &Arguments) -> Result<()> {
         let backend = backend(&config.backend)?;
         format!("{} {}", backend.name(), backend.version())
     };
-    let mut settings = toml::Table::try_from(&config)?;
-    if let Some(world) = &world {
-        // The diagnosis' own settings win.
-        let of_run = world.settings()?.into_iter();
-        let more: Vec<_> = of_run.filter(|(k, _)| !settings.contains_key(k)).collect();
-        settings.extend(more);
-    }
+    let settings = settings(&config, world.as_ref())?;
     diagnosis.result.seconds = Some(progress.seconds());
     diagnosis.result.seconds_to_first_table = progress.seconds_to_first_table();
     tell_origin(&mut diagnosis.trace, &engine, config.seed);
@@ -226,6 +220,17 @@ pub fn diagnose(arguments: &Arguments) -> Result<()> {
         failure::warn(&format!("check {}: {}", check.check, check.detail));
     }
     Ok(())
+}
+
+/// What `config.toml` holds: the diagnosis' own settings, which win, and those of the runs of a task.
+fn settings(config: &Config, world: Option<&real_world::Machine>) -> Result<toml::Table> {
+    let mut settings = toml::Table::try_from(config)?;
+    if let Some(world) = world {
+        let of_run = world.settings()?.into_iter();
+        let more: Vec<_> = of_run.filter(|(k, _)| !settings.contains_key(k)).collect();
+        settings.extend(more);
+    }
+    Ok(settings)
 }
 
 /// Adds to a trace what it was made with and what lies beside it.

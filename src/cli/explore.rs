@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::time::Instant;
 
-use crate::pipeline::episode_information;
+use crate::pipeline::{EpisodeInformation, episode_information};
 use anyhow::Result;
 use asid_algorithms::fisher::FisherSettings;
 use asid_core::real_world::RealEpisode;
@@ -144,37 +144,16 @@ pub fn explore(arguments: &Arguments) -> Result<()> {
         cost: session.cost(wall_s),
         versions: Versions::of(&session),
     };
-    let expected: Vec<String> = session
-        .parameters
-        .iter()
-        .zip(information.expected_std.last().into_iter().flatten())
-        .map(|(p, std)| format!("{} ± {} {}", p.name, figure(*std), p.unit))
-        .collect();
+    let expected = expected(&session, &information);
     let lines = [
         format!("start: {}", stage::start_line(&session)),
-        format!("expected after the episode: {}", expected.join(", ")),
+        format!("expected after the episode: {expected}"),
     ];
-    let mut files = vec![
-        (
-            "commands.csv",
-            "the commands to play: time in s, one column an actuator",
-        ),
-        (
-            "predicted.csv",
-            "log of the episode that the simulator expects, without noise",
-        ),
-        ("policy.json", "the exploration policy"),
-    ];
-    files.extend(
-        real.as_ref()
-            .map(|_| ("real.csv", "log of the real episode")),
-    );
-    let mut report = stage::report(&session, wall_s, &files);
+    let mut report = stage::report(&session, wall_s, &files(real.is_some()));
     report.explorer.clone_from(&config.explorer.name);
     report.answer = format!(
-        "From {}, the episode is expected to tell {}.",
+        "From {}, the episode is expected to tell {expected}.",
         stage::start_line(&session),
-        expected.join(", ")
     );
     report.episode = trace::episode(&session, &played.episode);
     report.view = view::of_prediction(&session, &played.episode, &center, &start)?;
@@ -194,6 +173,33 @@ pub fn explore(arguments: &Arguments) -> Result<()> {
         }
         Ok(())
     })
+}
+
+/// What each unknown is expected to be known to after an episode, in words.
+fn expected(session: &Session, information: &EpisodeInformation) -> String {
+    let deviations = information.expected_std.last().into_iter().flatten();
+    let each = session.parameters.iter().zip(deviations);
+    let each: Vec<String> = each
+        .map(|(p, std)| format!("{} ± {} {}", p.name, figure(*std), p.unit))
+        .collect();
+    each.join(", ")
+}
+
+/// The files of the folder beside result and report, with what they are; the last where a real world played.
+fn files(is_real: bool) -> Vec<(&'static str, &'static str)> {
+    let mut files = vec![
+        (
+            "commands.csv",
+            "the commands to play: time in s, one column an actuator",
+        ),
+        (
+            "predicted.csv",
+            "log of the episode that the simulator expects, without noise",
+        ),
+        ("policy.json", "the exploration policy"),
+    ];
+    files.extend(is_real.then_some(("real.csv", "log of the real episode")));
+    files
 }
 
 /// The task; of any machine the motion is designed here, and there is none.

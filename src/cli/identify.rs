@@ -97,13 +97,7 @@ pub fn identify(arguments: &Arguments) -> Result<()> {
     let clock = Instant::now();
     let common = &arguments.common;
     if let Some(path) = machine::path_of(&arguments.task)? {
-        if !arguments.log.is_empty() || arguments.train.is_some() || arguments.identifier.is_some()
-        {
-            return Err(wrong(
-                "--log",
-                "a study names its logs itself and is fitted by gauss-newton: --log, --train and --identifier go with a task",
-            ));
-        }
+        refuse_of_a_study(arguments)?;
         return machine::identify::identify(path, common);
     }
     if arguments.log.is_empty() && arguments.train.is_none() {
@@ -173,17 +167,7 @@ pub fn identify(arguments: &Arguments) -> Result<()> {
         cost: session.cost(wall_s),
         versions: Versions::of(&session),
     };
-    let mut lines: Vec<String> = found
-        .posterior
-        .marginals
-        .iter()
-        .map(parameter_line)
-        .collect();
-    lines.extend(result.articulation.as_ref().map(articulation_line));
-    lines.push(format!(
-        "residual: {:.2} times the sensors' noise",
-        found.residual
-    ));
+    let mut lines = lines(&found, result.articulation.as_ref());
     let caveats = caveats(&session.parameters, &found.posterior);
     lines.extend(caveats.iter().cloned());
     let names = copies(&arguments.log);
@@ -206,6 +190,29 @@ pub fn identify(arguments: &Arguments) -> Result<()> {
         failure::warn(&unexplained(found.residual));
     }
     Ok(())
+}
+
+/// Refuses what a study does not take.
+fn refuse_of_a_study(arguments: &Arguments) -> Result<()> {
+    if arguments.log.is_empty() && arguments.train.is_none() && arguments.identifier.is_none() {
+        return Ok(());
+    }
+    Err(wrong(
+        "--log",
+        "a study names its logs itself and is fitted by gauss-newton: --log, --train and --identifier go with a task",
+    ))
+}
+
+/// What was found, line by line.
+fn lines(found: &Identified, articulation: Option<&Articulation>) -> Vec<String> {
+    let marginals = found.posterior.marginals.iter();
+    let mut lines: Vec<String> = marginals.map(parameter_line).collect();
+    lines.extend(articulation.map(articulation_line));
+    lines.push(format!(
+        "residual: {:.2} times the sensors' noise",
+        found.residual
+    ));
+    lines
 }
 
 /// Names of the logs' copies in the folder, of the same format as the logs.

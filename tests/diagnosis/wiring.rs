@@ -2,9 +2,12 @@
 //! mended, all but an offset with and without the start in the log, and none is seen where there is none.
 
 use asid::core::Episode;
+use asid::diagnosis::intake::Intake;
 use asid::diagnosis::machine::Machine;
+use asid::diagnosis::result::{CheckResult, DiagnosisResult};
 use asid::diagnosis::study::Study;
 use asid::diagnosis::wiring::{Mended, Settings, mend};
+use asid::effects::EffectSpec;
 use asid::logs::episode::{ColumnMapping, remapped};
 
 use super::arm;
@@ -176,4 +179,44 @@ fn the_mending_lines_are_those_of_the_study_file() {
         mended(&mapped).wiring[0].mend,
         "[[column]]\nname = \"q_elbow\"\nfrom = \"joint_2\"\nunit = \"deg\"\nsign = -1.0\noffset = -0.25"
     );
+}
+
+/// The clock of a hopper was estimated 5 ms short, and the rest came out as a delay of every sensor.
+#[test]
+fn a_clock_that_was_estimated_short_takes_the_delay_of_every_sensor() {
+    let late = |seconds: f64| {
+        ["q_shoulder", "q_elbow"].map(|name| ColumnMapping {
+            delay: seconds,
+            ..of(name)
+        })
+    };
+    let right = study(true);
+    let spoilt = spoilt(&right, &late(-0.1));
+    let machine = machine(&right);
+    let mut intake = Intake::of(&spoilt, &machine).unwrap();
+    let told = |intake: &Intake| {
+        let mut result = DiagnosisResult::default();
+        intake.tell(&mut result, CheckResult::default());
+        let line = result.wiring[0].mend.lines().last().unwrap().to_owned();
+        let seconds: f64 = line.strip_prefix("delay = ").unwrap().parse().unwrap();
+        assert_eq!(result.wiring[0].fault, "wiring-clock");
+        seconds
+    };
+    let first = told(&intake);
+    assert!((first - 0.1).abs() < 0.01, "{first}");
+    let delay = |site: &str| EffectSpec {
+        name: "sensor-delay".into(),
+        site: site.into(),
+        values: vec![("delay".into(), 0.1 - first)],
+    };
+    // One sensor that is late is no clock.
+    assert_eq!(intake.clock_short(&[delay("q_elbow")]), None);
+    let short = intake.clock_short(&[delay("q_elbow"), delay("q_shoulder")]);
+    let layout = &machine.plant.layout;
+    intake.delay_clock(short.unwrap(), layout).unwrap();
+    assert!((told(&intake) - 0.1).abs() < 1e-9);
+    for ((_, a), (_, b)) in intake.study.test.iter().zip(&right.test) {
+        let off = distance(a, b);
+        assert!(off < 0.02, "off by {off} rad");
+    }
 }

@@ -1,17 +1,20 @@
 //! Compiles a scene: from the document to rapier's collections.
 
+mod built;
+
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::sync::Arc;
 
 use asid_core::layout::JointKind;
 use asid_core::{Error, Result, Scene, Status};
+use mjcf_rs::Model;
 use rapier3d::dynamics::{
     CCDSolver, ImpulseJointSet, IslandManager, MultibodyJointSet, RigidBody, RigidBodySet,
     SoftBodySet,
 };
 use rapier3d::geometry::{BroadPhaseBvh, ColliderSet, InteractionGroups, NarrowPhase};
-use rapier3d_mjcf::{MjcfLoaderOptions, MjcfMultibodyOptions, MjcfRobot};
+use rapier3d_mjcf::{MjcfLoaderOptions, MjcfRobot};
 
 use crate::compiled::{Compiled, set_inertia};
 use crate::contact::Resistance;
@@ -19,9 +22,48 @@ use crate::pairs::PairTable;
 use crate::sensor::SensorSlot;
 use crate::slot::JointSlot;
 use crate::state::State;
-use crate::structure::MassModel;
+use crate::structure::{MassModel, Structure};
 use crate::tables::Tables;
 use crate::{document, refusal, settings};
+
+use built::Built;
+
+/// What rapier's loader makes of a document.
+fn loaded(model: &Model, scene: &Scene) -> Result<MjcfRobot> {
+    let base = scene.directory().unwrap_or(Path::new(""));
+    let options = MjcfLoaderOptions {
+        skip_plane_geoms: false,
+        enable_joint_collisions: true,
+        disable_joint_motors: true,
+        ..MjcfLoaderOptions::default()
+    };
+    let load = || MjcfRobot::from_model(model, options, base);
+    let mut robot = catch_unwind(AssertUnwindSafe(load)).map_err(|_| Error::Scene {
+        scene: scene.name().to_owned(),
+        message: "rapier's loader failed on it".into(),
+    })?;
+    document::give_roots(&mut robot);
+    Ok(robot)
+}
+
+/// A world with nothing in it.
+fn empty(structure: Structure) -> State {
+    State {
+        bodies: RigidBodySet::new(),
+        colliders: ColliderSet::new(),
+        islands: IslandManager::new(),
+        broad_phase: BroadPhaseBvh::new(),
+        narrow_phase: NarrowPhase::new(),
+        impulse_joints: ImpulseJointSet::new(),
+        multibodies: MultibodyJointSet::new(),
+        soft_bodies: SoftBodySet::new(),
+        ccd: CCDSolver::new(),
+        resistance: Resistance::default(),
+        structure,
+        time: 0.0,
+        status: Status::Running,
+    }
+}
 
 impl Compiled {
     /// Compiles a scene.
@@ -66,107 +108,13 @@ impl Compiled {
         document::check_equalities(&model).map_err(fail)?;
         let groups = document::groups(&model);
         let places = document::rename(&mut model);
-        let base = scene.directory().unwrap_or(Path::new(""));
-        let options = MjcfLoaderOptions {
-            skip_plane_geoms: false,
-            enable_joint_collisions: true,
-            disable_joint_motors: true,
-            ..MjcfLoaderOptions::default()
-        };
-        let mut robot = catch_unwind(AssertUnwindSafe(|| {
-            MjcfRobot::from_model(&model, options, base)
-        }))
-        .map_err(|_| fail("rapier's loader failed on it".into()))?;
-        document::give_roots(&mut robot);
-        let geom_index = robot.geom_name_to_collider.clone();
-        let couplings = robot.joint_couplings.clone();
-        let joint_index = robot.joint_name_to_idx.clone();
-        let body_of_rapier: Vec<(usize, bool)> = robot
-            .bodies
-            .iter()
-            .map(|b| (b.mjcf_body_id, b.is_intermediate))
-            .collect();
-
-        let mut state = State {
-            bodies: RigidBodySet::new(),
-            colliders: ColliderSet::new(),
-            islands: IslandManager::new(),
-            broad_phase: BroadPhaseBvh::new(),
-            narrow_phase: NarrowPhase::new(),
-            impulse_joints: ImpulseJointSet::new(),
-            multibodies: MultibodyJointSet::new(),
-            soft_bodies: SoftBodySet::new(),
-            ccd: CCDSolver::new(),
-            resistance: Resistance::default(),
-            structure,
-            time: 0.0,
-            status: Status::Running,
-        };
-        let handles = robot.insert_using_multibody_joints(
-            &mut state.bodies,
-            &mut state.colliders,
-            &mut state.multibodies,
-            &mut state.impulse_joints,
-            MjcfMultibodyOptions::SKIP_JOINT_MOTORS | MjcfMultibodyOptions::SKIP_JOINT_SPRINGS,
-        );
-        for coupling in &couplings {
-            let tree = |joint: usize| {
-                let child = handles.joints.get(joint).map(|j| j.link2)?;
-                state
-                    .multibodies
-                    .rigid_body_link(child)
-                    .map(|l| l.multibody)
-            };
-            if tree(coupling.joint1) != tree(coupling.joint2) {
-                return Err(fail(
-                    "backend `rapier` couples only joints of one tree (<equality><joint>)".into(),
-                ));
-            }
-        }
-        let mut bodies = vec![None; layout.bodies.len()];
-        for (place, handle) in body_of_rapier.iter().zip(&handles.bodies) {
-            if let (&(body, false), Some(handle)) = (place, handle) {
-                bodies[body] = Some(handle.body);
-            }
-        }
-        let mut colliders = vec![None; layout.geoms.len()];
-        for (geom, collider) in colliders.iter_mut().enumerate() {
-            let Some(&(body, at)) = geom_index.get(&places.geom(geom)) else {
-                continue;
-            };
-            *collider = handles.bodies[body]
-                .as_ref()
-                .and_then(|b| b.colliders.get(at))
-                .map(|c| c.handle);
-        }
-        let mut joints = Vec::with_capacity(layout.joints.len());
-        let document = model
-            .bodies
-            .iter()
-            .enumerate()
-            .flat_map(|(i, b)| b.body.joints.iter().map(move |j| (i, b.parent, j)));
-        for (i, (place, (body, parent, joint))) in layout.joints.iter().zip(document).enumerate() {
-            let handle = joint_index
-                .get(&places.joint(i))
-                .and_then(|&at| handles.joints.get(at))
-                .and_then(|h| h.joint);
-            if handle.is_none() && place.kind != JointKind::Free {
-                return Err(fail(format!(
-                    "rapier could not build joint `{}` into a tree",
-                    place.name
-                )));
-            }
-            joints.push(JointSlot {
-                kind: place.kind,
-                qpos: place.qpos,
-                qvel: place.qvel,
-                body,
-                parent: parent.unwrap_or(0),
-                handle,
-                reference: joint.ref_,
-                spring_rest: joint.springref,
-            });
-        }
+        let robot = loaded(&model, scene)?;
+        let mut state = empty(structure);
+        let built = Built::of(robot, &mut state);
+        built.check_couplings(&state).map_err(fail)?;
+        let bodies = built.bodies(layout.bodies.len());
+        let colliders = built.colliders(&places, layout.geoms.len());
+        let joints = built.joints(&places, (&layout, &model)).map_err(fail)?;
         let compiled = Self {
             scene: scene.name().to_owned(),
             integration: settings::integration_parameters(layout.timestep),

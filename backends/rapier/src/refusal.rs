@@ -169,37 +169,42 @@ fn check_document(scene: &Scene) -> Result<()> {
                 format!("has no fluid: `{attribute}` of {}", place(&node)),
             ));
         }
-        if tag == "flag" {
-            for attribute in node.attributes() {
-                let solver = [
-                    "warmstart",
-                    "filterparent",
-                    "refsafe",
-                    "energy",
-                    "midphase",
-                    "nativeccd",
-                    "island",
-                    "multiccd",
-                    "eulerdamp",
-                    "autoreset",
-                    "sensor",
-                    "invdiscrete",
-                    "fwdinv",
-                    "sleep",
-                ];
-                let disables = attribute.value() == "disable" || attribute.name() == "override";
-                if disables
-                    && (attribute.name() == "filterparent" || !solver.contains(&attribute.name()))
-                {
-                    return Err(refuse(
-                        scene,
-                        format!("cannot honour `{}` of {}", attribute.name(), place(&node)),
-                    ));
-                }
-            }
+        if tag == "flag"
+            && let Some(flag) = refused_flag(&node)
+        {
+            let what = format!("cannot honour `{flag}` of {}", place(&node));
+            return Err(refuse(scene, what));
         }
     }
     Ok(())
+}
+
+/// Flags of MuJoCo's solver, which say nothing of the physics.
+const SOLVER: [&str; 14] = [
+    "warmstart",
+    "filterparent",
+    "refsafe",
+    "energy",
+    "midphase",
+    "nativeccd",
+    "island",
+    "multiccd",
+    "eulerdamp",
+    "autoreset",
+    "sensor",
+    "invdiscrete",
+    "fwdinv",
+    "sleep",
+];
+
+/// The flag of a `<flag>` that switches physics off that this backend always has.
+fn refused_flag<'a>(node: &Node<'a, '_>) -> Option<&'a str> {
+    let refused = node.attributes().find(|attribute| {
+        let disables = attribute.value() == "disable" || attribute.name() == "override";
+        let name = attribute.name();
+        disables && (name == "filterparent" || !SOLVER.contains(&name))
+    });
+    refused.map(|attribute| attribute.name())
 }
 
 /// Share of its speed with which a body leaves a contact of this `solref`, from which on it is
