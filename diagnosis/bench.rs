@@ -1,6 +1,6 @@
 //! The bench on which explanations are tried: the machine, the logs, their noise, and the starts of the episodes.
 
-mod held_out;
+pub mod held_out;
 
 use asid_core::layout::Layout;
 use asid_core::progress::Silent;
@@ -8,7 +8,7 @@ use asid_core::{Parameter, Progress, Result};
 use asid_effects::EffectSpec;
 
 use crate::candidate::Candidate;
-use crate::fit::{Effort, Fit, fit};
+use crate::fit::{Effort, Fit, cost, fit};
 use crate::linearise::{Open, Unknown};
 use crate::machine::Machine;
 use crate::predict::{Point, Predictor, State};
@@ -26,7 +26,7 @@ pub struct Explanation {
     pub unknowns: Vec<Unknown>,
     /// The fit to the training logs.
     pub fit: Fit,
-    /// Sum of squares of the residuals of the logs held out, beyond what their starts leave open.
+    /// Sum of squares of the residuals of the logs held out.
     pub held_out: f64,
     /// Starts of the held-out episodes under it.
     pub held_starts: Vec<State>,
@@ -176,7 +176,7 @@ impl Bench {
         }
     }
 
-    /// Replays the logs held out at an explanation's parameters and sets what it leaves of them beyond what their starts leave open;
+    /// Replays the logs held out at an explanation's parameters and sets what it leaves of them;
     /// where starts are open they are fitted on the first tenth, which then does not count.
     ///
     /// # Errors
@@ -187,7 +187,10 @@ impl Bench {
             theta: of.fit.point.theta.clone(),
             starts: of.held_starts.clone(),
         };
-        of.held_out = held_out::misfit(self, trials, &point)?;
+        let mut predictor = self.predictor(trials, &self.test)?;
+        let mut residuals = predictor.residuals(&[point])?.pop().unwrap_or_default();
+        self.mask_head(&mut residuals);
+        of.held_out = cost(&residuals);
         Ok(())
     }
 

@@ -32,6 +32,8 @@ pub struct Intake {
     wiring: Vec<WiringResult>,
     /// The mappings that mend them.
     mappings: Vec<ColumnMapping>,
+    /// The study before it was mended, where a clock was: readings are interpolated once, for each time makes their noise more alike.
+    before: Option<Study>,
     left_out: Vec<LeftOut>,
 }
 
@@ -53,6 +55,7 @@ impl Intake {
             is_mended: false,
             wiring: Vec::new(),
             mappings: Vec::new(),
+            before: None,
             left_out,
         };
         if intake.study.wired {
@@ -65,6 +68,9 @@ impl Intake {
         let as_given = std::mem::replace(&mut intake.study, mended.study);
         (intake.wiring, intake.is_mended) = (mended.wiring, true);
         intake.mappings = mended.mappings;
+        if intake.clock().is_some() {
+            intake.before = Some(as_given.clone());
+        }
         if mended.doubted {
             let share = share_left(&intake, &as_given, machine)?;
             let is_most = share < HALF;
@@ -98,11 +104,16 @@ impl Intake {
         }
     }
 
+    /// The mended clock.
+    fn clock(&self) -> Option<&WiringResult> {
+        self.wiring.iter().find(|w| w.fault == CLOCK)
+    }
+
     /// What a mended clock was estimated short by, s: the mean delay of a verdict that has every sensor late. `None` where no clock was
     /// mended, or some sensor is not late.
     #[must_use]
     pub fn clock_short(&self, effects: &[EffectSpec]) -> Option<f64> {
-        let clock = self.wiring.iter().find(|w| w.fault == CLOCK)?;
+        let clock = self.clock()?;
         let late = |sensor: &String| {
             let own = effects
                 .iter()
@@ -118,20 +129,17 @@ impl Intake {
     /// # Errors
     /// When the logs are too short for it.
     pub fn delay_clock(&mut self, seconds: f64, layout: &Layout) -> Result<()> {
-        let Some(clock) = self.wiring.iter().position(|w| w.fault == CLOCK) else {
+        let (Some(clock), Some(before)) = (self.clock(), &self.before) else {
             return Ok(());
         };
-        let further = |name: &String| ColumnMapping {
-            delay: seconds,
-            ..ColumnMapping::of(name)
-        };
-        let further: Vec<ColumnMapping> = self.wiring[clock].columns.iter().map(further).collect();
-        wiring::mend::apply(&mut self.study, layout, &further)?;
+        let columns = clock.columns.clone();
         for mapping in &mut self.mappings {
-            if wiring::mend::concerns_any(mapping, &self.wiring[clock].columns) {
+            if wiring::mend::concerns_any(mapping, &columns) {
                 mapping.delay += seconds;
             }
         }
+        self.study = before.clone();
+        wiring::mend::apply(&mut self.study, layout, &self.mappings)?;
         for w in &mut self.wiring {
             w.mend = wiring::mend::lines(&self.study, &self.mappings, &w.columns);
         }

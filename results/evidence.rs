@@ -12,7 +12,7 @@ pub struct Replayed {
     /// Of the logs that were fitted to.
     #[serde(deserialize_with = "nullable::scalar")]
     pub train: f64,
-    /// Of the logs held out, by the noise and by the covariance of starts that were fitted on their first tenth.
+    /// Of the logs held out; without effects, and of the set that was found, by the covariance of starts that were fitted on their first tenth too.
     #[serde(deserialize_with = "nullable::scalar")]
     pub held_out: f64,
 }

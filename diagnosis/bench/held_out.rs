@@ -15,37 +15,37 @@ use crate::linearise::{Differences, linearise};
 use crate::normal::inverse;
 use crate::predict::Point;
 
-use super::{Bench, Trial};
+use super::{Bench, Explanation, Trial};
 
-/// Linearisations: the first finds the size of the differences.
-const LINEARISATIONS: usize = 2;
+/// Physics steps of all logs held out times open coordinates of their starts, beyond which starts count as known: tens of seconds
+/// of one core, in machines of many joints.
+const AFFORDABLE: usize = 500_000;
 
-/// Squared Mahalanobis distance of the readings held out from those predicted, by the noise and by the covariance of the starts
-/// that were fitted; infinite where a replay diverges.
-pub(super) fn misfit(bench: &Bench, trials: &[Trial<'_>], point: &Point) -> Result<f64> {
-    let mut predictor = bench.predictor(trials, &bench.test)?;
-    if bench.open.is_empty() {
-        let residuals = predictor.residuals(std::slice::from_ref(point))?;
-        return Ok(residuals.iter().map(|r| cost(r)).sum());
+/// Squared Mahalanobis distance of the readings held out from those that an explanation predicts, by the noise and by the covariance of the
+/// starts that were fitted; infinite where a replay diverges.
+///
+/// # Errors
+/// When a rollout fails.
+pub fn misfit(bench: &Bench, trials: &[Trial<'_>], of: &Explanation) -> Result<f64> {
+    let logs = &bench.test.logs;
+    let steps = logs.episodes.iter().map(|e| e.plan.physics_steps());
+    if bench.open.is_empty() || steps.sum::<usize>() * bench.open.len() > AFFORDABLE {
+        return Ok(of.held_out);
     }
     let mut unknowns = bench.unknowns(trials);
     unknowns.iter_mut().for_each(|u| u.free = false);
-    let mut differences = Differences::new(unknowns.len(), bench.open.len());
-    let mut line = || {
-        linearise(
-            &mut predictor,
-            bench.layout(),
-            &unknowns,
-            point,
-            &bench.open,
-            &mut differences,
-        )
+    let point = Point {
+        theta: of.fit.point.theta.clone(),
+        starts: of.held_starts.clone(),
     };
-    for _ in 1..LINEARISATIONS {
-        line()?;
-    }
-    let line = line()?;
-    let logs = &bench.test.logs;
+    let line = linearise(
+        &mut bench.predictor(trials, &bench.test)?,
+        bench.layout(),
+        &unknowns,
+        &point,
+        &bench.open,
+        &mut Differences::new(unknowns.len(), bench.open.len()),
+    )?;
     let entries = logs.entries.len();
     let of_episode = |e: usize| {
         let head = bench.head.logs.episodes[e].plan.rows() * entries;

@@ -4,11 +4,12 @@ use asid_core::Result;
 use asid_mjcf::Plant;
 use asid_results::evidence::{Evidence, Replayed, Screened, Tried};
 
+use crate::bench::held_out::misfit;
 use crate::bench::{Bench, Explanation};
 use crate::candidate::Candidate;
 use crate::checks::change_by_step;
 use crate::decision::is_small;
-use crate::findings::Findings;
+use crate::findings::{Findings, trials};
 use crate::fit::cost;
 use crate::skill::about_the_mean;
 
@@ -31,10 +32,10 @@ fn labels(candidates: &[Candidate], set: &[usize]) -> Vec<String> {
 }
 
 /// Mean squares that whole replays of an explanation leave.
-fn replayed(bench: &Bench, of: &Explanation) -> Replayed {
+fn replayed(bench: &Bench, of: &Explanation, held_out: f64) -> Replayed {
     Replayed {
         train: of.fit.cost / bench.train.readings.max(1) as f64,
-        held_out: of.held_out / bench.held_readings().max(1.0),
+        held_out: held_out / bench.held_readings().max(1.0),
     }
 }
 
@@ -91,18 +92,25 @@ pub fn gather(
 ) -> Result<Evidence> {
     let plant = &bench.machine.plant;
     let tried = sets.iter().zip(&findings.found);
-    let tried: Vec<Tried> = tried
+    let place = |set: &[usize]| sets.iter().position(|s| s.candidates == set);
+    let found = place(&outcome.best.candidates);
+    let mut tried: Vec<Tried> = tried
         .map(|(set, found)| Tried {
             effects: labels(candidates, &set.candidates),
             names: set.names,
             evidence: set.fitted.evidence - outcome.none.evidence
                 + log_prior(plant, candidates, &set.candidates),
-            replayed: replayed(bench, &found.explanation),
+            replayed: replayed(bench, &found.explanation, found.explanation.held_out),
         })
         .collect();
-    let place = |set: &[usize]| sets.iter().position(|s| s.candidates == set);
-    let found = place(&outcome.best.candidates);
-    let none = replayed(bench, &findings.none);
+    // What the decision compares is weighed by what the starts are uncertain by.
+    if let Some(i) = found {
+        let of = &findings.found[i];
+        let trials = trials(candidates, &of.candidates, &of.explanation);
+        let misfit = misfit(bench, &trials, &of.explanation)?;
+        tried[i].replayed = replayed(bench, &of.explanation, misfit);
+    }
+    let none = replayed(bench, &findings.none, misfit(bench, &[], &findings.none)?);
     let [before, after] = outcome.missing;
     let is_missing = before.force.sqrt() > NOTHING || before.readings > LEAST_LEFT;
     let stopped = !outcome.untried.is_empty();
