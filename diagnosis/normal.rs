@@ -124,7 +124,8 @@ mod tests {
             columns: vec![vec![2.0, 0.0, 0.0]],
             start_columns: vec![vec![0.0, 4.0, 0.0]],
         };
-        let normal = Normal::new(&line, &[0..3], 0.0);
+        let rows = 0..3;
+        let normal = Normal::new(&line, std::slice::from_ref(&rows), 0.0);
         let step = normal.step(0.0, &[false]);
         assert!((step[0] - 0.5).abs() < 1e-9, "{step}");
         let start = normal.start_step(0, &step);

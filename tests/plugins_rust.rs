@@ -228,11 +228,16 @@ fn folders_are_searched_and_a_name_that_is_taken_gets_a_suffix() {
 #[test]
 fn a_program_that_links_a_plugin_has_the_whole_command_line() {
     let program = plugin_support::build(&["my-asid"]).remove(0);
-    let output = std::process::Command::new(program)
-        .arg("list")
-        .output()
-        .unwrap();
-    let listed = done(output);
+    let mut command = std::process::Command::new(program);
+    // Built beside the tests it has their native libraries, without a place to find them at.
+    let libraries = [("MUJOCO_DYNAMIC_LINK_DIR", ""), ("LIBTORCH", "lib")];
+    let folders = libraries.iter().filter_map(|(variable, below)| {
+        let folder = std::env::var_os(variable)?;
+        Some(Path::new(&folder).join(below))
+    });
+    let folders = std::env::join_paths(folders).unwrap();
+    command.arg("list").env("LD_LIBRARY_PATH", folders);
+    let listed = done(command.output().unwrap());
     assert!(
         listed.contains("[linked in: payload-swing 0.1.0]"),
         "{listed}"
