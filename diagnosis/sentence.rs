@@ -30,7 +30,7 @@ fn none(gap: f64, beyond: f64, repeats: Option<Repeats>) -> String {
         );
     }
     format!(
-        "No effect is found, {fitted}: the gap of {gap:.2} on the logs held out is no more than another program's version of the same physics leaves."
+        "No effect is found, {fitted}: the gap of {gap:.2} on the logs held out is within the differences between simulators of the same physics."
     )
 }
 
@@ -114,7 +114,7 @@ pub fn sentence(
             )
         }
         Kind::Unknown if result.gap.closed.is_some_and(|c| c > 0.5) => format!(
-            "{place}{} explains {}, and what is left is more than an effect of the catalogue usually leaves: there is something else{}.",
+            "{place}{} explains {}, but too much of the missing force and of the gap is left to name it as the cause: something else is missing{}.",
             grouped(labels).join(" with "),
             closed(),
             rest.map_or_else(String::new, |r| format!(": {r}"))

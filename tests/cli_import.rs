@@ -297,3 +297,16 @@ fn exported_logs_are_read_back_with_the_same_numbers() {
     // Stamps are whole nanoseconds.
     assert!(apart(&read, &csv) < 1e-9);
 }
+
+/// Its copies had two names, so that a study was written that fitted the log which it held out.
+#[test]
+fn a_log_that_is_fitted_and_held_out_is_refused() {
+    let place = tempfile::tempdir().unwrap();
+    let logs = each("bag_sqlite", "");
+    let twice = text(&logs[3]).to_owned();
+    let out = import(&logs, &place.path().join("study"), &["--test", &twice]);
+    let said = String::from_utf8_lossy(&out.stderr);
+    assert_eq!(out.status.code(), Some(2), "{said}");
+    assert!(said.contains("to be fitted and to be held out"), "{said}");
+    assert!(!place.path().join("study").exists());
+}

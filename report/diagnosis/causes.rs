@@ -21,8 +21,8 @@ const LITTLE: f64 = 0.01;
 
 pub(super) fn section(d: &DiagnosisResult, t: &DiagnosisTrace) -> Section {
     let lead = "An effect is written name@site, the site being the part of the scene that it acts on. A hypothesis is a set of effects of the catalogue, refitted together with the study's parameters. The probability of a verdict that \
-                names effects was calibrated on training worlds: by its evidence (marginal likelihood), the gap that it leaves, and whether the search was cut short. Its rivals share the rest by their evidence, \
-                and a part goes to `unknown`. The probability of an effect is the sum over the hypotheses that contain it.";
+                names effects comes from a logistic regression on training worlds with known causes: by the odds of its evidence (marginal likelihood), by whether a gap is left, and by whether the search was cut short. \
+                Its rivals share the rest by their evidence, and a part goes to `unknown`. The probability of an effect is the sum over the hypotheses that contain it.";
     let mut section = Section::new("Which effect").lead(lead);
     section = explanation(d, t).into_iter().fold(section, Section::text);
     section = section.figures(vec![figure(d)]);
@@ -76,7 +76,7 @@ fn explanation(d: &DiagnosisResult, t: &DiagnosisTrace) -> Vec<String> {
             text
         }
         Kind::Unknown => format!(
-            "The gap is {} times the noise, and no effect of the catalogue explains it. The probability of this verdict, `unknown`, is \
+            "The gap is {} times the noise, and no effect of the catalogue explains enough of it to be named. The probability of this verdict, `unknown`, is \
              {sure}.",
             gap(d.gap.identified)
         ),

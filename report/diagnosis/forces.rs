@@ -44,7 +44,7 @@ pub(super) fn section(d: &DiagnosisResult, t: &DiagnosisTrace) -> Option<Section
 }
 
 fn lead(law: bool) -> String {
-    let mut text = "The generalized force that would make the identified model follow the training logs, smoothed row by row. Where it \
+    let mut text = "The generalized force that the identified model lacks, as a Kalman smoother estimates it at each row of the training logs. Where it \
                     lies on a curve against speed, position or load, that curve is the law that the model lacks: a step at speed \
                     zero is dry friction, a slope against speed viscous friction, a slope against position a spring, a band that \
                     widens with the load friction of a gear."

@@ -95,7 +95,9 @@ fn told(r: &Remainder) -> String {
         r.place
     );
     if r.against.is_empty() {
-        return format!("{most} It goes with nothing that these logs show.");
+        return format!(
+            "{most} No variable that was looked at (time, commands, and the position, speed, acceleration and load there) predicts as much as 5 % of it."
+        );
     }
     let kinds = match &r.kinds[..] {
         [] => String::new(),

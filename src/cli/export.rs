@@ -17,7 +17,8 @@ use super::settings::difficulty;
 #[command(after_help = "\
 A study, or a refined model as `asid diagnose` and `asid identify` write it, becomes a plain MJCF document: values \
 are written, effects become MJCF's own elements, and one sentence tells of each that has none. Mesh files stay \
-where they are; the document refers to their paths. The logs of a study are replayed in both models, and both gaps are printed.")]
+where they are; the document refers to their paths. The logs of a study are \
+replayed in the model that it has and in the exported document, and the gap of each is printed.")]
 pub struct Arguments {
     /// The task, or a study (a folder or TOML file), a refined model (TOML) or an MJCF file
     task: String,

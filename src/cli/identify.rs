@@ -38,11 +38,11 @@ from that time on; and columns named after the scene's sensors, vectors as NAME.
 (quaternions w x y z). An empty cell is a missing reading. The machine's initial state is the scene's first \
 keyframe; the object's initial pose is estimated.
 
-The folder holds posterior.json (for `asid solve`), result.json, config.toml, a copy of the logs, \
+The results folder (--out) holds posterior.json (for `asid solve`), result.json, config.toml, a copy of the logs, \
 report.html and trace.json.
 
 A study (a folder with study.toml, or the file) names its logs itself: its parameters are fitted to those to train, \
-and the gap is measured on those held out. Its folder holds refined.toml, the model with the fitted values.")]
+and the gap is measured on those held out. The results folder then holds refined.toml, the model with the fitted values.")]
 pub struct Arguments {
     /// The task (see `asid list`), or a study: a folder or a TOML file
     task: String,

@@ -32,13 +32,13 @@ Which column is which sensor or command is proposed by names, units, ranges and 
 mapping by --map, or in the study's [[column]]. The folder holds study.toml, import.html (each column over time), and \
 model.xml where the model had no sensors; `asid diagnose DIR` runs on it. Without --out nothing is written.")]
 pub struct Arguments {
-    /// The logs, one an episode; the last third of them is held out, unless --test names others
+    /// The logs, one an episode; the last third of them is held out, unless --test adds others
     #[arg(required = true, value_name = "LOG")]
     logs: Vec<PathBuf>,
     /// The model: MJCF, or a refined model (TOML)
     #[arg(long, value_name = "FILE")]
     model: PathBuf,
-    /// Hold out this log (repeatable)
+    /// Import this log as well, and hold it out; it is not one of LOG (repeatable)
     #[arg(long, value_name = "LOG")]
     test: Vec<PathBuf>,
     /// Write the study into this folder, new or empty
@@ -157,6 +157,14 @@ fn open(arguments: &Arguments) -> Result<(Vec<Opened>, LogSettings)> {
         kind: None,
         topics: arguments.topic.clone(),
     };
+    if let Some(twice) = arguments.test.iter().find(|t| arguments.logs.contains(t)) {
+        return Err(Error::Log {
+            path: twice.clone(),
+            message: "is to be fitted and to be held out: name it once, before --test or after it"
+                .into(),
+        }
+        .into());
+    }
     let mut opener = Opener::default();
     let mut all = Vec::new();
     let fitted = arguments.logs.iter().map(|p| (p, false));

@@ -196,7 +196,7 @@ fn family_table(result: &ConformanceResult, family: &str, explain: bool) -> Opti
     if explain {
         table = table.caption(
             "A figure is a deviation, zero at best. Its bar is on a logarithmic scale that ends at ten times the tolerance, \
-             with a tick at the tolerance; a ring is less than a millionth of it. A second tolerance is that of single precision.",
+             with a tick at the tolerance; a ring is less than a millionth of it. Two tolerances are those of the engines in their order: one of single precision has the larger.",
         );
     }
     any.then_some(table)

@@ -113,8 +113,8 @@ pub fn draw(request: &Request<'_>) -> Result<Drawing> {
             format!(
                 "Ball of {TASK}, predicted open loop from its start and the actions alone. Models learn from {count} \
                  episodes of an explorer without noise; the simulator is fitted to one with noise. {tested} episodes \
-                 of each kind are predicted; outside: up to {BEYOND} m beyond the starts of training. Errors of the \
-                 simulator count as at least the tracker's noise, {floor} m."
+                 of each kind are predicted; outside: up to {BEYOND} m beyond the starts of training. In the ratio of \
+                 errors that of the simulator is taken as at least the tracker's noise, {floor} m."
             ),
         )
     };

@@ -7,7 +7,7 @@ pub struct Options {
     /// (repeatable)
     #[arg(long, value_name = "TARGET:LOW:HIGH", help_heading = "Any machine")]
     pub unknown: Vec<String>,
-    /// Know this one as little, but do not seek it: it is estimated along (repeatable)
+    /// Nuisance parameter: unknown within this range and estimated with the others, but the motion is not made for it (repeatable)
     #[arg(long, value_name = "TARGET:LOW:HIGH", help_heading = "Any machine")]
     pub nuisance: Vec<String>,
     /// Make this small: a-optimal (sum of variances), d-optimal (their volume), trace (of the information, to be large)
