@@ -1,6 +1,6 @@
 //! The catalogue of effects, one file a family: what a real machine does and its model may lack.
 //!
-//! On the command: [`command`], [`delay`], [`hysteresis`], [`supply`]. Of servos: [`servo`]. Between a drive and
+//! On the command: [`command`], [`command_dynamics`], [`hysteresis`], [`supply`]. Of servos: [`servo`]. Between a drive and
 //! its joint: [`backlash`], [`compliance`]. At a joint: [`joint_friction`], [`joint_force`], [`rotor`]. On bodies:
 //! [`mass`], [`payload`], [`geometry`], [`body_force`], [`gravity`]. In contacts: [`contact_friction`], [`friction_field`], [`contact_softness`]. On
 //! readings: [`sensor`], [`sensor_dynamics`]. A new family is a file here and its `mod` line
