@@ -90,7 +90,7 @@ fn explanation(d: &DiagnosisResult, t: &DiagnosisTrace) -> Vec<String> {
     }
     if d.verdict.kind != Kind::None && d.verdict.unexplained.is_finite() {
         first.push_str(&format!(
-            " {} of the squared gap above the noise floor remains unexplained.",
+            " {} of the squared gap above the noise, relative to that of the identified model, remains unexplained.",
             percent(d.verdict.unexplained)
         ));
     }

@@ -51,7 +51,7 @@ fn lead(law: bool) -> String {
         .to_owned();
     if law {
         text.push_str(
-            " Blue: the force that the refined model adds at the same rows. A cause that is right runs through the dots.",
+            " Blue: the force that the refined model adds at the same rows. If the cause is right, it follows the missing force in every plot.",
         );
     }
     text

@@ -61,7 +61,12 @@ fn lead(exploration: &Exploration, episode: &str) -> String {
             format!("Fisher information of the {episode} episode; the objective is {objective}.")
         }
         (objective, form) => format!(
-            "Fisher information of the {episode} episode, {form} form; the objective is {objective}."
+            "Fisher information of the {episode} episode, with {}; the objective is {objective}.",
+            match form {
+                "one-step" => "the sensitivities of one control step at a time",
+                "trajectory" => "sensitivities from the episode's start on",
+                other => other,
+            }
         ),
     };
     if let Some(share) = exploration.contact_fraction.filter(|c| c.is_finite()) {

@@ -38,8 +38,7 @@ pub struct Arguments {
     /// other as NAME=explorer+identifier+solver (repeatable) [default: asid, random, dr]
     #[arg(long, value_name = "M")]
     method: Vec<String>,
-    /// Condition of the task, such as left (repeatable) [default: all], or prior, whose truths are
-    /// drawn from the whole prior
+    /// Condition of the task, such as left; `prior` draws truths from the whole prior (repeatable) [default: all of the task's own; prior where it has none]
     #[arg(long, value_name = "NAME")]
     condition: Vec<String>,
     /// Play in this kind of real world, such as matched, crossed or perturbed (repeatable) [default: matched]

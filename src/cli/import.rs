@@ -53,7 +53,7 @@ pub struct Arguments {
     /// Write the episodes as CSV files of the model's own names and units, in place of references to the logs
     #[arg(long)]
     copy: bool,
-    /// Try the mapping with this engine: see `asid list`
+    /// The engine that tries the mapping: see `asid list`
     #[arg(long, value_name = "NAME")]
     backend: Option<String>,
     /// Show no progress on standard error

@@ -96,10 +96,10 @@ pub struct Simulator {
 pub struct Real {
     /// Play in this kind of real world: matched (the simulator itself), crossed (the other engine),
     /// perturbed (step, contacts, masses, servos and tracker a little off) or stand-in (another object)
-    /// [default: matched, or custom where a --real-… option says more]
+    /// [default: matched; with --real-model, --real-effect or another --real-backend the world is called custom]
     #[arg(long, value_name = "KIND")]
     pub world: Option<String>,
-    /// Give the real world this true value, which the methods do not see, such as mass_offset=0.06 [default: drawn from the prior by the seed]
+    /// Give the real world this true value, which the methods do not see, such as mass_offset=0.06 (repeatable) [default: drawn from the prior by the seed]
     #[arg(long, value_name = "NAME=VALUE")]
     pub truth: Vec<String>,
     /// Play the real world with this engine [default: the simulator's; the other one for --world crossed]

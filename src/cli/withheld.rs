@@ -103,8 +103,8 @@ pub struct Arguments {
     /// Leave out an effect of the catalogue (repeatable)
     #[arg(long, value_name = "EFFECT")]
     without: Vec<String>,
-    /// Divide the time step of every model by this
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    /// Divide the time step of the MJCF model of every case by this
+    #[arg(long, value_name = "N", default_value_t = 1, requires = "cases")]
     finer: u32,
     /// Answer this study by a baseline.
     #[arg(long, value_name = "DIR", hide = true)]

@@ -21,7 +21,7 @@ pub fn html(plan: &Plan, result: &ComparisonResult, runs: &[Run], repeat: &str) 
         None => "Methods compared".to_owned(),
     };
     let mut page = Page::new(&title).kicker("ASID compare").lead(format!(
-        "{} runs in {} rows; each row sums up the seeds of one method under one condition.",
+        "{} runs in {} rows; each row sums up the seeds of one method in one task, condition, world and engine.",
         runs.len(),
         result.rows.len()
     ));

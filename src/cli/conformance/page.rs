@@ -196,7 +196,7 @@ fn family_table(result: &ConformanceResult, family: &str, explain: bool) -> Opti
     if explain {
         table = table.caption(
             "A figure is a deviation, zero at best. Its bar is on a logarithmic scale that ends at ten times the tolerance, \
-             with a tick at the tolerance; a ring is less than a millionth of it. Two tolerances are those of the engines in their order: one of single precision has the larger.",
+             with a tick at the tolerance; a ring is less than a millionth of it. Where engines differ in precision, that of the first engine comes first and those that differ follow: single precision has the larger.",
         );
     }
     any.then_some(table)
@@ -273,7 +273,7 @@ fn not_claimed(result: &ConformanceResult) -> Section {
     }
     Section::new("Not claimed")
         .lead(
-            "An engine is asked for what it claims, and that it refuses the rest or gets it right.",
+            "An engine is checked on what it claims. What it does not claim it may refuse; what it takes all the same must be right.",
         )
         .table(table)
 }
