@@ -3,7 +3,8 @@
 
 use std::path::Path;
 
-use asid_core::{Error, Result, toml_text};
+use asid_core::{Error, Result};
+use asid_documents::toml_text;
 
 use crate::plan::Plan;
 

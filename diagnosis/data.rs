@@ -2,9 +2,10 @@
 
 mod cut;
 
-use asid_core::replay::ReplayPlan;
-use asid_core::signal::{Signal, SignalSet};
+use asid_core::signal::Signal;
 use asid_core::{Episode, Result};
+use asid_readings::SignalSet;
+use asid_readings::replay::ReplayPlan;
 
 /// One compared number of a row: a component of a sensor, or of a rotation.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,9 +1,9 @@
 //! Open-loop rollouts of logs in a model: many parameter values, all episodes, one batch.
 
 use asid_core::layout::{JointKind, Layout, Recording};
-use asid_core::replay::quaternions;
 use asid_core::simulator::{BatchConfig, Control, Rollout, Simulator};
 use asid_core::{Model, Parameter, Result};
+use asid_readings::replay::quaternions;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 use crate::data::Logs;

@@ -6,9 +6,9 @@
 mod contact;
 mod envelope;
 
-use asid_core::replay::ReplayPlan;
 use asid_core::{BatchConfig, Control, Model, Parameter, Result, Rollout, Simulator};
 use asid_mjcf::Plant;
+use asid_readings::replay::ReplayPlan;
 
 use crate::data::Logs;
 use crate::predict::{Point, columns_of};
@@ -212,7 +212,7 @@ pub fn positions(
     let rollout = Rollout::new(&[0], plan.frames, plan.substeps, control, &recording);
     simulator.rollout(&rollout, &mut out)?;
     let mut rows = vec![0.0; plan.rows() * width];
-    let turns = asid_core::replay::quaternions(layout, &recording, &names);
+    let turns = asid_readings::replay::quaternions(layout, &recording, &names);
     plan.resample(&first, &out, &turns, &mut rows);
     Ok(rows)
 }

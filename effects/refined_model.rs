@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use crate::EffectSpec;
-use asid_core::{Error, Result, Scene, Target, toml_text};
+use asid_core::{Error, Result, Scene, Target};
+use asid_documents::toml_text;
 use serde::{Deserialize, Serialize};
 
 /// The file, as written.

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use rusqlite::{Connection, OpenFlags};
 
-use asid_core::guard::guarded;
+use asid_documents::guard::guarded;
 
 use crate::mcap_file;
 use crate::ros::topics::{Described, Topics};

@@ -13,7 +13,7 @@ use mcap::records::op;
 use mcap::sans_io::LinearReaderOptions;
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader};
 
-use asid_core::guard::guarded;
+use asid_documents::guard::guarded;
 
 use crate::ros::topics::{Described, Topics};
 

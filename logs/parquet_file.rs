@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use asid_core::guard::guarded;
+use asid_documents::guard::guarded;
 use parquet::basic::Type as Physical;
 use parquet::errors::ParquetError;
 use parquet::file::reader::FileReader as _;

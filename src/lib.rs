@@ -13,6 +13,7 @@ pub use asid_learned as learned;
 pub use asid_logs as logs;
 pub use asid_mjcf as mjcf;
 pub use asid_plugin as plugin;
+pub use asid_readings as readings;
 pub use asid_report as report;
 pub use asid_results as results;
 pub use asid_scorer as scorer;

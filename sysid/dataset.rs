@@ -4,11 +4,12 @@ use std::collections::BTreeMap;
 
 use asid_core::episode::InitialState;
 use asid_core::error::{Error, Result};
-use asid_core::replay::Replay;
-use asid_core::signal::{Signal, SignalSet};
+use asid_core::signal::Signal;
 use asid_core::simulator::{BatchConfig, Simulator};
 use asid_core::{Episode, Model, Parameter};
 use asid_mjcf::Plant;
+use asid_readings::SignalSet;
+use asid_readings::replay::Replay;
 
 use crate::{columns, start, targets};
 

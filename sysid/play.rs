@@ -3,10 +3,11 @@
 use asid_core::error::Result;
 use asid_core::layout::Recording;
 use asid_core::problem::home;
-use asid_core::signal::{Signal, SignalSet};
+use asid_core::signal::Signal;
 use asid_core::simulator::{BatchConfig, Simulator};
 use asid_core::{Control, Error, Model, Parameter, Rollout};
 use asid_mjcf::Plant;
+use asid_readings::SignalSet;
 
 use crate::limits::{Excess, Limits};
 use crate::{columns, targets};

@@ -10,9 +10,9 @@ use asid::algorithms::fisher::FisherSettings;
 use asid::algorithms::identify::articulation::{self, Joint};
 use asid::core::episode::ChannelColumns;
 use asid::core::registry::{ExplorerEntry, IdentifierEntry, find};
-use asid::core::signal::SignalSet;
 use asid::core::{Control, Episode, Problem, RealWorld, Rollout, Streams};
 use asid::pipeline::episode_information;
+use asid::readings::SignalSet;
 use asid::worlds::SimulatedWorld;
 use rand::Rng as _;
 

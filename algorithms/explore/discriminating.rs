@@ -10,9 +10,9 @@
 use asid_core::explore::{CurvePoint, Explored, Explorer};
 use asid_core::layout::Recording;
 use asid_core::problem::Batch;
-use asid_core::signal::SignalSet;
 use asid_core::simulator::{Control, Rollout};
 use asid_core::{Error, Model, Parameter, Problem, Result};
+use asid_readings::SignalSet;
 
 use super::open_loop::{OpenLoop, Planned, Planner};
 use crate::optimise::CemSettings;

@@ -7,8 +7,8 @@
 use crate::fisher::{FisherBatch, FisherSettings};
 use asid_core::environment::{BatchEnvironment, Transition};
 use asid_core::rng::Rng;
-use asid_core::signal::SignalSet;
 use asid_core::{Problem, Result, Streams};
+use asid_readings::SignalSet;
 use rand::Rng as _;
 use rand_distr::{Distribution, StandardNormal};
 

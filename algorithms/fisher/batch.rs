@@ -12,10 +12,10 @@ use asid_core::error::Result;
 use asid_core::layout::Recording;
 use asid_core::parameter::Parameter;
 use asid_core::problem::{Batch, Problem, substeps};
-use asid_core::signal::SignalSet;
 use asid_core::simulator::{Control, Rollout};
 use asid_core::task::Commander;
 use asid_core::tracker::ReadingFrames;
+use asid_readings::SignalSet;
 
 /// Step of the start pose in finite differences, in standard deviations of its range.
 const START_DELTA: f64 = 0.02;

@@ -14,8 +14,8 @@ use asid_core::error::Result;
 use asid_core::layout::Recording;
 use asid_core::parameter::Parameter;
 use asid_core::problem::{Batch, Problem, substeps};
-use asid_core::signal::SignalSet;
 use asid_core::simulator::{Control, Rollout};
+use asid_readings::SignalSet;
 
 /// How expected deviations are computed.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -5,7 +5,7 @@
 //! It is divided by the noise, that of the trackers plus, of some entries, the square of what the reading deviates
 //! from a straight line over the copies.
 
-use asid_core::signal::SignalSet;
+use asid_readings::SignalSet;
 
 /// Turns the readings of an episode and its copies into whitened Jacobians.
 pub struct Sensitivity {

@@ -7,9 +7,9 @@
 //! their noise, is the whitened residual.
 
 use asid_core::problem::Batch;
-use asid_core::replay::Replay;
-use asid_core::signal::SignalSet;
 use asid_core::{Episode, Error, Parameter, Problem, Result};
+use asid_readings::SignalSet;
+use asid_readings::replay::Replay;
 use rand_distr::{Distribution, StandardNormal};
 
 /// How far a start pose may lie from its first reading, in standard deviations of that reading.

@@ -6,10 +6,10 @@ use std::sync::atomic::Ordering;
 use asid_core::layout::Recording;
 use asid_core::problem::Batch;
 use asid_core::rng::Rng;
-use asid_core::signal::SignalSet;
 use asid_core::simulator::{Control, Rollout};
 use asid_core::task::Commander;
 use asid_core::{Problem, Result};
+use asid_readings::SignalSet;
 use rand::Rng as _;
 use rand_distr::{Distribution, StandardNormal};
 

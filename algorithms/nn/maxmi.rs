@@ -12,7 +12,6 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 use asid_core::registry::{self, Settings};
-use asid_core::signal::SignalSet;
 use asid_core::{Parameter, Problem, Result};
 use asid_learned::Layer;
 use asid_learned::PpoConfig;
@@ -21,6 +20,7 @@ use asid_learned::inference::Inference;
 use asid_learned::learning::{LearnedExplorer, Trainer, Training};
 use asid_learned::maxmi::{MaxMi, PREDICTOR, Predicting};
 use asid_learned::{Dataset, Network as Plain};
+use asid_readings::SignalSet;
 use rand::Rng as _;
 
 use crate::predictor::Predictor;

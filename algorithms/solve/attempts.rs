@@ -2,8 +2,8 @@
 
 use asid_core::problem::Batch;
 use asid_core::rng::Rng;
-use asid_core::signal::SignalSet;
 use asid_core::{Control, Posterior, Problem, Recording, Result, Rollout};
+use asid_readings::SignalSet;
 use rand::Rng as _;
 use rand_distr::{Distribution, StandardNormal};
 

@@ -7,7 +7,7 @@
 //! - What is done: a [`Task`] with [`Parameter`]s; an [`Explorer`] makes a [`Policy`],
 //!   a [`RealWorld`] plays it, an [`Identifier`] fits a [`Posterior`] to the
 //!   [`Episode`], a [`TaskSolver`] makes a [`TaskPolicy`].
-//! - How readings are compared: [`signal`]; a log in a simulator: [`replay`].
+//! - What a tracker reads: [`signal`].
 //! - How parts are found: [`registry`].
 
 pub mod backend;
@@ -16,7 +16,6 @@ pub mod environment;
 pub mod episode;
 pub mod error;
 pub mod explore;
-pub mod guard;
 pub mod identify;
 pub mod layout;
 pub mod parameter;
@@ -25,7 +24,6 @@ pub mod problem;
 pub mod progress;
 pub mod real_world;
 pub mod registry;
-pub mod replay;
 pub mod rng;
 pub mod scene;
 pub mod settings;
@@ -34,7 +32,6 @@ pub mod simulator;
 pub mod solve;
 pub mod target;
 pub mod task;
-pub mod toml_text;
 pub mod tracker;
 
 // What public items speak of, so that an author need not match versions.

@@ -5,14 +5,13 @@
 //! by an engine, so that every engine sees the same bytes and `asid export`
 //! writes exactly what was simulated.
 
-mod xml;
-
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
+use asid_documents::guard::{guarded, one_line};
+use asid_documents::xml::{Fault, parse, spliced, wrong_eulerseq};
+
 use crate::error::{Error, Result};
-use crate::guard::{guarded, one_line};
-use xml::{parse, spliced, wrong_eulerseq};
 
 /// One MJCF document with its includes spliced in.
 #[derive(Clone)]
@@ -66,10 +65,7 @@ impl Scene {
                 .iter()
                 .find(|(n, _)| *n == file)
                 .map(|(_, text)| (*text).to_owned())
-                .ok_or_else(|| Error::Scene {
-                    scene: name.to_owned(),
-                    message: format!("included file `{file}` is not there"),
-                })
+                .ok_or_else(|| Fault::new(name, format!("included file `{file}` is not there")))
         })?;
         Self::checked(name.to_owned(), xml, None)
     }
@@ -220,15 +216,24 @@ impl Scene {
     }
 }
 
-fn read(path: &Path) -> Result<String> {
-    std::fs::read_to_string(path).map_err(|e| Error::Scene {
-        scene: path.display().to_string(),
-        message: match e.kind() {
+fn read(path: &Path) -> Result<String, Fault> {
+    std::fs::read_to_string(path).map_err(|e| {
+        let message = match e.kind() {
             std::io::ErrorKind::NotFound => "no such file".into(),
             std::io::ErrorKind::InvalidData => "is not UTF-8 text".into(),
             _ => e.to_string(),
-        },
+        };
+        Fault::new(path.display().to_string(), message)
     })
+}
+
+impl From<Fault> for Error {
+    fn from(fault: Fault) -> Self {
+        Self::Scene {
+            scene: fault.document,
+            message: fault.message,
+        }
+    }
 }
 
 #[cfg(test)]
@@ -298,7 +303,7 @@ mod tests {
             let error = Scene::from_xml("deep", &xml, &[]).unwrap_err().to_string();
             assert!(error.contains("nested deeper than 256"), "{error}");
         }
-        assert!(Scene::from_xml("deep", &nested(xml::MAX_LEVELS - 2), &[]).is_ok());
+        assert!(Scene::from_xml("deep", &nested(asid_documents::xml::MAX_LEVELS - 2), &[]).is_ok());
     }
 
     /// Symptom: "index out of bounds: the len is 3 but the index is 3" from the parser of MJCF. Cause: a fourth axis.

@@ -19,7 +19,7 @@ pub fn settings<S: serde::de::DeserializeOwned>(section: &str, table: &Settings)
     check_finite(section, table)?;
     S::deserialize(toml::Value::Table(table.clone())).map_err(|e| Error::Config {
         key: section.to_owned(),
-        message: crate::guard::one_line(e.message()),
+        message: asid_documents::guard::one_line(e.message()),
     })
 }
 
@@ -121,7 +121,7 @@ fn describe(
         // Links to Rust items read as the items' names.
         let plain = paragraph.replace("[`", "`").replace("`]", "`");
         let meaning =
-            crate::guard::one_line(&format!("{plain} {}", choices(property, definitions)));
+            asid_documents::guard::one_line(&format!("{plain} {}", choices(property, definitions)));
         if !meaning.is_empty() {
             found.insert(key.clone(), meaning);
         }

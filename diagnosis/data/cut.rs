@@ -1,7 +1,7 @@
 //! Parts of logs: their first rows, and windows of them.
 
 use asid_core::Layout;
-use asid_core::replay::ReplayPlan;
+use asid_readings::replay::ReplayPlan;
 
 use super::{LoggedEpisode, Logs};
 

@@ -125,7 +125,7 @@ impl Study {
             })
         })?;
         let document: Document =
-            asid_core::toml_text::read(&text).map_err(|e| fail(one_line(&e)))?;
+            asid_documents::toml_text::read(&text).map_err(|e| fail(one_line(&e)))?;
         let folder = file.parent().map(Path::to_path_buf).unwrap_or_default();
         let model = folder.join(&document.model);
         let source = RefinedModel::open(&model)?;

@@ -1,9 +1,9 @@
 //! Contacts along replays: which pairs of bodies can touch, and which do.
 
 use asid_core::layout::Recording;
-use asid_core::replay::ReplayPlan;
 use asid_core::{Control, Layout, Result, Rollout, Simulator};
 use asid_mjcf::Plant;
+use asid_readings::replay::ReplayPlan;
 
 use super::Trajectory;
 

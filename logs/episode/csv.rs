@@ -4,8 +4,8 @@ use std::io::{BufRead as _, BufReader, Read as _};
 use std::path::Path;
 
 use asid_core::Episode;
-use asid_core::guard::one_line;
 use asid_core::layout::Layout;
+use asid_documents::guard::one_line;
 
 use super::reader::Reader;
 use super::{ColumnMapping, LogNotes};

@@ -7,8 +7,8 @@ mod thrift;
 use std::path::Path;
 
 use asid_core::Episode;
-use asid_core::guard::{guarded, one_line};
 use asid_core::layout::Layout;
+use asid_documents::guard::{guarded, one_line};
 use parquet::file::reader::FileReader as _;
 use parquet::record::Field;
 

@@ -3,8 +3,8 @@
 #[cfg(feature = "torch")]
 use asid_core::Episode;
 use asid_core::Result;
-use asid_core::replay::Replay;
 use asid_effects::EffectSpec;
+use asid_readings::replay::Replay;
 
 use super::candidates::Shown;
 use super::noise;

@@ -3,9 +3,10 @@
 
 use std::collections::BTreeMap;
 
-use asid_core::replay::Replay;
-use asid_core::signal::{Signal, SignalSet};
+use asid_core::signal::Signal;
 use asid_core::{Episode, Error, Layout, Result};
+use asid_readings::SignalSet;
+use asid_readings::replay::Replay;
 
 use super::study::Study;
 use crate::answer::Answer;

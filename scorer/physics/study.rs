@@ -127,7 +127,7 @@ fn document(folder: &Path) -> Result<Document> {
         message,
     };
     let text = std::fs::read_to_string(&file).map_err(|e| fail(e.to_string()))?;
-    asid_core::toml_text::read(&text).map_err(|e| fail(e.message().replace('\n', " ")))
+    asid_documents::toml_text::read(&text).map_err(|e| fail(e.message().replace('\n', " ")))
 }
 
 /// Files of a folder whose name matches a pattern with at most one `*` in its last part, sorted.

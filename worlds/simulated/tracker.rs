@@ -6,8 +6,8 @@
 use asid_core::error::{Error, Result};
 use asid_core::layout::Layout;
 use asid_core::rng::Rng;
-use asid_core::signal::SignalSet;
 use asid_core::tracker::ReadingFrames;
+use asid_readings::SignalSet;
 use rand_distr::{Distribution, StandardNormal};
 
 /// Systematic errors of the tracker of a [`SimulatedWorld`](super::SimulatedWorld); without any by default.

@@ -7,6 +7,7 @@
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
 mod bench;
+mod binaries;
 mod deny;
 mod environment;
 mod fuzz;

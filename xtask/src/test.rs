@@ -4,8 +4,8 @@
 use anyhow::Result;
 
 use crate::lint::stages_of_lint;
-use crate::stage::{ALL_FEATURES, SHARED, Stages};
-use crate::{deny, library, miri, python, setup, slurm};
+use crate::stage::{SHARED, Stages};
+use crate::{binaries, deny, library, miri, python, setup, slurm};
 
 /// Tests of the command line that call every stage of the pipeline, and what this build refuses.
 const PURE: [&str; 2] = ["--test=cli_run", "--test=cli_refusals"];
@@ -16,11 +16,7 @@ pub fn run() -> Result<bool> {
     stages.run("setup", || setup::run(&library::ALL).map(|()| true))?;
     stages_of_lint(&mut stages)?;
     deny::stage(&mut stages)?;
-    stages.cargo(
-        "tests",
-        &["test", "--workspace", "--no-fail-fast", ALL_FEATURES],
-        &[],
-    )?;
+    stages.run("tests", binaries::run)?;
     // The program that the tests have built: alone it would be built anew, with other features of its dependencies.
     let program = library::target()?.join("debug/asid");
     slurm::stage(&mut stages, Some(&program))?;

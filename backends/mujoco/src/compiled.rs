@@ -53,6 +53,6 @@ fn forbid_simple(body: &mut MjsBody) {
 pub fn refused(scene: &Scene, message: &(impl ToString + ?Sized)) -> Error {
     Error::Scene {
         scene: scene.name().to_owned(),
-        message: asid_core::guard::one_line(&message.to_string()),
+        message: asid_documents::guard::one_line(&message.to_string()),
     }
 }

@@ -217,7 +217,7 @@ impl Batch {
             let status = *mjb_status(self.raw.as_ptr()).add(sim);
             (status != 0).then(|| {
                 let text = CStr::from_ptr(mjb_error(self.raw.as_ptr(), sim as c_int));
-                asid_core::guard::one_line(&text.to_string_lossy())
+                asid_documents::guard::one_line(&text.to_string_lossy())
             })
         }
     }

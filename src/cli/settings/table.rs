@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use anyhow::Result;
-use asid_core::{Error, toml_text};
+use asid_core::Error;
+use asid_documents::toml_text;
 use serde::de::DeserializeOwned;
 
 use crate::cli::options::Common;

@@ -2,9 +2,9 @@
 
 use crate::pipeline::RunOutcome;
 use anyhow::Result;
-use asid_core::replay::Replay as Replayed;
 use asid_core::signal::yaw;
 use asid_core::task::{Outline, TrackedObject};
+use asid_readings::replay::Replay as Replayed;
 use asid_report::run as r;
 
 use super::super::session::Session;

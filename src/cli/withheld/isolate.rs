@@ -91,7 +91,8 @@ pub fn copy(study: &Path, to: &Path, treatment: Treatment) -> Result<()> {
 fn treat(study: &Path, treatment: Treatment) -> Result<()> {
     let file = study.join("study.toml");
     let text = std::fs::read_to_string(&file).map_err(|e| failed(&file, &e))?;
-    let document: toml::Table = asid_core::toml_text::read(&text).map_err(|e| failed(&file, &e))?;
+    let document: toml::Table =
+        asid_documents::toml_text::read(&text).map_err(|e| failed(&file, &e))?;
     let model = document
         .get("model")
         .and_then(|m| m.as_str())

@@ -1,7 +1,26 @@
 //! The document as XML: includes spliced in by text, and what would end a parser refused first.
 
-use crate::error::{Error, Result};
 use crate::guard::one_line;
+
+/// Why a document cannot be taken.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{document}: {message}")]
+pub struct Fault {
+    /// Name or path of the document, or of the included one.
+    pub document: String,
+    /// What is wrong, with its line where known.
+    pub message: String,
+}
+
+impl Fault {
+    /// What is wrong with a document.
+    pub fn new(document: impl Into<String>, message: impl Into<String>) -> Self {
+        Self {
+            document: document.into(),
+            message: message.into(),
+        }
+    }
+}
 
 /// Deepest chain of `<include>` that is followed.
 const MAX_INCLUDE_DEPTH: usize = 8;
@@ -12,20 +31,21 @@ const MAX_INCLUDES: usize = 1000;
 
 /// Levels of elements that a document may have: robots have some 30, and ropes of 200 bodies fit. Parsers and
 /// engines follow them by recursion, at some kB of the stack a level.
-pub(super) const MAX_LEVELS: usize = 256;
+pub const MAX_LEVELS: usize = 256;
 
-pub fn parse<'a>(name: &str, xml: &'a str) -> Result<roxmltree::Document<'a>> {
+/// Parses the document `name`.
+///
+/// # Errors
+/// When it is not well-formed, with line and column, or its elements are nested without end.
+pub fn parse<'a>(name: &str, xml: &'a str) -> Result<roxmltree::Document<'a>, Fault> {
     if levels(xml) > MAX_LEVELS {
-        return Err(Error::Scene {
-            scene: name.to_owned(),
-            message: format!(
-                "its elements are nested deeper than {MAX_LEVELS}: is an end tag missing?"
-            ),
-        });
+        let message =
+            format!("its elements are nested deeper than {MAX_LEVELS}: is an end tag missing?");
+        return Err(Fault::new(name, message));
     }
-    roxmltree::Document::parse(xml).map_err(|e| Error::Scene {
-        scene: name.to_owned(),
-        message: format!("is not well-formed XML: {}", one_line(&e.to_string())),
+    roxmltree::Document::parse(xml).map_err(|e| {
+        let message = format!("is not well-formed XML: {}", one_line(&e.to_string()));
+        Fault::new(name, message)
     })
 }
 
@@ -71,7 +91,8 @@ fn end_of_tag(tag: &str) -> usize {
     tag.len()
 }
 
-/// An order of Euler's axes that is none, which parsers take for three letters.
+/// An order of Euler's axes that is none, which parsers take for three letters, and its node.
+#[must_use]
 pub fn wrong_eulerseq<'a>(
     document: &'a roxmltree::Document<'_>,
 ) -> Option<(roxmltree::Node<'a, 'a>, &'a str)> {
@@ -86,8 +107,12 @@ pub fn wrong_eulerseq<'a>(
 /// reads.
 ///
 /// # Errors
-/// [`Error::Scene`] where a file is not there or not well-formed, or includes have no end.
-pub fn spliced(name: &str, xml: &str, load: &dyn Fn(&str) -> Result<String>) -> Result<String> {
+/// Where a file is not there or not well-formed, or includes have no end.
+pub fn spliced(
+    name: &str,
+    xml: &str,
+    load: &dyn Fn(&str) -> Result<String, Fault>,
+) -> Result<String, Fault> {
     splice(name, xml, 0, &mut MAX_INCLUDES.clone(), load)
 }
 
@@ -97,31 +122,25 @@ fn splice(
     xml: &str,
     depth: usize,
     left: &mut usize,
-    load: &dyn Fn(&str) -> Result<String>,
-) -> Result<String> {
+    load: &dyn Fn(&str) -> Result<String, Fault>,
+) -> Result<String, Fault> {
+    let fault = |message: String| Fault::new(name, message);
     if depth > MAX_INCLUDE_DEPTH {
-        return Err(Error::Scene {
-            scene: name.to_owned(),
-            message: format!(
-                "includes are nested deeper than {MAX_INCLUDE_DEPTH}: is there a cycle?"
-            ),
-        });
+        return Err(fault(format!(
+            "includes are nested deeper than {MAX_INCLUDE_DEPTH}: is there a cycle?"
+        )));
     }
     let document = parse(name, xml)?;
     let mut out = String::with_capacity(xml.len());
     let mut copied = 0;
     for node in document.descendants().filter(|n| n.has_tag_name("include")) {
-        let file = node.attribute("file").ok_or_else(|| Error::Scene {
-            scene: name.to_owned(),
-            message: format!(
-                "line {}: <include> has no `file`",
-                document.text_pos_at(node.range().start).row
-            ),
+        let file = node.attribute("file").ok_or_else(|| {
+            let line = document.text_pos_at(node.range().start).row;
+            fault(format!("line {line}: <include> has no `file`"))
         })?;
-        *left = left.checked_sub(1).ok_or_else(|| Error::Scene {
-            scene: name.to_owned(),
-            message: format!("more than {MAX_INCLUDES} files are included"),
-        })?;
+        *left = left
+            .checked_sub(1)
+            .ok_or_else(|| fault(format!("more than {MAX_INCLUDES} files are included")))?;
         let text = splice(file, &load(file)?, depth + 1, left, load)?;
         let included = parse(file, &text)?;
         let root = included.root_element();

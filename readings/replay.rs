@@ -3,10 +3,8 @@
 //! A log whose rows lie on the physics grid is replayed frame by frame; any
 //! other is replayed step by step and interpolated to the times of its rows.
 
-use crate::episode::Episode;
-use crate::error::Result;
-use crate::layout::{JointKind, Layout, Recording};
-use crate::simulator::{Control, Rollout, Simulator};
+use asid_core::layout::JointKind;
+use asid_core::{Control, Episode, Layout, Recording, Result, Rollout, Simulator};
 
 /// How a log's commands are replayed, and how its rows lie among the recorded states.
 #[derive(Clone, Debug)]

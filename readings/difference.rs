@@ -1,0 +1,123 @@
+//! The difference of two readings of tracked signals.
+//!
+//! It is *whitened*: divided by the standard deviation
+//! of the sensor's noise, rotations compared as rotations. The same differences
+//! make the likelihood (identification), the sensitivity (information) and the
+//! gap (diagnosis).
+
+use asid_core::signal::{Signal, rotation_difference, unit_quaternion};
+use asid_core::{Layout, Result};
+use nalgebra::UnitQuaternion;
+
+#[derive(Clone, Copy, Debug)]
+struct Part {
+    start: usize,
+    len: usize,
+    rotation: bool,
+    noise: f64,
+}
+
+/// Signals resolved against a scene, in the order of a reading's row.
+#[derive(Clone, Debug)]
+pub struct SignalSet {
+    parts: Vec<Part>,
+    width: usize,
+    whitened: usize,
+}
+
+impl SignalSet {
+    /// Resolves `signals`, whose entries follow each other in a row.
+    ///
+    /// # Errors
+    /// When the scene has no such sensor.
+    pub fn new(layout: &Layout, signals: &[Signal]) -> Result<Self> {
+        let mut parts = Vec::with_capacity(signals.len());
+        let (mut width, mut whitened) = (0, 0);
+        for signal in signals {
+            let sensor = layout.sensor(&signal.sensor)?;
+            let rotation = sensor.len == 4;
+            parts.push(Part {
+                start: width,
+                len: sensor.len,
+                rotation,
+                noise: signal.noise,
+            });
+            width += sensor.len;
+            whitened += if rotation { 3 } else { sensor.len };
+        }
+        Ok(Self {
+            parts,
+            width,
+            whitened,
+        })
+    }
+
+    /// Entries of a reading's row.
+    #[must_use]
+    pub fn width(&self) -> usize {
+        self.width
+    }
+
+    /// Entries of a whitened difference: three for an orientation.
+    #[must_use]
+    pub fn whitened_len(&self) -> usize {
+        self.whitened
+    }
+
+    /// Writes the whitened difference `(a - b) / noise`, `whitened_len` entries.
+    /// Where either reading is missing (NaN) the entry is NaN.
+    pub fn difference(&self, a: &[f64], b: &[f64], out: &mut [f64]) {
+        let mut k = 0;
+        for part in &self.parts {
+            let (a, b) = (&a[part.start..][..part.len], &b[part.start..][..part.len]);
+            if part.rotation {
+                let turn = rotation_difference(a, b);
+                for t in turn {
+                    out[k] = t / part.noise;
+                    k += 1;
+                }
+            } else {
+                for (x, y) in a.iter().zip(b) {
+                    out[k] = (x - y) / part.noise;
+                    k += 1;
+                }
+            }
+        }
+    }
+
+    /// Adds the sensors' noise to a true reading; `normal` draws a standard normal number.
+    pub fn add_noise(&self, reading: &mut [f64], mut normal: impl FnMut() -> f64) {
+        for part in &self.parts {
+            let row = &mut reading[part.start..][..part.len];
+            if part.rotation {
+                let turn = nalgebra::Vector3::from_fn(|_, _| normal() * part.noise);
+                let noisy = UnitQuaternion::from_scaled_axis(turn) * unit_quaternion(row);
+                row.copy_from_slice(&[noisy.w, noisy.i, noisy.j, noisy.k]);
+            } else {
+                for x in row {
+                    *x += normal() * part.noise;
+                }
+            }
+        }
+    }
+
+    /// Shifts a reading by `offset`, `whitened_len` entries in the sensors' units: numbers are added,
+    /// a rotation vector (rad) turns an orientation about the axes of its object.
+    pub fn add_offset(&self, reading: &mut [f64], offset: &[f64]) {
+        let mut k = 0;
+        for part in &self.parts {
+            let row = &mut reading[part.start..][..part.len];
+            if part.rotation {
+                let turn = nalgebra::Vector3::new(offset[k], offset[k + 1], offset[k + 2]);
+                let turned = unit_quaternion(row) * UnitQuaternion::from_scaled_axis(turn);
+                row.copy_from_slice(&[turned.w, turned.i, turned.j, turned.k]);
+                k += 3;
+            } else {
+                for x in row {
+                    *x += offset[k];
+                    k += 1;
+                }
+            }
+        }
+    }
+}
