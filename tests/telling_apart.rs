@@ -121,6 +121,10 @@ fn a_task_is_run_diagnosed_and_run_again() {
         "logs=exploration",
         "--set",
         "search.depth=1",
+        "--set",
+        "search.raced=2",
+        "--set",
+        "search.finished=1",
         "--out",
         "a",
     ];

@@ -21,6 +21,7 @@ use crate::candidate::Candidate;
 use super::context::{Context, PUSH};
 use super::estimate::Estimate;
 use super::fit::Hypothesis;
+use super::one_step::one_step_tells;
 use super::step_map::{Derivatives, LinearEpisode};
 
 use asked::{Asked, Trial, bounds, trials};
@@ -139,6 +140,12 @@ impl Columns {
         let (mut asked, variations) = Asked::of_model(base, theta);
         let roles = 8 * context.plant().layout.nv + asked.base + 1;
         let mut map = context.map(&base.specs, &base.parameters(), roles)?;
+        let model = (&base.specs[..], &base.parameters()[..]);
+        map.by_one_step(one_step_tells(
+            context,
+            model,
+            (theta, &estimate.trajectory),
+        )?);
         let (want, steps) = slopes_wanted(context);
         let mut linear = map.linearise(theta, &estimate.trajectory, want, &steps, &variations)?;
         let late: Vec<Vec<f64>> = linear.iter().map(|l| l.late.clone()).collect();

@@ -47,7 +47,7 @@ pub struct Context<'a> {
     pub reading_variance: Vec<f64>,
     /// Typical inertial force at each degree of freedom, N or N m.
     pub inertial: Vec<f64>,
-    /// Whether one physics step of a row tells its slopes in the state.
+    /// Whether one physics step of a row tells its slopes in the state, of the model without further effects.
     pub one_step: bool,
 }
 
@@ -185,7 +185,7 @@ pub fn begin<'a>(
         walks: taken.walks,
         one_step: false,
     };
-    context.one_step = one_step_tells(&context, parameters, (theta, &trajectory))?;
+    context.one_step = one_step_tells(&context, (&[], parameters), (theta, &trajectory))?;
     let mut map = context.map(&[], parameters, nv + 1)?;
     let all = vec![true; trajectory.len()];
     map.roll(theta, (&mut trajectory, &all), &context.reading_variance)?;

@@ -35,7 +35,7 @@ const RISE: f64 = 0.5;
 /// Rounds without a rise that are gone on with (a watchdog: Chamberlain and others 1982), for a narrow valley bends away
 /// from its tangent.
 const PATIENCE: usize = 2;
-/// Shorter steps that are tried, at most.
+/// Shorter steps from one point that are tried, at most.
 const FAILURES: usize = 2;
 
 /// A model: the study's parameters and effects, with priors.
@@ -87,6 +87,8 @@ pub struct Fitted {
 
 /// A point from which steps are taken: what it and its step promise, and where that leads.
 struct Anchor {
+    /// Evidence there, and with what a step promises.
+    here: f64,
     hoped: f64,
     from: (Vec<f64>, Estimate),
     to: (Vec<f64>, Estimate),
@@ -133,7 +135,7 @@ pub fn fit(
         let variations = variations(unknowns, &free, &theta);
         let mut linear = slopes.linearise(
             (context, &mut map),
-            (&theta, unknowns),
+            (&theta, hypothesis),
             &estimate,
             &variations,
         )?;
@@ -152,6 +154,9 @@ pub fn fit(
         let rose = best.as_ref().is_none_or(|b| here > b.evidence + rise)
             || anchor.as_ref().is_none_or(|a| hoped > a.hoped + rise);
         waited = if rose { 0 } else { waited + 1 };
+        // A step that lost more than it had promised to win is no narrow valley.
+        let lost = |a: &Anchor| a.here - here > (a.hoped - a.here).max(rise);
+        let astray = anchor.as_ref().is_some_and(lost);
         if let Some(best) = best.as_ref().filter(|b| here < b.evidence) {
             drops.push(best.evidence - here);
         }
@@ -171,7 +176,7 @@ pub fn fit(
         if stands || failed == FAILURES || round + 1 == rounds || progress.is_stopped() {
             break;
         }
-        if waited > PATIENCE {
+        if waited > PATIENCE || astray && failed < FAILURES {
             // The tangents led astray: less of the way.
             let Some(anchor) = &anchor else {
                 break;
@@ -189,8 +194,9 @@ pub fn fit(
         shift(&mut linear, &moves);
         smooth(context, &mut map, &theta, (&linear, &steps), &mut estimate)?;
         if let Some(from) = from {
-            part = 1.0;
+            (part, failed) = (1.0, 0);
             anchor = Some(Anchor {
+                here,
                 hoped,
                 from,
                 to: (theta.clone(), estimate.clone()),
@@ -262,12 +268,7 @@ pub fn settle_noise(
         if round > 0 && progress.is_stopped() {
             break;
         }
-        let linear = slopes.linearise(
-            (context, &mut map),
-            (theta, &hypothesis.unknowns),
-            estimate,
-            &[],
-        )?;
+        let linear = slopes.linearise((context, &mut map), (theta, hypothesis), estimate, &[])?;
         let before = estimate.trajectory.clone();
         estimate.improve(context, &linear, em_rounds);
         estimate.roll(context, &mut map, theta, &before)?;

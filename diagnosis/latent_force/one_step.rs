@@ -1,9 +1,10 @@
 //! Whether one physics step of a row tells the slopes of the whole row.
 //!
 //! It does where the machine hardly changes over a row, and does not where a stiff drive comes to rest within one. Neither the model nor
-//! the log says which; a few rows that are taken both ways do.
+//! the log says which; a few rows that are taken both ways do. A drive that is found to be softer is told by one step from then on.
 
 use asid_core::{Parameter, Result};
+use asid_effects::EffectSpec;
 
 use super::context::Context;
 use super::step_map::{Derivatives, StepMap};
@@ -17,14 +18,14 @@ const APART: f64 = 0.1;
 /// Share of the rows that may differ by more, as where a joint comes to a stop within the row.
 const ODD: f64 = 0.05;
 
-/// Whether slopes in the state of one physics step, carried over its row, are those of the row, for a model without further effects along
-/// a trajectory.
+/// Whether slopes in the state of one physics step, carried over its row, are those of the row, for a model with some effects along a
+/// trajectory.
 ///
 /// # Errors
 /// When the engine fails.
 pub fn one_step_tells(
     context: &Context<'_>,
-    parameters: &[Parameter],
+    (specs, parameters): (&[EffectSpec], &[Parameter]),
     (theta, trajectory): (&[f64], &[Vec<f64>]),
 ) -> Result<bool> {
     let layout = &context.plant().layout;
@@ -41,7 +42,7 @@ pub fn one_step_tells(
         return Ok(false);
     }
     let of = (context.logs, &walks[..]);
-    let mut map = StepMap::new(context.machine, &[], parameters, of, nx + 1)?;
+    let mut map = StepMap::new(context.machine, specs, parameters, of, nx + 1)?;
     let want = Derivatives {
         state: true,
         ..Derivatives::default()

@@ -7,6 +7,7 @@
 //! that is varied. Effects that remember (a delay, a rotor behind its play) walk along with their
 //! own simulation, so that their memory at a row is that of the trajectory before it.
 
+mod carried;
 mod late;
 mod linear_episode;
 mod pass;
@@ -57,6 +58,8 @@ struct Common<'a> {
     remembers_motion: bool,
     /// Whether one physics step tells the slopes of a row in the state.
     one_step: bool,
+    /// Whether each parameter acts in each physics step alike, by what the model is then.
+    at_once: Vec<bool>,
 }
 
 impl Common<'_> {
@@ -64,6 +67,13 @@ impl Common<'_> {
     /// slopes in forces are wanted, which are those of rows.
     fn rolls(&self, walk: usize, want: Derivatives) -> bool {
         self.walks[walk].segment.is_some() && !want.force
+    }
+
+    /// Whether a variation is of parameters alone that act in each physics step alike. What sensors remember tells of other steps too.
+    fn acts_at_once(&self, theta: &[f64], variation: &Variation) -> bool {
+        let values = theta.iter().zip(&variation.theta).zip(&self.at_once);
+        let mut varied = values.filter(|((a, b), _)| a != b);
+        !self.reads && varied.all(|(_, at_once)| *at_once)
     }
 }
 
@@ -77,6 +87,10 @@ struct Request<'r> {
     variations: &'r [Variation],
     /// Walks whose slopes in the state are wanted; empty for all.
     due: &'r [bool],
+    /// [`LinearEpisode::carried`] of walks that are not due; empty where there is none.
+    carried: &'r [Vec<f64>],
+    /// Whether each variation is of what acts in each physics step alike.
+    at_once: &'r [bool],
 }
 
 impl Request<'_> {
@@ -125,15 +139,20 @@ impl<'a> StepMap<'a> {
             .chain(joints().map(|j| format!("qvel.{}", j.name)))
             .collect();
         let (mut remembers, mut reads, mut remembers_motion) = (false, false, false);
+        let mut of_model = Vec::new();
         for spec in machine.given_effects().iter().chain(specs) {
             let effect = spec.find(&machine.plant)?;
             remembers_motion |= effect.remembers_motion();
             match effect.acts() {
                 Acts::Measurement => reads = true,
                 Acts::Command | Acts::Force => remembers = true,
-                Acts::Model => {}
+                Acts::Model => of_model.push(spec.label()),
             }
         }
+        let acts_at_once = |p: &Parameter| {
+            let mut targets = p.targets.iter();
+            targets.all(|t| t.element != "effect" || of_model.contains(&t.name))
+        };
         let common = Common {
             states: layout.recording(&names)?,
             readings: layout.recording(&logs.channels())?,
@@ -146,6 +165,7 @@ impl<'a> StepMap<'a> {
             reads,
             remembers_motion,
             one_step: false,
+            at_once: parameters.iter().map(acts_at_once).collect(),
         };
         Ok(Self { common, parts })
     }
@@ -199,11 +219,11 @@ impl<'a> StepMap<'a> {
         push: &[f64],
         variations: &[Variation],
     ) -> Result<Vec<LinearEpisode>> {
-        self.linearise_due(theta, trajectory, (want, &[]), push, variations)
+        self.linearise_due(theta, trajectory, (want, &[], &[]), push, variations)
     }
 
     /// The same, with slopes in the state of those walks alone that are due (one flag a walk; empty for all): those of the others are
-    /// zero.
+    /// zero. `carried` has [`LinearEpisode::carried`] of the others, where they have it.
     ///
     /// # Errors
     /// As [`StepMap::linearise`].
@@ -211,10 +231,15 @@ impl<'a> StepMap<'a> {
         &mut self,
         theta: &[f64],
         trajectory: &[Vec<f64>],
-        (want, due): (Derivatives, &[bool]),
+        (want, due, carried): (Derivatives, &[bool], &[Vec<f64>]),
         push: &[f64],
         variations: &[Variation],
     ) -> Result<Vec<LinearEpisode>> {
+        let common = &self.common;
+        let at_once: Vec<bool> = variations
+            .iter()
+            .map(|v| common.acts_at_once(theta, v))
+            .collect();
         let request = Request {
             theta,
             trajectory,
@@ -222,8 +247,9 @@ impl<'a> StepMap<'a> {
             push,
             variations,
             due,
+            carried,
+            at_once: &at_once,
         };
-        let common = &self.common;
         let found: Vec<Vec<LinearEpisode>> = self
             .parts
             .par_iter_mut()

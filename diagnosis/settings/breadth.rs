@@ -46,7 +46,7 @@ impl Default for Breadth {
             near: 20.0,
             finished: 3,
             depth: 4,
-            rounds: [3, 15],
+            rounds: [4, 15],
             seed: 0,
         }
     }

@@ -62,7 +62,7 @@ pub struct Arguments {
     #[arg(long, value_name = "N")]
     seeds: Option<u64>,
     /// Answer after about this time with what is known by then; result.json lists the explanations not tried. Ctrl-C does the same
-    /// [default: 1.75]
+    /// [default: 1.5]
     #[arg(long, value_name = "MINUTES")]
     minutes: Option<f64>,
     /// Repeat the diagnosis on simulated logs for as long as --minutes allows, and tell how often it was right

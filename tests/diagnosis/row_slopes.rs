@@ -1,10 +1,11 @@
-//! Slopes of a row in the state, by all its physics steps and by one of them.
+//! Slopes of a row in the state and in values, by all its physics steps and by one of them.
 
 use asid::core::episode::ChannelColumns;
-use asid::core::{Episode, Scene};
+use asid::core::parameter::Scale;
+use asid::core::{Episode, Parameter, Scene};
 use asid::diagnosis::data::Logs;
 use asid::diagnosis::latent_force::context::{Taken, begin};
-use asid::diagnosis::latent_force::step_map::{Derivatives, LinearEpisode, StepMap};
+use asid::diagnosis::latent_force::step_map::{Derivatives, LinearEpisode, StepMap, Variation};
 use asid::diagnosis::latent_force::walk::Walk;
 use asid::diagnosis::machine::Machine;
 use asid::effects::EffectSpec;
@@ -59,14 +60,18 @@ fn linearised(machine: &Machine, specs: &[EffectSpec], one_step: bool) -> Linear
     let walks = [Walk::new(&logs, 0, DT)];
     let mut map = StepMap::new(machine, specs, &[], (&logs, &walks), 3).unwrap();
     map.by_one_step(one_step);
-    let state = |k: usize| [0.1 * (k as f64).sin(), 0.3 * (k as f64).cos()];
-    let states = (0..ROWS).flat_map(state).collect();
     let want = Derivatives {
         state: true,
         ..Derivatives::default()
     };
-    let mut found = map.linearise(&[], &[states], want, &[], &[]).unwrap();
+    let mut found = map.linearise(&[], &[states()], want, &[], &[]).unwrap();
     found.remove(0)
+}
+
+/// States along the log.
+fn states() -> Vec<f64> {
+    let state = |k: usize| [0.1 * (k as f64).sin(), 0.3 * (k as f64).cos()];
+    (0..ROWS).flat_map(state).collect()
 }
 
 fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
@@ -97,6 +102,56 @@ fn slopes_of_an_oscillator_are_those_of_its_solution_either_way() {
     assert!(largest_difference(&whole.a, &one.a) < 1e-6);
     assert_eq!(whole.defect, one.defect);
     assert_eq!(whole.residual, one.residual);
+}
+
+/// What a unit of damping (N s/m) changes of each row's end, `rows x 2`: by all steps of the row; by one of them, with fresh slopes in the state;
+/// and with slopes that were kept.
+fn columns_of_damping() -> [Vec<f64>; 3] {
+    let machine = machine(&scene(0.0, 1.0));
+    let logs = logs(&machine);
+    let walks = [Walk::new(&logs, 0, DT)];
+    let target = "joint/slide/damping".parse().unwrap();
+    let damping = Parameter {
+        name: "damping".into(),
+        targets: vec![target],
+        range: [0.0, 10.0],
+        scale: Scale::Linear,
+        unit: "N s/m".into(),
+    };
+    let mut map = StepMap::new(&machine, &[], &[damping], (&logs, &walks), 4).unwrap();
+    let step = 1e-3;
+    let varied = [Variation {
+        theta: vec![SLIDE[2] + step],
+        scale: step,
+    }];
+    let (theta, states) = ([SLIDE[2]], [states()]);
+    let fresh = Derivatives {
+        state: true,
+        ..Derivatives::default()
+    };
+    let whole = map.linearise(&theta, &states, fresh, &[], &varied).unwrap();
+    map.by_one_step(true);
+    let one = map.linearise(&theta, &states, fresh, &[], &varied).unwrap();
+    let carried = [one[0].carried.clone()];
+    let kept = (Derivatives::default(), &[false][..], &carried[..]);
+    let before = map.steps();
+    let again = map
+        .linearise_due(&theta, &states, kept, &[], &varied)
+        .unwrap();
+    // All steps of the model as it is, and one a row of the other.
+    let steps = (ROWS - 1) * (STEPS + 1);
+    assert_eq!(map.steps() - before, steps as u64);
+    [whole, one, again].map(|mut found| found.remove(0).state_columns)
+}
+
+#[test]
+fn what_a_value_changes_in_one_step_is_carried_over_the_row() {
+    let [whole, one, again] = columns_of_damping();
+    // Damping takes v / m off the speed in each second, and the speed turns by 2 rad/s: over the row to second order in 0.04.
+    let largest = whole.iter().copied().map(f64::abs).fold(0.0, f64::max);
+    assert!((largest / (0.3 / SLIDE[0] * STEPS as f64 * DT) - 1.0).abs() < 0.1);
+    assert!(largest_difference(&whole, &one) < 0.002 * largest);
+    assert_eq!(one, again);
 }
 
 #[test]

@@ -7,8 +7,11 @@ use asid_core::Result;
 use crate::latent_force::context::Context;
 use crate::latent_force::estimate::Estimate;
 use crate::latent_force::fitted_value::Unknown;
+use crate::latent_force::one_step::one_step_tells;
 use crate::latent_force::step_map::{Derivatives, LinearEpisode, StepMap, Variation};
 use crate::latent_force::tangent::difference;
+
+use super::Hypothesis;
 
 /// Linearisations that slopes along rows are kept for: their trajectory moves in each.
 const KEPT: usize = 3;
@@ -22,6 +25,7 @@ const KEPT_START: f64 = 5.0;
 #[derive(Clone, Debug, Default)]
 pub struct Slopes {
     a: Vec<Vec<f64>>,
+    carried: Vec<Vec<f64>>,
     h: Vec<Vec<f64>>,
     /// First states of the walks.
     first: Vec<Vec<f64>>,
@@ -29,6 +33,8 @@ pub struct Slopes {
     theta: Vec<f64>,
     /// Linearisations that have used them.
     used: usize,
+    /// Whether they are those of one physics step of each row.
+    by_one_step: bool,
 }
 
 impl Slopes {
@@ -49,11 +55,11 @@ impl Slopes {
     pub fn linearise(
         &mut self,
         (context, map): (&Context<'_>, &mut StepMap<'_>),
-        (theta, unknowns): (&[f64], &[Unknown]),
+        (theta, model): (&[f64], &Hypothesis),
         estimate: &Estimate,
         variations: &[Variation],
     ) -> Result<Vec<LinearEpisode>> {
-        let moved = self.h.is_empty() || self.furthest(theta, unknowns) > KEPT_MOVE;
+        let moved = self.h.is_empty() || self.furthest(theta, &model.unknowns) > KEPT_MOVE;
         // Readings that remember have slopes of their own past.
         let along = moved || self.used >= KEPT || map.reads() && !map.is_all_segments();
         let due: Vec<bool> = (0..context.walks.len())
@@ -68,7 +74,13 @@ impl Slopes {
         };
         let steps = context.start_steps();
         let trajectory = &estimate.trajectory;
-        let mut linear = map.linearise_due(theta, trajectory, (want, &due), &steps, variations)?;
+        if moved {
+            let refined = (&model.specs[..], &model.parameters()[..]);
+            self.by_one_step = one_step_tells(context, refined, (theta, trajectory))?;
+        }
+        map.by_one_step(self.by_one_step);
+        let wanted = (want, &due[..], &self.carried[..]);
+        let mut linear = map.linearise_due(theta, trajectory, wanted, &steps, variations)?;
         self.exchange(&mut linear, &due, trajectory);
         if moved || along && !context.has_segments() {
             self.theta = theta.to_vec();
@@ -98,11 +110,13 @@ impl Slopes {
     /// Takes fresh slopes over where they were due, and gives the kept ones to the other walks.
     fn exchange(&mut self, linear: &mut [LinearEpisode], due: &[bool], trajectory: &[Vec<f64>]) {
         self.a.resize(linear.len(), Vec::new());
+        self.carried.resize(linear.len(), Vec::new());
         self.h.resize(linear.len(), Vec::new());
         self.first.resize(linear.len(), Vec::new());
         for (w, linear) in linear.iter_mut().enumerate() {
             if due[w] {
                 self.a[w].clone_from(&linear.a);
+                self.carried[w] = std::mem::take(&mut linear.carried);
                 self.h[w].clone_from(&linear.h);
                 self.first[w].clone_from(&trajectory[w]);
             } else {

@@ -95,7 +95,7 @@ pub(super) fn pruned(
         for &c in &out {
             smaller = without(&smaller, candidates, c);
         }
-        smaller.fit(context, breadth.rounds[1], progress)?;
+        smaller.fit(context, (breadth.rounds[1], progress))?;
         let stands = if slight {
             left(&smaller) - left(&set) < breadth.shrinks * out.len() as f64
         } else {

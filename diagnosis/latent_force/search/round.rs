@@ -218,7 +218,7 @@ impl Upon<'_> {
             }
             progress.note(&format!("trying {}", name_of(self.candidates, &members)));
             let mut set = self.enlarged(screening, s);
-            set.fit(self.context, breadth.rounds[0], progress)?;
+            set.fit(self.context, (breadth.rounds[0], progress))?;
             sets.push(set);
             progress.advance(1);
         }
@@ -258,14 +258,15 @@ impl Upon<'_> {
         let hoped = |s: &Set| s.fitted.evidence + s.fitted.promised;
         let mut raced = raced;
         raced.sort_by(|a, b| hoped(b).total_cmp(&hoped(a)));
-        let mut best = raced.iter().map(|s| s.fitted.evidence).fold(base, f64::max);
+        // After as many rounds for each: one that was fitted to the end would be ahead by its rounds alone.
+        let best = raced.iter().map(|s| s.fitted.evidence).fold(base, f64::max);
+        let least = best - (breadth.behind * (best - base)).max(breadth.near);
         let mut fits = Fits {
             sets: Vec::new(),
             left_out: Vec::new(),
         };
         for mut set in raced.into_iter().take(breadth.finished) {
-            let behind = (breadth.behind * (best - base)).max(breadth.near);
-            if best - hoped(&set) > behind {
+            if hoped(&set) < least {
                 continue;
             }
             if !progress.is_stopped() {
@@ -275,8 +276,7 @@ impl Upon<'_> {
                 ));
                 // To the end by slopes of its own.
                 set.fitted.slopes = Slopes::default();
-                set.fit(context, breadth.rounds[1], progress)?;
-                best = best.max(set.fitted.evidence);
+                set.fit(context, (breadth.rounds[1], progress))?;
             }
             if progress.is_stopped() {
                 fits.left_out.push(set.candidates.clone());

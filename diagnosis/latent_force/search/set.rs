@@ -23,12 +23,11 @@ pub struct Set {
 }
 
 impl Set {
-    /// Fits it on from where it stands, over at most `rounds` linearisations.
+    /// Fits it on from where it stands, over at most so many linearisations.
     pub(super) fn fit(
         &mut self,
         context: &Context<'_>,
-        rounds: usize,
-        progress: &dyn Progress,
+        rounds: (usize, &dyn Progress),
     ) -> Result<()> {
         let from = &self.fitted;
         self.fitted = fit(
@@ -36,7 +35,7 @@ impl Set {
             &from.hypothesis,
             &from.theta,
             (&from.estimate, &from.slopes),
-            (rounds, progress),
+            rounds,
         )?;
         Ok(())
     }
@@ -78,7 +77,7 @@ pub(super) fn from_starts_of(
     let mut again = set.clone();
     again.fitted.estimate = other.fitted.estimate.clone();
     again.fitted.slopes = Slopes::default();
-    again.fit(context, breadth.rounds[1], progress)?;
+    again.fit(context, (breadth.rounds[1], progress))?;
     Ok(again)
 }
 

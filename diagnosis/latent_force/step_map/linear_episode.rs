@@ -31,6 +31,9 @@ pub struct LinearEpisode {
     pub defect: Vec<f64>,
     /// Slope of `f` in the state, `(rows - 1) x nx x nx`.
     pub a: Vec<f64>,
+    /// What a change in each physics step of a row comes to at its end, `(rows - 1) x nx x nx`: the sum of the powers of the slope of one
+    /// step. Empty where the slopes are not those of one step.
+    pub carried: Vec<f64>,
     /// Slope of `f` in a generalized force held over the row, `(rows - 1) x nx x nv`.
     pub b: Vec<f64>,
     /// The same of a force in the first physics step of the row.
@@ -64,6 +67,7 @@ impl LinearEpisode {
             rows,
             defect: vec![0.0; steps * nx],
             a: vec![0.0; state * steps * nx * nx],
+            carried: Vec::new(),
             b: vec![0.0; usize::from(want.force) * steps * nx * nv],
             jolt: vec![0.0; usize::from(want.jolt) * steps * nx * nv],
             residual: vec![f64::NAN; rows * ns],

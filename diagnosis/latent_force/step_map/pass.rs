@@ -149,7 +149,12 @@ impl Part {
         if c.remembers && k > 0 {
             let (mut from, mut to) = (Vec::new(), Vec::new());
             for (v, role) in roles.iter().enumerate() {
-                if matches!(role, Role::State(_) | Role::Force(_) | Role::Jolt(_)) {
+                let follows = match role {
+                    Role::State(_) | Role::Force(_) | Role::Jolt(_) => true,
+                    Role::Varied(i) => request.at_once[*i] && c.one_step && !c.remembers_motion,
+                    Role::Nominal | Role::Reading(_) | Role::Ramp(_) => false,
+                };
+                if follows {
                     from.extend(here);
                     to.extend(here.iter().map(|e| v * n + e));
                 }

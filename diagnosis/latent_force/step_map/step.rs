@@ -1,15 +1,12 @@
 //! Steps of all simulations from one row to the next.
 //!
-//! Slopes in the state cost most: one simulation for each coordinate. Where a row is many physics steps they are those of one step in its
-//! middle, carried over all of them, `A = a^n`: right to second order in the duration of the row. What a fit finds does not depend on them,
-//! only how fast it is found. Where an effect remembers the motion (a rotor behind its play, friction that sticks) a change of the state is
-//! answered over several steps, and each coordinate takes all of the row.
-
-use asid_core::simulator::{StepHook, StepView};
-use asid_core::{Control, Result, Rollout};
-use nalgebra::DMatrix;
+//! Slopes cost most: one simulation for each coordinate of the state, and for each value. Where a row is many physics steps they are those of
+//! one step in its middle, carried over all of them ([`super::carried`]). Where an effect remembers the motion (a rotor behind its play,
+//! friction that sticks) a change is answered over several steps, and each takes all of the row.
 
 use crate::latent_force::tangent::{difference, retract};
+use asid_core::simulator::{StepHook, StepView};
+use asid_core::{Control, Result, Rollout};
 
 use super::pass::{Part, STATE_STEP};
 use super::role::Role;
@@ -61,13 +58,9 @@ impl Part {
         } = stepped;
         let rolls = now.iter().any(|&e| c.rolls(self.walks[e], request.want));
         let all: Vec<usize> = (0..roles.len()).collect();
-        let is_state = |v: &usize| roles[*v].coordinate().is_some();
-        let (mut short, mut whole): (Vec<usize>, Vec<usize>) =
-            all.iter().partition(|v| is_state(v));
-        // The power of a matrix takes all of it.
-        let may = c.one_step && !c.remembers_motion && !rolls;
-        if substeps < MANY || !may || short.len() < 2 * c.layout.nv {
-            (short, whole) = (Vec::new(), all.clone());
+        let (mut short, mut whole) = (Vec::new(), all.clone());
+        if c.one_step && !c.remembers_motion && !rolls && substeps >= MANY {
+            (short, whole) = self.told_by_one_step(c, stepped, request, out);
         }
         let mut done = 0;
         if !short.is_empty() {
@@ -76,7 +69,7 @@ impl Part {
             self.place_at_nominal(c, (stepped, &short), request, row)?;
             self.advance(c, (stepped, &all), done..done + 1, request, row)?;
             done += 1;
-            carry_over(c, (stepped, &short), row, out);
+            self.carry_over(c, (stepped, &short), request, row, out);
         }
         self.advance(c, (stepped, &whole), done..substeps, request, row)?;
         let (nv, m) = (c.layout.nv, request.variations.len());
@@ -154,8 +147,8 @@ impl Part {
         self.simulator.rollout(&rollout, &mut row.next)
     }
 
-    /// Places simulations of slopes in the state where the nominal ones have come to, which are the first of `row.next`, each with its
-    /// coordinate moved. Where the engine has failed they begin at the row.
+    /// Places simulations of some roles where the nominal ones have come to, which are the first of `row.next`, each of a slope in the state with
+    /// its coordinate moved. Where the engine has failed they begin at the row.
     fn place_at_nominal(
         &mut self,
         c: &Common<'_>,
@@ -171,18 +164,17 @@ impl Part {
         row.qvel.clear();
         let mut change = vec![0.0; 2 * nv];
         for &v in which {
-            let Some(coordinate) = roles[v].coordinate() else {
-                continue;
-            };
             for (i, &e) in now.iter().enumerate() {
                 let mut state = row.state(i, width).to_vec();
                 if !state.iter().all(|x| x.is_finite()) {
                     let states = &request.trajectory[self.walks[e]];
                     state.copy_from_slice(&states[k * width..(k + 1) * width]);
                 }
-                change[coordinate] = STATE_STEP;
-                retract(&c.layout, &mut state, &change);
-                change[coordinate] = 0.0;
+                if let Some(coordinate) = roles[v].coordinate() {
+                    change[coordinate] = STATE_STEP;
+                    retract(&c.layout, &mut state, &change);
+                    change[coordinate] = 0.0;
+                }
                 row.sims.push(v * n + e);
                 row.qpos.extend_from_slice(&state[..nq]);
                 row.qvel.extend_from_slice(&state[nq..]);
@@ -206,42 +198,6 @@ impl Part {
     }
 }
 
-/// Slopes in the state over a row from those of one of its physics steps, which all roles have just taken.
-fn carry_over(
-    c: &Common<'_>,
-    (stepped, short): (Stepped<'_>, &[usize]),
-    row: &RowBuffers,
-    out: &mut [LinearEpisode],
-) {
-    let Stepped {
-        roles,
-        now,
-        k,
-        substeps,
-    } = stepped;
-    let (nx, width) = (2 * c.layout.nv, c.layout.nq + c.layout.nv);
-    let mut differ = vec![0.0; nx];
-    let steps = u32::try_from(substeps).unwrap_or(u32::MAX);
-    for (i, &e) in now.iter().enumerate() {
-        let nominal = row.state(i, width);
-        let mut of_step = DMatrix::zeros(nx, nx);
-        for &v in short {
-            let Some(coordinate) = roles[v].coordinate() else {
-                continue;
-            };
-            let other = row.state(v * now.len() + i, width);
-            difference(&c.layout, other, nominal, &mut differ);
-            for (s, d) in differ.iter().enumerate() {
-                let value = d / STATE_STEP;
-                of_step[(s, coordinate)] = if value.is_finite() { value } else { 0.0 };
-            }
-        }
-        // Row-major, which is what the transpose has in store.
-        let whole = of_step.pow(steps).transpose();
-        out[e].a[k * nx * nx..(k + 1) * nx * nx].copy_from_slice(whole.as_slice());
-    }
-}
-
 /// Arrays of one row, kept between rows.
 #[derive(Default)]
 pub(super) struct RowBuffers {
@@ -256,7 +212,7 @@ pub(super) struct RowBuffers {
 
 impl RowBuffers {
     /// One of the states that were stepped to, of some width.
-    fn state(&self, place: usize, width: usize) -> &[f64] {
+    pub(super) fn state(&self, place: usize, width: usize) -> &[f64] {
         &self.next[place * width..(place + 1) * width]
     }
 }

@@ -137,7 +137,7 @@ const OWN: [&str; 19] = [
 
 /// Time limit where none is given, min: most machines have their whole answer within a minute, and who waits for it would rather know
 /// by then what is known.
-pub const MINUTES: f64 = 1.75;
+pub const MINUTES: f64 = 1.5;
 
 /// Rate of false alarms where none is stated.
 fn false_alarms() -> f64 {

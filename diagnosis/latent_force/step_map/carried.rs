@@ -1,0 +1,151 @@
+//! Slopes over a row that are those of one of its physics steps, carried over all of them.
+//!
+//! With `a` the slope of a step in the state and `b` in a value of the model, those of `n` steps are `a^n` and `(I + a + … + a^(n-1)) b`:
+//! right to second order in the duration of the row, for they are taken in its middle. Where a fit comes to rest hardly depends on
+//! them, only how fast.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::latent_force::tangent::difference;
+
+use super::pass::{Part, STATE_STEP};
+use super::role::Role;
+use super::step::{RowBuffers, Stepped};
+use super::{Common, LinearEpisode, Request};
+
+impl Part {
+    /// The places of the roles that one physics step tells of, and of the others: coordinates of the state, where all of them are there,
+    /// for the power of a matrix takes all of it; and variations that act in each step alike, where their changes can be carried over the row.
+    pub(super) fn told_by_one_step(
+        &self,
+        c: &Common<'_>,
+        stepped: Stepped<'_>,
+        request: Request<'_>,
+        out: &[LinearEpisode],
+    ) -> (Vec<usize>, Vec<usize>) {
+        let Stepped { roles, now, .. } = stepped;
+        let states = roles.iter().filter(|r| r.coordinate().is_some()).count();
+        let all_states = states == 2 * c.layout.nv;
+        let carried = |e: &usize| !self.carried(*e, request, out).is_empty();
+        let carries = all_states || now.iter().all(carried);
+        (0..roles.len()).partition(|&v| match roles[v] {
+            Role::State(_) => all_states,
+            Role::Varied(i) => carries && request.at_once[i],
+            _ => false,
+        })
+    }
+
+    /// What changes in each physics step of a row come to for a walk, fresh or kept; empty where it is not known.
+    fn carried<'r>(
+        &self,
+        walk: usize,
+        request: Request<'r>,
+        out: &'r [LinearEpisode],
+    ) -> &'r [f64] {
+        let fresh = &out[walk].carried[..];
+        let kept = request.carried.get(self.walks[walk]);
+        if fresh.is_empty() {
+            kept.map_or(&[], |k| &k[..])
+        } else {
+            fresh
+        }
+    }
+
+    /// Slopes over a row from those of one of its physics steps, which all roles have just taken.
+    pub(super) fn carry_over(
+        &self,
+        c: &Common<'_>,
+        (stepped, short): (Stepped<'_>, &[usize]),
+        request: Request<'_>,
+        row: &RowBuffers,
+        out: &mut [LinearEpisode],
+    ) {
+        let Stepped {
+            roles,
+            now,
+            k,
+            substeps,
+        } = stepped;
+        let (nx, width) = (2 * c.layout.nv, c.layout.nq + c.layout.nv);
+        let m = request.variations.len();
+        let at = k * nx * nx..(k + 1) * nx * nx;
+        let mut differ = vec![0.0; nx];
+        for (i, &e) in now.iter().enumerate() {
+            let nominal = row.state(i, width);
+            let mut of_step = DMatrix::zeros(nx, nx);
+            let mut varied = Vec::new();
+            let mut states = false;
+            for &v in short {
+                let other = row.state(v * now.len() + i, width);
+                difference(&c.layout, other, nominal, &mut differ);
+                let scale = match roles[v] {
+                    Role::Varied(i) => request.variations[i].scale,
+                    _ => STATE_STEP,
+                };
+                let slope = differ.iter().map(|d| d / scale);
+                let slope = slope.map(|s| if s.is_finite() { s } else { 0.0 });
+                match roles[v] {
+                    Role::Varied(i) => varied.push((i, DVector::from_iterator(nx, slope))),
+                    Role::State(coordinate) => {
+                        states = true;
+                        of_step.set_column(coordinate, &DVector::from_iterator(nx, slope));
+                    }
+                    _ => {}
+                }
+            }
+            if states {
+                let (whole, carried) = powers(&of_step, substeps);
+                let steps = out[e].rows - 1;
+                out[e].carried.resize(steps * nx * nx, 0.0);
+                // Row-major, which is what the transpose has in store.
+                out[e].a[at.clone()].copy_from_slice(whole.transpose().as_slice());
+                out[e].carried[at.clone()].copy_from_slice(carried.transpose().as_slice());
+            }
+            if varied.is_empty() {
+                continue;
+            }
+            let carried = &self.carried(e, request, out)[at.clone()];
+            let carried = DMatrix::from_row_slice(nx, nx, carried);
+            for (i, slope) in varied {
+                let column = &carried * slope;
+                for (s, value) in column.iter().enumerate() {
+                    out[e].state_columns[(k * nx + s) * m + i] = *value;
+                }
+            }
+        }
+    }
+}
+
+/// The power `A^n` of a matrix, and the sum of its powers below, `I + A + … + A^(n-1)`, by doubling.
+fn powers(a: &DMatrix<f64>, n: usize) -> (DMatrix<f64>, DMatrix<f64>) {
+    let size = a.nrows();
+    let (mut power, mut sum) = (DMatrix::identity(size, size), DMatrix::zeros(size, size));
+    for bit in (0..usize::BITS - n.leading_zeros()).rev() {
+        sum += &power * &sum;
+        power = &power * &power;
+        if n >> bit & 1 == 1 {
+            sum = a * sum + DMatrix::identity(size, size);
+            power = a * power;
+        }
+    }
+    (power, sum)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn powers_are_products_and_their_sum_is_a_geometric_series() {
+        let a = DMatrix::from_row_slice(2, 2, &[0.9, 0.1, -0.3, 0.8]);
+        for n in [1, 2, 7, 10, 20] {
+            let (power, sum) = powers(&a, n);
+            let by_hand = (0..n).fold(DMatrix::identity(2, 2), |p, _| &a * p);
+            assert!((&power - by_hand).amax() < 1e-14);
+            // (A - I) (I + A + ... + A^(n-1)) = A^n - I
+            let identity = DMatrix::identity(2, 2);
+            let left = (&a - &identity) * sum;
+            assert!((left - (power - identity)).amax() < 1e-13, "{n}");
+        }
+    }
+}
