@@ -33,7 +33,7 @@ pub fn diagnose(
     progress: &dyn Progress,
 ) -> Result<(Diagnosis, Work)> {
     progress.begin("looking at the logs", 1);
-    let mut intake = Intake::of(study, &machine, progress)?;
+    let mut intake = Intake::of(study, &machine)?;
     progress.end();
     let (first, second) = intake.ways();
     let physics =

@@ -1,16 +1,21 @@
 //! What happens to logs before any physics: outliers are left out, wiring is mended, and both are said.
 
-use asid_core::{Layout, Progress, Result};
+use asid_core::{Layout, Result};
 use asid_effects::EffectSpec;
 use asid_effects::catalogue::sensor_dynamics::DELAY;
 use asid_logs::episode::ColumnMapping;
 
-use crate::latent_force::pipeline;
 use crate::machine::Machine;
 use crate::outliers::{self, LeftOut};
+use crate::predict::Point;
+use crate::prepare::{dataset, plain_residuals, set_reading_noise};
 use crate::result::{CheckResult, DiagnosisResult, WiringResult};
 use crate::study::Study;
 use crate::wiring::{self, Settings};
+
+/// Share of the power of what replays of the model as given leave of a column, as a geometric mean over the columns concerned, up to which
+/// such a fault is the more probable cause: what is left is then less than what the fault explains.
+const HALF: f64 = 0.5;
 
 /// Name of the fault that all readings are late or early.
 const CLOCK: &str = "wiring-clock";
@@ -37,7 +42,7 @@ impl Intake {
     ///
     /// # Errors
     /// When the engine fails.
-    pub fn of(study: &Study, machine: &Machine, progress: &dyn Progress) -> Result<Self> {
+    pub fn of(study: &Study, machine: &Machine) -> Result<Self> {
         let mut study = study.clone();
         let left_out = {
             let logs = study.train.iter_mut().chain(&mut study.test);
@@ -67,12 +72,10 @@ impl Intake {
             intake.before = Some(as_given.clone());
         }
         if mended.doubted {
-            // Columns that do not mean what the model takes them for want forces that are not there: the way that wants less comes first.
-            let [mended, given] = [&intake.study, &as_given]
-                .map(|study| pipeline::lacks(study, machine.clone(), progress));
-            let is_less = mended?.relative_to(given?) < 1.0;
+            let share = share_left(&intake, &as_given, machine)?;
+            let is_most = share < HALF;
             intake.other = Some(as_given);
-            if !is_less {
+            if !is_most {
                 intake.turn();
             }
         }
@@ -232,6 +235,48 @@ impl Intake {
             },
         })
     }
+}
+
+/// Power of what the mended wiring leaves of the columns concerned in replays of the model as given, relative to what the wiring `as_given`
+/// leaves: the geometric mean over the columns, which needs no noise and weighs them alike.
+fn share_left(intake: &Intake, as_given: &Study, machine: &Machine) -> Result<f64> {
+    let [mended, given] = [&intake.study, as_given].map(|s| open_loop_power(s, machine));
+    let concerned = |sensor: &str| {
+        let mut columns = intake.wiring.iter().flat_map(|w| &w.columns);
+        columns.any(|c| c == sensor)
+    };
+    let (mended, given) = (mended?, given?);
+    let pairs = mended.iter().zip(&given);
+    let own = pairs.filter(|((name, m), (_, g))| concerned(name) && *m > 0.0 && *g > 0.0);
+    let logs: Vec<f64> = own.map(|((_, m), (_, g))| (m / g).ln()).collect();
+    Ok((logs.iter().sum::<f64>() / logs.len().max(1) as f64).exp())
+}
+
+/// Mean square of what replays of the model as given leave of each sensor's training readings, in its unit.
+fn open_loop_power(study: &Study, machine: &Machine) -> Result<Vec<(String, f64)>> {
+    let (mut bench, theta) = dataset(study, machine.clone())?;
+    set_reading_noise(&mut bench, &study.noise);
+    let point = Point {
+        theta,
+        starts: bench.train.starts.clone(),
+    };
+    let residuals = plain_residuals(&bench, &bench.train, &[], &point)?;
+    let logs = &bench.train.logs;
+    let of_sensor = |(sensor, name): (usize, String)| {
+        let entries = logs.entries.iter().enumerate();
+        let own = entries.filter(|(_, e)| e.sensor == sensor);
+        let readings = own.flat_map(|(j, _)| {
+            let each = residuals.iter();
+            each.flat_map(move |r| r.iter().skip(j).step_by(logs.entries.len()))
+        });
+        let squares: Vec<f64> = readings.map(|r| r * r).filter(|p| p.is_finite()).collect();
+        (
+            name,
+            squares.iter().sum::<f64>() / squares.len().max(1) as f64,
+        )
+    };
+    let names = logs.sensors.iter().map(|s| s.name.clone());
+    Ok(names.enumerate().map(of_sensor).collect())
 }
 
 /// A fault of wiring in words.

@@ -8,10 +8,8 @@ mod without_effects;
 
 use asid_core::{Progress, Result};
 
-use crate::bench::Bench;
 use crate::candidate::{Candidate, LeftOut, enumerate};
 use crate::ceiling::Left;
-use crate::data::Logs;
 use crate::decision::{Rules, decide};
 use crate::findings::Repeats;
 use crate::machine::Machine;
@@ -21,7 +19,6 @@ use crate::study::Study;
 use crate::trace::ForceTrace;
 use crate::work::Work;
 
-use super::estimate::Missing;
 use super::fit::{Hypothesis, fit};
 use super::fitted_value::Unknown;
 use super::left::left;
@@ -101,60 +98,6 @@ fn searched(null: Null<'_>, shown_steps: &[Shown], settings: &Settings) -> Resul
     })
 }
 
-/// A study laid out for a smoothing of the model without effects.
-struct Smoothing {
-    bench: Bench,
-    /// Values of the study's parameters as given.
-    nominal: Vec<f64>,
-    /// Columns that steps in the logs show.
-    steps: Vec<Shown>,
-    logs: Logs,
-    hypothesis: Hypothesis,
-    rows: Rows,
-}
-
-impl Smoothing {
-    fn of(study: &Study, machine: Machine) -> Result<Self> {
-        let (mut bench, nominal) = dataset(study, machine)?;
-        set_reading_noise(&mut bench, &study.noise);
-        let steps = shown(&bench.train.logs);
-        // Until the end, where gaps are told in units of the sensors' own noise.
-        bench.set_noise(&noise_with_steps(&bench.train.logs));
-        let unknowns = study.parameters.iter().zip(&nominal);
-        Ok(Self {
-            logs: bench.train.logs.clone(),
-            hypothesis: Hypothesis {
-                specs: Vec::new(),
-                unknowns: unknowns.map(|(p, n)| Unknown::of_study(p, *n)).collect(),
-            },
-            rows: Rows::of(&bench, &nominal)?,
-            bench,
-            nominal,
-            steps,
-        })
-    }
-
-    fn null<'a>(&'a self, study: &'a Study, progress: &'a dyn Progress) -> Null<'a> {
-        Null {
-            study,
-            bench: &self.bench,
-            rows: &self.rows,
-            logs: &self.logs,
-            hypothesis: &self.hypothesis,
-            nominal: &self.nominal,
-            progress,
-        }
-    }
-}
-
-/// What the model of a study lacks, by a first smoothing without effects.
-///
-/// # Errors
-/// When a parameter cannot be set or the engine fails.
-pub fn lacks(study: &Study, machine: Machine, progress: &dyn Progress) -> Result<Missing> {
-    Smoothing::of(study, machine)?.null(study, progress).lacks()
-}
-
 /// Diagnoses a study.
 ///
 /// # Errors
@@ -166,10 +109,28 @@ pub fn diagnose(
     progress: &dyn Progress,
 ) -> Result<Work> {
     progress.begin("smoothing the logs", 1);
-    let smoothing = Smoothing::of(study, machine)?;
-    let null = smoothing.null(study, progress);
-    let found = searched(null, &smoothing.steps, settings)?;
-    let Smoothing { bench, nominal, .. } = smoothing;
+    let (mut bench, nominal) = dataset(study, machine)?;
+    set_reading_noise(&mut bench, &study.noise);
+    let shown_steps = shown(&bench.train.logs);
+    // Until the end, where gaps are told in units of the sensors' own noise.
+    bench.set_noise(&noise_with_steps(&bench.train.logs));
+    let logs = bench.train.logs.clone();
+    let unknowns = study.parameters.iter().zip(&nominal);
+    let hypothesis = Hypothesis {
+        specs: Vec::new(),
+        unknowns: unknowns.map(|(p, n)| Unknown::of_study(p, *n)).collect(),
+    };
+    let rows = Rows::of(&bench, &nominal)?;
+    let null = Null {
+        study,
+        bench: &bench,
+        rows: &rows,
+        logs: &logs,
+        hypothesis: &hypothesis,
+        nominal: &nominal,
+        progress,
+    };
+    let found = searched(null, &shown_steps, settings)?;
     let (candidates, outcome, members) = (found.candidates, found.outcome, found.members);
     progress.begin("replaying", 1);
     let parts = (&candidates[..], &outcome, &members[..]);

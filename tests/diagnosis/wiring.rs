@@ -2,7 +2,6 @@
 //! mended, all but an offset with and without the start in the log, and none is seen where there is none.
 
 use asid::core::Episode;
-use asid::core::progress::Silent;
 use asid::diagnosis::intake::Intake;
 use asid::diagnosis::machine::Machine;
 use asid::diagnosis::result::{CheckResult, DiagnosisResult};
@@ -195,7 +194,7 @@ fn a_clock_that_was_estimated_short_takes_the_delay_of_every_sensor() {
     let right = study(true);
     let spoilt = spoilt(&right, &late(-LATE));
     let machine = machine(&right);
-    let mut intake = Intake::of(&spoilt, &machine, &Silent).unwrap();
+    let mut intake = Intake::of(&spoilt, &machine).unwrap();
     let told = |intake: &Intake| {
         let mut result = DiagnosisResult::default();
         intake.tell(&mut result, CheckResult::default());

@@ -6,7 +6,6 @@ use crate::bench::Bench;
 use crate::data::Logs;
 use crate::findings::Repeats;
 use crate::latent_force::context::{Context, begin};
-use crate::latent_force::estimate::Missing;
 use crate::latent_force::fit::{Fitted, Hypothesis, Slopes, fit, settle_noise};
 use crate::latent_force::scatter::Scatter;
 use crate::latent_force::segments::DURATIONS;
@@ -55,30 +54,7 @@ pub(super) struct Null<'a> {
     pub(super) progress: &'a dyn Progress,
 }
 
-/// How far a first smoothing goes.
-fn first(context: &Context<'_>) -> (usize, usize) {
-    if context.has_segments() {
-        FIRST_OF_SEGMENTS
-    } else {
-        FIRST
-    }
-}
-
 impl<'a> Null<'a> {
-    /// What the model lacks by a first smoothing, of segments the shortest.
-    ///
-    /// # Errors
-    /// When the engine fails.
-    pub(super) fn lacks(self) -> Result<Missing> {
-        let taken = self.rows.cut(self.study, self.bench, DURATIONS[0]);
-        let parameters = (&self.study.parameters[..], self.nominal);
-        let (context, mut estimate) = begin(&self.bench.machine, self.logs, taken, parameters)?;
-        let rounds = first(&context);
-        let (model, theta) = (self.hypothesis, self.nominal);
-        settle_noise(&context, model, theta, &mut estimate, rounds, self.progress)?;
-        Ok(estimate.missing(&context))
-    }
-
     /// Fits it in short segments, then in longer ones from where the shorter begin and end, for as long as their replays do
     /// not scatter.
     ///
@@ -121,8 +97,12 @@ impl<'a> Null<'a> {
             estimate.begin_at(&context, (&shorter.context, &shorter.none.estimate));
             theta = &shorter.none.theta;
         }
-        let rounds = first(&context);
-        settle_noise(&context, hypothesis, theta, &mut estimate, rounds, progress)?;
+        let first = if context.has_segments() {
+            FIRST_OF_SEGMENTS
+        } else {
+            FIRST
+        };
+        settle_noise(&context, hypothesis, theta, &mut estimate, first, progress)?;
         let mut repeats = None;
         if context.has_segments() {
             let scatter = Scatter::of(&context, (hypothesis, theta), &estimate, finer)?;
