@@ -154,9 +154,9 @@ pub fn fit(
         let rose = best.as_ref().is_none_or(|b| here > b.evidence + rise)
             || anchor.as_ref().is_none_or(|a| hoped > a.hoped + rise);
         waited = if rose { 0 } else { waited + 1 };
-        // A step that lost more than it had promised to win is no narrow valley.
+        // A step that lost more than it had promised to win is no narrow valley. Evidence of segments falls by itself.
         let lost = |a: &Anchor| a.here - here > (a.hoped - a.here).max(rise);
-        let astray = anchor.as_ref().is_some_and(lost);
+        let astray = segments == 0 && anchor.as_ref().is_some_and(lost);
         if let Some(best) = best.as_ref().filter(|b| here < b.evidence) {
             drops.push(best.evidence - here);
         }

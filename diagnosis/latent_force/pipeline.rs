@@ -2,7 +2,6 @@
 
 mod replays;
 mod rows;
-mod stretches;
 mod told;
 mod without_effects;
 

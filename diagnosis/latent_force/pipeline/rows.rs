@@ -12,8 +12,6 @@ use crate::starts::given_start;
 use crate::study::Study;
 use crate::trajectory::Trajectory;
 
-use super::stretches::stretches;
-
 /// Physics steps of one walk along all logs times degrees of freedom, at most: a walk is taken once a coordinate and once a
 /// candidate, and both grow with the degrees of freedom.
 const BUDGET: f64 = 72_000.0;
@@ -39,7 +37,7 @@ pub(super) fn along(
 
 /// Rows of the training logs that are taken, and what touches in them.
 pub(super) struct Rows {
-    /// One walk a log, or two stretches of it.
+    /// One walk a log.
     walks: Vec<Walk>,
     /// Whether something touches, one flag a row.
     touches: Vec<Vec<bool>>,
@@ -91,7 +89,7 @@ fn at_home(layout: &Layout, walks: &[Walk]) -> Vec<Vec<f64>> {
     walks.iter().map(|w| still.repeat(w.len())).collect()
 }
 
-/// As many rows of each walk as the budget of physics steps allows: a screening takes all of them once a column.
+/// The first rows of each walk, as many as the budget of physics steps allows: a screening takes all of them once a column.
 fn within_budget(walks: Vec<Walk>, nv: usize) -> Vec<Walk> {
     let steps: usize = walks.iter().flat_map(|w| &w.substeps).sum();
     let nv = nv.max(1) as f64;
@@ -99,6 +97,9 @@ fn within_budget(walks: Vec<Walk>, nv: usize) -> Vec<Walk> {
     if share >= 1.0 {
         return walks;
     }
-    let rows = |w: &Walk| ((share * w.len() as f64).round() as usize).max(FEWEST);
-    stretches(&walks, rows)
+    let part = |w: &Walk| {
+        let rows = (share * w.len() as f64).round() as usize;
+        w.part(0..rows.max(FEWEST).min(w.len()))
+    };
+    walks.iter().map(part).collect()
 }
