@@ -22,6 +22,8 @@ pub const CAPACITY: usize = 8;
 pub struct Explanation {
     /// Effects at their sites, with the values of all their parameters.
     pub effects: Vec<EffectSpec>,
+    /// Which of them are what an ordinary machine has, and not named.
+    pub is_tolerance: Vec<bool>,
     /// The study's parameters, then those of the effects.
     pub unknowns: Vec<Unknown>,
     /// The fit to the training logs.
@@ -35,10 +37,12 @@ pub struct Explanation {
 }
 
 impl Explanation {
-    /// Labels of its effects, sorted; empty for none.
+    /// Labels of the effects that it names, sorted; empty for none.
     #[must_use]
     pub fn labels(&self) -> Vec<String> {
-        let mut labels: Vec<String> = self.effects.iter().map(EffectSpec::label).collect();
+        let all = self.effects.iter().zip(&self.is_tolerance);
+        let named = all.filter(|(_, is_tolerance)| !**is_tolerance);
+        let mut labels: Vec<String> = named.map(|(e, _)| e.label()).collect();
         labels.sort();
         labels
     }
@@ -159,6 +163,7 @@ impl Bench {
             .collect();
         let mut explanation = Explanation {
             effects,
+            is_tolerance: trials.iter().map(|(c, _)| c.is_tolerance).collect(),
             local_variances: vec![0.0; unknowns.len()],
             unknowns,
             fit,

@@ -24,6 +24,8 @@ pub struct Candidate {
     pub starts: Vec<Vec<f64>>,
     /// Range of each parameter: that of the effect, or where the logs can tell of it.
     pub ranges: Vec<[f64; 2]>,
+    /// Whether it stands for what an ordinary machine has, within [`Effect::tolerance`]: it is fitted and never named.
+    pub is_tolerance: bool,
 }
 
 /// A candidate that was left out, and why.
@@ -51,7 +53,8 @@ impl Candidate {
         self.effect.parameters()
     }
 
-    /// Its parameters as columns of a batch: whether each is searched for continuously.
+    /// Its parameters as columns of a batch: whether each is searched for continuously. What stands for a tolerance keeps the values that
+    /// the missing force has told: whole replays know nothing of priors.
     #[must_use]
     pub fn unknowns(&self) -> Vec<(Parameter, bool)> {
         self.parameters()
@@ -72,7 +75,7 @@ impl Candidate {
                     unit: p.unit.into(),
                 };
                 let free = !matches!(p.start, Start::Choice(_) | Start::Given | Start::Set(..));
-                (parameter, free)
+                (parameter, free && !self.is_tolerance)
             })
             .collect()
     }
@@ -88,8 +91,27 @@ impl Candidate {
     }
 }
 
+/// The same effect at the same site as what an ordinary machine has of it; `None` where it has none.
+fn within_tolerance(candidate: &Candidate, plant: &Plant, shown: &Trajectory) -> Option<Candidate> {
+    let site = &candidate.spec.site;
+    let measured = |reference: Reference| measure(plant, site, reference, shown);
+    let ranges = candidate.effect.tolerance(plant, site, &measured);
+    let is_wide = ranges.iter().any(|[low, high]| low < high);
+    (ranges.len() == candidate.parameters().len() && is_wide).then(|| Candidate {
+        ranges,
+        is_tolerance: true,
+        ..candidate.clone()
+    })
+}
+
+/// How many of some candidates can be named.
+#[must_use]
+pub fn nameable(candidates: &[Candidate]) -> usize {
+    candidates.iter().filter(|c| !c.is_tolerance).count()
+}
+
 /// All effects at all sites that the engine can give the scene, but for those that the
-/// model has already, and those named in `without`.
+/// model has already, and those named in `without`; then what an ordinary machine has of them.
 #[must_use]
 pub fn enumerate(
     machine: &Machine,
@@ -138,9 +160,15 @@ pub fn enumerate(
                 spec,
                 starts,
                 ranges,
+                is_tolerance: false,
             });
         }
     }
+    let tolerances = found
+        .iter()
+        .filter_map(|c| within_tolerance(c, plant, shown));
+    let tolerances: Vec<Candidate> = tolerances.collect();
+    found.extend(tolerances);
     (found, left_out)
 }
 

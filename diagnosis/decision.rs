@@ -80,7 +80,22 @@ pub fn decide(evidence: &Evidence, rules: &Rules) -> Judgement {
     let score = |evidence: f64, names: usize| evidence / rules.temperature - price * names as f64;
     let mut all = vec![Hypothesis::default()];
     let mut scores = vec![0.0];
+    // No effect, and what an ordinary machine has of everything.
+    let ordinary = evidence.found.filter(|&i| {
+        let set = &evidence.tried[i];
+        set.effects.is_empty() && has_skill(evidence, set.replayed)
+    });
+    if let Some(i) = ordinary {
+        all[0].found = ordinary;
+        scores[0] = score(evidence.tried[i].evidence, 0);
+    }
+    // Place among the hypotheses of each set that was tried.
+    let mut places = vec![0; evidence.tried.len()];
     for (i, set) in evidence.tried.iter().enumerate() {
+        if set.effects.is_empty() {
+            continue;
+        }
+        places[i] = all.len();
         all.push(Hypothesis {
             found: Some(i),
             labels: set.effects.clone(),
@@ -89,13 +104,13 @@ pub fn decide(evidence: &Evidence, rules: &Rules) -> Judgement {
         scores.push(score(set.evidence, set.names));
     }
     // What stands without a search: no effect, or the known ones.
-    let least = evidence.known.map_or(0, |i| i + 1);
+    let least = evidence.known.map_or(0, |i| places[i]);
     let stands = evidence.found.filter(|&i| {
         let set = evidence.tried[i].replayed;
         has_skill(evidence, set)
             && (!is_small(evidence.none) || closes_a_small_gap(evidence, set, rules))
     });
-    let best = stands.map_or(least, |i| i + 1);
+    let best = stands.map_or(least, |i| places[i]);
     // What parsimony passes over is not more probable than what it picks.
     for i in 0..all.len() {
         let odds = scores[i] - scores[best];
@@ -108,13 +123,17 @@ pub fn decide(evidence: &Evidence, rules: &Rules) -> Judgement {
         None => 1.0,
     };
     let seen = seen(evidence, rules);
-    if best != least {
+    if best != least && ordinary.is_none() {
         // Chance may reach the evidence of no effect, and no chance makes a gap.
         all[least].probability *= 1.0 - seen;
     }
     // What is named may make up for most of the gap and leave much of what is missing from row to row, or the other way round.
     let rest = evidence.left.min(open_loop).clamp(0.0, 1.0);
-    let unknown = if best == least {
+    let left_unexplained =
+        || sigmoid((rest / rules.unexplained).ln() / rules.sharpness).clamp(0.001, 0.999);
+    let unknown = if best == least && ordinary.is_some() {
+        (seen * left_unexplained()).clamp(0.02, 0.999)
+    } else if best == least {
         // A gap that no force makes up for is one of the readings, where replays can be repeated.
         if evidence.is_missing || evidence.repeatable && !is_small(evidence.none) {
             seen.clamp(0.02, 0.999)
@@ -122,7 +141,7 @@ pub fn decide(evidence: &Evidence, rules: &Rules) -> Judgement {
             0.02
         }
     } else {
-        sigmoid((rest / rules.unexplained).ln() / rules.sharpness).clamp(0.001, 0.999)
+        left_unexplained()
     };
     let ambiguous = (0..all.len())
         .filter(|&i| {

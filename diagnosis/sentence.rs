@@ -34,6 +34,19 @@ fn none(gap: f64, beyond: f64, repeats: Option<Repeats>) -> String {
     )
 }
 
+/// What was fitted within its tolerance, law by law; `None` where nothing was.
+fn within_tolerance(result: &DiagnosisResult) -> Option<String> {
+    let mut laws: Vec<&str> = result.tolerances.iter().map(|t| &*t.effect).collect();
+    laws.sort_unstable();
+    laws.dedup();
+    let (last, others) = laws.split_last()?;
+    Some(if others.is_empty() {
+        format!("{last} within its tolerance")
+    } else {
+        format!("{} and {last} within their tolerances", others.join(", "))
+    })
+}
+
 /// What is left beside the effects that are named; empty where it is little.
 fn beside(result: &DiagnosisResult) -> String {
     let remainder = result.verdict.remainder.as_ref();
@@ -94,6 +107,12 @@ pub fn sentence(
         _ => "what there is of it".into(),
     };
     let body = match result.verdict.kind {
+        Kind::None if !result.tolerances.is_empty() => format!(
+            "No effect stands out, once the study's parameters are fitted: {} take the gap from {:.2} to {:.2} on the logs held out.",
+            within_tolerance(result).unwrap_or_default(),
+            result.gap.identified,
+            result.gap.refined
+        ),
         Kind::None => none(result.gap.identified, beyond, repeats),
         Kind::Effects => {
             let ambiguous = if result.verdict.ambiguous_with.is_empty() {
@@ -107,8 +126,9 @@ pub fn sentence(
                 )
             };
             format!(
-                "{place}{} explains {}.{}{ambiguous}",
+                "{place}{}{} explains {}.{}{ambiguous}",
                 grouped(&result.verdict.effects).join(" with "),
+                within_tolerance(result).map_or_else(String::new, |t| format!(", beside {t},")),
                 closed(),
                 beside(result)
             )

@@ -28,7 +28,7 @@ mod unexplained;
 mod values;
 mod view;
 
-use answer::groups;
+use answer::{groups, tolerances};
 use gap::NO_GAP;
 use remainder::shares;
 use unexplained::{least_explained, least_made_up};
@@ -117,7 +117,7 @@ impl Telling<'_> {
         let mut gap = self.gap(&nominal, &identified, &refined);
         let kind = if j.is_unknown {
             Kind::Unknown
-        } else if best.is_none() {
+        } else if explanation.labels().is_empty() {
             Kind::None
         } else {
             Kind::Effects
@@ -141,6 +141,7 @@ impl Telling<'_> {
             effects,
             groups: groups(&verdict.effects),
             verdict,
+            tolerances: tolerances(&explanation),
             parameters: self.parameters(&explanation),
             checks: self.checks(none, &explanation, short.as_ref())?,
             next_experiment: if self.stopped {

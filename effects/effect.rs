@@ -176,6 +176,17 @@ pub trait Effect: Send + Sync {
     fn unusual_at(&self, _plant: &Plant, _site: &str) -> bool {
         false
     }
+    /// Values of each parameter, lowest and highest, that an ordinary machine has which is as its model says: makers' tolerances, friction that
+    /// differs from one machine to the next. They are taken as three deviations. `shown` is what the logs show of the site. Empty
+    /// where an ordinary machine has none of it.
+    fn tolerance(
+        &self,
+        _plant: &Plant,
+        _site: &str,
+        _shown: &dyn Fn(Reference) -> f64,
+    ) -> Vec<[f64; 2]> {
+        Vec::new()
+    }
     /// Whether it rounds readings to multiples of its one parameter: a log shows that by itself.
     fn rounds(&self) -> bool {
         false

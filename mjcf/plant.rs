@@ -40,6 +40,8 @@ pub struct PlantJoint {
     pub axis: [f64; 3],
     /// Coordinate at which the body is as declared.
     pub reference: f64,
+    /// Viscous friction, N s/m or N m s/rad.
+    pub damping: f64,
     /// Dry friction, N or N m.
     pub frictionloss: f64,
     /// Rotor inertia, kg or kg m².

@@ -50,6 +50,7 @@ pub fn page(result: &DiagnosisResult, trace: &DiagnosisTrace) -> String {
         Some(causes::section(d, t)),
         remainder::section(d),
         closing::parameters(d),
+        closing::tolerances(d),
         closing::checks(d),
         closing::next(d),
         closing::not_tried(d),

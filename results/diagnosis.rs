@@ -12,7 +12,7 @@ pub use gap::{Gap, Shares, SignalGap, Where};
 pub use sight::{
     Calibration, CalibrationRow, DetectionLimit, Isolability, MissingForce, RankedSet,
 };
-pub use verdict::{EffectResult, Group, HypothesisResult, Kind, Remainder, Verdict};
+pub use verdict::{EffectResult, Group, HypothesisResult, Kind, Remainder, Tolerance, Verdict};
 
 /// A parameter of the study, as fitted with the verdict's effects.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
@@ -106,6 +106,9 @@ pub struct DiagnosisResult {
     /// Effects of the verdict that are one law at several sites.
     #[serde(default)]
     pub groups: Vec<Group>,
+    /// What an ordinary machine has of effects, fitted and not named; empty where what is named does without.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub tolerances: Vec<Tolerance>,
     /// The study's parameters.
     pub parameters: Vec<ParameterResult>,
     /// Checks.

@@ -15,6 +15,8 @@ pub struct Unknown {
     pub bounds: [f64; 2],
     /// Whether it is fitted.
     pub free: bool,
+    /// Whether its prior is the tolerance of an ordinary machine: over that, no slope changes.
+    pub is_tolerance: bool,
 }
 
 impl Unknown {
@@ -29,6 +31,7 @@ impl Unknown {
             deviation: (high - low) / 12.0_f64.sqrt(),
             bounds: [low, high],
             free: true,
+            is_tolerance: false,
         }
     }
 

@@ -22,11 +22,11 @@ use super::fit::{Hypothesis, fit};
 use super::fitted_value::Unknown;
 use super::left::left;
 use super::picture::forces;
-use super::search::{Outcome, search};
+use super::search::{OpenLoop, Outcome, Set, search};
 use super::selection::gather;
 use super::steps::{Shown, beside, known, noise_with_steps, shown};
 
-use replays::replay;
+use replays::{Replays, replay};
 use rows::{Rows, along};
 use without_effects::{Null, Stands};
 
@@ -78,9 +78,18 @@ fn searched(null: Null<'_>, shown_steps: &[Shown], settings: &Settings) -> Resul
     let steps = known(shown_steps, &candidates);
     let members: Vec<usize> = steps.iter().map(|s| s.candidate).collect();
     let offered = (&candidates[..], &members[..]);
-    let outcome = search(&context, &none, offered, settings.breadth, progress)?;
     let firsts = (0..context.walks.len()).filter(|&w| context.walks[w].rows[0] == 0);
     let firsts = firsts.collect::<Vec<_>>();
+    let replays = Replays {
+        bench,
+        candidates: &candidates,
+        firsts: &firsts,
+        open: Vec::new(),
+        progress,
+    };
+    let open_loop = |set: &Set| replays.excess(&set.fitted, &set.candidates);
+    let how = (&open_loop as OpenLoop<'_>, progress);
+    let outcome = search(&context, &none, offered, settings.breadth, how)?;
     let drawn = (
         forces(&context, &outcome, &candidates)?,
         left(&context, &outcome),

@@ -41,7 +41,11 @@ pub fn regressions(
 }
 
 /// Best evidence of some columns over the scales, with coefficients.
-fn over_scales(sums: &[Regression], columns: &Columns, which: &[usize]) -> (f64, Vec<f64>) {
+pub(super) fn over_scales(
+    sums: &[Regression],
+    columns: &Columns,
+    which: &[usize],
+) -> (f64, Vec<f64>) {
     let mut best = (f64::NEG_INFINITY, Vec::new());
     for sum in sums {
         let found = evidence(

@@ -3,12 +3,15 @@
 mod prior;
 mod prune;
 mod round;
+mod screening;
 mod set;
+mod tolerances;
 
 use asid_core::{Progress, Result};
 
-use crate::candidate::Candidate;
+use crate::candidate::{Candidate, nameable};
 use crate::chance::threshold;
+use crate::findings::NEGLIGIBLE;
 use crate::settings::Breadth;
 
 use super::context::Context;
@@ -16,14 +19,13 @@ use super::estimate::Missing;
 use super::fit::Fitted;
 
 pub use prior::log_prior;
-pub use round::{Round, Sight};
-pub use set::{Set, name_of};
+pub use round::Round;
+pub use screening::Sight;
+pub use set::{Set, labels_of, name_of};
+pub use tolerances::Tolerances;
 
 use round::Upon;
 use set::{free_what_is_given, from_starts_of, is_due};
-
-/// Deviations of the evidence about its plateaus by which a further effect must rise above the threshold: 95 %.
-const WANDER: f64 = 2.0;
 
 /// A stage that was cut short, and the sets that it left out.
 #[derive(Clone, Debug)]
@@ -48,7 +50,33 @@ pub struct Outcome {
     pub untried: Vec<Untried>,
 }
 
-/// Searches upon the model without effects, among `candidates` without those that are `known` to act or not.
+/// Whether a set has what an ordinary machine has of everything.
+fn has_tolerances(candidates: &[Candidate], set: &Set) -> bool {
+    set.candidates.iter().any(|&c| candidates[c].is_tolerance)
+}
+
+/// Whether a set has a candidate within its tolerance.
+fn is_within(candidates: &[Candidate], set: &Set, candidate: usize) -> bool {
+    let like = |&c: &usize| {
+        candidates[c].is_tolerance && candidates[c].label() == candidates[candidate].label()
+    };
+    set.candidates.iter().any(like)
+}
+
+/// Excess power that open-loop replays of the training logs leave of a set.
+pub type OpenLoop<'o> = &'o dyn Fn(&Set) -> Result<f64>;
+
+/// Candidates that are tried upon a set: not those in it, within their tolerances or else, nor those that are `known` to act or not.
+fn open_upon(candidates: &[Candidate], known: &[usize], set: &Set) -> Vec<usize> {
+    (0..candidates.len())
+        .filter(|&c| !candidates[c].is_tolerance && !is_within(candidates, set, c))
+        .filter(|c| !set.candidates.contains(c) && !known.contains(c))
+        .filter(|&c| is_due(candidates, set, c))
+        .collect()
+}
+
+/// Searches upon the model without effects, among `candidates` without those that are `known` to act or not. Where hardly any force is missing
+/// and `open_loop` replays still leave a gap, as of a stiff drive that was made softer, what a further name closes of that gap counts.
 ///
 /// # Errors
 /// When the engine fails.
@@ -57,14 +85,10 @@ pub fn search(
     none: &Fitted,
     (candidates, known): (&[Candidate], &[usize]),
     breadth: Breadth,
-    progress: &dyn Progress,
+    (open_loop, progress): (OpenLoop<'_>, &dyn Progress),
 ) -> Result<Outcome> {
-    let threshold = threshold(candidates.len(), breadth.false_alarms);
-    let mut best = Set {
-        candidates: Vec::new(),
-        fitted: none.clone(),
-        names: 0,
-    };
+    let threshold = threshold(nameable(candidates), breadth.false_alarms);
+    let mut best = Set::without_effects(none);
     let at_first = none.estimate.missing(context);
     let mut none = none.clone();
     let left = |s: &Set| s.fitted.estimate.missing(context).relative_to(at_first);
@@ -73,9 +97,23 @@ pub fn search(
     // The set that stands with what no search tries, such as an offset of its friction: a rival of every further effect, which
     // needs no further name.
     let mut freed: Option<Set> = None;
-    for _ in 0..breadth.depth {
-        if left(&best) < breadth.shrinks {
-            break;
+    let mut depth = breadth.depth;
+    // Excess power of the open loop, without effects and of the set that stands, once that counts.
+    let mut excess: Option<[f64; 2]> = None;
+    while rounds.len() < depth {
+        let no_force = left(&best) < breadth.shrinks;
+        if no_force {
+            excess = match excess {
+                _ if context.has_segments() => None,
+                Some([first, _]) => Some([first, open_loop(&best)?]),
+                None => Some([open_loop(&Set::without_effects(&none))?, open_loop(&best)?]),
+            };
+            let is_open = |&[first, now]: &[f64; 2]| {
+                now.is_finite() && now > (breadth.shrinks * first).max(NEGLIGIBLE * NEGLIGIBLE)
+            };
+            if !excess.as_ref().is_some_and(is_open) {
+                break;
+            }
         }
         // The first screening is the least that an answer rests on.
         if !rounds.is_empty() && progress.is_stopped() {
@@ -85,10 +123,7 @@ pub fn search(
             });
             break;
         }
-        let open: Vec<usize> = (0..candidates.len())
-            .filter(|c| !best.candidates.contains(c) && !known.contains(c))
-            .filter(|&c| is_due(candidates, &best, c))
-            .collect();
+        let open = open_upon(candidates, known, &best);
         let upon = Upon {
             context,
             base: &best,
@@ -111,12 +146,15 @@ pub fn search(
                 }
             }
         }
+        let closes = match (&next, excess.filter(|_| no_force)) {
+            (Some(n), Some([first, now])) => now - open_loop(n)? > breadth.shrinks * first,
+            _ => false,
+        };
         let next = next.filter(|n| {
             // A first fit that was cut short has not told yet how much of the force it makes up for.
             let cut_short = stopped && best.candidates.is_empty();
-            let shrinks = cut_short || left(&best) - left(n) > breadth.shrinks;
-            let unsure = WANDER * n.fitted.wander.hypot(best.fitted.wander);
-            shrinks && n.fitted.evidence - best.fitted.evidence > threshold + unsure
+            let shrinks = cut_short || closes || left(&best) - left(n) > breadth.shrinks;
+            shrinks && n.rises_above(&best, threshold)
         });
         if let Some(own) = freed.take() {
             let evidence = own.fitted.evidence + threshold;
@@ -125,8 +163,25 @@ pub fn search(
                 continue;
             }
         }
+        // Nothing has earned a name: what an ordinary machine has may still make up for it.
+        let had = has_tolerances(candidates, &best);
+        let of_round = rounds.last().and_then(|r| r.tolerances.clone());
+        let next = match (next, &of_round) {
+            (None, Some(tolerances)) if !had && !stopped => {
+                tolerances.earned(context, candidates, &best, (breadth, progress))?
+            }
+            (next, _) => next,
+        };
         let Some(next) = next else { break };
         best = next;
+        if let Some(tolerances) = of_round.filter(|_| !had && has_tolerances(candidates, &best)) {
+            // They are no name.
+            depth += 1;
+            best = tolerances.settled(context, candidates, best, (breadth, progress))?;
+            if let Some(round) = rounds.last_mut() {
+                round.confirmed.push(best.clone());
+            }
+        }
         if stopped {
             untried.push(Untried {
                 stage: "values of the effects named that no search tries, such as an offset",

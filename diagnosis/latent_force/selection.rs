@@ -6,7 +6,7 @@ use asid_results::evidence::{Evidence, Replayed, Screened, Tried};
 
 use crate::bench::held_out::misfit;
 use crate::bench::{Bench, Explanation};
-use crate::candidate::Candidate;
+use crate::candidate::{Candidate, nameable};
 use crate::checks::change_by_step;
 use crate::decision::is_small;
 use crate::findings::{Findings, trials};
@@ -14,7 +14,7 @@ use crate::fit::cost;
 use crate::skill::about_the_mean;
 
 use super::estimate::LEAST_LEFT;
-use super::search::{Outcome, Set, log_prior};
+use super::search::{Outcome, Set, labels_of, log_prior};
 
 /// Root mean square of the missing force, relative to the inertial forces, up to which nothing is missing.
 const NOTHING: f64 = 0.01;
@@ -26,7 +26,7 @@ const SCREENED: usize = 40;
 
 /// Labels of a set, sorted.
 fn labels(candidates: &[Candidate], set: &[usize]) -> Vec<String> {
-    let mut labels: Vec<String> = set.iter().map(|&c| candidates[c].label()).collect();
+    let mut labels = labels_of(candidates, set);
     labels.sort();
     labels
 }
@@ -132,7 +132,7 @@ pub fn gather(
     };
     Ok(Evidence {
         schema: 1,
-        candidates: candidates.len(),
+        candidates: nameable(candidates),
         none,
         mean: Replayed {
             train: about_the_mean(&bench.train.logs),

@@ -159,6 +159,7 @@ pub fn beside(mut outcome: Outcome, known: &[Known], candidates: &[Candidate]) -
             sight: Sight::default(),
             raced: Vec::new(),
             confirmed: vec![alone.clone()],
+            tolerances: None,
         }),
     }
     outcome.best = if outcome.best.candidates.is_empty() {

@@ -4,9 +4,10 @@ use asid_core::Result;
 
 use super::remainder::remainder;
 use super::{NO_GAP, Telling};
+use crate::bench::Explanation;
 use crate::ceiling::Left;
 use crate::findings::trials;
-use crate::result::{EffectResult, Gap, Group, HypothesisResult, Kind, Verdict};
+use crate::result::{EffectResult, Gap, Group, HypothesisResult, Kind, Tolerance, Verdict};
 
 /// Effects of a verdict that are one law at several sites.
 pub(super) fn groups(labels: &[String]) -> Vec<Group> {
@@ -22,6 +23,18 @@ pub(super) fn groups(labels: &[String]) -> Vec<Group> {
     }
     all.retain(|g| g.sites.len() > 1);
     all
+}
+
+/// What an explanation has of an ordinary machine's tolerances.
+pub(super) fn tolerances(of: &Explanation) -> Vec<Tolerance> {
+    let all = of.effects.iter().zip(&of.is_tolerance);
+    let own = all.filter(|(_, is_tolerance)| **is_tolerance);
+    own.map(|(e, _)| Tolerance {
+        effect: e.name.clone(),
+        site: e.site.clone(),
+        parameters: e.values.iter().cloned().collect(),
+    })
+    .collect()
 }
 
 /// Counts an effect of a set that was screened only: it has no fitted values.
@@ -101,8 +114,12 @@ impl Telling<'_> {
                 continue;
             };
             let intervals = self.intervals(&found.explanation);
-            for (effect, (intervals95, at_bound)) in found.explanation.effects.iter().zip(intervals)
-            {
+            let fitted = found.explanation.effects.iter().zip(intervals);
+            let named = fitted.zip(&found.explanation.is_tolerance);
+            for ((effect, (intervals95, at_bound)), is_tolerance) in named {
+                if *is_tolerance {
+                    continue;
+                }
                 let known = all
                     .iter_mut()
                     .find(|e| e.effect == effect.name && e.site == effect.site);

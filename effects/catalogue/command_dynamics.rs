@@ -6,7 +6,7 @@
 
 use std::collections::VecDeque;
 
-use crate::{Acting, Acts, Confusion, Effect, EffectParameter, Native, Site};
+use crate::{Acting, Acts, Confusion, Effect, EffectParameter, Native, Reference, Site};
 use asid_core::Result;
 use asid_core::simulator::StepView;
 use asid_mjcf::Plant;
@@ -28,6 +28,9 @@ crate::register!(EffectEntry {
 
 /// Name of the lag of a drive.
 pub const LAG: &str = "actuator-lag";
+
+/// Three deviations of a delay that no model has and every bus and controller: a few cycles of a loop of 1 kHz, s.
+const DELAY_TOLERANCE: f64 = 4.5e-3;
 
 /// Longest delay that is looked for, s.
 const LONGEST: f64 = 0.5;
@@ -85,6 +88,10 @@ impl Effect for Delay {
 
     fn parameters(&self) -> &'static [EffectParameter] {
         const { &[EffectParameter::new("delay", "s", [0.0, LONGEST], 0.0)] }
+    }
+
+    fn tolerance(&self, _: &Plant, _: &str, _: &dyn Fn(Reference) -> f64) -> Vec<[f64; 2]> {
+        vec![[0.0, DELAY_TOLERANCE]]
     }
 
     fn sites(&self, plant: &Plant) -> Vec<String> {

@@ -1,6 +1,6 @@
 //! Lengths of links and directions of joints.
 
-use crate::{Acting, Acts, Confusion, Effect, EffectParameter, Site};
+use crate::{Acting, Acts, Confusion, Effect, EffectParameter, Reference, Site};
 use asid_core::layout::{Joint, JointKind};
 use asid_core::{Result, Target};
 use asid_mjcf::Plant;
@@ -40,6 +40,11 @@ impl Acting for GeometryAt {
     }
 }
 
+/// Three deviations of a length from its drawing, m: parts that are milled or printed, and how they are put together.
+const LENGTH_TOLERANCE: f64 = 3e-3;
+/// Three deviations of an axis from its drawing, rad: 1.5 degrees.
+const AXIS_TOLERANCE: f64 = 0.026;
+
 /// Joints of a body that fix it to its parent in some direction.
 fn joints<'p>(plant: &'p Plant, body: &str) -> impl Iterator<Item = &'p Joint> {
     let all = plant.layout.joints.iter();
@@ -75,6 +80,11 @@ impl Effect for Geometry {
                 EffectParameter::new("turn_z", "rad", [-0.5, 0.5], 0.0),
             ]
         }
+    }
+
+    fn tolerance(&self, _: &Plant, _: &str, _: &dyn Fn(Reference) -> f64) -> Vec<[f64; 2]> {
+        let within = |off: f64| [[-off, off]; 3];
+        [within(LENGTH_TOLERANCE), within(AXIS_TOLERANCE)].concat()
     }
 
     fn sites(&self, plant: &Plant) -> Vec<String> {

@@ -11,7 +11,7 @@ use asid_core::simulator::StepView;
 use asid_core::{Capabilities, Result, Target};
 use asid_mjcf::Plant;
 use asid_mjcf::native::NativeModel;
-use asid_mjcf::plant::Drive;
+use asid_mjcf::plant::{Drive, PlantJoint};
 
 use super::drive::{DriveAt, gains};
 use super::dry::{CREEP, DryFriction};
@@ -47,7 +47,19 @@ crate::register!(EffectEntry {
 /// Speed below which a joint counts as standing: small beside its speeds in the logs.
 const CREEP_PARAMETER: EffectParameter =
     EffectParameter::new("creep", "rad/s or m/s", [1e-5, 0.1], CREEP)
-        .starting(Start::Set(Reference::Speed, 3e-3));
+        .starting(Start::Set(Reference::Speed, CREEP_SHARE));
+/// The same as a share of the largest speed.
+const CREEP_SHARE: f64 = 3e-3;
+
+/// Three deviations of a joint's friction from what its model says, as a share of it: seals, grease and preload differ from one
+/// machine to the next, and with its temperature, by a tenth and more (Bittencourt and Gunnarsson 2012 report far more over temperature).
+const FRICTION_TOLERANCE: f64 = 0.3;
+
+/// A joint of the document by its name.
+fn joint_of<'p>(plant: &'p Plant, name: &str) -> Option<&'p PlantJoint> {
+    let index = plant.layout.joints.iter().position(|j| j.name == name);
+    index.and_then(|i| plant.joints.get(i))
+}
 
 /// Force `-damping v`: adds to the joint's `damping`.
 struct Viscous;
@@ -93,6 +105,11 @@ impl Effect for Viscous {
 
     fn targets(&self, _plant: &Plant, site: &str) -> Vec<Target> {
         vec![target("joint", site, "damping", 0)]
+    }
+
+    fn tolerance(&self, plant: &Plant, site: &str, _: &dyn Fn(Reference) -> f64) -> Vec<[f64; 2]> {
+        let off = FRICTION_TOLERANCE * joint_of(plant, site).map_or(0.0, |j| j.damping);
+        vec![[-off, off]]
     }
 
     fn needs(&self) -> Capabilities {
@@ -168,6 +185,20 @@ impl Effect for Coulomb {
 
     fn targets(&self, _plant: &Plant, site: &str) -> Vec<Target> {
         vec![target("joint", site, "damping", 0)]
+    }
+
+    fn tolerance(
+        &self,
+        plant: &Plant,
+        site: &str,
+        shown: &dyn Fn(Reference) -> f64,
+    ) -> Vec<[f64; 2]> {
+        let Some(joint) = joint_of(plant, site) else {
+            return Vec::new();
+        };
+        let friction = joint.damping * shown(Reference::Speed) + joint.frictionloss;
+        let creep = shown(Reference::Speed) * CREEP_SHARE;
+        vec![[0.0, FRICTION_TOLERANCE * friction], [0.0; 2], [creep; 2]]
     }
 
     fn needs(&self) -> Capabilities {

@@ -3,7 +3,7 @@
 //! Where a body's mass comes from its geoms, `mass` changes the geoms' masses; centre and inertia change
 //! what the geoms make. So all compose with a study that fits the mass of a geom.
 
-use crate::{Acting, Acts, Confusion, Effect, EffectParameter, Site};
+use crate::{Acting, Acts, Confusion, Effect, EffectParameter, Reference, Site};
 use asid_core::{Capabilities, Result, Target};
 use asid_mjcf::Plant;
 
@@ -61,6 +61,10 @@ impl Acting for MassPropertyAt {
     }
 }
 
+/// Three deviations of masses and moments of inertia from a drawing, as a share: what drawings leave out (cables, screws, grease), and
+/// densities.
+const TOLERANCE: f64 = 0.09;
+
 /// Name of the effect on a mass.
 pub const MASS: &str = "mass";
 
@@ -97,6 +101,13 @@ impl Effect for MassProperty {
                 told_apart_by: "hang a known weight on it, or let it fall",
             }],
             Self::Center | Self::Inertia => &[],
+        }
+    }
+
+    fn tolerance(&self, _: &Plant, _: &str, _: &dyn Fn(Reference) -> f64) -> Vec<[f64; 2]> {
+        match self {
+            Self::Mass | Self::Inertia => vec![[1.0 - TOLERANCE, 1.0 + TOLERANCE]],
+            Self::Center => Vec::new(),
         }
     }
 

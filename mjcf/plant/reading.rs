@@ -28,6 +28,7 @@ impl Plant {
                 anchor: j.pos,
                 axis: j.axis,
                 reference: j.ref_,
+                damping: j.damping,
                 frictionloss: j.frictionloss,
                 armature: j.armature,
             }));

@@ -55,6 +55,12 @@ fn explanation(d: &DiagnosisResult, t: &DiagnosisTrace) -> Vec<String> {
     let found = found(d);
     let sure = probability(d.verdict.probability);
     let mut first = match d.verdict.kind {
+        Kind::None if !d.tolerances.is_empty() => format!(
+            "No effect stands out (probability {sure}): with what tolerances allow of masses, lengths, friction and delays, and with the \
+             study's own parameters fitted, the model predicts the held-out episodes to {} times the noise instead of {}.",
+            gap(d.gap.refined),
+            gap(d.gap.identified)
+        ),
         Kind::None => format!(
             "No effect is missing (probability {sure}): with the study's own parameters fitted, the model predicts the held-out \
              episodes to {} times the noise.",

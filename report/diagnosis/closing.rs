@@ -72,6 +72,34 @@ pub(super) fn parameters(d: &DiagnosisResult) -> Option<Section> {
     )
 }
 
+pub(super) fn tolerances(d: &DiagnosisResult) -> Option<Section> {
+    if d.tolerances.is_empty() {
+        return None;
+    }
+    let columns = vec![
+        Column::text("effect"),
+        Column::text("at"),
+        Column::text("values"),
+    ];
+    let table = d.tolerances.iter().fold(Table::new(columns), |table, t| {
+        let value = |(name, x): (&String, &f64)| format!("{name} {}", round(*x, 3));
+        let values: Vec<String> = t.parameters.iter().map(value).collect();
+        table.row(vec![
+            t.effect.clone().into(),
+            t.site.clone().into(),
+            values.join(", ").into(),
+        ])
+    });
+    Some(
+        Section::new("Within tolerances")
+            .lead(
+                "What an ordinary machine has that is as its model says: fitted together, each value with the prior of its tolerance, \
+                 and not named. The refined model has them.",
+            )
+            .table(table),
+    )
+}
+
 fn interval(p: &ParameterResult, precision: Precision) -> String {
     if p.interval95.iter().all(|x| x.is_finite()) {
         quantity(&precision.interval(p.interval95), &p.unit)

@@ -41,6 +41,18 @@ pub struct EffectResult {
     pub at_bound: bool,
 }
 
+/// What an ordinary machine has of an effect, as it was fitted beside the verdict's: within its tolerance, and not named.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct Tolerance {
+    /// Name.
+    pub effect: String,
+    /// Site; empty for an effect of the whole scene.
+    pub site: String,
+    /// Fitted values.
+    #[serde(deserialize_with = "nullable::map")]
+    pub parameters: BTreeMap<String, f64>,
+}
+
 impl EffectResult {
     /// `name@site`; the name alone where it acts on the whole scene.
     #[must_use]

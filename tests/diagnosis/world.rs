@@ -39,6 +39,8 @@ pub enum Truth {
     SpeedSteps(f64),
     /// A magnet at 0.05 m, N: in no catalogue.
     Magnet(f64),
+    /// A little more of both frictions and a command that comes 1.5 ms later, as at any machine; and a spring, N/m.
+    Ordinary(f64),
     /// There are no readings but noise.
     Noise,
 }
@@ -64,6 +66,7 @@ fn extra(truth: Truth, x: f64, v: f64) -> f64 {
         Truth::UnevenFriction([force, offset]) => -force * (v / 5e-3).tanh() - offset,
         Truth::Viscous(d) => -d * v,
         Truth::Spring(k) => -k * x,
+        Truth::Ordinary(k) => -0.25 * v - 0.05 * (v / 5e-3).tanh() - k * x,
         Truth::Magnet(force) => {
             let s = (x - 0.05) / 0.04;
             -force * s * (-0.5 * s * s).exp()
@@ -74,10 +77,10 @@ fn extra(truth: Truth, x: f64, v: f64) -> f64 {
 
 /// The command that arrives: held for 10 ms, and later by the delay.
 fn arriving(truth: Truth, episode: usize, t: f64) -> f64 {
-    let late = if let Truth::Delay(tau) = truth {
-        tau
-    } else {
-        0.0
+    let late = match truth {
+        Truth::Delay(tau) => tau,
+        Truth::Ordinary(_) => 0.0015,
+        _ => 0.0,
     };
     // Half a step of the integrator off the edge, so that rounding does not matter.
     let row = ((t - late + 5e-5) / 0.01).floor().max(0.0);

@@ -119,6 +119,40 @@ fn each_at_each_site(xml: &str, mut check: impl FnMut(&dyn Backend, &str, Effect
 /// What a simulation computes in which the same parameters can be set and are not: an engine may round
 /// otherwise once a body's mass can change.
 #[test]
+fn what_an_ordinary_machine_has_of_an_effect_lies_about_none_of_it() {
+    let one = |_: asid::effects::Reference| 1.0;
+    let mut counted = 0;
+    for xml in [ARM, FLOOR] {
+        let plant = Plant::of(&scene(xml)).unwrap();
+        for entry in all::<EffectEntry>() {
+            let effect = (entry.make)();
+            for site in effect.sites(&plant) {
+                let tolerance = effect.tolerance(&plant, &site, &one);
+                if tolerance.is_empty() {
+                    continue;
+                }
+                assert_eq!(tolerance.len(), effect.parameters().len(), "{}", entry.name);
+                for ([low, high], p) in tolerance.iter().zip(effect.parameters()) {
+                    assert!(low <= high, "{} {}", entry.name, p.name);
+                    if low < high {
+                        counted += 1;
+                        assert!(
+                            *low <= p.null && p.null <= *high,
+                            "{} {}",
+                            entry.name,
+                            p.name
+                        );
+                        // It is part of what may be named.
+                        assert!(*high < p.range[1], "{} {}", entry.name, p.name);
+                    }
+                }
+            }
+        }
+    }
+    assert!(counted > 20, "{counted}");
+}
+
+#[test]
 fn every_effect_is_off_at_its_null_value_to_the_bit() {
     for xml in [ARM, FLOOR] {
         let plant = Plant::of(&scene(xml)).unwrap();

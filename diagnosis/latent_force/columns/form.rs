@@ -72,6 +72,7 @@ impl Form {
                     deviation: slope.map_or(other, |(_, d)| *d),
                     bounds: [low, high],
                     free,
+                    is_tolerance: candidate.is_tolerance,
                 }
             })
             .collect()

@@ -89,10 +89,11 @@ impl Slopes {
         Ok(linear)
     }
 
-    /// The largest move of a value since the slopes were taken, in deviations of its prior.
+    /// The largest move of a value since the slopes were taken, in deviations of its prior; tolerances aside, which are narrow.
     fn furthest(&self, theta: &[f64], unknowns: &[Unknown]) -> f64 {
         let moved = |((a, b), u): ((&f64, &f64), &Unknown)| (a - b).abs() / u.deviation;
         let pairs = self.theta.iter().zip(theta).zip(unknowns);
+        let pairs = pairs.filter(|(_, u)| !u.is_tolerance);
         pairs.map(moved).fold(0.0, f64::max)
     }
 

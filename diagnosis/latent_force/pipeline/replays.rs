@@ -8,7 +8,7 @@ use crate::candidate::Candidate;
 use crate::findings::{Findings, Found, Repeats};
 use crate::fit::Effort;
 use crate::latent_force::fit::Fitted;
-use crate::latent_force::search::{Outcome, Set, name_of};
+use crate::latent_force::search::{Outcome, Set, labels_of, name_of};
 use crate::predict::State;
 use crate::result::NotTried;
 
@@ -36,18 +36,21 @@ fn smoothed_starts(bench: &Bench, fitted: &Fitted, firsts: &[usize]) -> Vec<Stat
     firsts.iter().map(|&w| state(&trajectory[w])).collect()
 }
 
-/// All sets that were fitted, each once, the most evident first.
-fn all_sets(outcome: &Outcome) -> Vec<Set> {
+/// All sets that were fitted, each once by what it names, the most evident first.
+fn all_sets(outcome: &Outcome, candidates: &[Candidate]) -> Vec<Set> {
     let mut sets: Vec<Set> = Vec::new();
-    for set in outcome.rounds.iter().flat_map(|r| &r.confirmed) {
-        let mut members = set.candidates.clone();
+    let named = |set: &Set| {
+        let mut members = labels_of(candidates, &set.candidates);
         members.sort_unstable();
-        let same = |s: &&mut Set| {
-            let mut other = s.candidates.clone();
-            other.sort_unstable();
-            other == members
-        };
-        match sets.iter_mut().find(same) {
+        members
+    };
+    let stands = |set: &Set| set.candidates == outcome.best.candidates;
+    for set in outcome.rounds.iter().flat_map(|r| &r.confirmed) {
+        let members = named(set);
+        match sets.iter_mut().find(|s| named(s) == members) {
+            // With tolerances and without it is the same answer.
+            Some(known) if stands(set) && !stands(known) => *known = set.clone(),
+            Some(known) if stands(known) && !stands(set) => {}
             Some(known) if known.fitted.evidence < set.fitted.evidence => *known = set.clone(),
             Some(_) => {}
             None => sets.push(set.clone()),
@@ -58,17 +61,24 @@ fn all_sets(outcome: &Outcome) -> Vec<Set> {
 }
 
 /// Replays of fitted sets: from where their starts were smoothed, with the values fitted once more to whole logs.
-struct Replays<'a> {
-    bench: &'a Bench,
-    candidates: &'a [Candidate],
+pub(super) struct Replays<'a> {
+    pub(super) bench: &'a Bench,
+    pub(super) candidates: &'a [Candidate],
     /// Walks that begin an episode.
-    firsts: &'a [usize],
+    pub(super) firsts: &'a [usize],
     /// Coordinates of the starts that are fitted with the values.
-    open: Vec<usize>,
-    progress: &'a dyn Progress,
+    pub(super) open: Vec<usize>,
+    pub(super) progress: &'a dyn Progress,
 }
 
 impl Replays<'_> {
+    /// Excess power that a fitted set leaves of the training logs, a reading, in units of the noise.
+    pub(super) fn excess(&self, fitted: &Fitted, members: &[usize]) -> Result<f64> {
+        let of = self.of(fitted, members, Effort::LOOK)?;
+        let readings = self.bench.train.readings.max(1) as f64;
+        Ok((of.fit.cost / readings - 1.0).max(0.0))
+    }
+
     /// Replays a fitted set of candidates.
     fn of(&self, fitted: &Fitted, members: &[usize], effort: Effort) -> Result<Explanation> {
         let study = self.bench.parameters.len();
@@ -176,7 +186,7 @@ pub(super) fn replay(
         .collect();
     let (of_none, of_best, rivals) = efforts(repeats, progress, &mut not_tried);
     let none = replays.of(&outcome.none, &[], of_none)?;
-    let sets = all_sets(outcome);
+    let sets = all_sets(outcome, candidates);
     let ranking = ranking(candidates, outcome, &sets);
     let (sets, stands) = replayed_sets(outcome, sets, (known, rivals));
     let mut found = Vec::new();

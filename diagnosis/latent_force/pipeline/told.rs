@@ -8,7 +8,7 @@ use crate::candidate::Candidate;
 use crate::latent_force::detection::Limit;
 use crate::latent_force::estimate::Estimate;
 use crate::latent_force::picture::dofs;
-use crate::latent_force::search::{Outcome, Set, Sight};
+use crate::latent_force::search::{Outcome, Set, Sight, labels_of};
 use crate::result::{DetectionLimit, Isolability, MissingForce, RankedSet};
 
 /// Most sets that are listed with their evidence.
@@ -46,7 +46,7 @@ pub(super) fn ranking(
     let labels = |set: &[usize]| -> Vec<String> {
         let mut set = set.to_vec();
         set.sort_unstable();
-        set.iter().map(|&c| candidates[c].label()).collect()
+        labels_of(candidates, &set)
     };
     let of_fit = |set: &Set| RankedSet {
         effects: labels(&set.candidates),
@@ -54,6 +54,8 @@ pub(super) fn ranking(
         fitted: Some(set.fitted.evidence - none),
     };
     let mut all: Vec<RankedSet> = fitted.iter().map(of_fit).collect();
+    // What has no name is no effect.
+    all.retain(|r| !r.effects.is_empty());
     for (set, gain) in outcome.rounds.iter().take(1).flat_map(|r| &r.screened) {
         let effects = labels(set);
         match all.iter_mut().find(|r| r.effects == effects) {

@@ -15,7 +15,8 @@ const UNUSUAL: f64 = 10.0;
 #[must_use]
 pub fn log_prior(plant: &Plant, candidates: &[Candidate], set: &[usize]) -> f64 {
     let each = set.iter().map(|&c| &candidates[c]);
-    let unusual = each.filter(|c| c.effect.unusual_at(plant, &c.spec.site));
+    let named = each.filter(|c| !c.is_tolerance);
+    let unusual = named.filter(|c| c.effect.unusual_at(plant, &c.spec.site));
     let laws: BTreeSet<&str> = unusual.map(|c| &*c.spec.name).collect();
     -UNUSUAL.ln() * laws.len() as f64
 }

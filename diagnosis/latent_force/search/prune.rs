@@ -35,6 +35,9 @@ fn deeds(candidates: &[Candidate], set: &Set) -> Vec<Deed> {
     for &c in &set.candidates {
         let range = at..at + parameters(c);
         at = range.end;
+        if candidates[c].is_tolerance {
+            continue;
+        }
         // A speed at which a law changes is no size of it; a delay, which no slope is taken in, is.
         let all_of = candidates[c].parameters();
         let has_slopes = all_of.iter().any(|p| p.start == Start::Slope);
@@ -120,22 +123,8 @@ pub(super) fn pruned_at_once(candidates: &[Candidate], set: Set) -> Set {
     }
     let fitted = &set.fitted;
     let free = fitted.hypothesis.free();
-    let mut at = fitted.theta.len();
-    let mut out = Vec::new();
-    for &c in set.candidates.iter().rev() {
-        let end = at;
-        at -= candidates[c].parameters().len();
-        if idle.contains(&c) {
-            out.extend((0..free.len()).filter(|&k| (at..end).contains(&free[k])));
-        }
-    }
-    let unknowns = || free.iter().map(|&i| (&fitted.hypothesis.unknowns[i], i));
-    let off = DVector::from_iterator(
-        free.len(),
-        unknowns().map(|(u, i)| fitted.theta[i] - u.center),
-    );
-    let prior = DVector::from_iterator(free.len(), unknowns().map(|(u, _)| u.deviation));
-    let Some((gain, shift)) = at_null(&off, &fitted.covariance, &prior, &out) else {
+    let out = values_of(candidates, &set, &idle);
+    let Some((gain, shift)) = without_values(&set, &out) else {
         return set;
     };
     if gain < -IDLE_LOSS {
@@ -157,6 +146,40 @@ pub(super) fn pruned_at_once(candidates: &[Candidate], set: Set) -> Set {
         own.select_columns(&stay)
     });
     smaller
+}
+
+/// Places of the values of some candidates of a set among those that are fitted.
+fn values_of(candidates: &[Candidate], set: &Set, of: &[usize]) -> Vec<usize> {
+    let free = set.fitted.hypothesis.free();
+    let mut at = set.fitted.theta.len();
+    let mut all = Vec::new();
+    for &c in set.candidates.iter().rev() {
+        let end = at;
+        at -= candidates[c].parameters().len();
+        if of.contains(&c) {
+            all.extend((0..free.len()).filter(|&k| (at..end).contains(&free[k])));
+        }
+    }
+    all
+}
+
+/// As [`at_null`], for fitted values of a set.
+fn without_values(set: &Set, out: &[usize]) -> Option<(f64, DVector<f64>)> {
+    let fitted = &set.fitted;
+    let free = fitted.hypothesis.free();
+    let unknowns = || free.iter().map(|&i| (&fitted.hypothesis.unknowns[i], i));
+    let off = DVector::from_iterator(
+        free.len(),
+        unknowns().map(|(u, i)| fitted.theta[i] - u.center),
+    );
+    let prior = DVector::from_iterator(free.len(), unknowns().map(|(u, _)| u.deviation));
+    at_null(&off, &fitted.covariance, &prior, out)
+}
+
+/// Change of the evidence of a set without some of its candidates, to first order; `None` where that is not known.
+pub(super) fn change_without(candidates: &[Candidate], set: &Set, out: &[usize]) -> Option<f64> {
+    let values = values_of(candidates, set, out);
+    without_values(set, &values).map(|(gain, _)| gain)
 }
 
 /// Covariance of the values `stay` given those `out`; `None` where these are certain.

@@ -3,34 +3,20 @@
 use asid_core::{Progress, Result};
 use nalgebra::DMatrix;
 
-use crate::candidate::Candidate;
+use crate::candidate::{Candidate, nameable};
 use crate::chance::threshold;
-use crate::latent_force::columns::Columns;
 use crate::latent_force::context::Context;
-use crate::latent_force::detection::{Limit, limits};
 use crate::latent_force::estimate::Missing;
 use crate::latent_force::fit::{Fitted, Slopes};
-use crate::latent_force::rehearsal::{Rehearsal, rehearse};
-use crate::latent_force::screen::{Screened, isolability, rank, regressions};
-use crate::latent_force::smoother::Regression;
+use crate::latent_force::screen::Screened;
 use crate::settings::Breadth;
 
 use super::Untried;
 use super::prior::log_prior;
 use super::prune::{pruned, pruned_at_once};
-use super::set::{Set, from_starts_of, name_of, refined_by, with, without};
-
-/// Leading candidates that are compared pair by pair.
-const COMPARED: usize = 20;
-
-/// What a screening could have seen.
-#[derive(Clone, Debug, Default)]
-pub struct Sight {
-    /// The least that each candidate must be.
-    pub limits: Vec<Limit>,
-    /// What screenings of drawn logs say.
-    pub rehearsal: Rehearsal,
-}
+use super::screening::{Screening, Sight};
+use super::set::{Set, TOLERANCES, from_starts_of, name_of, refined_by, with, without};
+use super::tolerances::Tolerances;
 
 /// A round: what was screened and what was fitted upon a base.
 #[derive(Clone, Debug)]
@@ -47,6 +33,8 @@ pub struct Round {
     pub raced: Vec<Vec<usize>>,
     /// Sets that were fitted to the end, best first.
     pub confirmed: Vec<Set>,
+    /// What an ordinary machine has of everything, where that earns its place to first order.
+    pub tolerances: Option<Tolerances>,
 }
 
 /// What a round is about.
@@ -63,20 +51,31 @@ pub(super) struct Upon<'r> {
     pub(super) progress: &'r dyn Progress,
 }
 
-/// A screening: the open candidates, their columns, and the sets of them by evidence.
-struct Screening {
-    some: Vec<Candidate>,
-    columns: Columns,
-    ranked: Vec<Screened>,
-    /// Leading candidates, and the cosines between each two.
-    alike: (Vec<usize>, DMatrix<f64>),
-    sight: Sight,
-}
-
 /// Sets that were fitted, and those that there was no time for.
 struct Fits {
     sets: Vec<Set>,
     left_out: Vec<Vec<usize>>,
+}
+
+impl Screening {
+    /// What a round was, once it is over: what was `screened`, what was raced and confirmed, and tolerances that earn their place.
+    fn round(
+        self,
+        upon: &Upon<'_>,
+        screened: Vec<(Vec<usize>, f64)>,
+        (raced, confirmed): (Vec<Vec<usize>>, Vec<Set>),
+        tolerances: Option<Tolerances>,
+    ) -> Round {
+        Round {
+            base: upon.base.candidates.clone(),
+            screened,
+            alike: self.alike,
+            sight: self.sight,
+            raced,
+            confirmed,
+            tolerances,
+        }
+    }
 }
 
 impl Upon<'_> {
@@ -103,8 +102,26 @@ impl Upon<'_> {
             .map(|s| (self.members(&screening, s), s.gain))
             .collect();
         let rows = screened.iter().map(|(set, gain)| (name(set), *gain));
-        progress.ranking(&format!("screening{upon}"), &rows.collect::<Vec<_>>());
-        let raced = self.race(&screening)?;
+        let all = screening
+            .tolerances
+            .iter()
+            .map(|t| (TOLERANCES.to_owned(), t.gain));
+        let mut rows: Vec<_> = rows.chain(all).collect();
+        rows.sort_by(|a, b| b.1.total_cmp(&a.1));
+        progress.ranking(&format!("screening{upon}"), &rows);
+        let threshold = threshold(nameable(self.candidates), self.breadth.false_alarms);
+        let tolerances = screening.tolerances.as_ref();
+        let tolerances = tolerances.filter(|t| t.gain > threshold).cloned();
+        // One name that tells as much as many small things is the likelier.
+        let least = screening.of_names + threshold;
+        if let Some(leading) = tolerances.as_ref().filter(|t| t.gain > least) {
+            progress.note("fitting tolerances");
+            let mut set = leading.beside(self.base, self.candidates);
+            set.fit(self.context, (self.breadth.rounds[1], progress))?;
+            progress.end();
+            return Ok(screening.round(self, screened, (Vec::new(), vec![set]), tolerances));
+        }
+        let raced = self.race(&screening, tolerances.as_ref())?;
         let of_race = raced.sets.iter().map(|s| s.candidates.clone()).collect();
         let finished = self.finish(raced.sets)?;
         progress.end();
@@ -119,14 +136,7 @@ impl Upon<'_> {
         let gain = |s: &Set| self.worth(s) - self.base.fitted.evidence;
         let rows = confirmed.iter().map(|s| (name(&s.candidates), gain(s)));
         progress.ranking(&format!("fits{upon}"), &rows.collect::<Vec<_>>());
-        Ok(Round {
-            base: self.base.candidates.clone(),
-            screened,
-            alike: screening.alike,
-            sight: screening.sight,
-            raced: of_race,
-            confirmed,
-        })
+        Ok(screening.round(self, screened, (of_race, confirmed), tolerances))
     }
 
     /// Evidence of a set, that of effects at unusual sites the lower.
@@ -141,65 +151,8 @@ impl Upon<'_> {
         set.forms.iter().map(candidate).collect()
     }
 
-    /// Ranks the open candidates by one regression.
-    fn screen(&self) -> Result<Screening> {
-        self.progress.begin("screening", 1);
-        let open = self.open.iter();
-        let some: Vec<Candidate> = open.map(|&c| self.candidates[c].clone()).collect();
-        let fitted = &self.base.fitted;
-        let model = (&fitted.hypothesis, &fitted.theta[..]);
-        let columns = Columns::of(self.context, model, &fitted.estimate, &some, self.progress)?;
-        let sums = regressions(self.context, &fitted.estimate, &columns);
-        let mut ranked = rank(&sums, &columns, &some);
-        for s in &mut ranked {
-            let members = s.forms.iter().map(|&f| columns.forms[f].candidate);
-            s.gain += log_prior(self.context.plant(), &some, &members.collect::<Vec<_>>());
-        }
-        ranked.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-        let singles = ranked.iter().filter(|s| s.forms.len() == 1);
-        let leading: Vec<usize> = singles.map(|s| s.forms[0]).take(COMPARED).collect();
-        let candidate = |&f: &usize| self.open[columns.forms[f].candidate];
-        let alike = (
-            leading.iter().map(candidate).collect(),
-            isolability(&sums[0], &columns, &leading),
-        );
-        let found = ranked.iter().find(|s| s.forms.len() == 1);
-        let found = found.map_or(0.0, |s| s.gain);
-        let sight = self.sight((&sums, found), &columns, &some);
-        self.progress.end();
-        Ok(Screening {
-            some,
-            columns,
-            ranked,
-            alike,
-            sight,
-        })
-    }
-
-    /// What a screening could have seen whose best candidate has the evidence `found`, at the most likely of the scales of `q`.
-    fn sight(
-        &self,
-        (sums, found): (&[Regression], f64),
-        columns: &Columns,
-        some: &[Candidate],
-    ) -> Sight {
-        let likely =
-            |a: &&Regression, b: &&Regression| a.log_likelihood.total_cmp(&b.log_likelihood);
-        let Some(sum) = sums.iter().max_by(likely) else {
-            return Sight::default();
-        };
-        let threshold = threshold(self.candidates.len(), self.breadth.false_alarms);
-        let mut limits = limits(sum, columns, some, threshold);
-        let mut rehearsal = rehearse(sum, columns, (&limits, found), self.breadth.seed);
-        let place = |c: &mut usize| *c = self.open[*c];
-        limits.iter_mut().for_each(|l| place(&mut l.candidate));
-        let taken_for = rehearsal.recognised.iter_mut().flatten();
-        taken_for.filter_map(|r| r.1.as_mut()).for_each(place);
-        Sight { limits, rehearsal }
-    }
-
-    /// Fits what leads in a screening a little.
-    fn race(&self, screening: &Screening) -> Result<Fits> {
+    /// Fits what leads in a screening a little; tolerances too where no one name promises as much.
+    fn race(&self, screening: &Screening, tolerances: Option<&Tolerances>) -> Result<Fits> {
         let (breadth, progress) = (self.breadth, self.progress);
         let ranked = &screening.ranked;
         let lead = ranked.first().map_or(0.0, |s| s.gain);
@@ -210,6 +163,12 @@ impl Upon<'_> {
         progress.begin("confirming", due.len() as u64);
         let mut sets = Vec::new();
         let mut left_out = Vec::new();
+        if let Some(tolerances) = tolerances.filter(|t| t.gain > lead) {
+            progress.note("trying tolerances");
+            let mut set = tolerances.beside(self.base, self.candidates);
+            set.fit(self.context, (breadth.rounds[0], progress))?;
+            sets.push(set);
+        }
         for s in due {
             let members = self.members(screening, s);
             if !sets.is_empty() && progress.is_stopped() {

@@ -11,6 +11,9 @@ use crate::latent_force::fit::{Fitted, Hypothesis, Slopes, fit};
 use crate::latent_force::screen::Screened;
 use crate::settings::Breadth;
 
+/// Deviations of the evidence about its plateaus by which a further effect must rise above the threshold: 95 %.
+const WANDER: f64 = 2.0;
+
 /// A set of effects, fitted.
 #[derive(Clone, Debug)]
 pub struct Set {
@@ -23,6 +26,21 @@ pub struct Set {
 }
 
 impl Set {
+    /// No effect.
+    pub(super) fn without_effects(fitted: &Fitted) -> Self {
+        Self {
+            candidates: Vec::new(),
+            fitted: fitted.clone(),
+            names: 0,
+        }
+    }
+
+    /// Whether its evidence exceeds another one's by a threshold, and by what both scatter by.
+    pub(super) fn rises_above(&self, other: &Self, threshold: f64) -> bool {
+        let unsure = WANDER * self.fitted.wander.hypot(other.fitted.wander);
+        self.fitted.evidence - other.fitted.evidence > threshold + unsure
+    }
+
     /// Fits it on from where it stands, over at most so many linearisations.
     pub(super) fn fit(
         &mut self,
@@ -100,6 +118,9 @@ pub(super) fn free_what_is_given(
     for &c in best.candidates.iter().rev() {
         let parameters = candidates[c].parameters();
         at -= parameters.len();
+        if candidates[c].is_tolerance {
+            continue;
+        }
         let own = &fitted.theta[at..at + parameters.len()];
         for (i, p) in parameters.iter().enumerate() {
             let unknown = &mut hypothesis.unknowns[at + i];
@@ -151,11 +172,25 @@ pub(super) fn free_what_is_given(
     }))
 }
 
-/// Labels of some candidates.
+/// What a person is told who reads of a set that has no name.
+pub(super) const TOLERANCES: &str = "tolerances";
+
+/// Labels of some candidates, and whether tolerances are among them.
 #[must_use]
 pub fn name_of(candidates: &[Candidate], set: &[usize]) -> String {
-    let labels: Vec<String> = set.iter().map(|&c| candidates[c].label()).collect();
-    grouped(&labels).join(" + ")
+    let mut names = grouped(&labels_of(candidates, set));
+    if set.iter().any(|&c| candidates[c].is_tolerance) {
+        names.push(TOLERANCES.to_owned());
+    }
+    names.join(" + ")
+}
+
+/// Labels of those of some candidates that are named.
+#[must_use]
+pub fn labels_of(candidates: &[Candidate], set: &[usize]) -> Vec<String> {
+    let named = set.iter().map(|&c| &candidates[c]);
+    let named = named.filter(|c| !c.is_tolerance);
+    named.map(Candidate::label).collect()
 }
 
 /// The candidate that another one refines: the simpler law at the same site.

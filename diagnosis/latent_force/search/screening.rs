@@ -1,0 +1,109 @@
+//! A screening: all open candidates as columns of one regression upon a set, and what that could have seen.
+
+use asid_core::Result;
+use nalgebra::DMatrix;
+
+use crate::candidate::{Candidate, nameable};
+use crate::chance::threshold;
+use crate::latent_force::columns::Columns;
+use crate::latent_force::detection::{Limit, limits};
+use crate::latent_force::rehearsal::{Rehearsal, rehearse};
+use crate::latent_force::screen::{Screened, isolability, rank, regressions};
+use crate::latent_force::smoother::Regression;
+
+use super::prior::log_prior;
+use super::round::Upon;
+use super::tolerances::{Tolerances, of_names};
+
+/// Leading candidates that are compared pair by pair.
+const COMPARED: usize = 20;
+
+/// What a screening could have seen.
+#[derive(Clone, Debug, Default)]
+pub struct Sight {
+    /// The least that each candidate must be.
+    pub limits: Vec<Limit>,
+    /// What screenings of drawn logs say.
+    pub rehearsal: Rehearsal,
+}
+
+/// A screening: the open candidates, their columns, and the sets of them by evidence.
+pub(super) struct Screening {
+    pub(super) some: Vec<Candidate>,
+    pub(super) columns: Columns,
+    pub(super) ranked: Vec<Screened>,
+    /// Leading candidates, and the cosines between each two.
+    pub(super) alike: (Vec<usize>, DMatrix<f64>),
+    pub(super) sight: Sight,
+    /// What an ordinary machine has of everything, and the evidence of the best few names.
+    pub(super) tolerances: Option<Tolerances>,
+    pub(super) of_names: f64,
+}
+
+impl Upon<'_> {
+    /// Ranks the open candidates by one regression.
+    pub(super) fn screen(&self) -> Result<Screening> {
+        self.progress.begin("screening", 1);
+        let open = self.open.iter();
+        let some: Vec<Candidate> = open.map(|&c| self.candidates[c].clone()).collect();
+        let fitted = &self.base.fitted;
+        let model = (&fitted.hypothesis, &fitted.theta[..]);
+        let columns = Columns::of(self.context, model, &fitted.estimate, &some, self.progress)?;
+        let sums = regressions(self.context, &fitted.estimate, &columns);
+        let mut ranked = rank(&sums, &columns, &some);
+        for s in &mut ranked {
+            let members = s.forms.iter().map(|&f| columns.forms[f].candidate);
+            s.gain += log_prior(self.context.plant(), &some, &members.collect::<Vec<_>>());
+        }
+        ranked.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+        let singles = ranked.iter().filter(|s| s.forms.len() == 1);
+        let leading: Vec<usize> = singles.map(|s| s.forms[0]).take(COMPARED).collect();
+        let candidate = |&f: &usize| self.open[columns.forms[f].candidate];
+        let alike = (
+            leading.iter().map(candidate).collect(),
+            isolability(&sums[0], &columns, &leading),
+        );
+        let regressed = (&sums[..], &columns);
+        let base = &self.base.candidates;
+        let tolerances = Tolerances::of(regressed, self.open, self.candidates, base);
+        let of_names = tolerances.as_ref().map_or(0.0, |_| {
+            let price = (nameable(self.candidates) as f64).ln();
+            of_names(&sums, &columns, &ranked, price)
+        });
+        let found = ranked.iter().find(|s| s.forms.len() == 1);
+        let found = found.map_or(0.0, |s| s.gain);
+        let sight = self.sight((&sums, found), &columns, &some);
+        self.progress.end();
+        Ok(Screening {
+            some,
+            columns,
+            ranked,
+            alike,
+            sight,
+            tolerances,
+            of_names,
+        })
+    }
+
+    /// What a screening could have seen whose best candidate has the evidence `found`, at the most likely of the scales of `q`.
+    fn sight(
+        &self,
+        (sums, found): (&[Regression], f64),
+        columns: &Columns,
+        some: &[Candidate],
+    ) -> Sight {
+        let likely =
+            |a: &&Regression, b: &&Regression| a.log_likelihood.total_cmp(&b.log_likelihood);
+        let Some(sum) = sums.iter().max_by(likely) else {
+            return Sight::default();
+        };
+        let threshold = threshold(nameable(self.candidates), self.breadth.false_alarms);
+        let mut limits = limits(sum, columns, some, threshold);
+        let mut rehearsal = rehearse(sum, columns, (&limits, found), self.breadth.seed);
+        let place = |c: &mut usize| *c = self.open[*c];
+        limits.iter_mut().for_each(|l| place(&mut l.candidate));
+        let taken_for = rehearsal.recognised.iter_mut().flatten();
+        taken_for.filter_map(|r| r.1.as_mut()).for_each(place);
+        Sight { limits, rehearsal }
+    }
+}

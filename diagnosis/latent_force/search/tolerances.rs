@@ -1,0 +1,298 @@
+//! What an ordinary machine has of everything: masses, lengths, frictions and delays within their tolerances, all at once.
+//!
+//! A machine differs from its model in many small things, and one law that is none of them may make up for many: a lag at each
+//! drive for delays, frictions and a compliance. Here all of them together are a rival of every name: each with a normal prior as wide as
+//! its tolerance, so that what each does is paid for by the evidence alone. They are fitted, and never named.
+
+mod names;
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::candidate::Candidate;
+use crate::latent_force::columns::Columns;
+use crate::latent_force::evidence::evidence;
+use crate::latent_force::fit::Slopes;
+use crate::latent_force::fitted_value::Unknown;
+use crate::latent_force::screen::{Screened, over_scales};
+use crate::latent_force::smoother::Regression;
+
+use super::set::Set;
+
+/// Deviations that a tolerance is taken as.
+const DEVIATIONS: f64 = 3.0;
+/// Information of a value, in deviations of its tolerance, up to which the logs tell nothing of it: its evidence is half of that.
+const LEAST_INFORMATION: f64 = 0.1;
+/// Most names that tolerances are compared with in a screening: what the first three do not make up for is many small things.
+const NAMES: usize = 3;
+/// Sets that lead a screening and are tried as such a name.
+const LEADING: usize = 60;
+
+/// One thing within its tolerance: a candidate, the values to begin with, and the deviation of each; 0 where it is not fitted.
+#[derive(Clone, Debug)]
+struct Member {
+    candidate: usize,
+    values: Vec<f64>,
+    deviations: Vec<f64>,
+    /// The like candidate that can be named, and what its values are then.
+    named: (usize, Vec<Unknown>),
+}
+
+/// All that the logs can tell of an ordinary machine's tolerances upon a model, to first order.
+#[derive(Clone, Debug)]
+pub struct Tolerances {
+    /// Evidence over the model, natural logarithm.
+    pub(super) gain: f64,
+    base: Vec<f64>,
+    members: Vec<Member>,
+}
+
+/// Deviation of a value that is within a range about its null.
+fn deviation([low, high]: [f64; 2], null: f64) -> f64 {
+    (null - low).abs().max((high - null).abs()) / DEVIATIONS
+}
+
+impl Member {
+    /// Puts it into a set, which is not fitted then.
+    fn join(&self, set: &mut Set, candidate: &Candidate) {
+        let fitted = &mut set.fitted;
+        fitted.hypothesis.specs.push(candidate.spec.clone());
+        fitted.hypothesis.unknowns.extend(self.unknowns(candidate));
+        fitted.theta.extend(&self.values);
+        fitted.slopes = Slopes::default();
+        set.candidates.push(self.candidate);
+    }
+
+    /// What its parameters are as unknowns of a fit.
+    fn unknowns(&self, candidate: &Candidate) -> Vec<Unknown> {
+        let own = candidate.unknowns().into_iter();
+        own.zip(candidate.parameters())
+            .zip(&self.deviations)
+            .map(|(((parameter, _), p), &deviation)| Unknown {
+                bounds: parameter.range,
+                parameter,
+                center: p.null,
+                deviation: deviation.max(f64::MIN_POSITIVE),
+                free: deviation > 0.0,
+                is_tolerance: true,
+            })
+            .collect()
+    }
+}
+
+impl Tolerances {
+    /// Of the candidates that stand for tolerances and are not in a set yet, by the columns of the like candidates that can be named: those
+    /// that are `open`, of which `columns` and the regressions `sums` are. `None` where the logs tell nothing of them.
+    pub(super) fn of(
+        (sums, columns): (&[Regression], &Columns),
+        open: &[usize],
+        candidates: &[Candidate],
+        set: &[usize],
+    ) -> Option<Self> {
+        if set.iter().any(|&c| candidates[c].is_tolerance) {
+            return None;
+        }
+        let sharpest = sums.last()?;
+        // Column, deviation in those of its prior, bounds.
+        let mut taken: Vec<(usize, f64, [f64; 2])> = Vec::new();
+        let mut members = Vec::new();
+        for (c, candidate) in candidates.iter().enumerate() {
+            let like = |&s: &usize| candidates[s].label() == candidate.label();
+            let Some(named) = open
+                .iter()
+                .position(like)
+                .filter(|_| candidate.is_tolerance)
+            else {
+                continue;
+            };
+            let Some(form) = columns.forms.iter().find(|f| f.candidate == named) else {
+                continue;
+            };
+            let mut deviations = vec![0.0; candidate.ranges.len()];
+            let first = taken.len();
+            for (column, slope) in form.columns().zip(&form.slopes) {
+                let Some((p, size)) = *slope else { continue };
+                let (range, null) = (candidate.ranges[p], candidate.parameters()[p].null);
+                let own = deviation(range, null);
+                let factor = own / size;
+                if sharpest.gram[(column, column)] * factor * factor < LEAST_INFORMATION {
+                    continue;
+                }
+                deviations[p] = own;
+                taken.push((column, factor, range.map(|x| (x - null) / own)));
+            }
+            if taken.len() > first {
+                let ranges = form.begin.iter().zip(&candidate.ranges);
+                members.push(Member {
+                    candidate: c,
+                    values: ranges.map(|(x, r)| x.clamp(r[0], r[1])).collect(),
+                    deviations,
+                    named: (open[named], form.unknowns(&candidates[open[named]])),
+                });
+            }
+        }
+        if members.is_empty() {
+            return None;
+        }
+        let own = (0..columns.base).map(|i| (i, 1.0, columns.bounds[i]));
+        let all: Vec<(usize, f64, [f64; 2])> = own.chain(taken).collect();
+        let (gain, coefficients) = best(sums, columns, &all);
+        let base: Vec<usize> = (0..columns.base).collect();
+        let (none, _) = over_scales(sums, columns, &base);
+        let mut at = columns.base;
+        for member in &mut members {
+            for (value, deviation) in member.values.iter_mut().zip(&member.deviations) {
+                if *deviation > 0.0 {
+                    *value += coefficients[at] * deviation;
+                    at += 1;
+                }
+            }
+        }
+        Some(Self {
+            gain: gain - none,
+            base: coefficients[..columns.base].to_vec(),
+            members,
+        })
+    }
+
+    /// A set with all of them, its values moved as the screening says; not fitted yet.
+    pub(super) fn beside(&self, set: &Set, candidates: &[Candidate]) -> Set {
+        let mut set = set.clone();
+        let fitted = &mut set.fitted;
+        let free = fitted.hypothesis.free();
+        for (&i, c) in free.iter().zip(&self.base) {
+            let u = &fitted.hypothesis.unknowns[i];
+            fitted.theta[i] = (fitted.theta[i] + c * u.deviation).clamp(u.bounds[0], u.bounds[1]);
+        }
+        for member in &self.members {
+            member.join(&mut set, &candidates[member.candidate]);
+        }
+        set
+    }
+}
+
+/// Best evidence over the scales of some columns, each with another deviation of its prior, and their coefficients in these.
+fn best(sums: &[Regression], columns: &Columns, all: &[(usize, f64, [f64; 2])]) -> (f64, Vec<f64>) {
+    let n = all.len();
+    let which: Vec<usize> = (0..n).collect();
+    let bounds: Vec<[f64; 2]> = all.iter().map(|a| a.2).collect();
+    let center = |&(i, ..): &(usize, f64, [f64; 2])| {
+        if i < columns.base {
+            columns.center[i]
+        } else {
+            0.0
+        }
+    };
+    let center: Vec<f64> = all.iter().map(center).collect();
+    let mut best = (f64::NEG_INFINITY, vec![0.0; n]);
+    for sum in sums {
+        let gram = DMatrix::from_fn(n, n, |i, j| {
+            sum.gram[(all[i].0, all[j].0)] * all[i].1 * all[j].1
+        });
+        let moment = DVector::from_fn(n, |i, _| sum.moment[all[i].0] * all[i].1);
+        let found = evidence(&gram, &moment, &which, &center, &bounds);
+        let total = sum.log_likelihood + found.gain;
+        if total > best.0 {
+            best = (total, found.coefficients);
+        }
+    }
+    best
+}
+
+/// Evidence of the best few names by one regression, less the price of each but the first: what a search upon the present model may come to,
+/// to first order.
+pub(super) fn of_names(
+    sums: &[Regression],
+    columns: &Columns,
+    ranked: &[Screened],
+    price: f64,
+) -> f64 {
+    let mut which: Vec<usize> = (0..columns.base).collect();
+    let (none, _) = over_scales(sums, columns, &which);
+    let mut most = 0.0_f64;
+    for names in 0..NAMES {
+        let with = |s: &Screened| -> Option<Vec<usize>> {
+            let more = s.forms.iter().flat_map(|&f| columns.forms[f].columns());
+            let more: Vec<usize> = more.filter(|c| !which.contains(c)).collect();
+            (!more.is_empty()).then(|| [&which[..], &more].concat())
+        };
+        let tried = ranked.iter().take(LEADING).filter_map(with);
+        let tried = tried.map(|w| (over_scales(sums, columns, &w).0 - none, w));
+        let Some((gain, next)) = tried.max_by(|a, b| a.0.total_cmp(&b.0)) else {
+            break;
+        };
+        most = most.max(gain - price * names as f64);
+        which = next;
+    }
+    most
+}
+
+/// As [`deviation`]; 0 for a range of one value.
+fn deviation_within(range: [f64; 2], null: f64) -> f64 {
+    if range[0] < range[1] {
+        deviation(range, null)
+    } else {
+        0.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::latent_force::columns::Form;
+
+    #[test]
+    fn a_range_is_three_deviations() {
+        assert!((deviation([0.91, 1.09], 1.0) - 0.03).abs() < 1e-12);
+        // Of one side as well.
+        assert!((deviation([0.0, 0.0045], 0.0) - 0.0015).abs() < 1e-12);
+        assert_eq!(deviation_within([0.2, 0.2], 0.0), 0.0);
+    }
+
+    /// Columns of one form whose second is idle.
+    fn columns() -> Columns {
+        Columns {
+            linear: Vec::new(),
+            base: 0,
+            forms: vec![Form {
+                candidate: 0,
+                begin: vec![0.0],
+                slopes: vec![Some((0, 2.0))],
+                first: 0,
+            }],
+            center: vec![0.0; 2],
+            bounds: vec![[-9.0, 9.0]; 2],
+            complete: true,
+        }
+    }
+
+    #[test]
+    fn a_narrow_prior_is_the_regression_on_a_smaller_column() {
+        let sum = Regression {
+            log_likelihood: -7.0,
+            gram: DMatrix::from_row_slice(2, 2, &[40.0, 3.0, 3.0, 5.0]),
+            moment: DVector::from_row_slice(&[12.0, 1.0]),
+        };
+        let (gain, c) = best(&[sum], &columns(), &[(0, 0.1, [-3.0, 3.0])]);
+        // g = 40 / 100, b = 1.2: b^2 / (1 + g) / 2 - ln(1 + g) / 2.
+        let want = -7.0 + 0.5 * 1.44 / 1.4 - 0.5 * 1.4_f64.ln();
+        assert!((gain - want).abs() < 1e-12 && (c[0] - 1.2 / 1.4).abs() < 1e-12);
+    }
+
+    #[test]
+    fn names_pay_a_price_each_but_the_first() {
+        let sum = Regression {
+            log_likelihood: 0.0,
+            gram: DMatrix::from_diagonal_element(2, 2, 100.0),
+            moment: DVector::from_row_slice(&[60.0, 0.0]),
+        };
+        let ranked = [Screened {
+            forms: vec![0],
+            gain: 0.0,
+            base: Vec::new(),
+            coefficients: Vec::new(),
+        }];
+        let alone = 0.5 * 3600.0 / 101.0 - 0.5 * 101.0_f64.ln();
+        let found = of_names(&[sum], &columns(), &ranked, 4.0);
+        assert!((found - alone).abs() < 1e-9, "{found} {alone}");
+    }
+}

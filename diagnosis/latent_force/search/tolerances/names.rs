@@ -1,0 +1,181 @@
+//! What tolerances change of what is named: a value that outgrows its tolerance is named, and a name that does nothing beside them is not.
+
+use asid_core::{Progress, Result};
+
+use crate::candidate::{Candidate, nameable};
+use crate::chance::threshold;
+use crate::latent_force::context::Context;
+use crate::latent_force::search::prune::change_without;
+use crate::latent_force::search::set::{Set, without};
+use crate::settings::Breadth;
+
+use super::{DEVIATIONS, Member, Tolerances, deviation_within};
+
+/// How much more evidence than the threshold tangents may promise for a name that is tried without: they are right to a
+/// factor of some three.
+const TANGENT: f64 = 3.0;
+/// Share of a tolerance from which on a value is at its end.
+const AT_END: f64 = 0.95;
+
+impl Tolerances {
+    /// A set with them beside it, where that earns the threshold.
+    pub(in crate::latent_force::search) fn earned(
+        &self,
+        context: &Context<'_>,
+        candidates: &[Candidate],
+        set: &Set,
+        (breadth, progress): (Breadth, &dyn Progress),
+    ) -> Result<Option<Set>> {
+        progress.note("fitting tolerances");
+        let mut with = self.beside(set, candidates);
+        with.fit(context, (breadth.rounds[1], progress))?;
+        let threshold = threshold(nameable(candidates), breadth.false_alarms);
+        Ok(with.rises_above(set, threshold).then_some(with))
+    }
+
+    /// A fitted set with them, with the names that it then has: those of values that outgrow their tolerance, and without those that do
+    /// nothing beside them.
+    pub(in crate::latent_force::search) fn settled(
+        &self,
+        context: &Context<'_>,
+        candidates: &[Candidate],
+        set: Set,
+        how: (Breadth, &dyn Progress),
+    ) -> Result<Set> {
+        let set = self.outgrown(context, candidates, set, how)?;
+        needed(context, candidates, set, how)
+    }
+
+    /// A fitted set whose values at the end of their tolerance are let go beyond: each such effect is named. The set as it is where none is,
+    /// or where that does not earn the threshold.
+    fn outgrown(
+        &self,
+        context: &Context<'_>,
+        candidates: &[Candidate],
+        set: Set,
+        (breadth, progress): (Breadth, &dyn Progress),
+    ) -> Result<Set> {
+        let mut larger = set.clone();
+        let mut laws: Vec<&str> = Vec::new();
+        for member in &self.members {
+            let candidate = &candidates[member.candidate];
+            let Some(values) = values_of(candidates, &set, member.candidate) else {
+                continue;
+            };
+            let ends = values
+                .iter()
+                .zip(&candidate.ranges)
+                .zip(candidate.parameters());
+            let at_end = ends
+                .zip(&member.deviations)
+                .any(|(((x, range), p), deviation)| {
+                    let end = AT_END * DEVIATIONS * deviation;
+                    *deviation > 0.0 && range[0] < range[1] && (x - p.null).abs() >= end
+                });
+            if !at_end {
+                continue;
+            }
+            let (named, unknowns) = &member.named;
+            larger = without(&larger, candidates, member.candidate);
+            let fitted = &mut larger.fitted;
+            fitted
+                .hypothesis
+                .specs
+                .push(candidates[*named].spec.clone());
+            fitted.hypothesis.unknowns.extend(unknowns.iter().cloned());
+            fitted.theta.extend(values);
+            larger.candidates.push(*named);
+            let law = &*candidate.spec.name;
+            if !laws.contains(&law) {
+                laws.push(law);
+                larger.names += 1;
+            }
+        }
+        if laws.is_empty() {
+            return Ok(set);
+        }
+        progress.note(&format!(
+            "trying more than tolerances of {}",
+            laws.join(", ")
+        ));
+        larger.fit(context, (breadth.rounds[1], progress))?;
+        let threshold = threshold(nameable(candidates), breadth.false_alarms);
+        let least = set.fitted.evidence + threshold * laws.len() as f64;
+        Ok(if larger.fitted.evidence > least {
+            larger
+        } else {
+            set
+        })
+    }
+}
+
+/// Values of a candidate of a set; `None` where it is not in it.
+fn values_of(candidates: &[Candidate], set: &Set, candidate: usize) -> Option<Vec<f64>> {
+    let mut at = set.fitted.theta.len();
+    for &c in set.candidates.iter().rev() {
+        let n = candidates[c].parameters().len();
+        at -= n;
+        if c == candidate {
+            return Some(set.fitted.theta[at..at + n].to_vec());
+        }
+    }
+    None
+}
+
+/// A set with tolerances without the names that do nothing beside these: each law in turn is taken out, or back to its tolerance where
+/// an ordinary machine has some of it, and stays out unless it earns the threshold.
+fn needed(
+    context: &Context<'_>,
+    candidates: &[Candidate],
+    set: Set,
+    (breadth, progress): (Breadth, &dyn Progress),
+) -> Result<Set> {
+    let least = threshold(nameable(candidates), breadth.false_alarms);
+    let mut set = set;
+    let mut laws: Vec<String> = Vec::new();
+    for &c in &set.candidates {
+        let candidate = &candidates[c];
+        if !candidate.is_tolerance && !laws.contains(&candidate.spec.name) {
+            laws.push(candidate.spec.name.clone());
+        }
+    }
+    for law in laws {
+        let of_law = |&&c: &&usize| !candidates[c].is_tolerance && candidates[c].spec.name == law;
+        let own: Vec<usize> = set.candidates.iter().filter(of_law).copied().collect();
+        let change = change_without(candidates, &set, &own);
+        if progress.is_stopped() || change.is_none_or(|c| c < -TANGENT * least) {
+            continue;
+        }
+        let mut smaller = set.clone();
+        for &c in &own {
+            smaller = without(&smaller, candidates, c);
+        }
+        smaller.names = smaller.names.saturating_sub(1);
+        for &c in &own {
+            let like = |t: &Candidate| t.is_tolerance && t.label() == candidates[c].label();
+            let Some(t) = candidates.iter().position(like) else {
+                continue;
+            };
+            let candidate = &candidates[t];
+            let parameters = candidate.parameters().iter().zip(&candidate.ranges);
+            let member = Member {
+                candidate: t,
+                values: parameters
+                    .clone()
+                    .map(|(p, r)| p.null.clamp(r[0], r[1]))
+                    .collect(),
+                deviations: parameters
+                    .map(|(p, r)| deviation_within(*r, p.null))
+                    .collect(),
+                named: (c, Vec::new()),
+            };
+            member.join(&mut smaller, candidate);
+        }
+        progress.note(&format!("trying without {law}"));
+        smaller.fit(context, (breadth.rounds[1], progress))?;
+        if smaller.fitted.evidence > set.fitted.evidence - least {
+            set = smaller;
+        }
+    }
+    Ok(set)
+}
