@@ -75,6 +75,47 @@ fn open_upon(candidates: &[Candidate], known: &[usize], set: &Set) -> Vec<usize>
         .collect()
 }
 
+/// A set fitted from the starts of the next one, where that raises its evidence.
+fn better_from(
+    context: &Context<'_>,
+    (best, next): (&Set, &Set),
+    (breadth, progress): (Breadth, &dyn Progress),
+) -> Result<Option<Set>> {
+    let again = from_starts_of(context, (best, next), breadth, progress)?;
+    Ok((again.fitted.evidence > best.fitted.evidence).then_some(again))
+}
+
+/// What follows on the set that stands after a round: the `next` one that has earned it, or where none has and the search goes on the set with
+/// tolerances beside it, if these earn it; with the names that it has once tolerances are among it.
+fn upon_tolerances(
+    context: &Context<'_>,
+    candidates: &[Candidate],
+    (best, next, at_first): (&Set, Option<Set>, Missing),
+    round: Option<&mut Round>,
+    how: (Breadth, &dyn Progress),
+) -> Result<Option<Set>> {
+    let Some(round) = round.filter(|_| !has_tolerances(candidates, best)) else {
+        return Ok(next);
+    };
+    let Some(tolerances) = round.tolerances.clone() else {
+        return Ok(next);
+    };
+    let next = match next {
+        None if !how.1.is_stopped() => {
+            tolerances.earned(context, candidates, (best, at_first), how)?
+        }
+        next => next,
+    };
+    match next {
+        Some(next) if has_tolerances(candidates, &next) => {
+            let settled = tolerances.settled(context, candidates, next, how)?;
+            round.confirmed.push(settled.clone());
+            Ok(Some(settled))
+        }
+        next => Ok(next),
+    }
+}
+
 /// Searches upon the model without effects, among `candidates` without those that are `known` to act or not. Where hardly any force is missing
 /// and `open_loop` replays still leave a gap, as of a stiff drive that was made softer, what a further name closes of that gap counts.
 ///
@@ -87,6 +128,7 @@ pub fn search(
     breadth: Breadth,
     (open_loop, progress): (OpenLoop<'_>, &dyn Progress),
 ) -> Result<Outcome> {
+    let how = (breadth, progress);
     let threshold = threshold(nameable(candidates), breadth.false_alarms);
     let mut best = Set::without_effects(none);
     let at_first = none.estimate.missing(context);
@@ -137,13 +179,12 @@ pub fn search(
         let next = round.confirmed.first().cloned();
         rounds.push(round);
         let stopped = progress.is_stopped();
-        if let (true, false, Some(next)) = (context.has_segments(), stopped, &next) {
-            let again = from_starts_of(context, (&best, next), breadth, progress)?;
-            if again.fitted.evidence > best.fitted.evidence {
-                best = again;
-                if best.candidates.is_empty() {
-                    none = best.fitted.clone();
-                }
+        if let (true, false, Some(next)) = (context.has_segments(), stopped, &next)
+            && let Some(again) = better_from(context, (&best, next), how)?
+        {
+            best = again;
+            if best.candidates.is_empty() {
+                none = best.fitted.clone();
             }
         }
         let closes = match (&next, excess.filter(|_| no_force)) {
@@ -163,25 +204,19 @@ pub fn search(
                 continue;
             }
         }
-        // Nothing has earned a name: what an ordinary machine has may still make up for it.
-        let had = has_tolerances(candidates, &best);
-        let of_round = rounds.last().and_then(|r| r.tolerances.clone());
-        let next = match (next, &of_round) {
-            (None, Some(tolerances)) if !had && !stopped => {
-                tolerances.earned(context, candidates, &best, (breadth, progress))?
-            }
-            (next, _) => next,
-        };
+        let next = upon_tolerances(
+            context,
+            candidates,
+            (&best, next, at_first),
+            rounds.last_mut(),
+            how,
+        )?;
         let Some(next) = next else { break };
-        best = next;
-        if let Some(tolerances) = of_round.filter(|_| !had && has_tolerances(candidates, &best)) {
+        if has_tolerances(candidates, &next) && !has_tolerances(candidates, &best) {
             // They are no name.
             depth += 1;
-            best = tolerances.settled(context, candidates, best, (breadth, progress))?;
-            if let Some(round) = rounds.last_mut() {
-                round.confirmed.push(best.clone());
-            }
         }
+        best = next;
         if stopped {
             untried.push(Untried {
                 stage: "values of the effects named that no search tries, such as an offset",

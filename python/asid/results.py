@@ -599,6 +599,18 @@ class TaskTrial(Record):
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
+class Tolerance(Record):
+    """What an ordinary machine has of an effect, as it was fitted beside the verdict's: within its tolerance, and not named."""
+
+    effect: str
+    """Name."""
+    parameters: dict[str, float]
+    """Fitted values."""
+    site: str
+    """Site; empty for an effect of the whole scene."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
 class Verdict(Record):
     """The answer."""
 
@@ -678,6 +690,8 @@ class Diagnosis(Result):
     """Wall time of the diagnosis, s."""
     seconds_to_first_table: float | None = None
     """Wall time until the first ranking was known, s."""
+    tolerances: list[Tolerance] = dataclasses.field(default_factory=list)
+    """What an ordinary machine has of effects, fitted and not named; empty where what is named does without."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

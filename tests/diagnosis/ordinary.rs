@@ -29,7 +29,7 @@ fn a_little_friction_and_delay_are_no_effect_and_are_in_the_refined_model() {
 
 #[test]
 fn what_stands_out_beside_tolerances_is_named_alone() {
-    let (found, _) = run(Truth::Ordinary(12.0), &[]);
+    let (found, _) = run(Truth::Ordinary(2.0), &[]);
     let r = &found.result;
     assert_eq!(
         r.verdict.effects,

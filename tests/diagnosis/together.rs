@@ -87,7 +87,8 @@ fn compare(segments: [Option<usize>; 2]) {
         .collect();
     let states = &estimate.trajectory;
     let shown = Trajectory::along(&*model, plant, parameters, logs, states, &rows).unwrap();
-    let (candidates, _) = enumerate(&bench.machine, &shown, &[]);
+    let (mut candidates, _) = enumerate(&bench.machine, &shown, &[]);
+    candidates.retain(|c| !c.is_tolerance);
 
     let base = (&hypothesis, &nominal[..]);
     let together = columns(&context, base, &estimate, &candidates);

@@ -5,6 +5,7 @@ use asid_core::{Progress, Result};
 use crate::candidate::{Candidate, nameable};
 use crate::chance::threshold;
 use crate::latent_force::context::Context;
+use crate::latent_force::estimate::Missing;
 use crate::latent_force::search::prune::change_without;
 use crate::latent_force::search::set::{Set, without};
 use crate::settings::Breadth;
@@ -18,19 +19,21 @@ const TANGENT: f64 = 3.0;
 const AT_END: f64 = 0.95;
 
 impl Tolerances {
-    /// A set with them beside it, where that earns the threshold.
+    /// A set with them beside it, where that earns the threshold and makes up for the share of what was missing `at_first` that a name must.
     pub(in crate::latent_force::search) fn earned(
         &self,
         context: &Context<'_>,
         candidates: &[Candidate],
-        set: &Set,
+        (set, at_first): (&Set, Missing),
         (breadth, progress): (Breadth, &dyn Progress),
     ) -> Result<Option<Set>> {
         progress.note("fitting tolerances");
         let mut with = self.beside(set, candidates);
         with.fit(context, (breadth.rounds[1], progress))?;
         let threshold = threshold(nameable(candidates), breadth.false_alarms);
-        Ok(with.rises_above(set, threshold).then_some(with))
+        let left = |s: &Set| s.fitted.estimate.missing(context).relative_to(at_first);
+        let stands = with.rises_above(set, threshold) && left(set) - left(&with) > breadth.shrinks;
+        Ok(stands.then_some(with))
     }
 
     /// A fitted set with them, with the names that it then has: those of values that outgrow their tolerance, and without those that do
