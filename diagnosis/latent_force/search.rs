@@ -146,7 +146,7 @@ pub fn search(
         let no_force = left(&best) < breadth.shrinks;
         if no_force {
             excess = match excess {
-                _ if context.has_segments() => None,
+                _ if context.has_segments() || progress.is_stopped() => None,
                 Some([first, _]) => Some([first, open_loop(&best)?]),
                 None => Some([open_loop(&Set::without_effects(&none))?, open_loop(&best)?]),
             };
