@@ -69,18 +69,20 @@ impl Machine {
     /// # Errors
     /// As [`Refined::new`].
     pub fn with(&self, more: &[EffectSpec]) -> Result<Arc<dyn Model>> {
-        let effects = [&self.effects[..], more].concat();
-        if effects.is_empty() && self.fixed.is_empty() {
+        if self.effects.is_empty() && more.is_empty() && self.fixed.is_empty() {
             return Ok(Arc::clone(&self.model));
         }
+        Ok(self.refined(more)?)
+    }
+
+    /// The same, refined by nothing where there are none.
+    ///
+    /// # Errors
+    /// As [`Refined::new`].
+    pub fn refined(&self, more: &[EffectSpec]) -> Result<Arc<Refined>> {
+        let effects = [&self.effects[..], more].concat();
         let (model, plant) = (Arc::clone(&self.model), Arc::clone(&self.plant));
-        Ok(Refined::new(
-            &*self.backend,
-            model,
-            plant,
-            &self.fixed,
-            &effects,
-        )?)
+        Refined::new(&*self.backend, model, plant, &self.fixed, &effects)
     }
 
     /// Effects that the study's model has already.

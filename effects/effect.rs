@@ -157,10 +157,9 @@ pub trait Effect: Send + Sync {
     fn steps(&self) -> bool {
         matches!(self.acts(), Acts::Command | Acts::Force)
     }
-    /// Whether its forces depend on how the machine has moved before, and not on its present state and the commands alone. Where they do not,
-    /// what a change of the state makes of a physics step tells what it makes of many.
-    fn remembers_motion(&self) -> bool {
-        self.acts() == Acts::Force
+    /// Whether what it makes of a reading depends on readings before, and not on this one and its time alone.
+    fn remembers_readings(&self) -> bool {
+        self.acts() == Acts::Measurement
     }
     /// Names of effects that it is a refinement of: with some of its parameters at their null
     /// values it is one of them. The simpler one is preferred unless that leaves much more.

@@ -18,7 +18,8 @@ use asid_core::scene::Scene;
 use asid_core::simulator::{BatchConfig, Simulator};
 use asid_core::target::Target;
 use asid_mjcf::plant::Plant;
-use simulator::{Column, RefinedSimulator};
+use simulator::Column;
+pub use simulator::RefinedSimulator;
 
 /// An effect found, with the place where it acts.
 struct Placed {
@@ -175,6 +176,16 @@ impl Model for Refined {
     }
 
     fn simulator(&self, config: &BatchConfig) -> Result<Box<dyn Simulator>> {
+        Ok(Box::new(self.batch(config)?))
+    }
+}
+
+impl Refined {
+    /// A batch, as of [`Model::simulator`].
+    ///
+    /// # Errors
+    /// As [`Model::simulator`].
+    pub fn batch(&self, config: &BatchConfig) -> Result<RefinedSimulator> {
         let mut targets: Vec<Target> = Vec::new();
         let mut place = |target: &Target| match targets.iter().position(|t| t == target) {
             Some(i) => i,
@@ -218,6 +229,6 @@ impl Model for Refined {
         let mut simulator = RefinedSimulator::new(inner, effects, (places, base), columns);
         let all: Vec<usize> = (0..config.size).collect();
         simulator.set_parameters(&all, &nominal.repeat(config.size))?;
-        Ok(Box::new(simulator))
+        Ok(simulator)
     }
 }

@@ -27,7 +27,7 @@ use super::step_map::{Derivatives, LinearEpisode};
 use asked::{Asked, Trial, bounds, trials};
 use force_response::ForceSlopes;
 pub use form::Form;
-use null_model::All;
+use null_model::{NullModel, Way};
 use sizes::{REPLAY_TRIAL, sizes, sizes_by_replay};
 use source::Source;
 
@@ -136,7 +136,11 @@ impl Columns {
         candidates: &[Candidate],
         progress: &dyn Progress,
     ) -> Result<Self> {
-        let all = All::new(context, base, theta, candidates);
+        let model = |way| {
+            let model = NullModel::new(context, (base, theta), candidates, way);
+            (way, model)
+        };
+        let models = [Way::OneStep, Way::WholeRow].map(model);
         let (mut asked, variations) = Asked::of_model(base, theta);
         let roles = 8 * context.plant().layout.nv + asked.base + 1;
         let mut map = context.map(&base.specs, &base.parameters(), roles)?;
@@ -151,8 +155,15 @@ impl Columns {
         let late: Vec<Vec<f64>> = linear.iter().map(|l| l.late.clone()).collect();
         let slopes = linear.iter_mut().map(ForceSlopes::take);
         let slopes: Vec<ForceSlopes> = slopes.collect();
+        let carried: Vec<Vec<f64>> = linear
+            .iter_mut()
+            .map(|l| std::mem::take(&mut l.carried))
+            .collect();
+        let one_step = carried.iter().all(|c| !c.is_empty());
         let source = Source {
-            all,
+            candidates,
+            models: &models,
+            carried: if one_step { &carried } else { &[] },
             slopes: &slopes,
             late: &late,
             together: true,

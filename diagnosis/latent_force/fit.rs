@@ -3,6 +3,7 @@
 //! Everything is linearised anew about the smoothed trajectory until the evidence stands. An effect that is right
 //! makes the missing force small: each round the evidence is compared over common scales of `q`, so that it is seen.
 
+mod kept_columns;
 mod regression;
 mod slopes;
 
@@ -239,7 +240,7 @@ fn smooth(
     let before = estimate.trajectory.clone();
     estimate.improve(context, linear, EM_ROUNDS);
     estimate.roll(context, map, theta, &before)?;
-    let again = map.reads() && !map.is_all_segments();
+    let again = map.remembers_readings() && !map.is_all_segments();
     for _ in 0..if again { AGAIN } else { 0 } {
         let linear = map.linearise(theta, &estimate.trajectory, want, steps, &[])?;
         let before = estimate.trajectory.clone();

@@ -19,7 +19,7 @@ pub mod fit;
 pub mod fitted_value;
 pub mod initial;
 mod left;
-mod one_step;
+pub mod one_step;
 mod picture;
 pub mod pipeline;
 pub mod rehearsal;

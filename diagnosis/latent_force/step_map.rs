@@ -18,7 +18,7 @@ mod shares;
 mod step;
 
 use asid_core::layout::{Layout, Recording};
-use asid_core::{BatchConfig, Parameter, Result};
+use asid_core::{BatchConfig, Model as _, Parameter, Result, Simulator as _};
 use asid_effects::{Acts, EffectSpec};
 use rayon::prelude::*;
 
@@ -51,11 +51,10 @@ struct Common<'a> {
     readings: Recording,
     /// Most roles in one pass.
     capacity: usize,
-    /// Whether effects on the drive side remember, and whether some act on readings.
-    remembers: bool,
-    reads: bool,
-    /// Whether some remember how the machine has moved.
-    remembers_motion: bool,
+    /// Whether effects depend on time or on what was before: some on the drive side, or on readings.
+    depends_on_past: bool,
+    /// Whether some make readings depend on those before.
+    remembers_readings: bool,
     /// Whether one physics step tells the slopes of a row in the state.
     one_step: bool,
     /// Whether each parameter acts in each physics step alike, by what the model is then.
@@ -73,7 +72,7 @@ impl Common<'_> {
     fn acts_at_once(&self, theta: &[f64], variation: &Variation) -> bool {
         let values = theta.iter().zip(&variation.theta).zip(&self.at_once);
         let mut varied = values.filter(|((a, b), _)| a != b);
-        !self.reads && varied.all(|(_, at_once)| *at_once)
+        !self.remembers_readings && varied.all(|(_, at_once)| *at_once)
     }
 }
 
@@ -113,7 +112,7 @@ impl<'a> StepMap<'a> {
         (logs, walks): (&'a Logs, &'a [Walk]),
         roles: usize,
     ) -> Result<Self> {
-        let model = machine.with(specs)?;
+        let model = machine.refined(specs)?;
         let layout = model.layout().clone();
         let cores = match machine.threads {
             0 => std::thread::available_parallelism().map_or(1, usize::from),
@@ -125,7 +124,7 @@ impl<'a> StepMap<'a> {
         let parts = shares
             .into_iter()
             .map(|walks| {
-                let simulator = model.simulator(&BatchConfig {
+                let simulator = model.batch(&BatchConfig {
                     size: capacity * walks.len(),
                     threads: 1,
                     targets: parameters.iter().flat_map(|p| p.targets.clone()).collect(),
@@ -138,20 +137,19 @@ impl<'a> StepMap<'a> {
         let names: Vec<String> = names
             .chain(joints().map(|j| format!("qvel.{}", j.name)))
             .collect();
-        let (mut remembers, mut reads, mut remembers_motion) = (false, false, false);
-        let mut of_model = Vec::new();
+        let (mut depends_on_past, mut remembers_readings) = (false, false);
+        let mut in_each_step = Vec::new();
         for spec in machine.given_effects().iter().chain(specs) {
             let effect = spec.find(&machine.plant)?;
-            remembers_motion |= effect.remembers_motion();
-            match effect.acts() {
-                Acts::Measurement => reads = true,
-                Acts::Command | Acts::Force => remembers = true,
-                Acts::Model => of_model.push(spec.label()),
+            remembers_readings |= effect.remembers_readings();
+            depends_on_past |= effect.acts() != Acts::Model;
+            if matches!(effect.acts(), Acts::Model | Acts::Measurement) {
+                in_each_step.push(spec.label());
             }
         }
         let acts_at_once = |p: &Parameter| {
             let mut targets = p.targets.iter();
-            targets.all(|t| t.element != "effect" || of_model.contains(&t.name))
+            targets.all(|t| t.element != "effect" || in_each_step.contains(&t.name))
         };
         let common = Common {
             states: layout.recording(&names)?,
@@ -161,25 +159,23 @@ impl<'a> StepMap<'a> {
             layout,
             parameters: parameters.to_vec(),
             capacity,
-            remembers,
-            reads,
-            remembers_motion,
+            depends_on_past,
+            remembers_readings,
             one_step: false,
             at_once: parameters.iter().map(acts_at_once).collect(),
         };
         Ok(Self { common, parts })
     }
 
-    /// Takes slopes in the state from one physics step of each row, where nothing remembers the motion; from the whole row otherwise, as a new
-    /// map does.
+    /// Takes slopes in the state from one physics step of each row; from the whole row otherwise, as a new map does.
     pub fn by_one_step(&mut self, one: bool) {
         self.common.one_step = one;
     }
 
-    /// Whether an effect acts on readings, which then may remember.
+    /// Whether an effect makes readings depend on those before.
     #[must_use]
-    pub fn reads(&self) -> bool {
-        self.common.reads
+    pub fn remembers_readings(&self) -> bool {
+        self.common.remembers_readings
     }
 
     /// Whether some walks are segments.

@@ -146,10 +146,6 @@ impl Effect for BodyForce {
         Acts::Force
     }
 
-    fn remembers_motion(&self) -> bool {
-        false
-    }
-
     fn parameters(&self) -> &'static [EffectParameter] {
         self.parameters
     }

@@ -46,10 +46,6 @@ impl Effect for Stiffness {
         Acts::Force
     }
 
-    fn remembers_motion(&self) -> bool {
-        false
-    }
-
     fn parameters(&self) -> &'static [EffectParameter] {
         const {
             &[
@@ -114,10 +110,6 @@ impl Acting for RippleAt {
 impl Effect for Ripple {
     fn acts(&self) -> Acts {
         Acts::Force
-    }
-
-    fn remembers_motion(&self) -> bool {
-        false
     }
 
     fn parameters(&self) -> &'static [EffectParameter] {

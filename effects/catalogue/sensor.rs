@@ -81,6 +81,10 @@ impl Effect for Reading {
         Acts::Measurement
     }
 
+    fn remembers_readings(&self) -> bool {
+        false
+    }
+
     fn parameters(&self) -> &'static [EffectParameter] {
         const UNIT: &str = "unit of the reading";
         const RATE: &str = "units of the reading per second";

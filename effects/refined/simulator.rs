@@ -59,7 +59,7 @@ fn lock(row: &Mutex<Row>) -> std::sync::MutexGuard<'_, Row> {
 impl RefinedSimulator {
     /// Gives the engine's batch `inner` the effects `placed`. `places` are the columns of `inner` that each effect's
     /// targets are, `base` the values of these columns before any effect, and `columns` what the caller sets.
-    pub fn new(
+    pub(super) fn new(
         inner: Box<dyn Simulator>,
         (plant, placed): (Arc<Plant>, Arc<Vec<Placed>>),
         (places, base): (Vec<Vec<usize>>, Vec<f64>),
@@ -105,6 +105,12 @@ impl RefinedSimulator {
                 }
             }
         }
+    }
+
+    /// Lets the time of readings pass for some simulations, by so many physics steps, without a step: of machines that are
+    /// placed where they are read, and that what sensors remember is wanted of.
+    pub fn pass_time(&mut self, sims: &[usize], steps: u64) {
+        sims.iter().for_each(|&sim| self.steps[sim] += steps);
     }
 
     /// Lets the sensors' effects change `frames` rows of a simulation's readings, the first

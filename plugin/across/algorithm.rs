@@ -11,7 +11,10 @@ use asid_core::posterior::Posterior;
 use asid_core::problem::Problem;
 use asid_core::simulator::StepView;
 use asid_core::solve::{Solved, TaskPolicy, TaskSolver};
-use asid_effects::{Acting, Acts, Confusion, Effect, EffectParameter, Site};
+use asid_effects::{
+    Acting, Acts, Confusion, Effect, EffectParameter, Native, Reach, Reference, Site,
+};
+use asid_mjcf::native::NativeModel;
 use asid_mjcf::plant::Plant;
 
 use super::super::border::Border;
@@ -119,6 +122,10 @@ impl Identifier for Across<Box<dyn Identifier>> {
         Ok(found)
     }
 
+    fn correlated(&self) -> bool {
+        self.run(|identifier| identifier.correlated())
+    }
+
     fn train(&self, problem: &Problem<'_>, explorer: &dyn Explorer, file: &Path) -> Result<bool> {
         let back = self.border.back();
         let handed = Handed::new(problem, back);
@@ -164,8 +171,16 @@ impl Effect for Across<Box<dyn Effect>> {
         self.run(|effect| effect.targets(plant, site))
     }
 
+    fn reach(&self, plant: &Plant, site: &str) -> Reach {
+        self.run(|effect| effect.reach(plant, site))
+    }
+
     fn steps(&self) -> bool {
         self.run(|effect| effect.steps())
+    }
+
+    fn remembers_readings(&self) -> bool {
+        self.run(|effect| effect.remembers_readings())
     }
 
     fn refines(&self) -> &'static [&'static str] {
@@ -179,12 +194,30 @@ impl Effect for Across<Box<dyn Effect>> {
     fn unusual_at(&self, plant: &Plant, site: &str) -> bool {
         self.run(|effect| effect.unusual_at(plant, site))
     }
+
+    fn tolerance(
+        &self,
+        plant: &Plant,
+        site: &str,
+        shown: &dyn Fn(Reference) -> f64,
+    ) -> Vec<[f64; 2]> {
+        let tolerance = self.run(|effect| effect.tolerance(plant, site, shown));
+        let bounds: Vec<f64> = tolerance.iter().flatten().copied().collect();
+        self.border
+            .check_finite(&[], &bounds, "a tolerance of an effect");
+        tolerance
+    }
+
     fn rounds(&self) -> bool {
         self.run(|effect| effect.rounds())
     }
 
     fn needs(&self) -> Capabilities {
         self.run(|effect| effect.needs())
+    }
+
+    fn native(&self, site: &Site<'_>, document: &mut NativeModel<'_>) -> Result<Native> {
+        self.try_run(|effect| effect.native(site, document))
     }
 
     fn attach(&self, site: &Site<'_>) -> Result<Box<dyn Acting>> {
@@ -241,6 +274,18 @@ impl Progress for Across<&dyn Progress> {
 
     fn note(&self, text: &str) {
         self.run(|progress| progress.note(text));
+    }
+
+    fn ranking(&self, stage: &str, rows: &[(String, f64)]) {
+        self.run(|progress| progress.ranking(stage, rows));
+    }
+
+    fn is_stopped(&self) -> bool {
+        self.run(|progress| progress.is_stopped())
+    }
+
+    fn is_late(&self) -> bool {
+        self.run(|progress| progress.is_late())
     }
 
     fn end(&self) {

@@ -5,6 +5,7 @@ use asid::core::parameter::Scale;
 use asid::core::{Episode, Parameter, Scene};
 use asid::diagnosis::data::Logs;
 use asid::diagnosis::latent_force::context::{Taken, begin};
+use asid::diagnosis::latent_force::one_step::one_step_tells;
 use asid::diagnosis::latent_force::step_map::{Derivatives, LinearEpisode, StepMap, Variation};
 use asid::diagnosis::latent_force::walk::Walk;
 use asid::diagnosis::machine::Machine;
@@ -154,29 +155,65 @@ fn what_a_value_changes_in_one_step_is_carried_over_the_row() {
     assert_eq!(one, again);
 }
 
+/// Whether one step tells the slopes of a row, of a machine with some effects.
+fn tells(machine: &Machine, specs: &[EffectSpec]) -> bool {
+    let logs = logs(machine);
+    let taken = Taken {
+        walks: vec![Walk::new(&logs, 0, DT)],
+        given: vec![None],
+        open: Vec::new(),
+        otherwise: vec![vec![0.0; 2 * ROWS]],
+        scale: vec![0.1, 0.5],
+    };
+    let (context, _) = begin(machine, &logs, taken, (&[], &[])).unwrap();
+    one_step_tells(&context, (specs, &[]), (&[], &[states()])).unwrap()
+}
+
 #[test]
-fn friction_that_remembers_the_motion_takes_all_of_the_row() {
+fn friction_is_told_by_one_step_while_it_slides_and_not_where_it_stops_within_a_row() {
     let machine = machine(&scene(0.0, 1.0));
-    let friction: EffectSpec = "coulomb-friction@slide:force=0.4".parse().unwrap();
-    let of = |one| linearised(&machine, std::slice::from_ref(&friction), one);
-    assert_eq!(of(false).a, of(true).a);
+    let tells = |force: f64| {
+        let friction = format!("coulomb-friction@slide:force={force}");
+        tells(&machine, &[friction.parse().unwrap()])
+    };
+    // A slide of 2 kg at 0.3 m/s is stopped by 20 N within 0.03 s, and rows are 0.02 s.
+    assert!(tells(0.02));
+    assert!(!tells(20.0));
+}
+
+#[test]
+fn a_reading_that_drifts_has_the_slopes_of_one_that_does_not() {
+    let machine = machine(&scene(0.0, 1.0));
+    let drift: EffectSpec = "sensor-drift@x:rate=0.5".parse().unwrap();
+    let plain = linearised(&machine, &[], true);
+    for one in [false, true] {
+        let drifting = linearised(&machine, std::slice::from_ref(&drift), one);
+        assert!(largest_difference(&drifting.h, &plain.h) < 1e-6);
+        // 0.5 times the time of each row, less than which is read.
+        let time = |k: usize| (k * STEPS) as f64 * DT;
+        let pairs = plain.residual.iter().zip(&drifting.residual).enumerate();
+        for (k, (plain, drifting)) in pairs {
+            assert!((plain - drifting - 0.5 * time(k)).abs() < 1e-12, "{k}");
+        }
+    }
+}
+
+#[test]
+fn what_a_sensor_remembers_is_of_the_time_that_passes_and_takes_no_steps() {
+    let machine = machine(&scene(0.0, 1.0));
+    let late: EffectSpec = "sensor-delay@x:delay=0.005".parse().unwrap();
+    let found = linearised(&machine, &[late], false);
+    let nx = 2;
+    for row in found.h.chunks_exact(nx).skip(2) {
+        // 5 ms late, less than half a row: the place of then is the present one less 5 ms of the speed.
+        assert!((row[0] - 1.0).abs() < 1e-6, "{row:?}");
+        assert!((row[1] + 0.005).abs() < 1e-6, "{row:?}");
+    }
 }
 
 #[test]
 fn a_soft_machine_is_told_by_one_step_and_one_that_settles_within_a_row_is_not() {
-    let tells = |kp: f64, force: f64| {
-        let machine = machine(&scene(kp, force));
-        let logs = logs(&machine);
-        let taken = Taken {
-            walks: vec![Walk::new(&logs, 0, DT)],
-            given: vec![None],
-            open: Vec::new(),
-            otherwise: vec![vec![0.0; 2 * ROWS]],
-            scale: vec![0.1, 0.5],
-        };
-        let (context, _) = begin(&machine, &logs, taken, (&[], &[])).unwrap();
-        context.one_step
-    };
+    let tells = |kp: f64, force: f64| tells(&machine(&scene(kp, force)), &[]);
     assert!(tells(50.0, 100.0));
     // 300 rad/s, and far from its target at full force.
     assert!(!tells(2e5, 100.0));

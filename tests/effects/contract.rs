@@ -116,8 +116,6 @@ fn each_at_each_site(xml: &str, mut check: impl FnMut(&dyn Backend, &str, Effect
     }
 }
 
-/// What a simulation computes in which the same parameters can be set and are not: an engine may round
-/// otherwise once a body's mass can change.
 #[test]
 fn what_an_ordinary_machine_has_of_an_effect_lies_about_none_of_it() {
     let one = |_: asid::effects::Reference| 1.0;
@@ -152,6 +150,7 @@ fn what_an_ordinary_machine_has_of_an_effect_lies_about_none_of_it() {
     assert!(counted > 20, "{counted}");
 }
 
+/// Beside a simulation in which the same parameters can be set and are not: an engine may round otherwise once a body's mass can change.
 #[test]
 fn every_effect_is_off_at_its_null_value_to_the_bit() {
     for xml in [ARM, FLOOR] {

@@ -1,7 +1,7 @@
-//! The present model with all candidates at their nulls, from which columns are taken.
+//! The present model with candidates at their nulls, from which columns are taken.
 
 use asid_core::Parameter;
-use asid_effects::EffectSpec;
+use asid_effects::{Acts, EffectSpec};
 
 use crate::candidate::Candidate;
 use crate::latent_force::context::Context;
@@ -10,51 +10,67 @@ use crate::latent_force::trace::is_traceable;
 
 use super::source::Wanted;
 
-/// The present model with all candidates that need the engine at their nulls: effects, parameters and values.
+/// How the column of a candidate is found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Way {
+    /// Without the engine: it acts through forces alone.
+    Traced,
+    /// By the engine, and one physics step of a row tells all of it: it acts by what the model is.
+    OneStep,
+    /// By the engine's steps over whole rows.
+    WholeRow,
+}
+
+impl Way {
+    /// The way for a candidate. Where walks are replays, all columns are those of whole replays.
+    pub(super) fn of(context: &Context<'_>, candidate: &Candidate) -> Self {
+        if context.has_segments() {
+            Self::WholeRow
+        } else if is_traceable(context.plant(), candidate) {
+            Self::Traced
+        } else if candidate.effect.acts() == Acts::Model {
+            Self::OneStep
+        } else {
+            Self::WholeRow
+        }
+    }
+}
+
+/// The present model with all candidates of one way at their nulls: effects, parameters and values.
 #[derive(Clone)]
-pub(super) struct All<'c> {
+pub(super) struct NullModel {
     pub(super) specs: Vec<EffectSpec>,
     pub(super) parameters: Vec<Parameter>,
     pub(super) theta: Vec<f64>,
-    pub(super) candidates: &'c [Candidate],
     /// First parameter of each candidate.
-    pub(super) first: Vec<usize>,
-    /// Whether no walk is a replay.
-    traces: bool,
+    first: Vec<usize>,
 }
 
-impl<'c> All<'c> {
+impl NullModel {
     /// Of a model, its values, and candidates.
     pub(super) fn new(
         context: &Context<'_>,
-        base: &Hypothesis,
-        theta: &[f64],
-        candidates: &'c [Candidate],
+        (base, theta): (&Hypothesis, &[f64]),
+        candidates: &[Candidate],
+        way: Way,
     ) -> Self {
-        let mut all = Self {
+        let mut model = Self {
             specs: base.specs.clone(),
             parameters: base.parameters(),
             theta: theta.to_vec(),
-            candidates,
             first: Vec::with_capacity(candidates.len()),
-            traces: context.walks.iter().all(|w| w.segment.is_none()),
         };
         for c in candidates {
-            all.first.push(all.theta.len());
-            if all.is_traced(context, c) {
+            model.first.push(model.theta.len());
+            if Way::of(context, c) != way {
                 continue;
             }
-            all.specs.push(c.spec.clone());
-            all.parameters
-                .extend(c.unknowns().into_iter().map(|(p, _)| p));
-            all.theta.extend(c.parameters().iter().map(|p| p.null));
+            model.specs.push(c.spec.clone());
+            let parameters = c.unknowns().into_iter().map(|(p, _)| p);
+            model.parameters.extend(parameters);
+            model.theta.extend(c.parameters().iter().map(|p| p.null));
         }
-        all
-    }
-
-    /// Whether a candidate needs no engine: it acts through forces alone, and no walk is a replay.
-    pub(super) fn is_traced(&self, context: &Context<'_>, candidate: &Candidate) -> bool {
-        self.traces && is_traceable(context.plant(), candidate)
+        model
     }
 
     /// All values with those of some candidates.

@@ -30,23 +30,28 @@ const PART: usize = 6;
 /// How many such parts there are, spread over all walks.
 const PARTS: usize = 24;
 
-/// A context of some short parts of the logs, evenly spread, with the trajectory there.
+/// A context of some short parts of the logs, evenly spread, with the trajectory there, its slopes in forces and what is carried over rows.
 pub(super) fn parts<'c>(
     context: &'c Context<'_>,
     estimate: &Estimate,
-    slopes_of: &[ForceSlopes],
-) -> (Context<'c>, Vec<Vec<f64>>, Vec<ForceSlopes>) {
+    (slopes_of, carried_of): (&[ForceSlopes], &[Vec<f64>]),
+) -> (Context<'c>, Vec<Vec<f64>>, Vec<ForceSlopes>, Vec<Vec<f64>>) {
     let layout = &context.plant().layout;
     let (nv, width) = (layout.nv, layout.nq + layout.nv);
     let rows: usize = context.walks.iter().map(|w| w.len()).sum();
     let every = (rows / PARTS).max(PART);
-    let (mut walks, mut states, mut slopes) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut walks, mut states) = (Vec::new(), Vec::new());
+    let (mut slopes, mut carried) = (Vec::new(), Vec::new());
     for (w, walk) in context.walks.iter().enumerate() {
         let mut first = 0;
         while first + 2 <= walk.len() {
             let range = first..(first + PART).min(walk.len());
             states.push(estimate.trajectory[w][range.start * width..range.end * width].to_vec());
             slopes.push(slopes_of[w].part(range.start..range.end - 1, 2 * nv * nv));
+            if let Some(carried_of) = carried_of.get(w) {
+                let size = 4 * nv * nv;
+                carried.push(carried_of[range.start * size..(range.end - 1) * size].to_vec());
+            }
             walks.push(walk.part(range));
             first += every;
         }
@@ -64,7 +69,7 @@ pub(super) fn parts<'c>(
         one_step: context.one_step,
         walks,
     };
-    (context, states, slopes)
+    (context, states, slopes, carried)
 }
 
 /// Deviations of priors from what a trial step of each parameter does, for `(candidate, start, parameter)`; 0 where it does
@@ -77,8 +82,9 @@ pub(super) fn sizes(
 ) -> Result<(Vec<f64>, bool)> {
     let nv = context.plant().layout.nv;
     let (nx, ns) = (2 * nv, context.logs.entries.len());
-    let (short, states, slopes) = parts(context, estimate, source.slopes);
-    let candidates = source.all.candidates;
+    let (short, states, slopes, carried) =
+        parts(context, estimate, (source.slopes, source.carried));
+    let candidates = source.candidates;
     let wanted: Vec<Wanted> = trials
         .iter()
         .map(|(c, begin, p)| {
@@ -88,7 +94,9 @@ pub(super) fn sizes(
         .collect();
     let m = wanted.len();
     let source = Source {
-        all: source.all.clone(),
+        candidates,
+        models: source.models,
+        carried: &carried,
         slopes: &slopes,
         late: &[],
         // What does nothing has no size: here nothing of another column may come into it.

@@ -9,7 +9,7 @@ use crate::latent_force::trace::trace;
 
 use super::force_response::{ForceSlopes, Row};
 use super::group::{Group, grouped};
-use super::null_model::All;
+use super::null_model::{NullModel, Way};
 use super::together::{Account, Entries};
 
 /// Variations that one walk of the engine takes, at most: between two of them work can be stopped, and of all at once the memory
@@ -53,7 +53,11 @@ pub(super) type Along = (Vec<f64>, Vec<f64>);
 
 /// Columns of the present model with some candidates: those that need the engine from it, the others traced.
 pub(super) struct Source<'s> {
-    pub(super) all: All<'s>,
+    pub(super) candidates: &'s [Candidate],
+    /// The present model with those that one step tells of, and with those that take whole rows.
+    pub(super) models: &'s [(Way, NullModel)],
+    /// What a change in each physics step of a row comes to, one a walk; empty where one step does not tell.
+    pub(super) carried: &'s [Vec<f64>],
     /// Slopes in forces, one a walk.
     pub(super) slopes: &'s [ForceSlopes],
     /// How late readings are in the present model.
@@ -76,11 +80,7 @@ impl Source<'_> {
         let plant = context.plant();
         let (nv, m) = (plant.layout.nv, wanted.len());
         let (nx, ns) = (2 * nv, context.logs.entries.len());
-        let traced = |w: &Wanted| {
-            self.all
-                .is_traced(context, &self.all.candidates[w.candidate])
-        };
-        let by_engine: Vec<usize> = (0..m).filter(|&i| !traced(&wanted[i])).collect();
+        let way = |w: &Wanted| Way::of(context, &self.candidates[w.candidate]);
         let mut out: Vec<Along> = context
             .walks
             .iter()
@@ -89,11 +89,16 @@ impl Source<'_> {
                 (vec![0.0; (n - 1) * nx * m], vec![0.0; n * ns * m])
             })
             .collect();
-        let complete = self.walk((context, states), wanted, &by_engine, &mut out)?;
+        let mut complete = true;
+        for (own, model) in self.models {
+            let by_engine: Vec<usize> = (0..m).filter(|&i| way(&wanted[i]) == *own).collect();
+            complete &= self.walk((context, states), (wanted, &by_engine), model, &mut out)?;
+        }
         for (w, walk) in context.walks.iter().enumerate() {
             let b = &self.slopes[w].held;
+            let traced = |w: &Wanted| way(w) == Way::Traced;
             for (i, wanted) in wanted.iter().enumerate().filter(|(_, w)| traced(w)) {
-                let candidate = &self.all.candidates[wanted.candidate];
+                let candidate = &self.candidates[wanted.candidate];
                 let forces = trace(plant, candidate, &wanted.values, walk, &states[w])?;
                 for (k, force) in forces.chunks_exact(nv).enumerate() {
                     if force.iter().all(|x| *x == 0.0) {
@@ -114,13 +119,13 @@ impl Source<'_> {
     fn walk(
         &self,
         (context, states): (&Context<'_>, &[Vec<f64>]),
-        wanted: &[Wanted],
-        by_engine: &[usize],
+        (wanted, by_engine): (&[Wanted], &[usize]),
+        model: &NullModel,
         out: &mut [Along],
     ) -> Result<bool> {
         let plant = context.plant();
         let reach = |i: usize| {
-            let candidate = &self.all.candidates[wanted[i].candidate];
+            let candidate = &self.candidates[wanted[i].candidate];
             candidate.effect.reach(plant, &candidate.spec.site)
         };
         let reaches = by_engine.iter().map(|&i| (i, reach(i)));
@@ -138,7 +143,7 @@ impl Source<'_> {
             }
             begun = true;
             let rest = due.split_off(SLICE.min(due.len()));
-            let balances = self.slice((context, states), (&due, wanted), &entries, out)?;
+            let balances = self.slice((context, states), (&due, wanted), (model, &entries), out)?;
             // What reaches further than it says is walked for alone.
             let odd = due.into_iter().zip(balances).filter(|(_, fine)| !fine);
             due = odd.flat_map(|(group, _)| group.apart()).collect();
@@ -152,7 +157,7 @@ impl Source<'_> {
         &self,
         (context, states): (&Context<'_>, &[Vec<f64>]),
         (groups, wanted): (&[Group], &[Wanted]),
-        entries: &Entries,
+        (model, entries): (&NullModel, &Entries),
         out: &mut [Along],
     ) -> Result<Vec<bool>> {
         let (nv, m, own) = (context.plant().layout.nv, wanted.len(), groups.len());
@@ -160,14 +165,19 @@ impl Source<'_> {
         let variation = |group: &Group| {
             let each = group.members.iter().map(|&i| &wanted[i]);
             Variation {
-                theta: self.all.with_all(each),
+                theta: model.with_all(each),
                 scale: 1.0,
             }
         };
         let variations: Vec<Variation> = groups.iter().map(variation).collect();
-        let mut map = context.map(&self.all.specs, &self.all.parameters, own + 1)?;
-        let want = Derivatives::default();
-        let found = map.linearise(&self.all.theta, states, want, &[], &variations)?;
+        let mut map = context.map(&model.specs, &model.parameters, own + 1)?;
+        map.by_one_step(!self.carried.is_empty());
+        let wanted_too = (
+            Derivatives::default(),
+            &vec![false; states.len()][..],
+            self.carried,
+        );
+        let found = map.linearise_due(&model.theta, states, wanted_too, &[], &variations)?;
         // Only forces take several columns apart, and where all are walked for alone there may be no slopes in forces.
         let by_forces = groups
             .iter()

@@ -12,6 +12,7 @@ use crate::latent_force::step_map::{Derivatives, LinearEpisode, StepMap, Variati
 use crate::latent_force::tangent::difference;
 
 use super::Hypothesis;
+use super::kept_columns::KeptColumns;
 
 /// Linearisations that slopes along rows are kept for: their trajectory moves in each.
 const KEPT: usize = 3;
@@ -35,6 +36,8 @@ pub struct Slopes {
     used: usize,
     /// Whether they are those of one physics step of each row.
     by_one_step: bool,
+    /// Columns of tolerances.
+    columns: KeptColumns,
 }
 
 impl Slopes {
@@ -43,12 +46,13 @@ impl Slopes {
     pub fn begun(&self) -> Self {
         Self {
             used: 0,
+            columns: self.columns.begun(),
             ..self.clone()
         }
     }
 
-    /// Linearises a model at some values about an estimate's trajectory, with slopes in the state that are taken anew where they
-    /// are due, and kept elsewhere.
+    /// Linearises a model at some values about an estimate's trajectory, with slopes in the state, and columns of tolerances, that are taken
+    /// anew where they are due, and kept elsewhere. `variations` has one for each value that is fitted, or none.
     ///
     /// # Errors
     /// When a value is not physical or the engine fails.
@@ -61,7 +65,8 @@ impl Slopes {
     ) -> Result<Vec<LinearEpisode>> {
         let moved = self.h.is_empty() || self.furthest(theta, &model.unknowns) > KEPT_MOVE;
         // Readings that remember have slopes of their own past.
-        let along = moved || self.used >= KEPT || map.reads() && !map.is_all_segments();
+        let along =
+            moved || self.used >= KEPT || map.remembers_readings() && !map.is_all_segments();
         let due: Vec<bool> = (0..context.walks.len())
             .map(|w| match context.walks[w].segment {
                 Some(_) => moved || self.has_left(context, estimate, w),
@@ -79,9 +84,27 @@ impl Slopes {
             self.by_one_step = one_step_tells(context, refined, (theta, trajectory))?;
         }
         map.by_one_step(self.by_one_step);
+        let free = if variations.is_empty() {
+            Vec::new()
+        } else {
+            model.free()
+        };
+        // Of a segment the columns are those of a replay from a start that moves, and late readings are given to other rows.
+        let keeps = !map.remembers_readings() && !context.has_segments();
+        let places = if keeps {
+            self.columns.places(&model.unknowns, &free)
+        } else {
+            vec![None; free.len()]
+        };
+        let fresh = variations.iter().zip(&places).filter(|(_, p)| p.is_none());
+        let fresh: Vec<Variation> = fresh.map(|(v, _)| v.clone()).collect();
         let wanted = (want, &due[..], &self.carried[..]);
-        let mut linear = map.linearise_due(theta, trajectory, wanted, &steps, variations)?;
+        let mut linear = map.linearise_due(theta, trajectory, wanted, &steps, &fresh)?;
         self.exchange(&mut linear, &due, trajectory);
+        if keeps && fresh.len() == variations.len() {
+            self.columns.keep(&linear, &model.unknowns, &free);
+        }
+        self.columns.join(&mut linear, &places);
         if moved || along && !context.has_segments() {
             self.theta = theta.to_vec();
         }

@@ -28,7 +28,8 @@ impl Part {
         let all_states = states == 2 * c.layout.nv;
         let carried = |e: &usize| !self.carried(*e, request, out).is_empty();
         let carries = all_states || now.iter().all(carried);
-        (0..roles.len()).partition(|&v| match roles[v] {
+        let stepped = (0..roles.len()).filter(|&v| !roles[v].is_read_alone());
+        stepped.partition(|&v| match roles[v] {
             Role::State(_) => all_states,
             Role::Varied(i) => carries && request.at_once[i],
             _ => false,
@@ -51,11 +52,11 @@ impl Part {
         }
     }
 
-    /// Slopes over a row from those of one of its physics steps, which all roles have just taken.
+    /// Slopes over a row from those of one of its physics steps, which the roles `all` have just taken.
     pub(super) fn carry_over(
         &self,
         c: &Common<'_>,
-        (stepped, short): (Stepped<'_>, &[usize]),
+        (stepped, all, short): (Stepped<'_>, &[usize], &[usize]),
         request: Request<'_>,
         row: &RowBuffers,
         out: &mut [LinearEpisode],
@@ -75,8 +76,8 @@ impl Part {
             let mut of_step = DMatrix::zeros(nx, nx);
             let mut varied = Vec::new();
             let mut states = false;
-            for &v in short {
-                let other = row.state(v * now.len() + i, width);
+            for (place, &v) in all.iter().enumerate().filter(|(_, v)| short.contains(v)) {
+                let other = row.state(place * now.len() + i, width);
                 difference(&c.layout, other, nominal, &mut differ);
                 let scale = match roles[v] {
                     Role::Varied(i) => request.variations[i].scale,

@@ -1,6 +1,7 @@
 //! One walk along the rows: every simulation is set to the trajectory at each row, read, and stepped to the next.
 
-use asid_core::{Result, Simulator};
+use asid_core::{Result, Simulator as _};
+use asid_effects::refined::RefinedSimulator;
 
 use crate::latent_force::tangent::retract;
 use crate::latent_force::walk::{Walk, by_substeps};
@@ -18,7 +19,7 @@ pub(super) const STATE_STEP: f64 = 1e-6;
 /// Some of the walks on a core of their own: a row is too little work to share out.
 pub(super) struct Part {
     pub(super) walks: Vec<usize>,
-    pub(super) simulator: Box<dyn Simulator>,
+    pub(super) simulator: RefinedSimulator,
 }
 
 impl Part {
@@ -38,7 +39,7 @@ impl Part {
         let only_replays = self.walks.iter().all(|&w| c.rolls(w, want));
         let mut in_state = Vec::new();
         if want.state {
-            in_state = Role::in_state(nv, c.reads && !only_replays);
+            in_state = Role::in_state(nv, c.remembers_readings && !only_replays);
         }
         let mut others = Role::others(nv, want, variations.len());
         if due == all {
@@ -50,7 +51,7 @@ impl Part {
             .iter()
             .map(|&w| LinearEpisode::empty(c.walks[w].len(), (nv, ns, m), want, c.rolls(w, want)))
             .collect();
-        let late = usize::from(want.state && c.reads);
+        let late = usize::from(want.state && c.remembers_readings);
         let mut ramps: Vec<Vec<f64>> = episodes
             .iter()
             .map(|e| vec![0.0; late * e.rows * ns * nv])
@@ -146,12 +147,12 @@ impl Part {
             .filter(|&e| k == 0 || !c.rolls(self.walks[e], request.want))
             .collect();
         let here = &placed[..];
-        if c.remembers && k > 0 {
+        if c.depends_on_past && k > 0 {
             let (mut from, mut to) = (Vec::new(), Vec::new());
             for (v, role) in roles.iter().enumerate() {
                 let follows = match role {
                     Role::State(_) | Role::Force(_) | Role::Jolt(_) => true,
-                    Role::Varied(i) => request.at_once[*i] && c.one_step && !c.remembers_motion,
+                    Role::Varied(i) => request.at_once[*i] && c.one_step,
                     Role::Nominal | Role::Reading(_) | Role::Ramp(_) => false,
                 };
                 if follows {

@@ -1,6 +1,6 @@
 //! Readings at a row, and their slopes.
 
-use asid_core::Result;
+use asid_core::{Result, Simulator as _};
 
 use super::pass::{Part, STATE_STEP};
 use super::role::Role;
@@ -54,7 +54,7 @@ impl Part {
                         }
                     }
                     Role::Reading(_) | Role::Ramp(_) if segment => {}
-                    Role::State(i) if !c.reads => {
+                    Role::State(i) if !c.remembers_readings => {
                         for (s, d) in differ.iter().enumerate() {
                             out[e].h[(k * ns + s) * nx + i] = d / STATE_STEP;
                         }

@@ -24,10 +24,10 @@ pub(super) enum Role {
 }
 
 impl Role {
-    /// Those for the slopes in the state; where effects act on readings and may remember, also those that are moved all along.
-    pub(super) fn in_state(nv: usize, reads: bool) -> Vec<Self> {
+    /// Those for the slopes in the state; where readings remember, also those that are moved all along.
+    pub(super) fn in_state(nv: usize, remembers_readings: bool) -> Vec<Self> {
         let mut roles: Vec<Self> = (0..2 * nv).map(Self::State).collect();
-        if reads {
+        if remembers_readings {
             roles.extend((0..2 * nv).map(Self::Reading));
             roles.extend((0..nv).map(Self::Ramp));
         }
@@ -45,6 +45,11 @@ impl Role {
         }
         roles.extend((0..variations).map(Self::Varied));
         roles
+    }
+
+    /// Whether it is placed and read at each row, and never stepped.
+    pub(super) fn is_read_alone(self) -> bool {
+        matches!(self, Self::Reading(_) | Self::Ramp(_))
     }
 
     /// The coordinate of the state that it moves for `f`.

@@ -1,6 +1,6 @@
 //! Replays of short segments from their first rows.
 
-use asid_core::{Control, Result, Rollout};
+use asid_core::{Control, Result, Rollout, Simulator as _};
 
 use crate::latent_force::walk::{Walk, by_substeps};
 use crate::predict::columns_of;

@@ -1,12 +1,12 @@
 //! Steps of all simulations from one row to the next.
 //!
 //! Slopes cost most: one simulation for each coordinate of the state, and for each value. Where a row is many physics steps they are those of
-//! one step in its middle, carried over all of them ([`super::carried`]). Where an effect remembers the motion (a rotor behind its play,
-//! friction that sticks) a change is answered over several steps, and each takes all of the row.
+//! one step in its middle, carried over all of them ([`super::carried`]), unless a change is answered over several steps
+//! ([`one_step_tells`](crate::latent_force::one_step::one_step_tells)).
 
 use crate::latent_force::tangent::{difference, retract};
 use asid_core::simulator::{StepHook, StepView};
-use asid_core::{Control, Result, Rollout};
+use asid_core::{Control, Result, Rollout, Simulator as _};
 
 use super::pass::{Part, STATE_STEP};
 use super::role::Role;
@@ -57,9 +57,10 @@ impl Part {
             substeps,
         } = stepped;
         let rolls = now.iter().any(|&e| c.rolls(self.walks[e], request.want));
-        let all: Vec<usize> = (0..roles.len()).collect();
+        let (read, all): (Vec<usize>, Vec<usize>) =
+            (0..roles.len()).partition(|&v| roles[v].is_read_alone());
         let (mut short, mut whole) = (Vec::new(), all.clone());
-        if c.one_step && !c.remembers_motion && !rolls && substeps >= MANY {
+        if c.one_step && !rolls && substeps >= MANY {
             (short, whole) = self.told_by_one_step(c, stepped, request, out);
         }
         let mut done = 0;
@@ -69,9 +70,13 @@ impl Part {
             self.place_at_nominal(c, (stepped, &short), request, row)?;
             self.advance(c, (stepped, &all), done..done + 1, request, row)?;
             done += 1;
-            self.carry_over(c, (stepped, &short), request, row, out);
+            self.carry_over(c, (stepped, &all, &short), request, row, out);
         }
         self.advance(c, (stepped, &whole), done..substeps, request, row)?;
+        for v in read {
+            let sims: Vec<usize> = now.iter().map(|e| v * self.walks.len() + e).collect();
+            self.simulator.pass_time(&sims, substeps as u64);
+        }
         let (nv, m) = (c.layout.nv, request.variations.len());
         let (nx, width) = (2 * nv, c.layout.nq + nv);
         let mut differ = vec![0.0; nx];
