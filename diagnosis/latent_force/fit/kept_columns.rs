@@ -117,7 +117,7 @@ impl KeptColumns {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use asid_core::{Parameter, Scale};
+    use asid_core::parameter::{Parameter, Scale};
 
     fn unknown(name: &str, is_tolerance: bool) -> Unknown {
         let parameter = Parameter {

@@ -22,8 +22,8 @@ const SAME: [&str; 5] = [
 /// A comparison whose runs last a moment; its figures mean nothing.
 const TINY: &str = "compare rod-balancing --backend rapier --method random --method dr \
     --condition left --seeds 3 --set identifier.iterations=1 --set identifier.population=8 \
-    --set identifier.sampling.rounds=1 --set identifier.sampling.draws=8 --set solver.iterations=1 \
-    --set solver.population=2 --set solver.belief_samples=1";
+    --set identifier.sampling.rounds=1 --set identifier.sampling.draws=8 --set expected.rounds=1 \
+    --set solver.iterations=1 --set solver.population=2 --set solver.belief_samples=1";
 
 /// Runs of [`TINY`].
 const RUNS: usize = 6;
