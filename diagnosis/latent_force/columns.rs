@@ -9,6 +9,7 @@ mod asked;
 mod force_response;
 mod form;
 mod group;
+mod in_part;
 mod null_model;
 mod sizes;
 mod source;
@@ -27,9 +28,10 @@ use super::step_map::{Derivatives, LinearEpisode};
 use asked::{Asked, Trial, bounds, trials};
 use force_response::ForceSlopes;
 pub use form::Form;
+use in_part::Rest;
 use null_model::{NullModel, Way};
 use sizes::{REPLAY_TRIAL, sizes, sizes_by_replay};
-use source::Source;
+use source::{Along, Source};
 
 /// Share of a deviation of the prior that slopes of the present model are taken over.
 const BASE_SHARE: f64 = 0.01;
@@ -40,6 +42,9 @@ const SHARE: f64 = 0.2;
 const MOST: f64 = 3.0;
 /// Secants may be taken up to this multiple of their start value.
 pub const SECANT: f64 = 1.5;
+
+/// Says of each candidate whether it leads, by columns along a part of the segments.
+pub type Leads<'l> = &'l dyn Fn(&Columns) -> Vec<bool>;
 
 /// All candidates as columns of one regression, those of the present model's own unknowns first.
 pub struct Columns {
@@ -68,31 +73,34 @@ fn beside(a: &[f64], n: usize, b: &[f64], m: usize) -> Vec<f64> {
     out
 }
 
-/// Gives the slopes of a form other deviations of their priors, relative to those that they have.
+/// Gives the slopes of a form other deviations of their priors, by factors of those that they have, which become those that were taken: a
+/// deviation is at most half of its range, and a secant has none.
 fn resize(
     form: &mut Form,
     candidates: &[Candidate],
-    (factors, base): (&[f64], usize),
-    found: &mut [(Vec<f64>, Vec<f64>)],
+    (factors, base): (&mut [f64], usize),
     all_bounds: &mut [[f64; 2]],
 ) {
-    let m = factors.len();
     let columns = form.columns();
     for (column, slope) in columns.zip(&mut form.slopes) {
-        let Some((p, size)) = slope else { continue };
+        let factor = &mut factors[column - base];
+        let Some((p, size)) = slope else {
+            *factor = 1.0;
+            continue;
+        };
         let candidate = &candidates[form.candidate];
         let [low, high] = candidate.ranges[*p];
-        let most = 0.5 * (high - low) / *size;
-        let factor = factors[column - base].min(most);
-        *size *= factor;
+        *factor = factor.min(0.5 * (high - low) / *size);
+        *size *= *factor;
         all_bounds[column] = bounds(candidate, *p, *size);
-        for (states, readings) in found.iter_mut() {
-            for all in [states, readings] {
-                all.iter_mut()
-                    .skip(column - base)
-                    .step_by(m)
-                    .for_each(|x| *x *= factor);
-            }
+    }
+}
+
+/// Multiplies each of `m` columns.
+fn multiply((states, readings): &mut Along, factors: &[f64]) {
+    for rows in [states, readings] {
+        for row in rows.chunks_exact_mut(factors.len().max(1)) {
+            row.iter_mut().zip(factors).for_each(|(x, f)| *x *= f);
         }
     }
 }
@@ -125,7 +133,8 @@ fn sizes_by_range(candidates: &[Candidate], trials: &[Trial]) -> Vec<f64> {
 
 impl Columns {
     /// Columns of a fitted model's unknowns and of all candidates, along its trajectory; of those that there is time for where
-    /// the work is stopped.
+    /// the work is stopped. Where there are many segments, the columns of those that `leads` says lead on [a part](in_part) of them
+    /// (one flag a candidate), and the others' are zero elsewhere.
     ///
     /// # Errors
     /// When the engine fails.
@@ -133,7 +142,7 @@ impl Columns {
         context: &Context<'_>,
         (base, theta): (&Hypothesis, &[f64]),
         estimate: &Estimate,
-        candidates: &[Candidate],
+        (candidates, leads): (&[Candidate], Leads<'_>),
         progress: &dyn Progress,
     ) -> Result<Self> {
         let model = |way| {
@@ -176,7 +185,9 @@ impl Columns {
             sizes(context, estimate, &source, &trials)?
         };
         asked.add(candidates, &sizes);
-        let (mut found, walked) = source.columns(context, &estimate.trajectory, &asked.wanted)?;
+        let [first, others] = in_part::parts(context);
+        let along = (context, &estimate.trajectory[..]);
+        let (mut found, walked) = in_part::along(&source, along, &asked.wanted, &first)?;
         let Asked {
             center,
             mut bounds,
@@ -185,23 +196,36 @@ impl Columns {
             mut forms,
         } = asked;
         let more = wanted.len();
+        let mut factors = vec![1.0; more];
         if context.has_segments() {
-            let sizes = sizes_by_replay(context, estimate, &found, more);
+            factors = sizes_by_replay(context, estimate, (&found, &first), more);
             for form in &mut forms {
-                resize(form, candidates, (&sizes, base), &mut found, &mut bounds);
+                resize(form, candidates, (&mut factors, base), &mut bounds);
             }
+            found.iter_mut().for_each(|f| multiply(f, &factors));
         }
         for (linear, (state, reading)) in linear.iter_mut().zip(&found) {
             linear.state_columns = beside(&linear.state_columns, base, state, more);
             linear.reading_columns = beside(&linear.reading_columns, base, reading, more);
         }
-        Ok(Self {
+        let mut columns = Self {
             linear,
             base,
             forms,
             center,
             bounds,
             complete: felt && walked,
-        })
+        };
+        if columns.complete && !others.is_empty() {
+            let rest = Rest {
+                source: &source,
+                wanted: &wanted,
+                factors: &factors,
+                which: &others,
+            };
+            let leads = leads(&columns);
+            columns.add_rest(along, &rest, &leads)?;
+        }
+        Ok(columns)
     }
 }

@@ -78,6 +78,24 @@ impl Context<'_> {
         self.walks.iter().any(|w| w.segment.is_some())
     }
 
+    /// What is being explained along some of the walks alone.
+    #[must_use]
+    pub fn of_walks(&self, which: &[usize]) -> Context<'_> {
+        Context {
+            machine: self.machine,
+            logs: self.logs,
+            walks: which.iter().map(|&w| self.walks[w].clone()).collect(),
+            given: which.iter().map(|&w| self.given[w].clone()).collect(),
+            read: which.iter().map(|&w| self.read[w].clone()).collect(),
+            open: self.open.clone(),
+            scale: self.scale.clone(),
+            position_noise: self.position_noise.clone(),
+            reading_variance: self.reading_variance.clone(),
+            inertial: self.inertial.clone(),
+            one_step: self.one_step,
+        }
+    }
+
     /// A step map of the machine with more effects; `roles` as [`StepMap::new`].
     ///
     /// # Errors

@@ -73,8 +73,8 @@ pub struct Fitted {
     pub theta: Vec<f64>,
     /// Logarithm of its marginal likelihood, natural.
     pub evidence: f64,
-    /// Median of how far that evidence fell where a linearisation did not raise it: about each start of a segment that leaves as
-    /// little of the readings, slopes are others. 0 where there are no segments.
+    /// Median of how far that evidence came out from the best in those linearisations that did not raise it by what counts: about each
+    /// start of a segment that leaves as little of the readings, slopes are others. 0 where there are no segments.
     pub wander: f64,
     /// What a further step of the values promises, to first order.
     pub promised: f64,
@@ -131,7 +131,7 @@ pub fn fit(
     let (mut waited, mut failed) = (0, 0);
     let segments = context.walks.iter().filter(|w| w.segment.is_some()).count();
     let rise = RISE * (segments.max(1) as f64).sqrt();
-    let mut drops = Vec::new();
+    let mut apart = Vec::new();
     for round in 0..rounds.max(1) {
         let variations = variations(unknowns, &free, &theta);
         let mut linear = slopes.linearise(
@@ -158,8 +158,9 @@ pub fn fit(
         // A step that lost more than it had promised to win is no narrow valley. Evidence of segments falls by itself.
         let lost = |a: &Anchor| a.here - here > (a.hoped - a.here).max(rise);
         let astray = segments == 0 && anchor.as_ref().is_some_and(lost);
-        if let Some(best) = best.as_ref().filter(|b| here < b.evidence) {
-            drops.push(best.evidence - here);
+        // A step that went far astray is one of them, and so is each of those that find the same plateau again.
+        if let Some(best) = best.as_ref().filter(|b| here <= b.evidence + rise) {
+            apart.push((best.evidence - here).abs());
         }
         if best.as_ref().is_none_or(|b| here > b.evidence) {
             best = Some(Fitted {
@@ -208,7 +209,7 @@ pub fn fit(
         best.ok_or_else(|| asid_core::Error::Failed("no round of the fit was finite".into()))?;
     best.slopes = slopes;
     if segments > 0 {
-        best.wander = median(&mut drops).unwrap_or(0.0);
+        best.wander = median(&mut apart).unwrap_or(0.0);
     }
     Ok(best)
 }

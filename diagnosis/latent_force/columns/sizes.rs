@@ -5,7 +5,7 @@ use asid_core::Result;
 use nalgebra::DMatrix;
 
 use super::force_response::ForceSlopes;
-use super::source::{Source, Wanted};
+use super::source::{Along, Source, Wanted};
 use crate::latent_force::context::Context;
 use crate::latent_force::estimate::Estimate;
 
@@ -202,17 +202,18 @@ pub(super) fn spreads(context: &Context<'_>) -> Vec<f64> {
 }
 
 /// Deviations of priors where walks are segments, from what a unit of each parameter does to their readings along their
-/// replays, `rows x ns x m` a walk: a few times what is left of them, for the open starts take up most of it.
+/// replays, `rows x ns x m` for those walks that are said: a few times what is left of them, for the open starts take up most of it.
 pub(super) fn sizes_by_replay(
     context: &Context<'_>,
     estimate: &Estimate,
-    columns: &[(Vec<f64>, Vec<f64>)],
+    (columns, which): (&[Along], &[usize]),
     m: usize,
 ) -> Vec<f64> {
     let ns = context.logs.entries.len();
     let mut squares = vec![0.0; m];
     let mut n = 0.0;
-    for (walk, (_, read)) in context.walks.iter().zip(columns) {
+    for &w in which {
+        let (walk, (_, read)) = (&context.walks[w], &columns[w]);
         let lead = walk.segment.unwrap_or(0);
         for k in lead..walk.len() {
             for (s, r) in estimate.noise.r.iter().enumerate() {

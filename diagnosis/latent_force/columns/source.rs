@@ -17,6 +17,7 @@ use super::together::{Account, Entries};
 const SLICE: usize = 64;
 
 /// A column that is wanted: a candidate with some values, and what its change is divided by.
+#[derive(Clone)]
 pub(super) struct Wanted {
     pub(super) candidate: usize,
     pub(super) values: Vec<f64>,
@@ -52,6 +53,7 @@ impl Wanted {
 pub(super) type Along = (Vec<f64>, Vec<f64>);
 
 /// Columns of the present model with some candidates: those that need the engine from it, the others traced.
+#[derive(Clone, Copy)]
 pub(super) struct Source<'s> {
     pub(super) candidates: &'s [Candidate],
     /// The present model with those that one step tells of, and with those that take whole rows.
@@ -62,7 +64,7 @@ pub(super) struct Source<'s> {
     pub(super) slopes: &'s [ForceSlopes],
     /// How late readings are in the present model.
     pub(super) late: &'s [Vec<f64>],
-    /// Whether the engine walks once for what can be told apart, to a few percent of each column.
+    /// Whether the engine walks once for what can be told apart, to a few percent of the largest column of a walk.
     pub(super) together: bool,
     /// Who says when to stop.
     pub(super) progress: &'s dyn Progress,

@@ -5,7 +5,7 @@ use nalgebra::DMatrix;
 
 use crate::candidate::{Candidate, nameable};
 use crate::chance::threshold;
-use crate::latent_force::columns::Columns;
+use crate::latent_force::columns::{Columns, Leads};
 use crate::latent_force::detection::{Limit, limits};
 use crate::latent_force::rehearsal::{Rehearsal, rehearse};
 use crate::latent_force::screen::{Screened, isolability, rank, regressions};
@@ -17,6 +17,9 @@ use super::tolerances::{Tolerances, of_names};
 
 /// Leading candidates that are compared pair by pair.
 const COMPARED: usize = 20;
+
+/// Sets that lead on a part of the logs, whose members are looked at on all of them: several times as many as are [raced](crate::settings::Breadth).
+const LEADING: usize = 40;
 
 /// What a screening could have seen.
 #[derive(Clone, Debug, Default)]
@@ -48,7 +51,9 @@ impl Upon<'_> {
         let some: Vec<Candidate> = open.map(|&c| self.candidates[c].clone()).collect();
         let fitted = &self.base.fitted;
         let model = (&fitted.hypothesis, &fitted.theta[..]);
-        let columns = Columns::of(self.context, model, &fitted.estimate, &some, self.progress)?;
+        let leads = |columns: &Columns| self.leads(columns, &some);
+        let asked = (&some[..], &leads as Leads<'_>);
+        let columns = Columns::of(self.context, model, &fitted.estimate, asked, self.progress)?;
         let sums = regressions(self.context, &fitted.estimate, &columns);
         let mut ranked = rank(&sums, &columns, &some);
         for s in &mut ranked {
@@ -83,6 +88,17 @@ impl Upon<'_> {
             tolerances,
             of_names,
         })
+    }
+
+    /// Which candidates lead by columns along a part of the logs: members of the leading sets, and tolerances, which are judged all at once.
+    fn leads(&self, columns: &Columns, some: &[Candidate]) -> Vec<bool> {
+        let sums = regressions(self.context, &self.base.fitted.estimate, columns);
+        let mut leads: Vec<bool> = some.iter().map(|c| c.is_tolerance).collect();
+        for set in rank(&sums, columns, some).iter().take(LEADING) {
+            let members = set.forms.iter().map(|&f| columns.forms[f].candidate);
+            members.for_each(|c| leads[c] = true);
+        }
+        leads
     }
 
     /// What a screening could have seen whose best candidate has the evidence `found`, at the most likely of the scales of `q`.
