@@ -254,5 +254,9 @@ fn measure(plant: &Plant, site: &str, reference: Reference, shown: &Trajectory) 
         Reference::Speed => driven.map_or(1.0, |j| shown.speed(plant, j)),
         Reference::Reading => shown.reading(site),
         Reference::Force => driven.map_or(1.0, |j| shown.force(plant, j)),
+        Reference::Travel => driven.map_or(1.0, |j| shown.travel(plant, j)),
+        Reference::Give => driven.map_or(1.0, |j| {
+            shown.travel(plant, j) / shown.force(plant, j).max(f64::MIN_POSITIVE)
+        }),
     }
 }

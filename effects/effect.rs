@@ -42,6 +42,10 @@ pub enum Reference {
     Reading,
     /// The largest force of the drive on the joint.
     Force,
+    /// How far the joint travels between its ends.
+    Travel,
+    /// The compliance by which the largest force of the drive on the joint gives way as far as the joint travels.
+    Give,
 }
 
 /// A parameter of an effect.
@@ -70,6 +74,13 @@ impl EffectParameter {
             null,
             start: Start::Slope,
         }
+    }
+
+    /// Whether it is a limit that the machine never reaches at its null value, the upper end of the range: there is nothing between
+    /// that and the values that act.
+    #[must_use]
+    pub fn is_limit(&self) -> bool {
+        self.null == self.range[1]
     }
 
     /// The same with another start of the search.

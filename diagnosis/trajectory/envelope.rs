@@ -31,6 +31,20 @@ impl Trajectory {
             .fold(0.0, |a, v| a.max(v.abs()))
     }
 
+    /// How far a hinge or slide travels between its ends, rad or m.
+    #[must_use]
+    pub fn travel(&self, plant: &Plant, joint: usize) -> f64 {
+        let (nq, at) = (plant.layout.nq, plant.layout.joints[joint].qpos);
+        let episodes = self.episodes.iter();
+        let places = episodes.flat_map(|e| e.qpos.iter().skip(at).step_by(nq));
+        let ends = places
+            .filter(|q| q.is_finite())
+            .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], q| {
+                [low.min(*q), high.max(*q)]
+            });
+        (ends[1] - ends[0]).max(0.0)
+    }
+
     /// Largest force of the drives on a hinge or slide, N or N m.
     #[must_use]
     pub fn force(&self, plant: &Plant, joint: usize) -> f64 {

@@ -1,6 +1,6 @@
 //! Play between a drive and its load.
 
-use crate::{Acting, Acts, Confusion, Effect, EffectParameter, Native, Site, Start};
+use crate::{Acting, Acts, Confusion, Effect, EffectParameter, Native, Reference, Site, Start};
 use asid_core::{Capabilities, Result, Target};
 use asid_mjcf::Plant;
 use asid_mjcf::native::{NativeModel, Series};
@@ -36,7 +36,7 @@ impl Effect for Backlash {
     fn parameters(&self) -> &'static [EffectParameter] {
         const {
             &[EffectParameter::new("width", "rad or m", [0.0, 1.0], 0.0)
-                .starting(Start::Values(&[0.01, 0.03, 0.1]))]
+                .starting(Start::Multiples(Reference::Travel, &[0.005, 0.02, 0.08]))]
         }
     }
 

@@ -154,8 +154,9 @@ impl Effect for Saturation {
     fn parameters(&self) -> &'static [EffectParameter] {
         const {
             &[
-                EffectParameter::new("limit", "N or N m", [0.0, UNLIMITED], UNLIMITED)
-                    .starting(Start::Multiples(Reference::Force, &[0.9, 0.7, 0.5])),
+                EffectParameter::new("limit", "N or N m", [0.0, UNLIMITED], UNLIMITED).starting(
+                    Start::Multiples(Reference::Force, &[0.9, 0.7, 0.5, 0.25, 0.1]),
+                ),
             ]
         }
     }

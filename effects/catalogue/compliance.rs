@@ -1,6 +1,6 @@
 //! Elasticity in series: a drive that pulls its link through a spring.
 
-use crate::{Acting, Acts, Effect, EffectParameter, Native, Site};
+use crate::{Acting, Acts, Effect, EffectParameter, Native, Reference, Site, Start};
 use asid_core::{Capabilities, Result, Target};
 use asid_mjcf::Plant;
 use asid_mjcf::native::{NativeModel, Series};
@@ -27,12 +27,10 @@ impl Effect for Compliance {
 
     fn parameters(&self) -> &'static [EffectParameter] {
         const {
-            &[EffectParameter::new(
-                "compliance",
-                "rad/(N m) or m/N",
-                [0.0, 1.0],
-                0.0,
-            )]
+            &[
+                EffectParameter::new("compliance", "rad/(N m) or m/N", [0.0, 1.0], 0.0)
+                    .starting(Start::Multiples(Reference::Give, &[0.01, 0.1, 1.0])),
+            ]
         }
     }
 

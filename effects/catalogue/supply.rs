@@ -59,13 +59,9 @@ impl Acting for SpeedLimitAt {
 }
 
 impl Effect for SpeedLimit {
-    fn refines(&self) -> &'static [&'static str] {
-        &["actuator-saturation"]
-    }
-
     fn mistaken_for(&self) -> &'static [Confusion] {
         &[Confusion {
-            with: &["viscous-friction", "actuator-gain"],
+            with: &["viscous-friction", "actuator-gain", "actuator-saturation"],
             told_apart_by: "coast down with the drive off; move as fast with a smaller force",
         }]
     }
@@ -80,7 +76,7 @@ impl Effect for SpeedLimit {
                 EffectParameter::new("force", "N or N m", [0.0, UNLIMITED], UNLIMITED)
                     .starting(Start::Multiples(Reference::Force, &[1.0, 0.7])),
                 EffectParameter::new("speed", "rad/s or m/s", [0.01, FAST], FAST)
-                    .starting(Start::Multiples(Reference::Speed, &[1.0, 2.0])),
+                    .starting(Start::Multiples(Reference::Speed, &[0.5, 1.0, 2.0])),
             ]
         }
     }

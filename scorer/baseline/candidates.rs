@@ -44,9 +44,22 @@ impl Shown {
                 largest(column(&self.qvel, layout.nv, layout.joints[j].qvel))
             }
             (Reference::Force, _, Some(j)) => self.force(plant, j),
+            (Reference::Travel, _, Some(j)) => self.travel(plant, j),
+            (Reference::Give, _, Some(j)) => {
+                self.travel(plant, j) / self.force(plant, j).max(f64::MIN_POSITIVE)
+            }
             (Reference::Reading, ..) => spread(study, site),
             _ => 1.0,
         }
+    }
+
+    /// How far a joint travels between its ends, rad or m.
+    fn travel(&self, plant: &Plant, joint: usize) -> f64 {
+        let layout = &plant.layout;
+        let places = || column(&self.qpos, layout.nq, layout.joints[joint].qpos);
+        let low = places().fold(f64::INFINITY, f64::min);
+        let high = places().fold(f64::NEG_INFINITY, f64::max);
+        (high - low).max(0.0)
     }
 
     /// Largest force of the drives on a joint, N or N m.

@@ -31,7 +31,14 @@ fn columns(
     estimate: &Estimate,
     candidates: &[Candidate],
 ) -> Vec<(usize, Vec<f64>)> {
-    let found = Columns::of(context, model, estimate, (candidates, &|_| Vec::new()), &Silent).unwrap();
+    let found = Columns::of(
+        context,
+        model,
+        estimate,
+        (candidates, &|_| Vec::new()),
+        &Silent,
+    )
+    .unwrap();
     let m = found.center.len();
     let forms = found.forms.iter();
     let each = forms.flat_map(|f| f.columns().map(|column| (f.candidate, column)));
@@ -102,7 +109,9 @@ fn compare(segments: [Option<usize>; 2]) {
     assert_eq!(together.len(), alone.len());
     let length = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>().sqrt();
     let largest = |name: &str| {
-        let of_law = alone.iter().filter(|(c, _)| candidates[*c].spec.name == name);
+        let of_law = alone
+            .iter()
+            .filter(|(c, _)| candidates[*c].spec.name == name);
         of_law.map(|(_, column)| length(column)).fold(0.0, f64::max)
     };
     let mut compared = 0;

@@ -34,7 +34,9 @@ impl Form {
                 Some((i, deviation)) => values[*i] += c * deviation,
                 None => {
                     for (v, p) in values.iter_mut().zip(candidate.parameters()) {
-                        if !matches!(p.start, Start::Choice(_) | Start::Given | Start::Set(..)) {
+                        let stays =
+                            matches!(p.start, Start::Choice(_) | Start::Given | Start::Set(..));
+                        if !stays && !p.is_limit() {
                             *v = p.null + c * (*v - p.null);
                         }
                     }
@@ -60,7 +62,11 @@ impl Form {
                 let [low, high] = candidate.ranges[i];
                 // A parameter that is no slope is as uncertain as it is large.
                 let width = (high - low) / 12.0_f64.sqrt();
-                let size = (self.begin[i] - p.null).abs();
+                let size = if p.is_limit() {
+                    self.begin[i].abs()
+                } else {
+                    (self.begin[i] - p.null).abs()
+                };
                 let other = if size > 0.0 { size.min(width) } else { width };
                 Unknown {
                     parameter,

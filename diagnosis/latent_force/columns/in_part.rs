@@ -12,8 +12,8 @@ use super::source::{Along, Source, Wanted};
 
 /// Of so many segments one is replayed for all candidates.
 const EVERY: usize = 3;
-/// Fewest segments of that part. Fewer do not stand for the others.
-const FEWEST: usize = 4;
+/// Fewest segments of that part: one does not stand for the others.
+const FEWEST: usize = 2;
 
 /// The walks along which all candidates are taken, and the others.
 pub(super) fn parts(context: &Context<'_>) -> [Vec<usize>; 2] {

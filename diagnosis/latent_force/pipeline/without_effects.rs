@@ -19,6 +19,8 @@ use super::rows::Rows;
 const FIRST: (usize, usize) = (4, 8);
 /// The same of segments, whose noise is known but for what they leave: the fit goes on from there.
 const FIRST_OF_SEGMENTS: (usize, usize) = (2, 8);
+/// Linearisations of a fit in segments that are not the longest: enough to begin the longer ones where these end.
+const SHORT: usize = 4;
 /// Share of the segments' rows that scatter by more than their noise, from which on segments are not made longer: what is gained by
 /// length is lost where nothing can be repeated.
 const LOST: f64 = 0.3;
@@ -78,10 +80,27 @@ impl<'a> Null<'a> {
                 }
             }
         }
-        stands.ok_or_else(|| Error::Failed("there is no duration of segments".into()))
+        let mut stands =
+            stands.ok_or_else(|| Error::Failed("there is no duration of segments".into()))?;
+        if stands.context.has_segments() {
+            let (none, progress) = (&stands.none, self.progress);
+            let from = (&none.estimate, &Slopes::default());
+            let context = &stands.context;
+            let on = fit(
+                context,
+                self.hypothesis,
+                &none.theta,
+                from,
+                (ROUNDS, progress),
+            )?;
+            if on.evidence > none.evidence {
+                stands.none = on;
+            }
+        }
+        Ok(stands)
     }
 
-    /// Fits it in segments of a duration, s, unless their replays scatter and shorter ones stand.
+    /// Fits it in segments of a duration, s, a little, unless their replays scatter and shorter ones stand.
     fn fit_in(
         self,
         duration: f64,
@@ -118,7 +137,12 @@ impl<'a> Null<'a> {
             estimate.scatter = scatter.directions;
         }
         let from = (&estimate, &Slopes::default());
-        let none = fit(&context, hypothesis, theta, from, (ROUNDS, progress))?;
+        let rounds = if context.has_segments() {
+            SHORT
+        } else {
+            ROUNDS
+        };
+        let none = fit(&context, hypothesis, theta, from, (rounds, progress))?;
         Ok(Tried::Stands(Box::new(Stands {
             context,
             none,
