@@ -133,7 +133,7 @@ fn sizes_by_range(candidates: &[Candidate], trials: &[Trial]) -> Vec<f64> {
 
 impl Columns {
     /// Columns of a fitted model's unknowns and of all candidates, along its trajectory; of those that there is time for where
-    /// the work is stopped. Where there are many segments, the columns of those that `leads` says lead on [a part](in_part) of them
+    /// the work is stopped. Where there are many segments, the columns of those that `leads` says lead on a part of them
     /// (one flag a candidate), and the others' are zero elsewhere.
     ///
     /// # Errors

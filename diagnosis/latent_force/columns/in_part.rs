@@ -6,6 +6,7 @@
 use asid_core::Result;
 
 use crate::latent_force::context::Context;
+use crate::latent_force::walk::Walk;
 
 use super::Columns;
 use super::source::{Along, Source, Wanted};
@@ -24,6 +25,11 @@ pub(super) fn parts(context: &Context<'_>) -> [Vec<usize>; 2] {
     [first, others]
 }
 
+/// What some of the walks have, where any has it.
+fn some<T: Clone>(all: &[T], which: &[usize]) -> Vec<T> {
+    which.iter().filter_map(|&w| all.get(w).cloned()).collect()
+}
+
 /// Columns along some of the walks, zero along the others; and whether there was time for all of them.
 pub(super) fn along(
     source: &Source<'_>,
@@ -35,9 +41,6 @@ pub(super) fn along(
         return source.columns(context, states, wanted);
     }
     let part = context.of_walks(which);
-    fn some<T: Clone>(all: &[T], which: &[usize]) -> Vec<T> {
-        which.iter().filter_map(|&w| all.get(w).cloned()).collect()
-    }
     let own = Source {
         carried: &some(source.carried, which),
         slopes: &some(source.slopes, which),
@@ -47,7 +50,7 @@ pub(super) fn along(
     let (found, complete) = own.columns(&part, &some(states, which), wanted)?;
     let (nx, ns) = (2 * context.plant().layout.nv, context.logs.entries.len());
     let m = wanted.len();
-    let nothing = |w: &crate::latent_force::walk::Walk| {
+    let nothing = |w: &Walk| {
         let n = w.len();
         (vec![0.0; (n - 1) * nx * m], vec![0.0; n * ns * m])
     };

@@ -30,12 +30,21 @@ const PART: usize = 6;
 /// How many such parts there are, spread over all walks.
 const PARTS: usize = 24;
 
-/// A context of some short parts of the logs, evenly spread, with the trajectory there, its slopes in forces and what is carried over rows.
-pub(super) fn parts<'c>(
+/// Some short parts of the logs, evenly spread.
+struct Parts<'c> {
+    context: Context<'c>,
+    /// The trajectory there, its slopes in forces and what is carried over rows, one a part.
+    states: Vec<Vec<f64>>,
+    slopes: Vec<ForceSlopes>,
+    carried: Vec<Vec<f64>>,
+}
+
+/// Parts of the logs with the trajectory there.
+fn parts<'c>(
     context: &'c Context<'_>,
     estimate: &Estimate,
     (slopes_of, carried_of): (&[ForceSlopes], &[Vec<f64>]),
-) -> (Context<'c>, Vec<Vec<f64>>, Vec<ForceSlopes>, Vec<Vec<f64>>) {
+) -> Parts<'c> {
     let layout = &context.plant().layout;
     let (nv, width) = (layout.nv, layout.nq + layout.nv);
     let rows: usize = context.walks.iter().map(|w| w.len()).sum();
@@ -69,7 +78,12 @@ pub(super) fn parts<'c>(
         one_step: context.one_step,
         walks,
     };
-    (context, states, slopes, carried)
+    Parts {
+        context,
+        states,
+        slopes,
+        carried,
+    }
 }
 
 /// Deviations of priors from what a trial step of each parameter does, for `(candidate, start, parameter)`; 0 where it does
@@ -82,8 +96,12 @@ pub(super) fn sizes(
 ) -> Result<(Vec<f64>, bool)> {
     let nv = context.plant().layout.nv;
     let (nx, ns) = (2 * nv, context.logs.entries.len());
-    let (short, states, slopes, carried) =
-        parts(context, estimate, (source.slopes, source.carried));
+    let Parts {
+        context: short,
+        states,
+        slopes,
+        carried,
+    } = parts(context, estimate, (source.slopes, source.carried));
     let candidates = source.candidates;
     let wanted: Vec<Wanted> = trials
         .iter()

@@ -22,8 +22,14 @@ const SAME: [&str; 5] = [
 /// A comparison whose runs last a moment; its figures mean nothing.
 const TINY: &str = "compare rod-balancing --backend rapier --method random --method dr \
     --condition left --seeds 3 --set identifier.iterations=1 --set identifier.population=8 \
-    --set identifier.sampling.rounds=1 --set identifier.sampling.draws=8 --set expected.rounds=1 \
-    --set solver.iterations=1 --set solver.population=2 --set solver.belief_samples=1";
+    --set identifier.sampling.rounds=1 --set identifier.sampling.draws=8 --set solver.iterations=1 \
+    --set solver.population=2 --set solver.belief_samples=1";
+
+/// What makes a task of its array last some seconds.
+const BRIEF: &[&str] = &["--set", "expected.rounds=1"];
+
+/// What makes a task of its array last longer than the half minute after which Slurm looks at the time limits of its jobs.
+const LONG: &[&str] = &["--set", "expected.rounds=7"];
 
 /// Runs of [`TINY`].
 const RUNS: usize = 6;
@@ -45,7 +51,7 @@ pub fn check(cluster: &Cluster<'_>, program: &Path) -> Result<()> {
     let test = Test { cluster, program };
     let clock = Instant::now();
     let told = |what: &str| eprintln!("slurm: {what} ({:.0} s)", clock.elapsed().as_secs_f64());
-    test.asid("whole", &[])?;
+    test.asid("whole", BRIEF)?;
     told("one process is done");
     test.two_nodes_in_one_folder()?;
     told("two nodes that write into one folder give the bytes of one process");
@@ -169,8 +175,8 @@ impl Test<'_> {
             .slurm("scontrol", &["update", &job, "StartTime=now"]);
     }
 
-    /// The folder holds what one process gives, to the byte.
-    fn same(&self, out: &str) -> Result<()> {
+    /// The folder holds what one process gave, to the byte.
+    fn same(&self, out: &str, whole: &str) -> Result<()> {
         for file in SAME {
             let read = |folder: &str| {
                 let path = self.out(folder).join(file);
@@ -183,7 +189,7 @@ impl Test<'_> {
                 })
             };
             ensure!(
-                read("whole")? == read(out)?,
+                read(whole)? == read(out)?,
                 "{file} of {out} is not that of one process"
             );
         }
@@ -200,9 +206,9 @@ impl Test<'_> {
     }
 
     fn two_nodes_in_one_folder(&self) -> Result<()> {
-        let array = self.submit("array", &[])?;
+        let array = self.submit("array", BRIEF)?;
         self.ended("array", &array)?;
-        self.same("array")?;
+        self.same("array", "whole")?;
         let said = self.said("array")?;
         for node in NODES {
             ensure!(
@@ -214,7 +220,7 @@ impl Test<'_> {
     }
 
     fn killed_and_queued_again(&self) -> Result<()> {
-        let array = self.submit("killed", &[])?;
+        let array = self.submit("killed", BRIEF)?;
         self.until("killed", "first cells", || {
             Ok(self.cells("killed").len() >= 3)
         })?;
@@ -233,18 +239,17 @@ impl Test<'_> {
             !self.out("killed").join("result.json").exists(),
             "a killed task had ended"
         );
-        let again = self.submit("killed", &[])?;
+        let again = self.submit("killed", BRIEF)?;
         self.ended("killed", &again)?;
         self.kept("killed", &before)?;
-        self.same("killed")
+        self.same("killed", "whole")
     }
 
     /// The warning may come up to a minute early, so here it comes soon after the start.
     fn warned_before_the_limit(&self) -> Result<()> {
-        let array = self.submit(
-            "warned",
-            &["--sbatch=--time=1", "--sbatch=--signal=B:USR1@57"],
-        )?;
+        self.asid("whole-long", LONG)?;
+        let limit = ["--sbatch=--time=1", "--sbatch=--signal=B:USR1@57"];
+        let array = self.submit("warned", &[LONG, &limit].concat())?;
         let told = || {
             Ok(self
                 .said("warned")
@@ -254,6 +259,6 @@ impl Test<'_> {
         let before = self.cells("warned");
         self.ended("warned", &array)?;
         self.kept("warned", &before)?;
-        self.same("warned")
+        self.same("warned", "whole-long")
     }
 }
