@@ -6,12 +6,11 @@
 mod kept_columns;
 mod regression;
 mod slopes;
+mod wander;
 
 use asid_core::{Parameter, Progress, Result};
 use asid_effects::EffectSpec;
 use nalgebra::DMatrix;
-
-use crate::noise::median;
 
 use super::context::Context;
 use super::estimate::Estimate;
@@ -21,6 +20,7 @@ use super::step_map::{Derivatives, LinearEpisode, StepMap};
 use regression::{Compared, compare, in_units, shift, variations};
 pub use regression::{SCALES, regression};
 pub use slopes::Slopes;
+use wander::wander;
 
 /// Largest step of a value, in deviations of its prior: a tangent reaches no further.
 const LARGEST_STEP: f64 = 1.0;
@@ -131,7 +131,7 @@ pub fn fit(
     let (mut waited, mut failed) = (0, 0);
     let segments = context.walks.iter().filter(|w| w.segment.is_some()).count();
     let rise = RISE * (segments.max(1) as f64).sqrt();
-    let mut apart = Vec::new();
+    let mut all = Vec::new();
     for round in 0..rounds.max(1) {
         let variations = variations(unknowns, &free, &theta);
         let mut linear = slopes.linearise(
@@ -158,10 +158,7 @@ pub fn fit(
         // A step that lost more than it had promised to win is no narrow valley. Evidence of segments falls by itself.
         let lost = |a: &Anchor| a.here - here > (a.hoped - a.here).max(rise);
         let astray = segments == 0 && anchor.as_ref().is_some_and(lost);
-        // A step that went far astray is one of them, and so is each of those that find the same plateau again.
-        if let Some(best) = best.as_ref().filter(|b| here <= b.evidence + rise) {
-            apart.push((best.evidence - here).abs());
-        }
+        all.push(here);
         if best.as_ref().is_none_or(|b| here > b.evidence) {
             best = Some(Fitted {
                 hypothesis: hypothesis.clone(),
@@ -209,7 +206,7 @@ pub fn fit(
         best.ok_or_else(|| asid_core::Error::Failed("no round of the fit was finite".into()))?;
     best.slopes = slopes;
     if segments > 0 {
-        best.wander = median(&mut apart).unwrap_or(0.0);
+        best.wander = wander(&all, rise);
     }
     Ok(best)
 }

@@ -7,6 +7,7 @@ mod arm;
 mod ball;
 #[path = "../diagnosis_support/mod.rs"]
 mod diagnosis_support;
+mod far;
 mod ordinary;
 mod row_slopes;
 mod scatter;

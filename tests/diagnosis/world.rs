@@ -33,6 +33,8 @@ pub enum Truth {
     Spring(f64),
     /// The command comes later, s.
     Delay(f64),
+    /// The motor gives no more than this, N.
+    Limit(f64),
     /// The position is read too large, m.
     SensorBias(f64),
     /// The speed is read in steps, m/s.
@@ -84,7 +86,11 @@ fn arriving(truth: Truth, episode: usize, t: f64) -> f64 {
     };
     // Half a step of the integrator off the edge, so that rounding does not matter.
     let row = ((t - late + 5e-5) / 0.01).floor().max(0.0);
-    command(episode, row * 0.01)
+    let asked = command(episode, row * 0.01);
+    match truth {
+        Truth::Limit(most) => asked.clamp(-most, most),
+        _ => asked,
+    }
 }
 
 /// One episode as a log.

@@ -1,0 +1,37 @@
+//! What the evidence scatters by where replays of segments are linearised.
+
+use crate::noise::median;
+
+/// Median of how far the evidence of each linearisation came out from the best before it, of those that did not raise that by what
+/// counts. A step that went far astray is one of them, and so is each that finds the same plateau again.
+pub(super) fn wander(evidence: &[f64], rise: f64) -> f64 {
+    let mut apart = Vec::new();
+    let mut best = f64::NEG_INFINITY;
+    for here in evidence {
+        if *here <= best + rise {
+            apart.push((best - here).abs());
+        }
+        best = best.max(*here);
+    }
+    median(&mut apart).unwrap_or(0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_step_that_went_far_astray_is_not_what_evidence_scatters_by() {
+        // Two steps about contacts lost 2000 and 21,000, and the plateau was found again.
+        let rounds = [
+            52771.6, 50557.4, 31621.3, 52785.0, 52900.1, 52900.4, 52900.9, 52901.1,
+        ];
+        assert!((wander(&rounds, 1.2) - 0.5).abs() < 1e-6);
+    }
+
+    #[test]
+    fn rises_that_count_are_no_scatter() {
+        assert_eq!(wander(&[10.0, 40.0, 60.0], 0.5), 0.0);
+        assert_eq!(wander(&[10.0, 7.0, 5.0, 6.0], 0.5), 4.0);
+    }
+}
