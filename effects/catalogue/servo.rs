@@ -77,9 +77,9 @@ impl Effect for Gain {
     }
 
     fn unusual_at(&self, plant: &Plant, site: &str) -> bool {
-        // But where it meets its limit of force, the damping of a position servo is that of its joint: friction comes to mind first.
-        let is_position = |drive: Drive| drive.is_position_servo();
-        matches!(self, Self::Damping) && plant.drive(site).is_ok_and(|(_, d)| is_position(d))
+        // Without a limit the damping of a position servo is that of its joint: friction comes to mind first.
+        let without_limit = |drive: Drive| drive.is_position_servo() && drive.force_range.is_none();
+        matches!(self, Self::Damping) && plant.drive(site).is_ok_and(|(_, d)| without_limit(d))
     }
 
     fn acts(&self) -> Acts {
