@@ -177,9 +177,7 @@ pub fn fit(
         }
         if waited > PATIENCE || astray && failed < FAILURES {
             // The tangents led astray: less of the way.
-            let Some(anchor) = &anchor else {
-                break;
-            };
+            let Some(anchor) = &anchor else { break };
             part *= SHORTER;
             failed += 1;
             waited = 0;
@@ -202,8 +200,8 @@ pub fn fit(
             });
         }
     }
-    let mut best =
-        best.ok_or_else(|| asid_core::Error::Failed("no round of the fit was finite".into()))?;
+    let none_finite = || asid_core::Error::Failed("no round of the fit was finite".into());
+    let mut best = best.ok_or_else(none_finite)?;
     best.slopes = slopes;
     if segments > 0 {
         best.wander = wander(&all, rise);

@@ -1,5 +1,6 @@
 //! Forward selection of effects by evidence, with a look back after each.
 
+mod open_loop;
 mod prior;
 mod prune;
 mod round;
@@ -11,19 +12,20 @@ use asid_core::{Progress, Result};
 
 use crate::candidate::{Candidate, nameable};
 use crate::chance::threshold;
-use crate::findings::NEGLIGIBLE;
 use crate::settings::Breadth;
 
 use super::context::Context;
 use super::estimate::Missing;
 use super::fit::Fitted;
 
+pub use open_loop::OpenLoop;
 pub use prior::log_prior;
 pub use round::Round;
 pub use screening::Sight;
 pub use set::{Set, labels_of, name_of};
 pub use tolerances::Tolerances;
 
+use open_loop::OpenLoopGap;
 use round::Upon;
 use set::{free_what_is_given, from_starts_of, is_due};
 
@@ -34,6 +36,16 @@ pub struct Untried {
     pub stage: &'static str,
     /// Candidates of each set.
     pub sets: Vec<Vec<usize>>,
+}
+
+impl Untried {
+    /// What was left out of a stage upon a set.
+    fn upon(set: &Set, stage: &'static str) -> Self {
+        Self {
+            stage,
+            sets: vec![set.candidates.clone()],
+        }
+    }
 }
 
 /// What a search found.
@@ -63,9 +75,6 @@ fn is_within(candidates: &[Candidate], set: &Set, candidate: usize) -> bool {
     set.candidates.iter().any(like)
 }
 
-/// Excess power that open-loop replays of the training logs leave of a set.
-pub type OpenLoop<'o> = &'o dyn Fn(&Set) -> Result<f64>;
-
 /// Candidates that are tried upon a set: not those in it, within their tolerances or else, nor those that are `known` to act or not.
 fn open_upon(candidates: &[Candidate], known: &[usize], set: &Set) -> Vec<usize> {
     (0..candidates.len())
@@ -75,12 +84,15 @@ fn open_upon(candidates: &[Candidate], known: &[usize], set: &Set) -> Vec<usize>
         .collect()
 }
 
-/// A set fitted from the starts of the next one, where that raises its evidence.
+/// A set fitted from the starts of segments of the next one, where there is time and that raises its evidence.
 fn better_from(
     context: &Context<'_>,
     (best, next): (&Set, &Set),
     (breadth, progress): (Breadth, &dyn Progress),
 ) -> Result<Option<Set>> {
+    if !context.has_segments() || progress.is_stopped() {
+        return Ok(None);
+    }
     let again = from_starts_of(context, (best, next), breadth, progress)?;
     Ok((again.fitted.evidence > best.fitted.evidence).then_some(again))
 }
@@ -140,38 +152,23 @@ pub fn search(
     // needs no further name.
     let mut freed: Option<Set> = None;
     let mut depth = breadth.depth;
-    // Excess power of the open loop, without effects and of the set that stands, once that counts.
-    let mut excess: Option<[f64; 2]> = None;
+    let mut gap = OpenLoopGap::by(open_loop);
     while rounds.len() < depth {
         let no_force = left(&best) < breadth.shrinks;
-        if no_force {
-            excess = match excess {
-                _ if context.has_segments() || progress.is_stopped() => None,
-                Some([first, _]) => Some([first, open_loop(&best)?]),
-                None => Some([open_loop(&Set::without_effects(&none))?, open_loop(&best)?]),
-            };
-            let is_open = |&[first, now]: &[f64; 2]| {
-                now.is_finite() && now > (breadth.shrinks * first).max(NEGLIGIBLE * NEGLIGIBLE)
-            };
-            if !excess.as_ref().is_some_and(is_open) {
-                break;
-            }
+        if no_force && !gap.is_left(context, (&none, &best), how)? {
+            break;
         }
         // The first screening is the least that an answer rests on.
         if !rounds.is_empty() && progress.is_stopped() {
-            untried.push(Untried {
-                stage: "further effects beside those named",
-                sets: vec![best.candidates.clone()],
-            });
+            untried.push(Untried::upon(&best, "further effects beside those named"));
             break;
         }
-        let open = open_upon(candidates, known, &best);
         let upon = Upon {
             context,
             base: &best,
             at_first,
             candidates,
-            open: &open,
+            open: &open_upon(candidates, known, &best),
             breadth,
             progress,
         };
@@ -179,7 +176,7 @@ pub fn search(
         let next = round.confirmed.first().cloned();
         rounds.push(round);
         let stopped = progress.is_stopped();
-        if let (true, false, Some(next)) = (context.has_segments(), stopped, &next)
+        if let Some(next) = &next
             && let Some(again) = better_from(context, (&best, next), how)?
         {
             best = again;
@@ -187,8 +184,8 @@ pub fn search(
                 none = best.fitted.clone();
             }
         }
-        let closes = match (&next, excess.filter(|_| no_force)) {
-            (Some(n), Some([first, now])) => now - open_loop(n)? > breadth.shrinks * first,
+        let closes = match &next {
+            Some(n) if no_force => gap.is_closed_by(n, breadth)?,
             _ => false,
         };
         let next = next.filter(|n| {
@@ -218,20 +215,19 @@ pub fn search(
         }
         best = next;
         if stopped {
-            untried.push(Untried {
-                stage: "values of the effects named that no search tries, such as an offset",
-                sets: vec![best.candidates.clone()],
-            });
+            untried.push(Untried::upon(
+                &best,
+                "values of the effects named that no search tries, such as an offset",
+            ));
             break;
         }
         freed = free_what_is_given(context, candidates, &best, (breadth, threshold), progress)?;
     }
     let best = freed.unwrap_or(best);
-    let none = &none;
-    let of = |f: &Fitted| f.estimate.missing(context);
+    let missing = [&none, &best.fitted].map(|f| f.estimate.missing(context));
     Ok(Outcome {
-        none: none.clone(),
-        missing: [of(none), of(&best.fitted)],
+        none,
+        missing,
         rounds,
         best,
         untried,

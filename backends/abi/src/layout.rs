@@ -43,29 +43,8 @@ pub unsafe fn decode(layout: *const table::Layout) -> Result<Layout> {
         return Err(Error::Failed("its first body is not `world`".into()));
     }
     let geoms = names(layout.geoms, layout.ngeom, "a geom's name")?;
-    let (mut nq, mut nv) = (0, 0);
-    let mut joints = Vec::new();
     // SAFETY: see above.
-    for joint in unsafe { read(layout.joints, layout.njoint, "the joints")? } {
-        let kind = match joint.kind {
-            joint_kind::FREE => JointKind::Free,
-            joint_kind::BALL => JointKind::Ball,
-            joint_kind::HINGE => JointKind::Hinge,
-            joint_kind::SLIDE => JointKind::Slide,
-            other => return Err(Error::Failed(format!("a joint is of kind {other}"))),
-        };
-        joints.push(Joint {
-            // SAFETY: see above.
-            name: unsafe { text::read(joint.name, "a joint's name")? },
-            // SAFETY: see above.
-            body: unsafe { text::read(joint.body, "a joint's body")? },
-            kind,
-            qpos: nq,
-            qvel: nv,
-        });
-        nq += kind.qpos_len();
-        nv += kind.qvel_len();
-    }
+    let (joints, [nq, nv]) = unsafe { decode_joints(layout)? };
     let mut actuators = Vec::new();
     // SAFETY: see above.
     for actuator in unsafe { read(layout.actuators, layout.nactuator, "the actuators")? } {
@@ -75,32 +54,8 @@ pub unsafe fn decode(layout: *const table::Layout) -> Result<Layout> {
             ctrl_range: (actuator.ctrl_limited != 0).then_some(actuator.ctrl_range),
         });
     }
-    let mut sensors = Vec::new();
-    let mut address = 0;
     // SAFETY: see above.
-    for sensor in unsafe { read(layout.sensors, layout.nsensor, "the sensors")? } {
-        // SAFETY: see above.
-        let (name, kind) = unsafe {
-            (
-                text::read(sensor.name, "a sensor's name")?,
-                text::read(sensor.kind, "a sensor's kind")?,
-            )
-        };
-        let len = sensor_len(&kind);
-        if sensor.length != len as u64 {
-            return Err(Error::Failed(format!(
-                "sensor `{name}` ({kind}) has {} entries where {len} are right",
-                sensor.length
-            )));
-        }
-        sensors.push(Sensor {
-            name,
-            kind,
-            address,
-            len,
-        });
-        address += len;
-    }
+    let sensors = unsafe { decode_sensors(layout)? };
     let mut keyframes = Vec::new();
     // SAFETY: see above.
     for key in unsafe { read(layout.keyframes, layout.nkeyframe, "the keyframes")? } {
@@ -125,6 +80,71 @@ pub unsafe fn decode(layout: *const table::Layout) -> Result<Layout> {
         sensors,
         keyframes,
     })
+}
+
+/// The joints, and how many positions and velocities they have.
+///
+/// # Safety
+/// As for [`decode`].
+unsafe fn decode_joints(layout: &table::Layout) -> Result<(Vec<Joint>, [usize; 2])> {
+    let (mut nq, mut nv) = (0, 0);
+    let mut joints = Vec::new();
+    // SAFETY: as the caller promises.
+    for joint in unsafe { read(layout.joints, layout.njoint, "the joints")? } {
+        let kind = match joint.kind {
+            joint_kind::FREE => JointKind::Free,
+            joint_kind::BALL => JointKind::Ball,
+            joint_kind::HINGE => JointKind::Hinge,
+            joint_kind::SLIDE => JointKind::Slide,
+            other => return Err(Error::Failed(format!("a joint is of kind {other}"))),
+        };
+        joints.push(Joint {
+            // SAFETY: as the caller promises.
+            name: unsafe { text::read(joint.name, "a joint's name")? },
+            // SAFETY: as the caller promises.
+            body: unsafe { text::read(joint.body, "a joint's body")? },
+            kind,
+            qpos: nq,
+            qvel: nv,
+        });
+        nq += kind.qpos_len();
+        nv += kind.qvel_len();
+    }
+    Ok((joints, [nq, nv]))
+}
+
+/// The sensors, one after the other.
+///
+/// # Safety
+/// As for [`decode`].
+unsafe fn decode_sensors(layout: &table::Layout) -> Result<Vec<Sensor>> {
+    let mut sensors = Vec::new();
+    let mut address = 0;
+    // SAFETY: as the caller promises.
+    for sensor in unsafe { read(layout.sensors, layout.nsensor, "the sensors")? } {
+        // SAFETY: as the caller promises.
+        let (name, kind) = unsafe {
+            (
+                text::read(sensor.name, "a sensor's name")?,
+                text::read(sensor.kind, "a sensor's kind")?,
+            )
+        };
+        let len = sensor_len(&kind);
+        if sensor.length != len as u64 {
+            return Err(Error::Failed(format!(
+                "sensor `{name}` ({kind}) has {} entries where {len} are right",
+                sensor.length
+            )));
+        }
+        sensors.push(Sensor {
+            name,
+            kind,
+            address,
+            len,
+        });
+        address += len;
+    }
+    Ok(sensors)
 }
 
 /// A layout as the other side reads it; owns all that the structure points to.

@@ -3,6 +3,8 @@
 #[path = "missing.rs"]
 mod missing;
 
+use std::collections::BTreeMap;
+
 use asid_results::diagnosis::*;
 use asid_results::trace::*;
 
@@ -76,6 +78,174 @@ fn signal_gap(signal: &str, unit: &str, noise: f64, gaps: [f64; 3]) -> SignalGap
     }
 }
 
+/// Its gap, whole and by signal.
+fn patch_gap() -> Gap {
+    Gap {
+        nominal: 41.3,
+        identified: 14.2,
+        refined: 1.9,
+        closed: Some(0.984),
+        closed_interval95: Some([0.961, 0.993]),
+        shares: Some(Shares {
+            named: 0.984,
+            learnable: 0.01,
+            unrepeatable: 0.006,
+        }),
+        signals: vec![
+            signal_gap("puck_pos", "m", 0.002, [48.0, 16.5, 2.1]),
+            signal_gap("puck_yaw", "rad", 0.01, [12.3, 5.2, 1.2]),
+        ],
+        ..Gap::default()
+    }
+}
+
+/// Where it lies.
+fn patch_places() -> Vec<Where> {
+    [
+        (
+            "puck_pos.0",
+            "sliding, puck/board",
+            0.71,
+            "puck_pos.0 > 0.41",
+        ),
+        (
+            "puck_pos.1",
+            "sliding, puck/board",
+            0.13,
+            "puck_pos.0 > 0.41",
+        ),
+        ("puck_yaw", "sliding, puck/board", 0.09, ""),
+        ("puck_pos.0", "contact pusher/puck", 0.05, ""),
+        ("puck_pos.0", "sticking", 0.018, ""),
+        ("puck_yaw", "start-up", 0.002, ""),
+    ]
+    .map(
+        |(signal, regime, share, condition): (&str, &str, f64, &str)| Where {
+            signal: signal.into(),
+            regime: regime.into(),
+            share,
+            condition: (!condition.is_empty()).then(|| condition.into()),
+        },
+    )
+    .into()
+}
+
+/// Effects that were tried on it.
+fn patch_effects() -> Vec<EffectResult> {
+    vec![
+        effect(
+            ["friction-patch", "board"],
+            0.71,
+            0.984,
+            &[("axis", 0.0), ("place", 0.4112), ("ratio", 1.812)],
+        ),
+        effect(
+            ["friction-drift", "board"],
+            0.22,
+            0.957,
+            &[("per_second", 0.62)],
+        ),
+        effect(
+            ["gravity-tilt", ""],
+            0.034,
+            0.31,
+            &[("pitch", -0.021), ("roll", 0.004)],
+        ),
+        effect(
+            ["friction-anisotropy", "board"],
+            0.034,
+            0.42,
+            &[("cos_2", 0.12)],
+        ),
+        effect(
+            ["linear-drag", "puck"],
+            0.0048,
+            0.66,
+            &[("coefficient", 0.31)],
+        ),
+    ]
+}
+
+/// What its task gains by the refined model.
+fn patch_in_the_real_world() -> RealWorld {
+    RealWorld {
+        task: "shuffleboard".into(),
+        condition: "far".into(),
+        metric: "zone_error_m".into(),
+        unit: "m".into(),
+        rule: "at rest in the far zone".into(),
+        effects: vec!["friction-patch@board:ratio=0.35,place=0.75".into()],
+        truth: vec![("sliding_friction".into(), 0.02)],
+        trials: [
+            (
+                "a real world without the effect",
+                "the model as given",
+                0.06,
+                3,
+            ),
+            ("the real world", "the model as given", 0.4, 0),
+            ("the real world", "the refined model", 0.08, 3),
+        ]
+        .map(|(world, simulator, error, successes)| TaskTrial {
+            world: world.into(),
+            simulator: simulator.into(),
+            values: vec![0.5 * error, error, error, 1.5 * error],
+            successes,
+        })
+        .into(),
+        ..RealWorld::default()
+    }
+}
+
+/// Words of the effects that were tried on it.
+fn patch_catalogue() -> BTreeMap<String, EffectWords> {
+    [
+        words(
+            "friction-patch",
+            "sliding friction differs beyond a place",
+            &[("axis", "", 0.0), ("place", "m", 0.0), ("ratio", "1", 1.0)],
+        ),
+        words(
+            "friction-drift",
+            "sliding friction changes over time",
+            &[("per_second", "1/s", 0.0)],
+        ),
+        words(
+            "gravity-tilt",
+            "the ground is not level",
+            &[("pitch", "rad", 0.0), ("roll", "rad", 0.0)],
+        ),
+        words(
+            "friction-anisotropy",
+            "sliding friction differs by direction",
+            &[("cos_2", "1", 0.0)],
+        ),
+        words(
+            "linear-drag",
+            "a drag in proportion to speed",
+            &[("coefficient", "N s/m", 0.0)],
+        ),
+    ]
+    .into()
+}
+
+/// What each explanation leaves of its gap.
+fn patch_ladder() -> Vec<Rung> {
+    [
+        ("friction-patch@board", 1.9),
+        ("friction-drift@board", 3.1),
+        ("linear-drag@puck", 8.3),
+        ("friction-anisotropy@board", 10.9),
+        ("gravity-tilt", 11.8),
+        ("payload@puck", 14.1),
+    ]
+    .map(|(label, gap)| Rung {
+        label: label.into(),
+        gap,
+    })
+    .into()
+}
+
 /// A puck on a board with a rougher far half, which one other effect explains as well.
 pub fn patch() -> Diagnosis {
     let signals = puck();
@@ -84,34 +254,8 @@ pub fn patch() -> Diagnosis {
         study: "puck-on-board".into(),
         sentence: "The real board is rougher beyond 0.41 m: sliding friction there is 1.8 times the modelled one, which closes 98 % of the gap."
             .into(),
-        gap: Gap {
-            nominal: 41.3,
-            identified: 14.2,
-            refined: 1.9,
-            closed: Some(0.984),
-            closed_interval95: Some([0.961, 0.993]),
-            shares: Some(Shares { named: 0.984, learnable: 0.01, unrepeatable: 0.006 }),
-            signals: vec![
-                signal_gap("puck_pos", "m", 0.002, [48.0, 16.5, 2.1]),
-                signal_gap("puck_yaw", "rad", 0.01, [12.3, 5.2, 1.2]),
-            ],
-            ..Gap::default()
-        },
-        places: [
-            ("puck_pos.0", "sliding, puck/board", 0.71, "puck_pos.0 > 0.41"),
-            ("puck_pos.1", "sliding, puck/board", 0.13, "puck_pos.0 > 0.41"),
-            ("puck_yaw", "sliding, puck/board", 0.09, ""),
-            ("puck_pos.0", "contact pusher/puck", 0.05, ""),
-            ("puck_pos.0", "sticking", 0.018, ""),
-            ("puck_yaw", "start-up", 0.002, ""),
-        ]
-        .map(|(signal, regime, share, condition): (&str, &str, f64, &str)| Where {
-            signal: signal.into(),
-            regime: regime.into(),
-            share,
-            condition: (!condition.is_empty()).then(|| condition.into()),
-        })
-        .into(),
+        gap: patch_gap(),
+        places: patch_places(),
         hypotheses: vec![
             hypothesis(&["friction-patch@board"], 0.71),
             hypothesis(&["friction-drift@board"], 0.22),
@@ -120,13 +264,7 @@ pub fn patch() -> Diagnosis {
             hypothesis(&["linear-drag@puck"], 0.0048),
             hypothesis(&["none"], 1e-9),
         ],
-        effects: vec![
-            effect(["friction-patch", "board"], 0.71, 0.984, &[("axis", 0.0), ("place", 0.4112), ("ratio", 1.812)]),
-            effect(["friction-drift", "board"], 0.22, 0.957, &[("per_second", 0.62)]),
-            effect(["gravity-tilt", ""], 0.034, 0.31, &[("pitch", -0.021), ("roll", 0.004)]),
-            effect(["friction-anisotropy", "board"], 0.034, 0.42, &[("cos_2", 0.12)]),
-            effect(["linear-drag", "puck"], 0.0048, 0.66, &[("coefficient", 0.31)]),
-        ],
+        effects: patch_effects(),
         verdict: Verdict {
             kind: Kind::Effects,
             effects: names(&["friction-patch@board"]),
@@ -156,74 +294,14 @@ pub fn patch() -> Diagnosis {
                           with every pass."
                 .into(),
         },
-        real_world: Some(RealWorld {
-            task: "shuffleboard".into(),
-            condition: "far".into(),
-            metric: "zone_error_m".into(),
-            unit: "m".into(),
-            rule: "at rest in the far zone".into(),
-            effects: vec!["friction-patch@board:ratio=0.35,place=0.75".into()],
-            truth: vec![("sliding_friction".into(), 0.02)],
-            trials: [
-                ("a real world without the effect", "the model as given", 0.06, 3),
-                ("the real world", "the model as given", 0.4, 0),
-                ("the real world", "the refined model", 0.08, 3),
-            ]
-            .map(|(world, simulator, error, successes)| TaskTrial {
-                world: world.into(),
-                simulator: simulator.into(),
-                values: vec![0.5 * error, error, error, 1.5 * error],
-                successes,
-            })
-            .into(),
-            ..RealWorld::default()
-        }),
+        real_world: Some(patch_in_the_real_world()),
         ..DiagnosisResult::default()
     };
     let trace = DiagnosisTrace {
-        catalogue: [
-            words(
-                "friction-patch",
-                "sliding friction differs beyond a place",
-                &[("axis", "", 0.0), ("place", "m", 0.0), ("ratio", "1", 1.0)],
-            ),
-            words(
-                "friction-drift",
-                "sliding friction changes over time",
-                &[("per_second", "1/s", 0.0)],
-            ),
-            words(
-                "gravity-tilt",
-                "the ground is not level",
-                &[("pitch", "rad", 0.0), ("roll", "rad", 0.0)],
-            ),
-            words(
-                "friction-anisotropy",
-                "sliding friction differs by direction",
-                &[("cos_2", "1", 0.0)],
-            ),
-            words(
-                "linear-drag",
-                "a drag in proportion to speed",
-                &[("coefficient", "N s/m", 0.0)],
-            ),
-        ]
-        .into(),
+        catalogue: patch_catalogue(),
         held_out: 3,
         fitted_to: 9,
-        ladder: [
-            ("friction-patch@board", 1.9),
-            ("friction-drift@board", 3.1),
-            ("linear-drag@puck", 8.3),
-            ("friction-anisotropy@board", 10.9),
-            ("gravity-tilt", 11.8),
-            ("payload@puck", 14.1),
-        ]
-        .map(|(label, gap)| Rung {
-            label: label.into(),
-            gap,
-        })
-        .into(),
+        ladder: patch_ladder(),
         signals,
         map: Some(map),
         left_out: texts(&[

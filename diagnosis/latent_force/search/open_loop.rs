@@ -1,0 +1,59 @@
+//! The gap of the open loop: what a further name counts by where hardly any force is missing, as of a stiff drive that was made softer.
+
+use asid_core::{Progress, Result};
+
+use crate::findings::NEGLIGIBLE;
+use crate::latent_force::context::Context;
+use crate::latent_force::fit::Fitted;
+use crate::settings::Breadth;
+
+use super::set::Set;
+
+/// Excess power that open-loop replays of the training logs leave of a set.
+pub type OpenLoop<'o> = &'o dyn Fn(&Set) -> Result<f64>;
+
+/// The gap of the open loop, which counts where hardly any force is missing.
+pub(super) struct OpenLoopGap<'o> {
+    replay: OpenLoop<'o>,
+    /// Excess power without effects and of the set that stands, once that counts.
+    excess: Option<[f64; 2]>,
+}
+
+impl<'o> OpenLoopGap<'o> {
+    /// The gap by some replays.
+    pub(super) fn by(replay: OpenLoop<'o>) -> Self {
+        Self {
+            replay,
+            excess: None,
+        }
+    }
+
+    /// Whether the set that stands leaves as much of it as a further effect must close.
+    pub(super) fn is_left(
+        &mut self,
+        context: &Context<'_>,
+        (none, best): (&Fitted, &Set),
+        (breadth, progress): (Breadth, &dyn Progress),
+    ) -> Result<bool> {
+        self.excess = if context.has_segments() || progress.is_stopped() {
+            None
+        } else {
+            let first = match self.excess {
+                Some([first, _]) => first,
+                None => (self.replay)(&Set::without_effects(none))?,
+            };
+            Some([first, (self.replay)(best)?])
+        };
+        Ok(self.excess.is_some_and(|[first, now]| {
+            now.is_finite() && now > (breadth.shrinks * first).max(NEGLIGIBLE * NEGLIGIBLE)
+        }))
+    }
+
+    /// Whether a set closes as much of it.
+    pub(super) fn is_closed_by(&self, set: &Set, breadth: Breadth) -> Result<bool> {
+        Ok(match self.excess {
+            Some([first, now]) => now - (self.replay)(set)? > breadth.shrinks * first,
+            None => false,
+        })
+    }
+}
