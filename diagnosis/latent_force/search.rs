@@ -170,6 +170,7 @@ pub fn search(
             candidates,
             open: &open_upon(candidates, known, &best),
             breadth,
+            open_loop,
             progress,
         };
         let round = upon.round(&mut untried)?;
@@ -183,6 +184,13 @@ pub fn search(
             if best.candidates.is_empty() {
                 none = best.fitted.clone();
             }
+        }
+        // What a further effect owes to better starts of segments, or to more rounds, is only known once the set that it stands on has been
+        // fitted from there to the end too.
+        let unfair = context.has_segments() && !best.candidates.is_empty() && progress.is_stopped();
+        if unfair {
+            untried.push(Untried::upon(&best, "further effects beside those named"));
+            break;
         }
         let closes = match &next {
             Some(n) if no_force => gap.is_closed_by(n, breadth)?,

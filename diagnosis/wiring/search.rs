@@ -8,7 +8,7 @@ mod offset;
 use asid_core::Result;
 
 use super::evidence::Settings;
-use super::hypotheses::{self, Fault, Hypothesis, Quantity, view_of};
+use super::hypotheses::{self, Fault, Hypothesis, Quantity, view_of, with};
 use super::record::Recorded;
 use super::view::View;
 use super::windows::{Misses, Windows};
@@ -134,7 +134,9 @@ impl Search<'_> {
         for one in tried {
             let misses = self.all.misses(&one.hypothesis.view)?;
             let mut one = self.judged(one.hypothesis, &given, &misses);
-            if self.is_nonsense(view, &one.hypothesis, &misses) {
+            if self.is_nonsense(view, &one.hypothesis, &misses)
+                || self.is_silence(view, &one.hypothesis, &misses)?
+            {
                 one.probability = one.probability.min(self.settings.named / 2.0);
             }
             if best.as_ref().is_none_or(|b| one.shrinkage > b.shrinkage) {
@@ -178,6 +180,29 @@ impl Search<'_> {
         let larger = |q: &&Quantity| size(&hypothesis.view, q) > size(view, q);
         let mut readings = quantities.filter(|q| !q.command).filter(larger);
         hypothesis.fault == Fault::Unit && readings.any(|q| missed[q.place])
+    }
+
+    /// Whether a unit makes a command smaller and leaves no more of it than no command at all would. Where a drive answers late, that it
+    /// does not answer misses less of the motion than that it answers too early, and says nothing of the unit.
+    fn is_silence(
+        &mut self,
+        view: &View,
+        hypothesis: &Hypothesis,
+        misses: &Misses,
+    ) -> Result<bool> {
+        let size = |view: &View, q: &Quantity| view_of(view, q).factor.abs();
+        let mut quantities = hypothesis.quantities.iter().map(|&q| &self.quantities[q]);
+        let smaller = |q: &&Quantity| q.command && size(&hypothesis.view, q) < size(view, q);
+        let Some(command) = quantities.find(smaller) else {
+            return Ok(false);
+        };
+        if hypothesis.fault != Fault::Unit {
+            return Ok(false);
+        }
+        let silent = with(view, command, view_of(view, command).times(0.0));
+        let of_silence = self.all.misses(&silent)?;
+        let tells = self.settings.shrinkage(&of_silence, misses);
+        Ok(self.settings.probability(tells, 0.0) < self.settings.named)
     }
 
     /// Whether the starts that logs give speak against a view.

@@ -5,7 +5,7 @@
 //! that of every partner whose coefficient is as large or larger or has the priority, and that of
 //! whatever lies free on a fixed site.
 
-use crate::{Acting, Acts, Effect, EffectParameter, Site};
+use crate::{Acting, Acts, Effect, EffectParameter, Site, Start};
 use asid_core::{Capabilities, Result, Target};
 use asid_mjcf::Plant;
 
@@ -54,7 +54,10 @@ impl Effect for Friction {
     }
 
     fn parameters(&self) -> &'static [EffectParameter] {
-        const { &[EffectParameter::new("factor", "1", [0.1, 10.0], 1.0)] }
+        const {
+            &[EffectParameter::new("factor", "1", [0.1, 10.0], 1.0)
+                .starting(Start::Values(&[0.2, 0.5, 2.0]))]
+        }
     }
 
     fn sites(&self, plant: &Plant) -> Vec<String> {

@@ -8,11 +8,13 @@ mod ball;
 #[path = "../diagnosis_support/mod.rs"]
 mod diagnosis_support;
 mod far;
+mod late_drive;
 mod ordinary;
 mod row_slopes;
 mod scatter;
 mod small;
 mod steps;
+mod sticking;
 mod stopped;
 mod together;
 mod wiring;

@@ -29,7 +29,7 @@ fn machine(study: &Study) -> Machine {
     Machine::new(engine(), &study.scene, &study.fixed, &study.effects, 0).unwrap()
 }
 
-fn mended(study: &Study) -> Mended {
+pub fn mended(study: &Study) -> Mended {
     mend(study, &machine(study), &Settings::default()).unwrap()
 }
 

@@ -74,13 +74,22 @@ pub(super) struct Replays<'a> {
 impl Replays<'_> {
     /// Excess power that a fitted set leaves of the training logs, a reading, in units of the noise.
     pub(super) fn excess(&self, fitted: &Fitted, members: &[usize]) -> Result<f64> {
-        let of = self.of(fitted, members, Effort::LOOK)?;
+        let of = self.replayed(fitted, members, Effort::LOOK)?;
         let readings = self.bench.train.readings.max(1) as f64;
         Ok((of.fit.cost / readings - 1.0).max(0.0))
     }
 
-    /// Replays a fitted set of candidates.
+    /// Replays a fitted set of candidates, with the variances of its values.
     fn of(&self, fitted: &Fitted, members: &[usize], effort: Effort) -> Result<Explanation> {
+        let mut of = self.replayed(fitted, members, effort)?;
+        for (k, i) in fitted.hypothesis.free().into_iter().enumerate() {
+            of.local_variances[i] = fitted.covariance[(k, k)];
+        }
+        Ok(of)
+    }
+
+    /// Replays a set of candidates at its values.
+    fn replayed(&self, fitted: &Fitted, members: &[usize], effort: Effort) -> Result<Explanation> {
         let study = self.bench.parameters.len();
         let mut at = study;
         let chosen: Vec<_> = members
@@ -93,16 +102,12 @@ impl Replays<'_> {
             })
             .collect();
         let starts = smoothed_starts(self.bench, fitted, self.firsts);
-        let mut of = self.bench.explain(
+        self.bench.explain(
             &chosen,
             &fitted.theta[..study],
             (&starts, &self.open),
             (effort, &UntilLate(self.progress)),
-        )?;
-        for (k, i) in fitted.hypothesis.free().into_iter().enumerate() {
-            of.local_variances[i] = fitted.covariance[(k, k)];
-        }
-        Ok(of)
+        )
     }
 }
 

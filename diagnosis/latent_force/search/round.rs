@@ -12,6 +12,7 @@ use crate::latent_force::screen::Screened;
 use crate::settings::Breadth;
 
 use super::Untried;
+use super::open_loop::OpenLoop;
 use super::prior::log_prior;
 use super::prune::{pruned, pruned_at_once};
 use super::screening::{Screening, Sight};
@@ -48,6 +49,8 @@ pub(super) struct Upon<'r> {
     pub(super) candidates: &'r [Candidate],
     pub(super) open: &'r [usize],
     pub(super) breadth: Breadth,
+    /// Open-loop replays of a set.
+    pub(super) open_loop: OpenLoop<'r>,
     pub(super) progress: &'r dyn Progress,
 }
 
@@ -176,12 +179,53 @@ impl Upon<'_> {
                 continue;
             }
             progress.note(&format!("trying {}", name_of(self.candidates, &members)));
-            let mut set = self.enlarged(screening, s);
+            let mut set = self.begun(screening, s)?;
             set.fit(self.context, (breadth.rounds[0], progress))?;
             sets.push(set);
             progress.advance(1);
         }
         Ok(Fits { sets, left_out })
+    }
+
+    /// The base with the candidates of a set of a screening, at the values where a fit of it begins. Where bodies touch, a law that has no slope
+    /// at its null begins at that of its start values whose replays of whole logs leave least: from a null at which a contact sticks no
+    /// slope tells how far it is to where it slides, and segments that begin as the null has put them do not either.
+    fn begun(&self, screening: &Screening, screened: &Screened) -> Result<Set> {
+        let mut best = self.enlarged(screening, screened);
+        let forms = &screening.columns.forms;
+        let is_secant = |f: usize| forms[f].slopes.iter().all(Option::is_none);
+        if !self.context.has_segments() || !screened.forms.iter().any(|&f| is_secant(f)) {
+            return Ok(best);
+        }
+        let mut from = screened.clone();
+        let mut least = (self.open_loop)(&best)?;
+        for i in 0..screened.forms.len() {
+            let own = screened.forms[i];
+            let like = |&f: &usize| is_secant(f) && forms[f].candidate == forms[own].candidate;
+            for f in (0..forms.len()).filter(like) {
+                if self.progress.is_stopped() {
+                    return Ok(best);
+                }
+                let mut other = from.clone();
+                other.forms[i] = f;
+                other.coefficients[i] = vec![1.0; forms[f].slopes.len()];
+                let set = self.enlarged(screening, &other);
+                let left = (self.open_loop)(&set)?;
+                if left < least {
+                    (least, best, from) = (left, set, other);
+                }
+            }
+        }
+        // Segments first find starts that go with those values, which would else go with the starts.
+        let free = best.fitted.hypothesis.free();
+        let hold = |set: &mut Set, free_too: bool| {
+            let unknowns = &mut set.fitted.hypothesis.unknowns;
+            free.iter().for_each(|&i| unknowns[i].free = free_too);
+        };
+        hold(&mut best, false);
+        best.fit(self.context, (self.breadth.rounds[0], self.progress))?;
+        hold(&mut best, true);
+        Ok(best)
     }
 
     /// The base with the candidates of a set of a screening; a finer law takes the place of the simpler one.

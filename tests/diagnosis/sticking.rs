@@ -1,0 +1,102 @@
+//! A block on a ramp that slides where its model sticks: at the model's friction nothing moves, so that no slope there tells how
+//! far the friction is off.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use asid::core::Capabilities;
+use asid::diagnosis::result::DiagnosisResult;
+use rand::{Rng as _, SeedableRng as _};
+use rand_chacha::ChaCha8Rng;
+
+use super::run_on;
+use crate::diagnosis_support::engine;
+
+/// Gravity, m/s², and the slope of the ramp, rad.
+const GRAVITY: f64 = 9.81;
+const SLOPE: f64 = 0.3;
+/// Friction of the real block; the model has 1.
+const FRICTION: f64 = 0.15;
+/// Height of the block's centre, m.
+const HEIGHT: f64 = 0.02;
+/// Rows of a log, and the time between them, s.
+const ROWS: usize = 60;
+const ROW: f64 = 0.01;
+/// Deviation of a reading, m.
+const NOISE: f64 = 1e-3;
+
+/// The block on its ramp, which lies in the frame's plane: gravity leans instead.
+fn model() -> String {
+    let (sin, cos) = SLOPE.sin_cos();
+    let (along, down) = (GRAVITY * sin, GRAVITY * cos);
+    format!(
+        r#"<mujoco model="block"><option timestep="0.002" gravity="{along} 0 -{down}" cone="elliptic" impratio="10"/>
+        <worldbody><geom name="ramp" type="plane" size="20 20 0.1"/>
+        <body name="block" pos="0 0 {HEIGHT}"><freejoint name="block_free"/>
+        <geom name="block" type="box" size="0.1 0.1 {HEIGHT}" mass="0.5"/></body>
+        </worldbody><sensor><framepos name="place" objtype="xbody" objname="block"/></sensor></mujoco>"#
+    )
+}
+
+/// Where the block is that begins at 0 with a speed down the ramp (m/s, negative uphill): friction acts against the motion, and is too
+/// small to hold it.
+fn place(speed: f64, time: f64) -> f64 {
+    let (sin, cos) = SLOPE.sin_cos();
+    let uphill = GRAVITY * (sin + FRICTION * cos);
+    let downhill = GRAVITY * (sin - FRICTION * cos);
+    let turns = (-speed / uphill).max(0.0);
+    if time < turns {
+        return speed * time + 0.5 * uphill * time * time;
+    }
+    let top = 0.5 * speed * turns;
+    top + speed.max(0.0) * time + 0.5 * downhill * (time - turns).powi(2)
+}
+
+fn log(episode: u32) -> String {
+    let mut random = ChaCha8Rng::seed_from_u64(u64::from(episode));
+    let mut noise = || NOISE * ((0..12).map(|_| random.random::<f64>()).sum::<f64>() - 6.0);
+    let speed = 0.3 * f64::from(episode) - 0.6;
+    let mut text = "time,place.0,place.1,place.2".to_owned();
+    (0..7).for_each(|i| write!(text, ",qpos.block_free.{i}").unwrap());
+    (0..6).for_each(|i| write!(text, ",qvel.block_free.{i}").unwrap());
+    for row in 0..ROWS {
+        let time = ROW * row as f64;
+        let start = match row {
+            0 => format!("0,0,{HEIGHT},1,0,0,0,{speed},0,0,0,0,0"),
+            _ => ",".repeat(12),
+        };
+        let [x, y, z] = [place(speed, time), 0.0, HEIGHT].map(|x| x + noise());
+        write!(text, "\n{time:.2},{x},{y},{z},{start}").unwrap();
+    }
+    text + "\n"
+}
+
+fn diagnosed(folder: &Path) -> DiagnosisResult {
+    for episode in 0..6 {
+        let name = if episode < 4 { "train" } else { "test" };
+        std::fs::write(folder.join(format!("{name}_{episode}.csv")), log(episode)).unwrap();
+    }
+    std::fs::write(folder.join("nominal.xml"), model()).unwrap();
+    let study = "model = \"nominal.xml\"\ntrain = [\"train_*.csv\"]\ntest = [\"test_*.csv\"]\n";
+    std::fs::write(folder.join("study.toml"), study).unwrap();
+    run_on(folder, &[]).0.result
+}
+
+#[test]
+fn the_friction_of_a_block_that_slides_is_found_from_a_model_in_which_it_sticks() {
+    let needed = Capabilities::CONTACT | Capabilities::DOUBLE_PRECISION;
+    if !engine().capabilities().contains(needed) {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let r = diagnosed(folder.path());
+    assert_eq!(
+        r.verdict.effects,
+        ["sliding-friction@ramp"],
+        "{}",
+        r.sentence
+    );
+    let factor = r.effects[0].parameters["factor"];
+    assert!((factor - FRICTION).abs() < 0.02, "{factor}");
+    assert!(r.gap.closed.unwrap() > 0.95, "{:?}", r.gap);
+}
