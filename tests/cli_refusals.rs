@@ -100,8 +100,9 @@ fn settings_that_make_no_sense_are_named() {
     for (key, value) in [("ppo.gamma", "2"), ("ppo.minibatch", "1")] {
         let key = format!("explorer.{key}");
         let setting = format!("{key}={value}");
-        let options = ["--explorer", "fisher-ppo", "--set", &setting];
-        refused_run(&place, &options, &[&key]);
+        let run = ["run", "rod-balancing", "--explorer", "fisher-ppo"];
+        let arguments = [&run[..], &["--set", &setting]].concat();
+        refused(&place, &arguments, &[&key]);
     }
 }
 

@@ -445,10 +445,14 @@ fn an_interrupted_run_leaves_nothing() {
 fn a_report_names_the_explorers_objective_and_the_measure_apart() {
     let place = Workplace::new();
     let arguments = [
-        "run",
+        "explore",
         "sphere-striking",
         "--explorer",
         "fisher-cem",
+        "--set",
+        "explorer.iterations=1",
+        "--set",
+        "explorer.population=4",
         "--set",
         "explorer.fisher.form=one-step",
         "--set",
@@ -456,7 +460,7 @@ fn a_report_names_the_explorers_objective_and_the_measure_apart() {
         "--out",
         "a",
     ];
-    done(&place, &tiny(&arguments));
+    done(&place, &arguments);
     let trace = json(&place.read("a/trace.json"));
     let exploration = &trace["exploration"];
     for (key, expected) in [
