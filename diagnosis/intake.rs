@@ -1,8 +1,8 @@
 //! What happens to logs before any physics: outliers are left out, wiring is mended, and both are said.
 
+use asid_core::registry::find;
 use asid_core::{Layout, Result};
-use asid_effects::EffectSpec;
-use asid_effects::catalogue::sensor_dynamics::DELAY;
+use asid_effects::{EffectEntry, EffectSpec};
 use asid_logs::episode::ColumnMapping;
 
 use crate::machine::Machine;
@@ -114,10 +114,12 @@ impl Intake {
     #[must_use]
     pub fn clock_short(&self, effects: &[EffectSpec]) -> Option<f64> {
         let clock = self.clock()?;
+        let delays = |e: &&EffectSpec| {
+            find::<EffectEntry>(&e.name).is_ok_and(|entry| (entry.make)().delays())
+        };
         let late = |sensor: &String| {
-            let own = effects
-                .iter()
-                .find(|e| e.name == DELAY && e.site == *sensor)?;
+            let mut own = effects.iter().filter(|e| e.site == *sensor);
+            let own = own.find(delays)?;
             own.values.first().map(|(_, seconds)| *seconds)
         };
         let delays: Vec<f64> = clock.columns.iter().map(late).collect::<Option<_>>()?;

@@ -201,6 +201,10 @@ pub trait Effect: Send + Sync {
     fn rounds(&self) -> bool {
         false
     }
+    /// Whether it hands readings on late by its one parameter, s, and does nothing else.
+    fn delays(&self) -> bool {
+        false
+    }
     /// What an engine must be able to do for it, besides setting its targets and, where it
     /// [steps](Effect::steps), calling hooks.
     fn needs(&self) -> Capabilities {

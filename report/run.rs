@@ -24,11 +24,11 @@ mod posterior;
 mod signals;
 mod trace;
 
-pub use asid_results::trace::{FileEntry, NamedText};
+pub use asid_results::trace::{FileEntry, NamedText, StageCost};
 pub use trace::{
     Downstream, Episode, ExpectedStd, Exploration, LearningCurve, NamedValue, Narrowing,
     ObjectTrack, ParameterReport, Phase, PlanarPath, Prior, RealWorld, Replay, RunReport, SCHEMA,
-    Search, Shape, ShapeKind, SideView, Signal, StageCost, Trial,
+    Search, Shape, ShapeKind, SideView, Signal, Trial,
 };
 
 use std::path::Path;

@@ -186,6 +186,18 @@ pub struct ParameterWords {
     pub null: f64,
 }
 
+/// What a stage of a run took.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct StageCost {
+    /// Stage, such as `explore`.
+    pub stage: String,
+    /// Wall-clock time, s.
+    #[serde(deserialize_with = "nullable::scalar")]
+    pub wall_s: f64,
+    /// Physics steps.
+    pub physics_steps: u64,
+}
+
 /// A name and a text.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct NamedText {

@@ -11,6 +11,7 @@ use asid_core::posterior::Posterior;
 use asid_core::problem::Problem;
 use asid_core::real_world::{Attempt, RealEpisode, RealWorld};
 use asid_core::solve::{TaskSolver, Trial};
+pub use asid_results::trace::StageCost;
 
 /// Samples that stand for the prior where nothing was identified.
 const PRIOR_SAMPLES: usize = 256;
@@ -109,17 +110,6 @@ pub fn episode_information_as(
         }
     }
     Ok(out)
-}
-
-/// Seconds and physics steps of one stage.
-#[derive(Clone, Debug, PartialEq)]
-pub struct StageCost {
-    /// Name of the stage.
-    pub stage: &'static str,
-    /// Wall-clock time, s.
-    pub wall_s: f64,
-    /// Physics steps.
-    pub physics_steps: u64,
 }
 
 /// Everything that came of a run.
@@ -260,10 +250,10 @@ impl<'a> Stopwatch<'a> {
         }
     }
 
-    fn lap(&mut self, stage: &'static str) -> StageCost {
+    fn lap(&mut self, stage: &str) -> StageCost {
         let steps = self.problem.physics_steps();
         let cost = StageCost {
-            stage,
+            stage: stage.to_owned(),
             wall_s: self.at.elapsed().as_secs_f64(),
             physics_steps: steps - self.steps,
         };

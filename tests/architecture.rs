@@ -2,15 +2,14 @@
 
 #![allow(clippy::unwrap_used)]
 
+mod source_support;
+
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
-use std::path::{Path, PathBuf};
+
+use source_support::{root, sources, untested};
 
 type Names = BTreeSet<String>;
-
-fn root() -> PathBuf {
-    PathBuf::from(env!("CARGO_MANIFEST_DIR"))
-}
 
 /// The folders of the crates in the page's table from above, each with those that it uses.
 fn page() -> Vec<(String, Names)> {
@@ -78,30 +77,9 @@ fn crates_use_each_other_as_the_page_says() {
     }
 }
 
-/// Source files below a folder, without those of crates inside of it.
-fn sources(folder: &Path, files: &mut Vec<PathBuf>) {
-    for entry in fs::read_dir(folder).unwrap() {
-        let path = entry.unwrap().path();
-        let name = path.file_name().unwrap().to_str().unwrap();
-        if path.is_dir() {
-            let other = ["tests", "examples", "target"].contains(&name)
-                || name.starts_with('.')
-                || path.join("Cargo.toml").exists();
-            if !other {
-                sources(&path, files);
-            }
-        } else if name.ends_with(".rs") {
-            files.push(path);
-        }
-    }
-}
-
 /// Modules at the top of a crate that `text`, a module `depth` folders down, speaks of.
 fn mentioned(text: &str, depth: usize) -> Names {
-    let code: String = text
-        .split("#[cfg(test)]\nmod tests")
-        .next()
-        .unwrap_or_default()
+    let code: String = untested(text)
         .lines()
         .map(|line| line.split("//").next().unwrap_or_default().to_owned() + "\n")
         .collect();
@@ -155,10 +133,8 @@ fn modules(folder: &str) -> BTreeMap<String, Names> {
     } else {
         folder
     };
-    let mut files = Vec::new();
-    sources(&source, &mut files);
     let mut graph: BTreeMap<String, Names> = BTreeMap::new();
-    for file in files {
+    for file in sources(&source, false) {
         let parts: Vec<&str> = file
             .strip_prefix(&source)
             .unwrap()
@@ -167,8 +143,7 @@ fn modules(folder: &str) -> BTreeMap<String, Names> {
             .collect();
         let own = parts[0].trim_end_matches(".rs").to_owned();
         let last = parts[parts.len() - 1];
-        let apart = ["lib.rs", "main.rs", "build.rs"].contains(&last) || last.ends_with("tests.rs");
-        if apart {
+        if ["lib.rs", "main.rs", "build.rs"].contains(&last) {
             continue;
         }
         let depth = parts.len() - usize::from(last == "mod.rs");

@@ -96,6 +96,14 @@ fn settings_that_make_no_sense_are_named() {
             refused_run(&place, &["--set", &format!("{key}={value}")], &[key]);
         }
     }
+    // A key is named as it is set, wherever its value is checked.
+    for (key, value) in [("ppo.gamma", "2"), ("ppo.minibatch", "1")] {
+        let key = format!("explorer.{key}");
+        let setting = format!("{key}={value}");
+        let run = ["run", "rod-balancing", "--explorer", "fisher-ppo"];
+        let arguments = [&run[..], &["--set", &setting]].concat();
+        refused(&place, &arguments, &[&key]);
+    }
 }
 
 #[test]
@@ -393,4 +401,17 @@ fn an_explorer_left_out_says_how_to_get_it() {
     ];
     let says = ["fisher-ppo", "cargo xtask setup", "--features torch"];
     refused(&Workplace::new(), &arguments, &says);
+}
+
+#[cfg(not(feature = "torch"))]
+#[test]
+fn the_list_says_that_the_solver_ppo_needs_torch() {
+    let place = Workplace::new();
+    let list = String::from_utf8(place.run(&["list"]).stdout).unwrap();
+    let is_its = |line: &&str| line.split_whitespace().take(2).eq(["solver", "ppo"]);
+    let line = list.lines().find(is_its).unwrap();
+    assert!(
+        line.contains("missing") && line.contains("--features torch"),
+        "{line}"
+    );
 }

@@ -439,6 +439,44 @@ fn an_interrupted_run_leaves_nothing() {
     assert!(place.names().is_empty(), "{:?}", place.names());
 }
 
+/// Episodes of all explorers are measured alike, so that they can be compared, and the report says so. A ball has no
+/// heading, and its path is drawn all the same.
+#[test]
+fn a_report_names_the_explorers_objective_and_the_measure_apart() {
+    let place = Workplace::new();
+    let arguments = [
+        "explore",
+        "sphere-striking",
+        "--explorer",
+        "fisher-cem",
+        "--set",
+        "explorer.iterations=1",
+        "--set",
+        "explorer.population=4",
+        "--set",
+        "explorer.fisher.form=one-step",
+        "--set",
+        "explorer.fisher.objective=d-optimal",
+        "--out",
+        "a",
+    ];
+    done(&place, &arguments);
+    let trace = json(&place.read("a/trace.json"));
+    let exploration = &trace["exploration"];
+    for (key, expected) in [
+        ("objective", "d-optimal (one-step form)"),
+        ("form", "trajectory"),
+        ("gained_unit", "prior variance"),
+    ] {
+        assert_eq!(exploration[key], expected);
+    }
+    let page = place.read("a/report.html");
+    assert!(page.contains("measured as that of every explorer"));
+    assert!(page.contains("own objective is d-optimal (one-step form)"));
+    assert!(trace["episode"]["objects"][0]["poses"].is_array());
+    assert!(page.contains("Seen from above") && !page.contains("No view from above"));
+}
+
 #[test]
 fn lists_and_help_say_what_there_is() {
     let place = Workplace::new();

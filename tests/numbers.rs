@@ -2,8 +2,11 @@
 
 #![allow(clippy::unwrap_used)]
 
+mod source_support;
+
 use std::fs;
-use std::path::{Path, PathBuf};
+
+use source_support::{root, sources, untested};
 
 /// Folders of the crates whose numbers are looked at. The C ABI's are those of its header, which explains them.
 const CRATES: [&str; 18] = [
@@ -33,24 +36,9 @@ const FEWEST_WORDS: usize = 3;
 /// Types of numbers.
 const TYPES: [&str; 5] = ["f64", "f32", "usize", "u64", "u32"];
 
-fn sources(folder: &Path, files: &mut Vec<PathBuf>) {
-    for entry in fs::read_dir(folder).unwrap() {
-        let path = entry.unwrap().path();
-        let name = path.file_name().unwrap().to_str().unwrap();
-        if path.is_dir() {
-            if !["tests", "examples", "target"].contains(&name) {
-                sources(&path, files);
-            }
-        } else if name.ends_with(".rs") && !name.ends_with("tests.rs") {
-            files.push(path);
-        }
-    }
-}
-
 /// Names of the numeric constants of a text that say too little of themselves.
 fn unexplained(text: &str) -> Vec<String> {
-    let code = text.split("#[cfg(test)]\nmod tests").next().unwrap();
-    let lines: Vec<&str> = code.lines().map(str::trim).collect();
+    let lines: Vec<&str> = untested(text).lines().map(str::trim).collect();
     let mut found = Vec::new();
     for (i, line) in lines.iter().enumerate() {
         let public = line
@@ -84,12 +72,10 @@ fn unexplained(text: &str) -> Vec<String> {
 
 #[test]
 fn every_number_says_what_it_is() {
-    let root = PathBuf::from(env!("CARGO_MANIFEST_DIR"));
+    let root = root();
     let mut silent = Vec::new();
     for folder in CRATES {
-        let mut files = Vec::new();
-        sources(&root.join(folder), &mut files);
-        for file in files {
+        for file in sources(&root.join(folder), true) {
             let text = fs::read_to_string(&file).unwrap();
             let place = file.strip_prefix(&root).unwrap().display().to_string();
             silent.extend(

@@ -1,89 +1,56 @@
 //! Forces that the model lacks, as arrows: where they act, along what, and how large they are frame by frame.
 
 use asid_core::layout::JointKind;
-use asid_results::trace::{ForceSeries, ForceTrace};
+use asid_results::trace::ForceTrace;
 use asid_results::view::Force;
 
 use crate::Stage;
 
-/// The force that is missing at a degree of freedom along an episode.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Missing {
-    /// Joint; with the axis (`.x`, `.rx`, …) where it has several.
-    pub dof: String,
-    /// Unit: `N` or `N m`.
-    pub unit: String,
-    /// Times since the episode's first row, s, increasing.
-    pub time: Vec<f64>,
-    /// Without effects, N or N m.
-    pub before: Vec<f64>,
-    /// With the verdict's effects; empty where there are none.
-    pub after: Vec<f64>,
-}
-
-impl From<&ForceTrace> for Missing {
-    fn from(trace: &ForceTrace) -> Self {
-        let ForceSeries {
-            time,
-            before,
-            after,
-            ..
-        } = trace.whole.clone();
-        Self {
-            dof: trace.dof.clone(),
-            unit: trace.unit.clone(),
-            time,
-            before,
-            after,
-        }
-    }
-}
-
-impl Missing {
-    /// At the frames of an episode; `None` where the scene has no such degree of freedom.
-    pub(crate) fn at(&self, stage: &Stage<'_>, frames: &[f64]) -> Option<Force> {
-        let plant = stage.plant;
-        let joints = &plant.layout.joints;
-        let named = |j: usize| {
-            let axis = self.dof.strip_prefix(&joints[j].name)?;
-            (axis.is_empty() || axis.starts_with('.')).then_some((j, axis))
-        };
-        // The longest name wins: one joint's may begin with another's.
-        let (joint, axis) = (0..joints.len())
-            .filter_map(named)
-            .max_by_key(|(j, _)| joints[*j].name.len())?;
-        let own = &plant.joints[joint];
-        let unit = |letter: &str| match letter {
-            "x" => Some([1.0, 0.0, 0.0]),
-            "y" => Some([0.0, 1.0, 0.0]),
-            "z" => Some([0.0, 0.0, 1.0]),
-            _ => None,
-        };
-        let (turns, in_world, direction, at) = match joints[joint].kind {
-            JointKind::Hinge => (true, false, own.axis, own.anchor),
-            JointKind::Slide => (false, false, own.axis, own.anchor),
-            JointKind::Ball => (true, false, unit(axis.strip_prefix(".r")?)?, own.anchor),
-            JointKind::Free => {
-                let center = plant.bodies[own.body].center;
-                match axis.strip_prefix(".r") {
-                    Some(letter) => (true, false, unit(letter)?, center),
-                    None => (false, true, unit(axis.strip_prefix('.')?)?, center),
-                }
+/// The force that is missing along an episode, at some frames of it; `None` where the scene has no such degree of freedom.
+#[must_use]
+pub fn at(missing: &ForceTrace, stage: &Stage<'_>, frames: &[f64]) -> Option<Force> {
+    let plant = stage.plant;
+    let joints = &plant.layout.joints;
+    let named = |j: usize| {
+        let axis = missing.dof.strip_prefix(&joints[j].name)?;
+        (axis.is_empty() || axis.starts_with('.')).then_some((j, axis))
+    };
+    // The longest name wins: one joint's may begin with another's.
+    let (joint, axis) = (0..joints.len())
+        .filter_map(named)
+        .max_by_key(|(j, _)| joints[*j].name.len())?;
+    let own = &plant.joints[joint];
+    let unit = |letter: &str| match letter {
+        "x" => Some([1.0, 0.0, 0.0]),
+        "y" => Some([0.0, 1.0, 0.0]),
+        "z" => Some([0.0, 0.0, 1.0]),
+        _ => None,
+    };
+    let (turns, in_world, direction, at) = match joints[joint].kind {
+        JointKind::Hinge => (true, false, own.axis, own.anchor),
+        JointKind::Slide => (false, false, own.axis, own.anchor),
+        JointKind::Ball => (true, false, unit(axis.strip_prefix(".r")?)?, own.anchor),
+        JointKind::Free => {
+            let center = plant.bodies[own.body].center;
+            match axis.strip_prefix(".r") {
+                Some(letter) => (true, false, unit(letter)?, center),
+                None => (false, true, unit(axis.strip_prefix('.')?)?, center),
             }
-        };
-        let length = direction.iter().map(|x| x * x).sum::<f64>().sqrt();
-        Some(Force {
-            dof: self.dof.clone(),
-            unit: self.unit.clone(),
-            part: stage.part_of[own.body],
-            turns,
-            at: at.map(|x| x as f32),
-            axis: direction.map(|x| (x / length) as f32),
-            in_world,
-            before: along(&self.time, &self.before, frames),
-            after: along(&self.time, &self.after, frames),
-        })
-    }
+        }
+    };
+    let whole = &missing.whole;
+    let length = direction.iter().map(|x| x * x).sum::<f64>().sqrt();
+    Some(Force {
+        dof: missing.dof.clone(),
+        unit: missing.unit.clone(),
+        part: stage.part_of[own.body],
+        turns,
+        at: at.map(|x| x as f32),
+        axis: direction.map(|x| (x / length) as f32),
+        in_world,
+        before: along(&whole.time, &whole.before, frames),
+        after: along(&whole.time, &whole.after, frames),
+    })
 }
 
 /// A series at other times; 0 outside of it and where it is not known. Nothing where there is no series.
@@ -113,6 +80,7 @@ mod tests {
     use super::*;
     use asid_core::Scene;
     use asid_mjcf::Plant;
+    use asid_results::trace::ForceSeries;
 
     #[test]
     fn arrows_stand_where_the_degree_of_freedom_is() {
@@ -123,13 +91,16 @@ mod tests {
         let plant = Plant::of(&scene).unwrap();
         let stage = Stage::of(&scene, &plant).unwrap();
         let of = |dof: &str| {
-            let missing = Missing {
+            let missing = ForceTrace {
                 dof: dof.into(),
-                time: vec![1.0, 2.0],
-                before: vec![3.0, 5.0],
-                ..Missing::default()
+                whole: ForceSeries {
+                    time: vec![1.0, 2.0],
+                    before: vec![3.0, 5.0],
+                    ..ForceSeries::default()
+                },
+                ..ForceTrace::default()
             };
-            missing.at(&stage, &[0.0, 1.0, 1.5, 3.0])
+            at(&missing, &stage, &[0.0, 1.0, 1.5, 3.0])
         };
         let arm = of("arm").unwrap();
         assert_eq!((arm.part, arm.turns, arm.axis), (1, true, [0.0, 0.0, 1.0]));

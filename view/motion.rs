@@ -1,10 +1,11 @@
 //! Motions of a scene's machines as frames of an episode.
 
+use asid_results::trace::ForceTrace;
 use asid_results::view::{Machine, Origin, Take};
 use nalgebra::Isometry3;
 
 use crate::Stage;
-use crate::force::Missing;
+use crate::force;
 use crate::pack::{Cube, text};
 
 /// Most frames a second. A viewer that draws 60 a second interpolates one more between any two, which looks smooth.
@@ -53,7 +54,7 @@ pub struct Played<'a> {
     /// The machines.
     pub motions: &'a [Motion],
     /// Forces that the model lacks.
-    pub missing: &'a [Missing],
+    pub missing: &'a [ForceTrace],
 }
 
 impl Stage<'_> {
@@ -129,7 +130,7 @@ impl Stage<'_> {
                 .map(|(motion, (poses, points))| machine(motion, poses, points))
                 .collect(),
             forces: (played.missing.iter())
-                .filter_map(|m| m.at(self, &time))
+                .filter_map(|m| force::at(m, self, &time))
                 .collect(),
             // A tenth of a millisecond is far below a frame.
             time: time

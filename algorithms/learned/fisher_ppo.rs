@@ -110,7 +110,7 @@ impl LearnedExplorer for FisherPpo {
 
     fn check(&self) -> Result<()> {
         check_environments(self.environments)?;
-        self.ppo.validate()?;
+        self.ppo.validate("explorer")?;
         self.fisher.check()
     }
 

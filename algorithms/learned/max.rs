@@ -129,7 +129,7 @@ impl LearnedExplorer for Max {
 
     fn check(&self) -> Result<()> {
         check_environments(self.environments)?;
-        self.ppo.validate()?;
+        self.ppo.validate("explorer")?;
         let e = &self.ensemble;
         let rules = [
             ("rounds", self.rounds > 0, "at least 1"),

@@ -135,7 +135,7 @@ impl LearnedExplorer for MaxMi {
 
     fn check(&self) -> Result<()> {
         check_environments(self.environments)?;
-        self.ppo.validate()?;
+        self.ppo.validate("explorer")?;
         let p = &self.predictor;
         let rules = [
             ("hidden", !p.hidden.contains(&0), "widths of at least 1"),

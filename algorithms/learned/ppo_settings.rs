@@ -84,11 +84,19 @@ impl Default for PpoConfig {
 }
 
 impl PpoConfig {
-    /// Checks every value.
+    /// Checks every value; `section` is the one of the configuration that has these settings, such as `explorer`.
     ///
     /// # Errors
     /// [`Error::Config`] names the first key that is out of its domain.
-    pub fn validate(&self) -> Result<()> {
+    pub fn validate(&self, section: &str) -> Result<()> {
+        self.check().map_err(|(key, message)| Error::Config {
+            key: format!("{section}.ppo.{key}"),
+            message,
+        })
+    }
+
+    /// The first key that is out of its domain, and what is wrong with it.
+    fn check(&self) -> std::result::Result<(), (&'static str, String)> {
         let positive = [
             ("learning_rate", self.learning_rate),
             ("clip", self.clip),
@@ -98,12 +106,12 @@ impl PpoConfig {
         ];
         for (key, value) in positive {
             if !(value > 0.0 && value.is_finite()) {
-                return Err(invalid(key, format!("{value} should be above 0")));
+                return Err((key, format!("{value} should be above 0")));
             }
         }
         for (key, value) in [("gamma", self.gamma), ("lambda", self.lambda)] {
             if !(0.0..=1.0).contains(&value) {
-                return Err(invalid(key, format!("{value} should be between 0 and 1")));
+                return Err((key, format!("{value} should be between 0 and 1")));
             }
         }
         let not_negative = [
@@ -112,7 +120,7 @@ impl PpoConfig {
         ];
         for (key, value) in not_negative {
             if !(value >= 0.0 && value.is_finite()) {
-                return Err(invalid(key, format!("{value} should be 0 or above")));
+                return Err((key, format!("{value} should be 0 or above")));
             }
         }
         let counts = [
@@ -123,30 +131,23 @@ impl PpoConfig {
         ];
         for (key, value) in counts {
             if value == 0 {
-                return Err(invalid(key, "0 should be at least 1".to_owned()));
+                return Err((key, "0 should be at least 1".to_owned()));
             }
         }
         if self.minibatch < 2 {
             let message = format!("{} should be at least 2", self.minibatch);
-            return Err(invalid("minibatch", message));
+            return Err(("minibatch", message));
         }
         if !(-20.0..=5.0).contains(&self.initial_log_std) {
             let message = format!("{} should be between -20 and 5", self.initial_log_std);
-            return Err(invalid("initial_log_std", message));
+            return Err(("initial_log_std", message));
         }
         let index = self.device.strip_prefix("cuda:").map(str::parse::<usize>);
         if self.device != "cpu" && self.device != "cuda" && !matches!(index, Some(Ok(_))) {
             let message = format!("`{}` should be cpu, cuda or cuda:<index>", self.device);
-            return Err(invalid("device", message));
+            return Err(("device", message));
         }
         Ok(())
-    }
-}
-
-fn invalid(key: &str, message: String) -> Error {
-    Error::Config {
-        key: format!("ppo.{key}"),
-        message,
     }
 }
 
@@ -156,7 +157,7 @@ mod tests {
 
     #[test]
     fn the_defaults_are_valid_and_partial_settings_keep_the_rest() {
-        PpoConfig::default().validate().unwrap();
+        PpoConfig::default().validate("solver").unwrap();
         let config: PpoConfig = serde_json::from_str(r#"{"gamma":1.0}"#).unwrap();
         assert_eq!(config.gamma, 1.0);
         assert_eq!(config.minibatch, PpoConfig::default().minibatch);
@@ -167,12 +168,12 @@ mod tests {
     fn a_value_out_of_its_domain_is_named() {
         let message = |json: &str| {
             let config: PpoConfig = serde_json::from_str(json).unwrap();
-            config.validate().unwrap_err().to_string()
+            config.validate("explorer").unwrap_err().to_string()
         };
-        assert!(message(r#"{"gamma":1.5}"#).starts_with("config ppo.gamma: 1.5"));
-        assert!(message(r#"{"clip":0}"#).contains("ppo.clip"));
-        assert!(message(r#"{"minibatch":1}"#).contains("ppo.minibatch"));
-        assert!(message(r#"{"hidden":[64,0]}"#).contains("ppo.hidden"));
-        assert!(message(r#"{"device":"tpu"}"#).contains("ppo.device"));
+        assert!(message(r#"{"gamma":1.5}"#).starts_with("config explorer.ppo.gamma: 1.5"));
+        assert!(message(r#"{"clip":0}"#).contains("explorer.ppo.clip"));
+        assert!(message(r#"{"minibatch":1}"#).contains("explorer.ppo.minibatch"));
+        assert!(message(r#"{"hidden":[64,0]}"#).contains("explorer.ppo.hidden"));
+        assert!(message(r#"{"device":"tpu"}"#).contains("explorer.ppo.device"));
     }
 }

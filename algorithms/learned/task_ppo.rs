@@ -67,7 +67,7 @@ impl LearnedExplorer for TaskPpo {
 
     fn check(&self) -> Result<()> {
         check_environments(self.environments)?;
-        self.ppo.validate()
+        self.ppo.validate("explorer")
     }
 
     fn observation(&self, problem: &Problem<'_>) -> Result<Vec<ObservationEntry>> {

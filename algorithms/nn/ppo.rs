@@ -119,7 +119,7 @@ pub(crate) fn learn(
     seed: u64,
     on_progress: &mut dyn FnMut(&PpoProgress) -> ControlFlow<()>,
 ) -> Result<Learnt> {
-    config.validate()?;
+    config.validate("explorer")?;
     let device = device(config)?;
     tch::set_num_threads(1);
     let [mut weights, actions, mut order] = streams(seed);

@@ -68,7 +68,7 @@ asid_core::register!(SolverEntry {
                 message: "must be at least 2".into(),
             });
         }
-        solver.ppo.validate()?;
+        solver.ppo.validate("solver")?;
         Ok(Box::new(solver))
     },
 });

@@ -7,7 +7,7 @@
 
 use std::sync::{PoisonError, RwLock};
 
-use crate::backend::Backend;
+use crate::backend::{Backend, Capabilities};
 use crate::error::{Error, Result};
 use crate::explore::Explorer;
 use crate::identify::Identifier;
@@ -126,6 +126,19 @@ pub fn all<E: Entry>() -> Vec<&'static E> {
     entries.extend(added.iter().copied());
     entries.sort_by_key(|e| e.name());
     entries
+}
+
+/// The engine that is used where none is named: the first built in that computes in single precision, whose steps cost
+/// least, for a search takes very many; else the first.
+#[must_use]
+pub fn default_backend() -> Option<&'static BackendEntry> {
+    let engines = all::<BackendEntry>();
+    let is_quick = |entry: &&&BackendEntry| {
+        matches!(entry.origin, Origin::Linked(_))
+            && (entry.make)()
+                .is_ok_and(|e| !e.capabilities().contains(Capabilities::DOUBLE_PRECISION))
+    };
+    engines.iter().find(is_quick).or(engines.first()).copied()
 }
 
 /// Adds an entry for the rest of the process, and returns the name that it got.

@@ -2,7 +2,6 @@
 
 use asid_core::{Model, Result};
 use asid_results::view::{Origin, View};
-use asid_view::force::Missing;
 use asid_view::motion::Played;
 use asid_view::{Motion, Stage, logged};
 
@@ -60,12 +59,7 @@ impl Telling<'_> {
         for e in 0..bench.test.logs.episodes.len().min(SHOWN) {
             let starts = [nominal, identified, refined].map(|h| h.starts.get(e));
             let motions = self.motions(&bench.test.logs, e, &models, &starts, &mut unread)?;
-            told.push((
-                &bench.test.logs.episodes[e],
-                "held out",
-                motions,
-                Vec::new(),
-            ));
+            told.push((&bench.test.logs.episodes[e], "held out", motions, &[][..]));
         }
         let forces = &self.findings.forces;
         let trained = forces.first().and_then(|f| {
@@ -76,12 +70,11 @@ impl Telling<'_> {
             let starts = [&bench.train.starts, &none.starts, &best.fit.point.starts];
             let starts = starts.map(|s| s.get(e));
             let motions = self.motions(&bench.train.logs, e, &models, &starts, &mut unread)?;
-            let missing: Vec<Missing> = forces.iter().map(Missing::from).collect();
             told.push((
                 &bench.train.logs.episodes[e],
                 "fitted to, with the missing force",
                 motions,
-                missing,
+                forces.as_slice(),
             ));
         }
         let stage = Stage::of(&machine.scene, &machine.plant)?;

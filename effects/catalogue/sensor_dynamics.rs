@@ -13,11 +13,8 @@ use asid_mjcf::native::NativeModel;
 use super::sensor::sensors;
 use super::{at_least, values};
 
-/// Name of the effect by which a reading is late.
-pub const DELAY: &str = "sensor-delay";
-
 crate::register!(EffectEntry {
-    name: DELAY,
+    name: "sensor-delay",
     about: "a reading is old",
     make: || Box::new(Delay),
 });
@@ -110,6 +107,10 @@ impl Acting for DelayAt {
 }
 
 impl Effect for Delay {
+    fn delays(&self) -> bool {
+        true
+    }
+
     fn mistaken_for(&self) -> &'static [Confusion] {
         &[Confusion {
             with: &["actuator-lag", "sensor-filter"],

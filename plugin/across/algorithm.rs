@@ -212,6 +212,10 @@ impl Effect for Across<Box<dyn Effect>> {
         self.run(|effect| effect.rounds())
     }
 
+    fn delays(&self) -> bool {
+        self.run(|effect| effect.delays())
+    }
+
     fn needs(&self) -> Capabilities {
         self.run(|effect| effect.needs())
     }

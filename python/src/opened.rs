@@ -5,11 +5,8 @@ use std::sync::atomic::AtomicU64;
 
 use asid_algorithms::fisher::FisherSettings;
 use asid_core::progress::Silent;
-use asid_core::registry::{BackendEntry, TaskEntry, find};
+use asid_core::registry::{BackendEntry, TaskEntry, default_backend, find};
 use asid_core::{Backend, Error, Model, Parameter, Problem, Result, Streams, Task};
-
-/// The engine where none is named, as on the command line: the one that needs no native library.
-const DEFAULT: &str = "rapier";
 
 /// What a batch of episodes is asked for.
 #[derive(Clone, Debug)]
@@ -94,8 +91,11 @@ impl Opened {
 
 /// The engine of this name, where it can do what the task needs.
 fn backend(name: Option<&str>, task: &dyn Task) -> Result<Box<dyn Backend>> {
-    let name = name.unwrap_or(DEFAULT);
-    let backend = (find::<BackendEntry>(name)?.make)()?;
+    let entry = match name {
+        Some(name) => find::<BackendEntry>(name)?,
+        None => default_backend().ok_or_else(|| Error::Failed("no engine is built in".into()))?,
+    };
+    let backend = (entry.make)()?;
     let lacking = task.spec().requires - backend.capabilities();
     if lacking.is_empty() {
         return Ok(backend);
@@ -105,7 +105,7 @@ fn backend(name: Option<&str>, task: &dyn Task) -> Result<Box<dyn Backend>> {
         .map(|(n, _)| n.to_lowercase().replace('_', " "))
         .collect();
     Err(Error::Incapable {
-        backend: name.to_owned(),
+        backend: entry.name.to_owned(),
         what: format!("do what this task needs: {}", names.join(", ")),
     })
 }

@@ -58,10 +58,13 @@ fn lead(exploration: &Exploration, episode: &str) -> String {
     let mut text = match (exploration.objective.as_str(), exploration.form.as_str()) {
         ("", _) => format!("Fisher information of the {episode} episode."),
         (objective, "") => {
-            format!("Fisher information of the {episode} episode; the objective is {objective}.")
+            format!(
+                "Fisher information of the {episode} episode. The explorer's own objective is {objective}."
+            )
         }
         (objective, form) => format!(
-            "Fisher information of the {episode} episode, with {}; the objective is {objective}.",
+            "Fisher information of the {episode} episode, measured as that of every explorer: with {}. \
+             The explorer's own objective is {objective}.",
             match form {
                 "one-step" => "the sensitivities of one control step at a time",
                 "trajectory" => "sensitivities from the episode's start on",

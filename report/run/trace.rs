@@ -11,7 +11,7 @@ pub use stages::{
 use serde::{Deserialize, Serialize};
 
 use asid_results::nullable;
-use asid_results::trace::{FileEntry, NamedText};
+use asid_results::trace::{FileEntry, NamedText, StageCost};
 use asid_results::view::View;
 
 /// Version of the layout of `trace.json`.
@@ -242,16 +242,4 @@ pub struct Narrowing {
     /// The 2.5, 25, 50, 75 and 97.5 % quantiles.
     #[serde(deserialize_with = "nullable::array")]
     pub quantiles: [f64; 5],
-}
-
-/// What a stage took.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct StageCost {
-    /// Stage, such as `explore`.
-    pub stage: String,
-    /// Time in s.
-    #[serde(deserialize_with = "nullable::scalar")]
-    pub wall_s: f64,
-    /// Physics steps.
-    pub physics_steps: u64,
 }

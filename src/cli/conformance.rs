@@ -12,9 +12,10 @@ use serde::Serialize;
 
 use super::output::{OutFolder, write_json, write_text};
 use super::progress::Bars;
+use super::result::Program;
 use super::settings;
 use super::{failure, plugins, session};
-use result::{ConformanceResult, Count, Engine, Versions, sentence, verdict};
+use result::{ConformanceResult, Count, Engine, sentence, verdict};
 
 mod cell;
 mod choice;
@@ -117,10 +118,7 @@ pub fn conformance(arguments: &Arguments) -> Result<()> {
         schema: 1,
         rows,
         engines: said,
-        versions: Versions {
-            asid: env!("CARGO_PKG_VERSION"),
-            git: env!("ASID_GIT"),
-        },
+        versions: Program::THIS,
     };
     if let Some(out) = &out {
         write(out, &result, &engines, patterns)?;

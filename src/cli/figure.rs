@@ -29,6 +29,7 @@ use serde::Serialize;
 
 use super::options::Common;
 use super::output::{OutFolder, write_json, write_text};
+use super::result::Program;
 use drawing::{Claim, Data, Drawing, Number, Panel, mean, median, share};
 
 /// Compares methods on a task under one more setting, in a folder of its own that is gone on with.
@@ -145,14 +146,8 @@ struct FigureResult<'a> {
     notes: &'a [String],
     numbers: &'a [Number],
     claims: &'a [Claim],
-    versions: Versions,
+    versions: Program,
     command: String,
-}
-
-#[derive(Serialize)]
-struct Versions {
-    asid: &'static str,
-    git: &'static str,
 }
 
 /// Draws a figure and writes its folder.
@@ -178,10 +173,7 @@ pub fn figure(name: &str, request: &Request<'_>) -> Result<()> {
         notes: &drawing.notes,
         numbers: &drawing.numbers,
         claims: &drawing.claims,
-        versions: Versions {
-            asid: env!("CARGO_PKG_VERSION"),
-            git: env!("ASID_GIT"),
-        },
+        versions: Program::THIS,
         command: super::run::command_line(),
     };
     out.write(|folder| {

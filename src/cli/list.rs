@@ -20,12 +20,15 @@ pub struct Arguments {
     json: bool,
 }
 
-/// What this build may lack: kind, name, the feature that brings it.
+/// What this build may lack: kind, name, the feature that brings it. What is not built in cannot say so itself.
 const OPTIONAL: [(&str, &str, &str); 3] = [
     ("backend", "mujoco", "mujoco"),
     ("backend", "rapier", "rapier"),
     ("solver", "ppo", "torch"),
 ];
+
+/// Features that need a native library.
+const NATIVE: [&str; 2] = ["mujoco", "torch"];
 
 /// Packages whose parts count as built in.
 const OWN: [&str; 7] = [
@@ -50,10 +53,10 @@ pub fn missing(kind: &str, name: &str) -> Option<Error> {
 }
 
 fn reason(feature: &str) -> String {
-    let setup = if feature == "rapier" {
-        ""
-    } else {
+    let setup = if NATIVE.contains(&feature) {
         "`cargo xtask setup`, then "
+    } else {
+        ""
     };
     format!("this build is without it; {setup}build with `--features {feature}`")
 }

@@ -114,13 +114,33 @@ pub struct Versions {
 }
 
 impl Versions {
-    pub fn of(session: &Session) -> Self {
+    /// This program with an engine of this name and version.
+    pub fn with(engine: String) -> Self {
         Self {
             asid: env!("CARGO_PKG_VERSION"),
-            engine: session.engine.clone(),
+            engine,
             git: env!("ASID_GIT"),
         }
     }
+
+    pub fn of(session: &Session) -> Self {
+        Self::with(session.engine.clone())
+    }
+}
+
+/// What made a result that several engines have a part in.
+#[derive(Serialize)]
+pub struct Program {
+    pub asid: &'static str,
+    pub git: &'static str,
+}
+
+impl Program {
+    /// This program.
+    pub const THIS: Self = Self {
+        asid: env!("CARGO_PKG_VERSION"),
+        git: env!("ASID_GIT"),
+    };
 }
 
 /// `result.json` of `run`.

@@ -284,12 +284,7 @@ fn model_file(given: &Option<PathBuf>, table: &toml::Table) -> Result<Option<Pat
     Ok(given.clone().or(set))
 }
 
-/// The engine that is used where none is named: the first that is built in, MuJoCo last,
-/// so that nothing depends on a native library.
+/// Name of the engine that is used where none is named.
 pub fn default_backend() -> String {
-    let all = registry::all::<registry::BackendEntry>();
-    let rapier = all.iter().find(|e| e.name == "rapier");
-    rapier
-        .or(all.first())
-        .map_or_else(String::new, |e| e.name.to_owned())
+    registry::default_backend().map_or_else(String::new, |e| e.name.to_owned())
 }

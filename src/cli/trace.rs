@@ -72,15 +72,7 @@ pub fn run_report(
         ),
         learning: learning(&outcome.curve, outcome.curve_label),
         downstream: Some(downstream(session, &outcome.attempt, &outcome.trials)),
-        costs: outcome
-            .costs
-            .iter()
-            .map(|c| r::StageCost {
-                stage: c.stage.to_owned(),
-                wall_s: c.wall_s,
-                physics_steps: c.physics_steps,
-            })
-            .collect(),
+        costs: outcome.costs.clone(),
         wall_s,
         physics_steps: cost.physics_steps,
         env_steps: cost.env_steps,

@@ -227,6 +227,20 @@ fn what_an_effect_refines_or_is_mistaken_for_is_in_the_catalogue() {
     }
 }
 
+/// A clock that was mended is taken back by what a delay of every sensor says in seconds: there must be no other parameter.
+#[test]
+fn an_effect_that_delays_readings_has_a_time_and_nothing_else() {
+    let effects = all::<EffectEntry>().into_iter();
+    let delays = effects.filter(|e| (e.make)().delays());
+    let names: Vec<&str> = delays.map(|e| e.name).collect();
+    assert_eq!(names, ["sensor-delay"]);
+    let delay = (all::<EffectEntry>().iter())
+        .find(|e| e.name == "sensor-delay")
+        .map(|e| (e.make)().parameters())
+        .unwrap();
+    assert_eq!((delay.len(), delay[0].unit), (1, "s"));
+}
+
 #[test]
 fn a_force_on_a_body_is_unusual_where_joints_hold_it() {
     let plant = Plant::of(&scene(FLOOR)).unwrap();

@@ -45,7 +45,7 @@ impl TrackerErrors {
     /// [`Error::Config`] where one makes no sense.
     pub fn check(&self, signals: &SignalSet) -> Result<()> {
         let wrong = |key: &str, message: String| Error::Config {
-            key: format!("tracker {key}"),
+            key: format!("real.perturbation.tracker_{key}"),
             message,
         };
         if !(self.latency.is_finite() && self.latency >= 0.0) {
@@ -57,7 +57,7 @@ impl TrackerErrors {
             return Err(wrong("dropout", message));
         }
         if self.every == 0 {
-            return Err(wrong("rate", "a reading every 0 frames".into()));
+            return Err(wrong("every", "a reading every 0 frames".into()));
         }
         let wanted = signals.whitened_len();
         if !(self.offset.is_empty() || self.offset.len() == wanted) {

@@ -32,7 +32,7 @@ Usage: cargo xtask <subcommand>
 
   setup [--only mujoco|torch]  fetches the native libraries into .native/ (quick when all is there)
   lint                         formatting, clippy and rustdoc over the workspace, all features
-  deny                         licences, versions and sources of the dependencies, where `cargo deny` is there
+  deny                         licences, versions and sources of the dependencies, by a pinned `cargo deny`
   test                         setup, lint, deny and every test: what CI runs
   wheel                        the Python package as a wheel, into target/wheels/release
   python [--release]           the Python package's tests, on a wheel in a fresh virtual environment

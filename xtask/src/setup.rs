@@ -38,16 +38,27 @@ pub fn run(libraries: &[&'static Library]) -> Result<()> {
         let state = if let Some(chosen) = library.chosen() {
             check_chosen(library, &chosen)?;
             format!("yours, {chosen}")
-        } else if is_complete(library, &place) {
-            format!("ready in {}", place.display())
-        } else {
-            check_platform(library, std::env::consts::OS, std::env::consts::ARCH)?;
-            install(library, &place).with_context(|| format!("cannot set up {}", library.name))?;
+        } else if lay_out(library, &place)? {
             format!("laid out in {}", place.display())
+        } else {
+            format!("ready in {}", place.display())
         };
         println!("{:<8}{state}", library.name);
     }
     Ok(())
+}
+
+/// Lays `library` out in `place`; false where it is there already.
+///
+/// # Errors
+/// On another platform than that of the pins, and where a file cannot be had.
+pub fn lay_out(library: &Library, place: &Path) -> Result<bool> {
+    if is_complete(library, place) {
+        return Ok(false);
+    }
+    check_platform(library, std::env::consts::OS, std::env::consts::ARCH)?;
+    install(library, place).with_context(|| format!("cannot set up {}", library.name))?;
+    Ok(true)
 }
 
 /// A library that the user chose must hold what the build will look for.

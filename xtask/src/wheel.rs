@@ -124,6 +124,9 @@ impl Wheel {
             }
             let mut out = File::create(&target).with_context(|| target.display().to_string())?;
             io::copy(&mut entry, &mut out).with_context(|| target.display().to_string())?;
+            if entry.unix_mode().is_some_and(|mode| mode & 0o111 != 0) {
+                make_executable(&out).with_context(|| target.display().to_string())?;
+            }
         }
         match found.iter().position(|&f| !f) {
             Some(missing) => bail!(
@@ -135,6 +138,17 @@ impl Wheel {
             None => Ok(()),
         }
     }
+}
+
+#[cfg(unix)]
+fn make_executable(file: &File) -> io::Result<()> {
+    use std::os::unix::fs::PermissionsExt;
+    file.set_permissions(fs::Permissions::from_mode(0o755))
+}
+
+#[cfg(not(unix))]
+fn make_executable(_: &File) -> io::Result<()> {
+    Ok(())
 }
 
 /// SHA-256 of a file in lower-case hexadecimal.
@@ -264,6 +278,28 @@ mod tests {
         assert!(out.join("include/demo/a.h").exists());
         assert_eq!(fs::read_dir(out.join("lib")).unwrap().count(), 1);
         assert_eq!(fs::read_dir(&out).unwrap().count(), 2);
+    }
+
+    /// A program can be started as it comes out of its wheel; other files cannot.
+    #[cfg(unix)]
+    #[test]
+    fn a_program_can_be_started() {
+        use std::os::unix::fs::PermissionsExt;
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("demo.whl");
+        let mut writer = zip::ZipWriter::new(File::create(&path).unwrap());
+        for (name, mode) in [("demo/libdemo.so.1", 0o755), ("demo/include/a.h", 0o644)] {
+            let options = zip::write::FileOptions::default().unix_permissions(mode);
+            writer.start_file(name, options).unwrap();
+        }
+        writer.finish().unwrap();
+        WHEEL.extract(&path, folder.path()).unwrap();
+        let starts = |name: &str| {
+            let about = fs::metadata(folder.path().join(name)).unwrap();
+            about.permissions().mode() & 0o111 != 0
+        };
+        assert!(starts("lib/libdemo.so.1"));
+        assert!(!starts("include/a.h"));
     }
 
     #[test]

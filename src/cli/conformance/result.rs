@@ -5,6 +5,8 @@ use asid_conformance::{Outcome, Row};
 use asid_core::Error;
 use serde::Serialize;
 
+use crate::cli::result::Program;
+
 /// What is said of an engine beside its rows.
 #[derive(Serialize)]
 pub struct Engine {
@@ -48,13 +50,7 @@ pub struct ConformanceResult {
     pub schema: u32,
     pub rows: Vec<Row>,
     pub engines: Vec<Engine>,
-    pub versions: Versions,
-}
-
-#[derive(Serialize)]
-pub struct Versions {
-    pub asid: &'static str,
-    pub git: &'static str,
+    pub versions: Program,
 }
 
 /// An engine's rows in numbers.

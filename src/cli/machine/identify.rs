@@ -19,7 +19,7 @@ use crate::cli::failure;
 use crate::cli::options::Common;
 use crate::cli::output::{OutFolder, write_json, write_text};
 use crate::cli::progress::Bars;
-use crate::cli::result::{CostResult, ParameterResult, SCHEMA, caveats, parameter_line};
+use crate::cli::result::{CostResult, ParameterResult, SCHEMA, Versions, caveats, parameter_line};
 use crate::cli::settings::{given, parsed};
 use crate::cli::{run, trace};
 
@@ -47,14 +47,6 @@ struct GapResult {
     /// The same on the logs that were fitted.
     nominal_fitted: f64,
     identified_fitted: f64,
-}
-
-/// What made a result.
-#[derive(Serialize, schemars::JsonSchema)]
-struct Versions {
-    asid: &'static str,
-    engine: String,
-    git: &'static str,
 }
 
 /// `result.json`.
@@ -137,11 +129,7 @@ pub fn identify(path: &Path, common: &Common) -> Result<()> {
             physics_steps: found.physics_steps,
             env_steps: 0,
         },
-        versions: Versions {
-            asid: env!("CARGO_PKG_VERSION"),
-            engine: subject.engine(),
-            git: env!("ASID_GIT"),
-        },
+        versions: Versions::with(subject.engine()),
     };
     let caveats = caveats(&study.parameters, &found.posterior);
     let mut lines: Vec<String> = found

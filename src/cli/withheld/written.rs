@@ -13,6 +13,7 @@ use super::control::Control;
 use super::method::{Asked, Method};
 use super::score::Session;
 use crate::cli::output::{write_json, write_text};
+use crate::cli::result::Program;
 
 /// `result.json`.
 #[derive(Serialize)]
@@ -27,13 +28,7 @@ struct Output<'a> {
     backend: &'a str,
     /// Scores of the other methods on the same cases.
     others: &'a [Score],
-    versions: Versions,
-}
-
-#[derive(Serialize)]
-struct Versions {
-    asid: &'static str,
-    git: &'static str,
+    versions: Program,
 }
 
 impl Session<'_> {
@@ -52,10 +47,7 @@ impl Session<'_> {
             without: &arguments.without,
             backend: &asked.backend,
             others,
-            versions: Versions {
-                asid: env!("CARGO_PKG_VERSION"),
-                git: env!("ASID_GIT"),
-            },
+            versions: Program::THIS,
         };
         // Cases and controls of one set stand side by side; a score is written anew as a whole.
         let stem = arguments.control.map_or("", Control::name);
