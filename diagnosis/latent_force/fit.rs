@@ -5,6 +5,7 @@
 
 mod kept_columns;
 mod regression;
+mod secant;
 mod slopes;
 mod wander;
 

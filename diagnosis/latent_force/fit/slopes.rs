@@ -13,14 +13,18 @@ use crate::latent_force::tangent::difference;
 
 use super::Hypothesis;
 use super::kept_columns::KeptColumns;
+use super::secant::{Replayed, mend};
 
 /// Linearisations that slopes along rows are kept for: their trajectory moves in each.
 const KEPT: usize = 3;
 /// How far a value may move meanwhile, in deviations of its prior.
 const KEPT_MOVE: f64 = 0.3;
-/// How far the start of a segment may move meanwhile, in steps that its slopes are taken over: within a few of them the same
-/// points touch.
-const KEPT_START: f64 = 5.0;
+/// The same where all walks are segments, whose slopes are mended by each step that is made.
+const MENDED_MOVE: f64 = 1.0;
+/// How far the start of a segment may move meanwhile, in steps that its slopes are taken over.
+const KEPT_START: f64 = 50.0;
+/// The same of a segment whose replay did not keep what its slopes promised: within a step the slopes are the same.
+const MISLED_START: f64 = 1.0;
 
 /// Slopes of each walk, and where they were taken.
 #[derive(Clone, Debug, Default)]
@@ -38,6 +42,8 @@ pub struct Slopes {
     by_one_step: bool,
     /// Columns of tolerances.
     columns: KeptColumns,
+    /// The replay of each segment in the linearisation before; none at the beginning of a fit, whose values are others.
+    replayed: Vec<Replayed>,
 }
 
 impl Slopes {
@@ -47,6 +53,7 @@ impl Slopes {
         Self {
             used: 0,
             columns: self.columns.begun(),
+            replayed: Vec::new(),
             ..self.clone()
         }
     }
@@ -63,7 +70,12 @@ impl Slopes {
         estimate: &Estimate,
         variations: &[Variation],
     ) -> Result<Vec<LinearEpisode>> {
-        let moved = self.h.is_empty() || self.furthest(theta, &model.unknowns) > KEPT_MOVE;
+        let most = if map.is_all_segments() {
+            MENDED_MOVE
+        } else {
+            KEPT_MOVE
+        };
+        let moved = self.h.is_empty() || self.furthest(theta, &model.unknowns) > most;
         // Readings that remember have slopes of their own past.
         let along =
             moved || self.used >= KEPT || map.remembers_readings() && !map.is_all_segments();
@@ -100,6 +112,11 @@ impl Slopes {
         let fresh: Vec<Variation> = fresh.map(|(v, _)| v.clone()).collect();
         let wanted = (want, &due[..], &self.carried[..]);
         let mut linear = map.linearise_due(theta, trajectory, wanted, &steps, &fresh)?;
+        if context.has_segments() {
+            let deviations = |&i: &usize| theta[i] / model.unknowns[i].deviation;
+            let values: Vec<f64> = free.iter().map(deviations).collect();
+            self.mend(context, (&linear, &due), trajectory, &values);
+        }
         self.exchange(&mut linear, &due, trajectory);
         if keeps && fresh.len() == variations.len() {
             self.columns.keep(&linear, &model.unknowns, &free);
@@ -127,8 +144,42 @@ impl Slopes {
         let mut change = vec![0.0; 2 * layout.nv];
         difference(layout, now, &self.first[walk][..now.len()], &mut change);
         let steps = context.start_steps();
-        let mut pairs = change.iter().zip(&steps);
-        estimate.misled[walk] > 1.0 || pairs.any(|(c, step)| c.abs() > KEPT_START * step)
+        let pairs = change.iter().zip(&steps);
+        let furthest = pairs.map(|(c, step)| c.abs() / step).fold(0.0, f64::max);
+        let most = if estimate.misled[walk] > 1.0 {
+            MISLED_START
+        } else {
+            KEPT_START
+        };
+        furthest > most
+    }
+
+    /// Mends the slopes of segments that are kept by what their replays did since the linearisation before.
+    fn mend(
+        &mut self,
+        context: &Context<'_>,
+        (linear, due): (&[LinearEpisode], &[bool]),
+        trajectory: &[Vec<f64>],
+        values: &[f64],
+    ) {
+        let layout = &context.plant().layout;
+        let width = layout.nq + layout.nv;
+        let steps = context.start_steps();
+        let replayed = linear.iter().zip(trajectory).map(|(l, states)| Replayed {
+            residual: l.residual.clone(),
+            columns: l.reading_columns.clone(),
+            start: states[..width].to_vec(),
+            values: values.to_vec(),
+        });
+        let replayed: Vec<Replayed> = replayed.collect();
+        for (w, (before, after)) in self.replayed.iter().zip(&replayed).enumerate() {
+            if context.walks[w].segment.is_some() && !due[w] {
+                let mut change = vec![0.0; 2 * layout.nv];
+                difference(layout, &after.start, &before.start, &mut change);
+                mend(&mut self.h[w], (before, after), &change, &steps);
+            }
+        }
+        self.replayed = replayed;
     }
 
     /// Takes fresh slopes over where they were due, and gives the kept ones to the other walks.
