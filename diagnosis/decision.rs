@@ -73,6 +73,21 @@ fn untried(evidence: &Evidence, best: Option<&Tried>, rules: &Rules) -> Vec<Untr
     untried.collect()
 }
 
+/// Share that a set leaves of the gap, 0 to 1: of the missing force or of the gap of open-loop replays, whichever is less, for what is
+/// named may make up for most of the one and leave much of the other. That nothing stands out, of an `ordinary` machine, is said of a
+/// model that foretells the logs held out as well, where replays can be repeated.
+fn left_of_the_gap(evidence: &Evidence, (found, ordinary): (Option<usize>, Option<usize>)) -> f64 {
+    let share = |i: usize, of: fn(Replayed) -> f64| {
+        let beyond = |r: Replayed| excess(of(r)).powi(2);
+        beyond(evidence.tried[i].replayed) / beyond(evidence.none)
+    };
+    let open_loop = found.map_or(1.0, |i| share(i, |r| r.train));
+    let left = evidence.left.min(open_loop).clamp(0.0, 1.0);
+    let ordinary = ordinary.filter(|_| evidence.repeatable);
+    let foretold = ordinary.map_or(0.0, |i| share(i, |r| r.held_out));
+    left.max(foretold.clamp(0.0, 1.0))
+}
+
 /// Decides.
 #[must_use]
 pub fn decide(evidence: &Evidence, rules: &Rules) -> Judgement {
@@ -117,18 +132,12 @@ pub fn decide(evidence: &Evidence, rules: &Rules) -> Judgement {
         let passed = all[i].labels.len() > all[best].labels.len();
         all[i].probability = odds.min(if passed { -price } else { 0.0 }).exp();
     }
-    let beyond = |r: Replayed| excess(r.train).powi(2);
-    let open_loop = match all[best].found {
-        Some(i) => beyond(evidence.tried[i].replayed) / beyond(evidence.none),
-        None => 1.0,
-    };
     let seen = seen(evidence, rules);
     if best != least && ordinary.is_none() {
         // Chance may reach the evidence of no effect, and no chance makes a gap.
         all[least].probability *= 1.0 - seen;
     }
-    // What is named may make up for most of the gap and leave much of what is missing from row to row, or the other way round.
-    let rest = evidence.left.min(open_loop).clamp(0.0, 1.0);
+    let rest = left_of_the_gap(evidence, (all[best].found, ordinary));
     let left_unexplained =
         || sigmoid((rest / rules.unexplained).ln() / rules.sharpness).clamp(0.001, 0.999);
     let unknown = if best == least && ordinary.is_some() {
@@ -283,6 +292,19 @@ mod tests {
             decided(&e).best_explanation().labels,
             ["sensor-quantization@q"]
         );
+    }
+
+    #[test]
+    fn tolerances_that_fit_and_do_not_foretell_are_no_answer() {
+        let of = |held_out: f64, repeatable: bool| {
+            let mut e = evidence(100.0, vec![tried(&[], 0, 400.0, 4.0)], 0.2);
+            e.tried[0].replayed.held_out = held_out;
+            e.repeatable = repeatable;
+            decided(&e).is_unknown
+        };
+        assert!(!of(4.0, true), "both are closed");
+        assert!(of(90.0, true), "nine tenths of the gap held out are left");
+        assert!(!of(90.0, false), "which contacts may scatter by");
     }
 
     #[test]

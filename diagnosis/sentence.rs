@@ -107,7 +107,7 @@ pub fn sentence(
         _ => "what there is of it".into(),
     };
     let body = match result.verdict.kind {
-        Kind::None if !result.tolerances.is_empty() => format!(
+        Kind::None if !result.tolerances.is_empty() && result.gap.identified > OF_NOISE => format!(
             "No effect stands out, once the study's parameters are fitted: {} take the gap from {:.2} to {:.2} on the logs held out.",
             within_tolerance(result).unwrap_or_default(),
             result.gap.identified,
