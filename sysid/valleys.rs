@@ -4,8 +4,8 @@
 //! open-loop replays jumps. A straight line over a region of such a loss promises a place that its own replay does not
 //! confirm, and damped steps end in the first of many valleys. So the place that a fit arrives at is replayed. Where that is worse
 //! than the best replay so far by more than chance explains, draws about the best one are ranked by their own
-//! replays, by covariance matrix adaptation (N. Hansen, arXiv:1604.00772), whose mean is blind to single jumps. What is known of the
-//! values comes from a fit over the region about the best place, roughness included.
+//! replays, by covariance matrix adaptation (N. Hansen, arXiv:1604.00772), whose mean is blind to single jumps. What is known of
+//! the values stays what the fit over the whole region says, roughness included.
 
 use asid_algorithms::fisher::inverse_above_prior;
 use asid_algorithms::optimise::cma_es::{CmaEs, CmaEsSettings};
@@ -101,7 +101,10 @@ pub(crate) fn confirmed(
     };
     // A model that lacks something has a larger loss everywhere, and larger differences.
     let scale = (2.0 * least / space.readings.max(1) as f64).max(1.0);
-    if here - least <= UNCONFIRMED * scale {
+    // What single replays differ by beside the straight line. Where that is little the line is bent and not the loss rough, and its own
+    // place is as good as the line.
+    let luck = 0.5 * found.roughness.powi(2) * space.readings as f64;
+    if (here - least).min(luck) <= UNCONFIRMED * scale {
         return Ok(found);
     }
     progress.note("identify, replays jump");
@@ -128,7 +131,8 @@ fn widths(information: &DMatrix<f64>) -> Vec<f64> {
     known.map(|known| (WIDEN * known).min(SPREAD)).collect()
 }
 
-/// The best place so far, with what a fit over the region about it tells.
+/// The best place so far, moved within its valley by a straight line over a small region about it. What is known of the values stays
+/// what the first fit says, whose region has the valleys in it.
 fn about(
     watched: &mut Watched<'_, '_>,
     found: Fit,
@@ -171,9 +175,7 @@ fn about(
         free: point.clone(),
         point,
         residual: (2.0 * least / space.readings.max(1) as f64).sqrt(),
-        information: told.information,
-        roughness: told.roughness,
-        course: found.course,
+        ..found
     })
 }
 
