@@ -3,7 +3,8 @@
 //! Where all drives move at once at one size, the first that breaks a limit keeps all of them small. A joint that dry friction
 //! holds then never slips: its unknowns have no slope, and a search has nothing to follow. It slips where its command goes
 //! far, and keeps a limit of force or speed where it goes there slowly. So each drive in its turn gets curves of its own
-//! beside what those before it do: slow and fast, large and small. The one that makes the objective smallest and keeps the
+//! beside what those before it do: slow and fast, large and small, and slow ones to either side, since a joint may begin near one end of
+//! its range. The one that makes the objective smallest and keeps the
 //! limits stays; where none is better, the drive rests. The largest that keeps the limits says how far the search may move
 //! this drive.
 
@@ -22,8 +23,8 @@ const SLOW: [usize; 2] = [2, 4];
 /// Ratio of neighbouring sizes of a drive's curve: the largest that keeps the limits is found to this.
 const RATIO: f64 = 0.6;
 
-/// Sizes of a drive's curve: from the whole down to a hundredth.
-const SIZES: i32 = 10;
+/// Sizes of a drive's curve: from the whole down to a thirty-fifth.
+const SIZES: i32 = 8;
 
 /// Best curves of a drive that are looked at everywhere, at most.
 const LOOKS: usize = 6;
@@ -58,12 +59,18 @@ impl Designer<'_, '_> {
         for drive in 0..n / each {
             let own = drive * each..(drive + 1) * each;
             let (mut trials, mut sizes) = (Vec::new(), Vec::new());
-            for knots in SLOW.into_iter().chain([settings.knots]) {
+            let mut curves = Vec::new();
+            for knots in SLOW {
                 let curve = self.curve(knots, rng);
+                curves.push(curve.iter().map(|c| -c).collect());
+                curves.push(curve);
+            }
+            curves.push(self.curve(settings.knots, rng));
+            for curve in &curves {
                 for k in 0..SIZES {
                     let size = RATIO.powi(k);
                     let mut trial = coefficients.clone();
-                    for (to, c) in trial[own.clone()].iter_mut().zip(&curve) {
+                    for (to, c) in trial[own.clone()].iter_mut().zip(curve) {
                         *to = size * c;
                     }
                     trials.push(trial);

@@ -4,7 +4,8 @@
 //! ([`asid_algorithms::optimise::gauss_newton`]). Initial states that a log leaves open are marginalised: with their
 //! slopes `S` and a wide prior, residuals have the covariance `1 + S S^T`, and are whitened by
 //! its root, `r - U (1 - (1 + σ²)^-1/2) U^T r` with `S = U σ V^T`. As the prior widens that is variable projection
-//! (G. Golub, V. Pereyra, SIAM J. Numer. Anal. 10, 1973). The slopes are taken anew where the fit has arrived.
+//! (G. Golub, V. Pereyra, SIAM J. Numer. Anal. 10, 1973). The slopes are taken anew where the fit has arrived. Where replays jump, as
+//! with contacts, the search goes on among the valleys of their loss.
 
 use asid_algorithms::identify::gauss_newton::posterior_of;
 use asid_algorithms::optimise::gauss_newton::{Fit, GaussNewtonSettings, Space, minimise};
@@ -15,6 +16,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::dataset::{Dataset, Replayer, Trial};
 use crate::gap::{fit_start, start_slopes};
+use crate::valleys::{Watched, confirmed};
 
 /// Times that open starts and their slopes are found anew.
 const ROUNDS: usize = 3;
@@ -152,10 +154,15 @@ pub fn fit(
             }
             Ok(all)
         };
-        let fitted = minimise(settings, &mut residuals, space, &mut rng, || {
-            progress.advance(1)
-        })?;
+        let mut watched = Watched::new(&mut residuals);
+        if found.is_some() {
+            watched.losses(std::slice::from_ref(&z))?;
+        }
+        let mut seen = |points: &[Vec<f64>]| watched.residuals(points);
+        let fitted = minimise(settings, &mut seen, space, &mut rng, || progress.advance(1))?;
         let Some(fitted) = fitted else { break };
+        let with = (&mut rng, progress);
+        let fitted = confirmed(&mut watched, fitted, settings, space, with)?;
         z.clone_from(&fitted.point);
         for (i, x) in z.iter().enumerate() {
             box_.0[i] = (x - NEAR).max(-bound);

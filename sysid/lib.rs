@@ -25,6 +25,7 @@ pub mod rehearse;
 mod search;
 pub mod start;
 pub mod tells;
+mod valleys;
 
 use asid_core::{Parameter, Target};
 

@@ -4,6 +4,8 @@
 //! pairs, no contact between a body and its parent; the elementwise larger
 //! friction, or that of the geom with the higher priority.
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use mjcf_rs::Model;
 use rapier3d::geometry::SolverFlags;
 use rapier3d::pipeline::{ContactModificationContext, PairFilterContext, PhysicsHooks};
@@ -46,11 +48,34 @@ pub enum Overruled {
     ByPriority(usize),
 }
 
-/// The rules for every pair of geoms.
+/// What the document says about the contacts of a geom.
+#[derive(Clone, Copy, Debug)]
+struct Rules {
+    contype: u32,
+    conaffinity: u32,
+    priority: i32,
+    condim: u32,
+    body: usize,
+    /// Body that this geom's is rigidly joined to, and the one that it moves on.
+    group: usize,
+    parent_group: usize,
+}
+
+/// An explicit `<pair>`.
+#[derive(Clone, Copy, Debug, Default)]
+struct Explicit {
+    condim: Option<u32>,
+    friction: Option<Friction>,
+}
+
+/// The rules for every pair of geoms. They are kept by geom: pairs of a document of thousands of geoms fill the memory.
 #[derive(Clone, Debug)]
 pub struct PairTable {
-    geoms: usize,
-    pairs: Vec<Pair>,
+    geoms: Vec<Rules>,
+    /// Pairs of bodies that are excluded, in both orders.
+    excluded: BTreeSet<(usize, usize)>,
+    /// Explicit pairs of geoms, in both orders.
+    explicit: BTreeMap<(usize, usize), Explicit>,
     has_rolling_or_spinning_friction: bool,
 }
 
@@ -68,36 +93,14 @@ impl PairTable {
             let root = welded[body];
             model.bodies[root].parent.map_or(0, |p| welded[p])
         };
-        let mut excluded = Vec::new();
+        let mut excluded = BTreeSet::new();
         for exclude in &model.contact.excludes {
             let find = |name: &str| match name {
                 "world" => Ok(0),
                 _ => model.body_id_by_name(name).ok_or(format!("body `{name}`")),
             };
-            excluded.push((find(&exclude.body1)?, find(&exclude.body2)?));
-        }
-        let n = geoms.len();
-        let mut pairs = Vec::with_capacity(n * n);
-        for i in 0..n {
-            for j in 0..n {
-                let (a, b) = (geoms[i], geoms[j]);
-                let (p, q) = (body_of[i], body_of[j]);
-                let bits = a.contype & b.conaffinity != 0 || b.contype & a.conaffinity != 0;
-                let (u, v) = (welded[p], welded[q]);
-                let family = (u != 0 && u == parent_group(q)) || (v != 0 && v == parent_group(p));
-                let apart = excluded.contains(&(p, q)) || excluded.contains(&(q, p));
-                let (condim, ruling) = match a.priority.cmp(&b.priority) {
-                    std::cmp::Ordering::Greater => (a.condim, Ruling::First),
-                    std::cmp::Ordering::Less => (b.condim, Ruling::Second),
-                    std::cmp::Ordering::Equal => (a.condim.max(b.condim), Ruling::Both),
-                };
-                pairs.push(Pair {
-                    may_collide: bits && u != v && !family && !apart,
-                    condim,
-                    ruling,
-                    own: None,
-                });
-            }
+            let (a, b) = (find(&exclude.body1)?, find(&exclude.body2)?);
+            excluded.extend([(a, b), (b, a)]);
         }
         let index = |name: &str| {
             geoms
@@ -105,24 +108,65 @@ impl PairTable {
                 .position(|g| g.name.as_deref() == Some(name))
                 .ok_or(format!("geom `{name}`"))
         };
+        let mut explicit: BTreeMap<(usize, usize), Explicit> = BTreeMap::new();
         for pair in &model.contact.pairs {
             let (i, j) = (index(&pair.geom1)?, index(&pair.geom2)?);
-            for at in [i * n + j, j * n + i] {
-                pairs[at].may_collide = true;
-                pairs[at].condim = pair.condim.unwrap_or(pairs[at].condim);
-                pairs[at].own = pair.friction.map(|f| f.map(|x| x as f32));
+            for at in BTreeSet::from([(i, j), (j, i)]) {
+                let own = explicit.entry(at).or_default();
+                own.condim = pair.condim.or(own.condim);
+                own.friction = pair.friction.map(|f| f.map(|x| x as f32));
             }
         }
-        let turning = |p: &Pair| p.may_collide && p.condim >= 4;
-        Ok(Self {
-            geoms: n,
-            has_rolling_or_spinning_friction: pairs.iter().any(turning),
-            pairs,
-        })
+        let rules = geoms.iter().zip(body_of).map(|(geom, &body)| Rules {
+            contype: geom.contype,
+            conaffinity: geom.conaffinity,
+            priority: geom.priority,
+            condim: geom.condim,
+            body,
+            group: welded[body],
+            parent_group: parent_group(body),
+        });
+        let mut table = Self {
+            geoms: rules.collect(),
+            excluded,
+            explicit,
+            has_rolling_or_spinning_friction: false,
+        };
+        table.has_rolling_or_spinning_friction = table.some_pair_turns();
+        Ok(table)
     }
 
-    fn pair(&self, a: usize, b: usize) -> &Pair {
-        &self.pairs[a * self.geoms + b]
+    /// Whether a pair that can collide resists rolling or spinning: it is explicit, or one of its geoms asks for that.
+    fn some_pair_turns(&self) -> bool {
+        let turns = |(a, b): (usize, usize)| {
+            let pair = self.pair(a, b);
+            pair.may_collide && pair.condim >= 4
+        };
+        let all = 0..self.geoms.len();
+        let mut asking = all.clone().filter(|&a| self.geoms[a].condim >= 4);
+        self.explicit.keys().any(|&at| turns(at))
+            || asking.any(|a| all.clone().any(|b| turns((a, b))))
+    }
+
+    fn pair(&self, a: usize, b: usize) -> Pair {
+        let (first, second) = (&self.geoms[a], &self.geoms[b]);
+        let bits =
+            first.contype & second.conaffinity != 0 || second.contype & first.conaffinity != 0;
+        let (u, v) = (first.group, second.group);
+        let family = (u != 0 && u == second.parent_group) || (v != 0 && v == first.parent_group);
+        let apart = self.excluded.contains(&(first.body, second.body));
+        let (condim, ruling) = match first.priority.cmp(&second.priority) {
+            std::cmp::Ordering::Greater => (first.condim, Ruling::First),
+            std::cmp::Ordering::Less => (second.condim, Ruling::Second),
+            std::cmp::Ordering::Equal => (first.condim.max(second.condim), Ruling::Both),
+        };
+        let explicit = self.explicit.get(&(a, b));
+        Pair {
+            may_collide: explicit.is_some() || bits && u != v && !family && !apart,
+            condim: explicit.and_then(|e| e.condim).unwrap_or(condim),
+            ruling,
+            own: explicit.and_then(|e| e.friction),
+        }
     }
 
     /// True where some pair resists rolling or spinning.
@@ -134,7 +178,7 @@ impl PairTable {
     /// where the geom can touch nothing.
     pub fn overruled(&self, geom: usize) -> Option<Overruled> {
         let mut by = None;
-        let touched = (0..self.geoms).filter(|&other| self.pair(geom, other).may_collide);
+        let touched = (0..self.geoms.len()).filter(|&other| self.pair(geom, other).may_collide);
         for other in touched {
             let pair = self.pair(geom, other);
             let found = match (pair.own, pair.ruling) {
@@ -220,5 +264,21 @@ impl PhysicsHooks for Hooks<'_> {
                 sides.align(contact, impulse * *rigid.friction);
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// As pairs they would be 9e8, in 20 GB.
+    #[test]
+    fn a_document_of_many_geoms_takes_no_memory_for_each_pair() {
+        let geoms = r#"<geom size="0.1"/>"#.repeat(30_000);
+        let text = format!("<mujoco><worldbody><body>{geoms}</body></worldbody></mujoco>");
+        let base = std::path::Path::new(".");
+        let model = Model::from_str(&text, base).expect("a valid document");
+        let table = PairTable::new(&model, &vec![1; 30_000]).expect("no contact element");
+        assert!(!table.pair(0, 29_999).may_collide && !table.has_rolling_or_spinning_friction());
     }
 }
