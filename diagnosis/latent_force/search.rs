@@ -1,5 +1,6 @@
 //! Forward selection of effects by evidence, with a look back after each.
 
+mod begun;
 mod open_loop;
 mod prior;
 mod prune;
@@ -28,6 +29,9 @@ pub use tolerances::Tolerances;
 use open_loop::OpenLoopGap;
 use round::Upon;
 use set::{free_what_is_given, from_starts_of, is_due};
+
+/// The stage that looks for what is missing beside a set.
+const FURTHER: &str = "further effects beside those named";
 
 /// A stage that was cut short, and the sets that it left out.
 #[derive(Clone, Debug)]
@@ -84,17 +88,31 @@ fn open_upon(candidates: &[Candidate], known: &[usize], set: &Set) -> Vec<usize>
         .collect()
 }
 
-/// A set fitted from the starts of segments of the next one, where there is time and that raises its evidence.
-fn better_from(
+/// Fits the set that stands from the starts of segments of the next one, where there is time and that raises its evidence; what is
+/// without effects is then the better model without effects too.
+fn fit_from(
     context: &Context<'_>,
-    (best, next): (&Set, &Set),
+    next: Option<&Set>,
+    (best, none): (&mut Set, &mut Fitted),
     (breadth, progress): (Breadth, &dyn Progress),
-) -> Result<Option<Set>> {
-    if !context.has_segments() || progress.is_stopped() {
-        return Ok(None);
-    }
+) -> Result<()> {
+    let Some(next) = next.filter(|_| context.has_segments() && !progress.is_stopped()) else {
+        return Ok(());
+    };
     let again = from_starts_of(context, (best, next), breadth, progress)?;
-    Ok((again.fitted.evidence > best.fitted.evidence).then_some(again))
+    if again.fitted.evidence > best.fitted.evidence {
+        *best = again;
+        if best.candidates.is_empty() {
+            *none = best.fitted.clone();
+        }
+    }
+    Ok(())
+}
+
+/// Whether time has ended before the set that stands could be fitted from the starts of segments of the next one: what a further effect
+/// owes to better starts, or to more rounds, is only known then.
+fn is_cut_short(context: &Context<'_>, best: &Set, progress: &dyn Progress) -> bool {
+    context.has_segments() && !best.candidates.is_empty() && progress.is_stopped()
 }
 
 /// What follows on the set that stands after a round: the `next` one that has earned it, or where none has and the search goes on the set with
@@ -160,7 +178,7 @@ pub fn search(
         }
         // The first screening is the least that an answer rests on.
         if !rounds.is_empty() && progress.is_stopped() {
-            untried.push(Untried::upon(&best, "further effects beside those named"));
+            untried.push(Untried::upon(&best, FURTHER));
             break;
         }
         let upon = Upon {
@@ -177,19 +195,9 @@ pub fn search(
         let next = round.confirmed.first().cloned();
         rounds.push(round);
         let stopped = progress.is_stopped();
-        if let Some(next) = &next
-            && let Some(again) = better_from(context, (&best, next), how)?
-        {
-            best = again;
-            if best.candidates.is_empty() {
-                none = best.fitted.clone();
-            }
-        }
-        // What a further effect owes to better starts of segments, or to more rounds, is only known once the set that it stands on has been
-        // fitted from there to the end too.
-        let unfair = context.has_segments() && !best.candidates.is_empty() && progress.is_stopped();
-        if unfair {
-            untried.push(Untried::upon(&best, "further effects beside those named"));
+        fit_from(context, next.as_ref(), (&mut best, &mut none), how)?;
+        if is_cut_short(context, &best, progress) {
+            untried.push(Untried::upon(&best, FURTHER));
             break;
         }
         let closes = match &next {
@@ -202,12 +210,13 @@ pub fn search(
             let shrinks = cut_short || closes || left(&best) - left(n) > breadth.shrinks;
             shrinks && n.rises_above(&best, threshold)
         });
-        if let Some(own) = freed.take() {
-            let evidence = own.fitted.evidence + threshold;
-            if next.as_ref().is_none_or(|n| n.fitted.evidence < evidence) {
-                best = own;
-                continue;
-            }
+        let is_passed = |own: &Set| {
+            let least = own.fitted.evidence + threshold;
+            next.as_ref().is_some_and(|n| n.fitted.evidence >= least)
+        };
+        if let Some(own) = freed.take().filter(|own| !is_passed(own)) {
+            best = own;
+            continue;
         }
         let next = upon_tolerances(
             context,

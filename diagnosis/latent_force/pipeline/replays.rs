@@ -76,7 +76,13 @@ impl Replays<'_> {
     pub(super) fn excess(&self, fitted: &Fitted, members: &[usize]) -> Result<f64> {
         let of = self.replayed(fitted, members, Effort::LOOK)?;
         let readings = self.bench.train.readings.max(1) as f64;
-        Ok((of.fit.cost / readings - 1.0).max(0.0))
+        let excess = of.fit.cost / readings - 1.0;
+        // A replay that diverges leaves everything.
+        Ok(if excess.is_nan() {
+            f64::INFINITY
+        } else {
+            excess.max(0.0)
+        })
     }
 
     /// Replays a fitted set of candidates, with the variances of its values.

@@ -187,49 +187,8 @@ impl Upon<'_> {
         Ok(Fits { sets, left_out })
     }
 
-    /// The base with the candidates of a set of a screening, at the values where a fit of it begins. Where bodies touch, a law that has no slope
-    /// at its null begins at that of its start values whose replays of whole logs leave least: from a null at which a contact sticks no
-    /// slope tells how far it is to where it slides, and segments that begin as the null has put them do not either.
-    fn begun(&self, screening: &Screening, screened: &Screened) -> Result<Set> {
-        let mut best = self.enlarged(screening, screened);
-        let forms = &screening.columns.forms;
-        let is_secant = |f: usize| forms[f].slopes.iter().all(Option::is_none);
-        if !self.context.has_segments() || !screened.forms.iter().any(|&f| is_secant(f)) {
-            return Ok(best);
-        }
-        let mut from = screened.clone();
-        let mut least = (self.open_loop)(&best)?;
-        for i in 0..screened.forms.len() {
-            let own = screened.forms[i];
-            let like = |&f: &usize| is_secant(f) && forms[f].candidate == forms[own].candidate;
-            for f in (0..forms.len()).filter(like) {
-                if self.progress.is_stopped() {
-                    return Ok(best);
-                }
-                let mut other = from.clone();
-                other.forms[i] = f;
-                other.coefficients[i] = vec![1.0; forms[f].slopes.len()];
-                let set = self.enlarged(screening, &other);
-                let left = (self.open_loop)(&set)?;
-                if left < least {
-                    (least, best, from) = (left, set, other);
-                }
-            }
-        }
-        // Segments first find starts that go with those values, which would else go with the starts.
-        let free = best.fitted.hypothesis.free();
-        let hold = |set: &mut Set, free_too: bool| {
-            let unknowns = &mut set.fitted.hypothesis.unknowns;
-            free.iter().for_each(|&i| unknowns[i].free = free_too);
-        };
-        hold(&mut best, false);
-        best.fit(self.context, (self.breadth.rounds[0], self.progress))?;
-        hold(&mut best, true);
-        Ok(best)
-    }
-
     /// The base with the candidates of a set of a screening; a finer law takes the place of the simpler one.
-    fn enlarged(&self, screening: &Screening, screened: &Screened) -> Set {
+    pub(super) fn enlarged(&self, screening: &Screening, screened: &Screened) -> Set {
         let Screening { some, columns, .. } = screening;
         let base = self.base;
         let (hypothesis, theta, added) = with(&base.fitted, columns, some, screened);
