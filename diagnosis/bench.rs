@@ -8,7 +8,7 @@ use asid_core::{Parameter, Progress, Result};
 use asid_effects::EffectSpec;
 
 use crate::candidate::Candidate;
-use crate::fit::{Effort, Fit, cost, fit};
+use crate::fit::{Begin, Effort, Fit, cost, fit};
 use crate::linearise::{Open, Unknown};
 use crate::machine::Machine;
 use crate::predict::{Point, Predictor, State};
@@ -32,8 +32,17 @@ pub struct Explanation {
     pub held_out: f64,
     /// Starts of the held-out episodes under it.
     pub held_starts: Vec<State>,
-    /// Variances of the unknowns by a fit that allows for a missing force, in their units; 0 where they were not fitted so.
-    pub local_variances: Vec<f64>,
+    /// The unknowns by a fit that allows for a missing force; none where they were not fitted so.
+    pub local: Vec<Option<Local>>,
+}
+
+/// A value by a fit that allows for a missing force.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Local {
+    /// Mean of its posterior, in its unit.
+    pub mean: f64,
+    /// Variance of its posterior, in the square of its unit.
+    pub variance: f64,
 }
 
 impl Explanation {
@@ -119,34 +128,19 @@ impl Bench {
         Predictor::new(&*model, &parameters, &record.logs, CAPACITY, threads)
     }
 
-    /// Fits the study's parameters, from `theta` on, together with some effects' and the coordinates of the starts that are `open` to
-    /// the training logs, and looks at the logs held out.
+    /// Fits the study's parameters and some effects' to the training logs, and looks at the logs held out.
     ///
     /// # Errors
     /// As [`Bench::predictor`], and when a rollout fails.
     pub fn explain(
         &self,
         trials: &[Trial<'_>],
-        theta: &[f64],
-        (starts, open): (&[State], &Open),
-        (effort, progress): (Effort, &dyn Progress),
+        begin: Begin<'_>,
+        how: (Effort, &dyn Progress),
     ) -> Result<Explanation> {
         let unknowns = self.unknowns(trials);
-        let mut values = theta.to_vec();
-        trials.iter().for_each(|(_, v)| values.extend(v));
-        let point = Point {
-            theta: values,
-            starts: starts.to_vec(),
-        };
         let mut predictor = self.predictor(trials, &self.train)?;
-        let fit = fit(
-            &mut predictor,
-            self.layout(),
-            &unknowns,
-            point,
-            open,
-            (effort, progress),
-        )?;
+        let fit = fit(&mut predictor, (self.layout(), &unknowns), begin, how)?;
         let mut at = self.parameters.len();
         let effects = trials
             .iter()
@@ -164,7 +158,7 @@ impl Bench {
         let mut explanation = Explanation {
             effects,
             is_tolerance: trials.iter().map(|(c, _)| c.is_tolerance).collect(),
-            local_variances: vec![0.0; unknowns.len()],
+            local: vec![None; unknowns.len()],
             unknowns,
             fit,
             held_out: f64::NAN,
@@ -221,10 +215,8 @@ impl Bench {
         };
         let fit = fit(
             &mut predictor,
-            self.layout(),
-            &unknowns,
-            point,
-            &self.open,
+            (self.layout(), &unknowns),
+            Begin::at(point, &self.open),
             (Effort::START, &Silent),
         )?;
         Ok(fit.point.starts)

@@ -20,6 +20,9 @@ pub use units::units;
 
 /// Share of missing readings that is still called good.
 const MISSING: f64 = 0.2;
+/// An engine's own error, in changes by half the time step: what is of first order in the step (Richardson 1911), the worst
+/// that engines have.
+pub const RICHARDSON: f64 = 2.0;
 /// Root mean square change by a halved time step that does not matter, in units of the noise.
 const FINE: f64 = 0.5;
 
@@ -104,17 +107,17 @@ pub fn repeatability(repeats: Repeats) -> CheckResult {
     )
 }
 
-/// Change of the predictions of the training logs by a halved time step, in units of the noise; `halved` is the same machine with
-/// half of it.
+/// Change of the predictions of the training logs by an explanation at a halved time step, in units of the noise; `halved` is the same
+/// machine with half of it.
 ///
 /// # Errors
 /// When a rollout fails.
-pub fn change_by_step(bench: &Bench, none: &Explanation, halved: &Machine) -> Result<Vec<f64>> {
-    let point = &none.fit.point;
+pub fn change_by_step(bench: &Bench, of: &Explanation, halved: &Machine) -> Result<Vec<f64>> {
+    let (point, parameters) = (&of.fit.point, of.parameters());
     let read = |machine: &Machine| -> Result<Vec<f64>> {
-        let model = machine.with(&[])?;
+        let model = machine.with(&of.effects)?;
         let logs = bench.train.logs.replanned(model.layout());
-        let mut predictor = Predictor::new(&*model, &bench.parameters, &logs, 1, machine.threads)?;
+        let mut predictor = Predictor::new(&*model, &parameters, &logs, 1, machine.threads)?;
         let mut residuals = predictor.residuals(std::slice::from_ref(point))?;
         Ok(residuals.pop().unwrap_or_default())
     };

@@ -4,13 +4,21 @@
 //! Derivatives are differences of rollouts ([`crate::linearise`]), and all trial steps with several
 //! dampings are one batch.
 
+mod region;
+mod steps;
+
+use std::sync::Arc;
+
 use asid_core::layout::Layout;
 use asid_core::{Progress, Result};
 use nalgebra::DMatrix;
 
-use crate::linearise::{Differences, Linearisation, NOTHING, Open, Unknown, linearise, slope};
+use crate::linearise::{Differences, Linearisation, Open, Unknown, slope};
 use crate::normal::{Normal, inverse};
 use crate::predict::{Point, Predictor};
+
+pub use region::Region;
+use steps::Steps;
 
 /// How long and how finely to search.
 #[derive(Clone, Copy, Debug)]
@@ -19,7 +27,7 @@ pub struct Effort {
     pub iterations: usize,
     /// Share of the cost below which a step counts as none.
     pub tolerance: f64,
-    /// Whether derivatives in the starts are taken once and kept: over a short window they hardly
+    /// Whether derivatives in the starts are taken once and kept to the end: over a short window they hardly
     /// change.
     pub chord: bool,
 }
@@ -54,13 +62,30 @@ pub struct Fit {
     pub cost: f64,
     /// Residuals there.
     pub residuals: Vec<f64>,
-    /// Derivatives of the prediction in the free parameters at the last linearisation,
-    /// `residuals x free`, per unit of each.
-    pub jacobian: DMatrix<f64>,
+    /// Length of the derivatives of the prediction in each free parameter at the last linearisation, per unit of it.
+    pub shows: Vec<f64>,
+    /// How far each free parameter moves by a unit of each residual, with the starts refitted, `free x residuals`, in its unit.
+    pub gains: DMatrix<f64>,
     /// Covariance of the free parameters for residuals of unit variance, in their units.
     pub covariance: DMatrix<f64>,
     /// Indices of the free parameters.
     pub free: Vec<usize>,
+    /// Derivatives in the starts at the last linearisation.
+    pub starts: Arc<StartSlopes>,
+}
+
+impl Fit {
+    /// How far a fit to residuals that are changed so moves each free parameter, to first order, in its unit. Residuals that are not
+    /// numbers, as after a replay diverged, do not count.
+    #[must_use]
+    pub fn answer(&self, change: &[f64]) -> Vec<f64> {
+        let product = |row: usize| {
+            let gains = self.gains.row(row);
+            let pairs = gains.iter().zip(change).filter(|(_, c)| c.is_finite());
+            pairs.map(|(g, c)| g * c).sum()
+        };
+        (0..self.free.len()).map(product).collect()
+    }
 }
 
 /// Sum of squares.
@@ -77,143 +102,113 @@ fn bounds(predictor: &Predictor<'_>) -> Vec<std::ops::Range<usize>> {
         .collect()
 }
 
-/// Fits the unknowns and the starts' open coordinates from `point` on, as far as it comes until work is stopped.
+/// Derivatives in the starts, which fits of like models share.
+#[derive(Clone, Debug, Default)]
+pub struct StartSlopes {
+    /// Differences that they were taken over, one an open coordinate, m or rad or per second.
+    pub steps: Vec<f64>,
+    /// One column an open coordinate: of every episode at once. Empty where only the differences are shared.
+    pub columns: Vec<Vec<f64>>,
+}
+
+/// What a fit begins with.
+pub struct Begin<'b> {
+    /// Values and starts.
+    pub point: Point,
+    /// Coordinates of the starts that are fitted with the values.
+    pub open: &'b Open,
+    /// Derivatives in the starts of a model that is like this one: they do for a look, and a fit begins with their differences.
+    pub like: Option<&'b StartSlopes>,
+    /// Where the values stay.
+    pub region: Option<&'b Region>,
+}
+
+impl<'b> Begin<'b> {
+    /// From some values and starts on, of which some coordinates are open.
+    #[must_use]
+    pub fn at(point: Point, open: &'b Open) -> Self {
+        Self {
+            point,
+            open,
+            like: None,
+            region: None,
+        }
+    }
+}
+
+/// Fits the unknowns and the starts' open coordinates, as far as it comes until work is stopped. Derivatives in the
+/// starts are kept while steps win, for they cost a replay each and change little (a chord method).
 ///
 /// # Errors
 /// As [`Predictor::residuals`].
 pub fn fit(
     predictor: &mut Predictor<'_>,
-    layout: &Layout,
-    unknowns: &[Unknown],
-    point: Point,
-    open: &Open,
+    (layout, unknowns): (&Layout, &[Unknown]),
+    begin: Begin<'_>,
     (effort, progress): (Effort, &dyn Progress),
 ) -> Result<Fit> {
-    let free: Vec<usize> = (0..unknowns.len()).filter(|&i| unknowns[i].free).collect();
+    let Begin {
+        mut point,
+        open,
+        like,
+        region,
+    } = begin;
     let bounds = bounds(predictor);
     let mut differences = Differences::new(unknowns.len(), open.len());
-    let mut point = point;
-    let mut damping = 1e-3;
-    let mut line = linearise(predictor, layout, unknowns, &point, open, &mut differences)?;
-    let mut best = cost(&line.residuals);
-    if free.is_empty() && open.is_empty() {
-        return Ok(finish(unknowns, free, point, line, &bounds));
+    if let Some(like) = like {
+        differences.starts.clone_from(&like.steps);
     }
-    if effort.chord {
-        line = linearise(predictor, layout, unknowns, &point, open, &mut differences)?;
-        differences.kept = Some(line.start_columns.clone());
-    }
-    // The first differences are a guess; they are right once they hardly change.
-    for _ in 0..4 {
-        if progress.is_stopped() {
-            break;
-        }
-        let before = differences.clone();
-        line = linearise(predictor, layout, unknowns, &point, open, &mut differences)?;
-        let settled = |(a, b): (&f64, &f64)| (a / b).max(b / a) < 4.0;
-        if before.shares.iter().zip(&differences.shares).all(settled)
-            && before.starts.iter().zip(&differences.starts).all(settled)
-        {
-            break;
-        }
-    }
+    let nearby = like.filter(|l| effort.iterations == 0 && !l.columns.is_empty());
+    let nearby = nearby.map(|like| Linearisation {
+        start_columns: like.columns.clone(),
+        ..Linearisation::default()
+    });
+    let mut work = Steps {
+        predictor,
+        layout,
+        unknowns,
+        open,
+        free: (0..unknowns.len()).filter(|&i| unknowns[i].free).collect(),
+        bounds,
+        differences,
+        region,
+    };
+    let mut line = work.first(&point, nearby.as_ref(), progress)?;
+    let (mut best, mut damping) = (cost(&line.residuals), 1e-3);
+    // Whether derivatives in the starts are those of another point.
+    let mut stale = false;
     for _ in 0..effort.iterations {
-        if progress.is_stopped() {
+        if progress.is_stopped() || work.free.is_empty() && open.is_empty() {
             break;
         }
-        let mut accepted = None;
-        for _ in 0..3 {
-            let dampings = [damping * 0.1, damping, damping * 10.0];
-            let trials: Vec<Point> = dampings
-                .iter()
-                .map(|&d| trial(&line, layout, unknowns, &free, &point, open, &bounds, d))
-                .collect();
-            let residuals = predictor.residuals(&trials)?;
-            let costs: Vec<f64> = residuals.iter().map(|r| cost(r)).collect();
-            let lowest = (0..costs.len()).min_by(|&a, &b| costs[a].total_cmp(&costs[b]));
-            if let Some(k) = lowest.filter(|&k| costs[k] < best) {
-                accepted = Some((trials[k].clone(), costs[k]));
-                damping = dampings[k].clamp(1e-8, 1e8);
-                break;
-            }
-            damping *= 100.0;
+        let stepped = work.stepped((&line, &point), &mut damping, best)?;
+        let stands =
+            (stepped.as_ref()).is_none_or(|(_, c)| best - c < effort.tolerance * c.max(1.0));
+        let anew = stands && stale && !effort.chord;
+        let moves = stepped.is_some();
+        if let Some((next, value)) = stepped {
+            (point, best) = (next, value);
         }
-        let Some((next, value)) = accepted else { break };
-        let gain = best - value;
-        point = next;
-        best = value;
-        line = linearise(predictor, layout, unknowns, &point, open, &mut differences)?;
-        if gain < effort.tolerance * best.max(1.0) {
+        if anew {
+            line = work.line(&point, None)?;
+            stale = false;
+        } else if moves {
+            line = work.line(&point, Some(&line))?;
+            stale = !open.is_empty();
+        }
+        if stands && !anew {
             break;
         }
     }
-    Ok(finish(unknowns, free, point, line, &bounds))
+    if stale && !effort.chord && !progress.is_stopped() {
+        line = work.line(&point, None)?;
+    }
+    Ok(finish(work, point, line))
 }
 
-/// The point after a damped step, within the bounds.
-#[allow(clippy::too_many_arguments)]
-fn trial(
-    line: &Linearisation,
-    layout: &Layout,
-    unknowns: &[Unknown],
-    free: &[usize],
-    point: &Point,
-    open: &Open,
-    bounds: &[std::ops::Range<usize>],
-    damping: f64,
-) -> Point {
-    let normal = Normal::new(line, bounds, damping);
-    let unit: Vec<f64> = free
-        .iter()
-        .map(|&i| unknowns[i].parameter.to_unit(point.theta[i]))
-        .collect();
-    let readings = line.residuals.len().max(1) as f64;
-    let mut held: Vec<bool> = line
-        .columns
-        .iter()
-        .map(|c| (cost(c) / readings).sqrt() < NOTHING)
-        .collect();
-    let mut step = normal.step(damping, &held);
-    // Where the step leaves a bound that it starts from, that parameter stays.
-    for _ in 0..free.len() {
-        let mut again = false;
-        for k in 0..free.len() {
-            let leaves =
-                (unit[k] <= 1e-12 && step[k] < 0.0) || (unit[k] >= 1.0 - 1e-12 && step[k] > 0.0);
-            if leaves && !held[k] {
-                held[k] = true;
-                again = true;
-            }
-        }
-        if !again {
-            break;
-        }
-        step = normal.step(damping, &held);
-    }
-    let mut next = point.clone();
-    for (k, &i) in free.iter().enumerate() {
-        let u = (unit[k] + step[k]).clamp(0.0, 1.0);
-        next.theta[i] = unknowns[i].parameter.from_unit(u);
-    }
-    if !open.is_empty() {
-        for (e, start) in next.starts.iter_mut().enumerate() {
-            let moves = normal.start_step(e, &step);
-            for (&coordinate, by) in open.iter().zip(moves.iter()) {
-                start.shift(layout, coordinate, *by);
-            }
-        }
-    }
-    next
-}
-
-fn finish(
-    unknowns: &[Unknown],
-    free: Vec<usize>,
-    point: Point,
-    line: Linearisation,
-    bounds: &[std::ops::Range<usize>],
-) -> Fit {
-    let normal = Normal::new(&line, bounds, 0.0);
+fn finish(work: Steps<'_, '_>, point: Point, line: Linearisation) -> Fit {
+    let (unknowns, free) = (work.unknowns, work.free);
+    let normal = Normal::new(&line, &work.bounds, 0.0);
     let p = free.len();
     let inverse = inverse(&normal.information, 1e-14);
     // From shares of the range to the parameter's unit.
@@ -222,14 +217,22 @@ fn finish(
         .map(|&i| slope(&unknowns[i].parameter, point.theta[i]))
         .collect();
     let covariance = DMatrix::from_fn(p, p, |i, j| inverse[(i, j)] * scale[i] * scale[j]);
-    let rows = line.residuals.len();
-    let jacobian = DMatrix::from_fn(rows, p, |r, k| line.columns[k][r] / scale[k]);
+    let length = |(column, scale): (&Vec<f64>, &f64)| cost(column).sqrt() / scale.abs();
+    let mut gains = &inverse * normal.projected(&line, &work.bounds);
+    for (mut row, scale) in gains.row_iter_mut().zip(&scale) {
+        row *= *scale;
+    }
     Fit {
+        shows: line.columns.iter().zip(&scale).map(length).collect(),
+        gains,
         cost: cost(&line.residuals),
         residuals: line.residuals,
         point,
-        jacobian,
         covariance,
         free,
+        starts: Arc::new(StartSlopes {
+            steps: work.differences.starts,
+            columns: line.start_columns,
+        }),
     }
 }

@@ -82,6 +82,28 @@ impl Normal {
         }
     }
 
+    /// What a unit of each residual moves the gradient by, with the starts refitted: the columns with their part along the starts taken
+    /// out, `free x residuals`.
+    pub(crate) fn projected(
+        &self,
+        line: &Linearisation,
+        bounds: &[std::ops::Range<usize>],
+    ) -> DMatrix<f64> {
+        let p = line.columns.len();
+        let mut out = DMatrix::from_fn(p, line.residuals.len(), |k, r| line.columns[k][r]);
+        for (range, (inverse, coupling, _)) in bounds.iter().zip(&self.episodes) {
+            let by_starts = coupling * inverse;
+            for r in range.clone() {
+                for (j, start) in line.start_columns.iter().enumerate() {
+                    for k in 0..p {
+                        out[(k, r)] -= by_starts[(k, j)] * start[r];
+                    }
+                }
+            }
+        }
+        out
+    }
+
     /// Step of the free parameters; those in `held` do not move.
     pub(crate) fn step(&self, damping: f64, held: &[bool]) -> DVector<f64> {
         let p = self.gradient.len();

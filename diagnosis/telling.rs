@@ -122,7 +122,8 @@ impl Telling<'_> {
         } else {
             Kind::Effects
         };
-        let effects = self.effects(gap.identified)?;
+        let moved = self.moved_by_step(&explanation)?;
+        let effects = self.effects(gap.identified, &moved)?;
         let hypotheses = self.hypotheses();
         let labels = explanation.labels();
         let left = self.left(&members, &explanation)?;
@@ -142,7 +143,7 @@ impl Telling<'_> {
             groups: groups(&verdict.effects),
             verdict,
             tolerances: tolerances(&explanation),
-            parameters: self.parameters(&explanation),
+            parameters: self.parameters(&explanation, &moved),
             checks: self.checks(none, &explanation, short.as_ref())?,
             next_experiment: if self.stopped {
                 NextExperiment::default()

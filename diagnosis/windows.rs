@@ -14,7 +14,7 @@ use asid_mjcf::plant::Reads;
 
 use crate::bench::{Bench, Trial};
 use crate::data::Logs;
-use crate::fit::{Effort, fit};
+use crate::fit::{Begin, Effort, fit};
 use crate::predict::{Point, State};
 use crate::record::Record;
 use crate::starts::given_start;
@@ -87,10 +87,8 @@ pub fn settle(
     };
     let found = fit(
         &mut predictor,
-        bench.layout(),
-        &unknowns,
-        point,
-        &bench.open,
+        (bench.layout(), &unknowns),
+        Begin::at(point, &bench.open),
         (effort, &Silent),
     )?;
     Ok(found.point.starts)

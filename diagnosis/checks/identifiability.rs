@@ -37,7 +37,7 @@ pub fn identifiability(
     // Far off the logs a replay may be so chaotic that it has no slope; the best explanation is
     // nearer.
     let information = |k: usize| {
-        let of = |fit: &Fit| fit.jacobian.column(k).norm() * scale(fit, k);
+        let of = |fit: &Fit| fit.shows[k] * scale(fit, k);
         of(fit).max(of(&best.fit))
     };
     let silent: Vec<&str> = (0..p)

@@ -81,6 +81,9 @@ pub struct Fitted {
     pub promised: f64,
     /// Posterior covariance of the fitted values, in their units.
     pub covariance: DMatrix<f64>,
+    /// How far the posterior mean of each fitted value lies from the value, by the last linearisation, in their units: 0 where the fit has
+    /// come to its end.
+    pub ahead: Vec<f64>,
     /// Trajectory, force and noise.
     pub estimate: Estimate,
     /// Slopes in the state, with which fits of like models begin.
@@ -147,7 +150,7 @@ pub fn fit(
             here,
             promised,
             found,
-        }) = compare(context, &estimate, &linear, model)
+        }) = compare(context, &estimate, &linear, model, round == 0)
         else {
             break;
         };
@@ -168,6 +171,7 @@ pub fn fit(
                 wander: 0.0,
                 promised,
                 covariance: in_units(&found.covariance, unknowns, &free),
+                ahead: ahead(&found.coefficients, unknowns, &free),
                 estimate: estimate.clone(),
                 slopes: Slopes::default(),
             });
@@ -208,6 +212,14 @@ pub fn fit(
         best.wander = wander(&all, rise);
     }
     Ok(best)
+}
+
+/// What coefficients, as far as a tangent reaches, move the free values by, in their units.
+fn ahead(coefficients: &[f64], unknowns: &[Unknown], free: &[usize]) -> Vec<f64> {
+    let pairs = coefficients.iter().zip(free);
+    pairs
+        .map(|(c, &i)| c.clamp(-LARGEST_STEP, LARGEST_STEP) * unknowns[i].deviation)
+        .collect()
 }
 
 /// Moves the free values by coefficients in deviations of their priors, within their bounds and the reach of a tangent; returns the moves.

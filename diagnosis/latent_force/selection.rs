@@ -7,7 +7,7 @@ use asid_results::evidence::{Evidence, Replayed, Screened, Tried};
 use crate::bench::held_out::misfit;
 use crate::bench::{Bench, Explanation};
 use crate::candidate::{Candidate, nameable};
-use crate::checks::change_by_step;
+use crate::checks::{RICHARDSON, change_by_step};
 use crate::decision::is_small;
 use crate::findings::{Findings, trials};
 use crate::fit::cost;
@@ -18,9 +18,6 @@ use super::search::{Outcome, Set, labels_of, log_prior};
 
 /// Root mean square of the missing force, relative to the inertial forces, up to which nothing is missing.
 const NOTHING: f64 = 0.01;
-/// An engine's own error, in changes by half the time step: what is of first order in the step (Richardson 1911), the worst
-/// that engines have.
-const RICHARDSON: f64 = 2.0;
 /// Sets that were screened and not fitted that are kept: what is further behind has no probability that shows.
 const SCREENED: usize = 40;
 

@@ -76,6 +76,19 @@ impl Common<'_> {
     }
 }
 
+/// What of a linearisation is taken anew; all of it by default. What is not is zero.
+#[derive(Clone, Copy, Default)]
+pub struct Anew<'r> {
+    /// Walks whose slopes in the state are; empty for all.
+    pub state: &'r [bool],
+    /// [`LinearEpisode::carried`] of the other walks; empty where there is none.
+    pub carried: &'r [Vec<f64>],
+    /// Variations whose columns are kept but along the walks of `columns`; empty for none.
+    pub kept: &'r [bool],
+    /// Walks along which the columns of all variations are taken anew; empty for none.
+    pub columns: &'r [bool],
+}
+
 /// The linearisation point and what is wanted of it.
 #[derive(Clone, Copy)]
 struct Request<'r> {
@@ -84,10 +97,7 @@ struct Request<'r> {
     want: Derivatives,
     push: &'r [f64],
     variations: &'r [Variation],
-    /// Walks whose slopes in the state are wanted; empty for all.
-    due: &'r [bool],
-    /// [`LinearEpisode::carried`] of walks that are not due; empty where there is none.
-    carried: &'r [Vec<f64>],
+    anew: Anew<'r>,
     /// Whether each variation is of what acts in each physics step alike.
     at_once: &'r [bool],
 }
@@ -95,7 +105,12 @@ struct Request<'r> {
 impl Request<'_> {
     /// Whether the slopes of a walk in the state are wanted, where any are.
     fn due(&self, walk: usize) -> bool {
-        self.due.get(walk).is_none_or(|due| *due)
+        self.anew.state.get(walk).is_none_or(|due| *due)
+    }
+
+    /// Whether the column of a variation is wanted along the walks whose columns are `due`, or else along the others.
+    fn wants(&self, variation: usize, due: bool) -> bool {
+        due || !self.anew.kept.get(variation).is_some_and(|kept| *kept)
     }
 }
 
@@ -215,19 +230,18 @@ impl<'a> StepMap<'a> {
         push: &[f64],
         variations: &[Variation],
     ) -> Result<Vec<LinearEpisode>> {
-        self.linearise_due(theta, trajectory, (want, &[], &[]), push, variations)
+        self.linearise_anew(theta, trajectory, (want, Anew::default()), push, variations)
     }
 
-    /// The same, with slopes in the state of those walks alone that are due (one flag a walk; empty for all): those of the others are
-    /// zero. `carried` has [`LinearEpisode::carried`] of the others, where they have it.
+    /// The same of what is taken `anew` alone.
     ///
     /// # Errors
     /// As [`StepMap::linearise`].
-    pub fn linearise_due(
+    pub fn linearise_anew(
         &mut self,
         theta: &[f64],
         trajectory: &[Vec<f64>],
-        (want, due, carried): (Derivatives, &[bool], &[Vec<f64>]),
+        (want, anew): (Derivatives, Anew<'_>),
         push: &[f64],
         variations: &[Variation],
     ) -> Result<Vec<LinearEpisode>> {
@@ -242,8 +256,7 @@ impl<'a> StepMap<'a> {
             want,
             push,
             variations,
-            due,
-            carried,
+            anew,
             at_once: &at_once,
         };
         let found: Vec<Vec<LinearEpisode>> = self

@@ -105,15 +105,17 @@ impl Telling<'_> {
         all
     }
 
-    /// Effects of the hypotheses, each as fitted in the most probable set that has it.
-    pub(super) fn effects(&self, identified: f64) -> Result<Vec<EffectResult>> {
+    /// Effects of the hypotheses, each as fitted in the most probable set that has it. `moved` is how far the engine's own error moves each
+    /// fitted value of the best.
+    pub(super) fn effects(&self, identified: f64, moved: &[f64]) -> Result<Vec<EffectResult>> {
         let j = self.judgement;
         let mut all: Vec<EffectResult> = Vec::new();
         for (i, h) in j.hypotheses.iter().enumerate() {
             let Some(found) = self.found(i) else {
                 continue;
             };
-            let intervals = self.intervals(&found.explanation);
+            let moved = if i == j.best { moved } else { &[] };
+            let intervals = self.intervals(&found.explanation, moved);
             let fitted = found.explanation.effects.iter().zip(intervals);
             let named = fitted.zip(&found.explanation.is_tolerance);
             for ((effect, (intervals95, at_bound)), is_tolerance) in named {

@@ -3,11 +3,18 @@
 //! Intervals are those of least squares (Gauss), widened by how much more the fit leaves than the noise and by how alike
 //! neighbouring residuals are: many readings of one and the same error count once. Where the missing force was estimated they
 //! are no narrower than those of the fit that allows for it: what the model lacks leaves values as uncertain as it does there.
+//!
+//! Two errors that no spread of residuals shows are added as squares. A model that is wrong makes fits that weigh the logs otherwise
+//! disagree (Hausman 1978): the distance of the value from the mean of the fit that allows for a missing force. And the engine's own
+//! error: what the value would be at a time step of none, by how far half the step moves it (Richardson 1911).
 
 use std::collections::BTreeMap;
 
+use asid_core::Result;
+
 use super::Telling;
 use crate::bench::{Bench, Explanation};
+use crate::checks::{RICHARDSON, change_by_step};
 use crate::linearise::NOTHING;
 use crate::result::ParameterResult;
 
@@ -55,17 +62,58 @@ impl Telling<'_> {
         (of.fit.cost / readings).max(1.0) * (1.0 + rho) / (1.0 - rho)
     }
 
-    /// The value of an unknown of an explanation; `None` where it was not fitted.
-    pub(super) fn fitted(&self, of: &Explanation, unknown: usize) -> Option<Fitted> {
+    /// How far the engine's own error moves each fitted value of an explanation, in its unit; 0 where that cannot be told.
+    pub(super) fn moved_by_step(&self, of: &Explanation) -> Result<Vec<f64>> {
+        let none = vec![0.0; of.fit.free.len()];
+        let scatters = self.findings.repeats.is_some_and(|r| r.scatters);
+        if self.stopped || scatters || none.is_empty() {
+            return Ok(none);
+        }
+        let Ok(halved) = self.bench.machine.halved() else {
+            return Ok(none);
+        };
+        let change = change_by_step(self.bench, of, &halved)?;
+        let moved = of.fit.answer(&change);
+        Ok(moved.iter().map(|m| RICHARDSON * m).collect())
+    }
+
+    /// The value of an unknown of an explanation; `None` where it was not fitted. `moved` is how far the engine's own error moves each
+    /// fitted value, empty for nothing.
+    pub(super) fn fitted(
+        &self,
+        (of, moved): (&Explanation, &[f64]),
+        unknown: usize,
+    ) -> Option<Fitted> {
         let fit = &of.fit;
         let k = fit.free.iter().position(|&f| f == unknown)?;
         let [low, high] = of.unknowns[unknown].parameter.range;
         let value = fit.point.theta[unknown];
-        let column = fit.jacobian.column(k);
-        let shows = column.norm() * (high - low) / (column.len().max(1) as f64).sqrt();
+        let readings = fit.residuals.len().max(1) as f64;
+        let shows = fit.shows[k] * (high - low) / readings.sqrt();
         let deviation = if shows > NOTHING {
             let by_replays = fit.covariance[(k, k)].max(0.0) * self.inflation(of);
-            by_replays.max(of.local_variances[unknown]).sqrt()
+            let (local, apart) =
+                of.local[unknown].map_or((0.0, 0.0), |l| (l.variance, value - l.mean));
+            let moved = moved.get(k).copied().unwrap_or(0.0);
+            if let Ok(file) = std::env::var("ASIDVAL") {
+                use std::io::Write as _;
+                if let Ok(mut f) = std::fs::OpenOptions::new()
+                    .append(true)
+                    .create(true)
+                    .open(file)
+                {
+                    let _ = writeln!(
+                        f,
+                        "VAL {:?} {} value {value} replays {} local {} apart {apart} moved {moved} inflation {}",
+                        self.bench.train.logs.offset(1),
+                        of.unknowns[unknown].parameter.name,
+                        by_replays.sqrt(),
+                        local.sqrt(),
+                        self.inflation(of)
+                    );
+                }
+            }
+            (by_replays.max(local) + apart.powi(2) + moved.powi(2)).sqrt()
         } else {
             f64::INFINITY
         };
@@ -83,7 +131,11 @@ impl Telling<'_> {
 
     /// Intervals of the fitted values of each effect of an explanation, and whether one is at an end of its range that does not
     /// mean that the effect is absent.
-    pub(super) fn intervals(&self, of: &Explanation) -> Vec<(BTreeMap<String, [f64; 2]>, bool)> {
+    pub(super) fn intervals(
+        &self,
+        of: &Explanation,
+        moved: &[f64],
+    ) -> Vec<(BTreeMap<String, [f64; 2]>, bool)> {
         let mut at = self.bench.parameters.len();
         let each = of.effects.iter().map(|effect| {
             let first = at;
@@ -94,7 +146,7 @@ impl Telling<'_> {
             let mut intervals = BTreeMap::new();
             let mut at_bound = false;
             for (i, (name, _)) in effect.values.iter().enumerate() {
-                if let Some(fitted) = self.fitted(of, first + i) {
+                if let Some(fitted) = self.fitted((of, moved), first + i) {
                     intervals.insert(name.clone(), fitted.interval95);
                     at_bound |= fitted.at_bound && fitted.value != null(i);
                 }
@@ -105,11 +157,11 @@ impl Telling<'_> {
     }
 
     /// The study's parameters.
-    pub(super) fn parameters(&self, of: &Explanation) -> Vec<ParameterResult> {
+    pub(super) fn parameters(&self, of: &Explanation, moved: &[f64]) -> Vec<ParameterResult> {
         let all = self.bench.parameters.iter().enumerate();
         all.map(|(i, p)| {
             let value = of.fit.point.theta[i];
-            let fitted = self.fitted(of, i);
+            let fitted = self.fitted((of, moved), i);
             ParameterResult {
                 name: p.name.clone(),
                 unit: self.study.parameters[i].unit.clone(),

@@ -6,7 +6,9 @@ use asid::core::{Episode, Parameter, Scene};
 use asid::diagnosis::data::Logs;
 use asid::diagnosis::latent_force::context::{Taken, begin};
 use asid::diagnosis::latent_force::one_step::one_step_tells;
-use asid::diagnosis::latent_force::step_map::{Derivatives, LinearEpisode, StepMap, Variation};
+use asid::diagnosis::latent_force::step_map::{
+    Anew, Derivatives, LinearEpisode, StepMap, Variation,
+};
 use asid::diagnosis::latent_force::walk::Walk;
 use asid::diagnosis::machine::Machine;
 use asid::effects::EffectSpec;
@@ -134,10 +136,15 @@ fn columns_of_damping() -> [Vec<f64>; 3] {
     map.by_one_step(true);
     let one = map.linearise(&theta, &states, fresh, &[], &varied).unwrap();
     let carried = [one[0].carried.clone()];
-    let kept = (Derivatives::default(), &[false][..], &carried[..]);
+    let anew = Anew {
+        state: &[false],
+        carried: &carried,
+        ..Anew::default()
+    };
+    let kept = (Derivatives::default(), anew);
     let before = map.steps();
     let again = map
-        .linearise_due(&theta, &states, kept, &[], &varied)
+        .linearise_anew(&theta, &states, kept, &[], &varied)
         .unwrap();
     // All steps of the model as it is, and one a row of the other.
     let steps = (ROWS - 1) * (STEPS + 1);

@@ -4,7 +4,7 @@ use asid_core::{Progress, Result};
 
 use crate::candidate::Candidate;
 use crate::latent_force::context::Context;
-use crate::latent_force::step_map::{Derivatives, Variation, retime_columns};
+use crate::latent_force::step_map::{Anew, Derivatives, Variation, retime_columns};
 use crate::latent_force::trace::trace;
 
 use super::force_response::{ForceSlopes, Row};
@@ -174,12 +174,13 @@ impl Source<'_> {
         let variations: Vec<Variation> = groups.iter().map(variation).collect();
         let mut map = context.map(&model.specs, &model.parameters, own + 1)?;
         map.by_one_step(!self.carried.is_empty());
-        let wanted_too = (
-            Derivatives::default(),
-            &vec![false; states.len()][..],
-            self.carried,
-        );
-        let found = map.linearise_due(&model.theta, states, wanted_too, &[], &variations)?;
+        let anew = Anew {
+            state: &vec![false; states.len()],
+            carried: self.carried,
+            ..Anew::default()
+        };
+        let wanted_too = (Derivatives::default(), anew);
+        let found = map.linearise_anew(&model.theta, states, wanted_too, &[], &variations)?;
         // Only forces take several columns apart, and where all are walked for alone there may be no slopes in forces.
         let by_forces = groups
             .iter()

@@ -1,15 +1,20 @@
-//! Columns of tolerances, kept while they hardly change (a chord method), from one fit to the next too.
+//! Columns of values, kept while they hardly change (a chord method): those of tolerances from one fit to the next too.
 //!
-//! A machine has many tolerances, and each is a simulation of all logs in each linearisation. A gram more, or a millimetre, does nearly the
-//! same all along a search, for the trajectory stays near the readings.
+//! Each column is a simulation of all logs in each linearisation. Along the steps of a fit the trajectory stays near the readings, and while
+//! no value moves far its column stays what it was. A machine has many tolerances, and a gram more, or a millimetre, does nearly the
+//! same all along a search.
 
 use std::sync::Arc;
 
 use crate::latent_force::fitted_value::Unknown;
 use crate::latent_force::step_map::LinearEpisode;
 
-/// Linearisations that they are kept for in one fit: a race of so many takes none, a fit to the end takes them anew as its other values move.
+/// Linearisations that those of tolerances are kept for in one fit: a race of so many takes none, a fit to the end takes them anew as its
+/// other values move.
 const KEPT: usize = 4;
+/// How far any other value may move meanwhile, in deviations of its prior: a third of what slopes in the state stand, for laws that are no
+/// straight lines bend over a deviation.
+const KEPT_MOVE: f64 = 0.1;
 
 /// Columns of one walk: of the next states, `(rows - 1) x nx x m`, and of the readings, `rows x ns x m`.
 #[derive(Debug, Default)]
@@ -18,58 +23,65 @@ struct Along {
     readings: Vec<f64>,
 }
 
-/// Columns of tolerances, in deviations of their priors.
+/// Columns of values, in deviations of their priors.
 #[derive(Clone, Debug, Default)]
 pub(super) struct KeptColumns {
-    /// Names of their parameters.
+    /// Names of their parameters, and whether they are tolerances.
     names: Arc<Vec<String>>,
+    of_tolerances: Arc<Vec<bool>>,
     walks: Arc<Vec<Along>>,
+    /// Where those of other values than tolerances were taken: all values of the model; none of another fit's.
+    theta: Option<Vec<f64>>,
     /// Linearisations that have used them.
     used: usize,
 }
 
-/// The numbers of some columns of a row-major matrix of `m`.
-fn picked(all: &[f64], m: usize, columns: &[usize]) -> Vec<f64> {
-    let rows = all.chunks_exact(m);
-    rows.flat_map(|row| columns.iter().map(|&c| row[c]))
-        .collect()
+/// The largest move of a value, in deviations of its prior; tolerances aside, which are narrow.
+pub(super) fn furthest(from: &[f64], to: &[f64], unknowns: &[Unknown]) -> f64 {
+    let moved = |((a, b), u): ((&f64, &f64), &Unknown)| (a - b).abs() / u.deviation;
+    let pairs = from.iter().zip(to).zip(unknowns);
+    let pairs = pairs.filter(|(_, u)| !u.is_tolerance);
+    pairs.map(moved).fold(0.0, f64::max)
 }
 
-/// A row-major matrix of two: `from` has for each column its place in the second (of `n`), or none for the next of the first (of `m`).
-fn woven(
-    (fresh, m): (&[f64], usize),
-    (kept, n): (&[f64], usize),
-    from: &[Option<usize>],
-) -> Vec<f64> {
-    let rows = kept.len() / n;
-    let mut out = Vec::with_capacity(rows * from.len());
-    for k in 0..rows {
-        let (mut fresh, kept) = (fresh[k * m..(k + 1) * m].iter(), &kept[k * n..(k + 1) * n]);
-        out.extend(from.iter().map(|place| match place {
-            Some(place) => kept[*place],
-            None => fresh.next().copied().unwrap_or(0.0),
-        }));
+/// Copies columns of a row-major matrix of `n` to their places in one of `m`.
+fn fill(to: &mut [f64], m: usize, (from, n): (&[f64], usize), places: &[Option<usize>]) {
+    for (to, from) in to.chunks_exact_mut(m).zip(from.chunks_exact(n)) {
+        for (to, place) in to.iter_mut().zip(places) {
+            if let Some(place) = place {
+                *to = from[*place];
+            }
+        }
     }
-    out
 }
 
 impl KeptColumns {
-    /// The same at the beginning of another fit.
+    /// The same at the beginning of another fit, whose values are others.
     pub(super) fn begun(&self) -> Self {
         Self {
             used: 0,
+            theta: None,
             ..self.clone()
         }
     }
 
     /// The place here of each of the values that are fitted; none for all where one that is a tolerance has no column here, or they have
     /// been used for long.
-    pub(super) fn places(&self, unknowns: &[Unknown], free: &[usize]) -> Vec<Option<usize>> {
-        let place = |name: &String| self.names.iter().position(|n| n == name);
+    pub(super) fn places(
+        &self,
+        (unknowns, free): (&[Unknown], &[usize]),
+        theta: &[f64],
+    ) -> Vec<Option<usize>> {
+        let is_near =
+            (self.theta.as_ref()).is_some_and(|t| furthest(t, theta, unknowns) < KEPT_MOVE);
+        let place = |u: &Unknown| {
+            let place = self.names.iter().position(|n| *n == u.parameter.name)?;
+            (is_near || u.is_tolerance && self.of_tolerances[place]).then_some(place)
+        };
         let mut places = Vec::with_capacity(free.len());
         for &i in free {
             let u = &unknowns[i];
-            let kept = u.is_tolerance.then(|| place(&u.parameter.name)).flatten();
+            let kept = place(u);
             if u.is_tolerance && kept.is_none() || self.used >= KEPT {
                 return vec![None; free.len()];
             }
@@ -78,39 +90,48 @@ impl KeptColumns {
         places
     }
 
-    /// Puts the kept columns at their `places` among the fresh ones of a linearisation.
-    pub(super) fn join(&mut self, linear: &mut [LinearEpisode], places: &[Option<usize>]) {
-        let n = self.names.len();
-        let fresh = places.iter().filter(|p| p.is_none()).count();
-        if fresh == places.len() {
+    /// Puts the kept columns at their `places` into a linearisation, but for walks whose columns were taken `anew`.
+    pub(super) fn join(
+        &mut self,
+        linear: &mut [LinearEpisode],
+        places: &[Option<usize>],
+        anew: &[bool],
+    ) {
+        let (m, n) = (places.len(), self.names.len());
+        if places.iter().all(Option::is_none) {
             return;
         }
         self.used += 1;
-        for (linear, kept) in linear.iter_mut().zip(self.walks.iter()) {
-            linear.state_columns = woven((&linear.state_columns, fresh), (&kept.states, n), places);
-            linear.reading_columns = woven(
-                (&linear.reading_columns, fresh),
-                (&kept.readings, n),
-                places,
-            );
+        let walks = linear.iter_mut().zip(self.walks.iter()).zip(anew);
+        for ((linear, kept), _) in walks.filter(|(_, anew)| !**anew) {
+            fill(&mut linear.state_columns, m, (&kept.states, n), places);
+            fill(&mut linear.reading_columns, m, (&kept.readings, n), places);
         }
     }
 
-    /// Keeps the columns of the tolerances of a linearisation, all of which are fresh.
-    pub(super) fn keep(&mut self, linear: &[LinearEpisode], unknowns: &[Unknown], free: &[usize]) {
-        let m = free.len();
-        let columns: Vec<usize> = (0..m).filter(|&k| unknowns[free[k]].is_tolerance).collect();
-        if columns.is_empty() {
-            return;
+    /// Keeps the columns of a linearisation at some values, of which some are those that were `kept`.
+    pub(super) fn keep(
+        &mut self,
+        linear: &[LinearEpisode],
+        (unknowns, free): (&[Unknown], &[usize]),
+        (theta, kept): (&[f64], &[bool]),
+    ) {
+        if !kept.contains(&true) {
+            self.used = 1;
         }
-        let name = |&k: &usize| unknowns[free[k]].parameter.name.clone();
+        let is_tolerance = |&i: &usize| unknowns[i].is_tolerance;
+        let mut others = free.iter().zip(kept).filter(|(i, _)| !is_tolerance(i));
+        if others.any(|(_, kept)| !kept) {
+            self.theta = Some(theta.to_vec());
+        }
         let along = |linear: &LinearEpisode| Along {
-            states: picked(&linear.state_columns, m, &columns),
-            readings: picked(&linear.reading_columns, m, &columns),
+            states: linear.state_columns.clone(),
+            readings: linear.reading_columns.clone(),
         };
-        self.names = Arc::new(columns.iter().map(name).collect());
+        let name = |&i: &usize| unknowns[i].parameter.name.clone();
+        self.names = Arc::new(free.iter().map(name).collect());
+        self.of_tolerances = Arc::new(free.iter().map(is_tolerance).collect());
         self.walks = Arc::new(linear.iter().map(along).collect());
-        self.used = 1;
     }
 }
 
@@ -146,37 +167,74 @@ mod tests {
         }
     }
 
-    #[test]
-    fn kept_columns_come_between_fresh_ones_by_name() {
-        let all = ["mass", "slip", "delay", "spring"];
-        let unknowns: Vec<Unknown> = [(0, true), (1, false), (2, true), (3, false)]
-            .map(|(i, t)| unknown(all[i], t))
-            .to_vec();
+    /// A mass, a slip, a delay and a spring, of which the mass and the delay are tolerances.
+    fn four() -> Vec<Unknown> {
+        [
+            ("mass", true),
+            ("slip", false),
+            ("delay", true),
+            ("spring", false),
+        ]
+        .map(|(name, is_tolerance)| unknown(name, is_tolerance))
+        .to_vec()
+    }
+
+    /// Columns of the first three.
+    fn kept(unknowns: &[Unknown]) -> KeptColumns {
         let mut kept = KeptColumns::default();
-        kept.keep(&[linear(&[0.0, 1.0, 2.0])], &unknowns, &[0, 1, 2]);
-        // Another model, in another order: of four values two are kept.
+        let fresh = [linear(&[0.0, 1.0, 2.0])];
+        kept.keep(&fresh, (unknowns, &[0, 1, 2]), (&[0.0; 4], &[false; 3]));
+        kept
+    }
+
+    #[test]
+    fn columns_of_tolerances_of_another_fit_come_between_fresh_ones_by_name() {
+        let unknowns = four();
+        let mut kept = kept(&unknowns).begun();
         let free = [3, 2, 1, 0];
-        let places = kept.places(&unknowns, &free);
-        assert_eq!(places, [None, Some(1), None, Some(0)]);
-        let mut fresh = [linear(&[3.0, 1.0])];
-        kept.join(&mut fresh, &places);
+        let places = kept.places((&unknowns, &free), &[0.0; 4]);
+        assert_eq!(places, [None, Some(2), None, Some(0)]);
+        // What is kept was not taken; the second walk is anew.
+        let mut fresh = [linear(&[3.0, 9.0, 1.0, 9.0]), linear(&[3.0, 9.0, 1.0, 9.0])];
+        kept.walks = Arc::new(vec![
+            Along {
+                states: linear(&[0.0, 1.0, 2.0]).state_columns,
+                readings: linear(&[0.0, 1.0, 2.0]).reading_columns,
+            },
+            Along::default(),
+        ]);
+        kept.join(&mut fresh, &places, &[false, true]);
+        let joined = linear(&[3.0, 2.0, 1.0, 0.0]);
+        assert_eq!(fresh[0].state_columns, joined.state_columns);
+        assert_eq!(fresh[0].reading_columns, joined.reading_columns);
         assert_eq!(
-            fresh[0].state_columns,
-            linear(&[3.0, 2.0, 1.0, 0.0]).state_columns
+            fresh[1].state_columns,
+            linear(&[3.0, 9.0, 1.0, 9.0]).state_columns
         );
-        assert_eq!(fresh[0].reading_columns, fresh[0].state_columns);
+    }
+
+    #[test]
+    fn columns_of_a_fit_are_kept_while_no_value_but_a_tolerance_has_moved_far() {
+        let unknowns = four();
+        let kept = kept(&unknowns);
+        let places = |theta: [f64; 4]| kept.places((&unknowns, &[0, 1, 2]), &theta);
+        let near = 0.9 * KEPT_MOVE * unknowns[1].deviation;
+        assert_eq!(places([0.9, near, 0.0, 0.0]), [Some(0), Some(1), Some(2)]);
+        let far = 1.1 * KEPT_MOVE * unknowns[1].deviation;
+        assert_eq!(places([0.0, far, 0.0, 0.0]), [Some(0), None, Some(2)]);
     }
 
     #[test]
     fn columns_that_were_used_for_long_are_taken_anew() {
         let unknowns = [unknown("mass", true)];
+        let model = (&unknowns[..], &[0][..]);
         let mut kept = KeptColumns::default();
-        assert_eq!(kept.places(&unknowns, &[0]), [None]);
-        kept.keep(&[linear(&[0.0])], &unknowns, &[0]);
-        while kept.places(&unknowns, &[0]) == [Some(0)] {
-            kept.join(&mut [linear(&[])], &[Some(0)]);
+        assert_eq!(kept.places(model, &[0.0]), [None]);
+        kept.keep(&[linear(&[0.0])], model, (&[0.0], &[false]));
+        while kept.places(model, &[0.0]) == [Some(0)] {
+            kept.join(&mut [linear(&[0.0])], &[Some(0)], &[false]);
         }
         assert_eq!(kept.used, KEPT);
-        assert_eq!(kept.begun().places(&unknowns, &[0]), [Some(0)]);
+        assert_eq!(kept.begun().places(model, &[0.0]), [Some(0)]);
     }
 }

@@ -6,13 +6,12 @@ use asid_core::Result;
 
 use crate::latent_force::context::Context;
 use crate::latent_force::estimate::Estimate;
-use crate::latent_force::fitted_value::Unknown;
 use crate::latent_force::one_step::one_step_tells;
-use crate::latent_force::step_map::{Derivatives, LinearEpisode, StepMap, Variation};
+use crate::latent_force::step_map::{Anew, Derivatives, LinearEpisode, StepMap, Variation};
 use crate::latent_force::tangent::difference;
 
 use super::Hypothesis;
-use super::kept_columns::KeptColumns;
+use super::kept_columns::{KeptColumns, furthest};
 use super::secant::{Replayed, mend};
 
 /// Linearisations that slopes along rows are kept for: their trajectory moves in each.
@@ -40,7 +39,7 @@ pub struct Slopes {
     used: usize,
     /// Whether they are those of one physics step of each row.
     by_one_step: bool,
-    /// Columns of tolerances.
+    /// Columns of values.
     columns: KeptColumns,
     /// The replay of each segment in the linearisation before; none at the beginning of a fit, whose values are others.
     replayed: Vec<Replayed>,
@@ -58,7 +57,7 @@ impl Slopes {
         }
     }
 
-    /// Linearises a model at some values about an estimate's trajectory, with slopes in the state, and columns of tolerances, that are taken
+    /// Linearises a model at some values about an estimate's trajectory, with slopes in the state, and columns of values, that are taken
     /// anew where they are due, and kept elsewhere. `variations` has one for each value that is fitted, or none.
     ///
     /// # Errors
@@ -75,7 +74,7 @@ impl Slopes {
         } else {
             KEPT_MOVE
         };
-        let moved = self.h.is_empty() || self.furthest(theta, &model.unknowns) > most;
+        let moved = self.h.is_empty() || furthest(&self.theta, theta, &model.unknowns) > most;
         // Readings that remember have slopes of their own past.
         let along =
             moved || self.used >= KEPT || map.remembers_readings() && !map.is_all_segments();
@@ -101,40 +100,40 @@ impl Slopes {
         } else {
             model.free()
         };
-        // Of a segment the columns are those of a replay from a start that moves, and late readings are given to other rows.
-        let keeps = !map.remembers_readings() && !context.has_segments();
+        // Late readings are given to other rows.
+        let keeps = !map.remembers_readings() || map.is_all_segments();
+        let values = (&model.unknowns[..], &free[..]);
         let places = if keeps {
-            self.columns.places(&model.unknowns, &free)
+            self.columns.places(values, theta)
         } else {
             vec![None; free.len()]
         };
-        let fresh = variations.iter().zip(&places).filter(|(_, p)| p.is_none());
-        let fresh: Vec<Variation> = fresh.map(|(v, _)| v.clone()).collect();
-        let wanted = (want, &due[..], &self.carried[..]);
-        let mut linear = map.linearise_due(theta, trajectory, wanted, &steps, &fresh)?;
+        let kept: Vec<bool> = places.iter().map(Option::is_some).collect();
+        // Of a segment the columns are those of a replay from where it begins.
+        let is_segment = context.walks.iter().map(|w| w.segment.is_some());
+        let left: Vec<bool> = is_segment.zip(&due).map(|(s, due)| s && *due).collect();
+        let anew = Anew {
+            state: &due,
+            carried: &self.carried,
+            kept: &kept,
+            columns: &left,
+        };
+        let mut linear = map.linearise_anew(theta, trajectory, (want, anew), &steps, variations)?;
+        if keeps && !variations.is_empty() {
+            self.columns.join(&mut linear, &places, &left);
+            self.columns.keep(&linear, values, (theta, &kept));
+        }
         if context.has_segments() {
             let deviations = |&i: &usize| theta[i] / model.unknowns[i].deviation;
             let values: Vec<f64> = free.iter().map(deviations).collect();
             self.mend(context, (&linear, &due), trajectory, &values);
         }
         self.exchange(&mut linear, &due, trajectory);
-        if keeps && fresh.len() == variations.len() {
-            self.columns.keep(&linear, &model.unknowns, &free);
-        }
-        self.columns.join(&mut linear, &places);
         if moved || along && !context.has_segments() {
             self.theta = theta.to_vec();
         }
         self.used = if along { 0 } else { self.used + 1 };
         Ok(linear)
-    }
-
-    /// The largest move of a value since the slopes were taken, in deviations of its prior; tolerances aside, which are narrow.
-    fn furthest(&self, theta: &[f64], unknowns: &[Unknown]) -> f64 {
-        let moved = |((a, b), u): ((&f64, &f64), &Unknown)| (a - b).abs() / u.deviation;
-        let pairs = self.theta.iter().zip(theta).zip(unknowns);
-        let pairs = pairs.filter(|(_, u)| !u.is_tolerance);
-        pairs.map(moved).fold(0.0, f64::max)
     }
 
     /// Whether the start of a segment is no longer where its slopes were taken, or these kept no promise.

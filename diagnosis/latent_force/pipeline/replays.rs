@@ -1,15 +1,18 @@
 //! Replays, open loop, of the model without effects, of the set that stands and of its rivals.
 
+use std::sync::Arc;
+
 use asid_core::progress::UntilLate;
 use asid_core::{Progress, Result};
+use nalgebra::DVector;
 
-use crate::bench::{Bench, Explanation};
+use crate::bench::{Bench, Explanation, Local};
 use crate::candidate::Candidate;
 use crate::findings::{Findings, Found, Repeats};
-use crate::fit::Effort;
+use crate::fit::{Begin, Effort, Region, StartSlopes};
 use crate::latent_force::fit::Fitted;
 use crate::latent_force::search::{Outcome, Set, labels_of, name_of};
-use crate::predict::State;
+use crate::predict::{Point, State};
 use crate::result::NotTried;
 
 use super::told::{detection_limits, isolability, missing_forces, p_value, ranking};
@@ -34,6 +37,20 @@ fn smoothed_starts(bench: &Bench, fitted: &Fitted, firsts: &[usize]) -> Vec<Stat
     };
     let trajectory = &fitted.estimate.trajectory;
     firsts.iter().map(|&w| state(&trajectory[w])).collect()
+}
+
+/// The values that a fit holds possible: as far about the mean of its posterior as that is uncertain, and as its own values lie from it.
+/// `None` for a set that was enlarged and not fitted yet.
+fn region(fitted: &Fitted) -> Option<Region> {
+    let places = fitted.hypothesis.free();
+    if places.len() != fitted.ahead.len() {
+        return None;
+    }
+    let ahead = DVector::from_column_slice(&fitted.ahead);
+    let mean = places.iter().zip(&fitted.ahead);
+    let mean = mean.map(|(&i, ahead)| fitted.theta[i] + ahead).collect();
+    let covariance = &fitted.covariance + &ahead * ahead.transpose();
+    Region::new(places, mean, covariance)
 }
 
 /// All sets that were fitted, each once by what it names, the most evident first.
@@ -74,7 +91,7 @@ pub(super) struct Replays<'a> {
 impl Replays<'_> {
     /// Excess power that a fitted set leaves of the training logs, a reading, in units of the noise.
     pub(super) fn excess(&self, fitted: &Fitted, members: &[usize]) -> Result<f64> {
-        let of = self.replayed(fitted, members, Effort::LOOK)?;
+        let of = self.replayed(fitted, members, (Effort::LOOK, None))?;
         let readings = self.bench.train.readings.max(1) as f64;
         let excess = of.fit.cost / readings - 1.0;
         // A replay that diverges leaves everything.
@@ -85,19 +102,31 @@ impl Replays<'_> {
         })
     }
 
-    /// Replays a fitted set of candidates, with the variances of its values.
-    fn of(&self, fitted: &Fitted, members: &[usize], effort: Effort) -> Result<Explanation> {
-        let mut of = self.replayed(fitted, members, effort)?;
+    /// Replays a fitted set of candidates, with its values by the fit that allows for a missing force.
+    fn of(
+        &self,
+        fitted: &Fitted,
+        members: &[usize],
+        how: (Effort, Option<&StartSlopes>),
+    ) -> Result<Explanation> {
+        let mut of = self.replayed(fitted, members, how)?;
         for (k, i) in fitted.hypothesis.free().into_iter().enumerate() {
-            of.local_variances[i] = fitted.covariance[(k, k)];
+            of.local[i] = Some(Local {
+                mean: fitted.theta[i] + fitted.ahead[k],
+                variance: fitted.covariance[(k, k)],
+            });
         }
         Ok(of)
     }
 
-    /// Replays a set of candidates at its values.
-    fn replayed(&self, fitted: &Fitted, members: &[usize], effort: Effort) -> Result<Explanation> {
-        let study = self.bench.parameters.len();
-        let mut at = study;
+    /// Replays a set of candidates at its values, with the starts' slopes of a set that is `like` it.
+    fn replayed(
+        &self,
+        fitted: &Fitted,
+        members: &[usize],
+        (effort, like): (Effort, Option<&StartSlopes>),
+    ) -> Result<Explanation> {
+        let mut at = self.bench.parameters.len();
         let chosen: Vec<_> = members
             .iter()
             .map(|&c| {
@@ -107,13 +136,18 @@ impl Replays<'_> {
                 (&self.candidates[c], values)
             })
             .collect();
-        let starts = smoothed_starts(self.bench, fitted, self.firsts);
-        self.bench.explain(
-            &chosen,
-            &fitted.theta[..study],
-            (&starts, &self.open),
-            (effort, &UntilLate(self.progress)),
-        )
+        let point = Point {
+            theta: fitted.theta.clone(),
+            starts: smoothed_starts(self.bench, fitted, self.firsts),
+        };
+        let region = region(fitted);
+        let begin = Begin {
+            like,
+            region: region.as_ref(),
+            ..Begin::at(point, &self.open)
+        };
+        let how = (effort, &UntilLate(self.progress) as &dyn Progress);
+        self.bench.explain(&chosen, begin, how)
     }
 }
 
@@ -196,20 +230,29 @@ pub(super) fn replay(
         })
         .collect();
     let (of_none, of_best, rivals) = efforts(repeats, progress, &mut not_tried);
-    let none = replays.of(&outcome.none, &[], of_none)?;
+    let none = replays.of(&outcome.none, &[], (of_none, None))?;
     let sets = all_sets(outcome, candidates);
     let ranking = ranking(candidates, outcome, &sets);
     let (sets, stands) = replayed_sets(outcome, sets, (known, rivals));
-    let mut found = Vec::new();
+    // Without effects replays may lie far from the logs, where slopes are others.
+    let mut like = Arc::new(StartSlopes {
+        steps: none.fit.starts.steps.clone(),
+        columns: Vec::new(),
+    });
+    let mut found: Vec<Found> = Vec::new();
     for (i, set) in sets.iter().enumerate() {
         let effort = if i == 0 && stands {
             of_best
         } else {
             Effort::LOOK
         };
+        let explanation = replays.of(&set.fitted, &set.candidates, (effort, Some(&like)))?;
+        if i == 0 {
+            like = Arc::clone(&explanation.fit.starts);
+        }
         found.push(Found {
             candidates: set.candidates.clone(),
-            explanation: replays.of(&set.fitted, &set.candidates, effort)?,
+            explanation,
         });
     }
     let findings = Findings {

@@ -1,6 +1,6 @@
 //! The forward pass: a Kalman filter from the first row to the last, reading by reading. The backward pass is `adjoint.rs`.
 
-use super::matrix::{dot, multiply, multiply_abt, symmetrise};
+use super::matrix::{dot, multiply, multiply_abt, multiply_sparse, symmetrise};
 use super::{NoiseModel, Problem};
 
 /// Ratio of an innovation's variance to its reading's own from which on rounding is taken out of the covariance: it has
@@ -106,11 +106,7 @@ impl<'a> Filter<'a> {
         }
         let (nx, nz) = (self.nx, self.nz);
         let h = self.slope(k, entry);
-        let gain: Vec<f64> = self
-            .covariance
-            .chunks_exact(nz)
-            .map(|row| dot(&row[..nx], h))
-            .collect();
+        let gain = multiply_sparse(&self.covariance, h, nz);
         let variance = dot(&gain[..nx], h) + self.noise.r[entry];
         let innovation = reading - dot(&self.mean[..nx], h);
         let own = &mut self.log_likelihood[entry];

@@ -44,7 +44,7 @@ impl Part {
         out: &'r [LinearEpisode],
     ) -> &'r [f64] {
         let fresh = &out[walk].carried[..];
-        let kept = request.carried.get(self.walks[walk]);
+        let kept = request.anew.carried.get(self.walks[walk]);
         if fresh.is_empty() {
             kept.map_or(&[], |k| &k[..])
         } else {

@@ -34,17 +34,13 @@ impl Part {
         } = request;
         let nv = c.layout.nv;
         let nx = 2 * nv;
-        let all = vec![true; self.walks.len()];
-        let due: Vec<bool> = self.walks.iter().map(|&w| request.due(w)).collect();
         let only_replays = self.walks.iter().all(|&w| c.rolls(w, want));
         let mut in_state = Vec::new();
         if want.state {
             in_state = Role::in_state(nv, c.remembers_readings && !only_replays);
         }
-        let mut others = Role::others(nv, want, variations.len());
-        if due == all {
-            in_state.append(&mut others);
-        }
+        let others = Role::others(nv, want, variations.len());
+        let columns_due = |w: usize| request.anew.columns.get(w).is_some_and(|due| *due);
         let (ns, m) = (c.logs.entries.len(), variations.len());
         let mut episodes: Vec<LinearEpisode> = self
             .walks
@@ -56,18 +52,26 @@ impl Part {
             .iter()
             .map(|e| vec![0.0; late * e.rows * ns * nv])
             .collect();
-        for (roles, which) in [(&in_state, &due), (&others, &all)] {
-            let roles = if which.contains(&true) {
-                &roles[..]
-            } else {
-                &[]
-            };
-            for chunk in roles.chunks(c.capacity - 1) {
-                self.pass(c, request, (chunk, which), &mut episodes, &mut ramps)?;
+        for class in [(true, true), (true, false), (false, true), (false, false)] {
+            let own = |&w: &usize| (request.due(w), columns_due(w)) == class;
+            let which: Vec<bool> = self.walks.iter().map(own).collect();
+            if !which.contains(&true) {
+                continue;
             }
-        }
-        if others.is_empty() && (due != all || in_state.is_empty()) {
-            self.pass(c, request, (&[], &all), &mut episodes, &mut ramps)?;
+            let wanted = |role: &Role| match role {
+                Role::Varied(i) => request.wants(*i, class.1),
+                _ => true,
+            };
+            let mut roles: Vec<Role> = others.iter().copied().filter(wanted).collect();
+            if class.0 {
+                roles.splice(0..0, in_state.iter().copied());
+            }
+            for chunk in roles.chunks(c.capacity - 1) {
+                self.pass(c, request, (chunk, &which), &mut episodes, &mut ramps)?;
+            }
+            if roles.is_empty() {
+                self.pass(c, request, (&[], &which), &mut episodes, &mut ramps)?;
+            }
         }
         if late == 1 {
             for ((episode, ramps), &w) in episodes.iter_mut().zip(&ramps).zip(&self.walks) {
