@@ -6,7 +6,8 @@
 //!
 //! Two errors that no spread of residuals shows are added as squares. A model that is wrong makes fits that weigh the logs otherwise
 //! disagree (Hausman 1978): the distance of the value from the mean of the fit that allows for a missing force. And the engine's own
-//! error: what the value would be at a time step of none, by how far half the step moves it (Richardson 1911).
+//! error: what the value would be at a time step of none, by how far half the step moves it (Richardson 1911). A parameter of the study
+//! at an end of its range is as uncertain as the range is wide.
 
 use std::collections::BTreeMap;
 
@@ -95,29 +96,20 @@ impl Telling<'_> {
             let (local, apart) =
                 of.local[unknown].map_or((0.0, 0.0), |l| (l.variance, value - l.mean));
             let moved = moved.get(k).copied().unwrap_or(0.0);
-            if let Ok(file) = std::env::var("ASIDVAL") {
-                use std::io::Write as _;
-                if let Ok(mut f) = std::fs::OpenOptions::new()
-                    .append(true)
-                    .create(true)
-                    .open(file)
-                {
-                    let _ = writeln!(
-                        f,
-                        "VAL {:?} {} value {value} replays {} local {} apart {apart} moved {moved} inflation {}",
-                        self.bench.train.logs.offset(1),
-                        of.unknowns[unknown].parameter.name,
-                        by_replays.sqrt(),
-                        local.sqrt(),
-                        self.inflation(of)
-                    );
-                }
-            }
             (by_replays.max(local) + apart.powi(2) + moved.powi(2)).sqrt()
         } else {
             f64::INFINITY
         };
         let end = AT_END * (high - low);
+        let at_bound = value - low < end || high - value < end;
+        // The logs ask for a parameter of the study beyond its range: within it nothing tells where it is.
+        let is_of_study = unknown < self.bench.parameters.len();
+        let least = if at_bound && is_of_study {
+            (high - low) / 12.0_f64.sqrt()
+        } else {
+            0.0
+        };
+        let deviation = deviation.max(least);
         Some(Fitted {
             value,
             deviation,
@@ -125,7 +117,7 @@ impl Telling<'_> {
                 (value - DEVIATIONS * deviation).max(low),
                 (value + DEVIATIONS * deviation).min(high),
             ],
-            at_bound: value - low < end || high - value < end,
+            at_bound,
         })
     }
 

@@ -18,8 +18,6 @@ use super::secant::{Replayed, mend};
 const KEPT: usize = 3;
 /// How far a value may move meanwhile, in deviations of its prior.
 const KEPT_MOVE: f64 = 0.3;
-/// The same where all walks are segments, whose slopes are mended by each step that is made.
-const MENDED_MOVE: f64 = 1.0;
 /// How far the start of a segment may move meanwhile, in steps that its slopes are taken over.
 const KEPT_START: f64 = 50.0;
 /// The same of a segment whose replay did not keep what its slopes promised: within a step the slopes are the same.
@@ -69,12 +67,9 @@ impl Slopes {
         estimate: &Estimate,
         variations: &[Variation],
     ) -> Result<Vec<LinearEpisode>> {
-        let most = if map.is_all_segments() {
-            MENDED_MOVE
-        } else {
-            KEPT_MOVE
-        };
-        let moved = self.h.is_empty() || furthest(&self.theta, theta, &model.unknowns) > most;
+        // Slopes of segments are mended by each step that is made, and each that misleads is due by itself.
+        let far = || furthest(&self.theta, theta, &model.unknowns) > KEPT_MOVE;
+        let moved = self.h.is_empty() || !map.is_all_segments() && far();
         // Readings that remember have slopes of their own past.
         let along =
             moved || self.used >= KEPT || map.remembers_readings() && !map.is_all_segments();
