@@ -177,6 +177,10 @@ pub fn fit(
             });
         }
         let stands = round > 0 && !rose && promised < rise;
+        if stands && round + 1 < rounds && !progress.is_stopped() && slopes.renew_columns() {
+            // Kept columns may say so by mistake.
+            continue;
+        }
         if stands || failed == FAILURES || round + 1 == rounds || progress.is_stopped() {
             break;
         }

@@ -7,6 +7,7 @@ mod arm;
 mod ball;
 #[path = "../diagnosis_support/mod.rs"]
 mod diagnosis_support;
+mod drift;
 mod far;
 mod late_drive;
 mod ordinary;

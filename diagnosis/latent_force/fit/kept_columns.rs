@@ -12,8 +12,8 @@ use crate::latent_force::step_map::LinearEpisode;
 /// Linearisations that those of tolerances are kept for in one fit: a race of so many takes none, a fit to the end takes them anew as its
 /// other values move.
 const KEPT: usize = 4;
-/// How far any other value may move meanwhile, in deviations of its prior: a third of what slopes in the state stand, for laws that are no
-/// straight lines bend over a deviation.
+/// How far any other value may move meanwhile, as a share of its size and of the deviation of its prior: a law that is no straight line bends
+/// over either.
 const KEPT_MOVE: f64 = 0.1;
 
 /// Columns of one walk: of the next states, `(rows - 1) x nx x m`, and of the readings, `rows x ns x m`.
@@ -44,6 +44,14 @@ pub(super) fn furthest(from: &[f64], to: &[f64], unknowns: &[Unknown]) -> f64 {
     pairs.map(moved).fold(0.0, f64::max)
 }
 
+/// Whether no value but a tolerance has moved by more than the share of itself that columns stand.
+fn is_near(from: &[f64], to: &[f64], unknowns: &[Unknown]) -> bool {
+    let mut pairs = from.iter().zip(to).zip(unknowns);
+    pairs.all(|((a, b), u)| {
+        u.is_tolerance || (a - b).abs() <= KEPT_MOVE * u.deviation.min(a.abs().max(b.abs()))
+    })
+}
+
 /// Copies columns of a row-major matrix of `n` to their places in one of `m`.
 fn fill(to: &mut [f64], m: usize, (from, n): (&[f64], usize), places: &[Option<usize>]) {
     for (to, from) in to.chunks_exact_mut(m).zip(from.chunks_exact(n)) {
@@ -65,6 +73,11 @@ impl KeptColumns {
         }
     }
 
+    /// Lets go of those of other values than tolerances.
+    pub(super) fn renew(&mut self) {
+        self.theta = None;
+    }
+
     /// The place here of each of the values that are fitted; none for all where one that is a tolerance has no column here, or they have
     /// been used for long.
     pub(super) fn places(
@@ -72,8 +85,7 @@ impl KeptColumns {
         (unknowns, free): (&[Unknown], &[usize]),
         theta: &[f64],
     ) -> Vec<Option<usize>> {
-        let is_near =
-            (self.theta.as_ref()).is_some_and(|t| furthest(t, theta, unknowns) < KEPT_MOVE);
+        let is_near = (self.theta.as_ref()).is_some_and(|t| is_near(t, theta, unknowns));
         let place = |u: &Unknown| {
             let place = self.names.iter().position(|n| *n == u.parameter.name)?;
             (is_near || u.is_tolerance && self.of_tolerances[place]).then_some(place)
@@ -183,7 +195,8 @@ mod tests {
     fn kept(unknowns: &[Unknown]) -> KeptColumns {
         let mut kept = KeptColumns::default();
         let fresh = [linear(&[0.0, 1.0, 2.0])];
-        kept.keep(&fresh, (unknowns, &[0, 1, 2]), (&[0.0; 4], &[false; 3]));
+        let theta = [0.0, 0.5, 0.0, 0.0];
+        kept.keep(&fresh, (unknowns, &[0, 1, 2]), (&theta, &[false; 3]));
         kept
     }
 
@@ -218,10 +231,8 @@ mod tests {
         let unknowns = four();
         let kept = kept(&unknowns);
         let places = |theta: [f64; 4]| kept.places((&unknowns, &[0, 1, 2]), &theta);
-        let near = 0.9 * KEPT_MOVE * unknowns[1].deviation;
-        assert_eq!(places([0.9, near, 0.0, 0.0]), [Some(0), Some(1), Some(2)]);
-        let far = 1.1 * KEPT_MOVE * unknowns[1].deviation;
-        assert_eq!(places([0.0, far, 0.0, 0.0]), [Some(0), None, Some(2)]);
+        assert_eq!(places([0.9, 0.51, 0.0, 0.0]), [Some(0), Some(1), Some(2)]);
+        assert_eq!(places([0.0, 0.56, 0.0, 0.0]), [Some(0), None, Some(2)]);
     }
 
     #[test]

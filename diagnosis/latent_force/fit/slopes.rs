@@ -39,6 +39,8 @@ pub struct Slopes {
     by_one_step: bool,
     /// Columns of values.
     columns: KeptColumns,
+    /// Whether the last linearisation kept columns of values that are no tolerances.
+    kept_values: bool,
     /// The replay of each segment in the linearisation before; none at the beginning of a fit, whose values are others.
     replayed: Vec<Replayed>,
 }
@@ -53,6 +55,12 @@ impl Slopes {
             replayed: Vec::new(),
             ..self.clone()
         }
+    }
+
+    /// Whether the columns of some values that are no tolerances were kept in the last linearisation; from here on none are.
+    pub fn renew_columns(&mut self) -> bool {
+        self.columns.renew();
+        std::mem::take(&mut self.kept_values)
     }
 
     /// Linearises a model at some values about an estimate's trajectory, with slopes in the state, and columns of values, that are taken
@@ -104,6 +112,8 @@ impl Slopes {
             vec![None; free.len()]
         };
         let kept: Vec<bool> = places.iter().map(Option::is_some).collect();
+        let mut of_values = free.iter().zip(&kept);
+        self.kept_values = of_values.any(|(&i, kept)| *kept && !model.unknowns[i].is_tolerance);
         // Of a segment the columns are those of a replay from where it begins.
         let is_segment = context.walks.iter().map(|w| w.segment.is_some());
         let left: Vec<bool> = is_segment.zip(&due).map(|(s, due)| s && *due).collect();
