@@ -150,7 +150,7 @@ pub fn fit(
             here,
             promised,
             found,
-        }) = compare(context, &estimate, &linear, model, round == 0)
+        }) = compare(context, &estimate, &linear, model, true)
         else {
             break;
         };

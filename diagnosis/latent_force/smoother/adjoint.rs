@@ -7,7 +7,7 @@
 
 use super::Smoothed;
 use super::filter::{Filter, Step};
-use super::matrix::{dot, multiply, multiply_atb, multiply_sparse, symmetrise};
+use super::matrix::{dot, multiply, multiply_atb, multiply_sparse, nonzero, symmetrise};
 
 /// Smooths an episode whose forward pass took these steps.
 pub(super) fn backward(filter: &mut Filter<'_>, steps: &[Step]) -> Smoothed {
@@ -115,7 +115,8 @@ impl<'f, 'a> Adjoint<'f, 'a> {
         let mean = |i: usize| step.mean[i] - dot(row(i), &self.vector);
         let variance = |i: usize| {
             let product = &self.scratch[i * nz..(i + 1) * nz];
-            (row(i)[i] - dot(product, row(i))).max(0.0)
+            let column: f64 = (0..nz).map(|l| product[l] * row(l)[i]).sum();
+            (row(i)[i] - column).max(0.0)
         };
         for i in 0..nx {
             self.out.change[k * nx + i] = mean(i);
@@ -133,9 +134,8 @@ impl<'f, 'a> Adjoint<'f, 'a> {
         for taken in &step.taken {
             let h = self.filter.slope(k, taken.entry);
             let v = multiply_sparse(&step.covariance, h, nz);
-            let rows = self.scratch.chunks_exact(nz).zip(h);
-            let read = rows.filter(|(_, h)| **h != 0.0);
-            let bent: f64 = read.map(|(row, h)| h * dot(row, &v)).sum();
+            let product = |i: usize| &self.scratch[i * nz..(i + 1) * nz];
+            let bent: f64 = nonzero(h).map(|(i, h)| h * dot(product(i), &v)).sum();
             let spread = (dot(&v[..nx], h) - bent).max(0.0);
             let reading = self.filter.problem.linear.residual[k * ns + taken.entry];
             let left = reading - dot(&self.out.change[k * nx..(k + 1) * nx], h);
@@ -155,7 +155,8 @@ impl<'f, 'a> Adjoint<'f, 'a> {
         for j in 0..nv {
             let carried = |l: usize| -> f64 {
                 let row = &transition[l * nz..(l + 1) * nz];
-                dot(row, &step.covariance[(nx + j) * nz..(nx + j + 1) * nz])
+                let column = |i: usize| step.covariance[i * nz + nx + j];
+                (0..nz).map(|i| row[i] * column(i)).sum()
             };
             let column: Vec<f64> = (0..nz).map(carried).collect();
             let correction = &later.correction[j * nz..(j + 1) * nz];
@@ -181,12 +182,7 @@ impl<'f, 'a> Adjoint<'f, 'a> {
             let rows = self.matrix.chunks_exact(nz);
             let u: Vec<f64> = rows.map(|row| dot(row, &taken.gain) / s).collect();
             let c = dot(&u, &taken.gain) / s + 1.0 / s;
-            let read: Vec<(usize, f64)> = h
-                .iter()
-                .copied()
-                .enumerate()
-                .filter(|(_, h)| *h != 0.0)
-                .collect();
+            let read: Vec<(usize, f64)> = nonzero(h).collect();
             for &(i, h) in &read {
                 let row = &mut self.matrix[i * nz..(i + 1) * nz];
                 row.iter_mut().zip(&u).for_each(|(x, u)| *x -= h * u);

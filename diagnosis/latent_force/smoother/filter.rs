@@ -115,9 +115,11 @@ impl<'a> Filter<'a> {
         for (m, g) in self.mean.iter_mut().zip(&gain) {
             *m += g * innovation / variance;
         }
+        // In this order of the factors it stays symmetric to the last digit.
+        let inverse = 1.0 / variance;
         for (row, &g) in self.covariance.chunks_exact_mut(nz).zip(&gain) {
-            let share = g / variance;
-            row.iter_mut().zip(&gain).for_each(|(p, g)| *p -= share * g);
+            let products = gain.iter().map(|h| g * h * inverse);
+            row.iter_mut().zip(products).for_each(|(p, x)| *p -= x);
         }
         if variance > FINE * self.noise.r[entry] {
             self.restore(h, &gain, (variance, self.noise.r[entry]));
