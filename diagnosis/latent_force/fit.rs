@@ -145,16 +145,12 @@ pub fn fit(
             &variations,
         )?;
         let model = (&unknowns[..], &free[..], &theta[..]);
-        let Some(Compared {
-            scale,
-            here,
-            promised,
-            found,
-        }) = compare(context, &estimate, &linear, model, true)
-        else {
+        let whole = round == 0 || segments > 0;
+        let Some(compared) = compare(context, &estimate, &linear, model, whole) else {
             break;
         };
-        estimate.rescale(scale);
+        let (here, promised) = (compared.here, compared.promised);
+        estimate.rescale(compared.scale);
         let hoped = here + promised;
         let rose = best.as_ref().is_none_or(|b| here > b.evidence + rise)
             || anchor.as_ref().is_none_or(|a| hoped > a.hoped + rise);
@@ -164,17 +160,7 @@ pub fn fit(
         let astray = segments == 0 && anchor.as_ref().is_some_and(lost);
         all.push(here);
         if best.as_ref().is_none_or(|b| here > b.evidence) {
-            best = Some(Fitted {
-                hypothesis: hypothesis.clone(),
-                theta: theta.clone(),
-                evidence: here,
-                wander: 0.0,
-                promised,
-                covariance: in_units(&found.covariance, unknowns, &free),
-                ahead: ahead(&found.coefficients, unknowns, &free),
-                estimate: estimate.clone(),
-                slopes: Slopes::default(),
-            });
+            best = Some(fitted_at(hypothesis, (&theta, &estimate), &compared));
         }
         let stands = round > 0 && !rose && promised < rise;
         if stands && round + 1 < rounds && !progress.is_stopped() && slopes.renew_columns() {
@@ -196,7 +182,7 @@ pub fn fit(
             continue;
         }
         let from = rose.then(|| (theta.clone(), estimate.clone()));
-        let moves = step(unknowns, &free, &found.coefficients, &mut theta);
+        let moves = step(unknowns, &free, &compared.found.coefficients, &mut theta);
         shift(&mut linear, &moves);
         smooth(context, &mut map, &theta, (&linear, &steps), &mut estimate)?;
         if let Some(from) = from {
@@ -216,6 +202,26 @@ pub fn fit(
         best.wander = wander(&all, rise);
     }
     Ok(best)
+}
+
+/// The model at some values and an estimate, with what a comparison found there.
+fn fitted_at(
+    hypothesis: &Hypothesis,
+    (theta, estimate): (&[f64], &Estimate),
+    compared: &Compared,
+) -> Fitted {
+    let (unknowns, free) = (&hypothesis.unknowns, hypothesis.free());
+    Fitted {
+        hypothesis: hypothesis.clone(),
+        theta: theta.to_vec(),
+        evidence: compared.here,
+        wander: 0.0,
+        promised: compared.promised,
+        covariance: in_units(&compared.found.covariance, unknowns, &free),
+        ahead: ahead(&compared.found.coefficients, unknowns, &free),
+        estimate: estimate.clone(),
+        slopes: Slopes::default(),
+    }
 }
 
 /// What coefficients, as far as a tangent reaches, move the free values by, in their units.

@@ -67,14 +67,14 @@ pub(super) struct Compared {
     pub(super) found: Evidence,
 }
 
-/// Compares the common scales of `q` for a model (its unknowns, the places of those that are fitted, and all values): all of them at `first`,
-/// and later, about the scale that was best before, from the largest on while the evidence rises. `None` where there is no scale.
+/// Compares the common scales of `q` for a model (its unknowns, the places of those that are fitted, and all values): the `whole` of them,
+/// or, about the scale that was best before, from the largest on while the evidence rises. `None` where there is no scale.
 pub(super) fn compare(
     context: &Context<'_>,
     estimate: &Estimate,
     linear: &[LinearEpisode],
     (unknowns, free, theta): (&[Unknown], &[usize], &[f64]),
-    first: bool,
+    whole: bool,
 ) -> Option<Compared> {
     let m = free.len();
     let places: Vec<usize> = (0..m).collect();
@@ -96,7 +96,7 @@ pub(super) fn compare(
         let found = evidence(&sum.gram, &sum.moment, &places, &center, &bounds);
         let determinant = determinant_of(&found);
         let here = sum.log_likelihood - 0.5 * prior + determinant;
-        if !first && best.as_ref().is_some_and(|b| here <= b.here) {
+        if !whole && best.as_ref().is_some_and(|b| here <= b.here) {
             break;
         }
         if best.as_ref().is_none_or(|b| here > b.here) {
