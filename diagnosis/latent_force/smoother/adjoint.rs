@@ -7,7 +7,7 @@
 
 use super::Smoothed;
 use super::filter::{Filter, Step};
-use super::matrix::{dot, multiply, multiply_atb, multiply_sparse, nonzero, symmetrise};
+use super::matrix::{dot, multiply, multiply_atb, symmetrise};
 
 /// Smooths an episode whose forward pass took these steps.
 pub(super) fn backward(filter: &mut Filter<'_>, steps: &[Step]) -> Smoothed {
@@ -107,7 +107,7 @@ impl<'f, 'a> Adjoint<'f, 'a> {
         symmetrise(&mut self.matrix, nz);
     }
 
-    /// Smoothed state and force of row `k`, with their variances; `P Lambda` stays in the scratch.
+    /// Smoothed state and force of row `k`, with their variances.
     fn smooth(&mut self, k: usize, step: &Step) {
         let (nx, nv, nz) = (self.filter.nx, self.filter.nv, self.filter.nz);
         multiply(&step.covariance, &self.matrix, nz, &mut self.scratch);
@@ -128,14 +128,17 @@ impl<'f, 'a> Adjoint<'f, 'a> {
         }
     }
 
-    /// Adds what is left of the readings of row `k`, with its variance `h' (P - P Lambda P) h`, to their sums.
+    /// Adds what is left of the readings of row `k`, with its variance, to their sums.
     fn sum_readings(&mut self, k: usize, step: &Step) {
         let (nx, nz, ns) = (self.filter.nx, self.filter.nz, self.filter.ns);
         for taken in &step.taken {
             let h = self.filter.slope(k, taken.entry);
-            let v = multiply_sparse(&step.covariance, h, nz);
-            let product = |i: usize| &self.scratch[i * nz..(i + 1) * nz];
-            let bent: f64 = nonzero(h).map(|(i, h)| h * dot(product(i), &v)).sum();
+            let mut v = vec![0.0; nz];
+            for (v, row) in v.iter_mut().zip(step.covariance.chunks_exact(nz)) {
+                *v = dot(&row[..nx], h);
+            }
+            let rows = self.matrix.chunks_exact(nz).zip(&v);
+            let bent: f64 = rows.map(|(row, x)| x * dot(row, &v)).sum();
             let spread = (dot(&v[..nx], h) - bent).max(0.0);
             let reading = self.filter.problem.linear.residual[k * ns + taken.entry];
             let left = reading - dot(&self.out.change[k * nx..(k + 1) * nx], h);
@@ -171,7 +174,7 @@ impl<'f, 'a> Adjoint<'f, 'a> {
 
     /// Takes the readings of row `k` up into the adjoint variables, the last one first.
     fn take_up(&mut self, k: usize, step: &Step) {
-        let nz = self.filter.nz;
+        let (nx, nz) = (self.filter.nx, self.filter.nz);
         for taken in step.taken.iter().rev() {
             let h = self.filter.slope(k, taken.entry);
             let s = taken.variance;
@@ -182,17 +185,15 @@ impl<'f, 'a> Adjoint<'f, 'a> {
             let rows = self.matrix.chunks_exact(nz);
             let u: Vec<f64> = rows.map(|row| dot(row, &taken.gain) / s).collect();
             let c = dot(&u, &taken.gain) / s + 1.0 / s;
-            let read: Vec<(usize, f64)> = nonzero(h).collect();
-            for &(i, h) in &read {
+            for i in 0..nz {
+                let hi = if i < nx { h[i] } else { 0.0 };
                 let row = &mut self.matrix[i * nz..(i + 1) * nz];
-                row.iter_mut().zip(&u).for_each(|(x, u)| *x -= h * u);
-            }
-            for (row, u) in self.matrix.chunks_exact_mut(nz).zip(&u) {
-                read.iter().for_each(|(l, h)| row[*l] -= u * h);
-            }
-            for &(i, a) in &read {
-                read.iter()
-                    .for_each(|(l, b)| self.matrix[i * nz + l] += c * a * b);
+                for (x, u) in row.iter_mut().zip(&u) {
+                    *x -= hi * u;
+                }
+                for (x, h) in row[..nx].iter_mut().zip(h) {
+                    *x += (hi * c - u[i]) * h;
+                }
             }
         }
     }

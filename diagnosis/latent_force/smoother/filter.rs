@@ -1,6 +1,6 @@
 //! The forward pass: a Kalman filter from the first row to the last, reading by reading. The backward pass is `adjoint.rs`.
 
-use super::matrix::{dot, multiply, multiply_abt, multiply_sparse, symmetrise};
+use super::matrix::{dot, multiply, multiply_abt, symmetrise};
 use super::{NoiseModel, Problem};
 
 /// Ratio of an innovation's variance to its reading's own from which on rounding is taken out of the covariance: it has
@@ -106,7 +106,11 @@ impl<'a> Filter<'a> {
         }
         let (nx, nz) = (self.nx, self.nz);
         let h = self.slope(k, entry);
-        let gain = multiply_sparse(&self.covariance, h, nz);
+        let gain: Vec<f64> = self
+            .covariance
+            .chunks_exact(nz)
+            .map(|row| dot(&row[..nx], h))
+            .collect();
         let variance = dot(&gain[..nx], h) + self.noise.r[entry];
         let innovation = reading - dot(&self.mean[..nx], h);
         let own = &mut self.log_likelihood[entry];
@@ -115,11 +119,9 @@ impl<'a> Filter<'a> {
         for (m, g) in self.mean.iter_mut().zip(&gain) {
             *m += g * innovation / variance;
         }
-        // In this order of the factors it stays symmetric to the last digit.
-        let inverse = 1.0 / variance;
         for (row, &g) in self.covariance.chunks_exact_mut(nz).zip(&gain) {
-            let products = gain.iter().map(|h| g * h * inverse);
-            row.iter_mut().zip(products).for_each(|(p, x)| *p -= x);
+            let share = g / variance;
+            row.iter_mut().zip(&gain).for_each(|(p, g)| *p -= share * g);
         }
         if variance > FINE * self.noise.r[entry] {
             self.restore(h, &gain, (variance, self.noise.r[entry]));

@@ -86,20 +86,6 @@ pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
     sums.iter().sum::<f64>() + rest.map(|(x, y)| x * y).sum::<f64>()
 }
 
-/// The product of a row-major matrix of width `n` with a vector that is zero but for its first entries, and mostly zero there: a
-/// sensor reads one coordinate, or a few.
-pub(super) fn multiply_sparse(p: &[f64], h: &[f64], n: usize) -> Vec<f64> {
-    let read: Vec<(usize, f64)> = nonzero(h).collect();
-    p.chunks_exact(n)
-        .map(|row| read.iter().map(|(j, h)| row[*j] * h).sum())
-        .collect()
-}
-
-/// The entries that are not zero, with their places.
-pub(super) fn nonzero(h: &[f64]) -> impl Iterator<Item = (usize, f64)> + '_ {
-    h.iter().copied().enumerate().filter(|(_, h)| *h != 0.0)
-}
-
 /// Makes a row-major square matrix symmetric: each pair of entries becomes its mean.
 pub(super) fn symmetrise(p: &mut [f64], n: usize) {
     for i in 0..n {
