@@ -28,7 +28,7 @@ pub use tolerances::Tolerances;
 
 use open_loop::OpenLoopGap;
 use round::Upon;
-use set::{free_what_is_given, from_starts_of, is_due};
+use set::{free_what_is_given, from_fit_of, is_due};
 
 /// The stage that looks for what is missing beside a set.
 const FURTHER: &str = "further effects beside those named";
@@ -88,18 +88,20 @@ fn open_upon(candidates: &[Candidate], known: &[usize], set: &Set) -> Vec<usize>
         .collect()
 }
 
-/// Fits the set that stands from the starts of segments of the next one, where there is time and that raises its evidence; what is
-/// without effects is then the better model without effects too.
+/// Fits the set that stands from where the `next` one has come to, where there is time and that raises its evidence; what is
+/// without effects is then the better model without effects too. One that does not rise above it by the `threshold` as it is changes nothing.
 fn fit_from(
     context: &Context<'_>,
-    next: Option<&Set>,
+    (next, threshold): (Option<&Set>, f64),
     (best, none): (&mut Set, &mut Fitted),
     (breadth, progress): (Breadth, &dyn Progress),
 ) -> Result<()> {
-    let Some(next) = next.filter(|_| context.has_segments() && !progress.is_stopped()) else {
+    let rises = |n: &&Set| context.has_segments() || n.rises_above(best, threshold);
+    let Some(next) = next.filter(rises).filter(|_| !progress.is_stopped()) else {
         return Ok(());
     };
-    let again = from_starts_of(context, (best, next), breadth, progress)?;
+    progress.note("fitting what stands from there");
+    let again = from_fit_of(context, (best, next), breadth, progress)?;
     if again.fitted.evidence > best.fitted.evidence {
         *best = again;
         if best.candidates.is_empty() {
@@ -138,7 +140,7 @@ fn upon_tolerances(
     };
     match next {
         Some(next) if has_tolerances(candidates, &next) => {
-            let settled = tolerances.settled(context, candidates, next, how)?;
+            let settled = tolerances.settled(context, candidates, (next, at_first), how)?;
             round.confirmed.push(settled.clone());
             Ok(Some(settled))
         }
@@ -195,7 +197,7 @@ pub fn search(
         let next = round.confirmed.first().cloned();
         rounds.push(round);
         let stopped = progress.is_stopped();
-        fit_from(context, next.as_ref(), (&mut best, &mut none), how)?;
+        fit_from(context, (next.as_ref(), threshold), (&mut best, &mut none), how)?;
         if is_cut_short(context, &best, progress) {
             untried.push(Untried::upon(&best, FURTHER));
             break;

@@ -16,7 +16,7 @@ use super::open_loop::OpenLoop;
 use super::prior::log_prior;
 use super::prune::{pruned, pruned_at_once};
 use super::screening::{Screening, Sight};
-use super::set::{Set, TOLERANCES, from_starts_of, name_of, refined_by, with, without};
+use super::set::{Set, TOLERANCES, from_fit_of, name_of, refined_by, with, without};
 use super::tolerances::Tolerances;
 
 /// A round: what was screened and what was fitted upon a base.
@@ -136,16 +136,18 @@ impl Upon<'_> {
         untried.extend(cut.map(|(stage, sets)| Untried { stage, sets }));
         let mut confirmed = finished.sets;
         confirmed.sort_by(|a, b| self.worth(b).total_cmp(&self.worth(a)));
-        let gain = |s: &Set| self.worth(s) - self.base.fitted.evidence;
+        let gain = |s: &Set| s.fitted.evidence - self.base.fitted.evidence;
         let rows = confirmed.iter().map(|s| (name(&s.candidates), gain(s)));
         progress.ranking(&format!("fits{upon}"), &rows.collect::<Vec<_>>());
         Ok(screening.round(self, screened, (of_race, confirmed), tolerances))
     }
 
-    /// Evidence of a set, that of effects at unusual sites the lower.
+    /// Evidence of a set, that of effects at unusual sites the lower. One that names something pays for which of all it is: tolerances, which every
+    /// machine has, are one rival.
     fn worth(&self, set: &Set) -> f64 {
         let prior = log_prior(self.context.plant(), self.candidates, &set.candidates);
-        set.fitted.evidence + prior
+        let names = set.names.saturating_sub(self.base.names) as f64;
+        set.fitted.evidence + prior - names * (nameable(self.candidates) as f64).ln()
     }
 
     /// Candidates of a set of a screening.
@@ -154,7 +156,7 @@ impl Upon<'_> {
         set.forms.iter().map(candidate).collect()
     }
 
-    /// Fits what leads in a screening a little; tolerances too where no one name promises as much.
+    /// Fits what leads in a screening a little; tolerances too where they are not far behind.
     fn race(&self, screening: &Screening, tolerances: Option<&Tolerances>) -> Result<Fits> {
         let (breadth, progress) = (self.breadth, self.progress);
         let ranked = &screening.ranked;
@@ -166,7 +168,8 @@ impl Upon<'_> {
         progress.begin("confirming", due.len() as u64);
         let mut sets = Vec::new();
         let mut left_out = Vec::new();
-        if let Some(tolerances) = tolerances.filter(|t| t.gain > lead) {
+        let not_far = lead - (breadth.behind * lead).max(breadth.near);
+        if let Some(tolerances) = tolerances.filter(|t| t.gain > not_far) {
             progress.note("trying tolerances");
             let mut set = tolerances.beside(self.base, self.candidates);
             set.fit(self.context, (breadth.rounds[0], progress))?;
@@ -265,7 +268,7 @@ impl Upon<'_> {
             if self.progress.is_stopped() {
                 break;
             }
-            let again = from_starts_of(self.context, (set, best), self.breadth, self.progress)?;
+            let again = from_fit_of(self.context, (set, best), self.breadth, self.progress)?;
             if again.fitted.evidence > set.fitted.evidence {
                 *set = again;
             }

@@ -8,6 +8,7 @@ use crate::candidate::Candidate;
 use crate::latent_force::columns::{Columns, Form};
 use crate::latent_force::context::Context;
 use crate::latent_force::fit::{Fitted, Hypothesis, Slopes, fit};
+use crate::latent_force::fitted_value::Unknown;
 use crate::latent_force::screen::Screened;
 use crate::settings::Breadth;
 
@@ -84,9 +85,10 @@ pub(super) fn with(
     (hypothesis, theta, added)
 }
 
-/// A set fitted once more from where another one has put the starts of segments: of the many ways to begin that leave little of
-/// the readings a fit finds one, and what another one owes to a better one is no evidence for its effects.
-pub(super) fn from_starts_of(
+/// A set fitted once more from where another one has come to: from its trajectory, its noise, its starts of segments and its values of what both
+/// have. A fit finds one of the places where evidence no longer rises, and what another set owes to a better one is no evidence for its
+/// effects: a force that a model could make up for, but that its noise has taken for chance; one of the many ways to begin a segment.
+pub(super) fn from_fit_of(
     context: &Context<'_>,
     (set, other): (&Set, &Set),
     breadth: Breadth,
@@ -95,6 +97,14 @@ pub(super) fn from_starts_of(
     let mut again = set.clone();
     again.fitted.estimate = other.fitted.estimate.clone();
     again.fitted.slopes = Slopes::default();
+    let theirs = &other.fitted.hypothesis.unknowns;
+    let own = again.fitted.hypothesis.unknowns.iter();
+    for (u, value) in own.zip(&mut again.fitted.theta).filter(|(u, _)| u.free) {
+        let like = |o: &Unknown| o.parameter.name == u.parameter.name;
+        if let Some(at) = theirs.iter().position(like) {
+            *value = other.fitted.theta[at].clamp(u.bounds[0], u.bounds[1]);
+        }
+    }
     again.fit(context, (breadth.rounds[1], progress))?;
     Ok(again)
 }

@@ -13,6 +13,11 @@ use super::role::Role;
 use super::step::{RowBuffers, Stepped};
 use super::{Common, LinearEpisode, Request};
 
+/// Most that a step may multiply a change of a coordinate by. A step is short beside the time constants of what it steps, or its integrator
+/// fails: a change that grows by half within one is a jump between two branches of a law, as where a joint comes to a stop, and its power is
+/// nothing that a row does.
+const MOST_GROWTH: f64 = 1.5;
+
 impl Part {
     /// The places of the roles that one physics step tells of, and of the others: coordinates of the state, where all of them are there,
     /// for the power of a matrix takes all of it; and variations that act in each step alike, where their changes can be carried over the row.
@@ -52,13 +57,14 @@ impl Part {
         }
     }
 
-    /// Slopes over a row from those of one of its physics steps, which the roles `all` have just taken.
+    /// Slopes over a row from those of one of its physics steps, which the roles `all` have just taken; from those of the row before where the
+    /// step jumps.
     pub(super) fn carry_over(
         &self,
         c: &Common<'_>,
         (stepped, all, short): (Stepped<'_>, &[usize], &[usize]),
         request: Request<'_>,
-        row: &RowBuffers,
+        row: &mut RowBuffers,
         out: &mut [LinearEpisode],
     ) {
         let Stepped {
@@ -95,12 +101,16 @@ impl Part {
                 }
             }
             if states {
+                if jumps(&of_step) {
+                    of_step = row.of_step.get(&e).map_or_else(|| DMatrix::identity(nx, nx), DMatrix::clone);
+                }
                 let (whole, carried) = powers(&of_step, substeps);
                 let steps = out[e].rows - 1;
                 out[e].carried.resize(steps * nx * nx, 0.0);
                 // Row-major, which is what the transpose has in store.
                 out[e].a[at.clone()].copy_from_slice(whole.transpose().as_slice());
                 out[e].carried[at.clone()].copy_from_slice(carried.transpose().as_slice());
+                row.of_step.insert(e, of_step);
             }
             if varied.is_empty() {
                 continue;
@@ -115,6 +125,11 @@ impl Part {
             }
         }
     }
+}
+
+/// Whether a slope of one step is one of a jump, or not a number.
+fn jumps(of_step: &DMatrix<f64>) -> bool {
+    !of_step.diagonal().iter().all(|g| g.abs() <= MOST_GROWTH)
 }
 
 /// The power `A^n` of a matrix, and the sum of its powers below, `I + A + … + A^(n-1)`, by doubling.
@@ -135,6 +150,16 @@ fn powers(a: &DMatrix<f64>, n: usize) -> (DMatrix<f64>, DMatrix<f64>) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_joint_that_stops_within_a_step_is_a_jump() {
+        let smooth = DMatrix::from_row_slice(2, 2, &[1.0, 1e-3, -30.0, 0.97]);
+        assert!(!jumps(&smooth));
+        // Friction that changes its branch between two speeds that are 1e-6 apart.
+        let stops = DMatrix::from_row_slice(2, 2, &[1.0, 1e-3, -30.0, -181.0]);
+        assert!(jumps(&stops));
+        assert!(jumps(&DMatrix::from_element(2, 2, f64::NAN)));
+    }
 
     #[test]
     fn powers_are_products_and_their_sum_is_a_geometric_series() {

@@ -4,9 +4,12 @@
 //! one step in its middle, carried over all of them ([`super::carried`]), unless a change is answered over several steps
 //! ([`one_step_tells`](crate::latent_force::one_step::one_step_tells)).
 
+use std::collections::HashMap;
+
 use crate::latent_force::tangent::{difference, retract};
 use asid_core::simulator::{StepHook, StepView};
 use asid_core::{Control, Result, Rollout, Simulator as _};
+use nalgebra::DMatrix;
 
 use super::pass::{Part, STATE_STEP};
 use super::role::Role;
@@ -213,6 +216,8 @@ pub(super) struct RowBuffers {
     pushes: Vec<Option<(usize, f64, bool)>>,
     pub(super) read: Vec<f64>,
     next: Vec<f64>,
+    /// The last slope of one step of each walk that is no jump.
+    pub(super) of_step: HashMap<usize, DMatrix<f64>>,
 }
 
 impl RowBuffers {

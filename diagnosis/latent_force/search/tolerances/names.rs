@@ -42,20 +42,20 @@ impl Tolerances {
         &self,
         context: &Context<'_>,
         candidates: &[Candidate],
-        set: Set,
+        (set, at_first): (Set, Missing),
         how: (Breadth, &dyn Progress),
     ) -> Result<Set> {
-        let set = self.outgrown(context, candidates, set, how)?;
+        let set = self.outgrown(context, candidates, (set, at_first), how)?;
         needed(context, candidates, set, how)
     }
 
     /// A fitted set whose values at the end of their tolerance are let go beyond: each such effect is named. The set as it is where none is,
-    /// or where that does not earn the threshold.
+    /// or where that does not earn the threshold, or does not make up for the share of what was missing `at_first` that a name must.
     fn outgrown(
         &self,
         context: &Context<'_>,
         candidates: &[Candidate],
-        set: Set,
+        (set, at_first): (Set, Missing),
         (breadth, progress): (Breadth, &dyn Progress),
     ) -> Result<Set> {
         let mut larger = set.clone();
@@ -104,7 +104,9 @@ impl Tolerances {
         larger.fit(context, (breadth.rounds[1], progress))?;
         let threshold = threshold(nameable(candidates), breadth.false_alarms);
         let least = set.fitted.evidence + threshold * laws.len() as f64;
-        Ok(if larger.fitted.evidence > least {
+        let left = |s: &Set| s.fitted.estimate.missing(context).relative_to(at_first);
+        let shrinks = left(&set) - left(&larger) > breadth.shrinks;
+        Ok(if larger.fitted.evidence > least && shrinks {
             larger
         } else {
             set
