@@ -197,7 +197,12 @@ pub fn search(
         let next = round.confirmed.first().cloned();
         rounds.push(round);
         let stopped = progress.is_stopped();
-        fit_from(context, (next.as_ref(), threshold), (&mut best, &mut none), how)?;
+        fit_from(
+            context,
+            (next.as_ref(), threshold),
+            (&mut best, &mut none),
+            how,
+        )?;
         if is_cut_short(context, &best, progress) {
             untried.push(Untried::upon(&best, FURTHER));
             break;

@@ -1,14 +1,16 @@
 //! A study with the wiring that its logs show, and the lines that say so.
 
-use asid_core::{Layout, Result};
+use asid_core::parameter::Scale;
+use asid_core::{Layout, Parameter, Result, Target};
 use asid_logs::episode::{ColumnMapping, remapped};
+use asid_mjcf::plant::DriveLaw;
 
 use crate::machine::Machine;
 use crate::result::WiringResult;
 use crate::study::Study;
 
 use super::evidence::Settings;
-use super::hypotheses::{Fault, Quantity, quantities, view_of};
+use super::hypotheses::{Fault, LATEST, Quantity, quantities, view_of};
 use super::record::Recorded;
 use super::search::{Found, Outcome, Search};
 use super::view::{View, mapping};
@@ -82,9 +84,17 @@ pub fn mend(study: &Study, machine: &Machine, settings: &Settings) -> Result<Men
         return Ok(unchanged());
     };
     let all = quantities(&machine.plant, &sensors);
+    let dampings = dampings(machine, &study.parameters)?;
+    let with_damping = [&study.parameters[..], &dampings].concat();
+    let damped = if dampings.is_empty() {
+        None
+    } else {
+        Windows::new(machine, &record, (&sensors, &with_damping), WINDOWS)?
+    };
     let search = Search {
         few,
         all: many,
+        damped,
         record: &record,
         quantities: &all,
         settings,
@@ -128,6 +138,40 @@ pub fn mend(study: &Study, machine: &Machine, settings: &Settings) -> Result<Men
         shrinkage: found.iter().map(|f| f.shrinkage).collect(),
         nearest,
     })
+}
+
+/// The damping of each joint that a position servo drives, as a parameter: from that of the model up to where the servo lags by as much as the
+/// latest of clocks. Those that are among the study's own `parameters` are left out, and those that the engine does not set.
+fn dampings(machine: &Machine, parameters: &[Parameter]) -> Result<Vec<Parameter>> {
+    let layout = &machine.plant.layout;
+    let model = machine.with(&[])?;
+    let mut found: Vec<Parameter> = Vec::new();
+    for drive in machine.plant.drives.iter().flatten() {
+        let DriveLaw::Position { kp, .. } = drive.law else {
+            continue;
+        };
+        let target = Target {
+            element: "joint".into(),
+            name: layout.joints[drive.joint].name.clone(),
+            attribute: "damping".into(),
+            index: 0,
+        };
+        let Ok(given) = model.nominal(&target) else {
+            continue;
+        };
+        let lags = kp * drive.gear * drive.gear * LATEST;
+        let mut before = parameters.iter().chain(&found);
+        if lags > 0.0 && !before.any(|p| p.targets.contains(&target)) {
+            found.push(Parameter {
+                name: format!("damping of {}", target.name),
+                targets: vec![target],
+                range: [given, given + lags],
+                scale: Scale::Linear,
+                unit: String::new(),
+            });
+        }
+    }
+    Ok(found)
 }
 
 /// Reads the logs of a study by further mappings.

@@ -68,6 +68,8 @@ pub struct Search<'a> {
     pub few: Windows<'a>,
     /// All windows.
     pub all: Windows<'a>,
+    /// All windows, with the damping of each joint that a position servo drives among the parameters; `None` where there is none.
+    pub damped: Option<Windows<'a>>,
     /// The logs.
     pub record: &'a [Recorded],
     /// Their columns.

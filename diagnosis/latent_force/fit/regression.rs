@@ -97,7 +97,11 @@ pub(super) fn compare(
         let determinant = determinant_of(&found);
         let here = sum.log_likelihood - 0.5 * prior + determinant;
         // What is no number is no model of the logs.
-        let here = if here.is_nan() { f64::NEG_INFINITY } else { here };
+        let here = if here.is_nan() {
+            f64::NEG_INFINITY
+        } else {
+            here
+        };
         if !whole && best.as_ref().is_some_and(|b| here <= b.here) {
             break;
         }

@@ -102,7 +102,10 @@ impl Part {
             }
             if states {
                 if jumps(&of_step) {
-                    of_step = row.of_step.get(&e).map_or_else(|| DMatrix::identity(nx, nx), DMatrix::clone);
+                    of_step = row
+                        .of_step
+                        .get(&e)
+                        .map_or_else(|| DMatrix::identity(nx, nx), DMatrix::clone);
                 }
                 let (whole, carried) = powers(&of_step, substeps);
                 let steps = out[e].rows - 1;

@@ -53,7 +53,8 @@ impl Search<'_> {
 
     /// A clock with its delay fitted to all windows, and the study's parameters beside it; improbable where a delay of all
     /// commands says as much: then it is the drives' own. Of a machine with one drive nothing but a start in motion can tell
-    /// the two apart; of one with several, all drives are seldom late alike.
+    /// the two apart; of one with several, all drives are seldom late alike. Improbable too where friction says as much: a position servo
+    /// of gain `kp` lags behind its command by `damping / kp`.
     pub(super) fn clock_or_drive(
         &mut self,
         view: &View,
@@ -76,7 +77,15 @@ impl Search<'_> {
             ..found.hypothesis
         };
         let mut judged = self.judged(hypothesis, given, &clock);
-        if beats < handicap {
+        let beats_friction = match &mut self.damped {
+            Some(damped) => {
+                let as_they_are = |_: f64| view.clone();
+                let (_, friction) = size::fit(damped, &as_they_are, delay_fit(0.0, true))?;
+                self.settings.shrinkage(&friction, &clock) > 0.0
+            }
+            None => true,
+        };
+        if beats < handicap || !beats_friction {
             judged.probability = judged.probability.min(self.settings.named / 2.0);
         }
         Ok(judged)
