@@ -1,5 +1,6 @@
 //! From a study to what its result is told from, by the missing force.
 
+mod begin_values;
 mod replays;
 mod rows;
 mod told;
@@ -26,6 +27,7 @@ use super::search::{OpenLoop, Outcome, Set, search};
 use super::selection::gather;
 use super::steps::{Shown, beside, known, noise_with_steps, shown};
 
+use begin_values::begin_values;
 use replays::{Replays, replay};
 use rows::{Rows, along};
 use without_effects::{Null, Stands};
@@ -135,7 +137,7 @@ pub fn diagnose(
         rows: &rows,
         logs: &logs,
         hypothesis: &hypothesis,
-        nominal: &nominal,
+        begin: &begin_values(&bench, &rows, &nominal)?,
         progress,
     };
     let found = searched(null, &shown_steps, settings)?;

@@ -62,6 +62,11 @@ impl Rows {
         })
     }
 
+    /// Whether something touches in any of them.
+    pub(super) fn touches(&self) -> bool {
+        self.touches.iter().flatten().any(|t| *t)
+    }
+
     /// Them in segments of a duration, s, where something touches.
     pub(super) fn cut(&self, study: &Study, bench: &Bench, duration: f64) -> Taken {
         let plant = &bench.machine.plant;

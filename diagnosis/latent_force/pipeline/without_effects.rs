@@ -50,9 +50,9 @@ pub(super) struct Null<'a> {
     /// Rows that are taken, of which logs.
     pub(super) rows: &'a Rows,
     pub(super) logs: &'a Logs,
-    /// The model, and its values as given.
+    /// The model, and the values to begin with.
     pub(super) hypothesis: &'a Hypothesis,
-    pub(super) nominal: &'a [f64],
+    pub(super) begin: &'a [f64],
     pub(super) progress: &'a dyn Progress,
 }
 
@@ -109,9 +109,9 @@ impl<'a> Null<'a> {
     ) -> Result<Tried<'a>> {
         let (hypothesis, progress) = (self.hypothesis, self.progress);
         let taken = self.rows.cut(self.study, self.bench, duration);
-        let parameters = (&self.study.parameters[..], self.nominal);
+        let parameters = (&self.study.parameters[..], self.begin);
         let (context, mut estimate) = begin(&self.bench.machine, self.logs, taken, parameters)?;
-        let mut theta = self.nominal;
+        let mut theta = self.begin;
         if let Some(shorter) = shorter {
             estimate.begin_at(&context, (&shorter.context, &shorter.none.estimate));
             theta = &shorter.none.theta;
