@@ -27,20 +27,6 @@ fn a_little_friction_and_delay_are_no_effect_and_are_in_the_refined_model() {
     );
 }
 
-/// A bias of the drive makes up for it as well, and so does a tilt of the whole machine: names that pay for being one of many.
-#[test]
-fn a_rail_that_lies_a_third_of_a_degree_off_is_no_effect() {
-    let (found, _) = run(Truth::Tilted(0.006), &[]);
-    let r = &found.result;
-    assert_eq!(r.verdict.kind, Kind::None, "{}", r.sentence);
-    assert!(
-        r.gap.identified > 20.0 && r.gap.refined < 2.5,
-        "{:?}",
-        r.gap
-    );
-    assert_eq!(laws(r), ["geometry"], "{:?}", r.tolerances);
-}
-
 #[test]
 fn what_stands_out_beside_tolerances_is_named_alone() {
     let (found, _) = run(Truth::Ordinary(2.0), &[]);

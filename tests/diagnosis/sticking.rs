@@ -2,10 +2,9 @@
 //! far the friction is off.
 
 use std::fmt::Write as _;
-use std::path::Path;
 
 use asid::core::Capabilities;
-use asid::diagnosis::result::DiagnosisResult;
+use asid::diagnosis::result::{DiagnosisResult, Kind};
 use rand::{Rng as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
@@ -71,25 +70,32 @@ fn log(episode: u32) -> String {
     text + "\n"
 }
 
-fn diagnosed(folder: &Path) -> DiagnosisResult {
+/// Diagnoses the logs with a model, and what the study file says of its parameters.
+fn diagnosed(model: &str, parameters: &str) -> DiagnosisResult {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
     for episode in 0..6 {
         let name = if episode < 4 { "train" } else { "test" };
         std::fs::write(folder.join(format!("{name}_{episode}.csv")), log(episode)).unwrap();
     }
-    std::fs::write(folder.join("nominal.xml"), model()).unwrap();
+    std::fs::write(folder.join("nominal.xml"), model).unwrap();
     let study = "model = \"nominal.xml\"\ntrain = [\"train_*.csv\"]\ntest = [\"test_*.csv\"]\n";
-    std::fs::write(folder.join("study.toml"), study).unwrap();
+    std::fs::write(folder.join("study.toml"), format!("{study}{parameters}")).unwrap();
     run_on(folder, &[]).0.result
+}
+
+/// Whether the engine has contacts as exact as these tests ask for.
+fn has_contacts() -> bool {
+    let needed = Capabilities::CONTACT | Capabilities::DOUBLE_PRECISION;
+    engine().capabilities().contains(needed)
 }
 
 #[test]
 fn the_friction_of_a_block_that_slides_is_found_from_a_model_in_which_it_sticks() {
-    let needed = Capabilities::CONTACT | Capabilities::DOUBLE_PRECISION;
-    if !engine().capabilities().contains(needed) {
+    if !has_contacts() {
         return;
     }
-    let folder = tempfile::tempdir().unwrap();
-    let r = diagnosed(folder.path());
+    let r = diagnosed(&model(), "");
     assert_eq!(
         r.verdict.effects,
         ["sliding-friction@ramp"],
@@ -99,4 +105,21 @@ fn the_friction_of_a_block_that_slides_is_found_from_a_model_in_which_it_sticks(
     let factor = r.effects[0].parameters["factor"];
     assert!((factor - FRICTION).abs() < 0.02, "{factor}");
     assert!(r.gap.closed.unwrap() > 0.95, "{:?}", r.gap);
+}
+
+#[test]
+fn a_parameter_at_whose_given_value_the_block_sticks_is_fitted_and_no_effect_is_named() {
+    if !has_contacts() {
+        return;
+    }
+    // The larger friction of two bodies counts.
+    let slick = model().replace("type=\"box\"", "type=\"box\" friction=\"0.02\"");
+    let r = diagnosed(
+        &slick,
+        "[[parameter]]\nname = \"friction\"\ntarget = \"geom/ramp/friction/0\"\nrange = [0.05, 1.2]\n",
+    );
+    assert_eq!(r.verdict.kind, Kind::None, "{}", r.sentence);
+    let found = r.parameters[0].estimate;
+    assert!((found - FRICTION).abs() < 0.01, "{found}");
+    assert!(r.gap.refined < 1.2, "{:?}", r.gap);
 }

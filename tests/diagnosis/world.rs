@@ -43,8 +43,6 @@ pub enum Truth {
     Magnet(f64),
     /// A little more of both frictions and a command that comes 1.5 ms later, as at any machine; and a spring, N/m.
     Ordinary(f64),
-    /// The rail rises by an angle, rad, under gravity.
-    Tilted(f64),
     /// There are no readings but noise.
     Noise,
 }
@@ -52,8 +50,6 @@ pub enum Truth {
 /// Mass of the real cart, kg.
 pub const MASS: f64 = 1.3;
 const DAMPING: f64 = 2.0;
-/// Of [`Truth::Tilted`], m/s²; the other carts lie flat, and their models have none.
-const GRAVITY: f64 = 9.81;
 const SECONDS: f64 = 2.4;
 /// Deviations of the noise, m and m/s.
 pub const NOISE: [f64; 2] = [5e-4, 5e-3];
@@ -73,7 +69,6 @@ fn extra(truth: Truth, x: f64, v: f64) -> f64 {
         Truth::Viscous(d) => -d * v,
         Truth::Spring(k) => -k * x,
         Truth::Ordinary(k) => -0.25 * v - 0.05 * (v / 5e-3).tanh() - k * x,
-        Truth::Tilted(angle) => -MASS * GRAVITY * angle.sin(),
         Truth::Magnet(force) => {
             let s = (x - 0.05) / 0.04;
             -force * s * (-0.5 * s * s).exp()
@@ -175,10 +170,5 @@ pub fn write_study(folder: &Path, truth: Truth) {
 target = "geom/cart/mass"
 range = [0.4, 3.0]
 unit = "kg""#;
-    let heavy = NOMINAL.replace("gravity=\"0 0 0\"", "");
-    let model = match truth {
-        Truth::Tilted(_) => &*heavy,
-        _ => NOMINAL,
-    };
-    write_files(folder, model, mass, |episode| log(truth, episode));
+    write_files(folder, NOMINAL, mass, |episode| log(truth, episode));
 }
