@@ -211,17 +211,15 @@ pub fn search(
             Some(n) if no_force => gap.is_closed_by(n, breadth)?,
             _ => false,
         };
-        let next = next.filter(|n| {
-            // A first fit that was cut short has not told yet how much of the force it makes up for.
-            let cut_short = stopped && best.candidates.is_empty();
-            let shrinks = cut_short || closes || left(&best) - left(n) > breadth.shrinks;
-            shrinks && n.rises_above(&best, threshold)
-        });
-        let is_passed = |own: &Set| {
-            let least = own.fitted.evidence + threshold;
-            next.as_ref().is_some_and(|n| n.fitted.evidence >= least)
-        };
-        if let Some(own) = freed.take().filter(|own| !is_passed(own)) {
+        // A first fit that was cut short has not told yet how much of the force it makes up for.
+        let cut_short = stopped && best.candidates.is_empty();
+        let shrinks = |n: &Set| left(&best) - left(n) > breadth.shrinks;
+        let next =
+            next.filter(|n| (cut_short || closes || shrinks(n)) && n.rises_above(&best, threshold));
+        if let Some(own) = freed
+            .take()
+            .filter(|own| !own.is_passed(next.as_ref(), threshold))
+        {
             best = own;
             continue;
         }

@@ -42,6 +42,11 @@ impl Set {
         self.fitted.evidence - other.fitted.evidence > threshold + unsure
     }
 
+    /// Whether the next set, if there is one, has the evidence of this one and a threshold more.
+    pub(super) fn is_passed(&self, next: Option<&Self>, threshold: f64) -> bool {
+        next.is_some_and(|n| n.fitted.evidence >= self.fitted.evidence + threshold)
+    }
+
     /// Fits it on from where it stands, over at most so many linearisations.
     pub(super) fn fit(
         &mut self,
