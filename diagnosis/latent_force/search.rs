@@ -32,6 +32,8 @@ use set::{free_what_is_given, from_fit_of, is_due};
 
 /// The stage that looks for what is missing beside a set.
 const FURTHER: &str = "further effects beside those named";
+/// The stage that frees what is given of the effects that are named.
+const GIVEN: &str = "values of the effects named that no search tries, such as an offset";
 
 /// A stage that was cut short, and the sets that it left out.
 #[derive(Clone, Debug)]
@@ -197,12 +199,8 @@ pub fn search(
         let next = round.confirmed.first().cloned();
         rounds.push(round);
         let stopped = progress.is_stopped();
-        fit_from(
-            context,
-            (next.as_ref(), threshold),
-            (&mut best, &mut none),
-            how,
-        )?;
+        let further = (next.as_ref(), threshold);
+        fit_from(context, further, (&mut best, &mut none), how)?;
         if is_cut_short(context, &best, progress) {
             untried.push(Untried::upon(&best, FURTHER));
             break;
@@ -216,10 +214,8 @@ pub fn search(
         let shrinks = |n: &Set| left(&best) - left(n) > breadth.shrinks;
         let next =
             next.filter(|n| (cut_short || closes || shrinks(n)) && n.rises_above(&best, threshold));
-        if let Some(own) = freed
-            .take()
-            .filter(|own| !own.is_passed(next.as_ref(), threshold))
-        {
+        let is_ahead = |own: &Set| !own.is_passed(next.as_ref(), threshold);
+        if let Some(own) = freed.take().filter(is_ahead) {
             best = own;
             continue;
         }
@@ -237,10 +233,7 @@ pub fn search(
         }
         best = next;
         if stopped {
-            untried.push(Untried::upon(
-                &best,
-                "values of the effects named that no search tries, such as an offset",
-            ));
+            untried.push(Untried::upon(&best, GIVEN));
             break;
         }
         freed = free_what_is_given(context, candidates, &best, (breadth, threshold), progress)?;
