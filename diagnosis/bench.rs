@@ -181,16 +181,33 @@ impl Bench {
     /// # Errors
     /// When a rollout fails.
     pub fn hold_out(&self, trials: &[Trial<'_>], of: &mut Explanation) -> Result<()> {
-        of.held_starts = self.head_starts(trials, &of.fit.point.theta, &of.held_starts)?;
-        let point = Point {
-            theta: of.fit.point.theta.clone(),
-            starts: of.held_starts.clone(),
-        };
-        let mut predictor = self.predictor(trials, &self.test)?;
-        let mut residuals = predictor.residuals(&[point])?.pop().unwrap_or_default();
-        self.mask_head(&mut residuals);
+        let theta = &of.fit.point.theta;
+        let (starts, residuals) = self.replay_held_out(trials, theta, &of.held_starts)?;
+        of.held_starts = starts;
         of.held_out = cost(&residuals);
         Ok(())
+    }
+
+    /// Replays the logs held out at some values: the starts that were fitted to their first tenth where they are open, `from` some on, and
+    /// the residuals, of which that tenth is zero then.
+    ///
+    /// # Errors
+    /// When a rollout fails.
+    pub fn replay_held_out(
+        &self,
+        trials: &[Trial<'_>],
+        theta: &[f64],
+        from: &[State],
+    ) -> Result<(Vec<State>, Vec<f64>)> {
+        let point = Point {
+            theta: theta.to_vec(),
+            starts: self.head_starts(trials, theta, from)?,
+        };
+        let mut predictor = self.predictor(trials, &self.test)?;
+        let residuals = predictor.residuals(std::slice::from_ref(&point))?.pop();
+        let mut residuals = residuals.unwrap_or_default();
+        self.mask_head(&mut residuals);
+        Ok((point.starts, residuals))
     }
 
     /// Starts of the held-out episodes, fitted on their first tenth where they are open.

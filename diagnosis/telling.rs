@@ -64,6 +64,7 @@ pub(crate) struct Telling<'a> {
 
 /// Predictions of the held-out logs by one model: readings and plain residuals in units of
 /// the noise.
+#[derive(Clone)]
 struct HeldOut {
     starts: Vec<State>,
     readings: Vec<Vec<f64>>,
@@ -86,10 +87,30 @@ impl Telling<'_> {
         found.map_or_else(|| self.findings.none.clone(), |f| f.explanation.clone())
     }
 
-    /// Replays the held-out logs without whitening.
-    fn held(&self, trials: &[Trial<'_>], theta: &[f64]) -> Result<HeldOut> {
+    /// Replays the held-out logs by the model as given, as identified, and as refined by an explanation with its trials; the same model is
+    /// replayed once.
+    fn all_held(&self, (trials, refined): (&[Trial<'_>], &Explanation)) -> Result<[HeldOut; 3]> {
         let bench = self.bench;
-        let starts = bench.head_starts(trials, theta, &bench.test.starts)?;
+        let none = &self.findings.none;
+        let identified = self.held(&[], &none.fit.point.theta, none.held_starts.clone())?;
+        let nominal = if self.nominal == none.fit.point.theta {
+            identified.clone()
+        } else {
+            let starts = bench.head_starts(&[], self.nominal, &bench.test.starts)?;
+            self.held(&[], self.nominal, starts)?
+        };
+        let theta = &refined.fit.point.theta;
+        let refined = if trials.is_empty() && *theta == none.fit.point.theta {
+            identified.clone()
+        } else {
+            self.held(trials, theta, refined.held_starts.clone())?
+        };
+        Ok([nominal, identified, refined])
+    }
+
+    /// Replays the held-out logs from some starts without whitening.
+    fn held(&self, trials: &[Trial<'_>], theta: &[f64], starts: Vec<State>) -> Result<HeldOut> {
+        let bench = self.bench;
         let mut predictor = bench.predictor(trials, &bench.test)?;
         let point = Point {
             theta: theta.to_vec(),
@@ -111,9 +132,7 @@ impl Telling<'_> {
         let best = self.found(j.best);
         let (members, explanation) = (self.trials(best), self.explanation(best));
         let none = &self.findings.none;
-        let nominal = self.held(&[], self.nominal)?;
-        let identified = self.held(&[], &none.fit.point.theta)?;
-        let refined = self.held(&members, &explanation.fit.point.theta)?;
+        let [nominal, identified, refined] = self.all_held((&members, &explanation))?;
         let mut gap = self.gap(&nominal, &identified, &refined);
         let kind = if j.is_unknown {
             Kind::Unknown
@@ -159,7 +178,7 @@ impl Telling<'_> {
         };
         if self.stopped {
             result.not_tried.push(NotTried {
-                stage: "check of the time step, and the next experiment".into(),
+                stage: "check of the time step, short replays, and the next experiment".into(),
                 effects: Vec::new(),
             });
         }

@@ -89,8 +89,11 @@ fn searched(null: Null<'_>, shown_steps: &[Shown], settings: &Settings) -> Resul
         open: Vec::new(),
         progress,
     };
-    let open_loop = |set: &Set| replays.excess(&set.fitted, &set.candidates);
-    let how = (&open_loop as OpenLoop<'_>, progress);
+    let open_loop = OpenLoop {
+        excess: &|set: &Set| replays.excess(&set.fitted, &set.candidates),
+        is_gap: replays.leaves_a_gap(&none)?,
+    };
+    let how = (open_loop, progress);
     let outcome = search(&context, &none, offered, settings.breadth, how)?;
     let drawn = (
         forces(&context, &outcome, &candidates)?,

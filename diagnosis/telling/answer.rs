@@ -135,7 +135,9 @@ impl Telling<'_> {
                 let gap_closed = match alone {
                     Some(f) if identified > NO_GAP => {
                         let trials = trials(self.candidates, &f.candidates, &f.explanation);
-                        let held = self.held(&trials, &f.explanation.fit.point.theta)?;
+                        let of = &f.explanation;
+                        let starts = of.held_starts.clone();
+                        let held = self.held(&trials, &of.fit.point.theta, starts)?;
                         let (square, count) = self.rms(&held.residuals, None, None);
                         let r2 = square / f64::max(count, 1.0);
                         Some((1.0 - (r2 - 1.0) / (identified * identified - 1.0)).clamp(0.0, 1.0))

@@ -76,7 +76,8 @@ impl Telling<'_> {
         for found in &self.findings.found {
             if found.candidates.len() == 1 {
                 let trials = trials(self.candidates, &found.candidates, &found.explanation);
-                let held = self.held(&trials, &found.explanation.fit.point.theta)?;
+                let of = &found.explanation;
+                let held = self.held(&trials, &of.fit.point.theta, of.held_starts.clone())?;
                 let (square, count) = self.rms(&held.residuals, None, None);
                 let label = found.explanation.effects[0].label();
                 let gap = (square / f64::max(count, 1.0)).sqrt();

@@ -51,7 +51,8 @@ impl Telling<'_> {
     ) -> Result<Option<(Short, Short, f64)>> {
         let bench = self.bench;
         let plant = &bench.machine.plant;
-        if !self.findings.missing.is_empty() {
+        // They take seconds of machines of many joints: a search that had no time has none for them.
+        if self.stopped || !self.findings.missing.is_empty() {
             return Ok(None);
         }
         let Some(rows) = windows::rows(plant, &bench.train.logs, &bench.open) else {
@@ -63,6 +64,12 @@ impl Telling<'_> {
             forces::missing(bench, &record, trials, &e.fit.point.theta[..study])
         };
         let seconds = record.logs.longest();
-        Ok(Some((of(&[], none)?, of(members, best)?, seconds)))
+        let before = of(&[], none)?;
+        let after = if members.is_empty() && best.fit.point.theta == none.fit.point.theta {
+            before.clone()
+        } else {
+            of(members, best)?
+        };
+        Ok(Some((before, after, seconds)))
     }
 }

@@ -6,10 +6,10 @@ use asid_core::progress::UntilLate;
 use asid_core::{Progress, Result};
 use nalgebra::DVector;
 
-use crate::bench::{Bench, Explanation, Local};
+use crate::bench::{Bench, Explanation, Local, Trial};
 use crate::candidate::Candidate;
-use crate::findings::{Findings, Found, Repeats};
-use crate::fit::{Begin, Effort, Region, StartSlopes};
+use crate::findings::{Findings, Found, LEAST_GAP, Repeats};
+use crate::fit::{Begin, Effort, Region, StartSlopes, cost};
 use crate::latent_force::fit::Fitted;
 use crate::latent_force::search::{Outcome, Set, labels_of, name_of};
 use crate::predict::{Point, State};
@@ -91,15 +91,48 @@ pub(super) struct Replays<'a> {
 impl Replays<'_> {
     /// Excess power that a fitted set leaves of the training logs, a reading, in units of the noise.
     pub(super) fn excess(&self, fitted: &Fitted, members: &[usize]) -> Result<f64> {
-        let of = self.replayed(fitted, members, (Effort::LOOK, None))?;
-        let readings = self.bench.train.readings.max(1) as f64;
-        let excess = of.fit.cost / readings - 1.0;
-        // A replay that diverges leaves everything.
-        Ok(if excess.is_nan() {
-            f64::INFINITY
-        } else {
-            excess.max(0.0)
-        })
+        Ok((self.left(fitted, members)? - 1.0).max(0.0))
+    }
+
+    /// Whether the model without effects leaves a gap of the training logs, or of those held out.
+    pub(super) fn leaves_a_gap(&self, none: &Fitted) -> Result<bool> {
+        let (bench, least) = (self.bench, LEAST_GAP * LEAST_GAP);
+        if self.left(none, &[])? > least {
+            return Ok(true);
+        }
+        let (_, residuals) = bench.replay_held_out(&[], &none.theta, &bench.test.starts)?;
+        let left = cost(&residuals) / bench.held_readings().max(1.0);
+        // A replay that diverged leaves what is not a number.
+        Ok(left.is_nan() || left > least)
+    }
+
+    /// Mean square that replays of a fitted set leave of the training logs, in units of the noise; infinite where one diverges.
+    fn left(&self, fitted: &Fitted, members: &[usize]) -> Result<f64> {
+        let bench = self.bench;
+        let trials = self.trials(fitted, members);
+        let mut predictor = bench.predictor(&trials, &bench.train)?;
+        let residuals = predictor.residuals(&[self.point(fitted)])?.pop();
+        let left = cost(&residuals.unwrap_or_default()) / bench.train.readings.max(1) as f64;
+        Ok(if left.is_nan() { f64::INFINITY } else { left })
+    }
+
+    /// Candidates of a fitted set, each with its values.
+    fn trials(&self, fitted: &Fitted, members: &[usize]) -> Vec<Trial<'_>> {
+        let mut at = self.bench.parameters.len();
+        let with_values = |&c: &usize| {
+            let n = self.candidates[c].parameters().len();
+            at += n;
+            (&self.candidates[c], fitted.theta[at - n..at].to_vec())
+        };
+        members.iter().map(with_values).collect()
+    }
+
+    /// Values of a fitted set, and the starts that it has smoothed.
+    fn point(&self, fitted: &Fitted) -> Point {
+        Point {
+            theta: fitted.theta.clone(),
+            starts: smoothed_starts(self.bench, fitted, self.firsts),
+        }
     }
 
     /// Replays a fitted set of candidates, with its values by the fit that allows for a missing force.
@@ -126,28 +159,15 @@ impl Replays<'_> {
         members: &[usize],
         (effort, like): (Effort, Option<&StartSlopes>),
     ) -> Result<Explanation> {
-        let mut at = self.bench.parameters.len();
-        let chosen: Vec<_> = members
-            .iter()
-            .map(|&c| {
-                let n = self.candidates[c].parameters().len();
-                let values = fitted.theta[at..at + n].to_vec();
-                at += n;
-                (&self.candidates[c], values)
-            })
-            .collect();
-        let point = Point {
-            theta: fitted.theta.clone(),
-            starts: smoothed_starts(self.bench, fitted, self.firsts),
-        };
         let region = region(fitted);
         let begin = Begin {
             like,
             region: region.as_ref(),
-            ..Begin::at(point, &self.open)
+            ..Begin::at(self.point(fitted), &self.open)
         };
         let how = (effort, &UntilLate(self.progress) as &dyn Progress);
-        self.bench.explain(&chosen, begin, how)
+        self.bench
+            .explain(&self.trials(fitted, members), begin, how)
     }
 }
 

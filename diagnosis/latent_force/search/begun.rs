@@ -20,7 +20,7 @@ impl Upon<'_> {
             return Ok(best);
         }
         let mut from = screened.clone();
-        let mut least = (self.open_loop)(&best)?;
+        let mut least = (self.open_loop.excess)(&best)?;
         for i in 0..screened.forms.len() {
             let own = screened.forms[i];
             let like = |&f: &usize| is_secant(f) && forms[f].candidate == forms[own].candidate;
@@ -32,7 +32,7 @@ impl Upon<'_> {
                 other.forms[i] = f;
                 other.coefficients[i] = vec![1.0; forms[f].slopes.len()];
                 let set = self.enlarged(screening, &other);
-                let left = (self.open_loop)(&set)?;
+                let left = (self.open_loop.excess)(&set)?;
                 if left < least {
                     (least, best, from) = (left, set, other);
                 }

@@ -9,8 +9,15 @@ use crate::settings::Breadth;
 
 use super::set::Set;
 
-/// Excess power that open-loop replays of the training logs leave of a set.
-pub type OpenLoop<'o> = &'o dyn Fn(&Set) -> Result<f64>;
+/// Open-loop replays of whole logs.
+#[derive(Clone, Copy)]
+pub struct OpenLoop<'o> {
+    /// Excess power that they leave of the training logs, of a set.
+    pub excess: &'o dyn Fn(&Set) -> Result<f64>,
+    /// Whether they leave a gap without effects. Where they do not, no set could close one: a screening tells what the logs could have
+    /// shown, and nothing is fitted.
+    pub is_gap: bool,
+}
 
 /// The gap of the open loop, which counts where hardly any force is missing.
 pub(super) struct OpenLoopGap<'o> {
@@ -40,9 +47,9 @@ impl<'o> OpenLoopGap<'o> {
         } else {
             let first = match self.excess {
                 Some([first, _]) => first,
-                None => (self.replay)(&Set::without_effects(none))?,
+                None => (self.replay.excess)(&Set::without_effects(none))?,
             };
-            Some([first, (self.replay)(best)?])
+            Some([first, (self.replay.excess)(best)?])
         };
         Ok(self.excess.is_some_and(|[first, now]| {
             now.is_finite() && now > (breadth.shrinks * first).max(NEGLIGIBLE * NEGLIGIBLE)
@@ -52,7 +59,7 @@ impl<'o> OpenLoopGap<'o> {
     /// Whether a set closes as much of it.
     pub(super) fn is_closed_by(&self, set: &Set, breadth: Breadth) -> Result<bool> {
         Ok(match self.excess {
-            Some([first, now]) => now - (self.replay)(set)? > breadth.shrinks * first,
+            Some([first, now]) => now - (self.replay.excess)(set)? > breadth.shrinks * first,
             None => false,
         })
     }

@@ -112,6 +112,9 @@ impl Upon<'_> {
         let mut rows: Vec<_> = rows.chain(all).collect();
         rows.sort_by(|a, b| b.1.total_cmp(&a.1));
         progress.ranking(&format!("screening{upon}"), &rows);
+        if !self.open_loop.is_gap {
+            return Ok(screening.round(self, screened, (Vec::new(), Vec::new()), None));
+        }
         let threshold = threshold(nameable(self.candidates), self.breadth.false_alarms);
         let tolerances = screening.tolerances.as_ref();
         let tolerances = tolerances.filter(|t| t.gain > threshold).cloned();
