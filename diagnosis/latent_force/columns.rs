@@ -23,6 +23,7 @@ use super::context::{Context, PUSH};
 use super::estimate::Estimate;
 use super::fit::Hypothesis;
 use super::one_step::one_step_tells;
+use super::step_error::beside;
 use super::step_map::{Derivatives, LinearEpisode};
 
 use asked::{Asked, Trial, bounds, trials};
@@ -60,17 +61,6 @@ pub struct Columns {
     pub bounds: Vec<[f64; 2]>,
     /// Whether all candidates are there: those that work was stopped before add nothing.
     pub complete: bool,
-}
-
-/// Two row-major matrices of `n` and `m` columns side by side.
-fn beside(a: &[f64], n: usize, b: &[f64], m: usize) -> Vec<f64> {
-    let rows = a.len().checked_div(n).unwrap_or(b.len() / m.max(1));
-    let mut out = Vec::with_capacity(rows * (n + m));
-    for k in 0..rows {
-        out.extend_from_slice(&a[k * n..(k + 1) * n]);
-        out.extend_from_slice(&b[k * m..(k + 1) * m]);
-    }
-    out
 }
 
 /// Gives the slopes of a form other deviations of their priors, by factors of those that they have, which become those that were taken: a
@@ -161,6 +151,8 @@ impl Columns {
         )?);
         let (want, steps) = slopes_wanted(context);
         let mut linear = map.linearise(theta, &estimate.trajectory, want, &steps, &variations)?;
+        context.step_error.join(&mut linear, asked.base);
+        asked.add_step_errors(context.step_error.columns());
         let late: Vec<Vec<f64>> = linear.iter().map(|l| l.late.clone()).collect();
         let slopes = linear.iter_mut().map(ForceSlopes::take);
         let slopes: Vec<ForceSlopes> = slopes.collect();

@@ -13,6 +13,7 @@ use super::estimate::Estimate;
 use super::initial::{from_readings, open_by_reading, position_noise, start, start_of_segment};
 use super::one_step::one_step_tells;
 use super::smoother::{NoiseModel, Start};
+use super::step_error::StepError;
 use super::step_map::{Derivatives, StepMap};
 use super::walk::Walk;
 
@@ -49,6 +50,8 @@ pub struct Context<'a> {
     pub inertial: Vec<f64>,
     /// Whether one physics step of a row tells its slopes in the state, of the model without further effects.
     pub one_step: bool,
+    /// The engine's own error over the rows; none until a first trajectory is there, and where the engine takes no other time step.
+    pub step_error: StepError,
 }
 
 /// What the logs of a study are taken as.
@@ -93,6 +96,7 @@ impl Context<'_> {
             reading_variance: self.reading_variance.clone(),
             inertial: self.inertial.clone(),
             one_step: self.one_step,
+            step_error: self.step_error.of_walks(which),
         }
     }
 
@@ -202,6 +206,7 @@ pub fn begin<'a>(
         inertial: vec![0.0; nv],
         walks: taken.walks,
         one_step: false,
+        step_error: StepError::default(),
     };
     context.one_step = one_step_tells(&context, (&[], parameters), (theta, &trajectory))?;
     let mut map = context.map(&[], parameters, nv + 1)?;

@@ -144,6 +144,7 @@ pub fn fit(
             &estimate,
             &variations,
         )?;
+        context.step_error.join(&mut linear, m);
         let model = (&unknowns[..], &free[..], &theta[..]);
         let whole = round == 0 || segments > 0;
         let Some(compared) = compare(context, &estimate, &linear, model, whole) else {

@@ -29,6 +29,7 @@ pub mod search;
 pub mod segments;
 pub mod selection;
 pub mod smoother;
+pub mod step_error;
 pub mod step_map;
 mod steps;
 pub mod tangent;

@@ -25,6 +25,7 @@ use super::left::left;
 use super::picture::forces;
 use super::search::{OpenLoop, Outcome, Set, search};
 use super::selection::gather;
+use super::step_error::StepError;
 use super::steps::{Shown, beside, known, noise_with_steps, shown};
 
 use begin_values::begin_values;
@@ -58,14 +59,23 @@ fn searched(null: Null<'_>, shown_steps: &[Shown], settings: &Settings) -> Resul
         ..
     } = null;
     let Stands {
-        context,
+        mut context,
         mut none,
         repeats,
     } = null.fit()?;
     let rounds = (ROUNDS, progress);
-    if none.estimate.missing(&context).share < 1.0 {
+    if context.walks.iter().any(|w| w.segment.is_none())
+        && let Ok(finer) = bench.machine.halved()
+    {
+        let (model, states) = ((hypothesis, &none.theta[..]), &none.estimate.trajectory);
+        context.step_error = StepError::of(&context, model, states, &finer)?;
+    }
+    let shares = none.estimate.missing(&context).share < 1.0;
+    if shares {
         none.estimate.free_at_rest(&context);
         none.estimate.set_resolution(&context);
+    }
+    if shares || context.step_error.columns() > 0 {
         let from = (&none.estimate, &none.slopes);
         none = fit(&context, hypothesis, &none.theta, from, rounds)?;
     }

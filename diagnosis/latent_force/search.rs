@@ -205,15 +205,16 @@ pub fn search(
             untried.push(Untried::upon(&best, FURTHER));
             break;
         }
-        let closes = match &next {
-            Some(n) if no_force => gap.is_closed_by(n, breadth)?,
-            _ => false,
-        };
         // A first fit that was cut short has not told yet how much of the force it makes up for.
         let cut_short = stopped && best.candidates.is_empty();
-        let shrinks = |n: &Set| left(&best) - left(n) > breadth.shrinks;
-        let next =
-            next.filter(|n| (cut_short || closes || shrinks(n)) && n.rises_above(&best, threshold));
+        let next = next.filter(|n| n.rises_above(&best, threshold));
+        let counts = match &next {
+            Some(n) if cut_short || left(&best) - left(n) > breadth.shrinks => true,
+            Some(n) if no_force => gap.is_closed_by(n, breadth)?,
+            Some(n) => gap.is_mostly_closed_by(n, (context, &best))?,
+            None => false,
+        };
+        let next = next.filter(|_| counts);
         let is_ahead = |own: &Set| !own.is_passed(next.as_ref(), threshold);
         if let Some(own) = freed.take().filter(is_ahead) {
             best = own;

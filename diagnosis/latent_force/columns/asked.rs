@@ -72,6 +72,13 @@ impl Asked {
         (asked, variations)
     }
 
+    /// Adds the engine's own error to those of the present model.
+    pub(super) fn add_step_errors(&mut self, columns: usize) {
+        self.base += columns;
+        self.center.resize(self.base, 0.0);
+        self.bounds.resize(self.base, [f64::NEG_INFINITY, f64::INFINITY]);
+    }
+
     /// Adds those of all candidates; `sizes` are the deviations of the priors of their [`trials`], 0 for what does nothing.
     pub(super) fn add(&mut self, candidates: &[Candidate], sizes: &[f64]) {
         let mut sizes = sizes.iter();

@@ -8,6 +8,7 @@ use super::force_response::ForceSlopes;
 use super::source::{Along, Source, Wanted};
 use crate::latent_force::context::Context;
 use crate::latent_force::estimate::Estimate;
+use crate::latent_force::step_error::StepError;
 
 /// Share of a parameter's range over which its size is first felt for.
 const TRIAL: f64 = 1e-5;
@@ -76,6 +77,7 @@ fn parts<'c>(
         reading_variance: context.reading_variance.clone(),
         inertial: context.inertial.clone(),
         one_step: context.one_step,
+        step_error: StepError::default(),
         walks,
     };
     Parts {

@@ -76,19 +76,18 @@ pub(super) fn compare(
     (unknowns, free, theta): (&[Unknown], &[usize], &[f64]),
     whole: bool,
 ) -> Option<Compared> {
-    let m = free.len();
+    // The engine's own error comes last, with nothing known of its coefficient but its prior.
+    let m = free.len() + context.step_error.columns();
     let places: Vec<usize> = (0..m).collect();
-    let center: Vec<f64> = free
-        .iter()
-        .map(|&i| -unknowns[i].distance(theta[i]))
-        .collect();
-    let bounds: Vec<[f64; 2]> = free
-        .iter()
-        .map(|&i| {
-            let u = &unknowns[i];
-            u.bounds.map(|b| (b - theta[i]) / u.deviation)
-        })
-        .collect();
+    let center = free.iter().map(|&i| -unknowns[i].distance(theta[i]));
+    let mut center: Vec<f64> = center.collect();
+    let bounds = free.iter().map(|&i| {
+        let u = &unknowns[i];
+        u.bounds.map(|b| (b - theta[i]) / u.deviation)
+    });
+    let mut bounds: Vec<[f64; 2]> = bounds.collect();
+    center.resize(m, 0.0);
+    bounds.resize(m, [f64::NEG_INFINITY, f64::INFINITY]);
     let prior: f64 = center.iter().map(|c| c * c).sum();
     let mut best: Option<Compared> = None;
     for scale in SCALES {

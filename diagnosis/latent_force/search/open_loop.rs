@@ -2,12 +2,17 @@
 
 use asid_core::{Progress, Result};
 
-use crate::findings::NEGLIGIBLE;
+use crate::findings::{LEAST_GAP, NEGLIGIBLE};
 use crate::latent_force::context::Context;
 use crate::latent_force::fit::Fitted;
 use crate::settings::Breadth;
 
 use super::set::Set;
+
+/// Share of what the set that stands leaves of the gap that a further name must close to count by it, where it leaves the missing force as it is:
+/// more than half, as in a small gap ([`crate::decision`]). What errors add up to over a whole log may change by a few per cent for
+/// any reason.
+const MOST: f64 = 0.5;
 
 /// Open-loop replays of whole logs.
 #[derive(Clone, Copy)]
@@ -62,5 +67,16 @@ impl<'o> OpenLoopGap<'o> {
             Some([first, now]) => now - (self.replay.excess)(set)? > breadth.shrinks * first,
             None => false,
         })
+    }
+
+    /// Whether a set closes most of what the one that stands leaves of it. A sensor that reads to another scale hardly changes which force
+    /// is missing, and all that is foretold.
+    pub(super) fn is_mostly_closed_by(&self, set: &Set, (context, best): (&Context<'_>, &Set)) -> Result<bool> {
+        if context.has_segments() {
+            return Ok(false);
+        }
+        let now = (self.replay.excess)(best)?;
+        let is_there = now.is_finite() && now > LEAST_GAP * LEAST_GAP - 1.0;
+        Ok(is_there && (self.replay.excess)(set)? < (1.0 - MOST) * now)
     }
 }

@@ -1,0 +1,99 @@
+//! The engine's own error over a row, as a column of every model.
+//!
+//! An engine that takes finite steps errs in the same way in each row: a semi-implicit step damps or drives a joint a little, and logs
+//! show that as friction, a lag or a softer drive that the machine has not got. How the error acts is known: it is what half the
+//! time step changes, and twice that for a method of first order (Richardson 1911). How large it is is not, for the
+//! machine has no step at all, and the model's effects err as well. So it is a column with a coefficient of its own,
+//! `N(0, 1)`, in the regression of every model, with effects or without: what the step does earns no name any evidence.
+//! Segments have it as [directions](super::scatter).
+
+use asid_core::Result;
+
+use crate::checks::RICHARDSON;
+use crate::machine::Machine;
+
+use super::context::Context;
+use super::fit::Hypothesis;
+use super::step_map::{Derivatives, LinearEpisode, StepMap};
+use super::walk::Walk;
+
+/// The error of each walk, `(rows - 1) x nx` in tangent coordinates of the next state; nothing of segments.
+#[derive(Clone, Debug, Default)]
+pub struct StepError {
+    walks: Vec<Vec<f64>>,
+}
+
+impl StepError {
+    /// Of a model at some values along a trajectory; `finer` is the machine at half its time step.
+    ///
+    /// # Errors
+    /// When the engine fails.
+    pub fn of(
+        context: &Context<'_>,
+        (hypothesis, theta): (&Hypothesis, &[f64]),
+        trajectory: &[Vec<f64>],
+        finer: &Machine,
+    ) -> Result<Self> {
+        let parameters = hypothesis.parameters();
+        let specs = &hypothesis.specs;
+        let want = Derivatives::default();
+        let here = context
+            .map(specs, &parameters, 1)?
+            .linearise(theta, trajectory, want, &[], &[])?;
+        let walks: Vec<Walk> = context.walks.iter().map(Walk::halved).collect();
+        let rows = (context.logs, &walks[..]);
+        let there = StepMap::new(finer, specs, &parameters, rows, 1)?
+            .linearise(theta, trajectory, want, &[], &[])?;
+        let of_walk = |((walk, here), there): ((&Walk, &LinearEpisode), &LinearEpisode)| {
+            if walk.segment.is_some() {
+                return Vec::new();
+            }
+            let each = here.defect.iter().zip(&there.defect);
+            each.map(|(a, b)| {
+                let error = RICHARDSON * (b - a);
+                if error.is_finite() { error } else { 0.0 }
+            })
+            .collect()
+        };
+        let each = context.walks.iter().zip(&here).zip(&there);
+        Ok(Self {
+            walks: each.map(of_walk).collect(),
+        })
+    }
+
+    /// That of some of the walks.
+    #[must_use]
+    pub fn of_walks(&self, which: &[usize]) -> Self {
+        Self {
+            walks: which.iter().filter_map(|&w| self.walks.get(w)).cloned().collect(),
+        }
+    }
+
+    /// How many columns it is: one, or none where it is not known.
+    #[must_use]
+    pub fn columns(&self) -> usize {
+        usize::from(!self.walks.is_empty())
+    }
+
+    /// Puts its column beside the `m` that a linearisation has.
+    pub fn join(&self, linear: &mut [LinearEpisode], m: usize) {
+        for (linear, error) in linear.iter_mut().zip(&self.walks) {
+            if !error.is_empty() {
+                linear.state_columns = beside(&linear.state_columns, m, error, 1);
+            }
+            let none = vec![0.0; linear.residual.len()];
+            linear.reading_columns = beside(&linear.reading_columns, m, &none, 1);
+        }
+    }
+}
+
+/// Two row-major matrices of `n` and `m` columns side by side.
+pub(super) fn beside(a: &[f64], n: usize, b: &[f64], m: usize) -> Vec<f64> {
+    let rows = a.len().checked_div(n).unwrap_or(b.len() / m.max(1));
+    let mut out = Vec::with_capacity(rows * (n + m));
+    for k in 0..rows {
+        out.extend_from_slice(&a[k * n..(k + 1) * n]);
+        out.extend_from_slice(&b[k * m..(k + 1) * m]);
+    }
+    out
+}
