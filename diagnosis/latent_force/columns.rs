@@ -152,7 +152,7 @@ impl Columns {
         let (want, steps) = slopes_wanted(context);
         let mut linear = map.linearise(theta, &estimate.trajectory, want, &steps, &variations)?;
         context.step_error.join(&mut linear, asked.base);
-        asked.add_step_errors(context.step_error.columns());
+        asked.add_step_error(&context.step_error);
         let late: Vec<Vec<f64>> = linear.iter().map(|l| l.late.clone()).collect();
         let slopes = linear.iter_mut().map(ForceSlopes::take);
         let slopes: Vec<ForceSlopes> = slopes.collect();

@@ -233,10 +233,13 @@ fn ahead(coefficients: &[f64], unknowns: &[Unknown], free: &[usize]) -> Vec<f64>
         .collect()
 }
 
-/// Moves the free values by coefficients in deviations of their priors, within their bounds and the reach of a tangent; returns the moves.
+/// Moves the free values by coefficients in deviations of their priors, within their bounds and the reach of a tangent; returns the moves, and
+/// after them the coefficient of the engine's own error, which no tangent limits.
 fn step(unknowns: &[Unknown], free: &[usize], coefficients: &[f64], theta: &mut [f64]) -> Vec<f64> {
-    let limited = |c: &f64| c.clamp(-LARGEST_STEP, LARGEST_STEP);
-    let moves: Vec<f64> = coefficients.iter().map(limited).collect();
+    let mut moves = coefficients.to_vec();
+    for by in moves.iter_mut().take(free.len()) {
+        *by = by.clamp(-LARGEST_STEP, LARGEST_STEP);
+    }
     for (by, &i) in moves.iter().zip(free) {
         let [low, high] = unknowns[i].bounds;
         theta[i] = (theta[i] + by * unknowns[i].deviation).clamp(low, high);

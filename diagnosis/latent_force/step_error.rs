@@ -2,10 +2,9 @@
 //!
 //! An engine that takes finite steps errs in the same way in each row: a semi-implicit step damps or drives a joint a little, and logs
 //! show that as friction, a lag or a softer drive that the machine has not got. How the error acts is known: it is what half the
-//! time step changes, and twice that for a method of first order (Richardson 1911). How large it is is not, for the
-//! machine has no step at all, and the model's effects err as well. So it is a column with a coefficient of its own,
-//! `N(0, 1)`, in the regression of every model, with effects or without: what the step does earns no name any evidence.
-//! Segments have it as [directions](super::scatter).
+//! time step changes, and twice that for a method of first order (Richardson 1911). How large it is is known less well, for methods have
+//! other orders. So it is a column with a coefficient of its own in the regression of every model, with effects or without: what the step
+//! does earns no name any evidence. Segments have it as [directions](super::scatter).
 
 use asid_core::Result;
 
@@ -17,7 +16,13 @@ use super::fit::Hypothesis;
 use super::step_map::{Derivatives, LinearEpisode, StepMap};
 use super::walk::Walk;
 
-/// The error of each walk, `(rows - 1) x nx` in tangent coordinates of the next state; nothing of segments.
+/// Mean of the coefficient, in errors of a method of first order: between that and a method of high order, of which half the step tells
+/// half as much. A log that another simulation made has 0.5 at half the step, 0.75 at a quarter.
+const MEAN: f64 = 0.75;
+/// Its deviation: both ends are one away.
+const DEVIATION: f64 = 0.25;
+
+/// The error of each walk, for a coefficient of one deviation, `(rows - 1) x nx` in tangent coordinates of the next state; nothing of segments.
 #[derive(Clone, Debug, Default)]
 pub struct StepError {
     walks: Vec<Vec<f64>>,
@@ -37,20 +42,26 @@ impl StepError {
         let parameters = hypothesis.parameters();
         let specs = &hypothesis.specs;
         let want = Derivatives::default();
-        let here = context
-            .map(specs, &parameters, 1)?
-            .linearise(theta, trajectory, want, &[], &[])?;
+        let here =
+            context
+                .map(specs, &parameters, 1)?
+                .linearise(theta, trajectory, want, &[], &[])?;
         let walks: Vec<Walk> = context.walks.iter().map(Walk::halved).collect();
         let rows = (context.logs, &walks[..]);
-        let there = StepMap::new(finer, specs, &parameters, rows, 1)?
-            .linearise(theta, trajectory, want, &[], &[])?;
+        let there = StepMap::new(finer, specs, &parameters, rows, 1)?.linearise(
+            theta,
+            trajectory,
+            want,
+            &[],
+            &[],
+        )?;
         let of_walk = |((walk, here), there): ((&Walk, &LinearEpisode), &LinearEpisode)| {
             if walk.segment.is_some() {
                 return Vec::new();
             }
             let each = here.defect.iter().zip(&there.defect);
             each.map(|(a, b)| {
-                let error = RICHARDSON * (b - a);
+                let error = DEVIATION * RICHARDSON * (b - a);
                 if error.is_finite() { error } else { 0.0 }
             })
             .collect()
@@ -65,7 +76,11 @@ impl StepError {
     #[must_use]
     pub fn of_walks(&self, which: &[usize]) -> Self {
         Self {
-            walks: which.iter().filter_map(|&w| self.walks.get(w)).cloned().collect(),
+            walks: which
+                .iter()
+                .filter_map(|&w| self.walks.get(w))
+                .cloned()
+                .collect(),
         }
     }
 
@@ -73,6 +88,12 @@ impl StepError {
     #[must_use]
     pub fn columns(&self) -> usize {
         usize::from(!self.walks.is_empty())
+    }
+
+    /// Where the prior's center lies from an engine without error, in deviations; one a column.
+    #[must_use]
+    pub fn center(&self) -> &'static [f64] {
+        &[MEAN / DEVIATION][..self.columns()]
     }
 
     /// Puts its column beside the `m` that a linearisation has.

@@ -2,6 +2,7 @@
 
 use crate::candidate::Candidate;
 use crate::latent_force::fit::Hypothesis;
+use crate::latent_force::step_error::StepError;
 use crate::latent_force::step_map::Variation;
 
 use super::form::Form;
@@ -73,10 +74,11 @@ impl Asked {
     }
 
     /// Adds the engine's own error to those of the present model.
-    pub(super) fn add_step_errors(&mut self, columns: usize) {
-        self.base += columns;
-        self.center.resize(self.base, 0.0);
-        self.bounds.resize(self.base, [f64::NEG_INFINITY, f64::INFINITY]);
+    pub(super) fn add_step_error(&mut self, error: &StepError) {
+        self.base += error.columns();
+        self.center.extend(error.center());
+        self.bounds
+            .resize(self.base, [f64::NEG_INFINITY, f64::INFINITY]);
     }
 
     /// Adds those of all candidates; `sizes` are the deviations of the priors of their [`trials`], 0 for what does nothing.

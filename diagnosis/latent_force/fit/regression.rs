@@ -86,7 +86,7 @@ pub(super) fn compare(
         u.bounds.map(|b| (b - theta[i]) / u.deviation)
     });
     let mut bounds: Vec<[f64; 2]> = bounds.collect();
-    center.resize(m, 0.0);
+    center.extend(context.step_error.center());
     bounds.resize(m, [f64::NEG_INFINITY, f64::INFINITY]);
     let prior: f64 = center.iter().map(|c| c * c).sum();
     let mut best: Option<Compared> = None;
@@ -94,7 +94,11 @@ pub(super) fn compare(
         let sum = regression(context, estimate, linear, scale, m);
         let found = evidence(&sum.gram, &sum.moment, &places, &center, &bounds);
         let determinant = determinant_of(&found);
-        let here = sum.log_likelihood - 0.5 * prior + determinant;
+        // At the present values, whatever the engine's own error is.
+        let own: f64 = (free.len()..m)
+            .map(|e| 0.5 * (sum.moment[e] + center[e]).powi(2) / (1.0 + sum.gram[(e, e)]))
+            .sum();
+        let here = sum.log_likelihood + own - 0.5 * prior + determinant;
         // What is no number is no model of the logs.
         let here = if here.is_nan() {
             f64::NEG_INFINITY
@@ -108,7 +112,7 @@ pub(super) fn compare(
             best = Some(Compared {
                 scale,
                 here,
-                promised: found.gain - determinant + 0.5 * prior,
+                promised: found.gain - own - determinant + 0.5 * prior,
                 found,
             });
         }

@@ -71,7 +71,11 @@ impl<'o> OpenLoopGap<'o> {
 
     /// Whether a set closes most of what the one that stands leaves of it. A sensor that reads to another scale hardly changes which force
     /// is missing, and all that is foretold.
-    pub(super) fn is_mostly_closed_by(&self, set: &Set, (context, best): (&Context<'_>, &Set)) -> Result<bool> {
+    pub(super) fn is_mostly_closed_by(
+        &self,
+        set: &Set,
+        (context, best): (&Context<'_>, &Set),
+    ) -> Result<bool> {
         if context.has_segments() {
             return Ok(false);
         }
