@@ -5,7 +5,7 @@
 //! columns of one linear regression on its innovations; the few that lead are put into the model and fitted anew.
 //!
 //! From below: [`tangent`] (states), [`walk`] (rows), [`segments`] (where bodies touch) and [`scatter`] (how far their replays can be repeated), [`step_map`] (the model over a row and its derivatives),
-//! [`smoother`], [`initial`], `one_step` (how slopes are taken), [`context`] and [`estimate`] (trajectory, force and noise), [`fitted_value`] and [`fit`] (a model with its values),
+//! [`smoother`], [`initial`], `one_step` (how slopes are taken), [`step_error`] (the engine's own), [`context`] and [`estimate`] (trajectory, force and noise), [`fitted_value`] and [`fit`] (a model with its values),
 //! [`evidence`], [`trace`], [`columns`], [`screen`], [`search`], [`selection`],
 //! [`detection`] (what could have been seen), [`rehearsal`] (what a screening would say of machines like this one), `steps` (encoder steps), `picture` (what the report draws of the force), `left` (what could
 //! be learned of the rest), [`pipeline`].
@@ -17,6 +17,7 @@ pub mod estimate;
 pub mod evidence;
 pub mod fit;
 pub mod fitted_value;
+pub mod half_step;
 pub mod initial;
 mod left;
 pub mod one_step;

@@ -21,11 +21,11 @@ use crate::work::Work;
 
 use super::fit::{Hypothesis, fit};
 use super::fitted_value::Unknown;
+use super::half_step::step_error;
 use super::left::left;
 use super::picture::forces;
 use super::search::{OpenLoop, Outcome, Set, search};
 use super::selection::gather;
-use super::step_error::StepError;
 use super::steps::{Shown, beside, known, noise_with_steps, shown};
 
 use begin_values::begin_values;
@@ -68,7 +68,7 @@ fn searched(null: Null<'_>, shown_steps: &[Shown], settings: &Settings) -> Resul
         && let Ok(finer) = bench.machine.halved()
     {
         let (model, states) = ((hypothesis, &none.theta[..]), &none.estimate.trajectory);
-        context.step_error = StepError::of(&context, model, states, &finer)?;
+        context.step_error = step_error(&context, model, states, &finer)?;
     }
     let shares = none.estimate.missing(&context).share < 1.0;
     if shares {

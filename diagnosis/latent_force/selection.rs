@@ -111,11 +111,11 @@ pub fn gather(
     let [before, after] = outcome.missing;
     let is_missing = before.force.sqrt() > NOTHING || before.readings > LEAST_LEFT;
     let stopped = !outcome.untried.is_empty();
-    // One more replay at half the time step: what is named in a small gap cannot do without.
+    // One more replay at half the time step: what is named in a small gap cannot do without, nor can a large one that no missing force makes.
     let is_asked = if stopped {
         is_small(none) && found.is_some()
     } else {
-        is_missing || found.is_some()
+        is_missing || found.is_some() || !is_small(none)
     };
     let own_error = if is_asked {
         let change = change_by_step(bench, &findings.none, &bench.machine.halved()?)?;

@@ -6,21 +6,15 @@
 //! other orders. So it is a column with a coefficient of its own in the regression of every model, with effects or without: what the step
 //! does earns no name any evidence. Segments have it as [directions](super::scatter).
 
-use asid_core::Result;
-
 use crate::checks::RICHARDSON;
-use crate::machine::Machine;
 
-use super::context::Context;
-use super::fit::Hypothesis;
-use super::step_map::{Derivatives, LinearEpisode, StepMap};
-use super::walk::Walk;
+use super::step_map::LinearEpisode;
 
 /// Mean of the coefficient, in errors of a method of first order: between that and a method of high order, of which half the step tells
 /// half as much. A log that another simulation made has 0.5 at half the step, 0.75 at a quarter.
 const MEAN: f64 = 0.75;
 /// Its deviation: both ends are one away.
-const DEVIATION: f64 = 0.25;
+pub const DEVIATION: f64 = 0.25;
 
 /// The error of each walk, for a coefficient of one deviation, `(rows - 1) x nx` in tangent coordinates of the next state; nothing of segments.
 #[derive(Clone, Debug, Default)]
@@ -29,47 +23,25 @@ pub struct StepError {
 }
 
 impl StepError {
-    /// Of a model at some values along a trajectory; `finer` is the machine at half its time step.
-    ///
-    /// # Errors
-    /// When the engine fails.
-    pub fn of(
-        context: &Context<'_>,
-        (hypothesis, theta): (&Hypothesis, &[f64]),
-        trajectory: &[Vec<f64>],
-        finer: &Machine,
-    ) -> Result<Self> {
-        let parameters = hypothesis.parameters();
-        let specs = &hypothesis.specs;
-        let want = Derivatives::default();
-        let here =
-            context
-                .map(specs, &parameters, 1)?
-                .linearise(theta, trajectory, want, &[], &[])?;
-        let walks: Vec<Walk> = context.walks.iter().map(Walk::halved).collect();
-        let rows = (context.logs, &walks[..]);
-        let there = StepMap::new(finer, specs, &parameters, rows, 1)?.linearise(
-            theta,
-            trajectory,
-            want,
-            &[],
-            &[],
-        )?;
-        let of_walk = |((walk, here), there): ((&Walk, &LinearEpisode), &LinearEpisode)| {
-            if walk.segment.is_some() {
+    /// Of the rows of walks that were linearised about one trajectory at a time step and at half of it; of `segments` (one flag a walk)
+    /// there is none.
+    #[must_use]
+    pub fn between(here: &[LinearEpisode], finer: &[LinearEpisode], segments: &[bool]) -> Self {
+        let of_walk = |((here, finer), segment): ((&LinearEpisode, &LinearEpisode), &bool)| {
+            if *segment {
                 return Vec::new();
             }
-            let each = here.defect.iter().zip(&there.defect);
+            let each = here.defect.iter().zip(&finer.defect);
             each.map(|(a, b)| {
                 let error = DEVIATION * RICHARDSON * (b - a);
                 if error.is_finite() { error } else { 0.0 }
             })
             .collect()
         };
-        let each = context.walks.iter().zip(&here).zip(&there);
-        Ok(Self {
+        let each = here.iter().zip(finer).zip(segments);
+        Self {
             walks: each.map(of_walk).collect(),
-        })
+        }
     }
 
     /// That of some of the walks.

@@ -51,7 +51,7 @@ impl Effect for Stiffness {
             &[
                 EffectParameter::new("stiffness", "N m/rad or N/m", [0.0, 200.0], 0.0),
                 EffectParameter::new("rest", "rad or m", [-3.2, 3.2], 0.0)
-                    .starting(Start::Values(&[0.0, -1.0, 1.0])),
+                    .starting(Start::Values(&[0.0, -0.1, 0.1, -0.3, 0.3, -1.0, 1.0])),
                 EffectParameter::new("cubic", "N m/rad³ or N/m³", [0.0, 1000.0], 0.0)
                     .starting(Start::Given),
             ]

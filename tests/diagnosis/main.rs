@@ -14,6 +14,7 @@ mod ordinary;
 mod row_slopes;
 mod scatter;
 mod small;
+mod step_error;
 mod steps;
 mod sticking;
 mod stopped;
