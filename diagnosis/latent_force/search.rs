@@ -150,6 +150,20 @@ fn upon_tolerances(
     }
 }
 
+/// The first of some sets that rises above the one that stands by the `threshold`, and that `counts`.
+fn first_that_counts(
+    sets: Vec<Set>,
+    (best, threshold): (&Set, f64),
+    counts: impl Fn(&Set) -> Result<bool>,
+) -> Result<Option<Set>> {
+    for set in sets {
+        if set.rises_above(best, threshold) && counts(&set)? {
+            return Ok(Some(set));
+        }
+    }
+    Ok(None)
+}
+
 /// Searches upon the model without effects, among `candidates` without those that are `known` to act or not. Where hardly any force is missing
 /// and `open_loop` replays still leave a gap, as of a stiff drive that was made softer, what a further name closes of that gap counts.
 ///
@@ -196,10 +210,10 @@ pub fn search(
             progress,
         };
         let round = upon.round(&mut untried)?;
-        let next = round.confirmed.first().cloned();
+        let confirmed = round.confirmed.clone();
         rounds.push(round);
         let stopped = progress.is_stopped();
-        let further = (next.as_ref(), threshold);
+        let further = (confirmed.first(), threshold);
         fit_from(context, further, (&mut best, &mut none), how)?;
         if is_cut_short(context, &best, progress) {
             untried.push(Untried::upon(&best, FURTHER));
@@ -207,14 +221,12 @@ pub fn search(
         }
         // A first fit that was cut short has not told yet how much of the force it makes up for.
         let cut_short = stopped && best.candidates.is_empty();
-        let next = next.filter(|n| n.rises_above(&best, threshold));
-        let counts = match &next {
-            Some(n) if cut_short || left(&best) - left(n) > breadth.shrinks => true,
-            Some(n) if no_force => gap.is_closed_by(n, breadth)?,
-            Some(n) => gap.is_mostly_closed_by(n, (context, &best))?,
-            None => false,
+        let counts = |set: &Set| match no_force {
+            _ if cut_short || left(&best) - left(set) > breadth.shrinks => Ok(true),
+            true => gap.is_closed_by(set, breadth),
+            false => gap.is_mostly_closed_by(set, (context, &best)),
         };
-        let next = next.filter(|_| counts);
+        let next = first_that_counts(confirmed, (&best, threshold), counts)?;
         let is_ahead = |own: &Set| !own.is_passed(next.as_ref(), threshold);
         if let Some(own) = freed.take().filter(is_ahead) {
             best = own;
