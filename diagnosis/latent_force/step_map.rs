@@ -14,6 +14,7 @@ mod pass;
 mod reading;
 mod role;
 mod roll;
+mod sensors;
 mod shares;
 mod step;
 
@@ -30,6 +31,7 @@ use super::walk::Walk;
 pub use late::retime_columns;
 pub use linear_episode::{Derivatives, LinearEpisode, Variation};
 use pass::Part;
+use sensors::Sensors;
 use shares::share_out;
 
 /// Most simulations in one batch; each takes 50 to 500 kB.
@@ -59,6 +61,8 @@ struct Common<'a> {
     one_step: bool,
     /// Whether each parameter acts in each physics step alike, by what the model is then.
     at_once: Vec<bool>,
+    /// What readings depend on.
+    sensors: Sensors,
 }
 
 impl Common<'_> {
@@ -73,6 +77,14 @@ impl Common<'_> {
         let values = theta.iter().zip(&variation.theta).zip(&self.at_once);
         let mut varied = values.filter(|((a, b), _)| a != b);
         !self.remembers_readings && varied.all(|(_, at_once)| *at_once)
+    }
+
+    /// Whether a variation changes readings in the same state.
+    fn is_read(&self, theta: &[f64], variation: &Variation) -> bool {
+        let values = theta.iter().zip(&variation.theta);
+        let mut of_values = values.zip(&self.sensors.of_readings);
+        !self.sensors.read_the_state
+            || of_values.any(|((a, b), of_readings)| *of_readings && a != b)
     }
 }
 
@@ -100,6 +112,8 @@ struct Request<'r> {
     anew: Anew<'r>,
     /// Whether each variation is of what acts in each physics step alike.
     at_once: &'r [bool],
+    /// Whether each variation changes readings in the same state.
+    read: &'r [bool],
 }
 
 impl Request<'_> {
@@ -153,13 +167,16 @@ impl<'a> StepMap<'a> {
             .chain(joints().map(|j| format!("qvel.{}", j.name)))
             .collect();
         let (mut depends_on_past, mut remembers_readings) = (false, false);
-        let mut in_each_step = Vec::new();
+        let (mut in_each_step, mut on_readings) = (Vec::new(), Vec::new());
         for spec in machine.given_effects().iter().chain(specs) {
             let effect = spec.find(&machine.plant)?;
             remembers_readings |= effect.remembers_readings();
             depends_on_past |= effect.acts() != Acts::Model;
             if matches!(effect.acts(), Acts::Model | Acts::Measurement) {
                 in_each_step.push(spec.label());
+            }
+            if effect.acts() == Acts::Measurement {
+                on_readings.push(spec.label());
             }
         }
         let acts_at_once = |p: &Parameter| {
@@ -178,6 +195,7 @@ impl<'a> StepMap<'a> {
             remembers_readings,
             one_step: false,
             at_once: parameters.iter().map(acts_at_once).collect(),
+            sensors: Sensors::of(&model.layout().sensors, logs, (&on_readings, parameters)),
         };
         Ok(Self { common, parts })
     }
@@ -250,6 +268,10 @@ impl<'a> StepMap<'a> {
             .iter()
             .map(|v| common.acts_at_once(theta, v))
             .collect();
+        let read: Vec<bool> = variations
+            .iter()
+            .map(|v| common.is_read(theta, v))
+            .collect();
         let request = Request {
             theta,
             trajectory,
@@ -258,6 +280,7 @@ impl<'a> StepMap<'a> {
             variations,
             anew,
             at_once: &at_once,
+            read: &read,
         };
         let found: Vec<Vec<LinearEpisode>> = self
             .parts

@@ -8,6 +8,26 @@ use super::step::RowBuffers;
 use super::{Common, LinearEpisode, Request};
 
 impl Part {
+    /// The places of the roles that are read at row `k`; all of them where some walks go on by themselves. A slope in a force tells of
+    /// the next state alone.
+    fn read_at(
+        &self,
+        c: &Common<'_>,
+        roles: &[Role],
+        (here, k): (&[usize], usize),
+        request: Request<'_>,
+    ) -> Vec<usize> {
+        let rolls = here.iter().any(|&e| c.rolls(self.walks[e], request.want));
+        let is_read = |&v: &usize| match roles[v] {
+            _ if rolls => true,
+            Role::Nominal | Role::Reading(_) | Role::Ramp(_) => true,
+            Role::Force(_) | Role::Jolt(_) => false,
+            Role::State(_) => k == 0 || !c.sensors.read_the_state || c.sensors.change,
+            Role::Varied(i) => request.read[i],
+        };
+        (0..roles.len()).filter(is_read).collect()
+    }
+
     /// Reads the sensors at row `k`.
     pub(super) fn read_row(
         &mut self,
@@ -20,8 +40,9 @@ impl Part {
     ) -> Result<()> {
         let variations = request.variations;
         let (n, ns, nx) = (self.walks.len(), c.logs.entries.len(), 2 * c.layout.nv);
+        let read = self.read_at(c, roles, (here, k), request);
         row.sims.clear();
-        for v in 0..roles.len() {
+        for v in &read {
             row.sims.extend(here.iter().map(|e| v * n + e));
         }
         let width = c.readings.width();
@@ -41,7 +62,16 @@ impl Part {
                 residual.fill(f64::NAN);
             }
             for (v, role) in roles.iter().enumerate().skip(1) {
-                let place = v * here.len() + i;
+                let Ok(at) = read.binary_search(&v) else {
+                    if let Role::State(i) = *role {
+                        // The slope of a coordinate that is read as it is.
+                        for s in 0..ns {
+                            out[e].h[(k * ns + s) * nx + i] = out[e].h[s * nx + i];
+                        }
+                    }
+                    continue;
+                };
+                let place = at * here.len() + i;
                 let other = &row.read[place * width..(place + 1) * width];
                 c.logs.reading_difference(other, nominal, &mut differ);
                 let segment = c.rolls(self.walks[e], request.want);
