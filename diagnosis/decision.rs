@@ -42,9 +42,20 @@ fn own_error(evidence: &Evidence) -> f64 {
     evidence.own_error.max(0.0)
 }
 
+/// The same of the logs held out. It is measured along the logs that are fitted, and others may be longer or wilder: it is no smaller a share
+/// of their gap than of that of those.
+fn own_error_held_out(evidence: &Evidence) -> f64 {
+    let (own, none) = (own_error(evidence), evidence.none);
+    if none.train <= LEAST_GAP * LEAST_GAP {
+        return own;
+    }
+    let share = (own / (none.train - 1.0)).min(1.0);
+    own.max(share * (none.held_out - 1.0))
+}
+
 /// Probability that the gap without effects is one, and not the noise or the engine's own error.
 fn seen(evidence: &Evidence, rules: &Rules) -> f64 {
-    let gap = (evidence.none.held_out - own_error(evidence))
+    let gap = (evidence.none.held_out - own_error_held_out(evidence))
         .max(1.0)
         .sqrt();
     sigmoid((gap - rules.gap) / rules.gap_scale)
@@ -263,6 +274,18 @@ mod tests {
             !named(1.1, 1.5),
             "the engine's own error is as large as the gap"
         );
+    }
+
+    #[test]
+    fn a_gap_that_is_the_engines_own_error_is_none_on_logs_held_out_that_have_more_of_it() {
+        let unknown = |own_error: f64| {
+            let mut e = evidence(10.0, Vec::new(), 1.0);
+            e.none.held_out = 30.0;
+            e.own_error = own_error;
+            decided(&e).is_unknown
+        };
+        assert!(!unknown(9.0), "all of both gaps");
+        assert!(unknown(4.5), "half of them");
     }
 
     #[test]
