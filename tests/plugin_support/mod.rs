@@ -1,7 +1,9 @@
 //! Builds plugins for tests that load them.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::sync::Mutex;
 
 /// Features of the root package that bring in native libraries, and the whole workspace with them.
 const NATIVE: [(&str, bool); 3] = [
@@ -20,16 +22,36 @@ fn selection(packages: &[&str]) -> Vec<String> {
     packages.iter().map(|p| format!("--package={p}")).collect()
 }
 
+/// Set where the caller has built everything already, as `cargo xtask test` has. Cargo puts the libraries and the program in their
+/// places anew at every call where the file system links no files, and a test beside it then finds none for a moment.
+const BUILT: &str = "ASID_TESTS_PLUGINS_ARE_BUILT";
+
 /// Builds packages of this workspace as their authors would, next to the program under
 /// test, and returns what they make: shared libraries and programs, in the order of `packages`.
 pub fn build(packages: &[&str]) -> Vec<PathBuf> {
     let program = Path::new(env!("CARGO_BIN_EXE_asid"));
     let folder = program.parent().unwrap();
+    if std::env::var_os(BUILT).is_none() {
+        build_once(packages, folder.parent().unwrap());
+    }
+    packages
+        .iter()
+        .map(|package| made(folder, package))
+        .collect()
+}
+
+/// Calls cargo, once for each selection: what a test has loaded must not be replaced for another.
+fn build_once(packages: &[&str], target: &Path) {
+    static DONE: Mutex<BTreeSet<Vec<String>>> = Mutex::new(BTreeSet::new());
+    let mut done = DONE.lock().unwrap();
+    if !done.insert(selection(packages)) {
+        return;
+    }
     let mut cargo = Command::new(env!("CARGO"));
     cargo
         .current_dir(env!("CARGO_MANIFEST_DIR"))
         .args(["build", "--quiet", "--target-dir"])
-        .arg(folder.parent().unwrap());
+        .arg(target);
     if !cfg!(debug_assertions) {
         cargo.arg("--release");
     }
@@ -39,10 +61,6 @@ pub fn build(packages: &[&str]) -> Vec<PathBuf> {
         output.status.success(),
         "{packages:?} are not built: {said}"
     );
-    packages
-        .iter()
-        .map(|package| made(folder, package))
-        .collect()
 }
 
 /// The library or the program of a package.

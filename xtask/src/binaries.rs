@@ -20,6 +20,10 @@ use crate::stage::ALL_FEATURES;
 /// only take time from tests that have a limit of it.
 const AT_A_TIME: usize = 2;
 
+/// Tells tests of plugins that these are built. Each would call cargo otherwise, which takes the libraries out of their places for a
+/// moment while a test beside it loads them.
+const PLUGINS_ARE_BUILT: &str = "ASID_TESTS_PLUGINS_ARE_BUILT";
+
 /// A test binary of the workspace.
 #[derive(Debug, PartialEq)]
 struct Binary {
@@ -59,7 +63,7 @@ fn cargo() -> Command {
     cargo
 }
 
-/// The test binaries, built; `None` where the build failed and cargo has said why.
+/// The test binaries, built, and after them the plugins that they load; `None` where a build failed and cargo has said why.
 fn build() -> Result<Option<Vec<Binary>>> {
     let built = cargo()
         .args(["test", "--workspace", "--no-run", ALL_FEATURES])
@@ -68,6 +72,13 @@ fn build() -> Result<Option<Vec<Binary>>> {
         .output()
         .context("cannot start cargo")?;
     if !built.status.success() {
+        return Ok(None);
+    }
+    let plugins = cargo()
+        .args(["build", "--workspace", ALL_FEATURES])
+        .status()
+        .context("cannot start cargo")?;
+    if !plugins.success() {
         return Ok(None);
     }
     let lines = String::from_utf8_lossy(&built.stdout);
@@ -103,6 +114,7 @@ fn run_all(binaries: &[Binary]) -> Result<Vec<String>> {
             let output = Command::new(&binary.executable)
                 .current_dir(&binary.folder)
                 .env("CARGO_MANIFEST_DIR", &binary.folder)
+                .env(PLUGINS_ARE_BUILT, "1")
                 .stdin(Stdio::null())
                 .output()
                 .with_context(|| format!("cannot start {}", binary.executable.display()))?;
