@@ -19,7 +19,7 @@ use crate::study::Study;
 use crate::trace::ForceTrace;
 use crate::work::Work;
 
-use super::fit::{Hypothesis, fit};
+use super::fit::{Fitted, Hypothesis, fit};
 use super::fitted_value::Unknown;
 use super::half_step::step_error;
 use super::left::left;
@@ -36,6 +36,9 @@ use without_effects::{Null, Stands};
 /// Most linearisations of the fit without effects.
 const ROUNDS: usize = 15;
 
+/// Share of the excess power without effects that is left of a gap that is explained: less than half, as in the decision ([`crate::decision`]).
+const MOST: f64 = 0.5;
+
 /// What is kept of a search once the logs are let go of.
 struct Searched {
     outcome: Outcome,
@@ -46,46 +49,48 @@ struct Searched {
     /// Walks that begin an episode.
     firsts: Vec<usize>,
     repeats: Option<Repeats>,
+    /// Excess power that replays of what stands leave of the training logs, and whether that is the smaller part of what is there without effects.
+    excess: f64,
+    explains: bool,
     /// The missing force along the logs, and what is left of it.
     drawn: (Vec<ForceTrace>, Vec<Left>),
 }
 
-/// Fits the model without effects, and searches for what is missing.
+/// Fits the model without effects, and searches for what is missing: in the shortest segments, whose replays are next to linear in where they
+/// begin, and where what they show leaves most of the gap of whole replays, in the longest that can be repeated. A small force tells the
+/// more the longer it acts, but the evidence of long replays about contacts scatters.
 fn searched(null: Null<'_>, shown_steps: &[Shown], settings: &Settings) -> Result<Searched> {
+    let mut shortest = null.shortest()?;
+    let mut found = searched_in(null, &mut shortest, (shown_steps, settings))?;
+    if shortest.context.has_segments() && !found.explains && !null.progress.is_stopped() {
+        match null.longer(&mut shortest)? {
+            None => found.repeats = shortest.repeats,
+            Some(mut longest) => {
+                let other = searched_in(null, &mut longest, (shown_steps, settings))?;
+                if other.excess <= found.excess {
+                    found = other;
+                }
+                found.repeats = longest.repeats;
+            }
+        }
+    }
+    Ok(found)
+}
+
+/// Searches for what is missing beside a model without effects that stands in some segments.
+fn searched_in(
+    null: Null<'_>,
+    stands: &mut Stands<'_>,
+    (shown_steps, settings): (&[Shown], &Settings),
+) -> Result<Searched> {
     let Null {
-        bench,
-        hypothesis,
-        progress,
-        ..
+        bench, progress, ..
     } = null;
-    let Stands {
-        mut context,
-        mut none,
-        repeats,
-    } = null.fit()?;
-    let rounds = (ROUNDS, progress);
-    if context.walks.iter().any(|w| w.segment.is_none())
-        && let Ok(finer) = bench.machine.halved()
-    {
-        let (model, states) = ((hypothesis, &none.theta[..]), &none.estimate.trajectory);
-        context.step_error = step_error(&context, model, states, &finer)?;
-    }
-    let shares = none.estimate.missing(&context).share < 1.0;
-    if shares {
-        none.estimate.free_at_rest(&context);
-        none.estimate.set_resolution(&context);
-    }
-    if shares || context.step_error.columns() > 0 {
-        let from = (&none.estimate, &none.slopes);
-        none = fit(&context, hypothesis, &none.theta, from, rounds)?;
-    }
+    let none = without_steps(null, stands)?;
+    let context = &stands.context;
     progress.end();
-    let shown = along(
-        bench,
-        &context.walks,
-        &none.theta,
-        &none.estimate.trajectory,
-    )?;
+    let states = &none.estimate.trajectory;
+    let shown = along(bench, &context.walks, &none.theta, states)?;
     let (candidates, left_out) = enumerate(&bench.machine, &shown, &settings.without);
     let steps = known(shown_steps, &candidates);
     let members: Vec<usize> = steps.iter().map(|s| s.candidate).collect();
@@ -99,16 +104,19 @@ fn searched(null: Null<'_>, shown_steps: &[Shown], settings: &Settings) -> Resul
         open: Vec::new(),
         progress,
     };
+    let excess = |set: &Set| replays.excess(&set.fitted, &set.candidates);
     let open_loop = OpenLoop {
-        excess: &|set: &Set| replays.excess(&set.fitted, &set.candidates),
+        excess: &excess,
         is_gap: replays.leaves_a_gap(&none)?,
     };
     let how = (open_loop, progress);
-    let outcome = search(&context, &none, offered, settings.breadth, how)?;
+    let outcome = search(context, &none, offered, settings.breadth, how)?;
     let drawn = (
-        forces(&context, &outcome, &candidates)?,
-        left(&context, &outcome),
+        forces(context, &outcome, &candidates)?,
+        left(context, &outcome),
     );
+    let excess = excess(&outcome.best)?;
+    let explains = !open_loop.is_gap || excess < MOST * replays.excess(&outcome.none, &[])?;
     let outcome = beside(outcome, &steps, &candidates);
     Ok(Searched {
         outcome,
@@ -116,9 +124,34 @@ fn searched(null: Null<'_>, shown_steps: &[Shown], settings: &Settings) -> Resul
         left_out,
         members,
         firsts,
-        repeats,
+        repeats: stands.repeats,
         drawn,
+        excess,
+        explains,
     })
+}
+
+/// The model without effects that stands, with the engine's own error beside it, and its missing force shared out among what rests and moves.
+fn without_steps(null: Null<'_>, stands: &mut Stands<'_>) -> Result<Fitted> {
+    let (context, none) = (&mut stands.context, &mut stands.none);
+    let (bench, hypothesis) = (null.bench, null.hypothesis);
+    if context.walks.iter().any(|w| w.segment.is_none())
+        && let Ok(finer) = bench.machine.halved()
+    {
+        let (model, states) = ((hypothesis, &none.theta[..]), &none.estimate.trajectory);
+        context.step_error = step_error(context, model, states, &finer)?;
+    }
+    let shares = none.estimate.missing(context).share < 1.0;
+    if shares {
+        none.estimate.free_at_rest(context);
+        none.estimate.set_resolution(context);
+    }
+    if shares || context.step_error.columns() > 0 {
+        let from = (&none.estimate, &none.slopes);
+        let rounds = (ROUNDS, null.progress);
+        return fit(context, hypothesis, &none.theta, from, rounds);
+    }
+    Ok(none.clone())
 }
 
 /// Diagnoses a study.

@@ -184,9 +184,9 @@ fn efforts(
             effects: Vec::new(),
         });
     };
-    // Whole replays that nobody can repeat tell nothing of values.
+    // Whole replays that nobody can repeat tell nothing of values; nor are those asked that short segments stand for.
     let values = match repeats {
-        Some(Repeats { scatters: true, .. }) => Effort::LOOK,
+        Some(r) if r.scatters || r.duration.is_finite() => Effort::LOOK,
         _ => Effort::BRIEF,
     };
     // A stopped search fits the values of what stands alone.

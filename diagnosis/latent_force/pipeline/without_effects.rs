@@ -1,4 +1,4 @@
-//! The model without effects, in the longest segments whose replays do not scatter.
+//! The model without effects, in the shortest segments, or in the longest whose replays do not scatter.
 
 use asid_core::{Error, Progress, Result};
 
@@ -57,42 +57,48 @@ pub(super) struct Null<'a> {
 }
 
 impl<'a> Null<'a> {
-    /// Fits it in short segments, then in longer ones from where the shorter begin and end, for as long as their replays do
-    /// not scatter.
+    /// Fits it in the shortest segments.
     ///
     /// # Errors
     /// When the engine fails.
-    pub(super) fn fit(self) -> Result<Stands<'a>> {
+    pub(super) fn shortest(self) -> Result<Stands<'a>> {
+        let finer = self.bench.machine.halved().ok();
+        match self.fit_in(DURATIONS[0], finer.as_ref(), None)? {
+            Tried::Stands(stands) => self.fitted_on(*stands),
+            Tried::Scatters(_) => Err(Error::Failed("there is no shorter segment".into())),
+        }
+    }
+
+    /// Fits it in longer segments from where the shorter begin and end, for as long as their replays do not scatter; `None` where
+    /// the shorter ones are the longest that do not, whose replays are then told by those that do.
+    ///
+    /// # Errors
+    /// When the engine fails.
+    pub(super) fn longer(self, shorter: &mut Stands<'a>) -> Result<Option<Stands<'a>>> {
         let finer = self.bench.machine.halved().ok();
         let mut stands: Option<Stands<'a>> = None;
-        for duration in DURATIONS {
-            let is_enough =
-                |s: &Stands<'_>| s.repeats.is_none_or(|r| r.scatters) || self.progress.is_stopped();
-            if stands.as_ref().is_some_and(is_enough) {
+        for duration in &DURATIONS[1..] {
+            let before = stands.as_ref().unwrap_or(shorter);
+            if before.repeats.is_none_or(|r| r.scatters) || self.progress.is_stopped() {
                 break;
             }
-            match self.fit_in(duration, finer.as_ref(), stands.as_ref())? {
+            match self.fit_in(*duration, finer.as_ref(), Some(before))? {
                 Tried::Stands(longer) => stands = Some(*longer),
                 Tried::Scatters(repeats) => {
-                    if let Some(shorter) = &mut stands {
-                        shorter.repeats = Some(repeats);
-                    }
+                    stands.as_mut().unwrap_or(shorter).repeats = Some(repeats);
                 }
             }
         }
-        let mut stands =
-            stands.ok_or_else(|| Error::Failed("there is no duration of segments".into()))?;
+        stands.map(|s| self.fitted_on(s)).transpose()
+    }
+
+    /// Fits it to the end in the segments that stand.
+    fn fitted_on(self, mut stands: Stands<'a>) -> Result<Stands<'a>> {
         if stands.context.has_segments() {
             let (none, progress) = (&stands.none, self.progress);
             let from = (&none.estimate, &Slopes::default());
-            let context = &stands.context;
-            let on = fit(
-                context,
-                self.hypothesis,
-                &none.theta,
-                from,
-                (ROUNDS, progress),
-            )?;
+            let rounds = (ROUNDS, progress);
+            let on = fit(&stands.context, self.hypothesis, &none.theta, from, rounds)?;
             if on.evidence > none.evidence {
                 stands.none = on;
             }
