@@ -138,16 +138,12 @@ pub fn fit(
     let mut all = Vec::new();
     for round in 0..rounds.max(1) {
         let variations = variations(unknowns, &free, &theta);
-        let s0 = map.steps();
-        let t0 = std::time::Instant::now();
         let mut linear = slopes.linearise(
             (context, &mut map),
             (&theta, hypothesis),
             &estimate,
             &variations,
         )?;
-        let s1 = map.steps();
-        let t1 = t0.elapsed().as_secs_f64();
         context.step_error.join(&mut linear, m);
         let model = (&unknowns[..], &free[..], &theta[..]);
         let whole = round == 0 || segments > 0;
@@ -164,11 +160,6 @@ pub fn fit(
         let lost = |a: &Anchor| a.here - here > (a.hoped - a.here).max(rise);
         let astray = segments == 0 && anchor.as_ref().is_some_and(lost);
         all.push(here);
-        if std::env::var_os("DBG").is_some() {
-            let names: Vec<String> = hypothesis.specs.iter().map(|s| s.label()).collect();
-            let misled = estimate.misled.iter().filter(|m| **m > 1.0).count();
-            eprintln!("DBG round {round} {names:?} m {m} segs {segments} here {here:.1} promised {promised:.1} waited {waited} part {part} lin {} {t1:.2}s misled {misled}", s1 - s0);
-        }
         if best.as_ref().is_none_or(|b| here > b.evidence) {
             best = Some(fitted_at(hypothesis, (&theta, &estimate), &compared));
         }
@@ -194,11 +185,7 @@ pub fn fit(
         let from = rose.then(|| (theta.clone(), estimate.clone()));
         let moves = step(unknowns, &free, &compared.found.coefficients, &mut theta);
         shift(&mut linear, &moves);
-        let s2 = map.steps();
         smooth(context, &mut map, &theta, (&linear, &steps), &mut estimate)?;
-        if std::env::var_os("DBG").is_some() {
-            eprintln!("DBG    roll {}", map.steps() - s2);
-        }
         if let Some(from) = from {
             (part, failed) = (1.0, 0);
             anchor = Some(Anchor {
@@ -286,7 +273,7 @@ fn smooth(
     Ok(())
 }
 
-/// Smooths the logs in a model for the first time: linearises and fits the noise until both stand.
+/// Smooths the logs in a model for the first time: linearises and fits the noise until both stand. Returns the last slopes.
 ///
 /// # Errors
 /// When the engine fails.
@@ -297,7 +284,7 @@ pub fn settle_noise(
     estimate: &mut Estimate,
     (rounds, em_rounds): (usize, usize),
     progress: &dyn Progress,
-) -> Result<()> {
+) -> Result<Slopes> {
     let nx = 2 * context.plant().layout.nv;
     let mut map = context.map(&hypothesis.specs, &hypothesis.parameters(), 2 * nx + 1)?;
     let mut slopes = Slopes::default();
@@ -310,5 +297,5 @@ pub fn settle_noise(
         estimate.improve(context, &linear, em_rounds);
         estimate.roll(context, &mut map, theta, &before)?;
     }
-    Ok(())
+    Ok(slopes)
 }

@@ -17,8 +17,8 @@ use crate::machine::Machine;
 
 use super::context::Context;
 use super::estimate::Estimate;
-use super::fit::Hypothesis;
-use super::step_map::{Derivatives, LinearEpisode, StepMap};
+use super::fit::{Hypothesis, Slopes};
+use super::step_map::{Anew, Derivatives, LinearEpisode, StepMap};
 use super::tangent::retract;
 use super::walk::Walk;
 
@@ -38,14 +38,14 @@ pub struct Scatter {
 }
 
 impl Scatter {
-    /// Of the segments about a model at some values and an estimate of it; `finer` is the machine at half its time step, where the engine takes it.
+    /// Of the segments about a model at some values and an estimate of it, without slopes in what segments are `seen` to be blind to; `finer` is the machine at half its time step, where the engine takes it.
     ///
     /// # Errors
     /// When the engine fails.
     pub fn of(
         context: &Context<'_>,
         (hypothesis, theta): (&Hypothesis, &[f64]),
-        estimate: &Estimate,
+        (estimate, seen): (&Estimate, &Slopes),
         finer: Option<&Machine>,
     ) -> Result<Self> {
         let parameters = hypothesis.parameters();
@@ -56,8 +56,12 @@ impl Scatter {
             state: true,
             ..Derivatives::default()
         };
+        let anew = Anew {
+            blind: seen.blind(),
+            ..Anew::default()
+        };
         let (states, steps) = (&estimate.trajectory, context.start_steps());
-        let here = map.linearise(theta, states, slopes, &steps, &[])?;
+        let here = map.linearise_anew(theta, states, (slopes, anew), &steps, &[])?;
         let mut all = drawn(context, (&mut map, theta), estimate, &here)?;
         if let Some(finer) = finer {
             let walks: Vec<Walk> = context.walks.iter().map(Walk::halved).collect();

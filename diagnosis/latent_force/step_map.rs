@@ -99,6 +99,8 @@ pub struct Anew<'r> {
     pub kept: &'r [bool],
     /// Walks along which the columns of all variations are taken anew; empty for none.
     pub columns: &'r [bool],
+    /// Of each segment the coordinates of its start that its readings do not depend on, whose slopes are zero; empty for none.
+    pub blind: &'r [Vec<bool>],
 }
 
 /// The linearisation point and what is wanted of it.
@@ -116,10 +118,15 @@ struct Request<'r> {
     read: &'r [bool],
 }
 
-impl Request<'_> {
+impl<'r> Request<'r> {
     /// Whether the slopes of a walk in the state are wanted, where any are.
     fn due(&self, walk: usize) -> bool {
         self.anew.state.get(walk).is_none_or(|due| *due)
+    }
+
+    /// Coordinates of the start of a walk whose slopes are zero; empty for none.
+    fn blind(&self, walk: usize) -> &'r [bool] {
+        self.anew.blind.get(walk).map_or(&[], Vec::as_slice)
     }
 
     /// Whether the column of a variation is wanted along the walks whose columns are `due`, or else along the others.

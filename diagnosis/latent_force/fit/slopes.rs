@@ -23,12 +23,19 @@ const KEPT_START: f64 = 50.0;
 /// The same of a segment whose replay did not keep what its slopes promised: within a step the slopes are the same.
 const MISLED_START: f64 = 1.0;
 
+/// Information that the readings of a segment have of a coordinate of its start, in units of what is known of it before, up to which the
+/// coordinate counts as blind: evidence changes by half of it. Where a body touches another, the six of what the contact blocks, and of how
+/// a body of revolution is turned, have 1e-6 or less, the others 0.1 or more.
+const BLIND: f64 = 1e-3;
+
 /// Slopes of each walk, and where they were taken.
 #[derive(Clone, Debug, Default)]
 pub struct Slopes {
     a: Vec<Vec<f64>>,
     carried: Vec<Vec<f64>>,
     h: Vec<Vec<f64>>,
+    /// Of each segment the coordinates of its start that its readings do not depend on, as far as that is known.
+    blind: Vec<Vec<bool>>,
     /// First states of the walks.
     first: Vec<Vec<f64>>,
     /// The values.
@@ -55,6 +62,21 @@ impl Slopes {
             replayed: Vec::new(),
             ..self.clone()
         }
+    }
+
+    /// None, but for what segments are blind to, for a fit of the same model.
+    #[must_use]
+    pub fn renewed(&self) -> Self {
+        Self {
+            blind: self.blind.clone(),
+            ..Self::default()
+        }
+    }
+
+    /// Of each segment the coordinates of its start that its readings do not depend on; empty where that is not known.
+    #[must_use]
+    pub fn blind(&self) -> &[Vec<bool>] {
+        &self.blind
     }
 
     /// Whether the columns of some values that are no tolerances were kept in the last linearisation; from here on none are.
@@ -122,6 +144,7 @@ impl Slopes {
             carried: &self.carried,
             kept: &kept,
             columns: &left,
+            blind: &self.blind,
         };
         let mut linear = map.linearise_anew(theta, trajectory, (want, anew), &steps, variations)?;
         if keeps && !variations.is_empty() {
@@ -134,6 +157,7 @@ impl Slopes {
             self.mend(context, (&linear, &due), trajectory, &values);
         }
         self.exchange(&mut linear, &due, trajectory);
+        self.see(context, estimate, (&linear, &due));
         if moved || along && !context.has_segments() {
             self.theta = theta.to_vec();
         }
@@ -184,6 +208,23 @@ impl Slopes {
             }
         }
         self.replayed = replayed;
+    }
+
+    /// Notes what the readings of segments do not depend on, of those whose slopes are fresh and were taken in all coordinates.
+    fn see(
+        &mut self,
+        context: &Context<'_>,
+        estimate: &Estimate,
+        (linear, due): (&[LinearEpisode], &[bool]),
+    ) {
+        self.blind.resize(linear.len(), Vec::new());
+        let starts = context.starts(&estimate.trajectory);
+        for (w, linear) in linear.iter().enumerate() {
+            if context.walks[w].segment.is_some() && due[w] && self.blind[w].is_empty() {
+                let open = &starts[w].variance;
+                self.blind[w] = linear.blind(open, &estimate.noise.r, BLIND);
+            }
+        }
     }
 
     /// Takes fresh slopes over where they were due, and gives the kept ones to the other walks.

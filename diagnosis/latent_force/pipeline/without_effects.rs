@@ -6,7 +6,7 @@ use crate::bench::Bench;
 use crate::data::Logs;
 use crate::findings::Repeats;
 use crate::latent_force::context::{Context, begin};
-use crate::latent_force::fit::{Fitted, Hypothesis, Slopes, fit, settle_noise};
+use crate::latent_force::fit::{Fitted, Hypothesis, fit, settle_noise};
 use crate::latent_force::scatter::Scatter;
 use crate::latent_force::segments::DURATIONS;
 use crate::machine::Machine;
@@ -96,7 +96,7 @@ impl<'a> Null<'a> {
     fn fitted_on(self, mut stands: Stands<'a>) -> Result<Stands<'a>> {
         if stands.context.has_segments() {
             let (none, progress) = (&stands.none, self.progress);
-            let from = (&none.estimate, &Slopes::default());
+            let from = (&none.estimate, &none.slopes.renewed());
             let rounds = (ROUNDS, progress);
             let on = fit(&stands.context, self.hypothesis, &none.theta, from, rounds)?;
             if on.evidence > none.evidence {
@@ -127,10 +127,11 @@ impl<'a> Null<'a> {
         } else {
             FIRST
         };
-        settle_noise(&context, hypothesis, theta, &mut estimate, first, progress)?;
+        let slopes = settle_noise(&context, hypothesis, theta, &mut estimate, first, progress)?;
         let mut repeats = None;
         if context.has_segments() {
-            let scatter = Scatter::of(&context, (hypothesis, theta), &estimate, finer)?;
+            let model = (hypothesis, theta);
+            let scatter = Scatter::of(&context, model, (&estimate, &slopes), finer)?;
             let found = Repeats {
                 duration,
                 lost: scatter.lost,
@@ -142,7 +143,7 @@ impl<'a> Null<'a> {
             repeats = Some(found);
             estimate.scatter = scatter.directions;
         }
-        let from = (&estimate, &Slopes::default());
+        let from = (&estimate, &slopes.renewed());
         let rounds = if context.has_segments() {
             SHORT
         } else {

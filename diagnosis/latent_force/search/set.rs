@@ -101,7 +101,7 @@ pub(super) fn from_fit_of(
 ) -> Result<Set> {
     let mut again = set.clone();
     again.fitted.estimate = other.fitted.estimate.clone();
-    again.fitted.slopes = Slopes::default();
+    again.fitted.slopes = set.fitted.slopes.renewed();
     let theirs = &other.fitted.hypothesis.unknowns;
     let own = again.fitted.hypothesis.unknowns.iter();
     for (u, value) in own.zip(&mut again.fitted.theta).filter(|(u, _)| u.free) {

@@ -78,4 +78,44 @@ impl LinearEpisode {
             reading_columns: vec![0.0; rows * ns * m],
         }
     }
+    /// Coordinates of the start of a segment that its readings tell nothing of: whose slopes, squared, over the readings' variances `r` and times
+    /// how `open` the coordinate is (a variance), add up to less than `least`.
+    #[must_use]
+    pub fn blind(&self, open: &[f64], r: &[f64], least: f64) -> Vec<bool> {
+        let (nx, ns) = (open.len(), r.len());
+        let mut information = vec![0.0; nx];
+        for (at, h) in self.h.chunks_exact(nx).enumerate() {
+            if self.residual[at].is_finite() {
+                let each = information.iter_mut().zip(h).zip(open);
+                each.for_each(|((sum, h), open)| *sum += h * h * open / r[at % ns]);
+            }
+        }
+        information.iter().map(|sum| *sum < least).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_start_is_blind_where_no_reading_that_counts_tells_of_it() {
+        // Two readings a row, of which the first row's do not count.
+        let episode = LinearEpisode {
+            rows: 2,
+            residual: vec![f64::NAN, f64::NAN, 0.1, f64::NAN],
+            h: vec![
+                [9.0, 9.0, 9.0],
+                [9.0, 9.0, 9.0],
+                [2.0, 0.0, 0.01],
+                [0.0, 9.0, 0.0],
+            ]
+            .concat(),
+            ..LinearEpisode::default()
+        };
+        let blind = |open: [f64; 3]| episode.blind(&open, &[0.01, 0.01], 0.1);
+        // 4 / 0.01 and 1e-4 / 0.01 for each unit of variance.
+        assert_eq!(blind([1.0; 3]), [false, true, true]);
+        assert_eq!(blind([1e-6, 1.0, 100.0]), [true, true, false]);
+    }
 }

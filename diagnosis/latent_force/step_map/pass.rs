@@ -1,5 +1,7 @@
 //! One walk along the rows: every simulation is set to the trajectory at each row, read, and stepped to the next.
 
+use std::collections::BTreeMap;
+
 use asid_core::{Result, Simulator as _};
 use asid_effects::refined::RefinedSimulator;
 
@@ -15,6 +17,14 @@ use super::{Common, LinearEpisode, Request};
 /// Change of a coordinate of the state that derivatives are taken over, rad, m, rad/s or m/s: forward
 /// differences of smooth dynamics in double precision are right to about six digits.
 pub(super) const STATE_STEP: f64 = 1e-6;
+
+/// What is wanted of a walk: slopes in its state, the columns of all variations, and the coordinates of its start that need no slope.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Class<'r> {
+    state: bool,
+    columns: bool,
+    blind: &'r [bool],
+}
 
 /// Some of the walks on a core of their own: a row is too little work to share out.
 pub(super) struct Part {
@@ -40,7 +50,6 @@ impl Part {
             in_state = Role::in_state(nv, c.remembers_readings && !only_replays);
         }
         let others = Role::others(nv, want, variations.len());
-        let columns_due = |w: usize| request.anew.columns.get(w).is_some_and(|due| *due);
         let (ns, m) = (c.logs.entries.len(), variations.len());
         let mut episodes: Vec<LinearEpisode> = self
             .walks
@@ -52,20 +61,14 @@ impl Part {
             .iter()
             .map(|e| vec![0.0; late * e.rows * ns * nv])
             .collect();
-        for class in [(true, true), (true, false), (false, true), (false, false)] {
-            let own = |&w: &usize| (request.due(w), columns_due(w)) == class;
-            let which: Vec<bool> = self.walks.iter().map(own).collect();
-            if !which.contains(&true) {
-                continue;
-            }
+        for (class, which) in self.classes(c, request) {
             let wanted = |role: &Role| match role {
-                Role::Varied(i) => request.wants(*i, class.1),
+                Role::Varied(i) => request.wants(*i, class.columns),
+                Role::State(i) => class.state && !class.blind.get(*i).is_some_and(|blind| *blind),
                 _ => true,
             };
-            let mut roles: Vec<Role> = others.iter().copied().filter(wanted).collect();
-            if class.0 {
-                roles.splice(0..0, in_state.iter().copied());
-            }
+            let states = in_state.iter().filter(|_| class.state);
+            let roles: Vec<Role> = states.chain(&others).copied().filter(wanted).collect();
             for chunk in roles.chunks(c.capacity - 1) {
                 self.pass(c, request, (chunk, &which), &mut episodes, &mut ramps)?;
             }
@@ -84,6 +87,23 @@ impl Part {
         Ok(episodes)
     }
 
+    /// Its walks by what is wanted of them, one flag a walk.
+    fn classes<'r>(&self, c: &Common<'_>, request: Request<'r>) -> BTreeMap<Class<'r>, Vec<bool>> {
+        let mut classes = BTreeMap::new();
+        for (e, &w) in self.walks.iter().enumerate() {
+            let state = request.want.state && request.due(w);
+            let sees = state && c.rolls(w, request.want);
+            let class = Class {
+                state,
+                columns: request.anew.columns.get(w).is_some_and(|due| *due),
+                blind: if sees { request.blind(w) } else { &[] },
+            };
+            let which = classes.entry(class);
+            which.or_insert_with(|| vec![false; self.walks.len()])[e] = true;
+        }
+        classes
+    }
+
     /// One walk along some of the episodes with some roles beside the nominal one.
     fn pass(
         &mut self,
@@ -97,7 +117,9 @@ impl Part {
             .chain(extra.iter().copied())
             .collect();
         let n = self.walks.len();
-        let all: Vec<usize> = (0..roles.len() * n).collect();
+        let some: Vec<usize> = (0..n).filter(|&e| which[e]).collect();
+        let of_role = |v: usize| some.iter().map(move |e| v * n + e);
+        let all: Vec<usize> = (0..roles.len()).flat_map(of_role).collect();
         let mut columns = Vec::new();
         for role in &roles {
             let theta = match role {
@@ -105,7 +127,7 @@ impl Part {
                 _ => request.theta,
             };
             let row = columns_of(&c.parameters, theta);
-            (0..n).for_each(|_| columns.extend_from_slice(&row));
+            some.iter().for_each(|_| columns.extend_from_slice(&row));
         }
         self.simulator.reset(&all)?;
         self.simulator.set_parameters(&all, &columns)?;
