@@ -49,8 +49,7 @@ struct Searched {
     /// Walks that begin an episode.
     firsts: Vec<usize>,
     repeats: Option<Repeats>,
-    /// Excess power that replays of what stands leave of the training logs, and whether that is the smaller part of what is there without effects.
-    excess: f64,
+    /// Whether replays of what stands leave the smaller part of the excess power that the training logs have without effects.
     explains: bool,
     /// The missing force along the logs, and what is left of it.
     drawn: (Vec<ForceTrace>, Vec<Left>),
@@ -67,7 +66,7 @@ fn searched(null: Null<'_>, shown_steps: &[Shown], settings: &Settings) -> Resul
             None => found.repeats = shortest.repeats,
             Some(mut longest) => {
                 let other = searched_in(null, &mut longest, (shown_steps, settings))?;
-                if other.excess <= found.excess {
+                if other.explains || found.outcome.best.names == 0 {
                     found = other;
                 }
                 found.repeats = longest.repeats;
@@ -115,8 +114,8 @@ fn searched_in(
         forces(context, &outcome, &candidates)?,
         left(context, &outcome),
     );
-    let excess = excess(&outcome.best)?;
-    let explains = !open_loop.is_gap || excess < MOST * replays.excess(&outcome.none, &[])?;
+    let without = replays.excess(&outcome.none, &[])?;
+    let explains = !open_loop.is_gap || excess(&outcome.best)? < MOST * without;
     let outcome = beside(outcome, &steps, &candidates);
     Ok(Searched {
         outcome,
@@ -126,7 +125,6 @@ fn searched_in(
         firsts,
         repeats: stands.repeats,
         drawn,
-        excess,
         explains,
     })
 }

@@ -2,6 +2,7 @@
 
 mod begun;
 mod open_loop;
+mod path;
 mod prior;
 mod prune;
 mod round;
@@ -26,9 +27,9 @@ pub use screening::Sight;
 pub use set::{Set, labels_of, name_of};
 pub use tolerances::Tolerances;
 
-use open_loop::OpenLoopGap;
-use round::Upon;
-use set::{free_what_is_given, from_fit_of, is_due};
+use path::Path;
+use prior::worth;
+use set::{from_fit_of, is_due};
 
 /// The stage that looks for what is missing beside a set.
 const FURTHER: &str = "further effects beside those named";
@@ -164,8 +165,26 @@ fn first_that_counts(
     Ok(None)
 }
 
+/// A search: what it is in, and what it chooses from.
+struct Search<'s> {
+    context: &'s Context<'s>,
+    candidates: &'s [Candidate],
+    /// Candidates that are known to act or not.
+    known: &'s [usize],
+    breadth: Breadth,
+    open_loop: OpenLoop<'s>,
+    progress: &'s dyn Progress,
+    /// What is missing without effects.
+    at_first: Missing,
+    /// Evidence by which a name must rise above the set that stands.
+    threshold: f64,
+}
+
 /// Searches upon the model without effects, among `candidates` without those that are `known` to act or not. Where hardly any force is missing
 /// and `open_loop` replays still leave a gap, as of a stiff drive that was made softer, what a further name closes of that gap counts.
+///
+/// Which of two first names is the right one may only show once the second is there: where one is not far behind the one that was taken, and
+/// something was missing beside that, the search goes on from it too, and what is more likely in the end stands.
 ///
 /// # Errors
 /// When the engine fails.
@@ -176,88 +195,32 @@ pub fn search(
     breadth: Breadth,
     (open_loop, progress): (OpenLoop<'_>, &dyn Progress),
 ) -> Result<Outcome> {
-    let how = (breadth, progress);
-    let threshold = threshold(nameable(candidates), breadth.false_alarms);
-    let mut best = Set::without_effects(none);
-    let at_first = none.estimate.missing(context);
+    let search = Search {
+        context,
+        candidates,
+        known,
+        breadth,
+        open_loop,
+        progress,
+        at_first: none.estimate.missing(context),
+        threshold: threshold(nameable(candidates), breadth.false_alarms),
+    };
     let mut none = none.clone();
-    let left = |s: &Set| s.fitted.estimate.missing(context).relative_to(at_first);
-    let mut rounds: Vec<Round> = Vec::new();
-    let mut untried = Vec::new();
-    // The set that stands with what no search tries, such as an offset of its friction: a rival of every further effect, which
-    // needs no further name.
-    let mut freed: Option<Set> = None;
-    let mut depth = breadth.depth;
-    let mut gap = OpenLoopGap::by(open_loop);
-    while rounds.len() < depth {
-        let no_force = left(&best) < breadth.shrinks;
-        if no_force && !gap.is_left(context, (&none, &best), how)? {
-            break;
+    let mut path = search.follow(Path::from(Set::without_effects(&none)), &mut none)?;
+    if let Some(second) = search.second(&path) {
+        if progress.is_stopped() {
+            path.untried.push(Untried::upon(&second, FURTHER));
+        } else {
+            let other = search.follow(Path::from(second), &mut none)?;
+            path = path.or(other, |set| worth(context, candidates, set));
         }
-        // The first screening is the least that an answer rests on.
-        if !rounds.is_empty() && progress.is_stopped() {
-            untried.push(Untried::upon(&best, FURTHER));
-            break;
-        }
-        let upon = Upon {
-            context,
-            base: &best,
-            at_first,
-            candidates,
-            open: &open_upon(candidates, known, &best),
-            breadth,
-            open_loop,
-            progress,
-        };
-        let round = upon.round(&mut untried)?;
-        let confirmed = round.confirmed.clone();
-        rounds.push(round);
-        let stopped = progress.is_stopped();
-        let further = (confirmed.first(), threshold);
-        fit_from(context, further, (&mut best, &mut none), how)?;
-        if is_cut_short(context, &best, progress) {
-            untried.push(Untried::upon(&best, FURTHER));
-            break;
-        }
-        // A first fit that was cut short has not told yet how much of the force it makes up for.
-        let cut_short = stopped && best.candidates.is_empty();
-        let counts = |set: &Set| match no_force {
-            _ if cut_short || left(&best) - left(set) > breadth.shrinks => Ok(true),
-            true => gap.is_closed_by(set, breadth),
-            false => gap.is_mostly_closed_by(set, (context, &best)),
-        };
-        let next = first_that_counts(confirmed, (&best, threshold), counts)?;
-        let is_ahead = |own: &Set| !own.is_passed(next.as_ref(), threshold);
-        if let Some(own) = freed.take().filter(is_ahead) {
-            best = own;
-            continue;
-        }
-        let next = upon_tolerances(
-            context,
-            candidates,
-            (&best, next, at_first),
-            rounds.last_mut(),
-            how,
-        )?;
-        let Some(next) = next else { break };
-        if has_tolerances(candidates, &next) && !has_tolerances(candidates, &best) {
-            // They are no name.
-            depth += 1;
-        }
-        best = next;
-        if stopped {
-            untried.push(Untried::upon(&best, GIVEN));
-            break;
-        }
-        freed = free_what_is_given(context, candidates, &best, (breadth, threshold), progress)?;
     }
-    let best = freed.unwrap_or(best);
-    let missing = [&none, &best.fitted].map(|f| f.estimate.missing(context));
+    let missing = [&none, &path.best.fitted].map(|f| f.estimate.missing(context));
     Ok(Outcome {
         none,
         missing,
-        rounds,
-        best,
-        untried,
+        rounds: path.rounds,
+        best: path.best,
+        untried: path.untried,
     })
 }

@@ -25,8 +25,8 @@ const MISLED_START: f64 = 1.0;
 
 /// Information that the readings of a segment have of a coordinate of its start, in units of what is known of it before, up to which the
 /// coordinate counts as blind: evidence changes by half of it. Where a body touches another, the six of what the contact blocks, and of how
-/// a body of revolution is turned, have 1e-6 or less, the others 0.1 or more.
-const BLIND: f64 = 1e-3;
+/// a body of revolution is turned, have less, the others 0.1 or more.
+const BLIND: f64 = 1e-5;
 
 /// Slopes of each walk, and where they were taken.
 #[derive(Clone, Debug, Default)]

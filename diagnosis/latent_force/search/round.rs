@@ -13,7 +13,7 @@ use crate::settings::Breadth;
 
 use super::Untried;
 use super::open_loop::OpenLoop;
-use super::prior::log_prior;
+use super::prior::worth;
 use super::prune::{pruned, pruned_at_once};
 use super::screening::{Screening, Sight};
 use super::set::{Set, TOLERANCES, from_fit_of, name_of, refined_by, with, without};
@@ -138,19 +138,12 @@ impl Upon<'_> {
         let cut = cut.into_iter().filter(|(_, sets)| !sets.is_empty());
         untried.extend(cut.map(|(stage, sets)| Untried { stage, sets }));
         let mut confirmed = finished.sets;
-        confirmed.sort_by(|a, b| self.worth(b).total_cmp(&self.worth(a)));
+        let worth = |set: &Set| worth(self.context, self.candidates, set);
+        confirmed.sort_by(|a, b| worth(b).total_cmp(&worth(a)));
         let gain = |s: &Set| s.fitted.evidence - self.base.fitted.evidence;
         let rows = confirmed.iter().map(|s| (name(&s.candidates), gain(s)));
         progress.ranking(&format!("fits{upon}"), &rows.collect::<Vec<_>>());
         Ok(screening.round(self, screened, (of_race, confirmed), tolerances))
-    }
-
-    /// Evidence of a set, that of effects at unusual sites the lower. One that names something pays for which of all it is: tolerances, which every
-    /// machine has, are one rival.
-    fn worth(&self, set: &Set) -> f64 {
-        let prior = log_prior(self.context.plant(), self.candidates, &set.candidates);
-        let names = set.names.saturating_sub(self.base.names) as f64;
-        set.fitted.evidence + prior - names * (nameable(self.candidates) as f64).ln()
     }
 
     /// Candidates of a set of a screening.
