@@ -11,13 +11,13 @@ use crate::latent_force::fit::{Fitted, Slopes};
 use crate::latent_force::screen::Screened;
 use crate::settings::Breadth;
 
-use super::Untried;
 use super::open_loop::OpenLoop;
 use super::prior::worth;
 use super::prune::{pruned, pruned_at_once};
 use super::screening::{Screening, Sight};
 use super::set::{Set, TOLERANCES, from_fit_of, name_of, refined_by, with, without};
 use super::tolerances::Tolerances;
+use super::{Untried, has_tolerances};
 
 /// A round: what was screened and what was fitted upon a base.
 #[derive(Clone, Debug)]
@@ -127,7 +127,9 @@ impl Upon<'_> {
             progress.end();
             return Ok(screening.round(self, screened, (Vec::new(), vec![set]), tolerances));
         }
-        let raced = self.race(&screening, tolerances.as_ref())?;
+        let mut raced = self.race(&screening, tolerances.as_ref())?;
+        let alone = self.alone_beside(tolerances.as_ref(), &raced.sets)?;
+        raced.sets.extend(alone);
         let of_race = raced.sets.iter().map(|s| s.candidates.clone()).collect();
         let finished = self.finish(raced.sets)?;
         progress.end();
@@ -184,6 +186,32 @@ impl Upon<'_> {
             progress.advance(1);
         }
         Ok(Fits { sets, left_out })
+    }
+
+    /// Where a group leads those that were `raced`, the best of its members by itself, with tolerances beside it, fitted a little: one law at all
+    /// places makes up for many small things as they do, and is not there where it is strong at one place and small things are the rest.
+    fn alone_beside(&self, tolerances: Option<&Tolerances>, raced: &[Set]) -> Result<Option<Set>> {
+        let added =
+            |s: &Set| s.candidates[self.base.candidates.len().min(s.candidates.len())..].to_vec();
+        let by_evidence = |a: &&Set, b: &&Set| a.fitted.evidence.total_cmp(&b.fitted.evidence);
+        let named = raced.iter().filter(|s| !has_tolerances(self.candidates, s));
+        let Some(group) = named.clone().max_by(by_evidence).map(added) else {
+            return Ok(None);
+        };
+        let is_member = |s: &&Set| matches!(added(s)[..], [one] if group.contains(&one));
+        let member = named.filter(is_member).max_by(by_evidence);
+        let (Some(tolerances), Some(member)) = (tolerances, member) else {
+            return Ok(None);
+        };
+        if group.len() < 2 || self.progress.is_stopped() {
+            return Ok(None);
+        }
+        let name = name_of(self.candidates, &member.candidates);
+        self.progress
+            .note(&format!("trying {name} with tolerances"));
+        let mut set = tolerances.beside(member, self.candidates);
+        set.fit(self.context, (self.breadth.rounds[0], self.progress))?;
+        Ok(Some(set))
     }
 
     /// The base with the candidates of a set of a screening; a finer law takes the place of the simpler one.

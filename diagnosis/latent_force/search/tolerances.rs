@@ -154,7 +154,7 @@ impl Tolerances {
         })
     }
 
-    /// A set with all of them, its values moved as the screening says; not fitted yet.
+    /// A set with all of them but those of what it names, its values moved as the screening says; not fitted yet.
     pub(super) fn beside(&self, set: &Set, candidates: &[Candidate]) -> Set {
         let mut set = set.clone();
         let fitted = &mut set.fitted;
@@ -164,7 +164,9 @@ impl Tolerances {
             fitted.theta[i] = (fitted.theta[i] + c * u.deviation).clamp(u.bounds[0], u.bounds[1]);
         }
         for member in &self.members {
-            member.join(&mut set, &candidates[member.candidate]);
+            if !set.candidates.contains(&member.named.0) {
+                member.join(&mut set, &candidates[member.candidate]);
+            }
         }
         set
     }
