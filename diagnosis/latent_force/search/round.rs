@@ -128,8 +128,8 @@ impl Upon<'_> {
             return Ok(screening.round(self, screened, (Vec::new(), vec![set]), tolerances));
         }
         let mut raced = self.race(&screening, tolerances.as_ref())?;
-        let alone = self.alone_beside(tolerances.as_ref(), &raced.sets)?;
-        raced.sets.extend(alone);
+        let beside = self.beside_tolerances(tolerances.as_ref(), &raced.sets)?;
+        raced.sets.extend(beside);
         let of_race = raced.sets.iter().map(|s| s.candidates.clone()).collect();
         let finished = self.finish(raced.sets)?;
         progress.end();
@@ -188,30 +188,43 @@ impl Upon<'_> {
         Ok(Fits { sets, left_out })
     }
 
-    /// Where a group leads those that were `raced`, the best of its members by itself, with tolerances beside it, fitted a little: one law at all
-    /// places makes up for many small things as they do, and is not there where it is strong at one place and small things are the rest.
-    fn alone_beside(&self, tolerances: Option<&Tolerances>, raced: &[Set]) -> Result<Option<Set>> {
-        let added =
-            |s: &Set| s.candidates[self.base.candidates.len().min(s.candidates.len())..].to_vec();
+    /// Where a group leads those that were `raced`, the best of its members by itself with tolerances beside it, fitted a little: one law at all
+    /// places makes up for many small things as they do, and is not there where it is strong at one place and small things are the rest. With
+    /// the group beside tolerances too where it falls behind that.
+    fn beside_tolerances(
+        &self,
+        tolerances: Option<&Tolerances>,
+        raced: &[Set],
+    ) -> Result<Vec<Set>> {
+        let before = self.base.candidates.len();
+        let added = |s: &Set| s.candidates[before.min(s.candidates.len())..].to_vec();
         let by_evidence = |a: &&Set, b: &&Set| a.fitted.evidence.total_cmp(&b.fitted.evidence);
         let named = raced.iter().filter(|s| !has_tolerances(self.candidates, s));
-        let Some(group) = named.clone().max_by(by_evidence).map(added) else {
-            return Ok(None);
+        let leads = named.clone().max_by(by_evidence);
+        let (Some(tolerances), Some(group)) = (tolerances, leads) else {
+            return Ok(Vec::new());
         };
-        let is_member = |s: &&Set| matches!(added(s)[..], [one] if group.contains(&one));
-        let member = named.filter(is_member).max_by(by_evidence);
-        let (Some(tolerances), Some(member)) = (tolerances, member) else {
-            return Ok(None);
+        let members = added(group);
+        let is_member = |s: &&Set| matches!(added(s)[..], [one] if members.contains(&one));
+        let Some(member) = named.filter(is_member).max_by(by_evidence) else {
+            return Ok(Vec::new());
         };
-        if group.len() < 2 || self.progress.is_stopped() {
-            return Ok(None);
+        let mut fitted = Vec::new();
+        for set in [member, group] {
+            let is_behind = fitted
+                .last()
+                .is_none_or(|alone: &Set| alone.fitted.evidence > group.fitted.evidence);
+            if members.len() < 2 || self.progress.is_stopped() || !is_behind {
+                break;
+            }
+            let name = name_of(self.candidates, &set.candidates);
+            self.progress
+                .note(&format!("trying {name} with tolerances"));
+            let mut set = tolerances.beside(set, self.candidates);
+            set.fit(self.context, (self.breadth.rounds[0], self.progress))?;
+            fitted.push(set);
         }
-        let name = name_of(self.candidates, &member.candidates);
-        self.progress
-            .note(&format!("trying {name} with tolerances"));
-        let mut set = tolerances.beside(member, self.candidates);
-        set.fit(self.context, (self.breadth.rounds[0], self.progress))?;
-        Ok(Some(set))
+        Ok(fitted)
     }
 
     /// The base with the candidates of a set of a screening; a finer law takes the place of the simpler one.
