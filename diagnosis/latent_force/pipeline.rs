@@ -11,7 +11,7 @@ use asid_core::{Progress, Result};
 use crate::candidate::{Candidate, LeftOut, enumerate};
 use crate::ceiling::Left;
 use crate::decision::{Rules, decide};
-use crate::findings::Repeats;
+use crate::findings::{LEAST_GAP, Repeats};
 use crate::machine::Machine;
 use crate::prepare::{dataset, set_reading_noise};
 use crate::settings::Settings;
@@ -36,9 +36,6 @@ use without_effects::{Null, Stands};
 /// Most linearisations of the fit without effects.
 const ROUNDS: usize = 15;
 
-/// Share of the excess power without effects that is left of a gap that is explained: less than half, as in the decision ([`crate::decision`]).
-const MOST: f64 = 0.5;
-
 /// What is kept of a search once the logs are let go of.
 struct Searched {
     outcome: Outcome,
@@ -49,24 +46,25 @@ struct Searched {
     /// Walks that begin an episode.
     firsts: Vec<usize>,
     repeats: Option<Repeats>,
-    /// Whether replays of what stands leave the smaller part of the excess power that the training logs have without effects.
-    explains: bool,
+    /// Excess power that replays of what stands leave of the training logs, and whether that, or what they leave without effects, is a gap.
+    excess: f64,
+    leaves_a_gap: bool,
     /// The missing force along the logs, and what is left of it.
     drawn: (Vec<ForceTrace>, Vec<Left>),
 }
 
 /// Fits the model without effects, and searches for what is missing: in the shortest segments, whose replays are next to linear in where they
-/// begin, and where what they show leaves most of the gap of whole replays, in the longest that can be repeated. A small force tells the
-/// more the longer it acts, but the evidence of long replays about contacts scatters.
+/// begin, and where replays of whole logs still leave a gap, in the longest that can be repeated. A small force tells the more the longer it
+/// acts, but the evidence of long replays about contacts scatters: the answer stands that leaves less.
 fn searched(null: Null<'_>, shown_steps: &[Shown], settings: &Settings) -> Result<Searched> {
     let mut shortest = null.shortest()?;
     let mut found = searched_in(null, &mut shortest, (shown_steps, settings))?;
-    if shortest.context.has_segments() && !found.explains && !null.progress.is_stopped() {
+    if shortest.context.has_segments() && found.leaves_a_gap && !null.progress.is_stopped() {
         match null.longer(&mut shortest)? {
             None => found.repeats = shortest.repeats,
             Some(mut longest) => {
                 let other = searched_in(null, &mut longest, (shown_steps, settings))?;
-                if other.explains || found.outcome.best.names == 0 {
+                if other.excess <= found.excess {
                     found = other;
                 }
                 found.repeats = longest.repeats;
@@ -114,8 +112,8 @@ fn searched_in(
         forces(context, &outcome, &candidates)?,
         left(context, &outcome),
     );
-    let without = replays.excess(&outcome.none, &[])?;
-    let explains = !open_loop.is_gap || excess(&outcome.best)? < MOST * without;
+    let excess = excess(&outcome.best)?;
+    let leaves_a_gap = open_loop.is_gap && excess > LEAST_GAP * LEAST_GAP - 1.0;
     let outcome = beside(outcome, &steps, &candidates);
     Ok(Searched {
         outcome,
@@ -125,7 +123,8 @@ fn searched_in(
         firsts,
         repeats: stands.repeats,
         drawn,
-        explains,
+        excess,
+        leaves_a_gap,
     })
 }
 
