@@ -6,7 +6,7 @@ mod rows;
 mod told;
 mod without_effects;
 
-use asid_core::{Progress, Result};
+use asid_core::{Error, Progress, Result};
 
 use crate::candidate::{Candidate, LeftOut, enumerate};
 use crate::ceiling::Left;
@@ -36,6 +36,10 @@ use without_effects::{Null, Stands};
 /// Most linearisations of the fit without effects.
 const ROUNDS: usize = 15;
 
+/// How far the evidence of one model may scatter, natural logarithm, in segments that are searched first: what a further name must earn of
+/// 200 candidates ([`crate::chance`]).
+const SCATTERS: f64 = 6.0;
+
 /// What is kept of a search once the logs are let go of.
 struct Searched {
     outcome: Outcome,
@@ -53,25 +57,56 @@ struct Searched {
     drawn: (Vec<ForceTrace>, Vec<Left>),
 }
 
-/// Fits the model without effects, and searches for what is missing: in the shortest segments, whose replays are next to linear in where they
-/// begin, and where replays of whole logs still leave a gap, in the longest that can be repeated. A small force tells the more the longer it
-/// acts, but the evidence of long replays about contacts scatters: the answer stands that leaves less.
+/// Fits the model without effects, and searches for what is missing. Where bodies touch, that is done in the longest segments that can be
+/// repeated, for a small force tells the more the longer it acts; or in the shortest, whose replays are next to linear in where they begin,
+/// where the evidence of the long ones scatters. Where replays of whole logs then leave a gap, the others are asked too, and the
+/// answer stands that leaves less.
 fn searched(null: Null<'_>, shown_steps: &[Shown], settings: &Settings) -> Result<Searched> {
-    let mut shortest = null.shortest()?;
-    let mut found = searched_in(null, &mut shortest, (shown_steps, settings))?;
-    if shortest.context.has_segments() && found.leaves_a_gap && !null.progress.is_stopped() {
-        match null.longer(&mut shortest)? {
-            None => found.repeats = shortest.repeats,
-            Some(mut longest) => {
-                let other = searched_in(null, &mut longest, (shown_steps, settings))?;
-                if other.excess <= found.excess {
-                    found = other;
-                }
-                found.repeats = longest.repeats;
-            }
+    let mut short = null.shortest()?;
+    let mut long = None;
+    if short.context.has_segments() && leaves_a_gap(null, &short)? {
+        long = null.longer(&mut short)?;
+    }
+    let repeats = long.as_ref().unwrap_or(&short).repeats;
+    let scatters = long.as_ref().is_none_or(|l| l.none.wander > SCATTERS);
+    let mut stands = vec![Some(short), long];
+    if !scatters {
+        stands.reverse();
+    }
+    let mut found: Option<Searched> = None;
+    for stands in stands.iter_mut().flatten() {
+        if let Some(found) = &found
+            && (!found.leaves_a_gap || null.progress.is_stopped())
+        {
+            break;
+        }
+        let other = searched_in(null, stands, (shown_steps, settings))?;
+        if found.as_ref().is_none_or(|f| other.excess < f.excess) {
+            found = Some(other);
         }
     }
+    let mut found = found.ok_or_else(|| Error::Failed("no segments were searched".into()))?;
+    found.repeats = repeats;
     Ok(found)
+}
+
+/// Walks that begin an episode.
+fn firsts(stands: &Stands<'_>) -> Vec<usize> {
+    let walks = stands.context.walks.iter().enumerate();
+    let first = walks.filter(|(_, walk)| walk.rows[0] == 0);
+    first.map(|(w, _)| w).collect()
+}
+
+/// Whether whole replays of the model without effects leave a gap.
+fn leaves_a_gap(null: Null<'_>, stands: &Stands<'_>) -> Result<bool> {
+    let replays = Replays {
+        bench: null.bench,
+        candidates: &[],
+        firsts: &firsts(stands),
+        open: Vec::new(),
+        progress: null.progress,
+    };
+    replays.leaves_a_gap(&stands.none)
 }
 
 /// Searches for what is missing beside a model without effects that stands in some segments.
@@ -92,8 +127,7 @@ fn searched_in(
     let steps = known(shown_steps, &candidates);
     let members: Vec<usize> = steps.iter().map(|s| s.candidate).collect();
     let offered = (&candidates[..], &members[..]);
-    let firsts = (0..context.walks.len()).filter(|&w| context.walks[w].rows[0] == 0);
-    let firsts = firsts.collect::<Vec<_>>();
+    let firsts = firsts(stands);
     let replays = Replays {
         bench,
         candidates: &candidates,

@@ -225,3 +225,42 @@ fn a_soft_machine_is_told_by_one_step_and_one_that_settles_within_a_row_is_not()
     // 300 rad/s, and far from its target at full force.
     assert!(!tells(2e5, 100.0));
 }
+
+/// Of two segments, the first of which is blind to some coordinates of its start: what a linearisation finds, and its physics steps.
+fn segments(blind: &[Vec<bool>]) -> (Vec<LinearEpisode>, u64) {
+    let machine = machine(&scene(0.0, 1.0));
+    let logs = logs(&machine);
+    let segment = Walk {
+        segment: Some(2),
+        ..Walk::new(&logs, 0, DT)
+    };
+    let walks = [segment.clone(), segment];
+    let mut map = StepMap::new(&machine, &[], &[], (&logs, &walks), 3).unwrap();
+    let want = Derivatives {
+        state: true,
+        ..Derivatives::default()
+    };
+    let anew = Anew {
+        blind,
+        ..Anew::default()
+    };
+    let states = [states(), states()];
+    let found = map
+        .linearise_anew(&[], &states, (want, anew), &[1e-4; 2], &[])
+        .unwrap();
+    (found, map.steps())
+}
+
+#[test]
+fn a_coordinate_that_a_segment_is_blind_to_takes_no_simulation_and_others_stay() {
+    let (whole, steps) = segments(&[]);
+    let (some, fewer) = segments(&[vec![false, true], Vec::new()]);
+    assert_eq!(whole[1].h, some[1].h);
+    assert_eq!(whole[0].defect, some[0].defect);
+    for (whole, some) in whole[0].h.chunks(2).zip(some[0].h.chunks(2)) {
+        assert_eq!([whole[0], 0.0], some[..]);
+    }
+    // The place starts at cos(w t) of itself, so that it is seen.
+    assert!(whole[0].h[2 * 2] > 0.9);
+    assert_eq!(steps - fewer, ((ROWS - 1) * STEPS) as u64);
+}

@@ -4,7 +4,7 @@ use asid::core::episode::ChannelColumns;
 use asid::core::{Episode, Scene};
 use asid::diagnosis::data::Logs;
 use asid::diagnosis::latent_force::context::{Taken, begin};
-use asid::diagnosis::latent_force::fit::Hypothesis;
+use asid::diagnosis::latent_force::fit::{Hypothesis, Slopes};
 use asid::diagnosis::latent_force::scatter::Scatter;
 use asid::diagnosis::latent_force::walk::Walk;
 use asid::diagnosis::machine::Machine;
@@ -59,7 +59,13 @@ fn scatter(joint: &str) -> (Vec<[f64; 2]>, f64) {
     let (context, estimate) = begin(&machine, &logs, taken, (&[], &[])).unwrap();
     let finer = machine.halved().unwrap();
     let model = (&Hypothesis::default(), &[][..]);
-    let found = Scatter::of(&context, model, &estimate, Some(&finer)).unwrap();
+    let found = Scatter::of(
+        &context,
+        model,
+        (&estimate, &Slopes::default()),
+        Some(&finer),
+    )
+    .unwrap();
     let directions = found.directions[0].len() / ROWS;
     let rows = found.directions[0].chunks(directions).map(|row| {
         let power = |d: &[f64]| d.iter().map(|x| (x / NOISE).powi(2)).sum::<f64>();

@@ -184,9 +184,9 @@ fn efforts(
             effects: Vec::new(),
         });
     };
-    // Whole replays that nobody can repeat tell nothing of values; nor are those asked that short segments stand for.
+    // Whole replays that nobody can repeat tell nothing of values.
     let values = match repeats {
-        Some(r) if r.scatters || r.duration.is_finite() => Effort::LOOK,
+        Some(Repeats { scatters: true, .. }) => Effort::LOOK,
         _ => Effort::BRIEF,
     };
     // A stopped search fits the values of what stands alone.
