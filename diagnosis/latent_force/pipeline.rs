@@ -36,10 +36,6 @@ use without_effects::{Null, Stands};
 /// Most linearisations of the fit without effects.
 const ROUNDS: usize = 15;
 
-/// How far the evidence of one model may scatter, natural logarithm, in segments that are searched first: what a further name must earn of
-/// 200 candidates ([`crate::chance`]).
-const SCATTERS: f64 = 6.0;
-
 /// What is kept of a search once the logs are let go of.
 struct Searched {
     outcome: Outcome,
@@ -58,9 +54,8 @@ struct Searched {
 }
 
 /// Fits the model without effects, and searches for what is missing. Where bodies touch, that is done in the longest segments that can be
-/// repeated, for a small force tells the more the longer it acts; or in the shortest, whose replays are next to linear in where they begin,
-/// where the evidence of the long ones scatters. Where replays of whole logs then leave a gap, the others are asked too, and the
-/// answer stands that leaves less.
+/// repeated, for a small force tells the more the longer it acts. Where replays of whole logs then leave a gap, the shortest are asked too,
+/// whose replays are next to linear in where they begin, and the answer stands that leaves less.
 fn searched(null: Null<'_>, shown_steps: &[Shown], settings: &Settings) -> Result<Searched> {
     let mut short = null.shortest()?;
     let mut long = None;
@@ -68,13 +63,8 @@ fn searched(null: Null<'_>, shown_steps: &[Shown], settings: &Settings) -> Resul
         long = null.longer(&mut short)?;
     }
     let repeats = long.as_ref().unwrap_or(&short).repeats;
-    let scatters = long.as_ref().is_none_or(|l| l.none.wander > SCATTERS);
-    let mut stands = vec![Some(short), long];
-    if !scatters {
-        stands.reverse();
-    }
     let mut found: Option<Searched> = None;
-    for stands in stands.iter_mut().flatten() {
+    for stands in [long, Some(short)].iter_mut().flatten() {
         if let Some(found) = &found
             && (!found.leaves_a_gap || null.progress.is_stopped())
         {
