@@ -90,6 +90,13 @@ pub struct Fitted {
     pub slopes: Slopes,
 }
 
+/// Evidence that no longer counts as a rise, natural logarithm.
+#[must_use]
+pub fn rise(context: &Context<'_>) -> f64 {
+    let segments = context.walks.iter().filter(|w| w.segment.is_some()).count();
+    RISE * (segments.max(1) as f64).sqrt()
+}
+
 /// A point from which steps are taken: what it and its step promise, and where that leads.
 struct Anchor {
     /// Evidence there, and with what a step promises.
@@ -134,7 +141,7 @@ pub fn fit(
     let mut part = 1.0;
     let (mut waited, mut failed) = (0, 0);
     let segments = context.walks.iter().filter(|w| w.segment.is_some()).count();
-    let rise = RISE * (segments.max(1) as f64).sqrt();
+    let rise = rise(context);
     let mut all = Vec::new();
     for round in 0..rounds.max(1) {
         let variations = variations(unknowns, &free, &theta);

@@ -7,7 +7,7 @@ use crate::candidate::{Candidate, nameable};
 use crate::chance::threshold;
 use crate::latent_force::context::Context;
 use crate::latent_force::estimate::Missing;
-use crate::latent_force::fit::{Fitted, Slopes};
+use crate::latent_force::fit::{Fitted, Slopes, rise};
 use crate::latent_force::screen::Screened;
 use crate::settings::Breadth;
 
@@ -15,7 +15,9 @@ use super::open_loop::OpenLoop;
 use super::prior::worth;
 use super::prune::{pruned, pruned_at_once};
 use super::screening::{Screening, Sight};
-use super::set::{Set, TOLERANCES, from_fit_of, name_of, refined_by, with, without};
+use super::set::{
+    Set, TOLERANCES, from_fit_of, name_of, refined_by, simplest_first, with, without,
+};
 use super::tolerances::Tolerances;
 use super::{Untried, has_tolerances};
 
@@ -142,6 +144,7 @@ impl Upon<'_> {
         let mut confirmed = finished.sets;
         let worth = |set: &Set| worth(self.context, self.candidates, set);
         confirmed.sort_by(|a, b| worth(b).total_cmp(&worth(a)));
+        simplest_first(&mut confirmed, rise(self.context));
         let gain = |s: &Set| s.fitted.evidence - self.base.fitted.evidence;
         let rows = confirmed.iter().map(|s| (name(&s.candidates), gain(s)));
         progress.ranking(&format!("fits{upon}"), &rows.collect::<Vec<_>>());

@@ -42,6 +42,12 @@ impl Set {
         self.fitted.evidence - other.fitted.evidence > threshold + unsure
     }
 
+    /// Whether evidence does not tell it from another set that is ahead: by no more than what both scatter by, or than what counts as a `rise`.
+    fn is_level_with(&self, ahead: &Self, rise: f64) -> bool {
+        let unsure = WANDER * self.fitted.wander.hypot(ahead.fitted.wander);
+        ahead.fitted.evidence - self.fitted.evidence <= unsure.max(rise)
+    }
+
     /// Whether the next set, if there is one, has the evidence of this one and a threshold more.
     pub(super) fn is_passed(&self, next: Option<&Self>, threshold: f64) -> bool {
         next.is_some_and(|n| n.fitted.evidence >= self.fitted.evidence + threshold)
@@ -62,6 +68,18 @@ impl Set {
             rounds,
         )?;
         Ok(())
+    }
+}
+
+/// Puts the simplest of some sets, the best first, before those that evidence does not tell it from: of a tilt and a constant force on a single
+/// ball, which are the same to the ball, that of fewer values. It names no more than they do.
+pub(super) fn simplest_first(sets: &mut [Set], rise: f64) {
+    let Some(first) = sets.first() else { return };
+    let values = |s: &Set| s.fitted.hypothesis.free().len();
+    let level = sets.iter().enumerate();
+    let level = level.filter(|(_, s)| s.names <= first.names && s.is_level_with(first, rise));
+    if let Some((place, _)) = level.min_by_key(|(_, s)| values(s)) {
+        sets[..=place].rotate_right(1);
     }
 }
 
