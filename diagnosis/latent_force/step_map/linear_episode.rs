@@ -104,7 +104,7 @@ mod tests {
         let episode = LinearEpisode {
             rows: 2,
             residual: vec![f64::NAN, f64::NAN, 0.1, f64::NAN],
-            h: vec![
+            h: [
                 [9.0, 9.0, 9.0],
                 [9.0, 9.0, 9.0],
                 [2.0, 0.0, 0.01],
