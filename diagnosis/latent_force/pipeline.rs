@@ -11,7 +11,7 @@ use asid_core::{Error, Progress, Result};
 use crate::candidate::{Candidate, LeftOut, enumerate};
 use crate::ceiling::Left;
 use crate::decision::{Rules, decide};
-use crate::findings::{LEAST_GAP, Repeats};
+use crate::findings::Repeats;
 use crate::machine::Machine;
 use crate::prepare::{dataset, set_reading_noise};
 use crate::settings::Settings;
@@ -36,6 +36,9 @@ use without_effects::{Null, Stands};
 /// Most linearisations of the fit without effects.
 const ROUNDS: usize = 15;
 
+/// Share of the excess power without effects from which on what is left of it is most of the gap: half, as in the decision ([`crate::decision`]).
+const MOST: f64 = 0.5;
+
 /// What is kept of a search once the logs are let go of.
 struct Searched {
     outcome: Outcome,
@@ -46,16 +49,16 @@ struct Searched {
     /// Walks that begin an episode.
     firsts: Vec<usize>,
     repeats: Option<Repeats>,
-    /// Excess power that replays of what stands leave of the training logs, and whether that, or what they leave without effects, is a gap.
+    /// Excess power that replays of what stands leave of the training logs, and whether that is most of a gap that is there without effects.
     excess: f64,
-    leaves_a_gap: bool,
+    leaves_most: bool,
     /// The missing force along the logs, and what is left of it.
     drawn: (Vec<ForceTrace>, Vec<Left>),
 }
 
 /// Fits the model without effects, and searches for what is missing. Where bodies touch, that is done in the longest segments that can be
-/// repeated, for a small force tells the more the longer it acts. Where replays of whole logs then leave a gap, the shortest are asked too,
-/// whose replays are next to linear in where they begin, and the answer stands that leaves less.
+/// repeated, for a small force tells the more the longer it acts. Where replays of whole logs then leave most of the gap, the shortest are asked
+/// too, whose replays are next to linear in where they begin, and the answer stands that leaves less.
 fn searched(null: Null<'_>, shown_steps: &[Shown], settings: &Settings) -> Result<Searched> {
     let mut short = null.shortest()?;
     let mut long = None;
@@ -66,7 +69,7 @@ fn searched(null: Null<'_>, shown_steps: &[Shown], settings: &Settings) -> Resul
     let mut found: Option<Searched> = None;
     for stands in [long, Some(short)].iter_mut().flatten() {
         if let Some(found) = &found
-            && (!found.leaves_a_gap || null.progress.is_stopped())
+            && (!found.leaves_most || null.progress.is_stopped())
         {
             break;
         }
@@ -137,7 +140,8 @@ fn searched_in(
         left(context, &outcome),
     );
     let excess = excess(&outcome.best)?;
-    let leaves_a_gap = open_loop.is_gap && excess > LEAST_GAP * LEAST_GAP - 1.0;
+    let without = replays.excess(&outcome.none, &[])?;
+    let leaves_most = open_loop.is_gap && excess >= MOST * without;
     let outcome = beside(outcome, &steps, &candidates);
     Ok(Searched {
         outcome,
@@ -148,7 +152,7 @@ fn searched_in(
         repeats: stands.repeats,
         drawn,
         excess,
-        leaves_a_gap,
+        leaves_most,
     })
 }
 
