@@ -14,6 +14,8 @@ struct Part {
     start: usize,
     len: usize,
     rotation: bool,
+    /// Whether its entries are angles.
+    angle: bool,
     noise: f64,
 }
 
@@ -40,6 +42,7 @@ impl SignalSet {
                 start: width,
                 len: sensor.len,
                 rotation,
+                angle: rotation || sensor.unit() == "rad",
                 noise: signal.noise,
             });
             width += sensor.len;
@@ -62,6 +65,15 @@ impl SignalSet {
     #[must_use]
     pub fn whitened_len(&self) -> usize {
         self.whitened
+    }
+
+    /// Whether each entry of a whitened difference is an angle.
+    #[must_use]
+    pub fn angles(&self) -> Vec<bool> {
+        let parts = self.parts.iter();
+        parts
+            .flat_map(|p| std::iter::repeat_n(p.angle, if p.rotation { 3 } else { p.len }))
+            .collect()
     }
 
     /// Writes the whitened difference `(a - b) / noise`, `whitened_len` entries.

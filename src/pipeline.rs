@@ -206,7 +206,10 @@ pub fn run(
             problem,
             &FisherSettings::default(),
             &ExpectedSettings {
-                correlated: method.identifier.is_some_and(Identifier::correlated),
+                assumes: method
+                    .identifier
+                    .map(Identifier::assumes)
+                    .unwrap_or_default(),
                 ..method.expected
             },
             &belief.mean(),

@@ -48,7 +48,10 @@ fn identified(name: &str, force: f64, mass: f64, seed: u64) -> (Identified, f64)
         let identifier = (entry.make)(&(entry.defaults)()).unwrap();
         let episodes = std::slice::from_ref(&real.episode);
         let found = identifier.identify(problem, episodes).unwrap();
-        let settings = ExpectedSettings::default();
+        let settings = ExpectedSettings {
+            assumes: identifier.assumes(),
+            ..ExpectedSettings::default()
+        };
         let theta = found.posterior.mean();
         let expected =
             expected_deviation(problem, &settings, &theta, &found.starts[0], &real.actions)
@@ -89,6 +92,20 @@ fn a_truth_outside_of_the_prior_piles_up_at_its_edge() {
             let (found, _) = identified(name, 4.0, mass, 0);
             let m = &found.posterior.marginals[0];
             assert_eq!(m.at_edge, Some(edge), "{name}: {m:?}");
+        }
+    }
+}
+
+#[test]
+fn a_truth_a_little_outside_of_the_prior_is_found_and_the_result_says_where_it_was_looked_for() {
+    for name in IDENTIFIERS {
+        for (mass, searched) in [(2.4, [0.5, 2.75]), (0.35, [0.25, 2.0])] {
+            let (found, _) = identified(name, 4.0, mass, 1);
+            let m = &found.posterior.marginals[0];
+            assert!(m.at_edge.is_some(), "{name}: {m:?}");
+            assert_eq!(m.searched, Some(searched), "{name}: {m:?}");
+            assert!((m.estimate - mass).abs() < 3.5 * m.std, "{name}: {m:?}");
+            assert!(!m.reaches_an_end_of(searched), "{name}: {m:?}");
         }
     }
 }

@@ -19,6 +19,7 @@ use std::sync::atomic::AtomicU64;
 
 use asid::algorithms::fisher::expected::{ExpectedSettings, expected_deviation};
 use asid::algorithms::fisher::{FisherBatch, FisherSettings};
+use asid::core::identify::Assumptions;
 use asid::core::progress::Silent;
 use asid::core::registry::{
     AlgorithmEntry, BackendEntry, Entry, ExplorerEntry, IdentifierEntry, Settings, TaskEntry, find,
@@ -76,7 +77,10 @@ fn main() -> Outcome<()> {
         let paid = batch.information()[0].expected_std();
         let [alone, together] = [false, true].map(|correlated| {
             let settings = ExpectedSettings {
-                correlated,
+                assumes: Assumptions {
+                    correlated,
+                    ..identifier.assumes()
+                },
                 ..ExpectedSettings::default()
             };
             expected_deviation(&problem, &settings, &theta, start, &real.actions)

@@ -11,18 +11,19 @@ use nalgebra::DMatrix;
 use crate::fisher::inverse_above_prior;
 use crate::fisher::local_fit::{LocalFit, design, sets};
 use asid_core::error::Result;
+use asid_core::identify::Assumptions;
 use asid_core::layout::Recording;
 use asid_core::parameter::Parameter;
 use asid_core::problem::{Batch, Problem, substeps};
 use asid_core::simulator::{Control, Rollout};
-use asid_readings::SignalSet;
+use asid_core::tracker::TrackerErrors;
+use asid_readings::{ConstantErrors, SignalSet};
 
 /// How expected deviations are computed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ExpectedSettings {
-    /// Whether readings are weighed by how roughness runs along the episode, as
-    /// `identifier.sampling.correlated` has it, or by its size alone.
-    pub correlated: bool,
+    /// What the identifier assumes of the readings.
+    pub assumes: Assumptions,
     /// Fits, each over the region that the one before found: on the shuffleboard, where it takes longest, the
     /// deviation stays within a third of itself from the seventh on.
     pub rounds: usize,
@@ -33,7 +34,7 @@ pub struct ExpectedSettings {
 impl Default for ExpectedSettings {
     fn default() -> Self {
         Self {
-            correlated: false,
+            assumes: Assumptions::default(),
             rounds: 7,
             widen: 2.0,
         }
@@ -77,10 +78,10 @@ pub fn expected_deviation(
     let mut fit = None;
     for _ in 0..settings.rounds.max(1) {
         let points = design(&middle, &factor, (&low, &high), sets(n), &mut rng);
-        let Some(found) = episode.fit(&factor, &points)? else {
+        let Some(found) = episode.fit(&factor, &points, settings.assumes.tracker)? else {
             return Ok(None);
         };
-        let Some(told) = found.emulated(settings.correlated, d) else {
+        let Some(told) = found.emulated(settings.assumes.correlated, d) else {
             return Ok(None);
         };
         let covariance = inverse_above_prior(&(told + DMatrix::identity(n, n)));
@@ -110,7 +111,7 @@ pub fn expected_deviation(
             None
         } else {
             fit.first(episode.readings_after(h))
-                .emulated(settings.correlated, d)
+                .emulated(settings.assumes.correlated, d)
         };
         let prior = DMatrix::identity(n, n);
         let total = told.map_or_else(|| prior.clone(), |t| t + &prior);
@@ -204,8 +205,14 @@ impl<'a> Episode<'a> {
         (1 + frames) * self.signals.whitened_len()
     }
 
-    /// Simulates the middle and `points`, and fits what they differ by.
-    fn fit(&mut self, factor: &DMatrix<f64>, points: &[Vec<f64>]) -> Result<Option<LocalFit>> {
+    /// Simulates the middle and `points`, and fits what they differ by. The middle's readings say how constant
+    /// errors of the trackers would show.
+    fn fit(
+        &mut self,
+        factor: &DMatrix<f64>,
+        points: &[Vec<f64>],
+        tracker: TrackerErrors,
+    ) -> Result<Option<LocalFit>> {
         let protocol = self.problem.task.exploration();
         let d = self.sought.len();
         let (mut theta, mut starts) = (Vec::new(), Vec::new());
@@ -244,12 +251,21 @@ impl<'a> Episode<'a> {
         };
         let len = self.signals.whitened_len();
         let mut whitened = vec![0.0; len];
+        // What is tracked comes first in a row.
+        let tracked = self.signals.width();
+        let all: Vec<f64> = row(0).flat_map(|r| r[..tracked].to_vec()).collect();
+        let time: Vec<f64> = (0..=frames)
+            .map(|k| k as f64 * protocol.frame_period)
+            .collect();
+        let constant = ConstantErrors::at(tracker, &self.signals, &time, &all);
+        let there = vec![true; (1 + frames) * len];
         let mut of = |s: usize| -> Option<Vec<f64>> {
             let mut out = Vec::with_capacity((1 + frames) * len);
             for (a, b) in row(s).zip(row(0)) {
                 self.signals.difference(a, b, &mut whitened);
                 out.extend_from_slice(&whitened);
             }
+            constant.whiten(&there, &mut out);
             out.iter().all(|x| x.is_finite()).then_some(out)
         };
         let Some(middle) = of(0) else { return Ok(None) };

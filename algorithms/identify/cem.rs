@@ -1,7 +1,8 @@
 //! Identification by the cross-entropy method.
 
-use asid_core::identify::{Identified, Identifier};
+use asid_core::identify::{Assumptions, Identified, Identifier};
 use asid_core::registry;
+use asid_core::tracker::TrackerErrors;
 use asid_core::{Episode, Problem, Result};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -20,6 +21,8 @@ pub struct CemIdentifier {
     pub population: usize,
     /// Search distribution.
     pub cem: CemSettings,
+    /// What is constantly wrong with the trackers, which is integrated out.
+    pub tracker: TrackerErrors,
     /// Posterior after the search.
     pub sampling: SamplingSettings,
 }
@@ -33,6 +36,7 @@ impl Default for CemIdentifier {
                 elite_fraction: 0.15,
                 ..CemSettings::default()
             },
+            tracker: TrackerErrors::default(),
             sampling: SamplingSettings::default(),
         }
     }
@@ -47,6 +51,7 @@ asid_core::register!(IdentifierEntry {
         let identifier: CemIdentifier = registry::settings("identifier", s)?;
         identifier.budget().check()?;
         identifier.cem.check("identifier.cem")?;
+        identifier.tracker.check("identifier.tracker")?;
         identifier.sampling.check()?;
         Ok(Box::new(identifier))
     },
@@ -63,9 +68,19 @@ impl CemIdentifier {
 
 impl Identifier for CemIdentifier {
     fn identify(&self, problem: &Problem<'_>, episodes: &[Episode]) -> Result<Identified> {
-        search::identify(problem, episodes, self.budget(), &self.sampling, &self.cem)
+        search::identify(
+            problem,
+            episodes,
+            self.budget(),
+            self.tracker,
+            &self.sampling,
+            &self.cem,
+        )
     }
-    fn correlated(&self) -> bool {
-        self.sampling.correlated
+    fn assumes(&self) -> Assumptions {
+        Assumptions {
+            correlated: self.sampling.correlated,
+            tracker: self.tracker,
+        }
     }
 }

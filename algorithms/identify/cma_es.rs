@@ -1,7 +1,8 @@
 //! Identification by covariance matrix adaptation.
 
-use asid_core::identify::{Identified, Identifier};
+use asid_core::identify::{Assumptions, Identified, Identifier};
 use asid_core::registry;
+use asid_core::tracker::TrackerErrors;
 use asid_core::{Episode, Problem, Result};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -20,6 +21,8 @@ pub struct CmaEsIdentifier {
     pub population: usize,
     /// Search distribution.
     pub cma_es: CmaEsSettings,
+    /// What is constantly wrong with the trackers, which is integrated out.
+    pub tracker: TrackerErrors,
     /// Posterior after the search.
     pub sampling: SamplingSettings,
 }
@@ -32,6 +35,7 @@ impl Default for CmaEsIdentifier {
             iterations: 16,
             population: 20,
             cma_es: CmaEsSettings::default(),
+            tracker: TrackerErrors::default(),
             sampling: SamplingSettings::default(),
         }
     }
@@ -46,6 +50,7 @@ asid_core::register!(IdentifierEntry {
         let identifier: CmaEsIdentifier = registry::settings("identifier", s)?;
         identifier.budget().check()?;
         identifier.cma_es.check("identifier.cma_es")?;
+        identifier.tracker.check("identifier.tracker")?;
         identifier.sampling.check()?;
         Ok(Box::new(identifier))
     },
@@ -66,11 +71,15 @@ impl Identifier for CmaEsIdentifier {
             problem,
             episodes,
             self.budget(),
+            self.tracker,
             &self.sampling,
             &self.cma_es,
         )
     }
-    fn correlated(&self) -> bool {
-        self.sampling.correlated
+    fn assumes(&self) -> Assumptions {
+        Assumptions {
+            correlated: self.sampling.correlated,
+            tracker: self.tracker,
+        }
     }
 }

@@ -5,16 +5,18 @@
 //! leave it a deviation of the whole range of the prior (an information below 1/12 in prior deviations,
 //! since the range is the square root of 12 of them wide). Along it the posterior is the prior.
 
-use asid_core::identify::{Identified, Identifier, IterationSummary};
+use asid_core::identify::{Assumptions, Identified, Identifier, IterationSummary};
 use asid_core::posterior::Direction;
 use asid_core::registry;
 use asid_core::rng::Rng;
+use asid_core::tracker::TrackerErrors;
 use asid_core::{Episode, Error, Parameter, Posterior, Problem, Result};
 use nalgebra::{DMatrix, DVector};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::Likelihood;
+use super::beyond;
 use super::models;
 use super::sampling::{self, Evidence};
 use super::walk::{self, Walk};
@@ -34,15 +36,22 @@ const NAMED: f64 = 0.1;
 pub struct GaussNewtonIdentifier {
     /// Search and the fits at its end.
     pub gauss_newton: GaussNewtonSettings,
+    /// What is constantly wrong with the trackers, which is integrated out.
+    pub tracker: TrackerErrors,
     /// Samples of the posterior that are kept.
     pub samples: usize,
+    /// How far the search goes on past an end of a prior's range where the posterior piles up there, in
+    /// widths of the range; 0 keeps it inside.
+    pub beyond: f64,
 }
 
 impl Default for GaussNewtonIdentifier {
     fn default() -> Self {
         Self {
             gauss_newton: GaussNewtonSettings::default(),
+            tracker: TrackerErrors::default(),
             samples: 1000,
+            beyond: 1.0,
         }
     }
 }
@@ -55,19 +64,44 @@ asid_core::register!(IdentifierEntry {
     make: |s| {
         let identifier: GaussNewtonIdentifier = registry::settings("identifier", s)?;
         identifier.gauss_newton.check("identifier.gauss_newton")?;
+        identifier.tracker.check("identifier.tracker")?;
         let samples = identifier.samples;
         let key = "identifier.samples";
         require(samples > 1, key, samples as f64, "at least 2")?;
+        let beyond = identifier.beyond;
+        let key = "identifier.beyond";
+        require(
+            beyond >= 0.0 && beyond.is_finite(),
+            key,
+            beyond,
+            "at least 0",
+        )?;
         Ok(Box::new(identifier))
     },
 });
 
 impl Identifier for GaussNewtonIdentifier {
     fn identify(&self, problem: &Problem<'_>, episodes: &[Episode]) -> Result<Identified> {
+        beyond::identify(problem, self.beyond, |problem| {
+            self.within(problem, episodes)
+        })
+    }
+
+    fn assumes(&self) -> Assumptions {
+        Assumptions {
+            correlated: self.gauss_newton.correlated,
+            tracker: self.tracker,
+        }
+    }
+}
+
+impl GaussNewtonIdentifier {
+    /// Identifies inside the ranges of the problem's unknowns.
+    fn within(&self, problem: &Problem<'_>, episodes: &[Episode]) -> Result<Identified> {
         let starts = problem.task.exploration().start.len() * episodes.len();
         let settings = &self.gauss_newton;
         let size = settings.batch(problem.parameters.len() + starts);
-        let mut likelihood = Likelihood::new(problem, episodes, size)?;
+        let mut likelihood = Likelihood::new(problem, episodes, size)?.with_tracker(self.tracker);
         let models = models::all(problem.parameters)?;
         let units = (settings.iterations + settings.rounds) * models.len();
         problem.progress.begin("identify", units as u64);
@@ -84,12 +118,6 @@ impl Identifier for GaussNewtonIdentifier {
         models::average(problem.parameters, found, likelihood.present())
     }
 
-    fn correlated(&self) -> bool {
-        self.gauss_newton.correlated
-    }
-}
-
-impl GaussNewtonIdentifier {
     /// The fit of one model; `None` where nearly every simulation diverged.
     fn of_model(
         &self,

@@ -4,12 +4,14 @@
 //! are held at a value) in prior-scaled coordinates, then the start pose of each episode as an offset from what its
 //! first reading shows, in standard deviations of that reading. The episode's
 //! commands are replayed from there; what differs from the readings, divided by
-//! their noise, is the whitened residual.
+//! their noise, is the whitened residual. What is constantly wrong with a tracker is integrated out; see
+//! [`asid_readings::constant`].
 
 use asid_core::problem::Batch;
+use asid_core::tracker::TrackerErrors;
 use asid_core::{Episode, Error, Parameter, Problem, Result};
-use asid_readings::SignalSet;
 use asid_readings::replay::Replay;
+use asid_readings::{ConstantErrors, SignalSet};
 use rand_distr::{Distribution, StandardNormal};
 
 /// How far a start pose may lie from its first reading, in standard deviations of that reading.
@@ -21,6 +23,9 @@ const LOCATE_DRAWS: usize = 256;
 struct Observed {
     replay: Replay,
     readings: Vec<f64>,
+    /// Times of the rows, s, and which entries of a whitened difference are there.
+    time: Vec<f64>,
+    there: Vec<bool>,
     /// Start pose located by the first complete reading, and its deviation.
     start: Vec<f64>,
     start_std: Vec<f64>,
@@ -32,6 +37,7 @@ pub struct Likelihood<'a> {
     batch: Batch,
     size: usize,
     signals: SignalSet,
+    tracker: TrackerErrors,
     episodes: Vec<Observed>,
     predicted: Vec<f64>,
     present: usize,
@@ -85,13 +91,17 @@ impl<'a> Likelihood<'a> {
                     *q += d * d;
                 }
             }
+            let mut there = Vec::new();
             for row in readings.chunks_exact(width) {
                 signals.difference(row, row, &mut whitened);
-                present += whitened.iter().filter(|x| x.is_finite()).count();
+                there.extend(whitened.iter().map(|x| x.is_finite()));
             }
+            present += there.iter().filter(|x| **x).count();
             observed.push(Observed {
                 replay: Replay::new(layout, episode, &names)?,
                 readings,
+                time: episode.time.clone(),
+                there,
                 start,
                 start_std: squares
                     .iter()
@@ -102,6 +112,7 @@ impl<'a> Likelihood<'a> {
         Ok(Self {
             batch: problem.batch(size)?,
             size,
+            tracker: TrackerErrors::NONE,
             signals,
             episodes: observed,
             predicted: Vec::new(),
@@ -109,6 +120,13 @@ impl<'a> Likelihood<'a> {
             fixed: vec![None; problem.parameters.len()],
             problem,
         })
+    }
+
+    /// The same with these constant errors of the trackers integrated out.
+    #[must_use]
+    pub fn with_tracker(mut self, tracker: TrackerErrors) -> Self {
+        self.tracker = tracker;
+        self
     }
 
     /// Largest population.
@@ -225,6 +243,10 @@ impl<'a> Likelihood<'a> {
                                 .map(|x| if x.is_finite() { *x } else { 0.0 }),
                         );
                     }
+                    let constant =
+                        ConstantErrors::at(self.tracker, &self.signals, &observed.time, predicted);
+                    let from = out.len() - rows * len;
+                    constant.whiten(&observed.there, &mut out[from..]);
                 }
             }
         }

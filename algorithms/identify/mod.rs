@@ -6,6 +6,7 @@
 //! the spread of an elite, which measures only how far a search has converged.
 
 pub mod articulation;
+pub mod beyond;
 pub mod cem;
 pub mod cma_es;
 pub mod emulator;

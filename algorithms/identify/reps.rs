@@ -1,7 +1,8 @@
 //! Identification by relative entropy policy search over the simulator's parameters.
 
-use asid_core::identify::{Identified, Identifier};
+use asid_core::identify::{Assumptions, Identified, Identifier};
 use asid_core::registry;
+use asid_core::tracker::TrackerErrors;
 use asid_core::{Episode, Problem, Result};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -20,6 +21,8 @@ pub struct RepsIdentifier {
     pub population: usize,
     /// Step of the search; the reward is the log-likelihood.
     pub reps: RepsSettings,
+    /// What is constantly wrong with the trackers, which is integrated out.
+    pub tracker: TrackerErrors,
     /// Posterior after the search.
     pub sampling: SamplingSettings,
 }
@@ -33,6 +36,7 @@ impl Default for RepsIdentifier {
                 epsilon: 1.5,
                 min_eta: 1.0,
             },
+            tracker: TrackerErrors::default(),
             sampling: SamplingSettings::default(),
         }
     }
@@ -47,6 +51,7 @@ asid_core::register!(IdentifierEntry {
         let identifier: RepsIdentifier = registry::settings("identifier", s)?;
         identifier.budget().check()?;
         identifier.reps.check("identifier.reps")?;
+        identifier.tracker.check("identifier.tracker")?;
         identifier.sampling.check()?;
         Ok(Box::new(identifier))
     },
@@ -63,9 +68,19 @@ impl RepsIdentifier {
 
 impl Identifier for RepsIdentifier {
     fn identify(&self, problem: &Problem<'_>, episodes: &[Episode]) -> Result<Identified> {
-        search::identify(problem, episodes, self.budget(), &self.sampling, &self.reps)
+        search::identify(
+            problem,
+            episodes,
+            self.budget(),
+            self.tracker,
+            &self.sampling,
+            &self.reps,
+        )
     }
-    fn correlated(&self) -> bool {
-        self.sampling.correlated
+    fn assumes(&self) -> Assumptions {
+        Assumptions {
+            correlated: self.sampling.correlated,
+            tracker: self.tracker,
+        }
     }
 }

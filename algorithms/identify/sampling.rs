@@ -31,6 +31,9 @@ pub struct SamplingSettings {
     pub samples: usize,
     /// Whether readings are weighed by how roughness runs along the episode, or by its size alone.
     pub correlated: bool,
+    /// How far the search goes on past an end of a prior's range where the posterior piles up there, in
+    /// widths of the range; 0 keeps it inside.
+    pub beyond: f64,
 }
 
 impl Default for SamplingSettings {
@@ -41,6 +44,7 @@ impl Default for SamplingSettings {
             widen: 2.0,
             samples: 1000,
             correlated: false,
+            beyond: 1.0,
         }
     }
 }
@@ -55,6 +59,7 @@ impl SamplingSettings {
             draws,
             widen,
             samples,
+            beyond,
             ..
         } = *self;
         require(
@@ -69,7 +74,13 @@ impl SamplingSettings {
             samples as f64,
             "at least 2",
         )?;
-        require(widen > 0.0, "identifier.sampling.widen", widen, "above 0")
+        require(widen > 0.0, "identifier.sampling.widen", widen, "above 0")?;
+        require(
+            beyond >= 0.0 && beyond.is_finite(),
+            "identifier.sampling.beyond",
+            beyond,
+            "at least 0",
+        )
     }
 
     /// Draws a round for a search space of `n` entries.

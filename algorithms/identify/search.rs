@@ -2,9 +2,11 @@
 //! the losses, and turn all that was simulated into a posterior.
 
 use asid_core::identify::Identified;
+use asid_core::tracker::TrackerErrors;
 use asid_core::{Episode, Error, Problem, Result};
 
 use super::Likelihood;
+use super::beyond;
 use super::models;
 use super::sampling::{self, Samples, SamplingSettings};
 use crate::optimise::{Search, UpdateRule};
@@ -40,7 +42,8 @@ impl Budget {
     }
 }
 
-/// Searches by a rule from the whole prior on, then samples the posterior.
+/// Searches by a rule from the whole prior on, then samples the posterior; [`beyond`] the prior's
+/// ranges where it piles up at their ends.
 ///
 /// Binary unknowns make several models, which are searched one by one and compared; see
 /// [`super::models`].
@@ -51,11 +54,26 @@ pub fn identify<R: UpdateRule>(
     problem: &Problem<'_>,
     episodes: &[Episode],
     budget: Budget,
+    tracker: TrackerErrors,
+    settings: &SamplingSettings,
+    rule: &R,
+) -> Result<Identified> {
+    beyond::identify(problem, settings.beyond, |problem| {
+        within(problem, episodes, budget, tracker, settings, rule)
+    })
+}
+
+/// The same inside the ranges of the problem's unknowns.
+fn within<R: UpdateRule>(
+    problem: &Problem<'_>,
+    episodes: &[Episode],
+    budget: Budget,
+    tracker: TrackerErrors,
     settings: &SamplingSettings,
     rule: &R,
 ) -> Result<Identified> {
     let size = budget.population.max(settings.draws);
-    let mut likelihood = Likelihood::new(problem, episodes, size)?;
+    let mut likelihood = Likelihood::new(problem, episodes, size)?.with_tracker(tracker);
     let models = models::all(problem.parameters)?;
     let total = (budget.iterations + settings.rounds) * models.len();
     problem.progress.begin("identify", total as u64);

@@ -7,6 +7,7 @@ use crate::error::Result;
 use crate::explore::Explorer;
 use crate::posterior::Posterior;
 use crate::problem::Problem;
+use crate::tracker::TrackerErrors;
 
 /// The population of a search after one iteration, for pictures.
 #[derive(Clone, Debug, PartialEq)]
@@ -34,6 +35,25 @@ pub struct Identified {
     pub roughness: f64,
 }
 
+/// What an identifier assumes of the readings.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Assumptions {
+    /// Whether readings are weighed by how the luck of contact runs along an episode, or by its size
+    /// alone.
+    pub correlated: bool,
+    /// What is constantly wrong with the trackers over an episode, and integrated out.
+    pub tracker: TrackerErrors,
+}
+
+impl Default for Assumptions {
+    fn default() -> Self {
+        Self {
+            correlated: false,
+            tracker: TrackerErrors::NONE,
+        }
+    }
+}
+
 /// Turns real episodes into a posterior over the problem's parameters.
 pub trait Identifier: Send + Sync {
     /// Fits the simulator to the episodes.
@@ -42,10 +62,9 @@ pub trait Identifier: Send + Sync {
     /// When the engine fails, every simulation diverges, or the user interrupts.
     fn identify(&self, problem: &Problem<'_>, episodes: &[Episode]) -> Result<Identified>;
 
-    /// Whether it weighs readings by how the luck of contact runs along an episode, or by its size
-    /// alone: what an episode is expected to tell is computed alike.
-    fn correlated(&self) -> bool {
-        false
+    /// What it assumes of the readings: what an episode is expected to tell is computed alike.
+    fn assumes(&self) -> Assumptions {
+        Assumptions::default()
     }
 
     /// Learns to identify from episodes of `explorer` at truths drawn from the prior, and saves

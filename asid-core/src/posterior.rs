@@ -20,13 +20,27 @@ pub struct Marginal {
     /// Central 95 % interval.
     pub interval95: [f64; 2],
     /// The end of the prior's range at which the posterior piles up, where it does: the true
-    /// value may lie beyond, and then no interval inside the range holds it.
+    /// value may lie beyond, and no interval inside the range holds it then.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub at_edge: Option<Edge>,
+    /// What was searched in the end, where the search went on past that end: the posterior is inside of
+    /// this range.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub searched: Option<[f64; 2]>,
     /// Whether the data do not see it (see [`Posterior::unseen`]): what is believed of it is the
     /// prior, and the deviation that the data alone leave is infinite.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub unidentified: bool,
+}
+
+impl Marginal {
+    /// Whether the interval touches an end of this range, so that values beyond would do as well.
+    #[must_use]
+    pub fn reaches_an_end_of(&self, range: [f64; 2]) -> bool {
+        let [low, high] = self.interval95;
+        let touch = TOUCH * (high - low);
+        low - range[0] <= touch || range[1] - high <= touch
+    }
 }
 
 /// An end of a prior's range.
@@ -150,6 +164,7 @@ impl Posterior {
                     at_edge: (!p.is_binary())
                         .then(|| values.iter().map(|x| p.to_unit(*x)).collect::<Vec<_>>())
                         .and_then(|positions| edge(&positions, &weights)),
+                    searched: None,
                     unidentified: false,
                 }
             })

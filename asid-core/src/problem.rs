@@ -13,6 +13,7 @@ use crate::simulator::{BatchConfig, Simulator};
 use crate::task::Task;
 
 /// A task on an engine, with the unknowns to identify.
+#[derive(Clone)]
 pub struct Problem<'a> {
     /// The task.
     pub task: &'a dyn Task,

@@ -6,7 +6,7 @@ use std::path::Path;
 use asid_core::episode::Episode;
 use asid_core::error::Result;
 use asid_core::explore::{CurvePoint, Explored, Explorer, Policy};
-use asid_core::identify::{Identified, Identifier};
+use asid_core::identify::{Assumptions, Identified, Identifier};
 use asid_core::posterior::Posterior;
 use asid_core::problem::Problem;
 use asid_core::simulator::StepView;
@@ -122,8 +122,8 @@ impl Identifier for Across<Box<dyn Identifier>> {
         Ok(found)
     }
 
-    fn correlated(&self) -> bool {
-        self.run(|identifier| identifier.correlated())
+    fn assumes(&self) -> Assumptions {
+        self.run(|identifier| identifier.assumes())
     }
 
     fn train(&self, problem: &Problem<'_>, explorer: &dyn Explorer, file: &Path) -> Result<bool> {

@@ -36,6 +36,9 @@ pub struct ParameterResult {
     /// End of the prior's range that the posterior piles up at.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub at_edge: Option<Edge>,
+    /// What was searched in the end, where the search went on past that end.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub searched: Option<[f64; 2]>,
     /// The data do not see it: what is said of it is the prior.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub unidentified: bool,
@@ -59,6 +62,7 @@ impl ParameterResult {
             std: (!marginal.unidentified).then_some(marginal.std),
             interval95: marginal.interval95,
             at_edge: marginal.at_edge,
+            searched: marginal.searched,
             unidentified: marginal.unidentified,
         }
     }
@@ -232,13 +236,24 @@ pub fn caveats(parameters: &[Parameter], belief: &Posterior) -> Vec<String> {
         let end = m.at_edge?;
         let [low, high] = p.range.map(figure);
         let (unit, space) = (&p.unit, if p.unit.is_empty() { "" } else { " " });
-        Some(format!(
-            "{name} piles up at the {end} end of its range, {low} to {high}{space}{unit}: its true value may lie \
-             beyond, where no interval of this prior reaches; if that is possible, widen it with \
-             --set parameter.{name}.range=[LOW,HIGH]",
-            name = p.name,
-            end = end.name(),
-        ))
+        let (name, end) = (&p.name, end.name());
+        let piles = format!("{name} piles up at the {end} end of its range, {low} to {high}{space}{unit}");
+        let widen = format!("widen it with --set parameter.{name}.range=[LOW,HIGH]");
+        Some(match m.searched {
+            None => format!(
+                "{piles}: its true value may lie beyond, where no interval of this prior reaches; if that is \
+                 possible, {widen}"
+            ),
+            Some(searched) => {
+                let [low, high] = searched.map(figure);
+                let inside = if m.reaches_an_end_of(searched) {
+                    format!(", and its interval ends there; if more is possible, {widen}")
+                } else {
+                    String::new()
+                };
+                format!("{piles}: the search went on, from {low} to {high}{space}{unit}{inside}")
+            }
+        })
     });
     let unseen = belief.unseen.iter().map(|direction| {
         let parts: Vec<String> = direction

@@ -137,7 +137,7 @@ fn told(request: &Request<'_>, wanted: &Wanted) -> Result<Episode> {
     let found = identifier.identify(&problem, std::slice::from_ref(&real.episode))?;
     // As a run has it.
     let expected = ExpectedSettings {
-        correlated: identifier.correlated(),
+        assumes: identifier.assumes(),
         ..config.expected.settings()
     };
     let information = episode_information_as(
