@@ -2,11 +2,11 @@
 //!
 //! - [`replay`] plays a log's commands and says what the sensors would have read at each of its rows.
 //! - [`SignalSet`] whitens the difference of two readings.
-//! - [`constant`] whitens by what is constantly wrong with a tracker as well.
+//! - [`systematic`] whitens by the systematic errors of a tracker as well.
 
-pub mod constant;
 mod difference;
 pub mod replay;
+pub mod systematic;
 
-pub use constant::ConstantErrors;
 pub use difference::SignalSet;
+pub use systematic::SystematicErrors;

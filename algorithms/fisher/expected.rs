@@ -16,8 +16,8 @@ use asid_core::layout::Recording;
 use asid_core::parameter::Parameter;
 use asid_core::problem::{Batch, Problem, substeps};
 use asid_core::simulator::{Control, Rollout};
-use asid_core::tracker::TrackerErrors;
-use asid_readings::{ConstantErrors, SignalSet};
+use asid_core::tracker::TrackerPrior;
+use asid_readings::{SignalSet, SystematicErrors};
 
 /// How expected deviations are computed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -205,13 +205,13 @@ impl<'a> Episode<'a> {
         (1 + frames) * self.signals.whitened_len()
     }
 
-    /// Simulates the middle and `points`, and fits what they differ by. The middle's readings say how constant
+    /// Simulates the middle and `points`, and fits what they differ by. The middle's readings say how systematic
     /// errors of the trackers would show.
     fn fit(
         &mut self,
         factor: &DMatrix<f64>,
         points: &[Vec<f64>],
-        tracker: TrackerErrors,
+        tracker: TrackerPrior,
     ) -> Result<Option<LocalFit>> {
         let protocol = self.problem.task.exploration();
         let d = self.sought.len();
@@ -257,7 +257,7 @@ impl<'a> Episode<'a> {
         let time: Vec<f64> = (0..=frames)
             .map(|k| k as f64 * protocol.frame_period)
             .collect();
-        let constant = ConstantErrors::at(tracker, &self.signals, &time, &all);
+        let systematic = SystematicErrors::at(tracker, &self.signals, &time, &all);
         let there = vec![true; (1 + frames) * len];
         let mut of = |s: usize| -> Option<Vec<f64>> {
             let mut out = Vec::with_capacity((1 + frames) * len);
@@ -265,7 +265,7 @@ impl<'a> Episode<'a> {
                 self.signals.difference(a, b, &mut whitened);
                 out.extend_from_slice(&whitened);
             }
-            constant.whiten(&there, &mut out);
+            systematic.whiten(&there, &mut out);
             out.iter().all(|x| x.is_finite()).then_some(out)
         };
         let Some(middle) = of(0) else { return Ok(None) };

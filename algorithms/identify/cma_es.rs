@@ -2,7 +2,7 @@
 
 use asid_core::identify::{Assumptions, Identified, Identifier};
 use asid_core::registry;
-use asid_core::tracker::TrackerErrors;
+use asid_core::tracker::TrackerPrior;
 use asid_core::{Episode, Problem, Result};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -21,8 +21,8 @@ pub struct CmaEsIdentifier {
     pub population: usize,
     /// Search distribution.
     pub cma_es: CmaEsSettings,
-    /// What is constantly wrong with the trackers, which is integrated out.
-    pub tracker: TrackerErrors,
+    /// Deviations of the trackers' systematic errors, which are integrated out.
+    pub tracker: TrackerPrior,
     /// Posterior after the search.
     pub sampling: SamplingSettings,
 }
@@ -35,7 +35,7 @@ impl Default for CmaEsIdentifier {
             iterations: 16,
             population: 20,
             cma_es: CmaEsSettings::default(),
-            tracker: TrackerErrors::default(),
+            tracker: TrackerPrior::default(),
             sampling: SamplingSettings::default(),
         }
     }

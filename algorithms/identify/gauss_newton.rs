@@ -9,7 +9,7 @@ use asid_core::identify::{Assumptions, Identified, Identifier, IterationSummary}
 use asid_core::posterior::Direction;
 use asid_core::registry;
 use asid_core::rng::Rng;
-use asid_core::tracker::TrackerErrors;
+use asid_core::tracker::TrackerPrior;
 use asid_core::{Episode, Error, Parameter, Posterior, Problem, Result};
 use nalgebra::{DMatrix, DVector};
 use schemars::JsonSchema;
@@ -36,8 +36,8 @@ const NAMED: f64 = 0.1;
 pub struct GaussNewtonIdentifier {
     /// Search and the fits at its end.
     pub gauss_newton: GaussNewtonSettings,
-    /// What is constantly wrong with the trackers, which is integrated out.
-    pub tracker: TrackerErrors,
+    /// Deviations of the trackers' systematic errors, which are integrated out.
+    pub tracker: TrackerPrior,
     /// Samples of the posterior that are kept.
     pub samples: usize,
     /// How far the search goes on past an end of a prior's range where the posterior piles up there, in
@@ -49,7 +49,7 @@ impl Default for GaussNewtonIdentifier {
     fn default() -> Self {
         Self {
             gauss_newton: GaussNewtonSettings::default(),
-            tracker: TrackerErrors::default(),
+            tracker: TrackerPrior::default(),
             samples: 1000,
             beyond: 1.0,
         }

@@ -4,14 +4,14 @@
 //! are held at a value) in prior-scaled coordinates, then the start pose of each episode as an offset from what its
 //! first reading shows, in standard deviations of that reading. The episode's
 //! commands are replayed from there; what differs from the readings, divided by
-//! their noise, is the whitened residual. What is constantly wrong with a tracker is integrated out; see
-//! [`asid_readings::constant`].
+//! their noise, is the whitened residual. Systematic errors of the trackers are integrated out; see
+//! [`asid_readings::systematic`].
 
 use asid_core::problem::Batch;
-use asid_core::tracker::TrackerErrors;
+use asid_core::tracker::TrackerPrior;
 use asid_core::{Episode, Error, Parameter, Problem, Result};
 use asid_readings::replay::Replay;
-use asid_readings::{ConstantErrors, SignalSet};
+use asid_readings::{SignalSet, SystematicErrors};
 use rand_distr::{Distribution, StandardNormal};
 
 /// How far a start pose may lie from its first reading, in standard deviations of that reading.
@@ -37,7 +37,7 @@ pub struct Likelihood<'a> {
     batch: Batch,
     size: usize,
     signals: SignalSet,
-    tracker: TrackerErrors,
+    tracker: TrackerPrior,
     episodes: Vec<Observed>,
     predicted: Vec<f64>,
     present: usize,
@@ -112,7 +112,7 @@ impl<'a> Likelihood<'a> {
         Ok(Self {
             batch: problem.batch(size)?,
             size,
-            tracker: TrackerErrors::NONE,
+            tracker: TrackerPrior::NONE,
             signals,
             episodes: observed,
             predicted: Vec::new(),
@@ -122,9 +122,9 @@ impl<'a> Likelihood<'a> {
         })
     }
 
-    /// The same with these constant errors of the trackers integrated out.
+    /// The same with systematic errors of the trackers integrated out.
     #[must_use]
-    pub fn with_tracker(mut self, tracker: TrackerErrors) -> Self {
+    pub fn with_tracker(mut self, tracker: TrackerPrior) -> Self {
         self.tracker = tracker;
         self
     }
@@ -243,10 +243,14 @@ impl<'a> Likelihood<'a> {
                                 .map(|x| if x.is_finite() { *x } else { 0.0 }),
                         );
                     }
-                    let constant =
-                        ConstantErrors::at(self.tracker, &self.signals, &observed.time, predicted);
+                    let systematic = SystematicErrors::at(
+                        self.tracker,
+                        &self.signals,
+                        &observed.time,
+                        predicted,
+                    );
                     let from = out.len() - rows * len;
-                    constant.whiten(&observed.there, &mut out[from..]);
+                    systematic.whiten(&observed.there, &mut out[from..]);
                 }
             }
         }

@@ -2,7 +2,7 @@
 //! the losses, and turn all that was simulated into a posterior.
 
 use asid_core::identify::Identified;
-use asid_core::tracker::TrackerErrors;
+use asid_core::tracker::TrackerPrior;
 use asid_core::{Episode, Error, Problem, Result};
 
 use super::Likelihood;
@@ -54,7 +54,7 @@ pub fn identify<R: UpdateRule>(
     problem: &Problem<'_>,
     episodes: &[Episode],
     budget: Budget,
-    tracker: TrackerErrors,
+    tracker: TrackerPrior,
     settings: &SamplingSettings,
     rule: &R,
 ) -> Result<Identified> {
@@ -68,7 +68,7 @@ fn within<R: UpdateRule>(
     problem: &Problem<'_>,
     episodes: &[Episode],
     budget: Budget,
-    tracker: TrackerErrors,
+    tracker: TrackerPrior,
     settings: &SamplingSettings,
     rule: &R,
 ) -> Result<Identified> {

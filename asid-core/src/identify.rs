@@ -7,7 +7,7 @@ use crate::error::Result;
 use crate::explore::Explorer;
 use crate::posterior::Posterior;
 use crate::problem::Problem;
-use crate::tracker::TrackerErrors;
+use crate::tracker::TrackerPrior;
 
 /// The population of a search after one iteration, for pictures.
 #[derive(Clone, Debug, PartialEq)]
@@ -41,15 +41,15 @@ pub struct Assumptions {
     /// Whether readings are weighed by how the luck of contact runs along an episode, or by its size
     /// alone.
     pub correlated: bool,
-    /// What is constantly wrong with the trackers over an episode, and integrated out.
-    pub tracker: TrackerErrors,
+    /// Systematic errors of the trackers, which are integrated out.
+    pub tracker: TrackerPrior,
 }
 
 impl Default for Assumptions {
     fn default() -> Self {
         Self {
             correlated: false,
-            tracker: TrackerErrors::NONE,
+            tracker: TrackerPrior::NONE,
         }
     }
 }

@@ -1,4 +1,4 @@
-//! When the trackers read, and what is constantly wrong with them.
+//! When the trackers read, and what is systematically wrong with them.
 //!
 //! A camera is slower than the machine's own sensors.
 //!
@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use crate::error::{Error, Result};
 use crate::task::Task;
 
-/// Deviations of what is constantly wrong with the trackers over an episode; 0 where nothing is.
+/// Deviations of the trackers' systematic errors, which are the same for all readings of an episode; 0 where there are none.
 ///
 /// The defaults are what a laboratory has to reckon with: motion capture is 6 to 25 ms late from end to end
 /// (Qualisys at ETH Zurich; NIME 2021), of which drivers take out the part that they know, and its
@@ -19,7 +19,7 @@ use crate::task::Task;
 /// markers (estimates).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
-pub struct TrackerErrors {
+pub struct TrackerPrior {
     /// Age of a reading, s.
     pub latency: f64,
     /// Error of each coordinate of a tracked position, m.
@@ -28,7 +28,7 @@ pub struct TrackerErrors {
     pub rotation: f64,
 }
 
-impl Default for TrackerErrors {
+impl Default for TrackerPrior {
     fn default() -> Self {
         Self {
             latency: 0.01,
@@ -38,8 +38,8 @@ impl Default for TrackerErrors {
     }
 }
 
-impl TrackerErrors {
-    /// Trackers with which nothing is constantly wrong.
+impl TrackerPrior {
+    /// Trackers without systematic errors.
     pub const NONE: Self = Self {
         latency: 0.0,
         offset: 0.0,

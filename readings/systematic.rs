@@ -1,4 +1,4 @@
-//! What is constantly wrong with a tracker over an episode.
+//! Systematic errors of a tracker: what is wrong with all readings of an episode alike.
 //!
 //! A tracker is late by some milliseconds, and its frame is registered with the machine's to a millimetre or
 //! two. Neither averages out over an episode's readings, so a likelihood that knows of noise alone takes both for
@@ -9,22 +9,22 @@
 //! comes out are the innovations in their deviations. So the whitened residual of the first part of an episode
 //! is the first part of the whitened residual. No simulation is spent on any of it.
 
-use asid_core::tracker::TrackerErrors;
+use asid_core::tracker::TrackerPrior;
 use nalgebra::{DMatrix, DVector};
 
 use crate::SignalSet;
 
-/// Slopes of an episode's whitened readings by the constant errors of its trackers.
+/// Slopes of an episode's whitened readings by the systematic errors of its trackers.
 #[derive(Clone, Debug)]
-pub struct ConstantErrors {
+pub struct SystematicErrors {
     /// Errors x entries, in deviations of the errors.
     slopes: DMatrix<f64>,
 }
 
-impl ConstantErrors {
+impl SystematicErrors {
     /// Of predicted readings (`rows x width`) and their times (s).
     #[must_use]
-    pub fn at(errors: TrackerErrors, signals: &SignalSet, time: &[f64], predicted: &[f64]) -> Self {
+    pub fn at(errors: TrackerPrior, signals: &SignalSet, time: &[f64], predicted: &[f64]) -> Self {
         let (width, len) = (signals.width(), signals.whitened_len());
         let rows = predicted.len() / width.max(1);
         let row = |k: usize| &predicted[k * width..(k + 1) * width];
@@ -66,7 +66,7 @@ impl ConstantErrors {
         Self { slopes }
     }
 
-    /// Whitens a residual (`rows x whitened_len`, in deviations of the noise) by noise and constant errors
+    /// Whitens a residual (`rows x whitened_len`, in deviations of the noise) by noise and systematic errors
     /// together; where `present` is false there is no reading, and the entry stays as it is.
     pub fn whiten(&self, present: &[bool], residual: &mut [f64]) {
         let n = self.slopes.nrows();
@@ -95,8 +95,8 @@ mod tests {
     use super::*;
 
     /// Three readings, two errors.
-    fn errors() -> ConstantErrors {
-        ConstantErrors {
+    fn errors() -> SystematicErrors {
+        SystematicErrors {
             slopes: DMatrix::from_row_slice(2, 3, &[1.0, 2.0, 0.0, 0.5, -1.0, 3.0]),
         }
     }
@@ -118,7 +118,7 @@ mod tests {
         let (mut with, mut without) = ([1.0, 0.0, 0.7], [1.0, 0.7]);
         errors().whiten(&[true, false, true], &mut with);
         let slopes = errors().slopes.select_columns(&[0, 2]);
-        ConstantErrors { slopes }.whiten(&[true; 2], &mut without);
+        SystematicErrors { slopes }.whiten(&[true; 2], &mut without);
         assert_eq!([with[0], with[2]], without);
         assert_eq!(with[1], 0.0);
     }
