@@ -135,6 +135,8 @@ class Unknown(Record):
     unit: str
     at_edge: Edge | None = None
     """End of the prior's range that the posterior piles up at."""
+    searched: Array | None = None
+    """What was searched in the end, where the search went on past that end."""
     truth: float | None = None
     unidentified: bool = False
     """The data do not see it: what is said of it is the prior."""
