@@ -139,6 +139,10 @@ fn a_late_tracker_does_not_make_the_mass_certain_and_wrong() {
             let mut settings = (entry.defaults)();
             let prior = toml::Table::from_iter([("latency".to_owned(), prior.into())]);
             settings.insert("tracker".into(), toml::Value::Table(prior));
+            // What an unaware one leaves no other search would mend.
+            if settings.contains_key("restarts") {
+                settings.insert("restarts".into(), 0.into());
+            }
             let (found, _) = identified_late((name, settings), 4.0, mass, 2, latency);
             let m = &found.posterior.marginals[0];
             ((m.estimate - mass).abs() / m.std, m.std)
@@ -147,6 +151,23 @@ fn a_late_tracker_does_not_make_the_mass_certain_and_wrong() {
         assert!(unaware.0 > 5.0, "{name}: {unaware:?}");
         assert!(aware.0 < 3.0 && aware.1 < 0.3, "{name}: {aware:?}");
     }
+}
+
+#[test]
+fn a_search_begins_anew_where_its_fit_misses_the_readings_and_not_where_it_explains_them() {
+    let entry = find::<IdentifierEntry>("reps").unwrap();
+    let rounds = |restarts: i64, latency: f64| {
+        let mut settings = (entry.defaults)();
+        let none = toml::Table::from_iter([("latency".to_owned(), 0.0.into())]);
+        settings.insert("tracker".into(), toml::Value::Table(none));
+        settings.insert("restarts".into(), restarts.into());
+        let (found, _) = identified_late(("reps", settings), 4.0, 1.1, 2, latency);
+        (found.residual, found.iterations.len())
+    };
+    let (once, twice) = (rounds(0, 0.015), rounds(1, 0.015));
+    assert!(once.0 > 1.5 && twice.0 <= once.0, "{once:?} {twice:?}");
+    assert_eq!(twice.1, 2 * once.1);
+    assert_eq!(rounds(1, 0.0).1, once.1);
 }
 
 #[test]

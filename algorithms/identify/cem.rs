@@ -19,6 +19,9 @@ pub struct CemIdentifier {
     pub iterations: usize,
     /// Simulations a refit.
     pub population: usize,
+    /// Searches anew at most, each of twice the population of the one before, while readings are missed by more than
+    /// noise and a model's usual errors explain.
+    pub restarts: usize,
     /// Search distribution.
     pub cem: CemSettings,
     /// Deviations of the trackers' systematic errors, which are integrated out.
@@ -32,6 +35,7 @@ impl Default for CemIdentifier {
         Self {
             iterations: 5,
             population: 64,
+            restarts: 2,
             cem: CemSettings {
                 elite_fraction: 0.15,
                 ..CemSettings::default()
@@ -62,6 +66,7 @@ impl CemIdentifier {
         Budget {
             iterations: self.iterations,
             population: self.population,
+            restarts: self.restarts,
         }
     }
 }

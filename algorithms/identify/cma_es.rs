@@ -19,6 +19,9 @@ pub struct CmaEsIdentifier {
     pub iterations: usize,
     /// Simulations a refit.
     pub population: usize,
+    /// Searches anew at most, each of twice the population of the one before, while readings are missed by more than
+    /// noise and a model's usual errors explain.
+    pub restarts: usize,
     /// Search distribution.
     pub cma_es: CmaEsSettings,
     /// Deviations of the trackers' systematic errors, which are integrated out.
@@ -34,6 +37,7 @@ impl Default for CmaEsIdentifier {
             // is learned over refits, where theirs is that of one.
             iterations: 16,
             population: 20,
+            restarts: 2,
             cma_es: CmaEsSettings::default(),
             tracker: TrackerPrior::default(),
             sampling: SamplingSettings::default(),
@@ -61,6 +65,7 @@ impl CmaEsIdentifier {
         Budget {
             iterations: self.iterations,
             population: self.population,
+            restarts: self.restarts,
         }
     }
 }

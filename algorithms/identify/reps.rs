@@ -19,6 +19,9 @@ pub struct RepsIdentifier {
     pub iterations: usize,
     /// Simulations a refit.
     pub population: usize,
+    /// Searches anew at most, each of twice the population of the one before, while readings are missed by more than
+    /// noise and a model's usual errors explain.
+    pub restarts: usize,
     /// Step of the search; the reward is the log-likelihood.
     pub reps: RepsSettings,
     /// Deviations of the trackers' systematic errors, which are integrated out.
@@ -32,6 +35,7 @@ impl Default for RepsIdentifier {
         Self {
             iterations: 5,
             population: 64,
+            restarts: 2,
             reps: RepsSettings {
                 epsilon: 1.5,
                 min_eta: 1.0,
@@ -62,6 +66,7 @@ impl RepsIdentifier {
         Budget {
             iterations: self.iterations,
             population: self.population,
+            restarts: self.restarts,
         }
     }
 }
