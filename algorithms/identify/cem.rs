@@ -35,7 +35,7 @@ impl Default for CemIdentifier {
         Self {
             iterations: 5,
             population: 64,
-            restarts: 2,
+            restarts: 1,
             cem: CemSettings {
                 elite_fraction: 0.15,
                 ..CemSettings::default()

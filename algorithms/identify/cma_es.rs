@@ -37,7 +37,7 @@ impl Default for CmaEsIdentifier {
             // is learned over refits, where theirs is that of one.
             iterations: 16,
             population: 20,
-            restarts: 2,
+            restarts: 1,
             cma_es: CmaEsSettings::default(),
             tracker: TrackerPrior::default(),
             sampling: SamplingSettings::default(),

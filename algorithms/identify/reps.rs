@@ -35,7 +35,7 @@ impl Default for RepsIdentifier {
         Self {
             iterations: 5,
             population: 64,
-            restarts: 2,
+            restarts: 1,
             reps: RepsSettings {
                 epsilon: 1.5,
                 min_eta: 1.0,
