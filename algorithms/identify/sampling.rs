@@ -17,6 +17,13 @@ use super::Likelihood;
 use super::emulator::{Emulator, REACH, features_len};
 use crate::optimise::{Gaussian, require};
 
+/// Deviations of a region, of the [`REACH`] that is looked over, beyond which a posterior's mean says that the likelihood is
+/// better still outside: its width there is that of a tail which the region cuts.
+const OUTSIDE: f64 = 2.0;
+
+/// Rounds at most, in those of the settings: a region that moves gives its round for it.
+const PATIENCE: usize = 3;
+
 /// How the posterior is sampled after the search.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
@@ -193,7 +200,10 @@ pub fn posterior(
         .elite(2 * n + 4, &low, &high)?
         .widened(settings.widen);
     let mut found: Option<(Emulator, Vec<Vec<f64>>)> = None;
-    for _ in 0..settings.rounds.max(1) {
+    let rounds = settings.rounds.max(1);
+    let (mut narrowed, mut round) = (0, 0);
+    while narrowed < rounds && round < PATIENCE * rounds {
+        round += 1;
         let points: Vec<Vec<f64>> = (0..draws).map(|_| region.sample(rng)).collect();
         let residuals = likelihood.residuals(&points)?;
         samples.add(&points, residuals);
@@ -219,10 +229,19 @@ pub fn posterior(
         .ok_or_else(too_few)?;
         let drawn = emulator.sample(&low, &high, settings.samples.max(2), rng);
         iterations.push(summary(likelihood, &drawn, samples.best_loss()));
-        region = Gaussian::fit(&drawn, &vec![1.0; drawn.len()], &vec![1e-3; n], &low, &high)?
-            .widened(settings.widen);
+        let posterior =
+            Gaussian::fit(&drawn, &vec![1.0; drawn.len()], &vec![1e-3; n], &low, &high)?;
+        let off = region.standardise(posterior.mean());
+        region = if off.iter().any(|u| u.abs() > OUTSIDE) {
+            region.moved_to(posterior.mean())
+        } else {
+            narrowed += 1;
+            posterior.widened(settings.widen)
+        };
         found = Some((emulator, drawn));
-        problem.progress.advance(1);
+        if round <= rounds {
+            problem.progress.advance(1);
+        }
     }
     let (emulator, drawn) = found.ok_or_else(too_few)?;
     let best = emulator.best();

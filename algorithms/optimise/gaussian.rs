@@ -137,6 +137,15 @@ impl Gaussian {
         self.mean.as_slice()
     }
 
+    /// The same distribution about another mean.
+    #[must_use]
+    pub fn moved_to(&self, mean: &[f64]) -> Self {
+        Self {
+            mean: DVector::from_column_slice(mean),
+            ..self.clone()
+        }
+    }
+
     /// The same distribution with its deviations multiplied.
     #[must_use]
     pub fn widened(&self, factor: f64) -> Self {
