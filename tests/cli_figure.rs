@@ -166,7 +166,7 @@ fn without_libtorch_the_figure_of_learned_models_says_so() {
     let place = Workplace::new();
     let output = figure(&place, "learned-model", &[], "a");
     let text = said(&output);
-    assert_eq!(output.status.code(), Some(1));
+    assert_eq!(output.status.code(), Some(2));
     assert!(
         text.contains("libtorch") && text.lines().count() == 1,
         "{text}"
