@@ -8,7 +8,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::sampling::SamplingSettings;
-use super::search::{self, Budget};
+use super::search::{Budget, Course};
 use crate::optimise::CemSettings;
 
 /// Settings of identification by CEM.
@@ -53,39 +53,33 @@ asid_core::register!(IdentifierEntry {
     meanings: registry::meanings::<CemIdentifier>,
     make: |s| {
         let identifier: CemIdentifier = registry::settings("identifier", s)?;
-        identifier.budget().check()?;
+        identifier.course().check()?;
         identifier.cem.check("identifier.cem")?;
-        identifier.tracker.check("identifier.tracker")?;
-        identifier.sampling.check()?;
         Ok(Box::new(identifier))
     },
 });
 
 impl CemIdentifier {
-    fn budget(&self) -> Budget {
-        Budget {
+    fn course(&self) -> Course<'_, CemSettings> {
+        let budget = Budget {
             iterations: self.iterations,
             population: self.population,
             restarts: self.restarts,
+        };
+        Course {
+            budget,
+            tracker: self.tracker,
+            sampling: &self.sampling,
+            rule: &self.cem,
         }
     }
 }
 
 impl Identifier for CemIdentifier {
     fn identify(&self, problem: &Problem<'_>, episodes: &[Episode]) -> Result<Identified> {
-        search::identify(
-            problem,
-            episodes,
-            self.budget(),
-            self.tracker,
-            &self.sampling,
-            &self.cem,
-        )
+        self.course().identify(problem, episodes)
     }
     fn assumes(&self) -> Assumptions {
-        Assumptions {
-            correlated: self.sampling.correlated,
-            tracker: self.tracker,
-        }
+        self.course().assumes()
     }
 }

@@ -8,7 +8,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::sampling::SamplingSettings;
-use super::search::{self, Budget};
+use super::search::{Budget, Course};
 use crate::optimise::CmaEsSettings;
 
 /// Settings of identification by CMA-ES.
@@ -52,39 +52,33 @@ asid_core::register!(IdentifierEntry {
     meanings: registry::meanings::<CmaEsIdentifier>,
     make: |s| {
         let identifier: CmaEsIdentifier = registry::settings("identifier", s)?;
-        identifier.budget().check()?;
+        identifier.course().check()?;
         identifier.cma_es.check("identifier.cma_es")?;
-        identifier.tracker.check("identifier.tracker")?;
-        identifier.sampling.check()?;
         Ok(Box::new(identifier))
     },
 });
 
 impl CmaEsIdentifier {
-    fn budget(&self) -> Budget {
-        Budget {
+    fn course(&self) -> Course<'_, CmaEsSettings> {
+        let budget = Budget {
             iterations: self.iterations,
             population: self.population,
             restarts: self.restarts,
+        };
+        Course {
+            budget,
+            tracker: self.tracker,
+            sampling: &self.sampling,
+            rule: &self.cma_es,
         }
     }
 }
 
 impl Identifier for CmaEsIdentifier {
     fn identify(&self, problem: &Problem<'_>, episodes: &[Episode]) -> Result<Identified> {
-        search::identify(
-            problem,
-            episodes,
-            self.budget(),
-            self.tracker,
-            &self.sampling,
-            &self.cma_es,
-        )
+        self.course().identify(problem, episodes)
     }
     fn assumes(&self) -> Assumptions {
-        Assumptions {
-            correlated: self.sampling.correlated,
-            tracker: self.tracker,
-        }
+        self.course().assumes()
     }
 }
