@@ -2,7 +2,8 @@
 //!
 //! Intervals are those of least squares (Gauss), widened by how much more the fit leaves than the noise and by how alike
 //! neighbouring residuals are: many readings of one and the same error count once. Where the missing force was estimated they
-//! are no narrower than those of the fit that allows for it: what the model lacks leaves values as uncertain as it does there.
+//! are no narrower than those of the fit that allows for it: what the model lacks leaves values as uncertain as it does there. Nor are
+//! they narrower than the episodes disagree: what the model lacks often pulls one of them up and another one down.
 //!
 //! Two errors that no spread of residuals shows are added as squares. A model that is wrong makes fits that weigh the logs otherwise
 //! disagree (Hausman 1978): the distance of the value from the mean of the fit that allows for a missing force. And the engine's own
@@ -45,14 +46,38 @@ fn correlation(bench: &Bench, residuals: &[f64]) -> f64 {
     }
 }
 
+/// What the spread of residuals does not tell of the uncertainty of an explanation's values.
+struct Beyond<'m> {
+    /// How far the engine's own error moves each fitted value, in its unit; empty for nothing.
+    moved: &'m [f64],
+    /// Variance of each by how the episodes disagree.
+    by_episodes: Vec<f64>,
+}
+
+/// Variance of sums, of which each episode has given its part, one row an episode: of parts that are independent from one episode to
+/// the next it is their variance times their number (Liang and Zeger 1986, with episodes as clusters). 0 of a single episode.
+fn between_episodes(parts: &[Vec<f64>], values: usize) -> Vec<f64> {
+    let n = parts.len() as f64;
+    let of_value = |k: usize| {
+        let mean = parts.iter().map(|p| p[k]).sum::<f64>() / n;
+        let squares: f64 = parts.iter().map(|p| (p[k] - mean).powi(2)).sum();
+        if n > 1.0 {
+            n * squares / (n - 1.0)
+        } else {
+            0.0
+        }
+    };
+    (0..values).map(of_value).collect()
+}
+
 /// A value with its uncertainty.
-pub(super) struct Fitted {
-    pub(super) value: f64,
+struct Fitted {
+    value: f64,
     /// Infinite where it does not show in the readings.
-    pub(super) deviation: f64,
-    pub(super) interval95: [f64; 2],
+    deviation: f64,
+    interval95: [f64; 2],
     /// Whether it is at an end of its range.
-    pub(super) at_bound: bool,
+    at_bound: bool,
 }
 
 impl Telling<'_> {
@@ -78,13 +103,26 @@ impl Telling<'_> {
         Ok(moved.iter().map(|m| RICHARDSON * m).collect())
     }
 
-    /// The value of an unknown of an explanation; `None` where it was not fitted. `moved` is how far the engine's own error moves each
-    /// fitted value, empty for nothing.
-    pub(super) fn fitted(
-        &self,
-        (of, moved): (&Explanation, &[f64]),
-        unknown: usize,
-    ) -> Option<Fitted> {
+    /// What moves the values of an explanation, and how its episodes disagree about them.
+    fn beyond<'m>(&self, of: &Explanation, moved: &'m [f64]) -> Beyond<'m> {
+        let (logs, residuals) = (&self.bench.train.logs, &of.fit.residuals);
+        let mut own = vec![0.0; residuals.len()];
+        let of_episode = |e: usize| {
+            let rows = logs.offset(e)..logs.offset(e + 1);
+            own[rows.clone()].copy_from_slice(&residuals[rows.clone()]);
+            let part = of.fit.answer(&own);
+            own[rows].fill(0.0);
+            part
+        };
+        let parts: Vec<Vec<f64>> = (0..logs.episodes.len()).map(of_episode).collect();
+        Beyond {
+            moved,
+            by_episodes: between_episodes(&parts, of.fit.free.len()),
+        }
+    }
+
+    /// The value of an unknown of an explanation; `None` where it was not fitted.
+    fn fitted(&self, (of, beyond): (&Explanation, &Beyond<'_>), unknown: usize) -> Option<Fitted> {
         let fit = &of.fit;
         let k = fit.free.iter().position(|&f| f == unknown)?;
         let [low, high] = of.unknowns[unknown].parameter.range;
@@ -95,8 +133,9 @@ impl Telling<'_> {
             let by_replays = fit.covariance[(k, k)].max(0.0) * self.inflation(of);
             let (local, apart) =
                 of.local[unknown].map_or((0.0, 0.0), |l| (l.variance, value - l.mean));
-            let moved = moved.get(k).copied().unwrap_or(0.0);
-            (by_replays.max(local) + apart.powi(2) + moved.powi(2)).sqrt()
+            let moved = beyond.moved.get(k).copied().unwrap_or(0.0);
+            let disagreement = beyond.by_episodes[k];
+            (by_replays.max(local).max(disagreement) + apart.powi(2) + moved.powi(2)).sqrt()
         } else {
             f64::INFINITY
         };
@@ -122,13 +161,14 @@ impl Telling<'_> {
     }
 
     /// Intervals of the fitted values of each effect of an explanation, and whether one is at an end of its range that does not
-    /// mean that the effect is absent.
+    /// mean that the effect is absent. `moved` is how far the engine's own error moves each fitted value, empty for nothing.
     pub(super) fn intervals(
         &self,
         of: &Explanation,
         moved: &[f64],
     ) -> Vec<(BTreeMap<String, [f64; 2]>, bool)> {
         let mut at = self.bench.parameters.len();
+        let beyond = self.beyond(of, moved);
         let each = of.effects.iter().map(|effect| {
             let first = at;
             at += effect.values.len();
@@ -138,7 +178,7 @@ impl Telling<'_> {
             let mut intervals = BTreeMap::new();
             let mut at_bound = false;
             for (i, (name, _)) in effect.values.iter().enumerate() {
-                if let Some(fitted) = self.fitted((of, moved), first + i) {
+                if let Some(fitted) = self.fitted((of, &beyond), first + i) {
                     intervals.insert(name.clone(), fitted.interval95);
                     at_bound |= fitted.at_bound && fitted.value != null(i);
                 }
@@ -150,10 +190,11 @@ impl Telling<'_> {
 
     /// The study's parameters.
     pub(super) fn parameters(&self, of: &Explanation, moved: &[f64]) -> Vec<ParameterResult> {
+        let beyond = self.beyond(of, moved);
         let all = self.bench.parameters.iter().enumerate();
         all.map(|(i, p)| {
             let value = of.fit.point.theta[i];
-            let fitted = self.fitted((of, moved), i);
+            let fitted = self.fitted((of, &beyond), i);
             ParameterResult {
                 name: p.name.clone(),
                 unit: self.study.parameters[i].unit.clone(),
@@ -164,5 +205,25 @@ impl Telling<'_> {
             }
         })
         .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_mean_has_the_variance_of_its_sample_over_the_number_of_episodes() {
+        // Least squares of one value, read once an episode: each episode moves it by a quarter of its residual.
+        let readings = [1.0, 3.0, 2.0, 6.0];
+        let mean = 3.0;
+        let parts: Vec<Vec<f64>> = readings.iter().map(|x| vec![(x - mean) / 4.0]).collect();
+        let sample = (4.0 + 0.0 + 1.0 + 9.0) / 3.0;
+        assert!((between_episodes(&parts, 1)[0] - sample / 4.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn one_episode_cannot_disagree() {
+        assert_eq!(between_episodes(&[vec![0.3, -2.0]], 2), [0.0, 0.0]);
     }
 }
