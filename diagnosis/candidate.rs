@@ -110,13 +110,33 @@ pub fn nameable(candidates: &[Candidate]) -> usize {
     candidates.iter().filter(|c| !c.is_tolerance).count()
 }
 
+/// The parameter of a study that fits the mass of a body as a whole, of whose geoms some targets are: a model takes one of the two.
+fn fitted_as_a_whole<'p>(
+    plant: &Plant,
+    targets: &[Target],
+    parameters: &'p [Parameter],
+) -> Option<&'p str> {
+    let of_geom = |target: &Target| {
+        let geoms = &plant.layout.geoms;
+        let place = geoms.iter().position(|g| *g == target.name)?;
+        let shapes = target.element == "geom" && matches!(&*target.attribute, "mass" | "pos");
+        shapes.then(|| &plant.layout.bodies[plant.geoms[place].body])
+    };
+    let bodies: Vec<&String> = targets.iter().filter_map(of_geom).collect();
+    let is_whole =
+        |t: &Target| (&*t.element, &*t.attribute) == ("body", "mass") && bodies.contains(&&t.name);
+    let found = parameters.iter().find(|p| p.targets.iter().any(is_whole));
+    found.map(|p| &*p.name)
+}
+
 /// All effects at all sites that the engine can give the scene, but for those that the
-/// model has already, and those named in `without`; then what an ordinary machine has of them.
+/// model has already, those named in `without`, and those that set what the study's `parameters` set otherwise; then what an ordinary machine
+/// has of them.
 #[must_use]
 pub fn enumerate(
     machine: &Machine,
     shown: &Trajectory,
-    without: &[String],
+    (without, parameters): (&[String], &[Parameter]),
 ) -> (Vec<Candidate>, Vec<LeftOut>) {
     let plant = &machine.plant;
     let (mut found, mut left_out) = (Vec::new(), Vec::new());
@@ -143,6 +163,12 @@ pub fn enumerate(
             // What acts in contacts alone does nothing where there are none.
             if of_contacts(&*effect, plant, &site) && !shown.touches(plant, &site) {
                 let why = "nothing touches it in these logs".to_owned();
+                left_out.push(LeftOut { label, why });
+                continue;
+            }
+            let targets = effect.targets(plant, &site);
+            if let Some(parameter) = fitted_as_a_whole(plant, &targets, parameters) {
+                let why = format!("parameter `{parameter}` fits the mass of the body as a whole");
                 left_out.push(LeftOut { label, why });
                 continue;
             }

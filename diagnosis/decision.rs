@@ -53,11 +53,9 @@ fn own_error_held_out(evidence: &Evidence) -> f64 {
     own.max(share * (none.held_out - 1.0))
 }
 
-/// Probability that the gap without effects is one, and not the noise or the engine's own error.
-fn seen(evidence: &Evidence, rules: &Rules) -> f64 {
-    let gap = (evidence.none.held_out - own_error_held_out(evidence))
-        .max(1.0)
-        .sqrt();
+/// Probability that what replays of the logs held out leave, a mean square, is a gap, and not the noise or the engine's own error.
+fn seen(held_out: f64, evidence: &Evidence, rules: &Rules) -> f64 {
+    let gap = (held_out - own_error_held_out(evidence)).max(1.0).sqrt();
     sigmoid((gap - rules.gap) / rules.gap_scale)
 }
 
@@ -143,7 +141,7 @@ pub fn decide(evidence: &Evidence, rules: &Rules) -> Judgement {
         let passed = all[i].labels.len() > all[best].labels.len();
         all[i].probability = odds.min(if passed { -price } else { 0.0 }).exp();
     }
-    let seen = seen(evidence, rules);
+    let seen = seen(evidence.none.held_out, evidence, rules);
     if best != least && ordinary.is_none() {
         // Chance may reach the evidence of no effect, and no chance makes a gap.
         all[least].probability *= 1.0 - seen;
@@ -151,8 +149,16 @@ pub fn decide(evidence: &Evidence, rules: &Rules) -> Judgement {
     let rest = left_of_the_gap(evidence, (all[best].found, ordinary));
     let left_unexplained =
         || sigmoid((rest / rules.unexplained).ln() / rules.sharpness).clamp(0.001, 0.999);
-    let unknown = if best == least && ordinary.is_some() {
-        (seen * left_unexplained()).clamp(0.02, 0.999)
+    let unknown = if let (true, Some(i)) = (best == least, ordinary) {
+        // What there was no time to try may explain what tolerances leave.
+        let left = evidence.tried[i].replayed.held_out;
+        let is_left = if evidence.stopped {
+            self::seen(left, evidence, rules)
+        } else {
+            0.0
+        };
+        let unknown = (seen * left_unexplained()).max(is_left);
+        unknown.clamp(0.02, 0.999)
     } else if best == least {
         // A gap that no force makes up for is one of the readings, where replays can be repeated.
         if evidence.is_missing || evidence.repeatable && !is_small(evidence.none) {
@@ -315,6 +321,18 @@ mod tests {
             decided(&e).best_explanation().labels,
             ["sensor-quantization@q"]
         );
+    }
+
+    #[test]
+    fn a_search_that_was_cut_short_does_not_call_what_tolerances_leave_nothing() {
+        let of = |left: f64, stopped: bool| {
+            let mut e = evidence(8600.0, vec![tried(&[], 0, 1140.0, left)], 0.03);
+            e.stopped = stopped;
+            decided(&e)
+        };
+        assert!(of(137.0, true).is_unknown, "a gap of 11.7 is left");
+        assert!(!of(1.05, true).is_unknown, "nothing is left");
+        assert!(!of(137.0, false).is_unknown, "all has been tried");
     }
 
     #[test]

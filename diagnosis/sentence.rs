@@ -11,26 +11,35 @@ const WORTH_A_WORD: f64 = 0.05;
 /// Gap on the logs held out up to which it is that of the noise: its deviation is estimated.
 const OF_NOISE: f64 = 1.2;
 
+/// That the study's parameters are fitted, as a part of a sentence; empty where it has none.
+fn once_fitted(result: &DiagnosisResult) -> &'static str {
+    if result.parameters.is_empty() {
+        ""
+    } else {
+        ", once the study's parameters are fitted"
+    }
+}
+
 /// Where no effect is missing; `beyond` is the gap beyond what the starts of the logs held out leave open.
-fn none(gap: f64, beyond: f64, repeats: Option<Repeats>) -> String {
-    let fitted = "once the study's parameters are fitted";
+fn none(result: &DiagnosisResult, beyond: f64, repeats: Option<Repeats>) -> String {
+    let (gap, fitted) = (result.gap.identified, once_fitted(result));
     if gap <= OF_NOISE {
         return format!(
-            "No gap is left beyond the sensors' noise, {fitted} (gap {gap:.2} on the logs held out)."
+            "No gap is left beyond the sensors' noise{fitted} (gap {gap:.2} on the logs held out)."
         );
     }
     if beyond <= OF_NOISE {
         return format!(
-            "No effect is missing, {fitted}: the gap of {gap:.2} on the logs held out is within what their initial states leave open, which are fitted on the first tenth."
+            "No effect is missing{fitted}: the gap of {gap:.2} on the logs held out is within what their initial states leave open, which are fitted on the first tenth."
         );
     }
     if repeats.is_some_and(|r| r.scatters) {
         return format!(
-            "No effect is missing: short replays leave no more than the sensors' noise, {fitted}. Whole replays leave a gap of {gap:.2} on the logs held out, by which contacts scatter: see the check `repeatability`."
+            "No effect is missing: short replays leave no more than the sensors' noise{fitted}. Whole replays leave a gap of {gap:.2} on the logs held out, by which contacts scatter: see the check `repeatability`."
         );
     }
     format!(
-        "No effect is found, {fitted}: the gap of {gap:.2} on the logs held out is within the differences between simulators of the same physics."
+        "No effect is found{fitted}: the gap of {gap:.2} on the logs held out is within the differences between simulators of the same physics."
     )
 }
 
@@ -108,12 +117,13 @@ pub fn sentence(
     };
     let body = match result.verdict.kind {
         Kind::None if !result.tolerances.is_empty() && result.gap.identified > OF_NOISE => format!(
-            "No effect stands out, once the study's parameters are fitted: {} take the gap from {:.2} to {:.2} on the logs held out.",
+            "No effect stands out{}: {} take the gap from {:.2} to {:.2} on the logs held out.",
+            once_fitted(result),
             within_tolerance(result).unwrap_or_default(),
             result.gap.identified,
             result.gap.refined
         ),
-        Kind::None => none(result.gap.identified, beyond, repeats),
+        Kind::None => none(result, beyond, repeats),
         Kind::Effects => {
             let ambiguous = if result.verdict.ambiguous_with.is_empty() {
                 String::new()

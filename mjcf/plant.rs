@@ -121,6 +121,16 @@ impl Plant {
             .find(|&j| self.layout.joints[j].kind == JointKind::Free)
     }
 
+    /// Geoms that make the mass of a body, as indices in [`Layout::geoms`]; none where the document states the body's inertia, or the
+    /// plant has no such body.
+    pub fn geoms_with_mass(&self, body: &str) -> impl Iterator<Item = usize> {
+        let body = self.layout.bodies.iter().position(|b| b == body);
+        let geoms = self.geoms.iter().enumerate();
+        geoms
+            .filter(move |(_, g)| g.has_mass && body == Some(g.body))
+            .map(|(i, _)| i)
+    }
+
     /// Whether a body can move.
     #[must_use]
     pub fn moves(&self, body: usize) -> bool {

@@ -280,6 +280,27 @@ fn smooth(
     Ok(())
 }
 
+/// An estimate taken along to values of a model that differ by `changes`, one a column of a linearisation about it: the starts of segments move
+/// with the values, as they do in each step of a fit.
+///
+/// # Errors
+/// When a value is not physical or the engine fails.
+pub fn taken_along(
+    context: &Context<'_>,
+    (hypothesis, theta): (&Hypothesis, &[f64]),
+    (linear, changes): (&[LinearEpisode], &[f64]),
+    estimate: &Estimate,
+) -> Result<Estimate> {
+    let nx = 2 * context.plant().layout.nv;
+    let mut map = context.map(&hypothesis.specs, &hypothesis.parameters(), 2 * nx + 1)?;
+    let mut linear = linear.to_vec();
+    shift(&mut linear, changes);
+    let mut estimate = estimate.clone();
+    let steps = context.start_steps();
+    smooth(context, &mut map, theta, (&linear, &steps), &mut estimate)?;
+    Ok(estimate)
+}
+
 /// Smooths the logs in a model for the first time: linearises and fits the noise until both stand. Returns the last slopes.
 ///
 /// # Errors

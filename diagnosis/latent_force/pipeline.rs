@@ -116,7 +116,8 @@ fn searched_in(
     progress.end();
     let states = &none.estimate.trajectory;
     let shown = along(bench, &context.walks, &none.theta, states)?;
-    let (candidates, left_out) = enumerate(&bench.machine, &shown, &settings.without);
+    let offered = (&settings.without[..], &bench.parameters[..]);
+    let (candidates, left_out) = enumerate(&bench.machine, &shown, offered);
     let steps = known(shown_steps, &candidates);
     let members: Vec<usize> = steps.iter().map(|s| s.candidate).collect();
     let offered = (&candidates[..], &members[..]);

@@ -107,6 +107,14 @@ impl Study {
     /// # Errors
     /// When a file is missing or wrong; the message names file, row and column.
     pub fn read(path: &Path) -> Result<Self> {
+        Self::read_with(path, None)
+    }
+
+    /// The same with another `model` in place of the study's own, where there is one.
+    ///
+    /// # Errors
+    /// As [`Study::read`].
+    pub fn read_with(path: &Path, model: Option<&Path>) -> Result<Self> {
         let file = if path.is_dir() {
             path.join("study.toml")
         } else {
@@ -127,10 +135,13 @@ impl Study {
         let document: Document =
             asid_documents::toml_text::read(&text).map_err(|e| fail(one_line(&e)))?;
         let folder = file.parent().map(Path::to_path_buf).unwrap_or_default();
-        let model = folder.join(&document.model);
+        let own = || folder.join(&document.model);
+        let model = model.map_or_else(own, Path::to_path_buf);
         let source = RefinedModel::open(&model)?;
         let plant = Plant::of(&source.scene)?;
-        let parameters = document.parameters(&fail)?;
+        let mut parameters = document.parameters(&fail)?;
+        let targets = parameters.iter_mut().flat_map(|p| &mut p.targets);
+        targets.for_each(|t| by_geom(&plant, t));
         document.check_noise(&plant.layout, &fail)?;
         document.check_columns(&plant.layout, &fail)?;
         let mut notes = Vec::new();
@@ -181,6 +192,18 @@ fn one_line(error: &toml::de::Error) -> String {
         .split_whitespace()
         .collect::<Vec<_>>()
         .join(" ")
+}
+
+/// Names the mass of a body that is the mass of one geom by that geom, as effects of mass do: a model has one name for each thing that is set.
+fn by_geom(plant: &Plant, target: &mut Target) {
+    if (&*target.element, &*target.attribute) != ("body", "mass") {
+        return;
+    }
+    let geoms: Vec<usize> = plant.geoms_with_mass(&target.name).collect();
+    if let [geom] = geoms[..] {
+        target.element = "geom".into();
+        target.name.clone_from(&plant.layout.geoms[geom]);
+    }
 }
 
 /// The parameter that an entry describes.

@@ -204,13 +204,15 @@ fn files(is_real: bool) -> Vec<(&'static str, &'static str)> {
 
 /// The task; of any machine the motion is designed here, and there is none.
 fn any_machine(arguments: &Arguments) -> Result<Option<&str>> {
+    let common = &arguments.common;
     let wrong = |key: &str, message: &str| asid_core::Error::Config {
         key: key.into(),
         message: message.into(),
     };
-    let path = match (&arguments.task, &arguments.worlds.simulator.model) {
-        (Some(task), _) => machine::path_of(task)?,
-        (None, model) => model.as_deref(),
+    let given = arguments.worlds.simulator.model.as_deref();
+    let (path, model) = match &arguments.task {
+        Some(task) => (machine::path_of(task)?, given),
+        None => (given, None),
     };
     let Some(path) = path else {
         if arguments.motion.any() {
@@ -220,14 +222,18 @@ fn any_machine(arguments: &Arguments) -> Result<Option<&str>> {
         }
         return Ok(arguments.task.as_deref());
     };
-    if arguments.policy.is_some() || arguments.train.is_some() {
-        return Err(wrong("--policy", "goes with a task").into());
+    if arguments.policy.is_some() || arguments.train.is_some() || common.preset.is_some() {
+        return Err(wrong("--policy", "goes with a task, as --train and --preset do").into());
     }
-    let mut common = arguments.common.clone();
+    if arguments.worlds.real.is_described() {
+        let message = "goes with a task: the motion of a study or model is played by you";
+        return Err(wrong("--world", message).into());
+    }
+    let mut common = common.clone();
     if let Some(explorer) = &arguments.explorer {
         common.set.push(format!("explorer=\"{explorer}\""));
     }
-    machine::explore::explore(path, &common, &arguments.motion)?;
+    machine::explore::explore((path, model), &common, &arguments.motion)?;
     Ok(None)
 }
 

@@ -98,7 +98,7 @@ pub fn identify(arguments: &Arguments) -> Result<()> {
     let common = &arguments.common;
     if let Some(path) = machine::path_of(&arguments.task)? {
         refuse_of_a_study(arguments)?;
-        return machine::identify::identify(path, common);
+        return machine::identify::identify(path, arguments.simulator.model.as_deref(), common);
     }
     if arguments.log.is_empty() && arguments.train.is_none() {
         return Err(wrong(
@@ -194,12 +194,19 @@ pub fn identify(arguments: &Arguments) -> Result<()> {
 
 /// Refuses what a study does not take.
 fn refuse_of_a_study(arguments: &Arguments) -> Result<()> {
-    if arguments.log.is_empty() && arguments.train.is_none() && arguments.identifier.is_none() {
+    let algorithms = [&arguments.explorer, &arguments.identifier];
+    let files = [&arguments.train, &arguments.policy];
+    let none = arguments.log.is_empty()
+        && algorithms.iter().all(|a| a.is_none())
+        && files.iter().all(|f| f.is_none())
+        && arguments.common.preset.is_none();
+    if none {
         return Ok(());
     }
     Err(wrong(
         "--log",
-        "a study names its logs itself and is fitted by gauss-newton: --log, --train and --identifier go with a task",
+        "a study names its logs itself and is fitted by gauss-newton: --log, --train, --explorer, --policy, --identifier and \
+         --preset go with a task",
     ))
 }
 

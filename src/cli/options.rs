@@ -83,7 +83,7 @@ pub struct Algorithms {
 #[derive(clap::Args, Clone, Debug, Default)]
 pub struct Simulator {
     /// Simulate this model: MJCF, or TOML of a refined model, such as the refined.toml of a
-    /// diagnosis [default: the task's scene]
+    /// diagnosis [default: the task's scene, or the study's own model]
     #[arg(long, value_name = "FILE")]
     pub model: Option<PathBuf>,
     /// A refined model that is no file yet, in place of `model`.
@@ -112,6 +112,25 @@ pub struct Real {
     /// viscous-friction@joint1:damping=2 (repeatable)
     #[arg(long, value_name = "NAME@SITE:PARAMETER=VALUE")]
     pub real_effect: Vec<String>,
+}
+
+impl Real {
+    /// Whether an option describes it.
+    #[must_use]
+    pub fn is_described(&self) -> bool {
+        let Self {
+            world,
+            truth,
+            real_backend,
+            real_model,
+            real_effect,
+        } = self;
+        world.is_some()
+            || !truth.is_empty()
+            || real_backend.is_some()
+            || real_model.is_some()
+            || !real_effect.is_empty()
+    }
 }
 
 /// The simulator of a method, and the real world that it is tried in.

@@ -94,7 +94,7 @@ fn compare(segments: [Option<usize>; 2]) {
         .collect();
     let states = &estimate.trajectory;
     let shown = Trajectory::along(&*model, plant, parameters, logs, states, &rows).unwrap();
-    let (mut candidates, _) = enumerate(&bench.machine, &shown, &[]);
+    let (mut candidates, _) = enumerate(&bench.machine, &shown, (&[], &[]));
     candidates.retain(|c| !c.is_tolerance);
 
     let base = (&hypothesis, &nominal[..]);

@@ -2,8 +2,11 @@
 
 use crate::noise::median;
 
+/// Fewest linearisations without a rise that tell a scatter: of one or two, either may be a step that went far astray.
+const FEWEST: usize = 3;
+
 /// Median of how far the evidence of each linearisation came out from the best before it, of those that did not raise that by what
-/// counts. A step that went far astray is one of them, and so is each that finds the same plateau again.
+/// counts; 0 where there are too few. A step that went far astray is one of them, and so is each that finds the same plateau again.
 pub(super) fn wander(evidence: &[f64], rise: f64) -> f64 {
     let mut apart = Vec::new();
     let mut best = f64::NEG_INFINITY;
@@ -12,6 +15,9 @@ pub(super) fn wander(evidence: &[f64], rise: f64) -> f64 {
             apart.push((best - here).abs());
         }
         best = best.max(*here);
+    }
+    if apart.len() < FEWEST {
+        return 0.0;
     }
     median(&mut apart).unwrap_or(0.0)
 }
@@ -33,5 +39,10 @@ mod tests {
     fn rises_that_count_are_no_scatter() {
         assert_eq!(wander(&[10.0, 40.0, 60.0], 0.5), 0.0);
         assert_eq!(wander(&[10.0, 7.0, 5.0, 6.0], 0.5), 4.0);
+    }
+
+    #[test]
+    fn one_step_astray_at_the_end_of_a_fit_that_was_cut_short_is_no_scatter() {
+        assert_eq!(wander(&[52_898.3, 50_008.9], 1.2), 0.0);
     }
 }

@@ -2,6 +2,7 @@
 
 use asid_core::Result;
 
+use crate::latent_force::fit::taken_along;
 use crate::latent_force::screen::Screened;
 
 use super::round::Upon;
@@ -9,14 +10,25 @@ use super::screening::Screening;
 use super::set::Set;
 
 impl Upon<'_> {
-    /// The base with the candidates of a set of a screening, at the values where a fit of it begins. Where bodies touch, a law that has no slope
+    /// The base with the candidates of a set of a screening, at the values where a fit of it begins. Where bodies touch, starts of segments
+    /// move with the values: what a link that is longer by a centimetre touches is then as far away as it was. A law that has no slope
     /// at its null begins at that of its start values whose replays of whole logs leave least: from a null at which a contact sticks no
     /// slope tells how far it is to where it slides, and segments that begin as the null has put them do not either.
     pub(super) fn begun(&self, screening: &Screening, screened: &Screened) -> Result<Set> {
         let mut best = self.enlarged(screening, screened);
         let forms = &screening.columns.forms;
         let is_secant = |f: usize| forms[f].slopes.iter().all(Option::is_none);
-        if !self.context.has_segments() || !screened.forms.iter().any(|&f| is_secant(f)) {
+        if !self.context.has_segments() {
+            return Ok(best);
+        }
+        if !screened.forms.iter().any(|&f| is_secant(f)) {
+            let fitted = &mut best.fitted;
+            let model = (&fitted.hypothesis, &fitted.theta[..]);
+            let along = (
+                &screening.columns.linear[..],
+                &changes(screening, screened)[..],
+            );
+            fitted.estimate = taken_along(self.context, model, along, &fitted.estimate)?;
             return Ok(best);
         }
         let mut from = screened.clone();
@@ -49,4 +61,16 @@ impl Upon<'_> {
         hold(&mut best, true);
         Ok(best)
     }
+}
+
+/// Coefficients of a screened set, one a column of its screening.
+fn changes(screening: &Screening, screened: &Screened) -> Vec<f64> {
+    let columns = &screening.columns;
+    let mut changes = vec![0.0; columns.center.len()];
+    changes[..screened.base.len()].copy_from_slice(&screened.base);
+    for (&f, coefficients) in screened.forms.iter().zip(&screened.coefficients) {
+        let own = columns.forms[f].columns();
+        changes[own].copy_from_slice(coefficients);
+    }
+    changes
 }

@@ -170,15 +170,11 @@ impl Upon<'_> {
         let mut sets = Vec::new();
         let mut left_out = Vec::new();
         let not_far = lead - (breadth.behind * lead).max(breadth.near);
-        if let Some(tolerances) = tolerances.filter(|t| t.gain > not_far) {
-            progress.note("trying tolerances");
-            let mut set = tolerances.beside(self.base, self.candidates);
-            set.fit(self.context, (breadth.rounds[0], progress))?;
-            sets.push(set);
-        }
-        for s in due {
+        let mut near = tolerances.filter(|t| t.gain > not_far);
+        for (place, s) in due.into_iter().enumerate() {
             let members = self.members(screening, s);
-            if !sets.is_empty() && progress.is_stopped() {
+            // What leads comes first: where time is out, an answer rests on it.
+            if place > 0 && progress.is_stopped() {
                 left_out.push(members);
                 continue;
             }
@@ -187,8 +183,21 @@ impl Upon<'_> {
             set.fit(self.context, (breadth.rounds[0], progress))?;
             sets.push(set);
             progress.advance(1);
+            sets.extend(self.tried(near.take())?);
         }
+        sets.extend(self.tried(near)?);
         Ok(Fits { sets, left_out })
+    }
+
+    /// Tolerances beside the base, fitted a little, where there are any.
+    fn tried(&self, tolerances: Option<&Tolerances>) -> Result<Option<Set>> {
+        let Some(tolerances) = tolerances else {
+            return Ok(None);
+        };
+        self.progress.note("trying tolerances");
+        let mut set = tolerances.beside(self.base, self.candidates);
+        set.fit(self.context, (self.breadth.rounds[0], self.progress))?;
+        Ok(Some(set))
     }
 
     /// Where a group leads those that were `raced`, the best of its members by itself with tolerances beside it, fitted a little: one law at all

@@ -33,7 +33,7 @@ pub struct Config {
     /// The task that is diagnosed in place of a study.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub task: Option<String>,
-    /// The model in place of the task's scene: MJCF, or a refined model.
+    /// The model in place of the task's scene or of the study's own: MJCF, or a refined model.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub model: Option<PathBuf>,
     /// Logs of the task that are fitted to.

@@ -59,12 +59,18 @@ pub struct ExploreResult {
 }
 
 /// Designs a motion and writes it.
-pub fn explore(path: &Path, common: &Common, given: &super::motion_config::Options) -> Result<()> {
+pub fn explore(
+    (path, model): (&Path, Option<&Path>),
+    common: &Common,
+    given: &super::motion_config::Options,
+) -> Result<()> {
     let clock = Instant::now();
-    let config = Config::resolve(path, common, given)?;
+    let mut config = Config::resolve(path, common, given)?;
+    config.model = model.map(Path::to_path_buf).or(config.model);
     let mut notes = Vec::new();
-    let subject =
-        sensors::with_sensors(Subject::open(path, config.backend.as_deref())?, &mut notes)?;
+    let engine = config.backend.as_deref();
+    let subject = Subject::open_with(path, engine, config.model.as_deref())?;
+    let subject = sensors::with_sensors(subject, &mut notes)?;
     let mut setup = Setup::new(&subject, &config, common.threads.unwrap_or(0))?;
     notes.append(&mut setup.notes);
     let method = Method::named(&config.explorer)?;

@@ -1,6 +1,6 @@
 //! `asid identify STUDY`: the parameters of a study from its logs.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use anyhow::Result;
@@ -28,6 +28,9 @@ use crate::cli::{run, trace};
 #[serde(deny_unknown_fields)]
 struct Config {
     study: String,
+    /// The model in place of the study's own.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    model: Option<PathBuf>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     backend: Option<String>,
     #[serde(default)]
@@ -71,21 +74,23 @@ pub struct IdentifyResult {
 }
 
 /// The settings: a file, then single values, then options.
-fn resolve(path: &Path, common: &Common) -> Result<Config> {
+fn resolve(path: &Path, model: Option<&Path>, common: &Common) -> Result<Config> {
     let mut table = given(common)?;
     table.insert("study".into(), path.display().to_string().into());
     let mut config: Config = parsed(table)?;
+    config.model = model.map(Path::to_path_buf).or(config.model);
     config.backend = common.backend.clone().or(config.backend);
     config.seed = common.seed.unwrap_or(config.seed);
     config.gauss_newton.check("gauss_newton")?;
     Ok(config)
 }
 
-/// Fits and writes the result.
-pub fn identify(path: &Path, common: &Common) -> Result<()> {
+/// Fits and writes the result; with another `model` in place of the study's own, where there is one.
+pub fn identify(path: &Path, model: Option<&Path>, common: &Common) -> Result<()> {
     let clock = Instant::now();
-    let config = resolve(path, common)?;
-    let subject = Subject::open(path, config.backend.as_deref())?;
+    let config = resolve(path, model, common)?;
+    let engine = config.backend.as_deref();
+    let subject = Subject::open_with(path, engine, config.model.as_deref())?;
     let study = subject.needs_study()?;
     let out = OutFolder::claim(common.out.as_deref(), &format!("{}-identify", study.name))?;
     let threads = common.threads.unwrap_or(0);

@@ -4,7 +4,7 @@ mod options;
 mod text;
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use asid_core::Parameter;
@@ -37,6 +37,9 @@ const PRECISION: f64 = 0.01;
 pub struct Config {
     /// Study, or model.
     pub machine: String,
+    /// The model in place of a study's own.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub model: Option<PathBuf>,
     /// Engine; the default one where nothing is said.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub backend: Option<String>,
@@ -84,6 +87,7 @@ impl Default for Config {
     fn default() -> Self {
         Self {
             machine: String::new(),
+            model: None,
             backend: None,
             seed: 0,
             explorer: Method::FisherCem.name().to_owned(),
@@ -150,6 +154,16 @@ impl Config {
     }
 
     fn check(&self) -> Result<()> {
+        // A motion of a single command has nothing that can be searched for.
+        if self.period > 0.5 * self.seconds {
+            return Err(wrong(
+                "period",
+                format!(
+                    "{} s is longer than half of the motion of {} s: a motion has several commands",
+                    self.period, self.seconds
+                ),
+            ));
+        }
         for (key, value, least) in [
             ("seconds", self.seconds, f64::MIN_POSITIVE),
             ("period", self.period, f64::MIN_POSITIVE),

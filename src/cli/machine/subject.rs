@@ -34,7 +34,13 @@ pub struct Subject {
 impl Subject {
     /// Opens a study (a folder, or a TOML file with `train`), a refined model (any other TOML file) or an MJCF file.
     pub fn open(path: &Path, engine: Option<&str>) -> Result<Self> {
-        let study = is_study(path)?.then(|| Study::read(path)).transpose()?;
+        Self::open_with(path, engine, None)
+    }
+
+    /// The same with another `model` in place of the study's own, where there is one.
+    pub fn open_with(path: &Path, engine: Option<&str>, model: Option<&Path>) -> Result<Self> {
+        let study = is_study(path)?.then(|| Study::read_with(path, model));
+        let study = study.transpose()?;
         let (name, file, source) = match &study {
             Some(study) => (
                 study.name.clone(),

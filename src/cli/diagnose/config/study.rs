@@ -17,7 +17,7 @@ impl Config {
     /// The study: as written, or of a task with the logs that the settings name or `played`.
     pub fn study(&self, played: Option<Logs>) -> Result<Study> {
         match (&self.study, &self.task) {
-            (Some(path), _) => Ok(Study::read(path)?),
+            (Some(path), _) => Ok(Study::read_with(path, self.model.as_deref())?),
             (None, Some(name)) => {
                 let task = difficulty::at((find::<TaskEntry>(name)?.make)()?, &self.difficulty)?;
                 let model = match &self.model {
