@@ -8,7 +8,7 @@ use asid_core::Result;
 
 use crate::bench::{Bench, Explanation};
 use crate::data::Logs;
-use crate::findings::Repeats;
+use crate::findings::{LEAST_GAP, Repeats};
 use crate::fit::cost;
 use crate::machine::Machine;
 use crate::predict::Predictor;
@@ -133,7 +133,12 @@ pub fn time_step(bench: &Bench, none: &Explanation, halved: &Machine) -> Result<
     let change = change_by_step(bench, none, halved)?;
     let left = (cost(&change) / bench.train.readings.max(1) as f64).sqrt();
     let gap = (none.fit.cost / bench.train.readings.max(1) as f64).sqrt();
-    let ok = left < FINE || left < 0.5 * gap;
+    if !(left.is_finite() && gap.is_finite()) {
+        let diverged = "replays diverge, at the time step of the model or at half of it: whether the gap depends on it is not told";
+        return Ok(check("time-step", false, diverged.into()));
+    }
+    // Where there is no gap, none is the step's.
+    let ok = left < FINE || left < 0.5 * gap || gap <= LEAST_GAP;
     Ok(check(
         "time-step",
         ok,

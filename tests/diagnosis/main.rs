@@ -19,6 +19,7 @@ mod steps;
 mod sticking;
 mod stopped;
 mod together;
+mod unread;
 mod wiring;
 mod world;
 

@@ -1,16 +1,17 @@
 //! Which rows of the logs are smoothed, and which are taken in segments.
 
-use asid_core::{Layout, Result};
+use asid_core::Result;
 
 use crate::bench::Bench;
 use crate::latent_force::context::Taken;
-use crate::latent_force::initial::{from_readings, scales};
+use crate::latent_force::initial::{from_readings, position_noise, scales};
 use crate::latent_force::segments::cut;
 use crate::latent_force::touching::touching;
 use crate::latent_force::walk::Walk;
+use crate::predict::Point;
 use crate::starts::given_start;
 use crate::study::Study;
-use crate::trajectory::Trajectory;
+use crate::trajectory::{Path, Trajectory};
 
 /// Physics steps of one walk along all logs times degrees of freedom, at most: a walk is taken once a coordinate and once a
 /// candidate, and both grow with the degrees of freedom.
@@ -43,6 +44,8 @@ pub(super) struct Rows {
     touches: Vec<Vec<bool>>,
     /// Largest magnitude of each tangent coordinate.
     scale: Vec<f64>,
+    /// States where no sensor reads them.
+    unread: Unread,
 }
 
 impl Rows {
@@ -53,12 +56,14 @@ impl Rows {
         let logs = &bench.train.logs;
         let whole = |e| Walk::new(logs, e, layout.timestep);
         let walks = within_budget((0..logs.episodes.len()).map(whole).collect(), layout.nv);
-        let first = from_readings(plant, logs, &walks, &at_home(layout, &walks));
+        let unread = Unread::of(bench, nominal)?;
+        let first = from_readings(plant, logs, &walks, &unread.along(&walks));
         let shown = along(bench, &walks, nominal, &first)?;
         Ok(Self {
             touches: touching(plant, logs, &shown),
             scale: scales(plant, &first),
             walks,
+            unread,
         })
     }
 
@@ -80,18 +85,76 @@ impl Rows {
         Taken {
             given: walks.iter().map(given).collect(),
             open: bench.open.clone(),
-            otherwise: at_home(bench.layout(), &walks),
+            otherwise: self.unread.along(&walks),
             scale: self.scale.clone(),
             walks,
         }
     }
 }
 
-/// The first keyframe at rest in each row of some walks.
-fn at_home(layout: &Layout, walks: &[Walk]) -> Vec<Vec<f64>> {
-    let home = asid_core::problem::home(layout);
-    let still = [&home.0[..], &home.1[..]].concat();
-    walks.iter().map(|w| still.repeat(w.len())).collect()
+/// States along the logs where no sensor reads them.
+enum Unread {
+    /// The first keyframe, at rest: every hinge and slide is read.
+    Home(Vec<f64>),
+    /// The same but for hinges and slides, which move as replays of the model as it is have them; `rows x (nq + nv)` a log. At rest a joint
+    /// that no sensor reads would seem never to move, and no smoother would then let it.
+    Replayed { states: Vec<Vec<f64>>, width: usize },
+}
+
+impl Unread {
+    fn of(bench: &Bench, nominal: &[f64]) -> Result<Self> {
+        let layout = bench.layout();
+        let (nq, nv) = (layout.nq, layout.nv);
+        let home = asid_core::problem::home(layout);
+        let still = [&home.0[..], &home.1[..]].concat();
+        let logs = &bench.train.logs;
+        let plant = &bench.machine.plant;
+        let noise = position_noise(plant, logs);
+        let joints: Vec<_> = plant.scalar_joints().map(|j| &layout.joints[j]).collect();
+        if joints.iter().all(|j| noise[j.qvel] > 0.0) {
+            return Ok(Self::Home(still));
+        }
+        let point = Point {
+            theta: nominal.to_vec(),
+            starts: bench.train.starts.clone(),
+        };
+        let threads = bench.machine.threads;
+        let model = bench.machine.with(&[])?;
+        let shown = Trajectory::of(&*model, plant, &bench.parameters, logs, &point, threads)?;
+        let states = |path: Path| -> Vec<f64> {
+            let rows = path.qpos.chunks_exact(nq).zip(path.qvel.chunks_exact(nv));
+            let state = |(q, v): (&[f64], &[f64])| {
+                let mut state = still.clone();
+                for joint in &joints {
+                    let own = [q[joint.qpos], v[joint.qvel]];
+                    // A replay that diverged says nothing.
+                    if own.iter().all(|x| x.is_finite()) {
+                        (state[joint.qpos], state[nq + joint.qvel]) = (own[0], own[1]);
+                    }
+                }
+                state
+            };
+            rows.flat_map(state).collect()
+        };
+        Ok(Self::Replayed {
+            states: shown.episodes.into_iter().map(states).collect(),
+            width: nq + nv,
+        })
+    }
+
+    /// Along some walks, `rows x (nq + nv)` each.
+    fn along(&self, walks: &[Walk]) -> Vec<Vec<f64>> {
+        let along = |walk: &Walk| match self {
+            Self::Home(still) => still.repeat(walk.len()),
+            Self::Replayed { states, width } => {
+                let rows = walk.rows.iter();
+                let states = &states[walk.episode];
+                rows.flat_map(|k| states[k * width..(k + 1) * width].to_vec())
+                    .collect()
+            }
+        };
+        walks.iter().map(along).collect()
+    }
 }
 
 /// The first rows of each walk, as many as the budget of physics steps allows: a screening takes all of them once a column.
