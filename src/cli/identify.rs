@@ -25,7 +25,7 @@ use super::{failure, machine, stage, trace, train};
 
 /// A residual above this many standard deviations of the noise is more than chance and
 /// a noise that was guessed a little low.
-const UNEXPLAINED: f64 = 1.5;
+pub const UNEXPLAINED: f64 = 1.5;
 
 /// Episodes this many times longer than the task's are taken for times in another unit.
 const LONGEST: f64 = 100.0;

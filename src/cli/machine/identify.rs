@@ -16,6 +16,7 @@ use serde::{Deserialize, Serialize};
 
 use super::Subject;
 use crate::cli::failure;
+use crate::cli::identify::UNEXPLAINED;
 use crate::cli::options::Common;
 use crate::cli::output::{OutFolder, write_json, write_text};
 use crate::cli::progress::Bars;
@@ -174,6 +175,12 @@ pub fn identify(path: &Path, model: Option<&Path>, common: &Common) -> Result<()
             "the fitted model replays the logs held out worse than the model as given: something else differs; \
              `asid diagnose` looks for what",
         );
+    } else if found.residual > UNEXPLAINED {
+        failure::warn(&format!(
+            "the fitted model leaves {:.1} times the sensors' noise: something else differs, and the intervals hold only as far as the \
+             model is right; `asid diagnose` looks for what",
+            found.residual
+        ));
     }
     Ok(())
 }
