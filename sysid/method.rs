@@ -59,7 +59,7 @@ impl Method {
 }
 
 /// How widely the search goes.
-#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct DesignSettings {
     /// Heights of a spline an actuator: more follow faster motions, and need a longer search.

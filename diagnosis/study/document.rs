@@ -57,7 +57,7 @@ impl Document {
             .map(|p| parameter(p).map_err(fail))
             .collect::<Result<Vec<_>>>()?;
         for (i, p) in parameters.iter().enumerate() {
-            p.check()?;
+            p.check().map_err(|e| fail(e.to_string()))?;
             if parameters[..i].iter().any(|q| q.name == p.name) {
                 return Err(fail(format!("two parameters are named `{}`", p.name)));
             }
@@ -140,8 +140,14 @@ impl Study {
         let source = RefinedModel::open(&model)?;
         let plant = Plant::of(&source.scene)?;
         let mut parameters = document.parameters(&fail)?;
-        let targets = parameters.iter_mut().flat_map(|p| &mut p.targets);
-        targets.for_each(|t| by_geom(&plant, t));
+        for p in &mut parameters {
+            let known = |t: &Target| named(&plant, t);
+            p.targets
+                .iter()
+                .try_for_each(known)
+                .map_err(|e| fail(format!("parameter `{}`: {e}", p.name)))?;
+            p.targets.iter_mut().for_each(|t| by_geom(&plant, t));
+        }
         document.check_noise(&plant.layout, &fail)?;
         document.check_columns(&plant.layout, &fail)?;
         let mut notes = Vec::new();
@@ -192,6 +198,25 @@ fn one_line(error: &toml::de::Error) -> String {
         .split_whitespace()
         .collect::<Vec<_>>()
         .join(" ")
+}
+
+/// Whether the machine has the geom, body, joint or actuator that a target names; other elements are the engine's to know.
+fn named(plant: &Plant, target: &Target) -> Result<()> {
+    let layout = &plant.layout;
+    let (kind, names): (_, Vec<&str>) = match &*target.element {
+        "geom" => ("geom", layout.geoms.iter().map(String::as_str).collect()),
+        "body" => ("body", layout.bodies.iter().map(String::as_str).collect()),
+        "joint" => ("joint", layout.joints.iter().map(|j| &*j.name).collect()),
+        "actuator" => {
+            let actuators = layout.actuators.iter();
+            ("actuator", actuators.map(|a| &*a.name).collect())
+        }
+        _ => return Ok(()),
+    };
+    if names.contains(&&*target.name) {
+        return Ok(());
+    }
+    Err(Error::unknown(kind, &target.name, names))
 }
 
 /// Names the mass of a body that is the mass of one geom by that geom, as effects of mass do: a model has one name for each thing that is set.

@@ -1,4 +1,4 @@
-//! `asid config`: every setting of a task, or of the diagnosis of a study, with its value and meaning, as a file for `--config`.
+//! `asid config`: every setting of a task, or of what is done with a study or a model, with its value and meaning, as a file for `--config`.
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -7,9 +7,9 @@ use anyhow::Result;
 use asid_core::registry::{AlgorithmEntry, Entry, Meanings, TaskEntry, find, meanings};
 use asid_core::{Explorer, Identifier, Task, TaskSolver};
 
-use super::diagnose;
 use super::options::{Algorithms, Common, Worlds};
-use super::settings::{Config, ParameterConfig, Stage, difficulty};
+use super::settings::{Config, ParameterConfig, Stage, difficulty, wrong};
+use super::{diagnose, machine};
 
 /// Columns of a comment.
 const WIDTH: usize = 100;
@@ -17,9 +17,12 @@ const WIDTH: usize = 100;
 /// Arguments of `config`.
 #[derive(clap::Args)]
 pub struct Arguments {
-    /// The task, or the study: a TOML file, or a folder with study.toml
-    #[arg(value_name = "TASK|STUDY")]
+    /// The task; the study (a TOML file, or a folder with study.toml); or the model
+    #[arg(value_name = "TASK|STUDY|MODEL")]
     subject: String,
+    /// Print the settings of this command on a study [default: diagnose; explore on a model]
+    #[arg(long, value_name = "COMMAND")]
+    of: Option<OfStudy>,
     #[command(flatten)]
     algorithms: Algorithms,
     #[command(flatten)]
@@ -38,6 +41,14 @@ pub struct Arguments {
     pub config: Option<PathBuf>,
 }
 
+/// A command on a study or a model.
+#[derive(Clone, Copy, Debug, clap::ValueEnum)]
+enum OfStudy {
+    Diagnose,
+    Identify,
+    Explore,
+}
+
 /// Prints the settings.
 pub fn print(arguments: &Arguments) -> Result<()> {
     let common = Common {
@@ -48,9 +59,15 @@ pub fn print(arguments: &Arguments) -> Result<()> {
         ..Common::default()
     };
     let page = match find::<TaskEntry>(&arguments.subject) {
+        Ok(_) if arguments.of.is_some() => {
+            return Err(wrong(
+                "--of",
+                "goes with a study or a model: a task has the settings of `asid run`",
+            ));
+        }
         Ok(entry) => of_task((entry.make)()?, arguments, &common)?,
         Err(_) if Path::new(&arguments.subject).exists() => {
-            of_study(Path::new(&arguments.subject), &common)?
+            of_study(Path::new(&arguments.subject), arguments.of, &common)?
         }
         Err(unknown) => return Err(unknown.into()),
     };
@@ -58,17 +75,47 @@ pub fn print(arguments: &Arguments) -> Result<()> {
     Ok(())
 }
 
-/// The settings of the diagnosis of a study.
-fn of_study(study: &Path, common: &Common) -> Result<String> {
-    let config = diagnose::Config::of_study(study, common)?;
+/// The settings of a command on a study, or on a model.
+fn of_study(study: &Path, command: Option<OfStudy>, common: &Common) -> Result<String> {
+    let is_model = !machine::is_study(study)?;
+    let (name, example, table, meanings) = match command {
+        None if is_model => of_motion(study, common)?,
+        Some(OfStudy::Explore) => of_motion(study, common)?,
+        Some(OfStudy::Identify) => {
+            let config = machine::identify::Config::resolve(study, None, common)?;
+            let table = toml::Table::try_from(&config)?;
+            let meanings = meanings::<machine::identify::Config>();
+            ("identify", "gauss_newton.starts=4", table, meanings)
+        }
+        None | Some(OfStudy::Diagnose) => {
+            let table = toml::Table::try_from(&diagnose::Config::of_study(study, common)?)?;
+            let meanings = meanings::<diagnose::Config>();
+            ("diagnose", "search.depth=2", table, meanings)
+        }
+    };
     let mut page = format!(
-        "# Settings of `asid diagnose {}`. A setting is changed by --set KEY=VALUE, with the section before\n\
-         # its name, such as --set search.depth=2; this text in a file is read by --config FILE.\n",
+        "# Settings of `asid {name} {}`. A setting is changed by --set KEY=VALUE, with the section before\n\
+         # its name, such as --set {example}; this text in a file is read by --config FILE.\n",
         study.display()
     );
-    let table = toml::Table::try_from(&config)?;
-    write(&table, &[], &meanings::<diagnose::Config>(), &mut page);
+    write(&table, &[], &meanings, &mut page);
     Ok(page)
+}
+
+/// The settings of an exploration of a machine: name of the command, an example, the settings and what they mean.
+fn of_motion(
+    machine: &Path,
+    common: &Common,
+) -> Result<(&'static str, &'static str, toml::Table, Meanings)> {
+    type Motion = machine::motion_config::Config;
+    let config = Motion::resolve(machine, common, &machine::motion_config::Options::default())?;
+    let table = toml::Table::try_from(&config)?;
+    Ok((
+        "explore",
+        "design.iterations=20",
+        table,
+        meanings::<Motion>(),
+    ))
 }
 
 /// The settings of a task.

@@ -14,7 +14,7 @@ use std::path::Path;
 use anyhow::Result;
 use asid_core::registry::{TaskEntry, find};
 
-pub use subject::Subject;
+pub use subject::{Subject, is_study};
 
 /// The path that an argument names, where it is no registered task.
 ///

@@ -25,17 +25,21 @@ use crate::cli::settings::{given, parsed};
 use crate::cli::{run, trace};
 
 /// `config.toml`.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
-struct Config {
+pub struct Config {
+    /// The study that is fitted.
     study: String,
     /// The model in place of the study's own.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     model: Option<PathBuf>,
+    /// Engine; the default one where nothing is said.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     backend: Option<String>,
+    /// Seed of all random numbers.
     #[serde(default)]
     seed: u64,
+    /// How widely is searched.
     #[serde(default = "smooth")]
     gauss_newton: GaussNewtonSettings,
 }
@@ -74,22 +78,24 @@ pub struct IdentifyResult {
     versions: Versions,
 }
 
-/// The settings: a file, then single values, then options.
-fn resolve(path: &Path, model: Option<&Path>, common: &Common) -> Result<Config> {
-    let mut table = given(common)?;
-    table.insert("study".into(), path.display().to_string().into());
-    let mut config: Config = parsed(table)?;
-    config.model = model.map(Path::to_path_buf).or(config.model);
-    config.backend = common.backend.clone().or(config.backend);
-    config.seed = common.seed.unwrap_or(config.seed);
-    config.gauss_newton.check("gauss_newton")?;
-    Ok(config)
+impl Config {
+    /// The settings: a file, then single values, then options.
+    pub fn resolve(path: &Path, model: Option<&Path>, common: &Common) -> Result<Self> {
+        let mut table = given(common)?;
+        table.insert("study".into(), path.display().to_string().into());
+        let mut config: Self = parsed(table)?;
+        config.model = model.map(Path::to_path_buf).or(config.model);
+        config.backend = common.backend.clone().or(config.backend);
+        config.seed = common.seed.unwrap_or(config.seed);
+        config.gauss_newton.check("gauss_newton")?;
+        Ok(config)
+    }
 }
 
 /// Fits and writes the result; with another `model` in place of the study's own, where there is one.
 pub fn identify(path: &Path, model: Option<&Path>, common: &Common) -> Result<()> {
     let clock = Instant::now();
-    let config = resolve(path, model, common)?;
+    let config = Config::resolve(path, model, common)?;
     let engine = config.backend.as_deref();
     let subject = Subject::open_with(path, engine, config.model.as_deref())?;
     let study = subject.needs_study()?;

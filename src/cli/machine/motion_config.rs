@@ -32,7 +32,7 @@ const SETTLE: f64 = 1.0;
 const PRECISION: f64 = 0.01;
 
 /// `config.toml`.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Config {
     /// Study, or model.

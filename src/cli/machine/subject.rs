@@ -96,7 +96,7 @@ impl Subject {
 }
 
 /// Whether a path names a study and no model.
-fn is_study(path: &Path) -> Result<bool> {
+pub fn is_study(path: &Path) -> Result<bool> {
     if path.is_dir() {
         return Ok(true);
     }
