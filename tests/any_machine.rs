@@ -163,6 +163,40 @@ fn a_study_is_identified_and_its_refined_model_exported() {
     assert_eq!(again["parameters"], result["parameters"]);
 }
 
+#[test]
+fn a_study_is_fitted_in_another_model_that_takes_the_place_of_its_own() {
+    let place = Workplace::new();
+    write_study(&place.path("cart"), Truth::Viscous(1.5));
+    let damped = NOMINAL.replace("damping=\"2\"", "damping=\"3.5\"");
+    assert_ne!(damped, NOMINAL);
+    place.write("damped.xml", &damped);
+    let fit = ["identify", "cart", "--quiet", "--out"];
+    ok(&place, &[&fit[..], &["own"]].concat());
+    ok(
+        &place,
+        &[&fit[..], &["other", "--model", "damped.xml"]].concat(),
+    );
+    let gap = |folder: &str| {
+        let result = json(&place.read(&format!("{folder}/result.json")));
+        result["gap"]["identified"].as_f64().unwrap()
+    };
+    assert!(gap("own") > 5.0 && gap("other") < 1.2);
+    assert!(place.read("other/config.toml").contains("damped.xml"));
+}
+
+/// A body that is one geom has one mass, under two names.
+#[test]
+fn the_mass_of_a_body_of_one_geom_is_that_of_the_geom() {
+    let place = Workplace::new();
+    write_study(&place.path("cart"), Truth::None);
+    let study = place.read("cart/study.toml");
+    let by_body = study.replace("geom/cart/mass", "body/cart/mass");
+    assert_ne!(study, by_body);
+    place.write("cart/study.toml", &by_body);
+    let read = asid::diagnosis::study::Study::read(&place.path("cart")).unwrap();
+    assert_eq!(read.parameters[0].targets, mass().targets);
+}
+
 /// Options that make a search short.
 const SHORT: [&str; 6] = [
     "--set",
@@ -428,6 +462,30 @@ fn what_is_wrong_is_told_in_one_line() {
         (
             vec!["identify", "cart", "--log", "x.csv"],
             "a study names its logs itself",
+        ),
+        (
+            vec!["identify", "cart", "--explorer", "random"],
+            "--explorer, --policy, --identifier and --preset go with a task",
+        ),
+        (
+            vec!["identify", "cart", "--model", "nothing.xml"],
+            "nothing.xml: no such file",
+        ),
+        (
+            vec!["diagnose", "cart", "--model", "nothing.xml"],
+            "nothing.xml: no such file",
+        ),
+        (
+            vec!["explore", "cart", "--model", "nothing.xml"],
+            "nothing.xml: no such file",
+        ),
+        (
+            vec!["explore", "cart", "--world", "perturbed"],
+            "--world: goes with a task",
+        ),
+        (
+            vec!["explore", "cart", "--seconds", "1", "--period", "0.6"],
+            "period: 0.6 s is longer than half of the motion",
         ),
         (vec!["explore", "model.xml"], "nothing is sought"),
         (

@@ -79,6 +79,25 @@ fn what_is_printed_for_a_study_is_read_back_as_the_same() {
 }
 
 #[test]
+fn settings_of_each_command_on_a_study_stand_under_their_meanings() {
+    let place = Workplace::new();
+    let study = env!("CARGO_MANIFEST_DIR").to_owned() + "/studies/servo-pendulum";
+    let explore = printed(&place, &[&study, "--of", "explore"]);
+    assert_tells(
+        &explore,
+        &["# Length of the motion, s.", "[design]", "knots = "],
+    );
+    let identify = printed(&place, &[&study, "--of", "identify"]);
+    assert_tells(
+        &identify,
+        &["[gauss_newton]", "# Most iterations from each start."],
+    );
+    // A model has no logs: what can be done with it is to explore.
+    let model = printed(&place, &[&(study + "/nominal.xml")]);
+    assert_tells(&model, &["asid explore", "[design]"]);
+}
+
+#[test]
 fn an_unknown_task_is_refused_with_the_near_ones() {
     let place = Workplace::new();
     let output = place.run(&["config", "rod-balancin"]);

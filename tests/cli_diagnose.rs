@@ -132,7 +132,7 @@ fn bad_studies_and_logs_are_refused_in_one_line() {
     let toml = study.join("study.toml");
     let written = std::fs::read_to_string(&toml).unwrap();
     let with_log = |text: String| std::fs::write(&log, text).unwrap();
-    let cases: [Spoilt<'_>; 6] = [
+    let cases: [Spoilt<'_>; 7] = [
         (
             "no sensor",
             Box::new(|| with_log(good.replace(",x,dx,", ",place,speed,"))),
@@ -157,6 +157,11 @@ fn bad_studies_and_logs_are_refused_in_one_line() {
             "key",
             Box::new(|| std::fs::write(&toml, format!("speed = 3\n{written}")).unwrap()),
             "unknown field `speed`",
+        ),
+        (
+            "target",
+            Box::new(|| std::fs::write(&toml, written.replace("geom/cart", "geom/card")).unwrap()),
+            "study.toml: parameter `mass`: unknown geom `card`",
         ),
         (
             "pattern",
