@@ -1,6 +1,6 @@
 //! A diagnosis from a study to its result.
 
-use asid_core::{Progress, Result};
+use asid_core::{Error, Layout, Progress, Result};
 
 use crate::calibration::calibrate;
 use crate::intake::Intake;
@@ -8,6 +8,7 @@ use crate::machine::Machine;
 use crate::physics::diagnose_physics;
 use crate::prepare::plain_residuals;
 use crate::result::NotTried;
+use crate::starts::open_coordinates;
 use crate::study::Study;
 
 pub use crate::settings::Settings;
@@ -25,13 +26,14 @@ const BETTER: f64 = 0.8;
 /// that is more probable beforehand comes first.
 ///
 /// # Errors
-/// When a parameter cannot be set or a rollout fails.
+/// When the logs have fewer rows than their starts have unknown coordinates, a parameter cannot be set or a rollout fails.
 pub fn diagnose(
     study: &Study,
     machine: Machine,
     settings: Settings,
     progress: &dyn Progress,
 ) -> Result<(Diagnosis, Work)> {
+    enough_rows(study, &machine.plant.layout)?;
     progress.begin("looking at the logs", 1);
     let mut intake = Intake::of(study, &machine)?;
     progress.end();
@@ -76,4 +78,24 @@ pub fn diagnose(
     }
     intake.tell(&mut diagnosis.result, whiteness);
     Ok((diagnosis, work))
+}
+
+/// Refuses logs with fewer rows than their starts have unknown coordinates: a start then fits the readings whatever the machine is, and that
+/// no gap is left means nothing.
+fn enough_rows(study: &Study, layout: &Layout) -> Result<()> {
+    let rows: usize = study.train.iter().map(|(_, e)| e.rows()).sum();
+    let open = open_coordinates(layout, study).len();
+    let unknown = open * study.train.len();
+    if rows >= unknown {
+        return Ok(());
+    }
+    Err(Error::Config {
+        key: "train".into(),
+        message: format!(
+            "study {}: {} logs to fit to have {rows} rows in all, fewer than the {unknown} unknown coordinates of their starts ({open} in each): \
+             nothing can be told; log longer episodes, or give the starts as columns qpos.* and qvel.*",
+            study.name,
+            study.train.len()
+        ),
+    })
 }
