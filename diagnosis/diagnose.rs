@@ -21,12 +21,15 @@ const DOUBTFUL: f64 = 2.0;
 /// Share of the gap that the other way must leave at most to stand: each way estimates the noise for itself, and a tenth of it is chance.
 const BETTER: f64 = 0.8;
 
+/// Rows that a log to fit to has at least, in the mean: a first speed is taken over six, and the noise over third differences, of four.
+const FEWEST_ROWS: usize = 8;
+
 /// Diagnoses a study on a machine, with outliers left out of its logs and its wiring mended. Where an effect can look like what
 /// was mended, and a gap is left all the same, the wiring is taken the other way too, and what leaves less stands. The way
 /// that is more probable beforehand comes first.
 ///
 /// # Errors
-/// When the logs have fewer rows than their starts have unknown coordinates, a parameter cannot be set or a rollout fails.
+/// When the logs have too few rows to tell anything, a parameter cannot be set or a rollout fails.
 pub fn diagnose(
     study: &Study,
     machine: Machine,
@@ -80,22 +83,21 @@ pub fn diagnose(
     Ok((diagnosis, work))
 }
 
-/// Refuses logs with fewer rows than their starts have unknown coordinates: a start then fits the readings whatever the machine is, and that
-/// no gap is left means nothing.
+/// Refuses logs with no more rows than their starts have unknown coordinates, where a start fits the readings whatever the machine is and that
+/// no gap is left means nothing, and logs of hardly a row.
 fn enough_rows(study: &Study, layout: &Layout) -> Result<()> {
     let rows: usize = study.train.iter().map(|(_, e)| e.rows()).sum();
-    let open = open_coordinates(layout, study).len();
-    let unknown = open * study.train.len();
-    if rows >= unknown {
+    let (logs, open) = (study.train.len(), open_coordinates(layout, study).len());
+    let needed = (FEWEST_ROWS * logs).max(open * logs + 1);
+    if rows >= needed {
         return Ok(());
     }
     Err(Error::Config {
         key: "train".into(),
         message: format!(
-            "study {}: {} logs to fit to have {rows} rows in all, fewer than the {unknown} unknown coordinates of their starts ({open} in each): \
-             nothing can be told; log longer episodes, or give the starts as columns qpos.* and qvel.*",
-            study.name,
-            study.train.len()
+            "study {}: {logs} logs to fit to have {rows} rows in all, too little to tell anything: at least {needed} are needed, {FEWEST_ROWS} in \
+             each and more than the {open} coordinates of each start that are unknown; log longer episodes",
+            study.name
         ),
     })
 }

@@ -38,7 +38,7 @@ fn unknown_sites_and_parameters_list_the_near_ones() {
     for (text, expected) in [
         (
             "actuator-gian@drive",
-            "did you mean `actuator-bias` or `actuator-gain`? (`asid list` has all)",
+            "did you mean `actuator-bias`, `actuator-gain`, ",
         ),
         ("actuator-gain@driv", "did you mean `drive`?"),
         ("actuator-gain@drive:gian=1", "did you mean `gain`?"),
