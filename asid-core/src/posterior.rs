@@ -362,6 +362,12 @@ mod tests {
     }
 
     #[test]
+    #[should_panic(expected = "the weights of a posterior sum to 0")]
+    fn weights_that_sum_to_nothing_are_no_posterior() {
+        let _ = Posterior::from_samples(&[parameter()], vec![vec![0.5]], &[0.0]);
+    }
+
+    #[test]
     fn resampling_keeps_the_mean() {
         let parameters = [parameter()];
         let samples: Vec<Vec<f64>> = (0..50).map(|i| vec![f64::from(i) / 50.0]).collect();
