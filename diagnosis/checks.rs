@@ -20,6 +20,9 @@ pub use units::units;
 
 /// Share of missing readings that is still called good.
 const MISSING: f64 = 0.2;
+/// Rows of the training logs for each coordinate of a start that they leave open, below which there is too little for a diagnosis: fewer
+/// than three numbers for each that is fitted leave hardly a residual (a regression wants ten, Harrell 2015, section 4.4).
+const ROWS: usize = 3;
 /// An engine's own error, in changes by half the time step: what is of first order in the step (Richardson 1911), the worst
 /// that engines have.
 pub const RICHARDSON: f64 = 2.0;
@@ -39,9 +42,14 @@ fn check(name: &str, ok: bool, detail: String) -> CheckResult {
     }
 }
 
-/// Readings present, rates, and lengths.
+/// Rows of some logs, all together.
+fn rows(logs: &Logs) -> usize {
+    logs.episodes.iter().map(|e| e.episode.rows()).sum()
+}
+
+/// Readings present, lengths, and whether there are rows enough for starts of which `open` coordinates are unknown.
 #[must_use]
-pub fn data(train: &Logs, test: &Logs) -> CheckResult {
+pub fn data(train: &Logs, test: &Logs, open: usize) -> CheckResult {
     let present: usize = [train, test]
         .iter()
         .map(|l| l.present().iter().filter(|p| **p).count())
@@ -52,11 +60,20 @@ pub fn data(train: &Logs, test: &Logs) -> CheckResult {
     let seconds: f64 = episodes()
         .map(|e| e.episode.time[e.episode.rows() - 1] - e.episode.time[0])
         .sum();
+    let (rows, unknown) = (rows(train), open * train.episodes.len());
+    let few = rows < ROWS * unknown;
+    let too_little = if few {
+        format!(
+            "; {rows} rows to fit to, with {unknown} unknown coordinates of starts, are too little to tell: log longer episodes"
+        )
+    } else {
+        String::new()
+    };
     check(
         "data",
-        missing <= MISSING,
+        missing <= MISSING && !few,
         format!(
-            "{} + {} episodes, {seconds:.1} s, {present} readings, {:.1} % missing",
+            "{} + {} episodes, {seconds:.1} s, {present} readings, {:.1} % missing{too_little}",
             train.episodes.len(),
             test.episodes.len(),
             100.0 * missing

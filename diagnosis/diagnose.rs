@@ -1,6 +1,6 @@
 //! A diagnosis from a study to its result.
 
-use asid_core::{Progress, Result};
+use asid_core::{Error, Layout, Progress, Result};
 
 use crate::calibration::calibrate;
 use crate::intake::Intake;
@@ -8,6 +8,7 @@ use crate::machine::Machine;
 use crate::physics::diagnose_physics;
 use crate::prepare::plain_residuals;
 use crate::result::NotTried;
+use crate::starts::open_coordinates;
 use crate::study::Study;
 
 pub use crate::settings::Settings;
@@ -20,18 +21,22 @@ const DOUBTFUL: f64 = 2.0;
 /// Share of the gap that the other way must leave at most to stand: each way estimates the noise for itself, and a tenth of it is chance.
 const BETTER: f64 = 0.8;
 
+/// Rows that a log to fit to has at least, in the mean: a first speed is taken over six, and the noise over third differences, of four.
+const FEWEST_ROWS: usize = 8;
+
 /// Diagnoses a study on a machine, with outliers left out of its logs and its wiring mended. Where an effect can look like what
 /// was mended, and a gap is left all the same, the wiring is taken the other way too, and what leaves less stands. The way
 /// that is more probable beforehand comes first.
 ///
 /// # Errors
-/// When a parameter cannot be set or a rollout fails.
+/// When the logs have too few rows to tell anything, a parameter cannot be set or a rollout fails.
 pub fn diagnose(
     study: &Study,
     machine: Machine,
     settings: Settings,
     progress: &dyn Progress,
 ) -> Result<(Diagnosis, Work)> {
+    enough_rows(study, &machine.plant.layout)?;
     progress.begin("looking at the logs", 1);
     let mut intake = Intake::of(study, &machine)?;
     progress.end();
@@ -76,4 +81,23 @@ pub fn diagnose(
     }
     intake.tell(&mut diagnosis.result, whiteness);
     Ok((diagnosis, work))
+}
+
+/// Refuses logs with no more rows than their starts have unknown coordinates, where a start fits the readings whatever the machine is and that
+/// no gap is left means nothing, and logs of hardly a row.
+fn enough_rows(study: &Study, layout: &Layout) -> Result<()> {
+    let rows: usize = study.train.iter().map(|(_, e)| e.rows()).sum();
+    let (logs, open) = (study.train.len(), open_coordinates(layout, study).len());
+    let needed = (FEWEST_ROWS * logs).max(open * logs + 1);
+    if rows >= needed {
+        return Ok(());
+    }
+    Err(Error::Config {
+        key: "train".into(),
+        message: format!(
+            "study {}: {logs} logs to fit to have {rows} rows in all, too little to tell anything: at least {needed} are needed, {FEWEST_ROWS} in \
+             each and more than the {open} coordinates of each start that are unknown; log longer episodes",
+            study.name
+        ),
+    })
 }

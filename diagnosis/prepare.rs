@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use asid_core::{Layout, Result};
+use asid_core::{Error, Layout, Result};
 
 use crate::bench::Bench;
 use crate::data::Logs;
@@ -62,10 +62,16 @@ pub fn plain_residuals(
 /// as given.
 ///
 /// # Errors
-/// When a parameter cannot be set.
+/// When no log has a reading, or a parameter cannot be set.
 pub fn dataset(study: &Study, machine: Machine) -> Result<(Bench, Vec<f64>)> {
     let layout = machine.plant.layout.clone();
     let sensors = logged_sensors(&layout, study);
+    if sensors.is_empty() {
+        return Err(Error::Failed(format!(
+            "study {}: no log has a reading that is left, once late columns are moved and outliers left out: log longer episodes",
+            study.name
+        )));
+    }
     let record = |logs: &[(String, asid_core::Episode)]| -> Result<Record> {
         let starts = logs
             .iter()

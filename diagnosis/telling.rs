@@ -229,7 +229,7 @@ impl Telling<'_> {
     ) -> Result<Vec<crate::result::CheckResult>> {
         let bench = self.bench;
         let mut all = vec![
-            checks::data(&bench.train.logs, &bench.test.logs),
+            checks::data(&bench.train.logs, &bench.test.logs, bench.open.len()),
             checks::units(bench, self.nominal)?,
         ];
         all.extend(checks::identifiability(&bench.parameters, none, best));

@@ -6,14 +6,14 @@
 
 use std::path::Path;
 
-use crate::episode::{cell_number, delimiter};
+use crate::episode::{cell_number, delimiter, refuse_twice};
 use crate::raw::RawLog;
 use crate::table_file;
 
 /// Reads a file. Cells that are no numbers are missing; columns without any number are left out.
 ///
 /// # Errors
-/// When the file is no table, or has no column of stamps.
+/// When the file is no table, a name stands twice in its header, or it has no column of stamps.
 pub fn read(path: &Path, name: &str) -> Result<RawLog, String> {
     let text = std::fs::read(path).map_err(|e| e.to_string())?;
     let text = String::from_utf8_lossy(&text);
@@ -26,6 +26,7 @@ pub fn read(path: &Path, name: &str) -> Result<RawLog, String> {
         .delimiter(delimiter(first))
         .from_reader(text.as_bytes());
     let header = reader.headers().map_err(|e| e.to_string())?.clone();
+    refuse_twice(&header)?;
     let mut columns: Vec<(String, Vec<f64>)> = header
         .iter()
         .map(|name| (name.to_owned(), Vec::new()))

@@ -21,11 +21,11 @@ use std::path::Path;
 use asid_core::layout::Layout;
 use asid_core::{Episode, Error, Result};
 
-pub use self::csv::{cell_number, delimiter};
+pub use self::csv::{cell_number, delimiter, refuse_twice};
 #[cfg(feature = "parquet")]
 pub use self::parquet::ParquetFile;
 pub use clock::seconds;
-pub use mapping::{ColumnMapping, unit_factor};
+pub use mapping::{ColumnMapping, counts, unit_counts, unit_factor};
 pub use notes::LogNotes;
 pub use remapped::remapped;
 pub use table::{Table, of_table, quantities, wanted};

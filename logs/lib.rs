@@ -12,6 +12,7 @@
 pub mod align;
 #[cfg(feature = "ros")]
 pub mod bag;
+pub mod counted;
 mod csv_file;
 pub mod episode;
 pub mod format;

@@ -61,6 +61,10 @@ pub fn log(name: &str, columns: Vec<(String, Vec<f64>)>) -> Result<RawLog, Strin
     seconds(&mut time);
     let first = time.iter().copied().find(|t| t.is_finite()).unwrap_or(0.0);
     time.iter_mut().for_each(|t| *t -= first);
+    let numberless = columns.iter().enumerate().filter(|(i, (name, values))| {
+        *i != place && !name.is_empty() && values.iter().all(|x| !x.is_finite())
+    });
+    let numberless: Vec<&str> = numberless.map(|(_, (name, _))| &**name).collect();
     let series = columns.iter().enumerate().filter(|(i, _)| *i != place);
     let series = series.filter_map(|(_, (name, values))| {
         let points = time.iter().zip(values);
@@ -80,7 +84,14 @@ pub fn log(name: &str, columns: Vec<(String, Vec<f64>)>) -> Result<RawLog, Strin
         name: name.to_owned(),
         series: series.collect(),
         stamps: Some(columns[place].0.clone()),
-        remarks: Vec::new(),
+        remarks: if numberless.is_empty() {
+            Vec::new()
+        } else {
+            vec![format!(
+                "columns without a number are not read: {}",
+                numberless.join(", ")
+            )]
+        },
     })
 }
 

@@ -5,6 +5,7 @@
 
 mod algorithm;
 mod engine;
+mod identified;
 mod task;
 
 use std::mem::ManuallyDrop;

@@ -82,6 +82,17 @@ impl Border {
         }
     }
 
+    /// Refuses what a plugin returned, where it was looked at and found wrong.
+    ///
+    /// # Errors
+    /// [`Error::Failed`] naming the plugin, and what is wrong.
+    pub fn require(self, checked: Result<(), String>) -> Result<()> {
+        match (self, checked) {
+            (Self::Inward(_), Err(what)) => Err(self.fault(&what)),
+            _ => Ok(()),
+        }
+    }
+
     /// As [`Border::finite`], for calls that return no error.
     pub fn check_finite(self, given: &[f64], values: &[f64], what: &str) {
         if let Err(error) = self.finite(given, values, what) {

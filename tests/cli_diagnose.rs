@@ -132,7 +132,7 @@ fn bad_studies_and_logs_are_refused_in_one_line() {
     let toml = study.join("study.toml");
     let written = std::fs::read_to_string(&toml).unwrap();
     let with_log = |text: String| std::fs::write(&log, text).unwrap();
-    let cases: [Spoilt<'_>; 7] = [
+    let cases: [Spoilt<'_>; 9] = [
         (
             "no sensor",
             Box::new(|| with_log(good.replace(",x,dx,", ",place,speed,"))),
@@ -152,6 +152,19 @@ fn bad_studies_and_logs_are_refused_in_one_line() {
             "one row",
             Box::new(|| with_log(good.lines().take(2).collect::<Vec<_>>().join("\n"))),
             "at least 2",
+        ),
+        (
+            "twice",
+            Box::new(|| with_log(good.replacen(",x,dx,", ",x,x,", 1))),
+            "train_0.csv: column `x` stands twice",
+        ),
+        (
+            "unit",
+            Box::new(|| {
+                let column = "[[column]]\nname = \"x\"\nunit = \"deg\"\n";
+                std::fs::write(&toml, format!("{written}{column}")).unwrap();
+            }),
+            "`x` is a length; deg is an angle",
         ),
         (
             "key",
@@ -179,6 +192,29 @@ fn bad_studies_and_logs_are_refused_in_one_line() {
     }
     let (said, status) = refusal(&["diagnose", text(&folder.path().join("nowhere"))]);
     assert!(said.contains("no such file") && status == Some(2), "{said}");
+}
+
+/// A start fits two rows whatever the machine is, and that no gap was left passed for a verdict; with a start that is known a column that was taken
+/// for late left nothing, and the program panicked.
+#[test]
+fn logs_of_too_few_rows_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let study = folder.path().join("study");
+    write_study(&study, Truth::None);
+    for entry in std::fs::read_dir(&study).unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_some_and(|e| e == "csv") {
+            let log = std::fs::read_to_string(&path).unwrap();
+            let rows: Vec<&str> = log.lines().take(3).collect();
+            std::fs::write(&path, rows.join("\n")).unwrap();
+        }
+    }
+    let (said, status) = refusal(&["diagnose", text(&study), "--quiet"]);
+    assert!(
+        said.contains("4 logs to fit to have 8 rows in all"),
+        "{said}"
+    );
+    assert_eq!(status, Some(2), "{said}");
 }
 
 #[test]

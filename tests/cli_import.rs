@@ -310,3 +310,61 @@ fn a_log_that_is_fitted_and_held_out_is_refused() {
     assert!(said.contains("to be fitted and to be held out"), "{said}");
     assert!(!place.path().join("study").exists());
 }
+
+/// A study was written that `diagnose` refused.
+#[test]
+fn a_log_that_is_named_twice_is_refused() {
+    let place = tempfile::tempdir().unwrap();
+    let log = fixture("csv/train_0.csv");
+    let again = fixture("csv/../csv/train_0.csv");
+    for logs in [[log.clone(), log.clone()], [log, again]] {
+        let out = import(&logs, &place.path().join("study"), &[]);
+        let said = String::from_utf8_lossy(&out.stderr);
+        assert_eq!(out.status.code(), Some(2), "{said}");
+        assert!(
+            said.contains("is named twice") && said.lines().count() == 1,
+            "{said}"
+        );
+        assert!(!place.path().join("study").exists());
+    }
+}
+
+#[test]
+fn a_column_that_stands_twice_is_refused_before_it_is_mapped() {
+    let place = tempfile::tempdir().unwrap();
+    let log = place.path().join("log.csv");
+    let csv = std::fs::read_to_string(fixture("csv/train_0.csv")).unwrap();
+    let doubled = csv.lines().map(|line| {
+        let last = line.rsplit(',').next().unwrap();
+        format!("{line},{last}\n")
+    });
+    std::fs::write(&log, doubled.collect::<String>()).unwrap();
+    let out = import(&[log], &place.path().join("study"), &[]);
+    let said = String::from_utf8_lossy(&out.stderr);
+    assert_eq!(out.status.code(), Some(2), "{said}");
+    assert!(
+        said.contains("log.csv: column `gripper_gap` stands twice"),
+        "{said}"
+    );
+}
+
+#[test]
+fn what_is_not_used_and_where_the_stamps_are_is_said() {
+    let place = tempfile::tempdir().unwrap();
+    let csv = std::fs::read_to_string(fixture("csv/train_0.csv")).unwrap();
+    let more = csv.lines().enumerate().map(|(i, line)| match i {
+        0 => format!("{},battery,state\n", line.replacen("time", "stamp", 1)),
+        _ => format!("{line},12.1,running\n"),
+    });
+    let log = place.path().join("log.csv");
+    std::fs::write(&log, more.collect::<String>()).unwrap();
+    let out = import(&[log], &place.path().join("study"), &[]);
+    let noted = String::from_utf8_lossy(&out.stderr).into_owned();
+    let said = told(&out);
+    assert!(said.contains("\ntime is column stamp\n"), "{said}");
+    assert!(said.contains("\nnot used: battery\n"), "{said}");
+    assert!(
+        noted.contains("columns without a number are not read: state"),
+        "{noted}"
+    );
+}

@@ -415,3 +415,59 @@ fn the_list_says_that_the_solver_ppo_needs_torch() {
         "{line}"
     );
 }
+
+#[test]
+fn a_custom_world_with_nothing_of_its_own_is_refused() {
+    let place = Workplace::new();
+    refused_run(
+        &place,
+        &["--world", "custom"],
+        &["--world custom", "--real-effect", "matched"],
+    );
+}
+
+#[test]
+fn a_true_value_that_no_engine_takes_is_named_by_its_option() {
+    let place = Workplace::new();
+    let output = place.run(&tiny(&[
+        "run",
+        "rod-balancing",
+        "--quiet",
+        "--set",
+        "parameter.mass.target=body/rod/mass",
+        "--set",
+        "parameter.mass.range=[0.1, 1]",
+        "--truth",
+        "mass=-1",
+    ]));
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(2), "{said}");
+    assert!(
+        said.lines()
+            .last()
+            .unwrap()
+            .contains("--truth mass: must be positive, not -1"),
+        "{said}"
+    );
+}
+
+#[test]
+fn a_true_value_outside_of_the_prior_is_warned_of() {
+    let place = Workplace::new();
+    let output = place.run(&tiny(&[
+        "run",
+        "rod-balancing",
+        "--quiet",
+        "--truth",
+        "mass_offset=0.2",
+    ]));
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.success(), "{said}");
+    assert_eq!(
+        said.matches("warning: --truth mass_offset=0.2 lies outside of the prior")
+            .count(),
+        1,
+        "{said}"
+    );
+    assert!(said.contains("above its upper end"), "{said}");
+}

@@ -98,6 +98,38 @@ fn follow(guide: &str, settings: &[&str]) {
     );
 }
 
+/// Words in brackets or code marks of a text that look like the way to a file of the repository.
+fn ways(text: &str) -> Vec<&str> {
+    let links = text.split("](").skip(1);
+    let links = links.filter_map(|rest| rest.split(')').next());
+    let code = text.split('`').skip(1).step_by(2);
+    let code = code.filter(|c| c.starts_with("plugins/effect-") || c.starts_with("plugins/task-"));
+    links.filter(|l| !l.contains("://")).chain(code).collect()
+}
+
+#[test]
+fn guides_of_a_new_plugin_lead_nowhere_that_is_not_there() {
+    let place = Workplace::new();
+    for kind in ["engine-c", "mechanism-c", "task", "explorer", "effect"] {
+        let dir = format!("my-{kind}");
+        let output = place.run(&["new", kind, &dir]);
+        assert!(output.status.success(), "{output:?}");
+        for file in ["GUIDE.md", "README.md"] {
+            let text = place.read(&format!("{dir}/{file}"));
+            let lost: Vec<&str> = (ways(&text).into_iter())
+                .filter(|way| {
+                    !place
+                        .path(&dir)
+                        .join(way.split('#').next().unwrap())
+                        .exists()
+                })
+                .collect();
+            assert!(lost.is_empty(), "{kind} {file}: {lost:?}");
+            assert!(!text.contains("plugins/effect-"), "{kind} {file}");
+        }
+    }
+}
+
 #[test]
 fn the_guide_to_tasks_leads_to_a_run() {
     follow(GUIDES[0], &TINY);

@@ -113,6 +113,34 @@ fn an_algorithms_panics_end_as_one_line() {
 }
 
 #[test]
+fn what_an_identifier_hands_back_is_looked_at_before_it_is_used() {
+    let (_, solver) = TINY.split_at(8);
+    for (identifier, reason) in [
+        (
+            "identifies-without-starts",
+            "returned 0 starts for 1 episodes",
+        ),
+        ("identifies-short-starts", "entries of a start for"),
+        ("identifies-without-marginals", "returned 0 marginals for"),
+        ("identifies-without-samples", "the posterior has no samples"),
+        ("identifies-negative-weights", "is -0.5, below 0"),
+        ("identifies-weights-that-do-not-sum", "sum to 2, not to 1"),
+        ("identifies-few-weights", "returned 1 weights for 2 samples"),
+        ("identifies-long-samples", "entries of a sample for"),
+        ("identifies-nan-residual", "the residual is NaN"),
+    ] {
+        let call = [
+            "payload-swing",
+            "--explorer",
+            "random",
+            "--identifier",
+            identifier,
+        ];
+        faulty_says(&[&call, solver].concat(), reason);
+    }
+}
+
+#[test]
 fn an_effects_failures_end_as_one_line() {
     for (effect, reason) in [
         ("force-panics", "panicked: no force"),

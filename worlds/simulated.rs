@@ -145,8 +145,26 @@ impl<'a> SimulatedWorld<'a> {
 
     fn begin(&mut self, start: &[f64]) -> Result<()> {
         let both = self.truth.repeat(2);
-        self.batch.set_parameters(&[WORLD, COPY], &both)?;
+        let set = self.batch.set_parameters(&[WORLD, COPY], &both);
+        set.map_err(|e| self.of_truth(e))?;
         self.batch.place(self.task, &[WORLD], start)
+    }
+
+    /// An error of a parameter that an engine refuses, as one of the truth that was asked for.
+    fn of_truth(&self, error: Error) -> Error {
+        let Error::Parameter { parameter, message } = error else {
+            return error;
+        };
+        let own = |p: &Parameter| {
+            p.name == parameter || p.targets.iter().any(|t| t.to_string() == parameter)
+        };
+        match self.parameters.iter().position(own) {
+            Some(i) => Error::Config {
+                key: format!("--truth {}", self.parameters[i].name),
+                message,
+            },
+            None => Error::Parameter { parameter, message },
+        }
     }
 
     /// Whether the simulation goes on; one that a plugin's effect ended does not count.

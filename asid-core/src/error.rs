@@ -12,7 +12,7 @@ pub type Result<T, E = Error> = std::result::Result<T, E>;
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// A name that no registered item has.
-    #[error("unknown {kind} `{name}`{}", suggestion(.near))]
+    #[error("unknown {kind} `{name}`{}", suggestion(.kind, .near, *.all))]
     UnknownName {
         /// What kind of thing was looked for, such as `task`.
         kind: &'static str,
@@ -20,6 +20,8 @@ pub enum Error {
         name: String,
         /// Names that come close, nearest first; all names where none does.
         near: Vec<String>,
+        /// Whether these are all names that there are.
+        all: bool,
     },
     /// A scene that cannot be read or that an engine refuses.
     #[error("scene {scene}: {message}")]
@@ -110,10 +112,13 @@ impl Error {
         name: &str,
         known: impl IntoIterator<Item = &'a str>,
     ) -> Self {
+        let known: Vec<&str> = known.into_iter().collect();
+        let near = near_names(name, &known);
         Self::UnknownName {
             kind,
             name: name.to_owned(),
-            near: near_names(name, known),
+            all: near.len() == known.len(),
+            near,
         }
     }
 
@@ -137,24 +142,37 @@ impl Error {
     }
 }
 
-fn suggestion(near: &[String]) -> String {
-    match near {
+/// Kinds of which `asid list` has every name.
+const LISTED: [&str; 6] = [
+    "task",
+    "explorer",
+    "identifier",
+    "solver",
+    "backend",
+    "effect",
+];
+
+/// What was meant, by the names that come close, or what there is.
+fn suggestion(kind: &str, near: &[String], all: bool) -> String {
+    let quoted: Vec<String> = near.iter().map(|n| format!("`{n}`")).collect();
+    match &*quoted {
         [] => String::new(),
-        [one] => format!("; did you mean `{one}`?"),
-        many => format!(
-            "; known: {}",
-            many.iter()
-                .map(|n| format!("`{n}`"))
-                .collect::<Vec<_>>()
-                .join(", ")
-        ),
+        [one] => format!("; did you mean {one}?"),
+        many if all => format!("; known: {}", many.join(", ")),
+        [first @ .., last] => {
+            let rest = if LISTED.contains(&kind) {
+                " (`asid list` has all)"
+            } else {
+                ""
+            };
+            format!("; did you mean {} or {last}?{rest}", first.join(", "))
+        }
     }
 }
 
 /// Names within a third of their length in edits of `name` or containing it,
 /// nearest first; all of `known` where none is near.
-fn near_names<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Vec<String> {
-    let known: Vec<&str> = known.into_iter().collect();
+fn near_names(name: &str, known: &[&str]) -> Vec<String> {
     let mut near: Vec<(usize, &str)> = known
         .iter()
         .filter_map(|&k| {
@@ -208,6 +226,21 @@ mod tests {
             "unknown task `rod-balancin`; did you mean `rod-balancing`?"
         );
         assert!(error.is_usage());
+    }
+
+    #[test]
+    fn names_that_come_close_are_not_said_to_be_all() {
+        let known = ["fisher-cem", "fisher-ppo", "random"];
+        let error = Error::unknown("explorer", "fisher", known);
+        assert_eq!(
+            error.to_string(),
+            "unknown explorer `fisher`; did you mean `fisher-cem` or `fisher-ppo`? (`asid list` has all)"
+        );
+        let error = Error::unknown("sensor", "tip", ["tip.0", "tip.1", "tip.2", "elbow"]);
+        assert_eq!(
+            error.to_string(),
+            "unknown sensor `tip`; did you mean `tip.0`, `tip.1` or `tip.2`?"
+        );
     }
 
     #[test]

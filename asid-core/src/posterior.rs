@@ -126,10 +126,29 @@ pub struct Posterior {
 const SHARE: f64 = 0.1;
 
 impl Posterior {
-    /// Summarises weighted samples; weights need not be normalised.
+    /// Summarises weighted samples: `samples` is `n x d`, one row a sample and one entry a parameter, in its unit; `weights` are `n`
+    /// numbers from 0 on, which need not sum to 1.
+    ///
+    /// # Panics
+    /// Where there are not as many weights as samples, a sample has fewer entries than there are parameters, or the weights do not sum to
+    /// a number above 0.
     #[must_use]
     pub fn from_samples(parameters: &[Parameter], samples: Vec<Vec<f64>>, weights: &[f64]) -> Self {
+        let (n, d) = (samples.len(), parameters.len());
+        assert!(
+            weights.len() == n,
+            "a posterior of {n} samples has {} weights",
+            weights.len()
+        );
+        assert!(
+            samples.iter().all(|s| s.len() >= d),
+            "a sample of a posterior over {d} parameters has fewer entries"
+        );
         let total: f64 = weights.iter().sum();
+        assert!(
+            total.is_finite() && total > 0.0,
+            "the weights of a posterior sum to {total}, which is no number above 0"
+        );
         let weights: Vec<f64> = weights.iter().map(|w| w / total).collect();
         let marginals = parameters
             .iter()
@@ -340,6 +359,12 @@ mod tests {
         let seen = posterior.clone().with_unseen(vec![of(0.1)]);
         assert!(!seen.marginals[0].unidentified && seen.unseen.len() == 1);
         assert!(posterior.with_unseen(vec![of(0.7)]).marginals[0].unidentified);
+    }
+
+    #[test]
+    #[should_panic(expected = "the weights of a posterior sum to 0")]
+    fn weights_that_sum_to_nothing_are_no_posterior() {
+        let _ = Posterior::from_samples(&[parameter()], vec![vec![0.5]], &[0.0]);
     }
 
     #[test]

@@ -7,6 +7,7 @@ use asid_core::parameter::Scale;
 use asid_core::{Episode, Error, Layout, Parameter, Result, Target};
 use asid_effects::refined_model::RefinedModel;
 use asid_logs::LogSettings;
+use asid_logs::counted::check_units;
 use asid_logs::episode::ColumnMapping;
 use asid_mjcf::Plant;
 use serde::Deserialize;
@@ -81,15 +82,15 @@ impl Document {
     }
 
     /// Whether every mapping of a column fits the machine, and has a name of its own.
-    fn check_columns(&self, layout: &Layout, fail: Fail<'_>) -> Result<()> {
+    fn check_columns(&self, plant: &Plant, fail: Fail<'_>) -> Result<()> {
         for (i, mapping) in self.column.iter().enumerate() {
-            mapping.check(layout).map_err(|e| of_file(e, fail))?;
+            mapping.check(&plant.layout).map_err(|e| of_file(e, fail))?;
             let before = &self.column[..i];
             if before.iter().any(|m| m.name == mapping.name) {
                 return Err(fail(format!("two [[column]] are named `{}`", mapping.name)));
             }
         }
-        Ok(())
+        check_units(plant, &self.column).map_err(|e| of_file(e, fail))
     }
 }
 
@@ -149,7 +150,7 @@ impl Study {
             p.targets.iter_mut().for_each(|t| by_geom(&plant, t));
         }
         document.check_noise(&plant.layout, &fail)?;
-        document.check_columns(&plant.layout, &fail)?;
+        document.check_columns(&plant, &fail)?;
         let mut notes = Vec::new();
         let mut logs = files::Logs::new(&folder, &plant.layout, &document.column, &document.log);
         let mut read = |patterns: &[String], key: &str| -> Result<Vec<(String, Episode)>> {

@@ -1,5 +1,6 @@
 //! Logs as CSV files.
 
+use std::collections::HashMap;
 use std::io::{BufRead as _, BufReader, Read as _};
 use std::path::Path;
 
@@ -23,6 +24,28 @@ pub fn delimiter(first_line: &str) -> u8 {
     // The comma wins a draw: it is what the name says.
     let marks = [b'\t', b';', b','];
     marks.into_iter().max_by_key(|m| count(*m)).unwrap_or(b',')
+}
+
+/// Refuses a header in which a name stands twice: which of the two columns is meant, nobody can say. Empty names do not count, as of the
+/// index that pandas writes.
+///
+/// # Errors
+/// When a name stands twice; the message names it and both columns, counted from 1.
+pub fn refuse_twice<'a>(header: impl IntoIterator<Item = &'a str>) -> Result<(), String> {
+    let mut seen: HashMap<&str, usize> = HashMap::new();
+    for (i, name) in header.into_iter().enumerate() {
+        if name.is_empty() {
+            continue;
+        }
+        if let Some(first) = seen.insert(name, i) {
+            return Err(format!(
+                "column `{name}` stands twice in the header, as column {} and as column {}: rename one of them, or leave it out",
+                first + 1,
+                i + 1
+            ));
+        }
+    }
+    Ok(())
 }
 
 /// The number in a cell: NaN where it is missing, `None` where it is no finite number.
@@ -56,6 +79,7 @@ pub(super) fn read(
         .from_path(path)
         .map_err(told)?;
     let header = file.headers().map_err(told)?;
+    refuse_twice(header)?;
     let header = header.iter().map(str::to_owned).collect();
     let mut reader = Reader::new(layout, mappings, header)?;
     for (i, record) in file.records().enumerate() {

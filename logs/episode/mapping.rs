@@ -7,32 +7,56 @@ use asid_core::layout::Layout;
 use asid_core::{Error, Result};
 use serde::{Deserialize, Serialize};
 
-/// Units by name, with the factor that brings them to SI (NIST SP 811, appendix B).
-const UNITS: [(&str, f64); 24] = [
-    ("rad", 1.0),
-    ("mrad", 1e-3),
-    ("deg", std::f64::consts::PI / 180.0),
-    ("rev", std::f64::consts::TAU),
-    ("rad/s", 1.0),
-    ("deg/s", std::f64::consts::PI / 180.0),
-    ("rpm", std::f64::consts::TAU / 60.0),
-    ("m", 1.0),
-    ("cm", 1e-2),
-    ("mm", 1e-3),
-    ("m/s", 1.0),
-    ("cm/s", 1e-2),
-    ("mm/s", 1e-3),
-    ("m/s^2", 1.0),
-    ("g", 9.806_65),
-    ("N", 1.0),
-    ("mN", 1e-3),
-    ("N m", 1.0),
-    ("mN m", 1e-3),
-    ("s", 1.0),
-    ("ms", 1e-3),
-    ("us", 1e-6),
-    ("ns", 1e-9),
-    ("%", 1e-2),
+/// What a unit counts, in words.
+pub mod counts {
+    /// rad and its multiples.
+    pub const ANGLE: &str = "an angle";
+    /// m and its parts.
+    pub const LENGTH: &str = "a length";
+    /// rad/s.
+    pub const ANGULAR_SPEED: &str = "an angular speed";
+    /// m/s.
+    pub const SPEED: &str = "a speed";
+    /// m/s².
+    pub const ACCELERATION: &str = "an acceleration";
+    /// N.
+    pub const FORCE: &str = "a force";
+    /// N m.
+    pub const TORQUE: &str = "a torque";
+    /// s.
+    pub const TIME: &str = "a time";
+    /// A share of anything.
+    pub const SHARE: &str = "";
+}
+
+use counts::{ACCELERATION, ANGLE, ANGULAR_SPEED, FORCE, LENGTH, SHARE, SPEED, TIME, TORQUE};
+
+/// Units by name, with the factor that brings them to SI (NIST SP 811, appendix B) and what they count.
+const UNITS: [(&str, f64, &str); 24] = [
+    ("rad", 1.0, ANGLE),
+    ("mrad", 1e-3, ANGLE),
+    ("deg", std::f64::consts::PI / 180.0, ANGLE),
+    ("rev", std::f64::consts::TAU, ANGLE),
+    ("rad/s", 1.0, ANGULAR_SPEED),
+    ("deg/s", std::f64::consts::PI / 180.0, ANGULAR_SPEED),
+    ("rpm", std::f64::consts::TAU / 60.0, ANGULAR_SPEED),
+    ("m", 1.0, LENGTH),
+    ("cm", 1e-2, LENGTH),
+    ("mm", 1e-3, LENGTH),
+    ("m/s", 1.0, SPEED),
+    ("cm/s", 1e-2, SPEED),
+    ("mm/s", 1e-3, SPEED),
+    ("m/s^2", 1.0, ACCELERATION),
+    ("g", 9.806_65, ACCELERATION),
+    ("N", 1.0, FORCE),
+    ("mN", 1e-3, FORCE),
+    ("N m", 1.0, TORQUE),
+    ("mN m", 1e-3, TORQUE),
+    ("s", 1.0, TIME),
+    ("ms", 1e-3, TIME),
+    ("us", 1e-6, TIME),
+    ("ns", 1e-9, TIME),
+    ("%", 1e-2, SHARE),
 ];
 
 /// One `[[column]]`: the quantity `name` of the model is
@@ -124,7 +148,7 @@ impl ColumnMapping {
         if let Some(unit) = &self.unit
             && unit_factor(unit).is_none()
         {
-            let units: Vec<&str> = UNITS.iter().map(|(n, _)| *n).collect();
+            let units: Vec<&str> = UNITS.iter().map(|(n, ..)| *n).collect();
             return Err(fail(format!(
                 "unit `{unit}` is not known; known: {}; or give `scale`",
                 units.join(", ")
@@ -152,8 +176,17 @@ impl ColumnMapping {
 /// Factor that brings a unit to SI; `None` for one that is not known.
 #[must_use]
 pub fn unit_factor(unit: &str) -> Option<f64> {
-    let found = UNITS.iter().find(|(name, _)| *name == unit);
-    found.map(|(_, factor)| *factor)
+    let found = UNITS.iter().find(|(name, ..)| *name == unit);
+    found.map(|(_, factor, _)| *factor)
+}
+
+/// What a unit counts, in words of [`counts`]; `None` for one that is not known, and for a share, which goes with any quantity.
+#[must_use]
+pub fn unit_counts(unit: &str) -> Option<&'static str> {
+    let found = UNITS.iter().find(|(name, ..)| *name == unit);
+    found
+        .map(|(.., counts)| *counts)
+        .filter(|counts| *counts != SHARE)
 }
 
 /// What a mapping may name: sensors, their entries, commands.

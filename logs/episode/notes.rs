@@ -7,6 +7,10 @@ pub struct LogNotes {
     pub passed_over: Vec<String>,
     /// Columns among them that look like a misspelt sensor or command: the column, and the name that the model has.
     pub misspelt: Vec<(String, String)>,
+    /// Columns of sensors in which every reading is missing.
+    pub empty: Vec<String>,
+    /// Sensors without a column that have no name in the model, by the names that they get: `sensor` and their number.
+    pub nameless: Vec<String>,
     /// Unit of the stamps where it is not the second.
     pub time_unit: Option<&'static str>,
     /// Rows left out because another has the same stamp.
@@ -36,6 +40,17 @@ impl LogNotes {
                 "`{column}` looks like `{name}`, which has no column: `[[column]] name = \"{name}\" from = \"{column}\"` would read it"
             ));
         }
+        for column in &self.empty {
+            all.push(format!(
+                "every reading of column `{column}` is missing: nothing is said of its sensor"
+            ));
+        }
+        for name in &self.nameless {
+            all.push(format!(
+                "the sensor of the model that has no name is called `{name}`, and no column is: name it in the model as its column is named, \
+                 or map it by `[[column]] name = \"{name}\"`"
+            ));
+        }
         if let Some(unit) = self.time_unit {
             all.push(format!(
                 "stamps are in {unit}: brought to seconds from the first"
@@ -54,9 +69,11 @@ impl LogNotes {
         all
     }
 
-    /// Whether a reading may have been lost: a column that looks like a sensor's.
+    /// Whether a reading may have been lost: a column that looks like a sensor's, one of a sensor that is empty, or one that nobody knows where
+    /// a sensor has no name.
     #[must_use]
     pub fn is_suspicious(&self) -> bool {
-        !self.misspelt.is_empty()
+        let unnamed = !self.nameless.is_empty() && !self.passed_over.is_empty();
+        unnamed || !(self.misspelt.is_empty() && self.empty.is_empty())
     }
 }

@@ -38,9 +38,12 @@ fn noted(layout: &Layout, channels: &[ChannelColumns], passed_over: Vec<String>)
         passed_over,
         ..LogNotes::default()
     };
-    for s in &layout.sensors {
+    for (i, s) in layout.sensors.iter().enumerate() {
         if channels.iter().any(|c| c.name == s.name) {
             continue;
+        }
+        if s.name == format!("sensor{i}") {
+            notes.nameless.push(s.name.clone());
         }
         let stems = notes
             .passed_over
@@ -216,6 +219,13 @@ impl<'a> Reader<'a> {
         clock::check_duration(&episode.time, self.layout.timestep)?;
         if episode.readings.iter().all(|x| x.is_nan()) {
             return Err("every reading is missing".into());
+        }
+        let width = self.readings.len();
+        for (j, column) in self.readings.iter().enumerate() {
+            let mut cells = episode.readings.iter().skip(j).step_by(width);
+            if cells.all(|x| x.is_nan()) {
+                self.notes.empty.push(self.header[column.place].clone());
+            }
         }
         for (a, column) in self.ctrl.iter().enumerate() {
             let held = hold(&mut episode.ctrl, self.ctrl.len(), a).ok_or_else(|| {

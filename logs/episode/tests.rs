@@ -307,3 +307,48 @@ fn bad_logs_name_row_and_column() {
         assert!(error.contains(expected), "{error}");
     }
 }
+
+#[test]
+fn a_column_without_a_reading_and_a_sensor_without_a_name_are_said() {
+    let mut nameless = layout();
+    nameless.sensors[1].name = "sensor1".into();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("log.csv");
+    let read = |text: &str, layout: &Layout| {
+        std::fs::write(&path, text).unwrap();
+        read_mapped(&path, layout, &[]).unwrap().1
+    };
+    let notes = read(
+        "time,ctrl.servo,angle,tip.0,tip.1,tip.2\n0,0,,1,1,1\n0.1,0,nan,1,1,1\n",
+        &layout(),
+    );
+    assert_eq!(notes.empty, ["angle"]);
+    assert!(notes.is_suspicious());
+    let said = notes.lines().join("; ");
+    assert!(
+        said.contains("every reading of column `angle` is missing"),
+        "{said}"
+    );
+    let notes = read("time,ctrl.servo,angle\n0,0,1\n0.1,0,2\n", &nameless);
+    let said = notes.lines().join("; ");
+    assert!(said.contains("is called `sensor1`"), "{said}");
+    assert!(!notes.is_suspicious());
+    let notes = read("time,ctrl.servo,angle,tip\n0,0,1,1\n0.1,0,2,1\n", &nameless);
+    assert!(notes.is_suspicious());
+    let notes = read("time,ctrl.servo,angle\n0,0,1\n0.1,,2\n", &layout());
+    assert!(notes.empty.is_empty() && notes.nameless.is_empty());
+}
+
+#[test]
+fn a_column_that_stands_twice_is_refused_by_name() {
+    let error = read_text("time,ctrl.servo,angle,angle\n0,0,1,1\n0.1,0,2,2\n", &[]);
+    let said = error.unwrap_err().to_string();
+    assert!(
+        said.contains("log.csv") && said.contains("column `angle` stands twice"),
+        "{said}"
+    );
+    assert!(said.contains("column 3 and as column 4"), "{said}");
+    // The empty name of an index, and of cells behind the last comma.
+    let read = read_text(",time,ctrl.servo,angle,\n0,0,0,1,\n1,0.1,0,2,\n", &[]);
+    assert!(read.is_ok(), "{read:?}");
+}

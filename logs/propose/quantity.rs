@@ -6,6 +6,7 @@ use asid_mjcf::Plant;
 use asid_mjcf::plant::{DriveLaw, Reads};
 
 use super::words::{Measure, Words};
+use crate::counted::counted;
 
 /// What a number of a quantity counts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -35,6 +36,8 @@ pub struct Quantity {
     pub measure: Option<Measure>,
     /// What its numbers count.
     pub dimension: Dimension,
+    /// The same with its time, in words: what the unit of a column must count as well; `None` where that is not known.
+    pub counts: Option<&'static str>,
     /// Values that it can take, in SI units, where the model says.
     pub range: Option<[f64; 2]>,
     /// Its name and that of its joint or body, in words.
@@ -56,6 +59,9 @@ pub fn quantities(scene: &Scene, plant: &Plant) -> asid_core::Result<Vec<Quantit
     let mut all = commands(plant, &ranges);
     for (sensor, reads) in plant.layout.sensors.iter().zip(&plant.sensors) {
         all.extend(readings(plant, sensor, *reads, &ranges));
+    }
+    for quantity in &mut all {
+        quantity.counts = counted(plant, &quantity.name);
     }
     Ok(all)
 }
@@ -84,6 +90,7 @@ fn commands(plant: &Plant, ranges: &[Option<[f64; 2]>]) -> Vec<Quantity> {
             joint,
             measure,
             dimension: dimension(plant, joint, measure),
+            counts: None,
             range: actuator
                 .ctrl_range
                 .or_else(|| of_joint.and_then(|j| ranges.get(j).copied().flatten())),
@@ -164,6 +171,7 @@ fn readings(
             Dimension::Other => dimension(plant, joint, measure),
             known => known,
         },
+        counts: None,
         range,
         words: words(&sensor.name, site),
         axis: axes.get(i).copied(),

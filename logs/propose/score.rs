@@ -5,6 +5,7 @@ use std::collections::HashMap;
 use super::quantity::{Dimension, Quantity};
 use super::unit::{Unit, unit};
 use super::words::{Measure, Words};
+use crate::counted::allows;
 use crate::format::LogFormat;
 use crate::raw::RawLog;
 use crate::series::Series;
@@ -15,6 +16,12 @@ const OWN_NAME: f64 = 100.0;
 const SAME_WORDS: f64 = 4.0;
 /// Part of them where the words are in the topic's name only.
 const BY_TOPIC: f64 = 0.8;
+/// Points of a word that is the joint's or actuator's whole name, such as `x`: more than a place in a list has, for a name is a
+/// better ground.
+const WHOLE_NAME: f64 = 2.0;
+/// Further points of it where the column has no other telling word; less in proportion. Both together stay below shared telling words:
+/// a letter is in more names than a word.
+const NO_OTHER: f64 = 1.5;
 /// Points lost where both have words, and none in common.
 const OTHER_WORDS: f64 = 1.5;
 /// Points of the same measure.
@@ -178,6 +185,10 @@ impl<'a> Context<'a> {
         if series.name == quantity.name {
             return Some(made(OWN_NAME, vec!["its name".into()], unit));
         }
+        // Millimetres are no angle, whatever the column is called.
+        if unit.name.is_some_and(|u| !allows(quantity.counts, u)) {
+            return None;
+        }
         let mut points = role(quantity, &named.full) + measure(quantity, named);
         let mut reasons = Vec::new();
         if let Some(axis) = quantity.axis {
@@ -190,27 +201,39 @@ impl<'a> Context<'a> {
                 return None;
             }
             points += 1.0;
-        } else if named.full.axis.is_some() {
-            return None;
+        } else if let Some(axis) = named.full.axis {
+            // An axis tells entries of a vector, and joints that are named after theirs: `x`, `slide_x`.
+            if !quantity.words.iter().any(|w| w.axis == Some(axis)) {
+                return None;
+            }
         }
         let turns = quantity.dimension == Dimension::Angle;
         if quantity.dimension != Dimension::Other && named.full.turning.is_some_and(|t| t != turns)
         {
             return None;
         }
-        let alike = |words: &Words| {
+        let likeness = |words: &Words| {
             let each = quantity.words.iter().map(|own| own.likeness(words));
             each.fold(0.0, f64::max)
         };
-        let words = alike(&named.leaf).max(BY_TOPIC * alike(&named.full));
+        let words = likeness(&named.leaf).max(BY_TOPIC * likeness(&named.full));
         points += SAME_WORDS * words;
         let wordless = named.leaf.own.is_empty();
+        let whole = if words == 0.0 && quantity.axis.is_none() {
+            whole_name(quantity, named)
+        } else {
+            0.0
+        };
         if words > 0.0 {
             reasons.push("by name".into());
+        } else if whole > 0.0 {
+            points += WHOLE_NAME + NO_OTHER * whole;
+            reasons.push("its joint's or actuator's name is a word of it".into());
         } else if !wordless && quantity.words.iter().any(|w| !w.own.is_empty()) {
             points -= OTHER_WORDS;
         }
-        let ordered = words == 0.0
+        let alike = words > 0.0 || whole > 0.0;
+        let ordered = !alike
             && quantity.axis.is_none()
             && named.place.is_some()
             && named.place == quantity.place;
@@ -220,7 +243,7 @@ impl<'a> Context<'a> {
         }
         // Without a word or a place in common there may be but one such quantity.
         let only = wordless && self.is_only(quantity);
-        if words == 0.0 && !ordered {
+        if !alike && !ordered {
             if !only {
                 return None;
             }
@@ -246,6 +269,16 @@ impl<'a> Context<'a> {
         };
         self.quantities.iter().filter(same).count() == 1
     }
+}
+
+/// How much of a column's name is the whole name of a quantity, its joint or its actuator: 0 nothing, 1 all that tells it from others.
+fn whole_name(quantity: &Quantity, named: &Named) -> f64 {
+    let names = quantity.words.iter().filter_map(Words::whole);
+    let parts = names.map(|name| {
+        let leaf = named.leaf.part_of(name);
+        leaf.max(BY_TOPIC * named.full.part_of(name))
+    });
+    parts.fold(0.0, f64::max)
 }
 
 /// Points of being sent or read.

@@ -214,3 +214,47 @@ fn a_unit_is_told_by_the_episode_that_moves_where_the_first_stands_still() {
     };
     assert_eq!(unit(&whole).as_deref(), Some("deg"));
 }
+
+/// A cart with joints of one letter, as gantries have them.
+const GANTRY: &str = r#"<mujoco><worldbody>
+  <body name="bridge"><joint name="x" type="slide" axis="1 0 0" range="-0.6 0.6"/><geom size="0.1" mass="1"/>
+    <body name="cart"><joint name="y" type="slide" axis="0 1 0" range="-0.6 0.6"/><geom size="0.1" mass="1"/>
+      <body name="arm"><joint name="elbow" axis="0 1 0" range="-1.6 1.6"/><geom size="0.1" mass="1"/></body></body></body>
+  </worldbody>
+  <actuator><position name="x" joint="x" kp="9"/><position name="y" joint="y" kp="9"/><motor name="elbow" joint="elbow"/></actuator>
+  <sensor><jointpos name="x" joint="x"/><jointpos name="y" joint="y"/><jointpos name="elbow" joint="elbow"/></sensor></mujoco>"#;
+
+#[test]
+fn a_joint_of_one_letter_is_found_by_the_word_in_a_columns_name_before_a_place_in_a_list() {
+    let scene = Scene::from_xml("gantry", GANTRY, &[]).unwrap();
+    let plant = Plant::of(&scene).unwrap();
+    for (columns, wanted) in [
+        (
+            ["cmd_x", "cmd_y", "x_pos", "y_pos"],
+            ["cmd_x", "cmd_y", "x_pos", "y_pos"],
+        ),
+        (
+            ["yTarget", "target.x", "q-y", "pos/x"],
+            ["target.x", "yTarget", "pos/x", "q-y"],
+        ),
+    ] {
+        let mut all: Vec<Series> = (columns.iter().enumerate())
+            .map(|(i, name)| series("", name, move |t| motion(i % 2, t) - 0.6))
+            .collect();
+        all.push(series("", "elbow_torque_cmd", |t| t.sin()));
+        all.push(series("", "elbow_angle", |t| motion(2, t)));
+        for i in 0..3 {
+            all.push(series("", &format!("tip.{i}"), |t| 0.1 * t));
+        }
+        let log = RawLog {
+            series: all,
+            ..RawLog::default()
+        };
+        let found = propose(&scene, &plant, (&log, LogFormat::Csv), &[]).unwrap();
+        for (name, column) in ["ctrl.x", "ctrl.y", "x", "y"].iter().zip(wanted) {
+            assert_eq!(from(&found, name), column, "{name}");
+        }
+        assert_eq!(from(&found, "ctrl.elbow"), "elbow_torque_cmd");
+        assert_eq!(found.unused, ["tip.0", "tip.1", "tip.2"]);
+    }
+}

@@ -149,6 +149,7 @@ mod tests {
             joint: Some(0),
             measure: Some(Measure::Position),
             dimension,
+            counts: None,
             range,
             words: vec![Words::of("q")],
             axis: None,

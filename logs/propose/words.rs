@@ -149,6 +149,8 @@ const UNITS: [(&str, &str); 14] = [
 /// A name, taken apart.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Words {
+    /// All words, in their order.
+    pub all: Vec<String>,
     /// What tells it from others of its kind.
     pub own: Vec<String>,
     /// What it measures, where it says so.
@@ -229,7 +231,28 @@ impl Words {
                 found.index = word.parse().ok();
             }
         }
+        found.all = words;
         found
+    }
+
+    /// The word that is the whole name, such as `x` of a gantry's joint; `None` of a name of several words, and of one that tells
+    /// nothing from another.
+    #[must_use]
+    pub fn whole(&self) -> Option<&str> {
+        match &*self.all {
+            [word] if !FILLER.contains(&&**word) => Some(word),
+            _ => None,
+        }
+    }
+
+    /// Of the telling words and this one, the part that this one is: 1 where it stands alone, 0 where it is not among the words.
+    #[must_use]
+    pub fn part_of(&self, word: &str) -> f64 {
+        if !self.all.iter().any(|w| w == word) {
+            return 0.0;
+        }
+        let others = self.own.iter().filter(|w| *w != word).count();
+        1.0 / (1 + others) as f64
     }
 
     /// How alike the words of two names are that tell things apart: 1 all of them, 0 none (Jaccard's index).

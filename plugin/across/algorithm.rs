@@ -18,7 +18,7 @@ use asid_mjcf::native::NativeModel;
 use asid_mjcf::plant::Plant;
 
 use super::super::border::Border;
-use super::Across;
+use super::{Across, identified};
 use asid_core::backend::{Capabilities, Model};
 use asid_core::progress::Progress;
 use asid_core::target::Target;
@@ -113,12 +113,8 @@ impl Identifier for Across<Box<dyn Identifier>> {
         let handed = Handed::new(problem, self.border.back());
         let problem = handed.problem(problem);
         let found = self.try_run(|identifier| identifier.identify(&problem, episodes))?;
-        let marginals = &found.posterior.marginals;
-        let values: Vec<f64> = marginals
-            .iter()
-            .flat_map(|m| [m.estimate, m.std, m.interval95[0], m.interval95[1]])
-            .collect();
-        self.border.finite(&[], &values, "the posterior")?;
+        let checked = identified::check(&found, &problem, episodes);
+        self.border.require(checked)?;
         Ok(found)
     }
 

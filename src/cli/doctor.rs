@@ -81,6 +81,12 @@ pub fn doctor(_arguments: &Arguments, refused: &[Refused]) -> Result<()> {
                 library.what_for,
                 path.display()
             )?,
+            // A program that runs has found what it is linked with, wherever that is.
+            None if library.built_in => writeln!(
+                out,
+                "ok       {} for {} ({built})",
+                library.name, library.what_for
+            )?,
             None => writeln!(
                 out,
                 "missing  {} for {} ({built}): looked for {}; get it with `cargo xtask setup`, or set {}",

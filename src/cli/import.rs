@@ -1,6 +1,7 @@
 //! `asid import`: logs of another stack as a study of a model.
 
 mod files;
+mod opened;
 mod page;
 mod table;
 mod wired;
@@ -10,16 +11,15 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use asid_core::{Episode, Error, Layout};
+use asid_logs::counted::check_units;
 use asid_logs::episode::{ColumnMapping, of_table, wanted};
 use asid_logs::propose::{Proposal, propose};
-use asid_logs::{LogFormat, LogSettings, Opener, RawLog};
+use asid_logs::{LogFormat, RawLog};
 
 use super::failure;
 use super::machine::{Subject, sensors};
 use super::output::OutFolder;
-
-/// Columns that are named at most where one is sought; the rest is counted.
-const NAMED: usize = 12;
+use opened::{Opened, open};
 
 /// Arguments of `import`.
 #[derive(clap::Args)]
@@ -93,7 +93,7 @@ pub fn import(arguments: &Arguments) -> Result<()> {
     let mut notes = Vec::new();
     let bare = subject.plant.layout.sensors.is_empty();
     let subject = sensors::with_sensors(subject, &mut notes)?;
-    let (raw, settings) = open(arguments)?;
+    let (raw, settings) = open(&arguments.logs, &arguments.test, &arguments.topic)?;
     let kind = settings.kind.unwrap_or(LogFormat::Csv);
     let given = given(&arguments.map)?;
     let Some((_, first, _)) = raw.first() else {
@@ -105,10 +105,11 @@ pub fn import(arguments: &Arguments) -> Result<()> {
     notes.extend(first.remarks.iter().cloned());
     if let Err(error) = complete(&proposal) {
         if !arguments.json {
-            table::show(&proposal)?;
+            table::show(&proposal, whole.stamps.as_deref())?;
         }
         return Err(error);
     }
+    check_units(&subject.plant, &proposal.mappings())?;
     let mut imported = episodes(raw, &subject, &proposal)?;
     if !arguments.quiet {
         failure::note("trying the mapping in the model");
@@ -129,9 +130,9 @@ pub fn import(arguments: &Arguments) -> Result<()> {
         out.write(|folder| study.write(folder, &out.path(), &page))?;
     }
     if arguments.json {
-        return table::json(&proposal, &notes, out.as_ref());
+        return table::json(&proposal, whole.stamps.as_deref(), &notes, out.as_ref());
     }
-    table::show(&proposal)?;
+    table::show(&proposal, whole.stamps.as_deref())?;
     notes.iter().for_each(|note| failure::note(note));
     let mut stdout = std::io::stdout().lock();
     match out {
@@ -148,56 +149,6 @@ pub fn import(arguments: &Arguments) -> Result<()> {
     Ok(())
 }
 
-/// A log with its path, and whether it is held out.
-type Opened = (PathBuf, RawLog, bool);
-
-/// The logs as they were recorded, each with its path and whether it is held out; and the kind that they are of.
-fn open(arguments: &Arguments) -> Result<(Vec<Opened>, LogSettings)> {
-    let mut settings = LogSettings {
-        kind: None,
-        topics: arguments.topic.clone(),
-    };
-    if let Some(twice) = arguments.test.iter().find(|t| arguments.logs.contains(t)) {
-        return Err(Error::Log {
-            path: twice.clone(),
-            message: "is to be fitted and to be held out: name it once, before --test or after it"
-                .into(),
-        }
-        .into());
-    }
-    let mut opener = Opener::default();
-    let mut all = Vec::new();
-    let fitted = arguments.logs.iter().map(|p| (p, false));
-    for (path, test) in fitted.chain(arguments.test.iter().map(|p| (p, true))) {
-        let (file, episode) = asid_logs::open::split(path);
-        let kind = LogFormat::of(&file);
-        if *settings.kind.get_or_insert(kind) != kind {
-            return Err(Error::Log {
-                path: path.clone(),
-                message: "is of another kind than the log before: one import takes one kind".into(),
-            }
-            .into());
-        }
-        for log in opener.open(path, &settings)? {
-            // Episodes of a dataset are named by their number.
-            let own = match (kind, episode) {
-                (LogFormat::Lerobot, None) => match log.name.rsplit_once('#') {
-                    Some((_, number)) => PathBuf::from(format!("{}#{number}", file.display())),
-                    None => path.clone(),
-                },
-                _ => path.clone(),
-            };
-            all.push((own, log, test));
-        }
-    }
-    if arguments.test.is_empty() && all.len() > 1 {
-        let held = (all.len() / 3).max(1);
-        let first = all.len() - held;
-        all[first..].iter_mut().for_each(|(.., test)| *test = true);
-    }
-    Ok((all, settings))
-}
-
 fn given(map: &[String]) -> Result<Vec<(String, String)>> {
     let one = |text: &String| {
         let (name, column) = text.split_once('=').ok_or_else(|| Error::Config {
@@ -212,14 +163,9 @@ fn given(map: &[String]) -> Result<Vec<(String, String)>> {
 /// Refuses a mapping that no diagnosis can start from.
 fn complete(proposal: &Proposal) -> Result<()> {
     let missing = proposal.missing_commands();
-    let mut left: Vec<String> = proposal.unused.iter().take(NAMED).cloned().collect();
-    if proposal.unused.len() > NAMED {
-        left.push(format!("and {} more", proposal.unused.len() - NAMED));
-    }
-    let left = if left.is_empty() {
-        "nothing is left in the log".to_owned()
-    } else {
-        format!("left are {}", left.join(", "))
+    let left = match table::listed(&proposal.unused) {
+        None => "nothing is left in the log".to_owned(),
+        Some(names) => format!("left are {names}"),
     };
     if let Some(name) = missing.first() {
         return Err(Error::Config {

@@ -28,6 +28,8 @@ struct Kind {
     /// Text in the files that holds the plugin's name, and how a new name is written in
     /// its place, as `{}`.
     rename: (&'static str, &'static str),
+    /// The example's folder below `plugins`.
+    example: &'static str,
     /// True where a name is that of something built in, beside which a plugin would be
     /// listed under another name than its own.
     taken: fn(&str) -> bool,
@@ -58,6 +60,7 @@ const KINDS: &[Kind] = &[
         name: "engine-c",
         about: "a physics engine in one C file: rigid bodies in free flight",
         rename: ("\"flight\"", "\"{}\""),
+        example: "engine-c",
         taken: is_built_in::<BackendEntry>,
         cargo: false,
         files: &[
@@ -74,6 +77,7 @@ const KINDS: &[Kind] = &[
         name: "mechanism-c",
         about: "a larger engine in C: trees of joints, drives and sensors, without contact",
         rename: ("\"mechanism\"", "\"{}\""),
+        example: "mechanism-c",
         taken: is_built_in::<BackendEntry>,
         cargo: false,
         files: &[
@@ -102,6 +106,7 @@ const KINDS: &[Kind] = &[
         name: "task",
         about: "a task in Rust: a payload is weighed by swinging it, then swung to an angle",
         rename: ("payload-swing", "{}"),
+        example: "task-payload-swing",
         taken: is_built_in::<TaskEntry>,
         cargo: true,
         files: &[
@@ -133,6 +138,7 @@ const KINDS: &[Kind] = &[
         name: "explorer",
         about: "an explorer in Rust: sums of sines with random phases",
         rename: ("multisine", "{}"),
+        example: "explorer-multisine",
         taken: is_built_in::<ExplorerEntry>,
         cargo: true,
         files: &[
@@ -156,6 +162,7 @@ const KINDS: &[Kind] = &[
         name: "effect",
         about: "an effect in Rust: a magnet draws a joint to one place",
         rename: ("magnetic-catch", "{}"),
+        example: "effect-magnetic-catch",
         taken: is_built_in::<EffectEntry>,
         cargo: true,
         files: &[
@@ -192,9 +199,15 @@ impl Kind {
         PossibleValue::new(self.name).help(self.about)
     }
 
-    /// A file's text for a plugin of this name.
-    fn text(&self, text: &str, name: &str) -> String {
+    /// The text of a file, by its name in the folder, for a plugin of this name.
+    fn text(&self, file: &str, text: &str, name: &str) -> String {
         let (from, to) = self.rename;
+        let text = if Path::new(file).extension().is_some_and(|e| e == "md") {
+            // A guide names files by the example's folder, which is the new one.
+            unlinked(&text.replace(&format!("plugins/{}/", self.example), ""))
+        } else {
+            text.to_owned()
+        };
         let text = text.replace(from, &to.replace("{}", name));
         if !self.cargo {
             return text;
@@ -202,6 +215,34 @@ impl Kind {
         text.replace(&from.replace('-', "_"), &name.replace('-', "_"))
             .replace("\"../../", &format!("\"{SOURCES}/"))
     }
+}
+
+/// A text whose links to other files of the repository are names of those files: outside of it they lead nowhere.
+fn unlinked(text: &str) -> String {
+    let mut plain = String::with_capacity(text.len());
+    let mut rest = text;
+    while let Some(middle) = rest.find("](") {
+        let (before, after) = (&rest[..middle], &rest[middle + 2..]);
+        let begin = before.rfind('[').filter(|b| !before[*b..].contains('\n'));
+        let (Some(begin), Some(end)) = (begin, after.find(')')) else {
+            plain.push_str(&rest[..middle + 2]);
+            rest = after;
+            continue;
+        };
+        let (words, target) = (&before[begin + 1..], &after[..end]);
+        let file = target.split('#').next().unwrap_or_default();
+        if target.contains("://") || file.is_empty() || target.contains(char::is_whitespace) {
+            plain.push_str(&rest[..middle + 2 + end + 1]);
+        } else {
+            let place = file
+                .strip_prefix("../")
+                .map_or_else(|| format!("docs/{file}"), str::to_owned);
+            plain.push_str(&before[..begin]);
+            plain.push_str(&format!("{words} (`{place}` of ASID's repository)"));
+        }
+        rest = &after[end + 1..];
+    }
+    plain + rest
 }
 
 /// Writes the folder.
@@ -226,7 +267,7 @@ pub fn new(arguments: &Arguments) -> Result<()> {
         for (file, text) in kind.files {
             let path = staging.join(file);
             std::fs::create_dir_all(path.parent().unwrap_or(staging))
-                .and_then(|()| std::fs::write(&path, kind.text(text, &name)))
+                .and_then(|()| std::fs::write(&path, kind.text(file, text, &name)))
                 .map_err(|e| failed(&dir.join(file), &e))?;
         }
         Ok(())

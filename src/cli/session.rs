@@ -9,10 +9,11 @@ use asid_core::signal::Signal;
 use asid_core::{Backend, Capabilities, Error, Model, Parameter, Problem, Streams, Task};
 use asid_worlds::{SimulatedWorld, TrackerErrors};
 
+use super::failure;
 use super::model::{self, Needs};
 use super::options::{Algorithms, Common, Worlds};
 use super::progress::Bars;
-use super::result::CostResult;
+use super::result::{CostResult, figure};
 use super::settings::{Config, Stage, difficulty};
 use super::world::{PerturbedResult, World};
 
@@ -178,8 +179,17 @@ impl Session {
             .collect()
     }
 
-    /// The simulated real world with this truth.
+    /// The simulated real world with this truth. A value that was given and lies outside of the prior is warned of.
+    ///
+    /// # Errors
+    /// When the engine fails, or the tracker's errors make no sense.
     pub fn world(&self, truth: &[f64]) -> Result<SimulatedWorld<'_>> {
+        let given = &self.config.real.truth;
+        for p in &self.parameters {
+            if let Some(said) = given.get(&p.name).and_then(|x| outside(p, *x)) {
+                failure::warn(&said);
+            }
+        }
         let world = SimulatedWorld::new(
             &*self.task,
             &*self.real.model,
@@ -204,6 +214,29 @@ impl Session {
             env_steps: self.env_steps.load(Ordering::Relaxed),
         }
     }
+}
+
+/// What is to be said of a true value outside of the prior: how far beyond which end it lies; `None` of one inside.
+fn outside(parameter: &Parameter, value: f64) -> Option<String> {
+    let [low, high] = parameter.range;
+    let (beyond, end) = if value < low {
+        (low - value, "below its lower end")
+    } else if value > high {
+        (value - high, "above its upper end")
+    } else {
+        return None;
+    };
+    let unit = match &*parameter.unit {
+        "" => String::new(),
+        unit => format!(" {unit}"),
+    };
+    Some(format!(
+        "--truth {}={value} lies outside of the prior, {} to {}{unit}: {}{unit} {end}; no estimate inside of the prior finds it",
+        parameter.name,
+        figure(low),
+        figure(high),
+        figure(beyond)
+    ))
 }
 
 /// The engine of this name; one that was left out of the build says how to get it.

@@ -170,12 +170,16 @@ impl Config {
             check_condition(&task.conditions(), name)?;
         }
         let (parameter, parameters) = unknowns(task, &section(&table, "parameter")?)?;
-        let real = real::resolve(&section(&table, "real")?, real, task, &parameters, &backend)?;
+        let model = model_file(&simulator.model, &table)?;
+        let own_model = model.is_some() || simulator.refined.is_some();
+        let section_real = section(&table, "real")?;
+        let simulator = (&*backend, own_model);
+        let real = real::resolve(&section_real, real, task, &parameters, simulator)?;
         let (start, assumed) = start(stage, task, &section(&table, "start")?)?;
         let mut config = Self {
             command: stage,
             task: task.name().to_owned(),
-            model: model_file(&simulator.model, &table)?,
+            model,
             condition,
             seed: common.seed.or(seed(&table)?).unwrap_or(0),
             plugins: Vec::new(),

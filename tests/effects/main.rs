@@ -38,7 +38,7 @@ fn unknown_sites_and_parameters_list_the_near_ones() {
     for (text, expected) in [
         (
             "actuator-gian@drive",
-            "known: `actuator-bias`, `actuator-gain`",
+            "did you mean `actuator-bias`, `actuator-gain`, ",
         ),
         ("actuator-gain@driv", "did you mean `drive`?"),
         ("actuator-gain@drive:gian=1", "did you mean `gain`?"),

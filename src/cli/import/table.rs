@@ -62,8 +62,20 @@ pub(super) fn cells(found: &Match) -> [String; 5] {
     ]
 }
 
-/// Prints the mapping as a table.
-pub(super) fn show(proposal: &Proposal) -> Result<()> {
+/// Columns that are named at most; the rest is counted.
+const NAMED: usize = 12;
+
+/// Names of columns in a row, many of them in part; `None` where there are none.
+pub(super) fn listed(names: &[String]) -> Option<String> {
+    let mut all: Vec<String> = names.iter().take(NAMED).cloned().collect();
+    if names.len() > NAMED {
+        all.push(format!("and {} more", names.len() - NAMED));
+    }
+    (!all.is_empty()).then(|| all.join(", "))
+}
+
+/// Prints the mapping as a table, then where the stamps are and which columns nothing is read from.
+pub(super) fn show(proposal: &Proposal, stamps: Option<&str>) -> Result<()> {
     let head = ["quantity", "column", "read as", "Hz", "values", "because"];
     let mut rows = vec![head.map(str::to_owned)];
     for found in &proposal.matches {
@@ -81,11 +93,22 @@ pub(super) fn show(proposal: &Proposal) -> Result<()> {
         let line = cells.collect::<Vec<_>>().join("  ");
         writeln!(stdout, "{}", line.trim_end())?;
     }
+    if let Some(stamps) = stamps {
+        writeln!(stdout, "time is column {stamps}")?;
+    }
+    if let Some(unused) = listed(&proposal.unused) {
+        writeln!(stdout, "not used: {unused}")?;
+    }
     Ok(())
 }
 
 /// Prints the mapping as JSON.
-pub(super) fn json(proposal: &Proposal, notes: &[String], out: Option<&OutFolder>) -> Result<()> {
+pub(super) fn json(
+    proposal: &Proposal,
+    stamps: Option<&str>,
+    notes: &[String],
+    out: Option<&OutFolder>,
+) -> Result<()> {
     let rows = proposal.matches.iter().map(|found| {
         let m = found.mapping.as_ref();
         Row {
@@ -103,6 +126,7 @@ pub(super) fn json(proposal: &Proposal, notes: &[String], out: Option<&OutFolder
     let summary = serde_json::json!({
         "schema": SCHEMA,
         "columns": rows.collect::<Vec<_>>(),
+        "stamps": stamps,
         "unused": proposal.unused,
         "notes": notes,
         "out": out.map(OutFolder::path),

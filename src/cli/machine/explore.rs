@@ -179,37 +179,45 @@ pub fn relative(deviation: f64, reference: f64) -> String {
     }
 }
 
+/// What is known of an unknown before and after the motion, and how often it is to be played for `wanted` percent.
+fn told(u: &UnknownResult, wanted: f64) -> String {
+    let to = |deviation: f64| relative(deviation, u.reference);
+    let of = match (u.reference == 0.0, u.value == 0.0) {
+        (true, _) => "",
+        (false, true) => " of the middle of its range",
+        (false, false) => " of its value",
+    };
+    let known = match (u.logs, u.both) {
+        (Some(logs), Some(both)) => format!(
+            "your logs so far tell it to {}{of}, one play of this motion to {}, both to {}",
+            to(logs),
+            to(u.motion),
+            to(both)
+        ),
+        _ => format!(
+            "the prior tells it to {}{of}, one play of this motion to {}",
+            to(u.prior),
+            to(u.motion)
+        ),
+    };
+    let enough = match u.repeats {
+        Some(0) => "your logs are enough".to_owned(),
+        Some(1) => "one play is enough".to_owned(),
+        Some(n) => format!("it takes {n} plays"),
+        None => "no number of plays is enough".to_owned(),
+    };
+    format!("{}: {known}; {enough} for the wanted {wanted:.1} %", u.name)
+}
+
 /// The answer on the terminal.
 pub fn lines(result: &ExploreResult) -> Vec<String> {
     let mut all = Vec::new();
-    for u in &result.unknowns {
-        let to = |deviation: f64| relative(deviation, u.reference);
-        let mut line = match u.logs {
-            Some(logs) => format!(
-                "{}: your logs so far tell it to {}; this motion to {}, with them to {}",
-                u.name,
-                to(logs),
-                to(u.motion),
-                to(u.both.unwrap_or(u.motion))
-            ),
-            None => format!(
-                "{}: this motion tells it to {} (the prior has {})",
-                u.name,
-                to(u.motion),
-                to(u.prior)
-            ),
-        };
-        line += &match u.repeats {
-            Some(0) => format!("; the logs suffice for {:.1} %", 100.0 * result.precision),
-            Some(1) => format!("; one play makes it {:.1} %", 100.0 * result.precision),
-            Some(n) => format!("; {n} plays for {:.1} %", 100.0 * result.precision),
-            None => format!(
-                "; no number of plays makes it {:.1} %",
-                100.0 * result.precision
-            ),
-        };
-        all.push(line);
-    }
+    all.extend(
+        result
+            .unknowns
+            .iter()
+            .map(|u| told(u, 100.0 * result.precision)),
+    );
     for direction in &result.unseen {
         let parts: Vec<String> = direction
             .weights

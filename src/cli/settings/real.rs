@@ -50,13 +50,14 @@ impl RealConfig {
     }
 }
 
-/// Resolves the section `real` of the settings, under the options.
+/// Resolves the section `real` of the settings, under the options; `simulator` is the simulator's engine, and whether it has a model other than
+/// the task's scene.
 pub fn resolve(
     table: &toml::Table,
     options: &Real,
     task: &dyn Task,
     parameters: &[Parameter],
-    simulator: &str,
+    (simulator, own_model): (&str, bool),
 ) -> Result<RealConfig> {
     const KEYS: [&str; 6] = [
         "world",
@@ -87,6 +88,13 @@ pub fn resolve(
             "real.world",
             "a matched world is the simulator itself and has no engine, model or effects of its own; \
              leave them out, or choose another --world",
+        ));
+    }
+    if kind == WorldKind::Custom && !(other || made || own_model) {
+        return Err(wrong(
+            "--world custom",
+            "nothing of this world is other than the simulator's: name what is by --real-backend, --real-model or --real-effect, \
+             or choose --world matched",
         ));
     }
     if kind == WorldKind::StandIn && real.model.is_some() {

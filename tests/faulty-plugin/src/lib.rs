@@ -184,6 +184,49 @@ impl Drop for PanickingPolicy {
     }
 }
 
+/// An identifier whose result is spoilt in one way.
+struct FaultyIdentifier(fn(&mut Identified));
+
+macro_rules! faulty_identifiers {
+    ($($name:literal: $fault:expr),* $(,)?) => {$(
+        asid_core::register!(IdentifierEntry {
+            name: $name,
+            about: "fails",
+            defaults: Settings::new,
+            make: |_| Ok(Box::new(FaultyIdentifier($fault))),
+        });
+    )*};
+}
+
+faulty_identifiers! {
+    "identifies-without-starts": |found| found.starts.clear(),
+    "identifies-short-starts": |found| found.starts[0].push(0.0),
+    "identifies-without-marginals": |found| found.posterior.marginals.clear(),
+    "identifies-without-samples": |found| found.posterior.samples.clear(),
+    "identifies-negative-weights": |found| found.posterior.weights = vec![1.5, -0.5],
+    "identifies-weights-that-do-not-sum": |found| found.posterior.weights = vec![1.0, 1.0],
+    "identifies-few-weights": |found| found.posterior.weights = vec![1.0],
+    "identifies-long-samples": |found| found.posterior.samples[1].push(0.0),
+    "identifies-nan-residual": |found| found.residual = f64::NAN,
+}
+
+impl Identifier for FaultyIdentifier {
+    fn identify(&self, problem: &Problem<'_>, episodes: &[Episode]) -> Result<Identified> {
+        let centre: Vec<f64> = problem.parameters.iter().map(|p| p.center()).collect();
+        let samples = vec![centre.clone(), centre];
+        let coordinates = problem.task.exploration().start.len();
+        let mut found = Identified {
+            posterior: Posterior::from_samples(problem.parameters, samples, &[1.0, 1.0]),
+            starts: vec![vec![0.0; coordinates]; episodes.len()],
+            iterations: Vec::new(),
+            residual: 1.0,
+            roughness: 0.0,
+        };
+        (self.0)(&mut found);
+        Ok(found)
+    }
+}
+
 /// An identifier and a solver that panic.
 struct PanickingAlgorithm;
 

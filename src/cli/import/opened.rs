@@ -1,0 +1,84 @@
+//! The logs of an import, as they were recorded.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::Result;
+use asid_core::Error;
+use asid_logs::{LogFormat, LogSettings, Opener, RawLog};
+
+/// A log with its path, and whether it is held out.
+pub(super) type Opened = (PathBuf, RawLog, bool);
+
+/// The logs of `fitted` and those of `held_out`, of which `topics` are read, each with its path and whether it is held out; and the kind that
+/// they are of. Without `held_out` the last third is held out.
+///
+/// # Errors
+/// When a log cannot be read, is named twice, or is of another kind than the others.
+pub(super) fn open(
+    fitted: &[PathBuf],
+    held_out: &[PathBuf],
+    topics: &[String],
+) -> Result<(Vec<Opened>, LogSettings)> {
+    let mut settings = LogSettings {
+        kind: None,
+        topics: topics.to_vec(),
+    };
+    let mut opener = Opener::default();
+    let mut all: Vec<Opened> = Vec::new();
+    let each = fitted.iter().map(|p| (p, false));
+    for (path, test) in each.chain(held_out.iter().map(|p| (p, true))) {
+        let (file, episode) = asid_logs::open::split(path);
+        let kind = LogFormat::of(&file);
+        if *settings.kind.get_or_insert(kind) != kind {
+            return Err(failed(
+                path,
+                "is of another kind than the log before: one import takes one kind",
+            ));
+        }
+        for log in opener.open(path, &settings)? {
+            // Episodes of a dataset are named by their number.
+            let own = match (kind, episode) {
+                (LogFormat::Lerobot, None) => match log.name.rsplit_once('#') {
+                    Some((_, number)) => PathBuf::from(format!("{}#{number}", file.display())),
+                    None => path.clone(),
+                },
+                _ => path.clone(),
+            };
+            refuse_twice(&all, &own, test)?;
+            all.push((own, log, test));
+        }
+    }
+    if held_out.is_empty() && all.len() > 1 {
+        let held = (all.len() / 3).max(1);
+        let first = all.len() - held;
+        all[first..].iter_mut().for_each(|(.., test)| *test = true);
+    }
+    Ok((all, settings))
+}
+
+/// Refuses a log that is there already, by whatever way it is named: its copy would be fitted and held out, or counted twice.
+fn refuse_twice(all: &[Opened], own: &Path, test: bool) -> Result<()> {
+    let place = place(own);
+    match all.iter().find(|(path, ..)| self::place(path) == place) {
+        None => Ok(()),
+        Some((_, _, before)) if *before == test => Err(failed(own, "is named twice: name it once")),
+        Some(_) => Err(failed(
+            own,
+            "is to be fitted and to be held out: name it once, before --test or after it",
+        )),
+    }
+}
+
+/// Where a log is: its file without links and dots, and the episode in it.
+fn place(path: &Path) -> (PathBuf, Option<usize>) {
+    let (file, episode) = asid_logs::open::split(path);
+    (file.canonicalize().unwrap_or(file), episode)
+}
+
+fn failed(path: &Path, message: &str) -> anyhow::Error {
+    let error = Error::Log {
+        path: path.to_owned(),
+        message: message.to_owned(),
+    };
+    error.into()
+}
