@@ -4,6 +4,7 @@
 //! Two figures are not in the paper: `explorers` ranks explorers by what their episodes tell, and
 //! `difficulty` shows how methods fare as a task gets harder.
 
+mod claim;
 mod difficulty;
 mod displacement;
 mod distractors;
@@ -30,7 +31,8 @@ use serde::Serialize;
 use super::options::Common;
 use super::output::{OutFolder, write_json, write_text};
 use super::result::Program;
-use drawing::{Claim, Data, Drawing, Number, Panel, mean, median, share};
+use claim::Claim;
+use drawing::{Data, Drawing, Number, Panel, mean, median, share};
 
 /// Compares methods on a task under one more setting, in a folder of its own that is gone on with.
 pub type CompareAt<'a> = Box<dyn Fn(&str, &str, &Path) -> Result<ComparisonResult> + Sync + 'a>;
@@ -167,7 +169,7 @@ pub fn figure(name: &str, request: &Request<'_>) -> Result<()> {
         }
     };
     let result = FigureResult {
-        schema: 1,
+        schema: 2,
         figure: name,
         quick: request.quick,
         notes: &drawing.notes,

@@ -17,6 +17,12 @@ const BALL: &str = "ball_pos";
 /// Truths a square, as in the paper.
 const EPISODES: u64 = 5;
 
+/// Share of pushes that is asked for within the training box.
+const INSIDE: f64 = 0.8;
+
+/// Share of pushes that is asked for outside of it, where the arm does not reach every start.
+const OUTSIDE: f64 = 0.2;
+
 /// How far beyond the training box the map reaches, m.
 const BEYOND: f64 = 0.15;
 
@@ -114,15 +120,18 @@ fn claims(numbers: &[Number]) -> Vec<Claim> {
     let [inside, outside, heavy, _] = numbers else {
         return Vec::new();
     };
-    vec![Claim {
-        statement: format!(
+    let asked = [(inside, INSIDE), (heavy, INSIDE), (outside, OUTSIDE)];
+    vec![Claim::new(
+        format!(
             "the ball is pushed in {:.0} % inside of the training box, {:.0} % outside, and {:.0} % inside with another mass",
             100.0 * inside.value,
             100.0 * outside.value,
             100.0 * heavy.value
         ),
-        paper: "pushes generalise to starts that the arm reaches and to other masses (figure 13)"
-            .into(),
-        holds: inside.value > 0.8 && heavy.value > 0.8 && outside.value > 0.2,
-    }]
+        "pushes generalise to starts that the arm reaches and to other masses (figure 13)",
+        asked.iter().map(|(share, _)| share.n),
+        asked
+            .iter()
+            .all(|(share, least)| share.interval95[0] > *least),
+    )]
 }

@@ -104,15 +104,16 @@ fn claims(drawing: &Drawing) -> Vec<Claim> {
     let (Some(fisher), Some(maxmi)) = (covered("fisher"), covered("maxmi")) else {
         return Vec::new();
     };
-    vec![Claim {
-        statement: format!(
+    vec![Claim::new(
+        format!(
             "{} covers {:.3} m² an episode, maxmi {:.3} m²: {:.1} times as much",
             fisher.explorer,
             fisher.value,
             maxmi.value,
             fisher.value / maxmi.value
         ),
-        paper: "ASID activates the sphere over a much larger area than MaxMI (figure 4)".into(),
-        holds: fisher.interval95[0] > maxmi.interval95[1],
-    }]
+        "ASID activates the sphere over a much larger area than MaxMI (figure 4)",
+        [fisher.n, maxmi.n],
+        fisher.interval95[0] > maxmi.interval95[1],
+    )]
 }
