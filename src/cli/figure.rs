@@ -18,6 +18,7 @@ mod learned_model;
 mod map;
 mod patches;
 mod variant;
+mod wanted;
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -56,12 +57,12 @@ pub struct Request<'a> {
 }
 
 impl Request<'_> {
-    /// The explorers to show: those asked for, else the figure's own.
+    /// The explorers to show, each once: those asked for, else the figure's own.
     fn explorers(&self, own: &[&str]) -> Vec<String> {
         if self.explorers.is_empty() {
             return own.iter().map(|&e| e.to_owned()).collect();
         }
-        self.explorers.clone()
+        variant::distinct(&self.explorers)
     }
 
     /// Episodes of each explorer, unless asked otherwise.

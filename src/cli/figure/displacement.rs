@@ -3,8 +3,9 @@
 use anyhow::Result;
 use asid_report::plot::{Colour, Outline};
 
-use super::episodes::{Wanted, by_explorer, play, playable};
+use super::episodes::play;
 use super::map::{Grid, frame, with_fixtures};
+use super::wanted::{Wanted, by_explorer, playable};
 use super::{Claim, Data, Drawing, Panel, Request, mean, share, task};
 
 const TASK: &str = "sphere-striking";

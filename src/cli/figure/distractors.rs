@@ -5,8 +5,9 @@ use asid_comparison::statistics;
 use asid_report::plot::{Axis, Colour, Outline, Plan};
 
 use super::displacement::HIT;
-use super::episodes::{by_explorer, of_each, play, playable};
+use super::episodes::play;
 use super::map::with_fixtures;
+use super::wanted::{by_explorer, of_each, playable};
 use super::{Claim, Data, Drawing, Number, Panel, Request, mean, share, task};
 
 const TASK: &str = "sphere-distractors";

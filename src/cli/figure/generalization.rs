@@ -4,8 +4,9 @@ use anyhow::Result;
 use asid_report::plot::Colour;
 
 use super::displacement::HIT;
-use super::episodes::{Played, Wanted, play, playable};
+use super::episodes::{Played, play};
 use super::map::{Grid, frame};
+use super::wanted::{Wanted, playable};
 use super::{Claim, Data, Drawing, Number, Panel, Request, share, task};
 
 /// Without walls, so that the ball may lie anywhere.

@@ -4,8 +4,9 @@ use anyhow::Result;
 use asid_core::signal::rotation_difference;
 use asid_report::plot::{Colour, Outline};
 
-use super::episodes::{Played, by_explorer, of_each, play, playable};
+use super::episodes::{Played, play};
 use super::map::with_fixtures;
+use super::wanted::{by_explorer, of_each, playable};
 use super::{Claim, Data, Drawing, Panel, Request, share, task};
 
 const TASK: &str = "laptop-articulation";

@@ -5,8 +5,9 @@ use anyhow::Result;
 use asid_core::task::Outline;
 use asid_report::plot::Colour;
 
-use super::episodes::{by_explorer, of_each, play, playable};
+use super::episodes::play;
 use super::map::{Grid, with_fixtures};
+use super::wanted::{by_explorer, of_each, playable};
 use super::{Claim, Data, Drawing, Panel, Request, mean, share, task};
 
 const TASK: &str = "sphere-patches";
