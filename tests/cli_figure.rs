@@ -230,7 +230,7 @@ fn counts_of_episodes_are_at_least_one() {
     assert!(place.names().is_empty());
 }
 
-/// Two episodes tell nothing of the paper; an explorer that is named twice plays them once, and two whose values
+/// One episode tells nothing of the paper; an explorer that is named twice plays it once, and two whose values
 /// are the same have a name each.
 #[test]
 fn few_episodes_make_no_verdict_and_explorers_count_once_by_names_of_their_own() {
@@ -241,9 +241,9 @@ fn few_episodes_make_no_verdict_and_explorers_count_once_by_names_of_their_own()
         "random",
         "fisher-cem:prior_samples=2",
     ];
-    let mut arguments = vec!["--episodes", "2"];
+    let mut arguments = vec!["rod-balancing", "rod-balancing", "--episodes", "1"];
     arguments.extend(explorers.iter().flat_map(|e| ["--explorer", e]));
-    let output = figure(&place, "laptop", &arguments, "a");
+    let output = figure(&place, "explorers", &arguments, "a");
     assert!(output.status.success(), "{}", said(&output));
     let told = String::from_utf8_lossy(&output.stdout).into_owned();
     assert!(told.contains("too few episodes to tell: "), "{told}");
@@ -260,11 +260,15 @@ fn few_episodes_make_no_verdict_and_explorers_count_once_by_names_of_their_own()
     let result = result(&place, "a");
     assert_eq!(result["claims"][0]["verdict"], "too-few-episodes");
     let numbers = result["numbers"].as_array().unwrap();
-    assert!(numbers.iter().all(|n| n["n"] == 2), "{numbers:?}");
-    let names: Vec<&str> = numbers
-        .iter()
-        .step_by(2)
-        .map(|n| n["explorer"].as_str().unwrap())
+    assert!(
+        numbers.iter().all(|n| n["n"].as_u64() <= Some(1)),
+        "{numbers:?}"
+    );
+    let episodes = place.read("a/episodes.csv");
+    let names: Vec<&str> = episodes
+        .lines()
+        .skip(1)
+        .map(|line| line.split(',').nth(1).unwrap())
         .collect();
     let expected = [
         "random",
