@@ -93,13 +93,14 @@ pub fn unite(parts: &[Part], commits: Commits) -> Result<Merged> {
             .union(&other.plan)
             .map_err(|e| refuse(format!("does not belong to {}: {e}", name(first))))?;
         for cell in &part.cells {
-            let Some(same) = add(&cells, cell, part, commits).map_err(refuse)? else {
+            let Some((same, whose)) = add(&cells, cell, part, commits).map_err(refuse)? else {
                 cells.push((cell.clone(), part));
                 continue;
             };
             if same != cell {
                 return Err(refuse(format!(
-                    "has another outcome than an other folder for one cell: {}",
+                    "has another outcome than {} for one run: {}",
+                    name(whose),
                     cell.key.words()
                 )));
             }
@@ -122,13 +123,13 @@ pub fn unite(parts: &[Part], commits: Commits) -> Result<Merged> {
     })
 }
 
-/// Checks that a cell fits to those that are there, and finds itself among them.
+/// Checks that a cell fits to those that are there, and finds itself among them, with the folder that has it.
 fn add<'c>(
-    there: &'c [(Cell, &Part)],
+    there: &'c [(Cell, &'c Part)],
     cell: &Cell,
     part: &Part,
     commits: Commits,
-) -> Result<Option<&'c Cell>, String> {
+) -> Result<Option<(&'c Cell, &'c Part)>, String> {
     let mut same = None;
     for (other, whose) in there {
         let (ours, theirs) = (&cell.versions, &other.versions);
@@ -168,7 +169,7 @@ fn add<'c>(
             ));
         }
         if cell.key == other.key {
-            same = Some(other);
+            same = Some((other, *whose));
         }
     }
     Ok(same)
@@ -246,9 +247,10 @@ mod tests {
         };
         let said = refused("value", &[5], &|c| c.value = 9.0);
         assert!(
-            said.contains("another outcome") && said.contains("seed 5"),
+            said.contains("another outcome than") && said.contains("a for one run: "),
             "{said}"
         );
+        assert!(said.contains("seed 5"), "{said}");
         let said = refused("commit", &[6], &|c| c.versions.git = "d".into());
         assert!(said.contains("commit d") && said.contains("by c"), "{said}");
         let said = refused("engine", &[6], &|c| c.versions.engine = "rapier 2".into());

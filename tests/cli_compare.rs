@@ -238,6 +238,14 @@ fn shares_in_one_folder_or_merged_give_the_bytes_of_one_process() {
     let merged = place.run(&["compare", "--merge", "1-2", "2-2", "--out", "merged"]);
     assert!(merged.status.success(), "{}", said(&merged));
     assert_as_whole(&place, "merged");
+    let page = place.run(&["report", "merged"]);
+    assert_eq!(page.status.code(), Some(2));
+    assert!(
+        said(&page).contains("folder of a comparison")
+            && said(&page).contains("merged/report.html"),
+        "{}",
+        said(&page)
+    );
     let other = compare(&place, &["--method", "dr", "--shard", "1/2"], "all");
     assert_eq!(other.status.code(), Some(2));
     assert!(
@@ -245,6 +253,30 @@ fn shares_in_one_folder_or_merged_give_the_bytes_of_one_process() {
         "{}",
         said(&other)
     );
+}
+
+#[test]
+fn options_that_a_merge_does_not_use_are_refused_by_name() {
+    let place = Workplace::new();
+    for (arguments, option) in [
+        (&["rod-balancing", "--merge", "a", "b"][..], "TASK"),
+        (&["--merge", "a", "b", "--seeds", "7"], "--seeds"),
+        (&["--merge", "a", "b", "--shard", "1/2"], "--shard"),
+        (
+            &["--merge", "a", "b", "--set", "solver.iterations=1"],
+            "--set",
+        ),
+    ] {
+        let output = place.run(&[&["compare"], arguments].concat());
+        let text = said(&output);
+        assert_eq!(output.status.code(), Some(2), "{text}");
+        assert!(
+            text.contains(&format!("{option}: a merge does not use it"))
+                && text.lines().count() == 1,
+            "{text}"
+        );
+    }
+    assert!(place.names().is_empty());
 }
 
 #[test]
@@ -409,6 +441,7 @@ fn what_names_nothing_or_would_misname_a_row_is_refused_in_one_line() {
         (&["--table", "4"], "tables 1, 2 and 3"),
         (&["--shard", "3/2"], "i/n"),
         (&["--seeds", "0"], "at least 1"),
+        (&["--seeds", "-3"], "at least 1"),
         (&["--backend", "rapierr"], "rapier"),
     ] {
         let output = place.run(&[&["compare", "rod-balancing"], arguments].concat());

@@ -160,6 +160,166 @@ fn what_cannot_be_drawn_is_refused_in_one_line_and_nothing_is_written() {
     assert!(place.names().is_empty());
 }
 
+#[test]
+fn options_that_a_figure_does_not_use_are_refused_by_name() {
+    let place = Workplace::new();
+    let unused: [(&str, &[&str]); 22] = [
+        ("patches", &["rod-balancing"]),
+        ("laptop", &["--world", "perturbed"]),
+        ("laptop", &["--condition", "left"]),
+        ("explorers", &["--method", "asid"]),
+        ("explorers", &["--seeds", "3"]),
+        ("explorers", &["--truth", "mass_offset=0.02"]),
+        ("explorers", &["--preset", "published"]),
+        ("explorers", &["--model", "scene.xml"]),
+        ("explorers", &["--real-model", "scene.xml"]),
+        ("explorers", &["--real-backend", "rapier"]),
+        ("explorers", &["--real-effect", "mass@ball:factor=2"]),
+        ("explorers", &["--levels", "ledge_width=0.06"]),
+        ("explorers", &["--submit", "slurm"]),
+        ("explorers", &["--identifier", "reps"]),
+        ("explorers", &["--solver", "cem"]),
+        ("explorers", &["--train"]),
+        ("explorers", &["--shard", "1/2"]),
+        ("explorers", &["--table", "1"]),
+        ("explorers", &["--merge", "a"]),
+        ("difficulty", &["--explorer", "random"]),
+        ("difficulty", &["--episodes", "2"]),
+        ("difficulty", &["--shard", "1/2"]),
+    ];
+    for (name, arguments) in unused {
+        let output = figure(&place, name, arguments, "out");
+        let text = said(&output);
+        assert_eq!(
+            output.status.code(),
+            Some(2),
+            "{name} {arguments:?}: {text}"
+        );
+        let option = if arguments[0].starts_with("--") {
+            arguments[0]
+        } else {
+            "TASK"
+        };
+        let expected = format!("{option}: the figure `{name}` does not use it");
+        assert!(
+            text.contains(&expected) && text.lines().count() == 1,
+            "{name} {arguments:?}: {text}"
+        );
+    }
+    let engines = ["--backend", "rapier", "--backend", "mujoco"];
+    let text = said(&figure(&place, "explorers", &engines, "out"));
+    assert!(
+        text.contains("--backend: ") && text.contains("one engine"),
+        "{text}"
+    );
+    assert!(place.names().is_empty());
+}
+
+#[test]
+fn counts_of_episodes_are_at_least_one() {
+    let place = Workplace::new();
+    for count in ["0", "-2", "many", "99999999999999999999"] {
+        let output = figure(&place, "laptop", &["--episodes", count], "out");
+        let text = said(&output);
+        assert_eq!(output.status.code(), Some(2), "{text}");
+        assert!(
+            text.contains("--episodes") && text.contains("at least 1") && text.lines().count() == 1,
+            "{text}"
+        );
+    }
+    assert!(place.names().is_empty());
+}
+
+/// One episode tells nothing of the paper; an explorer that is named twice plays it once, and two whose values
+/// are the same have a name each.
+#[test]
+fn few_episodes_make_no_verdict_and_explorers_count_once_by_names_of_their_own() {
+    let place = Workplace::new();
+    let explorers = [
+        "random",
+        "fisher-cem:iterations=2",
+        "random",
+        "fisher-cem:prior_samples=2",
+    ];
+    let mut arguments = vec!["rod-balancing", "rod-balancing", "--episodes", "1"];
+    arguments.extend(explorers.iter().flat_map(|e| ["--explorer", e]));
+    let output = figure(&place, "explorers", &arguments, "a");
+    assert!(output.status.success(), "{}", said(&output));
+    let told = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(told.contains("too few episodes to tell: "), "{told}");
+    assert!(
+        place
+            .read("a/report.html")
+            .contains("too few episodes to tell")
+    );
+    let page = said(&place.run(&["report", "a"]));
+    assert!(
+        page.contains("folder of a figure") && page.contains("a/report.html"),
+        "{page}"
+    );
+    let result = result(&place, "a");
+    assert_eq!(result["claims"][0]["verdict"], "too-few-episodes");
+    let numbers = result["numbers"].as_array().unwrap();
+    assert!(
+        numbers.iter().all(|n| n["n"].as_u64() <= Some(1)),
+        "{numbers:?}"
+    );
+    let episodes = place.read("a/episodes.csv");
+    let names: Vec<&str> = episodes
+        .lines()
+        .skip(1)
+        .map(|line| line.split(',').nth(1).unwrap())
+        .collect();
+    let expected = [
+        "random",
+        "fisher-cem iterations=2",
+        "fisher-cem prior_samples=2",
+    ];
+    assert_eq!(names, expected);
+}
+
+#[test]
+fn episodes_of_a_map_of_pushes_have_a_truth_of_their_own() {
+    let place = Workplace::new();
+    let explorer = ["--quick", "--explorer", "random"];
+    let output = figure(&place, "generalization", &explorer, "a");
+    assert!(output.status.success(), "{}", said(&output));
+    drawn(&place, "a");
+    let text = place.read("a/pushes.csv");
+    let seeds: Vec<(&str, &str)> = text
+        .lines()
+        .skip(1)
+        .map(|line| {
+            let mut cells = line.split(',');
+            (cells.next().unwrap(), cells.next().unwrap())
+        })
+        .collect();
+    let mut once = seeds.clone();
+    once.sort_unstable();
+    once.dedup();
+    assert_eq!(once.len(), seeds.len());
+    let two = ["--explorer", "random", "--explorer", "fisher-cem"];
+    let refused = figure(&place, "generalization", &two, "b");
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(
+        said(&refused).contains("shows one explorer"),
+        "{}",
+        said(&refused)
+    );
+}
+
+#[test]
+fn a_wrong_setting_of_an_explorer_is_told_of_before_any_episode() {
+    let place = Workplace::new();
+    let arguments = ["compare", "--figure", "laptop", "--explorer", "random"];
+    let wrong = ["--explorer", "random:foo=1", "--out", "out"];
+    let output = place.run(&[&arguments[..], &wrong].concat());
+    let text = said(&output);
+    assert_eq!(output.status.code(), Some(2), "{text}");
+    assert!(text.contains("foo") && !text.contains("episodes"), "{text}");
+    assert!(place.names().is_empty());
+}
+
 #[cfg(not(feature = "torch"))]
 #[test]
 fn without_libtorch_the_figure_of_learned_models_says_so() {

@@ -17,6 +17,7 @@ use super::options::{Common, Simulator, threads};
 pub mod arm;
 mod cell;
 mod folder;
+mod given;
 mod merge;
 mod methods;
 pub mod page;
@@ -48,7 +49,7 @@ pub struct Arguments {
     #[arg(long, value_name = "NAME")]
     backend: Vec<String>,
     /// Run each row with this many seeds [default: 10; 3 with --quick]
-    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = super::options::count)]
     seeds: Option<u64>,
     /// Begin each row with this seed; its other runs count up from it
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = super::options::seed)]
@@ -61,7 +62,7 @@ pub struct Arguments {
     #[arg(long, value_name = "NAME")]
     figure: Option<String>,
     /// Play this many episodes of each explorer in a figure, or of each square of its map
-    #[arg(long, value_name = "N", requires = "figure")]
+    #[arg(long, value_name = "N", requires = "figure", allow_negative_numbers = true, value_parser = super::options::count)]
     episodes: Option<u64>,
     /// Explorer that a figure shows in place of its own; settings may follow, as in
     /// fisher-cem:fisher.objective=trace+fisher.form=one-step (repeatable)
@@ -209,6 +210,7 @@ impl Arguments {
 /// Runs the comparison, or what is missing of it, and writes its folder.
 pub fn compare(arguments: &Arguments) -> Result<()> {
     if let Some(name) = &arguments.figure {
+        arguments.check_figure(name)?;
         return figure::figure(name, &arguments.figure_request());
     }
     let parts = &arguments.parts;
@@ -228,6 +230,7 @@ pub fn compare(arguments: &Arguments) -> Result<()> {
         }
     }
     if !arguments.merge.is_empty() {
+        arguments.check_merge()?;
         return merge::merge(arguments);
     }
     if arguments.submit.is_some() {

@@ -4,6 +4,7 @@
 //! Two figures are not in the paper: `explorers` ranks explorers by what their episodes tell, and
 //! `difficulty` shows how methods fare as a task gets harder.
 
+mod claim;
 mod difficulty;
 mod displacement;
 mod distractors;
@@ -17,6 +18,7 @@ mod learned_model;
 mod map;
 mod patches;
 mod variant;
+mod wanted;
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -30,7 +32,8 @@ use serde::Serialize;
 use super::options::Common;
 use super::output::{OutFolder, write_json, write_text};
 use super::result::Program;
-use drawing::{Claim, Data, Drawing, Number, Panel, mean, median, share};
+use claim::Claim;
+use drawing::{Data, Drawing, Number, Panel, mean, median, share};
 
 /// Compares methods on a task under one more setting, in a folder of its own that is gone on with.
 pub type CompareAt<'a> = Box<dyn Fn(&str, &str, &Path) -> Result<ComparisonResult> + Sync + 'a>;
@@ -54,12 +57,12 @@ pub struct Request<'a> {
 }
 
 impl Request<'_> {
-    /// The explorers to show: those asked for, else the figure's own.
+    /// The explorers to show, each once: those asked for, else the figure's own.
     fn explorers(&self, own: &[&str]) -> Vec<String> {
         if self.explorers.is_empty() {
             return own.iter().map(|&e| e.to_owned()).collect();
         }
-        self.explorers.clone()
+        variant::distinct(&self.explorers)
     }
 
     /// Episodes of each explorer, unless asked otherwise.
@@ -91,48 +94,84 @@ impl Draw {
 struct Entry {
     name: &'static str,
     about: &'static str,
+    /// Whether it is of the tasks that are named, rather than of its own.
+    tasks: bool,
     draw: Draw,
+}
+
+/// What a figure makes use of.
+pub struct Uses {
+    /// The tasks that are named.
+    pub tasks: bool,
+    /// Comparisons with their options, rather than episodes that are played here.
+    pub comparisons: bool,
+}
+
+/// What the figure of this name makes use of.
+///
+/// # Errors
+/// When there is no such figure.
+pub fn uses(name: &str) -> Result<Uses> {
+    let entry = entry(name)?;
+    Ok(Uses {
+        tasks: entry.tasks,
+        comparisons: matches!(entry.draw, Draw::Comparisons(_)),
+    })
+}
+
+/// The figure of this name.
+fn entry(name: &str) -> Result<&'static Entry> {
+    let found = FIGURES.iter().find(|f| f.name == name);
+    Ok(found.ok_or_else(|| Error::unknown("figure", name, FIGURES.iter().map(|f| f.name)))?)
 }
 
 const FIGURES: [Entry; 8] = [
     Entry {
         name: "patches",
         about: "where the ball goes on three patches of friction (ASID, figure 4)",
+        tasks: false,
         draw: Draw::Episodes(patches::draw),
     },
     Entry {
         name: "displacement",
         about: "how far the ball is pushed from each start position (ASID, figure 7)",
+        tasks: false,
         draw: Draw::Episodes(displacement::draw),
     },
     Entry {
         name: "laptop",
         about: "how often the lid is moved (ASID, section 5.2)",
+        tasks: false,
         draw: Draw::Episodes(laptop::draw),
     },
     Entry {
         name: "distractors",
         about: "which of four balls is pushed (ASID, figure 10)",
+        tasks: false,
         draw: Draw::Episodes(distractors::draw),
     },
     Entry {
         name: "learned-model",
         about: "learned models of the motion beside the simulator, where nothing was seen (ASID, appendix)",
+        tasks: false,
         draw: Draw::Episodes(draw_learned_model),
     },
     Entry {
         name: "generalization",
         about: "pushes from start positions and masses never trained on (ASID, figure 13)",
+        tasks: false,
         draw: Draw::Episodes(generalization::draw),
     },
     Entry {
         name: "explorers",
         about: "explorers ranked by the posterior that their episodes lead to, and what was expected of it",
+        tasks: true,
         draw: Draw::Episodes(explorers::draw),
     },
     Entry {
         name: "difficulty",
         about: "success of methods as a task gets harder",
+        tasks: true,
         draw: Draw::Comparisons(difficulty::draw),
     },
 ];
@@ -152,9 +191,7 @@ struct FigureResult<'a> {
 
 /// Draws a figure and writes its folder.
 pub fn figure(name: &str, request: &Request<'_>) -> Result<()> {
-    let entry = FIGURES.iter().find(|f| f.name == name);
-    let entry =
-        entry.ok_or_else(|| Error::unknown("figure", name, FIGURES.iter().map(|f| f.name)))?;
+    let entry = entry(name)?;
     let common = &request.common;
     let (out, stem) = (common.out.as_deref(), format!("figure-{name}"));
     let (out, drawing) = match entry.draw {
@@ -167,7 +204,7 @@ pub fn figure(name: &str, request: &Request<'_>) -> Result<()> {
         }
     };
     let result = FigureResult {
-        schema: 1,
+        schema: 2,
         figure: name,
         quick: request.quick,
         notes: &drawing.notes,

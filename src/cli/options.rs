@@ -25,6 +25,18 @@ pub fn seed(text: &str) -> Result<u64, String> {
         .ok_or_else(|| format!("not a whole number from 0 to {LARGEST}"))
 }
 
+/// Most runs or episodes that may be asked for: far more than are ever played, and so few that they can be
+/// counted up from any seed.
+const MAX_COUNT: u64 = 1_000_000;
+
+/// How many runs or episodes.
+pub fn count(text: &str) -> Result<u64, String> {
+    text.parse()
+        .ok()
+        .filter(|n| (1..=MAX_COUNT).contains(n))
+        .ok_or_else(|| format!("must be a whole number, at least 1 and at most {MAX_COUNT}"))
+}
+
 /// Options of every subcommand that works.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub struct Common {

@@ -24,10 +24,27 @@ fn read<T: DeserializeOwned>(folder: &Path, name: &str) -> Result<T> {
     Ok(value.map_err(|message| Error::File { path, message })?)
 }
 
+/// What `asid compare` made a result as: it writes the page of it once, from what it ran.
+fn drawn_by_compare(result: &serde_json::Value) -> Option<&'static str> {
+    let kinds = [("rows", "comparison"), ("figure", "figure")];
+    let kind = kinds.iter().find(|(key, _)| result.get(key).is_some());
+    kind.map(|(_, kind)| *kind)
+}
+
 /// Writes `report.html` anew.
 pub fn report(arguments: &Arguments) -> Result<()> {
     let folder = &arguments.dir;
     let value: serde_json::Value = read(folder, "result.json")?;
+    if let Some(kind) = drawn_by_compare(&value) {
+        return Err(Error::File {
+            path: folder.clone(),
+            message: format!(
+                "is the folder of a {kind}, not of a run: its page is {}, which `asid compare` writes with it",
+                folder.join("report.html").display()
+            ),
+        }
+        .into());
+    }
     let page = if value.get("verdict").is_some() {
         diagnosis::page(&read(folder, "result.json")?, &read(folder, "trace.json")?)
     } else {

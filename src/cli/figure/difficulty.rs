@@ -8,8 +8,8 @@ use std::path::Path;
 use anyhow::Result;
 use asid_comparison::rows::Row;
 use asid_comparison::statistics;
+use asid_core::Error;
 use asid_core::difficulty::Difficulty;
-use asid_core::{Error, Task};
 
 use super::{Data, Drawing, Request, share, task};
 use crate::cli::settings::wrong;
@@ -55,7 +55,8 @@ pub fn draw(request: &Request<'_>, kept: &Path) -> Result<Drawing> {
         _ => return Err(wrong("difficulty", "is shown of one task at a time")),
     };
     let task = task(name)?;
-    let (setting, levels) = levels(request, &*task)?;
+    let given = request.levels.as_deref();
+    let (setting, levels) = levels(given, request.quick, name, &task.difficulty())?;
     let mut data = Data::new(
         "difficulty.csv",
         &[
@@ -106,18 +107,30 @@ pub fn draw(request: &Request<'_>, kept: &Path) -> Result<Drawing> {
     Ok(drawing)
 }
 
-/// The difficulty and its levels: as asked for, else the task's own. A quick look has the first, the middle
-/// and the last.
-fn levels(request: &Request<'_>, task: &dyn Task) -> Result<(Difficulty, Vec<f64>)> {
-    let (name, mut levels) = match &request.levels {
+/// The difficulty, of `all` that the task has, and its levels: as given, else the task's own, of which a quick
+/// look has the first, the middle and the last.
+fn levels(
+    given: Option<&str>,
+    quick: bool,
+    task: &str,
+    all: &[Difficulty],
+) -> Result<(Difficulty, Vec<f64>)> {
+    if all.is_empty() {
+        let message = format!(
+            "`{}` has no difficulty levels, over which the figure `difficulty` is drawn",
+            task
+        );
+        return Err(wrong("TASK", message));
+    }
+    let (name, mut levels) = match given {
         Some(text) => read(text)?,
         None => {
-            let own = LEVELS.iter().find(|(name, ..)| *name == task.name());
+            let own = LEVELS.iter().find(|(name, ..)| *name == task);
             let (_, name, levels) = own.ok_or_else(|| {
-                let known: Vec<String> = task.difficulty().into_iter().map(|d| d.name).collect();
+                let known: Vec<&str> = all.iter().map(|d| &*d.name).collect();
                 let message = format!(
                     "`{}` has no levels of its own: give NAME=VALUE,VALUE with one of {}",
-                    task.name(),
+                    task,
                     known.join(", ")
                 );
                 wrong("--levels", message)
@@ -125,14 +138,13 @@ fn levels(request: &Request<'_>, task: &dyn Task) -> Result<(Difficulty, Vec<f64
             ((*name).to_owned(), levels.to_vec())
         }
     };
-    let all = task.difficulty();
     let known = || all.iter().map(|d| &*d.name);
     let found = all.iter().find(|d| d.name == name);
     let found = found.ok_or_else(|| Error::unknown("difficulty", &name, known()))?;
     for level in &levels {
         found.check(*level)?;
     }
-    if request.quick && request.levels.is_none() {
+    if quick && given.is_none() {
         levels = vec![
             levels[0],
             levels[levels.len() / 2],
@@ -211,6 +223,17 @@ fn pooled(rows: &[Row]) -> Vec<Point> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_task_without_difficulties_is_refused_in_a_whole_sentence() {
+        for given in [None, Some("mass=1,2")] {
+            let error = levels(given, false, "my-task", &[]).unwrap_err();
+            assert_eq!(
+                error.to_string(),
+                "config TASK: `my-task` has no difficulty levels, over which the figure `difficulty` is drawn"
+            );
+        }
+    }
 
     #[test]
     fn levels_are_read_and_the_own_ones_fit_their_tasks() {

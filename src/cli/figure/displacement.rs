@@ -3,8 +3,9 @@
 use anyhow::Result;
 use asid_report::plot::{Colour, Outline};
 
-use super::episodes::{Wanted, by_explorer, play, playable};
+use super::episodes::play;
 use super::map::{Grid, frame, with_fixtures};
+use super::wanted::{Wanted, by_explorer, playable};
 use super::{Claim, Data, Drawing, Panel, Request, mean, share, task};
 
 const TASK: &str = "sphere-striking";
@@ -101,14 +102,15 @@ fn claims(drawing: &Drawing) -> Vec<Claim> {
     let (Some(fisher), Some(random)) = (hit("fisher"), hit("random")) else {
         return Vec::new();
     };
-    vec![Claim {
-        statement: format!(
+    vec![Claim::new(
+        format!(
             "{} hits the ball in {:.0} % of episodes, random actions in {:.0} %",
             fisher.explorer,
             100.0 * fisher.value,
             100.0 * random.value
         ),
-        paper: "Fisher exploration displaces the sphere from every start, random actions hardly (figure 7)".into(),
-        holds: fisher.interval95[0] > random.interval95[1],
-    }]
+        "Fisher exploration displaces the sphere from every start, random actions hardly (figure 7)",
+        [fisher.n, random.n],
+        fisher.interval95[0] > random.interval95[1],
+    )]
 }

@@ -1,17 +1,28 @@
 //! Which of four balls an explorer pushes: one has an unknown friction, three do not matter.
 
 use anyhow::Result;
+use asid_comparison::statistics;
 use asid_report::plot::{Axis, Colour, Outline, Plan};
 
 use super::displacement::HIT;
-use super::episodes::{by_explorer, of_each, play, playable};
+use super::episodes::play;
 use super::map::with_fixtures;
-use super::{Claim, Data, Drawing, Panel, Request, mean, share, task};
+use super::wanted::{by_explorer, of_each, playable};
+use super::{Claim, Data, Drawing, Number, Panel, Request, mean, share, task};
 
 const TASK: &str = "sphere-distractors";
 
 /// Episodes of an explorer, as in the paper.
 const EPISODES: u64 = 30;
+
+/// Share of all displacement that goes to the ball that matters.
+const FOCUS: &str = "share of all displacement that is of the ball that matters";
+
+/// Share of all displacement that is most of it: half.
+const MOST: f64 = 0.5;
+
+/// The least displacement that a share is taken of, m: where no ball is pushed the share is 0.
+const STILL: f64 = 1e-9;
 
 pub fn draw(request: &Request<'_>) -> Result<Drawing> {
     let task = task(TASK)?;
@@ -80,6 +91,7 @@ pub fn draw(request: &Request<'_>) -> Result<Drawing> {
             "m",
             &others,
         ));
+        drawing.numbers.push(focus(explorer, &matters, &others));
         for (b, ball) in balls.iter().enumerate() {
             drawing.numbers.push(share(
                 explorer,
@@ -96,36 +108,57 @@ pub fn draw(request: &Request<'_>) -> Result<Drawing> {
     Ok(drawing)
 }
 
-/// Share of all displacement that goes to the ball that matters.
-fn focus(drawing: &Drawing, name: &str) -> Option<(String, f64)> {
-    let of = |quantity: &str| {
-        let mut numbers = drawing.numbers.iter();
-        numbers.find(|n| n.explorer.starts_with(name) && n.quantity.starts_with(quantity))
+/// Share of all displacement that goes to the ball that matters; episodes are resampled as a whole.
+fn focus(explorer: &str, matters: &[f64], others: &[f64]) -> Number {
+    let of = |episodes: &[f64]| {
+        let sum = |ways: &[f64]| -> f64 { episodes.iter().map(|&e| ways[e as usize]).sum() };
+        let (own, rest) = (sum(matters), sum(others));
+        own / (own + rest).max(STILL)
     };
-    let (own, rest) = (
-        of("displacement of the ball")?,
-        of("displacement of the others")?,
-    );
-    Some((
-        own.explorer.clone(),
-        own.value / (own.value + rest.value).max(1e-9),
-    ))
+    let all: Vec<f64> = (0..matters.len()).map(|e| e as f64).collect();
+    Number {
+        explorer: explorer.to_owned(),
+        quantity: FOCUS.to_owned(),
+        unit: String::new(),
+        value: of(&all),
+        interval95: statistics::bootstrap(std::slice::from_ref(&all), of),
+        n: all.len(),
+    }
 }
 
+/// Most of what Fisher exploration pushes is the ball that matters, and more than of what MAX pushes, intervals
+/// apart.
 fn claims(drawing: &Drawing) -> Vec<Claim> {
-    let (Some((fisher, own)), Some((max, theirs))) =
-        (focus(drawing, "fisher"), focus(drawing, "max"))
-    else {
+    let focus = |name: &str| {
+        let mut numbers = drawing.numbers.iter();
+        numbers.find(|n| n.quantity == FOCUS && n.explorer.starts_with(name))
+    };
+    let (Some(fisher), Some(max)) = (focus("fisher"), focus("max")) else {
         return Vec::new();
     };
-    vec![Claim {
-        statement: format!(
-            "{:.0} % of what {fisher} pushes is the ball that matters, {:.0} % of what {max} pushes",
-            100.0 * own,
-            100.0 * theirs
+    vec![Claim::new(
+        format!(
+            "{:.0} % of what {} pushes is the ball that matters, {:.0} % of what {} pushes",
+            100.0 * fisher.value,
+            fisher.explorer,
+            100.0 * max.value,
+            max.explorer
         ),
-        paper: "Fisher exploration seeks out the one sphere, MAX is distracted by all (figure 10)"
-            .into(),
-        holds: own > theirs && own > 0.5,
-    }]
+        "Fisher exploration seeks out the one sphere, MAX is distracted by all (figure 10)",
+        [fisher.n, max.n],
+        fisher.interval95[0] > max.interval95[1].max(MOST),
+    )]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_share_of_the_ball_that_matters_is_of_all_episodes_together() {
+        let own = focus("a", &[0.3, 0.0], &[0.1, 0.0]);
+        assert!((own.value - 0.75).abs() < 1e-12 && own.n == 2);
+        let still = focus("a", &[0.0; 3], &[0.0; 3]);
+        assert_eq!((still.value, still.interval95), (0.0, [0.0; 2]));
+    }
 }

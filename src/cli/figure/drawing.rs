@@ -10,6 +10,7 @@ use asid_report::page::{Cell, Column, Figure, Page, Section, Table, Tone};
 use asid_report::plot::{Panels, Plot};
 use serde::Serialize;
 
+use super::claim::Claim;
 use crate::cli::compare::page::table;
 use crate::cli::result::figure as digits;
 
@@ -28,17 +29,6 @@ pub struct Number {
     pub interval95: [f64; 2],
     /// Episodes or runs behind it.
     pub n: usize,
-}
-
-/// What the paper says of the figure, and whether these numbers agree.
-#[derive(Clone, Debug, Serialize)]
-pub struct Claim {
-    /// The statement, with the numbers found.
-    pub statement: String,
-    /// What the paper reports, or what is asked for where it reports nothing.
-    pub paper: String,
-    /// Whether the numbers agree in direction.
-    pub holds: bool,
 }
 
 /// A file of data.
@@ -197,7 +187,7 @@ impl Drawing {
             }
         }
         for claim in &self.claims {
-            let mark = if claim.holds { "agrees" } else { "DIFFERS" };
+            let mark = claim.verdict.mark();
             writeln!(out, "{mark}: {} (paper: {})", claim.statement, claim.paper)?;
         }
         writeln!(out, "results: {}", folder.display())?;
@@ -274,15 +264,10 @@ impl Drawing {
             Column::text("direction"),
         ];
         self.claims.iter().fold(Table::new(columns), |t, c| {
-            let (word, tone) = if c.holds {
-                ("agrees", Tone::Good)
-            } else {
-                ("differs", Tone::Bad)
-            };
             t.row(vec![
                 Cell::from(c.statement.clone()),
                 Cell::from(c.paper.clone()),
-                Cell::toned(word, tone),
+                Cell::toned(c.verdict.words(), c.verdict.tone()),
             ])
         })
     }

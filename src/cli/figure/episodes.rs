@@ -14,83 +14,11 @@ use asid_core::registry::{ExplorerEntry, find};
 use asid_core::{Episode, Error, Explorer, Policy};
 use asid_worlds::SimulatedWorld;
 
-use super::Request;
 use super::variant::Variant;
+use super::wanted::Wanted;
 use crate::cli::compare::arm::reaches;
 use crate::cli::options::{Algorithms, Common, Worlds};
 use crate::cli::session::Session;
-
-/// Episodes that are to be played.
-#[derive(Clone, Debug, Default)]
-pub struct Wanted {
-    /// The task.
-    pub task: String,
-    /// The explorer, as [`Variant::of`] reads it.
-    pub explorer: String,
-    /// Settings, as `--set` takes them.
-    pub set: Vec<String>,
-    /// Effects of the world that the explorer does not know, as `--real-effect` takes them.
-    pub effects: Vec<String>,
-    /// Seed of truth, start and noise.
-    pub seed: u64,
-    /// Start pose; drawn by the seed where it is not given.
-    pub start: Option<Vec<f64>>,
-}
-
-/// The explorers that a figure shows on a task, and why others are left out.
-///
-/// # Errors
-/// When a name is unknown, or nothing is left.
-pub fn playable(
-    request: &Request<'_>,
-    task: &str,
-    own: &[&str],
-) -> Result<(Vec<String>, Vec<String>)> {
-    let (mut kept, mut notes) = (Vec::new(), Vec::new());
-    for explorer in request.explorers(own) {
-        match Variant::of(&explorer).lacks(task)? {
-            Some(why) => notes.push(why),
-            None => kept.push(explorer),
-        }
-    }
-    if kept.is_empty() {
-        return Err(Error::Failed(notes.join("; ")).into());
-    }
-    Ok((kept, notes))
-}
-
-/// The same episodes of each explorer: seeds from `first` on, starts drawn by them.
-pub fn of_each(
-    task: &str,
-    explorers: &[String],
-    set: &[&str],
-    first: u64,
-    episodes: u64,
-) -> Vec<Wanted> {
-    let one = |explorer: &String, seed| Wanted {
-        task: task.to_owned(),
-        explorer: explorer.clone(),
-        set: set.iter().map(|&s| s.to_owned()).collect(),
-        seed,
-        ..Wanted::default()
-    };
-    explorers
-        .iter()
-        .flat_map(|explorer| (first..first + episodes).map(move |seed| one(explorer, seed)))
-        .collect()
-}
-
-/// Each explorer by its label, with its episodes.
-pub fn by_explorer<'p>(
-    explorers: &[String],
-    played: &'p [Played],
-) -> Vec<(String, Vec<&'p Played>)> {
-    let of = |explorer: &String| {
-        let own = played.iter().filter(|p| &p.wanted.explorer == explorer);
-        (Variant::of(explorer).label(), own.collect())
-    };
-    explorers.iter().map(of).collect()
-}
 
 /// An episode that was played.
 pub struct Played {
@@ -155,7 +83,8 @@ pub fn play(common: &Common, wanted: Vec<Wanted>) -> Result<Vec<Played>> {
 /// the order is that of `wanted`.
 ///
 /// # Errors
-/// The first that one of them ends with; no other is begun then.
+/// When a setting is wrong, before any of them is begun; else the first that one of them ends with, and no
+/// other is begun then.
 pub fn each<T: Send>(
     common: &Common,
     wanted: Vec<Wanted>,
@@ -165,6 +94,7 @@ pub fn each<T: Send>(
         .threads
         .or_else(|| std::thread::available_parallelism().ok().map(usize::from))
         .unwrap_or(1);
+    check(common, &wanted)?;
     let total = wanted.len();
     let done: Mutex<Vec<(usize, Result<T>)>> = Mutex::new(Vec::with_capacity(total));
     let stop = AtomicBool::new(false);
@@ -200,6 +130,22 @@ pub fn each<T: Send>(
     let mut all = done.into_inner().unwrap_or_else(PoisonError::into_inner);
     all.sort_by_key(|(index, _)| *index);
     all.into_iter().map(|(_, result)| result).collect()
+}
+
+/// Opens one session of each task, explorer and settings, so that a wrong call ends before any work.
+fn check(common: &Common, wanted: &[Wanted]) -> Result<()> {
+    let mut checked: Vec<&Wanted> = Vec::new();
+    for one in wanted {
+        let own = |w: &Wanted| {
+            let parts = (&w.task, &w.explorer, &w.set, &w.effects);
+            parts == (&one.task, &one.explorer, &one.set, &one.effects)
+        };
+        if !checked.iter().any(|w| own(w)) {
+            open(common, one, false)?;
+            checked.push(one);
+        }
+    }
+    Ok(())
 }
 
 /// The session of an episode; with `quick`, searches of explorer and identifier are cut as those of a quick

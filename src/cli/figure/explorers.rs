@@ -12,8 +12,9 @@ use asid_algorithms::fisher::expected::ExpectedSettings;
 use asid_core::RealWorld as _;
 use asid_core::registry::{ExplorerEntry, IdentifierEntry, find};
 
-use super::episodes::{Wanted, each, of_each, open, playable};
-use super::variant::Variant;
+use super::episodes::{each, open};
+use super::variant::Labels;
+use super::wanted::{Wanted, of_each, playable};
 use super::{Data, Drawing, Number, Request, mean, median};
 use shown::{against, claims, ranking, table};
 
@@ -75,22 +76,28 @@ struct Row {
 }
 
 pub fn draw(request: &Request<'_>) -> Result<Drawing> {
-    let tasks: Vec<String> = match &request.tasks[..] {
-        [] => TASKS.map(str::to_owned).to_vec(),
-        given => given.to_vec(),
-    };
+    let mut tasks: Vec<&str> = Vec::new();
+    for task in request.tasks.iter().map(String::as_str) {
+        if !tasks.contains(&task) {
+            tasks.push(task);
+        }
+    }
+    if tasks.is_empty() {
+        tasks.extend(TASKS);
+    }
+    let labels = Labels::of(&request.explorers(&OWN));
     let count = request.episodes(3, EPISODES);
     let (mut notes, mut wanted) = (Vec::new(), Vec::new());
-    for task in &tasks {
+    for &task in &tasks {
         let (explorers, left_out) = playable(request, task, &OWN)?;
         notes.extend(left_out);
         wanted.extend(of_each(task, &explorers, &[], request.seed(), count));
     }
     let episodes = each(&request.common, wanted, |wanted| told(request, wanted))?;
-    let rows = rows(&tasks, &episodes);
+    let rows = rows(&tasks, &episodes, &labels);
     let mut drawing = Drawing {
         notes,
-        data: vec![data(&episodes)],
+        data: vec![data(&episodes, &labels)],
         tables: vec![table(&rows)],
         claims: claims(&rows),
         ..Drawing::new(
@@ -176,10 +183,10 @@ fn told(request: &Request<'_>, wanted: &Wanted) -> Result<Episode> {
 }
 
 /// Rows by task and unknown, the explorer whose posterior is narrowest first.
-fn rows(tasks: &[String], episodes: &[Episode]) -> Vec<Row> {
+fn rows(tasks: &[&str], episodes: &[Episode], labels: &Labels) -> Vec<Row> {
     let mut rows = Vec::new();
-    for task in tasks {
-        let here = || episodes.iter().filter(|e| &e.wanted.task == task);
+    for &task in tasks {
+        let here = || episodes.iter().filter(|e| e.wanted.task == task);
         let mut explorers: Vec<&str> = Vec::new();
         for episode in here() {
             if !explorers.contains(&&*episode.wanted.explorer) {
@@ -190,7 +197,7 @@ fn rows(tasks: &[String], episodes: &[Episode]) -> Vec<Row> {
         for i in 0..unknowns {
             let of = |explorer: &str| {
                 let own = here().filter(|e| e.wanted.explorer == explorer);
-                row(task, explorer, i, &own.collect::<Vec<_>>())
+                row(task, labels.get(explorer), i, &own.collect::<Vec<_>>())
             };
             let mut group: Vec<Row> = explorers.iter().map(|e| of(e)).collect();
             group.sort_by(|a, b| a.actual.value.total_cmp(&b.actual.value));
@@ -200,8 +207,7 @@ fn rows(tasks: &[String], episodes: &[Episode]) -> Vec<Row> {
     rows
 }
 
-fn row(task: &str, explorer: &str, i: usize, of: &[&Episode]) -> Row {
-    let explorer = Variant::of(explorer).label();
+fn row(task: &str, explorer: String, i: usize, of: &[&Episode]) -> Row {
     let told: Vec<&Told> = of.iter().map(|e| &e.told[i]).collect();
     let unknown = told[0].unknown.clone();
     let number = |quantity: &str, value: &dyn Fn(&Told) -> f64| {
@@ -237,7 +243,7 @@ fn row(task: &str, explorer: &str, i: usize, of: &[&Episode]) -> Row {
     }
 }
 
-fn data(episodes: &[Episode]) -> Data {
+fn data(episodes: &[Episode], labels: &Labels) -> Data {
     let mut data = Data::new(
         "episodes.csv",
         &[
@@ -268,7 +274,7 @@ fn data(episodes: &[Episode]) -> Data {
             ];
             let mut cells = vec![
                 wanted.task.clone(),
-                Variant::of(&wanted.explorer).label(),
+                labels.get(&wanted.explorer),
                 wanted.seed.to_string(),
                 t.unknown.clone(),
             ];

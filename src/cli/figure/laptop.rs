@@ -4,14 +4,21 @@ use anyhow::Result;
 use asid_core::signal::rotation_difference;
 use asid_report::plot::{Colour, Outline};
 
-use super::episodes::{Played, by_explorer, of_each, play, playable};
+use super::episodes::{Played, play};
 use super::map::with_fixtures;
+use super::wanted::{by_explorer, of_each, playable};
 use super::{Claim, Data, Drawing, Panel, Request, share, task};
 
 const TASK: &str = "laptop-articulation";
 
 /// A lid that turned by more was moved, rad (ASID, appendix: change of the lid's angle above 1e-2).
 const MOVED: f64 = 0.01;
+
+/// Share of episodes that Fisher exploration moves the lid in at least, as in the paper.
+const FISHER: f64 = 0.8;
+
+/// Share of episodes that random actions move the lid in at most: half of that of Fisher exploration.
+const RANDOM: f64 = 0.4;
 
 /// Episodes of an explorer.
 const EPISODES: u64 = 40;
@@ -118,7 +125,8 @@ fn lid_turned(episode: &Played) -> Result<f64> {
     Ok((0..base.len()).map(angle).fold(0.0, f64::max))
 }
 
-/// At least four of five episodes against at most two of five, as in the paper.
+/// Fisher exploration moves the lid more often than random actions, intervals apart, and the shares are about
+/// those of the paper.
 fn claims(drawing: &Drawing) -> Vec<Claim> {
     let moved = |name: &str| {
         let mut numbers = drawing.numbers.iter();
@@ -127,14 +135,39 @@ fn claims(drawing: &Drawing) -> Vec<Claim> {
     let (Some(fisher), Some(random)) = (moved("fisher"), moved("random")) else {
         return Vec::new();
     };
-    vec![Claim {
-        statement: format!(
+    let apart = fisher.interval95[0] > random.interval95[1];
+    vec![Claim::new(
+        format!(
             "{} moves the lid in {:.0} % of episodes, random actions in {:.0} %",
             fisher.explorer,
             100.0 * fisher.value,
             100.0 * random.value
         ),
-        paper: "80 % against 20 % (section 5.2)".into(),
-        holds: fisher.value >= 0.8 && random.value <= 0.4,
-    }]
+        "80 % against 20 % (section 5.2)",
+        [fisher.n, random.n],
+        apart && fisher.value >= FISHER && random.value <= RANDOM,
+    )]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::claim::Verdict;
+    use super::*;
+
+    #[test]
+    fn a_lid_moved_more_often_agrees_only_with_enough_episodes_and_intervals_apart() {
+        let verdict = |fisher: usize, random: usize, n: usize| {
+            let moved = |name, hits| share(name, "episodes in which the lid is moved", hits, n);
+            let drawing = Drawing {
+                numbers: vec![moved("random", random), moved("fisher-cem", fisher)],
+                ..Drawing::default()
+            };
+            claims(&drawing)[0].verdict
+        };
+        assert_eq!(verdict(40, 5, 40), Verdict::Agrees);
+        assert_eq!(verdict(20, 5, 40), Verdict::Differs);
+        // 100 % against 33 %: the intervals overlap.
+        assert_eq!(verdict(6, 2, 6), Verdict::Differs);
+        assert_eq!(verdict(4, 0, 4), Verdict::TooFewEpisodes);
+    }
 }

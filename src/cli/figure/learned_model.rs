@@ -17,7 +17,8 @@ use asid_learned::shipped;
 use asid_nn::{Motion, MotionModel};
 use rand::Rng as _;
 
-use super::episodes::{Played, Wanted, by_explorer, of_each, open, play, playable};
+use super::episodes::{Played, open, play};
+use super::wanted::{Wanted, by_explorer, of_each, playable};
 use super::{Drawing, Request, task};
 use motions::{Move, Path, fitted, motion, moved, path, simulated};
 use shown::{claims, data, numbers, panels};

@@ -5,8 +5,9 @@ use anyhow::Result;
 use asid_core::task::Outline;
 use asid_report::plot::Colour;
 
-use super::episodes::{by_explorer, of_each, play, playable};
+use super::episodes::play;
 use super::map::{Grid, with_fixtures};
+use super::wanted::{by_explorer, of_each, playable};
 use super::{Claim, Data, Drawing, Panel, Request, mean, share, task};
 
 const TASK: &str = "sphere-patches";
@@ -104,15 +105,16 @@ fn claims(drawing: &Drawing) -> Vec<Claim> {
     let (Some(fisher), Some(maxmi)) = (covered("fisher"), covered("maxmi")) else {
         return Vec::new();
     };
-    vec![Claim {
-        statement: format!(
+    vec![Claim::new(
+        format!(
             "{} covers {:.3} m² an episode, maxmi {:.3} m²: {:.1} times as much",
             fisher.explorer,
             fisher.value,
             maxmi.value,
             fisher.value / maxmi.value
         ),
-        paper: "ASID activates the sphere over a much larger area than MaxMI (figure 4)".into(),
-        holds: fisher.interval95[0] > maxmi.interval95[1],
-    }]
+        "ASID activates the sphere over a much larger area than MaxMI (figure 4)",
+        [fisher.n, maxmi.n],
+        fisher.interval95[0] > maxmi.interval95[1],
+    )]
 }

@@ -1,6 +1,8 @@
 //! Explorers with settings of their own, as figures name them: `fisher-cem`, or
 //! `fisher-cem:fisher.objective=trace+fisher.form=one-step`.
 
+use std::collections::HashMap;
+
 use anyhow::Result;
 use asid_core::registry::{ExplorerEntry, find};
 use asid_learned::learning::SHIPPED;
@@ -32,6 +34,15 @@ impl<'t> Variant<'t> {
             value.rsplit('/').next().unwrap_or(value).trim_matches('"')
         });
         let words: Vec<&str> = std::iter::once(self.name).chain(values).collect();
+        words.join(" ")
+    }
+
+    /// The same with the keys, such as `fisher-cem fisher.objective=trace`, where the values alone do not tell
+    /// explorers apart.
+    fn full_label(&self) -> String {
+        let words: Vec<&str> = std::iter::once(self.name)
+            .chain(self.settings.iter().copied())
+            .collect();
         words.join(" ")
     }
 
@@ -68,7 +79,11 @@ impl<'t> Variant<'t> {
         }))
     }
 
-    fn learns(&self) -> Result<bool> {
+    /// Whether it plays what was trained before.
+    ///
+    /// # Errors
+    /// When there is no such explorer.
+    pub fn learns(&self) -> Result<bool> {
         let defaults = (find::<ExplorerEntry>(self.name)?.defaults)();
         Ok(defaults.contains_key("policy"))
     }
@@ -78,9 +93,73 @@ impl<'t> Variant<'t> {
     }
 }
 
+/// Labels of explorers that are shown beside each other: no two are equal.
+pub struct Labels(HashMap<String, String>);
+
+impl Labels {
+    /// Labels of these explorers: [`Variant::label`], with the keys where two would be equal.
+    pub fn of(explorers: &[String]) -> Self {
+        let short = |explorer: &String| Variant::of(explorer).label();
+        let label = |explorer: &String| {
+            let own = short(explorer);
+            let mut others = explorers.iter().filter(|e| *e != explorer);
+            if others.any(|e| short(e) == own) {
+                return Variant::of(explorer).full_label();
+            }
+            own
+        };
+        Self(explorers.iter().map(|e| (e.clone(), label(e))).collect())
+    }
+
+    /// The label of one of them; of another explorer the one that it has alone.
+    pub fn get(&self, explorer: &str) -> String {
+        let known = self.0.get(explorer).cloned();
+        known.unwrap_or_else(|| Variant::of(explorer).label())
+    }
+}
+
+/// The explorers, each once, as [`Variant::of`] reads them.
+pub fn distinct(explorers: &[String]) -> Vec<String> {
+    let mut kept: Vec<String> = Vec::new();
+    for explorer in explorers {
+        let there = |k: &String| Variant::of(k) == Variant::of(explorer);
+        if !kept.iter().any(there) {
+            kept.push(explorer.clone());
+        }
+    }
+    kept
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn labels_have_the_keys_where_values_alone_do_not_tell_explorers_apart() {
+        let explorers = [
+            "random",
+            "fisher-cem:iterations=4",
+            "fisher-cem:population=4",
+            "fisher-cem:population=8",
+        ]
+        .map(str::to_owned);
+        let labels = Labels::of(&explorers);
+        let all = explorers.each_ref().map(|e| labels.get(e));
+        let expected = [
+            "random",
+            "fisher-cem iterations=4",
+            "fisher-cem population=4",
+            "fisher-cem 8",
+        ];
+        assert_eq!(all, expected);
+    }
+
+    #[test]
+    fn an_explorer_that_is_named_twice_is_one() {
+        let named = ["random", "fisher-cem:population=4", "random", "random:"];
+        let kept = distinct(&named.map(str::to_owned));
+        assert_eq!(kept, ["random", "fisher-cem:population=4"]);
+    }
 
     #[test]
     fn settings_follow_a_name_and_a_label_has_their_values() {

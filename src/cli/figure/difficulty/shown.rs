@@ -111,6 +111,7 @@ pub fn table(setting: &Difficulty, points: &[(f64, Vec<Point>)]) -> Grid {
 pub fn claims(points: &[(f64, Vec<Point>)]) -> Vec<Claim> {
     let interval = |p: &Point| statistics::wilson(p.successes, p.n);
     let (mut first, mut apart, mut counted) = (0, 0, 0);
+    let mut runs = Vec::new();
     for (_, of) in points {
         let Some(asid) = of.iter().find(|p| p.method == "asid") else {
             continue;
@@ -124,18 +125,21 @@ pub fn claims(points: &[(f64, Vec<Point>)]) -> Vec<Claim> {
         }
         let rate = |p: &Point| p.successes as f64 / p.n.max(1) as f64;
         counted += 1;
+        runs.push(asid.n);
+        runs.extend(others.iter().map(|p| p.n));
         first += usize::from(others.iter().all(|p| rate(asid) >= rate(p)));
         apart += usize::from(others.iter().all(|p| interval(asid)[0] > interval(p)[1]));
     }
     if counted == 0 {
         return Vec::new();
     }
-    vec![Claim {
-        statement: format!(
+    vec![Claim::new(
+        format!(
             "asid succeeds most often at {first} of {counted} levels, with its interval apart from all others' at \
              {apart}"
         ),
-        paper: "shows no such curve; ASID succeeds more often than every baseline (table 1)".into(),
-        holds: first == counted,
-    }]
+        "shows no such curve; ASID succeeds more often than every baseline (table 1)",
+        runs,
+        first == counted,
+    )]
 }

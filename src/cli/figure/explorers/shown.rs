@@ -166,16 +166,17 @@ pub fn claims(rows: &[Row]) -> Vec<Claim> {
         let best = of().find(|r| r.explorer.starts_with("fisher"));
         let random = of().find(|r| r.explorer == "random");
         if let (Some(fisher), Some(random)) = (best, random) {
-            claims.push(Claim {
-                statement: format!(
+            claims.push(Claim::new(
+                format!(
                     "{task}, {unknown}: {} leaves {} of the prior's deviation, random actions {}",
                     fisher.explorer,
                     short(fisher.actual.value),
                     short(random.actual.value)
                 ),
-                paper: "Fisher exploration tells more than random actions (table 1)".into(),
-                holds: fisher.actual.interval95[1] < random.actual.interval95[0],
-            });
+                "Fisher exploration tells more than random actions (table 1)",
+                [fisher.actual.n, random.actual.n],
+                fisher.actual.interval95[1] < random.actual.interval95[0],
+            ));
         }
         let ratios: Vec<f64> = of()
             .flat_map(|r| &r.pairs)
@@ -184,15 +185,17 @@ pub fn claims(rows: &[Row]) -> Vec<Claim> {
             .collect();
         let ratio = median("all", "", "", &ratios);
         let [low, high] = CALIBRATED;
-        claims.push(Claim {
-            statement: format!(
+        claims.push(Claim::new(
+            format!(
                 "{task}, {unknown}: expected over actual deviation {} in the median over {} episodes",
                 short(ratio.value),
                 ratio.n
             ),
-            paper: format!("says nothing of it; {low} to {high} is asked for here"),
-            holds: (low..=high).contains(&ratio.value),
-        });
+            format!("says nothing of it; {low} to {high} is asked for here"),
+            // Explorers meet the same truths: their episodes count once.
+            of().map(|r| r.ratio.n),
+            (low..=high).contains(&ratio.value),
+        ));
     }
     claims
 }
