@@ -8,7 +8,8 @@ use asid_nn::Motion;
 use asid_worlds::SimulatedWorld;
 
 use super::super::Request;
-use super::super::episodes::{Played, Wanted, each, open, played, played_in};
+use super::super::episodes::{Played, each, open, played, played_in};
+use super::super::wanted::Wanted;
 use super::{BALL, HAND};
 use crate::cli::session::Session;
 
