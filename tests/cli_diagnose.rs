@@ -194,6 +194,17 @@ fn bad_studies_and_logs_are_refused_in_one_line() {
     assert!(said.contains("no such file") && status == Some(2), "{said}");
 }
 
+/// Writes each log of a study anew.
+fn rewrite_logs(study: &std::path::Path, anew: impl Fn(&str) -> String) {
+    for entry in std::fs::read_dir(study).unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_some_and(|e| e == "csv") {
+            let log = std::fs::read_to_string(&path).unwrap();
+            std::fs::write(&path, anew(&log)).unwrap();
+        }
+    }
+}
+
 /// A start fits two rows whatever the machine is, and that no gap was left passed for a verdict; with a start that is known a column that was taken
 /// for late left nothing, and the program panicked.
 #[test]
@@ -201,14 +212,9 @@ fn logs_of_too_few_rows_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let study = folder.path().join("study");
     write_study(&study, Truth::None);
-    for entry in std::fs::read_dir(&study).unwrap() {
-        let path = entry.unwrap().path();
-        if path.extension().is_some_and(|e| e == "csv") {
-            let log = std::fs::read_to_string(&path).unwrap();
-            let rows: Vec<&str> = log.lines().take(3).collect();
-            std::fs::write(&path, rows.join("\n")).unwrap();
-        }
-    }
+    rewrite_logs(&study, |log| {
+        log.lines().take(3).collect::<Vec<_>>().join("\n")
+    });
     let (said, status) = refusal(&["diagnose", text(&study), "--quiet"]);
     assert!(
         said.contains("4 logs to fit to have 8 rows in all"),
@@ -301,21 +307,17 @@ fn degrees_in_place_of_radians_are_noticed() {
     let folder = tempfile::tempdir().unwrap();
     let study = folder.path().join("study");
     write_study(&study, Truth::None);
-    for entry in std::fs::read_dir(&study).unwrap() {
-        let path = entry.unwrap().path();
-        if path.extension().is_some_and(|e| e == "csv") {
-            let log = std::fs::read_to_string(&path).unwrap();
-            let scaled = log.lines().enumerate().map(|(i, line)| {
-                let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
-                if i > 0 {
-                    let x: f64 = cells[2].parse().unwrap();
-                    cells[2] = (x * 180.0 / std::f64::consts::PI).to_string();
-                }
-                cells.join(",") + "\n"
-            });
-            std::fs::write(&path, scaled.collect::<String>()).unwrap();
-        }
-    }
+    rewrite_logs(&study, |log| {
+        let scaled = log.lines().enumerate().map(|(i, line)| {
+            let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+            if i > 0 {
+                let x: f64 = cells[2].parse().unwrap();
+                cells[2] = (x * 180.0 / std::f64::consts::PI).to_string();
+            }
+            cells.join(",") + "\n"
+        });
+        scaled.collect()
+    });
     let out = asid(&[
         "diagnose",
         text(&study),
