@@ -105,7 +105,8 @@ impl TaskSolver for CemSolver {
             }));
             problem.progress.advance(1);
         }
-        let action = settled(&trials, &mut attempts, samples, &mut rng)?;
+        let finalists: Vec<_> = pool.into_iter().map(|(action, _)| action).collect();
+        let action = settled(finalists, &mut attempts, samples, &mut rng)?;
         problem.progress.end();
         Ok(Solved {
             policy: Box::new(FixedAction(action)),
@@ -114,42 +115,46 @@ impl TaskSolver for CemSolver {
     }
 }
 
-/// Trials within this share of the spread between best and median cost count as equally good.
+/// Actions within this share of the spread between best and median cost count as equally good.
 const TIE: f64 = 0.02;
 
 /// The middle of the best actions: where a whole stretch of actions does equally well, its
-/// middle is the safest. Should that middle do worse than the best trial, the best trial it is.
+/// middle is the safest. Should that middle do worse than the best of them, that one it is.
+///
+/// Each refit has situations of its own, and the best cost over many refits is partly luck. The better half of the finalists
+/// therefore meet once more at common situations, twice as many, and only what they cost there counts.
 fn settled(
-    trials: &[Trial],
+    mut finalists: Vec<Vec<f64>>,
     attempts: &mut Attempts<'_>,
     samples: usize,
     rng: &mut Rng,
 ) -> Result<Vec<f64>> {
-    let mut order: Vec<&Trial> = trials.iter().filter(|t| t.cost.is_finite()).collect();
-    order.sort_by(|a, b| a.cost.total_cmp(&b.cost));
-    let (Some(best), Some(median)) = (order.first(), order.get(order.len() / 2)) else {
+    finalists.truncate((finalists.len() / 2).max(1));
+    let situations = attempts.draw(2 * samples, rng)?;
+    let costs = attempts.mean_costs(&situations, &finalists)?;
+    let mut order: Vec<(f64, &[f64])> = costs
+        .iter()
+        .zip(&finalists)
+        .filter(|(cost, _)| cost.is_finite())
+        .map(|(cost, action)| (*cost, action.as_slice()))
+        .collect();
+    order.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let (Some(&(best_cost, best)), Some(&(median, _))) =
+        (order.first(), order.get(order.len() / 2))
+    else {
         return Err(Error::Failed("every attempt at the task diverged".into()));
     };
-    let limit = best.cost + TIE * (median.cost - best.cost);
-    let ties: Vec<&Trial> = order
-        .iter()
-        .copied()
-        .take_while(|t| t.cost <= limit)
-        .collect();
-    let middle: Vec<f64> = (0..best.action.len())
+    let limit = best_cost + TIE * (median - best_cost);
+    let ties = || order.iter().take_while(|(cost, _)| *cost <= limit);
+    let middle: Vec<f64> = (0..best.len())
         .map(|i| {
             // Half way between the ends, however the draws are spread between them.
-            let values = ties.iter().map(|t| t.action[i]);
+            let values = ties().map(|(_, action)| action[i]);
             let low = values.clone().fold(f64::INFINITY, f64::min);
             let high = values.fold(f64::NEG_INFINITY, f64::max);
             0.5 * (low + high)
         })
         .collect();
-    let situations = attempts.draw(samples, rng)?;
-    let tried = attempts.mean_costs(&situations, &[middle.clone(), best.action.clone()])?;
-    Ok(if tried[0] <= tried[1].max(limit) {
-        middle
-    } else {
-        best.action.clone()
-    })
+    let tried = attempts.mean_costs(&situations, std::slice::from_ref(&middle))?;
+    Ok(if tried[0] <= limit { middle } else { best.to_vec() })
 }
