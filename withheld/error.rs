@@ -47,6 +47,12 @@ pub enum Error {
         /// Why the last one was left out.
         reason: String,
     },
+    /// A set is asked for that cannot be.
+    #[error("{message}")]
+    Wanted {
+        /// What there is none of.
+        message: String,
+    },
     /// A file cannot be written or read.
     #[error("{path}: {message}")]
     File {

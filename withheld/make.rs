@@ -20,7 +20,7 @@ use crate::case;
 use crate::error::{Error, Result};
 use crate::label::Label;
 use crate::machine::{Half, Machine};
-use crate::plan::Plan;
+use crate::plan::{Plan, Wanted};
 use crate::seal::{LABELS, SEAL, Seal, commitment, digest, files};
 
 /// Folder of the studies, and that of the labels.
@@ -40,6 +40,22 @@ struct Set {
     count: usize,
     /// Machines that others wrote.
     outside: Vec<String>,
+    /// Which cases of the wheels are taken.
+    #[serde(default, skip_serializing_if = "Wanted::is_all")]
+    wanted: Wanted,
+}
+
+/// What set is asked for.
+#[derive(Clone, Debug)]
+pub struct Order {
+    /// Half of the machines.
+    pub half: Half,
+    /// Seed of everything that is drawn.
+    pub seed: u64,
+    /// Number of cases.
+    pub count: usize,
+    /// Which cases of the wheels are taken.
+    pub wanted: Wanted,
 }
 
 /// A case that was made.
@@ -117,21 +133,26 @@ fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
 /// Where the folder holds something else, or a file cannot be written.
 pub fn make(
     folder: &Path,
-    half: Half,
-    seed: u64,
-    count: usize,
+    order: &Order,
     outside: &[&'static Machine],
     done: &(dyn Fn() + Sync),
 ) -> Result<Made> {
+    let Order {
+        half,
+        seed,
+        count,
+        wanted,
+    } = order.clone();
+    let plan = Plan::draw_wanted(half, (seed, count), outside, &wanted)?;
     let set = Set {
         schema: 1,
         half,
         seed,
         count,
         outside: outside.iter().map(|m| m.name.to_owned()).collect(),
+        wanted,
     };
     let [studies, sealed] = open(folder, &set)?;
-    let plan = Plan::draw(half, seed, count, outside)?;
     let digits = count.saturating_sub(1).to_string().len().max(3);
     let results: Vec<Result<(String, Sealed)>> = (0..count)
         .into_par_iter()
@@ -151,6 +172,13 @@ pub fn make(
     let (mut left_out, mut seconds) = (Vec::new(), Vec::new());
     for (number, result) in results.into_iter().enumerate() {
         match result {
+            Ok((name, made)) if !order.wanted.takes_label(&made.label) => {
+                let study = studies.join(&name);
+                std::fs::remove_dir_all(&study).map_err(|e| failed(&study, &e))?;
+                let label = sealed.join(&name).with_extension("json");
+                std::fs::remove_file(&label).map_err(|e| failed(&label, &e))?;
+                left_out.push(format!("case {number}: no wanted cause could be sized"));
+            }
             Ok((name, made)) => {
                 labels.insert(name.clone(), made.label);
                 seals.insert(name, made.seal);

@@ -5,20 +5,25 @@
 //! machine hardly moves. Of the causes that a machine can have the one that was used least comes next, so that a
 //! set of 600 has each of them, at each gap, about as often as its machines allow.
 
+mod wanted;
+
 use std::collections::BTreeMap;
 
 use rand::Rng;
 use rand::seq::{IndexedRandom, SliceRandom};
 use rand_chacha::ChaCha8Rng;
+use serde::{Deserialize, Serialize};
 
 use crate::anatomy::Anatomy;
 use crate::cause::{Cause, Standing};
 use crate::causes;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::faults::{LogFault, WiringKind};
 use crate::machine::{Half, Machine};
 use crate::machines;
 use crate::random::{digest, stream};
+
+pub use wanted::Wanted;
 
 /// True excess gaps of causes in clean worlds, in noise floors.
 pub const GAPS: [f64; 4] = [1.5, 3.0, 10.0, 100.0];
@@ -26,7 +31,8 @@ pub const GAPS: [f64; 4] = [1.5, 3.0, 10.0, 100.0];
 pub const FACTORS: [f64; 3] = [2.0, 5.0, 20.0];
 
 /// What a case's causes are.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Kind {
     /// None.
     None,
@@ -63,6 +69,9 @@ const LITTLE: usize = 2;
 const COMMONEST: f64 = 0.5;
 /// Share of pairs and triples that are triples.
 const TRIPLES: f64 = 0.3;
+/// Wheels without a wanted case after which there is none: the rarest kind has one case a wheel, and a half has some twenty machines, so
+/// that within so many each machine has had it several times.
+const BARREN: usize = 100;
 
 /// What a case is to be.
 #[derive(Clone)]
@@ -131,40 +140,33 @@ impl Plan {
     /// # Errors
     /// Where a machine's model is wrong.
     pub fn draw(half: Half, seed: u64, count: usize, outside: &[&'static Machine]) -> Result<Self> {
+        Self::draw_wanted(half, (seed, count), outside, &Wanted::default())
+    }
+
+    /// Draws a plan of those cases only that are wanted.
+    ///
+    /// # Errors
+    /// Where a machine's model is wrong, or no machine of the half has such a case.
+    pub fn draw_wanted(
+        half: Half,
+        (seed, count): (u64, usize),
+        outside: &[&'static Machine],
+        wanted: &Wanted,
+    ) -> Result<Self> {
+        wanted.check()?;
         let all = machines::of(half).chain(outside.iter().copied());
         let machines: Vec<Anatomy> = all.map(Anatomy::of).collect::<Result<_>>()?;
-        let random = &mut stream(seed, &["plan", half.name()]);
-        let mut used = Used::default();
+        let mut dealer = Dealer::new(half, seed, &machines, wanted);
         let mut slots = Vec::with_capacity(count);
-        let mut order: Vec<usize> = Vec::new();
-        let (mut faults, mut wirings): (Vec<LogFault>, Vec<WiringKind>) = (Vec::new(), Vec::new());
+        let mut barren = 0;
         while slots.len() < count {
-            let mut wheel: Vec<(Kind, bool)> = WHEEL
-                .iter()
-                .flat_map(|&(kind, dirty, n)| std::iter::repeat_n((kind, dirty), n))
-                .collect();
-            wheel.shuffle(random);
-            let mut odd: Vec<usize> = (0..wheel.len()).collect();
-            odd.shuffle(random);
-            for (i, (kind, dirty)) in wheel.into_iter().enumerate() {
-                let machine = deal(&mut order, &(0..machines.len()).collect::<Vec<_>>(), random);
-                let place = odd.iter().position(|&o| o == i).unwrap_or(0);
-                let within = |from: usize, n: usize| (from..from + n).contains(&place);
-                let fault = within(0, FAULTS);
-                let wiring = within(FAULTS, WIRINGS);
-                let mut slot = Slot {
-                    machine,
-                    kind,
-                    causes: Vec::new(),
-                    same_joint: false,
-                    dirty,
-                    level: random.random_range(0..12),
-                    fault: fault.then(|| deal(&mut faults, &LogFault::ALL, random)),
-                    wiring: wiring.then(|| deal(&mut wirings, &WiringKind::ALL, random)),
-                    little: within(FAULTS + WIRINGS, LITTLE),
-                };
-                slot.choose(&machines[machine], &mut used, random);
-                slots.push(slot);
+            let before = slots.len();
+            let wheel = dealer.wheel();
+            slots.extend(wheel.into_iter().filter(|s| wanted.takes(s)));
+            barren = if slots.len() > before { 0 } else { barren + 1 };
+            if barren == BARREN {
+                let message = format!("no machine of the {} half has such a case", half.name());
+                return Err(Error::Wanted { message });
             }
         }
         slots.truncate(count);
@@ -173,6 +175,70 @@ impl Plan {
             machines,
             slots,
         })
+    }
+}
+
+/// Deals wheels of cases, one after the other.
+struct Dealer<'a> {
+    machines: &'a [Anatomy],
+    wanted: &'a Wanted,
+    random: ChaCha8Rng,
+    used: Used,
+    order: Vec<usize>,
+    faults: Vec<LogFault>,
+    wirings: Vec<WiringKind>,
+}
+
+impl<'a> Dealer<'a> {
+    fn new(half: Half, seed: u64, machines: &'a [Anatomy], wanted: &'a Wanted) -> Self {
+        Self {
+            machines,
+            wanted,
+            random: stream(seed, &["plan", half.name()]),
+            used: Used::default(),
+            order: Vec::new(),
+            faults: Vec::new(),
+            wirings: Vec::new(),
+        }
+    }
+
+    /// The cases of a wheel.
+    fn wheel(&mut self) -> Vec<Slot> {
+        let random = &mut self.random;
+        let mut wheel: Vec<(Kind, bool)> = WHEEL
+            .iter()
+            .flat_map(|&(kind, dirty, n)| std::iter::repeat_n((kind, dirty), n))
+            .collect();
+        wheel.shuffle(random);
+        let mut odd: Vec<usize> = (0..wheel.len()).collect();
+        odd.shuffle(random);
+        let machines: Vec<usize> = (0..self.machines.len()).collect();
+        let mut slots = Vec::with_capacity(wheel.len());
+        for (i, (kind, dirty)) in wheel.into_iter().enumerate() {
+            let machine = deal(&mut self.order, &machines, random);
+            let place = odd.iter().position(|&o| o == i).unwrap_or(0);
+            let within = |from: usize, n: usize| (from..from + n).contains(&place);
+            let fault = within(0, FAULTS);
+            let wiring = within(FAULTS, WIRINGS);
+            let mut slot = Slot {
+                machine,
+                kind,
+                causes: Vec::new(),
+                same_joint: false,
+                dirty,
+                level: random.random_range(0..12),
+                fault: fault.then(|| deal(&mut self.faults, &LogFault::ALL, random)),
+                wiring: wiring.then(|| deal(&mut self.wirings, &WiringKind::ALL, random)),
+                little: within(FAULTS + WIRINGS, LITTLE),
+            };
+            slot.choose(
+                &self.machines[machine],
+                (&mut self.used, self.wanted),
+                random,
+            );
+            slots.push(slot);
+        }
+        slots
     }
 }
 
@@ -186,8 +252,16 @@ fn deal<T: Copy>(left: &mut Vec<T>, all: &[T], random: &mut ChaCha8Rng) -> T {
 }
 
 impl Slot {
-    fn choose(&mut self, machine: &Anatomy, used: &mut Used, random: &mut ChaCha8Rng) {
-        let known = possible(machine, |s| s != Standing::Unknown);
+    fn choose(
+        &mut self,
+        machine: &Anatomy,
+        (used, wanted): (&mut Used, &Wanted),
+        random: &mut ChaCha8Rng,
+    ) {
+        let mut known = possible(machine, |s| s != Standing::Unknown);
+        if self.kind != Kind::Several {
+            known.retain(|c| wanted.takes_cause(c.name()));
+        }
         match self.kind {
             Kind::None => {}
             Kind::Single => {
@@ -198,7 +272,8 @@ impl Slot {
                 }
             }
             Kind::Unknown => {
-                let unknown = possible(machine, |s| s == Standing::Unknown);
+                let mut unknown = possible(machine, |s| s == Standing::Unknown);
+                unknown.retain(|c| wanted.takes_cause(c.name()));
                 let next = used.next(&unknown, random);
                 self.causes.extend(next.map(|(c, _)| c));
             }

@@ -156,5 +156,9 @@ fn settled(
         })
         .collect();
     let tried = attempts.mean_costs(&situations, std::slice::from_ref(&middle))?;
-    Ok(if tried[0] <= limit { middle } else { best.to_vec() })
+    Ok(if tried[0] <= limit {
+        middle
+    } else {
+        best.to_vec()
+    })
 }

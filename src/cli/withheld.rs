@@ -67,6 +67,9 @@ pub struct Arguments {
         requires = "make"
     )]
     half: Half,
+    #[cfg(feature = "mujoco")]
+    #[command(flatten)]
+    wanted: make::Wanted,
     /// Take only this case (repeatable)
     #[arg(long, value_name = "NAME")]
     case: Vec<String>,

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use asid_withheld::cause::Standing;
-use asid_withheld::plan::{FACTORS, GAPS, Kind, Plan, possible};
+use asid_withheld::plan::{FACTORS, GAPS, Kind, Plan, Wanted, possible};
 use asid_withheld::{Half, Result, causes, machines};
 
 /// The split by kind of machine, as it is written down in `docs/withheld.md`.
@@ -165,5 +165,47 @@ fn every_effect_of_the_catalogue_can_be_in_both_halves() -> Result<()> {
             assert!(somewhere, "{half:?}: no machine can have {}", cause.name());
         }
     }
+    Ok(())
+}
+
+#[test]
+fn a_set_for_one_question_has_only_its_cases() -> Result<()> {
+    let wanted = Wanted {
+        kinds: vec![Kind::Single, Kind::Group],
+        causes: vec!["viscous-friction".into(), "backlash".into()],
+        dirty: Some(false),
+        size: 10.0,
+    };
+    let plan = Plan::draw_wanted(Half::Training, (3, 40), &[], &wanted)?;
+    assert_eq!(plan.slots.len(), 40);
+    for slot in &plan.slots {
+        assert!(matches!(slot.kind, Kind::Single | Kind::Group) && !slot.dirty);
+        assert!(slot.aim(0) >= 10.0);
+        let names: Vec<&str> = slot.causes.iter().map(|c| c.name()).collect();
+        assert!(
+            names == ["viscous-friction"] || names == ["backlash"],
+            "{names:?}"
+        );
+    }
+    let none = Wanted {
+        kinds: vec![Kind::None],
+        ..Wanted::default()
+    };
+    let plan = Plan::draw_wanted(Half::Test, (3, 50), &[], &none)?;
+    assert!(plan.slots.iter().all(|s| s.causes.is_empty()));
+    let wrong = |causes: &[&str], kinds: &[Kind]| {
+        let wanted = Wanted {
+            kinds: kinds.to_vec(),
+            causes: causes.iter().map(|c| (*c).to_owned()).collect(),
+            ..Wanted::default()
+        };
+        let plan = Plan::draw_wanted(Half::Test, (3, 5), &[], &wanted);
+        plan.err().map(|e| e.to_string()).unwrap_or_default()
+    };
+    assert!(wrong(&["viscous"], &[]).starts_with("there is no cause `viscous`; there are "));
+    assert_eq!(
+        wrong(&["viscous-friction"], &[Kind::Unknown]),
+        "no machine of the test half has such a case"
+    );
     Ok(())
 }

@@ -5,15 +5,25 @@ use std::path::{Path, PathBuf};
 
 use asid_withheld::causes;
 use asid_withheld::label::Label;
-use asid_withheld::make::{make, with_threads};
+use asid_withheld::make::{Order, make, with_threads};
+use asid_withheld::plan::Wanted;
 use asid_withheld::seal::{Seal, commitment, digest, verify};
 use asid_withheld::{Half, Result};
 
 /// Cases of the set that is made here.
 const COUNT: usize = 6;
 
+fn order(seed: u64) -> Order {
+    Order {
+        half: Half::Training,
+        seed,
+        count: COUNT,
+        wanted: Wanted::default(),
+    }
+}
+
 fn made(folder: &Path, seed: u64, threads: usize) -> Result<()> {
-    let work = || make(folder, Half::Training, seed, COUNT, &[], &|| {});
+    let work = || make(folder, &order(seed), &[], &|| {});
     let made = with_threads(threads, work)?;
     assert_eq!(made.cases + made.left_out.len(), COUNT);
     Ok(())

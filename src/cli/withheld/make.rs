@@ -16,6 +16,63 @@ pub enum Half {
     Test,
 }
 
+/// What the causes of a case are.
+#[cfg(feature = "mujoco")]
+#[derive(Clone, Copy, Debug, clap::ValueEnum)]
+pub enum Kind {
+    /// Nothing
+    None,
+    /// One effect of the catalogue
+    Single,
+    /// Two or three effects
+    Several,
+    /// One effect at all places of a kind
+    Group,
+    /// A cause that the catalogue has not got
+    Unknown,
+}
+
+/// Which cases are made: those of a set for one question, or all.
+#[cfg(feature = "mujoco")]
+#[derive(clap::Args)]
+pub struct Wanted {
+    /// Make only cases of this kind (repeatable)
+    #[arg(long, value_name = "KIND", requires = "make")]
+    kind: Vec<Kind>,
+    /// Make only cases with this cause, such as backlash (repeatable)
+    #[arg(long, value_name = "NAME", requires = "make")]
+    cause: Vec<String>,
+    /// Make only worlds where nothing else is off
+    #[arg(long, requires = "make", conflicts_with = "dirty")]
+    clean: bool,
+    /// Make only worlds where everything else is a little off
+    #[arg(long, requires = "make")]
+    dirty: bool,
+    /// Plan causes for at least this excess gap, in noise floors; in dirty worlds for so many times that of the dirt
+    #[arg(long, value_name = "N", default_value_t = 0.0, requires = "make")]
+    size: f64,
+}
+
+#[cfg(feature = "mujoco")]
+impl Wanted {
+    fn of_plan(&self) -> asid_withheld::plan::Wanted {
+        use asid_withheld::plan::Kind as Planned;
+        let kind = |kind: &Kind| match kind {
+            Kind::None => Planned::None,
+            Kind::Single => Planned::Single,
+            Kind::Several => Planned::Several,
+            Kind::Group => Planned::Group,
+            Kind::Unknown => Planned::Unknown,
+        };
+        asid_withheld::plan::Wanted {
+            kinds: self.kind.iter().map(kind).collect(),
+            causes: self.cause.clone(),
+            dirty: (self.clean || self.dirty).then_some(self.dirty),
+            size: self.size,
+        }
+    }
+}
+
 /// Makes new cases in a folder.
 #[cfg(feature = "mujoco")]
 pub fn make(folder: &Path, arguments: &Arguments) -> Result<()> {
@@ -31,7 +88,12 @@ pub fn make(folder: &Path, arguments: &Arguments) -> Result<()> {
         Half::Training => asid_withheld::Half::Training,
         Half::Test => asid_withheld::Half::Test,
     };
-    let seed = common.seed.unwrap_or(0);
+    let order = asid_withheld::make::Order {
+        half,
+        seed: common.seed.unwrap_or(0),
+        count: arguments.count,
+        wanted: arguments.wanted.of_plan(),
+    };
     let bars = Bars::new(common.quiet);
     bars.begin("cases", arguments.count as u64);
     let done = || bars.advance(1);
@@ -46,7 +108,7 @@ pub fn make(folder: &Path, arguments: &Arguments) -> Result<()> {
             }
             None => Vec::new(),
         };
-        asid_withheld::make::make(folder, half, seed, arguments.count, &outside, &done)
+        asid_withheld::make::make(folder, &order, &outside, &done)
     };
     let made = asid_withheld::make::with_threads(common.threads.unwrap_or(0), make)
         .map_err(|e| Error::Failed(e.to_string()))?;

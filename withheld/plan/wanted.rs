@@ -1,0 +1,83 @@
+//! A set for one question: of the wheels' cases only some kinds, causes, worlds and sizes.
+
+use serde::{Deserialize, Serialize};
+
+use super::{Kind, Slot};
+use crate::causes;
+use crate::error::{Error, Result};
+use crate::label::Label;
+
+/// Which cases of the wheels a set takes. The default takes all.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Wanted {
+    /// Kinds; all where there is none.
+    pub kinds: Vec<Kind>,
+    /// Names of causes, of which a case has at least one; all cases where there is none.
+    pub causes: Vec<String>,
+    /// Clean worlds (`false`) or dirty ones (`true`); both where it is none.
+    pub dirty: Option<bool>,
+    /// Least size that causes are planned for: an excess gap in noise floors in clean worlds, how often that of the dirt in dirty ones.
+    pub size: f64,
+}
+
+impl Wanted {
+    /// Whether all cases are taken.
+    #[must_use]
+    pub fn is_all(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// Refuses what no wheel has.
+    ///
+    /// # Errors
+    /// Where a cause is none.
+    pub fn check(&self) -> Result<()> {
+        let known = |name: &str| causes::ALL.iter().any(|c| c.name() == name);
+        match self.causes.iter().find(|name| !known(name)) {
+            Some(name) => {
+                let names: Vec<&str> = causes::ALL.iter().map(|c| c.name()).collect();
+                let message = format!("there is no cause `{name}`; there are {}", names.join(", "));
+                Err(Error::Wanted { message })
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// Whether a cause may be drawn.
+    #[must_use]
+    pub fn takes_cause(&self, name: &str) -> bool {
+        self.causes.is_empty() || self.causes.iter().any(|c| c == name)
+    }
+
+    /// Whether a slot is one of these.
+    #[must_use]
+    pub fn takes(&self, slot: &Slot) -> bool {
+        let caused = slot.kind == Kind::None || slot.aim(0) >= self.size;
+        caused
+            && self.takes_kind(slot.kind)
+            && self.dirty.is_none_or(|dirty| dirty == slot.dirty)
+            && (self.causes.is_empty() || slot.causes.iter().any(|c| self.takes_cause(c.name())))
+    }
+
+    /// Whether a case that was made is one of these: where a cause could not be sized another one was drawn.
+    #[must_use]
+    pub fn takes_label(&self, label: &Label) -> bool {
+        let mut names = label
+            .effects
+            .iter()
+            .map(|e| e.split('@').next().unwrap_or(e));
+        let kind = match &*label.kind {
+            "none" => Kind::None,
+            "single" => Kind::Single,
+            "group" => Kind::Group,
+            "unknown" => Kind::Unknown,
+            _ => Kind::Several,
+        };
+        self.takes_kind(kind)
+            && (self.causes.is_empty() || names.any(|name| self.takes_cause(name)))
+    }
+
+    fn takes_kind(&self, kind: Kind) -> bool {
+        self.kinds.is_empty() || self.kinds.contains(&kind)
+    }
+}
