@@ -7,8 +7,7 @@
 //!
 //! Two things make them small although the noise is not. A reading that only repeats the one before (an encoder at rest, a sensor
 //! that is logged faster than it reads) has none of its own: such rows are passed over. And noise that was filtered
-//! differs little from row to row: third differences over two and four rows show it ([`Noise::correlation`]), for those of
-//! such noise grow by at most two from row to row, and those of a smooth residual by 64.
+//! differs little from row to row: third differences over more rows show it ([`Noise::correlation`]).
 //!
 //! Replays are measured in units of it ([`crate::prepare`] takes it from readings or residuals, [`crate::diagnose`] once more from what the
 //! best explanation leaves, [`crate::checks`] asks whether it is white). For the missing force it is where the variances of the readings begin, and

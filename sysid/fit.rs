@@ -14,6 +14,7 @@ use asid_core::error::{Error, Result};
 use asid_core::{Model, Parameter, Posterior, Progress, Streams};
 use nalgebra::{DMatrix, DVector};
 
+use crate::by_episodes::{parts, widened};
 use crate::dataset::{Dataset, Replayer, Trial};
 use crate::gap::{fit_start, start_slopes};
 use crate::valleys::{Watched, confirmed};
@@ -171,11 +172,14 @@ pub fn fit(
         found = Some(fitted);
     }
     progress.end();
-    let Some(found) = found else {
+    let Some(mut found) = found else {
         return Err(Error::Failed(
             "nearly every replay of the logs diverged; check the model, its time step and the first state".into(),
         ));
     };
+    let at = (parameters, &found.point[..]);
+    let parts = parts(&mut replayer, layout, data, at, &found.information)?;
+    found.information = widened(&found.information, &parts);
     Ok(Identified {
         posterior: posterior_of(&found, parameters, DRAWS, &mut rng),
         values: values(parameters, &found.point),
@@ -185,7 +189,7 @@ pub fn fit(
     })
 }
 
-fn values(parameters: &[Parameter], z: &[f64]) -> Vec<f64> {
+pub(crate) fn values(parameters: &[Parameter], z: &[f64]) -> Vec<f64> {
     parameters
         .iter()
         .zip(z)

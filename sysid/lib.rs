@@ -10,6 +10,7 @@
 //!   simulated true machines.
 
 mod by_drive;
+mod by_episodes;
 pub mod candidates;
 pub mod dataset;
 pub mod design;

@@ -103,7 +103,7 @@ impl Designer<'_, '_> {
             }
             search.tell(&candidates, &costs);
             course.push(best.1);
-            progress.note(&format!("explore, {:.3}", best.1));
+            progress.note(&format!("explore, objective {:.3e}", best.1));
             progress.advance(1);
         }
         progress.end();

@@ -216,7 +216,7 @@ pub fn figure(name: &str, request: &Request<'_>) -> Result<()> {
     out.write(|folder| {
         write_json(&folder.join("result.json"), &result)?;
         for data in &drawing.data {
-            write_text(&folder.join(&data.name), &data.csv())?;
+            write_text(&folder.join(&data.name), &data.csv()?)?;
         }
         if let Some(tables) = drawing.markdown() {
             write_text(&folder.join("table.md"), &tables)?;

@@ -153,13 +153,13 @@ impl Data {
     }
 
     /// The file's text.
-    pub fn csv(&self) -> String {
-        let mut text = self.columns.join(",") + "\n";
+    pub fn csv(&self) -> Result<String> {
+        let mut writer = csv::Writer::from_writer(Vec::new());
+        writer.write_record(&self.columns)?;
         for row in &self.rows {
-            text += &row.join(",");
-            text.push('\n');
+            writer.write_record(row)?;
         }
-        text
+        Ok(String::from_utf8(writer.into_inner()?)?)
     }
 }
 
@@ -270,5 +270,18 @@ impl Drawing {
                 Cell::toned(c.verdict.words(), c.verdict.tone()),
             ])
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cell_with_a_comma_is_one_cell_of_the_file() -> Result<()> {
+        let mut data = Data::new("a.csv", &["explorer", "covered"]);
+        data.rows.push(vec!["cem:a=1,b=2".into(), "0.5".into()]);
+        assert_eq!(data.csv()?, "explorer,covered\n\"cem:a=1,b=2\",0.5\n");
+        Ok(())
     }
 }

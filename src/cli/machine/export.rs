@@ -105,17 +105,15 @@ pub fn export(request: &Request<'_>) -> Result<()> {
         writeln!(stdout, "{}", serde_json::to_string_pretty(&result)?)?;
         return Ok(());
     }
-    let whole = result
-        .effects
-        .iter()
-        .filter(|e| e.sentence.is_none())
-        .count();
+    let count = |native: &str| result.effects.iter().filter(|e| e.native == native).count();
     writeln!(
         stdout,
-        "wrote {}: {} values, {whole} of {} effects in full",
+        "wrote {}: {} values; effects: {} whole, {} nearly, {} left out",
         result.file,
         written.values.len(),
-        result.effects.len()
+        count("whole"),
+        count("nearly"),
+        count("left-out"),
     )?;
     let sentences = result.effects.iter().filter_map(|e| e.sentence.as_ref());
     for sentence in sentences.chain(&result.left_out) {

@@ -1,0 +1,148 @@
+//! Intervals that are no narrower than the episodes disagree.
+//!
+//! What a model lacks often pulls a value up in one episode and down in another one. Residuals within an episode are then alike, and
+//! least squares, which takes them for independent readings, is too sure. The variance of a sum of parts that are independent from one
+//! episode to the next is told by these parts alone (K.-Y. Liang, S. L. Zeger, Biometrika 73, 1986, with episodes as clusters).
+
+use asid_core::error::Result;
+use asid_core::{Layout, Parameter};
+use nalgebra::{DMatrix, DVector};
+
+use crate::dataset::{Dataset, Replayer};
+use crate::fit::{marginal, values};
+
+/// Half width of the differences that slopes are taken by, in deviations of the fit: slopes over the region that the posterior covers.
+const STEP: f64 = 1.0;
+/// Least half width, in prior deviations: replays in double precision tell such a change from rounding.
+const LEAST_STEP: f64 = 1e-4;
+/// Most, in prior deviations: beyond it a replay is no straight line.
+const MOST_STEP: f64 = 0.3;
+
+/// An episode's part of the normal equations.
+pub(crate) struct Part {
+    /// Slopes' products, `J^T J`.
+    normal: DMatrix<f64>,
+    /// Slopes times residuals, `J^T r`.
+    gradient: DVector<f64>,
+}
+
+/// The parts of all episodes at a point, in prior deviations; none where a replay beside the point diverges.
+pub(crate) fn parts(
+    replayer: &mut Replayer,
+    layout: &Layout,
+    data: &Dataset,
+    (parameters, point): (&[Parameter], &[f64]),
+    information: &DMatrix<f64>,
+) -> Result<Vec<Part>> {
+    let covariance = covariance(information);
+    let theta = values(parameters, point);
+    let steps: Vec<f64> = (0..point.len())
+        .map(|k| (STEP * covariance[(k, k)].sqrt()).clamp(LEAST_STEP, MOST_STEP))
+        .collect();
+    let mut parts = Vec::with_capacity(data.trials.len());
+    for trial in &data.trials {
+        let marginal = marginal(replayer, layout, data, trial, &theta)?;
+        let mut beside = vec![theta.clone()];
+        for (k, step) in steps.iter().enumerate() {
+            for sign in [1.0, -1.0] {
+                let mut z = point.to_vec();
+                z[k] += sign * step;
+                beside.push(values(parameters, &z));
+            }
+        }
+        let points: Vec<_> = beside.iter().map(|t| (&t[..], &marginal.start)).collect();
+        let rows = replayer.residuals(data, trial, &points)?;
+        let Some(rows) = rows.into_iter().collect::<Option<Vec<_>>>() else {
+            return Ok(Vec::new());
+        };
+        let rows: Vec<DVector<f64>> = rows
+            .iter()
+            .map(|r| DVector::from_vec(marginal.apply(r)))
+            .collect();
+        let slopes: Vec<DVector<f64>> = steps
+            .iter()
+            .enumerate()
+            .map(|(k, step)| (&rows[2 * k + 1] - &rows[2 * k + 2]) / (2.0 * step))
+            .collect();
+        let slopes = DMatrix::from_columns(&slopes);
+        parts.push(Part {
+            normal: slopes.transpose() * &slopes,
+            gradient: slopes.transpose() * &rows[0],
+        });
+    }
+    Ok(parts)
+}
+
+/// Covariance of the fit with the prior, a unit normal.
+fn covariance(information: &DMatrix<f64>) -> DMatrix<f64> {
+    let n = information.nrows();
+    let with_prior = information + DMatrix::identity(n, n);
+    with_prior
+        .cholesky()
+        .map_or_else(|| DMatrix::identity(n, n), |c| c.inverse())
+}
+
+/// Information of which no deviation is smaller than the episodes disagree: correlations stay, deviations grow.
+pub(crate) fn widened(information: &DMatrix<f64>, parts: &[Part]) -> DMatrix<f64> {
+    let (n, count) = (information.nrows(), parts.len() as f64);
+    if parts.len() < 2 {
+        return information.clone();
+    }
+    let normal = parts.iter().map(|p| &p.normal).sum::<DMatrix<f64>>();
+    let inverse = covariance(&normal);
+    let pulls: Vec<DVector<f64>> = parts.iter().map(|p| &inverse * &p.gradient).collect();
+    let covariance = covariance(information);
+    let factor = |k: usize| {
+        let mean = pulls.iter().map(|p| p[k]).sum::<f64>() / count;
+        let squares: f64 = pulls.iter().map(|p| (p[k] - mean).powi(2)).sum();
+        let disagree = count * squares / (count - 1.0);
+        (covariance[(k, k)] / disagree.max(covariance[(k, k)])).sqrt()
+    };
+    let factors = DMatrix::from_diagonal(&DVector::from_fn(n, |k, _| factor(k)));
+    &factors * information * &factors
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Episodes that each read one value ten times with unit noise, off by these amounts from the fit.
+    fn read(off: &[f64]) -> (DMatrix<f64>, Vec<Part>) {
+        let part = |x: &f64| Part {
+            normal: DMatrix::from_element(1, 1, 10.0),
+            gradient: DVector::from_element(1, 10.0 * x),
+        };
+        let information = DMatrix::from_element(1, 1, 10.0 * off.len() as f64);
+        (information, off.iter().map(part).collect())
+    }
+
+    #[test]
+    fn a_mean_is_as_uncertain_as_its_episodes_are_apart() {
+        let off = [0.9, -1.1, 0.4, -0.2];
+        let (information, parts) = read(&off);
+        let wide = widened(&information, &parts);
+        // The standard error of a mean of four, the prior being of no weight.
+        let variance = off.iter().map(|x| x * x).sum::<f64>() / 3.0 / 4.0;
+        assert!((wide[(0, 0)] * variance - 1.0).abs() < 0.05, "{wide}");
+    }
+
+    #[test]
+    fn episodes_that_agree_leave_it_as_it_is() {
+        let (information, parts) = read(&[0.1, -0.1, 0.05]);
+        assert_eq!(widened(&information, &parts), information);
+        let (information, parts) = read(&[3.0]);
+        assert_eq!(widened(&information, &parts), information, "one episode");
+    }
+
+    #[test]
+    fn a_value_that_no_reading_sees_stays_unseen() {
+        let mut information = DMatrix::zeros(2, 2);
+        information[(0, 0)] = 40.0;
+        let part = |x: f64| Part {
+            normal: DMatrix::from_diagonal(&DVector::from_vec(vec![10.0, 0.0])),
+            gradient: DVector::from_vec(vec![10.0 * x, 0.0]),
+        };
+        let wide = widened(&information, &[1.0, -1.0, 1.0, -1.0].map(part));
+        assert!(wide[(0, 0)] < 10.0 && wide[(1, 1)] == 0.0);
+    }
+}
