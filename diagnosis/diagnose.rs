@@ -15,11 +15,12 @@ pub use crate::settings::Settings;
 pub use crate::telling::Diagnosis;
 pub use crate::work::Work;
 
-/// Gap in units of the noise from which on a verdict leaves so much that the other way to take the wiring is tried as well: the right
-/// wiring and the right effect leave the noise.
-const DOUBTFUL: f64 = 2.0;
-/// Share of the gap that the other way must leave at most to stand: each way estimates the noise for itself, and a tenth of it is chance.
+/// Share of the gap that the other way to take the wiring must leave at most to stand: each way estimates the noise for itself, and a tenth of
+/// it is chance.
 const BETTER: f64 = 0.8;
+/// Gap in units of the noise from which on that way is tried: the right wiring and the right effect leave the noise, and below this nothing that
+/// leaves the noise is better by as much.
+const DOUBTFUL: f64 = 1.0 / BETTER;
 
 /// Rows that a log to fit to has at least, in the mean: a first speed is taken over six, and the noise over third differences, of four.
 const FEWEST_ROWS: usize = 8;

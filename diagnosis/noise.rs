@@ -14,24 +14,13 @@
 //! what bounds them (`latent_force/estimate/variances.rs`). A study's own `noise` overrides it.
 
 mod quantization;
-mod third_differences;
+
+use asid_readings::noise::ThirdDifferences;
 
 use crate::data::Logs;
 
+pub use asid_readings::noise::{NORMAL, Noise, median};
 pub use quantization::step;
-use third_differences::{STRIDES, from_differences, third_differences};
-
-/// Ratio of a normal variable's deviation to the median of its magnitude.
-pub const NORMAL: f64 = 1.482_602_218_505_602;
-
-/// Noise of one sensor.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Noise {
-    /// Standard deviation, in the sensor's unit.
-    pub deviation: f64,
-    /// Correlation from one reading to the next; 0 for white noise.
-    pub correlation: f64,
-}
 
 /// Estimates the deviation of each sensor's noise; see [`describe`].
 #[must_use]
@@ -48,7 +37,7 @@ pub fn describe(logs: &Logs, residuals: &[Vec<f64>]) -> Vec<Noise> {
     let n = logs.entries.len();
     (0..logs.sensors.len())
         .map(|sensor| {
-            let mut differences: [Vec<f64>; STRIDES.len()] = Default::default();
+            let mut differences = ThirdDifferences::default();
             let entries = logs.entries.iter().enumerate();
             for (j, entry) in entries.filter(|(_, e)| e.sensor == sensor) {
                 for (e, residual) in residuals.iter().enumerate() {
@@ -59,20 +48,15 @@ pub fn describe(logs: &Logs, residuals: &[Vec<f64>]) -> Vec<Noise> {
                         .filter(|(k, x)| x.is_finite() && !repeats[*k])
                         .map(|(k, x)| (k, time[k], *x))
                         .collect();
-                    for (stride, found) in STRIDES.iter().zip(&mut differences) {
-                        third_differences(&series, *stride, found);
-                    }
+                    differences.add(&series);
                 }
             }
-            let of_differences = from_differences(&mut differences);
+            let of_differences = differences.noise();
             let floor = (step(logs, sensor) / 12.0_f64.sqrt()).max(smallest(logs, sensor));
             if of_differences.deviation >= floor {
                 of_differences
             } else {
-                Noise {
-                    deviation: floor,
-                    correlation: 0.0,
-                }
+                Noise::white(floor)
             }
         })
         .collect()
@@ -97,16 +81,6 @@ fn repeats(logs: &Logs, episode: usize, sensor: usize, component: usize) -> Vec<
         out[k] = columns.clone().all(|c| a[c] == b[c]);
     }
     out
-}
-
-/// Median, `None` of nothing.
-#[must_use]
-pub fn median(values: &mut [f64]) -> Option<f64> {
-    if values.is_empty() {
-        return None;
-    }
-    let middle = values.len() / 2;
-    Some(*values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
 
 /// Readings of a sensor, component after component.

@@ -2,9 +2,11 @@
 //!
 //! - [`replay`] plays a log's commands and says what the sensors would have read at each of its rows.
 //! - [`SignalSet`] whitens the difference of two readings.
+//! - [`noise`] tells the noise of a sensor from its readings.
 //! - [`systematic`] whitens by the systematic errors of a tracker as well.
 
 mod difference;
+pub mod noise;
 pub mod replay;
 pub mod systematic;
 

@@ -9,12 +9,10 @@ use asid_core::simulator::{BatchConfig, Simulator};
 use asid_core::{Episode, Model, Parameter};
 use asid_mjcf::Plant;
 use asid_readings::SignalSet;
+use asid_readings::noise::ThirdDifferences;
 use asid_readings::replay::Replay;
 
 use crate::{columns, start, targets};
-
-/// Ratio of a normal variable's standard deviation to the median of its magnitude.
-const NORMAL: f64 = 1.482_602_218_505_602;
 
 /// Smallest noise of a sensor, as a share of the spread of its readings: a simulated log has none at all.
 const LEAST_NOISE: f64 = 1e-5;
@@ -119,11 +117,10 @@ impl Dataset {
     }
 }
 
-/// The noise of a sensor from the rough part of its readings: third differences take out what is smooth, and have
-/// `sqrt(20)` times the deviation of white noise; their median magnitude is blind to a few impacts. Readings that come
-/// in steps have at least the deviation of a step, `step / sqrt(12)`.
+/// The noise of a sensor from the rough part of its readings. Readings that come in steps have at least the deviation of a
+/// step, `step / sqrt(12)`.
 fn noise_of(sensor: &str, logs: &[(String, Episode)]) -> f64 {
-    let mut rough = Vec::new();
+    let mut rough = ThirdDifferences::default();
     let mut step = f64::INFINITY;
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
     for (_, episode) in logs {
@@ -131,22 +128,20 @@ fn noise_of(sensor: &str, logs: &[(String, Episode)]) -> f64 {
             continue;
         };
         for column in range {
-            let series: Vec<f64> = (0..episode.rows())
-                .map(|k| episode.reading(k)[column])
+            let reading = |k: usize| episode.reading(k)[column];
+            // A reading that only repeats the one before, as of an encoder at rest, has no noise of its own.
+            let series: Vec<(usize, f64, f64)> = (0..episode.rows())
+                .filter(|&k| reading(k).is_finite() && (k == 0 || reading(k) != reading(k - 1)))
+                .map(|k| (k, episode.time[k], reading(k)))
                 .collect();
-            for x in series.iter().filter(|x| x.is_finite()) {
+            for (.., x) in &series {
                 (low, high) = (low.min(*x), high.max(*x));
             }
-            let steps = series.windows(2).map(|w| (w[1] - w[0]).abs());
+            let steps = series.windows(2).map(|w| (w[1].2 - w[0].2).abs());
             step = steps.filter(|d| *d > 0.0).fold(step, f64::min);
-            let third = series
-                .windows(4)
-                .map(|w| (w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0]).abs());
-            rough.extend(third.filter(|d| d.is_finite()));
+            rough.add(&series);
         }
     }
-    rough.sort_by(f64::total_cmp);
-    let median = rough.get(rough.len() / 2).copied().unwrap_or(0.0);
     let least = (LEAST_NOISE * (high - low)).max(f64::MIN_POSITIVE.sqrt());
     let least = if least.is_finite() { least } else { 1.0 };
     let step = if step.is_finite() {
@@ -154,7 +149,7 @@ fn noise_of(sensor: &str, logs: &[(String, Episode)]) -> f64 {
     } else {
         0.0
     };
-    (NORMAL * median / 20.0_f64.sqrt()).max(least).max(step)
+    rough.noise().deviation.max(least).max(step)
 }
 
 /// Replays episodes at many values of the parameters at once.

@@ -1,11 +1,42 @@
-//! Deviation and correlation of noise from third differences over one to sixteen rows, which vanish for parabolas.
+//! The noise of a sensor: its deviation and correlation from third differences over one to sixteen rows, which vanish for parabolas.
 //!
 //! Over a number of rows twice as large those of correlated noise grow by at most two, until readings so far apart are independent.
 //! What a model misses grows faster: its own third differences, squared, by 64 where it is smooth, and by 8 where a rough force
 //! makes it, which a machine integrates twice. Noise and such a rest are told apart by how the differences grow; over rows where the rest
 //! outgrows the noise they tell nothing of it.
 
-use super::{NORMAL, Noise, median};
+/// Ratio of a normal variable's deviation to the median of its magnitude.
+pub const NORMAL: f64 = 1.482_602_218_505_602;
+
+/// Noise of one sensor.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Noise {
+    /// Standard deviation, in the sensor's unit.
+    pub deviation: f64,
+    /// Correlation from one reading to the next; 0 for white noise.
+    pub correlation: f64,
+}
+
+impl Noise {
+    /// White noise.
+    #[must_use]
+    pub fn white(deviation: f64) -> Self {
+        Self {
+            deviation,
+            correlation: 0.0,
+        }
+    }
+}
+
+/// Median, `None` of nothing.
+#[must_use]
+pub fn median(values: &mut [f64]) -> Option<f64> {
+    if values.is_empty() {
+        return None;
+    }
+    let middle = values.len() / 2;
+    Some(*values.select_nth_unstable_by(middle, f64::total_cmp).1)
+}
 
 /// Squared deviation of the third differences of white noise of deviation 1: 1 + 9 + 9 + 1.
 const WHITE: f64 = 20.0;
@@ -24,13 +55,13 @@ const FEWEST: usize = 200;
 /// Rows that a third difference spans at most, where readings are missing: over more of them a residual is no parabola.
 const SPAN: usize = 12;
 /// Rows over which third differences are taken.
-pub(super) const STRIDES: [usize; 5] = [1, 2, 4, 8, 16];
+const STRIDES: [usize; 5] = [1, 2, 4, 8, 16];
 /// Strides that a correlation is told from, at least: noise, its correlation and a rest are three unknowns.
 const FEWEST_STRIDES: usize = 3;
 
 /// Magnitudes of the third differences of a series (row, time, value) over some readings, scaled so that those of white noise of
 /// deviation 1 have the deviation sqrt(20), whatever the times between.
-pub(super) fn third_differences(series: &[(usize, f64, f64)], stride: usize, found: &mut Vec<f64>) {
+fn third_differences(series: &[(usize, f64, f64)], stride: usize, found: &mut Vec<f64>) {
     for i in 0..series.len().saturating_sub(3 * stride) {
         let four = [0, 1, 2, 3].map(|k| series[i + k * stride]);
         if four[3].0 - four[0].0 > SPAN * stride {
@@ -57,39 +88,44 @@ fn squared(correlation: f64) -> f64 {
     1.0 + 2.0 * (-15.0 * r + 6.0 * r * r - r * r * r) / WHITE
 }
 
-/// Noise whose third differences over these strides are what was found: correlated noise and a rest.
-pub(super) fn from_differences(differences: &mut [Vec<f64>; STRIDES.len()]) -> Noise {
-    let count = differences[0].len();
-    let enough = |d: &&mut Vec<f64>| d.len() >= FEWEST;
-    let found: Vec<f64> = (differences.iter_mut().take_while(enough))
-        .map(|d| (NORMAL * median(d).unwrap_or(0.0)).powi(2) / WHITE)
-        .collect();
-    // Up to where the rest outgrows the noise.
-    let outgrown = found.windows(2).position(|w| w[1] > SMOOTH * w[0]);
-    let told = outgrown.map_or(found.len(), |k| k + 2);
-    let found = &found[..told];
-    if told < FEWEST_STRIDES || found[0] <= 0.0 {
-        let one = (NORMAL * median(&mut differences[0]).unwrap_or(0.0)).powi(2) / WHITE;
-        return Noise {
-            deviation: one.sqrt(),
-            correlation: 0.0,
-        };
+/// Third differences of some series of readings of one sensor, by [stride](STRIDES).
+#[derive(Debug, Default)]
+pub struct ThirdDifferences([Vec<f64>; STRIDES.len()]);
+
+impl ThirdDifferences {
+    /// Adds those of a series of readings: row, time (s) and value of each that is there.
+    pub fn add(&mut self, series: &[(usize, f64, f64)]) {
+        for (stride, found) in STRIDES.iter().zip(&mut self.0) {
+            third_differences(series, *stride, found);
+        }
     }
-    let fits: Vec<(f64, Noise)> = (0..=100)
-        .map(|k| SLOWEST * f64::from(k) / 100.0)
-        .flat_map(|r| RESTS.map(|growth| fit(found, r, growth)))
-        .flatten()
-        .collect();
-    let least = fits.iter().map(|f| f.0).fold(f64::INFINITY, f64::min);
-    let as_good = |f: &&(f64, Noise)| f.0 <= least + TIE / count as f64;
-    let first = fits.iter().find(as_good);
-    first.map_or(
-        Noise {
-            deviation: found[0].sqrt(),
-            correlation: 0.0,
-        },
-        |f| f.1,
-    )
+
+    /// Noise whose third differences are these: correlated noise and a rest.
+    #[must_use]
+    pub fn noise(mut self) -> Noise {
+        let count = self.0[0].len();
+        let typical = |d: &mut Vec<f64>| (NORMAL * median(d).unwrap_or(0.0)).powi(2) / WHITE;
+        let white = Noise::white(typical(&mut self.0[0]).sqrt());
+        let enough = |d: &&mut Vec<f64>| d.len() >= FEWEST;
+        let found: Vec<f64> = (self.0.iter_mut().take_while(enough))
+            .map(typical)
+            .collect();
+        // Up to where the rest outgrows the noise.
+        let outgrown = found.windows(2).position(|w| w[1] > SMOOTH * w[0]);
+        let told = outgrown.map_or(found.len(), |k| k + 2);
+        let found = &found[..told];
+        if told < FEWEST_STRIDES || found[0] <= 0.0 {
+            return white;
+        }
+        let fits: Vec<(f64, Noise)> = (0..=100)
+            .map(|k| SLOWEST * f64::from(k) / 100.0)
+            .flat_map(|r| RESTS.map(|growth| fit(found, r, growth)))
+            .flatten()
+            .collect();
+        let least = fits.iter().map(|f| f.0).fold(f64::INFINITY, f64::min);
+        let as_good = |f: &&(f64, Noise)| f.0 <= least + TIE / count as f64;
+        fits.iter().find(as_good).map_or(white, |f| f.1)
+    }
 }
 
 /// Noise of a correlation beside a rest that grows so, by least squares relative to what was found, with how far it misses that: the
@@ -147,11 +183,9 @@ mod tests {
             .enumerate()
             .map(|(k, x)| (k, 0.01 * k as f64, x))
             .collect();
-        let mut differences: [Vec<f64>; STRIDES.len()] = Default::default();
-        for (stride, found) in STRIDES.iter().zip(&mut differences) {
-            third_differences(&series, *stride, found);
-        }
-        from_differences(&mut differences)
+        let mut differences = ThirdDifferences::default();
+        differences.add(&series);
+        differences.noise()
     }
 
     #[test]
