@@ -1,8 +1,12 @@
 //! The next experiment: commands under which rival explanations predict most differently.
 //!
-//! The commands of a training episode are played faster or slower, larger or smaller, in
-//! the models of the rivals as they were fitted; the expected divergence of their readings,
-//! in units of the noise, says how well one such episode would tell them apart.
+//! The commands of a training episode are played faster or slower, larger or smaller ([`variation`]), in the models of the rivals. Of those
+//! that differ most the ones count that the machine may play ([`limits`]), and by what is left of the difference when both rivals are
+//! fitted anew ([`apart`]): it says how well one such episode would tell them apart.
+
+mod apart;
+mod limits;
+mod variation;
 
 use asid_core::registry::find;
 use asid_core::{Episode, Result};
@@ -10,131 +14,176 @@ use asid_effects::{Confusion, EffectEntry};
 
 use crate::bench::{Bench, Explanation, Trial};
 use crate::data::Logs;
-use crate::predict::Point;
+use crate::predict::{Point, State};
 use crate::record::Record;
 use crate::result::NextExperiment;
 
-/// Factors on the commands' size about their mean, and on time.
-const VARIANTS: [(f64, f64); 6] = [
-    (1.0, 1.0),
-    (0.4, 1.0),
-    (1.5, 1.0),
-    (1.0, 0.5),
-    (1.0, 2.0),
-    (-1.0, 1.0),
-];
-/// Divergence per episode, in the likelihood's unit, from which on one episode is enough.
-const ENOUGH: f64 = 20.0;
+use apart::apart;
+use limits::Limits;
+use variation::{VARIATIONS, Variation};
 
-/// An episode with its commands scaled about their mean and stretched in time.
-fn varied(episode: &Episode, layout: &asid_core::Layout, size: f64, stretch: f64) -> Episode {
-    let nu = episode.actuators.len();
-    let mut other = episode.clone();
-    let start = other.time[0];
-    for t in &mut other.time {
-        *t = start + (*t - start) * stretch;
-    }
-    for a in 0..nu {
-        let column = || episode.ctrl.iter().skip(a).step_by(nu);
-        let n = column().count().max(1) as f64;
-        let mean = column().sum::<f64>() / n;
-        let range = layout.actuators[a].ctrl_range;
-        for (k, u) in column().enumerate() {
-            let x = mean + size * (u - mean);
-            other.ctrl[k * nu + a] = range.map_or(x, |[low, high]| x.clamp(low, high));
-        }
-    }
-    other.readings.fill(0.0);
-    other
+/// Divergence per episode, in the likelihood's unit, from which on one episode is enough: its square root, 4.5 deviations, no chance makes.
+const ENOUGH: f64 = 20.0;
+/// Motions that are looked at more closely: one of each variation, at the cost of some replays of a single episode.
+const CLOSER: usize = VARIATIONS.len();
+
+/// Name of the file of its commands.
+const FILE: &str = "next.csv";
+
+/// An explanation with the trials that it was fitted from.
+type Rival<'r> = (&'r [Trial<'r>], &'r Explanation);
+
+/// The next experiment, and the commands to play.
+#[derive(Clone, Debug, Default)]
+pub struct Proposed {
+    /// What it would tell apart, and how.
+    pub told: NextExperiment,
+    /// Its commands, without readings; `None` where there are none.
+    pub commands: Option<Episode>,
+}
+
+/// A training episode with its commands varied, and how far the rivals predict it apart, a sum of squares in units of the noise.
+struct Motion {
+    episode: usize,
+    variation: Variation,
+    apart: f64,
 }
 
 /// Finds what would tell two explanations apart.
 ///
 /// # Errors
 /// When a rollout fails.
-pub fn next(
-    bench: &Bench,
-    (first, one): (&[Trial<'_>], &Explanation),
-    (second, other): (&[Trial<'_>], &Explanation),
-) -> Result<NextExperiment> {
-    let layout = bench.layout();
-    let train = &bench.train;
-    let n = train.logs.episodes.len();
-    let mut best: Option<(f64, usize, (f64, f64))> = None;
-    let passive = layout.nu() == 0;
-    let variants = if passive {
-        &VARIANTS[..1]
-    } else {
-        &VARIANTS[..]
-    };
-    for &(size, stretch) in variants {
-        let episodes = train
-            .logs
-            .episodes
-            .iter()
-            .map(|e| (e.name.clone(), varied(&e.episode, layout, size, stretch)))
-            .collect();
-        let mut logs = Logs::new(&bench.machine.plant, &train.logs.channels(), episodes)?;
-        let noise: Vec<f64> = train.logs.sensors.iter().map(|s| s.noise).collect();
-        logs.set_noise(&noise);
-        let record = Record::new(logs, one.fit.point.starts.clone());
-        let predict = |trials: &[Trial<'_>], e: &Explanation| -> Result<Vec<f64>> {
-            let mut predictor = bench.predictor(trials, &record)?;
-            let point = Point {
-                theta: e.fit.point.theta.clone(),
-                starts: one.fit.point.starts.clone(),
-            };
-            Ok(predictor.residuals(&[point])?.pop().unwrap_or_default())
-        };
-        let (a, b) = (predict(first, one)?, predict(second, other)?);
-        for e in 0..n {
-            let range = record.logs.offset(e)..record.logs.offset(e + 1);
-            let pairs = a[range.clone()].iter().zip(&b[range]);
-            let apart: f64 = pairs.map(|(x, y)| (x - y).powi(2)).sum();
-            if apart.is_finite() && best.as_ref().is_none_or(|(d, ..)| apart > *d) {
-                best = Some((apart, e, (size, stretch)));
-            }
-        }
-    }
+pub fn next(bench: &Bench, one: Rival<'_>, other: Rival<'_>) -> Result<Proposed> {
     let name = |e: &Explanation| match e.labels() {
         labels if labels.is_empty() => "none".to_owned(),
         labels => labels.join(" + "),
     };
-    let separates = vec![name(one), name(other)];
-    let Some((apart, e, (size, stretch))) = best else {
-        return Ok(NextExperiment {
-            separates,
-            how: "no variation of the recorded commands could be simulated".into(),
+    let mut told = NextExperiment {
+        separates: vec![name(one.1), name(other.1)],
+        ..NextExperiment::default()
+    };
+    let Some(best) = best(bench, one, other)? else {
+        "no variation of the recorded commands could be simulated within the machine's limits"
+            .clone_into(&mut told.how);
+        return Ok(Proposed {
+            told,
+            commands: None,
         });
     };
-    let mut how = format!("repeat {}", train.logs.episodes[e].name);
-    if passive {
-        how += " (there are no commands: vary the start)";
-    }
-    if size < 0.0 {
-        how += " with the commands mirrored about their mean";
-    } else if size != 1.0 {
-        how += &format!(" with commands {size} times as large about their mean");
-    }
-    if stretch != 1.0 {
-        how += if stretch < 1.0 {
-            " at twice the speed"
-        } else {
-            " at half the speed"
-        };
-    }
-    how += &format!(
-        ": the two predictions then differ by {:.1} standard deviations of the noise over the episode",
-        apart.sqrt()
+    let episode = &bench.train.logs.episodes[best.episode];
+    let layout = bench.layout();
+    told.how = format!("repeat {}", episode.name);
+    let commands = if layout.nu() == 0 {
+        told.how += " (there are no commands: vary the start)";
+        None
+    } else {
+        told.how += &best.variation.words();
+        FILE.clone_into(&mut told.file);
+        let varied = best.variation.of(&episode.episode, layout);
+        Some(Episode {
+            channels: Vec::new(),
+            readings: Vec::new(),
+            ..varied
+        })
+    };
+    told.how += &format!(
+        ": refitted, the two predictions then differ by {:.1} standard deviations of the noise over the episode",
+        best.apart.sqrt()
     );
-    if apart < ENOUGH {
-        how += &format!(
+    if best.apart < ENOUGH {
+        told.how += &format!(
             "; that is little, so {} such episodes are needed, or a motion of another kind",
-            (ENOUGH / apart.max(0.01)).ceil().min(1000.0)
+            (ENOUGH / best.apart.max(0.01)).ceil().min(1000.0)
         );
     }
-    how += &hint(one, other);
-    Ok(NextExperiment { separates, how })
+    told.how += &hint(one.1, other.1);
+    Ok(Proposed { told, commands })
+}
+
+/// The motion that tells most of those that the machine may play.
+fn best(bench: &Bench, one: Rival<'_>, other: Rival<'_>) -> Result<Option<Motion>> {
+    let mut motions = all(bench, one, other)?;
+    motions.sort_by(|a, b| b.apart.total_cmp(&a.apart));
+    let limits = Limits::of(bench, one)?;
+    let mut best: Option<Motion> = None;
+    for motion in motions.into_iter().take(CLOSER) {
+        if best.as_ref().is_some_and(|b| b.apart >= motion.apart) {
+            // Fitted anew they are never further apart.
+            break;
+        }
+        let record = varied(
+            bench,
+            &[motion.episode],
+            motion.variation,
+            &one.1.fit.point.starts,
+        )?;
+        let as_recorded = motion.variation == VARIATIONS[0];
+        if !as_recorded && !(limits.keeps(&record, one)? && limits.keeps(&record, other)?) {
+            continue;
+        }
+        let apart = apart(bench, &record, [one, other])?;
+        if apart.is_finite() && best.as_ref().is_none_or(|b| apart > b.apart) {
+            best = Some(Motion { apart, ..motion });
+        }
+    }
+    Ok(best)
+}
+
+/// For each variation the training episode whose predictions are furthest apart as the rivals were fitted.
+fn all(bench: &Bench, one: Rival<'_>, other: Rival<'_>) -> Result<Vec<Motion>> {
+    let episodes: Vec<usize> = (0..bench.train.logs.episodes.len()).collect();
+    let variations = if bench.layout().nu() == 0 {
+        &VARIATIONS[..1]
+    } else {
+        &VARIATIONS[..]
+    };
+    let mut motions = Vec::with_capacity(variations.len());
+    for &variation in variations {
+        let starts = &one.1.fit.point.starts;
+        let record = varied(bench, &episodes, variation, starts)?;
+        let predict = |(trials, of): Rival<'_>| -> Result<Vec<f64>> {
+            let point = Point {
+                theta: of.fit.point.theta.clone(),
+                starts: record.starts.clone(),
+            };
+            let mut predictor = bench.predictor(trials, &record)?;
+            Ok(predictor.residuals(&[point])?.pop().unwrap_or_default())
+        };
+        let (a, b) = (predict(one)?, predict(other)?);
+        let of_episode = |&episode: &usize| {
+            let range = record.logs.offset(episode)..record.logs.offset(episode + 1);
+            let pairs = a[range.clone()].iter().zip(&b[range]);
+            let apart: f64 = pairs.map(|(x, y)| (x - y).powi(2)).sum();
+            apart.is_finite().then_some(Motion {
+                episode,
+                variation,
+                apart,
+            })
+        };
+        let found = episodes.iter().filter_map(of_episode);
+        motions.extend(found.max_by(|a, b| a.apart.total_cmp(&b.apart)));
+    }
+    Ok(motions)
+}
+
+/// Some training episodes with their commands varied.
+fn varied(
+    bench: &Bench,
+    episodes: &[usize],
+    variation: Variation,
+    starts: &[State],
+) -> Result<Record> {
+    let logs = &bench.train.logs;
+    let vary = |&e: &usize| {
+        let log = &logs.episodes[e];
+        (log.name.clone(), variation.of(&log.episode, bench.layout()))
+    };
+    let played = episodes.iter().map(vary).collect();
+    let mut varied = Logs::new(&bench.machine.plant, &logs.channels(), played)?;
+    let noise: Vec<f64> = logs.sensors.iter().map(|s| s.noise).collect();
+    varied.set_noise(&noise);
+    let starts = episodes.iter().map(|&e| starts[e].clone()).collect();
+    Ok(Record::new(varied, starts))
 }
 
 /// What is known of a pair of confounded effects.

@@ -1,20 +1,20 @@
 //! What a search found, told as a result: gaps, probabilities, places, pictures.
 
-use asid_core::Result;
+use asid_core::{Episode, Result};
 use asid_effects::EffectSpec;
 use asid_results::evidence::Evidence;
 
 use crate::bench::{Bench, Explanation, Trial};
 use crate::candidate::{Candidate, LeftOut};
 use crate::checks;
-use crate::experiment;
+use crate::experiment::{self, Proposed};
 use crate::findings::{Findings, Found, trials};
 use crate::forces::Short;
 use crate::judgement::Judgement;
 use crate::localise::localise;
 use crate::predict::{Point, State};
 use crate::record::Record;
-use crate::result::{DiagnosisResult, Kind, NextExperiment, NotTried};
+use crate::result::{DiagnosisResult, Kind, NotTried};
 use crate::settings::Settings;
 use crate::study::Study;
 use crate::trace::DiagnosisTrace;
@@ -45,6 +45,8 @@ pub struct Diagnosis {
     pub effects: Vec<EffectSpec>,
     /// Values of the study's parameters that go with them.
     pub values: Vec<f64>,
+    /// Commands of the next experiment; `None` where there is none to play.
+    pub next_commands: Option<Episode>,
 }
 
 /// All that a result is told from.
@@ -151,6 +153,11 @@ impl Telling<'_> {
         gap.shares = shares(&gap, kind, &left);
         let places = self.places(none)?;
         let short = self.short(none, (&members, &explanation))?;
+        let proposed = if self.stopped {
+            Proposed::default()
+        } else {
+            self.next(best)?
+        };
         let mut result = DiagnosisResult {
             schema: 1,
             study: self.study.name.clone(),
@@ -164,11 +171,7 @@ impl Telling<'_> {
             tolerances: tolerances(&explanation),
             parameters: self.parameters(&explanation, &moved),
             checks: self.checks(none, &explanation, short.as_ref())?,
-            next_experiment: if self.stopped {
-                NextExperiment::default()
-            } else {
-                self.next(best)?
-            },
+            next_experiment: proposed.told,
             missing_force: self.findings.missing.clone(),
             ranking: self.findings.ranking.clone(),
             isolability: self.findings.isolability.clone(),
@@ -197,6 +200,7 @@ impl Telling<'_> {
             evidence: self.evidence.clone(),
             effects: explanation.effects.clone(),
             values: explanation.fit.point.theta[..study].to_vec(),
+            next_commands: proposed.commands,
         })
     }
 
@@ -251,7 +255,7 @@ impl Telling<'_> {
     }
 
     /// What would tell the verdict from its nearest rival.
-    fn next(&self, best: Option<&Found>) -> Result<NextExperiment> {
+    fn next(&self, best: Option<&Found>) -> Result<Proposed> {
         let j = self.judgement;
         let rival = j.ambiguous.first().copied().or_else(|| {
             let rivals = || (0..j.hypotheses.len()).filter(|&i| i != j.best);
@@ -261,7 +265,7 @@ impl Telling<'_> {
                 .or_else(|| rivals().find(none))
         });
         let Some(rival) = rival else {
-            return Ok(NextExperiment::default());
+            return Ok(Proposed::default());
         };
         let rival = self.found(rival);
         let (one, other) = (self.explanation(best), self.explanation(rival));

@@ -71,6 +71,9 @@ pub struct NextExperiment {
     pub separates: Vec<String>,
     /// How.
     pub how: String,
+    /// File of its commands, beside the result; empty where there are none to play.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub file: String,
 }
 
 /// A stage that a time limit or an interruption cut short.

@@ -18,6 +18,13 @@ impl Trajectory {
         let pairs = self.pairs.iter().zip(&self.touched);
         pairs.into_iter().any(|(p, &t)| t && p.contains(&body))
     }
+
+    /// Whether two bodies touch that do not in other episodes of the same machine.
+    #[must_use]
+    pub fn touches_more_than(&self, other: &Self) -> bool {
+        let mut pairs = self.touched.iter().zip(&other.touched);
+        pairs.any(|(here, there)| *here && !there)
+    }
 }
 
 /// Pairs of bodies that can touch.

@@ -462,6 +462,8 @@ class NextExperiment(Record):
     """How."""
     separates: list[str]
     """What it would tell apart."""
+    file: str | None = None
+    """File of its commands, beside the result; empty where there are none to play."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

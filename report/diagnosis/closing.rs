@@ -15,13 +15,17 @@ pub(super) fn next(d: &DiagnosisResult) -> Option<Section> {
     }
     let section = Section::new("The next experiment")
         .lead("What the robot could do to tell apart what these logs cannot.");
-    let section = if next.separates.is_empty() {
+    let mut facts = Vec::new();
+    if !next.separates.is_empty() {
+        facts.push(("tells apart".to_owned(), joined(&next.separates, "and")));
+    }
+    if !next.file.is_empty() {
+        facts.push(("commands".to_owned(), next.file.clone()));
+    }
+    let section = if facts.is_empty() {
         section
     } else {
-        section.facts(vec![(
-            "tells apart".to_owned(),
-            joined(&next.separates, "and"),
-        )])
+        section.facts(facts)
     };
     Some(if next.how.is_empty() {
         section

@@ -38,7 +38,7 @@ Where effects are found, the task is then played with the refined model, --seeds
 
 The folder holds result.json, refined.toml (the model with the diagnosed effects added, for a study's \
 `model`), config.toml, copies of the logs, report.html, trace.json and \
-evidence.json (what the decision rests on).")]
+evidence.json (what the decision rests on); and next.csv, the commands of the next experiment, where there is one.")]
 pub struct Arguments {
     /// Diagnose this study: a TOML file, or a folder with study.toml
     #[arg(required_unless_present_any = ["task", "config"], conflicts_with = "task")]
@@ -200,6 +200,11 @@ pub fn diagnose(arguments: &Arguments) -> Result<()> {
     tell_origin(&mut diagnosis.trace, &engine, config.seed);
     let more = files(&[("evidence.json", "what the decision rests on")]);
     diagnosis.trace.files.extend(more);
+    let next = diagnosis.result.next_experiment.file.clone();
+    if !next.is_empty() {
+        let commands = files(&[(&*next, "the commands of the next experiment")]);
+        diagnosis.trace.files.extend(commands);
+    }
     let result = &diagnosis.result;
     out.write(|folder| {
         write_json(&folder.join("result.json"), result)?;
@@ -211,6 +216,9 @@ pub fn diagnose(arguments: &Arguments) -> Result<()> {
             &folder.join("refined.toml"),
             &refined(&study, &diagnosis, folder)?,
         )?;
+        if let Some(commands) = &diagnosis.next_commands {
+            commands.write_csv(&folder.join(&next))?;
+        }
         copy_logs(&study, folder)?;
         Ok(())
     })?;

@@ -10,6 +10,7 @@ mod diagnosis_support;
 mod drift;
 mod far;
 mod late_drive;
+mod next;
 mod ordinary;
 mod row_slopes;
 mod scatter;

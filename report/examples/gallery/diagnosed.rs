@@ -293,6 +293,7 @@ pub fn patch() -> Diagnosis {
             how: "slide the puck across 0.41 m once more after waiting, then back across it: a rough place stays where it is, wear grows \
                           with every pass."
                 .into(),
+            file: "next.csv".into(),
         },
         real_world: Some(patch_in_the_real_world()),
         ..DiagnosisResult::default()

@@ -81,7 +81,12 @@ pub fn lines(result: &DiagnosisResult, engine: &str, seconds: f64) -> Vec<String
         line(&format!("not tried: {}", left.stage));
     }
     if !result.next_experiment.how.is_empty() {
-        line(&format!("next: {}", result.next_experiment.how));
+        let next = &result.next_experiment;
+        let file = match &*next.file {
+            "" => String::new(),
+            file => format!(" (commands: {file})"),
+        };
+        line(&format!("next: {}{file}", next.how));
     }
     line(&format!("{engine}, {seconds:.1} s"));
     all.extend(result.real_world.iter().flat_map(real_world_lines));

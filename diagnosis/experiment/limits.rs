@@ -1,0 +1,105 @@
+//! Whether a machine may play a motion: within the ranges of its joints, not much faster than it was logged, and without touching what it
+//! did not touch.
+//!
+//! A model says little of what a real machine bears; its logs show what it has borne. Forces need no look: commands stay within their ranges,
+//! and drives within theirs.
+
+use asid_core::Result;
+use asid_core::layout::JointKind;
+
+use crate::bench::{Bench, specs};
+use crate::record::Record;
+use crate::trajectory::Trajectory;
+
+use super::Rival;
+
+/// Most that a joint may move faster than in the logs: what a motion at twice the speed asks for, and a tenth for how it follows.
+const FASTER: f64 = 2.2;
+/// Share of a joint's range that is kept free at either end, unless the logs went there: where a real machine's end stop may be.
+const END_MARGIN: f64 = 0.02;
+
+/// What a machine does in the logs, by an explanation.
+pub(super) struct Limits<'b> {
+    bench: &'b Bench,
+    shown: Trajectory,
+}
+
+/// The smallest and the largest of some values.
+fn extremes<'v>(values: impl Iterator<Item = &'v f64>) -> [f64; 2] {
+    values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| {
+        [low.min(*x), high.max(*x)]
+    })
+}
+
+impl<'b> Limits<'b> {
+    /// By replays of the training logs with an explanation.
+    pub(super) fn of(bench: &'b Bench, rival: Rival<'_>) -> Result<Self> {
+        Ok(Self {
+            bench,
+            shown: played(bench, &bench.train, rival)?,
+        })
+    }
+
+    /// Whether an explanation keeps them in some episodes.
+    pub(super) fn keeps(&self, record: &Record, rival: Rival<'_>) -> Result<bool> {
+        let new = played(self.bench, record, rival)?;
+        let layout = self.bench.layout();
+        let scalar = |kind: JointKind| matches!(kind, JointKind::Hinge | JointKind::Slide);
+        for (i, joint) in layout.joints.iter().enumerate() {
+            if scalar(joint.kind) && !self.keeps_range(i, &new) {
+                return Ok(false);
+            }
+            for dof in joint.qvel..joint.qvel + joint.kind.qvel_len() {
+                let fastest = |t: &Trajectory| {
+                    let rows = t.episodes.iter();
+                    let [low, high] =
+                        extremes(rows.flat_map(|e| e.qvel.iter().skip(dof).step_by(layout.nv)));
+                    high.max(-low)
+                };
+                // What is not a number, after a divergence, keeps nothing.
+                let keeps = fastest(&new) <= FASTER * fastest(&self.shown);
+                if !keeps {
+                    return Ok(false);
+                }
+            }
+        }
+        Ok(!new.touches_more_than(&self.shown))
+    }
+
+    /// Whether a joint stays in its range, or where it was in the logs.
+    fn keeps_range(&self, joint: usize, new: &Trajectory) -> bool {
+        let layout = self.bench.layout();
+        let joint = &layout.joints[joint];
+        let end = |index: usize| {
+            let target = format!("joint/{}/range/{index}", joint.name).parse().ok()?;
+            self.bench.machine.nominal(&target)
+        };
+        let (Some(low), Some(high)) = (end(0), end(1)) else {
+            return true;
+        };
+        if low >= high {
+            return true;
+        }
+        let margin = END_MARGIN * (high - low);
+        let reached = |t: &Trajectory| {
+            let rows = t.episodes.iter();
+            extremes(rows.flat_map(|e| e.qpos.iter().skip(joint.qpos).step_by(layout.nq)))
+        };
+        let ([was_low, was_high], [is_low, is_high]) = (reached(&self.shown), reached(new));
+        is_low >= (low + margin).min(was_low) && is_high <= (high - margin).max(was_high)
+    }
+}
+
+/// What the machine does in some episodes, by an explanation.
+fn played(bench: &Bench, record: &Record, (trials, of): Rival<'_>) -> Result<Trajectory> {
+    let mut point = of.fit.point.clone();
+    point.starts.clone_from(&record.starts);
+    Trajectory::of(
+        &*bench.machine.with(&specs(trials))?,
+        &bench.machine.plant,
+        &bench.all_parameters(trials),
+        &record.logs,
+        &point,
+        bench.machine.threads,
+    )
+}

@@ -1,0 +1,112 @@
+//! The next experiment, for a cart on a rail that dry friction brakes: its commands, played by hand on the true machine, stay where the
+//! model's joint may go.
+
+use std::fmt::Write as _;
+
+use asid::core::Episode;
+use rand::{Rng as _, SeedableRng as _};
+use rand_chacha::ChaCha8Rng;
+
+use super::run_on;
+use super::world::write_files;
+
+/// Dry friction, N, on a cart of 1 kg.
+const FRICTION: f64 = 0.3;
+const NOISE: f64 = 2e-3;
+const ROW: f64 = 0.01;
+const SECONDS: f64 = 4.0;
+
+fn model(range: &str) -> String {
+    format!(
+        r#"<mujoco model="cart"><option timestep="0.002" integrator="implicitfast" gravity="0 0 0"/>
+  <worldbody><body name="cart"><joint name="rail" type="slide" axis="1 0 0" {range}/>
+    <geom name="cart" type="sphere" size="0.01" mass="1" contype="0" conaffinity="0"/></body></worldbody>
+  <actuator><motor name="push" joint="rail" ctrlrange="-6 6"/></actuator>
+  <sensor><jointpos name="x" joint="rail"/></sensor></mujoco>
+"#
+    )
+}
+
+/// Positions of the true cart under commands that are held from row to row: symplectic Euler at a tenth of a millisecond.
+fn positions(time: &[f64], command: impl Fn(usize) -> f64) -> Vec<f64> {
+    let (mut x, mut v) = (0.0_f64, 0.0_f64);
+    let h = 1e-4;
+    let mut all = vec![0.0];
+    for k in 1..time.len() {
+        let steps = ((time[k] - time[k - 1]) / h).round() as usize;
+        for _ in 0..steps {
+            let pushed = v + h * command(k - 1);
+            // Dry friction brings it to rest, and no further.
+            let lost = (h * FRICTION).min(pushed.abs());
+            v = pushed - lost.copysign(pushed);
+            x += h * v;
+        }
+        all.push(x);
+    }
+    all
+}
+
+fn log(episode: usize) -> String {
+    let mut random = ChaCha8Rng::seed_from_u64(7 + episode as u64);
+    let mut noise = || NOISE * ((0..12).map(|_| random.random::<f64>()).sum::<f64>() - 6.0);
+    let time: Vec<f64> = (0..(SECONDS / ROW) as usize)
+        .map(|k| ROW * k as f64)
+        .collect();
+    let phase = 0.3 * episode as f64;
+    // Cosines, so that the cart swings about a place and does not drift away.
+    let command = |k: usize| 3.0 * (5.0 * time[k]).cos() + (8.0 * time[k] + phase).cos();
+    let x = positions(&time, command);
+    let mut text = "time,ctrl.push,x,qpos.rail,qvel.rail".to_owned();
+    for (k, x) in x.iter().enumerate() {
+        let start = if k == 0 { "0,0" } else { "," };
+        let _ = write!(text, "\n{},{},{},{start}", time[k], command(k), x + noise());
+    }
+    text + "\n"
+}
+
+/// Commands of the next experiment of a diagnosis of these logs in a model of the cart.
+fn proposed(range: &str) -> (String, Episode) {
+    let folder = tempfile::tempdir().unwrap();
+    let mass = "name = \"mass\"\ntarget = \"geom/cart/mass\"\nrange = [0.8, 1.2]";
+    write_files(folder.path(), &model(range), mass, log);
+    let (diagnosis, _) = run_on(folder.path(), &[]);
+    let next = diagnosis.result.next_experiment;
+    assert_eq!(next.file, "next.csv");
+    (next.how, diagnosis.next_commands.expect("commands"))
+}
+
+/// How far the true cart gets from its start under some commands, m.
+fn furthest(commands: &Episode) -> f64 {
+    let x = positions(&commands.time, |k| commands.ctrl[k]);
+    x.iter().fold(0.0, |far: f64, x| far.max(x.abs()))
+}
+
+#[test]
+fn the_next_experiment_keeps_the_range_of_the_joint() {
+    let logged = {
+        let time: Vec<f64> = (0..400).map(|k| ROW * f64::from(k)).collect();
+        let x = positions(&time, |k| {
+            3.0 * (5.0 * time[k]).cos() + (8.0 * time[k]).cos()
+        });
+        x.iter().fold(0.0, |far: f64, x| far.max(x.abs()))
+    };
+    let (how, free) = proposed("");
+    assert!(
+        furthest(&free) > 1.3 * logged,
+        "{how}: {} {logged}",
+        furthest(&free)
+    );
+    let range = format!(
+        "range=\"{} {}\" limited=\"true\"",
+        -1.3 * logged,
+        1.3 * logged
+    );
+    let (how, narrow) = proposed(&range);
+    assert!(
+        furthest(&narrow) < 1.3 * logged,
+        "{how}: {}",
+        furthest(&narrow)
+    );
+    assert_eq!(narrow.actuators, ["push"]);
+    assert!(narrow.channels.is_empty() && narrow.ctrl.len() == narrow.time.len());
+}
