@@ -46,8 +46,6 @@ impl Default for Confidence {
 
 /// Probabilities beyond which evidence says no more.
 const CLIP: [f64; 2] = [0.02, 0.98];
-/// Most that `unknown` may be beside a verdict that names effects, relative to it: it is the verdict where it is more.
-const LESS: f64 = 0.9;
 /// Most sets that were screened only and are listed.
 const LISTED: usize = 8;
 
@@ -97,17 +95,15 @@ impl Confidence {
     }
 
     /// Probabilities of a verdict, of a rival as likely as it, and of `unknown`. `p` is the calibrated probability of the verdict, `others`
-    /// the sum of its rivals' likelihoods relative to its own. What neither the verdict nor a rival takes is `unknown`, which stays less
-    /// probable than the verdict.
+    /// the sum of its rivals' likelihoods relative to its own. What neither the verdict nor a rival takes is `unknown`, which may be more:
+    /// a search that was cut short names what closes most, and is mostly wrong.
     fn shares(&self, p: f64, others: f64) -> [f64; 3] {
         let rest = 1.0 - p;
         let most = (1.0 - self.beside) * rest;
         if p * others >= most {
             return [p, most / others, rest - most];
         }
-        let unknown = (rest - p * others).min(LESS * p);
-        let sum = p + p * others + unknown;
-        [p / sum, p / sum, unknown / sum]
+        [p, p, rest - p * others]
     }
 
     /// Gives the hypotheses of a judgement the probabilities that hold; the verdict stays what it is.
@@ -207,8 +203,10 @@ mod tests {
         assert!(stated(1.0, false) > 0.9);
         assert!(stated(4.0, false) < 0.8);
         assert!(stated(1.0, true) < stated(1.0, false));
-        // Where no rival is near, `unknown` takes the rest, and is less probable than the verdict.
-        assert!(stated(4.0, true) < 0.55);
+        // Where no rival is near, `unknown` takes the rest, and may be more probable than the verdict.
+        let mut j = judgement(sets, 1, 0.001);
+        Confidence::default().settle(&mut j, (4.0, true), &[]);
+        assert!(j.unknown > 0.5 && !j.is_unknown, "{}", j.unknown);
     }
 
     #[test]

@@ -70,6 +70,18 @@ fn beside(result: &DiagnosisResult) -> String {
         })
 }
 
+/// That a named cause is less probable than not, where no rival says so; empty where it is not.
+fn doubt(result: &DiagnosisResult) -> String {
+    let p = result.verdict.probability;
+    if p >= 0.5 || !result.verdict.ambiguous_with.is_empty() {
+        return String::new();
+    }
+    format!(
+        " That this is the cause is less probable than not ({:.0} %).",
+        100.0 * p
+    )
+}
+
 /// Says what a result means, in one sentence; `labels` are the effects of the best
 /// explanation, whether or not it is the verdict, `rest` what they leave, where one knows, `repeats` how far contacts can be
 /// repeated, and `beyond` the gap without effects beyond what the starts of the logs held out leave open.
@@ -136,11 +148,12 @@ pub fn sentence(
                 )
             };
             format!(
-                "{place}{}{} explains {}.{}{ambiguous}",
+                "{place}{}{} explains {}.{}{ambiguous}{}",
                 grouped(&result.verdict.effects).join(" with "),
                 within_tolerance(result).map_or_else(String::new, |t| format!(", beside {t},")),
                 closed(),
-                beside(result)
+                beside(result),
+                doubt(result)
             )
         }
         Kind::Unknown if result.gap.closed.is_some_and(|c| c > 0.5) => format!(
