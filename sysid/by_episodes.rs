@@ -9,7 +9,7 @@ use asid_core::{Layout, Parameter};
 use nalgebra::{DMatrix, DVector};
 
 use crate::dataset::{Dataset, Replayer};
-use crate::fit::{marginal, values};
+use crate::marginal::{marginal, values};
 
 /// Half width of the differences that slopes are taken by, in deviations of the fit: slopes over the region that the posterior covers.
 const STEP: f64 = 1.0;

@@ -18,6 +18,7 @@ pub mod fit;
 pub mod gap;
 pub mod limits;
 mod look;
+mod marginal;
 pub mod method;
 pub mod motion;
 mod places;

@@ -14,7 +14,7 @@ use asid_core::{Model, Parameter};
 use nalgebra::DMatrix;
 
 use crate::dataset::{Dataset, Replayer};
-use crate::fit::marginal;
+use crate::marginal::marginal;
 use crate::play::{Played, Player};
 
 /// Half step of the differences, in prior deviations: straight for smooth machines, and far above rounding.

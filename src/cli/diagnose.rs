@@ -200,34 +200,44 @@ pub fn diagnose(arguments: &Arguments) -> Result<()> {
     tell_origin(&mut diagnosis.trace, &engine, config.seed);
     let more = files(&[("evidence.json", "what the decision rests on")]);
     diagnosis.trace.files.extend(more);
-    let next = diagnosis.result.next_experiment.file.clone();
-    if !next.is_empty() {
-        let commands = files(&[(&*next, "the commands of the next experiment")]);
-        diagnosis.trace.files.extend(commands);
-    }
+    write(&out, &study, &mut diagnosis, &settings)?;
     let result = &diagnosis.result;
-    out.write(|folder| {
-        write_json(&folder.join("result.json"), result)?;
-        write_json(&folder.join("trace.json"), &diagnosis.trace)?;
-        write_json(&folder.join("evidence.json"), &diagnosis.evidence)?;
-        write_text(&folder.join("report.html"), &page(result, &diagnosis.trace))?;
-        write_text(&folder.join("config.toml"), &toml::to_string(&settings)?)?;
-        write_text(
-            &folder.join("refined.toml"),
-            &refined(&study, &diagnosis, folder)?,
-        )?;
-        if let Some(commands) = &diagnosis.next_commands {
-            commands.write_csv(&folder.join(&next))?;
-        }
-        copy_logs(&study, folder)?;
-        Ok(())
-    })?;
     let lines = terminal::lines(result, &engine, progress.seconds());
     out.tell(common.json, result, &lines)?;
     for check in result.checks.iter().filter(|c| !c.ok) {
         failure::warn(&format!("check {}: {}", check.check, check.detail));
     }
     Ok(())
+}
+
+/// Writes the folder of a diagnosis.
+fn write(
+    out: &OutFolder,
+    study: &Study,
+    diagnosis: &mut Diagnosis,
+    settings: &toml::Table,
+) -> Result<()> {
+    let next = diagnosis.result.next_experiment.file.clone();
+    if !next.is_empty() {
+        let commands = files(&[(&*next, "the commands of the next experiment")]);
+        diagnosis.trace.files.extend(commands);
+    }
+    let (result, trace) = (&diagnosis.result, &diagnosis.trace);
+    out.write(|folder| {
+        write_json(&folder.join("result.json"), result)?;
+        write_json(&folder.join("trace.json"), trace)?;
+        write_json(&folder.join("evidence.json"), &diagnosis.evidence)?;
+        write_text(&folder.join("report.html"), &page(result, trace))?;
+        write_text(&folder.join("config.toml"), &toml::to_string(settings)?)?;
+        write_text(
+            &folder.join("refined.toml"),
+            &refined(study, diagnosis, folder)?,
+        )?;
+        if let Some(commands) = &diagnosis.next_commands {
+            commands.write_csv(&folder.join(&next))?;
+        }
+        copy_logs(study, folder)
+    })
 }
 
 /// What `config.toml` holds: the diagnosis' own settings, which win, and those of the runs of a task.
