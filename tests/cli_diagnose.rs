@@ -46,6 +46,13 @@ fn a_fault_is_found_and_its_refined_model_has_none() {
     ] {
         assert!(out.join(file).is_file(), "{file}");
     }
+    let next = &result["next_experiment"];
+    assert!(
+        next["how"].as_str().unwrap().starts_with("repeat train_"),
+        "{next}"
+    );
+    let commands = std::fs::read_to_string(out.join(next["file"].as_str().unwrap())).unwrap();
+    assert!(commands.starts_with("time,ctrl."), "{commands}");
     // The true force is within its interval, and could have been seen were it a tenth of that.
     let effect = &result["effects"][0];
     let [low, high] = [0, 1].map(|i| effect["intervals95"]["force"][i].as_f64().unwrap());
