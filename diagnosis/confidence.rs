@@ -46,6 +46,9 @@ impl Default for Confidence {
 
 /// Probabilities beyond which evidence says no more.
 const CLIP: [f64; 2] = [0.02, 0.98];
+/// Most that `unknown` may be beside what a search that came to its end names, relative to it: of five such names that left a gap, of 40 training worlds
+/// (seed 9101), five were right.
+const LESS: f64 = 0.9;
 /// Most sets that were screened only and are listed.
 const LISTED: usize = 8;
 
@@ -95,15 +98,22 @@ impl Confidence {
     }
 
     /// Probabilities of a verdict, of a rival as likely as it, and of `unknown`. `p` is the calibrated probability of the verdict, `others`
-    /// the sum of its rivals' likelihoods relative to its own. What neither the verdict nor a rival takes is `unknown`, which may be more:
-    /// a search that was cut short names what closes most, and is mostly wrong.
-    fn shares(&self, p: f64, others: f64) -> [f64; 3] {
+    /// the sum of its rivals' likelihoods relative to its own. What neither the verdict nor a rival takes is `unknown`. It stays less
+    /// probable than what a whole search names; a search that was cut short names what closes most, and is mostly wrong.
+    fn shares(&self, (p, stopped): (f64, bool), others: f64) -> [f64; 3] {
         let rest = 1.0 - p;
         let most = (1.0 - self.beside) * rest;
         if p * others >= most {
             return [p, most / others, rest - most];
         }
-        [p, p, rest - p * others]
+        let unknown = rest - p * others;
+        let unknown = if stopped {
+            unknown
+        } else {
+            unknown.min(LESS * p)
+        };
+        let sum = p + p * others + unknown;
+        [p / sum, p / sum, unknown / sum]
     }
 
     /// Gives the hypotheses of a judgement the probabilities that hold; the verdict stays what it is.
@@ -134,7 +144,8 @@ impl Confidence {
         });
         let raw = judgement.marginal(&best.labels);
         let [p, each, unknown] = if is_named {
-            self.shares(sigmoid(self.of_named(raw, left, stopped)), others)
+            let p = sigmoid(self.of_named(raw, left, stopped));
+            self.shares((p, stopped), others)
         } else {
             let unknown = judgement.unknown.min(self.unknown);
             let each = (1.0 - unknown) / (with + others);

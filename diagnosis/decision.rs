@@ -83,17 +83,17 @@ fn untried(evidence: &Evidence, best: Option<&Tried>, rules: &Rules) -> Vec<Untr
 }
 
 /// Share that a set leaves of the gap, 0 to 1: of the missing force or of the gap of open-loop replays, whichever is less, for what is
-/// named may make up for most of the one and leave much of the other. That nothing stands out, of an `ordinary` machine, is said of a
-/// model that foretells the logs held out as well, where replays can be repeated.
-fn left_of_the_gap(evidence: &Evidence, (found, ordinary): (Option<usize>, Option<usize>)) -> f64 {
+/// named may make up for most of the one and leave much of the other. Where replays can be repeated it foretells the logs held out as well: what
+/// it leaves of their gap counts where that is more.
+fn left_of_the_gap(evidence: &Evidence, found: Option<usize>) -> f64 {
     let share = |i: usize, of: fn(Replayed) -> f64| {
         let beyond = |r: Replayed| excess(of(r)).powi(2);
         beyond(evidence.tried[i].replayed) / beyond(evidence.none)
     };
     let open_loop = found.map_or(1.0, |i| share(i, |r| r.train));
     let left = evidence.left.min(open_loop).clamp(0.0, 1.0);
-    let ordinary = ordinary.filter(|_| evidence.repeatable);
-    let foretold = ordinary.map_or(0.0, |i| share(i, |r| r.held_out));
+    let repeated = found.filter(|_| evidence.repeatable);
+    let foretold = repeated.map_or(0.0, |i| share(i, |r| r.held_out));
     left.max(foretold.clamp(0.0, 1.0))
 }
 
@@ -146,7 +146,7 @@ pub fn decide(evidence: &Evidence, rules: &Rules) -> Judgement {
         // Chance may reach the evidence of no effect, and no chance makes a gap.
         all[least].probability *= 1.0 - seen;
     }
-    let rest = left_of_the_gap(evidence, (all[best].found, ordinary));
+    let rest = left_of_the_gap(evidence, all[best].found);
     let left_unexplained =
         || sigmoid((rest / rules.unexplained).ln() / rules.sharpness).clamp(0.001, 0.999);
     let unknown = if let (true, Some(i)) = (best == least, ordinary) {
@@ -265,6 +265,20 @@ mod tests {
         assert!(!found.is_unknown);
         let p = found.marginal(&["a".to_owned()]);
         assert!(p > 0.5 && p < 0.9, "{p}");
+    }
+
+    #[test]
+    fn what_leaves_most_of_the_gap_of_the_logs_held_out_is_no_cause_where_replays_can_be_repeated()
+    {
+        let of = |held_out: f64, repeatable: bool| {
+            let mut e = evidence(100.0, vec![tried(&["a"], 1, 400.0, 3.0)], 0.01);
+            e.tried[0].replayed.held_out = held_out;
+            e.repeatable = repeatable;
+            decided(&e).is_unknown
+        };
+        assert!(!of(3.0, true) && !of(40.0, true));
+        assert!(of(80.0, true), "four fifths are left");
+        assert!(!of(80.0, false), "which contacts may scatter by");
     }
 
     #[test]
