@@ -82,9 +82,12 @@ fn untried(evidence: &Evidence, best: Option<&Tried>, rules: &Rules) -> Vec<Untr
     untried.collect()
 }
 
+/// Share of a gap from which on it is the larger part.
+const LARGER_PART: f64 = 0.5;
+
 /// Share that a set leaves of the gap, 0 to 1: of the missing force or of the gap of open-loop replays, whichever is less, for what is
 /// named may make up for most of the one and leave much of the other. Where replays can be repeated it foretells the logs held out as well: what
-/// it leaves of their gap counts where that is more.
+/// a named set leaves of their gap counts where that is the larger part, and what an ordinary machine's tolerances leave in any case.
 fn left_of_the_gap(evidence: &Evidence, found: Option<usize>) -> f64 {
     let share = |i: usize, of: fn(Replayed) -> f64| {
         let beyond = |r: Replayed| excess(of(r)).powi(2);
@@ -93,7 +96,13 @@ fn left_of_the_gap(evidence: &Evidence, found: Option<usize>) -> f64 {
     let open_loop = found.map_or(1.0, |i| share(i, |r| r.train));
     let left = evidence.left.min(open_loop).clamp(0.0, 1.0);
     let repeated = found.filter(|_| evidence.repeatable);
+    let is_named = found.is_some_and(|i| !evidence.tried[i].effects.is_empty());
     let foretold = repeated.map_or(0.0, |i| share(i, |r| r.held_out));
+    let foretold = if is_named && foretold <= LARGER_PART {
+        0.0
+    } else {
+        foretold
+    };
     left.max(foretold.clamp(0.0, 1.0))
 }
 
