@@ -1,8 +1,8 @@
 //! The next experiment: commands under which rival explanations predict most differently.
 //!
-//! The commands of a training episode are played faster or slower, larger or smaller ([`variation`]), in the models of the rivals. Of those
-//! that differ most the ones count that the machine may play ([`limits`]), and by what is left of the difference when both rivals are
-//! fitted anew ([`apart`]): it says how well one such episode would tell them apart.
+//! The commands of a training episode are played faster or slower, larger or smaller (`variation`), in the models of the rivals. Of those
+//! that differ most the ones count that the machine may play (`limits`), and by what is left of the difference when both rivals are
+//! fitted anew (`apart`): it says how well one such episode would tell them apart.
 
 mod apart;
 mod limits;
@@ -118,7 +118,9 @@ fn best(bench: &Bench, one: Rival<'_>, other: Rival<'_>) -> Result<Option<Motion
             &one.1.fit.point.starts,
         )?;
         let as_recorded = motion.variation == VARIATIONS[0];
-        if !as_recorded && !(limits.keeps(&record, one)? && limits.keeps(&record, other)?) {
+        let may_play =
+            as_recorded || limits.keeps(&record, one)? && limits.keeps(&record, other)?;
+        if !may_play {
             continue;
         }
         let apart = apart(bench, &record, [one, other])?;

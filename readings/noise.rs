@@ -88,7 +88,7 @@ fn squared(correlation: f64) -> f64 {
     1.0 + 2.0 * (-15.0 * r + 6.0 * r * r - r * r * r) / WHITE
 }
 
-/// Third differences of some series of readings of one sensor, by [stride](STRIDES).
+/// Third differences of some series of readings of one sensor, by stride.
 #[derive(Debug, Default)]
 pub struct ThirdDifferences([Vec<f64>; STRIDES.len()]);
 

@@ -166,6 +166,7 @@ fn a_task_is_run_diagnosed_and_run_again() {
             "config.toml",
             "evidence.json",
             "model.xml",
+            "next.csv",
             "refined.toml",
             "report.html",
             "result.json",
