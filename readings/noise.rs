@@ -3,7 +3,7 @@
 //! Over a number of rows twice as large those of correlated noise grow by at most two, until readings so far apart are independent.
 //! What a model misses grows faster: its own third differences, squared, by 64 where it is smooth, and by 8 where a rough force
 //! makes it, which a machine integrates twice. Noise and such a rest are told apart by how the differences grow; over rows where the rest
-//! outgrows the noise they tell nothing of it.
+//! outgrows the noise they tell nothing of it. Nor do differences across an impact, where what is read is no parabola.
 
 /// Ratio of a normal variable's deviation to the median of its magnitude.
 pub const NORMAL: f64 = 1.482_602_218_505_602;
@@ -50,6 +50,8 @@ const RESTS: [f64; 2] = [8.0, 64.0];
 const TIE: f64 = 2.7;
 /// Largest correlation from row to row that is called noise: slower changes are the model's.
 const SLOWEST: f64 = 0.97;
+/// Deviations of neighbouring rows' third differences from which on there is an impact between them: of normal noise one in two million.
+const IMPACT: f64 = 5.0;
 /// Third differences that a correlation is told from, at least.
 const FEWEST: usize = 200;
 /// Rows that a third difference spans at most, where readings are missing: over more of them a residual is no parabola.
@@ -59,27 +61,40 @@ const STRIDES: [usize; 5] = [1, 2, 4, 8, 16];
 /// Strides that a correlation is told from, at least: noise, its correlation and a rest are three unknowns.
 const FEWEST_STRIDES: usize = 3;
 
-/// Magnitudes of the third differences of a series (row, time, value) over some readings, scaled so that those of white noise of
-/// deviation 1 have the deviation sqrt(20), whatever the times between.
-fn third_differences(series: &[(usize, f64, f64)], stride: usize, found: &mut Vec<f64>) {
-    for i in 0..series.len().saturating_sub(3 * stride) {
-        let four = [0, 1, 2, 3].map(|k| series[i + k * stride]);
-        if four[3].0 - four[0].0 > SPAN * stride {
-            continue;
-        }
-        // Weights of the divided difference, which vanishes for parabolas.
-        let weight = |k: usize| -> f64 {
-            let others = (0..4).filter(|&l| l != k);
-            others.map(|l| 1.0 / (four[k].1 - four[l].1)).product()
-        };
-        let weights = [0, 1, 2, 3].map(weight);
-        let norm = weights.iter().map(|w| w * w).sum::<f64>().sqrt();
-        let sum: f64 = weights.iter().zip(&four).map(|(w, p)| w * p.2).sum();
-        let difference = (WHITE.sqrt() * sum / norm).abs();
-        if difference.is_finite() {
-            found.push(difference);
-        }
+/// Magnitude of the third difference of a series (row, time, value) from some reading on, scaled so that those of white noise of
+/// deviation 1 have the deviation sqrt(20), whatever the times between. `None` where it spans too many rows.
+fn third_difference(series: &[(usize, f64, f64)], from: usize, stride: usize) -> Option<f64> {
+    let four = [0, 1, 2, 3].map(|k| series[from + k * stride]);
+    if four[3].0 - four[0].0 > SPAN * stride {
+        return None;
     }
+    // Weights of the divided difference, which vanishes for parabolas.
+    let weight = |k: usize| -> f64 {
+        let others = (0..4).filter(|&l| l != k);
+        others.map(|l| 1.0 / (four[k].1 - four[l].1)).product()
+    };
+    let weights = [0, 1, 2, 3].map(weight);
+    let norm = weights.iter().map(|w| w * w).sum::<f64>().sqrt();
+    let sum: f64 = weights.iter().zip(&four).map(|(w, p)| w * p.2).sum();
+    let difference = (WHITE.sqrt() * sum / norm).abs();
+    difference.is_finite().then_some(difference)
+}
+
+/// Number of impacts before each reading of a series, at which its neighbouring readings are no parabola.
+fn impacts_before(series: &[(usize, f64, f64)]) -> Vec<usize> {
+    let starts = 0..series.len().saturating_sub(3);
+    let each: Vec<f64> = starts
+        .map(|i| third_difference(series, i, 1).unwrap_or(0.0))
+        .collect();
+    let typical = NORMAL * median(&mut each.clone()).unwrap_or(0.0);
+    let mut count = 0;
+    let mut before = vec![0];
+    for d in each {
+        count += usize::from(d > IMPACT * typical);
+        before.push(count);
+    }
+    before.resize(series.len() + 1, count);
+    before
 }
 
 /// Squared deviation of the third differences of noise of deviation 1 with a correlation between its readings, relative to white noise.
@@ -95,8 +110,13 @@ pub struct ThirdDifferences([Vec<f64>; STRIDES.len()]);
 impl ThirdDifferences {
     /// Adds those of a series of readings: row, time (s) and value of each that is there.
     pub fn add(&mut self, series: &[(usize, f64, f64)]) {
-        for (stride, found) in STRIDES.iter().zip(&mut self.0) {
-            third_differences(series, *stride, found);
+        let impacts = impacts_before(series);
+        for (&stride, found) in STRIDES.iter().zip(&mut self.0) {
+            let starts = 0..series.len().saturating_sub(3 * stride);
+            // Over a few rows the median is blind to impacts; over many, most differences would span one.
+            let is_smooth = |i: &usize| stride == 1 || impacts[*i] == impacts[i + 3 * stride];
+            let smooth = starts.filter(is_smooth);
+            found.extend(smooth.filter_map(|i| third_difference(series, i, stride)));
         }
     }
 
@@ -248,6 +268,26 @@ mod tests {
     }
 
     #[test]
+    fn impacts_make_no_noise() {
+        // A ball that bounces every 0.7 s, read beside two coordinates that do not.
+        let bounces = |k: usize| {
+            let t = (0.01 * k as f64) % 0.7;
+            1000.0 * (3.4 * t - 4.9 * t * t)
+        };
+        let mut differences = ThirdDifferences::default();
+        for axis in 0..3 {
+            let noise = coloured(0.0, 300 + axis).into_iter().enumerate();
+            let path = |k: usize| if axis == 0 { bounces(k) } else { 0.0 };
+            let read: Vec<_> = noise
+                .map(|(k, x)| (k, 0.01 * k as f64, x + path(k)))
+                .collect();
+            differences.add(&read);
+        }
+        let found = differences.noise();
+        assert!((found.deviation - 1.0).abs() < 0.1, "{found:?}");
+    }
+
+    #[test]
     fn a_fast_shaking_is_no_slow_noise() {
         for correlation in [0.0, 0.4] {
             let shaken = |k: usize| 5.0 * (0.26 * k as f64).sin();
@@ -268,8 +308,10 @@ mod tests {
             .filter(|(k, _)| (k * 7919) % 3 == 0 || (k * 104_729) % 11 == 0)
             .map(|(k, x)| (k, 0.01 * k as f64, x))
             .collect();
-        let mut found = Vec::new();
-        third_differences(&series, 1, &mut found);
+        let starts = 0..series.len() - 3;
+        let mut found: Vec<f64> = starts
+            .filter_map(|i| third_difference(&series, i, 1))
+            .collect();
         let deviation = NORMAL * median(&mut found).unwrap() / WHITE.sqrt();
         assert!((deviation - 1.0).abs() < 0.06, "{deviation}");
     }
