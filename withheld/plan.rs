@@ -5,6 +5,7 @@
 //! machine hardly moves. Of the causes that a machine can have the one that was used least comes next, so that a
 //! set of 600 has each of them, at each gap, about as often as its machines allow.
 
+mod kind;
 mod wanted;
 
 use std::collections::BTreeMap;
@@ -12,7 +13,6 @@ use std::collections::BTreeMap;
 use rand::Rng;
 use rand::seq::{IndexedRandom, SliceRandom};
 use rand_chacha::ChaCha8Rng;
-use serde::{Deserialize, Serialize};
 
 use crate::anatomy::Anatomy;
 use crate::cause::{Cause, Standing};
@@ -23,28 +23,13 @@ use crate::machine::{Half, Machine};
 use crate::machines;
 use crate::random::{digest, stream};
 
+pub use kind::Kind;
 pub use wanted::Wanted;
 
 /// True excess gaps of causes in clean worlds, in noise floors.
 pub const GAPS: [f64; 4] = [1.5, 3.0, 10.0, 100.0];
 /// How far causes stand out of the dirt, in dirty worlds.
 pub const FACTORS: [f64; 3] = [2.0, 5.0, 20.0];
-
-/// What a case's causes are.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Kind {
-    /// None.
-    None,
-    /// One.
-    Single,
-    /// Two or three, of which viscous and dry friction of one joint are the commonest.
-    Several,
-    /// One at all places of a kind.
-    Group,
-    /// One of no catalogue.
-    Unknown,
-}
 
 /// Cases of a wheel: kind, whether dirty, how many.
 const WHEEL: [(Kind, bool, usize); 10] = [

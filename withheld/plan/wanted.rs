@@ -66,14 +66,7 @@ impl Wanted {
             .effects
             .iter()
             .map(|e| e.split('@').next().unwrap_or(e));
-        let kind = match &*label.kind {
-            "none" => Kind::None,
-            "single" => Kind::Single,
-            "group" => Kind::Group,
-            "unknown" => Kind::Unknown,
-            _ => Kind::Several,
-        };
-        self.takes_kind(kind)
+        Kind::named(&label.kind).is_some_and(|kind| self.takes_kind(kind))
             && (self.causes.is_empty() || names.any(|name| self.takes_cause(name)))
     }
 

@@ -209,3 +209,12 @@ fn a_set_for_one_question_has_only_its_cases() -> Result<()> {
     );
     Ok(())
 }
+
+#[test]
+fn a_kind_is_found_by_its_name_and_by_those_of_labels() {
+    for kind in Kind::ALL {
+        assert_eq!(Kind::named(kind.name()), Some(kind));
+    }
+    assert_eq!(Kind::named("pair"), Some(Kind::Several));
+    assert_eq!(Kind::named("both"), None);
+}

@@ -4,6 +4,10 @@ use std::path::Path;
 
 use anyhow::Result;
 use asid_core::Error;
+#[cfg(feature = "mujoco")]
+use asid_withheld::plan::Kind;
+#[cfg(feature = "mujoco")]
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
 use super::Arguments;
 
@@ -16,20 +20,12 @@ pub enum Half {
     Test,
 }
 
-/// What the causes of a case are.
+/// Kinds of cases by their names.
 #[cfg(feature = "mujoco")]
-#[derive(Clone, Copy, Debug, clap::ValueEnum)]
-pub enum Kind {
-    /// Nothing
-    None,
-    /// One effect of the catalogue
-    Single,
-    /// Two or three effects
-    Several,
-    /// One effect at all places of a kind
-    Group,
-    /// A cause that the catalogue has not got
-    Unknown,
+fn kinds() -> impl TypedValueParser<Value = Kind> {
+    let kind = |kind: Kind| PossibleValue::new(kind.name()).help(kind.about());
+    PossibleValuesParser::new(Kind::ALL.map(kind))
+        .try_map(|name| Kind::named(&name).ok_or("is no kind of case"))
 }
 
 /// Which cases are made: those of a set for one question, or all.
@@ -37,7 +33,7 @@ pub enum Kind {
 #[derive(clap::Args)]
 pub struct Wanted {
     /// Make only cases of this kind (repeatable)
-    #[arg(long, value_name = "KIND", requires = "make")]
+    #[arg(long, value_name = "KIND", value_parser = kinds(), requires = "make")]
     kind: Vec<Kind>,
     /// Make only cases with this cause, such as backlash (repeatable)
     #[arg(long, value_name = "NAME", requires = "make")]
@@ -56,16 +52,8 @@ pub struct Wanted {
 #[cfg(feature = "mujoco")]
 impl Wanted {
     fn of_plan(&self) -> asid_withheld::plan::Wanted {
-        use asid_withheld::plan::Kind as Planned;
-        let kind = |kind: &Kind| match kind {
-            Kind::None => Planned::None,
-            Kind::Single => Planned::Single,
-            Kind::Several => Planned::Several,
-            Kind::Group => Planned::Group,
-            Kind::Unknown => Planned::Unknown,
-        };
         asid_withheld::plan::Wanted {
-            kinds: self.kind.iter().map(kind).collect(),
+            kinds: self.kind.clone(),
             causes: self.cause.clone(),
             dirty: (self.clean || self.dirty).then_some(self.dirty),
             size: self.size,

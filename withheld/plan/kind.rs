@@ -1,0 +1,63 @@
+//! What kinds of cases there are.
+
+use serde::{Deserialize, Serialize};
+
+/// What a case's causes are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Kind {
+    /// None.
+    None,
+    /// One.
+    Single,
+    /// Two or three, of which viscous and dry friction of one joint are the commonest.
+    Several,
+    /// One at all places of a kind.
+    Group,
+    /// One of no catalogue.
+    Unknown,
+}
+
+impl Kind {
+    /// All.
+    pub const ALL: [Self; 5] = [
+        Self::None,
+        Self::Single,
+        Self::Several,
+        Self::Group,
+        Self::Unknown,
+    ];
+
+    /// Name on the command line.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::None => "none",
+            Self::Single => "single",
+            Self::Several => "several",
+            Self::Group => "group",
+            Self::Unknown => "unknown",
+        }
+    }
+
+    /// What it is, in words.
+    #[must_use]
+    pub fn about(self) -> &'static str {
+        match self {
+            Self::None => "Nothing",
+            Self::Single => "One effect of the catalogue",
+            Self::Several => "Two or three effects",
+            Self::Group => "One effect at all places of a kind",
+            Self::Unknown => "A cause that the catalogue has not got",
+        }
+    }
+
+    /// The kind of a name; pairs and triples are several.
+    #[must_use]
+    pub fn named(name: &str) -> Option<Self> {
+        match name {
+            "pair" | "triple" => Some(Self::Several),
+            _ => Self::ALL.into_iter().find(|kind| kind.name() == name),
+        }
+    }
+}
