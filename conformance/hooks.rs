@@ -196,6 +196,7 @@ fn null_values(backend: &dyn Backend) -> Result<f64> {
                 name: &name,
                 values: &values,
                 columns: &[],
+                episode: 0,
             })?;
             let acting = Mutex::new(acting);
             let hook = By(|_, view: &mut StepView<'_>| {

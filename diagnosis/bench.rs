@@ -182,14 +182,18 @@ impl Bench {
     /// When a rollout fails.
     pub fn hold_out(&self, trials: &[Trial<'_>], of: &mut Explanation) -> Result<()> {
         let theta = &of.fit.point.theta;
-        let (starts, residuals) = self.replay_held_out(trials, theta, &of.held_starts)?;
-        of.held_starts = starts;
+        let (point, residuals) = self.replay_held_out(trials, theta, &of.held_starts)?;
+        let values = point.theta[self.parameters.len()..].iter();
+        let own = of.effects.iter_mut().flat_map(|e| &mut e.values);
+        own.zip(values).for_each(|((_, own), value)| *own = *value);
+        of.fit.point.theta = point.theta;
+        of.held_starts = point.starts;
         of.held_out = cost(&residuals);
         Ok(())
     }
 
-    /// Replays the logs held out at some values: the starts that were fitted to their first tenth where they are open, `from` some on, and
-    /// the residuals, of which that tenth is zero then.
+    /// Replays the logs held out at some values: the point with the [own values](Bench::head_point) of these logs, `from` some starts on, and
+    /// the residuals, of which the first tenth is zero where starts were fitted to it.
     ///
     /// # Errors
     /// When a rollout fails.
@@ -198,45 +202,48 @@ impl Bench {
         trials: &[Trial<'_>],
         theta: &[f64],
         from: &[State],
-    ) -> Result<(Vec<State>, Vec<f64>)> {
-        let point = Point {
-            theta: theta.to_vec(),
-            starts: self.head_starts(trials, theta, from)?,
-        };
+    ) -> Result<(Point, Vec<f64>)> {
+        let point = self.head_point(trials, theta, from)?;
         let mut predictor = self.predictor(trials, &self.test)?;
         let residuals = predictor.residuals(std::slice::from_ref(&point))?.pop();
         let mut residuals = residuals.unwrap_or_default();
         self.mask_head(&mut residuals);
-        Ok((point.starts, residuals))
+        Ok((point, residuals))
     }
 
-    /// Starts of the held-out episodes, fitted on their first tenth where they are open.
+    /// What is of the held-out episodes alone, fitted on their first tenth: their starts where these are open, and those values of effects that
+    /// are of one of these episodes.
     ///
     /// # Errors
     /// When a rollout fails.
-    pub fn head_starts(
-        &self,
-        trials: &[Trial<'_>],
-        theta: &[f64],
-        from: &[State],
-    ) -> Result<Vec<State>> {
-        if self.open.is_empty() {
-            return Ok(from.to_vec());
-        }
+    pub fn head_point(&self, trials: &[Trial<'_>], theta: &[f64], from: &[State]) -> Result<Point> {
         let mut unknowns = self.unknowns(trials);
         unknowns.iter_mut().for_each(|u| u.free = false);
-        let mut predictor = self.predictor(trials, &self.head)?;
+        let of_effects = trials.iter().flat_map(|(c, _)| self.of_held_out(c));
+        let own = unknowns[self.parameters.len()..].iter_mut();
+        own.zip(of_effects).for_each(|(u, free)| u.free = free);
         let point = Point {
             theta: theta.to_vec(),
             starts: from.to_vec(),
         };
+        if self.open.is_empty() && unknowns.iter().all(|u| !u.free) {
+            return Ok(point);
+        }
+        let mut predictor = self.predictor(trials, &self.head)?;
         let fit = fit(
             &mut predictor,
             (self.layout(), &unknowns),
             Begin::at(point, &self.open),
             (Effort::START, &Silent),
         )?;
-        Ok(fit.point.starts)
+        Ok(fit.point)
+    }
+
+    /// Whether each parameter of a candidate is the value of an episode held out.
+    fn of_held_out(&self, candidate: &Candidate) -> Vec<bool> {
+        let held = |number| self.test.logs.episodes.iter().any(|e| e.number == number);
+        let parameters = candidate.parameters().iter();
+        parameters.map(|p| p.episode.is_some_and(held)).collect()
     }
 
     /// Takes the first tenth of the held-out episodes out of their residuals, where starts

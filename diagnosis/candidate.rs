@@ -24,6 +24,8 @@ pub struct Candidate {
     pub starts: Vec<Vec<f64>>,
     /// Range of each parameter: that of the effect, or where the logs can tell of it.
     pub ranges: Vec<[f64; 2]>,
+    /// How many episodes there are to fit to: values of others are not fitted to them.
+    pub episodes: usize,
     /// Whether it stands for what an ordinary machine has, within [`Effect::tolerance`]: it is fitted and never named.
     pub is_tolerance: bool,
 }
@@ -75,7 +77,7 @@ impl Candidate {
                     unit: p.unit.into(),
                 };
                 let free = !matches!(p.start, Start::Choice(_) | Start::Given | Start::Set(..));
-                (parameter, free && !self.is_tolerance)
+                (parameter, free && !self.is_tolerance && self.is_fitted(p))
             })
             .collect()
     }
@@ -85,9 +87,14 @@ impl Candidate {
     pub fn slopes(&self) -> Vec<usize> {
         let parameters = self.parameters().iter().enumerate();
         parameters
-            .filter(|(_, p)| p.start == Start::Slope)
+            .filter(|(_, p)| p.start == Start::Slope && self.is_fitted(p))
             .map(|(i, _)| i)
             .collect()
+    }
+
+    /// Whether a parameter is of all episodes, or of one that is fitted to.
+    fn is_fitted(&self, parameter: &EffectParameter) -> bool {
+        parameter.episode.is_none_or(|e| e < self.episodes)
     }
 }
 
@@ -179,6 +186,16 @@ pub fn enumerate(
                 });
                 continue;
             }
+            let numbered = effect.parameters().iter().filter_map(|p| p.episode);
+            if let Some(last) = numbered.max().filter(|last| shown.logs > last + 1) {
+                let why = format!(
+                    "it has values for {} logs, and {} are fitted to",
+                    last + 1,
+                    shown.logs
+                );
+                left_out.push(LeftOut { label, why });
+                continue;
+            }
             let starts = starts(&*effect, plant, &site, shown);
             let ranges = ranges(&*effect, plant, &site, shown);
             found.push(Candidate {
@@ -186,6 +203,7 @@ pub fn enumerate(
                 spec,
                 starts,
                 ranges,
+                episodes: shown.logs,
                 is_tolerance: false,
             });
         }

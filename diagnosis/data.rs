@@ -37,6 +37,8 @@ pub struct LoggedSensor {
 pub struct LoggedEpisode {
     /// File name, for messages and tables.
     pub name: String,
+    /// Its number among all logs of the study, those to fit to before those held out, from 0.
+    pub number: usize,
     /// The log.
     pub episode: Episode,
     /// Readings of the compared sensors, `rows x width`, NaN where missing.
@@ -117,8 +119,10 @@ impl Logs {
         }
         let episodes = episodes
             .into_iter()
-            .map(|(name, episode)| LoggedEpisode {
+            .enumerate()
+            .map(|(number, (name, episode))| LoggedEpisode {
                 name,
+                number,
                 readings: episode.select(layout, sensors),
                 plan: ReplayPlan::new(layout, &episode, episode.rows()),
                 episode,
@@ -130,6 +134,15 @@ impl Logs {
             entries,
             episodes,
         })
+    }
+
+    /// The same logs, counted from a number on.
+    #[must_use]
+    pub fn counted_from(mut self, first: usize) -> Self {
+        for (i, e) in self.episodes.iter_mut().enumerate() {
+            e.number = first + i;
+        }
+        self
     }
 
     /// Duration of the longest, s.

@@ -67,6 +67,7 @@ fn candidate(joint: &str) -> Result<Candidate> {
         ranges: parameters.map(|p| p.range).collect(),
         effect: effect.into(),
         spec,
+        episodes: usize::MAX,
         is_tolerance: false,
     })
 }

@@ -8,6 +8,7 @@
 //! - [`predict`] replays the logs in a model, for many parameter values at once; [`fit`]
 //!   is least squares over such replays.
 
+mod batch_columns;
 pub mod bench;
 pub mod calibration;
 pub mod candidate;

@@ -6,6 +6,7 @@ use asid_core::{Model, Parameter, Result};
 use asid_readings::replay::quaternions;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
+use crate::batch_columns::BatchColumns;
 use crate::data::Logs;
 
 /// State at the start of an episode.
@@ -61,15 +62,6 @@ pub struct Point {
     pub starts: Vec<State>,
 }
 
-/// What the columns of a batch are set to at some values of the parameters.
-#[must_use]
-pub fn columns_of(parameters: &[Parameter], theta: &[f64]) -> Vec<f64> {
-    let pairs = parameters.iter().zip(theta);
-    pairs
-        .flat_map(|(p, &x)| std::iter::repeat_n(p.setting(x), p.targets.len()))
-        .collect()
-}
-
 /// Episodes that are rolled out together: the same physics steps a frame, about as long.
 struct Group {
     episodes: Vec<usize>,
@@ -81,7 +73,7 @@ struct Group {
 /// Predicts the readings of some logs for several points at once.
 pub struct Predictor<'a> {
     logs: &'a Logs,
-    parameters: Vec<Parameter>,
+    columns: BatchColumns,
     simulator: Box<dyn Simulator>,
     recording: Recording,
     quaternions: Vec<usize>,
@@ -106,13 +98,14 @@ impl<'a> Predictor<'a> {
         let layout = model.layout();
         let channels = logs.channels();
         let recording = layout.recording(&channels)?;
+        let columns = BatchColumns::new(model, parameters);
         let simulator = model.simulator(&BatchConfig {
             size: capacity * logs.episodes.len(),
             threads,
-            targets: parameters.iter().flat_map(|p| p.targets.clone()).collect(),
+            targets: columns.targets(),
         })?;
         Ok(Self {
-            parameters: parameters.to_vec(),
+            columns,
             quaternions: quaternions(layout, &recording, &channels),
             groups: groups(logs, layout.nu(), capacity),
             present: logs.present(),
@@ -152,8 +145,9 @@ impl<'a> Predictor<'a> {
         let sims: Vec<usize> = (0..points.len() * n).collect();
         let mut columns: Vec<f64> = Vec::new();
         for point in points {
-            let row = columns_of(&self.parameters, &point.theta);
-            (0..n).for_each(|_| columns.extend_from_slice(&row));
+            for e in &self.logs.episodes {
+                self.columns.push(&point.theta, e.number, &mut columns);
+            }
         }
         self.simulator.reset(&sims)?;
         self.simulator.set_parameters(&sims, &columns)?;

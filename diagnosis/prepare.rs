@@ -72,15 +72,18 @@ pub fn dataset(study: &Study, machine: Machine) -> Result<(Bench, Vec<f64>)> {
             study.name
         )));
     }
-    let record = |logs: &[(String, asid_core::Episode)]| -> Result<Record> {
+    let record = |logs: &[(String, asid_core::Episode)], first: usize| -> Result<Record> {
         let starts = logs
             .iter()
             .map(|(_, e)| given_start(&machine.plant, e))
             .collect();
         let logs = Logs::new(&machine.plant, &sensors, logs.to_vec())?;
-        Ok(Record::new(logs, starts))
+        Ok(Record::new(logs.counted_from(first), starts))
     };
-    let (train, test) = (record(&study.train)?, record(&study.test)?);
+    let (train, test) = (
+        record(&study.train, 0)?,
+        record(&study.test, study.train.len())?,
+    );
     let model = machine.with(&[])?;
     let nominal = study
         .parameters

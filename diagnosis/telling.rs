@@ -98,7 +98,9 @@ impl Telling<'_> {
         let nominal = if self.nominal == none.fit.point.theta {
             identified.clone()
         } else {
-            let starts = bench.head_starts(&[], self.nominal, &bench.test.starts)?;
+            let starts = bench
+                .head_point(&[], self.nominal, &bench.test.starts)?
+                .starts;
             self.held(&[], self.nominal, starts)?
         };
         let theta = &refined.fit.point.theta;

@@ -10,8 +10,9 @@ use asid_core::{BatchConfig, Control, Model, Parameter, Result, Rollout, Simulat
 use asid_mjcf::Plant;
 use asid_readings::replay::ReplayPlan;
 
+use crate::batch_columns::BatchColumns;
 use crate::data::Logs;
-use crate::predict::{Point, columns_of};
+use crate::predict::Point;
 
 use contact::{contact_channel, look_for_touches, pairs_of};
 use envelope::spreads;
@@ -21,6 +22,8 @@ use envelope::spreads;
 pub struct Trajectory {
     /// Names of the sensors that the logs have.
     pub sensors: Vec<String>,
+    /// How many logs there are: an episode may be a part of one.
+    pub logs: usize,
     /// One an episode.
     pub episodes: Vec<Path>,
     /// Pairs of bodies that can touch.
@@ -65,10 +68,11 @@ impl Trajectory {
         let recording = layout.recording(&names)?;
         let width = recording.width();
         let (nq, nv, nu) = (layout.nq, layout.nv, layout.nu());
+        let columns = BatchColumns::new(model, parameters);
         let mut simulator = model.simulator(&BatchConfig {
             size: 1,
             threads,
-            targets: parameters.iter().flat_map(|p| p.targets.clone()).collect(),
+            targets: columns.targets(),
         })?;
         let touches = layout.recording(&names[names.len() - pairs.len()..])?;
         let mut touched = vec![false; pairs.len()];
@@ -76,7 +80,7 @@ impl Trajectory {
         for (e, start) in logs.episodes.iter().zip(&point.starts) {
             let begin = |simulator: &mut dyn Simulator| -> Result<()> {
                 simulator.reset(&[0])?;
-                simulator.set_parameters(&[0], &columns_of(parameters, &point.theta))?;
+                simulator.set_parameters(&[0], &columns.row(&point.theta, e.number))?;
                 simulator.set_state(&[0], &start.qpos, &start.qvel)
             };
             begin(&mut *simulator)?;
@@ -107,6 +111,7 @@ impl Trajectory {
         }
         Ok(Self {
             sensors: logs.channels(),
+            logs: logs.episodes.len(),
             readings: spreads(logs),
             episodes,
             pairs,
@@ -133,12 +138,13 @@ impl Trajectory {
         let pairs = pairs_of(plant);
         let names: Vec<String> = pairs.iter().map(|p| contact_channel(layout, *p)).collect();
         let recording = layout.recording(&names)?;
+        let columns = BatchColumns::new(model, parameters);
         let mut simulator = model.simulator(&BatchConfig {
             size: 1,
             threads: 1,
-            targets: parameters.iter().flat_map(|p| p.targets.clone()).collect(),
+            targets: columns.targets(),
         })?;
-        simulator.set_parameters(&[0], &columns_of(parameters, theta))?;
+        simulator.set_parameters(&[0], &columns.row(theta, 0))?;
         let mut touched = vec![false; pairs.len()];
         let mut episodes = Vec::with_capacity(states.len());
         for (states, &(episode, rows)) in states.iter().zip(rows) {
@@ -173,6 +179,7 @@ impl Trajectory {
         }
         Ok(Self {
             sensors: logs.channels(),
+            logs: logs.episodes.len(),
             readings: spreads(logs),
             episodes,
             pairs,
@@ -195,12 +202,13 @@ pub fn positions(
     let joints = layout.joints.iter();
     let names: Vec<String> = joints.map(|j| format!("qpos.{}", j.name)).collect();
     let recording = layout.recording(&names)?;
+    let columns = BatchColumns::new(model, parameters);
     let mut simulator = model.simulator(&BatchConfig {
         size: 1,
         threads: 1,
-        targets: parameters.iter().flat_map(|p| p.targets.clone()).collect(),
+        targets: columns.targets(),
     })?;
-    simulator.set_parameters(&[0], &columns_of(parameters, &point.theta))?;
+    simulator.set_parameters(&[0], &columns.row(&point.theta, 0))?;
     for start in point.starts.iter().take(1) {
         simulator.set_state(&[0], &start.qpos, &start.qvel)?;
     }

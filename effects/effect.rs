@@ -61,6 +61,8 @@ pub struct EffectParameter {
     pub null: f64,
     /// How a search for its value begins.
     pub start: Start,
+    /// The episode of the logs whose value it is, by its number; `None` for a value of all.
+    pub episode: Option<usize>,
 }
 
 impl EffectParameter {
@@ -73,6 +75,7 @@ impl EffectParameter {
             range,
             null,
             start: Start::Slope,
+            episode: None,
         }
     }
 
@@ -81,6 +84,13 @@ impl EffectParameter {
     #[must_use]
     pub fn is_limit(&self) -> bool {
         self.null == self.range[1]
+    }
+
+    /// The same as the value of one episode of the logs.
+    #[must_use]
+    pub const fn of_episode(mut self, number: usize) -> Self {
+        self.episode = Some(number);
+        self
     }
 
     /// The same with another start of the search.
@@ -103,6 +113,8 @@ pub struct Site<'a> {
     /// Places of the effect's targets among the columns that [`Acting::set`] and
     /// [`StepView::parameters`] show, in the order of [`Effect::targets`].
     pub columns: &'a [usize],
+    /// Number of the episode among all logs, in their order, from 0.
+    pub episode: usize,
 }
 
 /// An effect at work at one site in one simulation.
@@ -204,6 +216,10 @@ pub trait Effect: Send + Sync {
     /// Whether it hands readings on late by its one parameter, s, and does nothing else.
     fn delays(&self) -> bool {
         false
+    }
+    /// Whether it depends on [`Site::episode`]: it goes with the order of the logs, or has values of single ones.
+    fn counts_episodes(&self) -> bool {
+        self.parameters().iter().any(|p| p.episode.is_some())
     }
     /// What an engine must be able to do for it, besides setting its targets and, where it
     /// [steps](Effect::steps), calling hooks.

@@ -96,6 +96,7 @@ pub fn plain(backend: &dyn Backend, model: &RefinedModel, folder: &Path) -> Resu
             name: &spec.site,
             values: &numbers,
             columns: &columns,
+            episode: 0,
         };
         let acting = effect.attach(&site)?;
         if effect.acts() == Acts::Model && !effect.steps() {

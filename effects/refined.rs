@@ -21,6 +21,25 @@ use asid_mjcf::plant::Plant;
 use simulator::Column;
 pub use simulator::RefinedSimulator;
 
+/// The column of a batch that says which episode of the logs a simulation is of, by its number, 0 if it is not set. Models have it
+/// whose effects [count episodes](Effect::counts_episodes).
+#[must_use]
+pub fn episode_number() -> Target {
+    Target {
+        element: "episode".into(),
+        name: String::new(),
+        attribute: "number".into(),
+        index: 0,
+    }
+}
+
+/// That column, where a model has it.
+#[must_use]
+pub fn counts_episodes(model: &dyn Model) -> Option<Target> {
+    let column = episode_number();
+    model.nominal(&column).is_ok().then_some(column)
+}
+
 /// An effect found, with the place where it acts.
 struct Placed {
     label: String,
@@ -132,6 +151,12 @@ impl Refined {
         Self::new(backend, backend.load(scene)?, plant, &[], effects)
     }
 
+    /// Whether a target is the number of the episode.
+    fn is_episode(&self, target: &Target) -> bool {
+        let counts = || self.placed.iter().any(|p| p.effect.counts_episodes());
+        *target == episode_number() && counts()
+    }
+
     /// The effect and its parameter that a target names; `None` for a target of the scene.
     fn effect_column(&self, target: &Target) -> Result<Option<(usize, usize)>> {
         if target.element != "effect" {
@@ -168,6 +193,9 @@ impl Model for Refined {
     }
 
     fn nominal(&self, target: &Target) -> Result<f64> {
+        if self.is_episode(target) {
+            return Ok(0.0);
+        }
         if let Some((effect, parameter)) = self.effect_column(target)? {
             return Ok(self.placed[effect].values[parameter]);
         }
@@ -198,6 +226,9 @@ impl Refined {
             .targets
             .iter()
             .map(|target| {
+                if self.is_episode(target) {
+                    return Ok(Column::Episode);
+                }
                 Ok(match self.effect_column(target)? {
                     None => Column::Model(place(target)),
                     Some((effect, parameter)) => Column::Effect(effect, parameter),

@@ -88,6 +88,7 @@ pub fn watched(
     for (number, motion) in motions.iter().enumerate() {
         sim.begin(number, &motion.qpos, &motion.qvel);
         for (drive, path) in &mut world.commands {
+            path.episode(number);
             path.begin(motion.commands[*drive], sim.dt);
         }
         for force in &mut world.forces {

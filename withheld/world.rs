@@ -12,6 +12,8 @@ use nalgebra::{Matrix3, Quaternion, UnitQuaternion};
 
 /// What happens to a command on its way.
 pub trait CommandPath: Send {
+    /// Says which episode begins.
+    fn episode(&mut self, _number: usize) {}
     /// Begins an episode whose command was `first` before it.
     fn begin(&mut self, first: f64, dt: f64);
     /// The command that arrives during the next step, of the one that is sent in it.

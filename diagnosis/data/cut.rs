@@ -40,6 +40,7 @@ impl Logs {
                 let episode = e.episode.part(part.clone());
                 logs.episodes.push(LoggedEpisode {
                     name: e.name.clone(),
+                    number: e.number,
                     readings: e.readings[part.start * width..part.end * width].to_vec(),
                     plan: ReplayPlan::new(layout, &episode, episode.rows()),
                     episode,

@@ -163,6 +163,7 @@ impl Columns {
         let one_step = carried.iter().all(|c| !c.is_empty());
         let source = Source {
             candidates,
+            replayed: context.has_segments(),
             models: &models,
             carried: if one_step { &carried } else { &[] },
             slopes: &slopes,

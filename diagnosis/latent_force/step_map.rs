@@ -23,6 +23,7 @@ use asid_core::{BatchConfig, Model as _, Parameter, Result, Simulator as _};
 use asid_effects::{Acts, EffectSpec};
 use rayon::prelude::*;
 
+use crate::batch_columns::BatchColumns;
 use crate::data::Logs;
 use crate::machine::Machine;
 
@@ -48,7 +49,7 @@ struct Common<'a> {
     logs: &'a Logs,
     walks: &'a [Walk],
     layout: Layout,
-    parameters: Vec<Parameter>,
+    columns: BatchColumns,
     states: Recording,
     readings: Recording,
     /// Most roles in one pass.
@@ -66,6 +67,11 @@ struct Common<'a> {
 }
 
 impl Common<'_> {
+    /// Number of the episode that a walk is of.
+    fn episode(&self, walk: usize) -> usize {
+        self.logs.episodes[self.walks[walk].episode].number
+    }
+
     /// Whether a walk is replayed from its first row, and its derivatives are those of the replay: a segment, but where the
     /// slopes in forces are wanted, which are those of rows.
     fn rolls(&self, walk: usize, want: Derivatives) -> bool {
@@ -150,6 +156,7 @@ impl<'a> StepMap<'a> {
     ) -> Result<Self> {
         let model = machine.refined(specs)?;
         let layout = model.layout().clone();
+        let columns = BatchColumns::new(&*model, parameters);
         let cores = match machine.threads {
             0 => std::thread::available_parallelism().map_or(1, usize::from),
             n => n,
@@ -163,7 +170,7 @@ impl<'a> StepMap<'a> {
                 let simulator = model.batch(&BatchConfig {
                     size: capacity * walks.len(),
                     threads: 1,
-                    targets: parameters.iter().flat_map(|p| p.targets.clone()).collect(),
+                    targets: columns.targets(),
                 })?;
                 Ok(Part { walks, simulator })
             })
@@ -196,7 +203,7 @@ impl<'a> StepMap<'a> {
             logs,
             walks,
             layout,
-            parameters: parameters.to_vec(),
+            columns,
             capacity,
             depends_on_past,
             remembers_readings,

@@ -29,7 +29,7 @@ pub fn trace(
     plant: &Plant,
     candidate: &Candidate,
     values: &[f64],
-    walk: &Walk,
+    (walk, episode): (&Walk, usize),
     states: &[f64],
 ) -> Result<Vec<f64>> {
     let layout = &plant.layout;
@@ -39,6 +39,7 @@ pub fn trace(
         name: &candidate.spec.site,
         values,
         columns: &[],
+        episode,
     })?;
     acting.restart();
     let steps = walk.len() - 1;

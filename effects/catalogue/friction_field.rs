@@ -1,4 +1,4 @@
-//! Sliding friction that differs by place, by time and by direction.
+//! Sliding friction that differs by place, by time, from episode to episode and by direction.
 //!
 //! The sites and the coefficients that are scaled are those of `sliding-friction`
 //! ([`super::contact_friction`]); the factor is computed anew before each step, for each body that slides
@@ -27,6 +27,12 @@ crate::register!(EffectEntry {
 });
 
 crate::register!(EffectEntry {
+    name: "friction-trend",
+    about: "sliding friction changes from episode to episode",
+    make: || Box::new(Field::Trend),
+});
+
+crate::register!(EffectEntry {
     name: "friction-anisotropy",
     about: "sliding friction differs by direction",
     make: || Box::new(Field::Anisotropy),
@@ -43,12 +49,14 @@ const SLOW: f64 = 0.001;
 /// - `Patch`: `ratio` where the coordinate `axis` (0 is x, 1 is y of the world) of the sliding body's
 ///   frame is beyond `place`, 1 before it, with a smooth step of 4 mm between.
 /// - `Drift`: `1 + per_second t`, at least 0, `t` since the episode began.
+/// - `Trend`: `1 + per_episode n`, at least 0, `n` the number of the episode among all logs: wear, wax, warmth.
 /// - `Anisotropy`: `1 + cos_2 cos 2φ + sin_2 sin 2φ`, at least 0, `φ` the direction of the body's
 ///   velocity in the plane of x and y.
 #[derive(Clone, Copy)]
 enum Field {
     Patch,
     Drift,
+    Trend,
     Anisotropy,
 }
 
@@ -71,6 +79,7 @@ impl FieldAt {
                 1.0 + (first - 1.0) * x * x * (3.0 - 2.0 * x)
             }
             Field::Drift => (1.0 + first * time).max(0.0),
+            Field::Trend => (1.0 + first).max(0.0),
             Field::Anisotropy => {
                 let v: Vector3<f64> = motion.velocity;
                 let all = v.x * v.x + v.y * v.y + SLOW * SLOW;
@@ -139,8 +148,16 @@ impl Effect for Field {
                 with: &["friction-anisotropy", "gravity-tilt", "friction-drift"],
                 told_apart_by: "the same track in several directions, and again after a half turn",
             }],
+            Self::Trend => &[Confusion {
+                with: &["sliding-friction", "friction-drift", "supply-trend"],
+                told_apart_by: "repeat the first episode after the last",
+            }],
             _ => &[],
         }
+    }
+
+    fn counts_episodes(&self) -> bool {
+        matches!(self, Self::Trend)
     }
 
     fn acts(&self) -> Acts {
@@ -165,6 +182,16 @@ impl Effect for Field {
                 }
             }
             Self::Drift => const { &[EffectParameter::new("per_second", "1/s", [-1.0, 5.0], 0.0)] },
+            Self::Trend => {
+                const {
+                    &[EffectParameter::new(
+                        "per_episode",
+                        "1/episode",
+                        [-0.5, 2.0],
+                        0.0,
+                    )]
+                }
+            }
             Self::Anisotropy => {
                 const {
                     &[
@@ -198,6 +225,10 @@ impl Effect for Field {
             Self::Drift => {
                 let [rate] = values(site)?;
                 [rate, 0.0, 0.0]
+            }
+            Self::Trend => {
+                let [rate] = values(site)?;
+                [rate * site.episode as f64, 0.0, 0.0]
             }
             Self::Anisotropy => {
                 let [cos, sin] = values(site)?;

@@ -3,7 +3,7 @@
 //! On the command: [`command`], [`command_dynamics`], [`hysteresis`], [`supply`]. Of servos: [`servo`]. Between a drive and
 //! its joint: [`backlash`], [`compliance`]. At a joint: [`joint_friction`], [`joint_force`], [`rotor`]. On bodies:
 //! [`mass`], [`payload`], [`geometry`], [`body_force`], [`gravity`]. In contacts: [`contact_friction`], [`friction_field`], [`contact_softness`]. On
-//! readings: [`sensor`], [`sensor_dynamics`]. A new family is a file here and its `mod` line
+//! readings: [`sensor`], [`sensor_dynamics`], [`episode_offset`]. A new family is a file here and its `mod` line
 //! (docs/add-an-effect.md has what else it needs); modules that are not public hold what several families share.
 //!
 //! Where the engine has the same physics (damping and rotor inertia of a joint, friction
@@ -21,6 +21,7 @@ pub mod contact_friction;
 pub mod contact_softness;
 mod drive;
 mod dry;
+pub mod episode_offset;
 pub mod friction_field;
 pub mod geometry;
 pub mod gravity;

@@ -1,4 +1,4 @@
-//! Errors of a reading at one time: shift, factor, slow growth, steps.
+//! Errors of a reading at one time: shift, factor, slow growth within an episode and from one to the next, steps.
 //!
 //! Sites are sensors that read numbers and vectors. Orientations and unit vectors are none: a
 //! number added to them means nothing.
@@ -28,6 +28,12 @@ crate::register!(EffectEntry {
 });
 
 crate::register!(EffectEntry {
+    name: "sensor-trend",
+    about: "a reading is off by more and more from episode to episode",
+    make: || Box::new(Reading::Trend),
+});
+
+crate::register!(EffectEntry {
     name: "sensor-quantization",
     about: "a reading comes in steps",
     make: || Box::new(Reading::Quantization),
@@ -38,12 +44,14 @@ crate::register!(EffectEntry {
 /// - `Bias`: `r + bias` of a number, `r + (x, y, z)` of a vector; the other parameters do nothing.
 /// - `Scale`: `scale r`, every entry of a vector.
 /// - `Drift`: `r + rate t` of a number, `r + (x, y, z) t` of a vector, `t` since the episode began.
+/// - `Trend`: `r + step n` of a number, `r + (x, y, z) n` of a vector, `n` the number of the episode among all logs.
 /// - `Quantization`: the nearest multiple of `step`, every entry of a vector.
 #[derive(Clone, Copy)]
 enum Reading {
     Bias,
     Scale,
     Drift,
+    Trend,
     Quantization,
 }
 
@@ -57,7 +65,7 @@ impl Acting for ReadingAt {
     fn read(&mut self, time: f64, reading: &mut [f64]) {
         for (r, value) in reading.iter_mut().zip(self.values) {
             match self.law {
-                Reading::Bias => *r += value,
+                Reading::Bias | Reading::Trend => *r += value,
                 Reading::Scale => *r *= value,
                 Reading::Drift => *r += value * time,
                 Reading::Quantization if value > 0.0 => *r = (*r / value).round() * value,
@@ -88,6 +96,7 @@ impl Effect for Reading {
     fn parameters(&self) -> &'static [EffectParameter] {
         const UNIT: &str = "unit of the reading";
         const RATE: &str = "units of the reading per second";
+        const STEP: &str = "units of the reading per episode";
         match self {
             Self::Bias => {
                 const {
@@ -110,6 +119,16 @@ impl Effect for Reading {
                     ]
                 }
             }
+            Self::Trend => {
+                const {
+                    &[
+                        EffectParameter::new("step", STEP, [-1.0, 1.0], 0.0),
+                        EffectParameter::new("x", STEP, [-1.0, 1.0], 0.0),
+                        EffectParameter::new("y", STEP, [-1.0, 1.0], 0.0),
+                        EffectParameter::new("z", STEP, [-1.0, 1.0], 0.0),
+                    ]
+                }
+            }
             Self::Quantization => {
                 const {
                     &[EffectParameter::new("step", UNIT, [0.0, 10.0], 0.0)
@@ -123,6 +142,10 @@ impl Effect for Reading {
         matches!(self, Self::Quantization)
     }
 
+    fn counts_episodes(&self) -> bool {
+        matches!(self, Self::Trend)
+    }
+
     fn sites(&self, plant: &Plant) -> Vec<String> {
         sensors(plant)
     }
@@ -130,9 +153,14 @@ impl Effect for Reading {
     fn attach(&self, site: &Site<'_>) -> Result<Box<dyn Acting>> {
         let scalar = site.plant.layout.sensor(site.name)?.len == 1;
         let values = match self {
-            Self::Bias | Self::Drift => {
+            Self::Bias | Self::Drift | Self::Trend => {
                 let [alone, x, y, z] = values(site)?;
-                if scalar { [alone, 0.0, 0.0] } else { [x, y, z] }
+                let each = if scalar { [alone, 0.0, 0.0] } else { [x, y, z] };
+                let times = match self {
+                    Self::Trend => site.episode as f64,
+                    _ => 1.0,
+                };
+                each.map(|value| value * times)
             }
             Self::Scale => {
                 let [scale] = values(site)?;

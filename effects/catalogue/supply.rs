@@ -18,7 +18,13 @@ crate::register!(EffectEntry {
 crate::register!(EffectEntry {
     name: "supply-drift",
     about: "the gain of a drive changes over time",
-    make: || Box::new(SupplyDrift),
+    make: || Box::new(Supply::Drift),
+});
+
+crate::register!(EffectEntry {
+    name: "supply-trend",
+    about: "the gain of a drive changes from episode to episode",
+    make: || Box::new(Supply::Trend),
 });
 
 /// Speed (rad/s or m/s) up to which no fall of the force is looked for.
@@ -104,38 +110,61 @@ impl Effect for SpeedLimit {
     }
 }
 
-/// `(1 + rate t) u`, after the command's range and never below zero times; `t` restarts with each episode.
-/// A battery that empties has a negative rate, a drive that warms up one of either sign.
-struct SupplyDrift;
+/// How the gain of a command changes, after the command's range and never below zero times. A battery that empties has a negative rate, a
+/// drive that warms up one of either sign.
+///
+/// - `Drift`: `(1 + rate t) u`, `t` restarts with each episode.
+/// - `Trend`: `(1 + rate n) u`, `n` the number of the episode among all logs.
+#[derive(Clone, Copy)]
+enum Supply {
+    Drift,
+    Trend,
+}
 
-struct SupplyDriftAt {
+struct SupplyAt {
     actuator: usize,
     range: [f64; 2],
+    /// Gain at the beginning of the episode.
+    first: f64,
+    /// Growth per second.
     rate: f64,
 }
 
-impl Acting for SupplyDriftAt {
+impl Acting for SupplyAt {
     fn before_step(&mut self, view: &mut StepView<'_>) {
-        let gain = (1.0 + self.rate * view.time).max(0.0);
+        let gain = (self.first + self.rate * view.time).max(0.0);
         let command = &mut view.ctrl[self.actuator];
         *command = gain * command.clamp(self.range[0], self.range[1]);
     }
 }
 
-impl Effect for SupplyDrift {
+impl Effect for Supply {
     fn mistaken_for(&self) -> &'static [Confusion] {
-        &[Confusion {
-            with: &["actuator-gain", "friction-drift", "sensor-drift"],
-            told_apart_by: "repeat a motion after a rest, and with a fresh supply",
-        }]
+        match self {
+            Self::Drift => &[Confusion {
+                with: &["actuator-gain", "friction-drift", "sensor-drift"],
+                told_apart_by: "repeat a motion after a rest, and with a fresh supply",
+            }],
+            Self::Trend => &[Confusion {
+                with: &["actuator-gain", "friction-trend", "supply-drift"],
+                told_apart_by: "repeat the first episode after the last, and with a fresh supply",
+            }],
+        }
     }
 
     fn acts(&self) -> Acts {
         Acts::Command
     }
 
+    fn counts_episodes(&self) -> bool {
+        matches!(self, Self::Trend)
+    }
+
     fn parameters(&self) -> &'static [EffectParameter] {
-        const { &[EffectParameter::new("rate", "1/s", [-1.0, 1.0], 0.0)] }
+        match self {
+            Self::Drift => const { &[EffectParameter::new("rate", "1/s", [-1.0, 1.0], 0.0)] },
+            Self::Trend => const { &[EffectParameter::new("rate", "1/episode", [-0.5, 0.5], 0.0)] },
+        }
     }
 
     fn sites(&self, plant: &Plant) -> Vec<String> {
@@ -147,9 +176,14 @@ impl Effect for SupplyDrift {
         let layout = &site.plant.layout;
         let actuator = layout.actuator(site.name)?;
         let range = layout.actuators[actuator].ctrl_range;
-        Ok(Box::new(SupplyDriftAt {
+        let (first, rate) = match self {
+            Self::Drift => (1.0, rate),
+            Self::Trend => (1.0 + rate * site.episode as f64, 0.0),
+        };
+        Ok(Box::new(SupplyAt {
             actuator,
             range: range.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]),
+            first,
             rate,
         }))
     }

@@ -19,6 +19,8 @@ pub enum Column {
     Model(usize),
     /// A parameter of an effect.
     Effect(usize, usize),
+    /// The number of the episode.
+    Episode,
 }
 
 /// Effects at work in one simulation; `None` where one has its null values.
@@ -182,10 +184,12 @@ impl Simulator for RefinedSimulator {
         for i in 0..sims.len() {
             let first = engine.len();
             engine.extend_from_slice(&self.base);
+            let mut episode = 0;
             for (column, &value) in self.columns.iter().zip(&values[i * d..]) {
                 match *column {
                     Column::Model(at) => engine[first + at] = value,
                     Column::Effect(effect, parameter) => given[effect][parameter] = value,
+                    Column::Episode => episode = value as usize,
                 }
             }
             let mut row = Row::with_capacity(given.len());
@@ -200,6 +204,7 @@ impl Simulator for RefinedSimulator {
                     name: &placed.site,
                     values,
                     columns,
+                    episode,
                 })?;
                 row.push(Some(acting));
             }

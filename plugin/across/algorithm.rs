@@ -212,6 +212,10 @@ impl Effect for Across<Box<dyn Effect>> {
         self.run(|effect| effect.delays())
     }
 
+    fn counts_episodes(&self) -> bool {
+        self.run(|effect| effect.counts_episodes())
+    }
+
     fn needs(&self) -> Capabilities {
         self.run(|effect| effect.needs())
     }

@@ -5,7 +5,7 @@ use asid::core::{
     Backend, BatchConfig, Capabilities, Control, Model as _, Rollout, Scene, Simulator,
 };
 use asid::effects::EffectEntry;
-use asid::effects::refined::{Refined, needs};
+use asid::effects::refined::{Refined, counts_episodes, needs};
 use asid::effects::{Effect, EffectSpec};
 use asid::mjcf::Plant;
 
@@ -49,7 +49,7 @@ impl Bench {
         let config = BatchConfig {
             size: 1,
             threads: 1,
-            targets: Vec::new(),
+            targets: counts_episodes(&*model).into_iter().collect(),
         };
         let sensors = &model.layout().sensors;
         Self {
@@ -65,6 +65,15 @@ impl Bench {
                 false => 2e-4,
             },
         }
+    }
+
+    /// Begins an episode of the logs, by its number.
+    pub fn episode(&mut self, number: usize) -> &mut Self {
+        self.simulator.reset(&[0]).unwrap();
+        self.simulator
+            .set_parameters(&[0], &[number as f64])
+            .unwrap();
+        self
     }
 
     pub fn state(&mut self, qpos: &[f64], qvel: &[f64]) -> &mut Self {

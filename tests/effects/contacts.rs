@@ -74,6 +74,19 @@ fn friction_drifts_with_time() {
     );
 }
 
+/// It stops after `v² / (2 mu g)`.
+#[test]
+fn friction_changes_from_episode_to_episode() {
+    let effect = "friction-trend@floor:per_episode=0.2";
+    on_each(BLOCK, &[effect], |bench| {
+        for n in [0, 1, 5] {
+            let [x, _] = slide(bench.episode(n), [1.0, 0.0]);
+            let expected = 1.0 / (2.0 * MU * G * (1.0 + 0.2 * n as f64));
+            near(&bench.engine, x, expected, 0.03 * expected);
+        }
+    });
+}
+
 #[test]
 fn friction_differs_by_direction() {
     let (cos, sin): (f64, f64) = (0.3, -0.2);

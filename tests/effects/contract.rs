@@ -204,7 +204,7 @@ fn the_catalogue_is_complete() {
         rolling-friction friction-patch friction-drift friction-anisotropy contact-restitution \
         contact-stiffness mass center-of-mass inertia payload gravity-tilt constant-force linear-drag \
         quadratic-drag magnus servo-stiffness servo-damping actuator-hysteresis torque-speed-limit \
-        supply-drift geometry";
+        supply-drift geometry episode-offset sensor-trend supply-trend friction-trend";
     for name in wanted.split_whitespace() {
         assert!(names.contains(&name), "{name}");
     }

@@ -140,3 +140,25 @@ fn vectors_have_a_shift_by_entry_and_orientations_none() {
     let spec: asid::effects::EffectSpec = "sensor-bias@turn".parse().unwrap();
     assert!(spec.find(&plant).is_err());
 }
+
+#[test]
+fn a_reading_has_a_shift_of_its_episode() {
+    type Law = fn(usize) -> f64;
+    let laws: [(&str, Law); 2] = [
+        ("sensor-trend@angle:step=-0.02", |n| -0.02 * n as f64),
+        ("episode-offset@angle:e0=0.3,e2=-0.1", |n| match n {
+            0 => 0.3,
+            2 => -0.1,
+            _ => 0.0,
+        }),
+    ];
+    for (effect, shift) in laws {
+        on_each(ROTOR, &[effect], |bench| {
+            for n in [0, 1, 2, 40] {
+                let rows = bench.episode(n).hold(3, &[0.0]);
+                near(&bench.engine, rows[2][0], shift(n), 1e-9);
+                assert_eq!(rows[2][1], 0.0, "{effect}");
+            }
+        });
+    }
+}

@@ -76,3 +76,16 @@ fn a_supply_that_fades_loses_speed_with_the_square_of_time() {
         near(&bench.engine, again, 0.8 / INERTIA, DT / INERTIA);
     });
 }
+
+/// `dv/dt = (1 + rate n) u / I`.
+#[test]
+fn a_supply_that_falls_from_episode_to_episode_gives_a_smaller_share_each_time() {
+    on_each(ROTOR, &["supply-trend@drive:rate=-0.1"], |bench| {
+        for n in [0, 1, 5, 12] {
+            let share = (1.0 - 0.1 * f64::from(n)).max(0.0);
+            let rows = bench.episode(n as usize).hold(500, &[0.5]);
+            let expected = share * 0.5 * 500.0 * DT / INERTIA;
+            near(&bench.engine, rows[499][1], expected, bench.rounding * 10.0);
+        }
+    });
+}

@@ -21,6 +21,7 @@ mod episode_offset;
 mod friction_anisotropy;
 mod friction_drift;
 mod friction_patch;
+mod friction_trend;
 mod geometry;
 mod gravity_tilt;
 mod inertia;
@@ -39,11 +40,13 @@ mod sensor_drift;
 mod sensor_filter;
 mod sensor_quantization;
 mod sensor_scale;
+mod sensor_trend;
 mod servo_damping;
 mod servo_stiffness;
 mod sliding_friction;
 mod stribeck_friction;
 mod supply_drift;
+mod supply_trend;
 mod torque_ripple;
 mod torque_speed_limit;
 mod torsional_friction;
@@ -109,6 +112,9 @@ pub const ALL: &[&dyn Cause] = &[
     &servo_damping::ServoDamping,
     &torque_speed_limit::TorqueSpeedLimit,
     &supply_drift::SupplyDrift,
+    &supply_trend::SupplyTrend,
+    &sensor_trend::SensorTrend,
+    &friction_trend::FrictionTrend,
     &episode_offset::EpisodeOffset,
     &geometry::Geometry,
     &unknown_magnet::Magnet,

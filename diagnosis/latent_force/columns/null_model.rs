@@ -2,6 +2,7 @@
 
 use asid_core::Parameter;
 use asid_effects::{Acts, EffectSpec};
+use asid_mjcf::Plant;
 
 use crate::candidate::Candidate;
 use crate::latent_force::context::Context;
@@ -22,11 +23,11 @@ pub(super) enum Way {
 }
 
 impl Way {
-    /// The way for a candidate. Where walks are replays, all columns are those of whole replays.
-    pub(super) fn of(context: &Context<'_>, candidate: &Candidate) -> Self {
-        if context.has_segments() {
+    /// The way for a candidate. Where some walks are `replayed`, all columns are those of whole replays.
+    pub(super) fn of(replayed: bool, plant: &Plant, candidate: &Candidate) -> Self {
+        if replayed {
             Self::WholeRow
-        } else if is_traceable(context.plant(), candidate) {
+        } else if is_traceable(plant, candidate) {
             Self::Traced
         } else if candidate.effect.acts() == Acts::Model {
             Self::OneStep
@@ -62,7 +63,7 @@ impl NullModel {
         };
         for c in candidates {
             model.first.push(model.theta.len());
-            if Way::of(context, c) != way {
+            if Way::of(context.has_segments(), context.plant(), c) != way {
                 continue;
             }
             model.specs.push(c.spec.clone());

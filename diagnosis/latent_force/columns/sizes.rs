@@ -115,6 +115,7 @@ pub(super) fn sizes(
     let m = wanted.len();
     let source = Source {
         candidates,
+        replayed: source.replayed,
         models: source.models,
         carried: &carried,
         slopes: &slopes,

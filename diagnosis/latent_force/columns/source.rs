@@ -56,6 +56,8 @@ pub(super) type Along = (Vec<f64>, Vec<f64>);
 #[derive(Clone, Copy)]
 pub(super) struct Source<'s> {
     pub(super) candidates: &'s [Candidate],
+    /// Whether some of all walks are segments, if not of those that columns are wanted along.
+    pub(super) replayed: bool,
     /// The present model with those that one step tells of, and with those that take whole rows.
     pub(super) models: &'s [(Way, NullModel)],
     /// What a change in each physics step of a row comes to, one a walk; empty where one step does not tell.
@@ -82,7 +84,7 @@ impl Source<'_> {
         let plant = context.plant();
         let (nv, m) = (plant.layout.nv, wanted.len());
         let (nx, ns) = (2 * nv, context.logs.entries.len());
-        let way = |w: &Wanted| Way::of(context, &self.candidates[w.candidate]);
+        let way = |w: &Wanted| Way::of(self.replayed, plant, &self.candidates[w.candidate]);
         let mut out: Vec<Along> = context
             .walks
             .iter()
@@ -101,7 +103,9 @@ impl Source<'_> {
             let traced = |w: &Wanted| way(w) == Way::Traced;
             for (i, wanted) in wanted.iter().enumerate().filter(|(_, w)| traced(w)) {
                 let candidate = &self.candidates[wanted.candidate];
-                let forces = trace(plant, candidate, &wanted.values, walk, &states[w])?;
+                let episode = context.logs.episodes[walk.episode].number;
+                let along = (walk, episode);
+                let forces = trace(plant, candidate, &wanted.values, along, &states[w])?;
                 for (k, force) in forces.chunks_exact(nv).enumerate() {
                     if force.iter().all(|x| *x == 0.0) {
                         continue;

@@ -7,7 +7,6 @@ use asid_effects::refined::RefinedSimulator;
 
 use crate::latent_force::tangent::retract;
 use crate::latent_force::walk::{Walk, by_substeps};
-use crate::predict::columns_of;
 
 use super::late::retime;
 use super::role::Role;
@@ -126,8 +125,10 @@ impl Part {
                 Role::Varied(i) => &request.variations[*i].theta,
                 _ => request.theta,
             };
-            let row = columns_of(&c.parameters, theta);
-            some.iter().for_each(|_| columns.extend_from_slice(&row));
+            for &e in &some {
+                c.columns
+                    .push(theta, c.episode(self.walks[e]), &mut columns);
+            }
         }
         self.simulator.reset(&all)?;
         self.simulator.set_parameters(&all, &columns)?;

@@ -3,7 +3,6 @@
 use asid_core::{Control, Result, Rollout, Simulator as _};
 
 use crate::latent_force::walk::{Walk, by_substeps};
-use crate::predict::columns_of;
 
 use super::Common;
 use super::pass::Part;
@@ -27,10 +26,13 @@ impl Part {
         if all.is_empty() {
             return Ok(left);
         }
-        let row = columns_of(&c.parameters, theta);
+        let mut columns = Vec::new();
+        for &e in &all {
+            c.columns
+                .push(theta, c.episode(self.walks[e]), &mut columns);
+        }
         self.simulator.reset(&all)?;
-        self.simulator
-            .set_parameters(&all, &row.repeat(all.len()))?;
+        self.simulator.set_parameters(&all, &columns)?;
         let first: Vec<&[f64]> = all.iter().map(|&e| &states[e][..width]).collect();
         let qpos: Vec<f64> = first.iter().flat_map(|s| s[..nq].to_vec()).collect();
         let qvel: Vec<f64> = first.iter().flat_map(|s| s[nq..].to_vec()).collect();

@@ -99,3 +99,18 @@ fn a_force_that_falls_with_speed_ends_at_a_top_speed() {
         near(run.at(t, 1), speed(t), 5e-3);
     }
 }
+
+#[test]
+fn a_supply_that_falls_from_episode_to_episode_gives_a_smaller_share() {
+    let run = Setup::new(SLIDE, "supply-trend", "motor", 0.1)
+        .drawn([0.1; 4])
+        .repeated(3)
+        .run(|_| 4.0);
+    for n in 0..3 {
+        near(
+            run.in_episode(n, 1.0, 1),
+            2.0 * (1.0 - 0.1 * n as f64),
+            1e-6,
+        );
+    }
+}

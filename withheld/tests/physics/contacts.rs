@@ -131,3 +131,16 @@ fn a_contact_of_less_stiffness_gives_way_further_as_an_integration_by_hand_does(
     near(depth, by_hand, 0.05);
     assert!((height - high).abs() < 0.002, "{height} {high}");
 }
+
+#[test]
+fn friction_that_grows_with_the_episodes_brakes_the_more() {
+    let run = Setup::new(PUCK, "friction-trend", "board", 0.5)
+        .from(&[0.0, 0.0, HEIGHT], &[2.0, 0.0, 0.0])
+        .repeated(3)
+        .run(|_| 0.0);
+    let t = 0.4;
+    for n in 0..3 {
+        let a = (1.0 + 0.5 * n as f64) * MU * G;
+        near(run.in_episode(n, t, 0), 2.0 * t - 0.5 * a * t * t, 1e-2);
+    }
+}

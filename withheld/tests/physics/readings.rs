@@ -52,3 +52,19 @@ fn an_eccentric_disc_errs_by_a_sine_of_the_reading() {
     let expected = true_value + 0.01 * (waves * true_value + phase).sin();
     near(run.at(0.4, 0), expected, 1e-9);
 }
+
+#[test]
+fn a_trend_shifts_by_a_step_an_episode_and_an_offset_by_chance() {
+    let of = |cause| {
+        Setup::new(SLIDE, cause, "x", 0.2)
+            .from(&[0.3], &[2.0])
+            .repeated(3)
+            .run(|_| 0.0)
+    };
+    let trend = of("sensor-trend");
+    (0..3).for_each(|n| near(trend.in_episode(n, 0.5, 0), 1.3 + 0.2 * n as f64, 1e-9));
+    let offset = of("episode-offset");
+    let shift = |n, t| offset.in_episode(n, t, 0) - 0.3 - 2.0 * t;
+    assert!(shift(0, 0.5) != shift(1, 0.5));
+    (0..3).for_each(|n| near(shift(n, 1.0), shift(n, 0.0), 1e-9));
+}

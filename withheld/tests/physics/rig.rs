@@ -147,7 +147,12 @@ pub struct Run {
 impl Run {
     /// A number of the readings at a time.
     pub fn at(&self, time: f64, column: usize) -> f64 {
-        self.record.at(0, time, column)
+        self.in_episode(0, time, column)
+    }
+
+    /// The same in an episode.
+    pub fn in_episode(&self, episode: usize, time: f64, column: usize) -> f64 {
+        self.record.at(episode, time, column)
     }
 
     /// A parameter's value.
@@ -169,6 +174,8 @@ pub struct Setup {
     pub start: (Vec<f64>, Vec<f64>),
     /// Length, s.
     pub seconds: f64,
+    /// How many episodes there are, all alike.
+    pub episodes: usize,
 }
 
 impl Setup {
@@ -182,7 +189,13 @@ impl Setup {
             // Signs are positive; no offset of dry friction.
             draw: [0.9, 0.1, 0.9, 0.1],
             seconds: 1.0,
+            episodes: 1,
         }
+    }
+
+    pub fn repeated(mut self, episodes: usize) -> Self {
+        self.episodes = episodes;
+        self
     }
 
     pub fn from(mut self, qpos: &[f64], qvel: &[f64]) -> Self {
@@ -236,7 +249,8 @@ impl Setup {
             let cause = causes::named(name).expect("a cause");
             values.extend(cause.act(&place, size, &mut world));
         }
-        let record = simulate(&anatomy, &mut world, &[motion]).expect("a run");
+        let motions = vec![motion; self.episodes];
+        let record = simulate(&anatomy, &mut world, &motions).expect("a run");
         Run {
             record,
             values,
