@@ -24,6 +24,7 @@ mod filter;
 mod matrix;
 mod regress;
 mod segment;
+mod shown;
 
 use nalgebra::{DMatrix, DVector};
 

@@ -5,7 +5,7 @@ use asid::core::registry::all;
 use asid::core::{Backend, BatchConfig, Capabilities, Control, Model as _, Rollout, Target};
 use asid::effects::EffectEntry;
 use asid::effects::EffectSpec;
-use asid::effects::refined::{Refined, needs};
+use asid::effects::refined::{Refined, counts_episodes, needs};
 use asid::mjcf::Plant;
 
 use super::bench::{engines, scene};
@@ -37,6 +37,8 @@ const FLOOR: &str = r#"<mujoco><compiler angle="radian"/><option timestep="0.002
 
 const FRAMES: usize = 40;
 const SUBSTEPS: usize = 5;
+/// The episode that the readings are of, for effects that count them.
+const EPISODE: f64 = 3.0;
 
 /// Commands that move everything, `frames x nu`.
 fn commands(nu: usize) -> Vec<f64> {
@@ -54,12 +56,17 @@ fn readings(
 ) -> asid::core::Result<Vec<u64>> {
     let model = Refined::load(backend, &scene(xml), effects)?;
     let layout = model.layout().clone();
+    let counted = counts_episodes(&*model);
     let config = BatchConfig {
         size: 1,
         threads: 1,
-        targets: targets.to_vec(),
+        targets: targets.iter().cloned().chain(counted.clone()).collect(),
     };
     let mut simulator = model.simulator(&config)?;
+    if counted.is_some() {
+        assert!(targets.is_empty(), "of effects no target is set");
+        simulator.set_parameters(&[0], &[EPISODE])?;
+    }
     let names: Vec<_> = layout.sensors.iter().map(|s| s.name.clone()).collect();
     let recording = layout.recording(&names)?;
     let control = commands(layout.nu());

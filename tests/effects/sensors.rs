@@ -1,6 +1,6 @@
 //! Effects on readings, against the same readings without them.
 
-use super::bench::{Bench, engines_for, near};
+use super::bench::{Bench, engines_for, near, on_each};
 use super::{DT, ROTOR};
 
 /// Rows of 10 ms.

@@ -4,6 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::filter::Filter;
 use super::matrix::multiply_columns;
+use super::shown::Shown;
 use super::{NoiseModel, Problem, Regression};
 
 /// Innovations that are collected before they are added up.
@@ -11,7 +12,9 @@ pub(super) const BLOCK: usize = 128;
 
 /// Filters an episode with its columns.
 #[must_use]
-pub fn regress(problem: Problem<'_>, noise: &NoiseModel, m: usize) -> Regression {
+pub fn regress(problem: Problem<'_>, noise: &NoiseModel, all: usize) -> Regression {
+    let shown = Shown::of(problem.linear, all);
+    let m = shown.len();
     let mut filter = Filter::new(problem, noise);
     let (nx, nz, ns) = (filter.nx, filter.nz, filter.ns);
     let mut out = Regression {
@@ -32,7 +35,7 @@ pub fn regress(problem: Problem<'_>, noise: &NoiseModel, m: usize) -> Regression
                 continue;
             };
             let own = (k * ns + entry) * m;
-            column.copy_from_slice(&problem.linear.reading_columns[own..own + m]);
+            column.copy_from_slice(&shown.readings[own..own + m]);
             let h = filter.slope(k, entry);
             for (i, &h) in h.iter().enumerate().filter(|(_, h)| **h != 0.0) {
                 let row = &sensitivity[i * m..(i + 1) * m];
@@ -67,7 +70,7 @@ pub fn regress(problem: Problem<'_>, noise: &NoiseModel, m: usize) -> Regression
             continue;
         }
         multiply_columns(&filter.transition, &sensitivity, (nz, m), &mut next);
-        let own = &problem.linear.state_columns[k * nx * m..(k + 1) * nx * m];
+        let own = &shown.states[k * nx * m..(k + 1) * nx * m];
         next.iter_mut().zip(own).for_each(|(t, c)| *t += c);
         std::mem::swap(&mut sensitivity, &mut next);
     }
@@ -75,6 +78,7 @@ pub fn regress(problem: Problem<'_>, noise: &NoiseModel, m: usize) -> Regression
     let innovations = innovations.rows(0, filled);
     out.gram.gemm(1.0, &block, &block.transpose(), 1.0);
     out.moment.gemv(1.0, &block, &innovations, 1.0);
+    (out.gram, out.moment) = shown.spread(&out.gram, &out.moment);
     out.log_likelihood = filter.total();
     out
 }

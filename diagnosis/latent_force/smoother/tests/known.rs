@@ -148,3 +148,25 @@ fn a_row_that_the_engine_did_not_carry_splits_the_walk_in_two() {
         assert_same((found.moment - both.moment).amax(), 0.0, "X'y");
     }
 }
+
+#[test]
+fn a_column_that_is_zero_all_along_leaves_the_others_as_they_are() {
+    let (force, mass, dt) = (3.0, 2.0, 0.01);
+    let noise = NoiseModel {
+        q: vec![1.0],
+        tau: vec![0.1],
+        white: vec![0.1],
+        r: vec![1e-6],
+    };
+    let mut case = Case::slide(mass, dt, &pushed(force, mass, dt, 101), noise);
+    let alone = regress(case.problem(), &case.noise, 1);
+    let beside = |columns: &[f64]| columns.iter().flat_map(|x| [0.0, *x, 0.0]).collect();
+    case.linear.state_columns = beside(&case.linear.state_columns);
+    case.linear.reading_columns = beside(&case.linear.reading_columns);
+    let found = regress(case.problem(), &case.noise, 3);
+    assert_eq!(found.gram[(1, 1)], alone.gram[(0, 0)]);
+    assert_eq!(found.moment[1], alone.moment[0]);
+    assert_eq!(found.log_likelihood, alone.log_likelihood);
+    assert_eq!(found.gram.sum(), alone.gram.sum());
+    assert_eq!(found.moment.sum(), alone.moment.sum());
+}
