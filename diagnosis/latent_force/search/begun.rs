@@ -5,9 +5,14 @@ use asid_core::Result;
 use crate::latent_force::fit::taken_along;
 use crate::latent_force::screen::Screened;
 
+use super::open_loop::MOST;
 use super::round::Upon;
 use super::screening::Screening;
 use super::set::Set;
+
+/// Parts of the way that a tangent at the null goes, besides the whole of it, at which replays of whole logs are asked: each twice the next, since a
+/// fit goes on from half or twice its values.
+const PARTS: [f64; 4] = [0.25, 0.5, 2.0, 4.0];
 
 impl Upon<'_> {
     /// The base with the candidates of a set of a screening, at the values where a fit of it begins. Where bodies touch, starts of segments
@@ -22,6 +27,9 @@ impl Upon<'_> {
             return Ok(best);
         }
         if !screened.forms.iter().any(|&f| is_secant(f)) {
+            if let Some(further) = self.further(&best)? {
+                return self.with_starts(further);
+            }
             let fitted = &mut best.fitted;
             let model = (&fitted.hypothesis, &fitted.theta[..]);
             let along = (
@@ -50,16 +58,51 @@ impl Upon<'_> {
                 }
             }
         }
-        // Segments first find starts that go with those values, which would else go with the starts.
-        let free = best.fitted.hypothesis.free();
+        self.with_starts(best)
+    }
+
+    /// An enlarged set with the added values at another distance from their nulls, where replays of whole logs leave by far less there: a slope at
+    /// the null tells the direction, and over how far it holds only they do. A contact that gives back three times as much is no three times
+    /// what a third of that does.
+    fn further(&self, set: &Set) -> Result<Option<Set>> {
+        let own = self.base.fitted.theta.len()..set.fitted.theta.len();
+        let at = |part: f64| {
+            let mut other = set.clone();
+            let values = &mut other.fitted.theta[own.clone()];
+            let unknowns = &set.fitted.hypothesis.unknowns[own.clone()];
+            for (value, u) in values.iter_mut().zip(unknowns) {
+                let moved = u.center + part * (*value - u.center);
+                *value = moved.clamp(u.bounds[0], u.bounds[1]);
+            }
+            other
+        };
+        let most = MOST * (self.open_loop.excess)(set)?;
+        let mut best = None;
+        let mut least = most;
+        for part in PARTS {
+            if self.progress.is_stopped() {
+                return Ok(None);
+            }
+            let other = at(part);
+            let left = (self.open_loop.excess)(&other)?;
+            if left < least {
+                (least, best) = (left, Some(other));
+            }
+        }
+        Ok(best)
+    }
+
+    /// A set whose segments first find starts that go with its values, which would else go with the starts.
+    fn with_starts(&self, mut set: Set) -> Result<Set> {
+        let free = set.fitted.hypothesis.free();
         let hold = |set: &mut Set, free_too: bool| {
             let unknowns = &mut set.fitted.hypothesis.unknowns;
             free.iter().for_each(|&i| unknowns[i].free = free_too);
         };
-        hold(&mut best, false);
-        best.fit(self.context, (self.breadth.rounds[0], self.progress))?;
-        hold(&mut best, true);
-        Ok(best)
+        hold(&mut set, false);
+        set.fit(self.context, (self.breadth.rounds[0], self.progress))?;
+        hold(&mut set, true);
+        Ok(set)
     }
 }
 

@@ -12,7 +12,7 @@ use super::set::Set;
 /// Share of what the set that stands leaves of the gap that a further name must close to count by it, where it leaves the missing force as it is:
 /// more than half, as in a small gap ([`crate::decision`]). What errors add up to over a whole log may change by a few per cent for
 /// any reason.
-const MOST: f64 = 0.5;
+pub(super) const MOST: f64 = 0.5;
 
 /// Open-loop replays of whole logs.
 #[derive(Clone, Copy)]
