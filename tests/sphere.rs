@@ -247,6 +247,38 @@ fn a_softer_ball_leaves_the_paddle_faster() {
     );
 }
 
+/// A paddle that stops lets the ball roll on as fast as it was itself, but for what the contact's spring gives back.
+#[test]
+fn a_struck_ball_rolls_on_as_fast_as_the_paddle() {
+    on_every_engine(
+        "sphere-striking",
+        "",
+        Capabilities::empty(),
+        |engine, problem| {
+            let protocol = problem.task.downstream();
+            let start: Vec<f64> = protocol.start.iter().map(|c| c.center()).collect();
+            let layout = problem.model.layout();
+            let recording = layout.recording(&protocol.channels).unwrap();
+            let substeps = problem.substeps(protocol.frame_period).unwrap();
+            for speed in [0.3, 0.6, 0.9] {
+                let mut batch = problem.batch(1).unwrap();
+                batch.set_parameters(&[0], &[1e-3]).unwrap();
+                batch.place(problem.task, &[0], &start).unwrap();
+                let control = problem.task.attempt(&start, &[speed, 0.0]).unwrap();
+                let control = Control::Shared(&control);
+                let rollout = Rollout::new(&[0], protocol.frames, substeps, control, &recording);
+                let mut out = vec![0.0; protocol.frames * 3];
+                batch.simulator.rollout(&rollout, &mut out).unwrap();
+                let at: Vec<&[f64]> = out.chunks_exact(3).collect();
+                let step = |w: &[&[f64]]| (w[1][0] - w[0][0]).hypot(w[1][1] - w[0][1]);
+                let fastest = at.windows(2).map(step).fold(0.0, f64::max) / protocol.frame_period;
+                println!("{engine}: struck at {speed} m/s the ball leaves at {fastest:.3} m/s");
+                assert!((fastest / speed - 1.0).abs() < 0.05, "{engine}: {fastest}");
+            }
+        },
+    );
+}
+
 /// Moves the hand on a straight line towards where a ball was first seen.
 struct Towards {
     /// First entry of the ball's position in a reading's row, and of the hand's.

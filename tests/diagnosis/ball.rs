@@ -19,24 +19,29 @@ const NOISE: f64 = 1e-3;
 /// Time steps of the model and of the real ball, s.
 const STEPS: [f64; 2] = [0.001, 0.0005];
 
-/// The ball above a floor that gives way, with gravity `down` the floor and along it.
-fn scene(timestep: f64, [along, down]: [f64; 2]) -> String {
+/// The ball above a floor that gives way, with gravity `down` the floor and along it, and a contact whose damping is so many times the model's.
+fn scene(timestep: f64, [along, down]: [f64; 2], damping: f64) -> String {
+    let solref = format!("-40000 -{}", 18.0 * damping);
     format!(
         r#"<mujoco model="ball"><option timestep="{timestep}" gravity="{along} 0 -{down}" cone="elliptic"/>
-        <worldbody><geom name="floor" type="plane" size="20 20 0.1" friction="0.4 0.005 0.0001" solref="-40000 -18"/>
+        <worldbody><geom name="floor" type="plane" size="20 20 0.1" friction="0.4 0.005 0.0001" solref="{solref}"/>
         <body name="ball" pos="0 0 1"><freejoint name="ball_free"/>
-        <geom name="ball" type="sphere" size="0.05" mass="0.06" friction="0.4 0.005 0.0001" condim="6" solref="-40000 -18"/></body>
+        <geom name="ball" type="sphere" size="0.05" mass="0.06" friction="0.4 0.005 0.0001" condim="6" solref="{solref}"/></body>
         </worldbody><sensor><framepos name="place" objtype="xbody" objname="ball"/></sensor></mujoco>"#
     )
 }
 
-/// Writes logs of a ball on a floor that is tilted by an angle, rad, and the model that does not know of it: so many, the last to hold out, of
-/// which some are thrown from so `high` that they never touch the floor.
-fn write_study(folder: &Path, tilt: f64, (episodes, high): (u32, &[u32])) {
+/// The ball on a floor that is tilted by an angle, rad.
+fn tilted(tilt: f64) -> String {
     let (sin, cos) = tilt.sin_cos();
-    let real = scene(STEPS[1], [9.81 * sin, 9.81 * cos]);
+    scene(STEPS[1], [9.81 * sin, 9.81 * cos], 1.0)
+}
+
+/// Writes logs of a real ball, and the model that does not know of what it has: so many, the last to hold out, of which some are thrown from so
+/// `high` that they never touch the floor.
+fn write_study(folder: &Path, real: &str, (episodes, high): (u32, &[u32])) {
     let scene_of = |xml: &str| Scene::from_xml("ball", xml, &[]).unwrap();
-    let model = engine().load(&scene_of(&real)).unwrap();
+    let model = engine().load(&scene_of(real)).unwrap();
     let mut simulator = model
         .simulator(&BatchConfig {
             size: 1,
@@ -84,25 +89,29 @@ fn write_study(folder: &Path, tilt: f64, (episodes, high): (u32, &[u32])) {
         };
         std::fs::write(folder.join(format!("{name}_{episode}.csv")), text).unwrap();
     }
-    std::fs::write(folder.join("nominal.xml"), scene(STEPS[0], [0.0, 9.81])).unwrap();
+    std::fs::write(
+        folder.join("nominal.xml"),
+        scene(STEPS[0], [0.0, 9.81], 1.0),
+    )
+    .unwrap();
     let study = "model = \"nominal.xml\"\ntrain = [\"train_*.csv\"]\ntest = [\"test_*.csv\"]\n";
     std::fs::write(folder.join("study.toml"), study).unwrap();
 }
 
-fn diagnosed(tilt: f64, logs: (u32, &[u32])) -> Option<DiagnosisResult> {
+fn diagnosed(real: &str, logs: (u32, &[u32])) -> Option<DiagnosisResult> {
     // A floor that gives way is MuJoCo's.
     let needed = Capabilities::CONTACT | Capabilities::DOUBLE_PRECISION;
     if !engine().capabilities().contains(needed) {
         return None;
     }
     let folder = tempfile::tempdir().unwrap();
-    write_study(folder.path(), tilt, logs);
+    write_study(folder.path(), real, logs);
     Some(run_on(folder.path(), &[]).0.result)
 }
 
 #[test]
 fn a_tilt_is_told_from_bounces_and_what_bounces_scatter_by_is_stated() {
-    let Some(r) = diagnosed(0.05, (5, &[])) else {
+    let Some(r) = diagnosed(&tilted(0.05), (5, &[])) else {
         return;
     };
     assert_eq!(r.verdict.effects, ["gravity-tilt"], "{}", r.sentence);
@@ -116,7 +125,7 @@ fn a_tilt_is_told_from_bounces_and_what_bounces_scatter_by_is_stated() {
 
 #[test]
 fn a_ball_that_lacks_nothing_is_accused_of_nothing() {
-    let Some(r) = diagnosed(0.0, (5, &[])) else {
+    let Some(r) = diagnosed(&tilted(0.0), (5, &[])) else {
         return;
     };
     assert_eq!(r.verdict.kind, Kind::None, "{}", r.sentence);
@@ -126,8 +135,24 @@ fn a_ball_that_lacks_nothing_is_accused_of_nothing() {
 /// All candidates are first tried along each third log, and here nothing touches in these.
 #[test]
 fn flights_among_bounces_are_taken_as_bounces_are() {
-    let Some(r) = diagnosed(0.05, (7, &[1, 4])) else {
+    let Some(r) = diagnosed(&tilted(0.05), (7, &[1, 4])) else {
         return;
     };
     assert_eq!(r.verdict.effects, ["gravity-tilt"], "{}", r.sentence);
+}
+
+/// The slope at the model's own damping tells less than half of what a bounce with three times as much loses.
+#[test]
+fn a_floor_that_takes_three_times_as_much_is_named() {
+    let real = scene(STEPS[1], [0.0, 9.81], 3.0);
+    let Some(r) = diagnosed(&real, (5, &[])) else {
+        return;
+    };
+    assert_eq!(
+        r.verdict.effects,
+        ["contact-restitution@floor"],
+        "{}",
+        r.sentence
+    );
+    assert!(r.gap.refined < 0.2 * r.gap.identified, "{:?}", r.gap);
 }

@@ -2,6 +2,7 @@
 
 use asid_core::Result;
 
+use crate::findings::NEGLIGIBLE;
 use crate::latent_force::fit::taken_along;
 use crate::latent_force::screen::Screened;
 
@@ -61,9 +62,10 @@ impl Upon<'_> {
         self.with_starts(best)
     }
 
-    /// An enlarged set with the added values at another distance from their nulls, where replays of whole logs leave by far less there: a slope at
-    /// the null tells the direction, and over how far it holds only they do. A contact that gives back three times as much is no three times
-    /// what a third of that does.
+    /// An enlarged set with the added values at another distance from their nulls, where replays of whole logs leave by far less there than where
+    /// it stands and than at the null: a slope at the null tells the direction, and over how far it holds only they do. A contact that gives
+    /// back three times as much is no three times what a third of that does. Where the null leaves no more than another program's
+    /// version of the same machine would, the set stays.
     fn further(&self, set: &Set) -> Result<Option<Set>> {
         let own = self.base.fitted.theta.len()..set.fitted.theta.len();
         let at = |part: f64| {
@@ -76,15 +78,19 @@ impl Upon<'_> {
             }
             other
         };
-        let most = MOST * (self.open_loop.excess)(set)?;
+        let excess = |set: &Set| (self.open_loop.excess)(set);
+        let stands = excess(self.base)?;
+        if stands < NEGLIGIBLE * NEGLIGIBLE {
+            return Ok(None);
+        }
+        let mut least = MOST * excess(set)?.min(stands);
         let mut best = None;
-        let mut least = most;
         for part in PARTS {
             if self.progress.is_stopped() {
                 return Ok(None);
             }
             let other = at(part);
-            let left = (self.open_loop.excess)(&other)?;
+            let left = excess(&other)?;
             if left < least {
                 (least, best) = (left, Some(other));
             }
