@@ -6,7 +6,7 @@ mod rows;
 mod told;
 mod without_effects;
 
-use asid_core::{Error, Progress, Result};
+use asid_core::{Progress, Result};
 
 use crate::candidate::{Candidate, LeftOut, enumerate};
 use crate::ceiling::Left;
@@ -56,9 +56,21 @@ struct Searched {
     drawn: (Vec<ForceTrace>, Vec<Left>),
 }
 
+impl Searched {
+    /// This one, or another one that leaves less.
+    fn or(self, other: Self) -> Self {
+        if other.excess < self.excess {
+            other
+        } else {
+            self
+        }
+    }
+}
+
 /// Fits the model without effects, and searches for what is missing. Where bodies touch, that is done in the longest segments that can be
 /// repeated, for a small force tells the more the longer it acts. Where replays of whole logs then leave most of the gap, the shortest are asked
-/// too, whose replays are next to linear in where they begin, and the answer stands that leaves less.
+/// too, whose replays are next to linear in where they begin, and then whole logs, where replays from their starts can be repeated: a ball whose
+/// spin no sensor reads keeps over a log what it was thrown with. The answer stands that leaves least.
 fn searched(null: Null<'_>, shown_steps: &[Shown], settings: &Settings) -> Result<Searched> {
     let mut short = null.shortest()?;
     let mut long = None;
@@ -66,20 +78,20 @@ fn searched(null: Null<'_>, shown_steps: &[Shown], settings: &Settings) -> Resul
         long = null.longer(&mut short)?;
     }
     let repeats = long.as_ref().unwrap_or(&short).repeats;
-    let mut found: Option<Searched> = None;
-    for stands in [long, Some(short)].iter_mut().flatten() {
-        if let Some(found) = &found
-            && (!found.leaves_most || null.progress.is_stopped())
-        {
-            break;
-        }
-        let other = searched_in(null, stands, (shown_steps, settings))?;
-        if found.as_ref().is_none_or(|f| other.excess < f.excess) {
-            found = Some(other);
-        }
-    }
-    let mut found = found.ok_or_else(|| Error::Failed("no segments were searched".into()))?;
+    let how = (shown_steps, settings);
+    let is_open = |found: &Searched| found.leaves_most && !null.progress.is_stopped();
+    let mut found = searched_in(null, long.as_mut().unwrap_or(&mut short), how)?;
     found.repeats = repeats;
+    if long.is_some() && is_open(&found) {
+        found = found.or(searched_in(null, &mut short, how)?);
+        found.repeats = repeats;
+    }
+    if short.context.has_segments()
+        && is_open(&found)
+        && let Some(mut whole) = null.whole(&short)?
+    {
+        found = found.or(searched_in(null, &mut whole, how)?);
+    }
     Ok(found)
 }
 

@@ -51,6 +51,16 @@ pub fn cut(walk: &Walk, touches: &[bool], duration: f64) -> Vec<Walk> {
     out
 }
 
+/// A walk as one segment from its first row on, where something touches (one flag a row); as it is where nothing does.
+#[must_use]
+pub fn whole(walk: &Walk, touches: &[bool]) -> Walk {
+    let mut walk = walk.clone();
+    if touches.contains(&true) {
+        walk.segment = Some(0);
+    }
+    walk
+}
+
 type Run = (std::ops::Range<usize>, bool);
 
 fn runs_of(flags: &[bool]) -> Vec<Run> {
@@ -151,6 +161,15 @@ mod tests {
         let parts = cut(&walk, &[true; 100], 0.25);
         assert_eq!(parts[0].segment, Some(0));
         assert_eq!(parts.len(), 4);
+    }
+
+    #[test]
+    fn a_log_can_be_one_segment_from_its_first_row_on() {
+        let walk = walk(400);
+        let touches: Vec<bool> = (0..400).map(|k| (150..230).contains(&k)).collect();
+        assert_eq!(counted(&whole(&walk, &touches)), 0..400);
+        assert_eq!(whole(&walk, &touches).segment, Some(0));
+        assert_eq!(whole(&walk, &[false; 400]), walk);
     }
 
     #[test]

@@ -5,7 +5,7 @@ use asid_core::Result;
 use crate::bench::Bench;
 use crate::latent_force::context::Taken;
 use crate::latent_force::initial::{from_readings, position_noise, scales};
-use crate::latent_force::segments::cut;
+use crate::latent_force::segments::{cut, whole};
 use crate::latent_force::touching::touching;
 use crate::latent_force::walk::Walk;
 use crate::predict::Point;
@@ -74,9 +74,20 @@ impl Rows {
 
     /// Them in segments of a duration, s, where something touches.
     pub(super) fn cut(&self, study: &Study, bench: &Bench, duration: f64) -> Taken {
-        let plant = &bench.machine.plant;
         let each = self.walks.iter().zip(&self.touches);
-        let walks: Vec<Walk> = each.flat_map(|(walk, t)| cut(walk, t, duration)).collect();
+        let walks = each.flat_map(|(walk, t)| cut(walk, t, duration));
+        self.taken(study, bench, walks.collect())
+    }
+
+    /// Them with each log in which something touches as one segment.
+    pub(super) fn whole(&self, study: &Study, bench: &Bench) -> Taken {
+        let each = self.walks.iter().zip(&self.touches);
+        let walks = each.map(|(walk, t)| whole(walk, t));
+        self.taken(study, bench, walks.collect())
+    }
+
+    fn taken(&self, study: &Study, bench: &Bench, walks: Vec<Walk>) -> Taken {
+        let plant = &bench.machine.plant;
         let given = |w: &Walk| {
             let episode = &study.train[w.episode].1;
             let known = w.rows[0] == 0 && episode.initial.is_some();

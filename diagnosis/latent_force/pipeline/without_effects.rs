@@ -40,7 +40,16 @@ pub(super) struct Stands<'a> {
     pub(super) repeats: Option<Repeats>,
 }
 
-/// A fit in segments of some duration, or how their replays scatter where they are too long.
+/// How long segments are.
+#[derive(Clone, Copy)]
+enum Length {
+    /// Some duration, s, within a stretch of contact.
+    Of(f64),
+    /// A whole log, from its first row on.
+    Log,
+}
+
+/// A fit in segments of some length, or how their replays scatter where they are too long.
 enum Tried<'a> {
     Stands(Box<Stands<'a>>),
     Scatters(Repeats),
@@ -68,7 +77,7 @@ impl<'a> Null<'a> {
     /// When the engine fails.
     pub(super) fn shortest(self) -> Result<Stands<'a>> {
         let finer = self.bench.machine.halved().ok();
-        match self.fit_in(DURATIONS[0], finer.as_ref(), None)? {
+        match self.fit_in(Length::Of(DURATIONS[0]), finer.as_ref(), None)? {
             Tried::Stands(stands) => self.fitted_on(*stands),
             Tried::Scatters(_) => Err(Error::Failed("there is no shorter segment".into())),
         }
@@ -87,7 +96,7 @@ impl<'a> Null<'a> {
             if before.repeats.is_none_or(|r| r.scatters) || self.progress.is_stopped() {
                 break;
             }
-            match self.fit_in(*duration, finer.as_ref(), Some(before))? {
+            match self.fit_in(Length::Of(*duration), finer.as_ref(), Some(before))? {
                 Tried::Stands(longer) => stands = Some(*longer),
                 Tried::Scatters(repeats) => {
                     stands.as_mut().unwrap_or(shorter).repeats = Some(repeats);
@@ -95,6 +104,18 @@ impl<'a> Null<'a> {
             }
         }
         stands.map(|s| self.fitted_on(s)).transpose()
+    }
+
+    /// Fits it in segments that are whole logs, from where shorter ones begin; `None` where their replays scatter.
+    ///
+    /// # Errors
+    /// When the engine fails.
+    pub(super) fn whole(self, shorter: &Stands<'a>) -> Result<Option<Stands<'a>>> {
+        let finer = self.bench.machine.halved().ok();
+        match self.fit_in(Length::Log, finer.as_ref(), Some(shorter))? {
+            Tried::Stands(stands) => self.fitted_on(*stands).map(Some),
+            Tried::Scatters(_) => Ok(None),
+        }
     }
 
     /// Fits it to the end in the segments that stand.
@@ -111,15 +132,18 @@ impl<'a> Null<'a> {
         Ok(stands)
     }
 
-    /// Fits it in segments of a duration, s, a little, unless their replays scatter and shorter ones stand.
+    /// Fits it in segments of a length, a little, unless their replays scatter and shorter ones stand.
     fn fit_in(
         self,
-        duration: f64,
+        length: Length,
         finer: Option<&Machine>,
         shorter: Option<&Stands<'a>>,
     ) -> Result<Tried<'a>> {
         let (hypothesis, progress) = (self.hypothesis, self.progress);
-        let taken = self.rows.cut(self.study, self.bench, duration);
+        let (taken, duration) = match length {
+            Length::Of(duration) => (self.rows.cut(self.study, self.bench, duration), duration),
+            Length::Log => (self.rows.whole(self.study, self.bench), f64::INFINITY),
+        };
         let parameters = (&self.study.parameters[..], self.begin);
         let (context, mut estimate) = begin(&self.bench.machine, self.logs, taken, parameters)?;
         let mut theta = self.begin;
