@@ -82,6 +82,18 @@ pub struct Bench {
 /// An effect to be tried: a candidate, and values to start from.
 pub type Trial<'a> = (&'a Candidate, Vec<f64>);
 
+/// A parameter of an effect whose range has a value in it, and as much beyond: steps of its slopes are shares of the range.
+fn around(mut parameter: Parameter, value: f64) -> Parameter {
+    let [low, high] = &mut parameter.range;
+    if value < *low {
+        *low = 2.0 * value;
+    }
+    if value > *high {
+        *high = 2.0 * value;
+    }
+    parameter
+}
+
 /// The effects of trials at their sites.
 #[must_use]
 pub fn specs(trials: &[Trial<'_>]) -> Vec<EffectSpec> {
@@ -99,13 +111,12 @@ impl Bench {
     #[must_use]
     pub fn unknowns(&self, trials: &[Trial<'_>]) -> Vec<Unknown> {
         let mut all: Vec<Unknown> = self.parameters.iter().cloned().map(Unknown::free).collect();
-        for (candidate, _) in trials {
-            all.extend(
-                candidate
-                    .unknowns()
-                    .into_iter()
-                    .map(|(parameter, free)| Unknown { parameter, free }),
-            );
+        for (candidate, values) in trials {
+            let own = candidate.unknowns().into_iter().zip(values);
+            all.extend(own.map(|((parameter, free), value)| Unknown {
+                parameter: around(parameter, *value),
+                free,
+            }));
         }
         all
     }

@@ -39,6 +39,10 @@ pub struct LeftOut {
     pub why: String,
 }
 
+/// How much larger than on a table a value may be that grows with the machine: mass grows with the third power of length, and a machine
+/// may be ten times as long.
+const LARGER: f64 = 1000.0;
+
 /// Most starts of one candidate.
 const MAX_STARTS: usize = 24;
 
@@ -80,6 +84,16 @@ impl Candidate {
                 (parameter, free && !self.is_tolerance && self.is_fitted(p))
             })
             .collect()
+    }
+
+    /// How far a fit may take a parameter: over its range, and [`LARGER`] times as far where that is the range of a machine on a table.
+    #[must_use]
+    pub fn limits(&self, parameter: usize) -> [f64; 2] {
+        let range = self.ranges[parameter];
+        if self.is_tolerance {
+            return range;
+        }
+        limits(&self.parameters()[parameter], range)
     }
 
     /// Parameters that act in proportion from their null value on.
@@ -225,6 +239,15 @@ fn of_contacts(effect: &dyn Effect, plant: &Plant, site: &str) -> bool {
     !targets.is_empty() && targets.iter().all(contact)
 }
 
+/// How far a fit may take a parameter that has some range.
+fn limits(parameter: &EffectParameter, range: [f64; 2]) -> [f64; 2] {
+    if parameter.grows_with_the_machine() {
+        range.map(|end| LARGER * end)
+    } else {
+        range
+    }
+}
+
 /// Ranges of the parameters; a place lies where the body goes.
 fn ranges(effect: &dyn Effect, plant: &Plant, site: &str, shown: &Trajectory) -> Vec<[f64; 2]> {
     let parameters = effect.parameters().iter();
@@ -277,7 +300,8 @@ fn starts(effect: &dyn Effect, plant: &Plant, site: &str, shown: &Trajectory) ->
                 };
                 values.into_iter().map(|x| {
                     let mut other = row.clone();
-                    other[i] = x.clamp(p.range[0], p.range[1]);
+                    let [low, high] = limits(p, p.range);
+                    other[i] = x.clamp(low, high);
                     other
                 })
             })

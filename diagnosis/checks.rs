@@ -107,7 +107,7 @@ pub fn repeatability(repeats: Repeats) -> CheckResult {
     let segments = if repeats.duration.is_finite() {
         format!("segments of {} s", repeats.duration)
     } else {
-        "whole stretches of contact".into()
+        "whole logs or stretches of contact".into()
     };
     let lost = 100.0 * repeats.lost;
     let so = if repeats.scatters {

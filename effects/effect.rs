@@ -86,6 +86,16 @@ impl EffectParameter {
         self.null == self.range[1]
     }
 
+    /// Whether its values grow with the machine's mass, or are in a unit that the model chooses: its range is then that of a
+    /// machine on a table.
+    #[must_use]
+    pub fn grows_with_the_machine(&self) -> bool {
+        !self.is_limit()
+            && ["N", "kg", "unit"]
+                .iter()
+                .any(|part| self.unit.contains(part))
+    }
+
     /// The same as the value of one episode of the logs.
     #[must_use]
     pub const fn of_episode(mut self, number: usize) -> Self {

@@ -79,7 +79,7 @@ fn resize(
             continue;
         };
         let candidate = &candidates[form.candidate];
-        let [low, high] = candidate.ranges[*p];
+        let [low, high] = candidate.limits(*p);
         *factor = factor.min(0.5 * (high - low) / *size);
         *size *= *factor;
         all_bounds[column] = bounds(candidate, *p, *size);

@@ -50,7 +50,7 @@ pub fn limits(
         for (column, slope) in form.columns().zip(&form.slopes) {
             let c = coefficient(gram[(column, column)].max(0.0), threshold);
             let (parameter, value) = match *slope {
-                Some((p, size)) => (p, within(candidate.ranges[p], parameters[p].null, c * size)),
+                Some((p, size)) => (p, within(candidate.limits(p), parameters[p].null, c * size)),
                 None => {
                     let moves = |p: &usize| {
                         let is_given = |s: &Start| {

@@ -6,7 +6,7 @@ mod rows;
 mod told;
 mod without_effects;
 
-use asid_core::{Progress, Result};
+use asid_core::{Error, Progress, Result};
 
 use crate::candidate::{Candidate, LeftOut, enumerate};
 use crate::ceiling::Left;
@@ -68,31 +68,36 @@ impl Searched {
 }
 
 /// Fits the model without effects, and searches for what is missing. Where bodies touch, that is done in the longest segments that can be
-/// repeated, for a small force tells the more the longer it acts. Where replays of whole logs then leave most of the gap, the shortest are asked
-/// too, whose replays are next to linear in where they begin, and then whole logs, where replays from their starts can be repeated: a ball whose
-/// spin no sensor reads keeps over a log what it was thrown with. The answer stands that leaves least.
+/// repeated, for a small force tells the more the longer it acts: in whole logs, for a ball whose spin no sensor reads keeps over a log what it was
+/// thrown with; in the longest stretches of contact; and in the shortest, whose replays are next to linear in where they begin. Each is asked where replays of
+/// whole logs leave most of the gap by the answer before it, and the answer stands that leaves least.
 fn searched(null: Null<'_>, shown_steps: &[Shown], settings: &Settings) -> Result<Searched> {
+    let how = (shown_steps, settings);
     let mut short = null.shortest()?;
+    if !short.context.has_segments() || !leaves_a_gap(null, &short)? {
+        return searched_in(null, &mut short, how);
+    }
+    let is_open = |found: &Searched| found.leaves_most && !null.progress.is_stopped();
+    let mut found = match null.whole(&short)? {
+        Some(mut whole) => Some(searched_in(null, &mut whole, how)?),
+        None => None,
+    };
     let mut long = None;
-    if short.context.has_segments() && leaves_a_gap(null, &short)? {
+    if found.as_ref().is_none_or(is_open) {
         long = null.longer(&mut short)?;
     }
     let repeats = long.as_ref().unwrap_or(&short).repeats;
-    let how = (shown_steps, settings);
-    let is_open = |found: &Searched| found.leaves_most && !null.progress.is_stopped();
-    let mut found = searched_in(null, long.as_mut().unwrap_or(&mut short), how)?;
-    found.repeats = repeats;
-    if long.is_some() && is_open(&found) {
-        found = found.or(searched_in(null, &mut short, how)?);
-        found.repeats = repeats;
+    for stands in [long, Some(short)].iter_mut().flatten() {
+        if found.as_ref().is_none_or(is_open) {
+            let other = searched_in(null, stands, how)?;
+            let other = Searched { repeats, ..other };
+            found = Some(match found {
+                Some(found) => found.or(other),
+                None => other,
+            });
+        }
     }
-    if short.context.has_segments()
-        && is_open(&found)
-        && let Some(mut whole) = null.whole(&short)?
-    {
-        found = found.or(searched_in(null, &mut whole, how)?);
-    }
-    Ok(found)
+    found.ok_or_else(|| Error::Failed("no segments were searched".into()))
 }
 
 /// Walks that begin an episode.

@@ -1,4 +1,4 @@
-//! An effect that is far from its null: a motor that gives a tenth of what is asked of it.
+//! Effects that are far from their null: a motor that gives a tenth of what is asked of it, a stiff spring.
 
 use super::run;
 use super::world::Truth;
@@ -15,4 +15,19 @@ fn a_motor_that_gives_a_tenth_of_what_is_asked_is_a_limit() {
     );
     let limit = found.effects[0].values[0].1;
     assert!((limit - 0.6).abs() < 0.03, "{limit}");
+}
+
+/// A spring is plausible up to 200 N m/rad or N/m on a table: that of a heavier machine is not cut off there.
+#[test]
+fn a_spring_ten_times_as_stiff_as_any_on_a_table_is_found() {
+    let (found, _) = run(Truth::Spring(2000.0), &[]);
+    let r = &found.result;
+    assert_eq!(
+        r.verdict.effects,
+        ["joint-stiffness@rail"],
+        "{}",
+        r.sentence
+    );
+    let stiffness = r.effects[0].parameters["stiffness"];
+    assert!((stiffness / 2000.0 - 1.0).abs() < 0.03, "{stiffness}");
 }

@@ -29,7 +29,7 @@ pub(super) struct Asked {
 
 /// Bounds of a slope with a prior of deviation `size`, in deviations about its null.
 pub(super) fn bounds(candidate: &Candidate, parameter: usize, size: f64) -> [f64; 2] {
-    let [low, high] = candidate.ranges[parameter];
+    let [low, high] = candidate.limits(parameter);
     let null = candidate.parameters()[parameter].null;
     [
         ((low - null) / size).max(-MOST),

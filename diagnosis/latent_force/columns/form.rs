@@ -43,8 +43,9 @@ impl Form {
                 }
             }
         }
-        for (v, range) in values.iter_mut().zip(&candidate.ranges) {
-            *v = v.clamp(range[0], range[1]);
+        for (i, v) in values.iter_mut().enumerate() {
+            let [low, high] = candidate.limits(i);
+            *v = v.clamp(low, high);
         }
         values
     }
@@ -76,7 +77,7 @@ impl Form {
                         self.begin[i]
                     },
                     deviation: slope.map_or(other, |(_, d)| *d),
-                    bounds: [low, high],
+                    bounds: candidate.limits(i),
                     free,
                     is_tolerance: candidate.is_tolerance,
                 }

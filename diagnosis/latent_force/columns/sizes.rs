@@ -179,7 +179,7 @@ pub(super) fn sizes(
             let by_force = (active / ratio).sqrt();
             let by_reading = READING_SHARE * (count / readings[i]).sqrt();
             let (c, _, p) = &trials[i];
-            let [low, high] = candidates[*c].ranges[*p];
+            let [low, high] = candidates[*c].limits(*p);
             let size = by_force.min(by_reading).min(0.5 * (high - low));
             let acts = ratio > 0.0 || readings[i] > 0.0;
             if acts && size.is_finite() { size } else { 0.0 }

@@ -33,7 +33,7 @@ impl Wanted {
         parameter: usize,
         step: f64,
     ) -> Self {
-        let [_, high] = candidates[c].ranges[parameter];
+        let [_, high] = candidates[c].limits(parameter);
         let mut values = begin.to_vec();
         let step = if values[parameter] + step <= high {
             step
