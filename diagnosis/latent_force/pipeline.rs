@@ -57,12 +57,11 @@ struct Searched {
 }
 
 impl Searched {
-    /// This one, or another one that leaves less.
-    fn or(self, other: Self) -> Self {
-        if other.excess < self.excess {
-            other
-        } else {
-            self
+    /// This one, or the one before it where that leaves no more.
+    fn or(self, before: Option<Self>) -> Self {
+        match before {
+            Some(before) if before.excess <= self.excess => before,
+            _ => self,
         }
     }
 }
@@ -70,7 +69,7 @@ impl Searched {
 /// Fits the model without effects, and searches for what is missing. Where bodies touch, that is done in the longest segments that can be
 /// repeated, for a small force tells the more the longer it acts: in whole logs, for a ball whose spin no sensor reads keeps over a log what it was
 /// thrown with; in the longest stretches of contact; and in the shortest, whose replays are next to linear in where they begin. Each is asked where replays of
-/// whole logs leave most of the gap by the answer before it, and the answer stands that leaves least.
+/// whole logs leave most of the gap by the answer before it, and the answer stands that leaves least. Whole logs whose slopes mislead are asked last.
 fn searched(null: Null<'_>, shown_steps: &[Shown], settings: &Settings) -> Result<Searched> {
     let how = (shown_steps, settings);
     let mut short = null.shortest()?;
@@ -78,9 +77,10 @@ fn searched(null: Null<'_>, shown_steps: &[Shown], settings: &Settings) -> Resul
         return searched_in(null, &mut short, how);
     }
     let is_open = |found: &Searched| found.leaves_most && !null.progress.is_stopped();
-    let mut found = match null.whole(&short)? {
-        Some(mut whole) => Some(searched_in(null, &mut whole, how)?),
-        None => None,
+    let mut whole = null.whole(&short)?;
+    let mut found = match &mut whole {
+        Some((whole, false)) => Some(searched_in(null, whole, how)?),
+        _ => None,
     };
     let mut long = None;
     if found.as_ref().is_none_or(is_open) {
@@ -90,12 +90,13 @@ fn searched(null: Null<'_>, shown_steps: &[Shown], settings: &Settings) -> Resul
     for stands in [long, Some(short)].iter_mut().flatten() {
         if found.as_ref().is_none_or(is_open) {
             let other = searched_in(null, stands, how)?;
-            let other = Searched { repeats, ..other };
-            found = Some(match found {
-                Some(found) => found.or(other),
-                None => other,
-            });
+            found = Some(Searched { repeats, ..other }.or(found));
         }
+    }
+    if let Some((mut whole, true)) = whole
+        && found.as_ref().is_none_or(is_open)
+    {
+        found = Some(searched_in(null, &mut whole, how)?.or(found));
     }
     found.ok_or_else(|| Error::Failed("no segments were searched".into()))
 }

@@ -106,14 +106,18 @@ impl<'a> Null<'a> {
         stands.map(|s| self.fitted_on(s)).transpose()
     }
 
-    /// Fits it in segments that are whole logs, from where shorter ones begin; `None` where their replays scatter.
+    /// Fits it in segments that are whole logs, from where shorter ones begin, and tells whether their slopes mislead; `None` where
+    /// their replays scatter.
     ///
     /// # Errors
     /// When the engine fails.
-    pub(super) fn whole(self, shorter: &Stands<'a>) -> Result<Option<Stands<'a>>> {
+    pub(super) fn whole(self, shorter: &Stands<'a>) -> Result<Option<(Stands<'a>, bool)>> {
         let finer = self.bench.machine.halved().ok();
         match self.fit_in(Length::Log, finer.as_ref(), Some(shorter))? {
-            Tried::Stands(stands) => self.fitted_on(*stands).map(Some),
+            Tried::Stands(stands) => {
+                let misleads = misled(&stands.context, &stands.none) >= MISLED;
+                Ok(Some((self.fitted_on(*stands)?, misleads)))
+            }
             Tried::Scatters(_) => Ok(None),
         }
     }
@@ -180,7 +184,8 @@ impl<'a> Null<'a> {
         };
         let none = fit(&context, hypothesis, theta, from, (rounds, progress))?;
         let misled = misled(&context, &none);
-        if let Some(repeats) = repeats.filter(|_| shorter.is_some() && misled >= MISLED) {
+        let is_longer = shorter.is_some() && matches!(length, Length::Of(_));
+        if let Some(repeats) = repeats.filter(|_| is_longer && misled >= MISLED) {
             return Ok(Tried::Scatters(Repeats {
                 lost: repeats.lost.max(misled),
                 scatters: true,
