@@ -86,7 +86,7 @@ impl Candidate {
             .collect()
     }
 
-    /// How far a fit may take a parameter: over its range, and [`LARGER`] times as far where that is the range of a machine on a table.
+    /// How far a fit may take a parameter: over its range, and a thousand times as far where that is the range of a machine on a table.
     #[must_use]
     pub fn limits(&self, parameter: usize) -> [f64; 2] {
         let range = self.ranges[parameter];
