@@ -8,7 +8,7 @@ use asid::diagnosis::result::{DiagnosisResult, Kind};
 use rand::{Rng as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
-use super::run_on;
+use super::{assert_names, run_on};
 use crate::diagnosis_support::engine;
 
 /// Rows of a log, and the time between them, s.
@@ -114,7 +114,7 @@ fn a_tilt_is_told_from_bounces_and_what_bounces_scatter_by_is_stated() {
     let Some(r) = diagnosed(&tilted(0.05), (5, &[])) else {
         return;
     };
-    assert_eq!(r.verdict.effects, ["gravity-tilt"], "{}", r.sentence);
+    assert_names(&r, &["gravity-tilt"]);
     // A bounce at twice the ball's time step is a little another one.
     assert!(r.gap.refined < 0.1 * r.gap.identified, "{:?}", r.gap);
     let pitch = r.effects[0].parameters["pitch"];
@@ -138,7 +138,7 @@ fn flights_among_bounces_are_taken_as_bounces_are() {
     let Some(r) = diagnosed(&tilted(0.05), (7, &[1, 4])) else {
         return;
     };
-    assert_eq!(r.verdict.effects, ["gravity-tilt"], "{}", r.sentence);
+    assert_names(&r, &["gravity-tilt"]);
 }
 
 /// The slope at the model's own damping tells less than half of what a bounce with three times as much loses.
@@ -148,11 +148,6 @@ fn a_floor_that_takes_three_times_as_much_is_named() {
     let Some(r) = diagnosed(&real, (5, &[])) else {
         return;
     };
-    assert_eq!(
-        r.verdict.effects,
-        ["contact-restitution@floor"],
-        "{}",
-        r.sentence
-    );
+    assert_names(&r, &["contact-restitution@floor"]);
     assert!(r.gap.refined < 0.2 * r.gap.identified, "{:?}", r.gap);
 }

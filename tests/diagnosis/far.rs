@@ -1,18 +1,13 @@
 //! Effects that are far from their null: a motor that gives a tenth of what is asked of it, a stiff spring.
 
-use super::run;
 use super::world::Truth;
+use super::{assert_names, run};
 
 #[test]
 fn a_motor_that_gives_a_tenth_of_what_is_asked_is_a_limit() {
     let (found, _) = run(Truth::Limit(0.6), &[]);
     let r = &found.result;
-    assert_eq!(
-        r.verdict.effects,
-        ["actuator-saturation@belt"],
-        "{}",
-        r.sentence
-    );
+    assert_names(r, &["actuator-saturation@belt"]);
     let limit = found.effects[0].values[0].1;
     assert!((limit - 0.6).abs() < 0.03, "{limit}");
 }
@@ -22,12 +17,7 @@ fn a_motor_that_gives_a_tenth_of_what_is_asked_is_a_limit() {
 fn a_spring_ten_times_as_stiff_as_any_on_a_table_is_found() {
     let (found, _) = run(Truth::Spring(2000.0), &[]);
     let r = &found.result;
-    assert_eq!(
-        r.verdict.effects,
-        ["joint-stiffness@rail"],
-        "{}",
-        r.sentence
-    );
+    assert_names(r, &["joint-stiffness@rail"]);
     let stiffness = r.effects[0].parameters["stiffness"];
     assert!((stiffness / 2000.0 - 1.0).abs() < 0.03, "{stiffness}");
 }

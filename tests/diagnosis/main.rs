@@ -30,11 +30,17 @@ use asid::core::progress::Silent;
 use asid::diagnosis::diagnose::{Diagnosis, Settings, Work, diagnose};
 use asid::diagnosis::forces;
 use asid::diagnosis::machine::Machine;
-use asid::diagnosis::result::Kind;
+use asid::diagnosis::result::{DiagnosisResult, Kind};
 use asid::diagnosis::study::Study;
 use asid::diagnosis::windows;
 use diagnosis_support::engine;
 use world::{MASS, Truth, write_study};
+
+/// The verdict names these effects and no other.
+#[track_caller]
+fn assert_names(result: &DiagnosisResult, effects: &[&str]) {
+    assert_eq!(result.verdict.effects, effects, "{}", result.sentence);
+}
 
 fn run(truth: Truth, without: &[&str]) -> (Diagnosis, Work) {
     let folder = tempfile::tempdir().unwrap();
@@ -204,12 +210,7 @@ fn a_chaotic_arm_is_fitted_up_to_its_horizon_and_its_integrator_is_no_second_eff
     arm::write_study(folder.path());
     let (diagnosis, _) = run_on(folder.path(), &[]);
     let r = &diagnosis.result;
-    assert_eq!(
-        r.verdict.effects,
-        ["actuator-gain@m_shoulder"],
-        "{}",
-        r.sentence
-    );
+    assert_names(r, &["actuator-gain@m_shoulder"]);
     assert!(r.verdict.probability > 0.9, "{}", r.sentence);
     let gain = diagnosis.effects[0].values[0].1;
     assert!((gain / arm::GAIN - 1.0).abs() < 1e-3, "gain {gain}");

@@ -2,8 +2,8 @@
 
 use asid::diagnosis::result::Kind;
 
-use super::run;
 use super::world::Truth;
+use super::{assert_names, run};
 
 /// Laws that were fitted within their tolerances.
 fn laws(result: &asid::diagnosis::result::DiagnosisResult) -> Vec<&str> {
@@ -31,12 +31,7 @@ fn a_little_friction_and_delay_are_no_effect_and_are_in_the_refined_model() {
 fn what_stands_out_beside_tolerances_is_named_alone() {
     let (found, _) = run(Truth::Ordinary(2.0), &[]);
     let r = &found.result;
-    assert_eq!(
-        r.verdict.effects,
-        ["joint-stiffness@rail"],
-        "{}",
-        r.sentence
-    );
+    assert_names(r, &["joint-stiffness@rail"]);
     assert!(r.gap.refined < 2.5, "{:?}", r.gap);
     assert!(!laws(r).contains(&"joint-stiffness"));
 }

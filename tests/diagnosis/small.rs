@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::world::{NOISE, NOMINAL, Truth, write_study};
-use super::{Kind, run_on};
+use super::{Kind, assert_names, run_on};
 
 /// The cart's study with a time step so fine that what is left of a gap is no integrator's.
 fn write_finely(folder: &Path, truth: Truth) {
@@ -45,12 +45,7 @@ fn a_missing_first_reading_leaves_the_noise_as_it_is() {
         }
     }
     let r = run_on(folder.path(), &[]).0.result;
-    assert_eq!(
-        r.verdict.effects,
-        ["coulomb-friction@rail"],
-        "{}",
-        r.sentence
-    );
+    assert_names(&r, &["coulomb-friction@rail"]);
     let x = r.gap.signals.iter().find(|s| s.signal == "x").unwrap();
     assert!((x.noise / NOISE[0] - 1.0).abs() < 0.2, "{}", x.noise);
 }
@@ -60,12 +55,7 @@ fn friction_that_is_stronger_one_way_needs_no_second_effect() {
     let folder = tempfile::tempdir().unwrap();
     write_study(folder.path(), Truth::UnevenFriction([0.8, 0.3]));
     let r = run_on(folder.path(), &[]).0.result;
-    assert_eq!(
-        r.verdict.effects,
-        ["coulomb-friction@rail"],
-        "{}",
-        r.sentence
-    );
+    assert_names(&r, &["coulomb-friction@rail"]);
     let parameters = &r.effects[0].parameters;
     assert!((parameters["force"] - 0.8).abs() < 0.05, "{parameters:?}");
     assert!((parameters["offset"] - 0.3).abs() < 0.05, "{parameters:?}");
