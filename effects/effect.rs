@@ -140,6 +140,10 @@ pub trait Acting: Send {
     /// Turns what a sensor would read at a time (s) into what it says; called in the
     /// order of time, possibly more than once for one time, for the sensor of the site.
     fn read(&mut self, _time: f64, _reading: &mut [f64]) {}
+    /// Called where the machine was placed `from` one state `to` another within an episode, not by a step, as on the next reading of a
+    /// log; positions and speeds of all joints each. What is remembered of where a joint was goes with it: a stiff spring would feel all
+    /// of the change else.
+    fn displaced(&mut self, _from: [&[f64]; 2], _to: [&[f64]; 2]) {}
     /// Forgets what was: a new episode begins.
     fn restart(&mut self) {}
     /// Appends what it remembers.

@@ -257,7 +257,7 @@ impl Refined {
             .map(|t| self.nominal(t))
             .collect::<Result<Vec<_>>>()?;
         let effects = (Arc::clone(&self.plant), Arc::clone(&self.placed));
-        let mut simulator = RefinedSimulator::new(inner, effects, (places, base), columns);
+        let mut simulator = RefinedSimulator::new(inner, effects, (places, base), columns)?;
         let all: Vec<usize> = (0..config.size).collect();
         simulator.set_parameters(&all, &nominal.repeat(config.size))?;
         Ok(simulator)

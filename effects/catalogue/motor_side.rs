@@ -96,8 +96,8 @@ pub struct MotorSide {
     inertia: Cell<f64>,
     kp: Cell<f64>,
     kv: Cell<f64>,
-    /// Angle and speed of the rotor, and the step that leads on from there.
-    state: Option<([f64; 2], Begun)>,
+    /// Angle and speed of the rotor, and the step that leads on from there; none where it has just been taken along.
+    state: Option<([f64; 2], Option<Begun>)>,
 }
 
 impl MotorSide {
@@ -223,6 +223,22 @@ impl MotorSide {
         [angle, v]
     }
 
+    /// A rotor whose joint was placed elsewhere, `from` and `to` a position and a speed. In balance the spring pulls as much more as the drive
+    /// does, so that the rotor follows by `1 / (1 + C b)`: all of the way behind a stiff spring, and not at all within its gap.
+    fn taken_along(&self, law: Law, rotor: [f64; 2], (from, to): ([f64; 2], [f64; 2])) -> [f64; 2] {
+        let is_free = (rotor[0] - from[0]).abs() < self.half_gap;
+        let follows = if is_free {
+            0.0
+        } else {
+            1.0 / (1.0 + self.compliance * law.b)
+        };
+        let mut moved = [0, 1].map(|i| rotor[i] + follows * (to[i] - from[i]));
+        if is_free {
+            moved[0] = moved[0].clamp(to[0] - self.half_gap, to[0] + self.half_gap);
+        }
+        moved
+    }
+
     /// Limits of the drive's force on the joint.
     fn limits(&self) -> Option<[f64; 2]> {
         self.drive.force_range.map(|range| {
@@ -251,7 +267,8 @@ impl Acting for MotorSide {
         let (q, v) = (view.qpos[self.qpos], view.qvel[self.dof]);
         let law = self.law(view.ctrl[self.actuator]);
         let rotor = match &self.state {
-            Some((rotor, begun)) => self.complete(begun, *rotor, q),
+            Some((rotor, Some(begun))) => self.complete(begun, *rotor, q),
+            Some((rotor, None)) => *rotor,
             None => self.settled(law, q, v),
         };
         let mut begun = self.begin(law, rotor, q, v);
@@ -272,7 +289,21 @@ impl Acting for MotorSide {
         }
         view.force[self.dof] += begun.force;
         view.parameters[self.damping] += begun.damping;
-        self.state = Some((rotor, begun));
+        self.state = Some((rotor, Some(begun)));
+    }
+
+    /// The rotor is taken along as far as its spring and its drive are then in balance.
+    fn displaced(&mut self, from: [&[f64]; 2], to: [&[f64]; 2]) {
+        let place = |[qpos, qvel]: [&[f64]; 2]| [qpos[self.qpos], qvel[self.dof]];
+        let (from, to) = (place(from), place(to));
+        let Some((rotor, begun)) = self.state else {
+            return;
+        };
+        let law = begun.map_or_else(|| self.law(0.0), |b| b.law);
+        let rotor = begun.map_or(rotor, |b| self.complete(&b, rotor, from[0]));
+        let moved = self.taken_along(law, rotor, (from, to));
+        let is_finite = moved.iter().all(|x| x.is_finite());
+        self.state = is_finite.then_some((moved, None));
     }
 
     fn restart(&mut self) {
@@ -280,9 +311,12 @@ impl Acting for MotorSide {
     }
 
     fn save(&self, memory: &mut Vec<f64>) {
-        if let Some((rotor, begun)) = &self.state {
+        let Some((rotor, begun)) = &self.state else {
+            return;
+        };
+        memory.extend(rotor);
+        if let Some(begun) = begun {
             let Law { a, b, d } = begun.law;
-            memory.extend(rotor);
             memory.extend([a, b, d, begun.force, begun.damping, begun.from]);
         }
     }
@@ -297,8 +331,9 @@ impl Acting for MotorSide {
                     damping,
                     from,
                 };
-                Some(([angle, speed], begun))
+                Some(([angle, speed], Some(begun)))
             }
+            [angle, speed] => Some(([angle, speed], None)),
             _ => None,
         };
     }

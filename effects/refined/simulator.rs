@@ -39,6 +39,9 @@ pub struct RefinedSimulator {
     /// Physics steps of each simulation since its episode began.
     steps: Vec<u64>,
     rows: Vec<Mutex<Row>>,
+    /// Positions and speeds of all joints, and those of simulations before they were placed elsewhere.
+    state: Recording,
+    before: Vec<f64>,
 }
 
 /// Memories of a simulation's effects, and its steps.
@@ -66,9 +69,15 @@ impl RefinedSimulator {
         (plant, placed): (Arc<Plant>, Arc<Vec<Placed>>),
         (places, base): (Vec<Vec<usize>>, Vec<f64>),
         columns: Vec<Column>,
-    ) -> Self {
+    ) -> Result<Self> {
         let size = inner.batch_size();
-        Self {
+        let joints = || inner.layout().joints.iter();
+        let positions = joints().map(|j| format!("qpos.{}", j.name));
+        let speeds = joints().map(|j| format!("qvel.{}", j.name));
+        let names: Vec<String> = positions.chain(speeds).collect();
+        Ok(Self {
+            state: inner.layout().recording(&names)?,
+            before: Vec::new(),
             inner,
             plant,
             placed,
@@ -77,7 +86,7 @@ impl RefinedSimulator {
             base,
             steps: vec![0; size],
             rows: (0..size).map(|_| Mutex::default()).collect(),
-        }
+        })
     }
 
     fn memory(&self, sim: usize) -> Memory {
@@ -242,7 +251,25 @@ impl Simulator for RefinedSimulator {
     }
 
     fn set_state(&mut self, sims: &[usize], qpos: &[f64], qvel: &[f64]) -> Result<()> {
-        self.inner.set_state(sims, qpos, qvel)
+        let busy = |s: &usize| lock(&self.rows[*s]).iter().any(Option::is_some);
+        if !self.placed.iter().any(|p| p.effect.steps()) || !sims.iter().any(busy) {
+            return self.inner.set_state(sims, qpos, qvel);
+        }
+        let (nq, nv) = (self.layout().nq, self.layout().nv);
+        self.before.resize(sims.len() * (nq + nv), 0.0);
+        self.inner.read(sims, &self.state, &mut self.before)?;
+        self.inner.set_state(sims, qpos, qvel)?;
+        let to = qpos
+            .chunks_exact(nq.max(1))
+            .zip(qvel.chunks_exact(nv.max(1)));
+        let before = self.before.chunks_exact((nq + nv).max(1));
+        for ((&sim, from), (q, v)) in sims.iter().zip(before).zip(to) {
+            let (from_q, from_v) = from.split_at(nq);
+            for acting in lock(&self.rows[sim]).iter_mut().flatten() {
+                acting.displaced([from_q, from_v], [q, v]);
+            }
+        }
+        Ok(())
     }
 
     fn rollout(&mut self, rollout: &Rollout<'_>, out: &mut [f64]) -> Result<()> {

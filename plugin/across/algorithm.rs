@@ -254,6 +254,10 @@ impl Acting for Across<Box<dyn Acting>> {
         self.run_mut(|acting| acting.read(time, reading));
     }
 
+    fn displaced(&mut self, from: [&[f64]; 2], to: [&[f64]; 2]) {
+        self.run_mut(|acting| acting.displaced(from, to));
+    }
+
     fn restart(&mut self) {
         self.run_mut(|acting| acting.restart());
     }

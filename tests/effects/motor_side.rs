@@ -129,6 +129,30 @@ fn a_stiff_spring_and_no_play_are_the_drive_itself() {
     }
 }
 
+/// Placed on a reading that is a milliradian off, a joint whose rotor stayed behind would be pulled by a spring of 10^7 N m/rad with 10^4 N m.
+#[test]
+fn the_rotor_goes_along_where_its_joint_is_placed_elsewhere() {
+    let xml = machine(r#"axis="0 1 0" damping="0.3" armature="0.1""#, STIFF);
+    for effect in [
+        "joint-compliance@spin:compliance=1e-7",
+        "backlash@spin:width=1e-7",
+    ] {
+        for backend in engines_for("backlash") {
+            let command = |k: usize| vec![0.5 * (0.05 * k as f64).sin()];
+            let commands: Vec<_> = (0..60).map(command).collect();
+            let rows = [&[][..], &[effect]].map(|effects| {
+                let mut bench = Bench::new(&*backend, &xml, effects);
+                bench.run(5, &commands[..30]);
+                bench.state(&[0.151], &[0.7]);
+                bench.run(5, &commands[30..])
+            });
+            for (a, b) in rows[0].iter().zip(&rows[1]) {
+                near(&format!("{effect}, {}", backend.name()), b[0], a[0], 0.01);
+            }
+        }
+    }
+}
+
 #[test]
 fn a_spring_in_series_sags_under_the_load() {
     let (compliance, kp) = (0.02, 400.0);
