@@ -29,7 +29,7 @@ impl Effect for Compliance {
         const {
             &[
                 EffectParameter::new("compliance", "rad/(N m) or m/N", [0.0, 1.0], 0.0)
-                    .starting(Start::Multiples(Reference::Give, &[0.01, 0.1])),
+                    .starting(Start::Multiples(Reference::Give, &[0.01, 0.1, 1.0])),
             ]
         }
     }

@@ -36,13 +36,6 @@ impl DryFriction {
         })
     }
 
-    /// Notes that the joint was placed elsewhere: what it changed by then no step did.
-    pub fn displaced(&mut self, from: [&[f64]; 2], to: [&[f64]; 2]) {
-        if let Some(before) = &mut self.before {
-            *before += to[1][self.dof] - from[1][self.dof];
-        }
-    }
-
     /// Resists motion with a force (N or N m) in the coming step.
     pub fn resist(&mut self, view: &mut StepView<'_>, friction: f64) {
         let speed = view.qvel[self.dof];

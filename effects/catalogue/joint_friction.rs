@@ -143,10 +143,6 @@ impl Acting for CoulombAt {
         view.force[self.dof] -= self.offset;
     }
 
-    fn displaced(&mut self, from: [&[f64]; 2], to: [&[f64]; 2]) {
-        self.dry.displaced(from, to);
-    }
-
     fn restart(&mut self) {
         self.dry.before = None;
     }
@@ -253,10 +249,6 @@ impl Acting for StribeckAt {
         self.dry.resist(view, friction);
     }
 
-    fn displaced(&mut self, from: [&[f64]; 2], to: [&[f64]; 2]) {
-        self.dry.displaced(from, to);
-    }
-
     fn restart(&mut self) {
         self.dry.before = None;
     }
@@ -342,10 +334,6 @@ impl Acting for LoadAt {
     fn before_step(&mut self, view: &mut StepView<'_>) {
         let force: f64 = self.drives.iter().map(|d| d.force(view)).sum();
         self.dry.resist(view, self.coefficient * force.abs());
-    }
-
-    fn displaced(&mut self, from: [&[f64]; 2], to: [&[f64]; 2]) {
-        self.dry.displaced(from, to);
     }
 
     fn restart(&mut self) {
