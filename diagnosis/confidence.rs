@@ -4,7 +4,6 @@
 //! than they say. What a verdict's probability is was counted instead, on training worlds: a logistic regression of whether what is named is
 //! among the true causes. It says by how much a verdict is less sure where a search was cut short, and where a gap is left beside what is named.
 
-use crate::findings::LEAST_GAP;
 use crate::judgement::{Hypothesis, Judgement};
 
 /// What a verdict's probability goes with. The first four are the maximum of the likelihood with normal priors of deviation 2 over the 37 named
@@ -18,8 +17,10 @@ pub struct Confidence {
     pub evidence: f64,
     /// Log odds that it loses where the search was cut short.
     pub stopped: f64,
-    /// Log odds that it loses where it leaves a gap above the noise.
+    /// Log odds that it loses by the logarithm of the mean square that it leaves of the logs held out.
     pub gap_left: f64,
+    /// Log odds that it loses by each law that it names beside the first: all of them have to be true.
+    pub more_laws: f64,
     /// Most that `unknown` may be: of 16 training worlds in which nothing was named although a gap was there, 8 had a cause that
     /// the catalogue has not.
     pub unknown: f64,
@@ -36,12 +37,24 @@ impl Default for Confidence {
             named: 1.04,
             evidence: 0.54,
             stopped: 1.67,
-            gap_left: 2.27,
+            gap_left: 0.45,
+            more_laws: 2.4,
             unknown: 0.55,
             beside: 0.2,
             screening: 0.5,
         }
     }
+}
+
+/// What is known of a verdict beside its evidence.
+#[derive(Clone, Copy, Debug)]
+pub struct Shown {
+    /// Mean square of what replays of the logs held out leave beyond the engine's own error, in units of the noise.
+    pub left: f64,
+    /// Whether the search was cut short.
+    pub stopped: bool,
+    /// Laws that it names, each at one site or at several.
+    pub laws: usize,
 }
 
 /// Probabilities beyond which evidence says no more.
@@ -81,14 +94,14 @@ fn normal(x: f64) -> f64 {
 }
 
 impl Confidence {
-    /// Log odds that all effects of a verdict are among the true ones, of which evidence says `probability`; `left` is the mean square of what
-    /// replays of the logs held out leave beyond the engine's own error, in units of the noise.
-    fn of_named(&self, probability: f64, left: f64, stopped: bool) -> f64 {
+    /// Log odds that all effects of a verdict are among the true ones, of which evidence says `probability`.
+    fn of_named(&self, probability: f64, shown: Shown) -> f64 {
         let p = probability.clamp(CLIP[0], CLIP[1]);
-        let is_left = f64::from(u8::from(left > LEAST_GAP * LEAST_GAP));
-        let is_stopped = f64::from(u8::from(stopped));
         let odds = (p / (1.0 - p)).ln();
-        self.named + self.evidence * odds - self.gap_left * is_left - self.stopped * is_stopped
+        let left = self.gap_left * shown.left.max(1.0).ln();
+        let stopped = self.stopped * f64::from(u8::from(shown.stopped));
+        let more = self.more_laws * shown.laws.saturating_sub(1) as f64;
+        self.named + self.evidence * odds - left - stopped - more
     }
 
     /// Probability that a set would pass the best one if it were fitted, of which a screening has the evidence `relative` to that of the best.
@@ -117,12 +130,7 @@ impl Confidence {
     }
 
     /// Gives the hypotheses of a judgement the probabilities that hold; the verdict stays what it is.
-    pub fn settle(
-        &self,
-        judgement: &mut Judgement,
-        (left, stopped): (f64, bool),
-        untried: &[Untried],
-    ) {
+    pub fn settle(&self, judgement: &mut Judgement, shown: Shown, untried: &[Untried]) {
         let best = judgement.best_explanation().clone();
         let holds = |h: &Hypothesis| best.labels.iter().all(|l| h.labels.contains(l));
         let is_named = !best.labels.is_empty() && !judgement.is_unknown;
@@ -144,8 +152,8 @@ impl Confidence {
         });
         let raw = judgement.marginal(&best.labels);
         let [p, each, unknown] = if is_named {
-            let p = sigmoid(self.of_named(raw, left, stopped));
-            self.shares((p, stopped), others)
+            let p = sigmoid(self.of_named(raw, shown));
+            self.shares((p, shown.stopped), others)
         } else {
             let unknown = judgement.unknown.min(self.unknown);
             let each = (1.0 - unknown) / (with + others);
@@ -180,6 +188,15 @@ mod tests {
         }
     }
 
+    fn shown(left: f64, stopped: bool) -> Shown {
+        let laws = 1;
+        Shown {
+            left,
+            stopped,
+            laws,
+        }
+    }
+
     fn sum(j: &Judgement) -> f64 {
         j.unknown + j.hypotheses.iter().map(|h| h.probability).sum::<f64>()
     }
@@ -206,7 +223,7 @@ mod tests {
         ];
         let stated = |left, stopped| {
             let mut j = judgement(sets, 1, 0.001);
-            Confidence::default().settle(&mut j, (left, stopped), &[]);
+            Confidence::default().settle(&mut j, shown(left, stopped), &[]);
             assert!((sum(&j) - 1.0).abs() < 1e-12);
             assert_eq!(j.best_explanation().labels, ["a"]);
             j.marginal(&["a".to_owned()])
@@ -216,8 +233,24 @@ mod tests {
         assert!(stated(1.0, true) < stated(1.0, false));
         // Where no rival is near, `unknown` takes the rest, and may be more probable than the verdict.
         let mut j = judgement(sets, 1, 0.001);
-        Confidence::default().settle(&mut j, (4.0, true), &[]);
+        Confidence::default().settle(&mut j, shown(4.0, true), &[]);
         assert!(j.unknown > 0.5 && !j.is_unknown, "{}", j.unknown);
+    }
+
+    #[test]
+    fn of_several_laws_all_have_to_be_true() {
+        let sets: &[(&[&str], f64)] = &[(&[], 0.0), (&["a", "b"], 0.98)];
+        let of = |laws: usize| {
+            let mut j = judgement(sets, 1, 0.001);
+            let shown = Shown {
+                laws,
+                ..shown(1.0, false)
+            };
+            Confidence::default().settle(&mut j, shown, &[]);
+            j.best_explanation().probability
+        };
+        assert!(of(1) > 0.9, "a group of sites is one law");
+        assert!(of(1) > of(2) && of(2) > of(3));
     }
 
     #[test]
@@ -229,7 +262,7 @@ mod tests {
             labels: vec![label.to_owned()],
             weight: confidence.passes(relative),
         });
-        confidence.settle(&mut j, (4.0, true), &untried);
+        confidence.settle(&mut j, shown(4.0, true), &untried);
         assert!((sum(&j) - 1.0).abs() < 1e-12);
         let p = |label: &str| j.marginal(&[label.to_owned()]);
         assert!(p("b") > 0.1 && p("c") < 0.01, "{} {}", p("b"), p("c"));
@@ -238,10 +271,10 @@ mod tests {
     #[test]
     fn none_stays_as_it_is_and_unknown_is_never_certain() {
         let mut j = judgement(&[(&[], 0.97), (&["a"], 0.01)], 0, 0.02);
-        Confidence::default().settle(&mut j, (1.0, false), &[]);
+        Confidence::default().settle(&mut j, shown(1.0, false), &[]);
         assert_eq!(j.best_explanation().probability, 0.97);
         let mut j = judgement(&[(&[], 0.0), (&["a"], 0.001)], 1, 0.999);
-        Confidence::default().settle(&mut j, (9.0, true), &[]);
+        Confidence::default().settle(&mut j, shown(9.0, true), &[]);
         assert_eq!(j.unknown, 0.55);
         assert!((sum(&j) - 1.0).abs() < 1e-12);
     }

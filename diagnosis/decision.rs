@@ -4,7 +4,7 @@ mod rules;
 
 use asid_results::evidence::{Evidence, Replayed, Screened, Tried};
 
-use crate::confidence::{Untried, sigmoid};
+use crate::confidence::{Shown, Untried, sigmoid};
 use crate::findings::{LEAST_GAP, NEGLIGIBLE, excess};
 use crate::judgement::{Hypothesis, Judgement};
 
@@ -196,7 +196,11 @@ pub fn decide(evidence: &Evidence, rules: &Rules) -> Judgement {
         .map(|i| &evidence.tried[i]);
     let replayed = found.map_or(evidence.none, |t| t.replayed);
     let untried = untried(evidence, found, rules);
-    let shown = (replayed.held_out - own_error(evidence), evidence.stopped);
+    let shown = Shown {
+        left: replayed.held_out - own_error(evidence),
+        stopped: evidence.stopped,
+        laws: found.map_or(0, |t| t.names),
+    };
     rules.confidence.settle(&mut judgement, shown, &untried);
     judgement
 }

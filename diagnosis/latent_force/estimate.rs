@@ -17,7 +17,7 @@ use super::smoother::{NoiseModel, Problem, Smoothed, Start, Sums, smooth};
 use super::step_map::LinearEpisode;
 use super::tangent::{difference, retract};
 
-pub use missing::{LEAST_LEFT, Missing};
+pub use missing::{LEAST_LEFT, Missing, NOTHING};
 
 /// Multiple of a step of EM in the logarithm of a variance: between 1 and 2 EM still rises (Lange 1995).
 const LENGTHENED: f64 = 1.7;

@@ -13,11 +13,9 @@ use crate::findings::{Findings, trials};
 use crate::fit::cost;
 use crate::skill::about_the_mean;
 
-use super::estimate::LEAST_LEFT;
+use super::estimate::{LEAST_LEFT, NOTHING};
 use super::search::{Outcome, Set, labels_of, log_prior};
 
-/// Root mean square of the missing force, relative to the inertial forces, up to which nothing is missing.
-const NOTHING: f64 = 0.01;
 /// Sets that were screened and not fitted that are kept: what is further behind has no probability that shows.
 const SCREENED: usize = 40;
 

@@ -6,6 +6,8 @@ use super::Estimate;
 
 /// Mean square of what is left of readings, beyond their noise and in units of it, that counts as nothing: a gap of 1.05.
 pub const LEAST_LEFT: f64 = 0.1;
+/// Root mean square of the missing force, relative to the inertial forces, up to which nothing is missing.
+pub const NOTHING: f64 = 0.01;
 /// Least deviation of the white part, relative to what is missing without any effect: what is finer decides
 /// nothing, for no law of friction or of a drive is the machine's own to the last digit.
 const LEAST_WHITE: f64 = 0.1;
@@ -33,20 +35,35 @@ impl Missing {
 }
 
 impl Estimate {
+    /// Power of the missing force at a degree of freedom, beyond what is too fine to decide, in units of the inertial forces there.
+    fn missing_at(&self, context: &Context<'_>, dof: usize) -> f64 {
+        let noise = &self.noise;
+        let beyond = noise.q[dof] + noise.white[dof] - self.least_white[dof];
+        beyond.max(0.0) / context.inertial[dof].powi(2)
+    }
+
+    /// Whether a model lacks less than a `share` of the power of the force that this one lacks, at some degree of freedom where that is more than
+    /// nothing. Beside a large force that is missing elsewhere it may be hardly any of all.
+    #[must_use]
+    pub fn is_made_up_for_by(&self, other: &Self, context: &Context<'_>, share: f64) -> bool {
+        let is_smoothed = context.walks.iter().any(|w| w.segment.is_none());
+        is_smoothed
+            && (0..context.inertial.len()).any(|dof| {
+                let [before, after] = [self, other].map(|e| e.missing_at(context, dof));
+                before > NOTHING * NOTHING && after < share * before
+            })
+    }
+
     /// What the model lacks.
     #[must_use]
     pub fn missing(&self, context: &Context<'_>) -> Missing {
-        let noise = &self.noise;
-        let power = |j: usize| {
-            let beyond = noise.q[j] + noise.white[j] - self.least_white[j];
-            beyond.max(0.0) / context.inertial[j].powi(2)
-        };
+        let power = |j: usize| self.missing_at(context, j);
         let (mut squares, mut n, mut in_segments, mut rows) = (0.0, 0.0, 0, 0);
         for (walk, smoothed) in context.walks.iter().zip(&self.smoothed) {
             rows += walk.len();
             if walk.segment.is_some() {
                 in_segments += walk.len();
-                for ([sum, count], r) in smoothed.sums.reading.iter().zip(&noise.r) {
+                for ([sum, count], r) in smoothed.sums.reading.iter().zip(&self.noise.r) {
                     squares += sum / r;
                     n += count;
                 }

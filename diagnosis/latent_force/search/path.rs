@@ -4,7 +4,7 @@ use asid_core::Result;
 
 use crate::latent_force::fit::Fitted;
 
-use super::open_loop::OpenLoopGap;
+use super::open_loop::{MOST, OpenLoopGap};
 use super::prior::worth;
 use super::round::{Round, Upon};
 use super::set::{Set, free_what_is_given};
@@ -111,8 +111,13 @@ impl Search<'_> {
             }
             // A first fit that was cut short has not told yet how much of the force it makes up for.
             let cut_short = stopped && best.candidates.is_empty();
+            let makes_up_for_most = |set: &Set| {
+                let [before, after] = [best, set].map(|s| &s.fitted.estimate);
+                before.is_made_up_for_by(after, context, 1.0 - MOST)
+            };
             let counts = |set: &Set| match no_force {
                 _ if cut_short || left(best) - left(set) > breadth.shrinks => Ok(true),
+                _ if makes_up_for_most(set) => Ok(true),
                 true => gap.is_closed_by(set, breadth),
                 false => gap.is_mostly_closed_by(set, (context, best)),
             };
