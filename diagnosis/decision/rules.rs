@@ -45,7 +45,7 @@ pub type Rule = (&'static str, fn(&mut Rules) -> &mut f64);
 
 impl Rules {
     /// All numbers, so that each can be changed and the decision repeated.
-    pub const ALL: [Rule; 15] = [
+    pub const ALL: [Rule; 16] = [
         ("temperature", |r| &mut r.temperature),
         ("apart", |r| &mut r.apart),
         ("unexplained", |r| &mut r.unexplained),
@@ -58,6 +58,7 @@ impl Rules {
         ("confidence.stopped", |r| &mut r.confidence.stopped),
         ("confidence.gap_left", |r| &mut r.confidence.gap_left),
         ("confidence.more_laws", |r| &mut r.confidence.more_laws),
+        ("confidence.ordinary", |r| &mut r.confidence.ordinary),
         ("confidence.unknown", |r| &mut r.confidence.unknown),
         ("confidence.beside", |r| &mut r.confidence.beside),
         ("confidence.screening", |r| &mut r.confidence.screening),
