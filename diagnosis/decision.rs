@@ -197,7 +197,8 @@ pub fn decide(evidence: &Evidence, rules: &Rules) -> Judgement {
     let replayed = found.map_or(evidence.none, |t| t.replayed);
     let untried = untried(evidence, found, rules);
     let shown = Shown {
-        left: replayed.held_out - own_error(evidence),
+        left: (replayed.held_out - own_error(evidence) - 1.0).max(0.0)
+            / (evidence.none.held_out - 1.0).max(f64::MIN_POSITIVE),
         stopped: evidence.stopped,
         laws: found.map_or(0, |t| t.names),
         within_tolerances: best == least && ordinary.is_some(),

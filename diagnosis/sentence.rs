@@ -56,6 +56,23 @@ fn within_tolerance(result: &DiagnosisResult) -> Option<String> {
     })
 }
 
+fn percent(x: f64) -> String {
+    format!("{:.0} %", 100.0 * x)
+}
+
+/// How much of the gap is closed, with its interval.
+fn part_closed(result: &DiagnosisResult) -> String {
+    match (result.gap.closed, result.gap.closed_interval95) {
+        (Some(c), Some([low, high])) => format!(
+            "{} of it ({:.0} to {:.0})",
+            percent(c),
+            100.0 * low,
+            100.0 * high
+        ),
+        _ => "what there is of it".into(),
+    }
+}
+
 /// What is left beside the effects that are named; empty where it is little.
 fn beside(result: &DiagnosisResult) -> String {
     let remainder = result.verdict.remainder.as_ref();
@@ -103,7 +120,6 @@ pub fn sentence(
         };
         format!("The gap is in {}{regime}{condition}; ", w.signal)
     });
-    let percent = |x: f64| format!("{:.0} %", 100.0 * x);
     let failed: Vec<&str> = result
         .checks
         .iter()
@@ -118,15 +134,7 @@ pub fn sentence(
             failed.join(", ")
         )
     };
-    let closed = || match (result.gap.closed, result.gap.closed_interval95) {
-        (Some(c), Some([low, high])) => format!(
-            "{} of it ({:.0} to {:.0})",
-            percent(c),
-            100.0 * low,
-            100.0 * high
-        ),
-        _ => "what there is of it".into(),
-    };
+    let closed = || part_closed(result);
     let body = match result.verdict.kind {
         Kind::None if !result.tolerances.is_empty() && result.gap.identified > OF_NOISE => format!(
             "No effect stands out{}: {} take the gap from {:.2} to {:.2} on the logs held out. One of them may still be its cause ({} that none is).",
