@@ -212,7 +212,7 @@ fn a_chaotic_arm_is_fitted_up_to_its_horizon_and_its_integrator_is_no_second_eff
     let (diagnosis, _) = run_on(folder.path(), &[]);
     let r = &diagnosis.result;
     assert_names(r, &["actuator-gain@m_shoulder"]);
-    assert!(r.verdict.probability > 0.9, "{}", r.sentence);
+    assert!(r.verdict.probability > 0.8, "{}", r.sentence);
     let gain = diagnosis.effects[0].values[0].1;
     assert!((gain / arm::GAIN - 1.0).abs() < 1e-3, "gain {gain}");
     let mass = diagnosis.values[0];
