@@ -20,7 +20,7 @@ use asid_readings::noise::ThirdDifferences;
 use crate::data::Logs;
 
 pub use asid_readings::noise::{NORMAL, Noise, median};
-pub use quantization::step;
+pub use quantization::{noise_before, step};
 
 /// Estimates the deviation of each sensor's noise; see [`describe`].
 #[must_use]
@@ -31,12 +31,17 @@ pub fn estimate(logs: &Logs, residuals: &[Vec<f64>]) -> Vec<f64> {
 
 /// Estimates the noise of each sensor from residuals `logged - predicted` in the sensors'
 /// units (`rows x entries`, NaN where missing), one array an episode. A sensor whose
-/// readings come in steps has at least the deviation of a step, step / sqrt(12).
+/// readings come in steps has at least the deviation of a step, step / sqrt(12); one whose steps are coarse that which it had before
+/// the rounding, beside which that is an effect.
 #[must_use]
 pub fn describe(logs: &Logs, residuals: &[Vec<f64>]) -> Vec<Noise> {
     let n = logs.entries.len();
     (0..logs.sensors.len())
         .map(|sensor| {
+            let least = smallest(logs, sensor);
+            if let Some(before) = noise_before(logs, sensor) {
+                return Noise::white(before.max(least));
+            }
             let mut differences = ThirdDifferences::default();
             let entries = logs.entries.iter().enumerate();
             for (j, entry) in entries.filter(|(_, e)| e.sensor == sensor) {
@@ -52,7 +57,7 @@ pub fn describe(logs: &Logs, residuals: &[Vec<f64>]) -> Vec<Noise> {
                 }
             }
             let of_differences = differences.noise();
-            let floor = (step(logs, sensor) / 12.0_f64.sqrt()).max(smallest(logs, sensor));
+            let floor = (step(logs, sensor) / 12.0_f64.sqrt()).max(least);
             if of_differences.deviation >= floor {
                 of_differences
             } else {

@@ -1,4 +1,6 @@
-//! Quantization: the step of a sensor whose readings are multiples of one.
+//! Quantization: the step of a sensor whose readings are multiples of one, and what noise there was before the rounding.
+
+use std::f64::consts::PI;
 
 use super::{median, readings};
 use crate::data::Logs;
@@ -14,6 +16,36 @@ pub fn step(logs: &Logs, sensor: usize) -> f64 {
         .filter_map(step_of)
         .collect();
     median(&mut steps).unwrap_or(0.0)
+}
+
+/// Steps that a motion spans, at least and at most, where they are coarse: fewer are a sensor at rest, and more than 16, four bits, an encoder that
+/// resolves the motion, whose rounding is its noise.
+const COARSE: [f64; 2] = [4.0, 16.0];
+
+/// Deviation of the noise before the rounding, for a sensor that resolves its motion into no more than 16 steps; `None` for any other.
+///
+/// While a motion of `v` a row passes the edge of a step, noise of deviation `s` takes the reading back and forth. It changes with
+/// probability `2 p (1 - p)` from row to row, with `p` the normal distribution function of the distance from the edge over `s`: `2 s / (v sqrt(pi))`
+/// times an edge where that is more than once. There are `v / step` edges a row, so that of the share of rows at which the reading changes
+/// `s = share step sqrt(pi) / 2` follows. Less noise changes a reading no less than once an edge: this is the most that there can have been.
+#[must_use]
+pub fn noise_before(logs: &Logs, sensor: usize) -> Option<f64> {
+    let step = step(logs, sensor);
+    let columns = readings(logs, sensor);
+    let span = |column: &Vec<f64>| {
+        let column = column.iter().copied();
+        column.clone().fold(f64::NEG_INFINITY, f64::max) - column.fold(f64::INFINITY, f64::min)
+    };
+    let spans = columns.iter().map(span).fold(0.0, f64::max) / step;
+    if !(COARSE[0]..=COARSE[1]).contains(&spans.round()) {
+        return None;
+    }
+    let (mut rows, mut changes) = (0, 0);
+    for column in &columns {
+        rows += column.len();
+        changes += column.windows(2).filter(|w| w[0] != w[1]).count();
+    }
+    Some(changes as f64 / rows as f64 * step * PI.sqrt() / 2.0)
 }
 
 /// Step that some values are multiples of, but for one common shift and rounding. Multiples are counted from
@@ -45,7 +77,12 @@ fn step_of(mut values: Vec<f64>) -> Option<f64> {
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used)]
 mod tests {
+    use rand::Rng as _;
+
+    use crate::data::tests::{log, plant};
+
     use super::*;
 
     #[test]
@@ -56,6 +93,30 @@ mod tests {
         let reading = |k: u32| (1e6 * (0.31 + step * f64::from(k))).round() / 1e6;
         let values: Vec<f64> = (0..4000).map(|i| reading((i * 7) % 501)).collect();
         assert!((step_of(values).unwrap() - step).abs() < 1e-8);
+    }
+
+    #[test]
+    fn the_noise_before_a_coarse_rounding_is_told_by_how_often_readings_change() {
+        // A slide that goes from 0 to 8 steps of 1 m in 8000 rows, with noise of 0.05 m.
+        let mut rng = asid_core::Streams::new(1).stream("readings");
+        let noise = rand_distr::Normal::new(0.0, 0.05).unwrap();
+        let places: Vec<f64> = (0..8000)
+            .map(|k| (0.001 * f64::from(k) + rng.sample(noise)).round())
+            .collect();
+        let of = |places: &[f64]| {
+            let logs = vec![log("a", places)];
+            noise_before(
+                &Logs::new(&plant(), &["place".to_owned()], logs).unwrap(),
+                0,
+            )
+        };
+        let found = of(&places).expect("eight steps are coarse");
+        assert!((found / 0.05 - 1.0).abs() < 0.2, "{found}");
+        // Without noise it is no more than how far the slide goes in a row.
+        let clean: Vec<f64> = (0..8000).map(|k| (0.001 * f64::from(k)).round()).collect();
+        assert!(of(&clean).expect("they are coarse") < 0.001);
+        let fine: Vec<f64> = (0..8000).map(|k| (0.01 * f64::from(k)).round()).collect();
+        assert_eq!(of(&fine), None);
     }
 
     #[test]
