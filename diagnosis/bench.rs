@@ -75,6 +75,8 @@ pub struct Bench {
     pub parameters: Vec<Parameter>,
     /// Coordinates of the starts that the logs do not give.
     pub open: Open,
+    /// How far each of these may lie from where it is first put, m or rad or per second ([`crate::starts::reach`]).
+    pub reach: Vec<f64>,
     /// The first tenth of the logs held out, on which open starts are fitted.
     pub head: Record,
 }
@@ -244,7 +246,7 @@ impl Bench {
         let fit = fit(
             &mut predictor,
             (self.layout(), &unknowns),
-            Begin::at(point, &self.open),
+            Begin::at(point, (&self.open, &self.reach)),
             (Effort::START, &Silent),
         )?;
         Ok(fit.point)

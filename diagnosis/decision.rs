@@ -17,17 +17,22 @@ pub fn is_small(none: Replayed) -> bool {
 }
 
 /// Whether a set stands in spite of a small gap: where replays of whole logs, those held out too, bear it out, and where
-/// the engine's own error is no larger than what else is there.
+/// the engine's own error is no larger than what else is there. Starts that are fitted may take up all of the gap of the logs that they are fitted to:
+/// the logs held out are the judge then, and those need only be left no worse.
 fn closes_a_small_gap(evidence: &Evidence, set: Replayed, rules: &Rules) -> bool {
     let power = |mean_square: f64| mean_square - 1.0;
     let (none, kept) = (evidence.none, 1.0 - rules.closes);
     let is_there = |p: f64| p > LEAST_GAP * LEAST_GAP - 1.0;
-    let [train, held] = [power(none.train), power(none.held_out)];
-    is_there(held)
-        && is_there(train)
-        && power(set.held_out) < kept * held
-        && power(set.train) < kept * train
-        && own_error(evidence) < kept * train
+    let closes = |before: f64, after: f64| {
+        let before = power(before);
+        power(after) < kept * before && own_error(evidence) < kept * before
+    };
+    let bears_out = if is_there(power(none.train)) {
+        closes(none.train, set.train)
+    } else {
+        set.train < none.train
+    };
+    is_there(power(none.held_out)) && closes(none.held_out, set.held_out) && bears_out
 }
 
 /// Whether replays of the logs held out come nearer to the readings with a set than without it, and than the readings' own mean
@@ -308,6 +313,26 @@ mod tests {
         assert!(
             !named(1.1, 1.5),
             "the engine's own error is as large as the gap"
+        );
+    }
+
+    #[test]
+    fn where_fitted_starts_take_up_the_gap_the_logs_held_out_are_the_judge() {
+        let named = |none: Replayed, left: Replayed| {
+            let mut e = evidence(3.0, vec![tried(&["a"], 1, 500.0, 1.0)], 0.1);
+            e.none = none;
+            e.tried[0].replayed = left;
+            !decided(&e).best_explanation().labels.is_empty()
+        };
+        assert!(named(replayed(1.1, 2.7), replayed(1.06, 1.2)));
+        assert!(!named(replayed(1.1, 2.7), replayed(1.06, 2.0)));
+        assert!(
+            !named(replayed(1.1, 2.7), replayed(1.2, 1.2)),
+            "it fits the logs worse"
+        );
+        assert!(
+            !named(replayed(1.1, 1.1), replayed(1.0, 1.0)),
+            "there is no gap"
         );
     }
 

@@ -117,6 +117,8 @@ pub struct Begin<'b> {
     pub point: Point,
     /// Coordinates of the starts that are fitted with the values.
     pub open: &'b Open,
+    /// How far each of these may lie from where it begins ([`crate::starts::reach`]).
+    pub reach: &'b [f64],
     /// Derivatives in the starts of a model that is like this one: they do for a look, and a fit begins with their differences.
     pub like: Option<&'b StartSlopes>,
     /// Where the values stay.
@@ -124,12 +126,13 @@ pub struct Begin<'b> {
 }
 
 impl<'b> Begin<'b> {
-    /// From some values and starts on, of which some coordinates are open.
+    /// From some values and starts on, of which some coordinates are open as far as they reach.
     #[must_use]
-    pub fn at(point: Point, open: &'b Open) -> Self {
+    pub fn at(point: Point, (open, reach): (&'b Open, &'b [f64])) -> Self {
         Self {
             point,
             open,
+            reach,
             like: None,
             region: None,
         }
@@ -150,6 +153,7 @@ pub fn fit(
     let Begin {
         mut point,
         open,
+        reach,
         like,
         region,
     } = begin;
@@ -168,6 +172,7 @@ pub fn fit(
         layout,
         unknowns,
         open,
+        reach,
         free: (0..unknowns.len()).filter(|&i| unknowns[i].free).collect(),
         bounds,
         differences,
@@ -208,7 +213,7 @@ pub fn fit(
 
 fn finish(work: Steps<'_, '_>, point: Point, line: Linearisation) -> Fit {
     let (unknowns, free) = (work.unknowns, work.free);
-    let normal = Normal::new(&line, &work.bounds, 0.0);
+    let normal = Normal::new(&line, &work.bounds, 0.0, work.reach);
     let p = free.len();
     let inverse = inverse(&normal.information, 1e-14);
     // From shares of the range to the parameter's unit.

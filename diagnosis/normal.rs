@@ -36,11 +36,13 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
 }
 
 impl Normal {
-    /// Of the rows before a replay diverges: after it residuals are infinite, and columns 0.
+    /// Of the rows before a replay diverges: after it residuals are infinite, and columns 0. Each coordinate of a start has a normal prior about
+    /// where it is, as wide as its `reach`; none where that is empty.
     pub(crate) fn new(
         line: &Linearisation,
         bounds: &[std::ops::Range<usize>],
         damping: f64,
+        reach: &[f64],
     ) -> Self {
         let finite = |x: &f64| if x.is_finite() { *x } else { 0.0 };
         let residuals: Vec<f64> = line.residuals.iter().map(finite).collect();
@@ -67,7 +69,8 @@ impl Normal {
                 let coupling = DMatrix::from_fn(p, m, |i, j| dot(&columns[i], &starts[j]));
                 let g = DVector::from_fn(m, |i, _| dot(&starts[i], r));
                 for i in 0..m {
-                    block[(i, i)] += damping * block[(i, i)] + 1e-9;
+                    let prior = reach.get(i).map_or(0.0, |reach| reach.powi(-2));
+                    block[(i, i)] += damping * block[(i, i)] + prior.max(1e-9);
                 }
                 let inverse = inverse(&block, 1e-12);
                 information -= &coupling * &inverse * coupling.transpose();
@@ -138,6 +141,24 @@ impl Normal {
 mod tests {
     use super::*;
 
+    /// The spin of a ball about the normal of its floor: a step of ten thousand rad/s, after which nothing was left of the log.
+    #[test]
+    fn a_coordinate_that_hardly_shows_steps_no_further_than_it_reaches() {
+        let line = Linearisation {
+            residuals: vec![3.0, 3.0],
+            columns: Vec::new(),
+            start_columns: vec![vec![3.0, -3.0], vec![1e-3, 1e-3]],
+        };
+        let (rows, none) = (0..2, DVector::zeros(0));
+        let step = |reach: &[f64]| {
+            let normal = Normal::new(&line, std::slice::from_ref(&rows), 0.0, reach);
+            normal.start_step(0, &none)[1]
+        };
+        assert!(step(&[]) > 1e3);
+        // A slope of 1e-3 a unit, and residuals of 3: 2 * 3e-3 over 2e-6 + 1 / 20^2.
+        assert!((step(&[1.0, 20.0]) - 6e-3 / (2e-6 + 2.5e-3)).abs() < 1e-6);
+    }
+
     /// A fish whose smoothed start made the replay diverge: the step was not a number, and the engine refused it.
     #[test]
     fn a_replay_that_diverges_steps_by_the_rows_before_it() {
@@ -147,7 +168,7 @@ mod tests {
             start_columns: vec![vec![0.0, 4.0, 0.0]],
         };
         let rows = 0..3;
-        let normal = Normal::new(&line, std::slice::from_ref(&rows), 0.0);
+        let normal = Normal::new(&line, std::slice::from_ref(&rows), 0.0, &[]);
         let step = normal.step(0.0, &[false]);
         assert!((step[0] - 0.5).abs() < 1e-9, "{step}");
         let start = normal.start_step(0, &step);

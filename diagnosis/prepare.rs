@@ -10,6 +10,7 @@ use crate::machine::Machine;
 use crate::noise;
 use crate::predict::Point;
 use crate::record::Record;
+use crate::starts::reach::reach;
 use crate::starts::{given_start, open_coordinates};
 use crate::study::Study;
 
@@ -91,7 +92,12 @@ pub fn dataset(study: &Study, machine: Machine) -> Result<(Bench, Vec<f64>)> {
         .map(|p| Ok(model.nominal(&p.targets[0])?.clamp(p.range[0], p.range[1])))
         .collect::<Result<Vec<_>>>()?;
     let open = open_coordinates(&layout, study);
+    let point = Point {
+        theta: nominal.clone(),
+        starts: train.starts.clone(),
+    };
     let bench = Bench {
+        reach: reach(&machine, &study.parameters, (&train.logs, &point), &open)?,
         machine,
         train,
         parameters: study.parameters.clone(),

@@ -1,5 +1,7 @@
 //! Where episodes begin: as their logs say, as their first readings show, and what neither tells.
 
+pub(crate) mod reach;
+
 use asid_core::Layout;
 use asid_core::layout::JointKind;
 use asid_core::problem::home;

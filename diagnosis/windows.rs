@@ -88,7 +88,7 @@ pub fn settle(
     let found = fit(
         &mut predictor,
         (bench.layout(), &unknowns),
-        Begin::at(point, &bench.open),
+        Begin::at(point, (&bench.open, &bench.reach)),
         (effort, &Silent),
     )?;
     Ok(found.point.starts)

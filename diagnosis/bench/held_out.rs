@@ -1,19 +1,16 @@
 //! What a replay leaves of the logs held out beyond what their starts leave open.
 //!
 //! A start that was fitted on the first tenth of a log is known to some covariance, and a small error of it grows over the rest of the log.
-//! Residuals are therefore measured by the covariance that they have if the model is right, `I + J S J'` in units of the
-//! noise, with `J` their derivatives in the start and `S` the covariance of the start by the first tenth. By Woodbury's identity their squared
-//! Mahalanobis distance is `r'r - r'J (J_h'J_h + J'J)^-1 J'r`, with `J_h` the derivatives of the first tenth.
+//! What counts is therefore what no start makes up for: the squared residuals of the whole log, with its start fitted to the whole of it, less those of
+//! its first tenth, with its start fitted to that. Where replays are linear in the start this is the squared Mahalanobis distance of the
+//! rest from its prediction, `r' (I + J S J')^-1 r` in units of the noise, with `J` the derivatives of the rest in the start and `S` the
+//! covariance of the start by the first tenth. Replays that lie far from a log are not linear in it, and a slope there makes up for too much.
 
-use std::ops::Range;
+use asid_core::progress::Silent;
+use asid_core::{Error, Result};
 
-use asid_core::Result;
-use nalgebra::{DMatrix, DVector};
-
-use crate::fit::cost;
-use crate::linearise::{Differences, linearise};
-use crate::normal::inverse;
-use crate::predict::Point;
+use crate::fit::{Begin, Effort, Fit, cost, fit};
+use crate::predict::{Point, State};
 
 use super::{Bench, Explanation, Trial};
 
@@ -21,77 +18,76 @@ use super::{Bench, Explanation, Trial};
 /// of one core, in machines of many joints.
 const AFFORDABLE: usize = 500_000;
 
-/// Squared Mahalanobis distance of the readings held out from those that an explanation predicts, by the noise and by the covariance of the
-/// starts that were fitted; infinite where a replay diverges.
+/// Shares of the logs that starts are fitted to, one from where the one before has come to: a start that the first tenth leaves open by much may
+/// lead so far off the rest that no slope leads back from there.
+const SHARES: [f64; 4] = [0.2, 0.4, 0.7, 1.0];
+
+/// An explanation, and its effects as trials.
+pub type Explained<'a> = (&'a [Trial<'a>], &'a Explanation);
+
+/// Squared distances of the readings held out from those that explanations predict, in units of the noise, that no start of their logs makes up
+/// for; infinite where a replay diverges. A fit of starts may end in a valley of its own: each begins where the others have ended too.
 ///
 /// # Errors
 /// When a rollout fails.
-pub fn misfit(bench: &Bench, trials: &[Trial<'_>], of: &Explanation) -> Result<f64> {
-    let logs = &bench.test.logs;
-    let steps = logs.episodes.iter().map(|e| e.plan.physics_steps());
-    if bench.open.is_empty() || steps.sum::<usize>() * bench.open.len() > AFFORDABLE {
-        return Ok(of.held_out);
+pub fn misfits(bench: &Bench, explained: &[Explained<'_>]) -> Result<Vec<f64>> {
+    let steps = bench.test.logs.episodes.iter();
+    let steps: usize = steps.map(|e| e.plan.physics_steps()).sum();
+    if bench.open.is_empty() || steps * bench.open.len() > AFFORDABLE {
+        return Ok(explained.iter().map(|(_, of)| of.held_out).collect());
     }
+    let fits: Vec<Fit> = (explained.iter())
+        .map(|of| fitted(bench, of, of.1.held_starts.clone(), &SHARES))
+        .collect::<Result<_>>()?;
+    let misfit = |(i, of): (usize, &Explained<'_>)| -> Result<f64> {
+        let mut left = fits[i].cost;
+        for (_, other) in fits.iter().enumerate().filter(|(j, _)| *j != i) {
+            let from = other.point.starts.clone();
+            left = left.min(fitted(bench, of, from, &[1.0])?.cost);
+        }
+        left -= head(bench, of)?;
+        Ok(if left.is_finite() {
+            left.max(0.0)
+        } else {
+            f64::INFINITY
+        })
+    };
+    explained.iter().enumerate().map(misfit).collect()
+}
+
+/// Fits the starts of the logs held out to some shares of them, one after the other.
+fn fitted(
+    bench: &Bench,
+    (trials, of): &Explained<'_>,
+    starts: Vec<State>,
+    shares: &[f64],
+) -> Result<Fit> {
     let mut unknowns = bench.unknowns(trials);
     unknowns.iter_mut().for_each(|u| u.free = false);
+    let mut found: Option<Fit> = None;
+    for &share in shares {
+        let begin = Point {
+            theta: of.fit.point.theta.clone(),
+            starts: found.map_or_else(|| starts.clone(), |fit| fit.point.starts),
+        };
+        let part = bench.test.cut(bench.layout(), share);
+        found = Some(fit(
+            &mut bench.predictor(trials, &part)?,
+            (bench.layout(), &unknowns),
+            Begin::at(begin, (&bench.open, &bench.reach)),
+            (Effort::BRIEF, &Silent),
+        )?);
+    }
+    found.ok_or_else(|| Error::Failed("there is no share of the logs to fit starts to".into()))
+}
+
+/// Squared residuals of the first tenth, from the starts that were fitted to it.
+fn head(bench: &Bench, (trials, of): &Explained<'_>) -> Result<f64> {
     let point = Point {
         theta: of.fit.point.theta.clone(),
         starts: of.held_starts.clone(),
     };
-    let line = linearise(
-        &mut bench.predictor(trials, &bench.test)?,
-        bench.layout(),
-        &unknowns,
-        &point,
-        &bench.open,
-        &mut Differences::new(unknowns.len(), bench.open.len()),
-    )?;
-    let entries = logs.entries.len();
-    let of_episode = |e: usize| {
-        let head = bench.head.logs.episodes[e].plan.rows() * entries;
-        let rows = logs.offset(e)..logs.offset(e + 1);
-        distance(&line.residuals, &line.start_columns, rows, head)
-    };
-    Ok((0..logs.episodes.len()).map(of_episode).sum())
-}
-
-/// Squared Mahalanobis distance of the residuals of one episode after its first `head`.
-fn distance(residuals: &[f64], columns: &[Vec<f64>], rows: Range<usize>, head: usize) -> f64 {
-    let rest = rows.start + head..rows.end;
-    let square = cost(&residuals[rest.clone()]);
-    if !square.is_finite() {
-        return f64::INFINITY;
-    }
-    let dot = |a: &[f64], b: &[f64]| -> f64 { a.iter().zip(b).map(|(x, y)| x * y).sum() };
-    let m = columns.len();
-    let information = DMatrix::from_fn(m, m, |i, j| {
-        dot(&columns[i][rows.clone()], &columns[j][rows.clone()])
-    });
-    let along = DVector::from_fn(m, |i, _| {
-        dot(&columns[i][rest.clone()], &residuals[rest.clone()])
-    });
-    (square - along.dot(&(inverse(&information, 1e-12) * &along))).max(0.0)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn an_error_that_grows_from_a_fitted_start_is_weighed_by_its_covariance() {
-        // A speed that is fitted on one row of slope 1, and two rows after it, of slopes 2 and 3: r' (I + J J')^-1 r by hand.
-        let columns = [vec![1.0, 2.0, 3.0]];
-        let residuals = [0.1, 4.0, 6.0];
-        let covariance = nalgebra::Matrix2::new(5.0, 6.0, 6.0, 10.0);
-        let r = nalgebra::Vector2::new(4.0, 6.0);
-        let by_hand = (r.transpose() * covariance.try_inverse().expect("it is regular") * r)[0];
-        let found = distance(&residuals, &columns, 0..3, 1);
-        assert!((found - by_hand).abs() < 1e-9, "{found} {by_hand}");
-        assert!(found < 52.0 / 10.0);
-        // What no start can make stays.
-        let across = distance(&[0.0, 3.0, -2.0], &columns, 0..3, 1);
-        assert!((across - 13.0).abs() < 1e-9, "{across}");
-        let diverged = distance(&[0.0, f64::INFINITY, 1.0], &columns, 0..3, 1);
-        assert!(diverged.is_infinite());
-    }
+    let mut predictor = bench.predictor(trials, &bench.head)?;
+    let residuals = predictor.residuals(std::slice::from_ref(&point))?.pop();
+    Ok(cost(&residuals.unwrap_or_default()))
 }

@@ -21,6 +21,7 @@ pub(super) struct Steps<'w, 'r> {
     pub(super) layout: &'w Layout,
     pub(super) unknowns: &'w [Unknown],
     pub(super) open: &'w Open,
+    pub(super) reach: &'w [f64],
     pub(super) free: Vec<usize>,
     pub(super) bounds: Vec<Range<usize>>,
     pub(super) differences: Differences,
@@ -99,7 +100,7 @@ impl Steps<'_, '_> {
 
     /// The point after a damped step, within the bounds and the region.
     fn trial(&self, (line, point): (&Linearisation, &Point), damping: f64) -> Point {
-        let normal = Normal::new(line, &self.bounds, damping);
+        let normal = Normal::new(line, &self.bounds, damping, self.reach);
         let parameter = |i: usize| &self.unknowns[i].parameter;
         let units = |theta: &[f64]| -> Vec<f64> {
             let own = self.free.iter();

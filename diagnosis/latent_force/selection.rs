@@ -4,7 +4,7 @@ use asid_core::Result;
 use asid_mjcf::Plant;
 use asid_results::evidence::{Evidence, Replayed, Screened, Tried};
 
-use crate::bench::held_out::misfit;
+use crate::bench::held_out::{Explained, misfits};
 use crate::bench::{Bench, Explanation};
 use crate::candidate::{Candidate, nameable};
 use crate::checks::{RICHARDSON, change_by_step};
@@ -98,14 +98,20 @@ pub fn gather(
             replayed: replayed(bench, &found.explanation, found.explanation.held_out),
         })
         .collect();
-    // What the decision compares is weighed by what the starts are uncertain by.
-    if let Some(i) = found {
-        let of = &findings.found[i];
-        let trials = trials(candidates, &of.candidates, &of.explanation);
-        let misfit = misfit(bench, &trials, &of.explanation)?;
-        tried[i].replayed = replayed(bench, &of.explanation, misfit);
+    // What the decision compares is what no start makes up for.
+    let of_found = found.map(|i| &findings.found[i]);
+    let of_found = of_found.map(|of| (trials(candidates, &of.candidates, &of.explanation), of));
+    let mut compared: Vec<Explained<'_>> = vec![(&[], &findings.none)];
+    compared.extend(
+        of_found
+            .iter()
+            .map(|(trials, of)| (&trials[..], &of.explanation)),
+    );
+    let misfits = misfits(bench, &compared)?;
+    let none = replayed(bench, &findings.none, misfits[0]);
+    if let (Some(i), Some(&left)) = (found, misfits.get(1)) {
+        tried[i].replayed = replayed(bench, compared[1].1, left);
     }
-    let none = replayed(bench, &findings.none, misfit(bench, &[], &findings.none)?);
     let [before, after] = outcome.missing;
     let is_missing = before.force.sqrt() > NOTHING || before.readings > LEAST_LEFT;
     let stopped = !outcome.untried.is_empty();

@@ -163,7 +163,7 @@ impl Replays<'_> {
         let begin = Begin {
             like,
             region: region.as_ref(),
-            ..Begin::at(self.point(fitted), &self.open)
+            ..Begin::at(self.point(fitted), (&self.open, &self.bench.reach))
         };
         let how = (effort, &UntilLate(self.progress) as &dyn Progress);
         self.bench
