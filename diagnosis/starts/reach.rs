@@ -5,12 +5,13 @@
 //! So each coordinate steps against a normal prior whose deviation is twice the largest value that it takes while the model replays the logs, about
 //! whichever axis of its joint.
 
-use asid_core::layout::JointKind;
+use std::ops::Range;
+
+use asid_core::layout::{Joint, JointKind};
+use asid_core::signal::rotation_difference;
 use asid_core::{Layout, Parameter, Result};
-use asid_mjcf::Plant;
 
 use crate::data::Logs;
-use crate::latent_force::initial::scales;
 use crate::machine::Machine;
 use crate::predict::Point;
 use crate::trajectory::{Path, Trajectory};
@@ -35,44 +36,67 @@ pub(crate) fn reach(
     let plant = &machine.plant;
     let model = machine.with(&[])?;
     let shown = Trajectory::of(&*model, plant, parameters, logs, point, machine.threads)?;
-    let largest = largest(plant, &shown.episodes);
+    let largest = largest(&plant.layout, &shown.episodes);
     Ok(open.iter().map(|&c| OPEN * largest[c]).collect())
 }
 
-/// Largest magnitude of each coordinate along some paths, of all axes of its joint that turn, or that shift.
-fn largest(plant: &Plant, paths: &[Path]) -> Vec<f64> {
-    let Layout { nq, nv, joints, .. } = &plant.layout;
-    let states = |path: &Path| -> Vec<f64> {
-        let rows = path.qpos.chunks_exact(*nq).zip(path.qvel.chunks_exact(*nv));
-        let rows = rows.map(|(q, v)| [q, v].concat());
+/// Least that a coordinate may lie from where it is first put, m or rad or per second.
+const LEAST: f64 = 1e-6;
+
+/// Largest magnitude of each coordinate along some paths, of positions their distance from the first row's, of all axes of its joint that turn, or
+/// that shift.
+fn largest(layout: &Layout, paths: &[Path]) -> Vec<f64> {
+    let nv = layout.nv;
+    let mut largest = vec![LEAST; 2 * nv];
+    for path in paths {
+        let rows = path.qpos.chunks_exact(layout.nq);
+        let rows = rows.zip(path.qvel.chunks_exact(nv));
         // A replay that diverged says nothing from there on.
-        let finite = rows.take_while(|row| row.iter().all(|x| x.is_finite()));
-        finite.flatten().collect()
-    };
-    let mut states: Vec<Vec<f64>> = paths.iter().map(states).collect();
-    states.retain(|s| !s.is_empty());
-    let mut largest = scales(plant, &states);
-    for joint in joints {
-        let alike: &[(usize, usize)] = match joint.kind {
-            JointKind::Hinge | JointKind::Slide => &[(0, 1)],
-            JointKind::Ball => &[(0, 3)],
-            JointKind::Free => &[(0, 3), (3, 6)],
-        };
-        for first in [joint.qvel, nv + joint.qvel] {
-            for (a, b) in alike {
-                let axes = &mut largest[first + a..first + b];
-                let most = axes.iter().copied().fold(0.0, f64::max);
-                axes.fill(most);
+        let finite = rows.take_while(|(q, v)| q.iter().chain(*v).all(|x| x.is_finite()));
+        for (q, v) in finite {
+            for joint in &layout.joints {
+                for (dofs, moved) in shifts_and_turns(joint, &path.qpos, q) {
+                    let speeds = v[dofs.clone()].iter().map(|x| x.abs());
+                    let speed = speeds.fold(0.0, f64::max);
+                    for d in dofs {
+                        largest[d] = largest[d].max(moved);
+                        largest[nv + d] = largest[nv + d].max(speed);
+                    }
+                }
             }
         }
     }
     largest
 }
 
+/// Degrees of freedom by which a joint shifts, and by which it turns, with how far each has taken it, at most along one axis, from one configuration
+/// to another, m or rad.
+fn shifts_and_turns(joint: &Joint, from: &[f64], to: &[f64]) -> Vec<(Range<usize>, f64)> {
+    let (place, dof) = (joint.qpos, joint.qvel);
+    let shift = |axes: usize| {
+        let axes = place..place + axes;
+        let moves = axes.map(|i| (to[i] - from[i]).abs());
+        moves.fold(0.0, f64::max)
+    };
+    let turn = |first: usize| {
+        let moves = rotation_difference(&to[first..first + 4], &from[first..first + 4]);
+        moves.iter().fold(0.0_f64, |most, x| most.max(x.abs()))
+    };
+    match joint.kind {
+        JointKind::Hinge | JointKind::Slide => vec![(dof..dof + 1, shift(1))],
+        JointKind::Ball => vec![(dof..dof + 3, turn(place))],
+        JointKind::Free => vec![
+            (dof..dof + 3, shift(3)),
+            (dof + 3..dof + 6, turn(place + 3)),
+        ],
+    }
+}
+
 #[cfg(test)]
 #[allow(clippy::unwrap_used)]
 mod tests {
     use asid_core::Scene;
+    use asid_mjcf::Plant;
 
     use super::*;
 
@@ -90,7 +114,7 @@ mod tests {
             ctrl: Vec::new(),
             contact: Vec::new(),
         };
-        let largest = largest(&plant, &[path]);
+        let largest = largest(&plant.layout, &[path]);
         assert_eq!(largest[..3], [0.3; 3]);
         assert!(largest[3..6].iter().all(|x| *x < 1e-5), "it never turned");
         assert_eq!(largest[6..], [1.0, 1.0, 1.0, 5.0, 5.0, 5.0]);
