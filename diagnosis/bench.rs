@@ -75,7 +75,7 @@ pub struct Bench {
     pub parameters: Vec<Parameter>,
     /// Coordinates of the starts that the logs do not give.
     pub open: Open,
-    /// How far each of these may lie from where it is first put, m or rad or per second ([`crate::starts::reach`]).
+    /// How far each of these may lie from where it is first put, m or rad or per second (`starts::reach`).
     pub reach: Vec<f64>,
     /// The first tenth of the logs held out, on which open starts are fitted.
     pub head: Record,

@@ -117,7 +117,7 @@ pub struct Begin<'b> {
     pub point: Point,
     /// Coordinates of the starts that are fitted with the values.
     pub open: &'b Open,
-    /// How far each of these may lie from where it begins ([`crate::starts::reach`]).
+    /// How far each of these may lie from where it begins (`starts::reach`).
     pub reach: &'b [f64],
     /// Derivatives in the starts of a model that is like this one: they do for a look, and a fit begins with their differences.
     pub like: Option<&'b StartSlopes>,
