@@ -135,8 +135,9 @@ impl Source<'_> {
             candidate.effect.reach(plant, &candidate.spec.site)
         };
         let reaches = by_engine.iter().map(|&i| (i, reach(i)));
-        // Of a segment the columns are those of its whole replay, which no row's slopes take apart.
-        let mut due: Vec<Group> = if self.together && !context.has_segments() {
+        // Of a segment the columns are those of its whole replay, which no row's slopes take apart; where there are any, a part of the walks without one
+        // has no such slopes either.
+        let mut due: Vec<Group> = if self.together && !self.replayed {
             grouped(reaches)
         } else {
             reaches.map(|(i, reach)| Group::single(i, reach)).collect()
