@@ -12,6 +12,7 @@ mod group;
 mod in_part;
 mod null_model;
 mod sizes;
+mod small_steps;
 mod source;
 mod together;
 
@@ -31,7 +32,8 @@ use force_response::ForceSlopes;
 pub use form::Form;
 use in_part::Rest;
 use null_model::{NullModel, Way};
-use sizes::{REPLAY_TRIAL, sizes, sizes_by_replay};
+use sizes::{REPLAY_TRIAL, sizes, sizes_along};
+use small_steps::take_smaller_steps;
 use source::{Along, Source};
 
 /// Share of a deviation of the prior that slopes of the present model are taken over.
@@ -180,18 +182,23 @@ impl Columns {
         asked.add(candidates, &sizes);
         let [first, others] = in_part::parts(context);
         let along = (context, &estimate.trajectory[..]);
-        let (mut found, walked) = in_part::along(&source, along, &asked.wanted, &first)?;
+        let mut wanted = std::mem::take(&mut asked.wanted);
+        let (mut found, mut walked) = in_part::along(&source, along, &wanted, &first)?;
+        if context.has_segments() && walked {
+            let steps = (&mut wanted[..], &asked.begins()[..]);
+            walked = take_smaller_steps(&source, along, steps, (&mut found, &first))?;
+        }
         let Asked {
             center,
             mut bounds,
             base,
-            wanted,
             mut forms,
+            ..
         } = asked;
         let more = wanted.len();
         let mut factors = vec![1.0; more];
         if context.has_segments() {
-            factors = sizes_by_replay(context, estimate, (&found, &first), more);
+            factors = sizes_along((context, estimate), &linear, (&found, &first), more);
             for form in &mut forms {
                 resize(form, candidates, (&mut factors, base), &mut bounds);
             }

@@ -14,6 +14,7 @@ mod next;
 mod ordinary;
 mod row_slopes;
 mod scatter;
+mod seldom;
 mod servo;
 mod small;
 mod step_error;

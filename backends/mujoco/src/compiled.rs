@@ -4,7 +4,7 @@ use asid_core::{Error, Layout, Result, Scene};
 use mujoco_rs::wrappers::mj_editing::{MjSpec, MjsBody};
 use mujoco_rs::wrappers::mj_model::MjModel;
 
-use crate::ffi;
+use crate::{contact, ffi};
 
 /// What all batches of one compiled scene share.
 pub struct Compiled {
@@ -39,6 +39,9 @@ pub fn compile(scene: &Scene, simple: bool) -> Result<MjModel> {
     }
     let mut model = spec.compile().map_err(|e| refused(scene, &e))?;
     ffi::disable_autoreset(&mut model);
+    if !contact::is_possible(&model) {
+        ffi::disable_contacts(&mut model);
+    }
     Ok(model)
 }
 

@@ -15,7 +15,7 @@ mod mjbatch;
 mod quiet;
 mod sim;
 
-pub use quiet::{disable_autoreset, silence_log};
+pub use quiet::{disable_autoreset, disable_contacts, silence_log};
 pub use sim::{BadNumber, Sim, is_bad};
 
 use std::any::Any;

@@ -119,6 +119,17 @@ impl Asked {
         }
     }
 
+    /// Values that each slope begins at, none of a secant; one a column beyond the present model's.
+    pub(super) fn begins(&self) -> Vec<Option<&[f64]>> {
+        let mut begins = Vec::new();
+        for form in &self.forms {
+            debug_assert_eq!(form.first - self.base, begins.len());
+            let slopes = form.slopes.iter();
+            begins.extend(slopes.map(|s| s.map(|_| &form.begin[..])));
+        }
+        begins
+    }
+
     fn push(&mut self, wanted: Wanted, bounds: [f64; 2]) {
         self.wanted.push(wanted);
         self.center.push(0.0);

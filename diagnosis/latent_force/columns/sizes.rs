@@ -9,6 +9,7 @@ use super::source::{Along, Source, Wanted};
 use crate::latent_force::context::Context;
 use crate::latent_force::estimate::Estimate;
 use crate::latent_force::step_error::StepError;
+use crate::latent_force::step_map::LinearEpisode;
 
 /// Share of a parameter's range over which its size is first felt for.
 const TRIAL: f64 = 1e-5;
@@ -24,6 +25,10 @@ const SILENT: f64 = 1e-8;
 const LEAST_MISSING: f64 = 0.1;
 /// Quantile of the missing force that counts as its size.
 const QUANTILE: f64 = 0.99;
+/// That quantile of the size of a normal variable, in deviations.
+const QUANTILE_OF_NORMAL: f64 = 2.6;
+/// Change of a speed from row to row, m/s or rad/s, that is none.
+const STILL: f64 = 1e-9;
 /// Share of a reading's spread that an effect on it may make up for.
 const READING_SHARE: f64 = 0.1;
 /// Rows of each part that sizes are felt for on.
@@ -222,9 +227,22 @@ pub(super) fn spreads(context: &Context<'_>) -> Vec<f64> {
     out
 }
 
+/// Deviations of priors where some walks are segments: the smaller of those that replays of segments say and of those that rows of the other
+/// walks do.
+pub(super) fn sizes_along(
+    (context, estimate): (&Context<'_>, &Estimate),
+    linear: &[LinearEpisode],
+    taken: (&[Along], &[usize]),
+    m: usize,
+) -> Vec<f64> {
+    let by_rows = sizes_along_rows((context, estimate), linear, taken, m);
+    let by_replay = sizes_by_replay(context, estimate, taken, m).into_iter();
+    by_replay.zip(by_rows).map(|(a, b)| a.min(b)).collect()
+}
+
 /// Deviations of priors where walks are segments, from what a unit of each parameter does to their readings along their
 /// replays, `rows x ns x m` for those walks that are said: a few times what is left of them, for the open starts take up most of it.
-pub(super) fn sizes_by_replay(
+fn sizes_by_replay(
     context: &Context<'_>,
     estimate: &Estimate,
     (columns, which): (&[Along], &[usize]),
@@ -248,4 +266,47 @@ pub(super) fn sizes_by_replay(
     let left = 1.0 + estimate.missing(context).readings;
     let size = |s: f64| REPLAY_MULTIPLE * (left * n / s).sqrt();
     squares.into_iter().map(size).collect()
+}
+
+/// Deviations of priors from what a unit of each parameter does to the speeds from row to row along those of some walks that are no segments,
+/// beside what is missing of these there; infinite where it does nothing.
+fn sizes_along_rows(
+    (context, estimate): (&Context<'_>, &Estimate),
+    linear: &[LinearEpisode],
+    (columns, which): (&[Along], &[usize]),
+    m: usize,
+) -> Vec<f64> {
+    let layout = &context.plant().layout;
+    let (nv, nx, width) = (layout.nv, 2 * layout.nv, layout.nq + layout.nv);
+    let rows = |w: &&usize| context.walks[**w].segment.is_none();
+    let (mut missing, mut moved) = (vec![0.0; nv], vec![0.0; nv]);
+    let mut squares = vec![0.0; nv * m];
+    for &w in which.iter().filter(rows) {
+        let states = &estimate.trajectory[w];
+        for k in 0..context.walks[w].len() - 1 {
+            for d in 0..nv {
+                let speed = |row: usize| states[row * width + layout.nq + d];
+                missing[d] += linear[w].defect[k * nx + nv + d].powi(2);
+                moved[d] += (speed(k + 1) - speed(k)).powi(2);
+                let at = (k * nx + nv + d) * m;
+                let row = columns[w].0[at..at + m].iter();
+                let own = &mut squares[d * m..(d + 1) * m];
+                own.iter_mut().zip(row).for_each(|(s, x)| *s += x * x);
+            }
+        }
+    }
+    let most = |(missing, moved): (&f64, &f64)| {
+        let most = missing.max(LEAST_MISSING * LEAST_MISSING * moved);
+        QUANTILE_OF_NORMAL * QUANTILE_OF_NORMAL * most
+    };
+    let most: Vec<f64> = missing.iter().zip(&moved).map(most).collect();
+    let size = |i: usize| {
+        let acting = (0..nv).filter(|d| squares[d * m + i] > 0.0 && most[*d] > STILL * STILL);
+        let ratios: Vec<f64> = acting.map(|d| squares[d * m + i] / most[d]).collect();
+        (ratios.len() as f64 / ratios.iter().sum::<f64>()).sqrt()
+    };
+    let sizes = (0..m).map(size);
+    sizes
+        .map(|s| if s > 0.0 { s } else { f64::INFINITY })
+        .collect()
 }

@@ -19,7 +19,7 @@ const KEPT_PROMISE: f64 = 1.1;
 /// Widths of the starts that are drawn where no step keeps its promise, in deviations of the start's posterior, which has the shape of
 /// the valley where the slopes are right. A touch that begins a row earlier or later is another valley, and no slope leads there.
 const BY_POSTERIOR: [f64; 3] = [0.5, 2.0, 8.0];
-/// The same in deviations of what its readings leave open, for where the slopes are wrong.
+/// The same in deviations of what its readings leave open and of what is known of it before, for where the slopes are wrong.
 const BY_READING: [f64; 3] = [0.03, 0.1, 0.3];
 /// Draws of each width.
 const DRAWS: usize = 4;
@@ -76,6 +76,8 @@ impl Estimate {
         }
         self.rolls += 1;
         let mut random = Streams::new(self.rolls).stream("starts of segments");
+        // A start that the log gives is hardly open.
+        let starts = context.starts(before);
         let scales = (&context.scale[..], &context.position_noise[..]);
         for _ in 0..DRAWS {
             for (posterior, reading) in BY_POSTERIOR.into_iter().zip(BY_READING) {
@@ -85,8 +87,6 @@ impl Estimate {
                 let normal = DVector::from_fn(most.unwrap_or(0).max(nx), |_, _| {
                     random.sample::<f64, _>(StandardNormal)
                 });
-                let wide =
-                    DVector::from_fn(nx, |i, _| reading * normal[i] * open_by_reading(i, scales));
                 let along = |s: &Self, w: usize| {
                     let root = &s.smoothed[w].root;
                     let change = || posterior * root * normal.rows(0, root.ncols());
@@ -94,7 +94,11 @@ impl Estimate {
                 };
                 self.offer(map, theta, (&from, &promised, &mut left), along)?;
                 let from = self.trajectory.clone();
-                let about = |_: &Self, _: usize| Some(wide.as_slice().to_vec());
+                let about = |_: &Self, w: usize| {
+                    let known = starts[w].variance.iter().map(|v| v.sqrt()).enumerate();
+                    let open = known.map(|(i, known)| known.min(open_by_reading(i, scales)));
+                    Some(open.zip(&normal).map(|(d, n)| reading * n * d).collect())
+                };
                 self.offer(map, theta, (&from, &promised, &mut left), about)?;
             }
         }

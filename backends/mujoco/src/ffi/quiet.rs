@@ -1,4 +1,4 @@
-//! What MuJoCo does unasked: it writes to the console, and restarts simulations.
+//! What MuJoCo does unasked: it writes to the console, restarts simulations, and looks for contacts where there can be none.
 
 use std::ffi::c_int;
 use std::sync::Once;
@@ -34,4 +34,11 @@ pub fn disable_autoreset(model: &mut MjModel) {
     // SAFETY: a flag of the options; no size or index table is touched.
     let raw = unsafe { model.ffi_mut() };
     raw.opt.disableflags |= mjtDisableBit::mjDSBL_AUTORESET as c_int;
+}
+
+/// Turns off the search for contacts of a model that can make none.
+pub fn disable_contacts(model: &mut MjModel) {
+    // SAFETY: as in `disable_autoreset`.
+    let raw = unsafe { model.ffi_mut() };
+    raw.opt.disableflags |= mjtDisableBit::mjDSBL_CONTACT as c_int;
 }

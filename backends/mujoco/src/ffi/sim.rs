@@ -4,13 +4,17 @@ use std::marker::PhantomData;
 
 use crate::field::Field;
 use mujoco_rs::mujoco_c::{
-    mj_contactForce, mj_forward, mj_step, mj_step1, mj_step2, mjData, mjModel,
+    mj_contactForce, mj_forward, mj_isPyramidal, mj_isSparse, mj_step, mj_step1, mj_step2,
+    mjContact, mjData, mjModel,
 };
 
 /// First of the warnings about bad numbers: `qpos`, `qvel`, `qacc`, `ctrl`.
 const WARN_BADQPOS: usize = 3;
 /// `mjMAXVAL`: a larger magnitude counts as bad.
 const MAX_VALUE: f64 = 1e10;
+
+/// Entries of the Jacobian of a contact, m/rad or 1, that are rounding.
+const NO_LEVER: f64 = 1e-12;
 
 /// True where MuJoCo's own check calls a number bad: not finite, or above 1e10.
 #[must_use]
@@ -164,7 +168,8 @@ impl Sim<'_> {
     }
 
     /// Sum of the normal forces between the geoms of two bodies, N, as of the
-    /// last [`Sim::forward`].
+    /// last [`Sim::forward`]. A contact that acts on no joint, as that of a thing without friction that slides along a table
+    /// and cannot leave it, counts as none: how large its force is nothing says.
     #[must_use]
     pub fn contact_force(&self, bodies: [usize; 2]) -> f64 {
         let mut sum = 0.0;
@@ -179,7 +184,8 @@ impl Sim<'_> {
                     continue;
                 }
                 let pair = [a, b].map(|g| *m.geom_bodyid.add(g as usize) as usize);
-                if pair == bodies || pair == [bodies[1], bodies[0]] {
+                let own = pair == bodies || pair == [bodies[1], bodies[0]];
+                if own && self.acts(contact) {
                     let mut force = [0.0; 6];
                     mj_contactForce(self.m, d, i, &raw mut force);
                     sum += force[0];
@@ -187,6 +193,32 @@ impl Sim<'_> {
             }
         }
         sum
+    }
+
+    /// Whether a contact acts on some degree of freedom.
+    fn acts(&self, contact: &mjContact) -> bool {
+        let Ok(first) = usize::try_from(contact.efc_address) else {
+            return false;
+        };
+        // SAFETY: the rows of a contact that is in the problem lie within those of its Jacobian, dense (`nv` a row) or sparse.
+        unsafe {
+            let (d, nv) = (&*self.d, (*self.m).nv as usize);
+            let dim = contact.dim as usize;
+            let rows = match mj_isPyramidal(self.m) {
+                1 if dim > 1 => 2 * (dim - 1),
+                _ => dim,
+            };
+            (first..first + rows).any(|row| {
+                let (start, len) = match mj_isSparse(self.m) {
+                    0 => (row * nv, nv),
+                    _ => (
+                        *d.efc_J_rowadr.add(row) as usize,
+                        *d.efc_J_rownnz.add(row) as usize,
+                    ),
+                };
+                (start..start + len).any(|entry| (*d.efc_J.add(entry)).abs() > NO_LEVER)
+            })
+        }
     }
 }
 
