@@ -5,8 +5,9 @@
 //! make the likelihood (identification), the sensitivity (information) and the
 //! gap (diagnosis).
 
+use asid_core::layout::JointKind;
 use asid_core::signal::{Signal, rotation_difference, unit_quaternion};
-use asid_core::{Layout, Result};
+use asid_core::{Layout, Result, Scene};
 use nalgebra::UnitQuaternion;
 
 #[derive(Clone, Copy, Debug)]
@@ -42,7 +43,7 @@ impl SignalSet {
                 start: width,
                 len: sensor.len,
                 rotation,
-                angle: rotation || sensor.unit() == "rad",
+                angle: rotation,
                 noise: signal.noise,
             });
             width += sensor.len;
@@ -53,6 +54,28 @@ impl SignalSet {
             width,
             whitened,
         })
+    }
+
+    /// The same with the positions of hinges known as angles, which a layout does not tell from those of slides: `scene` says which
+    /// joint a sensor reads. `signals` are those that it was made of.
+    ///
+    /// # Errors
+    /// When the scene's document is not valid MJCF.
+    pub fn with_angles_of(
+        mut self,
+        scene: &Scene,
+        layout: &Layout,
+        signals: &[Signal],
+    ) -> Result<Self> {
+        let document = scene.description()?;
+        for (part, signal) in self.parts.iter_mut().zip(signals) {
+            let mut sensors = document.sensors.iter().filter(|s| s.kind == "jointpos");
+            let joint = sensors
+                .find(|s| s.name.as_deref() == Some(&*signal.sensor))
+                .and_then(|s| layout.joint(s.objname.as_deref()?).ok());
+            part.angle |= joint.is_some_and(|j| j.kind == JointKind::Hinge);
+        }
+        Ok(self)
     }
 
     /// Entries of a reading's row.
@@ -67,7 +90,8 @@ impl SignalSet {
         self.whitened
     }
 
-    /// Whether each entry of a whitened difference is an angle.
+    /// Whether each entry of a whitened difference is an angle: those of an orientation, and of a hinge where
+    /// [`SignalSet::with_angles_of`] told.
     #[must_use]
     pub fn angles(&self) -> Vec<bool> {
         let parts = self.parts.iter();
@@ -131,5 +155,56 @@ impl SignalSet {
                 }
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use asid_core::layout::{Joint, Sensor};
+
+    /// Symptom: a tracked angle of a hinge had the prior of a tracked position, 0.001 m, in place of 0.005 rad. Cause: it was sought by
+    /// a unit that no sensor has: that of a joint's position is m or rad, by the joint.
+    #[test]
+    fn an_angle_is_known_by_the_joint_that_its_sensor_reads() {
+        let xml = r#"<mujoco><worldbody><body><joint name="turn"/><geom size="0.1"/></body>
+            <body><joint name="rail" type="slide"/><geom size="0.1"/></body></worldbody>
+            <sensor><jointpos name="x" joint="rail"/><jointpos name="q" joint="turn"/><jointvel name="w" joint="turn"/></sensor></mujoco>"#;
+        let scene = Scene::from_xml("s", xml, &[]).unwrap();
+        let joints = [("turn", JointKind::Hinge), ("rail", JointKind::Slide)];
+        let sensors = [("x", "jointpos"), ("q", "jointpos"), ("w", "jointvel")];
+        let layout = Layout {
+            timestep: 0.002,
+            nq: 2,
+            nv: 2,
+            bodies: Vec::new(),
+            geoms: Vec::new(),
+            joints: (0..2)
+                .map(|i| Joint {
+                    name: joints[i].0.into(),
+                    kind: joints[i].1,
+                    body: String::new(),
+                    qpos: i,
+                    qvel: i,
+                })
+                .collect(),
+            actuators: Vec::new(),
+            sensors: (0..3)
+                .map(|i| Sensor {
+                    name: sensors[i].0.into(),
+                    kind: sensors[i].1.into(),
+                    address: i,
+                    len: 1,
+                })
+                .collect(),
+            keyframes: Vec::new(),
+        };
+        let signals = sensors.map(|(name, _)| Signal {
+            sensor: name.into(),
+            noise: 1.0,
+        });
+        let set = SignalSet::new(&layout, &signals).unwrap();
+        let set = set.with_angles_of(&scene, &layout, &signals).unwrap();
+        assert_eq!(set.angles(), [false, true, false]);
     }
 }

@@ -177,6 +177,13 @@ impl Replay {
         self.plan.physics_steps()
     }
 
+    /// Memory that one replay is recorded and predicted in, bytes.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        let rows = self.plan.frames + self.plan.rows;
+        rows * self.width() * size_of::<f64>()
+    }
+
     /// Predicts all rows from the simulations' present states: `sims x rows x width`.
     ///
     /// # Errors

@@ -1,10 +1,11 @@
 //! Logs made ready for comparison with replays of them.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 use asid_core::episode::InitialState;
 use asid_core::error::{Error, Result};
-use asid_core::signal::Signal;
+use asid_core::signal::{Signal, rotation_difference};
 use asid_core::simulator::{BatchConfig, Simulator};
 use asid_core::{Episode, Model, Parameter};
 use asid_mjcf::Plant;
@@ -16,6 +17,13 @@ use crate::{columns, start, targets};
 
 /// Smallest noise of a sensor, as a share of the spread of its readings: a simulated log has none at all.
 const LEAST_NOISE: f64 = 1e-5;
+
+/// Entries of an orientation, `w x y z`.
+const QUATERNION: usize = 4;
+
+/// Memory that the replays of a batch are recorded in at most, bytes: 256 MiB. Readings at irregular times are interpolated between
+/// records of every physics step, which for 256 replays of a minute would be some gigabytes. Larger batches keep more cores busy.
+const RECORDS: usize = 256 << 20;
 
 /// One episode.
 #[derive(Clone, Debug)]
@@ -101,6 +109,12 @@ impl Dataset {
         self.differences.whitened_len()
     }
 
+    /// Compared numbers of an episode that are there.
+    pub(crate) fn present(&self, trial: &Trial) -> usize {
+        let itself = self.residuals(trial, &trial.readings);
+        itself.iter().filter(|x| x.is_finite()).count()
+    }
+
     /// Residuals `(logged - predicted) / noise` of an episode, `rows x entries`; NaN where a reading is missing.
     #[must_use]
     pub fn residuals(&self, trial: &Trial, predicted: &[f64]) -> Vec<f64> {
@@ -117,39 +131,80 @@ impl Dataset {
     }
 }
 
-/// The noise of a sensor from the rough part of its readings. Readings that come in steps have at least the deviation of a
-/// step, `step / sqrt(12)`.
+/// A reading that is there, or an angle that follows from it: row, time (s) and value.
+type Point = (usize, f64, f64);
+
+/// The noise of a sensor from the rough part of its readings: of each number, or of each rotation angle (rad) of an orientation.
+/// Readings that come in steps have at least the deviation of a step, `step / sqrt(12)`.
 fn noise_of(sensor: &str, logs: &[(String, Episode)]) -> f64 {
     let mut rough = ThirdDifferences::default();
     let mut step = f64::INFINITY;
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+    // A small rotation changes a quaternion by half of its angle.
+    let mut unit = 1.0;
     for (_, episode) in logs {
         let Some(range) = episode.channel(sensor) else {
             continue;
         };
-        for column in range {
-            let reading = |k: usize| episode.reading(k)[column];
-            // A reading that only repeats the one before, as of an encoder at rest, has no noise of its own.
-            let series: Vec<(usize, f64, f64)> = (0..episode.rows())
-                .filter(|&k| reading(k).is_finite() && (k == 0 || reading(k) != reading(k - 1)))
-                .map(|k| (k, episode.time[k], reading(k)))
-                .collect();
+        for column in range.clone() {
+            let series = numbers(episode, column);
             for (.., x) in &series {
                 (low, high) = (low.min(*x), high.max(*x));
             }
             let steps = series.windows(2).map(|w| (w[1].2 - w[0].2).abs());
             step = steps.filter(|d| *d > 0.0).fold(step, f64::min);
-            rough.add(&series);
+            if range.len() != QUATERNION {
+                rough.add(&series);
+            }
+        }
+        if range.len() == QUATERNION {
+            unit = 2.0;
+            for series in turns(episode, &range) {
+                rough.add(&series);
+            }
         }
     }
-    let least = (LEAST_NOISE * (high - low)).max(f64::MIN_POSITIVE.sqrt());
+    let least = (LEAST_NOISE * unit * (high - low)).max(f64::MIN_POSITIVE.sqrt());
     let least = if least.is_finite() { least } else { 1.0 };
     let step = if step.is_finite() {
-        step / 12.0_f64.sqrt()
+        unit * step / 12.0_f64.sqrt()
     } else {
         0.0
     };
     rough.noise().deviation.max(least).max(step)
+}
+
+/// The readings of a column that are there. One that only repeats the one before, as of an encoder at rest, has no noise of its own.
+fn numbers(episode: &Episode, column: usize) -> Vec<Point> {
+    let reading = |k: usize| episode.reading(k)[column];
+    (0..episode.rows())
+        .filter(|&k| reading(k).is_finite() && (k == 0 || reading(k) != reading(k - 1)))
+        .map(|k| (k, episode.time[k], reading(k)))
+        .collect()
+}
+
+/// The angles (rad) about the three axes of the world that an orientation has turned by since its first reading: sums of the turns from
+/// one reading to the next, which are small however far it turns in all, and in which the sign of a quaternion means nothing.
+fn turns(episode: &Episode, columns: &Range<usize>) -> [Vec<Point>; 3] {
+    let mut series: [Vec<Point>; 3] = Default::default();
+    let mut angles = [0.0; 3];
+    let mut before: Option<&[f64]> = None;
+    for k in 0..episode.rows() {
+        let now = &episode.reading(k)[columns.clone()];
+        if before == Some(now) {
+            continue;
+        }
+        let turn = rotation_difference(now, before.unwrap_or(now));
+        if turn.iter().any(|x| !x.is_finite()) {
+            continue;
+        }
+        for ((angle, by), series) in angles.iter_mut().zip(turn).zip(&mut series) {
+            *angle += by;
+            series.push((k, episode.time[k], *angle));
+        }
+        before = Some(now);
+    }
+    series
 }
 
 /// Replays episodes at many values of the parameters at once.
@@ -198,7 +253,8 @@ impl Replayer {
         let mut replay = trial.replay.clone();
         let length = replay.rows() * replay.width();
         let mut all = Vec::with_capacity(points.len());
-        for chunk in points.chunks(self.simulator.batch_size()) {
+        let size = batch(self.simulator.batch_size(), replay.bytes());
+        for chunk in points.chunks(size) {
             let sims: Vec<usize> = (0..chunk.len()).collect();
             let values: Vec<f64> = chunk
                 .iter()
@@ -223,24 +279,55 @@ impl Replayer {
     }
 }
 
+/// Replays at once, of at most `most`, that are recorded in `each` bytes.
+fn batch(most: usize, each: usize) -> usize {
+    (RECORDS / each.max(1)).clamp(1, most.max(1))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use asid_core::Streams;
     use asid_core::episode::ChannelColumns;
+    use asid_core::scene::Scene;
+    use nalgebra::{UnitQuaternion, Vector3};
     use rand::Rng as _;
 
     fn log(readings: Vec<f64>) -> (String, Episode) {
+        log_of(1, readings)
+    }
+
+    /// Rows of `len` numbers, a row every 0.01 s.
+    fn log_of(len: usize, readings: Vec<f64>) -> (String, Episode) {
+        let rows = readings.len() / len;
         let episode = Episode {
-            time: (0..readings.len()).map(|k| 0.01 * k as f64).collect(),
+            time: (0..rows).map(|k| 0.01 * k as f64).collect(),
             channels: vec![ChannelColumns {
                 name: "q".into(),
-                len: 1,
+                len,
             }],
             readings,
             ..Episode::default()
         };
         ("log".into(), episode)
+    }
+
+    /// A body that turns all the time, four times in all, read with a noise of 0.01 rad in each rotation angle; its quaternions come
+    /// with either sign.
+    fn turning(rows: usize) -> Vec<f64> {
+        let mut rng = Streams::new(1).stream("t");
+        let mut normal = || (0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0;
+        let mut readings = Vec::new();
+        for k in 0..rows {
+            let angle = 4.0 * std::f64::consts::TAU * k as f64 / rows as f64;
+            let axis = Vector3::new(0.6, 0.0, 0.8);
+            let noise = Vector3::from_fn(|_, _| 0.01 * normal());
+            let read = UnitQuaternion::from_scaled_axis(noise)
+                * UnitQuaternion::from_scaled_axis(angle * axis);
+            let sign = if k % 3 == 0 { -1.0 } else { 1.0 };
+            readings.extend([read.w, read.i, read.j, read.k].map(|x| sign * x));
+        }
+        readings
     }
 
     #[test]
@@ -259,5 +346,48 @@ mod tests {
         let readings = (0..1000).map(|k| 0.5 * f64::from(k / 100));
         let found = noise_of("q", &[log(readings.collect())]);
         assert!((found - 0.5 / 12.0_f64.sqrt()).abs() < 1e-12, "{found}");
+    }
+
+    /// Symptom: gaps of an orientation twice as large as those of any other sensor. Cause: the noise was that of the numbers of a
+    /// quaternion, each of which changes by half of a rotation angle at most.
+    #[test]
+    fn the_noise_of_an_orientation_is_that_of_its_angles() {
+        let found = noise_of("q", &[log_of(4, turning(4000))]);
+        assert!((found / 0.01 - 1.0).abs() < 0.1, "{found}");
+    }
+
+    #[test]
+    fn an_orientation_without_noise_has_but_the_least() {
+        let rows = (0..1000).flat_map(|k| {
+            let half = 0.5 * (0.01 * f64::from(k)).sin();
+            [half.cos(), 0.0, 0.0, half.sin()]
+        });
+        let found = noise_of("q", &[log_of(4, rows.collect())]);
+        assert!(found < 1e-4, "{found}");
+    }
+
+    /// Symptom: a residual below one noise where a model explains the log as well as it can. Cause: an orientation counted as four
+    /// readings, one a number of its quaternion, but has three residuals.
+    #[test]
+    fn an_orientation_counts_as_three_readings() {
+        let xml = r#"<mujoco><worldbody><body name="b"><freejoint/><geom size="0.1"/></body></worldbody>
+            <sensor><framequat name="q" objtype="xbody" objname="b"/></sensor></mujoco>"#;
+        let plant = Plant::of(&Scene::from_xml("s", xml, &[]).unwrap()).unwrap();
+        let (name, mut episode) = log_of(4, turning(50));
+        // An orientation of which a number is missing is none.
+        episode.readings[4 * 7 + 2] = f64::NAN;
+        let data = Dataset::new(&plant, &[(name, episode)], &BTreeMap::new()).unwrap();
+        assert_eq!(data.present(&data.trials[0]), 3 * 49);
+    }
+
+    /// Symptom: a minute's log of irregular times took gigabytes. Cause: every replay of a batch of 256 was recorded at each physics step.
+    #[test]
+    fn a_batch_is_as_large_as_its_records_allow() {
+        assert_eq!(batch(256, 8), 256);
+        // A minute in steps of 1 ms, 20 numbers each.
+        let each = 8 * 20 * 60_000;
+        let size = batch(256, each);
+        assert!((1..256).contains(&size) && size * each <= RECORDS);
+        assert_eq!(batch(256, usize::MAX), 1);
     }
 }

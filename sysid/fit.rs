@@ -15,7 +15,7 @@ use asid_core::{Model, Parameter, Posterior, Progress, Streams};
 use nalgebra::DMatrix;
 
 use crate::by_episodes::{parts, widened};
-use crate::dataset::{Dataset, Replayer, Trial};
+use crate::dataset::{Dataset, Replayer};
 use crate::marginal::{marginal, values};
 use crate::valleys::{Watched, confirmed};
 
@@ -104,7 +104,7 @@ pub fn fit(
             .iter()
             .map(|trial| marginal(&mut replayer, layout, data, trial, &theta))
             .collect::<Result<Vec<_>>>()?;
-        let present: usize = data.trials.iter().map(present).sum();
+        let present: usize = data.trials.iter().map(|t| data.present(t)).sum();
         let space = Space {
             low: &box_.0,
             high: &box_.1,
@@ -159,8 +159,4 @@ pub fn fit(
         information: found.about(parameters.len()),
         physics_steps: replayer.steps(),
     })
-}
-
-fn present(trial: &Trial) -> usize {
-    trial.readings.iter().filter(|x| x.is_finite()).count()
 }

@@ -159,7 +159,8 @@ pub fn warm_up(trial: &Trial) -> usize {
 /// The gap of a model on some logs, with the residuals of each episode that count (`rows x entries`).
 #[derive(Clone, Debug)]
 pub struct Gap {
-    /// Root mean square over all readings that count; infinite where a replay diverged.
+    /// Root mean square over all readings that count; infinite where a replay diverged, and not a number where none counts, as where
+    /// logs are no longer than what an open start is fitted to.
     pub value: f64,
     /// One an episode; empty where it diverged.
     pub residuals: Vec<Vec<f64>>,
@@ -200,7 +201,38 @@ pub fn gap(
         all.push(counted);
     }
     Ok(Gap {
-        value: (sum / count.max(1) as f64).sqrt(),
+        value: root_mean(sum, count),
         residuals: all,
     })
+}
+
+/// Root of the mean of `count` squares, of which there is none of nothing: 0 would be a perfect replay.
+fn root_mean(sum: f64, count: usize) -> f64 {
+    match count {
+        0 if sum.is_finite() => f64::NAN,
+        _ => (sum / count.max(1) as f64).sqrt(),
+    }
+}
+
+/// What to say of logs in which no reading counts, such as `held out`.
+#[must_use]
+pub fn too_short(logs: &str) -> String {
+    format!(
+        "the logs {logs} are too short for a gap: an open start is fitted to the first {WARM_UP_ROWS} rows at least, and no reading is left behind them"
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Symptom: a gap of 0.00 on logs of six rows, as if the model replayed them without fault. Cause: a start was fitted to all of them,
+    /// and the mean of no residual was 0.
+    #[test]
+    fn a_log_that_is_all_warm_up_has_no_gap() {
+        assert!(root_mean(0.0, 0).is_nan());
+        assert_eq!(root_mean(8.0, 2), 2.0);
+        // A replay that diverged is told as such.
+        assert_eq!(root_mean(f64::INFINITY, 0), f64::INFINITY);
+    }
 }

@@ -7,6 +7,7 @@
 //! - a finite Fourier series under a window ([`Shape::Fourier`]; J. Swevers et al., "Optimal robot excitation and
 //!   identification", IEEE Trans. Robotics and Automation 13, 1997).
 //!
+//! It is divided by its own peak where that is above one, so that it stays smooth: only the range of a command cuts it.
 //! The coefficients, each within `[-1, 1]`, are what a search moves.
 
 use asid_core::rng::Rng;
@@ -85,12 +86,12 @@ impl Family {
     pub fn commands(&self, coefficients: &[f64], scale: f64) -> Vec<f64> {
         let nu = self.base.len();
         let mut out = self.base.repeat(self.all_frames());
+        let frames: Vec<f64> = (0..self.frames).map(|k| self.time_of(k)).collect();
         for (own, a) in coefficients
             .chunks_exact(self.each().max(1))
             .zip(self.moving())
         {
-            for k in 0..self.frames {
-                let s = self.curve(own, k as f64 / self.frames as f64);
+            for (k, s) in self.curve(own, &frames).into_iter().enumerate() {
                 let value = self.base[a] + scale * self.amplitude[a] * s;
                 out[k * nu + a] = self.range[a].map_or(value, |[low, high]| value.clamp(low, high));
             }
@@ -98,19 +99,31 @@ impl Family {
         out
     }
 
-    /// The curve at a share of the motion, within `[-1, 1]`.
-    fn curve(&self, coefficients: &[f64], at: f64) -> f64 {
+    /// Frame `k` as a share of the motion.
+    fn time_of(&self, k: usize) -> f64 {
+        k as f64 / self.frames as f64
+    }
+
+    /// The curve at some shares of the motion, within `[-1, 1]` at each frame.
+    fn curve(&self, coefficients: &[f64], at: &[f64]) -> Vec<f64> {
+        let frames = (0..self.frames).map(|k| self.height(coefficients, self.time_of(k)).abs());
+        let peak = frames.fold(1.0, f64::max);
+        at.iter()
+            .map(|&at| self.height(coefficients, at) / peak)
+            .collect()
+    }
+
+    /// The height that coefficients sum up to at a share of the motion.
+    fn height(&self, coefficients: &[f64], at: f64) -> f64 {
         match self.shape {
             Shape::Spline(knots) => {
                 // Splines whose support lies within the motion: the curve and its slope vanish at the ends.
                 let x = at * (knots + 3) as f64;
-                let sum: f64 = coefficients
+                coefficients
                     .iter()
                     .enumerate()
                     .map(|(k, c)| c * cubic(x - k as f64))
-                    .sum();
-                // Where neighbours add up a curve of ones has the height one.
-                sum.clamp(-1.0, 1.0)
+                    .sum()
             }
             Shape::Fourier(harmonics) => {
                 let sum: f64 = (0..harmonics)
@@ -121,7 +134,7 @@ impl Family {
                     .sum();
                 let edge = (at.min(1.0 - at) / FADE).clamp(0.0, 1.0);
                 let window = edge * edge * (3.0 - 2.0 * edge);
-                (window * sum / (harmonics as f64).sqrt()).clamp(-1.0, 1.0)
+                window * sum / (harmonics as f64).sqrt()
             }
         }
     }
@@ -131,9 +144,12 @@ impl Family {
     pub fn near(&self, other: &Self, coefficients: &[f64]) -> Vec<f64> {
         let each = self.each();
         // A spline of the support `[k, k + 4]` peaks in its middle.
-        let middle = |k: usize| (k + 2) as f64 / (each + 3) as f64;
+        let middle: Vec<f64> = (0..each)
+            .map(|k| (k + 2) as f64 / (each + 3) as f64)
+            .collect();
         let all = coefficients.chunks_exact(other.each().max(1));
-        all.flat_map(|own| (0..each).map(move |k| other.curve(own, middle(k)) / OVERLAP))
+        all.flat_map(|own| other.curve(own, &middle))
+            .map(|height| height / OVERLAP)
             .collect()
     }
 
@@ -229,6 +245,35 @@ mod tests {
             assert!((at(0) - 0.5).abs() < 1e-9 && (at(1) - 0.5).abs() < 2e-2);
             assert!((at(199) - 0.5).abs() < 2e-2);
             assert!((200..210).all(|k| at(k) == 0.5));
+        }
+    }
+
+    /// Symptom: plateaus with corners in commands that are said to be smooth. Cause: curves above one were cut there. The second
+    /// differences of a curve whose slope is continuous fall by four where frames are twice as dense, those at a corner by two.
+    #[test]
+    fn a_curve_above_one_is_no_plateau() {
+        let loud = |shape| match shape {
+            Shape::Spline(_) => vec![1.0, 1.0, -1.0, -1.0, 1.0, 0.3, 1.0, 1.0],
+            // All harmonics peak in the middle.
+            Shape::Fourier(n) => [[-1.0, 0.0], [1.0, 0.0]].concat().repeat(n)[..2 * n].to_vec(),
+        };
+        for shape in [Shape::Spline(8), Shape::Fourier(3), Shape::Fourier(5)] {
+            let sharpest = |frames: usize| {
+                let wide = Family {
+                    range: vec![None; 2],
+                    frames,
+                    rest: 0,
+                    ..family(shape)
+                };
+                let commands = wide.commands(&loud(shape), 1.0);
+                let curve: Vec<f64> = commands.iter().step_by(2).map(|x| x - 0.5).collect();
+                let peak = curve.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+                assert!((peak - 1.0).abs() < 1e-12, "{shape:?}: {peak}");
+                let second = curve.windows(3).map(|w| (w[0] - 2.0 * w[1] + w[2]).abs());
+                second.fold(0.0, f64::max)
+            };
+            let ratio = sharpest(400) / sharpest(800);
+            assert!((3.5..4.5).contains(&ratio), "{shape:?}: {ratio}");
         }
     }
 }

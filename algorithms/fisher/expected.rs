@@ -174,7 +174,11 @@ impl<'a> Episode<'a> {
             ctrl,
             batch: problem.batch(size)?,
             recording: layout.recording(&protocol.channels())?,
-            signals: SignalSet::new(layout, problem.signals)?,
+            signals: SignalSet::new(layout, problem.signals)?.with_angles_of(
+                problem.task.scene(),
+                layout,
+                problem.signals,
+            )?,
             substeps: substeps(layout, protocol.frame_period)?,
             sims: (0..size).collect(),
             problem,

@@ -53,7 +53,12 @@ impl<'a> Likelihood<'a> {
     /// cannot set an unknown.
     pub fn new(problem: &'a Problem<'a>, episodes: &[Episode], size: usize) -> Result<Self> {
         let layout = problem.model.layout();
-        let signals = SignalSet::new(layout, problem.signals)?;
+        let scene = problem.task.scene();
+        let signals = SignalSet::new(layout, problem.signals)?.with_angles_of(
+            scene,
+            layout,
+            problem.signals,
+        )?;
         let names: Vec<String> = problem.signals.iter().map(|s| s.sensor.clone()).collect();
         let width = signals.width();
         let mut observed = Vec::with_capacity(episodes.len());

@@ -40,15 +40,14 @@ impl Drive {
     /// Force on the joint (N or N m) for a command, at a position and speed of the joint.
     #[must_use]
     pub fn force(&self, command: f64, position: f64, speed: f64) -> f64 {
-        let clamp = |x: f64, range: Option<[f64; 2]>| range.map_or(x, |[a, b]| x.clamp(a, b));
-        let command = clamp(command, self.ctrl_range);
+        let command = within(command, self.ctrl_range);
         let (q, v) = (self.gear * position, self.gear * speed);
         let force = match self.law {
             DriveLaw::Motor => command,
             DriveLaw::Position { kp, kv } => kp * (command - q) - kv * v,
             DriveLaw::Velocity { kv } => kv * (command - v),
         };
-        self.gear * clamp(force, self.force_range)
+        self.gear * within(force, self.force_range)
     }
 
     /// The command that makes the drive ask for a force on the joint (N or N m), before
@@ -87,6 +86,16 @@ impl Drive {
     #[must_use]
     pub fn is_position_servo(&self) -> bool {
         matches!(self.law, DriveLaw::Position { .. })
+    }
+}
+
+/// A number within a range, as MuJoCo has it (`mju_clip`): of one that is upside down, as where an unknown moves one end past the other,
+/// the lower end counts first. `f64::clamp` panics there.
+fn within(x: f64, range: Option<[f64; 2]>) -> f64 {
+    match range {
+        Some([low, _]) if x < low => low,
+        Some([_, high]) if x > high => high,
+        _ => x,
     }
 }
 
@@ -192,6 +201,17 @@ mod tests {
             assert_eq!(found.law, DriveLaw::Position { kp: 50.0, kv: 4.0 });
             assert_eq!(found.force_range, Some([-9.0, 9.0]));
         }
+    }
+
+    /// Symptom: `asid explore` ended in a panic where `--unknown actuator/A/forcerange/0:-1:8` met an upper end of 5. Cause: `f64::clamp`.
+    #[test]
+    fn limits_of_a_force_that_cross_each_other_make_no_panic() {
+        let motor = drive("", r#"<motor joint="j" forcerange="-5 5"/>"#).unwrap();
+        let crossed = motor.with("forcerange", 0, [-5.0, 8.0]);
+        assert_eq!(crossed.force_range, Some([8.0, 5.0]));
+        assert_eq!(crossed.force(3.0, 0.0, 0.0), 8.0);
+        assert_eq!(crossed.force(9.0, 0.0, 0.0), 5.0);
+        assert!(crossed.force(f64::NAN, 0.0, 0.0).is_nan());
     }
 
     /// The command of a motor with a gain is force before the gain; its limits hold after it.

@@ -12,7 +12,7 @@ use asid_effects::native::{PlainModel, plain};
 use asid_effects::{Native, RefinedModel};
 use asid_mjcf::Plant;
 use asid_sysid::dataset::Dataset;
-use asid_sysid::gap::gap;
+use asid_sysid::gap::{gap, too_short};
 use serde::Serialize;
 
 use super::Subject;
@@ -120,6 +120,10 @@ pub fn export(request: &Request<'_>) -> Result<()> {
         writeln!(stdout, "  {sentence}")?;
     }
     for row in &result.gap {
+        if row.refined.is_nan() || row.exported.is_nan() {
+            writeln!(stdout, "{}", too_short(row.logs))?;
+            continue;
+        }
         writeln!(
             stdout,
             "gap on the logs {}, in units of the noise: {:.3} refined, {:.3} exported",

@@ -11,7 +11,7 @@ use asid_effects::RefinedModel;
 use asid_report::run::{NamedText, RealWorld, RunReport};
 use asid_sysid::dataset::Dataset;
 use asid_sysid::fit::{Identified, fit, smooth};
-use asid_sysid::gap::gap;
+use asid_sysid::gap::{gap, too_short};
 use serde::{Deserialize, Serialize};
 
 use super::Subject;
@@ -45,6 +45,7 @@ pub struct Config {
 }
 
 /// Gaps in units of the noise.
+// Not a number, null in JSON, where logs are too short for one.
 #[derive(Serialize, schemars::JsonSchema)]
 #[schemars(rename = "FitGap")]
 struct GapResult {
@@ -76,6 +77,19 @@ pub struct IdentifyResult {
     held_out: Vec<String>,
     cost: CostResult,
     versions: Versions,
+}
+
+impl GapResult {
+    /// What it is on the logs held out.
+    fn sentence(&self) -> String {
+        if self.nominal.is_nan() || self.identified.is_nan() {
+            return too_short("held out");
+        }
+        format!(
+            "gap on logs held out, in units of the noise: {:.2} as given, {:.2} identified",
+            self.nominal, self.identified
+        )
+    }
 }
 
 impl Config {
@@ -150,10 +164,7 @@ pub fn identify(path: &Path, model: Option<&Path>, common: &Common) -> Result<()
         .iter()
         .map(parameter_line)
         .collect();
-    let sentence = format!(
-        "gap on logs held out, in units of the noise: {:.2} as given, {:.2} identified",
-        result.gap.nominal, result.gap.identified
-    );
+    let sentence = result.gap.sentence();
     lines.push(sentence.clone());
     lines.extend(caveats.iter().cloned());
     let mut report = report(&subject, &study.parameters, &found, &config, wall_s);

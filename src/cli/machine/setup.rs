@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 use asid_core::signal::Signal;
-use asid_core::{Error, Parameter, Progress, Streams};
+use asid_core::{Error, Parameter, Progress, Streams, Target};
 use asid_sysid::dataset::Dataset;
 use asid_sysid::design::{Designed, Designer};
 use asid_sysid::limits::Limits;
@@ -159,14 +159,16 @@ impl<'a> Setup<'a> {
     }
 }
 
-/// The range of a joint, by index, where the model has one.
+/// The range of a joint, by index, where the document has one. The model's values go before the document's; an engine that cannot
+/// change a range has none.
 fn range_of(subject: &Subject, joint: usize) -> Option<[f64; 2]> {
+    let [low, high] = subject.plant.joints[joint].range?;
     let name = &subject.plant.layout.joints[joint].name;
-    let end = |index: usize| {
-        let target = format!("joint/{name}/range/{index}").parse().ok()?;
-        subject.model.nominal(&target).ok()
+    let end = |index: usize, declared: f64| {
+        let target = Target::new("joint", name, "range", index);
+        subject.model.nominal(&target).unwrap_or(declared)
     };
-    Some([end(0)?, end(1)?]).filter(|[low, high]| low < high)
+    Some([end(0, low), end(1, high)]).filter(|[low, high]| low < high)
 }
 
 /// Commands under which the machine rests: the first keyframe's, else those of servos that hold the first state.
