@@ -31,13 +31,12 @@ impl Script<'_> {
     /// The script.
     #[must_use]
     pub fn text(&self) -> String {
-        let out = self.out.display();
         let mut head = String::new();
         let own = [
             "--job-name=asid-compare".to_owned(),
             format!("--array=1-{}", self.jobs),
             format!("--cpus-per-task={}", self.threads),
-            format!("--output={out}/slurm/%A_%a.log"),
+            format!("--output={}", log_of_tasks(self.out)),
             "--open-mode=append".to_owned(),
             "--requeue".to_owned(),
             format!("--signal=B:USR1@{GRACE}"),
@@ -75,6 +74,14 @@ exit "$status"
     }
 }
 
+/// The file of each task's log, as sbatch reads an option of a script: a backslash takes the meaning of the next character, in quotes too.
+/// In a file's name `%A` and `%a` are the numbers of array and task, and `%%` is `%`.
+fn log_of_tasks(out: &Path) -> String {
+    let out = out.display().to_string().replace('%', "%%");
+    let out = out.replace('\\', r"\\").replace('"', r#"\""#);
+    format!("\"{out}/slurm/%A_%a.log\"")
+}
+
 /// A path as one word of a shell.
 fn quoted(path: &Path) -> String {
     format!("'{}'", path.display().to_string().replace('\'', r"'\''"))
@@ -102,5 +109,18 @@ mod tests {
         assert!(text.contains("--signal=B:USR1@60") && !text.contains("USR1@300"));
         assert!(text.contains(r"'/opt/my asid' compare --config '/data/it'\''s/config.toml'"));
         assert!(text.contains("--shard \"$SLURM_ARRAY_TASK_ID/4\" --threads 2"));
+        assert!(text.contains("#SBATCH --output=\"/data/it's/slurm/%A_%a.log\"\n"));
+    }
+
+    /// Without quotes sbatch ends the option at a space or `#`, refuses a single quote, and puts the number of the job in place of `%j`.
+    #[test]
+    fn logs_of_tasks_go_to_a_folder_of_any_name() {
+        for (folder, option) in [
+            ("/data/my runs #2", r#""/data/my runs #2/slurm/%A_%a.log""#),
+            ("/data/90%job", r#""/data/90%%job/slurm/%A_%a.log""#),
+            (r#"/a "b""#, r#""/a \"b\"/slurm/%A_%a.log""#),
+        ] {
+            assert_eq!(log_of_tasks(Path::new(folder)), option);
+        }
     }
 }

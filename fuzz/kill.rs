@@ -116,7 +116,7 @@ fn try_case(case: &Case, asid: &Path, arguments: &Arguments) -> Result<Count> {
         let killed = if k % 2 == 0 {
             wait(&mut child, takes.mul_f64(rng.random()))?
         } else {
-            let seen = wait_for_staging(&mut child, &place, case)?;
+            let seen = wait_for_staging(&mut child, &place)?;
             count.writing += u64::from(seen);
             seen && wait(&mut child, WRITING.mul_f64(rng.random()))?
         };
@@ -150,11 +150,9 @@ fn look(case: &Case, asid: &Path, place: &Path, wanted: &[String]) -> Result<()>
         found == wanted,
         "after the second call there are {found:?}, not {wanted:?}"
     );
-    for folder in [place, &out] {
-        let mut hidden = left::hidden(folder)?;
-        hidden.retain(|n| n.starts_with(".asid-"));
-        ensure!(hidden.is_empty(), "the second call leaves {hidden:?}");
-    }
+    let mut hidden = left::hidden(place)?;
+    hidden.retain(|n| n.starts_with(".asid-"));
+    ensure!(hidden.is_empty(), "the second call leaves {hidden:?}");
     Ok(())
 }
 
@@ -193,10 +191,9 @@ fn wait(child: &mut Child, time: Duration) -> Result<bool> {
 }
 
 /// Waits until files are being written; false where the process ended before that was seen.
-fn wait_for_staging(child: &mut Child, place: &Path, case: &Case) -> Result<bool> {
+fn wait_for_staging(child: &mut Child, place: &Path) -> Result<bool> {
     loop {
-        let inside = left::hidden(&place.join(case.out)).unwrap_or_default();
-        if !left::hidden(place)?.is_empty() || !inside.is_empty() {
+        if !left::hidden(place)?.is_empty() {
             return Ok(true);
         }
         if child.try_wait()?.is_some() {

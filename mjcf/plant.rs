@@ -40,6 +40,8 @@ pub struct PlantJoint {
     pub axis: [f64; 3],
     /// Coordinate at which the body is as declared.
     pub reference: f64,
+    /// Range of a hinge or slide, rad or m; `None` where it is not limited.
+    pub range: Option<[f64; 2]>,
     /// Viscous friction, N s/m or N m s/rad.
     pub damping: f64,
     /// Dry friction, N or N m.
@@ -237,6 +239,33 @@ mod tests {
         assert_eq!(plant.sensors, [Reads::Joint(0), Reads::Body(3)]);
         assert_eq!(plant.bodies[2].mass, 2.0);
         assert_eq!(plant.bodies[2].center, [0.1, 0.0, 0.0]);
+    }
+
+    #[test]
+    fn a_joint_has_its_range_where_the_document_limits_it() {
+        let ranges = |compiler: &str, joints: &str| {
+            let xml = format!(
+                r#"<mujoco>{compiler}<default><default class="narrow"><joint range="-0.3 0.3"/></default></default>
+                <worldbody><body><geom size="0.1" mass="1"/>{joints}</body></worldbody></mujoco>"#
+            );
+            let plant = Plant::of(&Scene::from_xml("machine", &xml, &[]).unwrap()).unwrap();
+            plant.joints.iter().map(|j| j.range).collect::<Vec<_>>()
+        };
+        let radian = r#"<compiler angle="radian"/>"#;
+        let of_class = r#"<joint class="narrow"/><joint class="narrow" limited="false"/><joint/>"#;
+        assert_eq!(ranges(radian, of_class), [Some([-0.3, 0.3]), None, None]);
+        // An angle is in degrees where nothing else is said; a length never is.
+        let found = ranges(
+            "",
+            r#"<joint range="-90 45"/><joint type="slide" range="-2 1"/>"#,
+        );
+        let quarter = std::f64::consts::FRAC_PI_2;
+        assert_eq!(found, [Some([-quarter, quarter / 2.0]), Some([-2.0, 1.0])]);
+        let asked = r#"<compiler angle="radian" autolimits="false"/>"#;
+        let joints = r#"<joint range="-1 1"/><joint range="-1 1" limited="true"/>"#;
+        assert_eq!(ranges(asked, joints), [None, Some([-1.0, 1.0])]);
+        let ball = r#"<joint type="ball" range="0 1" limited="true"/>"#;
+        assert_eq!(ranges(radian, ball), [None]);
     }
 
     /// The Jacobian times a velocity is the finite difference of the point.

@@ -538,3 +538,70 @@ fn what_is_wrong_is_told_in_one_line() {
     }
     assert_eq!(place.names(), ["cart", "model.xml"]);
 }
+
+/// Symptom: "gap on logs held out: 0.00 as given, 0.00 identified" where these logs have six rows. Cause: their starts are open, and
+/// fitted to all rows; of what is left, nothing, the mean was 0.
+#[test]
+fn logs_that_are_all_warm_up_are_called_too_short_for_a_gap() {
+    let place = Workplace::new();
+    write_study(&place.path("cart"), Truth::None);
+    for name in ["test_4.csv", "test_5.csv"] {
+        let log = place.read(&format!("cart/{name}"));
+        // Six rows, without the columns that give the start.
+        let rows = log.lines().take(7);
+        let rows: Vec<String> = rows
+            .map(|l| l.split(',').take(4).collect::<Vec<_>>().join(",") + "\n")
+            .collect();
+        place.write(&format!("cart/{name}"), &rows.concat());
+    }
+    let said = ok(&place, &["identify", "cart", "--quiet", "--out", "fit"]);
+    assert!(said.contains("the logs held out are too short"), "{said}");
+    let gap = &json(&place.read("fit/result.json"))["gap"];
+    assert!(
+        gap["nominal"].is_null() && gap["identified"].is_null(),
+        "{gap}"
+    );
+    assert!(gap["identified_fitted"].is_number(), "{gap}");
+    let said = ok(&place, &["export", "cart", "--mjcf", "out.xml"]);
+    assert!(said.contains("the logs held out are too short"), "{said}");
+    assert!(said.contains("gap on the logs fitted"), "{said}");
+}
+
+/// Symptom: a panic in `f64::clamp` where the range of one limit of a force passes the other limit, and memory without end where
+/// `--seconds` is a million.
+#[test]
+fn motions_that_cannot_be_played_are_refused_in_a_line() {
+    let place = Workplace::new();
+    let limited = NOMINAL.replace(
+        r#"ctrlrange="-20 20""#,
+        r#"ctrlrange="-20 20" forcerange="-5 5""#,
+    );
+    place.write("cart.xml", &limited);
+    let refused = |options: &[&str], expected: &[&str]| {
+        let limits = ["--limit-position", "rail:-0.4:0.4", "--quiet"];
+        let arguments = [&["explore", "cart.xml"][..], &limits, options].concat();
+        let done = place.run(&arguments);
+        let said = String::from_utf8(done.stderr).unwrap();
+        assert_eq!(done.status.code(), Some(2), "{said}");
+        assert_eq!(said.trim_end().lines().count(), 1, "{said}");
+        for words in expected {
+            assert!(said.contains(words), "{said}");
+        }
+    };
+    let [lower, upper] = ["0:-6:8", "1:-7:-1"].map(|r| format!("actuator/belt/forcerange/{r}"));
+    refused(
+        &["--unknown", &lower],
+        &["actuator/belt/forcerange/0", "-6 to 8", "upper limit"],
+    );
+    refused(&["--unknown", &upper], &["lower limit", "which is -5"]);
+    // Either end is unknown, and their ranges overlap.
+    let [low, high] = ["0:-6:2", "1:1:6"].map(|r| format!("actuator/belt/forcerange/{r}"));
+    refused(
+        &["--unknown", &low, "--nuisance", &high],
+        &["which is 1 to 6"],
+    );
+    refused(
+        &["--unknown", "geom/cart/mass:0.4:3", "--seconds", "1e6"],
+        &["seconds", "physics steps", "at most 200 s"],
+    );
+}

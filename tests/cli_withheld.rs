@@ -171,6 +171,32 @@ fn shares_answer_and_the_call_without_one_scores() {
     }
 }
 
+/// Symptom: folders of calls that were killed stayed among the answers for good. Cause: they were named by the number of their process, and
+/// only a call of the same number took them away.
+#[test]
+fn what_a_killed_call_leaves_among_the_answers_is_taken_away() {
+    let folder = tempfile::tempdir().unwrap();
+    let (cases, out) = (folder.path().join("cases"), folder.path().join("out"));
+    write_study(&cases.join("a"), Truth::None);
+    std::fs::write(cases.join("labels.json"), r#"{"a": {"effects": []}}"#).unwrap();
+    let answers = out.join("answers/identify-only");
+    for left in [answers.join(".asid-dead"), out.join(".asid-dead")] {
+        std::fs::create_dir_all(left.join("content")).unwrap();
+        std::fs::write(left.join("content/result.json"), "half").unwrap();
+        std::fs::write(left.join("lock"), "").unwrap();
+    }
+    let done = withheld(&cases, &out, &["--method", "identify-only", "--names-only"]);
+    assert!(done.status.success(), "{}", said(&done));
+    let names = |folder: &Path| {
+        let entries = std::fs::read_dir(folder).unwrap();
+        let mut names: Vec<_> = entries.map(|e| e.unwrap().file_name()).collect();
+        names.sort();
+        names
+    };
+    assert_eq!(names(&answers), ["a"]);
+    assert_eq!(names(&out), ["answers", "report.html", "result.json"]);
+}
+
 #[test]
 fn a_residual_network_closes_a_gap_and_names_nothing() {
     let folder = tempfile::tempdir().unwrap();

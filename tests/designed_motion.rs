@@ -157,3 +157,28 @@ iterations = 8
     let found = motion.told.deviations()[0];
     assert!(found < of_one_reading, "{found} {of_one_reading}");
 }
+
+/// rapier has no target `joint/NAME/range`, so that a range that is asked of the engine is silently none: a motion then leaves the range.
+#[test]
+fn a_motion_keeps_the_ranges_of_joints_on_every_engine() {
+    let folder = tempfile::tempdir().unwrap();
+    let (model, settings) = (
+        folder.path().join("cart.xml"),
+        folder.path().join("cart.toml"),
+    );
+    std::fs::write(&model, CART).unwrap();
+    std::fs::write(&settings, SETTINGS).unwrap();
+    let config = MotionConfig::of_file(&model, &settings).unwrap();
+    for engine in ["mujoco", "rapier"] {
+        let subject = Subject::open(&model, Some(engine)).unwrap();
+        let setup = MotionSetup::new(&subject, &config, 2).unwrap();
+        let joints = &setup.player.limits().joints;
+        // Two hundredths of 3 m are kept free at either end.
+        let [low, high] = joints[0].position.unwrap();
+        assert!(
+            (low + 1.44).abs() < 1e-12 && (high - 1.44).abs() < 1e-12,
+            "{engine}: {low} {high}"
+        );
+        assert_eq!(joints[1].position, None, "{engine}");
+    }
+}

@@ -1,11 +1,13 @@
 //! What sources do not hold: unsafe code outside of its places, names of engines and effects outside of theirs, and functions
-//! that are too long to be read.
+//! that are too long to be read. And what pages name of them is there.
 
 #![allow(clippy::unwrap_used)]
 
 mod source_support;
 
+use std::collections::BTreeMap;
 use std::fs;
+use std::path::{Path, PathBuf};
 
 use source_support::{root, sources, untested};
 
@@ -176,4 +178,85 @@ fn the_reading_of_functions_sees_what_is_there() {
         ["src/a.rs: if x == \"jet\" {"]
     );
     assert!(strangers(&code, &["src/"], &jet).is_empty());
+}
+
+/// The folder of the sources of each crate that others use, by its name in code.
+fn crates() -> BTreeMap<String, PathBuf> {
+    let manifest = fs::read_to_string(root().join("Cargo.toml")).unwrap();
+    let manifest: toml::Table = manifest.parse().unwrap();
+    let all = manifest["workspace"]["dependencies"].as_table().unwrap();
+    let own = all.iter().filter_map(|(name, d)| {
+        let folder = root().join(d.get("path")?.as_str()?);
+        let inner = folder.join("src");
+        let source = if inner.exists() { inner } else { folder };
+        Some((name.replace('-', "_"), source))
+    });
+    own.collect()
+}
+
+/// Paths of items between code marks of a page, such as `asid_core::Error`.
+fn paths(text: &str) -> Vec<&str> {
+    let code = text.split('`').skip(1).step_by(2);
+    code.filter(|c| c.starts_with("asid_") && c.contains("::"))
+        .collect()
+}
+
+/// Whether a path leads to a module, or to a name that its last module speaks of.
+fn leads(crates: &BTreeMap<String, PathBuf>, path: &str) -> bool {
+    let mut names = path.split("::");
+    let Some(source) = names.next().and_then(|name| crates.get(name)) else {
+        return false;
+    };
+    if let Some(macro_name) = path.strip_suffix('!') {
+        let name = macro_name.rsplit("::").next().unwrap();
+        let declared = format!("macro_rules! {name} {{");
+        let holds = |file: &PathBuf| fs::read_to_string(file).unwrap().contains(&declared);
+        return sources(source, false).iter().any(holds);
+    }
+    let (mut folder, mut file) = (source.clone(), source.join("lib.rs"));
+    for name in names.by_ref() {
+        let module = [format!("{name}.rs"), format!("{name}/mod.rs")];
+        let Some(module) = module.iter().map(|m| folder.join(m)).find(|m| m.exists()) else {
+            return names.next().is_none() && speaks_of(&file, name);
+        };
+        (folder, file) = (folder.join(name), module);
+    }
+    true
+}
+
+/// Whether the code of a file has a name.
+fn speaks_of(file: &Path, name: &str) -> bool {
+    let text = fs::read_to_string(file).unwrap();
+    let code = text.lines().filter(|l| !l.trim_start().starts_with("//"));
+    let is_word = |c: char| c.is_alphanumeric() || c == '_';
+    code.flat_map(|l| l.split(|c| !is_word(c)))
+        .any(|word| word == name)
+}
+
+#[test]
+fn items_that_pages_name_are_there() {
+    let crates = crates();
+    let pages = fs::read_dir(root().join("docs")).unwrap();
+    let pages = pages.map(|e| e.unwrap().path());
+    let more = ["README.md", "CONTRIBUTING.md"].map(|p| root().join(p));
+    let mut seen = 0;
+    for page in pages
+        .chain(more)
+        .filter(|p| p.extension().is_some_and(|e| e == "md"))
+    {
+        let text = fs::read_to_string(&page).unwrap();
+        let paths = paths(&text);
+        seen += paths.len();
+        let lost: Vec<&str> = paths.into_iter().filter(|p| !leads(&crates, p)).collect();
+        assert!(lost.is_empty(), "{}: {lost:?}", page.display());
+    }
+    assert!(seen > 5, "only {seen} paths were found");
+    for lost in [
+        "asid_core::fisher::FisherBatch",
+        "asid_core::guard",
+        "asid_none::x",
+        "asid_core::nothing!",
+    ] {
+        assert!(!leads(&crates, lost), "{lost}");
+    }
 }

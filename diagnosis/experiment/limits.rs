@@ -68,18 +68,11 @@ impl<'b> Limits<'b> {
 
     /// Whether a joint stays in its range, or where it was in the logs.
     fn keeps_range(&self, joint: usize, new: &Trajectory) -> bool {
+        let Some([low, high]) = self.bench.machine.plant.joints[joint].range else {
+            return true;
+        };
         let layout = self.bench.layout();
         let joint = &layout.joints[joint];
-        let end = |index: usize| {
-            let target = format!("joint/{}/range/{index}", joint.name).parse().ok()?;
-            self.bench.machine.nominal(&target)
-        };
-        let (Some(low), Some(high)) = (end(0), end(1)) else {
-            return true;
-        };
-        if low >= high {
-            return true;
-        }
         let margin = END_MARGIN * (high - low);
         let reached = |t: &Trajectory| {
             let rows = t.episodes.iter();

@@ -54,7 +54,7 @@ impl Case {
     }
 }
 
-/// Commands that write files. `conformance`, `withheld` and the figures of `compare` write by the same code as `run` and `compare`.
+/// Commands that write files. `conformance` and the figures of `compare` write by the same code as `run` and `compare`.
 pub const COMMANDS: &[Case] = &[
     Case {
         name: "run",
@@ -199,6 +199,25 @@ pub const COMMANDS: &[Case] = &[
         prepare: diagnosis,
     },
     Case {
+        name: "withheld",
+        arguments: &[
+            "withheld",
+            "--cases",
+            "cases",
+            "--method",
+            "identify-only",
+            "--names-only",
+            "--quiet",
+            "--out",
+            "out",
+        ],
+        settings: &[],
+        out: "out",
+        folder: true,
+        repeats: true,
+        prepare: cases,
+    },
+    Case {
         name: "new",
         arguments: &["new", "task", "my-task"],
         settings: &[],
@@ -225,6 +244,19 @@ fn study(folder: &Path, _: &Path) -> Result<()> {
     let text = "model = 'model.xml'\ntrain = ['train_0.csv']\ntest = ['test_0.csv']\n\
                 [[parameter]]\nname = 'damping'\ntarget = 'joint/pan/damping'\nrange = [0.01, 0.5]\n";
     std::fs::write(to.join("study.toml"), text)?;
+    Ok(())
+}
+
+/// Two withheld cases of that study, with their labels.
+fn cases(folder: &Path, asid: &Path) -> Result<()> {
+    let cases = folder.join("cases");
+    for case in ["a", "b"] {
+        study(folder, asid)?;
+        std::fs::create_dir_all(&cases)?;
+        std::fs::rename(folder.join("study"), cases.join(case))?;
+    }
+    let labels = r#"{"a": {"effects": []}, "b": {"effects": []}}"#;
+    std::fs::write(cases.join("labels.json"), labels)?;
     Ok(())
 }
 

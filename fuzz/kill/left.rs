@@ -31,14 +31,22 @@ fn collect(path: &Path, way: &str, found: &mut Vec<String>) -> Result<()> {
     Ok(())
 }
 
-/// Hidden entries directly in a folder.
+/// Hidden entries below a folder, but for what lies in hidden ones.
 pub fn hidden(folder: &Path) -> Result<Vec<String>> {
     let Ok(entries) = fs::read_dir(folder) else {
         return Ok(Vec::new());
     };
-    let names = entries.map(|e| Ok(e?.file_name().to_string_lossy().into_owned()));
-    let names: Vec<String> = names.collect::<Result<_>>()?;
-    Ok(names.into_iter().filter(|n| n.starts_with('.')).collect())
+    let mut found = Vec::new();
+    for entry in entries {
+        let entry = entry?;
+        let name = entry.file_name().to_string_lossy().into_owned();
+        if name.starts_with('.') {
+            found.push(name);
+        } else {
+            found.extend(hidden(&entry.path())?);
+        }
+    }
+    Ok(found)
 }
 
 /// Looks at every file below a path: each must be whole.

@@ -1,6 +1,7 @@
 //! Reads a plant from a scene's document.
 
 use mjcf_rs::Model as Document;
+use mjcf_rs::body::{Joint, JointType};
 
 use super::drive::{Drive, law};
 use super::{Plant, PlantBody, PlantGeom, PlantJoint, Reads};
@@ -28,6 +29,7 @@ impl Plant {
                 anchor: j.pos,
                 axis: j.axis,
                 reference: j.ref_,
+                range: range(&model, j),
                 damping: j.damping,
                 frictionloss: j.frictionloss,
                 armature: j.armature,
@@ -111,6 +113,17 @@ impl Plant {
             poses,
         })
     }
+}
+
+/// The range of a joint that has one coordinate and is limited.
+fn range(model: &Document, joint: &Joint) -> Option<[f64; 2]> {
+    let scalar = matches!(joint.type_, JointType::Hinge | JointType::Slide);
+    let limited = joint
+        .limited
+        .resolve(model.compiler.autolimits, joint.range.is_some());
+    joint
+        .range
+        .filter(|[low, high]| scalar && limited && low < high)
 }
 
 fn drive(

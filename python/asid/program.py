@@ -8,6 +8,7 @@ line, because it is the command line.
 
 from __future__ import annotations
 
+import numbers
 import os
 import signal
 import subprocess
@@ -48,7 +49,8 @@ def arguments(options: Mapping[str, Option]) -> list[str]:
             words.append(option)
         elif isinstance(value, Mapping):
             words += [f"{option}={key}={_text(inner)}" for key, inner in value.items()]
-        elif isinstance(value, (str, int, float, os.PathLike)):
+        # A number of NumPy is no `int`, and none can be iterated over.
+        elif isinstance(value, (str, int, float, numbers.Number, os.PathLike)):
             words.append(f"{option}={_text(value)}")
         else:
             words += [f"{option}={_text(item)}" for item in value]
@@ -98,6 +100,7 @@ def call(words: Iterable[str | Path], progress: bool = False) -> str:
         output, status = _end(child)
     except BaseException:
         child.kill()
+        child.wait()
         raise
     listener.join()
     child.stdout.close()

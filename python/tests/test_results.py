@@ -1,6 +1,7 @@
 """The commands as functions: a diagnosis by the README's lines, what is written, and what goes wrong."""
 
 import dataclasses
+import os
 import re
 import signal
 import subprocess
@@ -12,6 +13,7 @@ import pandas
 import pytest
 
 import asid
+from asid.program import arguments, call
 from asid.results import Diagnosis, Run, StudyIdentification
 
 #: The smallest searches: the way through the program is that of long ones.
@@ -87,6 +89,40 @@ def test_errors_are_the_program_s_one_line(repository):
     assert said.returncode == 2 and said.stderr.strip() == f"asid: {line}"
     with pytest.raises(ValueError, match="no_such_option|no-such-option"):
         asid.run("rod-balancing", no_such_option=1)
+
+
+def test_a_number_of_numpy_is_one_value():
+    options = {"seeds": np.int64(3), "limit": np.float32(0.5), "set": {"seed": np.int32(7)}}
+    assert arguments(options) == ["--seeds=3", "--limit=0.5", "--set=seed=7"]
+    assert arguments({"seed": np.array([1, 2])}) == ["--seed=1", "--seed=2"]
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals of Windows end no call")
+def test_an_exception_leaves_no_program_behind(tmp_path, monkeypatch):
+    sleeper = tmp_path / "asid"
+    sleeper.write_text("#!/bin/sh\nexec sleep 60\n")
+    sleeper.chmod(0o755)
+    monkeypatch.setenv("ASID", str(sleeper))
+    started = []
+    open_process = subprocess.Popen
+
+    def open_and_remember(*words, **options):
+        started.append(open_process(*words, **options))
+        return started[-1]
+
+    monkeypatch.setattr(subprocess, "Popen", open_and_remember)
+
+    def late(*_):
+        raise TimeoutError
+
+    before = signal.signal(signal.SIGALRM, late)
+    try:
+        signal.setitimer(signal.ITIMER_REAL, 0.2)
+        with pytest.raises(TimeoutError):
+            call([])
+    finally:
+        signal.signal(signal.SIGALRM, before)
+    assert started[0].returncode == -signal.SIGKILL, "it was killed, and its end was waited for"
 
 
 def test_ctrl_c_ends_a_diagnosis_with_what_is_known(repository, tmp_path):

@@ -193,10 +193,25 @@ pub fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
     write_text(path, &(serde_json::to_string_pretty(value)? + "\n"))
 }
 
+/// The folder of a file.
+fn folder_of(path: &Path) -> &Path {
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
+    folder.unwrap_or(Path::new("."))
+}
+
+/// Writes a file whole or not at all, in the place of one that may be there: `fill` writes it under another name.
+pub fn replace_file(path: &Path, fill: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
+    let folder = folder_of(path);
+    staging::clear(folder);
+    let staging = Staging::new_in(folder).map_err(|e| failed(path, &e))?;
+    let written = staging.content().join("file");
+    fill(&written)?;
+    std::fs::rename(&written, path).map_err(|e| failed(path, &e))
+}
+
 /// Writes a file that must not be there yet, whole or not at all.
 pub fn create_text(path: &Path, text: &str) -> std::io::Result<()> {
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
-    let folder = folder.unwrap_or(Path::new("."));
+    let folder = folder_of(path);
     staging::clear(folder);
     let staging = Staging::new_in(folder)?;
     let written = staging.content().join("text");
@@ -207,5 +222,31 @@ pub fn create_text(path: &Path, text: &str) -> std::io::Result<()> {
             std::fs::rename(&written, path)
         }
         linked => linked,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Symptom: of two calls of `asid report` for one folder at once one failed, or a page of both was left. Cause: they wrote under the
+    /// same name before they renamed.
+    #[test]
+    fn several_write_one_file_at_once() {
+        let folder = tempfile::tempdir().unwrap();
+        let page = folder.path().join("report.html");
+        let write = |text: &str| {
+            for _ in 0..20 {
+                replace_file(&page, |file| write_text(file, text)).unwrap();
+            }
+        };
+        let texts = ["a".repeat(100_000), "b".repeat(200_000)];
+        std::thread::scope(|scope| {
+            for text in &texts {
+                scope.spawn(move || write(text));
+            }
+        });
+        assert!(texts.contains(&std::fs::read_to_string(&page).unwrap()));
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
     }
 }

@@ -8,6 +8,8 @@ use asid_report::diagnosis;
 use asid_report::run::RunReport;
 use serde::de::DeserializeOwned;
 
+use super::output::{replace_file, write_text};
+
 /// Arguments of `report`.
 #[derive(clap::Args)]
 pub struct Arguments {
@@ -50,12 +52,5 @@ pub fn report(arguments: &Arguments) -> Result<()> {
     } else {
         read::<RunReport>(folder, "trace.json")?.html()
     };
-    let html = arguments.dir.join("report.html");
-    let staging = arguments.dir.join(".report.html");
-    super::output::write_text(&staging, &page)?;
-    std::fs::rename(&staging, &html).map_err(|e| Error::File {
-        path: html,
-        message: e.to_string(),
-    })?;
-    Ok(())
+    replace_file(&folder.join("report.html"), |file| write_text(file, &page))
 }

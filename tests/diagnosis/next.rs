@@ -2,12 +2,18 @@
 //! model's joint may go.
 
 use std::fmt::Write as _;
+use std::sync::Arc;
 
-use asid::core::Episode;
+use asid::core::progress::Silent;
+use asid::core::registry::{BackendEntry, find};
+use asid::core::{Backend, Episode};
+use asid::diagnosis::diagnose::{Settings, diagnose};
+use asid::diagnosis::machine::Machine;
+use asid::diagnosis::study::Study;
 use rand::{Rng as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
-use super::run_on;
+use super::diagnosis_support::engine;
 use super::world::write_files;
 
 /// Dry friction, N, on a cart of 1 kg.
@@ -65,11 +71,13 @@ fn log(episode: usize) -> String {
 }
 
 /// Commands of the next experiment of a diagnosis of these logs in a model of the cart.
-fn proposed(range: &str) -> (String, Episode) {
+fn proposed(range: &str, engine: Arc<dyn Backend>) -> (String, Episode) {
     let folder = tempfile::tempdir().unwrap();
     let mass = "name = \"mass\"\ntarget = \"geom/cart/mass\"\nrange = [0.8, 1.2]";
     write_files(folder.path(), &model(range), mass, log);
-    let (diagnosis, _) = run_on(folder.path(), &[]);
+    let study = Study::read(folder.path()).unwrap();
+    let machine = Machine::new(engine, &study.scene, &study.fixed, &study.effects, 0).unwrap();
+    let (diagnosis, _) = diagnose(&study, machine, Settings::default(), &Silent).unwrap();
     let next = diagnosis.result.next_experiment;
     assert_eq!(next.file, "next.csv");
     (next.how, diagnosis.next_commands.expect("commands"))
@@ -81,32 +89,37 @@ fn furthest(commands: &Episode) -> f64 {
     x.iter().fold(0.0, |far: f64, x| far.max(x.abs()))
 }
 
+/// How far the cart gets in the logs, m.
+fn logged() -> f64 {
+    let time: Vec<f64> = (0..400).map(|k| ROW * f64::from(k)).collect();
+    let x = positions(&time, |k| {
+        3.0 * (5.0 * time[k]).cos() + (8.0 * time[k]).cos()
+    });
+    x.iter().fold(0.0, |far: f64, x| far.max(x.abs()))
+}
+
+/// Commands for a cart whose joint has a little more room than the logs take.
+fn in_a_narrow_range(engine: Arc<dyn Backend>) -> Episode {
+    let end = 1.3 * logged();
+    let range = format!("range=\"{} {end}\" limited=\"true\"", -end);
+    let (how, narrow) = proposed(&range, engine);
+    assert!(furthest(&narrow) < end, "{how}: {}", furthest(&narrow));
+    narrow
+}
+
 #[test]
 fn the_next_experiment_keeps_the_range_of_the_joint() {
-    let logged = {
-        let time: Vec<f64> = (0..400).map(|k| ROW * f64::from(k)).collect();
-        let x = positions(&time, |k| {
-            3.0 * (5.0 * time[k]).cos() + (8.0 * time[k]).cos()
-        });
-        x.iter().fold(0.0, |far: f64, x| far.max(x.abs()))
-    };
-    let (how, free) = proposed("");
-    assert!(
-        furthest(&free) > 1.3 * logged,
-        "{how}: {} {logged}",
-        furthest(&free)
-    );
-    let range = format!(
-        "range=\"{} {}\" limited=\"true\"",
-        -1.3 * logged,
-        1.3 * logged
-    );
-    let (how, narrow) = proposed(&range);
-    assert!(
-        furthest(&narrow) < 1.3 * logged,
-        "{how}: {}",
-        furthest(&narrow)
-    );
+    let (how, free) = proposed("", engine());
+    let (far, logged) = (furthest(&free), logged());
+    assert!(far > 1.3 * logged, "{how}: {far} {logged}");
+    let narrow = in_a_narrow_range(engine());
     assert_eq!(narrow.actuators, ["push"]);
     assert!(narrow.channels.is_empty() && narrow.ctrl.len() == narrow.time.len());
+}
+
+/// Symptom: on rapier the next experiment left the range. Cause: the range was asked of the engine, which has no such target there.
+#[test]
+fn the_next_experiment_keeps_a_range_that_the_engine_cannot_change() {
+    let entry = find::<BackendEntry>("rapier").unwrap();
+    in_a_narrow_range((entry.make)().unwrap().into());
 }

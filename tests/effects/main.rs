@@ -10,6 +10,7 @@ mod contract;
 mod general;
 mod joints;
 mod motor_side;
+mod page;
 mod sensors;
 mod servos;
 mod supply;

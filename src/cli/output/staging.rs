@@ -4,11 +4,12 @@
 //! .asid-UNIQUE/lock       locked as long as the process that fills it lives
 //! .asid-UNIQUE/content/   the result
 //! .asid-UNIQUE/moves      names that are being moved from `content` into a folder that was there before
+//! .asid-UNIQUE/replaced   a folder in whose place the result is put
 //! ```
 //!
 //! The lock tells what is left over from what is in use, across containers and machines, where numbers of processes repeat.
 
-use std::fs::{self, File, TryLockError};
+use std::fs::{self, File};
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 
@@ -19,12 +20,14 @@ const PREFIX: &str = ".asid-";
 const LOCK: &str = "lock";
 const CONTENT: &str = "content";
 const MOVES: &str = "moves";
+const REPLACED: &str = "replaced";
 /// What such a folder holds, in the order in which it is removed: the lock last, so that whatever a kill leaves of it [`clear`] knows for
 /// left over.
-const PARTS: [&str; 3] = [CONTENT, MOVES, LOCK];
+const PARTS: [&str; 4] = [CONTENT, MOVES, REPLACED, LOCK];
 
-/// Attempts to make a folder: [`clear`] of another process may take it before it is locked.
-const ATTEMPTS: usize = 3;
+/// Attempts to make a folder, which [`clear`] of another process may take before it is locked, and to give it a name that another process
+/// may take first.
+const ATTEMPTS: usize = 10;
 
 /// A folder that is being filled; it is removed with what is left in it.
 pub struct Staging {
@@ -80,6 +83,29 @@ impl Staging {
         }
         Ok(())
     }
+
+    /// Gives what it holds the name of a folder. One that has the name goes as a whole: nobody sees a part of it there.
+    pub fn replace(&self, folder: &Path) -> io::Result<()> {
+        let old = self.root.join(REPLACED);
+        let mut tried = 0;
+        loop {
+            if let Err(e) = fs::rename(folder, &old)
+                && e.kind() != io::ErrorKind::NotFound
+            {
+                return Err(e);
+            }
+            let Err(error) = fs::rename(self.content(), folder) else {
+                return Ok(());
+            };
+            tried += 1;
+            if tried == ATTEMPTS || !folder.exists() {
+                let _ = fs::rename(&old, folder);
+                return Err(error);
+            }
+            // Another process was quicker: its folder is replaced in turn.
+            let _ = fs::remove_dir_all(&old);
+        }
+    }
 }
 
 impl Drop for Staging {
@@ -109,23 +135,22 @@ pub fn clear(folder: &Path) {
             continue;
         }
         // One that was not locked yet holds nothing.
-        if fs::remove_dir(&root).is_ok() || !is_left(&root) {
+        if fs::remove_dir(&root).is_ok() {
             continue;
         }
+        // The lock is held until all is gone: a process that is about to take it would fill a folder that is being removed.
+        let Some(_lock) = left(&root) else {
+            continue;
+        };
         undo_moves(folder, &root);
         remove(&root, &PARTS);
     }
 }
 
-/// Whether nobody holds the lock.
-fn is_left(root: &Path) -> bool {
-    let Ok(lock) = File::open(root.join(LOCK)) else {
-        return false;
-    };
-    !matches!(
-        lock.try_lock(),
-        Err(TryLockError::WouldBlock | TryLockError::Error(_))
-    )
+/// The lock, taken, where nobody holds it.
+fn left(root: &Path) -> Option<File> {
+    let lock = File::open(root.join(LOCK)).ok()?;
+    lock.try_lock().is_ok().then_some(lock)
 }
 
 /// Takes back what was moved already, where some of it was not.
@@ -205,6 +230,33 @@ mod tests {
                 "{removed}: {left:?}"
             );
         }
+    }
+
+    /// Symptom: after a kill a case counted as answered and had no answer. Cause: the folder of the answer before was removed file by
+    /// file, and what says that it is done may stay to the last.
+    #[test]
+    fn a_folder_is_replaced_as_a_whole_by_several_at_once() {
+        let folder = tempfile::tempdir().unwrap();
+        let answer = folder.path().join("case");
+        let write = |text: String| {
+            for _ in 0..20 {
+                clear(folder.path());
+                let staging = Staging::new_in(folder.path()).unwrap();
+                for name in ["result.json", "run.json"] {
+                    fs::write(staging.content().join(name), &text).unwrap();
+                }
+                staging.replace(&answer).unwrap();
+            }
+        };
+        std::thread::scope(|scope| {
+            for n in 0..4 {
+                scope.spawn(move || write(n.to_string()));
+            }
+        });
+        assert_eq!(names(folder.path()), ["case"]);
+        assert_eq!(names(&answer), ["result.json", "run.json"]);
+        let read = |name: &str| fs::read_to_string(answer.join(name)).unwrap();
+        assert_eq!(read("result.json"), read("run.json"));
     }
 
     #[test]

@@ -10,6 +10,7 @@ use sha2::{Digest, Sha256};
 use super::child::{self, Ended, Stop};
 use super::isolate::{self, Treatment, hex};
 use super::method::{self, Asked};
+use crate::cli::output::staging::Staging;
 use crate::cli::output::write_json;
 
 /// The file that says that a case is done.
@@ -98,18 +99,16 @@ impl Maker<'_> {
         isolate::copy(study, &place.path().join("study"), self.treatment)?;
         let mut command = self.asked.command("study", "answer")?;
         let ended = child::run(&mut command, place.path(), self.limit, self.stop)?;
-        let staging = self.into.join(format!(".{case}-{}", std::process::id()));
-        let _ = std::fs::remove_dir_all(&staging);
-        std::fs::create_dir_all(&staging).map_err(|e| failed(&staging, &e))?;
+        let staging = Staging::new_in(self.into).map_err(|e| failed(self.into, &e))?;
+        let content = staging.content();
         for name in KEPT {
             let made = place.path().join("answer").join(name);
             if made.is_file() && ended.failure.is_none() {
-                std::fs::copy(&made, staging.join(name)).map_err(|e| failed(&staging, &e))?;
+                std::fs::copy(&made, content.join(name)).map_err(|e| failed(&content, &e))?;
             }
         }
-        write_json(&staging.join(RUN), &self.kept(key, ended))?;
-        let _ = std::fs::remove_dir_all(&folder);
-        std::fs::rename(&staging, &folder).map_err(|e| failed(&folder, &e))?;
+        write_json(&content.join(RUN), &self.kept(key, ended))?;
+        staging.replace(&folder).map_err(|e| failed(&folder, &e))?;
         Ok(false)
     }
 

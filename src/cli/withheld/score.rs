@@ -29,7 +29,7 @@ use super::method::{Asked, Method};
 use super::seal::sealed;
 use super::sensitivity::{Stored, sensitivity};
 use crate::cli::failure;
-use crate::cli::output::OutFolder;
+use crate::cli::output::{OutFolder, staging};
 use crate::cli::progress::Bars;
 use crate::cli::session::backend;
 
@@ -135,6 +135,7 @@ impl<'a> Session<'a> {
         let (program, into) = (kept::program()?, self.answers(method));
         std::fs::create_dir_all(&into)
             .map_err(|e| Error::Failed(format!("{}: cannot be written: {e}", into.display())))?;
+        staging::clear(&into);
         let noise = arguments.control == Some(Control::Noise);
         let shard = |i: usize| arguments.shard.is_none_or(|s| s.holds(i));
         let mine: Vec<&Case> = self

@@ -1,7 +1,6 @@
 //! What is written and told of scores.
 
 use std::io::Write as _;
-use std::path::Path;
 
 use anyhow::Result;
 use asid_core::Error;
@@ -12,7 +11,7 @@ use serde::Serialize;
 use super::control::Control;
 use super::method::{Asked, Method};
 use super::score::Session;
-use crate::cli::output::{write_json, write_text};
+use crate::cli::output::{replace_file, write_json, write_text};
 use crate::cli::result::Program;
 
 /// `result.json`.
@@ -64,10 +63,10 @@ impl Session<'_> {
         std::fs::create_dir_all(&self.out).map_err(|e| {
             Error::Failed(format!("{}: cannot be written: {e}", self.out.display()))
         })?;
-        whole(&named("report.html"), |file| {
+        replace_file(&named("report.html"), |file| {
             write_text(file, &page::page(scores, &about))
         })?;
-        whole(&named("result.json"), |file| write_json(file, &output))?;
+        replace_file(&named("result.json"), |file| write_json(file, &output))?;
         let mut stdout = std::io::stdout().lock();
         if arguments.common.json {
             writeln!(stdout, "{}", serde_json::to_string_pretty(&output)?)?;
@@ -82,18 +81,4 @@ impl Session<'_> {
         }
         Ok(())
     }
-}
-
-/// Writes a file that takes its name when it is whole, in place of one that has it.
-fn whole(file: &Path, write: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
-    let staging = file.with_extension(format!("{}.part", std::process::id()));
-    let done = write(&staging).and_then(|()| {
-        std::fs::rename(&staging, file).map_err(|e| {
-            Error::Failed(format!("{}: cannot be written: {e}", file.display())).into()
-        })
-    });
-    if done.is_err() {
-        let _ = std::fs::remove_file(&staging);
-    }
-    done
 }
