@@ -3,7 +3,7 @@
 #![cfg(feature = "mujoco")]
 #![allow(clippy::unwrap_used)]
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use asid::cli::{MotionConfig, MotionSetup, Subject};
 use asid::core::Streams;
@@ -57,13 +57,19 @@ fn root_mean_square(x: &[f64]) -> f64 {
     (x.iter().map(|x| x * x).sum::<f64>() / x.len() as f64).sqrt()
 }
 
+/// A model and the settings of a motion as files in a folder: the model's path, and what was read.
+fn written(folder: &Path, model: &str, settings: &str) -> (PathBuf, MotionConfig) {
+    let (xml, toml) = (folder.join("model.xml"), folder.join("motion.toml"));
+    std::fs::write(&xml, model).unwrap();
+    std::fs::write(&toml, settings).unwrap();
+    let config = MotionConfig::of_file(&xml, &toml).unwrap();
+    (xml, config)
+}
+
 /// Expected and actual deviations of a method's motion, in deviations of the prior, root mean squares over unknowns and
 /// machines; no machine may break a limit.
 fn deviations(folder: &Path, method: Method) -> [f64; 2] {
-    let (model, settings) = (folder.join("cart.xml"), folder.join("cart.toml"));
-    std::fs::write(&model, CART).unwrap();
-    std::fs::write(&settings, SETTINGS).unwrap();
-    let config = MotionConfig::of_file(&model, &settings).unwrap();
+    let (model, config) = written(folder, CART, SETTINGS);
     let subject = Subject::open(&model, Some("mujoco")).unwrap();
     let mut setup = MotionSetup::new(&subject, &config, 2).unwrap();
     let motion = setup.design(&config, method, 0, &Silent).unwrap();
@@ -118,19 +124,8 @@ const HELD: &str = r#"<mujoco model="held">
   <sensor><jointpos name="q" joint="held"/></sensor>
 </mujoco>"#;
 
-/// The servo of stiffness `k` slips where its command is `F / k` = 0.05 m away, and then follows at that distance: one reading of the
-/// noise 1 mm tells the friction `F` to 0.2 N. The other, at the same share of its range, may go a few millimetres only.
-#[test]
-fn a_joint_that_dry_friction_holds_is_made_to_slip() {
-    let folder = tempfile::tempdir().unwrap();
-    let (model, settings) = (
-        folder.path().join("held.xml"),
-        folder.path().join("held.toml"),
-    );
-    std::fs::write(&model, HELD).unwrap();
-    std::fs::write(
-        &settings,
-        r#"
+/// What a motion of it is designed for.
+const HELD_SETTINGS: &str = r#"
 seconds = 2.0
 period = 0.02
 rest_seconds = 0.2
@@ -143,10 +138,14 @@ q = 0.001
 [design]
 population = 16
 iterations = 8
-"#,
-    )
-    .unwrap();
-    let config = MotionConfig::of_file(&model, &settings).unwrap();
+"#;
+
+/// The servo of stiffness `k` slips where its command is `F / k` = 0.05 m away, and then follows at that distance: one reading of the
+/// noise 1 mm tells the friction `F` to 0.2 N. The other, at the same share of its range, may go a few millimetres only.
+#[test]
+fn a_joint_that_dry_friction_holds_is_made_to_slip() {
+    let folder = tempfile::tempdir().unwrap();
+    let (model, config) = written(folder.path(), HELD, HELD_SETTINGS);
     let subject = Subject::open(&model, Some("mujoco")).unwrap();
     let mut setup = MotionSetup::new(&subject, &config, 2).unwrap();
     let motion = setup
@@ -162,13 +161,7 @@ iterations = 8
 #[test]
 fn a_motion_keeps_the_ranges_of_joints_on_every_engine() {
     let folder = tempfile::tempdir().unwrap();
-    let (model, settings) = (
-        folder.path().join("cart.xml"),
-        folder.path().join("cart.toml"),
-    );
-    std::fs::write(&model, CART).unwrap();
-    std::fs::write(&settings, SETTINGS).unwrap();
-    let config = MotionConfig::of_file(&model, &settings).unwrap();
+    let (model, config) = written(folder.path(), CART, SETTINGS);
     for engine in ["mujoco", "rapier"] {
         let subject = Subject::open(&model, Some(engine)).unwrap();
         let setup = MotionSetup::new(&subject, &config, 2).unwrap();

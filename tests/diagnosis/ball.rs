@@ -1,14 +1,12 @@
 //! A ball that bounces: bodies touch, and short replays decide.
 
-use std::fmt::Write as _;
 use std::path::Path;
 
 use asid::core::{BatchConfig, Capabilities, Control, Rollout, Scene};
 use asid::diagnosis::diagnose::Diagnosis;
 use asid::diagnosis::result::{DiagnosisResult, Kind};
-use rand::{Rng as _, SeedableRng as _};
-use rand_chacha::ChaCha8Rng;
 
+use super::rows::{write_log, write_model};
 use super::{assert_names, run_on};
 use crate::diagnosis_support::engine;
 
@@ -53,7 +51,6 @@ fn write_study(folder: &Path, real: &str, (episodes, high): (u32, &[u32]), start
     let recording = model.layout().recording(&["place"]).unwrap();
     let substeps = (ROW / STEPS[1]).round() as usize;
     for episode in 0..episodes {
-        let mut random = ChaCha8Rng::seed_from_u64(u64::from(episode));
         let k = f64::from(episode);
         let up = match starts {
             true if high.contains(&episode) => 20.0,
@@ -70,43 +67,16 @@ fn write_study(folder: &Path, real: &str, (episodes, high): (u32, &[u32]), start
         simulator.rollout(&rollout, &mut out).unwrap();
         let mut places = qpos[..3].to_vec();
         places.extend(out);
-        let mut text = "time,place.0,place.1,place.2".to_owned();
         let start: Vec<f64> = [&qpos[..], &qvel[..]].concat();
         let start = if starts { &start[..] } else { &[] };
         let names = (0..7).map(|i| format!(",qpos.ball_free.{i}"));
         let names = names.chain((0..6).map(|i| format!(",qvel.ball_free.{i}")));
-        names
-            .take(start.len())
-            .for_each(|name| text.push_str(&name));
-        text.push('\n');
-        for (row, place) in places.chunks(3).enumerate() {
-            write!(text, "{:.2}", row as f64 * ROW).unwrap();
-            for x in place {
-                let noise = (0..12).map(|_| random.random::<f64>()).sum::<f64>() - 6.0;
-                write!(text, ",{}", x + NOISE * noise).unwrap();
-            }
-            for x in start {
-                match row {
-                    0 => write!(text, ",{x}").unwrap(),
-                    _ => text.push(','),
-                }
-            }
-            text.push('\n');
-        }
-        let name = if episode + 1 < episodes {
-            "train"
-        } else {
-            "test"
-        };
-        std::fs::write(folder.join(format!("{name}_{episode}.csv")), text).unwrap();
+        let names: String = names.take(start.len()).collect();
+        let columns = format!(",place.0,place.1,place.2{names}");
+        let place = (episode as usize, episodes as usize);
+        write_log(folder, place, &columns, (&places, 3), start, (ROW, NOISE));
     }
-    std::fs::write(
-        folder.join("nominal.xml"),
-        scene(STEPS[0], [0.0, 9.81], 1.0),
-    )
-    .unwrap();
-    let study = "model = \"nominal.xml\"\ntrain = [\"train_*.csv\"]\ntest = [\"test_*.csv\"]\n";
-    std::fs::write(folder.join("study.toml"), study).unwrap();
+    write_model(folder, &scene(STEPS[0], [0.0, 9.81], 1.0));
 }
 
 /// The diagnosis of such logs; `None` with an engine whose floors do not give way.

@@ -13,6 +13,7 @@ mod late_drive;
 mod next;
 mod ordinary;
 mod row_slopes;
+mod rows;
 mod scatter;
 mod seldom;
 mod servo;

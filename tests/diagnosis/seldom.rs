@@ -1,12 +1,10 @@
 //! A machine that touches in some of its logs alone: a plunger above a floor, and a slide beside it that drags.
 
-use std::fmt::Write as _;
 use std::path::Path;
 
 use asid::core::{BatchConfig, Capabilities, Control, Rollout, Scene};
-use rand::{Rng as _, SeedableRng as _};
-use rand_chacha::ChaCha8Rng;
 
+use super::rows::{write_log, write_model};
 use super::run_on;
 use crate::diagnosis_support::engine;
 
@@ -47,7 +45,6 @@ fn write_study(folder: &Path, damping: f64) {
     let recording = model.layout().recording(&["z", "x"]).unwrap();
     let substeps = (ROW / STEP).round() as usize;
     for (episode, height) in HEIGHT.into_iter().enumerate() {
-        let mut random = ChaCha8Rng::seed_from_u64(episode as u64);
         let start = [height, 0.0, 0.0, 1.0 + 0.2 * episode as f64];
         simulator.reset(&[0]).unwrap();
         let (qpos, qvel) = start.split_at(2);
@@ -55,30 +52,12 @@ fn write_study(folder: &Path, damping: f64) {
         let mut out = vec![0.0; 2 * (ROWS - 1)];
         let rollout = Rollout::new(&[0], ROWS - 1, substeps, Control::Shared(&[]), &recording);
         simulator.rollout(&rollout, &mut out).unwrap();
-        let mut text = "time,z,x,qpos.fall,qpos.rail,qvel.fall,qvel.rail\n".to_owned();
         let places = qpos.iter().chain(&out).copied().collect::<Vec<f64>>();
-        for (row, place) in places.chunks(2).enumerate() {
-            write!(text, "{:.2}", row as f64 * ROW).unwrap();
-            for x in place {
-                let noise = (0..12).map(|_| random.random::<f64>()).sum::<f64>() - 6.0;
-                write!(text, ",{}", x + NOISE * noise).unwrap();
-            }
-            match row {
-                0 => start.iter().for_each(|x| write!(text, ",{x}").unwrap()),
-                _ => text.push_str(",,,,"),
-            }
-            text.push('\n');
-        }
-        let part = if episode + 1 < EPISODES {
-            "train"
-        } else {
-            "test"
-        };
-        std::fs::write(folder.join(format!("{part}_{episode}.csv")), text).unwrap();
+        let columns = ",z,x,qpos.fall,qpos.rail,qvel.fall,qvel.rail";
+        let place = (episode, EPISODES);
+        write_log(folder, place, columns, (&places, 2), &start, (ROW, NOISE));
     }
-    std::fs::write(folder.join("nominal.xml"), scene(0.0)).unwrap();
-    let study = "model = \"nominal.xml\"\ntrain = [\"train_*.csv\"]\ntest = [\"test_*.csv\"]\n";
-    std::fs::write(folder.join("study.toml"), study).unwrap();
+    write_model(folder, &scene(0.0));
 }
 
 /// All candidates are first tried along each third log. Nothing touches in these, so that columns of both slides could be told apart by slopes in forces

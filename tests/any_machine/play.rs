@@ -1,0 +1,117 @@
+//! Motions that are played in the simulator: what they tell, and which limits they keep.
+
+use asid::core::registry::{BackendEntry, find};
+use asid::core::signal::Signal;
+use asid::core::{Parameter, Scene};
+use asid::mjcf::Plant;
+use asid::sysid::limits::{LimitRequest, Limits};
+use asid::sysid::play::Player;
+use asid::sysid::tells::{differences, of_plays};
+
+use super::mass;
+use super::world::NOMINAL;
+
+/// Without friction a cart's place is `F(t) / m` for some `F` of the commands alone, so that its derivative in the mass is
+/// `-x / m`, and what readings of the place tell is the sum of `(x / (m σ))²`.
+#[test]
+fn the_information_about_a_mass_is_the_closed_form() {
+    let xml = NOMINAL.replace(r#" damping="2""#, "");
+    let scene = Scene::from_xml("cart", &xml, &[]).unwrap();
+    let backend = (find::<BackendEntry>("mujoco").unwrap().make)().unwrap();
+    let model = backend.load(&scene).unwrap();
+    let plant = Plant::of(&scene).unwrap();
+    let limits = Limits::new(&plant, &|_| None, &LimitRequest::default()).unwrap();
+    let (sigma, parameters) = (1e-3, [mass()]);
+    let signals = [Signal {
+        sensor: "x".into(),
+        noise: sigma,
+    }];
+    let mut player = Player::new(
+        &*model,
+        &plant,
+        limits,
+        &parameters,
+        &signals,
+        (&[0.0], 0.0),
+        1,
+    )
+    .unwrap();
+    let commands: Vec<f64> = (0..200)
+        .map(|k| 4.0 * (0.05 * f64::from(k)).sin())
+        .collect();
+    let (points, widths) = differences(&parameters, &[1.3]);
+    let jobs: Vec<(&[f64], &[f64])> = points.iter().map(|p| (&commands[..], &p[..])).collect();
+    let plays = player.play(&jobs, 5).unwrap();
+    let told = of_plays(&player, &plays, &widths, 1);
+    let expected: f64 = plays[0]
+        .readings
+        .iter()
+        .map(|x| (x / (1.3 * sigma)).powi(2))
+        .sum();
+    // In prior deviations: a uniform prior's is its width by the root of twelve.
+    let prior = 2.6 / 12.0_f64.sqrt();
+    let found = told.matrix[(0, 0)] / (prior * prior);
+    // Central differences of 1/m over 0.02 prior deviations are off by their third derivative.
+    assert!((found / expected - 1.0).abs() < 1e-3, "{found} {expected}");
+}
+
+/// A servo of gain `kp` that is asked to go 0.1 m presses with 0.1 kp at first.
+#[test]
+fn the_force_of_a_servo_is_looked_at_with_the_gain_of_each_point() {
+    let xml = NOMINAL.replace(
+        r#"<motor name="belt" joint="rail" ctrlrange="-20 20"/>"#,
+        r#"<position name="belt" joint="rail" kp="100"/>"#,
+    );
+    let scene = Scene::from_xml("cart", &xml, &[]).unwrap();
+    let backend = (find::<BackendEntry>("mujoco").unwrap().make)().unwrap();
+    let model = backend.load(&scene).unwrap();
+    let plant = Plant::of(&scene).unwrap();
+    let request = LimitRequest {
+        force: [("belt".to_owned(), 15.0)].into(),
+        ..LimitRequest::default()
+    };
+    let limits = Limits::new(&plant, &|_| None, &request).unwrap();
+    let gain = Parameter {
+        name: "gain".into(),
+        targets: vec!["actuator/belt/kp".parse().unwrap()],
+        range: [50.0, 300.0],
+        scale: asid::core::parameter::Scale::Linear,
+        unit: "N/m".into(),
+    };
+    let (parameters, base) = ([gain], [0.0]);
+    let mut player =
+        Player::new(&*model, &plant, limits, &parameters, &[], (&base, 0.0), 1).unwrap();
+    let jobs = [(&[0.1][..], &[100.0][..]), (&[0.1], &[200.0])];
+    let plays = player.play(&jobs, 1).unwrap();
+    assert!(plays[0].excess.is_none(), "{:?}", plays[0].excess);
+    // The cart has moved by less than a millimetre within the step.
+    let (what, by) = plays[1].excess.worst.clone().unwrap();
+    assert!(what.starts_with("force of `belt`"), "{what}");
+    assert!((by - (20.0 / 15.0 - 1.0)).abs() < 0.01, "{by}");
+}
+
+#[test]
+fn a_joint_that_begins_at_the_end_of_its_range_may_stay_there() {
+    let scene = Scene::from_xml("cart", NOMINAL, &[]).unwrap();
+    let backend = (find::<BackendEntry>("mujoco").unwrap().make)().unwrap();
+    let model = backend.load(&scene).unwrap();
+    let plant = Plant::of(&scene).unwrap();
+    let begin = |range: [f64; 2]| {
+        let request = LimitRequest {
+            position: [("rail".to_owned(), range)].into(),
+            ..LimitRequest::default()
+        };
+        let limits = Limits::new(&plant, &|_| None, &request).unwrap();
+        let mut player = Player::new(&*model, &plant, limits, &[], &[], (&[0.0], 0.0), 1).unwrap();
+        let (at_stop, excess) = player.look_at_begin(&[]).unwrap();
+        let range = player.limits().joints[0].position.unwrap();
+        (at_stop, excess.worst.map(|(what, _)| what), range)
+    };
+    let (at_stop, beyond, [low, high]) = begin([0.001, 1.001]);
+    assert_eq!((at_stop, beyond), (vec!["rail".to_owned()], None));
+    assert!((low + 0.001).abs() < 1e-12 && high == 1.001, "{low} {high}");
+    assert_eq!(begin([-1.0, 1.0]), (Vec::new(), None, [-1.0, 1.0]));
+    let (at_stop, beyond, _) = begin([0.1, 1.0]);
+    assert!(at_stop.is_empty());
+    assert_eq!(beyond.unwrap(), "position of `rail` 0.000");
+}
