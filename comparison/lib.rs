@@ -7,9 +7,7 @@
 //! and from the plan, and from nothing else: no clock, no order of finishing, no machine. That is
 //! why an interrupted comparison, a [shard]ed one and an undisturbed one give the same bytes.
 //!
-//! [`statistics`] follows Agarwal et al. 2021, "Deep Reinforcement Learning at the Edge of the
-//! Statistical Precipice" (NeurIPS): interquartile means, stratified bootstrap intervals,
-//! probabilities of improvement. [`rows`] applies them, [`table`] sets them as Markdown, and
+//! [`rows`] are the statistics of its cells ([`asid_statistics`]), [`table`] sets them as Markdown, and
 //! [`paper`] holds the published values that stand beside them.
 
 pub mod cell;
@@ -26,6 +24,5 @@ pub mod schedule;
 pub mod settings;
 pub mod shard;
 pub mod slurm;
-pub mod statistics;
 pub mod store;
 pub mod table;

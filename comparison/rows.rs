@@ -3,11 +3,12 @@
 mod ranking;
 mod types;
 
+use asid_statistics::{bootstrap, deviation, interquartile_mean, mean, median, wilson};
+
 use crate::cell::{Cell, CellKey, Failure};
 use crate::paper::published;
 use crate::plan::Plan;
 use crate::settings::differences;
-use crate::statistics::{bootstrap, deviation, interquartile_mean, mean, median, wilson};
 pub use ranking::FEWEST;
 use ranking::{Entry, compare, rank};
 pub use types::{

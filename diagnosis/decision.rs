@@ -1,14 +1,16 @@
 //! From evidence to probabilities and a verdict: a function of what a search has stored, without a replay.
 
 mod rules;
+mod sets;
 
 use asid_results::evidence::{Evidence, Replayed, Screened, Tried};
 
 use crate::confidence::{Shown, Untried, sigmoid};
 use crate::findings::{LEAST_GAP, NEGLIGIBLE, excess};
-use crate::judgement::{Hypothesis, Judgement};
+use crate::judgement::Judgement;
 
 pub use rules::{Rule, Rules};
+use sets::Sets;
 
 /// Whether a gap without effects is so small that what evidence from row to row is for must be borne out by replays of whole logs.
 #[must_use]
@@ -114,100 +116,26 @@ fn left_of_the_gap(evidence: &Evidence, found: Option<usize>) -> f64 {
 /// Decides.
 #[must_use]
 pub fn decide(evidence: &Evidence, rules: &Rules) -> Judgement {
-    let price = (evidence.candidates.max(1) as f64).ln();
-    let score = |evidence: f64, names: usize| evidence / rules.temperature - price * names as f64;
-    let mut all = vec![Hypothesis::default()];
-    let mut scores = vec![0.0];
-    // No effect, and what an ordinary machine has of everything.
-    let ordinary = evidence.found.filter(|&i| {
-        let set = &evidence.tried[i];
-        set.effects.is_empty() && has_skill(evidence, set.replayed)
-    });
-    if let Some(i) = ordinary {
-        all[0].found = ordinary;
-        scores[0] = score(evidence.tried[i].evidence, 0);
-    }
-    // Place among the hypotheses of each set that was tried.
-    let mut places = vec![0; evidence.tried.len()];
-    for (i, set) in evidence.tried.iter().enumerate() {
-        if set.effects.is_empty() {
-            continue;
-        }
-        places[i] = all.len();
-        all.push(Hypothesis {
-            found: Some(i),
-            labels: set.effects.clone(),
-            ..Hypothesis::default()
-        });
-        scores.push(score(set.evidence, set.names));
-    }
-    // What stands without a search: no effect, or the known ones.
-    let least = evidence.known.map_or(0, |i| places[i]);
-    let stands = evidence.found.filter(|&i| {
-        let set = evidence.tried[i].replayed;
-        has_skill(evidence, set)
-            && (!is_small(evidence.none) || closes_a_small_gap(evidence, set, rules))
-    });
-    let best = stands.map_or(least, |i| places[i]);
-    // What parsimony passes over is not more probable than what it picks.
-    for i in 0..all.len() {
-        let odds = scores[i] - scores[best];
-        let passed = all[i].labels.len() > all[best].labels.len();
-        all[i].probability = odds.min(if passed { -price } else { 0.0 }).exp();
-    }
+    let mut sets = Sets::of(evidence, rules);
+    let (least, best) = sets.least_and_best();
     let seen = seen(evidence.none.held_out, evidence, rules);
-    if best != least && ordinary.is_none() {
-        // Chance may reach the evidence of no effect, and no chance makes a gap.
-        all[least].probability *= 1.0 - seen;
-    }
-    let rest = left_of_the_gap(evidence, all[best].found);
-    let left_unexplained =
-        || sigmoid((rest / rules.unexplained).ln() / rules.sharpness).clamp(0.001, 0.999);
-    let unknown = if let (true, Some(i)) = (best == least, ordinary) {
-        // What there was no time to try may explain what tolerances leave.
-        let left = evidence.tried[i].replayed.held_out;
-        let is_left = if evidence.stopped {
-            self::seen(left, evidence, rules)
-        } else {
-            0.0
-        };
-        let unknown = (seen * left_unexplained()).max(is_left);
-        unknown.clamp(0.02, 0.999)
-    } else if best == least {
-        // A gap that no force makes up for is one of the readings, where replays can be repeated.
-        if evidence.is_missing || evidence.repeatable && !is_small(evidence.none) {
-            seen.clamp(0.02, 0.999)
-        } else {
-            0.02
-        }
-    } else {
-        left_unexplained()
-    };
-    let ambiguous = (0..all.len())
-        .filter(|&i| {
-            let larger = all[best].labels.iter().all(|l| all[i].labels.contains(l));
-            i != best
-                && i != 0
-                && best != 0
-                && !larger
-                && all[i].labels.len() <= all[best].labels.len()
-                && rules.temperature * (scores[best] - scores[i]) < rules.apart
-        })
-        .collect();
-    let mut judgement = Judgement::of(all, (best, ambiguous), (unknown, rest));
-    let found = judgement
-        .best_explanation()
-        .found
-        .map(|i| &evidence.tried[i]);
+    sets.weigh((least, best), seen);
+    let rest = left_of_the_gap(evidence, sets.all[best].found);
+    let unknown = sets.unknown((least, best), seen, rest);
+    let ambiguous = sets.ambiguous(best);
+    let within_tolerances = best == least && sets.ordinary.is_some();
+    let mut judgement = Judgement::of(sets.all, (best, ambiguous), (unknown, rest));
+    let found = judgement.best_explanation().found;
+    let found = found.map(|i| &evidence.tried[i]);
     let replayed = found.map_or(evidence.none, |t| t.replayed);
-    let untried = untried(evidence, found, rules);
     let shown = Shown {
         left: (replayed.held_out - own_error(evidence) - 1.0).max(0.0)
             / (evidence.none.held_out - 1.0).max(f64::MIN_POSITIVE),
         stopped: evidence.stopped,
         laws: found.map_or(0, |t| t.names),
-        within_tolerances: best == least && ordinary.is_some(),
+        within_tolerances,
     };
+    let untried = untried(evidence, found, rules);
     rules.confidence.settle(&mut judgement, shown, &untried);
     judgement
 }

@@ -4,6 +4,8 @@
 //! episode. Shares are of the residual itself, which is what the user sees; conditions are
 //! looked for where the residual *grows*, which is where its cause acts.
 
+mod condition;
+
 use asid_core::layout::JointKind;
 use asid_mjcf::Plant;
 use asid_mjcf::plant::Reads;
@@ -11,22 +13,17 @@ use asid_mjcf::plant::Reads;
 use crate::data::Logs;
 use crate::result::Where;
 use crate::trajectory::{Path, Trajectory};
+use condition::{Features, growth};
 
 /// Share of an episode that counts as its beginning.
 const BEGINNING: f64 = 0.03;
 /// Share of the largest speed below which a joint stands or turns round.
 const SLOW: f64 = 0.03;
-/// Rows over which the growth of a residual is taken.
-const WINDOW: usize = 5;
-/// Largest share of the rows for which a condition may hold.
-const FEW: f64 = 0.6;
-/// Smallest share of the growth that a condition must hold for.
-const MOST: f64 = 0.8;
-/// Cells that are listed.
-const LISTED: usize = 8;
+/// Rows before and after one in which the speed of a joint that turns round has two signs.
+const AROUND: usize = 5;
 
-/// Shares of the excess squared residual, largest first; `residuals` are in units of the
-/// noise, without whitening, 0 where missing.
+/// Shares of the excess squared residual in every cell of signal and regime that has some, largest first; they sum
+/// to 1. `residuals` are in units of the noise, without whitening, 0 where missing.
 #[must_use]
 pub fn localise(plant: &Plant, logs: &Logs, shown: &Trajectory, residuals: &[f64]) -> Vec<Where> {
     let n = logs.entries.len();
@@ -52,15 +49,18 @@ pub fn localise(plant: &Plant, logs: &Logs, shown: &Trajectory, residuals: &[f64
     }
     cells.retain(|c| c.2 > 0.0);
     cells.sort_by(|a, b| b.2.total_cmp(&a.2));
-    cells.truncate(LISTED);
     let total: f64 = cells.iter().map(|c| c.2).sum();
+    let features = Features::of(logs);
+    let mut conditions: Vec<Option<Option<String>>> = vec![None; n];
     cells
         .into_iter()
         .map(|(j, regime, excess)| Where {
             signal: logs.entries[j].label.clone(),
             regime,
             share: excess / total,
-            condition: condition(logs, residuals, j),
+            condition: conditions[j]
+                .get_or_insert_with(|| features.condition(&growth(logs, residuals, j)))
+                .clone(),
         })
         .collect()
 }
@@ -111,8 +111,8 @@ fn joint_regime(plant: &Plant, path: &Path, joint: usize, row: usize) -> String 
     if speed.abs() > SLOW * largest {
         return "moving".into();
     }
-    let before = speeds().nth(row.saturating_sub(WINDOW)).copied();
-    let after = speeds().nth(row + WINDOW).copied();
+    let before = speeds().nth(row.saturating_sub(AROUND)).copied();
+    let after = speeds().nth(row + AROUND).copied();
     match (before, after) {
         (Some(a), Some(b)) if a * b < 0.0 => "reversal".into(),
         _ => "standing".into(),
@@ -143,83 +143,4 @@ fn body_regime(plant: &Plant, shown: &Trajectory, path: &Path, body: usize, row:
     let names = &plant.layout.bodies;
     let other = mover.unwrap_or(other);
     format!("contact {}/{}", names[body], names[other])
-}
-
-/// A threshold on a reading, a command or the time that most of an entry's growth lies
-/// beyond.
-fn condition(logs: &Logs, residuals: &[f64], entry: usize) -> Option<String> {
-    let n = logs.entries.len();
-    let actuators = logs.episodes.first()?.episode.actuators.len();
-    // Features: the entries of plain sensors, then commands, then time.
-    let mut growth = Vec::new();
-    let mut features: Vec<Vec<f64>> = Vec::new();
-    let mut names: Vec<String> = Vec::new();
-    let width = logs.width();
-    let mut column = 0;
-    let mut columns = Vec::new();
-    for (i, sensor) in logs.sensors.iter().enumerate() {
-        let own: Vec<_> = logs.entries.iter().filter(|e| e.sensor == i).collect();
-        if sensor.rotation {
-            column += 4;
-            continue;
-        }
-        for e in own {
-            names.push(e.label.clone());
-            columns.push(column);
-            column += 1;
-        }
-    }
-    if let Some(e) = logs.episodes.first() {
-        names.extend(e.episode.actuators.iter().map(|a| format!("ctrl.{a}")));
-    }
-    names.push("time".into());
-    features.resize(names.len(), Vec::new());
-    for (e, log) in logs.episodes.iter().enumerate() {
-        let rows = log.plan.rows();
-        let at = |k: usize| residuals[logs.offset(e) + k * n + entry];
-        for k in WINDOW..rows {
-            let d = at(k) - at(k - WINDOW);
-            if !d.is_finite() {
-                continue;
-            }
-            // The noise of a difference has a variance of two.
-            growth.push((d * d - 2.0).max(0.0));
-            let middle = k - WINDOW / 2;
-            for (f, &c) in columns.iter().enumerate() {
-                features[f].push(log.readings[middle * width + c]);
-            }
-            for a in 0..actuators {
-                features[columns.len() + a].push(log.episode.ctrl[middle * actuators + a]);
-            }
-            let last = features.len() - 1;
-            features[last].push(log.episode.time[middle] - log.episode.time[0]);
-        }
-    }
-    let total: f64 = growth.iter().sum();
-    if total <= growth.len() as f64 {
-        return None;
-    }
-    let mut best: Option<(f64, String)> = None;
-    for (name, values) in names.iter().zip(&features) {
-        let mut order: Vec<usize> = (0..values.len())
-            .filter(|&i| values[i].is_finite())
-            .collect();
-        order.sort_by(|&a, &b| values[a].total_cmp(&values[b]));
-        let m = order.len();
-        let mut below = 0.0;
-        for (k, &i) in order.iter().enumerate() {
-            below += growth[i];
-            let rows = (k + 1) as f64 / m as f64;
-            let share = below / total;
-            for (share, rows, sign) in [(share, rows, '<'), (1.0 - share, 1.0 - rows, '>')] {
-                if rows < FEW && rows > 0.02 && share > MOST {
-                    let merit = share - rows;
-                    if best.as_ref().is_none_or(|(b, _)| merit > *b) {
-                        best = Some((merit, format!("{name} {sign} {:.3}", values[i])));
-                    }
-                }
-            }
-        }
-    }
-    best.map(|(_, text)| text)
 }

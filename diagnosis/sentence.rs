@@ -99,16 +99,9 @@ fn doubt(result: &DiagnosisResult) -> String {
     )
 }
 
-/// Says what a result means, in one sentence; `labels` are the effects of the best
-/// explanation, whether or not it is the verdict, `rest` what they leave, where one knows, `repeats` how far contacts can be
-/// repeated, and `beyond` the gap without effects beyond what the starts of the logs held out leave open.
-#[must_use]
-pub fn sentence(
-    result: &DiagnosisResult,
-    (labels, rest): (&[String], Option<&str>),
-    (repeats, beyond): (Option<Repeats>, f64),
-) -> String {
-    let place = result.places.first().map_or_else(String::new, |w| {
+/// Where most of the gap is, as the beginning of a sentence; empty where no place is known.
+fn place(result: &DiagnosisResult) -> String {
+    result.places.first().map_or_else(String::new, |w| {
         let condition = w
             .condition
             .as_ref()
@@ -119,86 +112,103 @@ pub fn sentence(
             other => format!(" ({other})"),
         };
         format!("The gap is in {}{regime}{condition}; ", w.signal)
-    });
-    let failed: Vec<&str> = result
-        .checks
-        .iter()
-        .filter(|c| !c.ok)
-        .map(|c| &*c.check)
-        .collect();
-    let caution = if failed.is_empty() {
+    })
+}
+
+/// That a check failed; empty where none did.
+fn caution(result: &DiagnosisResult) -> String {
+    let failed = result.checks.iter().filter(|c| !c.ok);
+    let failed: Vec<&str> = failed.map(|c| &*c.check).collect();
+    if failed.is_empty() {
+        return String::new();
+    }
+    let failed = failed.join(", ");
+    format!(" But a check failed ({failed}): see there first.")
+}
+
+/// Where what an ordinary machine has of everything makes up for the gap.
+fn tolerances(result: &DiagnosisResult) -> String {
+    format!(
+        "No effect stands out{}: {} take the gap from {:.2} to {:.2} on the logs held out. One of them may still be its cause ({} that none is).",
+        once_fitted(result),
+        within_tolerance(result).unwrap_or_default(),
+        result.gap.identified,
+        result.gap.refined,
+        percent(result.verdict.probability)
+    )
+}
+
+/// Where effects are named.
+fn effects(result: &DiagnosisResult) -> String {
+    let sets = result.verdict.ambiguous_with.iter();
+    let rivals: Vec<String> = sets.map(|s| grouped(s).join(" + ")).collect();
+    let ambiguous = if rivals.is_empty() {
         String::new()
     } else {
-        format!(
-            " But a check failed ({}): see there first.",
-            failed.join(", ")
-        )
+        let rivals = rivals.join(", nor from ");
+        format!(" These data cannot tell it from {rivals}.")
     };
-    let closed = || part_closed(result);
-    let body = match result.verdict.kind {
-        Kind::None if !result.tolerances.is_empty() && result.gap.identified > OF_NOISE => format!(
-            "No effect stands out{}: {} take the gap from {:.2} to {:.2} on the logs held out. One of them may still be its cause ({} that none is).",
-            once_fitted(result),
-            within_tolerance(result).unwrap_or_default(),
-            result.gap.identified,
-            result.gap.refined,
-            percent(result.verdict.probability)
+    format!(
+        "{}{}{} explains {}.{}{ambiguous}{}",
+        place(result),
+        grouped(&result.verdict.effects).join(" with "),
+        within_tolerance(result).map_or_else(String::new, |t| format!(", beside {t},")),
+        part_closed(result),
+        beside(result),
+        doubt(result)
+    )
+}
+
+/// Where nothing in the catalogue explains the gap; `labels` come nearest and leave `rest`.
+fn unknown(result: &DiagnosisResult, labels: &[String], rest: Option<&str>) -> String {
+    let (place, closed) = (place(result), part_closed(result));
+    let closes_most = result.gap.closed.is_some_and(|c| c > 0.5);
+    let rest = rest.map_or_else(String::new, |r| format!(": {r}"));
+    let names = grouped(labels).join(" with ");
+    match (closes_most, labels.is_empty()) {
+        (true, true) => format!(
+            "{place}{} close {closed}, but too much of the missing force and of the gap is left to be theirs: something else is missing{rest}.",
+            within_tolerance(result).unwrap_or_else(|| "the study's parameters".into()),
         ),
-        Kind::None => none(result, beyond, repeats),
-        Kind::Effects => {
-            let ambiguous = if result.verdict.ambiguous_with.is_empty() {
-                String::new()
+        (true, false) => format!(
+            "{place}{names} explains {closed}, but too much of the missing force and of the gap is left to name it as the cause: something else is missing{rest}."
+        ),
+        (false, true) => {
+            let check = if result.missing_force.is_empty() {
+                "repeatability"
             } else {
-                let sets = result.verdict.ambiguous_with.iter();
-                let names: Vec<String> = sets.map(|s| grouped(s).join(" + ")).collect();
-                format!(
-                    " These data cannot tell it from {}.",
-                    names.join(", nor from ")
-                )
+                "forces"
             };
             format!(
-                "{place}{}{} explains {}.{}{ambiguous}{}",
-                grouped(&result.verdict.effects).join(" with "),
-                within_tolerance(result).map_or_else(String::new, |t| format!(", beside {t},")),
-                closed(),
-                beside(result),
-                doubt(result)
+                "{place}nothing in the catalogue explains it, nor a part of it that would count (see the check `{check}`)."
             )
         }
-        Kind::Unknown if result.gap.closed.is_some_and(|c| c > 0.5) && labels.is_empty() => {
-            format!(
-                "{place}{} close {}, but too much of the missing force and of the gap is left to be theirs: something else is missing{}.",
-                within_tolerance(result).unwrap_or_else(|| "the study's parameters".into()),
-                closed(),
-                rest.map_or_else(String::new, |r| format!(": {r}"))
-            )
-        }
-        Kind::Unknown if result.gap.closed.is_some_and(|c| c > 0.5) => format!(
-            "{place}{} explains {}, but too much of the missing force and of the gap is left to name it as the cause: something else is missing{}.",
-            grouped(labels).join(" with "),
-            closed(),
-            rest.map_or_else(String::new, |r| format!(": {r}"))
+        (false, false) => format!(
+            "{place}nothing in the catalogue explains it: {names} comes nearest, with {closed}."
         ),
-        Kind::Unknown if labels.is_empty() && !result.missing_force.is_empty() => format!(
-            "{place}nothing in the catalogue explains it, nor a part of it that would count (see the check `forces`)."
-        ),
-        Kind::Unknown if labels.is_empty() => format!(
-            "{place}nothing in the catalogue explains it, nor a part of it that would count (see the check `repeatability`)."
-        ),
-        Kind::Unknown => format!(
-            "{place}nothing in the catalogue explains it: {} comes nearest, with {}.",
-            if labels.is_empty() {
-                "no effect".into()
-            } else {
-                grouped(labels).join(" with ")
-            },
-            closed()
-        ),
+    }
+}
+
+/// Says what a result means, in one sentence; `labels` are the effects of the best
+/// explanation, whether or not it is the verdict, `rest` what they leave, where one knows, `repeats` how far contacts can be
+/// repeated, and `beyond` the gap without effects beyond what the starts of the logs held out leave open.
+#[must_use]
+pub fn sentence(
+    result: &DiagnosisResult,
+    (labels, rest): (&[String], Option<&str>),
+    (repeats, beyond): (Option<Repeats>, f64),
+) -> String {
+    let within_tolerances = !result.tolerances.is_empty() && result.gap.identified > OF_NOISE;
+    let body = match result.verdict.kind {
+        Kind::None if within_tolerances => tolerances(result),
+        Kind::None => none(result, beyond, repeats),
+        Kind::Effects => effects(result),
+        Kind::Unknown => unknown(result, labels, rest),
     };
     let early = if result.not_tried.is_empty() {
         ""
     } else {
         " The search was stopped early; what it left out may change the answer."
     };
-    body + &caution + early
+    body + &caution(result) + early
 }

@@ -1,15 +1,14 @@
 //! Shares, means and medians with intervals, and how far stated probabilities are from what happens.
 
 use asid_core::rng::Streams;
+use asid_statistics::{bootstrap, mean, wilson};
 use rand::Rng as _;
 use serde::Serialize;
 
-/// Draws of a bootstrap: the ends of a 95 % interval are then good to about a twentieth of its width.
+/// Draws of what a calibrated answer would show: its 95 % quantile then rests on 50 of them.
 const DRAWS: usize = 1000;
-/// Seed of all chance in a score: the same results give the same bytes.
+/// Seed of these draws: the same results give the same bytes.
 const SEED: u64 = 0x5c0_7e57;
-/// Deviations of a normal variable that 95 % lie within.
-const Z95: f64 = 1.959_963_984_540_054;
 /// Bins of a calibration curve, by width: ten, as in Guo et al. 2017, would hold a case or two each in a set of 75.
 pub const BINS: usize = 5;
 
@@ -68,53 +67,28 @@ impl Figure {
     /// Mean; `None` of no case.
     #[must_use]
     pub fn mean(values: &[f64]) -> Option<Self> {
-        Self::new(values, |v| v.iter().sum::<f64>() / v.len() as f64)
+        Self::new(values, mean)
     }
 
     /// Median; `None` of no case.
     #[must_use]
     pub fn median(values: &[f64]) -> Option<Self> {
-        Self::new(values, |v| median(v).unwrap_or(f64::NAN))
+        Self::new(values, |v| asid_statistics::median(v.iter().copied()))
     }
 
-    fn new(values: &[f64], of: impl Fn(&mut [f64]) -> f64) -> Option<Self> {
-        if values.is_empty() {
-            return None;
-        }
-        let mut random = Streams::new(SEED).stream("bootstrap");
-        let mut drawn: Vec<f64> = (0..DRAWS)
-            .map(|_| {
-                let mut again: Vec<f64> = (0..values.len())
-                    .map(|_| values[random.random_range(0..values.len())])
-                    .collect();
-                of(&mut again)
-            })
-            .collect();
-        drawn.sort_by(f64::total_cmp);
-        let at = |share: f64| drawn[(share * (DRAWS - 1) as f64).round() as usize];
-        Some(Self {
-            value: of(&mut values.to_vec()),
-            interval95: [at(0.025), at(0.975)],
+    fn new(values: &[f64], of: impl Fn(&[f64]) -> f64) -> Option<Self> {
+        (!values.is_empty()).then(|| Self {
+            value: of(values),
+            interval95: bootstrap(&[values.to_vec()], &of),
             of: values.len(),
         })
     }
 }
 
-/// Median, the mean of the two in the middle; sorts the values. `None` of nothing.
-pub fn median(values: &mut [f64]) -> Option<f64> {
-    values.sort_by(f64::total_cmp);
-    let n = values.len();
-    (n > 0).then(|| (values[(n - 1) / 2] + values[n / 2]) / 2.0)
-}
-
-/// Wilson's 95 % interval of a share.
+/// Median; `None` of nothing.
 #[must_use]
-pub fn wilson(count: usize, of: usize) -> [f64; 2] {
-    let (n, p) = (of as f64, count as f64 / of as f64);
-    let z2 = Z95 * Z95;
-    let center = (p + z2 / (2.0 * n)) / (1.0 + z2 / n);
-    let half = Z95 / (1.0 + z2 / n) * (p * (1.0 - p) / n + z2 / (4.0 * n * n)).sqrt();
-    [(center - half).max(0.0), (center + half).min(1.0)]
+pub fn median(values: &[f64]) -> Option<f64> {
+    (!values.is_empty()).then(|| asid_statistics::median(values.iter().copied()))
 }
 
 /// One bin of a calibration curve.
@@ -193,26 +167,17 @@ mod tests {
     use super::*;
 
     #[test]
-    fn wilson_is_the_interval_of_the_textbook() {
-        // 0 of 10: [0, z² / (n + z²)] (Wilson 1927).
-        let [low, high] = wilson(0, 10);
-        let z2 = Z95 * Z95;
-        assert!(low == 0.0 && (high - z2 / (10.0 + z2)).abs() < 1e-12);
-        let [low, high] = wilson(5, 10);
-        assert!((low + high - 1.0).abs() < 1e-12);
-    }
-
-    #[test]
-    fn a_bootstrap_of_the_mean_has_the_width_of_its_standard_error() {
+    fn a_figure_has_the_width_of_its_standard_error_and_none_of_no_case() {
         let values: Vec<f64> = (0..400).map(|i| f64::from(i % 2)).collect();
         let mean = Figure::mean(&values).unwrap();
         let width = mean.interval95[1] - mean.interval95[0];
-        let expected = 2.0 * Z95 * 0.5 / 20.0;
+        let expected = 2.0 * 1.96 * 0.5 / 20.0;
         assert!(
             mean.value == 0.5 && (width / expected - 1.0).abs() < 0.15,
             "{width}"
         );
         assert!(Figure::median(&[]).is_none());
+        assert!(Share::of([]).interval95.is_none());
     }
 
     #[test]

@@ -1,8 +1,9 @@
 //! Which of several methods is the best, and how surely.
 
+use asid_statistics::{improvement, improvement_interval};
+
 use super::types::{Improvement, Row, Summary};
 use crate::method::ORACLE;
-use crate::statistics::{improvement, improvement_interval};
 
 /// A method's figures among those that it is ranked with.
 pub struct Entry<'a> {

@@ -47,6 +47,6 @@ fn shown(episodes: &[Episode], sensor: &str) -> f64 {
             spread = spread.max(high - present().fold(f64::INFINITY, f64::min));
         }
     }
-    let noise = median(&mut rough).map_or(0.0, |m| NORMAL * m / THIRD);
+    let noise = median(&rough).map_or(0.0, |m| NORMAL * m / THIRD);
     noise.max(LEAST * spread).max(f64::MIN_POSITIVE)
 }

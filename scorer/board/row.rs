@@ -55,9 +55,9 @@ impl Row {
             covered: share_named(&|c| c.covered),
             unanswered: share(&|c| c.standing == Standing::NoAnswer),
             true_probability: Figure::mean(&figures(&|c| c.names().then_some(c.true_probability))),
-            set_size: median(&mut figures(&size)),
+            set_size: median(&figures(&size)),
             closed: Figure::median(&closed),
-            seconds: median(&mut figures(&|c| Some(c.seconds))),
+            seconds: median(&figures(&|c| Some(c.seconds))),
         }
     }
 }

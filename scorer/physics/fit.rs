@@ -270,8 +270,8 @@ pub fn robust_deviation(residuals: &[Vec<f64>]) -> f64 {
     /// Ratio of a normal variable's deviation to the median of its size.
     const NORMAL: f64 = 1.482_602_218_505_602;
     let sizes = residuals.iter().flatten().filter(|r| r.is_finite());
-    let mut sizes: Vec<f64> = sizes.map(|r| r.abs()).collect();
-    crate::statistics::median(&mut sizes).map_or(0.0, |m| NORMAL * m)
+    let sizes: Vec<f64> = sizes.map(|r| r.abs()).collect();
+    crate::statistics::median(&sizes).map_or(0.0, |m| NORMAL * m)
 }
 
 /// Huber's cost, in units of half the squared noise.

@@ -7,9 +7,9 @@ use std::path::Path;
 
 use anyhow::Result;
 use asid_comparison::rows::Row;
-use asid_comparison::statistics;
 use asid_core::Error;
 use asid_core::difficulty::Difficulty;
+use asid_statistics as statistics;
 
 use super::{Data, Drawing, Request, share, task};
 use crate::cli::settings::wrong;

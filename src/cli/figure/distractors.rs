@@ -1,8 +1,8 @@
 //! Which of four balls an explorer pushes: one has an unknown friction, three do not matter.
 
 use anyhow::Result;
-use asid_comparison::statistics;
 use asid_report::plot::{Axis, Colour, Outline, Plan};
+use asid_statistics as statistics;
 
 use super::displacement::HIT;
 use super::episodes::play;

@@ -5,9 +5,9 @@ use std::sync::Arc;
 
 use anyhow::Result;
 use asid_comparison::grid::Grid;
-use asid_comparison::statistics;
 use asid_report::page::{Cell, Column, Figure, Page, Section, Table, Tone};
 use asid_report::plot::{Panels, Plot};
+use asid_statistics as statistics;
 use serde::Serialize;
 
 use super::claim::Claim;

@@ -10,11 +10,11 @@ mod motions;
 mod shown;
 
 use anyhow::Result;
-use asid_comparison::statistics;
 use asid_core::{Streams, Task};
 use asid_learned::max::EnsembleSettings;
 use asid_learned::shipped;
 use asid_nn::{Motion, MotionModel};
+use asid_statistics as statistics;
 use rand::Rng as _;
 
 use super::episodes::{Played, open, play};

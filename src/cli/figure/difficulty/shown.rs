@@ -1,10 +1,10 @@
 //! How methods are shown over the levels: pictures, table, and what is claimed.
 
 use asid_comparison::grid::{Entry, Grid};
-use asid_comparison::statistics;
 use asid_core::Task;
 use asid_core::difficulty::Difficulty;
 use asid_report::plot::{Axis, Chart, Colour, Layer};
+use asid_statistics as statistics;
 
 use super::super::{Claim, Panel};
 use super::Point;

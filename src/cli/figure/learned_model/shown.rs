@@ -1,8 +1,8 @@
 //! How the models are shown beside each other: data, numbers, pictures, and what is claimed.
 
-use asid_comparison::statistics;
 use asid_core::Task;
 use asid_report::plot::{Axis, Chart, Colour, Layer, Outline, Plan, Spacing};
+use asid_statistics as statistics;
 
 use super::super::map::{frame, with_fixtures};
 use super::super::{Claim, Data, Number, Panel, mean};

@@ -1,4 +1,4 @@
-//! Statistics of a handful of runs.
+//! Statistics of a handful of runs or cases.
 //!
 //! After Agarwal, Schwarzer, Castro, Courville and Bellemare 2021, "Deep Reinforcement Learning at
 //! the Edge of the Statistical Precipice" (NeurIPS): the interquartile mean in place of the mean,

@@ -1,0 +1,136 @@
+//! The sets of effects that a search fitted, and none, weighed against each other.
+
+use asid_results::evidence::Evidence;
+
+use crate::confidence::sigmoid;
+use crate::judgement::Hypothesis;
+
+use super::{Rules, closes_a_small_gap, has_skill, is_small, seen};
+
+/// Least and most probability of `unknown` where a set is named.
+const NAMED: [f64; 2] = [0.001, 0.999];
+/// The same where none is: a cause of no catalogue may hide in a gap that is closed.
+const NOT_NAMED: [f64; 2] = [0.02, 0.999];
+
+/// Sets of effects with what they score. The first is none.
+pub(super) struct Sets<'e> {
+    evidence: &'e Evidence,
+    rules: &'e Rules,
+    pub(super) all: Vec<Hypothesis>,
+    /// Of each: evidence at the [temperature](Rules::temperature), less the price of its names.
+    scores: Vec<f64>,
+    /// Place in `all` of each set that was tried.
+    places: Vec<usize>,
+    /// What was tried and is no effect, but what an ordinary machine has of everything.
+    pub(super) ordinary: Option<usize>,
+    /// Price of a name: the logarithm of how many there are to choose from.
+    price: f64,
+}
+
+impl<'e> Sets<'e> {
+    pub(super) fn of(evidence: &'e Evidence, rules: &'e Rules) -> Self {
+        let price = (evidence.candidates.max(1) as f64).ln();
+        let score =
+            |evidence: f64, names: usize| evidence / rules.temperature - price * names as f64;
+        let ordinary = evidence.found.filter(|&i| {
+            let set = &evidence.tried[i];
+            set.effects.is_empty() && has_skill(evidence, set.replayed)
+        });
+        let mut all = vec![Hypothesis {
+            found: ordinary,
+            ..Hypothesis::default()
+        }];
+        let mut scores = vec![ordinary.map_or(0.0, |i| score(evidence.tried[i].evidence, 0))];
+        let mut places = vec![0; evidence.tried.len()];
+        let named = evidence.tried.iter().enumerate();
+        for (i, set) in named.filter(|(_, set)| !set.effects.is_empty()) {
+            places[i] = all.len();
+            all.push(Hypothesis {
+                found: Some(i),
+                labels: set.effects.clone(),
+                ..Hypothesis::default()
+            });
+            scores.push(score(set.evidence, set.names));
+        }
+        Self {
+            evidence,
+            rules,
+            all,
+            scores,
+            places,
+            ordinary,
+            price,
+        }
+    }
+
+    /// What stands without a search, no effect or the known ones; and what the search found, where that stands.
+    pub(super) fn least_and_best(&self) -> (usize, usize) {
+        let (evidence, rules) = (self.evidence, self.rules);
+        let least = evidence.known.map_or(0, |i| self.places[i]);
+        let stands = evidence.found.filter(|&i| {
+            let set = evidence.tried[i].replayed;
+            has_skill(evidence, set)
+                && (!is_small(evidence.none) || closes_a_small_gap(evidence, set, rules))
+        });
+        (least, stands.map_or(least, |i| self.places[i]))
+    }
+
+    /// Gives each set its likelihood relative to the best; `seen` is the probability that there is a gap.
+    pub(super) fn weigh(&mut self, (least, best): (usize, usize), seen: f64) {
+        let names = self.all[best].labels.len();
+        for (set, score) in self.all.iter_mut().zip(&self.scores) {
+            // What parsimony passes over is not more probable than what it picks.
+            let most = if set.labels.len() > names {
+                -self.price
+            } else {
+                0.0
+            };
+            set.probability = (score - self.scores[best]).min(most).exp();
+        }
+        if best != least && self.ordinary.is_none() {
+            // Chance may reach the evidence of no effect, and no chance makes a gap.
+            self.all[least].probability *= 1.0 - seen;
+        }
+    }
+
+    /// Probability that nothing in the catalogue explains the gap, which is there with the probability `seen`; `rest` is the share of it
+    /// that the best leaves.
+    pub(super) fn unknown(&self, (least, best): (usize, usize), seen: f64, rest: f64) -> f64 {
+        let (evidence, rules) = (self.evidence, self.rules);
+        let unexplained = sigmoid((rest / rules.unexplained).ln() / rules.sharpness);
+        let unexplained = unexplained.clamp(NAMED[0], NAMED[1]);
+        let [lowest, highest] = NOT_NAMED;
+        match self.ordinary {
+            _ if best != least => unexplained,
+            Some(i) => {
+                // What there was no time to try may explain what tolerances leave.
+                let left = evidence.tried[i].replayed.held_out;
+                let is_left = if evidence.stopped {
+                    self::seen(left, evidence, rules)
+                } else {
+                    0.0
+                };
+                (seen * unexplained).max(is_left).clamp(lowest, highest)
+            }
+            // A gap that no force makes up for is one of the readings, where replays can be repeated.
+            None if evidence.is_missing || evidence.repeatable && !is_small(evidence.none) => {
+                seen.clamp(lowest, highest)
+            }
+            None => lowest,
+        }
+    }
+
+    /// Sets that these data cannot tell from the best: no larger ones.
+    pub(super) fn ambiguous(&self, best: usize) -> Vec<usize> {
+        let (rules, scores) = (self.rules, &self.scores);
+        let named = &self.all[best].labels;
+        let as_likely = |i: usize| rules.temperature * (scores[best] - scores[i]) < rules.apart;
+        let rival = |i: usize| {
+            let labels = &self.all[i].labels;
+            let holds_it = named.iter().all(|l| labels.contains(l));
+            i != best && !holds_it && labels.len() <= named.len() && as_likely(i)
+        };
+        let sets = 1..self.all.len();
+        sets.filter(|&i| best != 0 && rival(i)).collect()
+    }
+}
