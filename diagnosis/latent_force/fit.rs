@@ -19,7 +19,7 @@ use super::fitted_value::Unknown;
 use super::step_map::{Derivatives, LinearEpisode, StepMap};
 
 use regression::{Compared, compare, in_units, shift, variations};
-pub use regression::{SCALES, regression};
+pub use regression::{SCALES, regression, regression_at};
 pub use slopes::Slopes;
 use wander::wander;
 

@@ -24,6 +24,7 @@ pub mod one_step;
 mod picture;
 pub mod pipeline;
 pub mod rehearsal;
+pub mod scales;
 pub mod scatter;
 pub mod screen;
 pub mod search;

@@ -1,24 +1,29 @@
-//! Ranking of all candidates, and of groups of them, by one linear regression.
+//! Ranking of all candidates, of groups and of pairs of them, by one linear regression.
+
+use std::collections::BTreeSet;
 
 use nalgebra::DMatrix;
 
 use crate::candidate::Candidate;
 
 use super::columns::Columns;
-use super::context::Context;
-use super::estimate::Estimate;
-use super::evidence::evidence;
-use super::fit::{SCALES, regression};
+use super::scales::Scales;
 use super::smoother::Regression;
 
-/// Evidence by which a group must beat the best of its members.
-const GROUP: f64 = 3.0;
+/// Evidence by which a group must beat the best of its members, and a pair the sum of its two.
+const MORE: f64 = 3.0;
+/// Candidates that lead by themselves, of each of which and any other a pair is looked at.
+const FIRSTS: usize = 40;
+/// Pairs that are kept, at most.
+const PAIRS: usize = 3;
 
 /// Candidates that may be missing together, with the evidence for them upon the present model.
 #[derive(Clone, Debug)]
 pub struct Screened {
     /// Forms of the candidates; see [`Columns::forms`].
     pub forms: Vec<usize>,
+    /// How many named things they are: a group counts once.
+    pub names: usize,
     /// Evidence over the present model, natural logarithm; a round adds the prior odds.
     pub gain: f64,
     /// Coefficients of the present model's unknowns.
@@ -27,104 +32,132 @@ pub struct Screened {
     pub coefficients: Vec<Vec<f64>>,
 }
 
-/// The regressions at all scales of `q`.
-pub fn regressions(
-    context: &Context<'_>,
-    estimate: &Estimate,
-    columns: &Columns,
-) -> Vec<Regression> {
-    let m = columns.center.len();
-    SCALES
-        .iter()
-        .map(|&scale| regression(context, estimate, &columns.linear, scale, m))
-        .collect()
-}
-
-/// Best evidence of some columns over the scales, with coefficients.
-pub(super) fn over_scales(
-    sums: &[Regression],
-    columns: &Columns,
-    which: &[usize],
-) -> (f64, Vec<f64>) {
-    let mut best = (f64::NEG_INFINITY, Vec::new());
-    for sum in sums {
-        let found = evidence(
-            &sum.gram,
-            &sum.moment,
-            which,
-            &columns.center,
-            &columns.bounds,
-        );
-        let total = sum.log_likelihood + found.gain;
-        if total > best.0 {
-            best = (total, found.coefficients);
-        }
+impl Screened {
+    /// Its evidence, less the `price` of each name but the first.
+    #[must_use]
+    pub fn worth(&self, price: f64) -> f64 {
+        self.gain - price * self.names.saturating_sub(1) as f64
     }
-    best
 }
 
-/// Ranks all candidates, and the groups of one effect at all its sites, best first.
-pub fn rank(sums: &[Regression], columns: &Columns, candidates: &[Candidate]) -> Vec<Screened> {
-    let base: Vec<usize> = (0..columns.base).collect();
-    let (none, _) = over_scales(sums, columns, &base);
-    let try_forms = |forms: &[usize]| {
-        let mut which = base.clone();
-        forms
-            .iter()
-            .for_each(|&f| which.extend(columns.forms[f].columns()));
-        let (total, coefficients) = over_scales(sums, columns, &which);
-        let mut at = base.len();
+/// A ranking by regressions.
+struct Ranking<'r> {
+    scales: &'r Scales,
+    columns: &'r Columns,
+    candidates: &'r [Candidate],
+    /// Columns of the present model, and the evidence of these alone.
+    base: Vec<usize>,
+    none: f64,
+}
+
+impl Ranking<'_> {
+    /// The evidence of some forms together, which are so many names.
+    fn screened(&self, forms: &[usize], names: usize) -> Screened {
+        let mut which = self.base.clone();
+        let own = forms.iter().flat_map(|&f| self.columns.forms[f].columns());
+        which.extend(own);
+        let (total, coefficients) = self.scales.best(self.columns, &which);
+        let mut at = self.base.len();
         let each = forms.iter().map(|&f| {
-            let n = columns.forms[f].slopes.len();
+            let n = self.columns.forms[f].slopes.len();
             let own = coefficients
                 .get(at..at + n)
                 .map_or_else(Vec::new, <[f64]>::to_vec);
             at += n;
             own
         });
-        let each: Vec<Vec<f64>> = each.collect();
         Screened {
             forms: forms.to_vec(),
-            gain: total - none,
-            base: coefficients.get(..base.len()).unwrap_or(&[]).to_vec(),
-            coefficients: each,
+            names,
+            gain: total - self.none,
+            coefficients: each.collect(),
+            base: coefficients.get(..self.base.len()).unwrap_or(&[]).to_vec(),
         }
+    }
+
+    /// Each candidate by itself, in its best form.
+    fn singles(&self) -> Vec<Screened> {
+        let mut best: Vec<Option<Screened>> = vec![None; self.candidates.len()];
+        for (f, form) in self.columns.forms.iter().enumerate() {
+            let found = self.screened(&[f], 1);
+            let own = &mut best[form.candidate];
+            if own.as_ref().is_none_or(|b| found.gain > b.gain) {
+                *own = Some(found);
+            }
+        }
+        let mut singles: Vec<Screened> = best.into_iter().flatten().collect();
+        singles.retain(|s| s.gain.is_finite());
+        singles
+    }
+
+    /// One effect at all its sites, but where that is one of them with idle ones.
+    fn groups(&self, singles: &[Screened]) -> Vec<Screened> {
+        let name = |s: &Screened| {
+            &*self.candidates[self.columns.forms[s.forms[0]].candidate]
+                .spec
+                .name
+        };
+        let names: BTreeSet<&str> = singles.iter().map(name).collect();
+        let group = |law: &str| {
+            let members: Vec<&Screened> = singles.iter().filter(|s| name(s) == law).collect();
+            let forms: Vec<usize> = members.iter().map(|s| s.forms[0]).collect();
+            let alone = members.iter().map(|s| s.gain);
+            let alone = alone.fold(f64::NEG_INFINITY, f64::max);
+            (forms.len() > 1)
+                .then(|| self.screened(&forms, 1))
+                .filter(|g| g.gain > alone + MORE)
+        };
+        names.into_iter().filter_map(group).collect()
+    }
+
+    /// Two candidates at one joint that tell more together than the sum of what each tells by itself: two frictions, each of which leaves to
+    /// the noise what the other makes. What is no more than the sum is found one after the other.
+    fn pairs(&self, singles: &[Screened]) -> Vec<Screened> {
+        let mut order: Vec<&Screened> = singles.iter().collect();
+        order.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+        let mut pairs = Vec::new();
+        for (i, first) in order.iter().take(FIRSTS).enumerate() {
+            for second in &order[i + 1..] {
+                let own = [first, second].map(|s| self.columns.forms[s.forms[0]].columns());
+                if !self
+                    .scales
+                    .at_one_joint(&own.into_iter().flatten().collect::<Vec<_>>())
+                {
+                    continue;
+                }
+                let pair = self.screened(&[first.forms[0], second.forms[0]], 2);
+                if pair.gain > first.gain.max(0.0) + second.gain.max(0.0) + MORE {
+                    pairs.push(pair);
+                }
+            }
+        }
+        pairs.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+        pairs.truncate(PAIRS);
+        pairs
+    }
+}
+
+/// Ranks all candidates, the groups of one effect at all its sites, and pairs, by their evidence less the `price` of a further name, best first.
+pub fn rank(
+    scales: &Scales,
+    columns: &Columns,
+    candidates: &[Candidate],
+    price: f64,
+) -> Vec<Screened> {
+    let base: Vec<usize> = (0..columns.base).collect();
+    let ranking = Ranking {
+        scales,
+        columns,
+        candidates,
+        none: scales.best(columns, &base).0,
+        base,
     };
-    let singles: Vec<Screened> = (0..columns.forms.len()).map(|f| try_forms(&[f])).collect();
-    // The best form of each candidate.
-    let mut best: Vec<Option<&Screened>> = vec![None; candidates.len()];
-    for s in &singles {
-        let c = columns.forms[s.forms[0]].candidate;
-        if best[c].is_none_or(|b| s.gain > b.gain) {
-            best[c] = Some(s);
-        }
-    }
-    let mut all: Vec<Screened> = best.iter().flatten().map(|s| (*s).clone()).collect();
-    let mut names: Vec<&str> = candidates.iter().map(|c| &*c.spec.name).collect();
-    names.dedup();
-    for name in names {
-        let members: Vec<usize> = best
-            .iter()
-            .enumerate()
-            .filter(|(c, _)| candidates[*c].spec.name == name)
-            .filter_map(|(_, s)| s.map(|s| s.forms[0]))
-            .collect();
-        if members.len() < 2 {
-            continue;
-        }
-        // A group that is one of its members with idle ones is not tried apart.
-        let alone = singles
-            .iter()
-            .filter(|s| members.contains(&s.forms[0]))
-            .map(|s| s.gain)
-            .fold(f64::NEG_INFINITY, f64::max);
-        let group = try_forms(&members);
-        if group.gain > alone + GROUP {
-            all.push(group);
-        }
-    }
+    let singles = ranking.singles();
+    let mut all = ranking.groups(&singles);
+    all.extend(ranking.pairs(&singles));
+    all.extend(singles);
     all.retain(|s| s.gain.is_finite());
-    all.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    all.sort_by(|a, b| b.worth(price).total_cmp(&a.worth(price)));
     all
 }
 
@@ -206,6 +239,55 @@ mod tests {
         };
         let all: Vec<usize> = (0..widths.len()).collect();
         isolability(&sum, &columns, &all)
+    }
+
+    /// Sums of columns that are orthogonal: each with the information `g` and the moment `b`.
+    fn orthogonal(log_likelihood: f64, n: usize, (g, b): (f64, f64)) -> Regression {
+        Regression {
+            log_likelihood,
+            gram: DMatrix::from_diagonal_element(n, n, g),
+            moment: DVector::from_element(n, b),
+        }
+    }
+
+    #[test]
+    fn two_laws_of_one_joint_are_seen_together_where_neither_is_by_itself() {
+        // Forms 0 and 1 act at one joint, form 2 at another. At the noise as it is each column tells next to nothing. With a smaller
+        // variance at the first joint the logs are less likely by 50, and each of its two laws makes up for 0.5 * 100^2 / 101 of that.
+        let forms = (0..3).map(|c| Form {
+            candidate: c,
+            begin: Vec::new(),
+            slopes: vec![Some((0, 1.0))],
+            first: c,
+        });
+        let columns = Columns {
+            linear: Vec::new(),
+            base: 0,
+            forms: forms.collect(),
+            center: vec![0.0; 3],
+            bounds: vec![[-9.0, 9.0]; 3],
+            complete: true,
+        };
+        let smaller = [0, 2].map(|first| {
+            let own: Vec<usize> = (first..3.min(first + 2)).collect();
+            let sums = orthogonal(-50.0, own.len(), (100.0, 100.0));
+            (own, vec![sums])
+        });
+        let ranking = Ranking {
+            scales: &Scales::known(vec![orthogonal(0.0, 3, (1.0, 0.1))], smaller.into()),
+            columns: &columns,
+            candidates: &[],
+            base: Vec::new(),
+            none: 0.0,
+        };
+        let singles: Vec<Screened> = (0..3).map(|f| ranking.screened(&[f], 1)).collect();
+        assert!(singles.iter().all(|s| s.gain < 0.0), "{singles:?}");
+        let pairs = ranking.pairs(&singles);
+        assert_eq!(pairs.len(), 1);
+        let each = 0.5 * 1e4 / 101.0 - 0.5 * 101.0_f64.ln();
+        assert!((pairs[0].gain - (2.0 * each - 50.0)).abs() < 1e-9);
+        assert_eq!((&pairs[0].forms[..], pairs[0].names), (&[0, 1][..], 2));
+        assert!((pairs[0].worth(4.0) - (pairs[0].gain - 4.0)).abs() < 1e-12);
     }
 
     #[test]

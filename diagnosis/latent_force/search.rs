@@ -22,7 +22,7 @@ use super::fit::Fitted;
 
 pub use open_loop::OpenLoop;
 pub use prior::log_prior;
-pub use round::Round;
+pub use round::{Round, Seen};
 pub use screening::Sight;
 pub use set::{Set, labels_of, name_of};
 pub use tolerances::Tolerances;

@@ -54,16 +54,16 @@ fn screened(
             base.unwrap_or((none, 0))
         };
         let raced: Vec<Vec<String>> = round.raced.iter().map(|s| labels(candidates, s)).collect();
-        for (set, gain) in &round.screened {
-            let members: Vec<usize> = round.base.iter().chain(set).copied().collect();
+        for seen in &round.screened {
+            let members: Vec<usize> = round.base.iter().chain(&seen.set).copied().collect();
             let effects = labels(candidates, &members);
             if raced.contains(&effects) {
                 continue;
             }
             all.push(Screened {
                 effects,
-                names: names + 1,
-                evidence: evidence - none + gain + log_prior(plant, candidates, &round.base),
+                names: names + seen.names,
+                evidence: evidence - none + seen.gain + log_prior(plant, candidates, &round.base),
             });
         }
     }

@@ -58,6 +58,15 @@ impl NoiseModel {
             ..self.clone()
         }
     }
+
+    /// The same with the variances of one missing force scaled, that of its white part not below `least`.
+    #[must_use]
+    pub fn scaled_at(&self, dof: usize, factor: f64, least: &[f64]) -> Self {
+        let mut scaled = self.clone();
+        scaled.q[dof] *= factor;
+        scaled.white[dof] = (scaled.white[dof] * factor).max(least[dof]);
+        scaled
+    }
 }
 
 /// Where an episode begins: mean of the change from the trajectory's first state, and its variances.
@@ -210,8 +219,18 @@ pub fn regress(problem: Problem<'_>, noise: &NoiseModel, m: usize) -> Regression
     if problem.walk.segment.is_some() {
         segment::regress(problem, noise, m)
     } else {
-        regress::regress(problem, noise, m)
+        regress::regress(problem, noise, (m, None))
     }
+}
+
+/// The same with some of its columns, of an episode that is no segment; its products are among those alone, in their order.
+#[must_use]
+pub fn regress_on(
+    problem: Problem<'_>,
+    noise: &NoiseModel,
+    (m, columns): (usize, &[usize]),
+) -> Regression {
+    regress::regress(problem, noise, (m, Some(columns)))
 }
 
 /// Smooths an episode.

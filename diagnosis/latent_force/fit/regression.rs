@@ -7,7 +7,7 @@ use crate::latent_force::context::Context;
 use crate::latent_force::estimate::Estimate;
 use crate::latent_force::evidence::{Evidence, evidence};
 use crate::latent_force::fitted_value::Unknown;
-use crate::latent_force::smoother::{Regression, regress};
+use crate::latent_force::smoother::{Regression, regress, regress_on};
 use crate::latent_force::step_map::{LinearEpisode, Variation};
 
 /// Common factors of `q` at which models are compared.
@@ -24,11 +24,27 @@ pub fn regression(
     m: usize,
 ) -> Regression {
     let starts = context.starts(&estimate.trajectory);
-    let parts: Vec<Regression> = estimate
-        .problems(context, linear, &starts)
-        .enumerate()
-        .map(|(w, p)| regress(p, &estimate.noise_along(context, w, scale), m))
-        .collect();
+    let problems = estimate.problems(context, linear, &starts).enumerate();
+    let of_walk = |(w, p)| regress(p, &estimate.noise_along(context, w, scale), m);
+    sum(problems.map(of_walk).collect(), m)
+}
+
+/// The regression of all walks, none of them a segment, on some of `m` columns, the variance of one missing force scaled.
+pub fn regression_at(
+    context: &Context<'_>,
+    estimate: &Estimate,
+    linear: &[LinearEpisode],
+    (dof, scale): (usize, f64),
+    (m, columns): (usize, &[usize]),
+) -> Regression {
+    let starts = context.starts(&estimate.trajectory);
+    let noise = estimate.noise.scaled_at(dof, scale, &estimate.least_white);
+    let problems = estimate.problems(context, linear, &starts);
+    let of_walk = |p| regress_on(p, &noise, (m, columns));
+    sum(problems.map(of_walk).collect(), columns.len())
+}
+
+fn sum(parts: Vec<Regression>, m: usize) -> Regression {
     let mut sum = Regression {
         log_likelihood: 0.0,
         gram: DMatrix::zeros(m, m),

@@ -56,13 +56,13 @@ pub(super) fn ranking(
     let mut all: Vec<RankedSet> = fitted.iter().map(of_fit).collect();
     // What has no name is no effect.
     all.retain(|r| !r.effects.is_empty());
-    for (set, gain) in outcome.rounds.iter().take(1).flat_map(|r| &r.screened) {
-        let effects = labels(set);
+    for seen in outcome.rounds.iter().take(1).flat_map(|r| &r.screened) {
+        let (effects, gain) = (labels(&seen.set), seen.gain);
         match all.iter_mut().find(|r| r.effects == effects) {
-            Some(known) => known.screened = Some(*gain),
+            Some(known) => known.screened = Some(gain),
             None => all.push(RankedSet {
                 effects,
-                screened: Some(*gain),
+                screened: Some(gain),
                 fitted: None,
             }),
         }

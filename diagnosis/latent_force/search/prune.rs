@@ -111,7 +111,44 @@ pub(super) fn pruned(
     Ok(set)
 }
 
-/// The same where there is no time to fit what is left: the values that stay take their means given that those that go are at their
+/// A set in which several names were put upon a base at once, without those that one name after the other would not have brought in: each
+/// must raise the evidence by the `threshold`, and make up for the share of what was missing `at_first` that any further effect must. What is
+/// left is one of the `others` that were fitted, where it is among them.
+pub(super) fn earned(
+    context: &Context<'_>,
+    candidates: &[Candidate],
+    (set, base, others): (Set, &Set, &[Set]),
+    (breadth, threshold, at_first): (Breadth, f64, Missing),
+    progress: &dyn Progress,
+) -> Result<Set> {
+    let left = |s: &Set| s.fitted.estimate.missing(context).relative_to(at_first);
+    let is_more = |c: &usize| !candidates[*c].is_tolerance && !base.candidates.contains(c);
+    let mut set = set;
+    while set.names > base.names + 1 && !progress.is_stopped() {
+        let added = set.candidates.iter().copied().filter(is_more);
+        let change = |c: usize| change_without(candidates, &set, &[c]).unwrap_or(f64::NEG_INFINITY);
+        // What is missed least.
+        let Some(out) = added.max_by(|a, b| change(*a).total_cmp(&change(*b))) else {
+            break;
+        };
+        let mut smaller = without(&set, candidates, out);
+        let same = |o: &&Set| {
+            let is_in = |c: &usize| smaller.candidates.contains(c);
+            o.candidates.len() == smaller.candidates.len() && o.candidates.iter().all(is_in)
+        };
+        match others.iter().find(same) {
+            Some(known) => smaller = known.clone(),
+            None => smaller.fit(context, (breadth.rounds[1], progress))?,
+        }
+        if set.rises_above(&smaller, threshold) && left(&smaller) - left(&set) > breadth.shrinks {
+            break;
+        }
+        set = smaller;
+    }
+    Ok(set)
+}
+
+/// The same as [`pruned`] where there is no time to fit what is left: the values that stay take their means given that those that go are at their
 /// null values, and the evidence is the one by the densities there ([`at_null`]). Slight members stay.
 pub(super) fn pruned_at_once(candidates: &[Candidate], set: Set) -> Set {
     let idle: Vec<usize> = (deeds(candidates, &set).iter())

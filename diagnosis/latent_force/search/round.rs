@@ -1,5 +1,7 @@
 //! A round of a search: all open candidates are screened upon a set, and the few that lead are fitted.
 
+use std::collections::BTreeSet;
+
 use asid_core::{Progress, Result};
 use nalgebra::DMatrix;
 
@@ -13,7 +15,7 @@ use crate::settings::Breadth;
 
 use super::open_loop::OpenLoop;
 use super::prior::worth;
-use super::prune::{pruned, pruned_at_once};
+use super::prune::{earned, pruned, pruned_at_once};
 use super::screening::{Screening, Sight};
 use super::set::{
     Set, TOLERANCES, from_fit_of, name_of, refined_by, simplest_first, with, without,
@@ -26,8 +28,8 @@ use super::{Untried, has_tolerances};
 pub struct Round {
     /// Candidates of the base.
     pub base: Vec<usize>,
-    /// Labels and evidences of screening, best first.
-    pub screened: Vec<(Vec<usize>, f64)>,
+    /// What was screened, best first.
+    pub screened: Vec<Seen>,
     /// The leading candidates of screening, and the cosines of the smallest principal angle between each two.
     pub alike: (Vec<usize>, DMatrix<f64>),
     /// What could have been seen upon the base.
@@ -38,6 +40,17 @@ pub struct Round {
     pub confirmed: Vec<Set>,
     /// What an ordinary machine has of everything, where that earns its place to first order.
     pub tolerances: Option<Tolerances>,
+}
+
+/// Candidates that were screened together.
+#[derive(Clone, Debug)]
+pub struct Seen {
+    /// The candidates.
+    pub set: Vec<usize>,
+    /// How many named things they are.
+    pub names: usize,
+    /// Evidence upon the base, with the prior odds.
+    pub gain: f64,
 }
 
 /// What a round is about.
@@ -67,7 +80,7 @@ impl Screening {
     fn round(
         self,
         upon: &Upon<'_>,
-        screened: Vec<(Vec<usize>, f64)>,
+        screened: Vec<Seen>,
         (raced, confirmed): (Vec<Vec<usize>>, Vec<Set>),
         tolerances: Option<Tolerances>,
     ) -> Round {
@@ -102,11 +115,13 @@ impl Upon<'_> {
                 sets: Vec::new(),
             });
         }
-        let ranked = screening.ranked.iter();
-        let screened: Vec<(Vec<usize>, f64)> = ranked
-            .map(|s| (self.members(&screening, s), s.gain))
-            .collect();
-        let rows = screened.iter().map(|(set, gain)| (name(set), *gain));
+        let seen = |s: &Screened| Seen {
+            set: self.members(&screening, s),
+            names: s.names,
+            gain: s.gain,
+        };
+        let screened: Vec<Seen> = screening.ranked.iter().map(seen).collect();
+        let rows = screened.iter().map(|s| (name(&s.set), s.gain));
         let all = screening
             .tolerances
             .iter()
@@ -117,7 +132,7 @@ impl Upon<'_> {
         if !self.open_loop.is_gap {
             return Ok(screening.round(self, screened, (Vec::new(), Vec::new()), None));
         }
-        let threshold = threshold(nameable(self.candidates), self.breadth.false_alarms);
+        let threshold = self.threshold();
         let tolerances = screening.tolerances.as_ref();
         let tolerances = tolerances.filter(|t| t.gain > threshold).cloned();
         // One name that tells as much as many small things is the likelier.
@@ -151,6 +166,11 @@ impl Upon<'_> {
         Ok(screening.round(self, screened, (of_race, confirmed), tolerances))
     }
 
+    /// Evidence by which a name must rise above what stands.
+    fn threshold(&self) -> f64 {
+        threshold(nameable(self.candidates), self.breadth.false_alarms)
+    }
+
     /// Candidates of a set of a screening.
     fn members(&self, screening: &Screening, set: &Screened) -> Vec<usize> {
         let candidate = |&f: &usize| self.open[screening.columns.forms[f].candidate];
@@ -161,10 +181,12 @@ impl Upon<'_> {
     fn race(&self, screening: &Screening, tolerances: Option<&Tolerances>) -> Result<Fits> {
         let (breadth, progress) = (self.breadth, self.progress);
         let ranked = &screening.ranked;
-        let lead = ranked.first().map_or(0.0, |s| s.gain);
+        let price = self.price();
+        let lead = ranked.first().map_or(0.0, |s| s.worth(price));
         let wander = self.base.fitted.wander;
         let least = (breadth.share * lead).max(breadth.least).max(wander);
-        let due = ranked.iter().take(breadth.raced).filter(|s| s.gain > least);
+        let due = ranked.iter().take(breadth.raced);
+        let due = due.filter(|s| s.worth(price) > least);
         let due: Vec<&Screened> = due.collect();
         progress.begin("confirming", due.len() as u64);
         let mut sets = Vec::new();
@@ -253,12 +275,11 @@ impl Upon<'_> {
                 theta,
                 ..base.fitted.clone()
             },
-            names: base.names + 1,
+            names: base.names + screened.names,
         };
         for &c in &added {
             if let Some(simpler) = refined_by(self.candidates, self.open[c]) {
                 set = without(&set, self.candidates, simpler);
-                set.names = base.names;
             }
         }
         set
@@ -301,6 +322,15 @@ impl Upon<'_> {
             }
             fits.sets.push(set);
         }
+        let others = fits.sets.clone();
+        let least = (breadth, self.threshold(), self.at_first);
+        for set in &mut fits.sets {
+            let own = (set.clone(), self.base, &others[..]);
+            *set = earned(context, self.candidates, own, least, progress)?;
+        }
+        let mut seen = BTreeSet::new();
+        let members = |s: &Set| s.candidates.iter().copied().collect::<BTreeSet<usize>>();
+        fits.sets.retain(|s| seen.insert(members(s)));
         if context.has_segments() {
             self.level(&mut fits.sets)?;
         }

@@ -8,7 +8,8 @@ use crate::chance::threshold;
 use crate::latent_force::columns::{Columns, Leads};
 use crate::latent_force::detection::{Limit, limits};
 use crate::latent_force::rehearsal::{Rehearsal, rehearse};
-use crate::latent_force::screen::{Screened, isolability, rank, regressions};
+use crate::latent_force::scales::Scales;
+use crate::latent_force::screen::{Screened, isolability, rank};
 use crate::latent_force::smoother::Regression;
 
 use super::prior::log_prior;
@@ -55,30 +56,30 @@ impl Upon<'_> {
         let leads = |columns: &Columns| self.leads(columns, &some);
         let asked = (&some[..], &leads as Leads<'_>);
         let columns = Columns::of(self.context, model, &fitted.estimate, asked, self.progress)?;
-        let sums = regressions(self.context, &fitted.estimate, &columns);
-        let mut ranked = rank(&sums, &columns, &some);
+        let price = self.price();
+        let scales = Scales::of(self.context, &fitted.estimate, (&columns, &some));
+        let mut ranked = rank(&scales, &columns, &some, price);
         for s in &mut ranked {
             let members = s.forms.iter().map(|&f| columns.forms[f].candidate);
             s.gain += log_prior(self.context.plant(), &some, &members.collect::<Vec<_>>());
         }
-        ranked.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+        ranked.sort_by(|a, b| b.worth(price).total_cmp(&a.worth(price)));
         let singles = ranked.iter().filter(|s| s.forms.len() == 1);
         let leading: Vec<usize> = singles.map(|s| s.forms[0]).take(COMPARED).collect();
         let candidate = |&f: &usize| self.open[columns.forms[f].candidate];
         let alike = (
             leading.iter().map(candidate).collect(),
-            isolability(&sums[0], &columns, &leading),
+            isolability(&scales.common[0], &columns, &leading),
         );
-        let regressed = (&sums[..], &columns);
+        let regressed = (&scales, &columns);
         let base = &self.base.candidates;
         let tolerances = Tolerances::of(regressed, self.open, self.candidates, base);
-        let of_names = tolerances.as_ref().map_or(0.0, |_| {
-            let price = (nameable(self.candidates) as f64).ln();
-            of_names(&sums, &columns, &ranked, price)
-        });
+        let of_names = tolerances
+            .as_ref()
+            .map_or(0.0, |_| of_names(&scales, &columns, &ranked, price));
         let found = ranked.iter().find(|s| s.forms.len() == 1);
         let found = found.map_or(0.0, |s| s.gain);
-        let sight = self.sight((&sums, found), &columns, &some);
+        let sight = self.sight((&scales.common, found), &columns, &some);
         self.progress.end();
         Ok(Screening {
             some,
@@ -91,11 +92,20 @@ impl Upon<'_> {
         })
     }
 
+    /// Price of a further name: the logarithm of how many there are to choose from.
+    pub(super) fn price(&self) -> f64 {
+        (nameable(self.candidates).max(1) as f64).ln()
+    }
+
     /// Which candidates lead by columns along a part of the logs: members of the leading sets, and tolerances, which are judged all at once.
     fn leads(&self, columns: &Columns, some: &[Candidate]) -> Vec<bool> {
-        let sums = regressions(self.context, &self.base.fitted.estimate, columns);
+        let estimate = &self.base.fitted.estimate;
+        let scales = Scales::of(self.context, estimate, (columns, some));
         let mut leads: Vec<bool> = some.iter().map(|c| c.is_tolerance).collect();
-        for set in rank(&sums, columns, some).iter().take(LEADING) {
+        for set in rank(&scales, columns, some, self.price())
+            .iter()
+            .take(LEADING)
+        {
             let members = set.forms.iter().map(|&f| columns.forms[f].candidate);
             members.for_each(|c| leads[c] = true);
         }

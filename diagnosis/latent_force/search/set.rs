@@ -240,7 +240,7 @@ pub(super) fn is_due(candidates: &[Candidate], set: &Set, candidate: usize) -> b
     refined_by(candidates, candidate).is_none_or(|simpler| set.candidates.contains(&simpler))
 }
 
-/// A set without one of its candidates, its other values as they are.
+/// A set without one of its candidates, its other values as they are. A law that it then names nowhere is a name less.
 pub(super) fn without(set: &Set, candidates: &[Candidate], out: usize) -> Set {
     let mut set = set.clone();
     let Some(place) = set.candidates.iter().position(|&c| c == out) else {
@@ -257,5 +257,9 @@ pub(super) fn without(set: &Set, candidates: &[Candidate], out: usize) -> Set {
     fitted.hypothesis.specs.remove(place);
     fitted.slopes = Slopes::default();
     set.candidates.remove(place);
+    let law = |c: usize| (!candidates[c].is_tolerance).then(|| &*candidates[c].spec.name);
+    if law(out).is_some() && !set.candidates.iter().any(|&c| law(c) == law(out)) {
+        set.names = set.names.saturating_sub(1);
+    }
     set
 }

@@ -13,7 +13,8 @@ use crate::latent_force::columns::Columns;
 use crate::latent_force::evidence::evidence;
 use crate::latent_force::fit::Slopes;
 use crate::latent_force::fitted_value::Unknown;
-use crate::latent_force::screen::{Screened, over_scales};
+use crate::latent_force::scales::Scales;
+use crate::latent_force::screen::Screened;
 use crate::latent_force::smoother::Regression;
 
 use super::set::Set;
@@ -81,9 +82,9 @@ impl Member {
 
 impl Tolerances {
     /// Of the candidates that stand for tolerances and are not in a set yet, by the columns of the like candidates that can be named: those
-    /// that are `open`, of which `columns` and the regressions `sums` are. `None` where the logs tell nothing of them.
+    /// that are `open`, of which `columns` and the regressions of `scales` are. `None` where the logs tell nothing of them.
     pub(super) fn of(
-        (sums, columns): (&[Regression], &Columns),
+        (scales, columns): (&Scales, &Columns),
         open: &[usize],
         candidates: &[Candidate],
         set: &[usize],
@@ -91,7 +92,7 @@ impl Tolerances {
         if set.iter().any(|&c| candidates[c].is_tolerance) {
             return None;
         }
-        let sharpest = sums.last()?;
+        let sharpest = scales.common.last()?;
         // Column, deviation in those of its prior, bounds.
         let mut taken: Vec<(usize, f64, [f64; 2])> = Vec::new();
         let mut members = Vec::new();
@@ -135,9 +136,9 @@ impl Tolerances {
         }
         let own = (0..columns.base).map(|i| (i, 1.0, columns.bounds[i]));
         let all: Vec<(usize, f64, [f64; 2])> = own.chain(taken).collect();
-        let (gain, coefficients) = best(sums, columns, &all);
+        let (gain, coefficients) = best(&scales.common, columns, &all);
         let base: Vec<usize> = (0..columns.base).collect();
-        let (none, _) = over_scales(sums, columns, &base);
+        let (none, _) = scales.best(columns, &base);
         let mut at = columns.base;
         for member in &mut members {
             for (value, deviation) in member.values.iter_mut().zip(&member.deviations) {
@@ -202,14 +203,9 @@ fn best(sums: &[Regression], columns: &Columns, all: &[(usize, f64, [f64; 2])]) 
 
 /// Evidence of the best few names by one regression, less the price of each but the first: what a search upon the present model may come to,
 /// to first order.
-pub(super) fn of_names(
-    sums: &[Regression],
-    columns: &Columns,
-    ranked: &[Screened],
-    price: f64,
-) -> f64 {
+pub(super) fn of_names(scales: &Scales, columns: &Columns, ranked: &[Screened], price: f64) -> f64 {
     let mut which: Vec<usize> = (0..columns.base).collect();
-    let (none, _) = over_scales(sums, columns, &which);
+    let (none, _) = scales.best(columns, &which);
     let mut most = 0.0_f64;
     for names in 0..NAMES {
         let with = |s: &Screened| -> Option<Vec<usize>> {
@@ -217,8 +213,9 @@ pub(super) fn of_names(
             let more: Vec<usize> = more.filter(|c| !which.contains(c)).collect();
             (!more.is_empty()).then(|| [&which[..], &more].concat())
         };
-        let tried = ranked.iter().take(LEADING).filter_map(with);
-        let tried = tried.map(|w| (over_scales(sums, columns, &w).0 - none, w));
+        let tried = ranked.iter().filter(|s| s.names == 1);
+        let tried = tried.take(LEADING).filter_map(with);
+        let tried = tried.map(|w| (scales.best(columns, &w).0 - none, w));
         let Some((gain, next)) = tried.max_by(|a, b| a.0.total_cmp(&b.0)) else {
             break;
         };
@@ -289,12 +286,18 @@ mod tests {
         };
         let ranked = [Screened {
             forms: vec![0],
+            names: 1,
             gain: 0.0,
             base: Vec::new(),
             coefficients: Vec::new(),
         }];
         let alone = 0.5 * 3600.0 / 101.0 - 0.5 * 101.0_f64.ln();
-        let found = of_names(&[sum], &columns(), &ranked, 4.0);
+        let found = of_names(
+            &Scales::known(vec![sum], Vec::new()),
+            &columns(),
+            &ranked,
+            4.0,
+        );
         assert!((found - alone).abs() < 1e-9, "{found} {alone}");
     }
 }

@@ -10,10 +10,14 @@ use super::{NoiseModel, Problem, Regression};
 /// Innovations that are collected before they are added up.
 pub(super) const BLOCK: usize = 128;
 
-/// Filters an episode with its columns.
+/// Filters an episode with its `m` columns, or some of them.
 #[must_use]
-pub fn regress(problem: Problem<'_>, noise: &NoiseModel, all: usize) -> Regression {
-    let shown = Shown::of(problem.linear, all);
+pub fn regress(
+    problem: Problem<'_>,
+    noise: &NoiseModel,
+    (m, some): (usize, Option<&[usize]>),
+) -> Regression {
+    let shown = Shown::of(problem.linear, m, some);
     let m = shown.len();
     let mut filter = Filter::new(problem, noise);
     let (nx, nz, ns) = (filter.nx, filter.nz, filter.ns);

@@ -7,11 +7,12 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::latent_force::step_map::LinearEpisode;
 
-/// The columns of an episode that are not zero all along.
+/// The columns of an episode that are asked for and not zero all along.
 pub(super) struct Shown<'c> {
-    /// Their places among all `m`.
+    /// Their places among those that are asked for.
     places: Vec<usize>,
-    m: usize,
+    /// How many are asked for.
+    asked: usize,
     /// Of the readings, `rows x ns x len`.
     pub(super) readings: Cow<'c, [f64]>,
     /// Of the states, `(rows - 1) x nx x len`.
@@ -30,22 +31,25 @@ fn pick<'c>(rows: &'c [f64], m: usize, places: &[usize]) -> Cow<'c, [f64]> {
 }
 
 impl<'c> Shown<'c> {
-    /// Of an episode with `m` columns.
-    pub(super) fn of(linear: &'c LinearEpisode, m: usize) -> Self {
+    /// Of an episode with `m` columns; of `some` of them, in ascending order, or of all.
+    pub(super) fn of(linear: &'c LinearEpisode, m: usize, some: Option<&[usize]>) -> Self {
         let (readings, states) = (&linear.reading_columns, &linear.state_columns);
-        let mut shows = vec![false; m];
+        let all: Vec<usize> = some.map_or_else(|| (0..m).collect(), <[usize]>::to_vec);
+        let mut shows = vec![false; all.len()];
         for row in [readings, states]
             .into_iter()
             .flat_map(|c| c.chunks_exact(m.max(1)))
         {
-            shows.iter_mut().zip(row).for_each(|(s, x)| *s |= *x != 0.0);
+            let asked = shows.iter_mut().zip(&all);
+            asked.for_each(|(s, &c)| *s |= row[c] != 0.0);
         }
-        let places: Vec<usize> = (0..m).filter(|&i| shows[i]).collect();
+        let places: Vec<usize> = (0..all.len()).filter(|&i| shows[i]).collect();
+        let columns: Vec<usize> = places.iter().map(|&i| all[i]).collect();
         Self {
-            readings: pick(readings, m, &places),
-            states: pick(states, m, &places),
+            readings: pick(readings, m, &columns),
+            states: pick(states, m, &columns),
             places,
-            m,
+            asked: all.len(),
         }
     }
 
@@ -54,13 +58,14 @@ impl<'c> Shown<'c> {
         self.places.len()
     }
 
-    /// Their products among all columns.
+    /// Their products among all that are asked for.
     pub(super) fn spread(
         &self,
         gram: &DMatrix<f64>,
         moment: &DVector<f64>,
     ) -> (DMatrix<f64>, DVector<f64>) {
-        let mut all = (DMatrix::zeros(self.m, self.m), DVector::zeros(self.m));
+        let n = self.asked;
+        let mut all = (DMatrix::zeros(n, n), DVector::zeros(n));
         for (i, &p) in self.places.iter().enumerate() {
             all.1[p] = moment[i];
             for (j, &q) in self.places.iter().enumerate() {

@@ -155,7 +155,6 @@ fn needed(
         for &c in &own {
             smaller = without(&smaller, candidates, c);
         }
-        smaller.names = smaller.names.saturating_sub(1);
         for &c in &own {
             let like = |t: &Candidate| t.is_tolerance && t.label() == candidates[c].label();
             let Some(t) = candidates.iter().position(like) else {

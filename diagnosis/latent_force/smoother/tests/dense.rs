@@ -185,6 +185,23 @@ fn the_regression_is_generalised_least_squares() {
 }
 
 #[test]
+fn a_regression_on_some_columns_has_the_products_of_these() {
+    for case in cases() {
+        let all = regress(case.problem(), &case.noise, case.m);
+        let some: Vec<usize> = (0..case.m).skip(1).collect();
+        let found = regress_on(case.problem(), &case.noise, (case.m, &some));
+        for (i, &p) in some.iter().enumerate() {
+            for (j, &q) in some.iter().enumerate() {
+                assert_same(found.gram[(i, j)], all.gram[(p, q)], "X' S^-1 X");
+            }
+            assert_same(found.moment[i], all.moment[p], "X' S^-1 y");
+        }
+        assert_eq!(found.moment.len(), some.len());
+        assert_same(found.log_likelihood, all.log_likelihood, "log-likelihood");
+    }
+}
+
+#[test]
 fn the_sums_are_posterior_expectations() {
     for case in cases() {
         let (nv, ns) = (case.noise.q.len(), case.noise.r.len());

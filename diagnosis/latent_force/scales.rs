@@ -1,0 +1,154 @@
+//! The regressions that candidates are ranked by: at several scales of the missing forces' variances.
+//!
+//! Where a law is missing, the noise model has taken its force for chance, and the smoother makes up for most of it: a slow force, such as
+//! that of viscous friction, hardly shows. With the law the variance is smaller, so that each set of columns is given the scale that is
+//! likeliest with it. What acts at one joint makes the variance there smaller and leaves those of the others as they are: many things
+//! that every machine has a little of are in these.
+
+use asid_effects::Reach;
+
+use crate::candidate::Candidate;
+
+use super::columns::Columns;
+use super::context::Context;
+use super::estimate::Estimate;
+use super::evidence::evidence;
+use super::fit::{SCALES, regression, regression_at};
+use super::smoother::Regression;
+
+/// Factors of one joint's variance: of the force a third, a tenth and a thirtieth is then left to chance.
+const AT_A_JOINT: [f64; 3] = [0.1, 0.01, 0.001];
+
+/// Joints that have scales of their own, at most: each takes as many passes of the filter as there are factors, and two arms have sixteen.
+const JOINTS: usize = 6;
+
+/// Regressions at scales of one degree of freedom's variance, on the columns of the present model and on those that reach no other.
+struct AtJoint {
+    /// Places of the columns among all, in ascending order.
+    columns: Vec<usize>,
+    sums: Vec<Regression>,
+}
+
+/// Regressions at all scales.
+pub struct Scales {
+    /// At common scales of all variances, on all columns; the first at the variances as they are.
+    pub common: Vec<Regression>,
+    joints: Vec<AtJoint>,
+}
+
+impl Scales {
+    /// Of the columns of some candidates along an estimate.
+    #[must_use]
+    pub fn of(
+        context: &Context<'_>,
+        estimate: &Estimate,
+        (columns, candidates): (&Columns, &[Candidate]),
+    ) -> Self {
+        let m = columns.center.len();
+        let at = |&scale: &f64| regression(context, estimate, &columns.linear, scale, m);
+        let at_joint = |dof: usize| {
+            let own = reaching(context, (columns, candidates), dof);
+            let scaled = |&scale: &f64| {
+                let linear = &columns.linear;
+                regression_at(context, estimate, linear, (dof, scale), (m, &own))
+            };
+            (own.len() > columns.base).then(|| AtJoint {
+                sums: AT_A_JOINT.iter().map(scaled).collect(),
+                columns: own.clone(),
+            })
+        };
+        Self {
+            common: SCALES.iter().map(at).collect(),
+            joints: lacking(context, estimate)
+                .into_iter()
+                .filter_map(at_joint)
+                .collect(),
+        }
+    }
+
+    /// Whether some columns, besides those of the present model, all reach one degree of freedom and nothing else.
+    #[must_use]
+    pub fn at_one_joint(&self, columns: &[usize]) -> bool {
+        let holds = |joint: &AtJoint| {
+            let of_joint = |c: &usize| joint.columns.binary_search(c).is_ok();
+            columns.iter().all(of_joint)
+        };
+        self.joints.iter().any(holds)
+    }
+
+    /// Of regressions at common scales, and of those on some columns at the scales of a joint.
+    #[cfg(test)]
+    pub fn known(common: Vec<Regression>, joints: Vec<(Vec<usize>, Vec<Regression>)>) -> Self {
+        let joints = joints.into_iter();
+        let joints = joints.map(|(columns, sums)| AtJoint { columns, sums });
+        Self {
+            common,
+            joints: joints.collect(),
+        }
+    }
+
+    /// Evidence of some columns, those of the present model among them, at the scale where it is largest, with their coefficients.
+    #[must_use]
+    pub fn best(&self, columns: &Columns, which: &[usize]) -> (f64, Vec<f64>) {
+        let (center, bounds) = (&columns.center, &columns.bounds);
+        let common = self.common.iter().map(|sum| {
+            let found = evidence(&sum.gram, &sum.moment, which, center, bounds);
+            (sum.log_likelihood + found.gain, found.coefficients)
+        });
+        let at_joints = self.joints.iter().flat_map(|joint| {
+            let place = |c: &usize| joint.columns.binary_search(c).ok();
+            let own: Option<Vec<usize>> = which.iter().map(place).collect();
+            let of = |all: &[f64]| joint.columns.iter().map(|&c| all[c]).collect::<Vec<f64>>();
+            let all_bounds = joint.columns.iter().map(|&c| bounds[c]);
+            let priors = own.map(|own| (own, of(center), all_bounds.collect::<Vec<_>>()));
+            let sums = priors.into_iter().flat_map(|(own, center, bounds)| {
+                let at_scale = move |sum: &Regression| {
+                    let found = evidence(&sum.gram, &sum.moment, &own, &center, &bounds);
+                    (sum.log_likelihood + found.gain, found.coefficients)
+                };
+                joint.sums.iter().map(at_scale)
+            });
+            sums
+        });
+        let none = (f64::NEG_INFINITY, Vec::new());
+        common
+            .chain(at_joints)
+            .fold(none, |best, next| if next.0 > best.0 { next } else { best })
+    }
+}
+
+/// The degrees of freedom that lack the most force relative to their inertial forces. None of a single one, which has all of it, and none where
+/// there are segments, whose replays lack none.
+fn lacking(context: &Context<'_>, estimate: &Estimate) -> Vec<usize> {
+    let nv = context.plant().layout.nv;
+    if context.has_segments() || nv < 2 {
+        return Vec::new();
+    }
+    let share =
+        |d: usize| (estimate.noise.q[d] + estimate.noise.white[d]) / context.inertial[d].powi(2);
+    let mut dofs: Vec<usize> = (0..nv).collect();
+    dofs.sort_by(|a, b| share(*b).total_cmp(&share(*a)));
+    dofs.truncate(JOINTS);
+    dofs
+}
+
+/// Columns of the present model, and those of candidates that reach one degree of freedom and nothing else; in ascending order.
+fn reaching(
+    context: &Context<'_>,
+    (columns, candidates): (&Columns, &[Candidate]),
+    dof: usize,
+) -> Vec<usize> {
+    let own = Reach::Dofs([dof].into());
+    let reaches = |candidate: &Candidate| {
+        candidate
+            .effect
+            .reach(context.plant(), &candidate.spec.site)
+            == own
+    };
+    let forms = columns.forms.iter();
+    let forms = forms.filter(|f| reaches(&candidates[f.candidate]));
+    let mut places: Vec<usize> = (0..columns.base).collect();
+    places.extend(forms.flat_map(|f| f.columns()));
+    places.sort_unstable();
+    places
+}
