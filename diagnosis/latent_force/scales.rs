@@ -101,14 +101,13 @@ impl Scales {
             let of = |all: &[f64]| joint.columns.iter().map(|&c| all[c]).collect::<Vec<f64>>();
             let all_bounds = joint.columns.iter().map(|&c| bounds[c]);
             let priors = own.map(|own| (own, of(center), all_bounds.collect::<Vec<_>>()));
-            let sums = priors.into_iter().flat_map(|(own, center, bounds)| {
+            priors.into_iter().flat_map(|(own, center, bounds)| {
                 let at_scale = move |sum: &Regression| {
                     let found = evidence(&sum.gram, &sum.moment, &own, &center, &bounds);
                     (sum.log_likelihood + found.gain, found.coefficients)
                 };
                 joint.sums.iter().map(at_scale)
-            });
-            sums
+            })
         });
         let none = (f64::NEG_INFINITY, Vec::new());
         common
