@@ -17,7 +17,7 @@ use asid::core::{Parameter, Streams};
 use asid::pipeline::{self, Method};
 use asid::worlds::SimulatedWorld;
 use asid_comparison::method::Method as Named;
-use asid_comparison::statistics::interquartile_mean;
+use asid_statistics::interquartile_mean;
 use cart_support::Cart;
 
 /// Runs of each method.

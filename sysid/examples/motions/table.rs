@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use asid_comparison::statistics::{bootstrap, interquartile_mean, mean};
+use asid_statistics::{bootstrap, interquartile_mean, mean};
 
 use crate::motion::Motion;
 use crate::world::World;
