@@ -95,7 +95,8 @@ pub fn cost(residuals: &[f64]) -> f64 {
 }
 
 /// Places of the episodes in a residual vector.
-fn bounds(predictor: &Predictor<'_>) -> Vec<std::ops::Range<usize>> {
+#[must_use]
+pub fn bounds(predictor: &Predictor<'_>) -> Vec<std::ops::Range<usize>> {
     let logs = predictor.logs();
     (0..logs.episodes.len())
         .map(|e| logs.offset(e)..logs.offset(e + 1))

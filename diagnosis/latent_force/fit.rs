@@ -39,6 +39,46 @@ const RISE: f64 = 0.5;
 const PATIENCE: usize = 2;
 /// Shorter steps from one point that are tried, at most.
 const FAILURES: usize = 2;
+/// Linearisations over which the pace of a fit is told.
+const PACE: usize = 2;
+/// Linearisations from which on a fit may be given up for a rival's evidence: the first few raise it most.
+const TRIED: usize = 4;
+
+/// How far a fit goes.
+#[derive(Clone, Copy)]
+pub struct Extent<'p> {
+    /// Most linearisations.
+    pub rounds: usize,
+    /// Evidence, natural logarithm, that it must come to; without it, all that there is.
+    pub rival: Option<f64>,
+    /// Work that may be stopped.
+    pub progress: &'p dyn Progress,
+}
+
+impl<'p> From<(usize, &'p dyn Progress)> for Extent<'p> {
+    fn from((rounds, progress): (usize, &'p dyn Progress)) -> Self {
+        Self {
+            rounds,
+            rival: None,
+            progress,
+        }
+    }
+}
+
+impl Extent<'_> {
+    /// Whether a fit does not come to its rival: at the pace of its last linearisations, of which each has raised the evidence to one of `reached`,
+    /// and with what a step promises.
+    fn is_out_of_reach(&self, reached: &[f64], promised: f64) -> bool {
+        let n = reached.len();
+        let Some(rival) = self.rival.filter(|_| n >= TRIED) else {
+            return false;
+        };
+        let now = reached[n - 1];
+        let pace = (now - reached[n - 1 - PACE]) / PACE as f64;
+        let further = self.rounds.saturating_sub(n) as f64;
+        now + promised.max(0.0) + pace * further < rival
+    }
+}
 
 /// A model: the study's parameters and effects, with priors.
 #[derive(Clone, Debug, Default)]
@@ -115,18 +155,20 @@ impl Anchor {
     }
 }
 
-/// Fits a model from some values, an estimate and the slopes of a like model on, over at most `rounds` linearisations;
-/// over those so far, but at least one, where the work is stopped.
+/// Fits a model from some values, an estimate and the slopes of a like model on, to some extent;
+/// over the linearisations so far, but at least one, where the work is stopped.
 ///
 /// # Errors
 /// When a value is not physical or the engine fails.
-pub fn fit(
+pub fn fit<'p>(
     context: &Context<'_>,
     hypothesis: &Hypothesis,
     theta: &[f64],
     (estimate, slopes): (&Estimate, &Slopes),
-    (rounds, progress): (usize, &dyn Progress),
+    extent: impl Into<Extent<'p>>,
 ) -> Result<Fitted> {
+    let extent = extent.into();
+    let (rounds, progress) = (extent.rounds, extent.progress);
     let unknowns = &hypothesis.unknowns;
     let free = hypothesis.free();
     let m = free.len();
@@ -142,7 +184,7 @@ pub fn fit(
     let (mut waited, mut failed) = (0, 0);
     let segments = context.walks.iter().filter(|w| w.segment.is_some()).count();
     let rise = rise(context);
-    let mut all = Vec::new();
+    let (mut all, mut reached) = (Vec::new(), Vec::new());
     for round in 0..rounds.max(1) {
         let variations = variations(unknowns, &free, &theta);
         let mut linear = slopes.linearise(
@@ -170,12 +212,14 @@ pub fn fit(
         if best.as_ref().is_none_or(|b| here > b.evidence) {
             best = Some(fitted_at(hypothesis, (&theta, &estimate), &compared));
         }
+        reached.push(all.iter().copied().fold(f64::NEG_INFINITY, f64::max));
         let stands = round > 0 && !rose && promised < rise;
         if stands && round + 1 < rounds && !progress.is_stopped() && slopes.renew_columns() {
             // Kept columns may say so by mistake.
             continue;
         }
-        if stands || failed == FAILURES || round + 1 == rounds || progress.is_stopped() {
+        let ends = stands || extent.is_out_of_reach(&reached, promised);
+        if ends || failed == FAILURES || round + 1 == rounds || progress.is_stopped() {
             break;
         }
         if waited > PATIENCE || astray && failed < FAILURES {
@@ -326,4 +370,26 @@ pub fn settle_noise(
         estimate.roll(context, &mut map, theta, &before)?;
     }
     Ok(slopes)
+}
+
+#[cfg(test)]
+mod tests {
+    use asid_core::progress::Silent;
+
+    use super::*;
+
+    #[test]
+    fn a_fit_is_given_up_where_its_pace_and_promise_do_not_come_to_its_rival() {
+        let extent = |rival| Extent {
+            rival,
+            ..Extent::from((10, &Silent as &dyn Progress))
+        };
+        // It has risen by 10 in each of the last two, and has 6 to go.
+        let reached = [0.0, 50.0, 60.0, 70.0];
+        assert!(!extent(Some(130.0)).is_out_of_reach(&reached, 0.0));
+        assert!(extent(Some(131.0)).is_out_of_reach(&reached, 0.0));
+        assert!(!extent(Some(131.0)).is_out_of_reach(&reached, 1.0));
+        assert!(!extent(Some(1e9)).is_out_of_reach(&reached[..3], 0.0));
+        assert!(!extent(None).is_out_of_reach(&reached, 0.0));
+    }
 }

@@ -167,24 +167,25 @@ pub fn rank(
 pub fn isolability(sum: &Regression, columns: &Columns, forms: &[usize]) -> DMatrix<f64> {
     let base: Vec<usize> = (0..columns.base).collect();
     let gram = project(&sum.gram, &base);
-    let basis = |f: usize| -> DMatrix<f64> {
+    let block =
+        |a: &[usize], b: &[usize]| DMatrix::from_fn(a.len(), b.len(), |i, j| gram[(a[i], b[j])]);
+    // The columns of each form, and what makes them orthonormal.
+    let basis = |&f: &usize| -> (Vec<usize>, DMatrix<f64>) {
         let own: Vec<usize> = columns.forms[f].columns().collect();
-        let part = DMatrix::from_fn(own.len(), own.len(), |i, j| gram[(own[i], own[j])]);
-        let eigen = part.symmetric_eigen();
+        let eigen = block(&own, &own).symmetric_eigen();
         let largest = eigen.eigenvalues.max().max(f64::MIN_POSITIVE);
-        let mut out = DMatrix::zeros(gram.nrows(), own.len());
+        let mut out = DMatrix::zeros(own.len(), own.len());
         for (k, value) in eigen.eigenvalues.iter().enumerate() {
             if *value > 1e-9 * largest {
-                for (i, &o) in own.iter().enumerate() {
-                    out[(o, k)] = eigen.eigenvectors[(i, k)] / value.sqrt();
-                }
+                out.set_column(k, &(eigen.eigenvectors.column(k) / value.sqrt()));
             }
         }
-        out
+        (own, out)
     };
-    let bases: Vec<DMatrix<f64>> = forms.iter().map(|&f| basis(f)).collect();
+    let bases: Vec<(Vec<usize>, DMatrix<f64>)> = forms.iter().map(basis).collect();
     DMatrix::from_fn(forms.len(), forms.len(), |i, j| {
-        let cross = bases[i].transpose() * &gram * &bases[j];
+        let [(a, left), (b, right)] = [&bases[i], &bases[j]];
+        let cross = left.transpose() * block(a, b) * right;
         cross.singular_values().max().min(1.0)
     })
 }

@@ -9,7 +9,7 @@ use crate::candidate::{Candidate, nameable};
 use crate::chance::threshold;
 use crate::latent_force::context::Context;
 use crate::latent_force::estimate::Missing;
-use crate::latent_force::fit::{Fitted, Slopes, rise};
+use crate::latent_force::fit::{Extent, Fitted, Slopes, rise};
 use crate::latent_force::screen::Screened;
 use crate::settings::Breadth;
 
@@ -296,6 +296,7 @@ impl Upon<'_> {
         // After as many rounds for each: one that was fitted to the end would be ahead by its rounds alone.
         let best = raced.iter().map(|s| s.fitted.evidence).fold(base, f64::max);
         let least = best - (breadth.behind * (best - base)).max(breadth.near);
+        let mut best_to_the_end = base;
         let mut fits = Fits {
             sets: Vec::new(),
             left_out: Vec::new(),
@@ -311,15 +312,23 @@ impl Upon<'_> {
                 ));
                 // To the end by slopes of its own.
                 set.fitted.slopes = Slopes::default();
-                set.fit(context, (breadth.rounds[1], progress))?;
+                let whole = Extent::from((breadth.rounds[1], progress));
+                let rival = (!context.has_segments()).then_some(best_to_the_end - breadth.near);
+                set.fit(context, Extent { rival, ..whole })?;
             }
-            if progress.is_stopped() {
-                fits.left_out.push(set.candidates.clone());
-                set = pruned_at_once(self.candidates, set);
+            best_to_the_end = best_to_the_end.max(set.fitted.evidence);
+            let at_once = pruned_at_once(self.candidates, set.clone());
+            // Fewer members do not bring back one that is far behind.
+            let is_far = hoped(&at_once) < best_to_the_end - breadth.near;
+            set = if progress.is_stopped() {
+                fits.left_out.push(set.candidates);
+                at_once
+            } else if is_far && !context.has_segments() {
+                at_once
             } else {
                 let least = (breadth, self.at_first);
-                set = pruned(context, self.candidates, set, least, progress)?;
-            }
+                pruned(context, self.candidates, set, least, progress)?
+            };
             fits.sets.push(set);
         }
         let others = fits.sets.clone();

@@ -7,7 +7,7 @@ use asid_results::naming::grouped;
 use crate::candidate::Candidate;
 use crate::latent_force::columns::{Columns, Form};
 use crate::latent_force::context::Context;
-use crate::latent_force::fit::{Fitted, Hypothesis, Slopes, fit};
+use crate::latent_force::fit::{Extent, Fitted, Hypothesis, Slopes, fit};
 use crate::latent_force::fitted_value::Unknown;
 use crate::latent_force::screen::Screened;
 use crate::settings::Breadth;
@@ -53,11 +53,11 @@ impl Set {
         next.is_some_and(|n| n.fitted.evidence >= self.fitted.evidence + threshold)
     }
 
-    /// Fits it on from where it stands, over at most so many linearisations.
-    pub(super) fn fit(
+    /// Fits it on from where it stands, to some extent.
+    pub(super) fn fit<'p>(
         &mut self,
         context: &Context<'_>,
-        rounds: (usize, &dyn Progress),
+        extent: impl Into<Extent<'p>>,
     ) -> Result<()> {
         let from = &self.fitted;
         self.fitted = fit(
@@ -65,7 +65,7 @@ impl Set {
             &from.hypothesis,
             &from.theta,
             (&from.estimate, &from.slopes),
-            rounds,
+            extent,
         )?;
         Ok(())
     }
