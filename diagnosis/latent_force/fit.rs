@@ -3,11 +3,13 @@
 //! Everything is linearised anew about the smoothed trajectory until the evidence stands. An effect that is right
 //! makes the missing force small: each round the evidence is compared over common scales of `q`, so that it is seen.
 
+mod extent;
 mod kept_columns;
 mod regression;
 mod secant;
 mod slopes;
 mod wander;
+mod watchdog;
 
 use asid_core::{Parameter, Progress, Result};
 use asid_effects::EffectSpec;
@@ -18,15 +20,15 @@ use super::estimate::Estimate;
 use super::fitted_value::Unknown;
 use super::step_map::{Derivatives, LinearEpisode, StepMap};
 
+pub use extent::Extent;
 use regression::{Compared, compare, in_units, shift, variations};
 pub use regression::{SCALES, regression, regression_at};
 pub use slopes::Slopes;
 use wander::wander;
+use watchdog::Watchdog;
 
 /// Largest step of a value, in deviations of its prior: a tangent reaches no further.
 const LARGEST_STEP: f64 = 1.0;
-/// Part of a step that is tried where the whole made things worse.
-const SHORTER: f64 = 0.3;
 /// Rounds of EM between two linearisations.
 const EM_ROUNDS: usize = 4;
 /// Further smoothings between two steps of the values where readings remember: their slope in the past of the state is
@@ -34,51 +36,6 @@ const EM_ROUNDS: usize = 4;
 const AGAIN: usize = 2;
 /// Evidence that no longer counts as a rise; where there are segments, of each, as errors that are independent add up.
 const RISE: f64 = 0.5;
-/// Rounds without a rise that are gone on with (a watchdog: Chamberlain and others 1982), for a narrow valley bends away
-/// from its tangent.
-const PATIENCE: usize = 2;
-/// Shorter steps from one point that are tried, at most.
-const FAILURES: usize = 2;
-/// Linearisations over which the pace of a fit is told.
-const PACE: usize = 2;
-/// Linearisations from which on a fit may be given up for a rival's evidence: the first few raise it most.
-const TRIED: usize = 4;
-
-/// How far a fit goes.
-#[derive(Clone, Copy)]
-pub struct Extent<'p> {
-    /// Most linearisations.
-    pub rounds: usize,
-    /// Evidence, natural logarithm, that it must come to; without it, all that there is.
-    pub rival: Option<f64>,
-    /// Work that may be stopped.
-    pub progress: &'p dyn Progress,
-}
-
-impl<'p> From<(usize, &'p dyn Progress)> for Extent<'p> {
-    fn from((rounds, progress): (usize, &'p dyn Progress)) -> Self {
-        Self {
-            rounds,
-            rival: None,
-            progress,
-        }
-    }
-}
-
-impl Extent<'_> {
-    /// Whether a fit does not come to its rival: at the pace of its last linearisations, of which each has raised the evidence to one of `reached`,
-    /// and with what a step promises.
-    fn is_out_of_reach(&self, reached: &[f64], promised: f64) -> bool {
-        let n = reached.len();
-        let Some(rival) = self.rival.filter(|_| n >= TRIED) else {
-            return false;
-        };
-        let now = reached[n - 1];
-        let pace = (now - reached[n - 1 - PACE]) / PACE as f64;
-        let further = self.rounds.saturating_sub(n) as f64;
-        now + promised.max(0.0) + pace * further < rival
-    }
-}
 
 /// A model: the study's parameters and effects, with priors.
 #[derive(Clone, Debug, Default)]
@@ -137,24 +94,6 @@ pub fn rise(context: &Context<'_>) -> f64 {
     RISE * (segments.max(1) as f64).sqrt()
 }
 
-/// A point from which steps are taken: what it and its step promise, and where that leads.
-struct Anchor {
-    /// Evidence there, and with what a step promises.
-    here: f64,
-    hoped: f64,
-    from: (Vec<f64>, Estimate),
-    to: (Vec<f64>, Estimate),
-}
-
-impl Anchor {
-    /// Values and estimate after a part of the step.
-    fn along(&self, context: &Context<'_>, part: f64) -> (Vec<f64>, Estimate) {
-        let (from, to) = (&self.from, &self.to);
-        let values = from.0.iter().zip(&to.0).map(|(a, b)| a + part * (b - a));
-        (values.collect(), from.1.towards(context, &to.1, part))
-    }
-}
-
 /// Fits a model from some values, an estimate and the slopes of a like model on, to some extent;
 /// over the linearisations so far, but at least one, where the work is stopped.
 ///
@@ -179,11 +118,9 @@ pub fn fit<'p>(
     let mut estimate = estimate.clone();
     let mut best: Option<Fitted> = None;
     let mut slopes = slopes.begun();
-    let mut anchor: Option<Anchor> = None;
-    let mut part = 1.0;
-    let (mut waited, mut failed) = (0, 0);
-    let segments = context.walks.iter().filter(|w| w.segment.is_some()).count();
+    let has_segments = context.has_segments();
     let rise = rise(context);
+    let mut watchdog = Watchdog::new(rise, has_segments);
     let (mut all, mut reached) = (Vec::new(), Vec::new());
     for round in 0..rounds.max(1) {
         let variations = variations(unknowns, &free, &theta);
@@ -195,62 +132,49 @@ pub fn fit<'p>(
         )?;
         context.step_error.join(&mut linear, m);
         let model = (&unknowns[..], &free[..], &theta[..]);
-        let whole = round == 0 || segments > 0;
+        let whole = round == 0 || has_segments;
         let Some(compared) = compare(context, &estimate, &linear, model, whole) else {
             break;
         };
         let (here, promised) = (compared.here, compared.promised);
         estimate.rescale(compared.scale);
-        let hoped = here + promised;
-        let rose = best.as_ref().is_none_or(|b| here > b.evidence + rise)
-            || anchor.as_ref().is_none_or(|a| hoped > a.hoped + rise);
-        waited = if rose { 0 } else { waited + 1 };
-        // A step that lost more than it had promised to win is no narrow valley. Evidence of segments falls by itself.
-        let lost = |a: &Anchor| a.here - here > (a.hoped - a.here).max(rise);
-        let astray = segments == 0 && anchor.as_ref().is_some_and(lost);
+        let outcome = watchdog.look((here, promised), best.as_ref().map(|b| b.evidence));
         all.push(here);
         if best.as_ref().is_none_or(|b| here > b.evidence) {
             best = Some(fitted_at(hypothesis, (&theta, &estimate), &compared));
         }
         reached.push(all.iter().copied().fold(f64::NEG_INFINITY, f64::max));
-        let stands = round > 0 && !rose && promised < rise;
+        let stands = round > 0 && !outcome.rose && promised < rise;
         if stands && round + 1 < rounds && !progress.is_stopped() && slopes.renew_columns() {
             // Kept columns may say so by mistake.
             continue;
         }
         let ends = stands || extent.is_out_of_reach(&reached, promised);
-        if ends || failed == FAILURES || round + 1 == rounds || progress.is_stopped() {
+        let is_last = round + 1 == rounds || progress.is_stopped();
+        if ends || is_last || watchdog.is_out_of_steps() {
             break;
         }
-        if waited > PATIENCE || astray && failed < FAILURES {
-            // The tangents led astray: less of the way.
-            let Some(anchor) = &anchor else { break };
-            part *= SHORTER;
-            failed += 1;
-            waited = 0;
-            (theta, estimate) = anchor.along(context, part);
+        if outcome.astray {
+            let Some(shorter) = watchdog.shorter(context) else {
+                break;
+            };
+            (theta, estimate) = shorter;
             let before = estimate.trajectory.clone();
             estimate.roll(context, &mut map, &theta, &before)?;
             continue;
         }
-        let from = rose.then(|| (theta.clone(), estimate.clone()));
+        let from = outcome.rose.then(|| (theta.clone(), estimate.clone()));
         let moves = step(unknowns, &free, &compared.found.coefficients, &mut theta);
         shift(&mut linear, &moves);
         smooth(context, &mut map, &theta, (&linear, &steps), &mut estimate)?;
         if let Some(from) = from {
-            (part, failed) = (1.0, 0);
-            anchor = Some(Anchor {
-                here,
-                hoped,
-                from,
-                to: (theta.clone(), estimate.clone()),
-            });
+            watchdog.anchor(&outcome, from, (theta.clone(), estimate.clone()));
         }
     }
     let none_finite = || asid_core::Error::Failed("no round of the fit was finite".into());
     let mut best = best.ok_or_else(none_finite)?;
     best.slopes = slopes;
-    if segments > 0 {
+    if has_segments {
         best.wander = wander(&all, rise);
     }
     Ok(best)
@@ -370,26 +294,4 @@ pub fn settle_noise(
         estimate.roll(context, &mut map, theta, &before)?;
     }
     Ok(slopes)
-}
-
-#[cfg(test)]
-mod tests {
-    use asid_core::progress::Silent;
-
-    use super::*;
-
-    #[test]
-    fn a_fit_is_given_up_where_its_pace_and_promise_do_not_come_to_its_rival() {
-        let extent = |rival| Extent {
-            rival,
-            ..Extent::from((10, &Silent as &dyn Progress))
-        };
-        // It has risen by 10 in each of the last two, and has 6 to go.
-        let reached = [0.0, 50.0, 60.0, 70.0];
-        assert!(!extent(Some(130.0)).is_out_of_reach(&reached, 0.0));
-        assert!(extent(Some(131.0)).is_out_of_reach(&reached, 0.0));
-        assert!(!extent(Some(131.0)).is_out_of_reach(&reached, 1.0));
-        assert!(!extent(Some(1e9)).is_out_of_reach(&reached[..3], 0.0));
-        assert!(!extent(None).is_out_of_reach(&reached, 0.0));
-    }
 }
