@@ -9,6 +9,7 @@ mod round;
 mod screening;
 mod set;
 mod tolerances;
+mod twins;
 
 use asid_core::{Progress, Result};
 
@@ -184,7 +185,8 @@ struct Search<'s> {
 /// and `open_loop` replays still leave a gap, as of a stiff drive that was made softer, what a further name closes of that gap counts.
 ///
 /// Which of two first names is the right one may only show once the second is there: where one is not far behind the one that was taken, and
-/// something was missing beside that, the search goes on from it too, and what is more likely in the end stands.
+/// something was missing beside that, the search goes on from it too, and what is more likely in the end stands. What no fit has told from a name
+/// that stands is a rival at the end too.
 ///
 /// # Errors
 /// When the engine fails.
@@ -214,6 +216,10 @@ pub fn search(
             let other = search.follow(Path::from(second), &mut none)?;
             path = path.or(other, |set| worth(context, candidates, set));
         }
+    }
+    let twins = search.twins(&path)?;
+    if let Some(last) = path.rounds.last_mut() {
+        last.confirmed.extend(twins);
     }
     let missing = [&none, &path.best.fitted].map(|f| f.estimate.missing(context));
     Ok(Outcome {

@@ -22,6 +22,8 @@ use super::told::{detection_limits, isolability, missing_forces, p_value, rankin
 const REPLAYED: usize = 500_000;
 /// Most sets besides the verdict's that are replayed.
 const RIVALS: usize = 4;
+/// Difference of evidence, natural logarithm, that tells two sets apart in no case.
+const LEVEL: f64 = 1.0;
 
 /// Starts of the training episodes as a fit smoothed them, where the logs leave them open; `firsts` are the walks that begin
 /// an episode.
@@ -218,6 +220,9 @@ fn replayed_sets(
         sets.remove(place);
         sets.insert(0, outcome.best.clone());
     }
+    // A twin is a rival however little time there is.
+    let is_level = |s: &Set| (s.fitted.evidence - outcome.best.fitted.evidence).abs() < LEVEL;
+    let rivals = rivals.max(usize::from(sets.get(1).is_some_and(is_level)));
     let of_known = sets.iter().position(|s| s.candidates == known);
     let of_known = of_known.filter(|i| *i > rivals).map(|i| sets.remove(i));
     sets.truncate(1 + rivals);

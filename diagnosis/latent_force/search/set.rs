@@ -43,7 +43,7 @@ impl Set {
     }
 
     /// Whether evidence does not tell it from another set that is ahead: by no more than what both scatter by, or than what counts as a `rise`.
-    fn is_level_with(&self, ahead: &Self, rise: f64) -> bool {
+    pub(super) fn is_level_with(&self, ahead: &Self, rise: f64) -> bool {
         let unsure = WANDER * self.fitted.wander.hypot(ahead.fitted.wander);
         ahead.fitted.evidence - self.fitted.evidence <= unsure.max(rise)
     }

@@ -1,0 +1,121 @@
+//! Twins of the set that stands: other names for what it does, which no fit has told from its own.
+//!
+//! A servo's damping and the friction of its joint do the same while the drive keeps within its limit of force. A search goes on from one of the
+//! two, and what is then put beside that one, tolerances or a further name, would raise it above the other. A twin has the same beside it.
+
+use asid_core::Result;
+
+use crate::candidate::Candidate;
+use crate::latent_force::fit::rise;
+
+use super::Search;
+use super::path::Path;
+use super::set::{Set, without};
+
+/// Twins that are fitted, at most.
+const MOST: usize = 2;
+
+/// What goes out of the `best` set and what comes in, where the set `ahead` of which it is made and an `other` one change places; `None` where it is
+/// not made of that one, or is no larger, or holds some of the other one already.
+fn exchanged(best: &[usize], ahead: &[usize], other: &[usize]) -> Option<[Vec<usize>; 2]> {
+    let not_in = |a: &[usize], b: &[usize]| -> Vec<usize> {
+        let own = a.iter().filter(|c| !b.contains(c));
+        own.copied().collect()
+    };
+    let (out, into) = (not_in(ahead, other), not_in(other, ahead));
+    let is_part = not_in(ahead, best).is_empty() && ahead.len() < best.len();
+    let is_new = not_in(&into, best).len() == into.len();
+    (is_part && is_new && !out.is_empty() && !into.is_empty()).then_some([out, into])
+}
+
+/// A set with a candidate of another set, at the values that it has there.
+fn with_that_of(set: &Set, other: &Set, candidates: &[Candidate], candidate: usize) -> Set {
+    let mut set = set.clone();
+    let Some(place) = other.candidates.iter().position(|&c| c == candidate) else {
+        return set;
+    };
+    let lengths =
+        |c: &[usize]| -> usize { c.iter().map(|&c| candidates[c].parameters().len()).sum() };
+    let theirs = &other.fitted;
+    let study = theirs.theta.len() - lengths(&other.candidates);
+    let first = study + lengths(&other.candidates[..place]);
+    let range = first..first + candidates[candidate].parameters().len();
+    let fitted = &mut set.fitted;
+    fitted.theta.extend(&theirs.theta[range.clone()]);
+    let unknowns = theirs.hypothesis.unknowns[range].iter().cloned();
+    fitted.hypothesis.unknowns.extend(unknowns);
+    let spec = theirs.hypothesis.specs[place].clone();
+    fitted.hypothesis.specs.push(spec);
+    set.candidates.push(candidate);
+    set
+}
+
+impl Search<'_> {
+    /// Tolerances of a set that are of the same effects at the same sites as some candidates.
+    fn within_tolerance(&self, set: &Set, some: &[usize]) -> Vec<usize> {
+        let candidates = self.candidates;
+        let labels: Vec<String> = some.iter().map(|&c| candidates[c].label()).collect();
+        let own = set.candidates.iter().copied();
+        own.filter(|&c| candidates[c].is_tolerance && labels.contains(&candidates[c].label()))
+            .collect()
+    }
+
+    /// Twins of the best set of a path, each fitted a little.
+    pub(super) fn twins(&self, path: &Path) -> Result<Vec<Set>> {
+        let (context, best) = (self.context, &path.best);
+        let rise = rise(context);
+        let mut twins: Vec<Set> = Vec::new();
+        for round in &path.rounds {
+            let is_part = |s: &&Set| s.candidates.iter().all(|c| best.candidates.contains(c));
+            let parts = round.confirmed.iter().filter(is_part);
+            let Some(ahead) = parts.max_by_key(|s| s.candidates.len()) else {
+                continue;
+            };
+            let is_level = |s: &&Set| {
+                s.names == ahead.names
+                    && s.is_level_with(ahead, rise)
+                    && ahead.is_level_with(s, rise)
+            };
+            for other in round.confirmed.iter().filter(is_level) {
+                let sets = (&best.candidates, &ahead.candidates, &other.candidates);
+                let Some([out, into]) = exchanged(sets.0, sets.1, sets.2) else {
+                    continue;
+                };
+                let mut twin = best.clone();
+                for c in out.into_iter().chain(self.within_tolerance(best, &into)) {
+                    twin = without(&twin, self.candidates, c);
+                }
+                for c in into {
+                    twin = with_that_of(&twin, other, self.candidates, c);
+                }
+                twin.names = best.names;
+                twin.fit(context, (self.breadth.rounds[0], self.progress))?;
+                twins.push(twin);
+                if twins.len() == MOST {
+                    return Ok(twins);
+                }
+            }
+        }
+        Ok(twins)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_was_level_changes_places_beside_what_came_later() {
+        // Friction (1, 2) and friction with a servo's damping (1, 3) were level; tolerances (8, 9) came later.
+        let swap = |best: &[usize]| exchanged(best, &[1, 2], &[1, 3]);
+        assert_eq!(swap(&[1, 2, 8, 9]), Some([vec![2], vec![3]]));
+        assert_eq!(swap(&[1, 2]), None, "it is a rival as it is");
+        assert_eq!(swap(&[1, 8, 9]), None, "it is not made of the two");
+        assert_eq!(swap(&[1, 2, 3]), None, "it holds both");
+        assert_eq!(
+            exchanged(&[1, 2, 8], &[1, 2], &[1]),
+            None,
+            "nothing comes in"
+        );
+    }
+}
