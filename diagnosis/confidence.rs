@@ -4,7 +4,11 @@
 //! than they say. What a verdict's probability is was counted instead, on training worlds: a logistic regression of whether what is named is
 //! among the true causes. It says by how much a verdict is less sure where a search was cut short, and where a gap is left beside what is named.
 
-use crate::judgement::{Hypothesis, Judgement};
+mod refit;
+
+use crate::judgement::{Claim, Hypothesis, Judgement};
+
+pub use refit::{Refitted, refit};
 
 /// What a verdict's probability goes with. The first five are the maximum of the likelihood with normal priors of deviation 2 over the 127 named
 /// verdicts of 194 training worlds (seeds 9101, 9303, 9404, 9505, 9606, 9808 and 1010; docs/diagnosis.md), 78 of them right; left out one by one,
@@ -101,15 +105,25 @@ fn normal(x: f64) -> f64 {
     if x > 0.0 { 1.0 - upper } else { upper }
 }
 
+/// What is claimed by a verdict of which, and of what the logs do not tell from it, evidence says the probability `raw`.
+fn claim(raw: f64, shown: Shown) -> Claim {
+    let p = raw.clamp(CLIP[0], CLIP[1]);
+    Claim {
+        odds: (p / (1.0 - p)).ln(),
+        stopped: f64::from(u8::from(shown.stopped)),
+        left: shown.left.clamp(CLOSED, 1.0).ln(),
+        more: shown.laws.saturating_sub(1) as f64,
+    }
+}
+
 impl Confidence {
-    /// Log odds that all effects of a verdict are among the true ones, of which evidence says `probability`.
-    fn of_named(&self, probability: f64, shown: Shown) -> f64 {
-        let p = probability.clamp(CLIP[0], CLIP[1]);
-        let odds = (p / (1.0 - p)).ln();
-        let left = self.gap_left * shown.left.clamp(CLOSED, 1.0).ln();
-        let stopped = self.stopped * f64::from(u8::from(shown.stopped));
-        let more = self.more_laws * shown.laws.saturating_sub(1) as f64;
-        self.named + self.evidence * odds - left - stopped - more
+    /// Log odds that a claim holds: that all effects of a verdict, or of a set that the logs do not tell from it, are among the true ones.
+    #[must_use]
+    pub fn log_odds(&self, claim: &Claim) -> f64 {
+        self.named + self.evidence * claim.odds
+            - self.stopped * claim.stopped
+            - self.gap_left * claim.left
+            - self.more_laws * claim.more
     }
 
     /// Probability that a set would pass the best one if it were fitted, of which a screening has the evidence `relative` to that of the best.
@@ -118,19 +132,19 @@ impl Confidence {
         normal(relative.max(f64::MIN_POSITIVE).ln() / self.screening)
     }
 
-    /// Probabilities of a verdict, of a rival as likely as it, and of `unknown`. `p` is the calibrated probability of the verdict, `others`
-    /// the sum of its rivals' likelihoods relative to its own. What neither the verdict nor a rival takes is `unknown`. It stays `less` probable
-    /// than one law that a whole search names; a search that was cut short names what closes most, and is mostly wrong.
-    fn shares(&self, (p, less): (f64, bool), others: f64) -> [f64; 3] {
+    /// Probabilities of a verdict with what the logs do not tell from it, of all its rivals, and of `unknown`. `p` is the calibrated probability of
+    /// the first, `rivals` what the likelihoods of the others, relative to its own, come to. What neither takes is `unknown`. It stays `less`
+    /// probable than one law that a whole search names; a search that was cut short names what closes most, and is mostly wrong.
+    fn shares(&self, (p, less): (f64, bool), rivals: f64) -> [f64; 3] {
         let rest = 1.0 - p;
         let most = (1.0 - self.beside) * rest;
-        if p * others >= most {
-            return [p, most / others, rest - most];
+        if rivals >= most {
+            return [p, most, rest - most];
         }
-        let unknown = rest - p * others;
+        let unknown = rest - rivals;
         let unknown = if less { unknown.min(LESS * p) } else { unknown };
-        let sum = p + p * others + unknown;
-        [p / sum, p / sum, unknown / sum]
+        let sum = p + rivals + unknown;
+        [p / sum, rivals / sum, unknown / sum]
     }
 
     /// Gives the hypotheses of a judgement the probabilities that hold; the verdict stays what it is.
@@ -154,25 +168,47 @@ impl Confidence {
             probability: best.probability * u.weight,
             ..Hypothesis::default()
         }));
-        let [with, others] = [true, false].map(|side| -> f64 {
-            let all = judgement.hypotheses.iter().filter(|h| holds(h) == side);
-            all.map(weight).sum()
-        });
+        let is_alike: Vec<bool> = (0..judgement.hypotheses.len())
+            .map(|i| judgement.ambiguous.contains(&i))
+            .collect();
+        let all = || judgement.hypotheses.iter().zip(&is_alike);
+        let weights = |side: [bool; 2]| -> f64 {
+            let own = all().filter(|&(h, alike)| [holds(h), *alike && !holds(h)] == side);
+            own.map(|(h, _)| weight(h)).sum()
+        };
+        let (with, alike, others) = (
+            weights([true, false]),
+            weights([false, true]),
+            weights([false, false]),
+        );
+        // Which of sets that the logs do not tell apart is right is another question than whether one of them is.
+        let of_alike = all().filter(|&(h, alike)| *alike && !holds(h));
+        let of_alike: f64 = of_alike.map(|(h, _)| h.probability).sum();
+        let marginal = judgement.marginal(&best.labels) + of_alike;
         // What is left of the gap counts by itself.
-        let raw =
-            judgement.marginal(&best.labels) / (1.0 - judgement.unknown).max(f64::MIN_POSITIVE);
-        let [p, each, unknown] = if is_named {
-            let p = sigmoid(self.of_named(raw, shown));
-            self.shares((p, !shown.stopped && shown.laws < 2), others)
-        } else if is_none {
-            self.shares((self.ordinary.min(best.probability), true), others)
+        let raw = marginal / (1.0 - judgement.unknown).max(f64::MIN_POSITIVE);
+        let first = with + alike;
+        let [p, rivals, unknown] = if is_named || is_none {
+            let (p, less) = if is_named {
+                let claim = claim(raw, shown);
+                judgement.claim = Some(claim);
+                let p = sigmoid(self.log_odds(&claim));
+                (p, !shown.stopped && shown.laws < 2)
+            } else {
+                (self.ordinary.min(best.probability), true)
+            };
+            self.shares((p, less), p * with / first * others)
         } else {
             let unknown = judgement.unknown.min(self.unknown);
-            let each = (1.0 - unknown) / (with + others);
-            [each * with, each, unknown]
+            let each = (1.0 - unknown) / (first + others);
+            [each * first, each * others, unknown]
         };
-        for h in &mut judgement.hypotheses {
-            let share = if holds(h) { p / with } else { each };
+        for (h, alike) in judgement.hypotheses.iter_mut().zip(is_alike) {
+            let share = if alike || holds(h) {
+                p / first
+            } else {
+                rivals / others.max(f64::MIN_POSITIVE)
+            };
             h.probability = share * weight(h);
         }
         judgement.unknown = unknown;
@@ -197,6 +233,7 @@ mod tests {
             best,
             ambiguous: Vec::new(),
             rest: 0.0,
+            claim: None,
         }
     }
 

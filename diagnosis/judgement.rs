@@ -11,6 +11,19 @@ pub struct Hypothesis {
     pub probability: f64,
 }
 
+/// What the probability of a named verdict goes with.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Claim {
+    /// Log odds of the verdict, and of what the logs do not tell from it, among the hypotheses, by evidence alone.
+    pub odds: f64,
+    /// Whether the search was cut short: 0 or 1.
+    pub stopped: f64,
+    /// Logarithm of the share of the gap that the verdict leaves.
+    pub left: f64,
+    /// Laws that it names beside the first.
+    pub more: f64,
+}
+
 /// What kind of answer, with its probability.
 #[derive(Clone, Debug)]
 pub struct Judgement {
@@ -26,6 +39,8 @@ pub struct Judgement {
     pub ambiguous: Vec<usize>,
     /// Share of the excess that the best leaves.
     pub rest: f64,
+    /// What the probability of the verdict goes with, once it is calibrated and where it names something.
+    pub claim: Option<Claim>,
 }
 
 impl Judgement {
@@ -48,6 +63,7 @@ impl Judgement {
             best,
             ambiguous,
             rest,
+            claim: None,
         };
         judgement.sort();
         judgement

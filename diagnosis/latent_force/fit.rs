@@ -34,6 +34,8 @@ const EM_ROUNDS: usize = 4;
 /// Further smoothings between two steps of the values where readings remember: their slope in the past of the state is
 /// right to first order only.
 const AGAIN: usize = 2;
+/// Evidence that slopes from elsewhere may have shown too much: rivals that lie no farther apart are all fitted to the end.
+const MISLED: f64 = 20.0;
 /// Evidence that no longer counts as a rise; where there are segments, of each, as errors that are independent add up.
 const RISE: f64 = 0.5;
 
@@ -116,7 +118,8 @@ pub fn fit<'p>(
     let steps = context.start_steps();
     let mut theta = theta.to_vec();
     let mut estimate = estimate.clone();
-    let mut best: Option<Fitted> = None;
+    // What is best of all, and by slopes that were taken there: by those of a like model, or of another place, it may come out far too well.
+    let (mut best, mut own): (Option<Fitted>, Option<Fitted>) = (None, None);
     let mut slopes = slopes.begun();
     let has_segments = context.has_segments();
     let rise = rise(context);
@@ -138,12 +141,20 @@ pub fn fit<'p>(
         };
         let (here, promised) = (compared.here, compared.promised);
         estimate.rescale(compared.scale);
-        let outcome = watchdog.look((here, promised), best.as_ref().map(|b| b.evidence));
+        let is_own = !has_segments && slopes.are_own();
+        if is_own && best.as_ref().is_some_and(|b| b.evidence - here > MISLED) {
+            best.clone_from(&own);
+        }
+        let before = best.as_ref().map(|b| b.evidence);
+        let outcome = watchdog.look((here, promised), before);
         all.push(here);
-        if best.as_ref().is_none_or(|b| here > b.evidence) {
+        if before.is_none_or(|b| here > b) {
             best = Some(fitted_at(hypothesis, (&theta, &estimate), &compared));
         }
-        reached.push(all.iter().copied().fold(f64::NEG_INFINITY, f64::max));
+        if is_own && own.as_ref().is_none_or(|o| here > o.evidence) {
+            own = Some(fitted_at(hypothesis, (&theta, &estimate), &compared));
+        }
+        reached.extend(best.as_ref().map(|b| b.evidence));
         let stands = round > 0 && !outcome.rose && promised < rise;
         if stands && round + 1 < rounds && !progress.is_stopped() && slopes.renew_columns() {
             // Kept columns may say so by mistake.

@@ -17,6 +17,16 @@ const FIRSTS: usize = 40;
 /// Pairs that are kept, at most.
 const PAIRS: usize = 3;
 
+/// Which pairs of candidates are offered.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Pairs {
+    /// Two at one joint that tell more together than the sum of what each tells by itself: two frictions, each of which leaves to the noise what
+    /// the other makes. What is no more than the sum is found one after the other.
+    BeyondTheSum,
+    /// Two at any joints that tell more together than the better of them: where nearly all of the force shows, each tells most by itself.
+    BeyondTheBetter,
+}
+
 /// Candidates that may be missing together, with the evidence for them upon the present model.
 #[derive(Clone, Debug)]
 pub struct Screened {
@@ -110,23 +120,28 @@ impl Ranking<'_> {
         names.into_iter().filter_map(group).collect()
     }
 
-    /// Two candidates at one joint that tell more together than the sum of what each tells by itself: two frictions, each of which leaves to
-    /// the noise what the other makes. What is no more than the sum is found one after the other.
-    fn pairs(&self, singles: &[Screened]) -> Vec<Screened> {
+    /// The best pairs, at the `price` of a further name.
+    fn pairs(&self, singles: &[Screened], (which, price): (Pairs, f64)) -> Vec<Screened> {
         let mut order: Vec<&Screened> = singles.iter().collect();
         order.sort_by(|a, b| b.gain.total_cmp(&a.gain));
         let mut pairs = Vec::new();
         for (i, first) in order.iter().take(FIRSTS).enumerate() {
-            for second in &order[i + 1..] {
+            let last = match which {
+                Pairs::BeyondTheSum => order.len(),
+                Pairs::BeyondTheBetter => order.len().min(FIRSTS),
+            };
+            for second in &order[(i + 1).min(last)..last] {
                 let own = [first, second].map(|s| self.columns.forms[s.forms[0]].columns());
-                if !self
-                    .scales
-                    .at_one_joint(&own.into_iter().flatten().collect::<Vec<_>>())
-                {
+                let own: Vec<usize> = own.into_iter().flatten().collect();
+                if which == Pairs::BeyondTheSum && !self.scales.at_one_joint(&own) {
                     continue;
                 }
                 let pair = self.screened(&[first.forms[0], second.forms[0]], 2);
-                if pair.gain > first.gain.max(0.0) + second.gain.max(0.0) + MORE {
+                let least = match which {
+                    Pairs::BeyondTheSum => first.gain.max(0.0) + second.gain.max(0.0),
+                    Pairs::BeyondTheBetter => first.gain.max(second.gain) + price,
+                };
+                if pair.gain > least + MORE {
                     pairs.push(pair);
                 }
             }
@@ -142,7 +157,7 @@ pub fn rank(
     scales: &Scales,
     columns: &Columns,
     candidates: &[Candidate],
-    price: f64,
+    (pairs, price): (Pairs, f64),
 ) -> Vec<Screened> {
     let base: Vec<usize> = (0..columns.base).collect();
     let ranking = Ranking {
@@ -154,7 +169,7 @@ pub fn rank(
     };
     let singles = ranking.singles();
     let mut all = ranking.groups(&singles);
-    all.extend(ranking.pairs(&singles));
+    all.extend(ranking.pairs(&singles, (pairs, price)));
     all.extend(singles);
     all.retain(|s| s.gain.is_finite());
     all.sort_by(|a, b| b.worth(price).total_cmp(&a.worth(price)));
@@ -283,7 +298,7 @@ mod tests {
         };
         let singles: Vec<Screened> = (0..3).map(|f| ranking.screened(&[f], 1)).collect();
         assert!(singles.iter().all(|s| s.gain < 0.0), "{singles:?}");
-        let pairs = ranking.pairs(&singles);
+        let pairs = ranking.pairs(&singles, (Pairs::BeyondTheSum, 4.0));
         assert_eq!(pairs.len(), 1);
         let each = 0.5 * 1e4 / 101.0 - 0.5 * 101.0_f64.ln();
         assert!((pairs[0].gain - (2.0 * each - 50.0)).abs() < 1e-9);

@@ -1,12 +1,15 @@
 //! Forward selection of effects by evidence, with a look back after each.
 
 mod begun;
+mod finish;
 mod open_loop;
 mod path;
 mod prior;
 mod prune;
+mod race;
 mod round;
 mod screening;
+mod second_look;
 mod set;
 mod tolerances;
 mod twins;

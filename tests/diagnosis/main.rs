@@ -12,6 +12,7 @@ mod far;
 mod late_drive;
 mod next;
 mod ordinary;
+mod roll;
 mod row_slopes;
 mod rows;
 mod scatter;

@@ -37,7 +37,7 @@ impl Extent<'_> {
             return false;
         };
         let now = reached[n - 1];
-        let pace = (now - reached[n - 1 - PACE]) / PACE as f64;
+        let pace = ((now - reached[n - 1 - PACE]) / PACE as f64).max(0.0);
         let further = self.rounds.saturating_sub(n) as f64;
         now + promised.max(0.0) + pace * further < rival
     }

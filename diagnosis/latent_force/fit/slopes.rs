@@ -79,6 +79,12 @@ impl Slopes {
         &self.blind
     }
 
+    /// Whether the last linearisation took slopes anew along the rows.
+    #[must_use]
+    pub fn are_own(&self) -> bool {
+        self.used == 0
+    }
+
     /// Whether the columns of some values that are no tolerances were kept in the last linearisation; from here on none are.
     pub fn renew_columns(&mut self) -> bool {
         self.columns.renew();

@@ -8,7 +8,7 @@ use crate::latent_force::screen::Screened;
 
 use super::open_loop::MOST;
 use super::round::Upon;
-use super::screening::Screening;
+use super::screening::Look;
 use super::set::Set;
 
 /// Parts of the way that a tangent at the null goes, besides the whole of it, at which replays of whole logs are asked: each twice the next, since a
@@ -20,9 +20,9 @@ impl Upon<'_> {
     /// move with the values: what a link that is longer by a centimetre touches is then as far away as it was. A law that has no slope
     /// at its null begins at that of its start values whose replays of whole logs leave least: from a null at which a contact sticks no
     /// slope tells how far it is to where it slides, and segments that begin as the null has put them do not either.
-    pub(super) fn begun(&self, screening: &Screening, screened: &Screened) -> Result<Set> {
-        let mut best = self.enlarged(screening, screened);
-        let forms = &screening.columns.forms;
+    pub(super) fn begun(&self, look: &Look, screened: &Screened) -> Result<Set> {
+        let mut best = self.enlarged(look, screened);
+        let forms = &look.columns.forms;
         let is_secant = |f: usize| forms[f].slopes.iter().all(Option::is_none);
         if !self.context.has_segments() {
             return Ok(best);
@@ -33,10 +33,7 @@ impl Upon<'_> {
             }
             let fitted = &mut best.fitted;
             let model = (&fitted.hypothesis, &fitted.theta[..]);
-            let along = (
-                &screening.columns.linear[..],
-                &changes(screening, screened)[..],
-            );
+            let along = (&look.columns.linear[..], &changes(look, screened)[..]);
             fitted.estimate = taken_along(self.context, model, along, &fitted.estimate)?;
             return Ok(best);
         }
@@ -52,7 +49,7 @@ impl Upon<'_> {
                 let mut other = from.clone();
                 other.forms[i] = f;
                 other.coefficients[i] = vec![1.0; forms[f].slopes.len()];
-                let set = self.enlarged(screening, &other);
+                let set = self.enlarged(look, &other);
                 let left = (self.open_loop.excess)(&set)?;
                 if left < least {
                     (least, best, from) = (left, set, other);
@@ -113,8 +110,8 @@ impl Upon<'_> {
 }
 
 /// Coefficients of a screened set, one a column of its screening.
-fn changes(screening: &Screening, screened: &Screened) -> Vec<f64> {
-    let columns = &screening.columns;
+fn changes(look: &Look, screened: &Screened) -> Vec<f64> {
+    let columns = &look.columns;
     let mut changes = vec![0.0; columns.center.len()];
     changes[..screened.base.len()].copy_from_slice(&screened.base);
     for (&f, coefficients) in screened.forms.iter().zip(&screened.coefficients) {

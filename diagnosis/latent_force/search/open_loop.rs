@@ -24,6 +24,23 @@ pub struct OpenLoop<'o> {
     pub is_gap: bool,
 }
 
+impl OpenLoop<'_> {
+    /// Whether a set closes most of the gap that the one before it leaves. A sensor that reads to another scale hardly changes which force is
+    /// missing, and all that is foretold.
+    pub(super) fn is_mostly_closed(
+        &self,
+        context: &Context<'_>,
+        (before, after): (&Set, &Set),
+    ) -> Result<bool> {
+        if context.has_segments() {
+            return Ok(false);
+        }
+        let now = (self.excess)(before)?;
+        let is_there = now.is_finite() && now > LEAST_GAP * LEAST_GAP - 1.0;
+        Ok(is_there && (self.excess)(after)? < (1.0 - MOST) * now)
+    }
+}
+
 /// The gap of the open loop, which counts where hardly any force is missing.
 pub(super) struct OpenLoopGap<'o> {
     replay: OpenLoop<'o>,
@@ -67,20 +84,5 @@ impl<'o> OpenLoopGap<'o> {
             Some([first, now]) => now - (self.replay.excess)(set)? > breadth.shrinks * first,
             None => false,
         })
-    }
-
-    /// Whether a set closes most of what the one that stands leaves of it. A sensor that reads to another scale hardly changes which force
-    /// is missing, and all that is foretold.
-    pub(super) fn is_mostly_closed_by(
-        &self,
-        set: &Set,
-        (context, best): (&Context<'_>, &Set),
-    ) -> Result<bool> {
-        if context.has_segments() {
-            return Ok(false);
-        }
-        let now = (self.replay.excess)(best)?;
-        let is_there = now.is_finite() && now > LEAST_GAP * LEAST_GAP - 1.0;
-        Ok(is_there && (self.replay.excess)(set)? < (1.0 - MOST) * now)
     }
 }

@@ -119,7 +119,7 @@ impl Search<'_> {
                 _ if cut_short || left(best) - left(set) > breadth.shrinks => Ok(true),
                 _ if makes_up_for_most(set) => Ok(true),
                 true => gap.is_closed_by(set, breadth),
-                false => gap.is_mostly_closed_by(set, (context, best)),
+                false => self.open_loop.is_mostly_closed(context, (best, set)),
             };
             let next = first_that_counts(confirmed, (best, threshold), counts)?;
             let is_ahead = |own: &Set| !own.is_passed(next.as_ref(), threshold);

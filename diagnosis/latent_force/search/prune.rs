@@ -111,17 +111,19 @@ pub(super) fn pruned(
     Ok(set)
 }
 
+/// Whether a set makes up for as much as a further name must of what the first one, without the name, leaves.
+pub(super) type Counts<'c> = dyn Fn(&Set, &Set) -> Result<bool> + 'c;
+
 /// A set in which several names were put upon a base at once, without those that one name after the other would not have brought in: each
-/// must raise the evidence by the `threshold`, and make up for the share of what was missing `at_first` that any further effect must. What is
-/// left is one of the `others` that were fitted, where it is among them.
+/// must raise the evidence by the `threshold`, and make up for what `counts`. What is left is one of the `others` that were fitted, where it is
+/// among them.
 pub(super) fn earned(
     context: &Context<'_>,
     candidates: &[Candidate],
     (set, base, others): (Set, &Set, &[Set]),
-    (breadth, threshold, at_first): (Breadth, f64, Missing),
+    (breadth, threshold, counts): (Breadth, f64, &Counts<'_>),
     progress: &dyn Progress,
 ) -> Result<Set> {
-    let left = |s: &Set| s.fitted.estimate.missing(context).relative_to(at_first);
     let is_more = |c: &usize| !candidates[*c].is_tolerance && !base.candidates.contains(c);
     let mut set = set;
     while set.names > base.names + 1 && !progress.is_stopped() {
@@ -140,7 +142,7 @@ pub(super) fn earned(
             Some(known) => smaller = known.clone(),
             None => smaller.fit(context, (breadth.rounds[1], progress))?,
         }
-        if set.rises_above(&smaller, threshold) && left(&smaller) - left(&set) > breadth.shrinks {
+        if set.rises_above(&smaller, threshold) && counts(&smaller, &set)? {
             break;
         }
         set = smaller;

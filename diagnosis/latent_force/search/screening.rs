@@ -9,7 +9,7 @@ use crate::latent_force::columns::{Columns, Leads};
 use crate::latent_force::detection::{Limit, limits};
 use crate::latent_force::rehearsal::{Rehearsal, rehearse};
 use crate::latent_force::scales::Scales;
-use crate::latent_force::screen::{Screened, isolability, rank};
+use crate::latent_force::screen::{Pairs, Screened, isolability, rank};
 use crate::latent_force::smoother::Regression;
 
 use super::prior::log_prior;
@@ -32,11 +32,17 @@ pub struct Sight {
     pub rehearsal: Rehearsal,
 }
 
-/// A screening: the open candidates, their columns, and the sets of them by evidence.
-pub(super) struct Screening {
+/// The open candidates, their columns, and the sets of them by evidence.
+pub(super) struct Look {
     pub(super) some: Vec<Candidate>,
     pub(super) columns: Columns,
     pub(super) ranked: Vec<Screened>,
+    scales: Scales,
+}
+
+/// A screening: a look at the open candidates, and what it tells beside their ranks.
+pub(super) struct Screening {
+    pub(super) look: Look,
     /// Leading candidates, and the cosines between each two.
     pub(super) alike: (Vec<usize>, DMatrix<f64>),
     pub(super) sight: Sight,
@@ -46,45 +52,59 @@ pub(super) struct Screening {
 }
 
 impl Upon<'_> {
-    /// Ranks the open candidates by one regression.
-    pub(super) fn screen(&self) -> Result<Screening> {
+    /// Ranks the open candidates, and some pairs of them, by one regression.
+    pub(super) fn look(&self, pairs: Pairs) -> Result<Look> {
         self.progress.begin("screening", 1);
         let open = self.open.iter();
         let some: Vec<Candidate> = open.map(|&c| self.candidates[c].clone()).collect();
         let fitted = &self.base.fitted;
         let model = (&fitted.hypothesis, &fitted.theta[..]);
-        let leads = |columns: &Columns| self.leads(columns, &some);
+        let leads = |columns: &Columns| self.leads(columns, &some, pairs);
         let asked = (&some[..], &leads as Leads<'_>);
         let columns = Columns::of(self.context, model, &fitted.estimate, asked, self.progress)?;
         let price = self.price();
         let scales = Scales::of(self.context, &fitted.estimate, (&columns, &some));
-        let mut ranked = rank(&scales, &columns, &some, price);
+        let mut ranked = rank(&scales, &columns, &some, (pairs, price));
         for s in &mut ranked {
             let members = s.forms.iter().map(|&f| columns.forms[f].candidate);
             s.gain += log_prior(self.context.plant(), &some, &members.collect::<Vec<_>>());
         }
         ranked.sort_by(|a, b| b.worth(price).total_cmp(&a.worth(price)));
+        self.progress.end();
+        Ok(Look {
+            some,
+            columns,
+            ranked,
+            scales,
+        })
+    }
+
+    /// Looks at the open candidates, and at what such a look could have seen.
+    pub(super) fn screen(&self) -> Result<Screening> {
+        let look = self.look(Pairs::BeyondTheSum)?;
+        let Look {
+            some,
+            columns,
+            ranked,
+            scales,
+        } = &look;
         let singles = ranked.iter().filter(|s| s.forms.len() == 1);
         let leading: Vec<usize> = singles.map(|s| s.forms[0]).take(COMPARED).collect();
         let candidate = |&f: &usize| self.open[columns.forms[f].candidate];
         let alike = (
             leading.iter().map(candidate).collect(),
-            isolability(&scales.common[0], &columns, &leading),
+            isolability(&scales.common[0], columns, &leading),
         );
-        let regressed = (&scales, &columns);
         let base = &self.base.candidates;
-        let tolerances = Tolerances::of(regressed, self.open, self.candidates, base);
+        let tolerances = Tolerances::of((scales, columns), self.open, self.candidates, base);
         let of_names = tolerances
             .as_ref()
-            .map_or(0.0, |_| of_names(&scales, &columns, &ranked, price));
+            .map_or(0.0, |_| of_names(scales, columns, ranked, self.price()));
         let found = ranked.iter().find(|s| s.forms.len() == 1);
         let found = found.map_or(0.0, |s| s.gain);
-        let sight = self.sight((&scales.common, found), &columns, &some);
-        self.progress.end();
+        let sight = self.sight((&scales.common, found), columns, some);
         Ok(Screening {
-            some,
-            columns,
-            ranked,
+            look,
             alike,
             sight,
             tolerances,
@@ -98,11 +118,11 @@ impl Upon<'_> {
     }
 
     /// Which candidates lead by columns along a part of the logs: members of the leading sets, and tolerances, which are judged all at once.
-    fn leads(&self, columns: &Columns, some: &[Candidate]) -> Vec<bool> {
+    fn leads(&self, columns: &Columns, some: &[Candidate], pairs: Pairs) -> Vec<bool> {
         let estimate = &self.base.fitted.estimate;
         let scales = Scales::of(self.context, estimate, (columns, some));
         let mut leads: Vec<bool> = some.iter().map(|c| c.is_tolerance).collect();
-        for set in rank(&scales, columns, some, self.price())
+        for set in rank(&scales, columns, some, (pairs, self.price()))
             .iter()
             .take(LEADING)
         {

@@ -120,16 +120,21 @@ pub(super) fn from_fit_of(
     let mut again = set.clone();
     again.fitted.estimate = other.fitted.estimate.clone();
     again.fitted.slopes = set.fitted.slopes.renewed();
-    let theirs = &other.fitted.hypothesis.unknowns;
-    let own = again.fitted.hypothesis.unknowns.iter();
-    for (u, value) in own.zip(&mut again.fitted.theta).filter(|(u, _)| u.free) {
-        let like = |o: &Unknown| o.parameter.name == u.parameter.name;
-        if let Some(at) = theirs.iter().position(like) {
-            *value = other.fitted.theta[at].clamp(u.bounds[0], u.bounds[1]);
-        }
-    }
+    shared_values(&mut again.fitted, &other.fitted);
     again.fit(context, (breadth.rounds[1], progress))?;
     Ok(again)
+}
+
+/// Gives the free values of a model those that another one has of them.
+pub(super) fn shared_values(fitted: &mut Fitted, other: &Fitted) {
+    let theirs = &other.hypothesis.unknowns;
+    let own = fitted.hypothesis.unknowns.iter();
+    for (u, value) in own.zip(&mut fitted.theta).filter(|(u, _)| u.free) {
+        let like = |o: &Unknown| o.parameter.name == u.parameter.name;
+        if let Some(at) = theirs.iter().position(like) {
+            *value = other.theta[at].clamp(u.bounds[0], u.bounds[1]);
+        }
+    }
 }
 
 /// Deviations from null up to which a value counts as nothing.

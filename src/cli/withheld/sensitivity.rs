@@ -6,7 +6,9 @@ use std::path::Path;
 
 use anyhow::Result;
 use asid_core::Error;
+use asid_diagnosis::confidence::{Refitted, refit};
 use asid_diagnosis::decision::{Rules, decide};
+use asid_diagnosis::judgement::Claim;
 use asid_results::evidence::Evidence;
 use asid_scorer::answer::Answer;
 use asid_scorer::judge::Judge;
@@ -45,6 +47,55 @@ struct Row {
     doubled: Tally,
 }
 
+/// A confidence that was fitted to the answers.
+#[derive(Debug, Serialize)]
+struct Fitted {
+    verdicts: usize,
+    holds: usize,
+    log_score_before: f64,
+    log_score: f64,
+    named: f64,
+    evidence: f64,
+    stopped: f64,
+    gap_left: f64,
+    more_laws: f64,
+}
+
+impl From<Refitted> for Fitted {
+    fn from(of: Refitted) -> Self {
+        let [named, evidence, stopped, gap_left, more_laws] = of.numbers;
+        Self {
+            verdicts: of.verdicts,
+            holds: of.holds,
+            log_score_before: of.log_score_before,
+            log_score: of.log_score,
+            named,
+            evidence,
+            stopped,
+            gap_left,
+            more_laws,
+        }
+    }
+}
+
+impl Fitted {
+    fn line(&self) -> String {
+        format!(
+            "confidence fitted to {} named verdicts, {} of them right (log score {:.2}, {:.2} before): named {:.2}, evidence {:.2}, stopped {:.2}, \
+             gap_left {:.2}, more_laws {:.2}",
+            self.verdicts,
+            self.holds,
+            self.log_score,
+            self.log_score_before,
+            self.named,
+            self.evidence,
+            self.stopped,
+            self.gap_left,
+            self.more_laws
+        )
+    }
+}
+
 /// `sensitivity.json`.
 #[derive(Debug, Serialize)]
 struct Output {
@@ -52,6 +103,8 @@ struct Output {
     cases: usize,
     as_is: Tally,
     rows: Vec<Row>,
+    /// The confidence that fits these answers, where something is named.
+    refitted: Option<Fitted>,
 }
 
 impl<'a> Stored<'a> {
@@ -64,6 +117,28 @@ impl<'a> Stored<'a> {
             answer: Answer::read(&folder.join("result.json")).ok()?,
             evidence: serde_json::from_str(&text).ok()?,
         })
+    }
+
+    /// What the verdict by some rules claims, and whether that, or what the logs do not tell from it, holds by the names; `None` where it names
+    /// nothing.
+    fn claimed(&self, rules: &Rules, catalogue: &BTreeSet<String>) -> Option<(Claim, bool)> {
+        let judgement = decide(&self.evidence, rules);
+        let claim = judgement.claim?;
+        let judge = Judge {
+            label: self.label,
+            sites: &self.sites,
+            catalogue,
+        };
+        let verdict = judge.claims_hold(
+            &self.answer,
+            judge.of_set(&self.answer.verdict.effects, &self.answer),
+        );
+        let alike = judgement
+            .ambiguous
+            .iter()
+            .map(|&i| &judgement.hypotheses[i].labels);
+        let is_true = |labels: &Vec<String>| judge.of_set(labels, &self.answer).is_right();
+        Some((claim, verdict || { alike }.any(is_true)))
     }
 
     /// The set of the verdict by some rules, whether it is right by its names, and the logarithm of the true set's probability.
@@ -135,11 +210,13 @@ pub fn sensitivity(all: &[Stored<'_>], catalogue: &BTreeSet<String>, out: &Path)
             doubled: times(2.0),
         }
     });
+    let claims = all.iter().filter_map(|s| s.claimed(&as_is, catalogue));
     let output = Output {
         schema: 1,
         cases: all.len(),
         as_is: tally(&as_is),
         rows: rows.collect(),
+        refitted: refit(&as_is.confidence, &claims.collect::<Vec<_>>()).map(Fitted::from),
     };
     write_json(&out.join("sensitivity.json"), &output)?;
     let mut stdout = std::io::stdout().lock();
@@ -175,5 +252,6 @@ fn lines(output: &Output) -> Vec<String> {
             part(&r.doubled)
         )
     }));
+    lines.extend(output.refitted.as_ref().map(Fitted::line));
     lines
 }

@@ -1,0 +1,113 @@
+//! The race of a round: what leads in a screening is fitted a little.
+
+use asid_core::Result;
+
+use crate::latent_force::screen::Screened;
+
+use super::finish::Fits;
+use super::has_tolerances;
+use super::round::Upon;
+use super::screening::Look;
+use super::set::{Set, name_of};
+use super::tolerances::Tolerances;
+
+/// Sets that are tried for each place of a race upon no effect, at most: one whose fit does not come to what stands leaves its place to the next.
+/// Upon what makes up for most of the gap few come to it.
+const TRIED: usize = 3;
+
+impl Upon<'_> {
+    /// Fits what leads in a screening a little; tolerances too where they are not far behind.
+    pub(super) fn race(&self, look: &Look, tolerances: Option<&Tolerances>) -> Result<Fits> {
+        let (breadth, progress) = (self.breadth, self.progress);
+        let ranked = &look.ranked;
+        let price = self.price();
+        let lead = ranked.first().map_or(0.0, |s| s.worth(price));
+        let wander = self.base.fitted.wander;
+        let least = (breadth.share * lead).max(breadth.least).max(wander);
+        let due = ranked.iter().filter(|s| s.worth(price) > least);
+        let places = if self.base.candidates.is_empty() {
+            TRIED
+        } else {
+            1
+        };
+        let due: Vec<&Screened> = due.take(places * breadth.raced).collect();
+        progress.begin("confirming", due.len().min(breadth.raced) as u64);
+        let (mut sets, mut risen) = (Vec::new(), 0);
+        let mut left_out = Vec::new();
+        let not_far = lead - (breadth.behind * lead).max(breadth.near);
+        let mut near = tolerances.filter(|t| t.gain > not_far);
+        for (place, s) in due.into_iter().enumerate() {
+            // One that has not come to what stands leaves its place to the next.
+            if risen == breadth.raced {
+                break;
+            }
+            let members = self.members(look, s);
+            // What leads comes first: where time is out, an answer rests on it.
+            if place > 0 && progress.is_stopped() {
+                left_out.push(members);
+                continue;
+            }
+            progress.note(&format!("trying {}", name_of(self.candidates, &members)));
+            let mut set = self.begun(look, s)?;
+            set.fit(self.context, (breadth.rounds[0], progress))?;
+            if set.fitted.evidence + set.fitted.promised > self.base.fitted.evidence {
+                risen += 1;
+                progress.advance(1);
+            }
+            sets.push(set);
+            sets.extend(self.tried(near.take())?);
+        }
+        sets.extend(self.tried(near)?);
+        Ok(Fits { sets, left_out })
+    }
+
+    /// Tolerances beside the base, fitted a little, where there are any.
+    fn tried(&self, tolerances: Option<&Tolerances>) -> Result<Option<Set>> {
+        let Some(tolerances) = tolerances else {
+            return Ok(None);
+        };
+        self.progress.note("trying tolerances");
+        let mut set = tolerances.beside(self.base, self.candidates);
+        set.fit(self.context, (self.breadth.rounds[0], self.progress))?;
+        Ok(Some(set))
+    }
+
+    /// Where a group leads those that were `raced`, the best of its members by itself with tolerances beside it, fitted a little: one law at all
+    /// places makes up for many small things as they do, and is not there where it is strong at one place and small things are the rest. With
+    /// the group beside tolerances too where it falls behind that.
+    pub(super) fn beside_tolerances(
+        &self,
+        tolerances: Option<&Tolerances>,
+        raced: &[Set],
+    ) -> Result<Vec<Set>> {
+        let before = self.base.candidates.len();
+        let added = |s: &Set| s.candidates[before.min(s.candidates.len())..].to_vec();
+        let by_evidence = |a: &&Set, b: &&Set| a.fitted.evidence.total_cmp(&b.fitted.evidence);
+        let named = raced.iter().filter(|s| !has_tolerances(self.candidates, s));
+        let leads = named.clone().max_by(by_evidence);
+        let (Some(tolerances), Some(group)) = (tolerances, leads) else {
+            return Ok(Vec::new());
+        };
+        let members = added(group);
+        let is_member = |s: &&Set| matches!(added(s)[..], [one] if members.contains(&one));
+        let Some(member) = named.filter(is_member).max_by(by_evidence) else {
+            return Ok(Vec::new());
+        };
+        let mut fitted = Vec::new();
+        for set in [member, group] {
+            let is_behind = fitted
+                .last()
+                .is_none_or(|alone: &Set| alone.fitted.evidence > group.fitted.evidence);
+            if members.len() < 2 || self.progress.is_stopped() || !is_behind {
+                break;
+            }
+            let name = name_of(self.candidates, &set.candidates);
+            self.progress
+                .note(&format!("trying {name} with tolerances"));
+            let mut set = tolerances.beside(set, self.candidates);
+            set.fit(self.context, (self.breadth.rounds[0], self.progress))?;
+            fitted.push(set);
+        }
+        Ok(fitted)
+    }
+}

@@ -1,0 +1,90 @@
+//! A wrist behind a stiff servo, integrated by hand, with dry and viscous friction that the model lacks: the commonest finding on real arms.
+//!
+//! The joint hardly weighs anything, so that its speed is as rough as the force that is missing: a screening about that trajectory is led by an
+//! inertia, and both frictions are far behind it.
+
+use std::fmt::Write as _;
+
+use rand::{Rng as _, SeedableRng as _};
+use rand_chacha::ChaCha8Rng;
+
+use super::run_on;
+use super::world::write_files;
+
+const NOMINAL: &str = r#"<mujoco model="wrist"><option timestep="0.001" integrator="implicitfast"/>
+  <worldbody><body name="wrist"><joint name="roll" type="hinge" axis="1 0 0" damping="0.2" armature="0.01"/>
+    <geom name="ball" type="sphere" size="0.02" mass="0.3" contype="0" conaffinity="0"/></body></worldbody>
+  <actuator><position name="servo" joint="roll" kp="25" kv="1.5" forcerange="-8 8"/></actuator>
+  <sensor><jointpos name="angle" joint="roll"/></sensor>
+</mujoco>
+"#;
+/// Inertia with the rotor's, kg m².
+const INERTIA: f64 = 0.01 + 0.4 * 0.3 * 0.02 * 0.02;
+/// Stiffness and damping of the servo, N m/rad and N m s/rad, and its limit, N m.
+const SERVO: (f64, f64, f64) = (25.0, 1.5, 8.0);
+/// Friction of the model, and what it lacks: N m s/rad, and dry, N m.
+const DAMPING: f64 = 0.2;
+const VISCOUS: f64 = 0.3;
+const DRY: f64 = 0.15;
+const NOISE: f64 = 1.5e-3;
+const SECONDS: f64 = 4.0;
+const ROW: f64 = 0.005;
+
+/// Slow sines about zero, rad.
+fn command(episode: usize, time: f64) -> f64 {
+    let k = episode as f64;
+    let wave =
+        |size: f64, pace: f64, phase: f64| size * ((pace * time + phase).sin() - phase.sin());
+    wave(0.2, 2.1 + 0.3 * k, 0.9 * k) + wave(0.15, 6.1 - 0.3 * k, 2.0 * k)
+}
+
+/// Angle and speed after a step of `h`: symplectic Euler, with dry friction that stops what it can stop.
+fn step([q, v]: [f64; 2], command: f64, h: f64) -> [f64; 2] {
+    let (kp, kv, limit) = SERVO;
+    let servo = (kp * (command - q) - kv * v).clamp(-limit, limit);
+    let free = v + h * (servo - (DAMPING + VISCOUS) * v) / INERTIA;
+    let stopped = h * DRY / INERTIA;
+    let v = free - free.clamp(-stopped, stopped);
+    [q + h * v, v]
+}
+
+fn log(episode: usize) -> String {
+    let mut random = ChaCha8Rng::seed_from_u64(70 + episode as u64);
+    let mut noise = || NOISE * ((0..12).map(|_| random.random::<f64>()).sum::<f64>() - 6.0);
+    let mut state = [0.0; 2];
+    let steps = 100;
+    let mut text = "time,ctrl.servo,angle,qpos.roll,qvel.roll".to_owned();
+    for row in 0..(SECONDS / ROW) as usize {
+        let time = ROW * row as f64;
+        let u = command(episode, time);
+        let start = if row == 0 { "0,0" } else { "," };
+        let _ = write!(text, "\n{time:.3},{u},{},{start}", state[0] + noise());
+        for _ in 0..steps {
+            state = step(state, u, ROW / f64::from(steps));
+        }
+    }
+    text + "\n"
+}
+
+/// While the servo keeps within its limit its damping is the same as the joint's: the logs cannot tell which of them it is.
+#[test]
+fn dry_friction_behind_a_stiff_servo_is_named_with_what_damps_beside_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let rotor = "name = \"rotor\"\ntarget = \"joint/roll/armature\"\nrange = [0.005, 0.02]";
+    write_files(folder.path(), NOMINAL, rotor, log);
+    let r = run_on(folder.path(), &[]).0.result;
+    let pairs =
+        ["servo-damping@servo", "viscous-friction@roll"].map(|s| ["coulomb-friction@roll", s]);
+    assert!(
+        pairs.iter().any(|pair| r.verdict.effects == pair),
+        "{}",
+        r.sentence
+    );
+    let value = |name: &str| {
+        let mut all = r.effects.iter().filter_map(|e| e.parameters.get(name));
+        *all.next().unwrap()
+    };
+    let (dry, viscous) = (value("force"), value("damping"));
+    assert!((dry / DRY - 1.0).abs() < 0.1, "{dry}");
+    assert!((viscous / VISCOUS - 1.0).abs() < 0.2, "{viscous}");
+}
