@@ -28,6 +28,8 @@ pub struct LoggedSensor {
     pub unit: String,
     /// Standard deviation of its noise, in its unit (rad for an orientation).
     pub noise: f64,
+    /// Readings in a row that its noise is alike in, by which slow changes are told that much less; 1 for white noise.
+    pub alike: f64,
     /// True for an orientation.
     pub rotation: bool,
 }
@@ -110,6 +112,7 @@ impl Logs {
                 name: name.clone(),
                 unit: place.map_or_else(String::new, |p| unit_of(plant, p)),
                 noise: 1.0,
+                alike: 1.0,
                 rotation,
             });
             signals.push(Signal {
@@ -241,6 +244,13 @@ impl Logs {
         for (sensor, &noise) in self.sensors.iter_mut().zip(noise) {
             sensor.noise = noise;
         }
+    }
+
+    /// Readings in a row that the noise of each entry is alike in.
+    #[must_use]
+    pub fn entry_alike(&self) -> Vec<f64> {
+        let alike = |e: &Entry| self.sensors[e.sensor].alike;
+        self.entries.iter().map(alike).collect()
     }
 
     /// Noise of each entry.

@@ -20,6 +20,7 @@ pub mod data;
 pub mod decision;
 pub mod diagnose;
 pub mod experiment;
+mod explained_noise;
 pub mod findings;
 pub mod fit;
 pub mod forces;

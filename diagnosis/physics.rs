@@ -1,17 +1,14 @@
 //! A diagnosis of logs whose wiring is in order: what the machine does that its model does not.
 
-mod final_noise;
-
 use asid_core::{Progress, Result};
 
+use crate::explained_noise::with_noise_left;
 use crate::latent_force;
 use crate::machine::Machine;
 use crate::settings::Settings;
 use crate::study::Study;
 use crate::telling::{Diagnosis, Telling};
 use crate::work::Work;
-
-use final_noise::final_noise;
 
 /// Diagnoses a study whose logs are in order.
 pub(crate) fn diagnose_physics(
@@ -21,7 +18,7 @@ pub(crate) fn diagnose_physics(
     progress: &dyn Progress,
 ) -> Result<(Diagnosis, Work)> {
     let mut work = latent_force::pipeline::diagnose(study, machine, &settings, progress)?;
-    work.findings = final_noise(&mut work.bench, study, &work.candidates, work.findings)?;
+    work.findings = with_noise_left(&mut work.bench, study, &work.candidates, work.findings)?;
     tell(study, work, settings, progress)
 }
 

@@ -7,7 +7,7 @@ use asid_core::{Error, Layout, Result};
 use crate::bench::Bench;
 use crate::data::Logs;
 use crate::machine::Machine;
-use crate::noise;
+use crate::noise::{self, Noise};
 use crate::predict::Point;
 use crate::record::Record;
 use crate::starts::reach::reach;
@@ -108,9 +108,9 @@ pub fn dataset(study: &Study, machine: Machine) -> Result<(Bench, Vec<f64>)> {
     Ok((bench, nominal))
 }
 
-/// Estimates the noise from the readings alone; what the study gives stays.
-pub fn set_reading_noise(bench: &mut Bench, given: &BTreeMap<String, f64>) {
-    let logs = &bench.train.logs;
+/// Noise of each sensor from the readings alone, without a model.
+#[must_use]
+pub fn reading_noise(logs: &Logs) -> Vec<Noise> {
     let n = logs.entries.len();
     let width = logs.width();
     let series: Vec<Vec<f64>> = logs
@@ -132,12 +132,21 @@ pub fn set_reading_noise(bench: &mut Bench, given: &BTreeMap<String, f64>) {
             out
         })
         .collect();
-    let estimated = noise::estimate(logs, &series);
-    let noise: Vec<f64> = logs
-        .sensors
-        .iter()
-        .zip(estimated)
-        .map(|(s, x)| given.get(&s.name).copied().unwrap_or(x))
+    noise::describe(logs, &series)
+}
+
+/// Estimates the noise from the readings alone; what the study gives stays.
+pub fn set_reading_noise(bench: &mut Bench, given: &BTreeMap<String, f64>) {
+    let logs = &bench.train.logs;
+    let estimated = reading_noise(logs);
+    let each = logs.sensors.iter().zip(&estimated);
+    let noise: Vec<f64> = each
+        .map(|(s, x)| given.get(&s.name).copied().unwrap_or(x.deviation))
         .collect();
     bench.set_noise(&noise);
+    for record in [&mut bench.train, &mut bench.test, &mut bench.head] {
+        for (sensor, x) in record.logs.sensors.iter_mut().zip(&estimated) {
+            sensor.alike = x.alike();
+        }
+    }
 }

@@ -1,4 +1,4 @@
-//! The noise of a sensor: its deviation and correlation from third differences over one to sixteen rows, which vanish for parabolas.
+//! The noise of a sensor: its deviation and correlation from third differences over one to 64 rows, which vanish for parabolas.
 //!
 //! Over a number of rows twice as large those of correlated noise grow by at most two, until readings so far apart are independent.
 //! What a model misses grows faster: its own third differences, squared, by 64 where it is smooth, and by 8 where a rough force
@@ -15,6 +15,9 @@ pub struct Noise {
     pub deviation: f64,
     /// Correlation from one reading to the next; 0 for white noise.
     pub correlation: f64,
+    /// Largest deviation that is nearly as likely: noise that is slow beside what is read may be much larger than its differences over few
+    /// rows tell.
+    pub most: f64,
 }
 
 impl Noise {
@@ -24,7 +27,17 @@ impl Noise {
         Self {
             deviation,
             correlation: 0.0,
+            most: deviation,
         }
+    }
+}
+
+impl Noise {
+    /// Readings in a row that count as one to what hardly changes over them: the ratio of the noise's spectral density at frequency zero to
+    /// that of white noise of the same deviation, `(1 + r) / (1 - r)` of first-order noise.
+    #[must_use]
+    pub fn alike(self) -> f64 {
+        (1.0 + self.correlation) / (1.0 - self.correlation)
     }
 }
 
@@ -44,10 +57,12 @@ const WHITE: f64 = 20.0;
 const SMOOTH: f64 = 4.0;
 /// Growth of a rest that a rough force makes, and of a smooth one.
 const RESTS: [f64; 2] = [8.0, 64.0];
-/// How much worse than the best a correlation may fit and still be preferred for being smaller, over the number of differences: half
-/// the variance of the logarithm of a squared median of normal magnitudes, which is `4 / (4 n f(m)^2 m^2) = 5.4 / n` with the density `f` of the
-/// magnitude at its median `m`.
+/// How much worse than the best correlation a smaller one may fit and still be preferred, times the number of differences: half
+/// the variance of the logarithm of a squared median of `n` normal magnitudes, which is `4 / (4 n f(m)^2 m^2) = 5.4 / n` with the density `f` of
+/// the magnitude at its median `m`.
 const TIE: f64 = 2.7;
+/// The same of a correlation that is nearly as likely: two deviations of that logarithm, squared.
+const NEARLY: f64 = 4.0 * 5.4;
 /// Largest correlation from row to row that is called noise: slower changes are the model's.
 const SLOWEST: f64 = 0.97;
 /// Deviations of neighbouring rows' third differences from which on there is an impact between them: of normal noise one in two million.
@@ -56,8 +71,9 @@ const IMPACT: f64 = 5.0;
 const FEWEST: usize = 200;
 /// Rows that a third difference spans at most, where readings are missing: over more of them a residual is no parabola.
 const SPAN: usize = 12;
-/// Rows over which third differences are taken.
-const STRIDES: [usize; 5] = [1, 2, 4, 8, 16];
+/// Rows over which third differences are taken. Noise of the largest correlation that is called noise is independent over the last, to
+/// 0.97^64 = 0.14; over fewer rows its differences only double from stride to stride, whatever its deviation.
+const STRIDES: [usize; 7] = [1, 2, 4, 8, 16, 32, 64];
 /// Strides that a correlation is told from, at least: noise, its correlation and a rest are three unknowns.
 const FEWEST_STRIDES: usize = 3;
 
@@ -123,18 +139,22 @@ impl ThirdDifferences {
     /// Noise whose third differences are these: correlated noise and a rest.
     #[must_use]
     pub fn noise(mut self) -> Noise {
-        let count = self.0[0].len();
         let typical = |d: &mut Vec<f64>| (NORMAL * median(d).unwrap_or(0.0)).powi(2) / WHITE;
         let white = Noise::white(typical(&mut self.0[0]).sqrt());
-        let enough = |d: &&mut Vec<f64>| d.len() >= FEWEST;
-        let found: Vec<f64> = (self.0.iter_mut().take_while(enough))
-            .map(typical)
+        let found: Vec<Found> = (self.0.iter_mut().zip(STRIDES))
+            .take_while(|(d, _)| d.len() >= FEWEST)
+            .map(|(d, stride)| Found {
+                // Differences that overlap tell of slow noise only once.
+                independent: d.len() as f64 / stride as f64,
+                squared: typical(d),
+            })
             .collect();
         // Up to where the rest outgrows the noise.
-        let outgrown = found.windows(2).position(|w| w[1] > SMOOTH * w[0]);
+        let grows = |w: &[Found]| w[1].squared > SMOOTH * w[0].squared;
+        let outgrown = found.windows(2).position(grows);
         let told = outgrown.map_or(found.len(), |k| k + 2);
         let found = &found[..told];
-        if told < FEWEST_STRIDES || found[0] <= 0.0 {
+        if told < FEWEST_STRIDES || found[0].squared <= 0.0 {
             return white;
         }
         let fits: Vec<(f64, Noise)> = (0..=100)
@@ -143,21 +163,42 @@ impl ThirdDifferences {
             .flatten()
             .collect();
         let least = fits.iter().map(|f| f.0).fold(f64::INFINITY, f64::min);
-        let as_good = |f: &&(f64, Noise)| f.0 <= least + TIE / count as f64;
-        fits.iter().find(as_good).map_or(white, |f| f.1)
+        let within = |miss: f64| {
+            fits.iter()
+                .filter(move |f| f.0 <= least + miss)
+                .map(|f| f.1)
+        };
+        let most = within(NEARLY).fold(0.0, |most, n| f64::max(most, n.deviation));
+        // A rest that outgrows the noise passes for slow noise over the last of the rows: the least correlation is taken then.
+        let is_least = outgrown.is_some() || within(TIE).any(|n| n.correlation == 0.0);
+        let taken = if is_least {
+            within(TIE).next()
+        } else {
+            within(0.0).next()
+        };
+        taken.map_or(white, |noise| Noise { most, ..noise })
     }
 }
 
+/// What the third differences over a number of rows are like.
+struct Found {
+    /// Their squared deviation, relative to that of white noise.
+    squared: f64,
+    /// How many of them are independent, at least.
+    independent: f64,
+}
+
 /// Noise of a correlation beside a rest that grows so, by least squares relative to what was found, with how far it misses that: the
-/// sum of squared logarithms. `None` where there is no such noise.
-fn fit(found: &[f64], correlation: f64, growth: f64) -> Option<(f64, Noise)> {
+/// sum of squared logarithms, each times the number of independent differences. `None` where there is no such noise.
+fn fit(found: &[Found], correlation: f64, growth: f64) -> Option<(f64, Noise)> {
     let noise = |k: usize| squared(correlation.powi(STRIDES[k] as i32));
     let rest = |k: usize| growth.powi(k as i32);
     let [mut nn, mut nr, mut rr, mut n1, mut r1] = [0.0; 5];
     for (k, d) in found.iter().enumerate() {
-        let (n, r) = (noise(k) / d, rest(k) / d);
-        (nn, nr, rr) = (nn + n * n, nr + n * r, rr + r * r);
-        (n1, r1) = (n1 + n, r1 + r);
+        let (n, r) = (noise(k) / d.squared, rest(k) / d.squared);
+        let w = d.independent;
+        (nn, nr, rr) = (nn + w * n * n, nr + w * n * r, rr + w * r * r);
+        (n1, r1) = (n1 + w * n, r1 + w * r);
     }
     let determinant = nn * rr - nr * nr;
     let both = [n1 * rr - r1 * nr, r1 * nn - n1 * nr].map(|x| x / determinant);
@@ -166,10 +207,14 @@ fn fit(found: &[f64], correlation: f64, growth: f64) -> Option<(f64, Noise)> {
     } else {
         [n1 / nn, 0.0]
     };
-    let miss = |(k, d): (usize, &f64)| ((v * noise(k) + s * rest(k)) / d).ln().powi(2);
+    let miss = |(k, d): (usize, &Found)| {
+        let ratio = (v * noise(k) + s * rest(k)) / d.squared;
+        d.independent * ratio.ln().powi(2)
+    };
     let noise = Noise {
         deviation: v.max(0.0).sqrt(),
         correlation,
+        most: v.max(0.0).sqrt(),
     };
     let missed: f64 = found.iter().enumerate().map(miss).sum();
     (v > 0.0 && missed.is_finite()).then_some((missed, noise))
@@ -216,7 +261,8 @@ mod tests {
             (0.3, 0.05),
             (0.5, 0.05),
             (0.8, 0.1),
-            (0.9, 0.2),
+            (0.9, 0.15),
+            (0.95, 0.2),
         ] {
             let noise = noise_of(coloured(correlation, 20_000).into_iter());
             assert!(
@@ -224,6 +270,15 @@ mod tests {
                 "{correlation}: {noise:?}"
             );
         }
+    }
+
+    #[test]
+    fn slow_noise_beside_a_swing_may_be_larger_than_its_fast_part_tells() {
+        // Third differences over few rows double with the rows, whatever the deviation; over more the swing outgrows them.
+        let swing = |k: usize| 300.0 * (0.02 * k as f64).sin();
+        let noise = coloured(0.95, 4000).into_iter().enumerate();
+        let found = noise_of(noise.map(|(k, x)| x + swing(k)));
+        assert!(found.deviation < 0.9 && found.most > 1.0, "{found:?}");
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! Faults of a log, and of the wiring of its columns.
 
 use rand::Rng;
+use serde::{Deserialize, Serialize};
 
 use crate::anatomy::Anatomy;
 
@@ -78,6 +79,69 @@ impl WiringKind {
         Self::Offset,
         Self::Clock,
     ];
+
+    /// Name in the label.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Swapped => "wiring-swapped",
+            Self::Sign => "wiring-sign",
+            Self::Unit => "wiring-unit",
+            Self::Offset => "wiring-offset",
+            Self::Clock => "wiring-clock",
+        }
+    }
+}
+
+/// What is wrong with the logs of a whole set.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
+pub enum Fault {
+    /// Nothing.
+    Nothing,
+    /// The logs themselves.
+    Log(LogFault),
+    /// Their wiring.
+    Wiring(WiringKind),
+}
+
+impl Fault {
+    /// All of them.
+    pub fn all() -> impl Iterator<Item = Self> {
+        let logs = LogFault::ALL.into_iter().map(Self::Log);
+        let wiring = WiringKind::ALL.into_iter().map(Self::Wiring);
+        std::iter::once(Self::Nothing).chain(logs).chain(wiring)
+    }
+
+    /// Name on the command line.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Nothing => "none",
+            Self::Log(fault) => fault.name(),
+            Self::Wiring(kind) => kind.name(),
+        }
+    }
+
+    /// The fault of a name.
+    #[must_use]
+    pub fn named(name: &str) -> Option<Self> {
+        Self::all().find(|fault| fault.name() == name)
+    }
+}
+
+impl TryFrom<String> for Fault {
+    type Error = String;
+
+    fn try_from(name: String) -> Result<Self, String> {
+        Self::named(&name).ok_or_else(|| format!("there is no fault `{name}`"))
+    }
+}
+
+impl From<Fault> for String {
+    fn from(fault: Fault) -> Self {
+        fault.name().to_owned()
+    }
 }
 
 /// A wiring fault at its columns.
@@ -112,14 +176,15 @@ impl Wiring {
             let n = scalars.len();
             (n > 0).then(|| scalars[Rng::random_range(random, 0..n)])
         };
-        let one = |fault, sensor: &crate::anatomy::Sensor, value| Self {
+        let fault = kind.name();
+        let one = |sensor: &crate::anatomy::Sensor, value| Self {
             fault,
             columns: vec![sensor.name.clone()],
             value,
             at: vec![sensor.address],
         };
         Some(match kind {
-            WiringKind::Sign => one("wiring-sign", pick(random)?, -1.0),
+            WiringKind::Sign => one(pick(random)?, -1.0),
             WiringKind::Unit => {
                 let sensor = pick(random)?;
                 let slide = anatomy.document.find(&sensor.kind, Some(&sensor.name));
@@ -132,12 +197,12 @@ impl Wiring {
                 } else {
                     180.0 / std::f64::consts::PI
                 };
-                one("wiring-unit", sensor, factor)
+                one(sensor, factor)
             }
             WiringKind::Offset => {
                 let sensor = pick(random)?;
                 let shift = random.random_range(SHIFT[0]..SHIFT[1]) * spread[sensor.address];
-                one("wiring-offset", sensor, shift)
+                one(sensor, shift)
             }
             WiringKind::Swapped => {
                 let a = pick(random)?;
@@ -147,7 +212,7 @@ impl Wiring {
                     .collect();
                 let b = others.get(random.random_range(0..others.len().max(1)))?;
                 Self {
-                    fault: "wiring-swapped",
+                    fault,
                     columns: vec![a.name.clone(), b.name.clone()],
                     value: 0.0,
                     at: vec![a.address, b.address],
@@ -158,7 +223,7 @@ impl Wiring {
                     return None;
                 }
                 Self {
-                    fault: "wiring-clock",
+                    fault,
                     columns: anatomy.sensors.iter().map(|s| s.name.clone()).collect(),
                     value: random.random_range(CLOCK[0]..CLOCK[1]),
                     at: Vec::new(),
@@ -170,7 +235,7 @@ impl Wiring {
     /// How late readings are, s.
     #[must_use]
     pub fn clock(&self) -> f64 {
-        if self.fault == "wiring-clock" {
+        if self.fault == WiringKind::Clock.name() {
             self.value
         } else {
             0.0

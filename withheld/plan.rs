@@ -155,6 +155,7 @@ impl Plan {
             }
         }
         slots.truncate(count);
+        slots.iter_mut().for_each(|slot| wanted.spoil(slot));
         Ok(Self {
             half,
             machines,

@@ -44,8 +44,11 @@ pub struct Context<'a> {
     pub scale: Vec<f64>,
     /// Deviation of the reading of each position that a sensor reads directly, else 0; `nv`.
     pub position_noise: Vec<f64>,
-    /// Variance of each entry of a reading, as given or first estimated.
+    /// Variance of each entry of a reading, as given or first estimated, times how many readings in a row its noise is alike in.
     pub reading_variance: Vec<f64>,
+    /// How many readings in a row the noise of each entry is alike in: noise that is slow tells as little of what is slow as white noise
+    /// of so many times its variance.
+    pub alike: Vec<f64>,
     /// Typical inertial force at each degree of freedom, N or N m.
     pub inertial: Vec<f64>,
     /// Whether one physics step of a row tells its slopes in the state, of the model without further effects.
@@ -94,6 +97,7 @@ impl Context<'_> {
             scale: self.scale.clone(),
             position_noise: self.position_noise.clone(),
             reading_variance: self.reading_variance.clone(),
+            alike: self.alike.clone(),
             inertial: self.inertial.clone(),
             one_step: self.one_step,
             step_error: self.step_error.of_walks(which),
@@ -193,7 +197,7 @@ pub fn begin<'a>(
     let (nv, width) = (layout.nv, layout.nq + layout.nv);
     let mut trajectory = from_readings(plant, logs, &taken.walks, &taken.otherwise);
     let read = trajectory.iter().map(|s| s[..width].to_vec());
-    let noise = logs.entry_noise();
+    let (noise, alike) = (logs.entry_noise(), logs.entry_alike());
     let mut context = Context {
         machine,
         logs,
@@ -202,7 +206,8 @@ pub fn begin<'a>(
         open: taken.open,
         scale: taken.scale,
         position_noise: position_noise(plant, logs),
-        reading_variance: noise.iter().map(|n| n * n).collect(),
+        reading_variance: noise.iter().zip(&alike).map(|(n, a)| n * n * a).collect(),
+        alike,
         inertial: vec![0.0; nv],
         walks: taken.walks,
         one_step: false,

@@ -11,6 +11,7 @@ use asid_core::{Error, Progress, Result};
 use crate::candidate::{Candidate, LeftOut, enumerate};
 use crate::ceiling::Left;
 use crate::decision::{Rules, decide};
+use crate::explained_noise::with_slow_noise;
 use crate::findings::Repeats;
 use crate::machine::Machine;
 use crate::prepare::{dataset, set_reading_noise};
@@ -238,6 +239,7 @@ pub fn diagnose(
     let (mut findings, sets) = replay(&bench, parts, segments, progress)?;
     (findings.forces, findings.left) = found.drawn;
     progress.end();
+    let findings = with_slow_noise(&mut bench, study, &candidates, findings)?;
     let evidence = gather(&bench, &outcome, (&sets, &members), &findings, &candidates)?;
     let judgement = decide(&evidence, &Rules::default());
     Ok(Work {

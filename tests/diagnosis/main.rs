@@ -18,6 +18,7 @@ mod rows;
 mod scatter;
 mod seldom;
 mod servo;
+mod slow_noise;
 mod small;
 mod step_error;
 mod steps;

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::{Kind, Slot};
 use crate::causes;
 use crate::error::{Error, Result};
+use crate::faults::Fault;
 use crate::label::Label;
 
 /// Which cases of the wheels a set takes. The default takes all.
@@ -18,6 +19,9 @@ pub struct Wanted {
     pub dirty: Option<bool>,
     /// Least size that causes are planned for: an excess gap in noise floors in clean worlds, how often that of the dirt in dirty ones.
     pub size: f64,
+    /// What is wrong with the logs of every case; faults as dealt where it is none. The same seed makes the same worlds with another fault.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub fault: Option<Fault>,
 }
 
 impl Wanted {
@@ -57,6 +61,17 @@ impl Wanted {
             && self.takes_kind(slot.kind)
             && self.dirty.is_none_or(|dirty| dirty == slot.dirty)
             && (self.causes.is_empty() || slot.causes.iter().any(|c| self.takes_cause(c.name())))
+    }
+
+    /// Gives a slot the fault of the set.
+    pub(super) fn spoil(&self, slot: &mut Slot) {
+        if let Some(fault) = self.fault {
+            (slot.fault, slot.wiring) = match fault {
+                Fault::Nothing => (None, None),
+                Fault::Log(fault) => (Some(fault), None),
+                Fault::Wiring(kind) => (None, Some(kind)),
+            };
+        }
     }
 
     /// Whether a case that was made is one of these: where a cause could not be sized another one was drawn.

@@ -3,7 +3,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use asid_withheld::cause::Standing;
-use asid_withheld::plan::{FACTORS, GAPS, Kind, Plan, Wanted, possible};
+use asid_withheld::faults::Fault;
+use asid_withheld::plan::{FACTORS, GAPS, Kind, Plan, Slot, Wanted, possible};
 use asid_withheld::{Half, Result, causes, machines};
 
 /// The split by kind of machine, as it is written down in `docs/withheld.md`.
@@ -175,6 +176,7 @@ fn a_set_for_one_question_has_only_its_cases() -> Result<()> {
         causes: vec!["viscous-friction".into(), "backlash".into()],
         dirty: Some(false),
         size: 10.0,
+        fault: None,
     };
     let plan = Plan::draw_wanted(Half::Training, (3, 40), &[], &wanted)?;
     assert_eq!(plan.slots.len(), 40);
@@ -207,6 +209,38 @@ fn a_set_for_one_question_has_only_its_cases() -> Result<()> {
         wrong(&["viscous-friction"], &[Kind::Unknown]),
         "no machine of the test half has such a case"
     );
+    Ok(())
+}
+
+#[test]
+fn the_same_worlds_have_another_fault() -> Result<()> {
+    let plan = |fault| {
+        let wanted = Wanted {
+            fault,
+            ..Wanted::default()
+        };
+        Plan::draw_wanted(Half::Training, (8, 60), &[], &wanted)
+    };
+    let dealt = plan(None)?;
+    assert!(dealt.slots.iter().any(|s| s.fault.is_some()));
+    for fault in Fault::all() {
+        assert_eq!(Fault::named(fault.name()), Some(fault));
+        let spoilt = plan(Some(fault))?;
+        for (a, b) in dealt.slots.iter().zip(&spoilt.slots) {
+            let names = |s: &Slot| s.causes.iter().map(|c| c.name()).collect::<Vec<_>>();
+            assert_eq!(
+                (a.machine, names(a), a.level),
+                (b.machine, names(b), b.level)
+            );
+            let own = match (b.fault, b.wiring) {
+                (None, None) => Fault::Nothing,
+                (Some(log), None) => Fault::Log(log),
+                (None, Some(wiring)) => Fault::Wiring(wiring),
+                both => panic!("{both:?}"),
+            };
+            assert_eq!(own, fault);
+        }
+    }
     Ok(())
 }
 

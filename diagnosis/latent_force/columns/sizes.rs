@@ -80,6 +80,7 @@ fn parts<'c>(
         scale: context.scale.clone(),
         position_noise: context.position_noise.clone(),
         reading_variance: context.reading_variance.clone(),
+        alike: context.alike.clone(),
         inertial: context.inertial.clone(),
         one_step: context.one_step,
         step_error: StepError::default(),

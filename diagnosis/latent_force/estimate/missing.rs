@@ -63,8 +63,9 @@ impl Estimate {
             rows += walk.len();
             if walk.segment.is_some() {
                 in_segments += walk.len();
-                for ([sum, count], r) in smoothed.sums.reading.iter().zip(&self.noise.r) {
-                    squares += sum / r;
+                let own = self.noise.r.iter().zip(&context.alike);
+                for ([sum, count], (r, alike)) in smoothed.sums.reading.iter().zip(own) {
+                    squares += alike * sum / r;
                     n += count;
                 }
             }

@@ -25,8 +25,9 @@ impl Estimate {
                 continue;
             }
             let (mut squares, mut n) = (0.0, 0.0);
-            for ([sum, count], r) in smoothed.sums.reading.iter().zip(&self.noise.r) {
-                squares += sum / r;
+            let own = self.noise.r.iter().zip(&context.alike);
+            for ([sum, count], (r, alike)) in smoothed.sums.reading.iter().zip(own) {
+                squares += alike * sum / r;
                 n += count;
             }
             let value: f64 = misled * squares / f64::max(n, 1.0);
@@ -75,7 +76,8 @@ impl Estimate {
             if *n > 0.0 {
                 let least = LEAST_READING.powi(2) * context.reading_variance[i];
                 let most = MOST_READING.powi(2) * context.reading_variance[i];
-                self.noise.r[i] = moved(self.noise.r[i], squares / n, least).min(most);
+                let variance = context.alike[i] * squares / n;
+                self.noise.r[i] = moved(self.noise.r[i], variance, least).min(most);
             }
         }
     }

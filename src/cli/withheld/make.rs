@@ -5,6 +5,8 @@ use std::path::Path;
 use anyhow::Result;
 use asid_core::Error;
 #[cfg(feature = "mujoco")]
+use asid_withheld::faults::Fault;
+#[cfg(feature = "mujoco")]
 use asid_withheld::plan::Kind;
 #[cfg(feature = "mujoco")]
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
@@ -28,6 +30,13 @@ fn kinds() -> impl TypedValueParser<Value = Kind> {
         .try_map(|name| Kind::named(&name).ok_or("is no kind of case"))
 }
 
+/// Faults of logs by their names.
+#[cfg(feature = "mujoco")]
+fn faults() -> impl TypedValueParser<Value = Fault> {
+    PossibleValuesParser::new(Fault::all().map(Fault::name))
+        .try_map(|name| Fault::named(&name).ok_or("is no fault of a log"))
+}
+
 /// Which cases are made: those of a set for one question, or all.
 #[cfg(feature = "mujoco")]
 #[derive(clap::Args)]
@@ -47,6 +56,9 @@ pub struct Wanted {
     /// Plan causes for at least this excess gap, in noise floors; in dirty worlds for so many times that of the dirt
     #[arg(long, value_name = "N", default_value_t = 0.0, requires = "make")]
     size: f64,
+    /// Give every log this fault, or none; the same seed with another fault of the log makes the same worlds [default: as they are dealt]
+    #[arg(long, value_name = "NAME", value_parser = faults(), requires = "make")]
+    fault: Option<Fault>,
 }
 
 #[cfg(feature = "mujoco")]
@@ -57,6 +69,7 @@ impl Wanted {
             causes: self.cause.clone(),
             dirty: (self.clean || self.dirty).then_some(self.dirty),
             size: self.size,
+            fault: self.fault,
         }
     }
 }
