@@ -205,6 +205,28 @@ impl Bench {
         Ok(())
     }
 
+    /// What an explanation leaves of the logs held out, from where they were fitted to begin, by the noise as it is now.
+    ///
+    /// # Errors
+    /// When a rollout fails.
+    pub fn rescore_held_out(&self, trials: &[Trial<'_>], of: &mut Explanation) -> Result<()> {
+        let point = Point {
+            theta: of.fit.point.theta.clone(),
+            starts: of.held_starts.clone(),
+        };
+        of.held_out = cost(&self.residuals_held_out(trials, &point)?);
+        Ok(())
+    }
+
+    /// Residuals of the logs held out, of which the first tenth is zero where starts were fitted to it.
+    fn residuals_held_out(&self, trials: &[Trial<'_>], point: &Point) -> Result<Vec<f64>> {
+        let mut predictor = self.predictor(trials, &self.test)?;
+        let residuals = predictor.residuals(std::slice::from_ref(point))?.pop();
+        let mut residuals = residuals.unwrap_or_default();
+        self.mask_head(&mut residuals);
+        Ok(residuals)
+    }
+
     /// Replays the logs held out at some values: the point with the [own values](Bench::head_point) of these logs, `from` some starts on, and
     /// the residuals, of which the first tenth is zero where starts were fitted to it.
     ///
@@ -217,10 +239,7 @@ impl Bench {
         from: &[State],
     ) -> Result<(Point, Vec<f64>)> {
         let point = self.head_point(trials, theta, from)?;
-        let mut predictor = self.predictor(trials, &self.test)?;
-        let residuals = predictor.residuals(std::slice::from_ref(&point))?.pop();
-        let mut residuals = residuals.unwrap_or_default();
-        self.mask_head(&mut residuals);
+        let residuals = self.residuals_held_out(trials, &point)?;
         Ok((point, residuals))
     }
 

@@ -2,12 +2,13 @@
 
 use asid_core::Result;
 
-use crate::bench::{Bench, Explanation, Trial};
+use crate::bench::Bench;
 use crate::candidate::Candidate;
+use crate::data::Logs;
 use crate::findings::{Findings, trials};
-use crate::fit::cost;
+use crate::fit::{Fit, cost};
 use crate::noise::{estimate, step};
-use crate::prepare::{plain_residuals, reading_noise};
+use crate::prepare::reading_noise;
 use crate::study::Study;
 
 /// Deviation that is left, relative to the one that the readings alone told, from which on it is taken. Two estimates of white noise differ by a few per
@@ -20,35 +21,6 @@ struct Left {
     most: f64,
 }
 
-/// Of each sensor.
-fn left(bench: &Bench, candidates: &[Candidate], findings: &Findings) -> Result<Vec<Left>> {
-    let best = findings
-        .found
-        .iter()
-        .min_by(|a, b| a.explanation.fit.cost.total_cmp(&b.explanation.fit.cost))
-        .filter(|f| f.explanation.fit.cost < findings.none.fit.cost);
-    let (members, explanation) = match best {
-        Some(f) => (
-            trials(candidates, &f.candidates, &f.explanation),
-            &f.explanation,
-        ),
-        None => (Vec::new(), &findings.none),
-    };
-    let logs = &bench.train.logs;
-    let residuals = plain_residuals(bench, &bench.train, &members, &explanation.fit.point)?;
-    let estimated = estimate(logs, &residuals).into_iter();
-    let each = estimated.zip(reading_noise(logs)).enumerate();
-    let left = each.map(|(sensor, (deviation, readings))| Left {
-        deviation,
-        most: if step(logs, sensor) > 0.0 {
-            readings.deviation
-        } else {
-            readings.most
-        },
-    });
-    Ok(left.collect())
-}
-
 /// Takes the noise of sensors from what the best explanation leaves where it is larger than the readings alone told: noise that is slow
 /// beside what the machine does tells of its size only without the motion. It is no larger than the readings allow. Errors of a rounding are
 /// alike from row to row too, and their size is known.
@@ -59,8 +31,8 @@ pub fn with_slow_noise(
     bench: &mut Bench,
     study: &Study,
     candidates: &[Candidate],
-    findings: Findings,
-) -> Result<Findings> {
+    findings: &mut Findings,
+) -> Result<()> {
     let slow = |before: f64, left: Left, given: Option<f64>| {
         let larger = left.deviation.min(left.most);
         if given.is_none() && larger > SLOW * before {
@@ -70,59 +42,97 @@ pub fn with_slow_noise(
         }
     };
     let before = bench.train.logs.entry_noise();
-    let mut findings = with_noise(bench, study, candidates, findings, slow)?;
+    with_noise(bench, study, findings, slow);
     if bench.train.logs.entry_noise() != before {
-        bench.hold_out(&[], &mut findings.none)?;
+        bench.rescore_held_out(&[], &mut findings.none)?;
         for found in &mut findings.found {
             let trials = trials(candidates, &found.candidates, &found.explanation);
-            bench.hold_out(&trials, &mut found.explanation)?;
+            bench.rescore_held_out(&trials, &mut found.explanation)?;
         }
     }
-    Ok(findings)
+    Ok(())
 }
 
 /// Takes the noise of all sensors from what the best explanation leaves. It is no larger than it was: what an explanation misses may look like noise.
-///
-/// # Errors
-/// When a rollout fails.
-pub fn with_noise_left(
-    bench: &mut Bench,
-    study: &Study,
-    candidates: &[Candidate],
-    findings: Findings,
-) -> Result<Findings> {
+pub fn with_noise_left(bench: &mut Bench, study: &Study, findings: &mut Findings) {
     let least =
         |before: f64, left: Left, given: Option<f64>| given.unwrap_or(before.min(left.deviation));
-    with_noise(bench, study, candidates, findings, least)
+    with_noise(bench, study, findings, least);
 }
 
-/// Sets the noise of each sensor, from what it was, what is left and what the study gives, and computes all sums of squares with it.
+/// Sets the noise of each sensor, from what it was, what is left and what the study gives, and all that is told in units of it.
 fn with_noise(
     bench: &mut Bench,
     study: &Study,
-    candidates: &[Candidate],
-    mut findings: Findings,
+    findings: &mut Findings,
     of: impl Fn(f64, Left, Option<f64>) -> f64,
-) -> Result<Findings> {
-    let left = left(bench, candidates, &findings)?;
-    let before = bench.train.logs.sensors.iter();
-    let noise: Vec<f64> = (before.zip(left))
+) {
+    let before = bench.train.logs.entry_noise();
+    let sensors = bench.train.logs.sensors.iter();
+    let noise: Vec<f64> = (sensors.zip(left(&bench.train.logs, findings)))
         .map(|(s, left)| of(s.noise, left, study.noise.get(&s.name).copied()))
         .collect();
     bench.set_noise(&noise);
-    rescore(bench, &[], &mut findings.none)?;
+    let pairs = bench.train.logs.entry_noise().into_iter().zip(before);
+    let factors: Vec<f64> = pairs.map(|(after, before)| after / before).collect();
+    rescale(&mut findings.none.fit, &factors);
     for found in &mut findings.found {
-        let trials = trials(candidates, &found.candidates, &found.explanation);
-        rescore(bench, &trials, &mut found.explanation)?;
+        rescale(&mut found.explanation.fit, &factors);
     }
-    Ok(findings)
 }
 
-/// Computes the residuals of an explanation and their sum of squares anew.
-fn rescore(bench: &Bench, trials: &[Trial<'_>], of: &mut Explanation) -> Result<()> {
-    let mut predictor = bench.predictor(trials, &bench.train)?;
-    let mut residuals = predictor.residuals(std::slice::from_ref(&of.fit.point))?;
-    of.fit.residuals = residuals.pop().unwrap_or_default();
-    of.fit.cost = cost(&of.fit.residuals);
-    Ok(())
+/// Noise of each sensor by what the best explanation leaves.
+fn left(logs: &Logs, findings: &Findings) -> Vec<Left> {
+    let found = findings.found.iter().map(|f| &f.explanation.fit);
+    let best = found.fold(&findings.none.fit, |best, fit| {
+        if fit.cost < best.cost { fit } else { best }
+    });
+    let estimated = estimate(logs, &in_units(logs, &best.residuals)).into_iter();
+    let each = estimated.zip(reading_noise(logs)).enumerate();
+    each.map(|(sensor, (deviation, readings))| Left {
+        deviation,
+        most: if step(logs, sensor) > 0.0 {
+            readings.deviation
+        } else {
+            readings.most
+        },
+    })
+    .collect()
+}
+
+/// Residuals in the sensors' units, one array an episode; NaN where a reading is missing.
+fn in_units(logs: &Logs, residuals: &[f64]) -> Vec<Vec<f64>> {
+    let noise = logs.entry_noise();
+    let of_episode = |e: usize| {
+        let own = &residuals[logs.offset(e)..logs.offset(e + 1)];
+        let mut out = vec![0.0; own.len()];
+        // Zero where a reading is there.
+        logs.difference(e, &logs.episodes[e].readings, &mut out);
+        for (k, (out, r)) in out.iter_mut().zip(own).enumerate() {
+            *out += r * noise[k % noise.len()];
+        }
+        out
+    };
+    (0..logs.episodes.len()).map(of_episode).collect()
+}
+
+/// Tells a fit in units of another noise: `factors` times as large, one an entry.
+fn rescale(fit: &mut Fit, factors: &[f64]) {
+    let factor = |k: usize| factors[k % factors.len()];
+    for (k, r) in fit.residuals.iter_mut().enumerate() {
+        *r /= factor(k);
+    }
+    fit.cost = cost(&fit.residuals);
+    if fit.gains.ncols() != fit.residuals.len() {
+        return;
+    }
+    let lengths = |fit: &Fit| -> Vec<f64> { fit.gains.row_iter().map(|row| row.norm()).collect() };
+    let before = lengths(fit);
+    for (k, mut column) in fit.gains.column_iter_mut().enumerate() {
+        column *= factor(k);
+    }
+    let pairs = lengths(fit).into_iter().zip(before);
+    let ratio = |(after, before): (f64, f64)| if before > 0.0 { after / before } else { 1.0 };
+    let ratios: Vec<f64> = pairs.map(ratio).collect();
+    fit.covariance = (fit.covariance).map_with_location(|i, j, c| c * ratios[i] * ratios[j]);
 }

@@ -18,7 +18,7 @@ pub(crate) fn diagnose_physics(
     progress: &dyn Progress,
 ) -> Result<(Diagnosis, Work)> {
     let mut work = latent_force::pipeline::diagnose(study, machine, &settings, progress)?;
-    work.findings = with_noise_left(&mut work.bench, study, &work.candidates, work.findings)?;
+    with_noise_left(&mut work.bench, study, &mut work.findings);
     tell(study, work, settings, progress)
 }
 

@@ -239,7 +239,7 @@ pub fn diagnose(
     let (mut findings, sets) = replay(&bench, parts, segments, progress)?;
     (findings.forces, findings.left) = found.drawn;
     progress.end();
-    let findings = with_slow_noise(&mut bench, study, &candidates, findings)?;
+    with_slow_noise(&mut bench, study, &candidates, &mut findings)?;
     let evidence = gather(&bench, &outcome, (&sets, &members), &findings, &candidates)?;
     let judgement = decide(&evidence, &Rules::default());
     Ok(Work {
