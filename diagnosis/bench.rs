@@ -188,6 +188,15 @@ impl Bench {
         }
     }
 
+    /// Sets how many readings in a row the noise of each sensor is alike in, in all records.
+    pub fn set_alike(&mut self, alike: &[f64]) {
+        for record in [&mut self.train, &mut self.test, &mut self.head] {
+            for (sensor, &alike) in record.logs.sensors.iter_mut().zip(alike) {
+                sensor.alike = alike;
+            }
+        }
+    }
+
     /// Replays the logs held out at an explanation's parameters and sets what it leaves of them;
     /// where starts are open they are fitted on the first tenth, which then does not count.
     ///

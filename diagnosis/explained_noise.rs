@@ -136,3 +136,40 @@ fn rescale(fit: &mut Fit, factors: &[f64]) {
     let ratios: Vec<f64> = pairs.map(ratio).collect();
     fit.covariance = (fit.covariance).map_with_location(|i, j, c| c * ratios[i] * ratios[j]);
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use nalgebra::DMatrix;
+
+    use super::*;
+    use crate::fit::StartSlopes;
+    use crate::predict::Point;
+
+    /// A value that is the mean of two readings, the second of a sensor with twice the noise.
+    #[test]
+    fn a_fit_is_told_in_units_of_another_noise() {
+        let gains = DMatrix::from_row_slice(1, 2, &[0.5, 1.0]);
+        let mut fit = Fit {
+            point: Point {
+                theta: vec![0.0],
+                starts: Vec::new(),
+            },
+            cost: 20.0,
+            residuals: vec![2.0, 4.0],
+            shows: vec![1.0],
+            covariance: &gains * gains.transpose(),
+            gains,
+            free: vec![0],
+            starts: Arc::new(StartSlopes::default()),
+        };
+        let answer = fit.answer(&fit.residuals);
+        rescale(&mut fit, &[2.0, 1.0]);
+        assert_eq!(fit.residuals, [1.0, 4.0]);
+        assert_eq!(fit.cost, 17.0);
+        // The same readings move the value as far, and both are as uncertain now.
+        assert_eq!(fit.answer(&fit.residuals), answer);
+        assert!((fit.covariance[(0, 0)] - 2.0).abs() < 1e-12);
+    }
+}

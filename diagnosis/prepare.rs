@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use asid_core::{Error, Layout, Result};
 
 use crate::bench::Bench;
-use crate::data::Logs;
+use crate::data::{LoggedSensor, Logs};
 use crate::machine::Machine;
 use crate::noise::{self, Noise};
 use crate::predict::Point;
@@ -135,7 +135,7 @@ pub fn reading_noise(logs: &Logs) -> Vec<Noise> {
     noise::describe(logs, &series)
 }
 
-/// Estimates the noise from the readings alone; what the study gives stays.
+/// Estimates the noise from the readings alone; what the study gives stays, and is white.
 pub fn set_reading_noise(bench: &mut Bench, given: &BTreeMap<String, f64>) {
     let logs = &bench.train.logs;
     let estimated = reading_noise(logs);
@@ -144,9 +144,15 @@ pub fn set_reading_noise(bench: &mut Bench, given: &BTreeMap<String, f64>) {
         .map(|(s, x)| given.get(&s.name).copied().unwrap_or(x.deviation))
         .collect();
     bench.set_noise(&noise);
-    for record in [&mut bench.train, &mut bench.test, &mut bench.head] {
-        for (sensor, x) in record.logs.sensors.iter_mut().zip(&estimated) {
-            sensor.alike = x.alike();
+    // A study that gives the noise of a sensor gives all of it.
+    let alike = |(sensor, x): (&LoggedSensor, &Noise)| {
+        if given.contains_key(&sensor.name) {
+            1.0
+        } else {
+            x.alike()
         }
-    }
+    };
+    let each = bench.train.logs.sensors.iter().zip(&estimated);
+    let alike: Vec<f64> = each.map(alike).collect();
+    bench.set_alike(&alike);
 }

@@ -30,9 +30,7 @@ impl Noise {
             most: deviation,
         }
     }
-}
 
-impl Noise {
     /// Readings in a row that count as one to what hardly changes over them: the ratio of the noise's spectral density at frequency zero to
     /// that of white noise of the same deviation, `(1 + r) / (1 - r)` of first-order noise.
     #[must_use]
@@ -270,6 +268,25 @@ mod tests {
                 "{correlation}: {noise:?}"
             );
         }
+    }
+
+    #[test]
+    fn a_mean_of_correlated_noise_is_as_uncertain_as_one_of_fewer_white_readings() {
+        let noise = Noise {
+            correlation: 0.8,
+            ..Noise::white(1.0)
+        };
+        let rows = 500;
+        let readings = coloured(noise.correlation, 200 * rows);
+        let means = readings
+            .chunks_exact(rows)
+            .map(|c| c.iter().sum::<f64>() / rows as f64);
+        let variance = means.map(|m| m * m).sum::<f64>() / 200.0;
+        // Of 200 means, a variance is known to a tenth.
+        assert!(
+            (variance * rows as f64 / noise.alike()).ln().abs() < 0.3,
+            "{variance}"
+        );
     }
 
     #[test]
