@@ -11,6 +11,7 @@ mod drift;
 mod far;
 mod late_drive;
 mod next;
+mod one_joint;
 mod ordinary;
 mod roll;
 mod row_slopes;

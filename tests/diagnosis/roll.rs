@@ -3,11 +3,7 @@
 //! The joint hardly weighs anything, so that its speed is as rough as the force that is missing: a screening about that trajectory is led by an
 //! inertia, and both frictions are far behind it.
 
-use std::fmt::Write as _;
-
-use rand::{Rng as _, SeedableRng as _};
-use rand_chacha::ChaCha8Rng;
-
+use super::one_joint::{joint_log, normal};
 use super::run_on;
 use super::world::write_files;
 
@@ -49,21 +45,10 @@ fn step([q, v]: [f64; 2], command: f64, h: f64) -> [f64; 2] {
 }
 
 fn log(episode: usize) -> String {
-    let mut random = ChaCha8Rng::seed_from_u64(70 + episode as u64);
-    let mut noise = || NOISE * ((0..12).map(|_| random.random::<f64>()).sum::<f64>() - 6.0);
-    let mut state = [0.0; 2];
-    let steps = 100;
-    let mut text = "time,ctrl.servo,angle,qpos.roll,qvel.roll".to_owned();
-    for row in 0..(SECONDS / ROW) as usize {
-        let time = ROW * row as f64;
-        let u = command(episode, time);
-        let start = if row == 0 { "0,0" } else { "," };
-        let _ = write!(text, "\n{time:.3},{u},{},{start}", state[0] + noise());
-        for _ in 0..steps {
-            state = step(state, u, ROW / f64::from(steps));
-        }
-    }
-    text + "\n"
+    let mut noise = normal(70 + episode as u64);
+    let machine = (|time| command(episode, time), step);
+    let header = "time,ctrl.servo,angle,qpos.roll,qvel.roll";
+    joint_log(header, [SECONDS, ROW], 100, machine, || NOISE * noise())
 }
 
 /// While the servo keeps within its limit its damping is the same as the joint's: the logs cannot tell which of them it is.

@@ -2,11 +2,7 @@
 //!
 //! Beside the swing, differences over a few rows tell a third of such noise, and a model that is right would seem to leave three times its noise.
 
-use std::fmt::Write as _;
-
-use rand::{Rng as _, SeedableRng as _};
-use rand_chacha::ChaCha8Rng;
-
+use super::one_joint::{joint_log, normal};
 use super::world::write_files;
 use super::{Kind, run_on};
 
@@ -45,27 +41,19 @@ fn step([q, v]: [f64; 2], torque: f64, dry: f64, h: f64) -> [f64; 2] {
 
 /// A log of the pendulum with some dry friction, N m.
 fn log(episode: usize, dry: f64) -> String {
-    let mut random = ChaCha8Rng::seed_from_u64(40 + episode as u64);
-    let mut fresh = || (0..12).map(|_| random.random::<f64>()).sum::<f64>() - 6.0;
-    let mut noise = fresh();
-    let mut state = [0.0; 2];
-    let steps = 20;
-    let mut text = "time,ctrl.motor,angle,qpos.hinge,qvel.hinge".to_owned();
-    for row in 0..(SECONDS / ROW) as usize {
-        let time = ROW * row as f64;
-        let torque = command(episode, time);
-        let start = if row == 0 { "0,0" } else { "," };
-        let _ = write!(
-            text,
-            "\n{time:.3},{torque},{},{start}",
-            state[0] + NOISE * noise
-        );
-        noise = CORRELATION * noise + (1.0 - CORRELATION * CORRELATION).sqrt() * fresh();
-        for _ in 0..steps {
-            state = step(state, torque, dry, ROW / f64::from(steps));
-        }
-    }
-    text + "\n"
+    let mut fresh = normal(40 + episode as u64);
+    let mut next = fresh();
+    let noise = || {
+        let now = next;
+        next = CORRELATION * now + (1.0 - CORRELATION * CORRELATION).sqrt() * fresh();
+        NOISE * now
+    };
+    let machine = (
+        |time| command(episode, time),
+        |state, torque, h| step(state, torque, dry, h),
+    );
+    let header = "time,ctrl.motor,angle,qpos.hinge,qvel.hinge";
+    joint_log(header, [SECONDS, ROW], 20, machine, noise)
 }
 
 const MASS: &str = "name = \"mass\"\ntarget = \"geom/ball/mass\"\nrange = [0.3, 0.8]";

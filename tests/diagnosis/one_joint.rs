@@ -1,0 +1,35 @@
+//! Logs of a machine with one joint, integrated by hand.
+
+use std::fmt::Write as _;
+
+use rand::{Rng as _, SeedableRng as _};
+use rand_chacha::ChaCha8Rng;
+
+/// Approximately normal numbers of deviation 1.
+pub fn normal(seed: u64) -> impl FnMut() -> f64 {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    move || (0..12).map(|_| random.random::<f64>()).sum::<f64>() - 6.0
+}
+
+/// A log of one joint that begins at rest at zero: `header`, then rows of time, command and angle, with `noise` of each reading. Rows are `row` s apart, over
+/// `seconds`, and `step` takes an angle, a speed and a command on over one of `steps` equal parts of a row.
+pub fn joint_log(
+    header: &str,
+    [seconds, row]: [f64; 2],
+    steps: u32,
+    (command, step): (impl Fn(f64) -> f64, impl Fn([f64; 2], f64, f64) -> [f64; 2]),
+    mut noise: impl FnMut() -> f64,
+) -> String {
+    let mut state = [0.0; 2];
+    let mut text = header.to_owned();
+    for k in 0..(seconds / row) as usize {
+        let time = row * k as f64;
+        let u = command(time);
+        let start = if k == 0 { "0,0" } else { "," };
+        let _ = write!(text, "\n{time:.3},{u},{},{start}", state[0] + noise());
+        for _ in 0..steps {
+            state = step(state, u, row / f64::from(steps));
+        }
+    }
+    text + "\n"
+}
