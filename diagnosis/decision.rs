@@ -37,9 +37,22 @@ fn closes_a_small_gap(evidence: &Evidence, set: Replayed, rules: &Rules) -> bool
     is_there(power(none.held_out)) && closes(none.held_out, set.held_out) && bears_out
 }
 
+/// Whether replays without effects leave a gap of the logs fitted to alone: no command of those held out reaches, say, the limit of a drive.
+#[must_use]
+pub fn is_in_training_alone(none: Replayed) -> bool {
+    let is_there = |mean_square: f64| mean_square > LEAST_GAP * LEAST_GAP;
+    is_there(none.train) && !is_there(none.held_out)
+}
+
 /// Whether replays of the logs held out come nearer to the readings with a set than without it, and than the readings' own mean
-/// ([`crate::skill`]): by what does not, nothing is explained.
-fn has_skill(evidence: &Evidence, set: Replayed) -> bool {
+/// ([`crate::skill`]): by what does not, nothing is explained. Where they have no gap there, a set leaves none and closes that of the logs
+/// fitted to.
+fn has_skill(evidence: &Evidence, set: Replayed, rules: &Rules) -> bool {
+    if is_in_training_alone(evidence.none) {
+        let left = |mean_square: f64| mean_square - 1.0;
+        let most = (1.0 - rules.closes) * left(evidence.none.train);
+        return set.held_out <= LEAST_GAP * LEAST_GAP && left(set.train) < most;
+    }
     let worse_than = |other: f64| set.held_out >= other;
     !worse_than(evidence.none.held_out) && !worse_than(evidence.mean.held_out)
 }
@@ -102,7 +115,7 @@ fn left_of_the_gap(evidence: &Evidence, found: Option<usize>) -> f64 {
     };
     let open_loop = found.map_or(1.0, |i| share(i, |r| r.train));
     let left = evidence.left.min(open_loop).clamp(0.0, 1.0);
-    let repeated = found.filter(|_| evidence.repeatable);
+    let repeated = found.filter(|_| evidence.repeatable && !is_in_training_alone(evidence.none));
     let is_named = found.is_some_and(|i| !evidence.tried[i].effects.is_empty());
     let foretold = repeated.map_or(0.0, |i| share(i, |r| r.held_out));
     let foretold = if is_named && foretold <= LARGER_PART {
@@ -118,7 +131,15 @@ fn left_of_the_gap(evidence: &Evidence, found: Option<usize>) -> f64 {
 pub fn decide(evidence: &Evidence, rules: &Rules) -> Judgement {
     let mut sets = Sets::of(evidence, rules);
     let (least, best) = sets.least_and_best();
-    let seen = seen(evidence.none.held_out, evidence, rules);
+    // What is named is judged by the logs that show it.
+    let judge = |r: Replayed| {
+        if best != least && is_in_training_alone(evidence.none) {
+            r.train
+        } else {
+            r.held_out
+        }
+    };
+    let seen = seen(judge(evidence.none), evidence, rules);
     sets.weigh((least, best), seen);
     let rest = left_of_the_gap(evidence, sets.all[best].found);
     let unknown = sets.unknown((least, best), seen, rest);
@@ -129,8 +150,8 @@ pub fn decide(evidence: &Evidence, rules: &Rules) -> Judgement {
     let found = found.map(|i| &evidence.tried[i]);
     let replayed = found.map_or(evidence.none, |t| t.replayed);
     let shown = Shown {
-        left: (replayed.held_out - own_error(evidence) - 1.0).max(0.0)
-            / (evidence.none.held_out - 1.0).max(f64::MIN_POSITIVE),
+        left: (judge(replayed) - own_error(evidence) - 1.0).max(0.0)
+            / (judge(evidence.none) - 1.0).max(f64::MIN_POSITIVE),
         stopped: evidence.stopped,
         laws: found.map_or(0, |t| t.names),
         within_tolerances,
@@ -262,6 +283,21 @@ mod tests {
             !named(replayed(1.1, 1.1), replayed(1.0, 1.0)),
             "there is no gap"
         );
+    }
+
+    #[test]
+    fn what_the_logs_held_out_never_reach_is_named_by_those_that_do() {
+        let named = |left: Replayed| {
+            let mut e = evidence(3.0, vec![tried(&["a"], 1, 230.0, 1.0)], 0.0);
+            e.none = replayed(150.0, 0.99);
+            e.tried[0].replayed = left;
+            let found = decided(&e);
+            let p = found.marginal(&["a".to_owned()]);
+            (!found.is_unknown && found.best_explanation().labels == ["a"]).then_some(p)
+        };
+        assert!(named(replayed(0.99, 0.99)).is_some_and(|p| p > 0.8));
+        assert!(named(replayed(0.99, 3.0)).is_none(), "it makes a gap");
+        assert!(named(replayed(90.0, 0.99)).is_none(), "it leaves the gap");
     }
 
     #[test]

@@ -60,8 +60,25 @@ fn percent(x: f64) -> String {
     format!("{:.0} %", 100.0 * x)
 }
 
+/// Gaps of the training logs without effects and with the best explanation.
+#[derive(Clone, Copy, Debug)]
+pub struct Training {
+    /// Without effects.
+    pub none: f64,
+    /// With the best explanation.
+    pub best: f64,
+    /// Whether the logs held out have none.
+    pub alone: bool,
+}
+
 /// How much of the gap is closed, with its interval.
-fn part_closed(result: &DiagnosisResult) -> String {
+fn part_closed(result: &DiagnosisResult, training: Training) -> String {
+    if training.alone {
+        let Training { none, best, .. } = training;
+        return format!(
+            "the gap of the training logs ({none:.2}, and {best:.2} with it); those held out never show it"
+        );
+    }
     match (result.gap.closed, result.gap.closed_interval95) {
         (Some(c), Some([low, high])) => format!(
             "{} of it ({:.0} to {:.0})",
@@ -139,7 +156,7 @@ fn tolerances(result: &DiagnosisResult) -> String {
 }
 
 /// Where effects are named.
-fn effects(result: &DiagnosisResult) -> String {
+fn effects(result: &DiagnosisResult, training: Training) -> String {
     let sets = result.verdict.ambiguous_with.iter();
     let rivals: Vec<String> = sets.map(|s| grouped(s).join(" + ")).collect();
     let ambiguous = if rivals.is_empty() {
@@ -153,15 +170,19 @@ fn effects(result: &DiagnosisResult) -> String {
         place(result),
         grouped(&result.verdict.effects).join(" with "),
         within_tolerance(result).map_or_else(String::new, |t| format!(", beside {t},")),
-        part_closed(result),
+        part_closed(result, training),
         beside(result),
         doubt(result)
     )
 }
 
 /// Where nothing in the catalogue explains the gap; `labels` come nearest and leave `rest`.
-fn unknown(result: &DiagnosisResult, labels: &[String], rest: Option<&str>) -> String {
-    let (place, closed) = (place(result), part_closed(result));
+fn unknown(
+    result: &DiagnosisResult,
+    (labels, rest): (&[String], Option<&str>),
+    training: Training,
+) -> String {
+    let (place, closed) = (place(result), part_closed(result, training));
     let closes_most = result.gap.closed.is_some_and(|c| c > 0.5);
     let rest = rest.map_or_else(String::new, |r| format!(": {r}"));
     let names = grouped(labels).join(" with ");
@@ -191,19 +212,20 @@ fn unknown(result: &DiagnosisResult, labels: &[String], rest: Option<&str>) -> S
 
 /// Says what a result means, in one sentence; `labels` are the effects of the best
 /// explanation, whether or not it is the verdict, `rest` what they leave, where one knows, `repeats` how far contacts can be
-/// repeated, and `beyond` the gap without effects beyond what the starts of the logs held out leave open.
+/// repeated, `beyond` the gap without effects beyond what the starts of the logs held out leave open, and `training` those of the logs
+/// fitted to.
 #[must_use]
 pub fn sentence(
     result: &DiagnosisResult,
-    (labels, rest): (&[String], Option<&str>),
-    (repeats, beyond): (Option<Repeats>, f64),
+    best: (&[String], Option<&str>),
+    (repeats, beyond, training): (Option<Repeats>, f64, Training),
 ) -> String {
     let within_tolerances = !result.tolerances.is_empty() && result.gap.identified > OF_NOISE;
     let body = match result.verdict.kind {
         Kind::None if within_tolerances => tolerances(result),
         Kind::None => none(result, beyond, repeats),
-        Kind::Effects => effects(result),
-        Kind::Unknown => unknown(result, labels, rest),
+        Kind::Effects => effects(result, training),
+        Kind::Unknown => unknown(result, best, training),
     };
     let early = if result.not_tried.is_empty() {
         ""

@@ -7,6 +7,7 @@ use asid_results::evidence::Evidence;
 use crate::bench::{Bench, Explanation, Trial};
 use crate::candidate::{Candidate, LeftOut};
 use crate::checks;
+use crate::decision::is_in_training_alone;
 use crate::experiment::{self, Proposed};
 use crate::findings::{Findings, Found, trials};
 use crate::forces::Short;
@@ -15,6 +16,7 @@ use crate::localise::localise;
 use crate::predict::{Point, State};
 use crate::record::Record;
 use crate::result::{DiagnosisResult, Kind, NotTried};
+use crate::sentence::{Training, sentence};
 use crate::settings::Settings;
 use crate::study::Study;
 use crate::trace::DiagnosisTrace;
@@ -191,8 +193,16 @@ impl Telling<'_> {
             .and_then(|(before, after, _)| least_explained(&before, &after))
             .or_else(|| least_made_up(&result.missing_force));
         let beyond = self.evidence.none.held_out.sqrt();
+        let of_best = j.best_explanation().found.map(|i| &self.evidence.tried[i]);
+        let of_best = of_best.map_or(self.evidence.none, |t| t.replayed);
+        let training = Training {
+            none: self.evidence.none.train.sqrt(),
+            best: of_best.train.sqrt(),
+            alone: is_in_training_alone(self.evidence.none),
+        };
         let best = (&labels[..], rest.as_deref());
-        result.sentence = crate::sentence::sentence(&result, best, (self.findings.repeats, beyond));
+        let gaps = (self.findings.repeats, beyond, training);
+        result.sentence = sentence(&result, best, gaps);
         let mut trace = self.trace(&nominal, &identified, &refined, &result.effects)?;
         trace.view = Some(self.view([&nominal, &identified, &refined], &explanation)?);
         let study = self.bench.parameters.len();

@@ -34,7 +34,7 @@ impl<'e> Sets<'e> {
             |evidence: f64, names: usize| evidence / rules.temperature - price * names as f64;
         let ordinary = evidence.found.filter(|&i| {
             let set = &evidence.tried[i];
-            set.effects.is_empty() && has_skill(evidence, set.replayed)
+            set.effects.is_empty() && has_skill(evidence, set.replayed, rules)
         });
         let mut all = vec![Hypothesis {
             found: ordinary,
@@ -69,7 +69,7 @@ impl<'e> Sets<'e> {
         let least = evidence.known.map_or(0, |i| self.places[i]);
         let stands = evidence.found.filter(|&i| {
             let set = evidence.tried[i].replayed;
-            has_skill(evidence, set)
+            has_skill(evidence, set, rules)
                 && (!is_small(evidence.none) || closes_a_small_gap(evidence, set, rules))
         });
         (least, stands.map_or(least, |i| self.places[i]))

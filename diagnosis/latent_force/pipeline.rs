@@ -149,8 +149,10 @@ fn searched_in(
         progress,
     };
     let excess = |set: &Set| replays.excess(&set.fitted, &set.candidates);
+    let states = |set: &Set| replays.states(&set.fitted, &set.candidates, &context.walks);
     let open_loop = OpenLoop {
         excess: &excess,
+        states: &states,
         is_gap: replays.leaves_a_gap(&none)?,
     };
     let how = (open_loop, progress);

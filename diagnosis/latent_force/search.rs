@@ -1,5 +1,6 @@
 //! Forward selection of effects by evidence, with a look back after each.
 
+mod about_replays;
 mod begun;
 mod finish;
 mod open_loop;

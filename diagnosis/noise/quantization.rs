@@ -54,8 +54,8 @@ fn step_of(mut values: Vec<f64>) -> Option<f64> {
     let count = values.len();
     values.sort_by(f64::total_cmp);
     values.dedup();
-    // Few distinct values for many readings, all on one grid.
-    if values.len() < 3 || 2 * values.len() >= count {
+    // Few distinct values for many readings, all on one grid. Two are one: of a joint that hardly leaves a step of its encoder.
+    if values.len() < 2 || 2 * values.len() >= count {
         return None;
     }
     let gaps: Vec<f64> = values.windows(2).map(|w| w[1] - w[0]).collect();
@@ -117,6 +117,15 @@ mod tests {
         assert!(of(&clean).expect("they are coarse") < 0.001);
         let fine: Vec<f64> = (0..8000).map(|k| (0.01 * f64::from(k)).round()).collect();
         assert_eq!(of(&fine), None);
+    }
+
+    #[test]
+    fn a_joint_that_hardly_leaves_one_step_of_its_encoder_is_read_to_that_step() {
+        let values: Vec<f64> = (0..800)
+            .map(|i| if i % 200 < 3 { 0.25 } else { 0.375 })
+            .collect();
+        assert!((step_of(values).unwrap() - 0.125).abs() < 1e-12);
+        assert_eq!(step_of(vec![0.25; 800]), None);
     }
 
     #[test]

@@ -137,6 +137,7 @@ impl Search<'_> {
             let misses = self.all.misses(&one.hypothesis.view)?;
             let mut one = self.judged(one.hypothesis, &given, &misses);
             if self.is_nonsense(view, &one.hypothesis, &misses)
+                || self.is_of_others(&one.hypothesis, &given, &misses)
                 || self.is_silence(view, &one.hypothesis, &misses)?
             {
                 one.probability = one.probability.min(self.settings.named / 2.0);
@@ -182,6 +183,25 @@ impl Search<'_> {
         let larger = |q: &&Quantity| size(&hypothesis.view, q) > size(view, q);
         let mut readings = quantities.filter(|q| !q.command).filter(larger);
         hypothesis.fault == Fault::Unit && readings.any(|q| missed[q.place])
+    }
+
+    /// Whether another view of readings makes sense of other columns and none of its own, which still misses more than it moves, and
+    /// nearly as much as before. A column that drifts away takes the state with it from which the others are predicted: in a larger unit
+    /// it would be still, and the others make sense.
+    fn is_of_others(&self, hypothesis: &Hypothesis, given: &Misses, misses: &Misses) -> bool {
+        let missed = Settings::missed(misses, 1.0);
+        let of = |place: usize| {
+            let pairs = [
+                (given.miss[place], misses.miss[place]),
+                (given.start_miss[place], misses.start_miss[place]),
+            ];
+            let [from, to]: [Vec<f64>; 2] = pairs.into_iter().unzip().into();
+            self.settings.logarithm(&from, &to)
+        };
+        let quantities = hypothesis.quantities.iter().map(|&q| &self.quantities[q]);
+        let mut own = quantities.filter(|q| !q.command).map(|q| q.place);
+        hypothesis.fault != Fault::Clock
+            && own.any(|place| missed[place] && of(place) < self.settings.even)
     }
 
     /// Whether a unit makes a command smaller and leaves no more of it than no command at all would. Where a drive answers late, that it

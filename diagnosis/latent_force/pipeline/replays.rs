@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use asid_core::progress::UntilLate;
 use asid_core::{Progress, Result};
+use asid_effects::EffectSpec;
 use nalgebra::DVector;
 
 use crate::bench::{Bench, Explanation, Local, Trial};
@@ -12,8 +13,10 @@ use crate::findings::{Findings, Found, LEAST_GAP, Repeats};
 use crate::fit::{Begin, Effort, Region, StartSlopes, cost};
 use crate::latent_force::fit::Fitted;
 use crate::latent_force::search::{Outcome, Set, labels_of, name_of};
+use crate::latent_force::walk::Walk;
 use crate::predict::{Point, State};
 use crate::result::NotTried;
+use crate::trajectory::Trajectory;
 
 use super::told::{detection_limits, isolability, missing_forces, p_value, ranking};
 
@@ -116,6 +119,40 @@ impl Replays<'_> {
         let residuals = predictor.residuals(&[self.point(fitted)])?.pop();
         let left = cost(&residuals.unwrap_or_default()) / bench.train.readings.max(1) as f64;
         Ok(if left.is_nan() { f64::INFINITY } else { left })
+    }
+
+    /// States of a fitted set along some walks, `rows x (nq + nv)` each.
+    pub(super) fn states(
+        &self,
+        fitted: &Fitted,
+        members: &[usize],
+        walks: &[Walk],
+    ) -> Result<Vec<Vec<f64>>> {
+        let bench = self.bench;
+        let specs: Vec<EffectSpec> = (members.iter())
+            .map(|&c| self.candidates[c].spec.clone())
+            .collect();
+        let model = bench.machine.refined(&specs)?;
+        let parameters = fitted.hypothesis.parameters();
+        let shown = Trajectory::of(
+            &*model,
+            &bench.machine.plant,
+            &parameters,
+            &bench.train.logs,
+            &self.point(fitted),
+            bench.machine.threads,
+        )?;
+        let layout = bench.layout();
+        let along = |walk: &Walk| {
+            let path = &shown.episodes[walk.episode];
+            let row = |&k: &usize| {
+                let place = &path.qpos[k * layout.nq..(k + 1) * layout.nq];
+                let speed = &path.qvel[k * layout.nv..(k + 1) * layout.nv];
+                [place, speed].concat()
+            };
+            walk.rows.iter().flat_map(row).collect()
+        };
+        Ok(walks.iter().map(along).collect())
     }
 
     /// Candidates of a fitted set, each with its values.

@@ -19,6 +19,8 @@ pub(super) const MOST: f64 = 0.5;
 pub struct OpenLoop<'o> {
     /// Excess power that they leave of the training logs, of a set.
     pub excess: &'o dyn Fn(&Set) -> Result<f64>,
+    /// States of a set along the walks, `rows x (nq + nv)` each.
+    pub states: &'o dyn Fn(&Set) -> Result<Vec<Vec<f64>>>,
     /// Whether they leave a gap without effects. Where they do not, no set could close one: a screening tells what the logs could have
     /// shown, and nothing is fitted.
     pub is_gap: bool,

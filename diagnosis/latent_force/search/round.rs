@@ -147,6 +147,7 @@ impl Upon<'_> {
         untried.extend(cut.map(|(stage, sets)| Untried { stage, sets }));
         let beside = (&screening.look, screening.tolerances.as_ref());
         let confirmed = self.with_a_second_look(finished.sets, beside)?;
+        let confirmed = self.with_a_look_about_replays(confirmed)?;
         let gain = |s: &Set| s.fitted.evidence - self.base.fitted.evidence;
         let rows = confirmed.iter().map(|s| (name(&s.candidates), gain(s)));
         progress.ranking(&format!("fits{upon}"), &rows.collect::<Vec<_>>());

@@ -30,7 +30,7 @@ fn members(set: &Set) -> BTreeSet<usize> {
 }
 
 /// Some sets and further ones; of those with the same members the one with more evidence.
-fn joined(mut sets: Vec<Set>, further: Vec<Set>) -> Vec<Set> {
+pub(super) fn joined(mut sets: Vec<Set>, further: Vec<Set>) -> Vec<Set> {
     for set in further {
         match sets.iter_mut().find(|s| members(s) == members(&set)) {
             Some(like) if like.fitted.evidence >= set.fitted.evidence => {}
@@ -116,7 +116,7 @@ impl Upon<'_> {
     }
 
     /// The sets, best first.
-    fn in_order(&self, mut sets: Vec<Set>) -> Vec<Set> {
+    pub(super) fn in_order(&self, mut sets: Vec<Set>) -> Vec<Set> {
         let worth = |set: &Set| worth(self.context, self.candidates, set);
         sets.sort_by(|a, b| worth(b).total_cmp(&worth(a)));
         simplest_first(&mut sets, rise(self.context));
