@@ -5,6 +5,7 @@
 
 mod arm;
 mod ball;
+mod beyond;
 #[path = "../diagnosis_support/mod.rs"]
 mod diagnosis_support;
 mod drift;

@@ -98,6 +98,20 @@ fn right_wiring_stays_though_a_drive_has_lost_a_quarter() {
     }
 }
 
+/// In degrees it would hardly move, and the state with it from which the other joint is predicted.
+#[test]
+fn a_column_that_drifts_away_is_in_no_other_unit() {
+    for rate in [-3.0, -1.5, 1.5, 3.0] {
+        let mut study = study(true);
+        for (_, episode) in study.train.iter_mut().chain(&mut study.test) {
+            let rows = episode.time.clone().into_iter().enumerate();
+            rows.for_each(|(row, time)| episode.readings[2 * row + 1] += rate * time);
+        }
+        let found = mended(&study);
+        assert!(found.wiring.is_empty(), "{rate} rad/s: {:?}", found.wiring);
+    }
+}
+
 #[test]
 fn wiring_sign() {
     let turned = ColumnMapping {
