@@ -3,6 +3,7 @@
 mod about_replays;
 mod begun;
 mod finish;
+mod given_back;
 mod open_loop;
 mod path;
 mod prior;

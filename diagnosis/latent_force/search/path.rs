@@ -137,7 +137,14 @@ impl Search<'_> {
                 // They are no name.
                 depth += 1;
             }
-            path.best = next;
+            if let Some(smaller) = self.given_back(&next, best)? {
+                let last = path.rounds.last_mut();
+                last.into_iter()
+                    .for_each(|round| round.confirmed.push(smaller.clone()));
+                path.best = smaller;
+            } else {
+                path.best = next;
+            }
             if stopped {
                 path.untried.push(Untried::upon(&path.best, GIVEN));
                 break;
