@@ -60,11 +60,54 @@ impl Search<'_> {
             .collect()
     }
 
+    /// Whether one candidate is easily mistaken for another one, by its own word or by that of the other, and acts where that one does.
+    fn is_confused(&self, a: usize, b: usize) -> bool {
+        let [a, b] = [a, b].map(|c| &self.candidates[c]);
+        let says = |a: &Candidate, b: &Candidate| {
+            let mut with = a.effect.mistaken_for().iter().flat_map(|c| c.with);
+            with.any(|name| *name == b.spec.name)
+        };
+        let plant = self.context.plant();
+        let [reach, other] = [a, b].map(|c| c.effect.reach(plant, &c.spec.site));
+        reach == other && (says(a, b) || says(b, a))
+    }
+
+    /// Sets that a path has fitted and found behind its best one, with a candidate that is easily mistaken for one of that: fitted a little more from where the
+    /// best one has come to. A fit may be given up, or end, far from the values at which it would do the same.
+    fn mistaken(&self, path: &Path) -> Result<Vec<Set>> {
+        let (context, best) = (self.context, &path.best);
+        let mut again: Vec<Set> = Vec::new();
+        for other in path.rounds.iter().flat_map(|r| &r.confirmed) {
+            let not_in = |a: &Set, b: &Set| -> Vec<usize> {
+                let own = a.candidates.iter().filter(|c| !b.candidates.contains(c));
+                own.copied().collect()
+            };
+            let (out, into) = (not_in(best, other), not_in(other, best));
+            let ([out], [into]) = (&out[..], &into[..]) else {
+                continue;
+            };
+            let is_behind = !other.is_level_with(best, rise(context));
+            let known = again.iter().any(|s| s.candidates.contains(into));
+            if known || !is_behind || !self.is_confused(*out, *into) || self.progress.is_stopped() {
+                continue;
+            }
+            let rest = without(best, self.candidates, *out);
+            let mut set = with_that_of(&rest, other, self.candidates, *into);
+            set.names = best.names;
+            set.fit(context, (self.breadth.rounds[0], self.progress))?;
+            again.push(set);
+            if again.len() == MOST {
+                break;
+            }
+        }
+        Ok(again)
+    }
+
     /// Twins of the best set of a path, each fitted a little.
     pub(super) fn twins(&self, path: &Path) -> Result<Vec<Set>> {
         let (context, best) = (self.context, &path.best);
         let rise = rise(context);
-        let mut twins: Vec<Set> = Vec::new();
+        let mut twins = self.mistaken(path)?;
         for round in &path.rounds {
             let is_part = |s: &&Set| s.candidates.iter().all(|c| best.candidates.contains(c));
             let parts = round.confirmed.iter().filter(is_part);
@@ -91,7 +134,7 @@ impl Search<'_> {
                 twin.names = best.names;
                 twin.fit(context, (self.breadth.rounds[0], self.progress))?;
                 twins.push(twin);
-                if twins.len() == MOST {
+                if twins.len() >= MOST {
                     return Ok(twins);
                 }
             }
