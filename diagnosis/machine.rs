@@ -85,12 +85,6 @@ impl Machine {
         Refined::new(&*self.backend, model, plant, &self.fixed, &effects)
     }
 
-    /// The value of a target in the document; `None` where the engine does not know it.
-    #[must_use]
-    pub fn nominal(&self, target: &Target) -> Option<f64> {
-        self.model.nominal(target).ok()
-    }
-
     /// Effects that the study's model has already.
     #[must_use]
     pub fn given_effects(&self) -> &[EffectSpec] {
