@@ -2,7 +2,7 @@
 
 use asid_core::layout::{JointKind, Layout};
 use asid_core::{Parameter, Result};
-use asid_effects::EffectSpec;
+use asid_effects::{EffectSpec, Reach};
 use asid_mjcf::Plant;
 
 use crate::data::Logs;
@@ -11,7 +11,8 @@ use crate::predict::State;
 
 use super::estimate::Estimate;
 use super::initial::{from_readings, open_by_reading, position_noise, start, start_of_segment};
-use super::one_step::one_step_tells;
+use super::islands::Islands;
+use super::one_step::both_ways;
 use super::smoother::{NoiseModel, Start};
 use super::step_error::StepError;
 use super::step_map::{Derivatives, StepMap};
@@ -51,6 +52,8 @@ pub struct Context<'a> {
     pub alike: Vec<f64>,
     /// Typical inertial force at each degree of freedom, N or N m.
     pub inertial: Vec<f64>,
+    /// Degrees of freedom that nothing couples, in the model without further effects.
+    pub islands: Islands,
     /// Whether one physics step of a row tells its slopes in the state, of the model without further effects.
     pub one_step: bool,
     /// The engine's own error over the rows; none until a first trajectory is there, and where the engine takes no other time step.
@@ -69,6 +72,8 @@ pub struct Taken {
     pub otherwise: Vec<Vec<f64>>,
     /// Largest magnitude of each tangent coordinate.
     pub scale: Vec<f64>,
+    /// Pairs of bodies that touch in some row.
+    pub touching: Vec<[usize; 2]>,
 }
 
 impl Context<'_> {
@@ -99,6 +104,7 @@ impl Context<'_> {
             reading_variance: self.reading_variance.clone(),
             alike: self.alike.clone(),
             inertial: self.inertial.clone(),
+            islands: self.islands.clone(),
             one_step: self.one_step,
             step_error: self.step_error.of_walks(which),
         }
@@ -117,7 +123,32 @@ impl Context<'_> {
         let rows = (self.logs, &self.walks[..]);
         let mut map = StepMap::new(self.machine, specs, parameters, rows, roles)?;
         map.by_one_step(self.one_step);
+        if !self.has_segments() && self.within_islands(specs)? {
+            map.apart(&self.islands);
+        }
         Ok(map)
+    }
+
+    /// Whether effects leave apart what nothing couples.
+    fn within_islands(&self, specs: &[EffectSpec]) -> Result<bool> {
+        for spec in specs {
+            let reach = spec.find(self.plant())?.reach(self.plant(), &spec.site);
+            let of_a_sensor = matches!(reach, Reach::Sensor(_));
+            if !of_a_sensor && self.islands.reached(&reach).is_none() {
+                return Ok(false);
+            }
+        }
+        Ok(true)
+    }
+
+    /// The sensor of each entry of a reading, by index in the layout; beyond it where the layout lacks it.
+    #[must_use]
+    pub fn entry_sensors(&self) -> Vec<usize> {
+        let layout = &self.plant().layout.sensors;
+        let entries = self.logs.entries.iter();
+        let name = entries.map(|e| &self.logs.sensors[e.sensor].name);
+        let place = |name: &String| layout.iter().position(|s| s.name == *name);
+        name.map(|n| place(n).unwrap_or(layout.len())).collect()
     }
 
     /// Changes of the start of a segment that slopes are taken over: a part of what its first readings leave open, so that
@@ -209,11 +240,17 @@ pub fn begin<'a>(
         reading_variance: noise.iter().zip(&alike).map(|(n, a)| n * n * a).collect(),
         alike,
         inertial: vec![0.0; nv],
+        islands: Islands::one(nv, logs.entries.len()),
         walks: taken.walks,
         one_step: false,
         step_error: StepError::default(),
     };
-    context.one_step = one_step_tells(&context, (&[], parameters), (theta, &trajectory))?;
+    let ways = both_ways(&context, (&[], parameters), (theta, &trajectory))?;
+    context.one_step = ways.one_step_tells(&context.scale);
+    if !context.has_segments() {
+        let sensors = context.entry_sensors();
+        context.islands = Islands::of(plant, &sensors, &taken.touching, &ways.by_rows);
+    }
     let mut map = context.map(&[], parameters, nv + 1)?;
     let all = vec![true; trajectory.len()];
     map.roll(theta, (&mut trajectory, &all), &context.reading_variance)?;

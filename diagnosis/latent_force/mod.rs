@@ -19,6 +19,7 @@ pub mod fit;
 pub mod fitted_value;
 pub mod half_step;
 pub mod initial;
+mod islands;
 mod left;
 pub mod one_step;
 mod picture;

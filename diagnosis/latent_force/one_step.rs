@@ -7,7 +7,7 @@ use asid_core::{Parameter, Result};
 use asid_effects::EffectSpec;
 
 use super::context::Context;
-use super::step_map::{Derivatives, StepMap};
+use super::step_map::{Derivatives, LinearEpisode, StepMap};
 use super::walk::Walk;
 
 /// Rows in the middle of each walk that are taken both ways.
@@ -18,6 +18,14 @@ const APART: f64 = 0.1;
 /// Share of the rows that may differ by more, as where a joint comes to a stop within the row.
 const ODD: f64 = 0.05;
 
+/// Slopes in the state along a few rows, taken both ways, one a walk that is no segment.
+pub struct BothWays {
+    /// Over whole rows.
+    pub by_rows: Vec<LinearEpisode>,
+    /// By one physics step of each.
+    by_steps: Vec<LinearEpisode>,
+}
+
 /// Whether slopes in the state of one physics step, carried over its row, are those of the row, for a model with some effects along a
 /// trajectory.
 ///
@@ -25,9 +33,21 @@ const ODD: f64 = 0.05;
 /// When the engine fails.
 pub fn one_step_tells(
     context: &Context<'_>,
+    model: (&[EffectSpec], &[Parameter]),
+    along: (&[f64], &[Vec<f64>]),
+) -> Result<bool> {
+    Ok(both_ways(context, model, along)?.one_step_tells(&context.scale))
+}
+
+/// Takes slopes of a model with some effects along a few rows of a trajectory both ways.
+///
+/// # Errors
+/// When the engine fails.
+pub fn both_ways(
+    context: &Context<'_>,
     (specs, parameters): (&[EffectSpec], &[Parameter]),
     (theta, trajectory): (&[f64], &[Vec<f64>]),
-) -> Result<bool> {
+) -> Result<BothWays> {
     let layout = &context.plant().layout;
     let (nx, width) = (2 * layout.nv, layout.nq + layout.nv);
     let (mut walks, mut states): (Vec<Walk>, Vec<Vec<f64>>) = (Vec::new(), Vec::new());
@@ -39,7 +59,10 @@ pub fn one_step_tells(
         states.push(trajectory[first * width..(first + rows) * width].to_vec());
     }
     if walks.is_empty() {
-        return Ok(false);
+        return Ok(BothWays {
+            by_rows: Vec::new(),
+            by_steps: Vec::new(),
+        });
     }
     let of = (context.logs, &walks[..]);
     let mut map = StepMap::new(context.machine, specs, parameters, of, nx + 1)?;
@@ -50,18 +73,27 @@ pub fn one_step_tells(
     let by_rows = map.linearise(theta, &states, want, &[], &[])?;
     map.by_one_step(true);
     let by_steps = map.linearise(theta, &states, want, &[], &[])?;
-    let (mut rows, mut odd) = (0_u32, 0_u32);
-    for (a, b) in by_rows.iter().zip(&by_steps) {
-        for (a, b) in a.a.chunks_exact(nx * nx).zip(b.a.chunks_exact(nx * nx)) {
-            let (mut apart, mut size) = (0.0, 0.0);
-            for (place, (x, y)) in a.iter().zip(b).enumerate() {
-                let unit = context.scale[place % nx] / context.scale[place / nx];
-                apart += ((x - y) * unit).powi(2);
-                size += (x * unit).powi(2);
+    Ok(BothWays { by_rows, by_steps })
+}
+
+impl BothWays {
+    /// Whether they agree, coordinates in units of their `scale`; not where there are none.
+    #[must_use]
+    pub fn one_step_tells(&self, scale: &[f64]) -> bool {
+        let nx = scale.len();
+        let (mut rows, mut odd) = (0_u32, 0_u32);
+        for (a, b) in self.by_rows.iter().zip(&self.by_steps) {
+            for (a, b) in a.a.chunks_exact(nx * nx).zip(b.a.chunks_exact(nx * nx)) {
+                let (mut apart, mut size) = (0.0, 0.0);
+                for (place, (x, y)) in a.iter().zip(b).enumerate() {
+                    let unit = scale[place % nx] / scale[place / nx];
+                    apart += ((x - y) * unit).powi(2);
+                    size += (x * unit).powi(2);
+                }
+                rows += 1;
+                odd += u32::from(apart.is_nan() || apart > APART * APART * size);
             }
-            rows += 1;
-            odd += u32::from(apart.is_nan() || apart > APART * APART * size);
         }
+        rows > 0 && f64::from(odd) <= ODD * f64::from(rows)
     }
-    Ok(f64::from(odd) <= ODD * f64::from(rows))
 }

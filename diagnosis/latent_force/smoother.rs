@@ -20,6 +20,7 @@
 //! effects are one linear regression.
 
 mod adjoint;
+mod blocks;
 mod filter;
 mod matrix;
 mod regress;
@@ -32,6 +33,7 @@ use super::step_map::LinearEpisode;
 use super::walk::Walk;
 
 use adjoint::backward;
+use blocks::Blocks;
 use filter::{Filter, Step};
 
 /// Covariances of the latent force and of the readings.
@@ -198,9 +200,17 @@ impl Regression {
     }
 }
 
-/// Logarithm of the likelihood of an episode.
+/// Logarithm of the likelihood of an episode that is no segment.
 #[must_use]
 pub fn log_likelihood(problem: Problem<'_>, noise: &NoiseModel) -> f64 {
+    match Blocks::of(problem, noise) {
+        Some(blocks) => blocks.log_likelihood(problem, noise),
+        None => log_likelihood_of_one(problem, noise),
+    }
+}
+
+/// The same of an episode that is taken as one block.
+fn log_likelihood_of_one(problem: Problem<'_>, noise: &NoiseModel) -> f64 {
     let mut filter = Filter::new(problem, noise);
     for k in 0..problem.linear.rows {
         for entry in 0..filter.ns {
@@ -219,7 +229,18 @@ pub fn regress(problem: Problem<'_>, noise: &NoiseModel, m: usize) -> Regression
     if problem.walk.segment.is_some() {
         segment::regress(problem, noise, m)
     } else {
-        regress::regress(problem, noise, (m, None))
+        regress_some(problem, noise, (m, None))
+    }
+}
+
+fn regress_some(
+    problem: Problem<'_>,
+    noise: &NoiseModel,
+    columns: (usize, Option<&[usize]>),
+) -> Regression {
+    match Blocks::of(problem, noise) {
+        Some(blocks) => blocks.regress(problem, noise, columns),
+        None => regress::regress(problem, noise, columns),
     }
 }
 
@@ -230,7 +251,7 @@ pub fn regress_on(
     noise: &NoiseModel,
     (m, columns): (usize, &[usize]),
 ) -> Regression {
-    regress::regress(problem, noise, (m, Some(columns)))
+    regress_some(problem, noise, (m, Some(columns)))
 }
 
 /// Smooths an episode.
@@ -239,6 +260,14 @@ pub fn smooth(problem: Problem<'_>, noise: &NoiseModel) -> Smoothed {
     if problem.walk.segment.is_some() {
         return segment::smooth(problem, noise);
     }
+    match Blocks::of(problem, noise) {
+        Some(blocks) => blocks.smooth(problem, noise),
+        None => smooth_one(problem, noise),
+    }
+}
+
+/// Smooths an episode that is no segment as one block.
+fn smooth_one(problem: Problem<'_>, noise: &NoiseModel) -> Smoothed {
     let mut filter = Filter::new(problem, noise);
     let rows = problem.linear.rows;
     let mut steps: Vec<Step> = Vec::with_capacity(rows);

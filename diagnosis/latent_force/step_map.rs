@@ -27,11 +27,13 @@ use crate::batch_columns::BatchColumns;
 use crate::data::Logs;
 use crate::machine::Machine;
 
+use super::islands::Islands;
 use super::walk::Walk;
 
 pub use late::retime_columns;
 pub use linear_episode::{Derivatives, LinearEpisode, Variation};
 use pass::Part;
+use role::Role;
 use sensors::Sensors;
 use shares::share_out;
 
@@ -60,8 +62,12 @@ struct Common<'a> {
     remembers_readings: bool,
     /// Whether one physics step tells the slopes of a row in the state.
     one_step: bool,
+    /// What one push tells of.
+    islands: Islands,
     /// Whether each parameter acts in each physics step alike, by what the model is then.
     at_once: Vec<bool>,
+    /// Whether each parameter is of an effect on readings.
+    measured: Vec<bool>,
     /// What readings depend on.
     sensors: Sensors,
 }
@@ -83,6 +89,14 @@ impl Common<'_> {
         let values = theta.iter().zip(&variation.theta).zip(&self.at_once);
         let mut varied = values.filter(|((a, b), _)| a != b);
         !self.remembers_readings && varied.all(|(_, at_once)| *at_once)
+    }
+
+    /// Whether a variation is of effects on readings alone: it moves as the model as it is does, and only has to be read.
+    fn is_read_alone(&self, theta: &[f64], variation: &Variation) -> bool {
+        let values = theta.iter().zip(&variation.theta).zip(&self.measured);
+        values
+            .filter(|((a, b), _)| a != b)
+            .all(|(_, measured)| *measured)
     }
 
     /// Whether a variation changes readings in the same state.
@@ -122,6 +136,8 @@ struct Request<'r> {
     at_once: &'r [bool],
     /// Whether each variation changes readings in the same state.
     read: &'r [bool],
+    /// Whether each variation is of readings alone.
+    alone: &'r [bool],
 }
 
 impl<'r> Request<'r> {
@@ -133,6 +149,14 @@ impl<'r> Request<'r> {
     /// Coordinates of the start of a walk whose slopes are zero; empty for none.
     fn blind(&self, walk: usize) -> &'r [bool] {
         self.anew.blind.get(walk).map_or(&[], Vec::as_slice)
+    }
+
+    /// Whether a role is read at each row, and never stepped.
+    fn is_read_alone(&self, role: Role) -> bool {
+        match role {
+            Role::Varied(i) => self.alone[i],
+            _ => role.is_read_alone(),
+        }
     }
 
     /// Whether the column of a variation is wanted along the walks whose columns are `due`, or else along the others.
@@ -193,12 +217,17 @@ impl<'a> StepMap<'a> {
                 on_readings.push(spec.label());
             }
         }
+        let is_measured = |p: &Parameter| {
+            let mut targets = p.targets.iter();
+            targets.all(|t| t.element == "effect" && on_readings.contains(&t.name))
+        };
         let acts_at_once = |p: &Parameter| {
             let mut targets = p.targets.iter();
             targets.all(|t| t.element != "effect" || in_each_step.contains(&t.name))
         };
         let common = Common {
             states: layout.recording(&names)?,
+            islands: Islands::one(layout.nv, logs.entries.len()),
             readings: layout.recording(&logs.channels())?,
             logs,
             walks,
@@ -209,6 +238,7 @@ impl<'a> StepMap<'a> {
             remembers_readings,
             one_step: false,
             at_once: parameters.iter().map(acts_at_once).collect(),
+            measured: parameters.iter().map(is_measured).collect(),
             sensors: Sensors::of(&model.layout().sensors, logs, (&on_readings, parameters)),
         };
         Ok(Self { common, parts })
@@ -217,6 +247,11 @@ impl<'a> StepMap<'a> {
     /// Takes slopes in the state from one physics step of each row; from the whole row otherwise, as a new map does.
     pub fn by_one_step(&mut self, one: bool) {
         self.common.one_step = one;
+    }
+
+    /// Takes slopes in what nothing couples together, where no walk is a segment.
+    pub fn apart(&mut self, islands: &Islands) {
+        self.common.islands.clone_from(islands);
     }
 
     /// Whether an effect makes readings depend on those before.
@@ -286,6 +321,10 @@ impl<'a> StepMap<'a> {
             .iter()
             .map(|v| common.is_read(theta, v))
             .collect();
+        let alone: Vec<bool> = variations
+            .iter()
+            .map(|v| common.is_read_alone(theta, v))
+            .collect();
         let request = Request {
             theta,
             trajectory,
@@ -295,6 +334,7 @@ impl<'a> StepMap<'a> {
             anew,
             at_once: &at_once,
             read: &read,
+            alone: &alone,
         };
         let found: Vec<Vec<LinearEpisode>> = self
             .parts

@@ -40,6 +40,24 @@ pub fn touching(plant: &Plant, logs: &Logs, shown: &Trajectory) -> Vec<Vec<bool>
         .collect()
 }
 
+/// Pairs of bodies that touch anywhere along a trajectory.
+#[must_use]
+pub fn pairs_touching(shown: &Trajectory) -> Vec<[usize; 2]> {
+    let n = shown.pairs.len();
+    let touch = |&(i, _): &(usize, &[usize; 2])| {
+        let mut paths = shown.episodes.iter();
+        paths.any(|p| {
+            p.contact
+                .iter()
+                .skip(i)
+                .step_by(n)
+                .any(|force| *force > 0.0)
+        })
+    };
+    let pairs = shown.pairs.iter().enumerate();
+    pairs.filter(touch).map(|(_, pair)| *pair).collect()
+}
+
 /// Whether each joint stays where it is along some positions (`rows x nq` an episode), as far as readings with such deviations
 /// (one a degree of freedom, 0 for none) tell; what no sensor reads may move.
 fn joints_at_rest(plant: &Plant, noise: &[f64], episodes: &[&[f64]]) -> Vec<bool> {

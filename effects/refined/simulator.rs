@@ -124,6 +124,19 @@ impl RefinedSimulator {
         sims.iter().for_each(|&sim| self.steps[sim] += steps);
     }
 
+    /// Brings simulations to where others have come, each with the memory of its own effects kept: of simulations that differ from those
+    /// in their readings alone.
+    ///
+    /// # Errors
+    /// As [`Simulator::copy_state`].
+    pub fn follow(&mut self, from: &[usize], to: &[usize]) -> Result<()> {
+        self.inner.copy_state(from, to)?;
+        for (&source, &sim) in from.iter().zip(to) {
+            self.steps[sim] = self.steps[source];
+        }
+        Ok(())
+    }
+
     /// Lets the sensors' effects change `frames` rows of a simulation's readings, the first
     /// after `first` physics steps of its episode and each `substeps` later than the one before.
     fn measure(

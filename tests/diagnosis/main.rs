@@ -10,6 +10,7 @@ mod beyond;
 mod diagnosis_support;
 mod drift;
 mod far;
+mod islands;
 mod late_drive;
 mod next;
 mod one_joint;

@@ -162,10 +162,45 @@ fn what_a_value_changes_in_one_step_is_carried_over_the_row() {
     assert_eq!(one, again);
 }
 
+#[test]
+fn what_acts_on_readings_alone_is_read_and_not_stepped() {
+    let machine = machine(&scene(0.0, 1.0));
+    let logs = logs(&machine);
+    let bias: EffectSpec = "sensor-bias@x:bias=0".parse().unwrap();
+    let parameter = Parameter {
+        name: "bias".into(),
+        targets: vec!["effect/sensor-bias@x/bias".parse().unwrap()],
+        range: [-1.0, 1.0],
+        scale: Scale::Linear,
+        unit: "m".into(),
+    };
+    // Along the rows, and as a segment that is replayed.
+    for segment in [None, Some(0)] {
+        let walks = [Walk {
+            segment,
+            ..Walk::new(&logs, 0, DT)
+        }];
+        let (specs, parameters) = ([bias.clone()], [parameter.clone()]);
+        let mut map = StepMap::new(&machine, &specs, &parameters, (&logs, &walks), 4).unwrap();
+        let varied = [Variation {
+            theta: vec![0.01],
+            scale: 0.01,
+        }];
+        let want = Derivatives::default();
+        let found = map
+            .linearise(&[0.0], &[states()], want, &[], &varied)
+            .unwrap();
+        assert_eq!(map.steps(), ((ROWS - 1) * STEPS) as u64);
+        assert!(largest_difference(&found[0].reading_columns, &[1.0; ROWS]) < 1e-12);
+        assert!(found[0].state_columns.iter().all(|x| *x == 0.0));
+    }
+}
+
 /// Whether one step tells the slopes of a row, of a machine with some effects.
 fn tells(machine: &Machine, specs: &[EffectSpec]) -> bool {
     let logs = logs(machine);
     let taken = Taken {
+        touching: Vec::new(),
         walks: vec![Walk::new(&logs, 0, DT)],
         given: vec![None],
         open: Vec::new(),

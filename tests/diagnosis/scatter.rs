@@ -47,6 +47,7 @@ fn scatter(joint: &str) -> (Vec<[f64; 2]>, f64) {
     let mut logs = Logs::new(&machine.plant, &["x".into()], named).unwrap();
     logs.set_noise(&[NOISE]);
     let taken = Taken {
+        touching: Vec::new(),
         walks: vec![Walk {
             segment: Some(0),
             ..Walk::new(&logs, 0, DT)

@@ -76,6 +76,7 @@ fn it_is_what_separates_a_row_of_steps_from_the_solution() {
     let trajectory = [states.clone()];
     let mut linear = map.linearise(&[], &trajectory, none, &[], &[]).unwrap();
     let taken = Taken {
+        touching: Vec::new(),
         walks: walks.clone(),
         given: vec![None],
         open: vec![0, 1],

@@ -73,6 +73,7 @@ fn compare(segments: [Option<usize>; 2]) {
     let otherwise: Vec<Vec<f64>> = still.collect();
     let first = from_readings(plant, logs, &walks, &otherwise);
     let taken = Taken {
+        touching: Vec::new(),
         given: vec![None; walks.len()],
         open: bench.open.clone(),
         otherwise,

@@ -2,6 +2,8 @@
 
 use asid_effects::Reach;
 
+use crate::latent_force::islands::Islands;
+
 /// Columns that are walked together, by their places in a list, with what each reaches.
 #[derive(Clone, Debug)]
 pub(super) struct Group {
@@ -20,10 +22,22 @@ impl Group {
         }
     }
 
-    /// The columns, each by itself.
-    pub(super) fn apart(self) -> impl Iterator<Item = Self> {
+    /// The columns in groups of which each reaches another island; each by itself where all of them do so already.
+    pub(super) fn apart(self, islands: &Islands) -> Vec<Self> {
+        let by_islands = self.islands(islands).is_some();
         let each = self.members.into_iter().zip(self.reaches);
-        each.map(|(member, reach)| Self::single(member, reach))
+        if by_islands {
+            return each.map(|(m, reach)| Self::single(m, reach)).collect();
+        }
+        by_island(each, islands)
+    }
+
+    /// The island that each column reaches, where that is another for each.
+    pub(super) fn islands(&self, islands: &Islands) -> Option<Vec<usize>> {
+        let own = self.reaches.iter().map(|r| islands.reached(r));
+        let own: Vec<usize> = own.collect::<Option<_>>()?;
+        let is_first = |(i, island): (usize, &usize)| !own[..i].contains(island);
+        own.iter().enumerate().all(is_first).then_some(own)
     }
 
     /// Whether its columns are of readings alone.
@@ -52,6 +66,32 @@ pub(super) fn grouped(columns: impl Iterator<Item = (usize, Reach)>) -> Vec<Grou
     groups
 }
 
+/// Groups of columns each of which reaches another island, whatever it reaches there.
+pub(super) fn by_island(
+    columns: impl Iterator<Item = (usize, Reach)>,
+    islands: &Islands,
+) -> Vec<Group> {
+    let mut groups: Vec<Group> = Vec::new();
+    for (member, reach) in columns {
+        let own = islands.reached(&reach);
+        let takes = |g: &&mut Group| {
+            own.is_some()
+                && g.reaches.iter().all(|r| {
+                    let other = islands.reached(r);
+                    other.is_some() && other != own
+                })
+        };
+        match groups.iter_mut().find(takes) {
+            Some(group) => {
+                group.members.push(member);
+                group.reaches.push(reach);
+            }
+            None => groups.push(Group::single(member, reach)),
+        }
+    }
+    groups
+}
+
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
@@ -59,6 +99,32 @@ pub(super) mod tests {
     /// Of some degrees of freedom.
     pub(in crate::latent_force::columns) fn dofs(own: &[usize]) -> Reach {
         Reach::Dofs(own.iter().copied().collect())
+    }
+
+    #[test]
+    fn columns_of_different_islands_are_told_apart_whatever_they_reach_there() {
+        use super::super::super::step_map::LinearEpisode;
+        use asid_core::Scene;
+        use asid_mjcf::Plant;
+
+        let scene = r#"<mujoco><worldbody>
+            <body><joint type="hinge"/><geom size="0.1" mass="1"/>
+              <body><joint type="hinge"/><geom size="0.1" mass="1"/></body></body>
+            <body><joint type="slide"/><geom size="0.1" mass="1"/></body></worldbody></mujoco>"#;
+        let plant = Plant::of(&Scene::from_xml("scene", scene, &[]).unwrap()).unwrap();
+        let none: [LinearEpisode; 0] = [];
+        let islands = Islands::of(&plant, &[], &[], &none);
+        let reaches = [dofs(&[0]), dofs(&[0, 1]), dofs(&[2]), Reach::Everything];
+        let groups = by_island(reaches.into_iter().enumerate(), &islands);
+        let members: Vec<_> = groups.iter().map(|g| &g.members[..]).collect();
+        assert_eq!(members, [&[0, 2][..], &[1], &[3]]);
+        assert_eq!(groups[0].islands(&islands), Some(vec![0, 1]));
+        // What does not balance by islands is walked for alone; what did not by forces, by islands first.
+        assert_eq!(groups[0].clone().apart(&islands).len(), 2);
+        let of_all = grouped([(0, dofs(&[0])), (1, dofs(&[1])), (2, dofs(&[2]))].into_iter());
+        let apart = of_all[0].clone().apart(&islands);
+        let members: Vec<_> = apart.iter().map(|g| &g.members[..]).collect();
+        assert_eq!(members, [&[0, 2][..], &[1]]);
     }
 
     #[test]

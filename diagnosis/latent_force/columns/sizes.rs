@@ -82,6 +82,7 @@ fn parts<'c>(
         reading_variance: context.reading_variance.clone(),
         alike: context.alike.clone(),
         inertial: context.inertial.clone(),
+        islands: context.islands.clone(),
         one_step: context.one_step,
         step_error: StepError::default(),
         walks,

@@ -1,6 +1,7 @@
 //! Where columns come from: the engine, or a trace of the forces.
 
 use asid_core::{Progress, Result};
+use asid_effects::Reach;
 
 use crate::candidate::Candidate;
 use crate::latent_force::context::Context;
@@ -8,7 +9,7 @@ use crate::latent_force::step_map::{Anew, Derivatives, Variation, retime_columns
 use crate::latent_force::trace::trace;
 
 use super::force_response::{ForceSlopes, Row};
-use super::group::{Group, grouped};
+use super::group::{Group, by_island, grouped};
 use super::null_model::{NullModel, Way};
 use super::together::{Account, Entries};
 
@@ -66,7 +67,8 @@ pub(super) struct Source<'s> {
     pub(super) slopes: &'s [ForceSlopes],
     /// How late readings are in the present model.
     pub(super) late: &'s [Vec<f64>],
-    /// Whether the engine walks once for what can be told apart, to a few percent of the largest column of a walk.
+    /// Whether the engine walks once for what acts on the motion and can be told apart, to a few percent of the largest column of a walk. What acts on
+    /// readings alone is told apart exactly, and is walked for together in any case.
     pub(super) together: bool,
     /// Who says when to stop.
     pub(super) progress: &'s dyn Progress,
@@ -135,13 +137,20 @@ impl Source<'_> {
             candidate.effect.reach(plant, &candidate.spec.site)
         };
         let reaches = by_engine.iter().map(|&i| (i, reach(i)));
-        // Of a segment the columns are those of its whole replay, which no row's slopes take apart; where there are any, a part of the walks without one
-        // has no such slopes either.
-        let mut due: Vec<Group> = if self.together && !self.replayed {
-            grouped(reaches)
+        let (of_sensors, others): (Vec<_>, Vec<_>) =
+            reaches.partition(|(_, reach)| matches!(reach, Reach::Sensor(_)));
+        // What acts on readings leaves the motion as it is, and each sensor's readings are its own.
+        let mut due = grouped(of_sensors.into_iter());
+        // Of a segment the other columns are those of its whole replay, which no row's slopes take apart; where there are any, a part of the walks
+        // without one has no such slopes either.
+        if self.together && !self.replayed {
+            due.extend(grouped(others.into_iter()));
+        } else if !self.replayed {
+            due.extend(by_island(others.into_iter(), &context.islands));
         } else {
-            reaches.map(|(i, reach)| Group::single(i, reach)).collect()
-        };
+            let alone = others.into_iter();
+            due.extend(alone.map(|(i, reach)| Group::single(i, reach)));
+        }
         let entries = Entries::of(context);
         let mut begun = false;
         while !due.is_empty() {
@@ -153,7 +162,9 @@ impl Source<'_> {
             let balances = self.slice((context, states), (&due, wanted), (model, &entries), out)?;
             // What reaches further than it says is walked for alone.
             let odd = due.into_iter().zip(balances).filter(|(_, fine)| !fine);
-            due = odd.flat_map(|(group, _)| group.apart()).collect();
+            due = odd
+                .flat_map(|(group, _)| group.apart(&context.islands))
+                .collect();
             due.extend(rest);
         }
         Ok(true)
@@ -187,9 +198,12 @@ impl Source<'_> {
         let wanted_too = (Derivatives::default(), anew);
         let found = map.linearise_anew(&model.theta, states, wanted_too, &[], &variations)?;
         // Only forces take several columns apart, and where all are walked for alone there may be no slopes in forces.
-        let by_forces = groups
-            .iter()
-            .any(|g| g.members.len() > 1 && !g.is_of_sensors());
+        let by_islands: Vec<Option<Vec<usize>>> =
+            groups.iter().map(|g| g.islands(&context.islands)).collect();
+        let several = groups.iter().zip(&by_islands);
+        let by_forces = several
+            .into_iter()
+            .any(|(g, own)| g.members.len() > 1 && own.is_none() && !g.is_of_sensors());
         let mut accounts = vec![Account::default(); own];
         let mut change = vec![0.0; nx.max(ns)];
         for (w, mut linear) in found.into_iter().enumerate() {
@@ -210,13 +224,21 @@ impl Source<'_> {
                     (groups, wanted),
                     &mut change[..nx],
                     to,
-                    |g, change, set| match &row {
-                        Some(row) if !groups[g].is_of_sensors() => {
-                            accounts[g].states(&groups[g], row, change, |i, part| {
-                                part.iter().enumerate().for_each(|(s, x)| set(i, s, *x));
-                            });
+                    |g, change, set| {
+                        let set = |i: usize, part: &[f64]| {
+                            part.iter().enumerate().for_each(|(s, x)| set(i, s, *x));
+                        };
+                        let account = &mut accounts[g];
+                        match (&by_islands[g], &row) {
+                            (Some(own), _) => {
+                                let own = (&own[..], &context.islands);
+                                account.by_islands(own, (change, &context.scale), set);
+                            }
+                            (None, Some(row)) if !groups[g].is_of_sensors() => {
+                                account.states(&groups[g], row, change, set);
+                            }
+                            _ => account.still(change, &context.scale),
                         }
-                        _ => accounts[g].still(change, &context.scale),
                     },
                 );
             }

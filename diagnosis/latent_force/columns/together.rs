@@ -9,11 +9,12 @@ use asid_effects::Reach;
 use nalgebra::DVector;
 
 use crate::latent_force::context::Context;
+use crate::latent_force::islands::Islands;
 
 use super::force_response::Row;
 use super::group::Group;
 
-/// Share of the force of a group, by magnitude, that may come up where no member reaches: more, and one reaches further than
+/// Share of what a group makes, by magnitude, that may come up where no member reaches: more, and one reaches further than
 /// it says. Differences are right to a thousandth of it.
 const ELSEWHERE: f64 = 0.01;
 
@@ -34,14 +35,10 @@ pub(super) struct Entries {
 impl Entries {
     /// Of the logs that are compared.
     pub(super) fn of(context: &Context<'_>) -> Self {
-        let layout = &context.plant().layout.sensors;
-        let logs = context.logs;
-        let name = logs.entries.iter().map(|e| &logs.sensors[e.sensor].name);
-        // A sensor that the layout lacks is no effect's own.
-        let place = |name: &String| layout.iter().position(|s| s.name == *name);
-        let noise = logs.entry_noise();
+        let noise = context.logs.entry_noise();
         Self {
-            sensors: name.map(|n| place(n).unwrap_or(layout.len())).collect(),
+            // A sensor that the layout lacks is no effect's own.
+            sensors: context.entry_sensors(),
             least: noise.iter().map(|n| NO_CHANGE * n).collect(),
         }
     }
@@ -50,8 +47,8 @@ impl Entries {
 /// How the changes of a group came out.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Account {
-    /// Sum of squares of all forces that the changes stand for, and of those where no member reaches.
-    forces: [f64; 2],
+    /// Sum of squares of all that the changes stand for, as forces or in units of the coordinates, and of what is where no member reaches.
+    parts: [f64; 2],
     /// Whether something came up that members cannot have made.
     strange: bool,
 }
@@ -59,7 +56,7 @@ pub(super) struct Account {
 impl Account {
     /// Whether the members reach what they say and nothing else.
     pub(super) fn balances(&self) -> bool {
-        !self.strange && self.forces[1] <= ELSEWHERE.powi(2) * self.forces[0]
+        !self.strange && self.parts[1] <= ELSEWHERE.powi(2) * self.parts[0]
     }
 
     /// Takes note of the change of the state (`nx`, relative to the largest of each) by effects that do not reach it.
@@ -104,10 +101,37 @@ impl Account {
         }
         for (d, reached) in reached.iter().enumerate() {
             let square: f64 = (d..n).step_by(nv).map(|p| forces[p].powi(2)).sum();
-            self.forces[0] += square;
+            self.parts[0] += square;
             if !reached {
-                self.forces[1] += square;
+                self.parts[1] += square;
             }
+        }
+    }
+
+    /// Takes the change of the state over a row (`nx`, relative to the largest of each, `scale`) apart by the island that each member reaches;
+    /// `set` is given each member's place in the group and its part.
+    pub(super) fn by_islands(
+        &mut self,
+        (own, islands): (&[usize], &Islands),
+        (change, scale): (&[f64], &[f64]),
+        mut set: impl FnMut(usize, &[f64]),
+    ) {
+        let nv = change.len() / 2;
+        let of = |at: usize| islands.island(at % nv);
+        let all = change.iter().enumerate();
+        for ((at, x), scale) in all.clone().zip(scale).filter(|(_, scale)| **scale > 0.0) {
+            let square = (x / scale).powi(2);
+            self.parts[0] += square;
+            if !own.contains(&of(at)) {
+                self.parts[1] += square;
+            }
+        }
+        let mut part = vec![0.0; change.len()];
+        for (i, island) in own.iter().enumerate() {
+            for (at, x) in all.clone() {
+                part[at] = if of(at) == *island { *x } else { 0.0 };
+            }
+            set(i, &part);
         }
     }
 
@@ -121,13 +145,10 @@ impl Account {
     ) {
         let each = entries.sensors.iter().zip(&entries.least).zip(change);
         for (entry, ((sensor, least), x)) in each.enumerate() {
-            if x.abs() <= *least {
-                continue;
-            }
             let is_own = |r: &Reach| *r == Reach::Sensor(*sensor);
             match group.reaches.iter().position(is_own) {
                 Some(i) => set(i, entry, *x),
-                None => self.strange = true,
+                None => self.strange |= x.abs() > *least,
             }
         }
     }

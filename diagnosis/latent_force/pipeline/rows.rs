@@ -6,7 +6,7 @@ use crate::bench::Bench;
 use crate::latent_force::context::Taken;
 use crate::latent_force::initial::{from_readings, position_noise, scales};
 use crate::latent_force::segments::{cut, whole};
-use crate::latent_force::touching::touching;
+use crate::latent_force::touching::{pairs_touching, touching};
 use crate::latent_force::walk::Walk;
 use crate::predict::Point;
 use crate::starts::given_start;
@@ -42,6 +42,8 @@ pub(super) struct Rows {
     walks: Vec<Walk>,
     /// Whether something touches, one flag a row.
     touches: Vec<Vec<bool>>,
+    /// Pairs of bodies that touch in some row.
+    pairs: Vec<[usize; 2]>,
     /// Largest magnitude of each tangent coordinate.
     scale: Vec<f64>,
     /// States where no sensor reads them.
@@ -61,6 +63,7 @@ impl Rows {
         let shown = along(bench, &walks, nominal, &first)?;
         Ok(Self {
             touches: touching(plant, logs, &shown),
+            pairs: pairs_touching(&shown),
             scale: scales(plant, &first),
             walks,
             unread,
@@ -98,6 +101,7 @@ impl Rows {
             open: bench.open.clone(),
             otherwise: self.unread.along(&walks),
             scale: self.scale.clone(),
+            touching: self.pairs.clone(),
             walks,
         }
     }

@@ -91,6 +91,24 @@ impl Case {
         }
     }
 
+    /// The same with nothing that couples its degrees of freedom 0 and 2 with the others, nor the odd entries of its readings with them.
+    fn uncoupled(mut self) -> Self {
+        let (nv, ns) = (self.noise.q.len(), self.noise.r.len());
+        let nx = 2 * nv;
+        let part = |at: usize| at % nv % 2;
+        let cut = |all: &mut Vec<f64>, n: usize, row: &dyn Fn(usize) -> usize| {
+            for (i, x) in all.iter_mut().enumerate() {
+                if row(i / n) != part(i % n) {
+                    *x = 0.0;
+                }
+            }
+        };
+        cut(&mut self.linear.a, nx, &|row| part(row % nx));
+        cut(&mut self.b, nv, &|row| part(row % nx));
+        cut(&mut self.linear.h, nx, &|row| row % ns % 2);
+        self
+    }
+
     /// A mass on a slide, its place read in each row, about a trajectory that stays at rest at 0. One column: a
     /// force of one unit.
     fn slide(mass: f64, dt: f64, places: &[f64], noise: NoiseModel) -> Self {
@@ -178,7 +196,20 @@ fn assert_same(got: f64, want: f64, what: &str) {
     );
 }
 
-/// One degree of freedom with two entries a row, two with three.
-fn cases() -> [Case; 2] {
-    [Case::random(1, 6, 2, 3), Case::random(2, 6, 3, 4)]
+/// One degree of freedom with two entries a row, two with three, and three of which one is apart from the others.
+fn cases() -> [Case; 3] {
+    [
+        Case::random(1, 6, 2, 3),
+        Case::random(2, 6, 3, 4),
+        Case::random(3, 6, 4, 3).uncoupled(),
+    ]
+}
+
+#[test]
+fn what_nothing_couples_is_filtered_apart() {
+    let case = Case::random(3, 6, 4, 3).uncoupled();
+    let blocks = Blocks::of(case.problem(), &case.noise).unwrap();
+    assert_eq!(blocks.sizes(), [2, 1]);
+    let coupled = Case::random(3, 6, 4, 3);
+    assert!(Blocks::of(coupled.problem(), &coupled.noise).is_none());
 }

@@ -29,11 +29,11 @@ impl Part {
         out: &[LinearEpisode],
     ) -> (Vec<usize>, Vec<usize>) {
         let Stepped { roles, now, .. } = stepped;
-        let states = roles.iter().filter(|r| r.coordinate().is_some()).count();
-        let all_states = states == 2 * c.layout.nv;
+        let states = roles.iter().filter(|r| r.slot().is_some()).count();
+        let all_states = states == 2 * c.islands.slots();
         let carried = |e: &usize| !self.carried(*e, request, out).is_empty();
         let carries = all_states || now.iter().all(carried);
-        let stepped = (0..roles.len()).filter(|&v| !roles[v].is_read_alone());
+        let stepped = (0..roles.len()).filter(|&v| !request.is_read_alone(roles[v]));
         stepped.partition(|&v| match roles[v] {
             Role::State(_) => all_states,
             Role::Varied(i) => carries && request.at_once[i],
@@ -93,9 +93,13 @@ impl Part {
                 let slope = slope.map(|s| if s.is_finite() { s } else { 0.0 });
                 match roles[v] {
                     Role::Varied(i) => varied.push((i, DVector::from_iterator(nx, slope))),
-                    Role::State(coordinate) => {
+                    Role::State(slot) => {
                         states = true;
-                        of_step.set_column(coordinate, &DVector::from_iterator(nx, slope));
+                        for (s, slope) in slope.enumerate() {
+                            if let Some(coordinate) = c.islands.coordinate_told(slot, s) {
+                                of_step[(s, coordinate)] = slope;
+                            }
+                        }
                     }
                     _ => {}
                 }

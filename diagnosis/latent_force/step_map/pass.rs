@@ -46,9 +46,12 @@ impl Part {
         let only_replays = self.walks.iter().all(|&w| c.rolls(w, want));
         let mut in_state = Vec::new();
         if want.state {
-            in_state = Role::in_state(nv, c.remembers_readings && !only_replays);
+            in_state = Role::in_state(
+                (c.islands.slots(), nv),
+                c.remembers_readings && !only_replays,
+            );
         }
-        let others = Role::others(nv, want, variations.len());
+        let others = Role::others(c.islands.slots(), want, variations.len());
         let (ns, m) = (c.logs.entries.len(), variations.len());
         let mut episodes: Vec<LinearEpisode> = self
             .walks
@@ -179,7 +182,7 @@ impl Part {
             for (v, role) in roles.iter().enumerate() {
                 let follows = match role {
                     Role::State(_) | Role::Force(_) | Role::Jolt(_) => true,
-                    Role::Varied(i) => request.at_once[*i] && c.one_step,
+                    Role::Varied(i) => request.at_once[*i] && !request.alone[*i] && c.one_step,
                     Role::Nominal | Role::Reading(_) | Role::Ramp(_) => false,
                 };
                 if follows {
@@ -204,13 +207,15 @@ impl Part {
                     retract(&c.layout, &mut state, &change);
                     change.fill(0.0);
                 }
-                if let (Role::State(i), true) = (*role, segment) {
-                    change[i] = request.push[i];
+                if let Role::State(slot) = *role {
+                    for i in c.islands.moved(slot) {
+                        change[i] = if segment { request.push[i] } else { STATE_STEP };
+                    }
                     retract(&c.layout, &mut state, &change);
                     change.fill(0.0);
-                } else if let Role::State(i) | Role::Reading(i) = *role {
+                } else if let Role::Reading(i) = *role {
                     change[i] = STATE_STEP;
-                    if let (Role::Reading(_), Some(place)) = (role, i.checked_sub(nv)) {
+                    if let Some(place) = i.checked_sub(nv) {
                         change[place] = STATE_STEP * c.walks[self.walks[e]].time[k];
                     }
                     retract(&c.layout, &mut state, &change);

@@ -63,10 +63,12 @@ impl Part {
             }
             for (v, role) in roles.iter().enumerate().skip(1) {
                 let Ok(at) = read.binary_search(&v) else {
-                    if let Role::State(i) = *role {
-                        // The slope of a coordinate that is read as it is.
-                        for s in 0..ns {
-                            out[e].h[(k * ns + s) * nx + i] = out[e].h[s * nx + i];
+                    if let Role::State(slot) = *role {
+                        // The slopes of coordinates that are read as they are.
+                        for i in c.islands.moved(slot) {
+                            for s in 0..ns {
+                                out[e].h[(k * ns + s) * nx + i] = out[e].h[s * nx + i];
+                            }
                         }
                     }
                     continue;
@@ -84,9 +86,11 @@ impl Part {
                         }
                     }
                     Role::Reading(_) | Role::Ramp(_) if segment => {}
-                    Role::State(i) if !c.remembers_readings => {
+                    Role::State(slot) if !c.remembers_readings => {
                         for (s, d) in differ.iter().enumerate() {
-                            out[e].h[(k * ns + s) * nx + i] = d / STATE_STEP;
+                            if let Some(i) = c.islands.coordinate_read(slot, s) {
+                                out[e].h[(k * ns + s) * nx + i] = d / STATE_STEP;
+                            }
                         }
                     }
                     Role::Reading(i) => {

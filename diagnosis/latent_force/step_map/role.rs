@@ -7,7 +7,7 @@ use super::Derivatives;
 pub(super) enum Role {
     /// The model as it is.
     Nominal,
-    /// A coordinate of the state is moved, for `f` and `h`.
+    /// Coordinates of the state that nothing couples are moved, one of each [island](super::Islands), for `f` and `h`.
     State(usize),
     /// A coordinate of the state is moved all along, for `h` alone: a position by a constant, a speed by a constant and its
     /// position by a ramp. A reading that remembers (a delay, a filter) sees the past of a speed as its position; what the
@@ -15,18 +15,18 @@ pub(super) enum Role {
     Reading(usize),
     /// A speed is moved by a ramp, for how late a sensor of speeds is.
     Ramp(usize),
-    /// A generalized force acts all along the row.
+    /// Generalized forces act all along the row, one at each island.
     Force(usize),
-    /// It acts in the first physics step of the row.
+    /// They act in the first physics step of the row.
     Jolt(usize),
     /// A variation of the parameters.
     Varied(usize),
 }
 
 impl Role {
-    /// Those for the slopes in the state; where readings remember, also those that are moved all along.
-    pub(super) fn in_state(nv: usize, remembers_readings: bool) -> Vec<Self> {
-        let mut roles: Vec<Self> = (0..2 * nv).map(Self::State).collect();
+    /// Those for the slopes in the state, by so many pushes; where readings remember, also those that are moved all along.
+    pub(super) fn in_state((slots, nv): (usize, usize), remembers_readings: bool) -> Vec<Self> {
+        let mut roles: Vec<Self> = (0..2 * slots).map(Self::State).collect();
         if remembers_readings {
             roles.extend((0..2 * nv).map(Self::Reading));
             roles.extend((0..nv).map(Self::Ramp));
@@ -35,13 +35,13 @@ impl Role {
     }
 
     /// Those for the slopes in forces and for some variations.
-    pub(super) fn others(nv: usize, want: Derivatives, variations: usize) -> Vec<Self> {
+    pub(super) fn others(slots: usize, want: Derivatives, variations: usize) -> Vec<Self> {
         let mut roles = Vec::new();
         if want.force {
-            roles.extend((0..nv).map(Self::Force));
+            roles.extend((0..slots).map(Self::Force));
         }
         if want.jolt {
-            roles.extend((0..nv).map(Self::Jolt));
+            roles.extend((0..slots).map(Self::Jolt));
         }
         roles.extend((0..variations).map(Self::Varied));
         roles
@@ -52,8 +52,8 @@ impl Role {
         matches!(self, Self::Reading(_) | Self::Ramp(_))
     }
 
-    /// The coordinate of the state that it moves for `f`.
-    pub(super) fn coordinate(self) -> Option<usize> {
+    /// Which coordinates of the state it moves for `f`; see [`Islands::moved`](super::Islands::moved).
+    pub(super) fn slot(self) -> Option<usize> {
         match self {
             Self::State(i) => Some(i),
             _ => None,

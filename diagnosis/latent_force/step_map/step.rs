@@ -6,6 +6,7 @@
 
 use std::collections::HashMap;
 
+use crate::latent_force::islands::Islands;
 use crate::latent_force::tangent::{difference, retract};
 use asid_core::simulator::{StepHook, StepView};
 use asid_core::{Control, Result, Rollout, Simulator as _};
@@ -18,18 +19,23 @@ use super::{Common, LinearEpisode, Request};
 /// Fewest physics steps of a row whose slopes are those of one of them: placing a simulation costs about as much as a step.
 const MANY: usize = 4;
 
-/// A generalized force on some rows of a rollout.
+/// Generalized forces on some rows of a rollout.
 struct Push<'a> {
-    /// For each row of the rollout, the degree of freedom, the force, and whether it acts in the first physics step alone.
-    rows: &'a [Option<(usize, f64, bool)>],
+    islands: &'a Islands,
+    /// The force at each degree of freedom.
+    force: &'a [f64],
+    /// For each row of the rollout, which are pushed, and whether in the first physics step alone.
+    rows: &'a [Option<(usize, bool)>],
 }
 
 impl StepHook for Push<'_> {
     fn before_step(&self, row: usize, step: usize, view: &mut StepView<'_>) {
-        if let Some((dof, force, at_first)) = self.rows[row]
+        if let Some((slot, at_first)) = self.rows[row]
             && (step == 0 || !at_first)
         {
-            view.force[dof] += force;
+            for &dof in self.islands.pushed(slot) {
+                view.force[dof] += self.force[dof];
+            }
         }
     }
 }
@@ -61,7 +67,7 @@ impl Part {
         } = stepped;
         let rolls = now.iter().any(|&e| c.rolls(self.walks[e], request.want));
         let (read, all): (Vec<usize>, Vec<usize>) =
-            (0..roles.len()).partition(|&v| roles[v].is_read_alone());
+            (0..roles.len()).partition(|&v| request.is_read_alone(roles[v]));
         let (mut short, mut whole) = (Vec::new(), all.clone());
         if c.one_step && !rolls && substeps >= MANY {
             (short, whole) = self.told_by_one_step(c, stepped, request, out);
@@ -78,7 +84,11 @@ impl Part {
         self.advance(c, (stepped, &whole), done..substeps, request, row)?;
         for v in read {
             let sims: Vec<usize> = now.iter().map(|e| v * self.walks.len() + e).collect();
-            self.simulator.pass_time(&sims, substeps as u64);
+            if rolls {
+                self.simulator.follow(now, &sims)?;
+            } else {
+                self.simulator.pass_time(&sims, substeps as u64);
+            }
         }
         let (nv, m) = (c.layout.nv, request.variations.len());
         let (nx, width) = (2 * nv, c.layout.nq + nv);
@@ -94,19 +104,29 @@ impl Part {
             for (place, &v) in whole.iter().enumerate().skip(1) {
                 let other = row.state(place * now.len() + i, width);
                 difference(&c.layout, other, nominal, &mut differ);
-                let (matrix, columns, at, scale) = match roles[v] {
-                    Role::State(i) => (&mut out[e].a, nx, i, STATE_STEP),
-                    Role::Force(i) => (&mut out[e].b, nv, i, request.push[i]),
-                    Role::Jolt(i) => (&mut out[e].jolt, nv, i, request.push[i]),
-                    Role::Varied(i) => {
-                        (&mut out[e].state_columns, m, i, request.variations[i].scale)
-                    }
+                let role = roles[v];
+                let (matrix, columns) = match role {
+                    Role::State(_) => (&mut out[e].a, nx),
+                    Role::Force(_) => (&mut out[e].b, nv),
+                    Role::Jolt(_) => (&mut out[e].jolt, nv),
+                    Role::Varied(_) => (&mut out[e].state_columns, m),
                     Role::Nominal | Role::Reading(_) | Role::Ramp(_) => continue,
                 };
+                let told = |s: usize| match role {
+                    Role::State(slot) => Some((c.islands.coordinate_told(slot, s)?, STATE_STEP)),
+                    Role::Force(slot) | Role::Jolt(slot) => {
+                        let dof = c.islands.dof_told(slot, s)?;
+                        Some((dof, request.push[dof]))
+                    }
+                    Role::Varied(i) => Some((i, request.variations[i].scale)),
+                    Role::Nominal | Role::Reading(_) | Role::Ramp(_) => None,
+                };
                 for (s, d) in differ.iter().enumerate() {
-                    let value = d / scale;
-                    matrix[(k * nx + s) * columns + at] =
-                        if value.is_finite() { value } else { 0.0 };
+                    if let Some((at, scale)) = told(s) {
+                        let value = d / scale;
+                        matrix[(k * nx + s) * columns + at] =
+                            if value.is_finite() { value } else { 0.0 };
+                    }
                 }
             }
         }
@@ -133,13 +153,17 @@ impl Part {
                 let ctrl = &c.walks[self.walks[e]].ctrl[k * nu..(k + 1) * nu];
                 row.ctrl.extend_from_slice(ctrl);
                 row.pushes.push(match roles[v] {
-                    Role::Force(d) => Some((d, request.push[d], false)),
-                    Role::Jolt(d) if steps.start == 0 => Some((d, request.push[d], true)),
+                    Role::Force(slot) => Some((slot, false)),
+                    Role::Jolt(slot) if steps.start == 0 => Some((slot, true)),
                     _ => None,
                 });
             }
         }
-        let hook = Push { rows: &row.pushes };
+        let hook = Push {
+            islands: &c.islands,
+            force: request.push,
+            rows: &row.pushes,
+        };
         let mut rollout = Rollout::new(
             &row.sims,
             1,
@@ -178,10 +202,10 @@ impl Part {
                     let states = &request.trajectory[self.walks[e]];
                     state.copy_from_slice(&states[k * width..(k + 1) * width]);
                 }
-                if let Some(coordinate) = roles[v].coordinate() {
-                    change[coordinate] = STATE_STEP;
+                if let Some(slot) = roles[v].slot() {
+                    c.islands.moved(slot).for_each(|i| change[i] = STATE_STEP);
                     retract(&c.layout, &mut state, &change);
-                    change[coordinate] = 0.0;
+                    change.fill(0.0);
                 }
                 row.sims.push(v * n + e);
                 row.qpos.extend_from_slice(&state[..nq]);
@@ -213,7 +237,7 @@ pub(super) struct RowBuffers {
     pub(super) qpos: Vec<f64>,
     pub(super) qvel: Vec<f64>,
     ctrl: Vec<f64>,
-    pushes: Vec<Option<(usize, f64, bool)>>,
+    pushes: Vec<Option<(usize, bool)>>,
     pub(super) read: Vec<f64>,
     next: Vec<f64>,
     /// The last slope of one step of each walk that is no jump.
