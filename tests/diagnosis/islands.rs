@@ -9,6 +9,7 @@ use asid::diagnosis::latent_force::walk::Walk;
 use asid::diagnosis::machine::Machine;
 
 use crate::diagnosis_support::engine;
+use crate::row_slopes::largest_difference;
 
 /// Two arms of two hinges, one with a servo, and a body in free fall.
 const SCENE: &str = r#"<mujoco><option timestep="0.002"/><worldbody>
@@ -45,12 +46,6 @@ fn logs(machine: &Machine) -> Logs {
     };
     let names = NAMES.map(String::from);
     Logs::new(&machine.plant, &names, vec![("log".into(), episode)]).unwrap()
-}
-
-fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
-    assert_eq!(a.len(), b.len());
-    let each = a.iter().zip(b).map(|(a, b)| (a - b).abs());
-    each.fold(0.0, f64::max)
 }
 
 #[test]

@@ -77,7 +77,8 @@ fn states() -> Vec<f64> {
     (0..ROWS).flat_map(state).collect()
 }
 
-fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
+/// Largest difference of two lists of as many numbers.
+pub(crate) fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
     assert_eq!(a.len(), b.len());
     let each = a.iter().zip(b).map(|(a, b)| (a - b).abs());
     each.fold(0.0, f64::max)
