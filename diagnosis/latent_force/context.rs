@@ -252,7 +252,7 @@ pub fn begin<'a>(
         context.islands = Islands::of(plant, &sensors, &taken.touching, &ways.by_rows);
     }
     let mut map = context.map(&[], parameters, nv + 1)?;
-    let all = vec![true; trajectory.len()];
+    let all = vec![Some(f64::INFINITY); trajectory.len()];
     map.roll(theta, (&mut trajectory, &all), &context.reading_variance)?;
     let want = Derivatives {
         force: true,

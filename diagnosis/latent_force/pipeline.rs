@@ -153,6 +153,7 @@ fn searched_in(
     let open_loop = OpenLoop {
         excess: &excess,
         states: &states,
+        steps: replays.steps(),
         is_gap: replays.leaves_a_gap(&none)?,
     };
     let how = (open_loop, progress);

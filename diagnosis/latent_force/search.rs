@@ -9,6 +9,7 @@ mod path;
 mod prior;
 mod prune;
 mod race;
+mod replayed_order;
 mod round;
 mod screening;
 mod second_look;

@@ -351,15 +351,16 @@ impl<'a> StepMap<'a> {
     }
 
     /// Replays some of the segments from the first rows of their trajectories, which become those of the replays. With the sum of
-    /// squares of what is left of the readings that count, each divided by its `variance` (one an entry); 0 for other walks,
-    /// infinite where the engine failed.
+    /// squares of what is left of the readings that count, each divided by its `variance` (one an entry); 0 for other walks. A replay ends where it
+    /// leaves more than the `most` that is asked of it (one a walk, `None` where it is not replayed), and has left infinitely much then, as where
+    /// the engine fails.
     ///
     /// # Errors
     /// As [`StepMap::linearise`].
     pub fn roll(
         &mut self,
         theta: &[f64],
-        (trajectory, which): (&mut [Vec<f64>], &[bool]),
+        (trajectory, most): (&mut [Vec<f64>], &[Option<f64>]),
         variance: &[f64],
     ) -> Result<Vec<f64>> {
         let common = &self.common;
@@ -375,7 +376,7 @@ impl<'a> StepMap<'a> {
             .parts
             .par_iter_mut()
             .zip(&mut shares)
-            .map(|(part, states)| part.roll(common, (theta, variance), (states, which)))
+            .map(|(part, states)| part.roll(common, (theta, variance), (states, most)))
             .collect();
         let mut out = vec![0.0; self.common.walks.len()];
         for ((part, states), left) in self.parts.iter().zip(shares).zip(left) {

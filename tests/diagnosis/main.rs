@@ -27,6 +27,7 @@ mod step_error;
 mod steps;
 mod sticking;
 mod stopped;
+mod stopped_knee;
 mod together;
 mod unread;
 mod wiring;

@@ -6,6 +6,7 @@ use asid::diagnosis::data::Logs;
 use asid::diagnosis::latent_force::context::{Taken, begin};
 use asid::diagnosis::latent_force::fit::{Hypothesis, Slopes};
 use asid::diagnosis::latent_force::scatter::Scatter;
+use asid::diagnosis::latent_force::step_map::StepMap;
 use asid::diagnosis::latent_force::walk::Walk;
 use asid::diagnosis::machine::Machine;
 
@@ -20,10 +21,9 @@ const NOISE: f64 = 1e-3;
 /// Where the slide begins, m, its speed, m/s, and its acceleration, m/s².
 const START: [f64; 3] = [0.01, 0.3, 0.5];
 
-/// Scatter of a slide that moves freely but for what `joint` says of it, as one segment: power of each row in units of the noise, of draws
-/// and of half the time step, with the share of rows that is lost.
-fn scatter(joint: &str) -> (Vec<[f64; 2]>, f64) {
-    let [place, speed, acceleration] = START;
+/// A slide that moves freely but for what `joint` says of it, pulled by a constant acceleration.
+fn slide(joint: &str) -> Machine {
+    let acceleration = START[2];
     let xml = format!(
         r#"<mujoco><option timestep="{DT}" gravity="{acceleration} 0 0"/><worldbody><body>
         <joint name="slide" type="slide" axis="1 0 0" {joint}/>
@@ -31,7 +31,12 @@ fn scatter(joint: &str) -> (Vec<[f64; 2]>, f64) {
         <sensor><jointpos name="x" joint="slide"/></sensor></mujoco>"#
     );
     let scene = Scene::from_xml("slide", &xml, &[]).unwrap();
-    let machine = Machine::new(engine(), &scene, &[], &[], 1).unwrap();
+    Machine::new(engine(), &scene, &[], &[], 1).unwrap()
+}
+
+/// The log of it without a stop, with no noise.
+fn logs(machine: &Machine) -> Logs {
+    let [place, speed, acceleration] = START;
     let time: Vec<f64> = (0..ROWS).map(|k| (k * STEPS) as f64 * DT).collect();
     let at = |t: &f64| place + speed * t + 0.5 * acceleration * t * t;
     let episode = Episode {
@@ -46,12 +51,25 @@ fn scatter(joint: &str) -> (Vec<[f64; 2]>, f64) {
     let named = vec![("log".into(), episode)];
     let mut logs = Logs::new(&machine.plant, &["x".into()], named).unwrap();
     logs.set_noise(&[NOISE]);
+    logs
+}
+
+/// The log as one segment.
+fn segment(logs: &Logs) -> Vec<Walk> {
+    vec![Walk {
+        segment: Some(0),
+        ..Walk::new(logs, 0, DT)
+    }]
+}
+
+/// Scatter of a slide with some `joint`, as one segment: power of each row in units of the noise, of draws and of half the time step, with the share
+/// of rows that is lost.
+fn scatter(joint: &str) -> (Vec<[f64; 2]>, f64) {
+    let machine = slide(joint);
+    let logs = logs(&machine);
     let taken = Taken {
         touching: Vec::new(),
-        walks: vec![Walk {
-            segment: Some(0),
-            ..Walk::new(&logs, 0, DT)
-        }],
+        walks: segment(&logs),
         given: vec![None],
         open: Vec::new(),
         otherwise: vec![vec![0.0; 2 * ROWS]],
@@ -98,4 +116,31 @@ fn behind_a_stop_replays_scatter_and_before_it_they_do_not() {
     }
     assert!(rows[8..].iter().any(|[draws, _]| *draws > 0.01));
     assert!(lost < 0.7, "{lost}");
+}
+
+#[test]
+fn a_replay_ends_where_it_leaves_more_than_is_asked_of_it() {
+    let machine = slide("");
+    let logs = logs(&machine);
+    let walks = segment(&logs);
+    let mut map = StepMap::new(&machine, &[], &[], (&logs, &walks), 1).unwrap();
+    // A start that is off by three deviations is off by as much in every row, but for the integrator's error of 0.1 deviations at the end.
+    let [place, speed, _] = START;
+    let first = [place + 3.0 * NOISE, speed];
+    let begun = [&first[..], &[f64::NAN; 2 * (ROWS - 1)]].concat();
+    let mut roll = |most: Option<f64>| {
+        let mut states = vec![begun.clone()];
+        let left = map.roll(&[], (&mut states, &[most]), &[NOISE * NOISE]);
+        let rows = states[0].iter().step_by(2).filter(|x| x.is_finite());
+        (left.unwrap()[0], rows.count())
+    };
+    let (whole, rows) = roll(Some(f64::INFINITY));
+    assert!((whole / (9.0 * ROWS as f64) - 1.0).abs() < 0.1, "{whole}");
+    assert_eq!(rows, ROWS);
+    assert_eq!(roll(Some(1.001 * whole)), (whole, ROWS));
+    // A third of the rows leave a third of it.
+    let (left, rows) = roll(Some(whole / 3.0));
+    assert_eq!(left, f64::INFINITY);
+    assert!(rows.abs_diff(ROWS / 3) <= 2, "{rows}");
+    assert_eq!(roll(None), (0.0, 1));
 }

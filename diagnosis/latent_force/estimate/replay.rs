@@ -59,7 +59,7 @@ impl Estimate {
         if !map.has_segments() {
             return Ok(());
         }
-        let all: Vec<bool> = vec![true; self.trajectory.len()];
+        let all = vec![Some(f64::INFINITY); self.trajectory.len()];
         let mut left = map.roll(theta, (&mut self.trajectory, &all), &self.noise.r)?;
         let promised: Vec<f64> = self
             .smoothed
@@ -132,7 +132,10 @@ impl Estimate {
                 retract(&layout, &mut other[w][..width], &change);
             }
         }
-        let of_other = map.roll(theta, (&mut other, &worse), &self.noise.r)?;
+        // One that leaves more than the best so far is of no use.
+        let each = worse.iter().zip(&*left);
+        let most: Vec<Option<f64>> = each.map(|(worse, left)| worse.then_some(*left)).collect();
+        let of_other = map.roll(theta, (&mut other, &most), &self.noise.r)?;
         for (w, states) in other.into_iter().enumerate() {
             if worse[w] && of_other[w] < left[w] {
                 left[w] = of_other[w];

@@ -94,6 +94,12 @@ pub(super) struct Replays<'a> {
 }
 
 impl Replays<'_> {
+    /// Physics steps of a replay of all training logs.
+    pub(super) fn steps(&self) -> usize {
+        let episodes = self.bench.train.logs.episodes.iter();
+        episodes.map(|e| e.plan.physics_steps()).sum()
+    }
+
     /// Excess power that a fitted set leaves of the training logs, a reading, in units of the noise.
     pub(super) fn excess(&self, fitted: &Fitted, members: &[usize]) -> Result<f64> {
         Ok((self.left(fitted, members)? - 1.0).max(0.0))
@@ -275,16 +281,16 @@ pub(super) fn replay(
     (firsts, repeats): (&[usize], Option<Repeats>),
     progress: &dyn Progress,
 ) -> Result<(Findings, Vec<Set>)> {
-    let episodes = &bench.train.logs.episodes;
-    let steps: usize = episodes.iter().map(|e| e.plan.physics_steps()).sum();
-    let few = steps * bench.open.len() <= REPLAYED && !progress.is_stopped();
-    let replays = Replays {
+    let mut replays = Replays {
         bench,
         candidates,
         firsts,
-        open: bench.open.iter().copied().filter(|_| few).collect(),
+        open: Vec::new(),
         progress,
     };
+    if replays.steps() * bench.open.len() <= REPLAYED && !progress.is_stopped() {
+        replays.open.clone_from(&bench.open);
+    }
     let mut not_tried: Vec<NotTried> = (outcome.untried.iter())
         .map(|u| NotTried {
             stage: u.stage.to_owned(),

@@ -64,17 +64,6 @@ impl Upon<'_> {
     /// back three times as much is no three times what a third of that does. Where the null leaves no more than another program's
     /// version of the same machine would, the set stays.
     fn further(&self, set: &Set) -> Result<Option<Set>> {
-        let own = self.base.fitted.theta.len()..set.fitted.theta.len();
-        let at = |part: f64| {
-            let mut other = set.clone();
-            let values = &mut other.fitted.theta[own.clone()];
-            let unknowns = &set.fitted.hypothesis.unknowns[own.clone()];
-            for (value, u) in values.iter_mut().zip(unknowns) {
-                let moved = u.center + part * (*value - u.center);
-                *value = moved.clamp(u.bounds[0], u.bounds[1]);
-            }
-            other
-        };
         let excess = |set: &Set| (self.open_loop.excess)(set);
         let stands = excess(self.base)?;
         if stands < NEGLIGIBLE * NEGLIGIBLE {
@@ -86,13 +75,26 @@ impl Upon<'_> {
             if self.progress.is_stopped() {
                 return Ok(None);
             }
-            let other = at(part);
+            let other = self.at(set, part);
             let left = excess(&other)?;
             if left < least {
                 (least, best) = (left, Some(other));
             }
         }
         Ok(best)
+    }
+
+    /// An enlarged set with the added values at a `part` of their distance from their nulls, within their bounds.
+    pub(super) fn at(&self, set: &Set, part: f64) -> Set {
+        let own = self.base.fitted.theta.len()..;
+        let mut other = set.clone();
+        let values = &mut other.fitted.theta[own.clone()];
+        let unknowns = &set.fitted.hypothesis.unknowns[own];
+        for (value, u) in values.iter_mut().zip(unknowns) {
+            let moved = u.center + part * (*value - u.center);
+            *value = moved.clamp(u.bounds[0], u.bounds[1]);
+        }
+        other
     }
 
     /// A set whose segments first find starts that go with its values, which would else go with the starts.

@@ -21,6 +21,8 @@ pub struct OpenLoop<'o> {
     pub excess: &'o dyn Fn(&Set) -> Result<f64>,
     /// States of a set along the walks, `rows x (nq + nv)` each.
     pub states: &'o dyn Fn(&Set) -> Result<Vec<Vec<f64>>>,
+    /// Physics steps of one of all training logs.
+    pub steps: usize,
     /// Whether they leave a gap without effects. Where they do not, no set could close one: a screening tells what the logs could have
     /// shown, and nothing is fitted.
     pub is_gap: bool,

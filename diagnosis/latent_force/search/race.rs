@@ -24,7 +24,11 @@ impl Upon<'_> {
         let lead = ranked.first().map_or(0.0, |s| s.worth(price));
         let wander = self.base.fitted.wander;
         let least = (breadth.share * lead).max(breadth.least).max(wander);
-        let due = ranked.iter().filter(|s| s.worth(price) > least);
+        let closing = self.closing(look)?;
+        let others = ranked.iter().enumerate();
+        let others = others.filter(|(i, s)| s.worth(price) > least && !closing.contains(i));
+        let others = others.map(|(_, s)| s);
+        let due = closing.iter().map(|&i| &ranked[i]).chain(others);
         let places = if self.base.candidates.is_empty() {
             TRIED
         } else {

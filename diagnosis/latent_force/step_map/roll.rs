@@ -8,49 +8,44 @@ use super::Common;
 use super::pass::Part;
 
 impl Part {
-    /// Replays some of its segments from the first rows of the trajectories, which become those of the replays. With the sum of
-    /// squares of the readings that count, each divided by its variance; infinite where the engine failed.
+    /// Replays some of its segments as [`StepMap::roll`](super::StepMap::roll).
     pub(super) fn roll(
         &mut self,
         c: &Common<'_>,
         (theta, variance): (&[f64], &[f64]),
-        (states, which): (&mut [Vec<f64>], &[bool]),
+        (states, most): (&mut [Vec<f64>], &[Option<f64>]),
     ) -> Result<Vec<f64>> {
         let (nq, nu) = (c.layout.nq, c.layout.nu());
         let width = nq + c.layout.nv;
         let walks: Vec<&Walk> = self.walks.iter().map(|&w| &c.walks[w]).collect();
-        let all: Vec<usize> = (0..walks.len())
-            .filter(|&e| walks[e].segment.is_some() && which[self.walks[e]])
+        let mut going: Vec<usize> = (0..walks.len())
+            .filter(|&e| walks[e].segment.is_some() && most[self.walks[e]].is_some())
             .collect();
         let mut left = vec![0.0; walks.len()];
-        if all.is_empty() {
+        if going.is_empty() {
             return Ok(left);
         }
         let mut columns = Vec::new();
-        for &e in &all {
+        for &e in &going {
             c.columns
                 .push(theta, c.episode(self.walks[e]), &mut columns);
         }
-        self.simulator.reset(&all)?;
-        self.simulator.set_parameters(&all, &columns)?;
-        let first: Vec<&[f64]> = all.iter().map(|&e| &states[e][..width]).collect();
+        self.simulator.reset(&going)?;
+        self.simulator.set_parameters(&going, &columns)?;
+        let first: Vec<&[f64]> = going.iter().map(|&e| &states[e][..width]).collect();
         let qpos: Vec<f64> = first.iter().flat_map(|s| s[..nq].to_vec()).collect();
         let qvel: Vec<f64> = first.iter().flat_map(|s| s[nq..].to_vec()).collect();
-        self.simulator.set_state(&all, &qpos, &qvel)?;
+        self.simulator.set_state(&going, &qpos, &qvel)?;
         let (entries, readings) = (c.logs.entries.len(), c.readings.width());
         let mut read = Vec::new();
         let mut differ = vec![0.0; entries];
         let mut next = Vec::new();
-        let longest = all.iter().map(|&e| walks[e].len()).max().unwrap_or(0);
+        let longest = going.iter().map(|&e| walks[e].len()).max().unwrap_or(0);
         for k in 0..longest {
-            let here: Vec<usize> = all
-                .iter()
-                .copied()
-                .filter(|&e| walks[e].len() > k)
-                .collect();
-            read.resize(here.len() * readings, 0.0);
-            self.simulator.read(&here, &c.readings, &mut read)?;
-            for (&e, read) in here.iter().zip(read.chunks_exact(readings)) {
+            going.retain(|&e| walks[e].len() > k);
+            read.resize(going.len() * readings, 0.0);
+            self.simulator.read(&going, &c.readings, &mut read)?;
+            for (&e, read) in going.iter().zip(read.chunks_exact(readings)) {
                 if walks[e].segment.is_some_and(|lead| k < lead) {
                     continue;
                 }
@@ -61,7 +56,14 @@ impl Part {
                 let present = differ.iter().zip(variance).filter(|(d, _)| !d.is_nan());
                 left[e] += present.map(|(d, v)| d * d / v).sum::<f64>();
             }
-            for (substeps, now) in by_substeps(&walks, here, k) {
+            going.retain(|&e| {
+                let goes_on = most[self.walks[e]].is_some_and(|most| left[e] <= most);
+                if !goes_on {
+                    left[e] = f64::INFINITY;
+                }
+                goes_on && left[e].is_finite()
+            });
+            for (substeps, now) in by_substeps(&walks, going.clone(), k) {
                 let ctrl: Vec<f64> = now
                     .iter()
                     .flat_map(|&e| walks[e].ctrl[k * nu..(k + 1) * nu].to_vec())

@@ -1,0 +1,149 @@
+//! A leg whose knee nearly sticks: a dry friction so large that slopes at the model without it tell little of it.
+
+use std::fmt::Write as _;
+use std::path::Path;
+use std::sync::Mutex;
+
+use asid::core::{BatchConfig, Capabilities, Control, Progress, Rollout, Scene};
+use asid::diagnosis::diagnose::{Settings, diagnose};
+use asid::diagnosis::machine::Machine;
+use asid::diagnosis::study::Study;
+
+use super::assert_names;
+use super::one_joint::normal;
+use super::rows::write_model;
+use crate::diagnosis_support::engine;
+
+/// Rows of a log, and the time between them, s.
+const ROWS: usize = 100;
+const ROW: f64 = 0.01;
+/// Time step, s.
+const STEP: f64 = 0.001;
+/// Deviation of a reading, m or rad.
+const NOISE: f64 = 1e-3;
+/// Dry friction of the real knee, N m; the motor makes up to 4.
+const FRICTION: f64 = 1.0;
+
+/// A trunk on a vertical rail, whose leg pushes it off the floor.
+fn scene(friction: f64) -> String {
+    format!(
+        r#"<mujoco model="leg"><option timestep="{STEP}" cone="elliptic"/>
+        <worldbody><geom name="floor" type="plane" size="9 9 0.1"/>
+        <body name="trunk" pos="0 0 0.5"><joint name="rail" type="slide" axis="0 0 1"/>
+          <geom name="trunk" type="box" size="0.1 0.05 0.05" mass="1" contype="0" conaffinity="0"/>
+          <body name="thigh"><joint name="hip" type="hinge" axis="0 1 0" stiffness="20" damping="0.05"/>
+            <geom name="thigh" type="capsule" fromto="0 0 0 0 0 -0.25" size="0.02" mass="0.3" contype="0" conaffinity="0"/>
+            <body name="shank" pos="0 0 -0.25"><joint name="knee" type="hinge" axis="0 1 0" stiffness="10" damping="0.02" frictionloss="{friction}"/>
+              <geom name="shank" type="capsule" fromto="0 0 0 0 0 -0.25" size="0.02" mass="0.2" contype="0" conaffinity="0"/>
+              <geom name="foot" type="sphere" size="0.03" pos="0 0 -0.25" mass="0.05"/></body></body></body>
+        </worldbody><actuator><motor name="at_hip" joint="hip"/><motor name="at_knee" joint="knee"/></actuator>
+        <sensor><jointpos name="height" joint="rail"/><jointpos name="q_hip" joint="hip"/><jointpos name="q_knee" joint="knee"/>
+        </sensor></mujoco>"#
+    )
+}
+
+/// Torques of a log at a time, N m.
+fn torques(episode: u32, time: f64) -> [f64; 2] {
+    let k = f64::from(episode);
+    let wave = |pace: f64, phase: f64| (std::f64::consts::TAU * pace * time + phase).sin();
+    [
+        2.0 * wave(1.0 + 0.2 * k, k),
+        3.0 * wave(1.7 - 0.1 * k, 2.0 * k),
+    ]
+}
+
+fn write_study(folder: &Path, episodes: u32) {
+    let scene_of = |xml: &str| Scene::from_xml("leg", xml, &[]).unwrap();
+    let model = engine().load(&scene_of(&scene(FRICTION))).unwrap();
+    let config = BatchConfig {
+        size: 1,
+        threads: 1,
+        targets: Vec::new(),
+    };
+    let mut simulator = model.simulator(&config).unwrap();
+    let recording = model
+        .layout()
+        .recording(&["height", "q_hip", "q_knee"])
+        .unwrap();
+    let substeps = (ROW / STEP).round() as usize;
+    for episode in 0..episodes {
+        let mut noise = normal(300 + u64::from(episode));
+        let start = [0.03, 0.2, -0.4];
+        simulator.reset(&[0]).unwrap();
+        simulator.set_state(&[0], &start, &[0.0; 3]).unwrap();
+        let commands = (0..ROWS - 1).flat_map(|k| torques(episode, ROW * k as f64));
+        let commands: Vec<f64> = commands.collect();
+        let mut places = start.to_vec();
+        for now in commands.chunks_exact(2) {
+            let mut next = [0.0; 3];
+            let rollout = Rollout::new(&[0], 1, substeps, Control::Shared(now), &recording);
+            simulator.rollout(&rollout, &mut next).unwrap();
+            places.extend(next);
+        }
+        let mut text = "time,ctrl.at_hip,ctrl.at_knee,height,q_hip,q_knee".to_owned();
+        for kind in ["qpos", "qvel"] {
+            for name in ["rail", "hip", "knee"] {
+                write!(text, ",{kind}.{name}").unwrap();
+            }
+        }
+        for (k, row) in places.chunks_exact(3).enumerate() {
+            let time = ROW * k as f64;
+            let [hip, knee] = torques(episode, time);
+            write!(text, "\n{time:.2},{hip},{knee}").unwrap();
+            for x in row {
+                write!(text, ",{}", x + NOISE * noise()).unwrap();
+            }
+            let [height, hip, knee] = start;
+            match k {
+                0 => write!(text, ",{height},{hip},{knee},0,0,0").unwrap(),
+                _ => text += &",".repeat(6),
+            }
+        }
+        let kind = if episode + 2 < episodes {
+            "train"
+        } else {
+            "test"
+        };
+        std::fs::write(folder.join(format!("{kind}_{episode}.csv")), text + "\n").unwrap();
+    }
+    write_model(folder, &scene(0.0));
+}
+
+/// Keeps what is tried, and stops the work at the second of it.
+#[derive(Default)]
+struct Tried(Mutex<Vec<String>>);
+
+impl Progress for Tried {
+    fn begin(&self, _stage: &str, _total: u64) {}
+    fn advance(&self, _units: u64) {}
+    fn end(&self) {}
+    fn is_stopped(&self) -> bool {
+        self.0.lock().unwrap().len() > 1
+    }
+    fn note(&self, text: &str) {
+        self.0
+            .lock()
+            .unwrap()
+            .extend(text.strip_prefix("trying ").map(str::to_owned));
+    }
+}
+
+/// By slopes at a knee without friction a hysteresis of the drives leads; replays with friction leave least.
+#[test]
+fn a_friction_that_stops_a_knee_is_tried_first_and_named() {
+    let needed = Capabilities::CONTACT | Capabilities::DOUBLE_PRECISION;
+    if !engine().capabilities().contains(needed) {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    write_study(folder.path(), 5);
+    let study = Study::read(folder.path()).unwrap();
+    let machine = Machine::new(engine(), &study.scene, &[], &[], 0).unwrap();
+    let tried = Tried::default();
+    let (found, _) = diagnose(&study, machine, Settings::default(), &tried).unwrap();
+    let r = &found.result;
+    assert_names(r, &["coulomb-friction@knee"]);
+    let force = r.effects[0].parameters["force"];
+    assert!((force / FRICTION - 1.0).abs() < 0.05, "{force}");
+    assert_eq!(tried.0.lock().unwrap()[0], "coulomb-friction@knee");
+}
