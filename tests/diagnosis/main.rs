@@ -29,6 +29,7 @@ mod sticking;
 mod stopped;
 mod stopped_knee;
 mod together;
+mod unmoved;
 mod unread;
 mod wiring;
 mod world;

@@ -1,7 +1,8 @@
 //! Columns along segments: of all candidates along a part of the segments, and of those that lead there along the others.
 //!
 //! Of a segment a column is a replay of its own, which no other column shares, and a machine with contacts has hundreds of
-//! candidates. What leads on all segments leads on a third of them too, for they are spread evenly over the logs.
+//! candidates. What leads on all segments leads on a third of them too, where they are spread over the logs and something moves along them: a log in
+//! which a puck is never reached tells nothing of what it slides on.
 
 use asid_core::Result;
 
@@ -19,10 +20,53 @@ const FEWEST: usize = 2;
 /// The walks along which all candidates are taken, and the others.
 pub(super) fn parts(context: &Context<'_>) -> [Vec<usize>; 2] {
     let n = context.walks.len();
-    let whole = !context.has_segments() || n < EVERY * FEWEST;
-    let is_first = |w: &usize| whole || w % EVERY == EVERY / 2;
-    let (first, others) = (0..n).partition(is_first);
-    [first, others]
+    if !context.has_segments() || n < EVERY * FEWEST {
+        return [(0..n).collect(), Vec::new()];
+    }
+    let motion: Vec<f64> = context.walks.iter().map(|w| motion(context, w)).collect();
+    let first = most_of_each(&motion);
+    let others = (0..n).filter(|w| !first.contains(w));
+    [first.clone(), others.collect()]
+}
+
+/// How much moves along a walk: of all entries of its readings, the logarithm of their variance in units of the noise, so that a thing that moves a little
+/// counts beside one that moves much.
+fn motion(context: &Context<'_>, walk: &Walk) -> f64 {
+    let logs = context.logs;
+    let width = logs.width();
+    let readings = &logs.episodes[walk.episode].readings;
+    let row = |k: usize| &readings[k * width..(k + 1) * width];
+    let rows = &walk.rows[walk.segment.unwrap_or(0)..];
+    let noise = logs.entry_noise();
+    let mut differ = vec![0.0; noise.len()];
+    // Rows, sum and sum of squares of each entry.
+    let mut sums = vec![[0.0_f64; 3]; noise.len()];
+    for &k in rows {
+        logs.reading_difference(row(k), row(rows[0]), &mut differ);
+        for (sums, x) in sums.iter_mut().zip(&differ).filter(|(_, x)| x.is_finite()) {
+            sums[0] += 1.0;
+            sums[1] += x;
+            sums[2] += x * x;
+        }
+    }
+    let of_entry = |([n, sum, squares], noise): (&[f64; 3], &f64)| {
+        let n = n.max(1.0);
+        ((squares / n - (sum / n).powi(2)).max(0.0) / (noise * noise)).ln_1p()
+    };
+    sums.iter().zip(&noise).map(of_entry).sum()
+}
+
+/// Of each so many in a row the place of the largest, of the middle one where none is larger; of the last ones, if they are fewer, where they have a
+/// middle.
+fn most_of_each(values: &[f64]) -> Vec<usize> {
+    let most = |first: usize| {
+        let own = first..(first + EVERY).min(values.len());
+        let middle = first + EVERY / 2;
+        let larger = |most, w| if values[w] > values[most] { w } else { most };
+        own.contains(&middle).then(|| own.fold(middle, larger))
+    };
+    let firsts = (0..values.len()).step_by(EVERY);
+    firsts.filter_map(most).collect()
 }
 
 /// What some of the walks have, where any has it.
@@ -101,5 +145,17 @@ impl Columns {
             }
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn of_each_three_it_is_that_along_which_most_moves() {
+        assert_eq!(most_of_each(&[3.0, 1.0, 2.0, 1.0, 1.0, 5.0]), [0, 5]);
+        assert_eq!(most_of_each(&[1.0; 8]), [1, 4, 7]);
+        assert_eq!(most_of_each(&[1.0, 1.0, 1.0, 9.0]), [1]);
     }
 }
