@@ -2,12 +2,12 @@
 
 use std::path::Path;
 
-use asid::core::{BatchConfig, Capabilities, Control, Rollout, Scene};
+use asid::core::{BatchConfig, Control, Rollout, Scene};
 use asid::diagnosis::diagnose::Diagnosis;
 use asid::diagnosis::result::{DiagnosisResult, Kind};
 
 use super::rows::{write_log, write_model};
-use super::{assert_names, run_on};
+use super::{assert_names, has_contacts, run_on};
 use crate::diagnosis_support::engine;
 
 /// Rows of a log, and the time between them, s.
@@ -81,8 +81,7 @@ fn write_study(folder: &Path, real: &str, (episodes, high): (u32, &[u32]), start
 
 /// The diagnosis of such logs; `None` with an engine whose floors do not give way.
 fn diagnosed_with(real: &str, logs: (u32, &[u32]), starts: bool) -> Option<Diagnosis> {
-    let needed = Capabilities::CONTACT | Capabilities::DOUBLE_PRECISION;
-    if !engine().capabilities().contains(needed) {
+    if !has_contacts() {
         return None;
     }
     let folder = tempfile::tempdir().unwrap();

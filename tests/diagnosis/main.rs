@@ -36,6 +36,7 @@ mod world;
 
 use std::path::Path;
 
+use asid::core::Capabilities;
 use asid::core::progress::Silent;
 use asid::diagnosis::diagnose::{Diagnosis, Settings, Work, diagnose};
 use asid::diagnosis::forces;
@@ -45,6 +46,12 @@ use asid::diagnosis::study::Study;
 use asid::diagnosis::windows;
 use diagnosis_support::engine;
 use world::{MASS, Truth, write_study};
+
+/// Whether the engine has contacts as exact as these tests ask for.
+fn has_contacts() -> bool {
+    let needed = Capabilities::CONTACT | Capabilities::DOUBLE_PRECISION;
+    engine().capabilities().contains(needed)
+}
 
 /// The verdict names these effects and no other.
 #[track_caller]

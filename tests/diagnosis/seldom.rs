@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use asid::core::{BatchConfig, Capabilities, Control, Rollout, Scene};
+use asid::core::{BatchConfig, Control, Rollout, Scene};
 
 use super::rows::{write_log, write_model};
-use super::run_on;
+use super::{has_contacts, run_on};
 use crate::diagnosis_support::engine;
 
 /// Rows of a log, time between them and of a step, s.
@@ -64,8 +64,7 @@ fn write_study(folder: &Path, damping: f64) {
 /// there, and no other log had such slopes: a study of a finger ended in a panic.
 #[test]
 fn a_part_of_the_logs_without_contact_is_walked_as_the_others_are() {
-    let needed = Capabilities::CONTACT | Capabilities::DOUBLE_PRECISION;
-    if !engine().capabilities().contains(needed) {
+    if !has_contacts() {
         return;
     }
     let folder = tempfile::tempdir().unwrap();

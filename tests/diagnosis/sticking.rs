@@ -3,13 +3,11 @@
 
 use std::fmt::Write as _;
 
-use asid::core::Capabilities;
 use asid::diagnosis::result::{DiagnosisResult, Kind};
 use rand::{Rng as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
-use super::{assert_names, run_on};
-use crate::diagnosis_support::engine;
+use super::{assert_names, has_contacts, run_on};
 
 /// Gravity, m/s², and the slope of the ramp, rad.
 const GRAVITY: f64 = 9.81;
@@ -82,12 +80,6 @@ fn diagnosed(model: &str, parameters: &str) -> DiagnosisResult {
     let study = "model = \"nominal.xml\"\ntrain = [\"train_*.csv\"]\ntest = [\"test_*.csv\"]\n";
     std::fs::write(folder.join("study.toml"), format!("{study}{parameters}")).unwrap();
     run_on(folder, &[]).0.result
-}
-
-/// Whether the engine has contacts as exact as these tests ask for.
-fn has_contacts() -> bool {
-    let needed = Capabilities::CONTACT | Capabilities::DOUBLE_PRECISION;
-    engine().capabilities().contains(needed)
 }
 
 #[test]

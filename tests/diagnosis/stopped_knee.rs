@@ -4,14 +4,14 @@ use std::fmt::Write as _;
 use std::path::Path;
 use std::sync::Mutex;
 
-use asid::core::{BatchConfig, Capabilities, Control, Progress, Rollout, Scene};
+use asid::core::{BatchConfig, Control, Progress, Rollout, Scene};
 use asid::diagnosis::diagnose::{Settings, diagnose};
 use asid::diagnosis::machine::Machine;
 use asid::diagnosis::study::Study;
 
-use super::assert_names;
 use super::one_joint::normal;
 use super::rows::write_model;
+use super::{assert_names, has_contacts};
 use crate::diagnosis_support::engine;
 
 /// Rows of a log, and the time between them, s.
@@ -131,8 +131,7 @@ impl Progress for Tried {
 /// By slopes at a knee without friction a hysteresis of the drives leads; replays with friction leave least.
 #[test]
 fn a_friction_that_stops_a_knee_is_tried_first_and_named() {
-    let needed = Capabilities::CONTACT | Capabilities::DOUBLE_PRECISION;
-    if !engine().capabilities().contains(needed) {
+    if !has_contacts() {
         return;
     }
     let folder = tempfile::tempdir().unwrap();

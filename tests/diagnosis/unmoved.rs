@@ -1,10 +1,7 @@
 //! A block that is pushed over a floor in some logs and lies still in the others: those tell nothing of the floor.
 
-use asid::core::Capabilities;
-
 use super::rows::{write_log, write_model};
-use super::{assert_names, run_on};
-use crate::diagnosis_support::engine;
+use super::{assert_names, has_contacts, run_on};
 
 /// Gravity, m/s².
 const GRAVITY: f64 = 9.81;
@@ -38,8 +35,7 @@ fn place(speed: f64, time: f64) -> f64 {
 
 #[test]
 fn friction_is_found_where_the_second_of_each_three_logs_shows_none() {
-    let needed = Capabilities::CONTACT | Capabilities::DOUBLE_PRECISION;
-    if !engine().capabilities().contains(needed) {
+    if !has_contacts() {
         return;
     }
     let folder = tempfile::tempdir().unwrap();
