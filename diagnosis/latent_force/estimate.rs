@@ -4,6 +4,7 @@
 //! Stoffer 1982): `q` and `tau` from the force and its products over a row, `r` from what is left of
 //! the readings. Between linearisations a few rounds are taken, lengthened, for EM is slow where a variance is small.
 
+mod before;
 mod missing;
 mod replay;
 mod rest;
@@ -31,7 +32,7 @@ pub struct Estimate {
     pub noise: NoiseModel,
     /// Slopes in generalized forces of the model without effects, one a walk.
     pub b: Vec<Vec<f64>>,
-    /// Variance of the force that may hold a joint at rest, `rows x nv`, one a walk; empty for none.
+    /// Variance of the force that may hold a joint at rest, or that a drive makes of what was before the log, `rows x nv`, one a walk; empty for none.
     pub free: Vec<Vec<f64>>,
     /// Directions in which the replays of each segment scatter, `rows x ns x directions`; empty for none.
     pub scatter: Vec<Vec<f64>>,

@@ -192,6 +192,7 @@ fn without_steps(null: Null<'_>, stands: &mut Stands<'_>) -> Result<Fitted> {
     let shares = none.estimate.missing(context).share < 1.0;
     if shares {
         none.estimate.free_at_rest(context);
+        none.estimate.free_at_start(context);
         none.estimate.set_resolution(context);
     }
     if shares || context.step_error.columns() > 0 {

@@ -12,7 +12,7 @@
 //! `w_k` is the generalized force that the model lacks, a first-order process at each degree of freedom (a latent force
 //! model, Alvarez, Luengo and Lawrence 2009, in state-space form, Hartikainen and Sarkka 2010). `e_k` is independent from row to
 //! row: `white` covers what changes at once, as friction does where a joint turns round, and `free_k`, known and of some rows only,
-//! the force that may hold a joint at rest.
+//! the force that may hold a joint at rest, or that a drive makes of what was before the log.
 //!
 //! Readings are taken one by one, so that no matrix is inverted. The forward pass is in `filter.rs`; smoothing is by the adjoint
 //! recursion of Bryson and Frazier (Bierman 1977), which inverts none either, in `adjoint.rs`.

@@ -2,13 +2,12 @@
 
 use std::path::Path;
 
-use asid::core::{BatchConfig, Control, Rollout, Scene};
 use asid::diagnosis::diagnose::Diagnosis;
 use asid::diagnosis::result::{DiagnosisResult, Kind};
 
+use super::played::Player;
 use super::rows::{write_log, write_model};
 use super::{assert_names, has_contacts, run_on};
-use crate::diagnosis_support::engine;
 
 /// Rows of a log, and the time between them, s.
 const ROWS: usize = 90;
@@ -39,17 +38,7 @@ fn tilted(tilt: f64) -> String {
 /// Writes logs of a real ball, and the model that does not know of what it has: so many, the last to hold out, of which some are thrown from so
 /// `high` that they never touch the floor; with the columns of their starts, or without.
 fn write_study(folder: &Path, real: &str, (episodes, high): (u32, &[u32]), starts: bool) {
-    let scene_of = |xml: &str| Scene::from_xml("ball", xml, &[]).unwrap();
-    let model = engine().load(&scene_of(real)).unwrap();
-    let mut simulator = model
-        .simulator(&BatchConfig {
-            size: 1,
-            threads: 1,
-            targets: Vec::new(),
-        })
-        .unwrap();
-    let recording = model.layout().recording(&["place"]).unwrap();
-    let substeps = (ROW / STEPS[1]).round() as usize;
+    let mut player = Player::of(real, &["place"], [ROW, STEPS[1]]);
     for episode in 0..episodes {
         let k = f64::from(episode);
         let up = match starts {
@@ -60,13 +49,7 @@ fn write_study(folder: &Path, real: &str, (episodes, high): (u32, &[u32]), start
         };
         let qpos = [0.0, 0.0, up, 1.0, 0.0, 0.0, 0.0];
         let qvel = [0.4 - 0.2 * k, 0.1 * k, 0.0, 0.0, 0.0, 0.0];
-        simulator.reset(&[0]).unwrap();
-        simulator.set_state(&[0], &qpos, &qvel).unwrap();
-        let mut out = vec![0.0; 3 * (ROWS - 1)];
-        let rollout = Rollout::new(&[0], ROWS - 1, substeps, Control::Shared(&[]), &recording);
-        simulator.rollout(&rollout, &mut out).unwrap();
-        let mut places = qpos[..3].to_vec();
-        places.extend(out);
+        let places = player.play((&qpos, &qvel), &[], ROWS);
         let start: Vec<f64> = [&qpos[..], &qvel[..]].concat();
         let start = if starts { &start[..] } else { &[] };
         let names = (0..7).map(|i| format!(",qpos.ball_free.{i}"));

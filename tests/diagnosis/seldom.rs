@@ -2,11 +2,9 @@
 
 use std::path::Path;
 
-use asid::core::{BatchConfig, Control, Rollout, Scene};
-
+use super::played::Player;
 use super::rows::{write_log, write_model};
 use super::{has_contacts, run_on};
-use crate::diagnosis_support::engine;
 
 /// Rows of a log, time between them and of a step, s.
 const ROWS: usize = 80;
@@ -33,26 +31,10 @@ fn scene(damping: f64) -> String {
 }
 
 fn write_study(folder: &Path, damping: f64) {
-    let model = engine()
-        .load(&Scene::from_xml("plunger", &scene(damping), &[]).unwrap())
-        .unwrap();
-    let config = BatchConfig {
-        size: 1,
-        threads: 1,
-        targets: Vec::new(),
-    };
-    let mut simulator = model.simulator(&config).unwrap();
-    let recording = model.layout().recording(&["z", "x"]).unwrap();
-    let substeps = (ROW / STEP).round() as usize;
+    let mut player = Player::of(&scene(damping), &["z", "x"], [ROW, STEP]);
     for (episode, height) in HEIGHT.into_iter().enumerate() {
         let start = [height, 0.0, 0.0, 1.0 + 0.2 * episode as f64];
-        simulator.reset(&[0]).unwrap();
-        let (qpos, qvel) = start.split_at(2);
-        simulator.set_state(&[0], qpos, qvel).unwrap();
-        let mut out = vec![0.0; 2 * (ROWS - 1)];
-        let rollout = Rollout::new(&[0], ROWS - 1, substeps, Control::Shared(&[]), &recording);
-        simulator.rollout(&rollout, &mut out).unwrap();
-        let places = qpos.iter().chain(&out).copied().collect::<Vec<f64>>();
+        let places = player.play(start.split_at(2), &[], ROWS);
         let columns = ",z,x,qpos.fall,qpos.rail,qvel.fall,qvel.rail";
         let place = (episode, EPISODES);
         write_log(folder, place, columns, (&places, 2), &start, (ROW, NOISE));

@@ -4,12 +4,13 @@ use std::fmt::Write as _;
 use std::path::Path;
 use std::sync::Mutex;
 
-use asid::core::{BatchConfig, Control, Progress, Rollout, Scene};
+use asid::core::Progress;
 use asid::diagnosis::diagnose::{Settings, diagnose};
 use asid::diagnosis::machine::Machine;
 use asid::diagnosis::study::Study;
 
 use super::one_joint::normal;
+use super::played::Player;
 use super::rows::write_model;
 use super::{assert_names, has_contacts};
 use crate::diagnosis_support::engine;
@@ -53,33 +54,14 @@ fn torques(episode: u32, time: f64) -> [f64; 2] {
 }
 
 fn write_study(folder: &Path, episodes: u32) {
-    let scene_of = |xml: &str| Scene::from_xml("leg", xml, &[]).unwrap();
-    let model = engine().load(&scene_of(&scene(FRICTION))).unwrap();
-    let config = BatchConfig {
-        size: 1,
-        threads: 1,
-        targets: Vec::new(),
-    };
-    let mut simulator = model.simulator(&config).unwrap();
-    let recording = model
-        .layout()
-        .recording(&["height", "q_hip", "q_knee"])
-        .unwrap();
-    let substeps = (ROW / STEP).round() as usize;
+    let sensors = ["height", "q_hip", "q_knee"];
+    let mut player = Player::of(&scene(FRICTION), &sensors, [ROW, STEP]);
     for episode in 0..episodes {
         let mut noise = normal(300 + u64::from(episode));
         let start = [0.03, 0.2, -0.4];
-        simulator.reset(&[0]).unwrap();
-        simulator.set_state(&[0], &start, &[0.0; 3]).unwrap();
         let commands = (0..ROWS - 1).flat_map(|k| torques(episode, ROW * k as f64));
         let commands: Vec<f64> = commands.collect();
-        let mut places = start.to_vec();
-        for now in commands.chunks_exact(2) {
-            let mut next = [0.0; 3];
-            let rollout = Rollout::new(&[0], 1, substeps, Control::Shared(now), &recording);
-            simulator.rollout(&rollout, &mut next).unwrap();
-            places.extend(next);
-        }
+        let places = player.play((&start, &[0.0; 3]), &commands, ROWS);
         let mut text = "time,ctrl.at_hip,ctrl.at_knee,height,q_hip,q_knee".to_owned();
         for kind in ["qpos", "qvel"] {
             for name in ["rail", "hip", "knee"] {

@@ -11,7 +11,7 @@ const REST_SHARE: f64 = 0.02;
 
 impl Estimate {
     /// Speed of a degree of freedom in a row of a walk.
-    fn speed(&self, context: &Context<'_>, walk: usize, row: usize, dof: usize) -> f64 {
+    pub(super) fn speed(&self, context: &Context<'_>, walk: usize, row: usize, dof: usize) -> f64 {
         let layout = &context.plant().layout;
         self.trajectory[walk][row * (layout.nq + layout.nv) + layout.nq + dof]
     }

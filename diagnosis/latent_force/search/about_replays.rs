@@ -9,17 +9,21 @@ use asid_effects::Reach;
 
 use crate::findings::LEAST_GAP;
 use crate::latent_force::fit::Slopes;
-use crate::latent_force::screen::{Pairs, Screened};
+use crate::latent_force::screen::Pairs;
 
+use super::open_loop::MOST;
 use super::round::Upon;
+use super::screening::Look;
 use super::second_look::joined;
 use super::set::{Set, name_of};
 
 /// Sets that are fitted, at most.
 const TRIED: usize = 3;
+/// Sets that are replayed, at most: each takes five replays of all logs or more.
+const REPLAYED: usize = 8;
 
 impl Upon<'_> {
-    /// Sets that were `fitted` to the end, best first, and those of readings alone that promise more than the best of them about replays of what
+    /// Sets that were `fitted` to the end, best first, and those of readings alone that lead about replays of what
     /// stands. Upon no effect, where the best leaves a gap of replays.
     pub(super) fn with_a_look_about_replays(&self, fitted: Vec<Set>) -> Result<Vec<Set>> {
         let is_due = self.base.candidates.is_empty() && !self.context.has_segments();
@@ -40,13 +44,8 @@ impl Upon<'_> {
             ..*self
         };
         let look = about.look(Pairs::BeyondTheSum)?;
-        let least = fitted.first().map_or(0.0, |s| s.fitted.evidence) - self.base.fitted.evidence;
-        let least = least.max(self.threshold());
-        let promises = |s: &&Screened| s.gain > least;
-        let leading: Vec<&Screened> = look.ranked.iter().filter(promises).take(TRIED).collect();
         let mut further = Vec::new();
-        for s in leading {
-            let mut set = about.enlarged(&look, s);
+        for mut set in about.leading(&look)? {
             let name = name_of(self.candidates, &set.candidates);
             self.progress.note(&format!("trying {name}"));
             set.fit(self.context, (self.breadth.rounds[0], self.progress))?;
@@ -54,6 +53,34 @@ impl Upon<'_> {
         }
         let further = self.finish(further, self.base.fitted.evidence)?.sets;
         Ok(self.in_order(joined(fitted, further)))
+    }
+
+    /// Sets of a look about replays that are worth a fit: those with which replays leave less than half of what stands leaves, the least first, and
+    /// those that promise what a name must. A value goes on along its slope for as long as replays leave far less: where a joint hits its stop,
+    /// a slope holds for a part of the way.
+    fn leading(&self, look: &Look) -> Result<Vec<Set>> {
+        let excess = |set: &Set| (self.open_loop.excess)(set);
+        let stands = excess(self.base)?;
+        let (mut closing, mut promising) = (Vec::new(), Vec::new());
+        for screened in look.ranked.iter().take(REPLAYED) {
+            if self.progress.is_stopped() {
+                break;
+            }
+            let mut set = self.enlarged(look, screened);
+            let mut left = excess(&set)?;
+            while let Some(further) = self.further(&set)? {
+                set = further;
+                left = excess(&set)?;
+            }
+            if left < MOST * stands {
+                closing.push((left, set));
+            } else if screened.gain > self.threshold() {
+                promising.push(set);
+            }
+        }
+        closing.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let closing = closing.into_iter().map(|(_, set)| set);
+        Ok(closing.chain(promising).take(TRIED).collect())
     }
 
     /// Whether replays with a set that rises above what stands leave no gap.

@@ -63,7 +63,7 @@ impl Upon<'_> {
     /// it stands and than at the null: a slope at the null tells the direction, and over how far it holds only they do. A contact that gives
     /// back three times as much is no three times what a third of that does. Where the null leaves no more than another program's
     /// version of the same machine would, the set stays.
-    fn further(&self, set: &Set) -> Result<Option<Set>> {
+    pub(super) fn further(&self, set: &Set) -> Result<Option<Set>> {
         let excess = |set: &Set| (self.open_loop.excess)(set);
         let stands = excess(self.base)?;
         if stands < NEGLIGIBLE * NEGLIGIBLE {
