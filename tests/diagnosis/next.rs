@@ -79,7 +79,12 @@ fn proposed(range: &str, engine: Arc<dyn Backend>) -> (String, Episode) {
     write_files(folder.path(), &model(range), mass, log);
     let study = Study::read(folder.path()).unwrap();
     let machine = Machine::new(engine, &study.scene, &study.fixed, &study.effects, 0).unwrap();
-    let (diagnosis, _) = diagnose(&study, machine, Settings::default(), &Silent).unwrap();
+    // Faults of the sensor are told from friction by small motions, which stay where they are.
+    let settings = Settings {
+        without: ["sensor-scale", "sensor-drift"].map(String::from).into(),
+        ..Settings::default()
+    };
+    let (diagnosis, _) = diagnose(&study, machine, settings, &Silent).unwrap();
     let result = diagnosis.result;
     let next = result.next_experiment;
     assert_eq!(next.file, "next.csv", "{}", result.sentence);
