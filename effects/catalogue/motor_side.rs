@@ -3,15 +3,14 @@
 //!
 //! With the drive's law `a - b θ - d ω` on the rotor (angle `θ`, speed `ω`, inertia `J`, all seen
 //! from the joint), a spring of compliance `C` between rotor and joint and a gap of `w`, one step of
-//! `dt` is
+//! `dt` of backward Euler is
 //!
-//! `J (ω1 - ω) / dt = a - b (θ1 - e ω dt) - d ω1 - T`, `θ1 = θ + ω1 dt`,
-//! `C T = θ1 - q1 ∓ w/2 - f dt (ω - v)`, `q1 = q + v1 dt`,
+//! `J (ω1 - ω) / dt = a - b θ1 - d ω1 - T`, `θ1 = θ + ω1 dt`, `C T = θ1 - q1 ∓ w/2`, `q1 = q + v1 dt`,
 //!
 //! so the transmitted force is linear in the joint's speed at the end of the step:
 //!
-//! `T = K (θ + dt X / A - f dt (ω - v) ∓ w/2 - q) - K dt v1`, with `A = J/dt + b dt + d`,
-//! `X = (J/dt + e b dt) ω + a - b θ`, `K = 1 / (C + dt/A)`.
+//! `T = K (θ + dt X / A ∓ w/2 - q) - K dt v1`, with `A = J/dt + b dt + d`, `X = J ω / dt + a - b θ`,
+//! `K = 1 / (C + dt/A)`.
 //!
 //! The first part is applied as a force and `K dt` as damping of the joint, which engines
 //! integrate implicitly: it is stable however stiff the spring is, a gap's ends are rigid and do
@@ -19,14 +18,6 @@
 //! added. What the damping took over the step, however an engine divides it, follows from the way that
 //! the joint went: `v1` is then `(q1 - q) / dt`, so that rotor and joint exchange equal impulses. A
 //! rotor without inertia needs a law with `b` or `d`.
-//!
-//! With `e = f = 0` this is backward Euler, which damps both springs by their stiffness times `dt`: at 1 ms a
-//! soft spring of a hand-sized servo by a third of what its bearing does. With `e = f = 1` the springs pull by where rotor and joint are at
-//! the beginning of the step and by how far they are accelerated in it, as engines' own springs do (symplectic Euler): nothing is
-//! damped, and it is as stable. Between the two stand `e = (J/dt) / A`, for a rotor without inertia follows its drive at once, and
-//! `f = C K`, by which a spring that hardly gives and the ends of a gap stay rigid. `J` is
-//! `J0 λ dt / (exp(λ dt) - 1)` for a rotor of inertia `J0`, with `λ = d / J0`, by which a steady force turns it as
-//! it does without steps (exponential Euler).
 
 use std::cell::Cell;
 
@@ -165,28 +156,13 @@ impl MotorSide {
         }
     }
 
-    /// Inertia of the rotor over a time step, as a law damps it.
-    fn inertia_per_step(&self, law: Law) -> f64 {
-        let per_step = self.inertia.get() / self.timestep;
-        if law.d > 0.0 && per_step > 0.0 {
-            law.d / (law.d / per_step).exp_m1()
-        } else {
-            per_step
-        }
-    }
-
     /// `A` and `X` of a law.
     fn coefficients(&self, law: Law, [angle, speed]: [f64; 2]) -> (f64, f64) {
-        let inertia = self.inertia_per_step(law);
-        let spring = law.b * self.timestep;
-        let resistance = inertia + spring + law.d;
-        let kept = if resistance > 0.0 {
-            inertia / resistance * spring
-        } else {
-            0.0
-        };
-        let push = (inertia + kept) * speed + law.a - law.b * angle;
-        (resistance, push)
+        let inertia = self.inertia.get() / self.timestep;
+        (
+            inertia + law.b * self.timestep + law.d,
+            inertia * speed + law.a - law.b * angle,
+        )
     }
 
     /// The step that a law begins at a joint's position and speed.
@@ -205,7 +181,6 @@ impl MotorSide {
         let ahead = rotor[0] + dt * push / resistance - q;
         let stiffness = 1.0 / (self.compliance + dt / resistance);
         let stretch = ahead - v * dt;
-        let ahead = ahead - self.compliance * stiffness * dt * (rotor[1] - v);
         if stretch.abs() < self.half_gap {
             return Begun {
                 law,

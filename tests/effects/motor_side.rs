@@ -183,23 +183,6 @@ fn rotor_and_load_swing_against_each_other() {
     });
 }
 
-/// Backward Euler would damp it by its stiffness times the time step, which leaves a third of the swing after four seconds.
-#[test]
-fn a_spring_in_series_keeps_its_swing() {
-    let xml = machine(r#"axis="0 0 1" armature="0.1""#, "motor");
-    on_each(&xml, &["joint-compliance@spin:compliance=0.05"], |bench| {
-        bench.hold(30, &[1.0]);
-        let rows = bench.hold(2100, &[0.0]);
-        let swing = |rows: &[Vec<f64>]| {
-            let speeds = rows.iter().map(|row| row[1]);
-            let [low, high] = [f64::min, f64::max].map(|of| speeds.clone().reduce(of).unwrap());
-            high - low
-        };
-        let [first, last] = [swing(&rows[..300]), swing(&rows[1800..])];
-        near(&bench.engine, last, first, 0.05 * first);
-    });
-}
-
 #[test]
 fn without_rotor_inertia_a_motor_is_no_site() {
     let xml = machine(LEVEL, "motor");
