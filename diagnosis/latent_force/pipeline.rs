@@ -149,9 +149,13 @@ fn searched_in(
         progress,
     };
     let excess = |set: &Set| replays.excess(&set.fitted, &set.candidates);
+    let residuals = |set: &Set| replays.residuals(&set.fitted, &set.candidates);
+    let fitted = |set: &Set| replays.fitted(set);
     let states = |set: &Set| replays.states(&set.fitted, &set.candidates, &context.walks);
     let open_loop = OpenLoop {
         excess: &excess,
+        residuals: &residuals,
+        fitted: &fitted,
         states: &states,
         steps: replays.steps(),
         is_gap: replays.leaves_a_gap(&none)?,

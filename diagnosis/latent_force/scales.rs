@@ -116,6 +116,29 @@ impl Scales {
     }
 }
 
+/// An estimate with the variances that the present model's own columns are likeliest with, joint by joint. Else a candidate's scale at one joint
+/// would be credited with what the model without it gains there, and candidates of other joints would not.
+#[must_use]
+pub fn at_own_scales(context: &Context<'_>, estimate: &Estimate, columns: &Columns) -> Estimate {
+    let base: Vec<usize> = (0..columns.base).collect();
+    let m = columns.center.len();
+    let mut own = estimate.clone();
+    for dof in lacking(context, estimate) {
+        let likelihood = |scale: f64| {
+            let asked = (m, &base[..]);
+            let sum = regression_at(context, &own, &columns.linear, (dof, scale), asked);
+            let (center, bounds) = (&columns.center, &columns.bounds);
+            sum.log_likelihood + evidence(&sum.gram, &sum.moment, &base, center, bounds).gain
+        };
+        let scaled = AT_A_JOINT.iter().map(|&scale| (scale, likelihood(scale)));
+        let (scale, _) = scaled.fold((1.0, likelihood(1.0)), |best, next| {
+            if next.1 > best.1 { next } else { best }
+        });
+        own.noise = own.noise.scaled_at(dof, scale, &own.least_white);
+    }
+    own
+}
+
 /// The degrees of freedom that lack the most force relative to their inertial forces. None of a single one, which has all of it, and none where
 /// there are segments, whose replays lack none.
 fn lacking(context: &Context<'_>, estimate: &Estimate) -> Vec<usize> {

@@ -2,6 +2,7 @@
 
 mod about_replays;
 mod begun;
+mod by_replays;
 mod finish;
 mod given_back;
 mod open_loop;

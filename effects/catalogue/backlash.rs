@@ -62,7 +62,7 @@ impl Effect for Backlash {
         }
         joint.series = Some(Series {
             gap: width,
-            compliance: 0.0,
+            ..Series::default()
         });
         Ok(Native::Nearly(format!(
             "is a second joint `{}_link` behind the drive's, so that qpos has one place more",
@@ -73,6 +73,6 @@ impl Effect for Backlash {
     fn attach(&self, site: &Site<'_>) -> Result<Box<dyn Acting>> {
         let [width] = values(site)?;
         let width = at_least(site, "width", width, 0.0)?;
-        Ok(Box::new(MotorSide::new(site, 0.0, width)?))
+        Ok(Box::new(MotorSide::with_gap(site, width)?))
     }
 }

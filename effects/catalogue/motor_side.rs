@@ -2,22 +2,32 @@
 //! or both.
 //!
 //! With the drive's law `a - b θ - d ω` on the rotor (angle `θ`, speed `ω`, inertia `J`, all seen
-//! from the joint), a spring of compliance `C` between rotor and joint and a gap of `w`, one step of
-//! `dt` of backward Euler is
+//! from the joint), a spring of compliance `C` between rotor and joint, a damper beside it and a gap of `w`, one step of
+//! `dt` is
 //!
-//! `J (ω1 - ω) / dt = a - b θ1 - d ω1 - T`, `θ1 = θ + ω1 dt`, `C T = θ1 - q1 ∓ w/2`, `q1 = q + v1 dt`,
+//! `J (ω1 - ω) / dt = a - b (θ + s dt ω1 - g dt ω) - d ω1 - T`,
+//! `C T = θ - q ∓ w/2 + s' dt (ω1 - v1) - g' dt (ω - v) + τ (ω1 - v1)`,
+//! `θ1 = θ + ω1 dt`, `q1 = q + v1 dt`,
 //!
-//! so the transmitted force is linear in the joint's speed at the end of the step:
+//! so the transmitted force is linear in the joint's speed at the end of the step: with `σ = s' dt + τ`,
 //!
-//! `T = K (θ + dt X / A ∓ w/2 - q) - K dt v1`, with `A = J/dt + b dt + d`, `X = J ω / dt + a - b θ`,
-//! `K = 1 / (C + dt/A)`.
+//! `T = K (θ - q ∓ w/2 - g' dt (ω - v) + σ X / A) - K σ v1`, with `A = J/dt + s b dt + d`,
+//! `X = (J/dt + g b dt) ω + a - b θ`, `K = 1 / (C + σ / A)`.
 //!
-//! The first part is applied as a force and `K dt` as damping of the joint, which engines
+//! The first part is applied as a force and `K σ` as damping of the joint, which engines
 //! integrate implicitly: it is stable however stiff the spring is, a gap's ends are rigid and do
 //! not bounce, and as `C` and `w` vanish it becomes the drive at the joint with the rotor's inertia
 //! added. What the damping took over the step, however an engine divides it, follows from the way that
 //! the joint went: `v1` is then `(q1 - q) / dt`, so that rotor and joint exchange equal impulses. A
 //! rotor without inertia needs a law with `b` or `d`.
+//!
+//! The damper is the transmission's own loss: `τ = 2 ζ sqrt(J C)` has the rotor swing against a joint that is held with a damping ratio `ζ`.
+//! A spring of the step's own loss would hide it: with `s = 1` and `g = 0` (backward Euler) that is a damper of `dt`, at 1 ms more than
+//! the steel of a hand-sized servo's gears. With `s = g = 1/4` a spring loses nothing, and its swing has the period of the trapezoidal rule, stable at any
+//! stiffness. But what can hardly swing should not: a spring that hardly gives, and the ends of
+//! a gap, are rigid, with `s = 1`, and a rotor without inertia in its gap goes to where its drive has it, by `s = 1 / (1 - exp(-x)) - 1 / x` with
+//! `x = b dt / d` exactly as fast as without steps (exponential Euler). So each spring is shared between the two, by how much its rotor's inertia or its
+//! compliance counts over a step: [`Share`].
 
 use std::cell::Cell;
 
@@ -61,6 +71,32 @@ pub fn targets(plant: &Plant, site: &str) -> Vec<Target> {
     targets
 }
 
+/// How a step takes a spring: at what it gives way by until then, and `late` and `early` steps' worth of the speeds at its end and at its beginning.
+#[derive(Clone, Copy, Debug)]
+struct Share {
+    late: f64,
+    early: f64,
+}
+
+impl Share {
+    /// The trapezoidal rule for a share that swings (0 to 1), `creeping` for the rest.
+    fn of(swings: f64, creeping: f64) -> Self {
+        Self {
+            late: 0.25 * swings + creeping * (1.0 - swings),
+            early: 0.25 * swings,
+        }
+    }
+}
+
+/// How late a step takes a spring that gives way against a damper `1 / x` of a step's time constant of it: half a step where that is long, the end
+/// of the step where it is short.
+fn exponential(x: f64) -> f64 {
+    if x < 1e-4 {
+        return 0.5 + x / 12.0;
+    }
+    -1.0 / (-x).exp_m1() - 1.0 / x
+}
+
 /// A drive's force on its rotor, `a - b θ - d ω`, seen from the joint.
 #[derive(Clone, Copy, Debug)]
 struct Law {
@@ -73,11 +109,46 @@ struct Law {
 #[derive(Clone, Copy, Debug)]
 struct Begun {
     law: Law,
+    /// `A` and `X`.
+    resistance: f64,
+    push: f64,
     /// Transmitted force `force - damping v1`.
     force: f64,
     damping: f64,
     /// Where the joint was.
     from: f64,
+}
+
+impl Begun {
+    /// All of it, to be remembered.
+    fn numbers(&self) -> [f64; 8] {
+        let Law { a, b, d } = self.law;
+        let (resistance, push) = (self.resistance, self.push);
+        [
+            a,
+            b,
+            d,
+            resistance,
+            push,
+            self.force,
+            self.damping,
+            self.from,
+        ]
+    }
+
+    /// From what was remembered.
+    fn of(numbers: &[f64]) -> Option<Self> {
+        let [a, b, d, resistance, push, force, damping, from] =
+            <[f64; 8]>::try_from(numbers).ok()?;
+        Some(Self {
+            law: Law { a, b, d },
+            resistance,
+            push,
+            force,
+            damping,
+            from,
+        })
+    }
 }
 
 /// A rotor and its drive.
@@ -91,6 +162,8 @@ pub struct MotorSide {
     drive: Drive,
     timestep: f64,
     compliance: f64,
+    /// Damping ratio of the spring.
+    loss: f64,
     half_gap: f64,
     /// Rotor inertia and gains, as the simulation's parameters were before they were taken.
     inertia: Cell<f64>,
@@ -101,8 +174,24 @@ pub struct MotorSide {
 }
 
 impl MotorSide {
-    /// Attaches it with a compliance (rad/(N m) or m/N) and a gap (rad or m).
-    pub fn new(site: &Site<'_>, compliance: f64, gap: f64) -> Result<Self> {
+    /// Attaches it behind a spring, with its compliance (rad/(N m) or m/N) and its damping ratio.
+    pub fn with_spring(site: &Site<'_>, compliance: f64, loss: f64) -> Result<Self> {
+        Ok(Self {
+            compliance,
+            loss,
+            ..Self::rigid(site)?
+        })
+    }
+
+    /// Attaches it behind a gap (rad or m).
+    pub fn with_gap(site: &Site<'_>, gap: f64) -> Result<Self> {
+        Ok(Self {
+            half_gap: gap / 2.0,
+            ..Self::rigid(site)?
+        })
+    }
+
+    fn rigid(site: &Site<'_>) -> Result<Self> {
         let joint = site.plant.layout.joint(site.name)?;
         let joints = &site.plant.layout.joints;
         let index = joints.iter().position(|j| j.name == site.name);
@@ -122,8 +211,9 @@ impl MotorSide {
             gains: site.columns[2..].to_vec(),
             drive: *drive,
             timestep: site.plant.layout.timestep,
-            compliance,
-            half_gap: gap / 2.0,
+            compliance: 0.0,
+            loss: 0.0,
+            half_gap: 0.0,
             inertia: Cell::new(0.0),
             kp: Cell::new(0.0),
             kv: Cell::new(0.0),
@@ -156,44 +246,62 @@ impl MotorSide {
         }
     }
 
-    /// `A` and `X` of a law.
-    fn coefficients(&self, law: Law, [angle, speed]: [f64; 2]) -> (f64, f64) {
+    /// `A` and `X` of a law, for a rotor that pushes its joint or one that is free of it.
+    fn coefficients(&self, law: Law, [angle, speed]: [f64; 2], pushes: bool) -> (f64, f64) {
         let inertia = self.inertia.get() / self.timestep;
+        let spring = law.b * self.timestep;
+        let whole = inertia + spring + law.d;
+        if whole <= 0.0 {
+            return (0.0, law.a - law.b * angle);
+        }
+        let share = if pushes {
+            // With the joint's inertia, its damper does not let it creep.
+            Share::of((inertia + law.d) / whole, 1.0)
+        } else if law.d > 0.0 {
+            Share::of(inertia / whole, exponential(spring / law.d))
+        } else {
+            Share::of(inertia / whole, 1.0)
+        };
         (
-            inertia + law.b * self.timestep + law.d,
-            inertia * speed + law.a - law.b * angle,
+            inertia + share.late * spring + law.d,
+            (inertia + share.early * spring) * speed + law.a - law.b * angle,
         )
     }
 
     /// The step that a law begins at a joint's position and speed.
     fn begin(&self, law: Law, rotor: [f64; 2], q: f64, v: f64) -> Begun {
         let dt = self.timestep;
-        let (resistance, push) = self.coefficients(law, rotor);
+        let begun = |resistance, push| Begun {
+            law,
+            resistance,
+            push,
+            force: 0.0,
+            damping: 0.0,
+            from: q,
+        };
+        let (resistance, push) = self.coefficients(law, rotor, false);
         if resistance <= 0.0 {
             // Nothing holds the rotor back: its drive's force passes.
             return Begun {
-                law,
                 force: law.a,
-                damping: 0.0,
-                from: q,
+                ..begun(resistance, push)
             };
         }
-        let ahead = rotor[0] + dt * push / resistance - q;
-        let stiffness = 1.0 / (self.compliance + dt / resistance);
-        let stretch = ahead - v * dt;
+        let stretch = rotor[0] - q + dt * (push / resistance - v);
         if stretch.abs() < self.half_gap {
-            return Begun {
-                law,
-                force: 0.0,
-                damping: 0.0,
-                from: q,
-            };
+            return begun(resistance, push);
         }
+        let (resistance, push) = self.coefficients(law, rotor, true);
+        let share = Share::of(self.compliance / (self.compliance + dt / resistance), 1.0);
+        let damper = 2.0 * self.loss * (self.inertia.get() * self.compliance).sqrt();
+        let seconds = share.late * dt + damper;
+        let stiffness = 1.0 / (self.compliance + seconds / resistance);
+        let twist = rotor[0] - q - self.half_gap.copysign(stretch);
+        let pulled = twist - share.early * dt * (rotor[1] - v);
         Begun {
-            law,
-            force: stiffness * (ahead - self.half_gap.copysign(stretch)),
-            damping: stiffness * dt,
-            from: q,
+            force: stiffness * (pulled + seconds * push / resistance),
+            damping: stiffness * seconds,
+            ..begun(resistance, push)
         }
     }
 
@@ -201,7 +309,9 @@ impl MotorSide {
     fn complete(&self, begun: &Begun, rotor: [f64; 2], q: f64) -> [f64; 2] {
         let v = (q - begun.from) / self.timestep;
         let force = begun.force - begun.damping * v;
-        let (resistance, push) = self.coefficients(begun.law, rotor);
+        let Begun {
+            resistance, push, ..
+        } = *begun;
         if resistance <= 0.0 {
             let stretch = self.compliance * force + self.half_gap * force.signum();
             return [q + stretch, v];
@@ -316,24 +426,14 @@ impl Acting for MotorSide {
         };
         memory.extend(rotor);
         if let Some(begun) = begun {
-            let Law { a, b, d } = begun.law;
-            memory.extend([a, b, d, begun.force, begun.damping, begun.from]);
+            memory.extend(begun.numbers());
         }
     }
 
     fn load(&mut self, memory: &[f64]) {
         self.state = match *memory {
-            [angle, speed, a, b, d, force, damping, from] => {
-                let law = Law { a, b, d };
-                let begun = Begun {
-                    law,
-                    force,
-                    damping,
-                    from,
-                };
-                Some(([angle, speed], Some(begun)))
-            }
             [angle, speed] => Some(([angle, speed], None)),
+            [angle, speed, ref begun @ ..] => Begun::of(begun).map(|b| ([angle, speed], Some(b))),
             _ => None,
         };
     }

@@ -69,6 +69,8 @@ pub struct Series {
     pub gap: f64,
     /// Compliance, rad/(N m) or m/N.
     pub compliance: f64,
+    /// Damping ratio of the rotor on the compliance.
+    pub loss: f64,
 }
 
 /// What a joint has beside its own attributes.

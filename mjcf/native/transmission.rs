@@ -2,8 +2,7 @@
 //!
 //! The joint that the drive acts on keeps its name and is now the rotor's; behind it, in the same body and about the
 //! same axis, stands a joint of the link against the rotor: free within a `range` as wide as the gap, or held by a
-//! spring. What the catalogue's backward Euler takes out of the motion is damping here: a spring `K` over a time step
-//! `dt` damps by `K dt`, and so does a position servo's `kp` at the rotor. What belongs to the sum of the two (damping, dry friction, the joint's own range, what its
+//! spring with its damper. What belongs to the sum of the two (damping, dry friction, the joint's own range, what its
 //! sensors read) moves to a fixed tendon over both.
 
 use asid_core::Target;
@@ -54,16 +53,17 @@ impl Writer<'_, '_> {
             DriveLaw::Velocity { .. } => (0.0, value(self, "kv")?),
             DriveLaw::Motor => (0.0, 0.0),
         };
-        let mut inertia = get(self, "armature")?;
+        let square = drive.gear * drive.gear;
+        let rotor = get(self, "armature")?;
+        let mut inertia = rotor;
         if inertia <= 0.0 {
             // A rotor without inertia follows its servo's law; this much it lags a step behind it.
-            inertia = drive.gear * drive.gear * timestep * (kv + kp * timestep);
+            inertia = square * timestep * (kv + kp * timestep);
             self.leave_out(format!(
                 "joint `{name}` has no rotor inertia: {inertia:.3e} is written in its place, which lags the servo by a step"
             ));
         }
-        self.markup
-            .set_numbers(node, "damping", &[drive.gear * drive.gear * kp * timestep]);
+        self.markup.set(node, "damping", "0");
         self.markup.set(node, "frictionloss", "0");
         self.markup.set_numbers(node, "armature", &[inertia]);
         self.markup.set(node, "name", name.clone());
@@ -79,7 +79,7 @@ impl Writer<'_, '_> {
         };
         let hold = if series.compliance > 0.0 {
             let stiffness = 1.0 / series.compliance;
-            let damping = stiffness * timestep;
+            let damping = 2.0 * series.loss * (rotor * stiffness).sqrt();
             format!(
                 "limited=\"false\" stiffness=\"{stiffness}\" springref=\"0\" damping=\"{damping}\""
             )

@@ -76,6 +76,8 @@ fn a_spring_in_series_is_named_where_no_log_says_how_far_it_is_stretched() {
     write_files(folder.path(), NOMINAL, STUDY, log);
     let r = run_on(folder.path(), &[]).0.result;
     assert_names(&r, &["joint-compliance@hinge"]);
-    let compliance = r.effects[0].parameters["compliance"];
-    assert!((compliance / COMPLIANCE - 1.0).abs() < 0.1, "{compliance}");
+    // Its damping is the model's guess, and its stretch is open: the logs tell it to a fifth.
+    let [low, high] = r.effects[0].intervals95["compliance"];
+    assert!(low < COMPLIANCE && COMPLIANCE < high, "{low} {high}");
+    assert!(high - low < 0.5 * COMPLIANCE, "{low} {high}");
 }

@@ -183,6 +183,30 @@ fn rotor_and_load_swing_against_each_other() {
     });
 }
 
+/// The swing dies as the transmission's own loss has it: by its ratio of critical for a rotor against a joint that is held, and by
+/// `sqrt(1 + J/I)` of that where the joint gives way. Backward Euler would add its stiffness times the time step.
+#[test]
+fn a_spring_in_series_swings_on_for_long() {
+    let (rotor, compliance, loss) = (0.1, 0.05, 0.02);
+    let xml = machine(r#"axis="0 0 1" armature="0.1""#, "motor");
+    let effect = format!("joint-compliance@spin:compliance={compliance},loss={loss}");
+    on_each(&xml, &[&effect], |bench| {
+        bench.hold(30, &[1.0]);
+        let rows = bench.hold(2100, &[0.0]);
+        let swing = |rows: &[Vec<f64>]| {
+            let speeds = rows.iter().map(|row| row[1]);
+            let [low, high] = [f64::min, f64::max].map(|of| speeds.clone().reduce(of).unwrap());
+            high - low
+        };
+        let [first, last] = [swing(&rows[..300]), swing(&rows[1800..])];
+        let reduced = INERTIA * rotor / (INERTIA + rotor);
+        let damper = 2.0 * loss * f64::sqrt(rotor / compliance);
+        let rate = damper / (2.0 * reduced);
+        let expected = f64::exp(-rate * 1800.0 * DT);
+        near(&bench.engine, last / first, expected, 0.1 * expected);
+    });
+}
+
 #[test]
 fn without_rotor_inertia_a_motor_is_no_site() {
     let xml = machine(LEVEL, "motor");

@@ -10,7 +10,7 @@ use nalgebra::DVector;
 use crate::bench::{Bench, Explanation, Local, Trial};
 use crate::candidate::Candidate;
 use crate::findings::{Findings, Found, LEAST_GAP, Repeats};
-use crate::fit::{Begin, Effort, Region, StartSlopes, cost};
+use crate::fit::{Begin, Effort, Region, StartSlopes, cost, fit};
 use crate::latent_force::fit::Fitted;
 use crate::latent_force::search::{Outcome, Set, labels_of, name_of};
 use crate::latent_force::walk::Walk;
@@ -119,12 +119,40 @@ impl Replays<'_> {
 
     /// Mean square that replays of a fitted set leave of the training logs, in units of the noise; infinite where one diverges.
     fn left(&self, fitted: &Fitted, members: &[usize]) -> Result<f64> {
+        let left = cost(&self.residuals(fitted, members)?);
+        Ok(if left.is_nan() { f64::INFINITY } else { left })
+    }
+
+    /// Residuals of the training logs that replays of a fitted set leave, in units of the noise and of the root of how many readings there are.
+    pub(super) fn residuals(&self, fitted: &Fitted, members: &[usize]) -> Result<Vec<f64>> {
         let bench = self.bench;
         let trials = self.trials(fitted, members);
         let mut predictor = bench.predictor(&trials, &bench.train)?;
         let residuals = predictor.residuals(&[self.point(fitted)])?.pop();
-        let left = cost(&residuals.unwrap_or_default()) / bench.train.readings.max(1) as f64;
-        Ok(if left.is_nan() { f64::INFINITY } else { left })
+        let mut residuals = residuals.unwrap_or_default();
+        let scale = (bench.train.readings.max(1) as f64).sqrt();
+        residuals.iter_mut().for_each(|r| *r /= scale);
+        Ok(residuals)
+    }
+
+    /// A set with its values fitted to whole replays from the starts that it has smoothed, after the excess power that they then leave.
+    pub(super) fn fitted(&self, set: &Set) -> Result<(f64, Set)> {
+        let bench = self.bench;
+        let trials = self.trials(&set.fitted, &set.candidates);
+        let unknowns = bench.unknowns(&trials);
+        let mut predictor = bench.predictor(&trials, &bench.train)?;
+        let begin = Begin::at(self.point(&set.fitted), (&self.open, &bench.reach));
+        let how = (Effort::BRIEF, &UntilLate(self.progress) as &dyn Progress);
+        let found = fit(&mut predictor, (bench.layout(), &unknowns), begin, how)?;
+        let mut set = set.clone();
+        set.fitted.theta.clone_from(&found.point.theta);
+        let left = found.cost / bench.train.readings.max(1) as f64 - 1.0;
+        let left = if left.is_nan() {
+            f64::INFINITY
+        } else {
+            left.max(0.0)
+        };
+        Ok((left, set))
     }
 
     /// States of a fitted set along some walks, `rows x (nq + nv)` each.

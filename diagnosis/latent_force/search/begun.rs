@@ -23,11 +23,10 @@ impl Upon<'_> {
     pub(super) fn begun(&self, look: &Look, screened: &Screened) -> Result<Set> {
         let mut best = self.enlarged(look, screened);
         let forms = &look.columns.forms;
-        let is_secant = |f: usize| forms[f].slopes.iter().all(Option::is_none);
         if !self.context.has_segments() {
             return Ok(best);
         }
-        if !screened.forms.iter().any(|&f| is_secant(f)) {
+        if !screened.forms.iter().any(|&f| look.is_secant(f)) {
             if let Some(further) = self.further(&best)? {
                 return self.with_starts(further);
             }
@@ -41,7 +40,7 @@ impl Upon<'_> {
         let mut least = (self.open_loop.excess)(&best)?;
         for i in 0..screened.forms.len() {
             let own = screened.forms[i];
-            let like = |&f: &usize| is_secant(f) && forms[f].candidate == forms[own].candidate;
+            let like = |&f: &usize| look.is_secant(f) && forms[f].candidate == forms[own].candidate;
             for f in (0..forms.len()).filter(like) {
                 if self.progress.is_stopped() {
                     return Ok(best);

@@ -19,6 +19,10 @@ pub(super) const MOST: f64 = 0.5;
 pub struct OpenLoop<'o> {
     /// Excess power that they leave of the training logs, of a set.
     pub excess: &'o dyn Fn(&Set) -> Result<f64>,
+    /// Residuals of the training logs that they leave, of a set; their squares add up to the mean square in units of the noise.
+    pub residuals: &'o dyn Fn(&Set) -> Result<Vec<f64>>,
+    /// A set with its values fitted to them, after the excess power that they then leave.
+    pub fitted: &'o dyn Fn(&Set) -> Result<(f64, Set)>,
     /// States of a set along the walks, `rows x (nq + nv)` each.
     pub states: &'o dyn Fn(&Set) -> Result<Vec<Vec<f64>>>,
     /// Physics steps of one of all training logs.

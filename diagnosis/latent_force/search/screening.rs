@@ -8,7 +8,7 @@ use crate::chance::threshold;
 use crate::latent_force::columns::{Columns, Leads};
 use crate::latent_force::detection::{Limit, limits};
 use crate::latent_force::rehearsal::{Rehearsal, rehearse};
-use crate::latent_force::scales::Scales;
+use crate::latent_force::scales::{Scales, at_own_scales};
 use crate::latent_force::screen::{Pairs, Screened, isolability, rank};
 use crate::latent_force::smoother::Regression;
 
@@ -40,6 +40,13 @@ pub(super) struct Look {
     scales: Scales,
 }
 
+impl Look {
+    /// Whether a form has no slope at its null.
+    pub(super) fn is_secant(&self, form: usize) -> bool {
+        self.columns.forms[form].slopes.iter().all(Option::is_none)
+    }
+}
+
 /// A screening: a look at the open candidates, and what it tells beside their ranks.
 pub(super) struct Screening {
     pub(super) look: Look,
@@ -63,7 +70,8 @@ impl Upon<'_> {
         let asked = (&some[..], &leads as Leads<'_>);
         let columns = Columns::of(self.context, model, &fitted.estimate, asked, self.progress)?;
         let price = self.price();
-        let scales = Scales::of(self.context, &fitted.estimate, (&columns, &some));
+        let estimate = at_own_scales(self.context, &fitted.estimate, &columns);
+        let scales = Scales::of(self.context, &estimate, (&columns, &some));
         let mut ranked = rank(&scales, &columns, &some, (pairs, price));
         for s in &mut ranked {
             let members = s.forms.iter().map(|&f| columns.forms[f].candidate);
@@ -119,8 +127,8 @@ impl Upon<'_> {
 
     /// Which candidates lead by columns along a part of the logs: members of the leading sets, and tolerances, which are judged all at once.
     fn leads(&self, columns: &Columns, some: &[Candidate], pairs: Pairs) -> Vec<bool> {
-        let estimate = &self.base.fitted.estimate;
-        let scales = Scales::of(self.context, estimate, (columns, some));
+        let estimate = at_own_scales(self.context, &self.base.fitted.estimate, columns);
+        let scales = Scales::of(self.context, &estimate, (columns, some));
         let mut leads: Vec<bool> = some.iter().map(|c| c.is_tolerance).collect();
         for set in rank(&scales, columns, some, (pairs, self.price()))
             .iter()
