@@ -123,18 +123,23 @@ pub fn at_own_scales(context: &Context<'_>, estimate: &Estimate, columns: &Colum
     let base: Vec<usize> = (0..columns.base).collect();
     let m = columns.center.len();
     let mut own = estimate.clone();
+    let mut stands = None;
     for dof in lacking(context, estimate) {
-        let likelihood = |scale: f64| {
+        let likelihood = |own: &Estimate, scale: f64| {
             let asked = (m, &base[..]);
-            let sum = regression_at(context, &own, &columns.linear, (dof, scale), asked);
+            let sum = regression_at(context, own, &columns.linear, (dof, scale), asked);
             let (center, bounds) = (&columns.center, &columns.bounds);
             sum.log_likelihood + evidence(&sum.gram, &sum.moment, &base, center, bounds).gain
         };
-        let scaled = AT_A_JOINT.iter().map(|&scale| (scale, likelihood(scale)));
-        let (scale, _) = scaled.fold((1.0, likelihood(1.0)), |best, next| {
-            if next.1 > best.1 { next } else { best }
-        });
-        own.noise = own.noise.scaled_at(dof, scale, &own.least_white);
+        let mut best = (1.0, stands.unwrap_or_else(|| likelihood(&own, 1.0)));
+        for scale in AT_A_JOINT {
+            let found = likelihood(&own, scale);
+            if found > best.1 {
+                best = (scale, found);
+            }
+        }
+        own.noise = own.noise.scaled_at(dof, best.0, &own.least_white);
+        stands = Some(best.1);
     }
     own
 }

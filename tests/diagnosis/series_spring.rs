@@ -76,8 +76,8 @@ fn a_spring_in_series_is_named_where_no_log_says_how_far_it_is_stretched() {
     write_files(folder.path(), NOMINAL, STUDY, log);
     let r = run_on(folder.path(), &[]).0.result;
     assert_names(&r, &["joint-compliance@hinge"]);
-    // Its damping is the model's guess, and its stretch is open: the logs tell it to a fifth.
+    // Its damping is the model's guess, and its stretch is open: the logs tell it to a quarter.
     let [low, high] = r.effects[0].intervals95["compliance"];
     assert!(low < COMPLIANCE && COMPLIANCE < high, "{low} {high}");
-    assert!(high - low < 0.5 * COMPLIANCE, "{low} {high}");
+    assert!(high - low < 0.6 * COMPLIANCE, "{low} {high}");
 }

@@ -145,3 +145,21 @@ impl Upon<'_> {
         Ok(Given { slopes })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// By hand: of (3, 4, 0) a slope along the first axis takes 3, and one that does nothing takes nothing.
+    #[test]
+    fn the_studys_parameters_take_their_share_of_residuals() {
+        let left = |columns: &[f64]| {
+            let slopes = DMatrix::from_column_slice(3, columns.len() / 3, columns);
+            Given { slopes }.left(vec![3.0, 4.0, 0.0])
+        };
+        assert!((left(&[]) - 25.0).abs() < 1e-12);
+        assert!((left(&[2.0, 0.0, 0.0]) - 16.0).abs() < 1e-9);
+        assert!((left(&[2.0, 0.0, 0.0, 0.0, 0.0, 0.0]) - 16.0).abs() < 1e-9);
+        assert!(left(&[1.0, 1.0, 0.0, 1.0, -1.0, 0.0]) < 1e-9);
+    }
+}
