@@ -26,6 +26,7 @@ mod series_spring;
 mod servo;
 mod slow_noise;
 mod small;
+mod soft_belt;
 mod step_error;
 mod steps;
 mod sticking;
