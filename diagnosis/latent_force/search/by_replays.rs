@@ -53,8 +53,8 @@ impl Upon<'_> {
         }
         self.progress.note("replaying laws");
         let (mut stands, _) = (self.open_loop.fitted)(self.base)?;
-        for set in fitted.iter().take(1) {
-            stands = stands.min((self.open_loop.excess)(set)?);
+        if let Some(best) = fitted.first() {
+            stands = stands.min((self.open_loop.excess)(best)?);
         }
         let mut further = Vec::new();
         for set in self.replayed_laws(look)?.into_iter().take(TRIED) {

@@ -56,8 +56,8 @@ impl Share {
     }
 }
 
-/// How late a step takes a spring that gives way against a damper `1 / x` of a step's time constant of it: half a step where that is long, the end
-/// of the step where it is short.
+/// When in a step a spring is taken that relaxes against a damper, the step being `x` of their time constants: in its middle where it is a small part
+/// of one, at its end where it is many. The relaxation is then that of a continuous time.
 fn exponential(x: f64) -> f64 {
     if x < 1e-4 {
         return 0.5 + x / 12.0;
@@ -241,5 +241,100 @@ impl Transmission {
             moved[0] = moved[0].clamp(to[0] - self.between.half_gap, to[0] + self.between.half_gap);
         }
         moved
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const DT: f64 = 1e-3;
+
+    fn rotor(inertia: f64, between: Between) -> Transmission {
+        Transmission {
+            between,
+            inertia,
+            dt: DT,
+        }
+    }
+
+    /// `θ = θ∞ (1 - exp(-b t / d))`, whatever the step.
+    #[test]
+    fn a_rotor_without_inertia_relaxes_in_its_gap_as_in_continuous_time() {
+        for d in [1e-3, 0.1, 3.0] {
+            let between = Between {
+                half_gap: 2.0,
+                ..Between::default()
+            };
+            let transmission = rotor(0.0, between);
+            let law = Law {
+                a: 20.0,
+                b: 20.0,
+                d,
+            };
+            let mut state = [0.0, 0.0];
+            for k in 1..50 {
+                let begun = transmission.begin(law, state, 0.0, 0.0);
+                state = transmission.complete(&begun, state, 0.0);
+                let expected = -(-20.0 * DT * f64::from(k) / d).exp_m1();
+                assert!((state[0] - expected).abs() < 1e-12, "{d} {k}");
+            }
+        }
+    }
+
+    /// Largest angles in the first of some hundred periods and in the last, of a rotor that swings on its spring against a joint that is held.
+    fn swings(loss: f64) -> [f64; 2] {
+        let (inertia, compliance) = (0.02, 0.05);
+        let between = Between {
+            compliance,
+            loss,
+            half_gap: 0.0,
+        };
+        let transmission = rotor(inertia, between);
+        let law = Law {
+            a: 0.0,
+            b: 0.0,
+            d: 0.0,
+        };
+        let period = std::f64::consts::TAU * f64::sqrt(inertia * compliance);
+        let steps = |periods: f64| (periods * period / DT) as usize;
+        let mut state = [0.3, 0.0];
+        let mut angles = Vec::new();
+        for _ in 0..steps(11.0) {
+            angles.push(state[0]);
+            let begun = transmission.begin(law, state, 0.0, 0.0);
+            state = transmission.complete(&begun, state, 0.0);
+        }
+        [0.0, 10.0].map(|first| {
+            let period = &angles[steps(first)..steps(first + 1.0)];
+            period.iter().copied().fold(0.0, f64::max)
+        })
+    }
+
+    #[test]
+    fn a_rotor_swings_on_its_spring_by_the_loss_that_is_said() {
+        let [first, last] = swings(0.0);
+        assert!((last / first - 1.0).abs() < 2e-3, "{first} {last}");
+        let loss = 0.03;
+        let [first, last] = swings(loss);
+        let expected = (-std::f64::consts::TAU * 10.0 * loss / (1.0 - loss * loss).sqrt()).exp();
+        assert!(
+            (last / first / expected - 1.0).abs() < 0.02,
+            "{first} {last}"
+        );
+    }
+
+    /// By hand: at rest a servo's force, and at a speed what its damper takes of it.
+    #[test]
+    fn a_rotor_that_nothing_parts_from_its_joint_is_the_drive() {
+        let transmission = rotor(0.0, Between::default());
+        let law = Law {
+            a: 6.0,
+            b: 10.0,
+            d: 2.0,
+        };
+        let begun = transmission.begin(law, [0.4, 0.0], 0.4, 0.0);
+        assert!((begun.force - 2.0).abs() < 1e-12);
+        assert!((begun.damping - 2.0).abs() < 5e-3);
     }
 }
