@@ -26,8 +26,7 @@ impl Upon<'_> {
     /// Sets that were `fitted` to the end, best first, and those of readings alone that lead about replays of what
     /// stands. Upon no effect, where the best leaves a gap of replays.
     pub(super) fn with_a_look_about_replays(&self, fitted: Vec<Set>) -> Result<Vec<Set>> {
-        let is_due = self.base.candidates.is_empty() && !self.context.has_segments();
-        if !is_due || self.progress.is_stopped() || self.is_closed_by(fitted.first())? {
+        if !self.asks_replays(&fitted)? {
             return Ok(fitted);
         }
         let mut base = self.base.clone();
@@ -44,14 +43,24 @@ impl Upon<'_> {
             ..*self
         };
         let look = about.look(Pairs::BeyondTheSum)?;
-        let mut further = Vec::new();
-        for mut set in about.leading(&look)? {
+        let rivals = about.leading(&look)?;
+        self.with_rivals(fitted, rivals)
+    }
+
+    /// Whether replays are asked beside the sets that were `fitted`, best first: upon no effect, along rows, where the best leaves a gap of replays.
+    pub(super) fn asks_replays(&self, fitted: &[Set]) -> Result<bool> {
+        let is_due = self.base.candidates.is_empty() && !self.context.has_segments();
+        Ok(is_due && !self.progress.is_stopped() && !self.is_closed_by(fitted.first())?)
+    }
+
+    /// Sets that were `fitted` to the end and rivals that replays have found, these fitted too; best first.
+    pub(super) fn with_rivals(&self, fitted: Vec<Set>, mut rivals: Vec<Set>) -> Result<Vec<Set>> {
+        for set in &mut rivals {
             let name = name_of(self.candidates, &set.candidates);
             self.progress.note(&format!("trying {name}"));
             set.fit(self.context, (self.breadth.rounds[0], self.progress))?;
-            further.push(set);
         }
-        let further = self.finish(further, self.base.fitted.evidence)?.sets;
+        let further = self.finish(rivals, self.base.fitted.evidence)?.sets;
         Ok(self.in_order(joined(fitted, further)))
     }
 
@@ -84,7 +93,7 @@ impl Upon<'_> {
     }
 
     /// Whether replays with a set that rises above what stands leave no gap.
-    pub(super) fn is_closed_by(&self, set: Option<&Set>) -> Result<bool> {
+    fn is_closed_by(&self, set: Option<&Set>) -> Result<bool> {
         let Some(set) = set.filter(|s| s.rises_above(self.base, self.threshold())) else {
             return Ok(false);
         };

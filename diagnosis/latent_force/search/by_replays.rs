@@ -12,8 +12,7 @@ use crate::latent_force::screen::Screened;
 use super::open_loop::MOST;
 use super::round::Upon;
 use super::screening::Look;
-use super::second_look::joined;
-use super::set::{Set, name_of};
+use super::set::Set;
 
 /// Candidates that are replayed, at most: each takes as many replays of all logs as it has start values, and one more.
 const REPLAYED: usize = 8;
@@ -47,8 +46,7 @@ impl Upon<'_> {
     /// Sets that were `fitted` to the end, best first, and those single laws without a slope at their null with which replays leave less than half of what
     /// they leave with the best of these and without any. Upon no effect, where the best leaves a gap of replays.
     pub(super) fn with_laws_by_replays(&self, fitted: Vec<Set>, look: &Look) -> Result<Vec<Set>> {
-        let is_due = self.base.candidates.is_empty() && !self.context.has_segments();
-        if !is_due || self.progress.is_stopped() || self.is_closed_by(fitted.first())? {
+        if !self.asks_replays(&fitted)? {
             return Ok(fitted);
         }
         self.progress.note("replaying laws");
@@ -56,7 +54,7 @@ impl Upon<'_> {
         if let Some(best) = fitted.first() {
             stands = stands.min((self.open_loop.excess)(best)?);
         }
-        let mut further = Vec::new();
+        let mut rivals = Vec::new();
         for set in self.replayed_laws(look)?.into_iter().take(TRIED) {
             if self.progress.is_stopped() {
                 break;
@@ -68,13 +66,9 @@ impl Upon<'_> {
             }
             set.fitted.estimate.trajectory = states;
             set.fitted.slopes = Slopes::default();
-            let name = name_of(self.candidates, &set.candidates);
-            self.progress.note(&format!("trying {name}"));
-            set.fit(self.context, (self.breadth.rounds[0], self.progress))?;
-            further.push(set);
+            rivals.push(set);
         }
-        let further = self.finish(further, self.base.fitted.evidence)?.sets;
-        Ok(self.in_order(joined(fitted, further)))
+        self.with_rivals(fitted, rivals)
     }
 
     /// The laws without a slope at their null that lead a screening, each where replays leave least, the least first.
