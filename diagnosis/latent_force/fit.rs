@@ -18,10 +18,11 @@ use nalgebra::DMatrix;
 use super::context::Context;
 use super::estimate::Estimate;
 use super::fitted_value::Unknown;
+use super::scales::settled;
 use super::step_map::{Derivatives, LinearEpisode, StepMap};
 
 pub use extent::Extent;
-use regression::{Compared, compare, in_units, shift, variations};
+use regression::{Compared, compare, in_units, prior_of, shift, variations};
 pub use regression::{SCALES, regression, regression_at};
 pub use slopes::Slopes;
 use wander::wander;
@@ -136,6 +137,11 @@ pub fn fit<'p>(
         context.step_error.join(&mut linear, m);
         let model = (&unknowns[..], &free[..], &theta[..]);
         let whole = round == 0 || has_segments;
+        if round == 0 && extent.settles {
+            let (center, bounds) = prior_of(context, model);
+            let all: Vec<usize> = (0..center.len()).collect();
+            estimate = settled(context, &estimate, (&linear, &all), (&center, &bounds));
+        }
         let Some(compared) = compare(context, &estimate, &linear, model, whole) else {
             break;
         };

@@ -15,6 +15,7 @@ use super::estimate::Estimate;
 use super::evidence::evidence;
 use super::fit::{SCALES, regression, regression_at};
 use super::smoother::Regression;
+use super::step_map::LinearEpisode;
 
 /// Factors of one joint's variance: of the force a third, a tenth and a thirtieth is then left to chance.
 const AT_A_JOINT: [f64; 3] = [0.1, 0.01, 0.001];
@@ -121,15 +122,26 @@ impl Scales {
 #[must_use]
 pub fn at_own_scales(context: &Context<'_>, estimate: &Estimate, columns: &Columns) -> Estimate {
     let base: Vec<usize> = (0..columns.base).collect();
-    let m = columns.center.len();
+    let prior = (&columns.center[..], &columns.bounds[..]);
+    settled(context, estimate, (&columns.linear, &base), prior)
+}
+
+/// An estimate with the variances that some columns of a linearisation are likeliest with, joint by joint; all columns have a center and bounds.
+#[must_use]
+pub fn settled(
+    context: &Context<'_>,
+    estimate: &Estimate,
+    (linear, which): (&[LinearEpisode], &[usize]),
+    (center, bounds): (&[f64], &[[f64; 2]]),
+) -> Estimate {
+    let m = center.len();
     let mut own = estimate.clone();
     let mut stands = None;
     for dof in lacking(context, estimate) {
         let likelihood = |own: &Estimate, scale: f64| {
-            let asked = (m, &base[..]);
-            let sum = regression_at(context, own, &columns.linear, (dof, scale), asked);
-            let (center, bounds) = (&columns.center, &columns.bounds);
-            sum.log_likelihood + evidence(&sum.gram, &sum.moment, &base, center, bounds).gain
+            let sum = regression_at(context, own, linear, (dof, scale), (m, which));
+            let found = evidence(&sum.gram, &sum.moment, which, center, bounds);
+            sum.log_likelihood + found.gain
         };
         let mut best = (1.0, stands.unwrap_or_else(|| likelihood(&own, 1.0)));
         for scale in AT_A_JOINT {

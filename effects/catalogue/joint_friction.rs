@@ -366,7 +366,8 @@ impl Effect for Load {
     fn parameters(&self) -> &'static [EffectParameter] {
         const {
             &[
-                EffectParameter::new("coefficient", "1", [0.0, 0.9], 0.0),
+                // At 1 the drive could not move its joint.
+                EffectParameter::new("coefficient", "1", [0.0, 0.99], 0.0),
                 CREEP_PARAMETER,
             ]
         }

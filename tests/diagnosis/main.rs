@@ -11,6 +11,7 @@ mod diagnosis_support;
 mod drift;
 mod far;
 mod filtered_at_a_stop;
+mod held_joint;
 mod islands;
 mod late_drive;
 mod next;

@@ -14,6 +14,8 @@ pub struct Extent<'p> {
     pub rounds: usize,
     /// Evidence, natural logarithm, that it must come to; without it, all that there is.
     pub rival: Option<f64>,
+    /// Whether the variances of missing forces are first settled joint by joint.
+    pub settles: bool,
     /// Work that may be stopped.
     pub progress: &'p dyn Progress,
 }
@@ -23,6 +25,7 @@ impl<'p> From<(usize, &'p dyn Progress)> for Extent<'p> {
         Self {
             rounds,
             rival: None,
+            settles: false,
             progress,
         }
     }

@@ -83,18 +83,13 @@ pub(super) struct Compared {
     pub(super) found: Evidence,
 }
 
-/// Compares the common scales of `q` for a model (its unknowns, the places of those that are fitted, and all values): the `whole` of them,
-/// or, about the scale that was best before, from the largest on while the evidence rises. `None` where there is no scale.
-pub(super) fn compare(
+/// Centers and bounds of the coefficients, in deviations of their priors about the present values. The engine's own error comes last, with
+/// nothing known of its coefficient but its prior.
+pub(super) fn prior_of(
     context: &Context<'_>,
-    estimate: &Estimate,
-    linear: &[LinearEpisode],
     (unknowns, free, theta): (&[Unknown], &[usize], &[f64]),
-    whole: bool,
-) -> Option<Compared> {
-    // The engine's own error comes last, with nothing known of its coefficient but its prior.
+) -> (Vec<f64>, Vec<[f64; 2]>) {
     let m = free.len() + context.step_error.columns();
-    let places: Vec<usize> = (0..m).collect();
     let center = free.iter().map(|&i| -unknowns[i].distance(theta[i]));
     let mut center: Vec<f64> = center.collect();
     let bounds = free.iter().map(|&i| {
@@ -104,6 +99,21 @@ pub(super) fn compare(
     let mut bounds: Vec<[f64; 2]> = bounds.collect();
     center.extend(context.step_error.center());
     bounds.resize(m, [f64::NEG_INFINITY, f64::INFINITY]);
+    (center, bounds)
+}
+
+/// Compares the common scales of `q` for a model (its unknowns, the places of those that are fitted, and all values): the `whole` of them,
+/// or, about the scale that was best before, from the largest on while the evidence rises. `None` where there is no scale.
+pub(super) fn compare(
+    context: &Context<'_>,
+    estimate: &Estimate,
+    linear: &[LinearEpisode],
+    (unknowns, free, theta): (&[Unknown], &[usize], &[f64]),
+    whole: bool,
+) -> Option<Compared> {
+    let (center, bounds) = prior_of(context, (unknowns, free, theta));
+    let m = center.len();
+    let places: Vec<usize> = (0..m).collect();
     let prior: f64 = center.iter().map(|c| c * c).sum();
     let mut best: Option<Compared> = None;
     for scale in SCALES {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use asid_core::progress::UntilLate;
 use asid_core::{Progress, Result};
 use asid_effects::EffectSpec;
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 
 use crate::bench::{Bench, Explanation, Local, Trial};
 use crate::candidate::Candidate;
@@ -135,7 +135,8 @@ impl Replays<'_> {
         Ok(residuals)
     }
 
-    /// A set with its values fitted to whole replays from the starts that it has smoothed, after the excess power that they then leave.
+    /// A set with its values fitted to whole replays from the starts that it has smoothed, after the excess power that they then leave. Its
+    /// covariance is how far all that they leave could have moved each value, if it were of one sign with what the value does.
     pub(super) fn fitted(&self, set: &Set) -> Result<(f64, Set)> {
         let bench = self.bench;
         let trials = self.trials(&set.fitted, &set.candidates);
@@ -146,6 +147,13 @@ impl Replays<'_> {
         let found = fit(&mut predictor, (bench.layout(), &unknowns), begin, how)?;
         let mut set = set.clone();
         set.fitted.theta.clone_from(&found.point.theta);
+        let free = set.fitted.hypothesis.free();
+        let place = |i: usize| found.free.iter().position(|&f| f == free[i]);
+        let excess = (found.cost - bench.train.readings as f64).max(1.0);
+        set.fitted.covariance = DMatrix::from_fn(free.len(), free.len(), |i, j| {
+            let places = place(i).zip(place(j));
+            places.map_or(0.0, |at| excess * found.covariance[at])
+        });
         let left = found.cost / bench.train.readings.max(1) as f64 - 1.0;
         let left = if left.is_nan() {
             f64::INFINITY

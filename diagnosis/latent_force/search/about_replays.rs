@@ -8,7 +8,7 @@ use asid_core::Result;
 use asid_effects::Reach;
 
 use crate::findings::LEAST_GAP;
-use crate::latent_force::fit::Slopes;
+use crate::latent_force::fit::{Extent, Slopes};
 use crate::latent_force::screen::Pairs;
 
 use super::open_loop::MOST;
@@ -58,7 +58,14 @@ impl Upon<'_> {
         for set in &mut rivals {
             let name = name_of(self.candidates, &set.candidates);
             self.progress.note(&format!("trying {name}"));
-            set.fit(self.context, (self.breadth.rounds[0], self.progress))?;
+            let brief = Extent::from((self.breadth.rounds[0], self.progress));
+            set.fit(
+                self.context,
+                Extent {
+                    settles: true,
+                    ..brief
+                },
+            )?;
         }
         let further = self.finish(rivals, self.base.fitted.evidence)?.sets;
         Ok(self.in_order(joined(fitted, further)))

@@ -146,9 +146,9 @@ impl Upon<'_> {
         let cut = cut.into_iter().filter(|(_, sets)| !sets.is_empty());
         untried.extend(cut.map(|(stage, sets)| Untried { stage, sets }));
         let beside = (&screening.look, screening.tolerances.as_ref());
-        let confirmed = self.with_a_second_look(finished.sets, beside)?;
+        let confirmed = self.with_laws_by_replays(self.in_order(finished.sets), beside)?;
+        let confirmed = self.with_a_second_look(confirmed, beside)?;
         let confirmed = self.with_a_look_about_replays(confirmed)?;
-        let confirmed = self.with_laws_by_replays(confirmed, &screening.look)?;
         let gain = |s: &Set| s.fitted.evidence - self.base.fitted.evidence;
         let rows = confirmed.iter().map(|s| (name(&s.candidates), gain(s)));
         progress.ranking(&format!("fits{upon}"), &rows.collect::<Vec<_>>());

@@ -103,8 +103,7 @@ impl Upon<'_> {
             leading.iter().map(candidate).collect(),
             isolability(&scales.common[0], columns, &leading),
         );
-        let base = &self.base.candidates;
-        let tolerances = Tolerances::of((scales, columns), self.open, self.candidates, base);
+        let tolerances = Tolerances::of((scales, columns), self.open, self.candidates, self.base);
         let of_names = tolerances
             .as_ref()
             .map_or(0.0, |_| of_names(scales, columns, ranked, self.price()));

@@ -32,6 +32,8 @@ const LEADING: usize = 60;
 #[derive(Clone, Debug)]
 struct Member {
     candidate: usize,
+    /// Where nothing is off, and where the regression has them.
+    begin: Vec<f64>,
     values: Vec<f64>,
     deviations: Vec<f64>,
     /// The like candidate that can be named, and what its values are then.
@@ -52,13 +54,19 @@ fn deviation([low, high]: [f64; 2], null: f64) -> f64 {
     (null - low).abs().max((high - null).abs()) / DEVIATIONS
 }
 
+/// Of the coefficients of a model's own columns those of its values, as many as are `free`: after them comes that of the engine's own error,
+/// which moves none.
+fn of_values(own: &[f64], free: usize) -> Vec<f64> {
+    own[..free.min(own.len())].to_vec()
+}
+
 impl Member {
-    /// Puts it into a set, which is not fitted then.
-    fn join(&self, set: &mut Set, candidate: &Candidate) {
+    /// Puts it into a set with some values, which is not fitted then.
+    fn join(&self, set: &mut Set, candidate: &Candidate, values: &[f64]) {
         let fitted = &mut set.fitted;
         fitted.hypothesis.specs.push(candidate.spec.clone());
         fitted.hypothesis.unknowns.extend(self.unknowns(candidate));
-        fitted.theta.extend(&self.values);
+        fitted.theta.extend(values);
         fitted.slopes = Slopes::default();
         set.candidates.push(self.candidate);
     }
@@ -87,9 +95,9 @@ impl Tolerances {
         (scales, columns): (&Scales, &Columns),
         open: &[usize],
         candidates: &[Candidate],
-        set: &[usize],
+        set: &Set,
     ) -> Option<Self> {
-        if set.iter().any(|&c| candidates[c].is_tolerance) {
+        if set.candidates.iter().any(|&c| candidates[c].is_tolerance) {
             return None;
         }
         let sharpest = scales.common.last()?;
@@ -123,9 +131,11 @@ impl Tolerances {
             }
             if taken.len() > first {
                 let ranges = form.begin.iter().zip(&candidate.ranges);
+                let begin: Vec<f64> = ranges.map(|(x, r)| x.clamp(r[0], r[1])).collect();
                 members.push(Member {
                     candidate: c,
-                    values: ranges.map(|(x, r)| x.clamp(r[0], r[1])).collect(),
+                    values: begin.clone(),
+                    begin,
                     deviations,
                     named: (open[named], form.unknowns(&candidates[open[named]])),
                 });
@@ -150,7 +160,10 @@ impl Tolerances {
         }
         Some(Self {
             gain: gain - none,
-            base: coefficients[..columns.base].to_vec(),
+            base: of_values(
+                &coefficients[..columns.base],
+                set.fitted.hypothesis.free().len(),
+            ),
             members,
         })
     }
@@ -164,9 +177,19 @@ impl Tolerances {
             let u = &fitted.hypothesis.unknowns[i];
             fitted.theta[i] = (fitted.theta[i] + c * u.deviation).clamp(u.bounds[0], u.bounds[1]);
         }
+        self.joined(set, candidates, |member| &member.values)
+    }
+
+    /// A set with all of them but those of what it names, each where nothing is off, and its own values as they are; not fitted yet. What the
+    /// screening says of them upon a trajectory of another model does not hold about the set's own.
+    pub(super) fn from_null(&self, set: &Set, candidates: &[Candidate]) -> Set {
+        self.joined(set.clone(), candidates, |member| &member.begin)
+    }
+
+    fn joined(&self, mut set: Set, candidates: &[Candidate], values: fn(&Member) -> &[f64]) -> Set {
         for member in &self.members {
             if !set.candidates.contains(&member.named.0) {
-                member.join(&mut set, &candidates[member.candidate]);
+                member.join(&mut set, &candidates[member.candidate], values(member));
             }
         }
         set
@@ -245,6 +268,13 @@ mod tests {
         // Of one side as well.
         assert!((deviation([0.0, 0.0045], 0.0) - 0.0015).abs() < 1e-12);
         assert_eq!(deviation_within([0.2, 0.2], 0.0), 0.0);
+    }
+
+    #[test]
+    fn the_engines_own_error_moves_no_value_of_an_effect_that_tolerances_come_beside() {
+        // A value of the study and the engine's error; beside a name the next value is the name's.
+        assert_eq!(of_values(&[0.3, 7.0], 1), [0.3]);
+        assert_eq!(of_values(&[0.3], 1), [0.3]);
     }
 
     /// Columns of one form whose second is idle.

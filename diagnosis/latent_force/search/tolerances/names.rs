@@ -162,18 +162,20 @@ fn needed(
             };
             let candidate = &candidates[t];
             let parameters = candidate.parameters().iter().zip(&candidate.ranges);
+            let begin: Vec<f64> = parameters
+                .clone()
+                .map(|(p, r)| p.null.clamp(r[0], r[1]))
+                .collect();
             let member = Member {
                 candidate: t,
-                values: parameters
-                    .clone()
-                    .map(|(p, r)| p.null.clamp(r[0], r[1]))
-                    .collect(),
+                values: begin.clone(),
+                begin,
                 deviations: parameters
                     .map(|(p, r)| deviation_within(*r, p.null))
                     .collect(),
                 named: (c, Vec::new()),
             };
-            member.join(&mut smaller, candidate);
+            member.join(&mut smaller, candidate, &member.begin);
         }
         progress.note(&format!("trying without {law}"));
         smaller.fit(context, (breadth.rounds[1], progress))?;
