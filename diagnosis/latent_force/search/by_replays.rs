@@ -78,7 +78,7 @@ impl Upon<'_> {
             }
             set.fitted.estimate.trajectory = states;
             set.fitted.slopes = Slopes::default();
-            rivals.extend(tolerances.map(|t| t.from_null(&set, self.candidates)));
+            rivals.extend(tolerances.map(|t| t.begun_at_null(&set, self.candidates)));
             rivals.push(set.clone());
             found.push((left, set));
         }

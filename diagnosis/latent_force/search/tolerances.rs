@@ -182,7 +182,7 @@ impl Tolerances {
 
     /// A set with all of them but those of what it names, each where nothing is off, and its own values as they are; not fitted yet. What the
     /// screening says of them upon a trajectory of another model does not hold about the set's own.
-    pub(super) fn from_null(&self, set: &Set, candidates: &[Candidate]) -> Set {
+    pub(super) fn begun_at_null(&self, set: &Set, candidates: &[Candidate]) -> Set {
         self.joined(set.clone(), candidates, |member| &member.begin)
     }
 
