@@ -1,8 +1,6 @@
 //! Two servos, one of them behind a gear that nearly holds: its friction is 0.94 of what the drive gives, integrated by hand.
 
-use std::fmt::Write as _;
-
-use super::one_joint::normal;
+use super::one_joint::{machine_log, normal};
 use super::world::write_files;
 use super::{assert_names, run_on};
 
@@ -58,21 +56,15 @@ fn step(q: [f64; 2], v: [f64; 2], u: [f64; 2], h: f64) -> ([f64; 2], [f64; 2]) {
 
 fn log(episode: usize) -> String {
     let mut noise = normal(70 + episode as u64);
-    let (mut q, mut v) = ([0.0; 2], [0.0; 2]);
-    let mut text =
-        "time,ctrl.s_pan,ctrl.s_roll,q_pan,q_roll,qpos.pan,qpos.roll,qvel.pan,qvel.roll\n"
-            .to_owned();
-    for row in 0..(SECONDS / ROW) as usize {
-        let time = ROW * row as f64;
-        let u = commands(episode, time);
+    let header = "time,ctrl.s_pan,ctrl.s_roll,q_pan,q_roll,qpos.pan,qpos.roll,qvel.pan,qvel.roll";
+    let read = |u: &[f64; 2], (q, _): &([f64; 2], [f64; 2])| {
         let [pan, roll] = q.map(|x| x + NOISE * noise());
-        let start = if row == 0 { "0,0,0,0" } else { ",,," };
-        writeln!(text, "{time:.2},{},{},{pan},{roll},{start}", u[0], u[1]).unwrap();
-        for _ in 0..2000 {
-            (q, v) = step(q, v, u, ROW / 2000.0);
-        }
-    }
-    text
+        format!("{},{},{pan},{roll}", u[0], u[1])
+    };
+    let advance = |(q, v), u: &[f64; 2], h| step(q, v, *u, h);
+    let machine = (|time| commands(episode, time), read, advance);
+    let rest = ([0.0; 2], [0.0; 2]);
+    machine_log(header, ([SECONDS, ROW], 2000), (rest, "0,0,0,0"), machine)
 }
 
 /// From row to row a friction of 0.94 of the drive is much like one of 0.99, or like a servo that is far too soft; where the joint has gone to

@@ -20,15 +20,33 @@ pub fn joint_log(
     (command, step): (impl Fn(f64) -> f64, impl Fn([f64; 2], f64, f64) -> [f64; 2]),
     mut noise: impl FnMut() -> f64,
 ) -> String {
-    let mut state = [0.0; 2];
+    let read = |u: &f64, state: &[f64; 2]| format!("{u},{}", state[0] + noise());
+    let advance = |state, u: &f64, h| step(state, *u, h);
+    let machine = (command, read, advance);
+    machine_log(header, ([seconds, row], steps), ([0.0; 2], "0,0"), machine)
+}
+
+/// A log of a machine: `header`, then rows of time, what `read` writes of a command and a state, and in the first row where it `begins`. Rows are `row` s apart,
+/// over `seconds`, and `step` takes a state and a command on over one of `steps` equal parts of a row.
+pub fn machine_log<S, U>(
+    header: &str,
+    ([seconds, row], steps): ([f64; 2], u32),
+    (mut state, begins): (S, &str),
+    (command, mut read, step): (
+        impl Fn(f64) -> U,
+        impl FnMut(&U, &S) -> String,
+        impl Fn(S, &U, f64) -> S,
+    ),
+) -> String {
     let mut text = header.to_owned();
+    let open: String = begins.matches(',').collect();
     for k in 0..(seconds / row) as usize {
         let time = row * k as f64;
         let u = command(time);
-        let start = if k == 0 { "0,0" } else { "," };
-        let _ = write!(text, "\n{time:.3},{u},{},{start}", state[0] + noise());
+        let start = if k == 0 { begins } else { &open };
+        let _ = write!(text, "\n{time:.3},{},{start}", read(&u, &state));
         for _ in 0..steps {
-            state = step(state, u, row / f64::from(steps));
+            state = step(state, &u, row / f64::from(steps));
         }
     }
     text + "\n"

@@ -1,8 +1,6 @@
 //! A servo that pulls its pendulum through a spring, integrated by hand, and logs that begin in the middle of a motion.
 
-use std::fmt::Write as _;
-
-use super::one_joint::normal;
+use super::one_joint::{machine_log, normal};
 use super::world::write_files;
 use super::{assert_names, run_on};
 
@@ -49,24 +47,13 @@ fn log(episode: usize) -> String {
     let mut noise = normal(20 + episode as u64);
     let k = episode as f64;
     let (q, v) = (0.25 * (3.0 * k).sin(), 0.3 * (2.0 * k).cos());
+    let header = "time,ctrl.servo,angle,qpos.hinge,qvel.hinge";
+    let read = |u: &f64, state: &[f64; 4]| format!("{u},{}", state[0] + NOISE * noise());
+    let advance = |state, u: &f64, h| step(state, *u, h);
+    let machine = (|time| command(episode, time), read, advance);
     // Its rotor is where the joint is, and goes with it.
-    let mut state = [q, v, q, v];
-    let mut text = "time,ctrl.servo,angle,qpos.hinge,qvel.hinge\n".to_owned();
-    let steps = 1000;
-    for row in 0..(SECONDS / ROW) as usize {
-        let time = ROW * row as f64;
-        let start = if row == 0 {
-            format!("{q},{v}")
-        } else {
-            ",".to_owned()
-        };
-        let u = command(episode, time);
-        writeln!(text, "{time:.2},{u},{},{start}", state[0] + NOISE * noise()).unwrap();
-        for _ in 0..steps {
-            state = step(state, u, ROW / f64::from(steps));
-        }
-    }
-    text
+    let begins = ([q, v, q, v], &*format!("{q},{v}"));
+    machine_log(header, ([SECONDS, ROW], 1000), begins, machine)
 }
 
 /// A model begins with its rotor in balance between servo and spring: the spring would be stretched by up to a tenth, whose swing is the first second.

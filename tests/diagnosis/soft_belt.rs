@@ -1,8 +1,6 @@
 //! A cart with a pole that hangs from it, pulled by a motor through a soft belt, integrated by hand.
 
-use std::fmt::Write as _;
-
-use super::one_joint::normal;
+use super::one_joint::{machine_log, normal};
 use super::world::write_files;
 use super::{assert_names, run_on};
 
@@ -61,20 +59,16 @@ fn step(at: [f64; 3], speed: [f64; 3], force: f64, h: f64) -> ([f64; 3], [f64; 3
 
 fn log(episode: usize) -> String {
     let mut noise = normal(60 + episode as u64);
-    let (mut at, mut speed) = ([0.0; 3], [0.0; 3]);
-    let mut text = "time,ctrl.belt,x,dx,phi,qpos.rail,qpos.pivot,qvel.rail,qvel.pivot\n".to_owned();
-    for row in 0..(SECONDS / ROW) as usize {
-        let time = ROW * row as f64;
-        let u = command(episode, time);
+    let header = "time,ctrl.belt,x,dx,phi,qpos.rail,qpos.pivot,qvel.rail,qvel.pivot";
+    let read = |u: &f64, (at, speed): &([f64; 3], [f64; 3])| {
         let read = [at[0], speed[0], at[1]];
         let [x, dx, phi] = [0, 1, 2].map(|i| read[i] + NOISE[i] * noise());
-        let start = if row == 0 { "0,0,0,0" } else { ",,," };
-        writeln!(text, "{time:.2},{u},{x},{dx},{phi},{start}").unwrap();
-        for _ in 0..1000 {
-            (at, speed) = step(at, speed, u, ROW / 1000.0);
-        }
-    }
-    text
+        format!("{u},{x},{dx},{phi}")
+    };
+    let advance = |(at, speed), u: &f64, h| step(at, speed, *u, h);
+    let machine = (|time| command(episode, time), read, advance);
+    let rest = ([0.0; 3], [0.0; 3]);
+    machine_log(header, ([SECONDS, ROW], 1000), (rest, "0,0,0,0"), machine)
 }
 
 /// A lighter cart makes up for most of the belt from row to row, and columns about that trajectory show nothing of it: replays do.
