@@ -22,6 +22,8 @@ pub struct Candidate {
     pub spec: EffectSpec,
     /// Points to start from, one value a parameter.
     pub starts: Vec<Vec<f64>>,
+    /// Points at which it is large, and does not act in proportion: looked at beside its slopes where stretches of the logs are replayed.
+    pub large: Vec<Vec<f64>>,
     /// Range of each parameter: that of the effect, or where the logs can tell of it.
     pub ranges: Vec<[f64; 2]>,
     /// How many episodes there are to fit to: values of others are not fitted to them.
@@ -120,6 +122,7 @@ fn within_tolerance(candidate: &Candidate, plant: &Plant, shown: &Trajectory) ->
     let is_wide = ranges.iter().any(|[low, high]| low < high);
     (ranges.len() == candidate.parameters().len() && is_wide).then(|| Candidate {
         ranges,
+        large: Vec::new(),
         is_tolerance: true,
         ..candidate.clone()
     })
@@ -211,11 +214,13 @@ pub fn enumerate(
                 continue;
             }
             let starts = starts(&*effect, plant, &site, shown);
+            let large = large(&*effect, plant, &site, (shown, &starts));
             let ranges = ranges(&*effect, plant, &site, shown);
             found.push(Candidate {
                 effect: effect.into(),
                 spec,
                 starts,
+                large,
                 ranges,
                 episodes: shown.logs,
                 is_tolerance: false,
@@ -289,10 +294,7 @@ fn starts(effect: &dyn Effect, plant: &Plant, site: &str, shown: &Trajectory) ->
                     Start::Set(reference, multiple) => {
                         vec![multiple * measure(plant, site, reference, shown)]
                     }
-                    Start::Multiples(reference, v) => {
-                        let unit = measure(plant, site, reference, shown);
-                        v.iter().map(|x| x * unit).collect()
-                    }
+                    Start::Multiples(reference, v) => multiples(plant, site, (reference, v), shown),
                     Start::Places(quantiles) => {
                         let axis = axis.map_or(0, |a| row[a] as usize);
                         shown.places(plant, site, axis, quantiles)
@@ -309,6 +311,45 @@ fn starts(effect: &dyn Effect, plant: &Plant, site: &str, shown: &Trajectory) ->
     }
     all.truncate(MAX_STARTS);
     all
+}
+
+/// The first start with one parameter at each of the values at which it is large.
+fn large(
+    effect: &dyn Effect,
+    plant: &Plant,
+    site: &str,
+    (shown, starts): (&Trajectory, &[Vec<f64>]),
+) -> Vec<Vec<f64>> {
+    let Some(first) = starts.first() else {
+        return Vec::new();
+    };
+    let mut all = Vec::new();
+    for (i, p) in effect.parameters().iter().enumerate() {
+        let values = match p.large {
+            Some(Start::Values(v)) => v.to_vec(),
+            Some(Start::Multiples(reference, v)) => multiples(plant, site, (reference, v), shown),
+            _ => Vec::new(),
+        };
+        let [low, high] = limits(p, p.range);
+        let values = values.into_iter().map(|x| x.clamp(low, high));
+        all.extend(values.filter(|x| *x != p.null).map(|x| {
+            let mut row = first.clone();
+            row[i] = x;
+            row
+        }));
+    }
+    all
+}
+
+/// Multiples of what the logs show of something at a site.
+fn multiples(
+    plant: &Plant,
+    site: &str,
+    (reference, multiples): (Reference, &[f64]),
+    shown: &Trajectory,
+) -> Vec<f64> {
+    let unit = measure(plant, site, reference, shown);
+    multiples.iter().map(|x| x * unit).collect()
 }
 
 /// What the logs show of a site, in the unit of the reference.

@@ -64,6 +64,7 @@ fn candidate(joint: &str) -> Result<Candidate> {
     let parameters = effect.parameters().iter();
     Ok(Candidate {
         starts: Vec::new(),
+        large: Vec::new(),
         ranges: parameters.map(|p| p.range).collect(),
         effect: effect.into(),
         spec,

@@ -61,6 +61,8 @@ pub struct EffectParameter {
     pub null: f64,
     /// How a search for its value begins.
     pub start: Start,
+    /// Large values that are looked at beside its slope: see [`EffectParameter::large_at`].
+    pub large: Option<Start>,
     /// The episode of the logs whose value it is, by its number; `None` for a value of all.
     pub episode: Option<usize>,
 }
@@ -75,6 +77,7 @@ impl EffectParameter {
             range,
             null,
             start: Start::Slope,
+            large: None,
             episode: None,
         }
     }
@@ -100,6 +103,14 @@ impl EffectParameter {
     #[must_use]
     pub const fn of_episode(mut self, number: usize) -> Self {
         self.episode = Some(number);
+        self
+    }
+
+    /// The same of what acts out of proportion where it is large, as friction does that holds its joint: where stretches of a log are replayed, a
+    /// search looks at these values too ([`Start::Values`] or [`Start::Multiples`]). A slope at the null knows of no joint that is held.
+    #[must_use]
+    pub const fn large_at(mut self, values: Start) -> Self {
+        self.large = Some(values);
         self
     }
 

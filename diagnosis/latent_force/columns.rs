@@ -179,7 +179,7 @@ impl Columns {
         } else {
             sizes(context, estimate, &source, &trials)?
         };
-        asked.add(candidates, &sizes);
+        asked.add(candidates, &sizes, context.has_segments());
         let [first, others] = in_part::parts(context);
         let along = (context, &estimate.trajectory[..]);
         let mut wanted = std::mem::take(&mut asked.wanted);

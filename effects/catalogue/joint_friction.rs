@@ -51,6 +51,12 @@ const CREEP_PARAMETER: EffectParameter =
 /// The same as a share of the largest speed.
 const CREEP_SHARE: f64 = 3e-3;
 
+/// Shares of the drive's largest force at which dry friction is looked at as a large one: there its joint stands for a good part of the time. A fit goes on
+/// from half or twice its value, so that two of them cover a decade.
+const LARGE: &[f64] = &[0.1, 0.3];
+/// The same of friction that grows with the drive's force: of what that leaves for the motion, `1 - coefficient`, two values that cover a decade.
+const LARGE_BY_LOAD: &[f64] = &[0.3, 0.8];
+
 /// Three deviations of a joint's friction from what its model says, as a share of it: seals, grease and preload differ from one
 /// machine to the next, and with its temperature, by a tenth and more (Bittencourt and Gunnarsson 2012 report far more over temperature).
 const FRICTION_TOLERANCE: f64 = 0.3;
@@ -171,7 +177,8 @@ impl Effect for Coulomb {
     fn parameters(&self) -> &'static [EffectParameter] {
         const {
             &[
-                EffectParameter::new("force", "N m or N", [0.0, 50.0], 0.0),
+                EffectParameter::new("force", "N m or N", [0.0, 50.0], 0.0)
+                    .large_at(Start::Multiples(Reference::Force, LARGE)),
                 EffectParameter::new("offset", "N m or N", [-50.0, 50.0], 0.0)
                     .starting(Start::Given),
                 CREEP_PARAMETER,
@@ -367,7 +374,8 @@ impl Effect for Load {
         const {
             &[
                 // At 1 the drive could not move its joint.
-                EffectParameter::new("coefficient", "1", [0.0, 0.99], 0.0),
+                EffectParameter::new("coefficient", "1", [0.0, 0.99], 0.0)
+                    .large_at(Start::Values(LARGE_BY_LOAD)),
                 CREEP_PARAMETER,
             ]
         }

@@ -81,20 +81,16 @@ impl Asked {
             .resize(self.base, [f64::NEG_INFINITY, f64::INFINITY]);
     }
 
-    /// Adds those of all candidates; `sizes` are the deviations of the priors of their [`trials`], 0 for what does nothing.
-    pub(super) fn add(&mut self, candidates: &[Candidate], sizes: &[f64]) {
+    /// Adds those of all candidates; `sizes` are the deviations of the priors of their [`trials`], 0 for what does nothing. Where segments are
+    /// `replayed`, what is large is a secant beside its slopes: a replay in which a joint moves has no slope that tells of one that stands.
+    pub(super) fn add(&mut self, candidates: &[Candidate], sizes: &[f64], replayed: bool) {
         let mut sizes = sizes.iter();
         for (c, candidate) in candidates.iter().enumerate() {
             for begin in &candidate.starts {
                 let first = self.base + self.wanted.len();
                 let mut slopes = Vec::new();
                 if candidate.slopes().is_empty() {
-                    let secant = Wanted {
-                        candidate: c,
-                        values: begin.clone(),
-                        scale: 1.0,
-                    };
-                    self.push(secant, [0.0, SECANT]);
+                    self.push_secant(c, begin);
                     slopes.push(None);
                 }
                 for p in candidate.slopes() {
@@ -116,6 +112,15 @@ impl Asked {
                     });
                 }
             }
+            for begin in candidate.large.iter().filter(|_| replayed) {
+                self.forms.push(Form {
+                    candidate: c,
+                    begin: begin.clone(),
+                    slopes: vec![None],
+                    first: self.base + self.wanted.len(),
+                });
+                self.push_secant(c, begin);
+            }
         }
     }
 
@@ -128,6 +133,16 @@ impl Asked {
             begins.extend(slopes.map(|s| s.map(|_| &form.begin[..])));
         }
         begins
+    }
+
+    /// Adds what a candidate does at some values.
+    fn push_secant(&mut self, candidate: usize, values: &[f64]) {
+        let secant = Wanted {
+            candidate,
+            values: values.to_vec(),
+            scale: 1.0,
+        };
+        self.push(secant, [0.0, SECANT]);
     }
 
     fn push(&mut self, wanted: Wanted, bounds: [f64; 2]) {
