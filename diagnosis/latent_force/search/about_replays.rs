@@ -100,7 +100,7 @@ impl Upon<'_> {
     }
 
     /// Whether replays with a set that rises above what stands leave no gap.
-    fn is_closed_by(&self, set: Option<&Set>) -> Result<bool> {
+    pub(super) fn is_closed_by(&self, set: Option<&Set>) -> Result<bool> {
         let Some(set) = set.filter(|s| s.rises_above(self.base, self.threshold())) else {
             return Ok(false);
         };

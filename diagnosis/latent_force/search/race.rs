@@ -16,7 +16,9 @@ use super::tolerances::Tolerances;
 const TRIED: usize = 3;
 
 impl Upon<'_> {
-    /// Fits what leads in a screening a little; tolerances too where they are not far behind.
+    /// Fits what leads in a screening a little; tolerances too where they are not far behind. Once a set leaves no gap of replays, upon no effect, only
+    /// those are fitted besides that a screening puts within a part of what it has come to ([`Breadth::behind`](crate::settings::Breadth::behind)), and its own law
+    /// at more places: the others would have to close the gap too, and be ahead of it.
     pub(super) fn race(&self, look: &Look, tolerances: Option<&Tolerances>) -> Result<Fits> {
         let (breadth, progress) = (self.breadth, self.progress);
         let ranked = &look.ranked;
@@ -37,6 +39,7 @@ impl Upon<'_> {
         let due: Vec<&Screened> = due.take(places * breadth.raced).collect();
         progress.begin("confirming", due.len().min(breadth.raced) as u64);
         let (mut sets, mut risen) = (Vec::new(), 0);
+        let (mut closed, mut far) = (Vec::new(), f64::NEG_INFINITY);
         let mut left_out = Vec::new();
         let not_far = lead - (breadth.behind * lead).max(breadth.near);
         let mut near = tolerances.filter(|t| t.gain > not_far);
@@ -46,6 +49,10 @@ impl Upon<'_> {
                 break;
             }
             let members = self.members(look, s);
+            let holds = s.names == 1 && members.iter().any(|m| closed.contains(m));
+            if s.worth(price) < far && !holds {
+                continue;
+            }
             // What leads comes first: where time is out, an answer rests on it.
             if place > 0 && progress.is_stopped() {
                 left_out.push(members);
@@ -57,6 +64,11 @@ impl Upon<'_> {
             if set.fitted.evidence + set.fitted.promised > self.base.fitted.evidence {
                 risen += 1;
                 progress.advance(1);
+            }
+            if self.base.candidates.is_empty() && self.is_closed_by(Some(&set))? {
+                let gain = set.fitted.evidence - self.base.fitted.evidence;
+                far = far.max(breadth.behind * gain);
+                closed.extend(&set.candidates);
             }
             sets.push(set);
             sets.extend(self.tried(near.take())?);
