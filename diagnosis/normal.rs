@@ -1,6 +1,7 @@
 //! Normal equations of a fit, in arrow form: the starts of an episode act on that episode alone, and
 //! are eliminated there (Schur's complement).
 
+use nalgebra::linalg::SVD;
 use nalgebra::{DMatrix, DVector};
 
 use crate::linearise::Linearisation;
@@ -15,8 +16,11 @@ pub(crate) struct Normal {
     episodes: Vec<(DMatrix<f64>, DMatrix<f64>, DVector<f64>)>,
 }
 
+/// QR iterations of a singular value decomposition, at most, for each row: it takes two or three, and never ends where an entry is no number.
+const ITERATIONS: usize = 100;
+
 /// Pseudo-inverse of a symmetric matrix, scaled to a unit diagonal first: directions whose
-/// share is below `tolerance` stay out.
+/// share is below `tolerance` stay out. Zero where an entry is no number: it tells of nothing.
 #[must_use]
 pub(crate) fn inverse(matrix: &DMatrix<f64>, tolerance: f64) -> DMatrix<f64> {
     let n = matrix.nrows();
@@ -25,9 +29,14 @@ pub(crate) fn inverse(matrix: &DMatrix<f64>, tolerance: f64) -> DMatrix<f64> {
     }
     let scale = |i: usize| 1.0 / matrix[(i, i)].abs().sqrt().max(1e-150);
     let scaled = DMatrix::from_fn(n, n, |i, j| matrix[(i, j)] * scale(i) * scale(j));
-    let inverse = scaled
-        .pseudo_inverse(tolerance)
-        .unwrap_or_else(|_| DMatrix::zeros(n, n));
+    let parts = scaled
+        .iter()
+        .all(|x| x.is_finite())
+        .then(|| SVD::try_new(scaled, true, true, 5.0 * f64::EPSILON, ITERATIONS * n))
+        .flatten();
+    let inverse = parts
+        .and_then(|parts| parts.pseudo_inverse(tolerance).ok())
+        .unwrap_or_else(|| DMatrix::zeros(n, n));
     DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] * scale(i) * scale(j))
 }
 
@@ -140,6 +149,18 @@ impl Normal {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A window of a hopper whose replay had failed: the decomposition never ended, and no answer came.
+    #[test]
+    fn the_inverse_of_what_is_no_number_is_zero_and_comes() {
+        let matrix = DMatrix::from_row_slice(2, 2, &[2.0, f64::NAN, f64::NAN, 3.0]);
+        assert_eq!(inverse(&matrix, 1e-12), DMatrix::zeros(2, 2));
+        let matrix = DMatrix::from_row_slice(2, 2, &[f64::INFINITY, 1.0, 1.0, 3.0]);
+        assert_eq!(inverse(&matrix, 1e-12), DMatrix::zeros(2, 2));
+        let matrix = DMatrix::from_row_slice(2, 2, &[4.0, 0.0, 0.0, 0.0]);
+        let expected = DMatrix::from_row_slice(2, 2, &[0.25, 0.0, 0.0, 0.0]);
+        assert!((inverse(&matrix, 1e-12) - expected).amax() < 1e-15);
+    }
 
     /// The spin of a ball about the normal of its floor: a step of ten thousand rad/s, after which nothing was left of the log.
     #[test]

@@ -78,8 +78,12 @@ impl Linear {
         order.sort_unstable();
         let column = |i: &usize| order.iter().position(|o| o == i).unwrap_or(0);
         let own = places.iter().map(|i| line.columns[column(i)].clone());
+        // Rows from which on a replay has failed tell of no force.
+        let finite = |x: f64| if x.is_finite() { x } else { 0.0 };
+        let mut columns: Vec<Vec<f64>> = own.chain(line.start_columns).collect();
+        columns.iter_mut().flatten().for_each(|x| *x = finite(*x));
         Ok(Self {
-            columns: own.chain(line.start_columns).collect(),
+            columns,
             ranges: places
                 .iter()
                 .map(|&i| unknowns[i].parameter.range)
@@ -103,7 +107,9 @@ impl Linear {
         let part = |i: usize| &self.columns[i][rows.clone()];
         let normal = DMatrix::from_fn(n, n, |i, j| dot(part(i), part(j)));
         let covariance = inverse(&normal, 1e-12);
-        let along = DVector::from_fn(n, |i, _| dot(part(i), &self.residuals[rows.clone()]));
+        let finite = |x: &f64| if x.is_finite() { *x } else { 0.0 };
+        let residuals: Vec<f64> = self.residuals[rows.clone()].iter().map(finite).collect();
+        let along = DVector::from_fn(n, |i, _| dot(part(i), &residuals));
         let found = &covariance * along;
         let of = |(k, [low, high]): (usize, &[f64; 2])| {
             let unit = high - low;
