@@ -5,7 +5,7 @@ use std::path::Path;
 use std::sync::Mutex;
 
 use asid::core::Progress;
-use asid::diagnosis::diagnose::{Settings, diagnose};
+use asid::diagnosis::diagnose::{Diagnosis, Settings, diagnose};
 use asid::diagnosis::machine::Machine;
 use asid::diagnosis::study::Study;
 
@@ -92,23 +92,44 @@ fn write_study(folder: &Path, friction: f64, episodes: u32) {
     write_model(folder, &scene(0.0));
 }
 
-/// Keeps what is tried, and stops the work at the second of it.
-#[derive(Default)]
-struct Tried(Mutex<Vec<String>>);
+/// Keeps what is tried and what leads each ranking, and stops the work once `is_enough` of both.
+struct Watched {
+    tried: Mutex<Vec<String>>,
+    led: Mutex<Vec<String>>,
+    is_enough: fn(tried: usize, led: usize) -> bool,
+}
 
-impl Progress for Tried {
+impl Progress for Watched {
     fn begin(&self, _stage: &str, _total: u64) {}
     fn advance(&self, _units: u64) {}
     fn end(&self) {}
     fn is_stopped(&self) -> bool {
-        self.0.lock().unwrap().len() > 1
+        let [tried, led] = [&self.tried, &self.led].map(|all| all.lock().unwrap().len());
+        (self.is_enough)(tried, led)
     }
     fn note(&self, text: &str) {
-        self.0
-            .lock()
-            .unwrap()
-            .extend(text.strip_prefix("trying ").map(str::to_owned));
+        let name = text.strip_prefix("trying ").map(str::to_owned);
+        self.tried.lock().unwrap().extend(name);
     }
+    fn ranking(&self, _stage: &str, rows: &[(String, f64)]) {
+        let first = rows.first().map(|(name, _)| name.clone());
+        self.led.lock().unwrap().extend(first);
+    }
+}
+
+/// Diagnoses the leg with some friction of its knee until what was seen `is_enough`; with what was seen.
+fn diagnosed(friction: f64, is_enough: fn(usize, usize) -> bool) -> (Diagnosis, Watched) {
+    let folder = tempfile::tempdir().unwrap();
+    write_study(folder.path(), friction, 5);
+    let study = Study::read(folder.path()).unwrap();
+    let machine = Machine::new(engine(), &study.scene, &[], &[], 0).unwrap();
+    let watched = Watched {
+        tried: Mutex::default(),
+        led: Mutex::default(),
+        is_enough,
+    };
+    let (found, _) = diagnose(&study, machine, Settings::default(), &watched).unwrap();
+    (found, watched)
 }
 
 /// By slopes at a knee without friction a hysteresis of the drives leads; replays with friction leave least.
@@ -117,36 +138,12 @@ fn a_friction_that_stops_a_knee_is_tried_first_and_named() {
     if !has_contacts() {
         return;
     }
-    let folder = tempfile::tempdir().unwrap();
-    write_study(folder.path(), STOPS, 5);
-    let study = Study::read(folder.path()).unwrap();
-    let machine = Machine::new(engine(), &study.scene, &[], &[], 0).unwrap();
-    let tried = Tried::default();
-    let (found, _) = diagnose(&study, machine, Settings::default(), &tried).unwrap();
+    let (found, watched) = diagnosed(STOPS, |tried, _| tried > 1);
     let r = &found.result;
     assert_names(r, &["coulomb-friction@knee"]);
     let force = r.effects[0].parameters["force"];
     assert!((force / STOPS - 1.0).abs() < 0.05, "{force}");
-    assert_eq!(tried.0.lock().unwrap()[0], "coulomb-friction@knee");
-}
-
-/// Keeps the first ranking, and stops the work there.
-#[derive(Default)]
-struct First(Mutex<Vec<(String, f64)>>);
-
-impl Progress for First {
-    fn begin(&self, _stage: &str, _total: u64) {}
-    fn advance(&self, _units: u64) {}
-    fn end(&self) {}
-    fn is_stopped(&self) -> bool {
-        !self.0.lock().unwrap().is_empty()
-    }
-    fn ranking(&self, _stage: &str, rows: &[(String, f64)]) {
-        let mut first = self.0.lock().unwrap();
-        if first.is_empty() {
-            first.extend_from_slice(rows);
-        }
-    }
+    assert_eq!(watched.tried.lock().unwrap()[0], "coulomb-friction@knee");
 }
 
 /// In replays that begin where the knee stands, the model's own knee moves at once, and a little friction there takes little from it.
@@ -155,16 +152,6 @@ fn a_friction_that_holds_a_knee_leads_the_screening() {
     if !has_contacts() {
         return;
     }
-    let folder = tempfile::tempdir().unwrap();
-    write_study(folder.path(), HOLDS, 5);
-    let study = Study::read(folder.path()).unwrap();
-    let machine = Machine::new(engine(), &study.scene, &[], &[], 0).unwrap();
-    let first = First::default();
-    diagnose(&study, machine, Settings::default(), &first).unwrap();
-    let first = first.0.into_inner().unwrap();
-    let leads = &first[0].0;
-    assert!(
-        leads.contains("coulomb-friction") && leads.contains("knee"),
-        "{leads}"
-    );
+    let (_, watched) = diagnosed(HOLDS, |_, led| led > 0);
+    assert_eq!(watched.led.lock().unwrap()[0], "coulomb-friction@knee");
 }
