@@ -4,11 +4,12 @@
 
 mod clock;
 mod offset;
+mod refusal;
 
 use asid_core::Result;
 
 use super::evidence::Settings;
-use super::hypotheses::{self, Fault, Hypothesis, Quantity, view_of, with};
+use super::hypotheses::{self, Fault, Hypothesis, Quantity};
 use super::record::Recorded;
 use super::view::View;
 use super::windows::{Misses, Windows};
@@ -136,10 +137,7 @@ impl Search<'_> {
         for one in tried {
             let misses = self.all.misses(&one.hypothesis.view)?;
             let mut one = self.judged(one.hypothesis, &given, &misses);
-            if self.is_nonsense(view, &one.hypothesis, &misses)
-                || self.is_of_others(&one.hypothesis, &given, &misses)
-                || self.is_silence(view, &one.hypothesis, &misses)?
-            {
+            if self.is_refused((view, &one.hypothesis), &given, &misses)? {
                 one.probability = one.probability.min(self.settings.named / 2.0);
             }
             if best.as_ref().is_none_or(|b| one.shrinkage > b.shrinkage) {
@@ -172,59 +170,6 @@ impl Search<'_> {
             (true, None) => any,
         };
         self.quantities.iter().map(of).collect()
-    }
-
-    /// Whether a unit makes a column larger that would then be in question again. With a unit that is far too large everything flies
-    /// on, so that the column says nothing against the model, and nothing for it.
-    fn is_nonsense(&self, view: &View, hypothesis: &Hypothesis, misses: &Misses) -> bool {
-        let missed = Settings::missed(misses, self.settings.nonsense);
-        let quantities = hypothesis.quantities.iter().map(|&q| &self.quantities[q]);
-        let size = |view: &View, q: &Quantity| view_of(view, q).factor.abs();
-        let larger = |q: &&Quantity| size(&hypothesis.view, q) > size(view, q);
-        let mut readings = quantities.filter(|q| !q.command).filter(larger);
-        hypothesis.fault == Fault::Unit && readings.any(|q| missed[q.place])
-    }
-
-    /// Whether another view of readings makes sense of other columns and none of its own, which still misses more than it moves, and
-    /// nearly as much as before. A column that drifts away takes the state with it from which the others are predicted: in a larger unit
-    /// it would be still, and the others make sense.
-    fn is_of_others(&self, hypothesis: &Hypothesis, given: &Misses, misses: &Misses) -> bool {
-        let missed = Settings::missed(misses, 1.0);
-        let of = |place: usize| {
-            let pairs = [
-                (given.miss[place], misses.miss[place]),
-                (given.start_miss[place], misses.start_miss[place]),
-            ];
-            let [from, to]: [Vec<f64>; 2] = pairs.into_iter().unzip().into();
-            self.settings.logarithm(&from, &to)
-        };
-        let quantities = hypothesis.quantities.iter().map(|&q| &self.quantities[q]);
-        let mut own = quantities.filter(|q| !q.command).map(|q| q.place);
-        hypothesis.fault != Fault::Clock
-            && own.any(|place| missed[place] && of(place) < self.settings.even)
-    }
-
-    /// Whether a unit makes a command smaller and leaves no more of it than no command at all would. Where a drive answers late, that it
-    /// does not answer misses less of the motion than that it answers too early, and says nothing of the unit.
-    fn is_silence(
-        &mut self,
-        view: &View,
-        hypothesis: &Hypothesis,
-        misses: &Misses,
-    ) -> Result<bool> {
-        let size = |view: &View, q: &Quantity| view_of(view, q).factor.abs();
-        let mut quantities = hypothesis.quantities.iter().map(|&q| &self.quantities[q]);
-        let smaller = |q: &&Quantity| q.command && size(&hypothesis.view, q) < size(view, q);
-        let Some(command) = quantities.find(smaller) else {
-            return Ok(false);
-        };
-        if hypothesis.fault != Fault::Unit {
-            return Ok(false);
-        }
-        let silent = with(view, command, view_of(view, command).times(0.0));
-        let of_silence = self.all.misses(&silent)?;
-        let tells = self.settings.shrinkage(&of_silence, misses);
-        Ok(self.settings.probability(tells, 0.0) < self.settings.named)
     }
 
     /// Whether the starts that logs give speak against a view.

@@ -15,6 +15,7 @@ mod held_joint;
 mod islands;
 mod late_drive;
 mod next;
+mod no_wiring;
 mod one_joint;
 mod ordinary;
 mod played;

@@ -1,5 +1,6 @@
 //! What predictions miss: residuals of the windows, and their means in motions.
 
+use super::placement::Window;
 use super::{LOCAL, Windows};
 use crate::wiring::view::View;
 
@@ -73,14 +74,9 @@ impl Windows<'_> {
         let frame = self.duration / self.frames as f64;
         let half = LOCAL * self.duration;
         let mut motion = vec![0.0; width];
-        let (mut miss, mut start_miss) = (vec![0.0; width], vec![0.0; width]);
-        for entry in 0..width {
+        for (entry, motion) in motion.iter_mut().enumerate() {
             let view = view.readings[entry];
             let straight = self.is_place(entry);
-            let of_window = |w: usize| -> Option<f64> {
-                let own = (0..rows).map(|k| residual[(w * rows + k) * width + entry]);
-                rms(own.filter(|r| !r.is_nan()))
-            };
             let mut moved = Vec::new();
             for window in self.windows.iter().filter(|w| !w.given) {
                 let record = &self.record[window.episode];
@@ -94,11 +90,36 @@ impl Windows<'_> {
                 });
                 moved.extend(rms(away.filter(|x| x.is_finite())));
             }
-            motion[entry] = mean(&moved).unwrap_or(0.0).max(f64::MIN_POSITIVE);
+            *motion = mean(&moved).unwrap_or(0.0).max(f64::MIN_POSITIVE);
+        }
+        self.means(residual, motion, |_| true)
+    }
+
+    /// The same of one log's windows, in motions of all.
+    pub fn of_log(&self, misses: &Misses, log: usize) -> Misses {
+        let (residual, motion) = (misses.residual.clone(), misses.motion.clone());
+        self.means(residual, motion, |w| w.episode == log)
+    }
+
+    /// Mean magnitudes of residuals over some windows, in motions.
+    fn means(
+        &self,
+        residual: Vec<f64>,
+        motion: Vec<f64>,
+        counts: impl Fn(&Window) -> bool,
+    ) -> Misses {
+        let (rows, width) = (self.frames + 1, self.width);
+        let (mut miss, mut start_miss) = (vec![0.0; width], vec![0.0; width]);
+        for entry in 0..width {
+            let of_window = |w: usize| -> Option<f64> {
+                let own = (0..rows).map(|k| residual[(w * rows + k) * width + entry]);
+                rms(own.filter(|r| !r.is_nan()))
+            };
             let of = |given: bool| -> f64 {
-                let own = (0..self.windows.len()).filter(|&w| self.windows[w].given == given);
+                let windows = self.windows.iter().enumerate();
+                let own = windows.filter(|(_, w)| w.given == given && counts(w));
                 let each: Vec<f64> = own
-                    .filter_map(of_window)
+                    .filter_map(|(w, _)| of_window(w))
                     .map(|r| (r / motion[entry]).min(FARTHEST))
                     .collect();
                 mean(&each).unwrap_or(0.0)
