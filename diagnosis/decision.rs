@@ -174,6 +174,7 @@ mod tests {
             effects: effects.iter().map(|&e| e.to_owned()).collect(),
             names,
             evidence,
+            prior: 0.0,
             replayed: replayed(left, left),
         }
     }

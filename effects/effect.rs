@@ -223,6 +223,10 @@ pub trait Effect: Send + Sync {
     fn unusual_at(&self, _plant: &Plant, _site: &str) -> bool {
         false
     }
+    /// Effects that come with it at the same site more often than by chance, for they have one origin. One side of a pair says so.
+    fn goes_with(&self) -> &'static [&'static str] {
+        &[]
+    }
     /// Values of each parameter, lowest and highest, that an ordinary machine has which is as its model says: makers' tolerances, friction that
     /// differs from one machine to the next. They are taken as three deviations. `shown` is what the logs show of the site. Empty
     /// where an ordinary machine has none of it.

@@ -43,6 +43,13 @@ impl Reach {
         dofs.map_or(Self::Everything, Self::Dofs)
     }
 
+    /// Reach of a force on a body: the joints that carry it.
+    #[must_use]
+    pub fn of_body(plant: &Plant, name: &str) -> Self {
+        let body = plant.layout.bodies.iter().position(|b| b == name);
+        body.map_or(Self::Everything, |b| Self::Dofs(body_dofs(plant, b)))
+    }
+
     /// Whether a third party can tell what this makes from what the other makes.
     #[must_use]
     pub fn is_apart_from(&self, other: &Self) -> bool {
@@ -73,6 +80,18 @@ fn drive_dofs(plant: &Plant, actuator: &str) -> Option<BTreeSet<usize>> {
     Some(joint_dofs(plant, drive.joint))
 }
 
+/// Degrees of freedom that carry a body.
+fn body_dofs(plant: &Plant, body: usize) -> BTreeSet<usize> {
+    let mut body = body;
+    let mut dofs = BTreeSet::new();
+    while body != 0 {
+        let joints = plant.bodies[body].joints.clone();
+        joints.for_each(|joint| dofs.extend(joint_dofs(plant, joint)));
+        body = plant.bodies[body].parent;
+    }
+    dofs
+}
+
 /// Those that a target's value makes forces on: of a body's mass all joints that carry it.
 fn target_dofs(plant: &Plant, target: &Target) -> Option<BTreeSet<usize>> {
     let layout = &plant.layout;
@@ -91,14 +110,8 @@ fn target_dofs(plant: &Plant, target: &Target) -> Option<BTreeSet<usize>> {
                 .then(|| joint_dofs(plant, joint))
         }
         "body" if ["mass", "ipos", "inertia"].contains(&&*target.attribute) => {
-            let mut body = layout.bodies.iter().position(|b| *b == target.name)?;
-            let mut dofs = BTreeSet::new();
-            while body != 0 {
-                let joints = plant.bodies[body].joints.clone();
-                joints.for_each(|joint| dofs.extend(joint_dofs(plant, joint)));
-                body = plant.bodies[body].parent;
-            }
-            Some(dofs)
+            let body = layout.bodies.iter().position(|b| *b == target.name)?;
+            Some(body_dofs(plant, body))
         }
         _ => None,
     }
@@ -133,6 +146,7 @@ mod tests {
         assert_eq!(reach("mass", "upper"), Reach::Dofs([0].into()));
         assert_eq!(reach("mass", "lower"), Reach::Dofs([0, 1].into()));
         assert_eq!(reach("mass", "box"), Reach::Dofs((2..8).collect()));
+        assert_eq!(reach("linear-drag", "lower"), Reach::Dofs([0, 1].into()));
         assert!(reach("mass", "lower").is_apart_from(&reach("mass", "box")));
         assert!(!reach("mass", "lower").is_apart_from(&reach("mass", "upper")));
     }

@@ -33,9 +33,12 @@ pub struct Tried {
     pub effects: Vec<String>,
     /// How many named things it is: a group counts once.
     pub names: usize,
-    /// Evidence over the model without effects, natural logarithm.
+    /// Evidence over the model without effects, with the prior odds of its names, natural logarithm.
     #[serde(deserialize_with = "nullable::scalar")]
     pub evidence: f64,
+    /// Logarithm of these prior odds, natural, without the price of names.
+    #[serde(default)]
+    pub prior: f64,
     /// Whole replays with it.
     pub replayed: Replayed,
 }

@@ -120,11 +120,16 @@ impl<'e> Sets<'e> {
         }
     }
 
-    /// Sets that these data cannot tell from the best: no larger ones.
+    /// Sets that these data cannot tell from the best, whatever is likelier without them: no larger ones.
     pub(super) fn ambiguous(&self, best: usize) -> Vec<usize> {
-        let (rules, scores) = (self.rules, &self.scores);
+        let rules = self.rules;
         let named = &self.all[best].labels;
-        let as_likely = |i: usize| rules.temperature * (scores[best] - scores[i]) < rules.apart;
+        let prior = |i: usize| {
+            let found = self.all[i].found;
+            found.map_or(0.0, |tried| self.evidence.tried[tried].prior)
+        };
+        let score = |i: usize| self.scores[i] - prior(i) / rules.temperature;
+        let as_likely = |i: usize| rules.temperature * (score(best) - score(i)) < rules.apart;
         let rival = |i: usize| {
             let labels = &self.all[i].labels;
             let holds_it = named.iter().all(|l| labels.contains(l));

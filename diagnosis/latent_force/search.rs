@@ -3,8 +3,10 @@
 mod about_replays;
 mod begun;
 mod by_replays;
+mod exchanged;
 mod finish;
 mod given_back;
+mod measure;
 mod open_loop;
 mod path;
 mod prior;
@@ -224,10 +226,8 @@ pub fn search(
             path = path.or(other, |set| worth(context, candidates, set));
         }
     }
-    let twins = search.twins(&path)?;
-    if let Some(last) = path.rounds.last_mut() {
-        last.confirmed.extend(twins);
-    }
+    path = search.exchange(path)?;
+    search.with_twins(&mut path)?;
     let missing = [&none, &path.best.fitted].map(|f| f.estimate.missing(context));
     Ok(Outcome {
         none,

@@ -90,12 +90,15 @@ pub fn gather(
     let place = |set: &[usize]| sets.iter().position(|s| s.candidates == set);
     let found = place(&outcome.best.candidates);
     let mut tried: Vec<Tried> = tried
-        .map(|(set, found)| Tried {
-            effects: labels(candidates, &set.candidates),
-            names: set.names,
-            evidence: set.fitted.evidence - outcome.none.evidence
-                + log_prior(plant, candidates, &set.candidates),
-            replayed: replayed(bench, &found.explanation, found.explanation.held_out),
+        .map(|(set, found)| {
+            let prior = log_prior(plant, candidates, &set.candidates);
+            Tried {
+                effects: labels(candidates, &set.candidates),
+                names: set.names,
+                evidence: set.fitted.evidence - outcome.none.evidence + prior,
+                prior,
+                replayed: replayed(bench, &found.explanation, found.explanation.held_out),
+            }
         })
         .collect();
     // What the decision compares is what no start makes up for.

@@ -1,6 +1,6 @@
 //! Forces on moving bodies: a constant one, and those of the air.
 
-use crate::{Acting, Acts, Effect, EffectParameter, Native, Site};
+use crate::{Acting, Acts, Effect, EffectParameter, Native, Reach, Site};
 use asid_core::Result;
 use asid_core::nalgebra::Vector3;
 use asid_core::simulator::StepView;
@@ -144,6 +144,10 @@ impl Effect for BodyForce {
 
     fn acts(&self) -> Acts {
         Acts::Force
+    }
+
+    fn reach(&self, plant: &Plant, site: &str) -> Reach {
+        Reach::of_body(plant, site)
     }
 
     fn parameters(&self) -> &'static [EffectParameter] {

@@ -83,6 +83,11 @@ impl Acting for ViscousAt {
 }
 
 impl Effect for Viscous {
+    /// Bearings and seals rub dry and in their grease at once (Armstrong-Hélouvry and others 1994).
+    fn goes_with(&self) -> &'static [&'static str] {
+        &["coulomb-friction"]
+    }
+
     fn mistaken_for(&self) -> &'static [Confusion] {
         &[Confusion {
             with: &["linear-drag", "actuator-gain"],

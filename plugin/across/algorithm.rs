@@ -191,6 +191,10 @@ impl Effect for Across<Box<dyn Effect>> {
         self.run(|effect| effect.unusual_at(plant, site))
     }
 
+    fn goes_with(&self) -> &'static [&'static str] {
+        self.run(|effect| effect.goes_with())
+    }
+
     fn tolerance(
         &self,
         plant: &Plant,

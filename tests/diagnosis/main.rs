@@ -26,6 +26,7 @@ mod scatter;
 mod seldom;
 mod series_spring;
 mod servo;
+mod several_causes;
 mod slow_noise;
 mod small;
 mod soft_belt;

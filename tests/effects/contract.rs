@@ -219,12 +219,13 @@ fn the_catalogue_is_complete() {
 }
 
 #[test]
-fn what_an_effect_refines_or_is_mistaken_for_is_in_the_catalogue() {
+fn what_an_effect_refines_goes_with_or_is_mistaken_for_is_in_the_catalogue() {
     let all = all::<EffectEntry>();
     for entry in &all {
         let effect = (entry.make)();
         let confused = effect.mistaken_for().iter().flat_map(|c| c.with);
-        for name in effect.refines().iter().chain(confused) {
+        let others = effect.refines().iter().chain(effect.goes_with());
+        for name in others.chain(confused) {
             assert!(
                 all.iter().any(|e| e.name == *name) && *name != entry.name,
                 "{}: `{name}`",

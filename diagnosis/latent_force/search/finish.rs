@@ -86,7 +86,7 @@ impl Upon<'_> {
 
     /// Whether a set makes up for as much of what the one `before` leaves as a further name must: of the force, of most of it at some joint, or of the
     /// gap of replays. Where the one before leaves neither force nor gap, a search would end with it.
-    fn counts(&self, before: &Set, after: &Set) -> Result<bool> {
+    pub(super) fn counts(&self, before: &Set, after: &Set) -> Result<bool> {
         let (context, breadth) = (self.context, self.breadth);
         let left = |s: &Set| {
             s.fitted

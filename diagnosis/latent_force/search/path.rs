@@ -4,13 +4,14 @@ use asid_core::Result;
 
 use crate::latent_force::fit::Fitted;
 
-use super::open_loop::{MOST, OpenLoopGap};
+use super::measure::Measure;
+use super::open_loop::OpenLoopGap;
 use super::prior::worth;
 use super::round::{Round, Upon};
 use super::set::{Set, free_what_is_given};
 use super::{
-    FURTHER, GIVEN, Search, Untried, first_that_counts, fit_from, has_tolerances, is_cut_short,
-    open_upon, upon_tolerances,
+    FURTHER, GIVEN, Search, Untried, fit_from, has_tolerances, is_cut_short, open_upon,
+    upon_tolerances,
 };
 
 /// How far a path has come.
@@ -51,19 +52,26 @@ impl Path {
 }
 
 impl Search<'_> {
-    /// The second of the sets that the first round of a path has fitted to the end, where it is as likely as the one that was taken but for
-    /// what a name must earn, and something was missing beside that one.
+    /// The second of the sets that the first round of a path has fitted to the end, where something was missing beside the one that was taken: where it is
+    /// as likely as that but for what a name must earn, or where the path ends though a further name earns its evidence, which what was taken may have left.
     pub(super) fn second(&self, path: &Path) -> Option<Set> {
-        let [first, _further, ..] = &path.rounds[..] else {
+        let [first, further, ..] = &path.rounds[..] else {
             return None;
         };
+        let taken = &further.base;
+        if path.best.candidates.is_empty() {
+            return None;
+        }
         let worth = |set: &Set| worth(self.context, self.candidates, set);
-        let taken = &path.rounds[1].base;
         let of_taken = first.confirmed.iter().find(|s| s.candidates == *taken)?;
+        let last = path.rounds.last()?;
+        let earns =
+            |s: &Set| s.names > path.best.names && s.rises_above(&path.best, self.threshold);
+        let is_left = last.base == path.best.candidates && last.confirmed.iter().any(earns);
         let near = |s: &&Set| {
             s.candidates != *taken
                 && !has_tolerances(self.candidates, s)
-                && worth(s) > worth(of_taken) - self.threshold
+                && (is_left || worth(s) > worth(of_taken) - self.threshold)
         };
         let others = first.confirmed.iter().filter(near);
         let best = others.max_by(|a, b| worth(a).total_cmp(&worth(b)));
@@ -72,6 +80,10 @@ impl Search<'_> {
 
     /// Names one candidate upon the other for as long as they earn it. `none` is the model without effects, fitted, which becomes a better fit
     /// of it where one is found.
+    ///
+    /// One that earns its evidence and makes up for too little to count is gone on from once, where nothing else does: of a drive that answers late and a
+    /// sensor that drifts, neither closes much of the gap by itself, and both close all of it. What comes of that stands if all of it counts and each
+    /// part is missed.
     pub(super) fn follow(&self, mut path: Path, none: &mut Fitted) -> Result<Path> {
         let Search {
             context,
@@ -87,6 +99,8 @@ impl Search<'_> {
         // The set that stands with what no search tries, such as an offset of its friction: a rival of every further effect, which
         // needs no further name.
         let mut freed: Option<Set> = None;
+        // What is gone on from though it does not count by itself.
+        let mut tentative: Option<Set> = None;
         let mut depth = breadth.depth.saturating_sub(path.best.names);
         let mut gap = OpenLoopGap::by(self.open_loop);
         while path.rounds.len() < depth {
@@ -99,39 +113,44 @@ impl Search<'_> {
                 path.untried.push(Untried::upon(&path.best, FURTHER));
                 break;
             }
-            let (round, confirmed) = self.round(&mut path)?;
+            let base = tentative.clone().unwrap_or_else(|| path.best.clone());
+            let (round, confirmed) = self.round(&base, &mut path.untried)?;
             path.rounds.push(round);
             let stopped = progress.is_stopped();
             let further = (confirmed.first(), threshold);
-            fit_from(context, further, (&mut path.best, none), how)?;
+            if tentative.is_none() {
+                fit_from(context, further, (&mut path.best, none), how)?;
+            }
             let best = &path.best;
             if is_cut_short(context, best, progress) {
                 path.untried.push(Untried::upon(best, FURTHER));
                 break;
             }
-            // A first fit that was cut short has not told yet how much of the force it makes up for.
-            let cut_short = stopped && best.candidates.is_empty();
-            let makes_up_for_most = |set: &Set| {
-                let [before, after] = [best, set].map(|s| &s.fitted.estimate);
-                before.is_made_up_for_by(after, context, 1.0 - MOST)
+            let measure = Measure {
+                search: self,
+                stands: best,
+                no_force,
+                gap: &gap,
+                cut_short: stopped && best.candidates.is_empty(),
             };
-            let counts = |set: &Set| match no_force {
-                _ if cut_short || left(best) - left(set) > breadth.shrinks => Ok(true),
-                _ if makes_up_for_most(set) => Ok(true),
-                true => gap.is_closed_by(set, breadth),
-                false => self.open_loop.is_mostly_closed(context, (best, set)),
-            };
-            let next = first_that_counts(confirmed, (best, threshold), counts)?;
+            let next = measure.first(&confirmed, tentative.as_ref())?;
             let is_ahead = |own: &Set| !own.is_passed(next.as_ref(), threshold);
             if let Some(own) = freed.take().filter(is_ahead) {
                 path.best = own;
                 continue;
             }
-            let last = path.rounds.last_mut();
+            let was_tried = tentative.take().is_some();
+            let last = path.rounds.last_mut().filter(|_| !was_tried);
             let Some(next) =
                 upon_tolerances(context, candidates, (best, next, at_first), last, how)?
             else {
-                break;
+                let is_name = |s: &&Set| s.names > best.names && s.rises_above(best, threshold);
+                let leads = confirmed.iter().find(is_name);
+                tentative = leads.filter(|_| !was_tried && !stopped).cloned();
+                if tentative.is_none() {
+                    break;
+                }
+                continue;
             };
             if has_tolerances(candidates, &next) && !has_tolerances(candidates, best) {
                 // They are no name.
@@ -158,20 +177,25 @@ impl Search<'_> {
         Ok(path)
     }
 
-    /// A round upon the set that stands, and the sets that it has fitted to the end.
-    fn round(&self, path: &mut Path) -> Result<(Round, Vec<Set>)> {
-        let upon = Upon {
+    /// A round upon a set, and the sets that it has fitted to the end.
+    fn round(&self, base: &Set, untried: &mut Vec<Untried>) -> Result<(Round, Vec<Set>)> {
+        let open = open_upon(self.candidates, self.known, base);
+        let round = self.upon(base, &open).round(untried)?;
+        let confirmed = round.confirmed.clone();
+        Ok((round, confirmed))
+    }
+
+    /// What a round upon a set is about, of its `open` candidates.
+    pub(super) fn upon<'u>(&'u self, base: &'u Set, open: &'u [usize]) -> Upon<'u> {
+        Upon {
             context: self.context,
-            base: &path.best,
+            base,
             at_first: self.at_first,
             candidates: self.candidates,
-            open: &open_upon(self.candidates, self.known, &path.best),
+            open,
             breadth: self.breadth,
             open_loop: self.open_loop,
             progress: self.progress,
-        };
-        let round = upon.round(&mut path.untried)?;
-        let confirmed = round.confirmed.clone();
-        Ok((round, confirmed))
+        }
     }
 }

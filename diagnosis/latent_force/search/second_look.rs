@@ -25,7 +25,7 @@ const TRIED: usize = 3;
 const SHARE: f64 = 0.5;
 
 /// Candidates of a set, in whatever order they were added.
-fn members(set: &Set) -> BTreeSet<usize> {
+pub(super) fn members(set: &Set) -> BTreeSet<usize> {
     set.candidates.iter().copied().collect()
 }
 

@@ -10,6 +10,7 @@ use crate::latent_force::fit::rise;
 
 use super::Search;
 use super::path::Path;
+use super::prior::worth;
 use super::set::{Set, without};
 
 /// Twins that are fitted, at most.
@@ -103,8 +104,27 @@ impl Search<'_> {
         Ok(again)
     }
 
+    /// Adds the twins of the best set of a path to what its last round has fitted. One that is worth more, for its name is likelier, stands; twins of it are its rivals
+    /// then.
+    pub(super) fn with_twins(&self, path: &mut Path) -> Result<()> {
+        let worth = |set: &Set| worth(self.context, self.candidates, set);
+        for _ in 0..MOST {
+            let twins = self.twins(path)?;
+            let likelier = twins.iter().max_by(|a, b| worth(a).total_cmp(&worth(b)));
+            let likelier = likelier
+                .filter(|twin| worth(twin) > worth(&path.best))
+                .cloned();
+            if let Some(last) = path.rounds.last_mut() {
+                last.confirmed.extend(twins);
+            }
+            let Some(twin) = likelier else { break };
+            path.best = twin;
+        }
+        Ok(())
+    }
+
     /// Twins of the best set of a path, each fitted a little.
-    pub(super) fn twins(&self, path: &Path) -> Result<Vec<Set>> {
+    fn twins(&self, path: &Path) -> Result<Vec<Set>> {
         let (context, best) = (self.context, &path.best);
         let rise = rise(context);
         let mut twins = self.mistaken(path)?;

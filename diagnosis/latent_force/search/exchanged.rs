@@ -1,0 +1,114 @@
+//! Each name of a set that stands is asked once more against all others (sequential replacement: Miller 2002).
+//!
+//! Forward selection takes the first name where nothing else makes up for what is missing, and what came first may have taken the place of what
+//! only shows beside the second: viscous friction that of a softer servo, where a supply sinks besides. About the trajectory of the whole set, and
+//! beside its other names, all candidates are seen as well as the one that was taken.
+
+use std::collections::BTreeSet;
+
+use asid_core::Result;
+
+use crate::latent_force::fit::{Slopes, rise};
+use crate::latent_force::screen::Pairs;
+
+use super::path::Path;
+use super::prior::worth;
+use super::round::Upon;
+use super::second_look::members;
+use super::set::{Set, without};
+use super::{Search, open_upon};
+
+/// Sets that are tried in the place of one name, at most.
+const TRIED: usize = 2;
+
+impl Search<'_> {
+    /// Exchanges names of the set that a path has come to for as long as that is worth more. What was tried becomes a part of the path's last round.
+    pub(super) fn exchange(&self, mut path: Path) -> Result<Path> {
+        let worth = |set: &Set| worth(self.context, self.candidates, set);
+        let laws = |set: &Set| -> BTreeSet<String> {
+            let named = set.candidates.iter().map(|&c| &self.candidates[c]);
+            let named = named.filter(|c| !c.is_tolerance);
+            named.map(|c| c.spec.name.clone()).collect()
+        };
+        for law in laws(&path.best) {
+            if path.best.names < 2 || self.progress.is_stopped() {
+                break;
+            }
+            let is_out = |c: &usize| {
+                let candidate = &self.candidates[*c];
+                !candidate.is_tolerance && candidate.spec.name == law
+            };
+            let out: Vec<usize> = path
+                .best
+                .candidates
+                .iter()
+                .copied()
+                .filter(is_out)
+                .collect();
+            if out.is_empty() {
+                continue;
+            }
+            let known: Vec<BTreeSet<usize>> = path
+                .rounds
+                .iter()
+                .flat_map(|r| &r.confirmed)
+                .map(members)
+                .collect();
+            let rivals = self.in_place_of(&path.best, &out, known)?;
+            for rival in rivals {
+                let is_better = worth(&rival) > worth(&path.best) + rise(self.context);
+                if let Some(last) = path.rounds.last_mut() {
+                    last.confirmed.push(rival.clone());
+                }
+                if is_better {
+                    path.best = rival;
+                }
+            }
+        }
+        Ok(path)
+    }
+
+    /// Sets with other names in the place of some candidates of a set, fitted to the end, that are as likely to first order; but those that are `known`.
+    fn in_place_of(
+        &self,
+        set: &Set,
+        out: &[usize],
+        mut known: Vec<BTreeSet<usize>>,
+    ) -> Result<Vec<Set>> {
+        let rest = out.iter();
+        let mut base = rest.fold(set.clone(), |s, &c| without(&s, self.candidates, c));
+        base.fitted.slopes = Slopes::default();
+        let open = open_upon(self.candidates, self.known, &base);
+        let upon: Upon<'_> = self.upon(&base, &open);
+        let look = upon.look(Pairs::BeyondTheBetter)?;
+        let price = upon.price();
+        let own: BTreeSet<usize> = out.iter().copied().collect();
+        let is_own = |m: &[usize]| m.iter().copied().collect::<BTreeSet<usize>>() == own;
+        let ranked = &look.ranked;
+        let rows = ranked.iter().map(|s| (upon.named(&look, s), s.gain));
+        let what = super::name_of(self.candidates, out);
+        self.progress
+            .ranking(&format!("in place of {what}"), &rows.collect::<Vec<_>>());
+        let least = ranked.iter().find(|s| is_own(&upon.members(&look, s)));
+        let least = least.map_or(f64::INFINITY, |s| s.worth(price) - self.breadth.near);
+        let mut sets = Vec::new();
+        for s in ranked
+            .iter()
+            .filter(|s| s.names == 1 && s.worth(price) >= least)
+        {
+            if sets.len() == TRIED || self.progress.is_stopped() {
+                break;
+            }
+            let mut other = upon.enlarged(&look, s);
+            if known.contains(&members(&other)) || members(&other) == members(set) {
+                continue;
+            }
+            known.push(members(&other));
+            self.progress
+                .note(&format!("trying {}", upon.named(&look, s)));
+            other.fit(self.context, (self.breadth.rounds[0], self.progress))?;
+            sets.push(other);
+        }
+        Ok(upon.finish(sets, set.fitted.evidence)?.sets)
+    }
+}

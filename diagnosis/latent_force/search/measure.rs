@@ -1,0 +1,74 @@
+//! What a further name must make up for to count, beyond what stands.
+
+use asid_core::Result;
+
+use super::open_loop::{MOST, OpenLoopGap};
+use super::prune::{Counts, earned};
+use super::set::Set;
+use super::{Search, first_that_counts};
+
+/// The set that stands, and what is left of it.
+pub(super) struct Measure<'m> {
+    pub(super) search: &'m Search<'m>,
+    pub(super) stands: &'m Set,
+    /// Whether hardly any force is missing, so that the gap of the open loop counts.
+    pub(super) no_force: bool,
+    pub(super) gap: &'m OpenLoopGap<'m>,
+    /// Whether the first fits were cut short: they have not told yet how much of the force they make up for.
+    pub(super) cut_short: bool,
+}
+
+impl Measure<'_> {
+    /// Whether a set makes up for as much as a further name must: of the force, of most of it at some joint, or of the gap of the open loop.
+    pub(super) fn counts(&self, set: &Set) -> Result<bool> {
+        let (search, stands) = (self.search, self.stands);
+        let (context, breadth) = (search.context, search.breadth);
+        let left = |s: &Set| {
+            let missing = s.fitted.estimate.missing(context);
+            missing.relative_to(search.at_first)
+        };
+        let [before, after] = [stands, set].map(|s| &s.fitted.estimate);
+        if self.cut_short
+            || left(stands) - left(set) > breadth.shrinks
+            || before.is_made_up_for_by(after, context, 1.0 - MOST)
+        {
+            return Ok(true);
+        }
+        if self.no_force {
+            self.gap.is_closed_by(set, breadth)
+        } else {
+            search.open_loop.is_mostly_closed(context, (stands, set))
+        }
+    }
+
+    /// The first of the sets that were fitted upon a base that rises above it and counts. Where the base is no more than what is gone on from for a try, all that
+    /// is beyond what stands must be missed in it.
+    pub(super) fn first(&self, fitted: &[Set], base: Option<&Set>) -> Result<Option<Set>> {
+        let threshold = self.search.threshold;
+        let from = (base.unwrap_or(self.stands), threshold);
+        let first = first_that_counts(fitted.to_vec(), from, |s| self.counts(s))?;
+        match (first, base) {
+            (Some(all), Some(_)) => {
+                let missed = self.missed(all, fitted)?;
+                first_that_counts(vec![missed], (self.stands, threshold), |s| self.counts(s))
+            }
+            (first, _) => Ok(first),
+        }
+    }
+
+    /// A set of which several names were put upon what stands, without those that are not missed in it ([`earned`]).
+    fn missed(&self, set: Set, others: &[Set]) -> Result<Set> {
+        let search = self.search;
+        let upon = search.upon(self.stands, &[]);
+        let counts = |before: &Set, after: &Set| upon.counts(before, after);
+        let least = (search.breadth, search.threshold, &counts as &Counts<'_>);
+        let sets = (set, self.stands, others);
+        earned(
+            search.context,
+            search.candidates,
+            sets,
+            least,
+            search.progress,
+        )
+    }
+}
