@@ -20,9 +20,9 @@ pub use units::units;
 
 /// Share of missing readings that is still called good.
 const MISSING: f64 = 0.2;
-/// Rows of the training logs for each coordinate of a start that they leave open, below which there is too little for a diagnosis: fewer
+/// Readings of the training logs for each coordinate of a start that they leave open, below which there is too little for a diagnosis: fewer
 /// than three numbers for each that is fitted leave hardly a residual (a regression wants ten, Harrell 2015, section 4.4).
-const ROWS: usize = 3;
+const READINGS: usize = 3;
 /// An engine's own error, in changes by half the time step: what is of first order in the step (Richardson 1911), the worst
 /// that engines have.
 pub const RICHARDSON: f64 = 2.0;
@@ -42,29 +42,22 @@ fn check(name: &str, ok: bool, detail: String) -> CheckResult {
     }
 }
 
-/// Rows of some logs, all together.
-fn rows(logs: &Logs) -> usize {
-    logs.episodes.iter().map(|e| e.episode.rows()).sum()
-}
-
-/// Readings present, lengths, and whether there are rows enough for starts of which `open` coordinates are unknown.
+/// Readings present, lengths, and whether these are enough for starts of which `open` coordinates are unknown.
 #[must_use]
 pub fn data(train: &Logs, test: &Logs, open: usize) -> CheckResult {
-    let present: usize = [train, test]
-        .iter()
-        .map(|l| l.present().iter().filter(|p| **p).count())
-        .sum();
+    let readings = |logs: &Logs| logs.present().iter().filter(|p| **p).count();
+    let present: usize = [train, test].map(readings).iter().sum();
     let all = train.len() + test.len();
     let missing = 1.0 - present as f64 / all.max(1) as f64;
     let episodes = || train.episodes.iter().chain(&test.episodes);
     let seconds: f64 = episodes()
         .map(|e| e.episode.time[e.episode.rows() - 1] - e.episode.time[0])
         .sum();
-    let (rows, unknown) = (rows(train), open * train.episodes.len());
-    let few = rows < ROWS * unknown;
+    let (fitted, unknown) = (readings(train), open * train.episodes.len());
+    let few = fitted < READINGS * unknown;
     let too_little = if few {
         format!(
-            "; {rows} rows to fit to, with {unknown} unknown coordinates of starts, are too little to tell: log longer episodes"
+            "; {fitted} readings to fit to, with {unknown} unknown coordinates of starts, are too little to tell: log longer episodes"
         )
     } else {
         String::new()

@@ -1,6 +1,6 @@
 //! A diagnosis from a study to its result.
 
-use asid_core::{Error, Layout, Progress, Result};
+use asid_core::{Episode, Error, Layout, Progress, Result};
 
 use crate::calibration::calibrate;
 use crate::intake::Intake;
@@ -84,20 +84,30 @@ pub fn diagnose(
     Ok((diagnosis, work))
 }
 
-/// Refuses logs with no more rows than their starts have unknown coordinates, where a start fits the readings whatever the machine is and that
+/// Refuses logs with no more readings than their starts have unknown coordinates, where a start fits the readings whatever the machine is and that
 /// no gap is left means nothing, and logs of hardly a row.
 fn enough_rows(study: &Study, layout: &Layout) -> Result<()> {
+    let logs = study.train.len();
     let rows: usize = study.train.iter().map(|(_, e)| e.rows()).sum();
-    let (logs, open) = (study.train.len(), open_coordinates(layout, study).len());
-    let needed = (FEWEST_ROWS * logs).max(open * logs + 1);
-    if rows >= needed {
+    let finite = |e: &Episode| e.readings.iter().filter(|x| x.is_finite()).count();
+    let readings: usize = study.train.iter().map(|(_, e)| finite(e)).sum();
+    let open = open_coordinates(layout, study).len();
+    let message = if rows < FEWEST_ROWS * logs {
+        format!(
+            "have {rows} rows in all, too little to tell anything: each needs {FEWEST_ROWS} at least"
+        )
+    } else if readings <= open * logs {
+        format!(
+            "have {readings} readings in all, too little to tell anything: more than the {open} coordinates of each start that are unknown are needed \
+             of each"
+        )
+    } else {
         return Ok(());
-    }
+    };
     Err(Error::Config {
         key: "train".into(),
         message: format!(
-            "study {}: {logs} logs to fit to have {rows} rows in all, too little to tell anything: at least {needed} are needed, {FEWEST_ROWS} in \
-             each and more than the {open} coordinates of each start that are unknown; log longer episodes",
+            "study {}: {logs} logs to fit to {message}; log longer episodes",
             study.name
         ),
     })

@@ -10,6 +10,7 @@ mod beyond;
 mod diagnosis_support;
 mod drift;
 mod far;
+mod few_rows;
 mod filtered_at_a_stop;
 mod held_joint;
 mod islands;
