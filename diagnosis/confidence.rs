@@ -11,7 +11,7 @@ use crate::judgement::{Claim, Hypothesis, Judgement};
 pub use refit::{Refitted, refit};
 
 /// What a verdict's probability goes with. The first five are the maximum of the likelihood with normal priors of deviation 2 over the 127 named
-/// verdicts of 194 training worlds (seeds 9101, 9303, 9404, 9505, 9606, 9808 and 1010; docs/diagnosis.md), 78 of them right; left out one by one,
+/// verdicts of 194 training worlds (seeds 9101, 9303, 9404, 9505, 9606, 9808 and 1010; docs/diagnosis-method.md), 78 of them right; left out one by one,
 /// they give a mean log score of -0.55, a constant -0.68.
 #[derive(Clone, Debug)]
 pub struct Confidence {
