@@ -82,9 +82,9 @@ impl Default for Max {
         Self {
             policy: String::new(),
             play_round: 0,
-            environments: 32,
+            environments: 128,
             rounds: 12,
-            warm_up: 32,
+            warm_up: 256,
             ensemble: EnsembleSettings::default(),
             ppo: PpoConfig {
                 total_steps: 40_000,
@@ -189,12 +189,14 @@ fn of_round(saved: &Saved, round: usize) -> Result<Saved> {
 /// What moves, and how it moved: the state of which the models are learned.
 ///
 /// Places and orientations (two columns of the rotation) of tracked parts, the end effector, the
-/// same less what they were a control step ago, since a reading has no velocity; then the share of
-/// the episode that is over.
+/// same less what they were a control step ago, since a reading has no velocity; where the end effector is seen
+/// from each tracked place, in the world's directions; then the share of the episode that is over.
 pub struct Motion {
     /// First entry in a reading's row and number; four are an orientation.
     channels: Vec<(usize, usize)>,
     names: Vec<String>,
+    /// How many of the channels, the first, are of tracked parts.
+    tracked: usize,
     horizon: usize,
     before: Vec<f64>,
 }
@@ -218,6 +220,7 @@ impl Motion {
         Ok(Self {
             channels: kept.iter().map(channel).collect(),
             names: kept.iter().map(|&i| names[i].clone()).collect(),
+            tracked,
             horizon: protocol.horizon,
             before: Vec::new(),
         })
@@ -226,8 +229,25 @@ impl Motion {
     /// Entries of a place in state space, without the differences.
     #[must_use]
     pub fn places(&self) -> usize {
-        let len = |&(_, len): &(usize, usize)| if len == 4 { 6 } else { len };
-        self.channels.iter().map(len).sum()
+        width(&self.channels)
+    }
+
+    /// Those of them, the first, that are of tracked parts.
+    #[must_use]
+    pub fn tracked(&self) -> usize {
+        width(&self.channels[..self.tracked])
+    }
+
+    /// First entries of a tracked place and of the end effector, for each pair.
+    #[must_use]
+    pub fn relations(&self) -> Vec<[usize; 2]> {
+        if self.channels.len() == self.tracked {
+            return Vec::new();
+        }
+        let objects = (0..self.tracked).filter(|&i| self.channels[i].1 == 3);
+        objects
+            .map(|i| [width(&self.channels[..i]), self.tracked()])
+            .collect()
     }
 
     /// What the entries of an observation are.
@@ -239,9 +259,19 @@ impl Motion {
         vec![
             entry(text.clone(), places),
             entry(format!("what a control step changed of {text}"), places),
+            entry(
+                "end effector as seen from tracked places".into(),
+                3 * self.relations().len(),
+            ),
             entry("share of the episode".into(), 1),
         ]
     }
+}
+
+/// Entries of a place in state space for these channels.
+fn width(channels: &[(usize, usize)]) -> usize {
+    let len = |&(_, len): &(usize, usize)| if len == 4 { 6 } else { len };
+    channels.iter().map(len).sum()
 }
 
 impl Observe for Motion {
@@ -275,7 +305,14 @@ impl Observe for Motion {
             *change = if before.is_finite() { x - before } else { 0.0 };
         }
         self.before.copy_from_slice(now);
-        rest[places] = step as f64 / self.horizon as f64;
+        let mut at = places;
+        for [object, hand] in self.relations() {
+            for i in 0..3 {
+                rest[at + i] = now[hand + i] - now[object + i];
+            }
+            at += 3;
+        }
+        rest[at] = step as f64 / self.horizon as f64;
         Ok(())
     }
 }
@@ -291,19 +328,21 @@ mod tests {
             let mut motion = Motion::new(problem).unwrap();
             // Place 3, rotation 6, effector 3.
             assert_eq!(motion.places(), 12);
+            assert_eq!(motion.tracked(), 9);
             let names = problem.task.exploration().channels();
             let width = problem.model.layout().recording(&names).unwrap().width();
             let mut reading = vec![0.0; width];
             reading[..7].copy_from_slice(&[0.5, 0.1, 0.0, 1.0, 0.0, 0.0, 0.0]);
-            let mut out = vec![f64::NAN; 25];
+            let mut out = vec![f64::NAN; 28];
             motion.observe(0, &reading, &mut out).unwrap();
-            assert_eq!(out[12..], [0.0; 13]);
+            assert_eq!(out[12..24], [0.0; 12]);
+            assert_eq!(out[24..], [-0.5, -0.1, 0.0, 0.0]);
             reading[0] = 0.6;
             reading[1] = f64::NAN;
             motion.observe(1, &reading, &mut out).unwrap();
             assert_eq!(out[..2], [0.6, 0.1]);
             assert!((out[12] - 0.1).abs() < 1e-12 && out[13] == 0.0);
-            assert!((out[24] - 1.0 / 20.0).abs() < 1e-12);
+            assert!((out[27] - 1.0 / 20.0).abs() < 1e-12);
         });
     }
 }

@@ -45,6 +45,18 @@ pub struct Transitions {
     pub change: Vec<f32>,
 }
 
+impl Transitions {
+    /// Those that came after `before`, of which these are a continuation.
+    pub fn after(&self, before: &Self, widths: Widths) -> Self {
+        let n = before.change.len() / widths.places;
+        Self {
+            state: self.state[n * widths.state..].to_vec(),
+            action: self.action[n * widths.action..].to_vec(),
+            change: self.change[n * widths.places..].to_vec(),
+        }
+    }
+}
+
 /// Lengths of a row.
 #[derive(Clone, Copy, Debug)]
 pub struct Widths {
@@ -84,6 +96,17 @@ struct Member {
 pub struct Prediction {
     pub mean: Tensor,
     pub variance: Tensor,
+}
+
+impl Prediction {
+    /// The same of the first `places` alone.
+    pub fn first(&self, places: usize) -> Self {
+        let part = |all: &Tensor| all.narrow(2, 0, places as i64);
+        Self {
+            mean: part(&self.mean),
+            variance: part(&self.variance),
+        }
+    }
 }
 
 /// The members with the scales of what they take and give.
@@ -183,6 +206,28 @@ impl Ensemble {
             mean: stack(|m| &m.0),
             variance: stack(|m| &m.1),
         })
+    }
+
+    /// Mean divergence of the first `paid` places over transitions, nats; `None` before a fit and of no transition.
+    pub fn utility(&self, data: &Transitions, paid: usize) -> Option<f64> {
+        let prediction = self.predict(&data.state, &data.action)?;
+        let each = divergence(&prediction.first(paid));
+        let found = each.mean(None::<Kind>).double_value(&[]);
+        found.is_finite().then_some(found)
+    }
+
+    /// Root of the mean squared error of the mean prediction over that of the prediction that nothing changes,
+    /// places weighted by their scales. `None` before a fit and of no transition.
+    pub fn error(&self, data: &Transitions) -> Option<f64> {
+        let prediction = self.predict(&data.state, &data.action)?;
+        let mean = prediction
+            .mean
+            .mean_dim(Some([0].as_slice()), false, None::<Kind>);
+        let std = &self.scales.as_ref()?[1].std;
+        let wanted = Tensor::from_slice(&data.change).view([-1, self.widths.places as i64]);
+        let power = |off: Tensor| (off / std).square().mean(None::<Kind>).double_value(&[]);
+        let error = (power(&wanted - self.unscale(&mean)) / power(wanted)).sqrt();
+        error.is_finite().then_some(error)
     }
 
     /// Changes in the state's units for scaled ones, `n x places`.

@@ -35,18 +35,27 @@ inventory::submit! {
     Trainer { algorithm: Max::NAME, train }
 }
 
-/// What an observation is made of: `places` entries that move, as many changes of them since the
-/// last step where `changes`, and the share of the episode that is over.
-#[derive(Clone, Copy, Debug)]
+/// What an observation is made of: `places` entries that move, the first `paid` of them those whose
+/// disagreement is sought; as many changes of them since the last step where `changes`; for each of
+/// `relations`, whose two numbers are the first entries of an object and of the hand, the hand as seen from the object;
+/// and the share of the episode that is over.
+#[derive(Clone, Debug)]
 pub struct Shape {
     pub places: usize,
+    pub paid: usize,
     pub changes: bool,
+    pub relations: Vec<[usize; 2]>,
     pub horizon: usize,
 }
 
 impl Shape {
     /// Entries of a state: an observation without the clock.
-    fn state(self) -> usize {
+    fn state(&self) -> usize {
+        self.moving() + 3 * self.relations.len()
+    }
+
+    /// Those of them that are places and changes; relations follow.
+    fn moving(&self) -> usize {
         self.places * if self.changes { 2 } else { 1 }
     }
 }
@@ -58,6 +67,10 @@ pub struct Round {
     pub utility: f64,
     /// Standard deviation of the same.
     pub utility_std: f64,
+    /// Mean divergence that its episodes in the world collect, before the ensemble learns from them, nats.
+    pub utility_real: f64,
+    /// How well the ensemble foresees a control step of the same episodes; see [`Ensemble::error`].
+    pub model_error: f64,
     /// Real control steps so far.
     pub steps: usize,
 }
@@ -81,7 +94,7 @@ pub fn explore(
         places: shape.places,
     };
     let mut ensemble = Ensemble::new(&settings.ensemble, widths, &mut rng)?;
-    let mut experience = Experience::new(shape);
+    let mut experience = Experience::new(shape.clone());
     let mut random = ChaCha8Rng::seed_from_u64(rng.random());
     experience.play(world, settings.warm_up, &mut |_, actions| {
         actions.fill_with(|| random.random_range(-1.0..=1.0));
@@ -101,14 +114,19 @@ pub fn explore(
         };
         let trained = ppo(&mut imagination, &settings.ppo, rng.random(), carry_on)?;
         let policy = trained.policy;
+        let known = experience.transitions.clone();
         let mut noise = ChaCha8Rng::seed_from_u64(rng.random());
         experience.play(world, settings.environments, &mut |seen, actions| {
             policy.sample(seen, actions, &mut noise)
         })?;
+        let new = experience.transitions.after(&known, widths);
         let round = Round {
             policy,
             utility,
             utility_std,
+            utility_real: ensemble.utility(&new, shape.paid).unwrap_or(f64::NAN)
+                * shape.horizon as f64,
+            model_error: ensemble.error(&new).unwrap_or(f64::NAN),
             steps: experience.steps,
         };
         told(number, &round)?;
@@ -124,9 +142,12 @@ fn train(problem: &Problem<'_>, settings: &Settings) -> Result<Training> {
     let sights = (0..explorer.environments)
         .map(|_| Motion::new(problem))
         .collect::<Result<Vec<_>>>()?;
+    let motion = Motion::new(problem)?;
     let shape = Shape {
-        places: Motion::new(problem)?.places(),
+        places: motion.places(),
+        paid: motion.tracked(),
         changes: true,
+        relations: motion.relations(),
         horizon: problem.task.exploration().horizon,
     };
     let mut world = TrackedEnvironment::new(problem, sights, len, Nothing, "max episodes")?;
@@ -150,9 +171,14 @@ fn train(problem: &Problem<'_>, settings: &Settings) -> Result<Training> {
             values: vec![
                 ("charts/episodic_return", round.utility as f32),
                 ("charts/SPS", rate as f32),
+                ("charts/utility_real", round.utility_real as f32),
+                ("losses/model_error", round.model_error as f32),
             ],
         });
-        let note = format!("utility {:.2} nats", round.utility);
+        let note = format!(
+            "utility {:.2} nats imagined, {:.2} in the world, error {:.2}",
+            round.utility, round.utility_real, round.model_error
+        );
         problem.progress.note(&note);
         problem.progress.advance(1);
         Ok(())
@@ -167,7 +193,11 @@ fn train(problem: &Problem<'_>, settings: &Settings) -> Result<Training> {
         tensors,
         observation,
         steps: last.steps as u64,
-        figures: vec![("utility_nats", last.utility)],
+        figures: vec![
+            ("utility_nats", last.utility),
+            ("utility_real_nats", last.utility_real),
+            ("model_error_over_still", last.model_error),
+        ],
         curve,
         events,
     })
@@ -271,11 +301,13 @@ mod tests {
         };
         let shape = Shape {
             places: 1,
+            paid: 1,
             changes: false,
+            relations: Vec::new(),
             horizon: 40,
         };
         let mut world = Corridor::new(4);
-        let rounds = explore(&mut world, shape, &settings, 3, &mut |_, _| Ok(())).unwrap();
+        let rounds = explore(&mut world, shape.clone(), &settings, 3, &mut |_, _| Ok(())).unwrap();
         assert_eq!(rounds.last().unwrap().steps, 5 * 4 * 40);
         let mut random = Corridor::new(4);
         let mut rng = ChaCha8Rng::seed_from_u64(1);

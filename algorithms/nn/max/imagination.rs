@@ -31,10 +31,10 @@ impl Experience {
     /// Nothing played yet.
     pub fn new(shape: Shape) -> Self {
         Self {
+            seen: vec![[f32::INFINITY, f32::NEG_INFINITY]; shape.places],
             shape,
             transitions: Transitions::default(),
             starts: Vec::new(),
-            seen: vec![[f32::INFINITY, f32::NEG_INFINITY]; shape.places],
             steps: 0,
         }
     }
@@ -117,7 +117,7 @@ impl<'a> Imagination<'a> {
     }
 
     fn observe(&self, observation: &mut [f64]) {
-        let shape = self.experience.shape;
+        let shape = &self.experience.shape;
         let share = self.step as f64 / shape.horizon as f64;
         let rows = observation.chunks_exact_mut(shape.state() + 1);
         for (row, state) in rows.zip(self.state.chunks_exact(shape.state())) {
@@ -160,7 +160,7 @@ impl BatchEnvironment for Imagination<'_> {
     }
 
     fn step(&mut self, actions: &[f64], transition: &mut Transition) -> Result<()> {
-        let shape = self.experience.shape;
+        let shape = &self.experience.shape;
         let (places, len) = (shape.places, shape.state());
         let single: Vec<f32> = actions.iter().map(|a| a.clamp(-1.0, 1.0) as f32).collect();
         let unfitted = || Error::Failed("imagination before a fit".into());
@@ -168,7 +168,7 @@ impl BatchEnvironment for Imagination<'_> {
             .ensemble
             .predict(&self.state, &single)
             .ok_or_else(unfitted)?;
-        let utility: Vec<f64> = to_vec(&divergence(&prediction));
+        let utility: Vec<f64> = to_vec(&divergence(&prediction.first(shape.paid)));
         transition.reward.copy_from_slice(&utility);
         // The next state is a draw from a member that is drawn, as of the mixture.
         let models = prediction.mean.size()[0];
@@ -191,6 +191,7 @@ impl BatchEnvironment for Imagination<'_> {
             .zip(change.chunks_exact(places))
         {
             let (now, rest) = state.split_at_mut(places);
+            let (rest, seen_from) = rest.split_at_mut(shape.moving() - places);
             for (i, (x, d)) in now.iter_mut().zip(change).enumerate() {
                 let [low, high] = self.experience.seen[i];
                 let slack = BEYOND * (high - low);
@@ -199,6 +200,11 @@ impl BatchEnvironment for Imagination<'_> {
                     *last = to - *x;
                 }
                 *x = to;
+            }
+            for (out, [object, hand]) in seen_from.chunks_exact_mut(3).zip(&shape.relations) {
+                for (i, x) in out.iter_mut().enumerate() {
+                    *x = now[hand + i] - now[object + i];
+                }
             }
         }
         self.step += 1;
