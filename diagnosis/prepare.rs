@@ -2,13 +2,15 @@
 
 use std::collections::BTreeMap;
 
+use asid_core::episode::InitialState;
 use asid_core::{Error, Layout, Result};
+use asid_readings::first_row;
 
 use crate::bench::Bench;
 use crate::data::{LoggedSensor, Logs};
 use crate::machine::Machine;
 use crate::noise::{self, Noise};
-use crate::predict::Point;
+use crate::predict::{Point, State};
 use crate::record::Record;
 use crate::starts::reach::reach;
 use crate::starts::{given_start, open_coordinates};
@@ -59,6 +61,15 @@ pub fn plain_residuals(
         .collect())
 }
 
+/// Sensors whose reading in the first row of a log follows a command before it, which no model can predict.
+fn of_commands(machine: &Machine, study: &Study) -> Result<Vec<String>> {
+    let Some((_, episode)) = study.train.first() else {
+        return Ok(Vec::new());
+    };
+    let State { qpos, qvel } = given_start(&machine.plant, episode);
+    first_row::of_commands(&*machine.with(&[])?, &InitialState { qpos, qvel }, episode)
+}
+
 /// The bench of a study with its noise still open, and the values of its parameters in the model
 /// as given.
 ///
@@ -73,12 +84,16 @@ pub fn dataset(study: &Study, machine: Machine) -> Result<(Bench, Vec<f64>)> {
             study.name
         )));
     }
+    let of_commands = of_commands(&machine, study)?;
     let record = |logs: &[(String, asid_core::Episode)], first: usize| -> Result<Record> {
         let starts = logs
             .iter()
             .map(|(_, e)| given_start(&machine.plant, e))
             .collect();
-        let logs = Logs::new(&machine.plant, &sensors, logs.to_vec())?;
+        let mut logs = logs.to_vec();
+        logs.iter_mut()
+            .for_each(|(_, episode)| first_row::open(episode, &of_commands));
+        let logs = Logs::new(&machine.plant, &sensors, logs)?;
         Ok(Record::new(logs.counted_from(first), starts))
     };
     let (train, test) = (

@@ -11,6 +11,7 @@ mod diagnosis_support;
 mod drift;
 mod far;
 mod few_rows;
+mod first_row;
 mod filtered_at_a_stop;
 mod held_joint;
 mod islands;

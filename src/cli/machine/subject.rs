@@ -8,6 +8,8 @@ use asid_core::{Backend, Error, Model};
 use asid_diagnosis::study::Study;
 use asid_effects::RefinedModel;
 use asid_mjcf::Plant;
+use asid_readings::first_row;
+use asid_sysid::start::start_of;
 
 use super::super::diagnose::default_backend;
 use super::super::model::refine;
@@ -40,7 +42,7 @@ impl Subject {
     /// The same with another `model` in place of the study's own, where there is one.
     pub fn open_with(path: &Path, engine: Option<&str>, model: Option<&Path>) -> Result<Self> {
         let study = is_study(path)?.then(|| Study::read_with(path, model));
-        let study = study.transpose()?;
+        let mut study = study.transpose()?;
         let (name, file, source) = match &study {
             Some(study) => (
                 study.name.clone(),
@@ -65,6 +67,9 @@ impl Subject {
         let mut plant = Plant::of(&source.scene)?;
         plant.layout = compiled.layout().clone();
         let model = refine(&*backend, compiled, &source.scene, &source, &[])?;
+        if let Some(study) = &mut study {
+            open_first_rows(&*model, &plant, study)?;
+        }
         Ok(Self {
             name,
             file,
@@ -93,6 +98,18 @@ impl Subject {
     pub fn engine(&self) -> String {
         format!("{} {}", self.backend.name(), self.backend.version())
     }
+}
+
+/// Takes those readings out of the first rows of a study's logs that follow a command from before the log.
+fn open_first_rows(model: &dyn Model, plant: &Plant, study: &mut Study) -> Result<()> {
+    let Some((_, episode)) = study.train.first() else {
+        return Ok(());
+    };
+    let (start, _) = start_of(plant, episode);
+    let sensors = first_row::of_commands(model, &start, episode)?;
+    let logs = study.train.iter_mut().chain(&mut study.test);
+    logs.for_each(|(_, episode)| first_row::open(episode, &sensors));
+    Ok(())
 }
 
 /// Whether a path names a study and no model.

@@ -1,0 +1,160 @@
+//! Readings of a log's first row that a command before the log decides.
+//!
+//! The force of a drive, an acceleration or the pressure below a foot follows the command that acts when it is read. In the first row that is a
+//! command from before the log begins, which no row holds: no model can predict such a reading, however right it is. Such a reading counts as missing.
+//! Which sensors are so is found by a trial, so that it holds on any engine and for any sensor: in states along a replay of a log each
+//! actuator in turn has had another command for a step, and the state is then put back.
+
+use asid_core::episode::InitialState;
+use asid_core::simulator::BatchConfig;
+use asid_core::{Control, Episode, Layout, Model, Recording, Result, Rollout, Simulator};
+
+use crate::replay::ReplayPlan;
+
+/// States of a replay in which sensors are tried: a foot may be off the ground in some.
+const STATES: usize = 8;
+/// Share of a reading by which it must differ to follow a command: a solver of contacts ends within a millionth.
+const DIFFERS: f64 = 1e-4;
+
+/// Batch of one simulation that has had the commands of the log, and one for each actuator that has had another command.
+struct Trial {
+    simulator: Box<dyn Simulator>,
+    sims: Vec<usize>,
+    /// Positions and velocities, in the order of [`Simulator::set_state`].
+    state: Recording,
+    sensors: Recording,
+    nq: usize,
+}
+
+/// Places and speeds of all joints, as channels.
+fn state_channels(layout: &Layout) -> Vec<String> {
+    let of = |kind: &'static str| {
+        let joints = layout.joints.iter();
+        joints.map(move |joint| format!("{kind}.{}", joint.name))
+    };
+    of("qpos").chain(of("qvel")).collect()
+}
+
+impl Trial {
+    fn new(model: &dyn Model, sensors: &[String]) -> Result<Self> {
+        let layout = model.layout();
+        let size = 1 + layout.nu();
+        let config = BatchConfig {
+            size,
+            threads: 1,
+            targets: Vec::new(),
+        };
+        Ok(Self {
+            simulator: model.simulator(&config)?,
+            sims: (0..size).collect(),
+            state: layout.recording(&state_channels(layout))?,
+            sensors: layout.recording(sensors)?,
+            nq: layout.nq,
+        })
+    }
+
+    /// Puts the first simulation into a state of an episode.
+    fn begin(&mut self, start: &InitialState) -> Result<()> {
+        self.simulator.reset(&self.sims)?;
+        self.simulator
+            .set_state(&self.sims[..1], &start.qpos, &start.qvel)
+    }
+
+    /// Marks the entries of the sensors that follow a command in the present state of the first simulation, and leaves that as it is. `commands` has a
+    /// row of commands for each simulation.
+    fn mark(&mut self, commands: &[f64], follows: &mut [bool]) -> Result<()> {
+        let (n, width) = (self.sims.len(), self.sensors.width());
+        let simulator = &mut *self.simulator;
+        let own = &self.sims[..1];
+        let before = simulator.save(own)?;
+        let mut state = vec![0.0; self.state.width()];
+        simulator.read(own, &self.state, &mut state)?;
+        simulator.load(&before, &vec![0; n], &self.sims)?;
+        let mut stepped = vec![0.0; n * width];
+        let control = Control::PerSimulation(commands);
+        simulator.rollout(
+            &Rollout::new(&self.sims, 1, 1, control, &self.sensors),
+            &mut stepped,
+        )?;
+        let (qpos, qvel) = state.split_at(self.nq);
+        simulator.set_state(&self.sims, &qpos.repeat(n), &qvel.repeat(n))?;
+        let mut readings = vec![0.0; n * width];
+        simulator.read(&self.sims, &self.sensors, &mut readings)?;
+        simulator.load(&before, &[0], own)?;
+        let (first, others) = readings.split_at(width);
+        for other in others.chunks_exact(width.max(1)) {
+            for ((follows, a), b) in follows.iter_mut().zip(first).zip(other) {
+                // What has diverged is not larger than anything.
+                *follows |= (a - b).abs() > DIFFERS * a.abs().max(b.abs());
+            }
+        }
+        Ok(())
+    }
+}
+
+/// For each simulation of a [`Trial`] the commands of the first row, those of one actuator replaced by the one of the log that is farthest from it.
+fn commands(episode: &Episode, nu: usize) -> Vec<f64> {
+    let first = &episode.ctrl[..nu];
+    let farthest = |a: usize| {
+        let all = episode.ctrl.iter().skip(a).step_by(nu).copied();
+        let far = |x: &f64| (x - first[a]).abs();
+        all.filter(|x| x.is_finite())
+            .max_by(|x, y| far(x).total_cmp(&far(y)))
+    };
+    let with = |a: usize| {
+        let mut own = first.to_vec();
+        own[a] = farthest(a).unwrap_or(own[a]);
+        own
+    };
+    let moved = (0..nu).flat_map(with);
+    first.iter().copied().chain(moved).collect()
+}
+
+/// Names of the sensors of a log whose readings follow the command that acts when they are read, in states along a replay of the log from a start.
+///
+/// # Errors
+/// As [`Simulator::rollout`].
+pub fn of_commands(
+    model: &dyn Model,
+    start: &InitialState,
+    episode: &Episode,
+) -> Result<Vec<String>> {
+    let layout = model.layout();
+    let is_read = |name: &str| episode.channel(name).is_some();
+    let sensors = layout.sensors.iter().filter(|s| is_read(&s.name));
+    let sensors: Vec<String> = sensors.map(|s| s.name.clone()).collect();
+    if layout.nu() == 0 || sensors.is_empty() || episode.rows() < 2 {
+        return Ok(Vec::new());
+    }
+    let commands = commands(episode, layout.nu());
+    let plan = ReplayPlan::new(layout, episode, episode.rows());
+    let mut trial = Trial::new(model, &sensors)?;
+    trial.begin(start)?;
+    let mut follows = vec![false; trial.sensors.width()];
+    let frames = plan.frames.div_ceil(STATES);
+    for part in plan.ctrl.chunks(frames * layout.nu()) {
+        trial.mark(&commands, &mut follows)?;
+        let n = part.len() / layout.nu();
+        let mut passed = vec![0.0; n * trial.sensors.width()];
+        let rollout = Rollout::new(
+            &trial.sims[..1],
+            n,
+            plan.substeps,
+            Control::Shared(part),
+            &trial.sensors,
+        );
+        trial.simulator.rollout(&rollout, &mut passed)?;
+    }
+    let any = |i: &usize| follows[trial.sensors.range(*i)].contains(&true);
+    let places = (0..sensors.len()).filter(any);
+    Ok(places.map(|i| sensors[i].clone()).collect())
+}
+
+/// Takes the readings of some sensors out of the first row of an episode.
+pub fn open(episode: &mut Episode, sensors: &[String]) {
+    for name in sensors {
+        if let Some(range) = episode.channel(name) {
+            episode.readings[range].fill(f64::NAN);
+        }
+    }
+}
