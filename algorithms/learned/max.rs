@@ -3,8 +3,9 @@
 //! members disagree. It knows nothing of unknown parameters: it seeks what is new.
 //!
 //! What differs from the publication: the policy is trained by PPO, not SAC; it is retrained after
-//! every round of episodes, not every 25 steps; and the sizes are those of a small machine
-//! (5 networks of 2 x 64 where there are 32 of 4 x 512).
+//! every round of episodes, not every 25 steps; only disagreement about what is tracked is sought,
+//! not that about the end effector, which is read without noise and would be most of it; and the
+//! sizes are those of a small machine (5 networks of 2 x 64 where there are 32 of 4 x 512).
 
 use std::sync::Arc;
 

@@ -331,6 +331,19 @@ mod tests {
         }
     }
 
+    /// Two members that agree on the first place and are far apart on the second, such as the hand's.
+    #[test]
+    fn a_place_that_is_not_paid_for_adds_nothing() {
+        let rows = |values: &[f64]| Tensor::from_slice(values).view([2, 1, 2]);
+        let both = Prediction {
+            mean: rows(&[1.0, 0.0, 1.0, 40.0]),
+            variance: rows(&[1.0; 4]),
+        };
+        let of = |p: &Prediction| divergence(p).double_value(&[0]);
+        assert!((of(&both) - 2.0_f64.ln()).abs() < 1e-12);
+        assert!(of(&both.first(1)).abs() < 1e-12);
+    }
+
     /// Where all members have seen the world they agree, whatever its noise; where none has been
     /// they do not.
     #[test]
