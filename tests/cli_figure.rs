@@ -44,7 +44,7 @@ fn explorers_are_ranked_by_what_identification_makes_of_the_same_episodes() {
         "random",
         "fisher-cem",
         "fisher-cem:fisher.form=one-step",
-        "max",
+        "task-ppo",
     ];
     let mut arguments = vec!["rod-balancing", "--episodes", "1"];
     arguments.extend(explorers.iter().flat_map(|e| ["--explorer", e]));
@@ -62,7 +62,7 @@ fn explorers_are_ranked_by_what_identification_makes_of_the_same_episodes() {
     assert!(rows[1..].iter().all(|r| r[4] == rows[1][4]));
     let shipped = result(&place, "a")["notes"].to_string();
     assert!(
-        shipped.contains("Left out: max on rod-balancing"),
+        shipped.contains("Left out: task-ppo on rod-balancing"),
         "{shipped}"
     );
     let random: Vec<f64> = rows[1][6..10].iter().map(|x| x.parse().unwrap()).collect();
