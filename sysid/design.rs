@@ -11,11 +11,12 @@ use asid_core::{Parameter, Progress, Streams};
 use rand::Rng as _;
 
 use crate::candidates::{Candidates, ends};
+use crate::expected::Expected;
 use crate::limits::Excess;
 use crate::method::{DesignSettings, Method};
 use crate::motion::Family;
 use crate::play::{Played, Player};
-use crate::tells::{Told, differences, of_plays};
+use crate::tells::Told;
 
 /// Factors by which a motion is made smaller to keep limits.
 const SHRINK: f64 = 0.85;
@@ -36,6 +37,8 @@ pub struct Designed {
     pub commands: Vec<f64>,
     /// What it tells.
     pub told: Told,
+    /// What slopes alone say that it tells: more where bodies touch ([`crate::expected`]).
+    pub by_slopes: Told,
     /// Its play at the middle of the unknowns.
     pub played: Played,
     /// By how much limits are passed at the worst of all points; nothing where they are kept.
@@ -80,11 +83,12 @@ impl<'a> Designer<'_, 'a> {
         streams: Streams,
         progress: &dyn Progress,
     ) -> Result<Designed> {
+        self.bound_open_drives()?;
         if self.family.is_empty() {
             return Err(Error::Config {
                 key: "actuator".into(),
                 message: "no actuator has a range to move in: give its joint or command one, such as --limit-position \
-                          JOINT:LOW:HIGH"
+                          JOINT:LOW:HIGH or --limit-speed JOINT:SPEED"
                     .into(),
             });
         }
@@ -185,14 +189,14 @@ impl<'a> Designer<'_, 'a> {
         }
         let larger = joined(&self.excess_at(coefficients, LARGER * scale, points)?);
         let commands = self.family.commands(coefficients, scale);
-        let (near, widths) = differences(self.parameters, &self.values);
-        let jobs: Vec<(&[f64], &[f64])> = near.iter().map(|p| (&commands[..], &p[..])).collect();
-        let plays = self.player.play(&jobs, self.substeps)?;
+        let about = (self.parameters, &self.values[..]);
+        let motion = (&commands[..], self.substeps);
+        let expected = Expected::of(self.player, motion, about, self.sought)?;
         Ok(Designed {
-            told: of_plays(self.player, &plays, &widths, self.sought),
-            played: plays
-                .into_iter()
-                .next()
+            told: expected.told,
+            by_slopes: expected.by_slopes,
+            played: expected
+                .played
                 .ok_or_else(|| Error::Failed("nothing was played".into()))?,
             commands,
             next_limit: larger.worst.map(|(what, _)| what),

@@ -5,7 +5,7 @@
 //!
 //! - [`fit`]: the unknowns are fitted to logs by least squares over open-loop replays, with the initial states of the
 //!   episodes marginalised ([`dataset`], [`start`]), and the gap on logs held out is measured ([`gap`]).
-//! - [`design`]: a [`method`] gives the motion that tells the most about the unknowns ([`tells`]) and keeps all
+//! - [`design`]: a [`method`] gives the motion that tells the most about the unknowns ([`tells`], [`expected`]) and keeps all
 //!   [`limits`], searched among [`candidates`]; it is a [`motion`] of a few numbers, simulated in batches by [`play`], and [`rehearse`]d in
 //!   simulated true machines.
 
@@ -14,6 +14,7 @@ mod by_episodes;
 pub mod candidates;
 pub mod dataset;
 pub mod design;
+pub mod expected;
 pub mod fit;
 pub mod gap;
 pub mod limits;
@@ -21,6 +22,7 @@ mod look;
 mod marginal;
 pub mod method;
 pub mod motion;
+mod open_drives;
 mod places;
 pub mod play;
 pub mod rehearse;

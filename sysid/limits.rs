@@ -52,8 +52,31 @@ pub struct JointLimit {
     pub dof: usize,
     /// Range of positions, rad or m.
     pub position: Option<[f64; 2]>,
+    /// Ends of the joint's range in the model, rad or m, where `position` stays within them by a margin.
+    pub stops: Option<[f64; 2]>,
     /// Largest speed, rad/s or m/s.
     pub speed: Option<f64>,
+}
+
+impl JointLimit {
+    /// Lets the joint stay at `at` where that is an end of its range in the model or of its limit, and a hair beyond that end, as a stop
+    /// gives way; whether it is.
+    pub(crate) fn stay_at_stop(&mut self, at: f64) -> bool {
+        let Some(limit) = &mut self.position else {
+            return false;
+        };
+        let stops = self.stops.unwrap_or(*limit);
+        let hair = STOP * (stops[1] - stops[0]);
+        let mut stays = false;
+        for (end, outward) in [(0, -hair), (1, hair)] {
+            let near = [stops[end], limit[end]];
+            if let Some(stop) = near.into_iter().find(|stop| (at - stop).abs() <= hair) {
+                limit[end] = stop + outward;
+                stays = true;
+            }
+        }
+        stays
+    }
 }
 
 /// A limit of a drive.
@@ -134,12 +157,14 @@ impl Limits {
                     [low + margin, high - margin]
                 };
                 let given = request.position.get(&joint.name).copied();
+                let stops = if given.is_some() { None } else { ranges(i) };
                 let speed = request.speed.get(&joint.name).or(request.speed.get(""));
                 JointLimit {
                     name: joint.name.clone(),
                     qpos: joint.qpos,
                     dof: joint.qvel,
-                    position: given.or_else(|| ranges(i).map(shrink)),
+                    position: given.or(stops.map(shrink)),
+                    stops,
                     speed: speed.copied(),
                 }
             })

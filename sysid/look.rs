@@ -4,7 +4,7 @@ use asid_core::error::Result;
 use asid_mjcf::plant::Drive;
 
 use crate::columns;
-use crate::limits::{DIVERGED, Excess, STOP};
+use crate::limits::{DIVERGED, Excess};
 use crate::play::{Played, Player, TOUCH};
 
 impl Player<'_> {
@@ -20,20 +20,10 @@ impl Player<'_> {
         let mut row = vec![0.0; self.record.width()];
         self.simulator.read(&[0], &self.record, &mut row)?;
         let state = &row[self.readings..self.readings + nq + nv];
-        let at_stop = self.limits.joints.iter_mut().filter_map(|joint| {
-            let [low, high] = joint.position.as_mut()?;
-            let (at, hair) = (state[joint.qpos], STOP * (*high - *low));
-            let is_low = (at - *low).abs() <= hair;
-            let is_high = (at - *high).abs() <= hair;
-            if is_low {
-                *low -= hair;
-            }
-            if is_high {
-                *high += hair;
-            }
-            (is_low || is_high).then(|| joint.name.clone())
-        });
-        let at_stop = at_stop.collect();
+        let joints = self.limits.joints.iter_mut();
+        let at_stop = joints
+            .filter_map(|j| j.stay_at_stop(state[j.qpos]).then(|| j.name.clone()))
+            .collect();
         let mut excess = Excess::default();
         let drives = self.drives_at(point);
         self.look_at_joints(&state[..nq], &state[nq..], 1, &mut excess);
@@ -104,7 +94,7 @@ impl Player<'_> {
             let v = &last[self.readings + nq..self.readings + nq + nv];
             let fastest = v.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
             excess.add(fastest / rest - 1.0, 1, || {
-                format!("speed at the end {fastest:.3}")
+                format!("speed at the end {fastest:.3}, limit {rest}")
             });
         }
         played.excess = excess;
@@ -115,15 +105,19 @@ impl Player<'_> {
         for joint in &self.limits.joints {
             if let Some([low, high]) = joint.position {
                 let at = q[joint.qpos];
-                let beyond = (low - at).max(at - high) / (high - low);
-                excess.add(beyond, frames, || {
-                    format!("position of `{}` {at:.3}", joint.name)
+                let beyond = (low - at).max(at - high);
+                excess.add(beyond / (high - low), frames, || {
+                    format!(
+                        "position of `{}` {at:.3}, {} beyond its limit of {low:.3} to {high:.3}",
+                        joint.name,
+                        distance(beyond)
+                    )
                 });
             }
             if let Some(limit) = joint.speed {
                 let speed = v[joint.dof].abs();
                 excess.add(speed / limit - 1.0, frames, || {
-                    format!("speed of `{}` {speed:.3}", joint.name)
+                    format!("speed of `{}` {speed:.3}, limit {limit}", joint.name)
                 });
             }
         }
@@ -147,8 +141,8 @@ impl Player<'_> {
             let force = drive.force(command, q[joint.qpos], v[joint.qvel]).abs();
             excess.add(force / limit.force - 1.0, frames, || {
                 format!(
-                    "force of `{}` {force:.3}",
-                    layout.actuators[limit.actuator].name
+                    "force of `{}` {force:.3}, limit {}",
+                    layout.actuators[limit.actuator].name, limit.force
                 )
             });
         }
@@ -169,13 +163,24 @@ impl Player<'_> {
                 let beyond = (low[k] - place[k]).max(place[k] - high[k]) / (high[k] - low[k]);
                 excess.add(beyond, frames, || {
                     format!(
-                        "`{}` at {:.3} m along {}",
+                        "`{}` at {:.3} m along {}, limit {} to {}",
                         limit.name,
                         place[k],
-                        ["x", "y", "z"][k]
+                        ["x", "y", "z"][k],
+                        low[k],
+                        high[k]
                     )
                 });
             }
         }
+    }
+}
+
+/// A distance, rad or m, with the digits that it has.
+fn distance(x: f64) -> String {
+    if x < 0.01 {
+        format!("{x:.1e}")
+    } else {
+        format!("{x:.3}")
     }
 }

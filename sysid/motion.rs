@@ -35,7 +35,8 @@ pub struct Family {
     pub shape: Shape,
     /// Command of each actuator at rest.
     pub base: Vec<f64>,
-    /// Largest distance from it; 0 for an actuator that stays.
+    /// Largest distance from it; 0 for an actuator that stays, infinite for one that only the limits of its joint bound
+    /// (`open_drives` finds how far it goes).
     pub amplitude: Vec<f64>,
     /// Range of each command.
     pub range: Vec<Option<[f64; 2]>>,

@@ -52,6 +52,16 @@ impl Told {
         }
     }
 
+    /// What whitened derivatives tell, one column an entry, about `sought` unknowns of `n` entries; nothing where there are none.
+    #[must_use]
+    pub(crate) fn of(columns: Option<&[Vec<f64>]>, (sought, n): (usize, usize)) -> Self {
+        let mut told = Self::nothing(sought, n);
+        if let Some(columns) = columns {
+            told.add(columns);
+        }
+        told
+    }
+
     /// Adds whitened derivatives, one column an entry. Readings that are missing tell nothing.
     pub fn add(&mut self, columns: &[Vec<f64>]) {
         let n = columns.len();
@@ -80,9 +90,20 @@ impl Told {
     /// Covariance of the unknowns that are sought, with the prior, in prior deviations.
     #[must_use]
     pub fn covariance(&self) -> DMatrix<f64> {
-        let n = self.matrix.nrows();
-        let all = inverse_above_prior(&(&self.matrix + DMatrix::identity(n, n)));
+        let all = self.whole_covariance();
         all.view((0, 0), (self.sought, self.sought)).into_owned()
+    }
+
+    /// The same of the nuisance entries too.
+    fn whole_covariance(&self) -> DMatrix<f64> {
+        let n = self.matrix.nrows();
+        inverse_above_prior(&(&self.matrix + DMatrix::identity(n, n)))
+    }
+
+    /// Expected standard deviation of each unknown and nuisance entry, in prior deviations.
+    pub(crate) fn all_deviations(&self) -> Vec<f64> {
+        let diagonal = self.whole_covariance().diagonal();
+        diagonal.iter().map(|v| v.max(0.0).sqrt()).collect()
     }
 
     /// Expected standard deviation of each unknown, in prior deviations.
@@ -141,25 +162,25 @@ impl Told {
 /// between up and down, in prior deviations.
 #[must_use]
 pub fn differences(parameters: &[Parameter], values: &[f64]) -> (Vec<Vec<f64>>, Vec<f64>) {
-    differences_over(parameters, values, STEP)
+    differences_over(parameters, values, &vec![STEP; parameters.len()])
 }
 
 /// As [`differences`], over the wider step of a search.
 #[must_use]
 pub fn search_differences(parameters: &[Parameter], values: &[f64]) -> (Vec<Vec<f64>>, Vec<f64>) {
-    differences_over(parameters, values, SEARCH_STEP)
+    differences_over(parameters, values, &vec![SEARCH_STEP; parameters.len()])
 }
 
-/// Differences of a half step in prior deviations.
-fn differences_over(
+/// Differences of a half step in each entry, in prior deviations.
+pub(crate) fn differences_over(
     parameters: &[Parameter],
     values: &[f64],
-    step: f64,
+    steps: &[f64],
 ) -> (Vec<Vec<f64>>, Vec<f64>) {
     let bound = Parameter::scaled_bound();
     let mut points = vec![values.to_vec()];
     let mut widths = Vec::with_capacity(parameters.len());
-    for (i, parameter) in parameters.iter().enumerate() {
+    for (i, (parameter, step)) in parameters.iter().zip(steps).enumerate() {
         let z = parameter.to_scaled(values[i]);
         let ends = [(z + step).min(bound), (z - step).max(-bound)];
         widths.push(ends[0] - ends[1]);
@@ -175,27 +196,31 @@ fn differences_over(
 /// What a motion tells, from its plays at the points of [`differences`].
 #[must_use]
 pub fn of_plays(player: &Player<'_>, plays: &[Played], widths: &[f64], sought: usize) -> Told {
-    let mut told = Told::nothing(sought, widths.len());
+    let columns = derivatives(player, plays, widths);
+    Told::of(columns.as_deref(), (sought, widths.len()))
+}
+
+/// Whitened derivatives from plays at the points of [`differences`], one column an entry; `None` where a play diverged.
+pub(crate) fn derivatives(
+    player: &Player<'_>,
+    plays: &[Played],
+    widths: &[f64],
+) -> Option<Vec<Vec<f64>>> {
     if plays.iter().any(|p| p.readings.is_empty()) {
-        return told;
+        return None;
     }
     let (width, entries) = (player.width(), player.differences.whitened_len());
-    let columns: Vec<Vec<f64>> = widths
-        .iter()
-        .enumerate()
-        .map(|(i, h)| {
-            let (up, down) = (&plays[1 + 2 * i].readings, &plays[2 + 2 * i].readings);
-            let mut out = vec![0.0; up.len() / width.max(1) * entries];
-            let rows = up.chunks_exact(width).zip(down.chunks_exact(width));
-            for ((up, down), row) in rows.zip(out.chunks_exact_mut(entries)) {
-                player.differences.difference(up, down, row);
-                row.iter_mut().for_each(|x| *x /= h);
-            }
-            out
-        })
-        .collect();
-    told.add(&columns);
-    told
+    let column = |(i, h): (usize, &f64)| {
+        let (up, down) = (&plays[1 + 2 * i].readings, &plays[2 + 2 * i].readings);
+        let mut out = vec![0.0; up.len() / width.max(1) * entries];
+        let rows = up.chunks_exact(width).zip(down.chunks_exact(width));
+        for ((up, down), row) in rows.zip(out.chunks_exact_mut(entries)) {
+            player.differences.difference(up, down, row);
+            row.iter_mut().for_each(|x| *x /= h);
+        }
+        out
+    };
+    Some(widths.iter().enumerate().map(column).collect())
 }
 
 /// What logs tell, with the starts that they leave open marginalised.

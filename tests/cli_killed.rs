@@ -99,3 +99,41 @@ fn a_plugins_folder_that_was_begun_is_begun_anew() {
             .all(|n| !n.starts_with(".asid-"))
     );
 }
+
+/// Whether a process has a handler of SIGINT.
+#[cfg(target_os = "linux")]
+fn watches(process: u32) -> bool {
+    let status = std::fs::read_to_string(format!("/proc/{process}/status")).unwrap_or_default();
+    let mask = status.lines().find_map(|l| l.strip_prefix("SigCgt:"));
+    let mask = mask.and_then(|m| u64::from_str_radix(m.trim(), 16).ok());
+    mask.is_some_and(|m| m & 0b10 != 0)
+}
+
+/// Symptom: Ctrl-C ended a run and an exploration without a word.
+#[test]
+#[cfg(target_os = "linux")]
+fn ctrl_c_says_what_was_stopped_and_that_nothing_was_written() {
+    for (command, what) in [("run", "the run of"), ("explore", "the exploration of")] {
+        let place = Workplace::new();
+        let mut call = place.asid(&[command, "rod-balancing", "--quiet", "--out", "out"]);
+        let mut child = call.stderr(std::process::Stdio::piped()).spawn().unwrap();
+        while !watches(child.id()) && child.try_wait().unwrap().is_none() {
+            std::thread::yield_now();
+        }
+        let process = child.id().to_string();
+        let kill = std::process::Command::new("kill")
+            .args(["-INT", &process])
+            .status();
+        assert!(kill.unwrap().success());
+        let done = child.wait_with_output().unwrap();
+        let said = String::from_utf8_lossy(&done.stderr);
+        assert_eq!(done.status.code(), Some(130), "{said}");
+        assert_eq!(said.trim_end().lines().count(), 1, "{said}");
+        let expected = format!("{what} rod-balancing was stopped");
+        assert!(
+            said.contains(&expected) && said.contains("nothing was written"),
+            "{said}"
+        );
+        assert!(place.names().is_empty(), "{:?}", place.names());
+    }
+}

@@ -23,7 +23,7 @@ use super::output::{OutFolder, write_json};
 use super::result::{CostResult, ExplorationResult, SCHEMA, Versions, figure};
 use super::session::Session;
 use super::settings::Stage;
-use super::{machine, stage, trace, train, view};
+use super::{interrupt, machine, stage, trace, train, view};
 
 /// Arguments of `explore`.
 #[derive(clap::Args)]
@@ -94,6 +94,7 @@ pub fn explore(arguments: &Arguments) -> Result<()> {
         return train::explorer(&session, common, file);
     }
     let out = OutFolder::claim(common.out.as_deref(), &format!("{task}-explore"))?;
+    interrupt::watch(&format!("the exploration of {task}"))?;
     stage::check_start(&session);
     let config = &session.config;
     let start = session.start();

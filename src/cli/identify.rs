@@ -21,7 +21,7 @@ use super::result::{
 };
 use super::session::Session;
 use super::settings::{Stage, wrong};
-use super::{failure, machine, stage, trace, train};
+use super::{failure, interrupt, machine, stage, trace, train};
 
 /// A residual above this many standard deviations of the noise is more than chance and
 /// a noise that was guessed a little low.
@@ -137,6 +137,7 @@ pub fn identify(arguments: &Arguments) -> Result<()> {
         common.out.as_deref(),
         &format!("{}-identify", arguments.task),
     )?;
+    interrupt::watch(&format!("the identification of {}", arguments.task))?;
     let config = &session.config;
     let identifier =
         (find::<IdentifierEntry>(&config.identifier.name)?.make)(&config.identifier.settings)?;

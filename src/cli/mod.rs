@@ -12,6 +12,7 @@ mod failure;
 mod figure;
 mod identify;
 mod import;
+mod interrupt;
 mod list;
 mod machine;
 mod model;

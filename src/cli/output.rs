@@ -15,6 +15,7 @@ use anyhow::Result;
 use asid_core::Error;
 use serde::Serialize;
 
+use super::interrupt;
 use staging::Staging;
 
 pub mod staging;
@@ -132,6 +133,7 @@ impl OutFolder {
         let beside = beside
             .filter(|p| !p.as_os_str().is_empty())
             .unwrap_or(Path::new("."));
+        let mut written = interrupt::writing();
         std::fs::create_dir_all(beside).map_err(|e| failed(beside, &e))?;
         let staging = Staging::new_in(beside).map_err(|e| failed(beside, &e))?;
         let content = staging.content();
@@ -142,6 +144,7 @@ impl OutFolder {
                 self.name(&content)
             }
         });
+        *written = done.is_ok();
         // Whatever went wrong, the work had been done: the call was not at fault.
         done.map_err(|e| Error::Failed(format!("{e:#}")).into())
     }

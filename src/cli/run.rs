@@ -7,6 +7,7 @@ use crate::pipeline::{self, Method, RunOutcome};
 use anyhow::Result;
 use asid_core::registry::{ExplorerEntry, IdentifierEntry, SolverEntry, find};
 
+use super::interrupt;
 use super::options::{Algorithms, Common, Worlds};
 use super::output::{OutFolder, write_json, write_text};
 use super::result::{RunResult, articulation_line, caveats, figure, parameter_line};
@@ -36,6 +37,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         &arguments.worlds,
     )?;
     let out = OutFolder::claim(arguments.common.out.as_deref(), &arguments.task)?;
+    interrupt::watch(&format!("the run of {}", arguments.task))?;
     let truth = session.truth();
     let outcome = pipeline(&session, &truth)?;
     let wall_s = clock.elapsed().as_secs_f64();

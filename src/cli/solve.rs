@@ -16,7 +16,7 @@ use super::result::{CostResult, ParameterResult, SCHEMA, Versions};
 use super::session::Session;
 use super::settings::Stage;
 use super::stage::{self, Named};
-use super::trace;
+use super::{interrupt, trace};
 
 /// What stands for the prior in place of a folder.
 const PRIOR: &str = "prior";
@@ -103,6 +103,7 @@ pub fn solve(arguments: &Arguments) -> Result<()> {
     )?;
     let belief = belief(&session, &arguments.posterior)?;
     let out = OutFolder::claim(common.out.as_deref(), &format!("{}-solve", arguments.task))?;
+    interrupt::watch(&format!("the search for an action of {}", arguments.task))?;
     stage::check_start(&session);
     let config = &session.config;
     let protocol = session.task.downstream();

@@ -194,3 +194,43 @@ fn the_expected_deviation_is_the_actual_one() {
         "{actual} {expected}"
     );
 }
+
+/// Designs a motion for a variant of the cart; what it says.
+fn design_for(model: &str, options: &[&str]) -> (Value, String) {
+    let place = Workplace::new();
+    place.write("cart.xml", model);
+    let unknown = ["--unknown", "geom/cart/mass:0.4:3", "--seconds", "2"];
+    let call = ["explore", "cart.xml", "--quiet", "--out", "motion"];
+    let said = ok(&place, &[&call[..], &unknown, options, &SHORT].concat());
+    (json(&place.read("motion/result.json")), said)
+}
+
+/// Symptom: "no actuator has a range to move in: … such as --limit-position JOINT:LOW:HIGH", with this very limit given. Cause: only a
+/// command's range, a servo's joint or a limit of force bounded a drive.
+#[test]
+fn a_limit_of_the_joint_alone_is_enough_for_a_motion() {
+    let free = NOMINAL.replace(r#"ctrlrange="-20 20""#, "");
+    assert_ne!(free, NOMINAL);
+    let known = |limit: [&str; 2]| {
+        let (result, said) = design_for(&free, &limit);
+        assert_eq!(result["broken"], Value::Null, "{said}");
+        let of = |key: &str| result["unknowns"][0][key].as_f64().unwrap();
+        of("motion") / of("prior")
+    };
+    assert!(known(["--limit-position", "rail:-0.4:0.4"]) < 0.1);
+    assert!(known(["--limit-speed", "rail:1"]) < 0.1);
+}
+
+/// Symptom: a joint that began at the end of its range was refused. Cause: only an end of the limit counted, 2 % within the range.
+#[test]
+fn a_joint_may_stay_at_the_end_of_its_range_where_the_limit_ends_before_it() {
+    let rail = r#"<joint name="rail""#;
+    let ended = NOMINAL.replace(rail, &format!("{rail} limited=\"true\" range=\"0 1\""));
+    assert_ne!(ended, NOMINAL);
+    let (result, said) = design_for(&ended, &["--limit-force", "8"]);
+    assert_eq!(result["broken"], Value::Null, "{said}");
+    assert!(
+        said.contains("at rest at the end of the range, and may stay there: rail"),
+        "{said}"
+    );
+}

@@ -113,5 +113,8 @@ fn a_joint_that_begins_at_the_end_of_its_range_may_stay_there() {
     assert_eq!(begin([-1.0, 1.0]), (Vec::new(), None, [-1.0, 1.0]));
     let (at_stop, beyond, _) = begin([0.1, 1.0]);
     assert!(at_stop.is_empty());
-    assert_eq!(beyond.unwrap(), "position of `rail` 0.000");
+    assert_eq!(
+        beyond.unwrap(),
+        "position of `rail` 0.000, 0.100 beyond its limit of 0.100 to 1.000"
+    );
 }

@@ -67,7 +67,7 @@ fn what_is_wrong_is_told_in_one_line() {
         // The cart begins at 0.
         (
             vec!["explore", "cart", "--limit-position", "rail:0.1:1"],
-            "limit_box: the machine begins beyond one: position of `rail` 0.000",
+            "limit_box: the machine begins beyond one: position of `rail` 0.000, 0.100 beyond its limit of 0.100 to 1.000",
         ),
         (
             vec!["explore", "cart", "--explorer", "chance"],

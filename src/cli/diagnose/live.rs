@@ -9,6 +9,7 @@ use anyhow::Result;
 use asid_core::{Error, Progress};
 use signal_hook::consts::SIGINT;
 
+use super::super::interrupt::INTERRUPTED;
 use super::super::progress::Bars;
 
 /// Share of the time limit after which nothing further is searched. Larger: more is tried, and less time is left for a fit of the values.
@@ -16,8 +17,6 @@ const SEARCHING: f64 = 0.75;
 /// Share of the time limit after which the values of what was found are not fitted to whole replays any further: last replays and the
 /// report take the rest (5 to 15 % of the time of diagnoses of 5 s to a minute).
 const FITTING: f64 = 0.87;
-/// Exit status of a process that SIGINT ended, as shells count it.
-const INTERRUPTED: i32 = 130;
 /// Rows of a ranking that are printed.
 const ROWS: usize = 5;
 /// Characters of a name that are printed: a group of many joints is long.

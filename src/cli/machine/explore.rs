@@ -19,12 +19,11 @@ use serde::Serialize;
 use super::motion_config::Config;
 use super::setup::Setup;
 use super::{Subject, motion_page, sensors};
-use crate::cli::failure;
 use crate::cli::options::Common;
 use crate::cli::output::{OutFolder, write_json, write_text};
 use crate::cli::progress::Bars;
 use crate::cli::result::{CostResult, SCHEMA, figure};
-use crate::cli::view;
+use crate::cli::{failure, interrupt, view};
 use unknown::{UnknownResult, unknown_results};
 
 /// `result.json`.
@@ -76,6 +75,7 @@ pub fn explore(
     let method = Method::named(&config.explorer)?;
     let objective: Objective = config.objective.parse()?;
     let out = OutFolder::claim(common.out.as_deref(), &format!("{}-explore", subject.name))?;
+    interrupt::watch(&format!("the search for a motion of {}", subject.name))?;
     let found = setup.design(&config, method, config.seed, &Bars::new(common.quiet))?;
     let period = setup.period();
     let frames = found.commands.len() / setup.base.len().max(1);
@@ -85,7 +85,7 @@ pub fn explore(
         unknowns,
         &setup.values,
         subject.study.as_ref().map(|_| &setup.known),
-        &found.told,
+        &found,
         config.precision,
     );
     let names: Vec<String> = unknowns.iter().map(|p| p.name.clone()).collect();
@@ -209,6 +209,16 @@ fn told(u: &UnknownResult, wanted: f64) -> String {
     format!("{}: {known}; {enough} for the wanted {wanted:.1} %", u.name)
 }
 
+/// What contact does to what is known of an unknown, where it limits that.
+fn limited(u: &UnknownResult) -> Option<String> {
+    let by_slopes = relative(u.by_slopes?, u.reference);
+    Some(format!(
+        "{}: contact limits it. Slopes alone would promise {by_slopes}, but a contact that comes a time step earlier makes readings jump, \
+         and no identification finds a value by jumps",
+        u.name
+    ))
+}
+
 /// The answer on the terminal.
 pub fn lines(result: &ExploreResult) -> Vec<String> {
     let mut all = Vec::new();
@@ -218,6 +228,7 @@ pub fn lines(result: &ExploreResult) -> Vec<String> {
             .iter()
             .map(|u| told(u, 100.0 * result.precision)),
     );
+    all.extend(result.unknowns.iter().filter_map(limited));
     for direction in &result.unseen {
         let parts: Vec<String> = direction
             .weights

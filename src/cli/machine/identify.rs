@@ -15,14 +15,13 @@ use asid_sysid::gap::{gap, too_short};
 use serde::{Deserialize, Serialize};
 
 use super::Subject;
-use crate::cli::failure;
 use crate::cli::identify::UNEXPLAINED;
 use crate::cli::options::Common;
 use crate::cli::output::{OutFolder, write_json, write_text};
 use crate::cli::progress::Bars;
 use crate::cli::result::{CostResult, ParameterResult, SCHEMA, Versions, caveats, parameter_line};
 use crate::cli::settings::{given, parsed};
-use crate::cli::{run, trace};
+use crate::cli::{failure, interrupt, run, trace};
 
 /// `config.toml`.
 #[derive(Clone, Debug, Serialize, Deserialize, schemars::JsonSchema)]
@@ -114,6 +113,7 @@ pub fn identify(path: &Path, model: Option<&Path>, common: &Common) -> Result<()
     let subject = Subject::open_with(path, engine, config.model.as_deref())?;
     let study = subject.needs_study()?;
     let out = OutFolder::claim(common.out.as_deref(), &format!("{}-identify", study.name))?;
+    interrupt::watch(&format!("the identification of {}", study.name))?;
     let threads = common.threads.unwrap_or(0);
     let progress = Bars::new(common.quiet);
     let data = |logs| Dataset::new(&subject.plant, logs, &study.noise);

@@ -95,7 +95,7 @@ fn told(result: &ExploreResult) -> Section {
     let mut section = Section::new("What it tells").table(table);
     for line in lines(result)
         .iter()
-        .filter(|l| l.starts_with("stays unseen"))
+        .filter(|l| l.starts_with("stays unseen") || l.contains(": contact limits it"))
     {
         section = section.note(line.clone());
     }

@@ -187,7 +187,8 @@ fn base_commands(subject: &Subject) -> Vec<f64> {
         .collect()
 }
 
-/// How far each command may go from its base: half of what limits leave, whichever side is wider.
+/// How far each command may go from its base: half of what limits leave, whichever side is wider. Infinite for a drive that only the limits
+/// of its joint bound, 0 for one that nothing bounds.
 fn amplitudes(subject: &Subject, limits: &Limits, base: &[f64]) -> Vec<f64> {
     let reach = |range: Option<[f64; 2]>, base: f64| {
         range.map_or(f64::INFINITY, |[low, high]| {
@@ -196,17 +197,23 @@ fn amplitudes(subject: &Subject, limits: &Limits, base: &[f64]) -> Vec<f64> {
     };
     let each = base.iter().enumerate().map(|(a, &base)| {
         let mut width = reach(limits.command[a], base);
-        if let Some(drive) = subject.plant.drives[a] {
-            let joint = &subject.plant.layout.joints[drive.joint];
-            let limit = limits.joints.iter().find(|l| l.name == joint.name);
-            if drive.is_position_servo() {
-                let range = limit.and_then(|l| l.position);
-                width = width.min(reach(range.map(|r| r.map(|x| x * drive.gear)), base));
-            } else if let Some(force) = limits.drives.iter().find(|d| d.actuator == a) {
-                width = width.min(force.force / drive.gear.abs());
-            }
+        let Some(drive) = subject.plant.drives[a] else {
+            return if width.is_finite() { width } else { 0.0 };
+        };
+        let joint = &subject.plant.layout.joints[drive.joint];
+        let limit = limits.joints.iter().find(|l| l.name == joint.name);
+        if drive.is_position_servo() {
+            let range = limit.and_then(|l| l.position);
+            width = width.min(reach(range.map(|r| r.map(|x| x * drive.gear)), base));
+        } else if let Some(force) = limits.drives.iter().find(|d| d.actuator == a) {
+            width = width.min(force.force / drive.gear.abs());
         }
-        if width.is_finite() { width } else { 0.0 }
+        let is_bounded = limit.is_some_and(|l| l.position.is_some() || l.speed.is_some());
+        if width.is_finite() || is_bounded {
+            width
+        } else {
+            0.0
+        }
     });
     each.collect()
 }
@@ -230,7 +237,8 @@ fn settle(
     let (at_stop, beyond) = player.look_at_begin(values)?;
     if let Some((what, _)) = beyond.worst {
         let message = format!(
-            "the machine begins beyond one: {what}; move its first keyframe within the limits, or widen this one"
+            "the machine begins beyond one: {what}; move its first keyframe within the limits, or widen this one (that of a joint in the \
+             model is its range less 2 % at either end)"
         );
         return Err(Error::Config {
             key: "limit_position, limit_speed, limit_force, limit_box".into(),

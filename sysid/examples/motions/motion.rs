@@ -60,7 +60,7 @@ pub fn designed(
     let found = setup.design(&machine.config, method, seed, &Silent)?;
     let motion = Motion {
         commands: found.commands,
-        expected: found.told.deviations(),
+        expected: found.by_slopes.deviations(),
         broken: found.excess.worst.map(|(what, _)| what),
         next_limit: found.next_limit,
         course: found.course,

@@ -1,11 +1,15 @@
 //! What is known of the unknowns before and after a motion.
 
 use asid_core::Parameter;
+use asid_sysid::design::Designed;
 use asid_sysid::tells::Told;
 use serde::Serialize;
 
 /// Most repeats that are counted: who would play more looks for another motion.
 const MOST_REPEATS: usize = 1000;
+
+/// Ratio of the deviation that is expected to that by slopes alone from which on contact limits what a motion tells.
+const LIMITED: f64 = 2.0;
 
 /// What is known of an unknown, in its unit.
 #[derive(Clone, Debug, Serialize, schemars::JsonSchema)]
@@ -22,6 +26,9 @@ pub struct UnknownResult {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub logs: Option<f64>,
     pub motion: f64,
+    /// What slopes alone would promise of this motion, where contact limits what it tells.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub by_slopes: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub both: Option<f64>,
     /// Plays of the motion until it is known to the precision asked for, with the logs; null where no number of them
@@ -43,12 +50,14 @@ pub fn unknown_results(
     unknowns: &[Parameter],
     values: &[f64],
     logs: Option<&Told>,
-    motion: &Told,
+    found: &Designed,
     precision: f64,
 ) -> Vec<UnknownResult> {
+    let motion = &found.told;
     let nothing = Told::nothing(motion.sought, motion.matrix.nrows());
     let known = logs.unwrap_or(&nothing);
     let alone = motion.deviations();
+    let by_slopes = found.by_slopes.deviations();
     let so_far = known.deviations();
     let both = motion.and(1.0, known).deviations();
     unknowns
@@ -79,6 +88,7 @@ pub fn unknown_results(
                 prior: unit(1.0),
                 logs: logs.map(|_| unit(so_far[i])),
                 motion: unit(alone[i]),
+                by_slopes: (alone[i] > LIMITED * by_slopes[i]).then(|| unit(by_slopes[i])),
                 both: logs.map(|_| unit(both[i])),
                 repeats,
             }
