@@ -24,6 +24,8 @@ use variation::{VARIATIONS, Variation};
 
 /// Divergence per episode, in the likelihood's unit, from which on one episode is enough: its square root, 4.5 deviations, no chance makes.
 const ENOUGH: f64 = 20.0;
+/// Divergence below which a motion is not worth its play: the predictions differ by less than a deviation, which noise does to any two.
+const TELLS: f64 = 1.0;
 /// Motions that are looked at more closely: one of each variation, at the cost of some replays of a single episode.
 const CLOSER: usize = VARIATIONS.len();
 
@@ -70,6 +72,17 @@ pub fn next(bench: &Bench, one: Rival<'_>, other: Rival<'_>) -> Result<Proposed>
             commands: None,
         });
     };
+    if best.apart < TELLS {
+        told.how = format!(
+            "none of these motions tells more: refitted, the two predictions differ by less than one standard deviation of the noise \
+             over an episode; a motion of another kind is needed{}",
+            hint(one.1, other.1)
+        );
+        return Ok(Proposed {
+            told,
+            commands: None,
+        });
+    }
     let episode = &bench.train.logs.episodes[best.episode];
     let layout = bench.layout();
     told.how = format!("repeat {}", episode.name);
@@ -93,7 +106,7 @@ pub fn next(bench: &Bench, one: Rival<'_>, other: Rival<'_>) -> Result<Proposed>
     if best.apart < ENOUGH {
         told.how += &format!(
             "; that is little, so {} such episodes are needed, or a motion of another kind",
-            (ENOUGH / best.apart.max(0.01)).ceil().min(1000.0)
+            (ENOUGH / best.apart).ceil()
         );
     }
     told.how += &hint(one.1, other.1);

@@ -27,6 +27,7 @@ mod gap;
 mod remainder;
 mod trace;
 mod unexplained;
+mod units;
 mod values;
 mod view;
 

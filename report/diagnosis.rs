@@ -27,6 +27,7 @@ mod wiring;
 mod words;
 
 pub use real_world::lines as real_world_lines;
+pub use words::values as effect_values;
 
 use asid_results::diagnosis::DiagnosisResult;
 use asid_results::trace::DiagnosisTrace;

@@ -3,6 +3,7 @@
 use asid_core::Result;
 
 use super::remainder::remainder;
+use super::units::units;
 use super::{NO_GAP, Telling};
 use crate::bench::Explanation;
 use crate::ceiling::Left;
@@ -150,6 +151,7 @@ impl Telling<'_> {
                     probability: h.probability,
                     gap_closed,
                     parameters: effect.values.iter().cloned().collect(),
+                    units: units(self.bench, effect),
                     intervals95,
                     at_bound,
                 });

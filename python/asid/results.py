@@ -212,6 +212,8 @@ class MotionUnknown(Record):
     value: float
     """The value about which the motion was designed."""
     both: float | None = None
+    by_slopes: float | None = None
+    """What slopes alone would promise of this motion, where contact limits what it tells."""
     logs: float | None = None
 
 
@@ -382,6 +384,8 @@ class Effect(Record):
     """Sum of the probabilities of the hypotheses that it is in."""
     site: str
     """Site; empty for an effect of the whole scene."""
+    units: dict[str, str]
+    """Units of the values at this site."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -4,7 +4,7 @@ use asid_results::diagnosis::{DiagnosisResult, EffectResult, HypothesisResult};
 use asid_results::naming::grouped;
 use asid_results::trace::DiagnosisTrace;
 
-use crate::number::{NOT_A_NUMBER, Precision, decimals, quantity, round, significant, unit_symbol};
+use crate::number::{NOT_A_NUMBER, Precision, decimals, quantity, round, significant};
 
 /// `a + b`, with the sites of one law together.
 pub(super) fn set(effects: &[String]) -> String {
@@ -59,6 +59,11 @@ pub(super) fn about<'t>(trace: &'t DiagnosisTrace, effect: &EffectResult) -> &'t
     known.map_or("", |words| &*words.about)
 }
 
+/// Whether a unit is told in words: what it depends on, or what is meant by it.
+fn is_in_words(unit: &str) -> bool {
+    ["unit of", " or ", ","].iter().any(|w| unit.contains(w))
+}
+
 /// `place = 0.41 m`, or `place = 0.41 (0.38 to 0.44) m` where there is an interval.
 fn value(name: &str, value: f64, unit: &str, interval: Option<[f64; 2]>) -> String {
     let number = match interval.filter(|i| i.iter().all(|x| x.is_finite())) {
@@ -69,8 +74,7 @@ fn value(name: &str, value: f64, unit: &str, interval: Option<[f64; 2]>) -> Stri
         }
         None => round(value, 3),
     };
-    // What a parameter's unit depends on is told in words.
-    let told = if unit_symbol(unit).contains(' ') && unit.len() > 6 {
+    let told = if is_in_words(unit) {
         format!("{number} ({unit})")
     } else {
         quantity(&number, unit)
@@ -79,13 +83,14 @@ fn value(name: &str, value: f64, unit: &str, interval: Option<[f64; 2]>) -> Stri
 }
 
 /// The fitted values of an effect; those that have no part in it are left out.
-pub(super) fn values(trace: &DiagnosisTrace, effect: &EffectResult) -> String {
+pub fn values(trace: &DiagnosisTrace, effect: &EffectResult) -> String {
     let words = trace.catalogue.get(&effect.effect);
     let acting = effect.parameters.iter().filter_map(|(name, x)| {
         let known = words.and_then(|w| w.parameters.get(name));
         let acts = known.is_none_or(|k| k.null != *x);
         let interval = effect.intervals95.get(name).copied();
-        acts.then(|| value(name, *x, known.map_or("", |k| &*k.unit), interval))
+        let unit = effect.units.get(name).or(known.map(|k| &k.unit));
+        acts.then(|| value(name, *x, unit.map_or("", |u| u), interval))
     });
     let text = acting.collect::<Vec<_>>().join(", ");
     if effect.at_bound && !text.is_empty() {

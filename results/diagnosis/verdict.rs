@@ -33,6 +33,9 @@ pub struct EffectResult {
     /// Fitted values.
     #[serde(deserialize_with = "nullable::map")]
     pub parameters: BTreeMap<String, f64>,
+    /// Units of the values at this site.
+    #[serde(default)]
+    pub units: BTreeMap<String, String>,
     /// 95 % intervals of those that were fitted.
     #[serde(default, deserialize_with = "nullable::intervals")]
     pub intervals95: BTreeMap<String, [f64; 2]>,

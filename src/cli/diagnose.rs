@@ -202,7 +202,7 @@ pub fn diagnose(arguments: &Arguments) -> Result<()> {
     diagnosis.trace.files.extend(more);
     write(&out, &study, &mut diagnosis, &settings)?;
     let result = &diagnosis.result;
-    let lines = terminal::lines(result, &engine, progress.seconds());
+    let lines = terminal::lines((result, &diagnosis.trace), &engine, progress.seconds());
     out.tell(common.json, result, &lines)?;
     for check in result.checks.iter().filter(|c| !c.ok) {
         failure::warn(&format!("check {}: {}", check.check, check.detail));

@@ -136,6 +136,8 @@ fn nothing_earns_evidence_by_it() {
     let result = diagnosis.result;
     assert!(result.gap.identified > 3.0, "{}", result.gap.identified);
     assert!(result.verdict.kind == Kind::None, "{}", result.sentence);
+    let step = result.checks.iter().find(|c| c.check == "time-step");
+    assert!(step.is_some_and(|c| !c.ok), "{step:?}");
     for set in &result.ranking {
         let evidence = set.fitted.or(set.screened).unwrap_or(0.0);
         assert!(evidence < 4.0, "{evidence} for {:?}", set.effects);

@@ -1,12 +1,17 @@
 //! The answer of a diagnosis on the terminal.
 
-use asid_report::diagnosis::real_world_lines;
-use asid_report::number::{Precision, round};
+use asid_report::diagnosis::{effect_values, real_world_lines};
+use asid_report::number::{Precision, quantity};
 use asid_results::diagnosis::DiagnosisResult;
 use asid_results::naming::grouped;
+use asid_results::trace::DiagnosisTrace;
 
 /// The answer on the terminal.
-pub fn lines(result: &DiagnosisResult, engine: &str, seconds: f64) -> Vec<String> {
+pub fn lines(
+    (result, trace): (&DiagnosisResult, &DiagnosisTrace),
+    engine: &str,
+    seconds: f64,
+) -> Vec<String> {
     let mut all = Vec::new();
     let mut line = |text: &str| all.push(text.to_owned());
     line(&result.sentence);
@@ -37,25 +42,13 @@ pub fn lines(result: &DiagnosisResult, engine: &str, seconds: f64) -> Vec<String
         .iter()
         .filter(|e| result.verdict.effects.contains(&e.label()))
     {
-        let values = e.parameters.iter().filter(|(_, v)| **v != 0.0);
-        let text: Vec<String> = values
-            .map(|(n, v)| match e.intervals95.get(n) {
-                Some(ends) => {
-                    let precision = Precision::of(*v, (ends[1] - ends[0]) / 4.0);
-                    format!(
-                        "{n} = {} ({})",
-                        precision.show(*v),
-                        precision.interval(*ends)
-                    )
-                }
-                None => format!("{n} = {}", round(*v, 4)),
-            })
-            .collect();
-        line(&format!("  {} {}: {}", e.effect, e.site, text.join(", ")));
+        let values = effect_values(trace, e).replace('\u{a0}', " ");
+        line(&format!("  {} {}: {values}", e.effect, e.site));
     }
     for p in &result.parameters {
         let estimate = Precision::of(p.estimate, p.std).with_uncertainty(p.estimate, p.std);
-        line(&format!("  {} = {estimate}", p.name));
+        let told = quantity(&estimate, &p.unit).replace('\u{a0}', " ");
+        line(&format!("  {} = {told}", p.name));
     }
     if let Some(c) = &result.calibration {
         line(&format!("calibration on simulated logs, {} runs:", c.runs));
