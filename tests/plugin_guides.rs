@@ -130,6 +130,33 @@ fn guides_of_a_new_plugin_lead_nowhere_that_is_not_there() {
     }
 }
 
+/// Symptom: a new plugin had paths of the machine that built the program.
+#[test]
+fn a_new_plugin_has_no_absolute_paths() {
+    let place = Workplace::new();
+    for kind in ["task", "explorer", "effect"] {
+        let dir = format!("my-{kind}");
+        assert!(place.run(&["new", kind, &dir]).status.success());
+        let manifest = place.read(&format!("{dir}/Cargo.toml"));
+        let paths: Vec<&str> = (manifest.split("path = \"").skip(1))
+            .filter_map(|rest| rest.split('"').next())
+            .collect();
+        assert!(paths.len() > 1, "{manifest}");
+        for path in paths {
+            assert!(path.starts_with("../"), "{path}");
+            assert!(
+                place.path(&dir).join(path).join("Cargo.toml").is_file(),
+                "{path}"
+            );
+        }
+    }
+    let lost = place.run(&["new", "task", "other", "--sources", "my-task"]);
+    let said = String::from_utf8_lossy(&lost.stderr);
+    assert_eq!(lost.status.code(), Some(2), "{said}");
+    assert!(said.contains("my-task: is no checkout of ASID"), "{said}");
+    assert!(!place.path("other").exists());
+}
+
 #[test]
 fn the_guide_to_tasks_leads_to_a_run() {
     follow(GUIDES[0], &TINY);

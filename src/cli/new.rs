@@ -19,6 +19,10 @@ pub struct Arguments {
     kind: String,
     /// Write this folder; it must be empty or not exist. Its name becomes the plugin's
     dir: PathBuf,
+    /// Depend on the crates in this checkout of ASID; it must be of the revision that `asid doctor` shows [default: the one that this
+    /// program was built from]. The paths that are written lead there from the new folder
+    #[arg(long, value_name = "CHECKOUT")]
+    sources: Option<PathBuf>,
 }
 
 /// Something that can be started.
@@ -51,8 +55,11 @@ const ENGINE_GUIDE: (&str, &str) = ("GUIDE.md", include_str!("../../docs/add-a-b
 /// The versions of dependencies that this program was built with: a plugin in Rust needs the same.
 const CARGO_LOCK: (&str, &str) = ("Cargo.lock", include_str!("../../Cargo.lock"));
 
-/// The sources that this program was built from.
-const SOURCES: &str = env!("CARGO_MANIFEST_DIR");
+/// Where the sources that this program was built from were when it was built.
+const BUILT_FROM: &str = env!("CARGO_MANIFEST_DIR");
+
+/// A file of the sources, by which a folder is known for them.
+const OF_SOURCES: &str = "asid-core/Cargo.toml";
 
 /// All that there is to start from: the examples themselves, which tests build and run.
 const KINDS: &[Kind] = &[
@@ -180,6 +187,10 @@ const KINDS: &[Kind] = &[
                 include_str!("../../plugins/effect-magnetic-catch/tests/theory.rs"),
             ),
             (
+                "tests/late_command.rs",
+                include_str!("../../plugins/effect-magnetic-catch/tests/late_command.rs"),
+            ),
+            (
                 "README.md",
                 include_str!("../../plugins/effect-magnetic-catch/README.md"),
             ),
@@ -199,8 +210,8 @@ impl Kind {
         PossibleValue::new(self.name).help(self.about)
     }
 
-    /// The text of a file, by its name in the folder, for a plugin of this name.
-    fn text(&self, file: &str, text: &str, name: &str) -> String {
+    /// The text of a file, by its name in the folder, for a plugin of this name; `sources` is the way from it to the sources.
+    fn text(&self, file: &str, text: &str, (name, sources): (&str, &str)) -> String {
         let (from, to) = self.rename;
         let text = if Path::new(file).extension().is_some_and(|e| e == "md") {
             // A guide names files by the example's folder, which is the new one.
@@ -213,7 +224,7 @@ impl Kind {
             return text;
         }
         text.replace(&from.replace('-', "_"), &name.replace('-', "_"))
-            .replace("\"../../", &format!("\"{SOURCES}/"))
+            .replace("\"../../", &format!("\"{sources}/"))
     }
 }
 
@@ -262,12 +273,14 @@ pub fn new(arguments: &Arguments) -> Result<()> {
         }
         .into());
     }
+    let sources = sources(kind, arguments)?;
     prepare(dir)?;
+    let to_sources = sources.map_or_else(String::new, |sources| way(dir, &sources));
     OutFolder::claim(Some(dir), "plugin")?.write(|staging| {
         for (file, text) in kind.files {
             let path = staging.join(file);
             std::fs::create_dir_all(path.parent().unwrap_or(staging))
-                .and_then(|()| std::fs::write(&path, kind.text(file, text, &name)))
+                .and_then(|()| std::fs::write(&path, kind.text(file, text, (&name, &to_sources))))
                 .map_err(|e| failed(&dir.join(file), &e))?;
         }
         Ok(())
@@ -277,6 +290,47 @@ pub fn new(arguments: &Arguments) -> Result<()> {
     writeln!(out, "{}: {}", dir.display(), names.join(", "))?;
     writeln!(out, "README.md says how to build it and what to change")?;
     Ok(())
+}
+
+/// The sources that a plugin in Rust depends on; `None` for other plugins.
+fn sources(kind: &Kind, arguments: &Arguments) -> Result<Option<PathBuf>> {
+    if !kind.cargo {
+        return Ok(None);
+    }
+    let refuse = |path: &Path, message: &str| Error::File {
+        path: path.to_path_buf(),
+        message: message.to_owned(),
+    };
+    let given = arguments.sources.as_deref();
+    let path = given.unwrap_or(Path::new(BUILT_FROM));
+    if path.join(OF_SOURCES).is_file() {
+        return Ok(Some(path.to_path_buf()));
+    }
+    let error = match given {
+        Some(path) => refuse(path, "is no checkout of ASID: it has no asid-core"),
+        None => refuse(
+            &arguments.dir,
+            "a plugin in Rust depends on crates of ASID, and the sources that this program was built from are not on this machine: give \
+             a checkout of the revision that `asid doctor` shows, --sources CHECKOUT",
+        ),
+    };
+    Err(error.into())
+}
+
+/// The way from one folder to another, with `/` between its parts: `../..` and on.
+fn way(from: &Path, to: &Path) -> String {
+    let full = |path: &Path| path.canonicalize().unwrap_or_else(|_| path.to_path_buf());
+    let (from, to) = (full(from), full(to));
+    let shared = from.components().zip(to.components());
+    let shared = shared.take_while(|(a, b)| a == b).count();
+    let up = from.components().skip(shared).map(|_| "..".to_owned());
+    let down = to.components().skip(shared);
+    let down = down.map(|c| c.as_os_str().to_string_lossy().into_owned());
+    let parts: Vec<String> = up.chain(down).collect();
+    match &*parts.join("/") {
+        "" => ".".to_owned(),
+        way => way.to_owned(),
+    }
 }
 
 /// The plugin's name: that of its folder.
@@ -325,5 +379,22 @@ fn failed(path: &Path, error: &std::io::Error) -> Error {
     Error::File {
         path: path.to_path_buf(),
         message: format!("cannot be written: {error}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_way_to_the_sources_goes_up_and_down() {
+        let root = tempfile::tempdir().unwrap();
+        let [plugin, sources] = ["plugins/mine", "asid"].map(|p| root.path().join(p));
+        for folder in [&plugin, &sources] {
+            std::fs::create_dir_all(folder).unwrap();
+        }
+        assert_eq!(way(&plugin, &sources), "../../asid");
+        assert_eq!(way(&sources.clone(), &sources), ".");
+        assert_eq!(way(&sources, root.path()), "..");
     }
 }

@@ -5,22 +5,23 @@
 //! move it enough to tell the mass. The task is one pulse of the motor, half a second
 //! long, after which the arm swings on by itself; its torque must fit the payload.
 
+use std::collections::BTreeMap;
+
 use asid_core::parameter::{Parameter, Scale};
+use asid_core::registry::Settings;
 use asid_core::signal::Signal;
 use asid_core::task::{
     Commander, Condition, Coordinate, DownstreamProtocol, ExplorationProtocol, Outcome, Task,
     TaskSpec,
 };
-use asid_core::{Capabilities, Layout, Result, Scene};
+use asid_core::{Capabilities, Difficulty, Layout, Levels, Result, Scene};
 
 /// Name on the command line.
 const NAME: &str = "payload-swing";
 /// One line for `asid list`.
 const ABOUT: &str = "weigh a payload by swinging it, then swing it to a set angle";
 
-/// Angle that the swing is to reach, rad.
-const GOAL: f64 = 0.6;
-/// Largest distance of the peak from [`GOAL`] that is a success, rad.
+/// Largest distance of the swing's peak from the goal that is a success, rad.
 const THRESHOLD: f64 = 0.05;
 /// Length of a frame, s.
 const FRAME_PERIOD: f64 = 0.02;
@@ -38,6 +39,14 @@ asid_plugin::export_plugin!();
 /// The task.
 pub struct PayloadSwing {
     spec: TaskSpec,
+    /// Angle that the swing is to reach, rad.
+    goal: f64,
+}
+
+/// What can be set of how hard it is.
+fn difficulties() -> Vec<Difficulty> {
+    let about = "angle that the swing is to reach";
+    vec![Difficulty::new("goal", "rad", 0.6, [0.3, 0.9], about)]
 }
 
 impl PayloadSwing {
@@ -46,6 +55,12 @@ impl PayloadSwing {
     /// # Errors
     /// When the scene that is built in cannot be read.
     pub fn new() -> Result<Self> {
+        Self::at(&Levels::new(difficulties()))
+    }
+
+    /// The task at some levels of difficulty.
+    fn at(levels: &Levels) -> Result<Self> {
+        let goal = levels.get("goal")?;
         let angle = Signal {
             sensor: "angle".into(),
             noise: 0.01,
@@ -63,7 +78,7 @@ impl PayloadSwing {
         let downstream = DownstreamProtocol {
             metric: "peak_error_rad".into(),
             unit: "rad".into(),
-            rule: "the swing's peak within 0.05 rad of 0.6 rad".into(),
+            rule: format!("the swing's peak within {THRESHOLD} rad of {goal} rad"),
             threshold: Some(THRESHOLD),
             frames: FRAMES[1],
             frame_period: FRAME_PERIOD,
@@ -79,6 +94,7 @@ impl PayloadSwing {
                 | Capabilities::JOINT_IMPEDANCE
                 | Capabilities::MASS_PARAMETERS,
             parameters: unknowns(),
+            difficulty: difficulties(),
             conditions: [("light", 0.3, 0.02), ("heavy", 0.9, 0.05)]
                 .map(|(name, mass, damping)| {
                     Condition::fixed(name, &[("mass", mass), ("damping", damping)])
@@ -86,7 +102,7 @@ impl PayloadSwing {
                 .into(),
             ..TaskSpec::new([NAME, ABOUT], scene, exploration, downstream)
         };
-        Ok(Self { spec })
+        Ok(Self { spec, goal })
     }
 }
 
@@ -140,7 +156,7 @@ impl Task for PayloadSwing {
             .iter()
             .map(|angle| {
                 peak = angle.max(peak);
-                (peak - GOAL).abs()
+                (peak - self.goal).abs()
             })
             .collect()
     }
@@ -148,11 +164,24 @@ impl Task for PayloadSwing {
     fn outcome(&self, readings: &[f64]) -> Outcome {
         // `max` would pass over the NaN of a simulation that diverged.
         let highest = |a: f64, &b: &f64| if a > b { a } else { b };
-        let error = (readings.iter().fold(f64::NEG_INFINITY, highest) - GOAL).abs();
+        let error = (readings.iter().fold(f64::NEG_INFINITY, highest) - self.goal).abs();
         Outcome {
             value: error,
             success: error <= THRESHOLD,
             cost: error,
+        }
+    }
+
+    fn adjusted(&self, values: &BTreeMap<String, f64>) -> Result<Option<Box<dyn Task>>> {
+        let levels = Levels::new(difficulties()).with(values)?;
+        Ok(Some(Box::new(Self::at(&levels)?)))
+    }
+
+    fn settings(&self, section: &str, algorithm: &str) -> Settings {
+        // One number is sought: fewer candidates find it.
+        match (section, algorithm) {
+            ("solver", "cem") => Settings::from_iter([("population".to_owned(), 16.into())]),
+            _ => Settings::new(),
         }
     }
 }

@@ -68,3 +68,13 @@ fn an_oracle_always_succeeds_and_no_single_torque_does() {
     let share = best_blind as f64 / truths.len() as f64;
     assert!(share < 0.3, "one torque succeeds in {share} of the prior");
 }
+
+#[test]
+fn the_goal_can_be_set_and_a_name_that_is_unknown_is_refused() {
+    let task = PayloadSwing::new().unwrap();
+    let set = |name: &str| task.adjusted(&[(name.to_owned(), 0.8)].into());
+    let farther = set("goal").unwrap().unwrap();
+    assert_eq!(farther.metric(&[0.8, 0.1]), [0.0, 0.0]);
+    assert!(farther.outcome(&[0.8]).success && !task.outcome(&[0.8]).success);
+    assert!(set("gaol").is_err());
+}
