@@ -26,6 +26,9 @@ use variation::{VARIATIONS, Variation};
 const ENOUGH: f64 = 20.0;
 /// Divergence below which a motion is not worth its play: the predictions differ by less than a deviation, which noise does to any two.
 const TELLS: f64 = 1.0;
+/// What is said where no motion is worth its play.
+const NONE_TELLS: &str = "none of these motions tells more: refitted, the two predictions differ by less than one standard deviation of \
+                          the noise over an episode; a motion of another kind is needed";
 /// Motions that are looked at more closely: one of each variation, at the cost of some replays of a single episode.
 const CLOSER: usize = VARIATIONS.len();
 
@@ -64,53 +67,63 @@ pub fn next(bench: &Bench, one: Rival<'_>, other: Rival<'_>) -> Result<Proposed>
         separates: vec![name(one.1), name(other.1)],
         ..NextExperiment::default()
     };
-    let Some(best) = best(bench, one, other)? else {
-        "no variation of the recorded commands could be simulated within the machine's limits"
-            .clone_into(&mut told.how);
-        return Ok(Proposed {
-            told,
-            commands: None,
-        });
+    let commands = match best(bench, one, other)? {
+        None => {
+            "no variation of the recorded commands could be simulated within the machine's limits"
+                .clone_into(&mut told.how);
+            None
+        }
+        Some(best) if !tells(best.apart) => {
+            NONE_TELLS.clone_into(&mut told.how);
+            told.how += &hint(one.1, other.1);
+            None
+        }
+        Some(best) => {
+            let commands = repeat(bench, &best, &mut told);
+            told.how += &differ(best.apart);
+            told.how += &hint(one.1, other.1);
+            commands
+        }
     };
-    if best.apart < TELLS {
-        told.how = format!(
-            "none of these motions tells more: refitted, the two predictions differ by less than one standard deviation of the noise \
-             over an episode; a motion of another kind is needed{}",
-            hint(one.1, other.1)
-        );
-        return Ok(Proposed {
-            told,
-            commands: None,
-        });
-    }
-    let episode = &bench.train.logs.episodes[best.episode];
+    Ok(Proposed { told, commands })
+}
+
+/// Whether a motion that is this far apart, a sum of squares in units of the noise, is worth its play.
+fn tells(apart: f64) -> bool {
+    apart >= TELLS
+}
+
+/// Tells how a motion repeats an episode, and names the file of its commands: these, `None` for a machine without any.
+fn repeat(bench: &Bench, motion: &Motion, told: &mut NextExperiment) -> Option<Episode> {
+    let episode = &bench.train.logs.episodes[motion.episode];
     let layout = bench.layout();
     told.how = format!("repeat {}", episode.name);
-    let commands = if layout.nu() == 0 {
+    if layout.nu() == 0 {
         told.how += " (there are no commands: vary the start)";
-        None
-    } else {
-        told.how += &best.variation.words();
-        FILE.clone_into(&mut told.file);
-        let varied = best.variation.of(&episode.episode, layout);
-        Some(Episode {
-            channels: Vec::new(),
-            readings: Vec::new(),
-            ..varied
-        })
-    };
-    told.how += &format!(
-        ": refitted, the two predictions then differ by {:.1} standard deviations of the noise over the episode",
-        best.apart.sqrt()
+        return None;
+    }
+    told.how += &motion.variation.words();
+    FILE.clone_into(&mut told.file);
+    Some(Episode {
+        channels: Vec::new(),
+        readings: Vec::new(),
+        ..motion.variation.of(&episode.episode, layout)
+    })
+}
+
+/// By how much two predictions differ, and how many episodes it takes where one is too few.
+fn differ(apart: f64) -> String {
+    let deviations = apart.sqrt();
+    let mut text = format!(
+        ": refitted, the two predictions then differ by {deviations:.1} standard deviations of the noise over the episode"
     );
-    if best.apart < ENOUGH {
-        told.how += &format!(
-            "; that is little, so {} such episodes are needed, or a motion of another kind",
-            (ENOUGH / best.apart).ceil()
+    if apart < ENOUGH {
+        let episodes = (ENOUGH / apart).ceil();
+        text += &format!(
+            "; that is little, so {episodes} such episodes are needed, or a motion of another kind"
         );
     }
-    told.how += &hint(one.1, other.1);
-    Ok(Proposed { told, commands })
+    text
 }
 
 /// The motion that tells most of those that the machine may play.
@@ -212,4 +225,19 @@ fn hint(one: &Explanation, other: &Explanation) -> String {
     };
     let found = of(one, other).or_else(|| of(other, one));
     found.map_or_else(String::new, |text| format!("; {text}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Symptom: motions that tell nothing were proposed, to be repeated hundreds of times.
+    #[test]
+    fn a_motion_that_is_proposed_takes_no_more_than_twenty_plays() {
+        assert!(!tells(0.99 * 0.99) && !tells(0.0) && !tells(f64::NAN));
+        assert!(tells(1.0));
+        assert!(differ(1.0).contains("differ by 1.0 standard deviations"));
+        assert!(differ(1.0).contains("so 20 such episodes are needed"));
+        assert!(differ(ENOUGH).ends_with("over the episode"));
+    }
 }
