@@ -1,6 +1,7 @@
 //! Checks before any diagnosis: are the logs and the study's parameters fit for it?
 
 mod identifiability;
+mod missing;
 mod missing_force;
 mod units;
 
@@ -55,6 +56,12 @@ pub fn data(train: &Logs, test: &Logs, open: usize) -> CheckResult {
         .sum();
     let (fitted, unknown) = (readings(train), open * train.episodes.len());
     let few = fitted < READINGS * unknown;
+    let sound = missing <= MISSING;
+    let named = if sound {
+        String::new()
+    } else {
+        missing::named([train, test])
+    };
     let too_little = if few {
         format!(
             "; {fitted} readings to fit to, with {unknown} unknown coordinates of starts, are too little to tell: log longer episodes"
@@ -64,9 +71,9 @@ pub fn data(train: &Logs, test: &Logs, open: usize) -> CheckResult {
     };
     check(
         "data",
-        missing <= MISSING && !few,
+        sound && !few,
         format!(
-            "{} + {} episodes, {seconds:.1} s, {present} readings, {:.1} % missing{too_little}",
+            "{} + {} episodes, {seconds:.1} s, {present} readings, {:.1} % missing{named}{too_little}",
             train.episodes.len(),
             test.episodes.len(),
             100.0 * missing

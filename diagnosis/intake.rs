@@ -1,4 +1,8 @@
-//! What happens to logs before any physics: outliers are left out, wiring is mended, and both are said.
+//! What happens to logs before any physics: outliers are left out, dead sensors passed over, wiring is mended, and all is said.
+
+mod absent;
+mod open_loop;
+mod unchanging;
 
 use asid_core::registry::find;
 use asid_core::{Layout, Result};
@@ -7,11 +11,13 @@ use asid_logs::episode::ColumnMapping;
 
 use crate::machine::Machine;
 use crate::outliers::{self, LeftOut};
-use crate::predict::Point;
-use crate::prepare::{dataset, plain_residuals, set_reading_noise};
 use crate::result::{CheckResult, DiagnosisResult, WiringResult};
 use crate::study::Study;
 use crate::wiring::{self, Settings};
+
+pub use absent::{Absent, absent};
+use open_loop::OpenLoop;
+pub use unchanging::{Unchanging, pass_over};
 
 /// Share of the power of what replays of the model as given leave of a column, as a geometric mean over the columns concerned, up to which
 /// such a fault is the more probable cause: what is left is then less than what the fault explains.
@@ -35,6 +41,10 @@ pub struct Intake {
     /// The study before it was mended, where a clock was: readings are interpolated once, for each time makes their noise more alike.
     before: Option<Study>,
     left_out: Vec<LeftOut>,
+    /// Sensors that some logs read and others do not.
+    absent: Vec<Absent>,
+    /// Sensors that never change, and are passed over.
+    unchanging: Vec<Unchanging>,
 }
 
 impl Intake {
@@ -43,12 +53,15 @@ impl Intake {
     /// # Errors
     /// When the engine fails.
     pub fn of(study: &Study, machine: &Machine) -> Result<Self> {
+        let sensors = machine.plant.layout.sensors.iter().map(|s| &*s.name);
+        let absent = absent(study, sensors);
         let mut study = study.clone();
         let left_out = {
             let logs = study.train.iter_mut().chain(&mut study.test);
             let mut logs: Vec<_> = logs.map(|(_, e)| e).collect();
             outliers::leave_out(&mut logs, &machine.plant.layout)
         };
+        let unchanging = pass_over(&mut study, machine)?;
         let mut intake = Self {
             study,
             other: None,
@@ -57,6 +70,8 @@ impl Intake {
             mappings: Vec::new(),
             before: None,
             left_out,
+            absent,
+            unchanging,
         };
         if intake.study.wired {
             return Ok(intake);
@@ -170,9 +185,13 @@ impl Intake {
         }
     }
 
-    /// What was passed over or mended as the logs were read; nothing where nothing was.
+    /// What was passed over or mended in the logs, sensors that cannot be used first; nothing where nothing was.
     fn log_check(&self) -> Option<CheckResult> {
-        let mut lines: Vec<(String, usize, bool)> = Vec::new();
+        let unchanging = self.unchanging.iter().map(Unchanging::line);
+        let unusable = unchanging.chain(self.absent.iter().map(Absent::line));
+        let all = self.study.notes.len();
+        let mut lines: Vec<(String, usize, bool)> =
+            unusable.map(|line| (line, all, true)).collect();
         for (_, notes) in &self.study.notes {
             for line in notes.lines() {
                 match lines.iter_mut().find(|(l, ..)| *l == line) {
@@ -181,7 +200,6 @@ impl Intake {
                 }
             }
         }
-        let all = self.study.notes.len();
         let ok = !lines.iter().any(|(_, _, suspicious)| *suspicious);
         let text = |(line, files, _): &(String, usize, bool)| {
             if *files == all {
@@ -256,14 +274,8 @@ fn share_left(intake: &Intake, as_given: &Study, machine: &Machine) -> Result<f6
 
 /// Mean square of what replays of the model as given leave of each sensor's training readings, in its unit.
 fn open_loop_power(study: &Study, machine: &Machine) -> Result<Vec<(String, f64)>> {
-    let (mut bench, theta) = dataset(study, machine.clone())?;
-    set_reading_noise(&mut bench, &study.noise);
-    let point = Point {
-        theta,
-        starts: bench.train.starts.clone(),
-    };
-    let residuals = plain_residuals(&bench, &bench.train, &[], &point)?;
-    let logs = &bench.train.logs;
+    let replayed = OpenLoop::of(study, machine)?;
+    let (logs, residuals) = (replayed.logs(), replayed.residuals());
     let of_sensor = |(sensor, name): (usize, String)| {
         let entries = logs.entries.iter().enumerate();
         let own = entries.filter(|(_, e)| e.sensor == sensor);
