@@ -120,7 +120,7 @@ impl Study {
                 whole.scale = (own.factor() * further.factor()).abs();
             }
         }
-        whole
+        whole.in_one_unit()
     }
 
     /// Holds out whole episodes where the study names no test logs: a third of them, the last.

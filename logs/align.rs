@@ -10,7 +10,7 @@ use crate::series::Series;
 /// A stream with fewer samples than this part of the rows is slower: its samples go to single rows.
 const SLOWER: f64 = 0.7;
 /// Samples farther apart than this many usual ones have lost what is between them.
-const LOST: f64 = 2.5;
+pub const LOST: f64 = 2.5;
 
 /// The stamps of the stream that holds the most of some series, in order; of two such, the faster.
 #[must_use]

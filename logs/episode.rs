@@ -2,8 +2,8 @@
 //!
 //! A log is checked as it is read: whatever is wrong is told with its file, row and column, and what is ordinary
 //! (other columns, other units of time, doubled stamps, commands at a lower rate) is mended and noted.
-//! The first row of data is row 2, as a spreadsheet of the CSV file counts it; a Parquet file's
-//! rows are counted the same way.
+//! Rows of a CSV file are counted as an editor counts its lines; the first row of data of any other log is row 2, as that of a CSV file
+//! without comments is.
 
 mod clock;
 mod csv;
@@ -21,12 +21,12 @@ use std::path::Path;
 use asid_core::layout::Layout;
 use asid_core::{Episode, Error, Result};
 
-pub use self::csv::{cell_number, delimiter, refuse_twice};
 #[cfg(feature = "parquet")]
 pub use self::parquet::ParquetFile;
 pub use clock::seconds;
 pub use mapping::{ColumnMapping, counts, unit_counts, unit_factor};
 pub use notes::LogNotes;
+pub use reader::is_of_start;
 pub use remapped::remapped;
 pub use table::{Table, of_table, quantities, wanted};
 

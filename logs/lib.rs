@@ -31,8 +31,9 @@ pub mod raw;
 pub mod ros;
 pub mod series;
 mod table_file;
+mod text_table;
 
 pub use format::{LogFormat, LogSettings};
 pub use open::Opener;
-pub use raw::RawLog;
+pub use raw::{Numberless, RawLog};
 pub use series::Series;

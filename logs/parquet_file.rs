@@ -12,7 +12,7 @@ use parquet::schema::types::Type;
 
 use crate::episode::ParquetFile;
 use crate::raw::RawLog;
-use crate::table_file;
+use crate::table_file::{self, Column};
 
 /// Longest list that is kept: states and actions of robots are shorter.
 const LONGEST_LIST: usize = 512;
@@ -133,5 +133,12 @@ fn number(field: &Field) -> f64 {
 /// # Errors
 /// When the file is damaged, or has no column of stamps.
 pub fn read(path: &Path, name: &str) -> Result<RawLog, String> {
-    table_file::log(name, columns(path, false)?)
+    let columns: Vec<Column> = columns(path, false)?
+        .into_iter()
+        .map(|(name, values)| Column {
+            values,
+            ..Column::named(&name)
+        })
+        .collect();
+    table_file::log(name, &columns)
 }

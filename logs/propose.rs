@@ -21,7 +21,8 @@ use speed::match_speed;
 use unit::Unit;
 use words::Measure;
 
-use crate::episode::{ColumnMapping, unit_factor};
+use crate::align::LOST;
+use crate::episode::{ColumnMapping, is_of_start, unit_factor};
 use crate::format::LogFormat;
 use crate::raw::RawLog;
 use crate::series::Series;
@@ -50,8 +51,20 @@ pub struct Proposal {
     pub time: Option<ColumnMapping>,
     /// Topics that are needed.
     pub topics: Vec<String>,
+    /// Columns of the state of the first row: `qpos.*` and `qvel.*` of a table.
+    pub start: Vec<String>,
     /// Columns that nothing is read from.
     pub unused: Vec<String>,
+}
+
+impl Match {
+    /// Reads the quantity by another mapping from a log.
+    pub fn remap(&mut self, mapping: ColumnMapping, log: &RawLog) {
+        if let Some(series) = log.series(source(&mapping)) {
+            (self.values, self.rate) = (values(series, &mapping), rate(series));
+        }
+        self.mapping = Some(mapping);
+    }
 }
 
 impl Proposal {
@@ -99,9 +112,8 @@ pub fn propose(
         let names = quantities.iter().map(|q| &*q.name);
         let place = quantities.iter().position(|q| q.name == *name);
         let place = place.ok_or_else(|| Error::unknown("sensor or command", name, names))?;
-        let columns = log.series.iter().map(|s| &*s.name);
         let series = log.series.iter().position(|s| s.name == *column);
-        let series = series.ok_or_else(|| Error::unknown("column", column, columns))?;
+        let series = series.ok_or_else(|| no_column(log, column))?;
         taken[place] = Some(context.given(place, series));
     }
     // Readings first: commands are compared with them.
@@ -149,9 +161,12 @@ pub fn propose(
             .any(|m| source(m) == s.name)
     };
     let mut topics: Vec<String> = Vec::new();
-    let mut unused = Vec::new();
+    let (mut start, mut unused) = (Vec::new(), Vec::new());
     for s in &log.series {
-        if !used(s) {
+        let of_start = kind.is_table() && is_of_start(&plant.layout, &s.name);
+        if !used(s) && of_start {
+            start.push(s.name.clone());
+        } else if !used(s) {
             unused.push(s.name.clone());
         } else if !s.stream.is_empty() && !topics.contains(&s.stream) {
             topics.push(s.stream.clone());
@@ -165,8 +180,20 @@ pub fn propose(
         }),
         matches,
         topics,
+        start,
         unused,
     })
+}
+
+/// Why a column that somebody named cannot be read.
+fn no_column(log: &RawLog, column: &str) -> Error {
+    match log.numberless.iter().find(|n| n.name == column) {
+        None => Error::unknown("column", column, log.series.iter().map(|s| &*s.name)),
+        Some(found) => Error::Config {
+            key: "--map".into(),
+            message: format!("no cell of column {} is a number", found.told()),
+        },
+    }
 }
 
 fn source(mapping: &ColumnMapping) -> &str {
@@ -204,17 +231,29 @@ fn matched(quantity: &Quantity, candidate: Option<&Candidate>, log: &RawLog) -> 
     if !unit.fits {
         reasons.push("values beyond the model's range".into());
     }
-    let seconds = series.time.last().unwrap_or(&0.0) - series.time.first().unwrap_or(&0.0);
     Match {
         name: quantity.name.clone(),
         values: values(series, &mapping),
         mapping: Some(mapping),
         reasons,
-        rate: if seconds > 0.0 {
-            (series.time.len() - 1) as f64 / seconds
-        } else {
-            0.0
-        },
+        rate: rate(series),
+    }
+}
+
+/// Values of a series in a second, but for stretches in which it has none; 0 where no time goes by.
+fn rate(series: &Series) -> f64 {
+    let mut steps: Vec<f64> = series.time.windows(2).map(|w| w[1] - w[0]).collect();
+    let middle = steps.len() / 2;
+    if steps.is_empty() {
+        return 0.0;
+    }
+    let usual = *steps.select_nth_unstable_by(middle, f64::total_cmp).1;
+    steps.retain(|step| *step <= LOST * usual);
+    let seconds: f64 = steps.iter().sum();
+    if seconds > 0.0 {
+        steps.len() as f64 / seconds
+    } else {
+        0.0
     }
 }
 

@@ -15,8 +15,31 @@ pub struct RawLog {
     pub series: Vec<Series>,
     /// Column of the stamps, of a table.
     pub stamps: Option<String>,
+    /// Columns of a table that hold no number.
+    pub numberless: Vec<Numberless>,
     /// What a reader should know: streams that could not be read, and why.
     pub remarks: Vec<String>,
+}
+
+/// A column of a table that holds no number.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Numberless {
+    /// Its name.
+    pub name: String,
+    /// The first of its cells that is not empty; empty where all are, or where the format has no text.
+    pub cell: String,
+}
+
+impl Numberless {
+    /// It and what it holds, in words.
+    #[must_use]
+    pub fn told(&self) -> String {
+        if self.cell.is_empty() {
+            self.name.clone()
+        } else {
+            format!("{} (`{}`)", self.name, self.cell)
+        }
+    }
 }
 
 impl RawLog {
@@ -26,7 +49,7 @@ impl RawLog {
         self.series.iter().find(|s| s.name == name)
     }
 
-    /// Logs one after the other as one, with the series of the first: what one episode does not move another may.
+    /// Logs one after the other as one, with every series that any of them has: what one episode does not move another may.
     #[must_use]
     pub fn joined<'l>(logs: impl IntoIterator<Item = &'l Self>) -> Self {
         let mut logs = logs.into_iter();
@@ -40,13 +63,33 @@ impl RawLog {
             let after = ends.copied().fold(0.0, f64::max) + between;
             let first = log.series.iter().filter_map(|s| s.time.first());
             let shift = after - first.copied().fold(f64::INFINITY, f64::min);
-            for own in &mut whole.series {
-                if let Some(more) = log.series(&own.name) {
-                    own.time.extend(more.time.iter().map(|t| t + shift));
-                    own.values.extend(&more.values);
+            for more in &log.series {
+                let later = more.time.iter().map(|t| t + shift);
+                match whole.series.iter_mut().find(|s| s.name == more.name) {
+                    Some(own) => {
+                        own.time.extend(later);
+                        own.values.extend(&more.values);
+                    }
+                    None => whole.series.push(Series {
+                        time: later.collect(),
+                        ..more.clone()
+                    }),
+                }
+            }
+            for more in &log.numberless {
+                if !whole.numberless.iter().any(|own| own.name == more.name) {
+                    whole.numberless.push(more.clone());
+                }
+            }
+            for remark in &log.remarks {
+                if !whole.remarks.contains(remark) {
+                    whole.remarks.push(remark.clone());
                 }
             }
         }
+        whole
+            .numberless
+            .retain(|n| !whole.series.iter().any(|s| s.name == n.name));
         whole
     }
 

@@ -1,8 +1,35 @@
 //! A table of any names as a log: which column has the stamps.
 
 use crate::episode::seconds;
-use crate::raw::RawLog;
+use crate::raw::{Numberless, RawLog};
 use crate::series::Series;
+
+/// A column of a table.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Column {
+    /// Its name.
+    pub name: String,
+    /// Its numbers, one a row, NaN where there is none.
+    pub values: Vec<f64>,
+    /// The first of its cells that is neither a number nor missing; empty where there is none.
+    pub text: String,
+}
+
+impl Column {
+    /// A column without a row.
+    #[must_use]
+    pub fn named(name: &str) -> Self {
+        Self {
+            name: name.to_owned(),
+            ..Self::default()
+        }
+    }
+
+    /// Whether no row has a number.
+    fn is_numberless(&self) -> bool {
+        self.values.iter().all(|x| !x.is_finite())
+    }
+}
 
 /// Names of columns of stamps, as programs write them, the usual ones first.
 const STAMPS: [&str; 12] = [
@@ -36,62 +63,80 @@ fn rank(name: &str) -> Option<usize> {
 
 /// The column of stamps among some: by its name, else the first that only grows.
 #[must_use]
-pub fn stamps(columns: &[(String, Vec<f64>)]) -> Option<usize> {
-    let named = (0..columns.len()).filter_map(|i| Some((rank(&columns[i].0)?, i)));
+pub fn stamps(columns: &[Column]) -> Option<usize> {
+    let named = (0..columns.len()).filter_map(|i| Some((rank(&columns[i].name)?, i)));
     let grows = |values: &[f64]| values.len() > 2 && values.windows(2).all(|w| w[1] > w[0]);
     named
         .min()
         .map(|(_, i)| i)
-        .or_else(|| columns.iter().position(|(_, values)| grows(values)))
+        .or_else(|| columns.iter().position(|c| grows(&c.values)))
 }
 
 /// The log of a table. Columns without a number are left out.
 ///
 /// # Errors
-/// When no column has stamps.
-pub fn log(name: &str, columns: Vec<(String, Vec<f64>)>) -> Result<RawLog, String> {
-    let Some(place) = stamps(&columns) else {
-        let names: Vec<&str> = columns.iter().take(8).map(|(n, _)| &**n).collect();
+/// When no column has stamps, or they are no numbers.
+pub fn log(name: &str, columns: &[Column]) -> Result<RawLog, String> {
+    let Some(place) = stamps(columns) else {
+        let names: Vec<&str> = columns.iter().take(8).map(|c| &*c.name).collect();
         return Err(format!(
             "has no column of stamps: one named `time`, or one that only grows; its columns are {}",
             names.join(", ")
         ));
     };
-    let mut time = columns[place].1.clone();
+    let stamps = &columns[place];
+    if stamps.is_numberless() {
+        return Err(numberless_stamps(stamps));
+    }
+    let mut time = stamps.values.clone();
     seconds(&mut time);
     let first = time.iter().copied().find(|t| t.is_finite()).unwrap_or(0.0);
     time.iter_mut().for_each(|t| *t -= first);
-    let numberless = columns.iter().enumerate().filter(|(i, (name, values))| {
-        *i != place && !name.is_empty() && values.iter().all(|x| !x.is_finite())
-    });
-    let numberless: Vec<&str> = numberless.map(|(_, (name, _))| &**name).collect();
-    let series = columns.iter().enumerate().filter(|(i, _)| *i != place);
-    let series = series.filter_map(|(_, (name, values))| {
-        let points = time.iter().zip(values);
-        let mut points: Vec<(f64, f64)> = points
-            .map(|(t, x)| (*t, *x))
-            .filter(|(t, x)| t.is_finite() && x.is_finite())
-            .collect();
-        points.sort_by(|a, b| a.0.total_cmp(&b.0));
-        (!points.is_empty()).then(|| Series {
-            name: name.clone(),
-            stream: String::new(),
-            time: points.iter().map(|p| p.0).collect(),
-            values: points.iter().map(|p| p.1).collect(),
-        })
-    });
+    let others = || {
+        let all = columns.iter().enumerate();
+        all.filter(|(i, _)| *i != place).map(|(_, c)| c)
+    };
+    let numberless = others().filter(|c| !c.name.is_empty() && c.is_numberless());
     Ok(RawLog {
         name: name.to_owned(),
-        series: series.collect(),
-        stamps: Some(columns[place].0.clone()),
-        remarks: if numberless.is_empty() {
-            Vec::new()
-        } else {
-            vec![format!(
-                "columns without a number are not read: {}",
-                numberless.join(", ")
-            )]
-        },
+        numberless: numberless
+            .map(|c| Numberless {
+                name: c.name.clone(),
+                cell: c.text.clone(),
+            })
+            .collect(),
+        series: others().filter_map(|c| series(&time, c)).collect(),
+        stamps: Some(stamps.name.clone()),
+        remarks: Vec::new(),
+    })
+}
+
+/// Says that the column of stamps holds none that is a number.
+fn numberless_stamps(stamps: &Column) -> String {
+    let holds = if stamps.text.is_empty() {
+        "is empty".to_owned()
+    } else {
+        format!("holds no numbers but text such as `{}`", stamps.text)
+    };
+    format!(
+        "column `{}`, the stamps, {holds}: write seconds, or ms, us or ns from a common start, in place of dates",
+        stamps.name
+    )
+}
+
+/// A column as a series, its numbers in the order of their stamps; `None` where it has none.
+fn series(time: &[f64], column: &Column) -> Option<Series> {
+    let points = time.iter().zip(&column.values);
+    let mut points: Vec<(f64, f64)> = points
+        .map(|(t, x)| (*t, *x))
+        .filter(|(t, x)| t.is_finite() && x.is_finite())
+        .collect();
+    points.sort_by(|a, b| a.0.total_cmp(&b.0));
+    (!points.is_empty()).then(|| Series {
+        name: column.name.clone(),
+        stream: String::new(),
+        time: points.iter().map(|p| p.0).collect(),
+        values: points.iter().map(|p| p.1).collect(),
     })
 }
 
@@ -101,7 +146,10 @@ mod tests {
 
     #[test]
     fn stamps_are_found_by_name_and_else_by_growing() {
-        let column = |name: &str, values: &[f64]| (name.to_owned(), values.to_vec());
+        let column = |name: &str, values: &[f64]| Column {
+            values: values.to_vec(),
+            ..Column::named(name)
+        };
         let rows = [
             column("q", &[1.0, 1.0, 1.0]),
             column("frame", &[1.0, 2.0, 3.0]),
@@ -110,8 +158,28 @@ mod tests {
         assert_eq!(stamps(&rows), Some(2));
         assert_eq!(stamps(&rows[..2]), Some(1));
         assert_eq!(stamps(&rows[..1]), None);
-        let log = log("log", rows.to_vec()).unwrap();
+        let log = log("log", &rows).unwrap();
         assert_eq!(log.stamps.as_deref(), Some("Time [ms]"));
         assert_eq!(log.series.len(), 2);
+    }
+
+    #[test]
+    fn stamps_that_are_dates_are_named() {
+        let column = |name: &str, text: &str, value: f64| Column {
+            name: name.into(),
+            text: text.into(),
+            values: vec![value; 2],
+        };
+        let columns = [
+            column("time", "2026-01-01T10:00:00", f64::NAN),
+            column("q", "", 1.0),
+        ];
+        let said = log("log", &columns).unwrap_err();
+        assert!(
+            said.contains(
+                "column `time`, the stamps, holds no numbers but text such as `2026-01-01T10:00:00`"
+            ),
+            "{said}"
+        );
     }
 }

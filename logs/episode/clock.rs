@@ -69,15 +69,18 @@ pub fn seconds(stamps: &mut [f64]) -> Option<&'static str> {
     notes.time_unit
 }
 
-/// Order of the rows in time: doubled stamps once, the last of them; late arrivals where they belong.
-pub(super) fn order(time: &[f64], notes: &mut LogNotes) -> Result<Vec<usize>, String> {
+/// Order of the rows in time: doubled stamps once, the last of them; late arrivals where they belong. Messages call rows by `numbers`.
+pub(super) fn order(
+    time: &[f64],
+    numbers: &[usize],
+    notes: &mut LogNotes,
+) -> Result<Vec<usize>, String> {
     let usual = row_time(time).unwrap_or(0.0);
     let mut latest = f64::NEG_INFINITY;
-    for (row, &t) in time.iter().enumerate() {
+    for (&row, &t) in numbers.iter().zip(time) {
         if t < latest - LATE_ARRIVAL * usual {
             return Err(format!(
-                "row {}: the time goes back from {latest} to {t} s: give each episode a file of its own",
-                row + 2
+                "row {row}: the time goes back from {latest} to {t} s: give each episode a file of its own"
             ));
         }
         notes.reordered += usize::from(t < latest);
@@ -98,8 +101,12 @@ pub(super) fn order(time: &[f64], notes: &mut LogNotes) -> Result<Vec<usize>, St
     Ok(kept)
 }
 
-/// Refuses a log that no simulator replays within minutes.
-pub(super) fn check_duration(time: &[f64], timestep: f64) -> Result<(), String> {
+/// Refuses a log that no simulator replays within minutes; messages call rows by `numbers`.
+pub(super) fn check_duration(
+    time: &[f64],
+    numbers: &[usize],
+    timestep: f64,
+) -> Result<(), String> {
     let (Some(first), Some(last)) = (time.first(), time.last()) else {
         return Ok(());
     };
@@ -107,7 +114,7 @@ pub(super) fn check_duration(time: &[f64], timestep: f64) -> Result<(), String> 
     if timestep > 0.0 && seconds / timestep > MOST_STEPS {
         let gap = time.windows(2).enumerate();
         let widest = gap.max_by(|(_, a), (_, b)| (a[1] - a[0]).total_cmp(&(b[1] - b[0])));
-        let row = widest.map_or(2, |(i, _)| i + 3);
+        let row = widest.map_or(0, |(i, _)| numbers[i + 1]);
         return Err(format!(
             "lasts {seconds:.0} s, {:.1e} time steps of the model: are its stamps in seconds? \
              The longest step in time leads to row {row}. `[[column]] name = \"time\"` with `unit` states another unit",
@@ -154,7 +161,11 @@ mod tests {
     #[test]
     fn late_arrivals_are_put_in_order_and_doubled_stamps_once() {
         let mut notes = LogNotes::default();
-        let rows = order(&[0.0, 0.1, 0.3, 0.2, 0.4, 0.4], &mut notes).unwrap();
+        let rows = order(
+            &[0.0, 0.1, 0.3, 0.2, 0.4, 0.4],
+            &[2, 3, 4, 5, 6, 7],
+            &mut notes,
+        ).unwrap();
         assert_eq!(rows, [0, 1, 3, 2, 5]);
         assert_eq!((notes.reordered, notes.doubled), (1, 1));
     }
@@ -163,7 +174,8 @@ mod tests {
     fn a_clock_that_starts_anew_is_refused() {
         let mut time: Vec<f64> = (0..40).map(|k| 0.01 * f64::from(k)).collect();
         time.extend(time.clone());
-        let error = order(&time, &mut LogNotes::default()).unwrap_err();
+        let numbers: Vec<usize> = (2..82).collect();
+        let error = order(&time, &numbers, &mut LogNotes::default()).unwrap_err();
         assert!(
             error.contains("row 42") && error.contains("of its own"),
             "{error}"
@@ -172,11 +184,11 @@ mod tests {
 
     #[test]
     fn a_log_of_years_is_refused_in_one_line() {
-        let error = check_duration(&[0.0, 0.01, 1.7e9], 0.001).unwrap_err();
+        let error = check_duration(&[0.0, 0.01, 1.7e9], &[2, 3, 4], 0.001).unwrap_err();
         assert!(
             error.contains("row 4") && error.lines().count() == 1,
             "{error}"
         );
-        assert!(check_duration(&[0.0, 100.0], 0.001).is_ok());
+        assert!(check_duration(&[0.0, 100.0], &[2, 3], 0.001).is_ok());
     }
 }

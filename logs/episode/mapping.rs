@@ -59,6 +59,9 @@ const UNITS: [(&str, f64, &str); 24] = [
     ("%", 1e-2, SHARE),
 ];
 
+/// How far factors that are the same may differ, relative: by what digits of files round.
+const SAME_FACTOR: f64 = 1e-9;
+
 /// One `[[column]]`: the quantity `name` of the model is
 /// `sign * scale * (column in SI units) + offset`, `delay` seconds before the row's time.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -120,6 +123,23 @@ impl ColumnMapping {
     pub fn factor(&self) -> f64 {
         let unit = self.unit.as_deref().and_then(unit_factor).unwrap_or(1.0);
         self.sign * self.scale * unit
+    }
+
+    /// The same mapping with a unit alone, or none, in place of a unit and a scale that make the factor of one of the same kind.
+    #[must_use]
+    pub fn in_one_unit(mut self) -> Self {
+        let Some(counts) = self.unit.as_deref().and_then(unit_counts) else {
+            return self;
+        };
+        let factor = self.factor().abs();
+        let is_same = |unit: &&(&str, f64, &str)| {
+            unit.2 == counts && (unit.1 / factor - 1.0).abs() < SAME_FACTOR
+        };
+        if let Some((name, of_unit, _)) = UNITS.iter().find(is_same) {
+            self.unit = (*of_unit != 1.0).then(|| (*name).to_owned());
+            self.scale = 1.0;
+        }
+        self
     }
 
     /// The lines of a study file.
@@ -268,6 +288,30 @@ mod tests {
         };
         let read: Study = toml::from_str(&mapping.lines()).unwrap();
         assert_eq!(read.column, [mapping]);
+    }
+
+    #[test]
+    fn a_scale_that_undoes_a_unit_takes_both_away() {
+        let mapping = ColumnMapping {
+            unit: Some("deg".into()),
+            scale: 180.0 / std::f64::consts::PI,
+            sign: -1.0,
+            ..ColumnMapping::of("angle")
+        };
+        let plain = mapping.in_one_unit();
+        assert_eq!((plain.unit, plain.scale, plain.sign), (None, 1.0, -1.0));
+        let tenths = ColumnMapping {
+            unit: Some("cm".into()),
+            scale: 0.1,
+            ..ColumnMapping::of("tip.0")
+        };
+        assert_eq!(tenths.in_one_unit().unit.as_deref(), Some("mm"));
+        let odd = ColumnMapping {
+            unit: Some("deg".into()),
+            scale: 1.1,
+            ..ColumnMapping::of("angle")
+        };
+        assert_eq!(odd.clone().in_one_unit(), odd);
     }
 
     #[test]

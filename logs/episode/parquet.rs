@@ -40,7 +40,7 @@ fn read_rows(
     for (i, row) in file.get_row_iter(None).map_err(told)?.enumerate() {
         let row = row.map_err(|e| format!("row {}: {}", i + 2, told(e)))?;
         let fields: Vec<&Field> = row.get_column_iter().map(|(_, field)| field).collect();
-        reader.row(|column| number(fields[column]))?;
+        reader.row(i + 2, |column| number(fields[column]))?;
     }
     reader.finish()
 }

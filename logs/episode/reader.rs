@@ -28,6 +28,8 @@ pub(super) struct Reader<'a> {
     readings: Vec<Column>,
     /// Column, whether it is a velocity, and its place in `qpos` or `qvel`.
     state: Vec<(usize, bool, usize)>,
+    /// Number of each row, as messages have it.
+    numbers: Vec<usize>,
     episode: Episode,
     notes: LogNotes,
 }
@@ -142,19 +144,20 @@ impl<'a> Reader<'a> {
                 channels,
                 ..Episode::default()
             },
+            numbers: Vec::new(),
             notes,
             header,
         })
     }
 
-    /// Takes the next row. `cell` gives the number in a column, NaN where it is empty, or else
+    /// Takes the next row, which messages call by its number. `cell` gives the number in a column, NaN where it is empty, or else
     /// what stands there.
     pub(super) fn row(
         &mut self,
+        row: usize,
         cell: impl Fn(usize) -> Result<f64, String>,
     ) -> Result<(), String> {
         let episode = &mut self.episode;
-        let row = episode.rows() + 2;
         let header = &self.header;
         let number = |c: usize| -> Result<f64, String> {
             cell(c).map_err(|text| {
@@ -181,6 +184,7 @@ impl<'a> Reader<'a> {
             }
             episode.initial = Some(state);
         }
+        self.numbers.push(row);
         episode.time.push(time);
         for c in &self.ctrl {
             episode.ctrl.push(c.factor * number(c.place)? + c.offset);
@@ -197,7 +201,7 @@ impl<'a> Reader<'a> {
     pub(super) fn finish(mut self) -> Result<(Episode, LogNotes), String> {
         let episode = &mut self.episode;
         clock::to_seconds(&mut episode.time, self.time_factor, &mut self.notes);
-        let rows = clock::order(&episode.time, &mut self.notes)?;
+        let rows = clock::order(&episode.time, &self.numbers, &mut self.notes)?;
         if self.notes.doubled + self.notes.reordered > 0 {
             let (nu, width) = (episode.actuators.len(), episode.width());
             let gather = |values: &[f64], width: usize| -> Vec<f64> {
@@ -216,7 +220,8 @@ impl<'a> Reader<'a> {
                 episode.rows()
             ));
         }
-        clock::check_duration(&episode.time, self.layout.timestep)?;
+        let numbers: Vec<usize> = rows.iter().map(|&k| self.numbers[k]).collect();
+        clock::check_duration(&episode.time, &numbers, self.layout.timestep)?;
         if episode.readings.iter().all(|x| x.is_nan()) {
             return Err("every reading is missing".into());
         }
@@ -266,28 +271,40 @@ fn near_column(header: &[String], name: &str) -> String {
 /// Columns of the state at the first row: column, whether it is a velocity, and its place in
 /// `qpos` or `qvel`.
 fn state_columns(layout: &Layout, header: &[String]) -> Vec<(usize, bool, usize)> {
-    let mut found = Vec::new();
-    for (i, name) in header.iter().enumerate() {
-        let (rest, velocity) = match (name.strip_prefix("qpos."), name.strip_prefix("qvel.")) {
-            (Some(rest), _) => (rest, false),
-            (_, Some(rest)) => (rest, true),
-            _ => continue,
+    let columns = header.iter().enumerate();
+    let of = |(i, name): (usize, &String)| {
+        let (velocity, place) = state_place(layout, name)?;
+        Some((i, velocity, place))
+    };
+    columns.filter_map(of).collect()
+}
+
+/// Whether a column of this name holds a coordinate of the state at the first row: `qpos.<joint>` or `qvel.<joint>`, with `.i` where a joint
+/// has several.
+#[must_use]
+pub fn is_of_start(layout: &Layout, name: &str) -> bool {
+    state_place(layout, name).is_some()
+}
+
+/// Whether a coordinate of the state is a velocity, and its place in `qpos` or `qvel`; `None` of a column that is none.
+fn state_place(layout: &Layout, name: &str) -> Option<(bool, usize)> {
+    let (rest, velocity) = match (name.strip_prefix("qpos."), name.strip_prefix("qvel.")) {
+        (Some(rest), _) => (rest, false),
+        (_, rest) => (rest?, true),
+    };
+    let place = layout.joints.iter().find_map(|j| {
+        let (first, len) = if velocity {
+            (j.qvel, j.kind.qvel_len())
+        } else {
+            (j.qpos, j.kind.qpos_len())
         };
-        let place = layout.joints.iter().find_map(|j| {
-            let (first, len) = if velocity {
-                (j.qvel, j.kind.qvel_len())
-            } else {
-                (j.qpos, j.kind.qpos_len())
-            };
-            match rest.strip_prefix(&*j.name)? {
-                "" if len == 1 => Some(first),
-                entry => {
-                    let entry: usize = entry.strip_prefix('.')?.parse().ok()?;
-                    (entry < len).then_some(first + entry)
-                }
+        match rest.strip_prefix(&*j.name)? {
+            "" if len == 1 => Some(first),
+            entry => {
+                let entry: usize = entry.strip_prefix('.')?.parse().ok()?;
+                (entry < len).then_some(first + entry)
             }
-        });
-        found.extend(place.map(|place| (i, velocity, place)));
-    }
-    found
+        }
+    })?;
+    Some((velocity, place))
 }

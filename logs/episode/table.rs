@@ -61,7 +61,7 @@ pub fn of_table(
         // The stamps are in seconds already.
         reader.time_factor = Some(1.0);
         for (row, time) in table.time.iter().enumerate() {
-            reader.row(|column| {
+            reader.row(row + 2, |column| {
                 let x = match column.checked_sub(1) {
                     None => *time,
                     Some(column) => table.columns[column]

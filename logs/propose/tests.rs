@@ -258,3 +258,30 @@ fn a_joint_of_one_letter_is_found_by_the_word_in_a_columns_name_before_a_place_i
         assert_eq!(found.unused, ["tip.0", "tip.1", "tip.2"]);
     }
 }
+
+#[test]
+fn another_mapping_shows_its_own_values() {
+    let log = RawLog {
+        series: vec![series("", "q_pan", |t| t), series("", "other", |t| 2.0 * t)],
+        ..RawLog::default()
+    };
+    let mut found = proposed(log.series.clone(), LogFormat::Csv).matches;
+    let pan = found.iter_mut().find(|m| m.name == "q_pan").unwrap();
+    let mapping = ColumnMapping {
+        from: Some("other".into()),
+        sign: -1.0,
+        ..ColumnMapping::of("q_pan")
+    };
+    pan.remap(mapping, &log);
+    assert!((pan.values[0] + 2.0 * 2.99).abs() < 1e-12 && pan.values[1] == 0.0);
+}
+
+#[test]
+fn a_rate_is_that_of_the_stretches_that_have_values() {
+    let whole = series("", "q", |t| t);
+    let mut halves = whole.clone();
+    halves.time.drain(100..200);
+    halves.values.drain(100..200);
+    assert!((rate(&whole) - 100.0).abs() < 1e-9);
+    assert!((rate(&halves) - 100.0).abs() < 1e-9);
+}

@@ -14,7 +14,7 @@ use asid_core::{Episode, Error, Layout};
 use asid_logs::counted::check_units;
 use asid_logs::episode::{ColumnMapping, of_table, wanted};
 use asid_logs::propose::{Proposal, propose};
-use asid_logs::{LogFormat, RawLog};
+use asid_logs::{LogFormat, Numberless, RawLog};
 
 use super::failure;
 use super::machine::{Subject, sensors};
@@ -96,14 +96,17 @@ pub fn import(arguments: &Arguments) -> Result<()> {
     let (raw, settings) = open(&arguments.logs, &arguments.test, &arguments.topic)?;
     let kind = settings.kind.unwrap_or(LogFormat::Csv);
     let given = given(&arguments.map)?;
-    let Some((_, first, _)) = raw.first() else {
+    if raw.is_empty() {
         return Err(Error::Failed("no log holds an episode".into()).into());
-    };
+    }
     let scene = &subject.source.scene;
     let whole = RawLog::joined(raw.iter().map(|(_, log, _)| log));
     let mut proposal = propose(scene, &subject.plant, (&whole, kind), &given)?;
-    notes.extend(first.remarks.iter().cloned());
-    if let Err(error) = complete(&proposal) {
+    notes.extend(whole.remarks.iter().cloned());
+    let numberless: Vec<String> = whole.numberless.iter().map(Numberless::told).collect();
+    let numberless = table::listed(&numberless);
+    notes.extend(numberless.map(|n| format!("columns without a number are not read: {n}")));
+    if let Err(error) = complete(&proposal, &whole) {
         if !arguments.json {
             table::show(&proposal, whole.stamps.as_deref())?;
         }
@@ -114,7 +117,7 @@ pub fn import(arguments: &Arguments) -> Result<()> {
     if !arguments.quiet {
         failure::note("trying the mapping in the model");
     }
-    let found = wired::look(&subject, &mut imported, &mut proposal)?;
+    let found = wired::look(&subject, &mut imported, &mut proposal, &whole)?;
     notes.extend(found);
     let study = files::Files {
         subject: &subject,
@@ -160,32 +163,48 @@ fn given(map: &[String]) -> Result<Vec<(String, String)>> {
     map.iter().map(one).collect()
 }
 
-/// Refuses a mapping that no diagnosis can start from.
-fn complete(proposal: &Proposal) -> Result<()> {
+/// Refuses a mapping that no diagnosis can start from; `log` is what it was sought in.
+fn complete(proposal: &Proposal, log: &RawLog) -> Result<()> {
+    let refuse = |message: String| {
+        Err(Error::Config {
+            key: "--map".into(),
+            message: format!("{message}; {}", left(proposal, log)),
+        }
+        .into())
+    };
     let missing = proposal.missing_commands();
-    let left = match table::listed(&proposal.unused) {
+    let quoted: Vec<String> = missing.iter().map(|name| format!("`{name}`")).collect();
+    match *missing {
+        [] => {}
+        [name] => {
+            return refuse(format!(
+                "no column is the command of actuator `{name}`; a diagnosis needs what was sent: --map ctrl.{name}=COLUMN names it"
+            ));
+        }
+        [first, ..] => {
+            return refuse(format!(
+                "no column is the command of the actuators {}; a diagnosis needs what was sent: name each, such as --map ctrl.{first}=COLUMN",
+                quoted.join(", ")
+            ));
+        }
+    }
+    if proposal.readings() == 0 {
+        return refuse("no column is a sensor of the model: --map SENSOR=COLUMN names one".into());
+    }
+    Ok(())
+}
+
+/// The columns that are left for what is missing, in words.
+fn left(proposal: &Proposal, log: &RawLog) -> String {
+    let unused = match table::listed(&proposal.unused) {
         None => "nothing is left in the log".to_owned(),
         Some(names) => format!("left are {names}"),
     };
-    if let Some(name) = missing.first() {
-        return Err(Error::Config {
-            key: "--map".into(),
-            message: format!(
-                "no column is the command of actuator `{name}`; a diagnosis needs what was sent: --map ctrl.{name}=COLUMN names it; {left}"
-            ),
-        }
-        .into());
+    let numberless: Vec<String> = log.numberless.iter().map(Numberless::told).collect();
+    match table::listed(&numberless) {
+        None => unused,
+        Some(names) => format!("{unused}; without a number are {names}"),
     }
-    if proposal.readings() == 0 {
-        return Err(Error::Config {
-            key: "--map".into(),
-            message: format!(
-                "no column is a sensor of the model: --map SENSOR=COLUMN names one; {left}"
-            ),
-        }
-        .into());
-    }
-    Ok(())
 }
 
 /// The logs as episodes of the model.

@@ -1,6 +1,6 @@
 //! The picture of an import: which column is what, and every column over time.
 
-use asid_logs::propose::Match;
+use asid_logs::propose::Proposal;
 use asid_report::page::{Cell, Column, Figure, Page, Section, Table, Tone};
 use asid_report::plot::{Axis, Chart, Colour, Layer};
 
@@ -31,12 +31,12 @@ pub(super) fn page(study: &Files<'_>, notes: &[String]) -> String {
     if !notes.is_empty() {
         page = page.badge("see the notes", Tone::Fair);
     }
-    page.section(mapping(&proposal.matches, notes, &proposal.unused))
+    page.section(mapping(proposal, notes))
         .section(pictures(study))
         .html()
 }
 
-fn mapping(matches: &[Match], notes: &[String], unused: &[String]) -> Section {
+fn mapping(proposal: &Proposal, notes: &[String]) -> Section {
     let mut table = Table::new(vec![
         Column::text("quantity"),
         Column::text("column"),
@@ -45,7 +45,7 @@ fn mapping(matches: &[Match], notes: &[String], unused: &[String]) -> Section {
         Column::text("values"),
     ])
     .caption("Range of the values after the conversion of units, in the unit of the model.");
-    for found in matches {
+    for found in &proposal.matches {
         let [column, read, rate, values, why] = cells(found);
         table = table.row(vec![
             found.name.clone().into(),
@@ -59,8 +59,13 @@ fn mapping(matches: &[Match], notes: &[String], unused: &[String]) -> Section {
     for note in notes {
         section = section.note(note.clone());
     }
-    if !unused.is_empty() {
-        section = section.note(format!("Not used: {}.", unused.join(", ")));
+    for (what, columns) in [
+        ("State of the first row", &proposal.start),
+        ("Not used", &proposal.unused),
+    ] {
+        if !columns.is_empty() {
+            section = section.note(format!("{what}: {}.", columns.join(", ")));
+        }
     }
     section
 }

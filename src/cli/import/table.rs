@@ -96,6 +96,9 @@ pub(super) fn show(proposal: &Proposal, stamps: Option<&str>) -> Result<()> {
     if let Some(stamps) = stamps {
         writeln!(stdout, "time is column {stamps}")?;
     }
+    if let Some(start) = listed(&proposal.start) {
+        writeln!(stdout, "state of the first row: {start}")?;
+    }
     if let Some(unused) = listed(&proposal.unused) {
         writeln!(stdout, "not used: {unused}")?;
     }
@@ -127,6 +130,7 @@ pub(super) fn json(
         "schema": SCHEMA,
         "columns": rows.collect::<Vec<_>>(),
         "stamps": stamps,
+        "start": proposal.start,
         "unused": proposal.unused,
         "notes": notes,
         "out": out.map(OutFolder::path),

@@ -1,11 +1,15 @@
-//! The proposed mapping, tried in the model: what the check of wiring finds is put right before the study is written.
+//! The proposed mapping, tried in the model: sensors that some logs lack or that never change are said, and what the check of wiring
+//! finds is put right before the study is written.
 
 use std::collections::BTreeMap;
 
 use anyhow::Result;
+use asid_core::Episode;
+use asid_diagnosis::intake::{Absent, Unchanging, absent, pass_over};
 use asid_diagnosis::machine::Machine;
 use asid_diagnosis::study::Study;
 use asid_diagnosis::wiring::{Settings, mend};
+use asid_logs::RawLog;
 use asid_logs::episode::ColumnMapping;
 use asid_logs::propose::Proposal;
 use serde::Deserialize;
@@ -23,32 +27,40 @@ struct Lines {
     column: Vec<ColumnMapping>,
 }
 
-/// Looks at the wiring of the episodes, puts what is found into the proposal and the episodes, and says it.
-pub(super) fn look(
-    subject: &Subject,
-    imported: &mut [Imported],
-    proposal: &mut Proposal,
-) -> Result<Vec<String>> {
+/// The episodes as a study.
+fn study(subject: &Subject, imported: &[Imported], proposal: &Proposal) -> Study {
     let source = &subject.source;
-    let train: Vec<_> = imported
-        .iter()
-        .filter(|i| !i.test)
-        .map(|i| (i.raw.name.clone(), i.episode.clone()))
-        .collect();
-    let study = Study {
+    let logs = |test: bool| -> Vec<(String, Episode)> {
+        let own = imported.iter().filter(|i| i.test == test);
+        let name = |i: &Imported| i.path.display().to_string();
+        own.map(|i| (name(i), i.episode.clone())).collect()
+    };
+    Study {
         name: subject.name.clone(),
         model: subject.file.clone(),
         scene: source.scene.clone(),
         fixed: source.parameters.clone(),
         effects: source.effects.clone(),
         parameters: Vec::new(),
-        train,
-        test: Vec::new(),
+        train: logs(false),
+        test: logs(true),
         noise: BTreeMap::new(),
         columns: proposal.mappings(),
         notes: Vec::new(),
         wired: false,
-    };
+    }
+}
+
+/// Looks at the sensors and the wiring of the episodes, puts what is found into the proposal and the episodes, and says it; `whole` is all
+/// logs as one.
+pub(super) fn look(
+    subject: &Subject,
+    imported: &mut [Imported],
+    proposal: &mut Proposal,
+    whole: &RawLog,
+) -> Result<Vec<String>> {
+    let source = &subject.source;
+    let mut study = study(subject, imported, proposal);
     let machine = Machine::new(
         backend(subject.backend.name())?.into(),
         &source.scene,
@@ -56,8 +68,14 @@ pub(super) fn look(
         &source.effects,
         0,
     )?;
+    let sensors = subject.plant.layout.sensors.iter().map(|s| &*s.name);
+    let mut said: Vec<String> = absent(&study, sensors).iter().map(Absent::line).collect();
+    said.extend(
+        pass_over(&mut study, &machine)?
+            .iter()
+            .map(Unchanging::line),
+    );
     let mended = mend(&study, &machine, &Settings::default())?;
-    let mut said = Vec::new();
     for fault in &mended.wiring {
         if fault.fault == CLOCK {
             said.push(format!(
@@ -86,7 +104,7 @@ pub(super) fn look(
             found
                 .reasons
                 .push(format!("tried in the model: {}", fault.fault));
-            found.mapping = Some(mapping);
+            found.remap(mapping, whole);
         }
     }
     if !mended.wiring.is_empty() {

@@ -1,0 +1,348 @@
+//! Tables of text as loggers write them: what is comment, what divides cells, what is a number.
+//!
+//! Lines that begin with `#` are comments, above the header and below it. The first other line is the header, unless it is a row of numbers
+//! below a comment that has as many cells, as NumPy writes its names. Cells are divided by commas, semicolons or tabs; where commas divide
+//! none, they may be decimal. Rows are counted as an editor counts lines, from 1.
+
+use std::collections::HashMap;
+use std::path::Path;
+
+use asid_documents::guard::one_line;
+use csv::StringRecord;
+
+/// How writers of CSV files put a missing number, besides an empty cell: NumPy and pandas, R, SQL, JSON.
+const MISSING: [&str; 6] = ["nan", "na", "n/a", "null", "none", "-"];
+
+/// What begins a comment.
+const COMMENT: char = '#';
+
+/// The text of a file, without the mark of its byte order, as Excel writes it.
+///
+/// # Errors
+/// When the file cannot be read.
+pub fn text(path: &Path) -> Result<String, String> {
+    let bytes = std::fs::read(path).map_err(|e| e.to_string())?;
+    let text = String::from_utf8_lossy(&bytes);
+    Ok(text.trim_start_matches('\u{feff}').to_owned())
+}
+
+/// What stands between the cells of a table, and what is a number in one.
+#[derive(Clone, Copy, Debug)]
+struct Marks {
+    delimiter: u8,
+    decimal_comma: bool,
+}
+
+/// A table of text.
+#[derive(Debug)]
+pub struct TextTable<'t> {
+    /// Names of its columns.
+    pub header: Vec<String>,
+    /// Row of the header.
+    header_row: usize,
+    /// What is below the header, and its first row.
+    body: &'t str,
+    first_row: usize,
+    marks: Marks,
+}
+
+/// A row of a table.
+#[derive(Debug)]
+pub struct Row {
+    /// Its number.
+    pub number: usize,
+    cells: StringRecord,
+    decimal_comma: bool,
+}
+
+impl Row {
+    /// What stands in a column.
+    #[must_use]
+    pub fn cell(&self, column: usize) -> &str {
+        self.cells.get(column).unwrap_or_default()
+    }
+
+    /// The number in a column: NaN where it is missing, `None` where it is no finite number.
+    #[must_use]
+    pub fn number_in(&self, column: usize) -> Option<f64> {
+        cell_number(self.cell(column), self.decimal_comma)
+    }
+}
+
+/// The number in a cell: NaN where it is missing, `None` where it is no finite number.
+fn cell_number(text: &str, decimal_comma: bool) -> Option<f64> {
+    if text.is_empty() || MISSING.iter().any(|m| text.eq_ignore_ascii_case(m)) {
+        return Some(f64::NAN);
+    }
+    let number = if decimal_comma && text.contains(',') {
+        text.replacen(',', ".", 1).parse()
+    } else {
+        text.parse()
+    };
+    number.ok().filter(|x: &f64| x.is_finite())
+}
+
+/// What stands between the cells of a table whose header is this: a comma, a semicolon or a tab, the most frequent.
+fn delimiter(header: &str) -> u8 {
+    let count = |mark: u8| header.bytes().filter(|b| *b == mark).count();
+    // The comma wins a draw: it is what the name says.
+    let marks = [b'\t', b';', b','];
+    marks.into_iter().max_by_key(|m| count(*m)).unwrap_or(b',')
+}
+
+/// A reader of rows.
+fn reader(text: &str, delimiter: u8) -> csv::Reader<&[u8]> {
+    csv::ReaderBuilder::new()
+        .has_headers(false)
+        .flexible(true)
+        .trim(csv::Trim::All)
+        .comment(Some(COMMENT as u8))
+        .delimiter(delimiter)
+        .from_reader(text.as_bytes())
+}
+
+/// The cells of a line.
+fn cells(line: &str, delimiter: u8) -> Vec<String> {
+    let first = reader(line, delimiter).into_records().next();
+    let cells = first.and_then(Result::ok).unwrap_or_default();
+    cells.iter().map(str::to_owned).collect()
+}
+
+/// Whether a line is no row.
+fn is_void(line: &str) -> bool {
+    line.trim().is_empty() || line.starts_with(COMMENT)
+}
+
+/// Refuses a header in which a name stands twice: which of the two columns is meant, nobody can say. Empty names do not count, as of the
+/// index that pandas writes.
+fn refuse_twice(header: &[String]) -> Result<(), String> {
+    let mut seen: HashMap<&str, usize> = HashMap::new();
+    for (i, name) in header.iter().enumerate().filter(|(_, n)| !n.is_empty()) {
+        if let Some(first) = seen.insert(name, i) {
+            return Err(format!(
+                "column `{name}` stands twice in the header, as column {} and as column {}: rename one of them, or leave it out",
+                first + 1,
+                i + 1
+            ));
+        }
+    }
+    Ok(())
+}
+
+impl<'t> TextTable<'t> {
+    /// Finds the header of a text, and how its numbers are written.
+    ///
+    /// # Errors
+    /// When there is no header, a name stands twice in it, or no row is below it.
+    pub fn of(text: &'t str) -> Result<Self, String> {
+        if text.trim().is_empty() {
+            return Err("is empty: record it again, or leave it out".into());
+        }
+        let mut table = Self::headed(text)
+            .ok_or("holds comments alone: names of columns and rows are missing")?;
+        refuse_twice(&table.header)?;
+        if table.rows().next().is_none() {
+            return Err(format!(
+                "has no rows below its header (row {}): record it again, or leave it out",
+                table.header_row
+            ));
+        }
+        table.marks.decimal_comma = table.has_decimal_commas();
+        Ok(table)
+    }
+
+    /// The table below the header of a text.
+    fn headed(text: &'t str) -> Option<Self> {
+        let (mut at, mut comment) = (0, None);
+        for (i, line) in text.split_inclusive('\n').enumerate() {
+            if is_void(line) {
+                comment = Some((i + 1, line.trim_start_matches(COMMENT)));
+                at += line.len();
+                continue;
+            }
+            let delimiter = delimiter(line);
+            let own = cells(line, delimiter);
+            let numbers = own
+                .iter()
+                .all(|c| cell_number(c, delimiter != b',').is_some());
+            let above = comment.map(|(row, line)| (row, cells(line, delimiter)));
+            let named = above.filter(|(_, names)| numbers && names.len() == own.len());
+            let marks = Marks {
+                delimiter,
+                decimal_comma: false,
+            };
+            return Some(match named {
+                Some((header_row, header)) => Self {
+                    header,
+                    header_row,
+                    body: &text[at..],
+                    first_row: i + 1,
+                    marks,
+                },
+                None => Self {
+                    header: own,
+                    header_row: i + 1,
+                    body: &text[at + line.len()..],
+                    first_row: i + 2,
+                    marks,
+                },
+            });
+        }
+        None
+    }
+
+    /// Whether numbers have decimal commas: some has one, and none a point.
+    fn has_decimal_commas(&self) -> bool {
+        if self.marks.delimiter == b',' {
+            return false;
+        }
+        let mut commas = false;
+        for row in self.rows().map_while(Result::ok) {
+            for cell in &row.cells {
+                if cell.contains('.') && cell_number(cell, false).is_some() {
+                    return false;
+                }
+                commas |= cell.contains(',') && cell_number(cell, true).is_some();
+            }
+        }
+        commas
+    }
+
+    /// The rows below the header, each as long as it, or one line that says which is not.
+    pub fn rows(&self) -> impl Iterator<Item = Result<Row, String>> {
+        let mut reader = reader(self.body, self.marks.delimiter);
+        let (mut at, mut number) = (0, self.first_row);
+        std::iter::from_fn(move || {
+            loop {
+                let mut cells = StringRecord::new();
+                match reader.read_record(&mut cells) {
+                    Ok(false) => return None,
+                    Ok(true) => {}
+                    Err(e) => return Some(Err(one_line(&e.to_string()))),
+                }
+                let start = cells.position().map_or(0, |p| p.byte() as usize);
+                number += newlines(&self.body[at..start]);
+                at = start;
+                // A record begins where the one before it ended: before blank lines and comments.
+                for line in self.body[start..]
+                    .split_inclusive('\n')
+                    .take_while(|l| is_void(l))
+                {
+                    at += line.len();
+                    number += 1;
+                }
+                // Spaces alone are no row.
+                if cells.len() > 1 || cells.iter().any(|c| !c.is_empty()) {
+                    return Some(self.row(number, cells));
+                }
+            }
+        })
+    }
+
+    /// A row of some cells, as many as the header's; empty ones beyond it do not count.
+    fn row(&self, number: usize, cells: StringRecord) -> Result<Row, String> {
+        let expected = self.header.len();
+        if cells.len() < expected || cells.iter().skip(expected).any(|c| !c.is_empty()) {
+            return Err(format!(
+                "row {number}: cells found: {}, expected by the header (row {}): {expected}; complete or delete the row that is wrong; lines \
+                 above the header begin with `{COMMENT}`",
+                cells.len(),
+                self.header_row
+            ));
+        }
+        Ok(Row {
+            number,
+            cells,
+            decimal_comma: self.marks.decimal_comma,
+        })
+    }
+}
+
+/// Ends of lines in a text.
+fn newlines(text: &str) -> usize {
+    text.bytes().filter(|b| *b == b'\n').count()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn refused(text: &str) -> String {
+        let table = match TextTable::of(text) {
+            Err(message) => return message,
+            Ok(table) => table,
+        };
+        let said = table.rows().find_map(Result::err).unwrap();
+        assert_eq!(said.lines().count(), 1, "{said}");
+        said
+    }
+
+    /// The numbers of a table, and the numbers of its rows.
+    fn numbers(text: &str) -> (Vec<Vec<f64>>, Vec<usize>) {
+        let table = TextTable::of(text).unwrap();
+        let rows: Vec<Row> = table.rows().map(Result::unwrap).collect();
+        let columns = 0..table.header.len();
+        let of = |row: &Row| (columns.clone().map(|i| row.number_in(i).unwrap())).collect();
+        let numbers = rows.iter().map(of).collect();
+        (numbers, rows.iter().map(|row| row.number).collect())
+    }
+
+    #[test]
+    fn comments_are_passed_over_and_rows_are_counted_as_lines() {
+        for end in ["\n", "\r\n"] {
+            let text = [
+                "# robot: a, b",
+                "",
+                "t,x",
+                "0,1",
+                "# stop",
+                "",
+                "1,2",
+                "2,3",
+            ]
+            .join(end);
+            let (found, rows) = numbers(&text);
+            assert_eq!(found, [[0.0, 1.0], [1.0, 2.0], [2.0, 3.0]]);
+            assert_eq!(rows, [4, 7, 8]);
+        }
+    }
+
+    #[test]
+    fn names_in_a_comment_above_numbers_are_the_header() {
+        let table = TextTable::of("# made by numpy\n# t, x\n0,1\n1,2\n").unwrap();
+        assert_eq!(table.header, ["t", "x"]);
+        assert_eq!(table.rows().next().unwrap().unwrap().number, 3);
+    }
+
+    #[test]
+    fn decimal_commas_are_read_where_semicolons_divide_cells() {
+        assert_eq!(
+            numbers("t;x\n0;-5,25\n1;1,5e-3\n").0,
+            [[0.0, -5.25], [1.0, 1.5e-3]]
+        );
+        // Beside decimal points a comma divides thousands, or nobody knows.
+        let table = TextTable::of("t;x\n0.5;1,234\n").unwrap();
+        let row = table.rows().next().unwrap().unwrap();
+        assert_eq!((row.number_in(0), row.number_in(1)), (Some(0.5), None));
+    }
+
+    #[test]
+    fn a_row_of_another_length_is_told_with_its_number() {
+        let said = refused("# a\nt,x\n0,1\n1\n");
+        assert!(
+            said.contains("row 4: cells found: 1, expected by the header (row 2): 2"),
+            "{said}"
+        );
+        assert!(refused("t,x\n0,1\n1,2,3\n").contains("row 3: cells found: 3"));
+        assert_eq!(numbers("t,x\n0,1,,\n1,2\n").0.len(), 2);
+    }
+
+    #[test]
+    fn a_file_without_rows_says_so() {
+        assert!(refused("").contains("is empty"));
+        assert!(refused(" \n").contains("is empty"));
+        assert!(refused("# a\n").contains("comments alone"));
+        assert!(refused("t,x\n").contains("no rows below its header (row 1)"));
+        assert!(refused("t,x,t\n0,1,2\n").contains("`t` stands twice"));
+    }
+}
