@@ -24,6 +24,7 @@ mod explained_noise;
 pub mod findings;
 pub mod fit;
 pub mod forces;
+mod home;
 pub mod intake;
 pub mod judgement;
 pub mod latent_force;

@@ -2,10 +2,13 @@
 
 use std::sync::Arc;
 
+use asid_core::layout::Keyframe;
 use asid_core::{Backend, Model, Result, Scene, Target};
 use asid_effects::EffectSpec;
 use asid_effects::refined::Refined;
 use asid_mjcf::Plant;
+
+use crate::home::default_state;
 
 /// A scene compiled by an engine, what is known of its machine, and what the study's model
 /// file has set and added already.
@@ -36,9 +39,14 @@ impl Machine {
         effects: &[EffectSpec],
         threads: usize,
     ) -> Result<Self> {
+        let model = backend.load(scene)?;
+        let mut plant = Plant::of(scene)?;
+        if plant.layout.keyframes.is_empty() {
+            plant.layout.keyframes.push(default_state(&*model)?);
+        }
         let machine = Self {
-            plant: Arc::new(Plant::of(scene)?),
-            model: backend.load(scene)?,
+            plant: Arc::new(plant),
+            model,
             backend,
             scene: scene.clone(),
             threads,
@@ -49,19 +57,33 @@ impl Machine {
         Ok(machine)
     }
 
+    /// The same machine, which begins elsewhere where a log does not say.
+    #[must_use]
+    pub(crate) fn beginning_at(&self, home: Keyframe) -> Self {
+        let mut plant = Plant::clone(&self.plant);
+        plant.layout.keyframes = vec![home];
+        Self {
+            plant: Arc::new(plant),
+            ..self.clone()
+        }
+    }
+
     /// The same machine with half the time step.
     ///
     /// # Errors
     /// As [`Machine::new`].
     pub fn halved(&self) -> Result<Self> {
         let scene = self.scene.with_timestep(self.plant.layout.timestep / 2.0)?;
-        Self::new(
+        let (fixed, effects) = (&self.fixed, &self.effects);
+        let finer = Self::new(
             Arc::clone(&self.backend),
             &scene,
-            &self.fixed,
-            &self.effects,
+            fixed,
+            effects,
             self.threads,
-        )
+        )?;
+        let home = self.plant.layout.keyframes.first();
+        Ok(home.map_or(finer.clone(), |home| finer.beginning_at(home.clone())))
     }
 
     /// The model with more effects.

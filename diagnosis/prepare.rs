@@ -3,11 +3,13 @@
 use std::collections::BTreeMap;
 
 use asid_core::episode::InitialState;
-use asid_core::{Error, Layout, Result};
-use asid_readings::first_row;
+use asid_core::{Episode, Error, Layout, Result};
+use asid_readings::first_row::Followers;
 
 use crate::bench::Bench;
 use crate::data::{LoggedSensor, Logs};
+use crate::fit::cost;
+use crate::home::at_rest;
 use crate::machine::Machine;
 use crate::noise::{self, Noise};
 use crate::predict::{Point, State};
@@ -62,20 +64,70 @@ pub fn plain_residuals(
 }
 
 /// Sensors whose reading in the first row of a log follows a command before it, which no model can predict.
-fn of_commands(machine: &Machine, study: &Study) -> Result<Vec<String>> {
+fn followers(machine: &Machine, study: &Study) -> Result<Followers> {
     let Some((_, episode)) = study.train.first() else {
-        return Ok(Vec::new());
+        return Ok(Followers::default());
     };
     let State { qpos, qvel } = given_start(&machine.plant, episode);
-    first_row::of_commands(&*machine.with(&[])?, &InitialState { qpos, qvel }, episode)
+    Followers::of(&*machine.with(&[])?, &InitialState { qpos, qvel }, episode)
 }
 
 /// The bench of a study with its noise still open, and the values of its parameters in the model
-/// as given.
+/// as given. Where a log does not give its start the machine begins at its home, or where it comes to rest from there, if replays of the first rows leave
+/// less then.
 ///
 /// # Errors
 /// When no log has a reading, or a parameter cannot be set.
 pub fn dataset(study: &Study, machine: Machine) -> Result<(Bench, Vec<f64>)> {
+    let settled = settled(study, &machine)?;
+    let (bench, nominal) = dataset_of(study, machine)?;
+    let Some(machine) = settled else {
+        return Ok((bench, nominal));
+    };
+    let (other, _) = dataset_of(study, machine)?;
+    let [before, after] = [&bench, &other].map(|b| left_of_first_rows(b, &nominal));
+    // Replays that diverge are not better than anything.
+    let bench = if after? < before? { other } else { bench };
+    Ok((bench, nominal))
+}
+
+/// The machine at rest under the first command of the first log, where it comes to rest and some log leaves its start open.
+fn settled(study: &Study, machine: &Machine) -> Result<Option<Machine>> {
+    let logs = || study.train.iter().chain(&study.test);
+    let (Some((_, first)), Some(home)) =
+        (study.train.first(), machine.plant.layout.keyframes.first())
+    else {
+        return Ok(None);
+    };
+    let is_open = |(_, e): &(String, Episode)| e.initial.as_ref().is_none_or(|s| !s.is_complete());
+    if !logs().any(is_open) {
+        return Ok(None);
+    }
+    let command = &first.ctrl[..machine.plant.layout.nu()];
+    let found = at_rest(&*machine.with(&[])?, home, command)?;
+    Ok(found.map(|home| machine.beginning_at(home)))
+}
+
+/// Squared residuals of the first rows of the training logs that replays leave, in units of what the readings alone tell of the noise; infinite where one
+/// diverges.
+fn left_of_first_rows(bench: &Bench, nominal: &[f64]) -> Result<f64> {
+    let mut head = bench.train.cut(bench.layout(), HEAD);
+    let noise: Vec<f64> = reading_noise(&bench.train.logs)
+        .iter()
+        .map(|n| n.deviation)
+        .collect();
+    head.logs.set_noise(&noise);
+    let point = Point {
+        theta: nominal.to_vec(),
+        starts: head.starts.clone(),
+    };
+    let residuals = bench.predictor(&[], &head)?.residuals(&[point])?.pop();
+    let left = cost(&residuals.unwrap_or_default());
+    Ok(if left.is_nan() { f64::INFINITY } else { left })
+}
+
+/// The same of a machine that begins where it does.
+fn dataset_of(study: &Study, machine: Machine) -> Result<(Bench, Vec<f64>)> {
     let layout = machine.plant.layout.clone();
     let sensors = logged_sensors(&layout, study);
     if sensors.is_empty() {
@@ -84,7 +136,7 @@ pub fn dataset(study: &Study, machine: Machine) -> Result<(Bench, Vec<f64>)> {
             study.name
         )));
     }
-    let of_commands = of_commands(&machine, study)?;
+    let followers = followers(&machine, study)?;
     let record = |logs: &[(String, asid_core::Episode)], first: usize| -> Result<Record> {
         let starts = logs
             .iter()
@@ -92,7 +144,7 @@ pub fn dataset(study: &Study, machine: Machine) -> Result<(Bench, Vec<f64>)> {
             .collect();
         let mut logs = logs.to_vec();
         logs.iter_mut()
-            .for_each(|(_, episode)| first_row::open(episode, &of_commands));
+            .for_each(|(_, episode)| followers.open(episode));
         let logs = Logs::new(&machine.plant, &sensors, logs)?;
         Ok(Record::new(logs.counted_from(first), starts))
     };

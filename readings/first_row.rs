@@ -1,8 +1,9 @@
 //! Readings of a log's first row that a command before the log decides.
 //!
 //! The force of a drive, an acceleration or the pressure below a foot follows the command that acts when it is read. In the first row that is a
-//! command from before the log begins, which no row holds: no model can predict such a reading, however right it is. Such a reading counts as missing.
-//! Which sensors are so is found by a trial, so that it holds on any engine and for any sensor: in states along a replay of a log each
+//! command from before the log begins, which no row holds. A simulation begins without command. Where a log does too, its machine was idle before, and the two
+//! agree; where its first command is another one, no model can predict such a reading, however right it is, and it counts as missing.
+//! Which sensors follow which actuator is found by a trial, so that it holds on any engine and for any sensor: in states along a replay of a log each
 //! actuator in turn has had another command for a step, and the state is then put back.
 
 use asid_core::episode::InitialState;
@@ -60,8 +61,8 @@ impl Trial {
             .set_state(&self.sims[..1], &start.qpos, &start.qvel)
     }
 
-    /// Marks the entries of the sensors that follow a command in the present state of the first simulation, and leaves that as it is. `commands` has a
-    /// row of commands for each simulation.
+    /// Marks the entries of the sensors that follow the command of each actuator in the present state of the first simulation, and leaves that as it is;
+    /// `commands` has a row of commands for each simulation, `follows` a row of entries for each actuator.
     fn mark(&mut self, commands: &[f64], follows: &mut [bool]) -> Result<()> {
         let (n, width) = (self.sims.len(), self.sensors.width());
         let simulator = &mut *self.simulator;
@@ -82,7 +83,10 @@ impl Trial {
         simulator.read(&self.sims, &self.sensors, &mut readings)?;
         simulator.load(&before, &[0], own)?;
         let (first, others) = readings.split_at(width);
-        for other in others.chunks_exact(width.max(1)) {
+        let each = others
+            .chunks_exact(width)
+            .zip(follows.chunks_exact_mut(width));
+        for (other, follows) in each {
             for ((follows, a), b) in follows.iter_mut().zip(first).zip(other) {
                 // What has diverged is not larger than anything.
                 *follows |= (a - b).abs() > DIFFERS * a.abs().max(b.abs());
@@ -110,51 +114,60 @@ fn commands(episode: &Episode, nu: usize) -> Vec<f64> {
     first.iter().copied().chain(moved).collect()
 }
 
-/// Names of the sensors of a log whose readings follow the command that acts when they are read, in states along a replay of the log from a start.
-///
-/// # Errors
-/// As [`Simulator::rollout`].
-pub fn of_commands(
-    model: &dyn Model,
-    start: &InitialState,
-    episode: &Episode,
-) -> Result<Vec<String>> {
-    let layout = model.layout();
-    let is_read = |name: &str| episode.channel(name).is_some();
-    let sensors = layout.sensors.iter().filter(|s| is_read(&s.name));
-    let sensors: Vec<String> = sensors.map(|s| s.name.clone()).collect();
-    if layout.nu() == 0 || sensors.is_empty() || episode.rows() < 2 {
-        return Ok(Vec::new());
-    }
-    let commands = commands(episode, layout.nu());
-    let plan = ReplayPlan::new(layout, episode, episode.rows());
-    let mut trial = Trial::new(model, &sensors)?;
-    trial.begin(start)?;
-    let mut follows = vec![false; trial.sensors.width()];
-    let frames = plan.frames.div_ceil(STATES);
-    for part in plan.ctrl.chunks(frames * layout.nu()) {
-        trial.mark(&commands, &mut follows)?;
-        let n = part.len() / layout.nu();
-        let mut passed = vec![0.0; n * trial.sensors.width()];
-        let rollout = Rollout::new(
-            &trial.sims[..1],
-            n,
-            plan.substeps,
-            Control::Shared(part),
-            &trial.sensors,
-        );
-        trial.simulator.rollout(&rollout, &mut passed)?;
-    }
-    let any = |i: &usize| follows[trial.sensors.range(*i)].contains(&true);
-    let places = (0..sensors.len()).filter(any);
-    Ok(places.map(|i| sensors[i].clone()).collect())
+/// For each actuator of a scene the sensors that follow its command at once.
+#[derive(Clone, Debug, Default)]
+pub struct Followers {
+    of_actuators: Vec<Vec<String>>,
 }
 
-/// Takes the readings of some sensors out of the first row of an episode.
-pub fn open(episode: &mut Episode, sensors: &[String]) {
-    for name in sensors {
-        if let Some(range) = episode.channel(name) {
-            episode.readings[range].fill(f64::NAN);
+impl Followers {
+    /// Of the sensors of a log, in states along a replay of it from a start.
+    ///
+    /// # Errors
+    /// As [`Simulator::rollout`].
+    pub fn of(model: &dyn Model, start: &InitialState, episode: &Episode) -> Result<Self> {
+        let layout = model.layout();
+        let nu = layout.nu();
+        let is_read = |name: &str| episode.channel(name).is_some();
+        let sensors = layout.sensors.iter().filter(|s| is_read(&s.name));
+        let sensors: Vec<String> = sensors.map(|s| s.name.clone()).collect();
+        if nu == 0 || sensors.is_empty() || episode.rows() < 2 {
+            return Ok(Self::default());
+        }
+        let commands = commands(episode, nu);
+        let plan = ReplayPlan::new(layout, episode, episode.rows());
+        let mut trial = Trial::new(model, &sensors)?;
+        trial.begin(start)?;
+        let width = trial.sensors.width();
+        let mut follows = vec![false; nu * width];
+        let frames = plan.frames.div_ceil(STATES);
+        for part in plan.ctrl.chunks(frames * nu) {
+            trial.mark(&commands, &mut follows)?;
+            let n = part.len() / nu;
+            let mut passed = vec![0.0; n * width];
+            let control = Control::Shared(part);
+            let own = &trial.sims[..1];
+            let rollout = Rollout::new(own, n, plan.substeps, control, &trial.sensors);
+            trial.simulator.rollout(&rollout, &mut passed)?;
+        }
+        let followers = |follows: &[bool]| {
+            let any = |i: &usize| follows[trial.sensors.range(*i)].contains(&true);
+            let places = (0..sensors.len()).filter(any);
+            places.map(|i| sensors[i].clone()).collect()
+        };
+        Ok(Self {
+            of_actuators: follows.chunks_exact(width).map(followers).collect(),
+        })
+    }
+
+    /// Takes the readings that follow a command from before an episode out of its first row: those of actuators whose first command is not zero.
+    pub fn open(&self, episode: &mut Episode) {
+        let commanded = self.of_actuators.iter().zip(episode.ctrl.clone());
+        let commanded = commanded.filter(|(_, command)| *command != 0.0);
+        for name in commanded.flat_map(|(sensors, _)| sensors) {
+            if let Some(range) = episode.channel(name) {
+                episode.readings[range].fill(f64::NAN);
+            }
         }
     }
 }

@@ -3,6 +3,7 @@
 mod about_replays;
 mod begun;
 mod by_replays;
+mod confused;
 mod exchanged;
 mod finish;
 mod given_back;

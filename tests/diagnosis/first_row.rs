@@ -7,7 +7,7 @@ use asid::core::episode::{ChannelColumns, InitialState};
 use asid::core::layout::Sensor;
 use asid::core::{Episode, Scene};
 use asid::diagnosis::result::Kind;
-use asid::readings::first_row;
+use asid::readings::first_row::Followers;
 
 use super::one_joint::normal;
 use super::played::Player;
@@ -93,9 +93,12 @@ fn the_force_of_a_drive_follows_the_command_and_its_joint_does_not_yet() {
         qpos: vec![0.1],
         qvel: vec![0.0],
     };
-    let found = first_row::of_commands(&*model, &start, &episode).unwrap();
-    assert_eq!(found, ["torque"]);
-    first_row::open(&mut episode, &found);
+    let followers = Followers::of(&*model, &start, &episode).unwrap();
+    let mut idle = episode.clone();
+    followers.open(&mut idle);
+    assert_eq!(idle.readings, episode.readings, "its first command is none");
+    episode.ctrl[0] = 0.5;
+    followers.open(&mut episode);
     assert!(episode.readings[..2].iter().all(|x| *x == 0.0));
     assert!(episode.readings[2].is_nan());
     assert!(episode.readings[3..].iter().all(|x| *x == 0.0));

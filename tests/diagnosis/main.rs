@@ -6,6 +6,7 @@
 mod arm;
 mod ball;
 mod beyond;
+mod coupled_finger;
 #[path = "../diagnosis_support/mod.rs"]
 mod diagnosis_support;
 mod drift;
@@ -33,6 +34,7 @@ mod slow_noise;
 mod small;
 mod soft_belt;
 mod step_error;
+mod standing;
 mod steps;
 mod sticking;
 mod stopped;

@@ -149,6 +149,7 @@ impl Upon<'_> {
         let confirmed = self.with_laws_by_replays(self.in_order(finished.sets), beside)?;
         let confirmed = self.with_a_second_look(confirmed, beside)?;
         let confirmed = self.with_a_look_about_replays(confirmed)?;
+        let confirmed = self.with_what_is_mistaken(confirmed, &screening.look)?;
         let gain = |s: &Set| s.fitted.evidence - self.base.fitted.evidence;
         let rows = confirmed.iter().map(|s| (name(&s.candidates), gain(s)));
         progress.ranking(&format!("fits{upon}"), &rows.collect::<Vec<_>>());

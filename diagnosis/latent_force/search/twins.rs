@@ -9,6 +9,7 @@ use crate::candidate::Candidate;
 use crate::latent_force::fit::rise;
 
 use super::Search;
+use super::confused::is_confused;
 use super::path::Path;
 use super::prior::worth;
 use super::set::{Set, without};
@@ -61,18 +62,6 @@ impl Search<'_> {
             .collect()
     }
 
-    /// Whether one candidate is easily mistaken for another one, by its own word or by that of the other, and acts where that one does.
-    fn is_confused(&self, a: usize, b: usize) -> bool {
-        let [a, b] = [a, b].map(|c| &self.candidates[c]);
-        let says = |a: &Candidate, b: &Candidate| {
-            let mut with = a.effect.mistaken_for().iter().flat_map(|c| c.with);
-            with.any(|name| *name == b.spec.name)
-        };
-        let plant = self.context.plant();
-        let [reach, other] = [a, b].map(|c| c.effect.reach(plant, &c.spec.site));
-        reach == other && (says(a, b) || says(b, a))
-    }
-
     /// Sets that a path has fitted and found behind its best one, with a candidate that is easily mistaken for one of that: fitted a little more from where the
     /// best one has come to. A fit may be given up, or end, far from the values at which it would do the same.
     fn mistaken(&self, path: &Path) -> Result<Vec<Set>> {
@@ -89,7 +78,11 @@ impl Search<'_> {
             };
             let is_behind = !other.is_level_with(best, rise(context));
             let known = again.iter().any(|s| s.candidates.contains(into));
-            if known || !is_behind || !self.is_confused(*out, *into) || self.progress.is_stopped() {
+            if known
+                || !is_behind
+                || !is_confused(context, self.candidates, (*out, *into))
+                || self.progress.is_stopped()
+            {
                 continue;
             }
             let rest = without(best, self.candidates, *out);

@@ -8,7 +8,7 @@ use asid_core::{Backend, Error, Model};
 use asid_diagnosis::study::Study;
 use asid_effects::RefinedModel;
 use asid_mjcf::Plant;
-use asid_readings::first_row;
+use asid_readings::first_row::Followers;
 use asid_sysid::start::start_of;
 
 use super::super::diagnose::default_backend;
@@ -106,9 +106,9 @@ fn open_first_rows(model: &dyn Model, plant: &Plant, study: &mut Study) -> Resul
         return Ok(());
     };
     let (start, _) = start_of(plant, episode);
-    let sensors = first_row::of_commands(model, &start, episode)?;
+    let followers = Followers::of(model, &start, episode)?;
     let logs = study.train.iter_mut().chain(&mut study.test);
-    logs.for_each(|(_, episode)| first_row::open(episode, &sensors));
+    logs.for_each(|(_, episode)| followers.open(episode));
     Ok(())
 }
 

@@ -1,0 +1,65 @@
+//! What is easily mistaken for a name that leads, and that no fit has seen: fitted too.
+//!
+//! A screening ranks laws about the trajectory of the model without them. Dry friction turns round with each error of a speed's sign there and
+//! shows a tenth of what it is, a dead band of the drive at the same joint shows half; and once that one leads the fits, nothing far behind is
+//! raced. So what a leading law is [mistaken for](asid_effects::Effect::mistaken_for), by its own word or by that of the other, is fitted as well
+//! where it acts.
+
+use asid_core::Result;
+
+use crate::candidate::Candidate;
+use crate::latent_force::context::Context;
+use crate::latent_force::screen::Screened;
+
+use super::round::Upon;
+use super::screening::Look;
+use super::set::Set;
+
+/// Names that are fitted beside the one that leads, at most: of a drive, play and friction of its joint.
+const MOST: usize = 2;
+
+/// Whether one candidate is easily mistaken for another one, by its own word or by that of the other, and acts where that one does.
+pub(super) fn is_confused(
+    context: &Context<'_>,
+    candidates: &[Candidate],
+    (a, b): (usize, usize),
+) -> bool {
+    let [a, b] = [a, b].map(|c| &candidates[c]);
+    let says = |a: &Candidate, b: &Candidate| {
+        let mut with = a.effect.mistaken_for().iter().flat_map(|c| c.with);
+        with.any(|name| *name == b.spec.name)
+    };
+    let plant = context.plant();
+    let [reach, other] = [a, b].map(|c| c.effect.reach(plant, &c.spec.site));
+    reach == other && (says(a, b) || says(b, a))
+}
+
+impl Upon<'_> {
+    /// Sets that were `fitted` to the end, best first, and those that have in the place of a name of the best one what is easily mistaken for it and is in
+    /// none of them: the likeliest two of the screening, fitted from its own base.
+    pub(super) fn with_what_is_mistaken(&self, fitted: Vec<Set>, look: &Look) -> Result<Vec<Set>> {
+        let Some(best) = fitted.first() else {
+            return Ok(fitted);
+        };
+        let named =
+            |c: &&usize| !self.candidates[**c].is_tolerance && !self.base.candidates.contains(*c);
+        let names: Vec<usize> = best.candidates.iter().filter(named).copied().collect();
+        let is_confused = |s: &&Screened| {
+            let [into] = self.members(look, s)[..] else {
+                return false;
+            };
+            let is_fitted = fitted.iter().any(|set| set.candidates.contains(&into));
+            let confused = |&c: &usize| is_confused(self.context, self.candidates, (c, into));
+            !is_fitted && names.iter().any(confused)
+        };
+        let mistaken = look.ranked.iter().filter(is_confused).take(MOST);
+        let mut rivals = Vec::new();
+        for screened in mistaken {
+            if self.progress.is_stopped() {
+                break;
+            }
+            rivals.push(self.begun(look, screened)?);
+        }
+        self.with_rivals(fitted, rivals)
+    }
+}
