@@ -102,11 +102,7 @@ pub(super) fn order(
 }
 
 /// Refuses a log that no simulator replays within minutes; messages call rows by `numbers`.
-pub(super) fn check_duration(
-    time: &[f64],
-    numbers: &[usize],
-    timestep: f64,
-) -> Result<(), String> {
+pub(super) fn check_duration(time: &[f64], numbers: &[usize], timestep: f64) -> Result<(), String> {
     let (Some(first), Some(last)) = (time.first(), time.last()) else {
         return Ok(());
     };
@@ -165,7 +161,8 @@ mod tests {
             &[0.0, 0.1, 0.3, 0.2, 0.4, 0.4],
             &[2, 3, 4, 5, 6, 7],
             &mut notes,
-        ).unwrap();
+        )
+        .unwrap();
         assert_eq!(rows, [0, 1, 3, 2, 5]);
         assert_eq!((notes.reordered, notes.doubled), (1, 1));
     }
