@@ -29,7 +29,7 @@ pub struct Settings {
     pub clock: f64,
     /// The same for readings that come before what they tell of: only stamps of commands that are late make them.
     pub early: f64,
-    /// Additional logarithm for commands and for units that hardly any log is in: their faults are rarer than the others.
+    /// Additional logarithm for commands, for units that hardly any log is in, and for two faults at once: they are rarer than the others.
     pub rare: f64,
     /// Logarithm of the factor by which late readings have to beat late commands to be a clock's: on a machine with one drive, whose
     /// own delay is as likely, and on one with several, which are seldom late alike.

@@ -81,6 +81,8 @@ pub struct Hypothesis {
     pub quantities: Vec<usize>,
     /// Whether hardly any log is so.
     pub rare: bool,
+    /// Whether it is several faults at once, of which each alone makes no sense.
+    pub compound: bool,
     /// How the columns are read.
     pub view: View,
 }
@@ -214,6 +216,7 @@ pub fn of_columns(all: &[Quantity], view: &View, suspects: &[bool]) -> Vec<Hypot
                     fault,
                     quantities: vec![i],
                     rare: false,
+                    compound: false,
                     view: with(view, a, of),
                 });
             };
@@ -232,24 +235,37 @@ pub fn of_columns(all: &[Quantity], view: &View, suspects: &[bool]) -> Vec<Hypot
                     quantities: vector.clone(),
                     // The usual one comes first.
                     rare: k > 0,
+                    compound: false,
                     view: scaled,
                 });
             }
         }
         for (j, b) in all.iter().enumerate().skip(i + 1) {
             if a.kind == b.kind && (suspects[i] || suspects[j]) {
-                let (from_a, from_b) = (own, view_of(view, b));
-                let swapped = with(view, a, from_b);
-                found.push(Hypothesis {
-                    fault: Fault::Swapped,
-                    quantities: vec![i, j],
-                    rare: false,
-                    view: with(&swapped, b, from_a),
-                });
+                found.push(swapped(view, [(i, a), (j, b)], [1.0, 1.0]));
+                // Of two encoders that are exchanged, one may be mounted the other way round: neither fault alone makes sense.
+                if !a.command && suspects[i] && suspects[j] {
+                    let signs = [[1.0, -1.0], [-1.0, 1.0], [-1.0, -1.0]];
+                    found.extend(signs.map(|signs| swapped(view, [(i, a), (j, b)], signs)));
+                }
             }
         }
     }
     found
+}
+
+/// Two quantities read from each other's columns, each times a sign.
+fn swapped(view: &View, [(i, a), (j, b)]: [(usize, &Quantity); 2], signs: [f64; 2]) -> Hypothesis {
+    let (from_a, from_b) = (view_of(view, a), view_of(view, b));
+    let first = with(view, a, from_b.times(signs[0]));
+    let compound = signs != [1.0, 1.0];
+    Hypothesis {
+        fault: Fault::Swapped,
+        quantities: vec![i, j],
+        rare: compound,
+        compound,
+        view: with(&first, b, from_a.times(signs[1])),
+    }
 }
 
 /// The view with all readings later by some time.

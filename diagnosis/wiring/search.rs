@@ -131,7 +131,12 @@ impl Search<'_> {
         if !view.commands.is_empty() && !so_far.found.iter().any(is_clock) {
             tried.extend(self.clock(view, &few)?);
         }
-        tried.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+        let order = |a: &Tried, b: &Tried| {
+            let by_probability = b.probability.total_cmp(&a.probability);
+            // Of what is certain, what shrinks misses more.
+            by_probability.then(b.shrinkage.total_cmp(&a.shrinkage))
+        };
+        tried.sort_by(order);
         tried.truncate(LEADING);
         let mut best: Option<Tried> = None;
         for one in tried {
@@ -140,7 +145,8 @@ impl Search<'_> {
             if self.is_refused((view, &one.hypothesis), &given, &misses)? {
                 one.probability = one.probability.min(self.settings.named / 2.0);
             }
-            if best.as_ref().is_none_or(|b| one.shrinkage > b.shrinkage) {
+            let weight = |t: &Tried| self.weight(t);
+            if best.as_ref().is_none_or(|b| weight(&one) > weight(b)) {
                 best = Some(one);
             }
         }
@@ -150,6 +156,15 @@ impl Search<'_> {
                 self.refined(view, best, &given).map(Some)
             }
             other => Ok(other),
+        }
+    }
+
+    /// By what hypotheses are compared: how far they shrink misses, less what several faults at once must shrink them more than one.
+    fn weight(&self, tried: &Tried) -> f64 {
+        if tried.hypothesis.compound {
+            tried.shrinkage - self.settings.rare
+        } else {
+            tried.shrinkage
         }
     }
 

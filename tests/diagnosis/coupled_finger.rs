@@ -40,10 +40,15 @@ fn write_study(folder: &Path) {
         let commands: Vec<f64> = (0..ROWS).map(command).collect();
         let start = [commands[0]; 2];
         let places = player.play((&start, &[0.0; 2]), &commands[..ROWS - 1], ROWS);
-        let mut text = "time,ctrl.grip,gap".to_owned();
+        let mut text = "time,ctrl.grip,gap,qpos.left,qpos.right,qvel.left,qvel.right".to_owned();
         for (k, (command, place)) in commands.iter().zip(&places).enumerate() {
             let read = place + NOISE * noise();
-            write!(text, "\n{:.2},{command},{read}", ROW * k as f64).unwrap();
+            write!(text, "\n{:.2},{command},{read},", ROW * k as f64).unwrap();
+            text.push_str(&if k == 0 {
+                format!("{},{},0,0", start[0], start[1])
+            } else {
+                ",,,".to_owned()
+            });
         }
         text.push('\n');
         let kind = if episode < 3 { "train" } else { "test" };

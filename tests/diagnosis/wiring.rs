@@ -140,6 +140,23 @@ fn wiring_swapped() {
     is_mended("wiring-swapped", &["q_elbow", "q_shoulder"], &swapped, 1e-9);
 }
 
+/// Commands that were swapped made more sense than either fault alone, and the log was then mended to nonsense.
+#[test]
+fn swapped_encoders_of_which_one_counts_the_other_way_are_found_at_once() {
+    let from = |name: &str, from: &str, sign: f64| ColumnMapping {
+        from: Some(from.into()),
+        sign,
+        ..of(name)
+    };
+    for signs in [[1.0, -1.0], [-1.0, 1.0], [-1.0, -1.0]] {
+        let swapped = [
+            from("q_shoulder", "q_elbow", signs[0]),
+            from("q_elbow", "q_shoulder", signs[1]),
+        ];
+        is_mended("wiring-swapped", &["q_elbow", "q_shoulder"], &swapped, 1e-9);
+    }
+}
+
 #[test]
 fn wiring_offset() {
     // By its own deviation; less than 0.4 of it is an effect.

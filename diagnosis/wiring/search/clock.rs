@@ -40,6 +40,7 @@ impl Search<'_> {
                 .map(|(i, _)| i)
                 .collect(),
             rare: false,
+            compound: false,
             view: at(delay),
         };
         Ok(Some(self.judged(hypothesis, given, &misses)))

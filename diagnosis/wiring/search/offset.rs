@@ -50,6 +50,7 @@ impl Search<'_> {
             fault: Fault::Offset,
             quantities: vec![index],
             rare: false,
+            compound: false,
             view: at(size),
         };
         Ok(Some(self.judged(hypothesis, given, &misses)))
