@@ -200,7 +200,7 @@ mod tests {
             "signals":[{"signal":"elbow","noise":0.01,"unit":"rad","nominal":null,"identified":4.0,"refined":1.1}]},
         "where":[{"signal":"elbow","regime":"reversal","share":1.0,"condition":null}],
         "hypotheses":[{"effects":["actuator-delay@elbow"],"probability":0.9},{"effects":["none"],"probability":0.1}],
-        "effects":[{"effect":"actuator-delay","site":"elbow","probability":0.9,"gap_closed":null,"parameters":{"delay":0.03},"intervals95":{"delay":[0.029,null]},"at_bound":false}],
+        "effects":[{"effect":"actuator-delay","site":"elbow","probability":0.9,"gap_closed":null,"parameters":{"delay":0.03},"units":{"delay":"s"},"intervals95":{"delay":[0.029,null]},"at_bound":false}],
         "verdict":{"kind":"effects","effects":["actuator-delay@elbow"],"probability":0.9,"ambiguous_with":[["sensor-delay@q"]],"unexplained":0.02,
             "remainder":{"share":0.02,"where":"elbow","against":"speed","kinds":["friction-like"]}},
         "groups":[{"effect":"actuator-delay","sites":["elbow","wrist"]}],
