@@ -20,12 +20,8 @@ fn simulation(model: &dyn Model) -> Result<(Box<dyn Simulator>, Recording)> {
         threads: 1,
         targets: Vec::new(),
     };
-    let of = |kind: &'static str| {
-        let joints = layout.joints.iter();
-        joints.map(move |joint| format!("{kind}.{}", joint.name))
-    };
-    let channels: Vec<String> = of("qpos").chain(of("qvel")).collect();
-    Ok((model.simulator(&config)?, layout.recording(&channels)?))
+    let recording = layout.recording(&layout.state_channels())?;
+    Ok((model.simulator(&config)?, recording))
 }
 
 /// A state as a keyframe.

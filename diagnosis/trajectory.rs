@@ -61,9 +61,7 @@ impl Trajectory {
     ) -> Result<Self> {
         let layout = model.layout();
         let pairs = pairs_of(plant);
-        let mut names: Vec<String> = Vec::new();
-        names.extend(layout.joints.iter().map(|j| format!("qpos.{}", j.name)));
-        names.extend(layout.joints.iter().map(|j| format!("qvel.{}", j.name)));
+        let mut names = layout.state_channels();
         names.extend(pairs.iter().map(|p| contact_channel(layout, *p)));
         let recording = layout.recording(&names)?;
         let width = recording.width();

@@ -8,7 +8,7 @@
 
 use asid_core::episode::InitialState;
 use asid_core::simulator::BatchConfig;
-use asid_core::{Control, Episode, Layout, Model, Recording, Result, Rollout, Simulator};
+use asid_core::{Control, Episode, Model, Recording, Result, Rollout, Simulator};
 
 use crate::replay::ReplayPlan;
 
@@ -27,15 +27,6 @@ struct Trial {
     nq: usize,
 }
 
-/// Places and speeds of all joints, as channels.
-fn state_channels(layout: &Layout) -> Vec<String> {
-    let of = |kind: &'static str| {
-        let joints = layout.joints.iter();
-        joints.map(move |joint| format!("{kind}.{}", joint.name))
-    };
-    of("qpos").chain(of("qvel")).collect()
-}
-
 impl Trial {
     fn new(model: &dyn Model, sensors: &[String]) -> Result<Self> {
         let layout = model.layout();
@@ -48,7 +39,7 @@ impl Trial {
         Ok(Self {
             simulator: model.simulator(&config)?,
             sims: (0..size).collect(),
-            state: layout.recording(&state_channels(layout))?,
+            state: layout.recording(&layout.state_channels())?,
             sensors: layout.recording(sensors)?,
             nq: layout.nq,
         })

@@ -77,8 +77,7 @@ impl<'a> Player<'a> {
         let layout = &plant.layout;
         let mut names: Vec<String> = signals.iter().map(|s| s.sensor.clone()).collect();
         let sensors = names.len();
-        names.extend(layout.joints.iter().map(|j| format!("qpos.{}", j.name)));
-        names.extend(layout.joints.iter().map(|j| format!("qvel.{}", j.name)));
+        names.extend(layout.state_channels());
         let bodies = &layout.bodies;
         names.extend(
             limits

@@ -199,11 +199,7 @@ impl<'a> StepMap<'a> {
                 Ok(Part { walks, simulator })
             })
             .collect::<Result<_>>()?;
-        let joints = || layout.joints.iter();
-        let names = joints().map(|j| format!("qpos.{}", j.name));
-        let names: Vec<String> = names
-            .chain(joints().map(|j| format!("qvel.{}", j.name)))
-            .collect();
+        let names = layout.state_channels();
         let (mut depends_on_past, mut remembers_readings) = (false, false);
         let (mut in_each_step, mut on_readings) = (Vec::new(), Vec::new());
         for spec in machine.given_effects().iter().chain(specs) {

@@ -71,12 +71,8 @@ impl RefinedSimulator {
         columns: Vec<Column>,
     ) -> Result<Self> {
         let size = inner.batch_size();
-        let joints = || inner.layout().joints.iter();
-        let positions = joints().map(|j| format!("qpos.{}", j.name));
-        let speeds = joints().map(|j| format!("qvel.{}", j.name));
-        let names: Vec<String> = positions.chain(speeds).collect();
         Ok(Self {
-            state: inner.layout().recording(&names)?,
+            state: inner.layout().recording(&inner.layout().state_channels())?,
             before: Vec::new(),
             inner,
             plant,

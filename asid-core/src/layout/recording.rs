@@ -21,6 +21,15 @@ impl Layout {
         Ok(Recording { channels, offsets })
     }
 
+    /// Channels of the whole state: positions of all joints (`nq` entries), then velocities (`nv`), in the order of
+    /// [`Simulator::set_state`](crate::Simulator::set_state).
+    #[must_use]
+    pub fn state_channels(&self) -> Vec<String> {
+        let positions = self.joints.iter().map(|j| format!("qpos.{}", j.name));
+        let velocities = self.joints.iter().map(|j| format!("qvel.{}", j.name));
+        positions.chain(velocities).collect()
+    }
+
     fn channel(&self, name: &str) -> Result<(Channel, usize)> {
         if let Some(joint) = name.strip_prefix("qpos.") {
             let j = self.joint(joint)?;
