@@ -20,6 +20,7 @@ use crate::study::Study;
 use crate::trace::ForceTrace;
 use crate::work::Work;
 
+use super::context::Context;
 use super::fit::{Fitted, Hypothesis, fit};
 use super::fitted_value::Unknown;
 use super::half_step::step_error;
@@ -132,6 +133,7 @@ fn searched_in(
     } = null;
     let none = without_steps(null, stands)?;
     let context = &stands.context;
+    let none = led_by_replays(null, context, none, &firsts(stands))?;
     progress.end();
     let states = &none.estimate.trajectory;
     let shown = along(bench, &context.walks, &none.theta, states)?;
@@ -150,11 +152,13 @@ fn searched_in(
     };
     let excess = |set: &Set| replays.excess(&set.fitted, &set.candidates);
     let residuals = |set: &Set| replays.residuals(&set.fitted, &set.candidates);
+    let as_logged = |set: &Set| replays.as_logged(&set.fitted, &set.candidates);
     let fitted = |set: &Set| replays.fitted(set);
     let states = |set: &Set| replays.states(&set.fitted, &set.candidates, &context.walks);
     let open_loop = OpenLoop {
         excess: &excess,
         residuals: &residuals,
+        as_logged: &as_logged,
         fitted: &fitted,
         states: &states,
         steps: replays.steps(),
@@ -205,6 +209,38 @@ fn without_steps(null: Null<'_>, stands: &mut Stands<'_>) -> Result<Fitted> {
         return fit(context, hypothesis, &none.theta, from, rounds);
     }
     Ok(none.clone())
+}
+
+/// The model without effects, fitted on from the values that replays of whole logs are fitted with, where these leave less than half of what they leave as
+/// it stands: in segments whose slopes mislead a fit may end far from the study's parameters, and whatever is named then would stand in for them.
+fn led_by_replays(
+    null: Null<'_>,
+    context: &Context<'_>,
+    none: Fitted,
+    firsts: &[usize],
+) -> Result<Fitted> {
+    if !context.has_segments() || null.hypothesis.free().is_empty() {
+        return Ok(none);
+    }
+    let replays = Replays {
+        bench: null.bench,
+        candidates: &[],
+        firsts,
+        open: Vec::new(),
+        progress: null.progress,
+    };
+    let (left, fitted) = replays.fitted(&Set::without_effects(&none))?;
+    if left >= (1.0 - MOST) * replays.excess(&none, &[])? {
+        return Ok(none);
+    }
+    let from = (&none.estimate, &none.slopes.renewed());
+    let rounds = (ROUNDS, null.progress);
+    let again = fit(context, null.hypothesis, &fitted.fitted.theta, from, rounds)?;
+    Ok(if again.evidence > none.evidence {
+        again
+    } else {
+        none
+    })
 }
 
 /// Diagnoses a study.

@@ -4,9 +4,12 @@ mod about_replays;
 mod begun;
 mod by_replays;
 mod confused;
+mod due;
 mod exchanged;
 mod finish;
 mod given_back;
+mod line;
+mod line_fit;
 mod measure;
 mod open_loop;
 mod path;
@@ -160,20 +163,6 @@ fn upon_tolerances(
         }
         next => Ok(next),
     }
-}
-
-/// The first of some sets that rises above the one that stands by the `threshold`, and that `counts`.
-fn first_that_counts(
-    sets: Vec<Set>,
-    (best, threshold): (&Set, f64),
-    counts: impl Fn(&Set) -> Result<bool>,
-) -> Result<Option<Set>> {
-    for set in sets {
-        if set.rises_above(best, threshold) && counts(&set)? {
-            return Ok(Some(set));
-        }
-    }
-    Ok(None)
 }
 
 /// A search: what it is in, and what it chooses from.

@@ -40,6 +40,7 @@ mod sticking;
 mod stopped;
 mod stopped_knee;
 mod together;
+mod tray;
 mod unmoved;
 mod unread;
 mod wiring;

@@ -125,10 +125,27 @@ impl Replays<'_> {
 
     /// Residuals of the training logs that replays of a fitted set leave, in units of the noise and of the root of how many readings there are.
     pub(super) fn residuals(&self, fitted: &Fitted, members: &[usize]) -> Result<Vec<f64>> {
+        self.residuals_at(&self.point(fitted), (fitted, members))
+    }
+
+    /// The same from where the logs say that they begin.
+    pub(super) fn as_logged(&self, fitted: &Fitted, members: &[usize]) -> Result<Vec<f64>> {
+        let point = Point {
+            theta: fitted.theta.clone(),
+            starts: self.bench.train.starts.clone(),
+        };
+        self.residuals_at(&point, (fitted, members))
+    }
+
+    fn residuals_at(
+        &self,
+        point: &Point,
+        (fitted, members): (&Fitted, &[usize]),
+    ) -> Result<Vec<f64>> {
         let bench = self.bench;
         let trials = self.trials(fitted, members);
         let mut predictor = bench.predictor(&trials, &bench.train)?;
-        let residuals = predictor.residuals(&[self.point(fitted)])?.pop();
+        let residuals = predictor.residuals(std::slice::from_ref(point))?.pop();
         let mut residuals = residuals.unwrap_or_default();
         let scale = (bench.train.readings.max(1) as f64).sqrt();
         residuals.iter_mut().for_each(|r| *r /= scale);
@@ -335,8 +352,14 @@ pub(super) fn replay(
         .collect();
     let (of_none, of_best, rivals) = efforts(repeats, progress, &mut not_tried);
     let none = replays.of(&outcome.none, &[], (of_none, None))?;
-    let sets = all_sets(outcome, candidates);
+    let mut sets = all_sets(outcome, candidates);
     let ranking = ranking(candidates, outcome, &sets);
+    if progress.is_stopped() {
+        // Slopes in what an ordinary machine has of everything take longer than those of all names.
+        let best = &outcome.best.candidates;
+        let is_tolerance = |&c: &usize| candidates[c].is_tolerance;
+        sets.retain(|s| s.candidates == *best || !s.candidates.iter().any(is_tolerance));
+    }
     let (sets, stands) = replayed_sets(outcome, sets, (known, rivals));
     // Without effects replays may lie far from the logs, where slopes are others.
     let mut like = Arc::new(StartSlopes {

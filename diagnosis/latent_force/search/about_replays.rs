@@ -101,10 +101,12 @@ impl Upon<'_> {
 
     /// Whether replays with a set that rises above what stands leave no gap.
     pub(super) fn is_closed_by(&self, set: Option<&Set>) -> Result<bool> {
-        let Some(set) = set.filter(|s| s.rises_above(self.base, self.threshold())) else {
+        let Some(set) = set else {
             return Ok(false);
         };
-        Ok((self.open_loop.excess)(set)? <= LEAST_GAP * LEAST_GAP - 1.0)
+        let (sets, threshold) = ((self.base, set), self.threshold());
+        Ok(self.open_loop.rises(self.context, sets, threshold)?
+            && (self.open_loop.excess)(set)? <= LEAST_GAP * LEAST_GAP - 1.0)
     }
 
     /// The open candidates that act on readings alone.

@@ -97,7 +97,7 @@ impl Upon<'_> {
     }
 
     /// A set whose segments first find starts that go with its values, which would else go with the starts.
-    fn with_starts(&self, mut set: Set) -> Result<Set> {
+    pub(super) fn with_starts(&self, mut set: Set) -> Result<Set> {
         let free = set.fitted.hypothesis.free();
         let hold = |set: &mut Set, free_too: bool| {
             let unknowns = &mut set.fitted.hypothesis.unknowns;

@@ -26,16 +26,16 @@ const HALVINGS: usize = 3;
 /// Sets that are fitted to replays, and of these to the missing force, at most.
 const TRIED: usize = 3;
 /// Difference of a study's parameter that slopes of replays are taken over, in deviations of its prior.
-const STEP: f64 = 0.02;
+pub(super) const STEP: f64 = 0.02;
 
 /// What replays tell of the study's parameters, to first order.
-struct Given {
+pub(super) struct Given {
     slopes: DMatrix<f64>,
 }
 
 impl Given {
     /// Mean square that is left of residuals once the parameters have made up for what they can.
-    fn left(&self, residuals: Vec<f64>) -> f64 {
+    pub(super) fn left(&self, residuals: Vec<f64>) -> f64 {
         let r = DVector::from_vec(residuals);
         if self.slopes.ncols() == 0 || self.slopes.nrows() != r.len() {
             return r.norm_squared();
@@ -46,6 +46,16 @@ impl Given {
         let taken = gram.svd(true, true).solve(&moment, f64::EPSILON.sqrt());
         let taken = taken.map_or(0.0, |x| x.dot(&moment));
         (r.norm_squared() - taken).max(0.0)
+    }
+
+    /// Excess power that is left of residuals then; infinite where they are not numbers.
+    pub(super) fn excess(&self, residuals: Vec<f64>) -> f64 {
+        let left = self.left(residuals) - 1.0;
+        if left.is_nan() {
+            f64::INFINITY
+        } else {
+            left.max(0.0)
+        }
     }
 }
 
@@ -134,7 +144,7 @@ impl Upon<'_> {
 
     /// The single laws that lead a screening, each where replays leave least, the least first.
     fn replayed_laws(&self, look: &Look, stands: f64) -> Result<Vec<Set>> {
-        let given = self.given()?;
+        let given = self.given(self.open_loop.residuals)?;
         let singles = |without_slope: bool| {
             let is_one = move |s: &&Screened| matches!(s.forms[..], [f] if look.is_secant(f) == without_slope);
             look.ranked.iter().filter(is_one).take(REPLAYED)
@@ -215,22 +225,21 @@ impl Upon<'_> {
             .collect()
     }
 
-    /// Slopes of replays of the base in the values that it fits.
-    fn given(&self) -> Result<Given> {
-        let here = DVector::from_vec((self.open_loop.residuals)(self.base)?);
+    /// Slopes of `residuals` of replays of the base in the values that it fits.
+    pub(super) fn given(&self, residuals: &dyn Fn(&Set) -> Result<Vec<f64>>) -> Result<Given> {
+        let here = DVector::from_vec(residuals(self.base)?);
         let hypothesis = &self.base.fitted.hypothesis;
         let mut columns = Vec::new();
         for i in hypothesis.free() {
-            let unknown = &hypothesis.unknowns[i];
             let mut moved = self.base.clone();
             let value = &mut moved.fitted.theta[i];
-            let step = STEP * unknown.deviation;
-            *value += if *value + step > unknown.bounds[1] {
-                -step
-            } else {
-                step
-            };
-            let there = DVector::from_vec((self.open_loop.residuals)(&moved)?);
+            let unknown = &hypothesis.unknowns[i];
+            let mut step = STEP * unknown.deviation;
+            if *value + step > unknown.bounds[1] {
+                step = -step;
+            }
+            *value += step;
+            let there = DVector::from_vec(residuals(&moved)?);
             let slope = (there - &here) / step;
             if slope.iter().all(|x| x.is_finite()) {
                 columns.push(slope);

@@ -2,10 +2,10 @@
 
 use asid_core::Result;
 
+use super::Search;
 use super::open_loop::{MOST, OpenLoopGap};
 use super::prune::{Counts, earned};
 use super::set::Set;
-use super::{Search, first_that_counts};
 
 /// The set that stands, and what is left of it.
 pub(super) struct Measure<'m> {
@@ -44,16 +44,26 @@ impl Measure<'_> {
     /// The first of the sets that were fitted upon a base that rises above it and counts. Where the base is no more than what is gone on from for a try, all that
     /// is beyond what stands must be missed in it.
     pub(super) fn first(&self, fitted: &[Set], base: Option<&Set>) -> Result<Option<Set>> {
-        let threshold = self.search.threshold;
-        let from = (base.unwrap_or(self.stands), threshold);
-        let first = first_that_counts(fitted.to_vec(), from, |s| self.counts(s))?;
+        let first = self.first_above(base.unwrap_or(self.stands), fitted)?;
         match (first, base) {
             (Some(all), Some(_)) => {
-                let missed = self.missed(all, fitted)?;
-                first_that_counts(vec![missed], (self.stands, threshold), |s| self.counts(s))
+                let missed = self.missed(all.clone(), fitted)?;
+                Ok(self.first_above(self.stands, &[missed])?.cloned())
             }
-            (first, _) => Ok(first),
+            (first, _) => Ok(first.cloned()),
         }
+    }
+
+    /// The first of some sets that rises above another one, and that counts.
+    fn first_above<'s>(&self, other: &Set, sets: &'s [Set]) -> Result<Option<&'s Set>> {
+        let threshold = self.search.threshold;
+        for set in sets {
+            let open_loop = &self.search.open_loop;
+            if open_loop.rises(self.search.context, (other, set), threshold)? && self.counts(set)? {
+                return Ok(Some(set));
+            }
+        }
+        Ok(None)
     }
 
     /// A set of which several names were put upon what stands, without those that are not missed in it ([`earned`]).

@@ -21,6 +21,8 @@ pub struct OpenLoop<'o> {
     pub excess: &'o dyn Fn(&Set) -> Result<f64>,
     /// Residuals of the training logs that they leave, of a set; their squares add up to the mean square in units of the noise.
     pub residuals: &'o dyn Fn(&Set) -> Result<Vec<f64>>,
+    /// The same of replays that begin where the logs themselves say, as far as they do.
+    pub as_logged: &'o dyn Fn(&Set) -> Result<Vec<f64>>,
     /// A set with its values fitted to them, after the excess power that they then leave.
     pub fitted: &'o dyn Fn(&Set) -> Result<(f64, Set)>,
     /// States of a set along the walks, `rows x (nq + nv)` each.
@@ -33,6 +35,26 @@ pub struct OpenLoop<'o> {
 }
 
 impl OpenLoop<'_> {
+    /// Whether a set rises above the one before it by a threshold: by more than what the evidence of both scatters by, or, of segments, where replays of whole
+    /// logs confirm it by most of the gap that the one before leaves with its values fitted to them. Evidence scatters by how segments begin, which these
+    /// do not depend on.
+    pub(super) fn rises(
+        &self,
+        context: &Context<'_>,
+        (before, after): (&Set, &Set),
+        threshold: f64,
+    ) -> Result<bool> {
+        if after.rises_above(before, threshold) {
+            return Ok(true);
+        }
+        let is_more = after.fitted.evidence - before.fitted.evidence > threshold;
+        if !is_more || !context.has_segments() {
+            return Ok(false);
+        }
+        let most = (self.excess)(after)? / (1.0 - MOST);
+        Ok(most < (self.excess)(before)? && most < (self.fitted)(before)?.0)
+    }
+
     /// Whether a set closes most of the gap that the one before it leaves. A sensor that reads to another scale hardly changes which force is
     /// missing, and all that is foretold.
     pub(super) fn is_mostly_closed(

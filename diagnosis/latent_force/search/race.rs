@@ -2,18 +2,12 @@
 
 use asid_core::Result;
 
-use crate::latent_force::screen::Screened;
-
 use super::finish::Fits;
 use super::has_tolerances;
 use super::round::Upon;
 use super::screening::Look;
 use super::set::{Set, name_of};
 use super::tolerances::Tolerances;
-
-/// Sets that are tried for each place of a race upon no effect, at most: one whose fit does not come to what stands leaves its place to the next.
-/// Upon what makes up for most of the gap few come to it.
-const TRIED: usize = 3;
 
 impl Upon<'_> {
     /// Fits what leads in a screening a little; tolerances too where they are not far behind. Once a set leaves no gap of replays, upon no effect, only
@@ -24,33 +18,25 @@ impl Upon<'_> {
         let ranked = &look.ranked;
         let price = self.price();
         let lead = ranked.first().map_or(0.0, |s| s.worth(price));
-        let wander = self.base.fitted.wander;
-        let least = (breadth.share * lead).max(breadth.least).max(wander);
-        let closing = self.closing(look)?;
-        let others = ranked.iter().enumerate();
-        let others = others.filter(|(i, s)| s.worth(price) > least && !closing.contains(i));
-        let others = others.map(|(_, s)| s);
-        let due = closing.iter().map(|&i| &ranked[i]).chain(others);
-        let places = if self.base.candidates.is_empty() {
-            TRIED
-        } else {
-            1
-        };
-        let due: Vec<&Screened> = due.take(places * breadth.raced).collect();
+        let least = (breadth.share * lead).max(breadth.least);
+        let replayed = self.replayed(look)?;
+        let due = self.due(look, &replayed, least);
         progress.begin("confirming", due.len().min(breadth.raced) as u64);
         let (mut sets, mut risen) = (Vec::new(), 0);
         let (mut closed, mut far) = (Vec::new(), f64::NEG_INFINITY);
         let mut left_out = Vec::new();
         let not_far = lead - (breadth.behind * lead).max(breadth.near);
         let mut near = tolerances.filter(|t| t.gain > not_far);
-        for (place, s) in due.into_iter().enumerate() {
+        for (place, due) in due.into_iter().enumerate() {
+            let s = due.screened;
             // One that has not come to what stands leaves its place to the next.
             if risen == breadth.raced {
                 break;
             }
             let members = self.members(look, s);
             let holds = s.names == 1 && members.iter().any(|m| closed.contains(m));
-            if s.worth(price) < far && !holds {
+            let is_out = replayed.closes && due.is_behind && !closed.is_empty();
+            if (s.worth(price) < far || is_out) && !holds {
                 continue;
             }
             // What leads comes first: where time is out, an answer rests on it.
@@ -59,7 +45,10 @@ impl Upon<'_> {
                 continue;
             }
             progress.note(&format!("trying {}", name_of(self.candidates, &members)));
-            let mut set = self.begun(look, s)?;
+            let mut set = match due.elsewhere {
+                Some(set) => self.with_starts(set.clone())?,
+                None => self.begun(look, s)?,
+            };
             set.fit(self.context, (breadth.rounds[0], progress))?;
             if set.fitted.evidence + set.fitted.promised > self.base.fitted.evidence {
                 risen += 1;
@@ -88,8 +77,8 @@ impl Upon<'_> {
         Ok(Some(set))
     }
 
-    /// Where a group leads those that were `raced`, the best of its members by itself with tolerances beside it, fitted a little: one law at all
-    /// places makes up for many small things as they do, and is not there where it is strong at one place and small things are the rest. With
+    /// Where a group leads those that were `raced`, the best law at one place with tolerances beside it, fitted a little: one law at all
+    /// places makes up for many small things as they do, and is not there where one is strong at one place and small things are the rest. With
     /// the group beside tolerances too where it falls behind that.
     pub(super) fn beside_tolerances(
         &self,
@@ -105,8 +94,8 @@ impl Upon<'_> {
             return Ok(Vec::new());
         };
         let members = added(group);
-        let is_member = |s: &&Set| matches!(added(s)[..], [one] if members.contains(&one));
-        let Some(member) = named.filter(is_member).max_by(by_evidence) else {
+        let is_single = |s: &&Set| matches!(added(s)[..], [_]);
+        let Some(member) = named.filter(is_single).max_by(by_evidence) else {
             return Ok(Vec::new());
         };
         let mut fitted = Vec::new();

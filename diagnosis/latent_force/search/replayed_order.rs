@@ -1,75 +1,201 @@
 //! What a race begins with where bodies touch: what replays of whole logs say.
 //!
 //! A slope at the null tells little of a law that is large: a friction that stops a foot is many times the friction that its slope was
-//! taken over, and by slopes it comes far behind other laws. A replay with it lands on the log. So the sets that lead by
-//! slopes are replayed once at the values that these promise, the best of them further and less far too, and those that leave least are
-//! fitted before all others. Evidence decides as ever; but where time is short it has been asked of what closes the gap.
+//! taken over, and by slopes it comes far behind other laws. Where a model lets go of what the machine holds, all laws that keep it held come out alike by
+//! slopes. A replay with the right one lands on the log. So the sets that lead by slopes are replayed at the values that these promise, the better half of them at
+//! others along the same direction too (successive halving, Jamieson and Talwalkar 2016), and the best of these are fitted to the replays: how far they go along the
+//! direction, and the study's parameters, which stand in for what a model lacks and have to let go of it. Those that leave least
+//! are fitted before all others, from there. Evidence decides as ever; but it is asked of what closes the gap.
 
 use asid_core::Result;
 
-use crate::findings::NEGLIGIBLE;
+use crate::findings::{LEAST_GAP, NEGLIGIBLE};
 use crate::latent_force::screen::Screened;
 
+use super::by_replays::{Given, STEP};
+use super::line::Line;
+use super::line_fit::{Value, fitted};
 use super::open_loop::MOST;
 use super::round::Upon;
 use super::screening::Look;
 use super::set::Set;
 
-/// Physics steps that such replays take, at most: a third of what a screening of a machine with contacts takes.
-const STEPS: usize = 300_000;
-/// Of so many sets that are replayed at the values that slopes promise, one is also replayed at others.
-const EVERY: usize = 4;
-/// These others, in units of what slopes promise.
-const PARTS: [f64; 2] = [0.25, 4.0];
+/// Physics steps that such replays take, at most: about what a screening of a machine with contacts takes.
+const STEPS: usize = 1_600_000;
+/// Replays, for each set that is replayed at first: itself, two of each of the better half, and a fit of each of the best quarter.
+const REPLAYS: f64 = 5.0;
+/// Further replays of each of the better half.
+const FURTHER: usize = 2;
+/// Difference of the part of the way that slopes of replays are taken over, relative to it.
+const PART_STEP: f64 = 0.02;
+/// Starts that the logs tell by themselves are replayed from unless those that the base has smoothed leave so much less, as power: these make a
+/// model that lacks something look better than it is, but where nothing tells how fast a ball spins they are all there is.
+const SMOOTHED: f64 = 0.25;
 /// Excess power, relative to the least, up to which a set is one that a race begins with: a gap of 1.4 times the least.
 const LEVEL: f64 = 2.0;
 
+/// Deviations of the mean square of readings that are noise alone by which one may exceed 1 by chance: 98 %.
+const CHANCE: f64 = 2.0;
+
+/// Residuals of replays of a set.
+type Residuals<'r> = &'r dyn Fn(&Set) -> Result<Vec<f64>>;
+
+/// A set of a screening that was replayed.
+pub(super) struct Candidacy {
+    /// Place among those ranked.
+    pub(super) place: usize,
+    /// Where replays leave least, if that is not at the values that slopes promise.
+    pub(super) elsewhere: Option<Set>,
+    /// Whether they leave most of the gap there, or far more than what leaves no more than chance does.
+    pub(super) is_behind: bool,
+}
+
+/// What replays say of the sets of a screening.
+#[derive(Default)]
+pub(super) struct Replayed {
+    /// Those that were replayed: first those that a race begins with, then the others, those that leave least first.
+    pub(super) sets: Vec<Candidacy>,
+    /// How many a race begins with.
+    pub(super) first: usize,
+    /// Whether one of these leaves no more than chance does.
+    pub(super) closes: bool,
+}
+
 impl Upon<'_> {
-    /// Places among those ranked of the sets that a race begins with: of those that close most of the gap that the base leaves, and whose replays leave
-    /// about the least, the one of fewest values first. None where there are no segments, or hardly a gap.
-    pub(super) fn closing(&self, look: &Look) -> Result<Vec<usize>> {
+    /// The single names that lead a screening by what replays leave with them. A race begins with those of them that close most of the gap that the base leaves,
+    /// and leave about the least, the one of fewest values first. None where there are no segments, or hardly a gap.
+    pub(super) fn replayed(&self, look: &Look) -> Result<Replayed> {
         if !self.context.has_segments() {
-            return Ok(Vec::new());
+            return Ok(Replayed::default());
         }
-        let excess = |set: &Set| (self.open_loop.excess)(set);
-        let stands = excess(self.base)?;
+        let smoothed = (self.open_loop.excess)(self.base)?;
+        let logged = excess(&(self.open_loop.as_logged)(self.base)?);
+        let residuals = if logged.is_finite() && SMOOTHED * logged <= smoothed {
+            self.open_loop.as_logged
+        } else {
+            self.open_loop.residuals
+        };
+        let given = self.given(residuals)?;
+        let of_base = residuals(self.base)?;
+        let chance = CHANCE * (2.0 / of_base.len().max(1) as f64).sqrt();
+        let stands = given.excess(of_base);
         if !(stands.is_finite() && stands > NEGLIGIBLE * NEGLIGIBLE) {
-            return Ok(Vec::new());
+            return Ok(Replayed::default());
         }
+        let lines = self.lines(look, (residuals, &given))?;
+        let least = lines.first().map_or(f64::INFINITY, Line::left);
+        let closes = least <= chance;
+        let level = LEVEL * least.max(LEAST_GAP * LEAST_GAP - 1.0);
+        let leads = |l: &Line| l.left() <= level && l.left() < MOST * stands;
+        let is_behind = |l: &Line| l.left() >= MOST * stands || closes && l.left() > level;
+        let first = lines.iter().take_while(|l| leads(l)).count();
+        let first = first.min(self.breadth.raced.div_ceil(2));
+        let values = |l: &Line| -> usize {
+            let coefficients = look.ranked[l.place].coefficients.iter();
+            coefficients.map(Vec::len).sum()
+        };
+        let mut lines = lines;
+        lines[..first].sort_by_key(values);
+        let candidacy = |l: Line| {
+            let along = || (l.part() != 1.0).then(|| self.at(&l.set, l.part()));
+            Candidacy {
+                place: l.place,
+                elsewhere: l.fitted().cloned().or_else(along),
+                is_behind: is_behind(&l),
+            }
+        };
+        Ok(Replayed {
+            sets: lines.into_iter().map(candidacy).collect(),
+            first,
+            closes,
+        })
+    }
+
+    /// The single names that lead by slopes, replayed; those that leave least first.
+    fn lines(&self, look: &Look, (residuals, given): (Residuals<'_>, &Given)) -> Result<Vec<Line>> {
+        let most = STEPS as f64 / self.open_loop.steps.max(1) as f64;
         let names = look.ranked.iter().enumerate();
         let single = |(_, s): &(usize, &Screened)| s.names == 1 && s.gain > self.breadth.least;
-        let most = STEPS / self.open_loop.steps.max(1);
-        let mut replayed: Vec<(f64, usize)> = Vec::new();
-        for (place, screened) in names.filter(single).take(most) {
+        let names = names.filter(single).take((most / REPLAYS).ceil() as usize);
+        let line = |(place, s)| Line::new(place, self.enlarged(look, s));
+        let mut lines: Vec<Line> = names.map(line).collect();
+        let n = lines.len();
+        for line in &mut lines {
+            self.replay(line, 1.0, (residuals, given))?;
+        }
+        let sort = |lines: &mut [Line]| lines.sort_by(|a, b| a.left().total_cmp(&b.left()));
+        sort(&mut lines);
+        for line in lines.iter_mut().take(n.div_ceil(2)) {
+            for _ in 0..FURTHER {
+                let Some(part) = line.next() else { break };
+                self.replay(line, part, (residuals, given))?;
+            }
+        }
+        sort(&mut lines);
+        for line in lines.iter_mut().take(n.div_ceil(4)) {
             if self.progress.is_stopped() {
                 break;
             }
-            replayed.push((excess(&self.enlarged(look, screened))?, place));
+            let (left, set) = self.fitted_along(line, residuals)?;
+            line.add_fitted(left, set);
         }
-        replayed.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let few = replayed.len().div_ceil(EVERY);
-        for (left, place) in replayed.iter_mut().take(few) {
-            let set = self.enlarged(look, &look.ranked[*place]);
-            for part in PARTS {
-                if self.progress.is_stopped() {
-                    break;
-                }
-                *left = left.min(excess(&self.at(&set, part))?);
-            }
+        sort(&mut lines);
+        Ok(lines)
+    }
+
+    /// Replays a set at a part of its way, if there is time for it; beyond a bound of its values it leaves nothing that is finite.
+    fn replay(
+        &self,
+        line: &mut Line,
+        part: f64,
+        (residuals, given): (Residuals<'_>, &Given),
+    ) -> Result<()> {
+        if self.progress.is_stopped() {
+            return Ok(());
         }
-        replayed.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let least = replayed.first().map_or(f64::INFINITY, |r| r.0);
-        let leads = |left: f64| left <= LEVEL * least && left < MOST * stands;
-        let leading = replayed.into_iter().take_while(|r| leads(r.0));
-        let mut leading: Vec<usize> = leading.map(|r| r.1).collect();
-        leading.truncate(self.breadth.raced.div_ceil(2));
-        leading.sort_by_key(|&place| {
-            look.ranked[place]
-                .coefficients
-                .iter()
-                .map(Vec::len)
-                .sum::<usize>()
+        let moved = self.at(&line.set, part);
+        let is_same = |p: f64| self.at(&line.set, p).fitted.theta == moved.fitted.theta;
+        let left = if line.parts().any(is_same) {
+            f64::INFINITY
+        } else {
+            given.excess(residuals(&moved)?)
+        };
+        line.add(part, left);
+        Ok(())
+    }
+
+    /// Fits the part of its way that a line goes, and the values of the base, to replays; with the excess power that they leave.
+    fn fitted_along(&self, line: &Line, residuals: Residuals<'_>) -> Result<(f64, Set)> {
+        let hypothesis = &self.base.fitted.hypothesis;
+        let free = hypothesis.free();
+        let part = Value {
+            start: line.part(),
+            step: PART_STEP * line.part(),
+            bounds: [0.0, f64::INFINITY],
+        };
+        let of_base = free.iter().map(|&i| Value {
+            start: line.set.fitted.theta[i],
+            step: STEP * hypothesis.unknowns[i].deviation,
+            bounds: hypothesis.unknowns[i].bounds,
         });
-        Ok(leading)
+        let values: Vec<Value> = std::iter::once(part).chain(of_base).collect();
+        let set = |z: &[f64]| {
+            let mut set = self.at(&line.set, z[0]);
+            let values = free.iter().zip(&z[1..]);
+            values.for_each(|(&i, value)| set.fitted.theta[i] = *value);
+            set
+        };
+        let (found, left) = fitted(&|z| residuals(&set(z)), &values, self.progress)?;
+        Ok((excess(&left), set(&found)))
+    }
+}
+
+/// Excess power of some residuals, whose squares add up to the mean square in units of the noise.
+fn excess(residuals: &[f64]) -> f64 {
+    let left = residuals.iter().map(|r| r * r).sum::<f64>() - 1.0;
+    if left.is_nan() {
+        f64::INFINITY
+    } else {
+        left.max(0.0)
     }
 }

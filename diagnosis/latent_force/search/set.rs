@@ -28,7 +28,7 @@ pub struct Set {
 
 impl Set {
     /// No effect.
-    pub(super) fn without_effects(fitted: &Fitted) -> Self {
+    pub(in crate::latent_force) fn without_effects(fitted: &Fitted) -> Self {
         Self {
             candidates: Vec::new(),
             fitted: fitted.clone(),

@@ -1,0 +1,149 @@
+//! A fit of a few values to replays: Gauss and Newton's method with differences for slopes.
+//!
+//! It ranks sets by what they can leave, and a real fit begins where it ends: some steps do.
+
+use asid_core::{Progress, Result};
+use nalgebra::{DMatrix, DVector};
+
+/// Steps, at most.
+const STEPS: usize = 4;
+/// Parts of a step that are tried, until one leaves less.
+const PARTS: [f64; 2] = [1.0, 0.5];
+/// Share of what is left above the noise that a step must take away for a further one.
+const GAINED: f64 = 0.05;
+
+/// A value that is fitted.
+pub(super) struct Value {
+    /// Where it begins.
+    pub(super) start: f64,
+    /// Difference that its slope is taken over.
+    pub(super) step: f64,
+    /// Its least and its largest.
+    pub(super) bounds: [f64; 2],
+}
+
+/// Residuals of some values; their squares add up to the mean square of readings in units of their noise.
+pub(super) type Residuals<'r> = &'r dyn Fn(&[f64]) -> Result<Vec<f64>>;
+
+/// Values at which residuals are less than at their start, and these residuals.
+///
+/// # Errors
+/// When residuals cannot be had.
+pub(super) fn fitted(
+    residuals: Residuals<'_>,
+    values: &[Value],
+    progress: &dyn Progress,
+) -> Result<(Vec<f64>, Vec<f64>)> {
+    let mut at: Vec<f64> = values.iter().map(|v| v.start).collect();
+    let mut here = residuals(&at)?;
+    for _ in 0..STEPS {
+        if progress.is_stopped() {
+            break;
+        }
+        let Some(step) = step(residuals, values, (&at, &here))? else {
+            break;
+        };
+        let before = power(&here);
+        for part in PARTS {
+            let moved = at.iter().zip(step.iter()).zip(values);
+            let moved: Vec<f64> = moved
+                .map(|((x, by), v)| (x - part * by).clamp(v.bounds[0], v.bounds[1]))
+                .collect();
+            let there = residuals(&moved)?;
+            if power(&there) < before {
+                (at, here) = (moved, there);
+                break;
+            }
+        }
+        if before - power(&here) <= GAINED * (before - 1.0) {
+            break;
+        }
+    }
+    Ok((at, here))
+}
+
+/// The step at which linear residuals would be least; `None` where there are no slopes.
+fn step(
+    residuals: Residuals<'_>,
+    values: &[Value],
+    (at, here): (&[f64], &[f64]),
+) -> Result<Option<DVector<f64>>> {
+    let here = DVector::from_column_slice(here);
+    let mut slopes = DMatrix::zeros(here.len(), values.len());
+    for (i, value) in values.iter().enumerate() {
+        let is_near = at[i] + value.step > value.bounds[1];
+        let by = if is_near { -value.step } else { value.step };
+        let mut moved = at.to_vec();
+        moved[i] += by;
+        let there = DVector::from_vec(residuals(&moved)?);
+        if there.len() != here.len() {
+            return Ok(None);
+        }
+        slopes.set_column(i, &((there - &here) / by));
+    }
+    if slopes.iter().chain(here.iter()).any(|x| !x.is_finite()) {
+        return Ok(None);
+    }
+    let gram = slopes.tr_mul(&slopes);
+    let moment = slopes.tr_mul(&here);
+    // What tells nothing stays where it is.
+    Ok(gram
+        .svd(true, true)
+        .solve(&moment, f64::EPSILON.sqrt())
+        .ok())
+}
+
+fn power(residuals: &[f64]) -> f64 {
+    residuals.iter().map(|r| r * r).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use asid_core::progress::Silent;
+
+    use super::*;
+
+    fn value(start: f64, bounds: [f64; 2]) -> Value {
+        Value {
+            start,
+            step: 1e-6,
+            bounds,
+        }
+    }
+
+    /// By hand: a spring of stiffness 1/x under a load y gives way by x y; with the load itself read, both are found though each stands in for the other.
+    #[test]
+    fn two_values_that_stand_in_for_each_other_are_told_apart() {
+        let residuals = |z: &[f64]| Ok(vec![30.0 * (z[0] * z[1] - 6.0), 10.0 * (z[1] - 3.0)]);
+        let start = [value(0.5, [0.0, 10.0]), value(5.0, [0.0, 10.0])];
+        let (found, left) = fitted(&residuals, &start, &Silent).unwrap();
+        assert!((found[0] - 2.0).abs() < 1e-3, "{found:?}");
+        assert!((found[1] - 3.0).abs() < 1e-3, "{found:?}");
+        assert!(power(&left) < 1e-3);
+    }
+
+    #[test]
+    fn a_value_stays_within_its_bounds() {
+        let residuals = |z: &[f64]| Ok(vec![40.0 * (z[0] - 2.0)]);
+        let (found, _) = fitted(&residuals, &[value(0.5, [0.0, 1.0])], &Silent).unwrap();
+        assert_eq!(found, [1.0]);
+    }
+
+    #[test]
+    fn what_no_replay_depends_on_stays_where_it_is() {
+        let residuals = |z: &[f64]| Ok(vec![40.0 * (z[0] - 2.0), 7.0]);
+        let start = [value(0.5, [0.0, 9.0]), value(4.0, [0.0, 9.0])];
+        let (found, _) = fitted(&residuals, &start, &Silent).unwrap();
+        assert!(
+            (found[0] - 2.0).abs() < 1e-6 && found[1] == 4.0,
+            "{found:?}"
+        );
+    }
+
+    #[test]
+    fn replays_that_diverge_are_not_followed() {
+        let residuals = |z: &[f64]| Ok(vec![if z[0] > 1.0 { f64::NAN } else { 5.0 - z[0] }]);
+        let (found, left) = fitted(&residuals, &[value(0.5, [0.0, 9.0])], &Silent).unwrap();
+        assert_eq!((found, left), (vec![0.5], vec![4.5]));
+    }
+}
