@@ -6,6 +6,7 @@
 //! where it acts.
 
 use asid_core::Result;
+use asid_effects::Reach;
 
 use crate::candidate::Candidate;
 use crate::latent_force::context::Context;
@@ -18,7 +19,7 @@ use super::set::Set;
 /// Names that are fitted beside the one that leads, at most: of a drive, play and friction of its joint.
 const MOST: usize = 2;
 
-/// Whether one candidate is easily mistaken for another one, by its own word or by that of the other, and acts where that one does.
+/// Whether one candidate is easily mistaken for another one, by its own word or by that of the other, and one of them acts where the other one does.
 pub(super) fn is_confused(
     context: &Context<'_>,
     candidates: &[Candidate],
@@ -31,7 +32,16 @@ pub(super) fn is_confused(
     };
     let plant = context.plant();
     let [reach, other] = [a, b].map(|c| c.effect.reach(plant, &c.spec.site));
-    reach == other && (says(a, b) || says(b, a))
+    is_within(&reach, &other) && (says(a, b) || says(b, a))
+}
+
+/// Whether one of two effects acts on no more than what the other one acts on. A tilt acts on all that a force on the only body does.
+fn is_within(a: &Reach, b: &Reach) -> bool {
+    match (a, b) {
+        (Reach::Dofs(a), Reach::Dofs(b)) => a.is_subset(b) || b.is_subset(a),
+        (Reach::Everything, Reach::Dofs(_)) | (Reach::Dofs(_), Reach::Everything) => true,
+        _ => a == b,
+    }
 }
 
 impl Upon<'_> {
@@ -61,5 +71,20 @@ impl Upon<'_> {
             rivals.push(self.begun(look, screened)?);
         }
         self.with_rivals(fitted, rivals)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_tilt_acts_where_a_force_on_a_body_does_and_no_sensor_does() {
+        let dofs = |d: &[usize]| Reach::Dofs(d.iter().copied().collect());
+        assert!(is_within(&Reach::Everything, &dofs(&[0, 1])));
+        assert!(is_within(&dofs(&[1]), &dofs(&[0, 1])));
+        assert!(!is_within(&dofs(&[1, 2]), &dofs(&[0, 1])));
+        assert!(!is_within(&Reach::Everything, &Reach::Sensor(0)));
+        assert!(is_within(&Reach::Sensor(0), &Reach::Sensor(0)));
     }
 }

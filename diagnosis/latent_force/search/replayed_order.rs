@@ -22,11 +22,13 @@ use super::set::Set;
 
 /// Physics steps that such replays take, at most: about what a screening of a machine with contacts takes.
 const STEPS: usize = 1_600_000;
-/// Replays, for each set that is replayed at first: itself, two of each of the better half, and a fit of each of the best quarter.
-const REPLAYS: f64 = 5.0;
+/// Replays of a fit, about.
+const OF_FIT: f64 = 12.0;
 /// Further replays of each of the better half.
 const FURTHER: usize = 2;
-/// Difference of the part of the way that slopes of replays are taken over, relative to it.
+/// Values of a set, at most, that are fitted by themselves: a force has three. Of more only how far all of them go is fitted, which is no bound of what they could leave.
+const FEW: usize = 3;
+/// Difference of a value, or of the part of the way, that slopes of replays are taken over, relative to it.
 const PART_STEP: f64 = 0.02;
 /// Starts that the logs tell by themselves are replayed from unless those that the base has smoothed leave so much less, as power: these make a
 /// model that lacks something look better than it is, but where nothing tells how fast a ball spins they are all there is.
@@ -46,7 +48,7 @@ pub(super) struct Candidacy {
     pub(super) place: usize,
     /// Where replays leave least, if that is not at the values that slopes promise.
     pub(super) elsewhere: Option<Set>,
-    /// Whether they leave most of the gap there, or far more than what leaves no more than chance does.
+    /// Whether they leave most of the gap there, or, of few values, far more than what leaves no more than chance does.
     pub(super) is_behind: bool,
 }
 
@@ -87,7 +89,9 @@ impl Upon<'_> {
         let closes = least <= chance;
         let level = LEVEL * least.max(LEAST_GAP * LEAST_GAP - 1.0);
         let leads = |l: &Line| l.left() <= level && l.left() < MOST * stands;
-        let is_behind = |l: &Line| l.left() >= MOST * stands || closes && l.left() > level;
+        let is_known = |l: &Line| l.was_fitted() && own_values(&l.set, self.base).len() <= FEW;
+        let is_behind =
+            |l: &Line| l.left() >= MOST * stands || closes && is_known(l) && l.left() > level;
         let first = lines.iter().take_while(|l| leads(l)).count();
         let first = first.min(self.breadth.raced.div_ceil(2));
         let values = |l: &Line| -> usize {
@@ -116,23 +120,27 @@ impl Upon<'_> {
         let most = STEPS as f64 / self.open_loop.steps.max(1) as f64;
         let names = look.ranked.iter().enumerate();
         let single = |(_, s): &(usize, &Screened)| s.names == 1 && s.gain > self.breadth.least;
-        let names = names.filter(single).take((most / REPLAYS).ceil() as usize);
+        let of_better = FURTHER as f64 + OF_FIT;
+        let names = names.filter(single);
+        let names = names.take((most / (1.0 + 0.5 * of_better)).ceil() as usize);
         let line = |(place, s)| Line::new(place, self.enlarged(look, s));
         let mut lines: Vec<Line> = names.map(line).collect();
         let n = lines.len();
+        // All of them where there are few.
+        let better = n.div_ceil(2).max((most / (1.0 + of_better)) as usize);
         for line in &mut lines {
             self.replay(line, 1.0, (residuals, given))?;
         }
         let sort = |lines: &mut [Line]| lines.sort_by(|a, b| a.left().total_cmp(&b.left()));
         sort(&mut lines);
-        for line in lines.iter_mut().take(n.div_ceil(2)) {
+        for line in lines.iter_mut().take(better) {
             for _ in 0..FURTHER {
                 let Some(part) = line.next() else { break };
                 self.replay(line, part, (residuals, given))?;
             }
         }
         sort(&mut lines);
-        for line in lines.iter_mut().take(n.div_ceil(4)) {
+        for line in lines.iter_mut().take(better) {
             if self.progress.is_stopped() {
                 break;
             }
@@ -164,30 +172,58 @@ impl Upon<'_> {
         Ok(())
     }
 
-    /// Fits the part of its way that a line goes, and the values of the base, to replays; with the excess power that they leave.
+    /// Fits the values of a line and those of the base to replays; of a line of many values the part of its way that it goes. With the excess power that they
+    /// leave.
     fn fitted_along(&self, line: &Line, residuals: Residuals<'_>) -> Result<(f64, Set)> {
-        let hypothesis = &self.base.fitted.hypothesis;
-        let free = hypothesis.free();
-        let part = Value {
-            start: line.part(),
-            step: PART_STEP * line.part(),
-            bounds: [0.0, f64::INFINITY],
-        };
-        let of_base = free.iter().map(|&i| Value {
-            start: line.set.fitted.theta[i],
-            step: STEP * hypothesis.unknowns[i].deviation,
-            bounds: hypothesis.unknowns[i].bounds,
-        });
-        let values: Vec<Value> = std::iter::once(part).chain(of_base).collect();
+        let begin = self.at(&line.set, line.part());
+        let unknowns = &begin.fitted.hypothesis.unknowns;
+        let own = own_values(&line.set, self.base);
+        let is_way = own.len() > FEW;
+        let mut places = self.base.fitted.hypothesis.free();
+        if !is_way {
+            places.extend(&own);
+        }
+        let mut values: Vec<Value> = places
+            .iter()
+            .map(|&i| {
+                let size = (begin.fitted.theta[i] - unknowns[i].center).abs();
+                let least = STEP * unknowns[i].deviation;
+                Value {
+                    start: begin.fitted.theta[i],
+                    step: if own.contains(&i) && size > 0.0 {
+                        least.min(PART_STEP * size)
+                    } else {
+                        least
+                    },
+                    bounds: unknowns[i].bounds,
+                }
+            })
+            .collect();
+        if is_way {
+            values.push(Value {
+                start: line.part(),
+                step: PART_STEP * line.part(),
+                bounds: [0.0, f64::INFINITY],
+            });
+        }
         let set = |z: &[f64]| {
-            let mut set = self.at(&line.set, z[0]);
-            let values = free.iter().zip(&z[1..]);
+            let mut set = match z.get(places.len()) {
+                Some(part) => self.at(&line.set, *part),
+                None => begin.clone(),
+            };
+            let values = places.iter().zip(z);
             values.for_each(|(&i, value)| set.fitted.theta[i] = *value);
             set
         };
         let (found, left) = fitted(&|z| residuals(&set(z)), &values, self.progress)?;
         Ok((excess(&left), set(&found)))
     }
+}
+
+/// Places of the free values that a set adds to a base.
+fn own_values(set: &Set, base: &Set) -> Vec<usize> {
+    let all = set.fitted.hypothesis.free().into_iter();
+    all.filter(|&i| i >= base.fitted.theta.len()).collect()
 }
 
 /// Excess power of some residuals, whose squares add up to the mean square in units of the noise.

@@ -8,11 +8,11 @@ use asid_core::Result;
 use crate::candidate::Candidate;
 use crate::latent_force::fit::rise;
 
-use super::Search;
 use super::confused::is_confused;
 use super::path::Path;
 use super::prior::worth;
 use super::set::{Set, without};
+use super::{Search, is_within};
 
 /// Twins that are fitted, at most.
 const MOST: usize = 2;
@@ -63,7 +63,8 @@ impl Search<'_> {
     }
 
     /// Sets that a path has fitted and found behind its best one, with a candidate that is easily mistaken for one of that: fitted a little more from where the
-    /// best one has come to. A fit may be given up, or end, far from the values at which it would do the same.
+    /// best one has come to. A fit may be given up, or end, far from the values at which it would do the same; and of a tilt and a force that may
+    /// point anywhere, the force stands in for a part of what a further name makes up for later.
     fn mistaken(&self, path: &Path) -> Result<Vec<Set>> {
         let (context, best) = (self.context, &path.best);
         let mut again: Vec<Set> = Vec::new();
@@ -73,16 +74,21 @@ impl Search<'_> {
                 own.copied().collect()
             };
             let (out, into) = (not_in(best, other), not_in(other, best));
-            let ([out], [into]) = (&out[..], &into[..]) else {
+            let [into] = &into[..] else {
                 continue;
             };
+            let is_name = |c: usize| !self.candidates[c].is_tolerance;
+            let confused =
+                |&&c: &&usize| is_name(c) && is_confused(context, self.candidates, (c, *into));
+            let Some(out) = out.iter().find(confused) else {
+                continue;
+            };
+            if !is_name(*into) || is_within(self.candidates, best, *into) {
+                continue;
+            }
             let is_behind = !other.is_level_with(best, rise(context));
             let known = again.iter().any(|s| s.candidates.contains(into));
-            if known
-                || !is_behind
-                || !is_confused(context, self.candidates, (*out, *into))
-                || self.progress.is_stopped()
-            {
+            if known || !is_behind || self.progress.is_stopped() {
                 continue;
             }
             let rest = without(best, self.candidates, *out);
