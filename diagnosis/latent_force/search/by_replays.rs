@@ -48,14 +48,18 @@ impl Given {
         (r.norm_squared() - taken).max(0.0)
     }
 
-    /// Excess power that is left of residuals then; infinite where they are not numbers.
+    /// Excess power that is left of residuals then.
     pub(super) fn excess(&self, residuals: Vec<f64>) -> f64 {
-        let left = self.left(residuals) - 1.0;
-        if left.is_nan() {
-            f64::INFINITY
-        } else {
-            left.max(0.0)
-        }
+        excess(self.left(residuals))
+    }
+}
+
+/// Excess power over that of the noise; infinite where it is no number.
+pub(super) fn excess(power: f64) -> f64 {
+    if power.is_nan() {
+        f64::INFINITY
+    } else {
+        (power - 1.0).max(0.0)
     }
 }
 

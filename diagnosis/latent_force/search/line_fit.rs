@@ -93,7 +93,8 @@ fn step(
         .ok())
 }
 
-fn power(residuals: &[f64]) -> f64 {
+/// Sum of squares.
+pub(super) fn power(residuals: &[f64]) -> f64 {
     residuals.iter().map(|r| r * r).sum()
 }
 

@@ -3,18 +3,18 @@
 //! A slope at the null tells little of a law that is large: a friction that stops a foot is many times the friction that its slope was
 //! taken over, and by slopes it comes far behind other laws. Where a model lets go of what the machine holds, all laws that keep it held come out alike by
 //! slopes. A replay with the right one lands on the log. So the sets that lead by slopes are replayed at the values that these promise, the better half of them at
-//! others along the same direction too (successive halving, Jamieson and Talwalkar 2016), and the best of these are fitted to the replays: how far they go along the
-//! direction, and the study's parameters, which stand in for what a model lacks and have to let go of it. Those that leave least
-//! are fitted before all others, from there. Evidence decides as ever; but it is asked of what closes the gap.
+//! others along the same direction too (successive halving, Jamieson and Talwalkar 2016), and these are fitted to the replays together with the study's
+//! parameters, which stand in for what a model lacks and have to let go of it. Those that leave least are fitted before all others, from
+//! there. Evidence decides as ever; but it is asked of what closes the gap.
 
 use asid_core::Result;
 
 use crate::findings::{LEAST_GAP, NEGLIGIBLE};
 use crate::latent_force::screen::Screened;
 
-use super::by_replays::{Given, STEP};
+use super::by_replays::{Given, STEP, excess};
 use super::line::Line;
-use super::line_fit::{Value, fitted};
+use super::line_fit::{Value, fitted, power};
 use super::open_loop::MOST;
 use super::round::Upon;
 use super::screening::Look;
@@ -35,7 +35,6 @@ const PART_STEP: f64 = 0.02;
 const SMOOTHED: f64 = 0.25;
 /// Excess power, relative to the least, up to which a set is one that a race begins with: a gap of 1.4 times the least.
 const LEVEL: f64 = 2.0;
-
 /// Deviations of the mean square of readings that are noise alone by which one may exceed 1 by chance: 98 %.
 const CHANCE: f64 = 2.0;
 
@@ -71,7 +70,7 @@ impl Upon<'_> {
             return Ok(Replayed::default());
         }
         let smoothed = (self.open_loop.excess)(self.base)?;
-        let logged = excess(&(self.open_loop.as_logged)(self.base)?);
+        let logged = excess(power(&(self.open_loop.as_logged)(self.base)?));
         let residuals = if logged.is_finite() && SMOOTHED * logged <= smoothed {
             self.open_loop.as_logged
         } else {
@@ -84,7 +83,7 @@ impl Upon<'_> {
         if !(stands.is_finite() && stands > NEGLIGIBLE * NEGLIGIBLE) {
             return Ok(Replayed::default());
         }
-        let lines = self.lines(look, (residuals, &given))?;
+        let mut lines = self.lines(look, (residuals, &given))?;
         let least = lines.first().map_or(f64::INFINITY, Line::left);
         let closes = least <= chance;
         let level = LEVEL * least.max(LEAST_GAP * LEAST_GAP - 1.0);
@@ -98,7 +97,6 @@ impl Upon<'_> {
             let coefficients = look.ranked[l.place].coefficients.iter();
             coefficients.map(Vec::len).sum()
         };
-        let mut lines = lines;
         lines[..first].sort_by_key(values);
         let candidacy = |l: Line| {
             let along = || (l.part() != 1.0).then(|| self.at(&l.set, l.part()));
@@ -183,22 +181,21 @@ impl Upon<'_> {
         if !is_way {
             places.extend(&own);
         }
-        let mut values: Vec<Value> = places
-            .iter()
-            .map(|&i| {
-                let size = (begin.fitted.theta[i] - unknowns[i].center).abs();
-                let least = STEP * unknowns[i].deviation;
-                Value {
-                    start: begin.fitted.theta[i],
-                    step: if own.contains(&i) && size > 0.0 {
-                        least.min(PART_STEP * size)
-                    } else {
-                        least
-                    },
-                    bounds: unknowns[i].bounds,
-                }
-            })
-            .collect();
+        let value = |&i: &usize| {
+            let size = (begin.fitted.theta[i] - unknowns[i].center).abs();
+            let step = STEP * unknowns[i].deviation;
+            let is_small = own.contains(&i) && size > 0.0;
+            Value {
+                start: begin.fitted.theta[i],
+                step: if is_small {
+                    step.min(PART_STEP * size)
+                } else {
+                    step
+                },
+                bounds: unknowns[i].bounds,
+            }
+        };
+        let mut values: Vec<Value> = places.iter().map(value).collect();
         if is_way {
             values.push(Value {
                 start: line.part(),
@@ -216,7 +213,7 @@ impl Upon<'_> {
             set
         };
         let (found, left) = fitted(&|z| residuals(&set(z)), &values, self.progress)?;
-        Ok((excess(&left), set(&found)))
+        Ok((excess(power(&left)), set(&found)))
     }
 }
 
@@ -224,14 +221,4 @@ impl Upon<'_> {
 fn own_values(set: &Set, base: &Set) -> Vec<usize> {
     let all = set.fitted.hypothesis.free().into_iter();
     all.filter(|&i| i >= base.fitted.theta.len()).collect()
-}
-
-/// Excess power of some residuals, whose squares add up to the mean square in units of the noise.
-fn excess(residuals: &[f64]) -> f64 {
-    let left = residuals.iter().map(|r| r * r).sum::<f64>() - 1.0;
-    if left.is_nan() {
-        f64::INFINITY
-    } else {
-        left.max(0.0)
-    }
 }
