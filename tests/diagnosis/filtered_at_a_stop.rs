@@ -5,7 +5,7 @@ use std::path::Path;
 
 use super::one_joint::normal;
 use super::played::Player;
-use super::rows::write_model;
+use super::rows::{write_episode, write_model};
 use super::{assert_names, has_contacts, run_on};
 
 /// Rows of a log, the time between them and a time step, s, and the deviation of a reading, rad.
@@ -71,12 +71,7 @@ fn write_study(folder: &Path) {
             )
             .unwrap();
         }
-        let kind = if episode + 2 < EPISODES {
-            "train"
-        } else {
-            "test"
-        };
-        std::fs::write(folder.join(format!("{kind}_{episode}.csv")), text).unwrap();
+        write_episode(folder, (episode as usize, EPISODES as usize - 2), &text);
     }
     write_model(folder, ARM);
 }

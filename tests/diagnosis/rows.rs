@@ -33,17 +33,23 @@ pub fn write_log(
         }
         text.push('\n');
     }
-    let part = if episode + 1 < episodes {
-        "train"
-    } else {
-        "test"
-    };
+    write_episode(folder, (episode, episodes - 1), &text);
+}
+
+/// Writes the text of an episode's log; those from so many on are held out.
+pub fn write_episode(folder: &Path, (episode, training): (usize, usize), text: &str) {
+    let part = if episode < training { "train" } else { "test" };
     std::fs::write(folder.join(format!("{part}_{episode}.csv")), text).unwrap();
 }
 
 /// Writes the model, and the study of such logs.
 pub fn write_model(folder: &Path, xml: &str) {
+    write_model_with(folder, xml, "");
+}
+
+/// The same of a study that has parameters.
+pub fn write_model_with(folder: &Path, xml: &str, parameters: &str) {
     std::fs::write(folder.join("nominal.xml"), xml).unwrap();
     let study = "model = \"nominal.xml\"\ntrain = [\"train_*.csv\"]\ntest = [\"test_*.csv\"]\n";
-    std::fs::write(folder.join("study.toml"), study).unwrap();
+    std::fs::write(folder.join("study.toml"), format!("{study}{parameters}")).unwrap();
 }

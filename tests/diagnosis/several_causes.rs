@@ -5,7 +5,7 @@ use std::path::Path;
 
 use super::one_joint::normal;
 use super::played::Player;
-use super::rows::write_model;
+use super::rows::{write_episode, write_model};
 use super::{has_contacts, run_on};
 
 /// Rows of a log, the time between them and a time step, s.
@@ -88,8 +88,7 @@ impl Machine<'_> {
                 };
                 writeln!(text, "{time:.2},{command},{read},{begins}").unwrap();
             }
-            let kind = if episode < 6 { "train" } else { "test" };
-            std::fs::write(folder.join(format!("{kind}_{episode}.csv")), text).unwrap();
+            write_episode(folder, (episode, 6), &text);
         }
         write_model(folder, self.model);
     }

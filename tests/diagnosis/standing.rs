@@ -7,7 +7,7 @@ use asid::diagnosis::result::Kind;
 
 use super::one_joint::normal;
 use super::played::Player;
-use super::rows::write_model;
+use super::rows::{write_episode, write_model};
 use super::{has_contacts, run_on};
 
 /// Rows of a log, how many the machine has stood for before it, the time between them and a time step, s.
@@ -47,8 +47,7 @@ fn write_study(folder: &Path) {
             }
         }
         text.push('\n');
-        let kind = if episode < 3 { "train" } else { "test" };
-        std::fs::write(folder.join(format!("{kind}_{episode}.csv")), text).unwrap();
+        write_episode(folder, (episode as usize, 3), &text);
     }
     write_model(folder, SCENE);
 }

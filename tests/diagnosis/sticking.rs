@@ -7,6 +7,7 @@ use asid::diagnosis::result::{DiagnosisResult, Kind};
 use rand::{Rng as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
+use super::rows::{write_episode, write_model_with};
 use super::{assert_names, has_contacts, run_on};
 
 /// Gravity, m/s², and the slope of the ramp, rad.
@@ -73,12 +74,9 @@ fn diagnosed(model: &str, parameters: &str) -> DiagnosisResult {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     for episode in 0..6 {
-        let name = if episode < 4 { "train" } else { "test" };
-        std::fs::write(folder.join(format!("{name}_{episode}.csv")), log(episode)).unwrap();
+        write_episode(folder, (episode as usize, 4), &log(episode));
     }
-    std::fs::write(folder.join("nominal.xml"), model).unwrap();
-    let study = "model = \"nominal.xml\"\ntrain = [\"train_*.csv\"]\ntest = [\"test_*.csv\"]\n";
-    std::fs::write(folder.join("study.toml"), format!("{study}{parameters}")).unwrap();
+    write_model_with(folder, model, parameters);
     run_on(folder, &[]).0.result
 }
 

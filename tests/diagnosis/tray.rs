@@ -8,6 +8,7 @@ use std::path::Path;
 
 use super::one_joint::normal;
 use super::played::Player;
+use super::rows::{write_episode, write_model_with};
 use super::{assert_names, has_contacts, run_on};
 
 /// Rows of a log, the time between them and a time step, s, and the deviation of a reading, m.
@@ -15,8 +16,9 @@ const ROWS: usize = 130;
 const ROW: f64 = 0.01;
 const STEP: f64 = 0.001;
 const NOISE: f64 = 5e-4;
-/// Logs, of which two are held out, and rows before each in which the tray comes to rest.
+/// Logs, how many of them are no test, and rows before each in which the tray comes to rest.
 const EPISODES: usize = 8;
+const TRAINING: usize = 6;
 const SETTLING: usize = 200;
 
 /// How far the lift gives way, m/N.
@@ -78,24 +80,19 @@ fn write_study(folder: &Path) {
         let shown = player.play((&start, &[0.0; 8]), &commands[..rows - 1], rows);
         let shown = &shown[6 * SETTLING..];
         let commands = commands[SETTLING..].iter();
-        write_log(folder, (episode, EPISODES), commands.copied(), shown);
+        write_episode(
+            folder,
+            (episode, TRAINING),
+            &log(episode, commands.copied(), shown),
+        );
     }
-    std::fs::write(folder.join("nominal.xml"), model()).unwrap();
-    std::fs::write(
-        folder.join("study.toml"),
-        "model = \"nominal.xml\"\ntrain = [\"train_*.csv\"]\ntest = [\"test_*.csv\"]\n\
-         [[parameter]]\nname = \"block\"\ntarget = \"geom/block/mass\"\nrange = [0.05, 0.3]\n",
-    )
-    .unwrap();
+    let parameters =
+        "[[parameter]]\nname = \"block\"\ntarget = \"geom/block/mass\"\nrange = [0.05, 0.3]\n";
+    write_model_with(folder, &model(), parameters);
 }
 
-/// Writes a log of the hoist's commands and of readings of the tray and the block.
-fn write_log(
-    folder: &Path,
-    (episode, episodes): (usize, usize),
-    commands: impl Iterator<Item = f64>,
-    places: &[f64],
-) {
+/// A log of the hoist's commands and of readings of the tray and the block.
+fn log(episode: usize, commands: impl Iterator<Item = f64>, places: &[f64]) -> String {
     let mut noise = normal(40 + episode as u64);
     let mut text = "time,ctrl.hoist".to_owned();
     for sensor in ["height", "place"] {
@@ -108,12 +105,7 @@ fn write_log(
         }
     }
     text.push('\n');
-    let kind = if episode + 2 < episodes {
-        "train"
-    } else {
-        "test"
-    };
-    std::fs::write(folder.join(format!("{kind}_{episode}.csv")), text).unwrap();
+    text
 }
 
 /// Its column comes far behind that of a heavier tray. Replays from where the logs say that they begin leave nothing with the spring; from where the model without it has
