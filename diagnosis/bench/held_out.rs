@@ -10,8 +10,8 @@
 
 mod linear;
 
-use asid_core::progress::Silent;
-use asid_core::{Error, Result};
+use asid_core::progress::UntilLate;
+use asid_core::{Error, Progress, Result};
 
 use crate::fit::{Begin, Effort, Fit, cost, fit};
 use crate::linearise::Unknown;
@@ -35,11 +35,15 @@ const SHARES: [f64; 4] = [0.2, 0.4, 0.7, 1.0];
 pub type Explained<'a> = (&'a [Trial<'a>], &'a Explanation);
 
 /// Squared distances of the readings held out from those that explanations predict, in units of the noise, that no start of their logs makes up
-/// for; infinite where a replay diverges.
+/// for; infinite where a replay diverges. Once it is late, slopes have to do.
 ///
 /// # Errors
 /// When a rollout fails.
-pub fn misfits(bench: &Bench, explained: &[Explained<'_>]) -> Result<Vec<f64>> {
+pub fn misfits(
+    bench: &Bench,
+    explained: &[Explained<'_>],
+    progress: &dyn Progress,
+) -> Result<Vec<f64>> {
     let steps = bench.test.logs.episodes.iter();
     let steps: usize = steps.map(|e| e.plan.physics_steps()).sum();
     let size = steps * bench.open.len();
@@ -49,8 +53,10 @@ pub fn misfits(bench: &Bench, explained: &[Explained<'_>]) -> Result<Vec<f64>> {
     let by_slopes = explained.iter().map(|of| linear(bench, of));
     let by_slopes: Vec<_> = by_slopes.collect::<Result<_>>()?;
     let mut left: Vec<f64> = by_slopes.iter().map(|l| l.cost).collect();
-    if size <= PART_BY_PART && by_slopes.iter().any(|l| !l.is_kept) {
-        let fitted = part_by_part(bench, explained)?;
+    if size <= PART_BY_PART && by_slopes.iter().any(|l| !l.is_kept) && !progress.is_late() {
+        let fitted = part_by_part(bench, explained, progress)?;
+        // What one was fitted with time and the other without is no comparison.
+        let fitted = fitted.into_iter().filter(|_| !progress.is_late());
         left.iter_mut().zip(fitted).for_each(|(l, f)| *l = l.min(f));
     }
     let misfit = |(left, of): (f64, &Explained<'_>)| -> Result<f64> {
@@ -66,15 +72,22 @@ pub fn misfits(bench: &Bench, explained: &[Explained<'_>]) -> Result<Vec<f64>> {
 
 /// Squared residuals of the whole logs with their starts fitted part by part. A fit of starts may end in a valley of its own: each begins where the
 /// others have ended too.
-fn part_by_part(bench: &Bench, explained: &[Explained<'_>]) -> Result<Vec<f64>> {
+fn part_by_part(
+    bench: &Bench,
+    explained: &[Explained<'_>],
+    progress: &dyn Progress,
+) -> Result<Vec<f64>> {
+    let fitted = |of: &Explained<'_>, starts: Vec<State>, shares: &[f64]| {
+        fitted(bench, of, (starts, shares), progress)
+    };
     let fits: Vec<Fit> = (explained.iter())
-        .map(|of| fitted(bench, of, of.1.held_starts.clone(), &SHARES))
+        .map(|of| fitted(of, of.1.held_starts.clone(), &SHARES[..]))
         .collect::<Result<_>>()?;
     let least = |(i, of): (usize, &Explained<'_>)| -> Result<f64> {
         let mut left = fits[i].cost;
         for (_, other) in fits.iter().enumerate().filter(|(j, _)| *j != i) {
             let from = other.point.starts.clone();
-            left = left.min(fitted(bench, of, from, &[1.0])?.cost);
+            left = left.min(fitted(of, from, &[1.0])?.cost);
         }
         Ok(left)
     };
@@ -92,8 +105,8 @@ fn given(bench: &Bench, trials: &[Trial<'_>]) -> Vec<Unknown> {
 fn fitted(
     bench: &Bench,
     (trials, of): &Explained<'_>,
-    starts: Vec<State>,
-    shares: &[f64],
+    (starts, shares): (Vec<State>, &[f64]),
+    progress: &dyn Progress,
 ) -> Result<Fit> {
     let unknowns = given(bench, trials);
     let mut found: Option<Fit> = None;
@@ -112,7 +125,7 @@ fn fitted(
             &mut bench.predictor(trials, &part)?,
             (bench.layout(), &unknowns),
             begin,
-            (Effort::BRIEF, &Silent),
+            (Effort::BRIEF, &UntilLate(progress)),
         )?);
     }
     found.ok_or_else(|| Error::Failed("there is no share of the logs to fit starts to".into()))

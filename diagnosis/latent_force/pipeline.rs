@@ -282,9 +282,10 @@ pub fn diagnose(
     let segments = (&found.firsts[..], found.repeats);
     let (mut findings, sets) = replay(&bench, parts, segments, progress)?;
     (findings.forces, findings.left) = found.drawn;
-    progress.end();
     with_slow_noise(&mut bench, study, &candidates, &mut findings)?;
-    let evidence = gather(&bench, &outcome, (&sets, &members), &findings, &candidates)?;
+    let told = (&findings, &candidates[..]);
+    let evidence = gather(&bench, &outcome, (&sets, &members), told, progress)?;
+    progress.end();
     let judgement = decide(&evidence, &Rules::default());
     Ok(Work {
         bench,

@@ -1,6 +1,6 @@
 //! From a search by the missing force to what its decision rests on.
 
-use asid_core::Result;
+use asid_core::{Progress, Result};
 use asid_mjcf::Plant;
 use asid_results::evidence::{Evidence, Replayed, Screened, Tried};
 
@@ -82,8 +82,8 @@ pub fn gather(
     bench: &Bench,
     outcome: &Outcome,
     (sets, known): (&[Set], &[usize]),
-    findings: &Findings,
-    candidates: &[Candidate],
+    (findings, candidates): (&Findings, &[Candidate]),
+    progress: &dyn Progress,
 ) -> Result<Evidence> {
     let plant = &bench.machine.plant;
     let tried = sets.iter().zip(&findings.found);
@@ -110,7 +110,7 @@ pub fn gather(
             .iter()
             .map(|(trials, of)| (&trials[..], &of.explanation)),
     );
-    let misfits = misfits(bench, &compared)?;
+    let misfits = misfits(bench, &compared, progress)?;
     let none = replayed(bench, &findings.none, misfits[0]);
     if let (Some(i), Some(&left)) = (found, misfits.get(1)) {
         tried[i].replayed = replayed(bench, compared[1].1, left);
