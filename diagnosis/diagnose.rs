@@ -58,12 +58,12 @@ pub fn diagnose(
         }
     }
     intake.settle();
-    // A clock is estimated over short windows; whole logs tell it better.
-    if let Some(short) = intake.clock_short(&diagnosis.effects)
+    // A clock and a zero are estimated over short windows; whole logs tell them better.
+    if let Some(short) = intake.estimated_short(&diagnosis.effects)
         && !progress.is_stopped()
     {
-        progress.note("the clock was estimated short");
-        intake.delay_clock(short, &machine.plant.layout)?;
+        progress.note("the wiring was estimated short");
+        intake.mend_further(&short, &machine.plant.layout)?;
         (diagnosis, work) = physics(&intake.study)?;
     }
     let (bench, point) = (&work.bench, &work.findings.none.fit.point);

@@ -1,12 +1,11 @@
 //! What happens to logs before any physics: outliers are left out, dead sensors passed over, wiring is mended, and all is said.
 
 mod absent;
+mod estimated_short;
 mod open_loop;
 mod unchanging;
 
-use asid_core::registry::find;
-use asid_core::{Layout, Result};
-use asid_effects::{EffectEntry, EffectSpec};
+use asid_core::Result;
 use asid_logs::episode::ColumnMapping;
 
 use crate::machine::Machine;
@@ -16,6 +15,7 @@ use crate::study::Study;
 use crate::wiring::{self, Settings};
 
 pub use absent::{Absent, absent};
+pub use estimated_short::Short;
 use open_loop::OpenLoop;
 pub use unchanging::{Unchanging, pass_over};
 
@@ -25,6 +25,8 @@ const HALF: f64 = 0.5;
 
 /// Name of the fault that all readings are late or early.
 const CLOCK: &str = "wiring-clock";
+/// Name of the fault that a reading is shifted.
+const ZERO: &str = "wiring-offset";
 
 /// A study whose logs are ready for a diagnosis.
 pub struct Intake {
@@ -117,50 +119,6 @@ impl Intake {
         if !self.is_mended {
             self.wiring.clear();
         }
-    }
-
-    /// The mended clock.
-    fn clock(&self) -> Option<&WiringResult> {
-        self.wiring.iter().find(|w| w.fault == CLOCK)
-    }
-
-    /// What a mended clock was estimated short by, s: the mean delay of a verdict that has every sensor late. `None` where no clock was
-    /// mended, or some sensor is not late.
-    #[must_use]
-    pub fn clock_short(&self, effects: &[EffectSpec]) -> Option<f64> {
-        let clock = self.clock()?;
-        let delays = |e: &&EffectSpec| {
-            find::<EffectEntry>(&e.name).is_ok_and(|entry| (entry.make)().delays())
-        };
-        let late = |sensor: &String| {
-            let mut own = effects.iter().filter(|e| e.site == *sensor);
-            let own = own.find(delays)?;
-            own.values.first().map(|(_, seconds)| *seconds)
-        };
-        let delays: Vec<f64> = clock.columns.iter().map(late).collect::<Option<_>>()?;
-        Some(delays.iter().sum::<f64>() / delays.len().max(1) as f64)
-    }
-
-    /// Mends a clock by further seconds, in the logs and in the lines for the study's file.
-    ///
-    /// # Errors
-    /// When the logs are too short for it.
-    pub fn delay_clock(&mut self, seconds: f64, layout: &Layout) -> Result<()> {
-        let (Some(clock), Some(before)) = (self.clock(), &self.before) else {
-            return Ok(());
-        };
-        let columns = clock.columns.clone();
-        for mapping in &mut self.mappings {
-            if wiring::mend::concerns_any(mapping, &columns) {
-                mapping.delay += seconds;
-            }
-        }
-        self.study = before.clone();
-        wiring::mend::apply(&mut self.study, layout, &self.mappings)?;
-        for w in &mut self.wiring {
-            w.mend = wiring::mend::lines(&self.study, &self.mappings, &w.columns);
-        }
-        Ok(())
     }
 
     /// Says in a result what was done, and what the noise is like.
@@ -301,7 +259,7 @@ fn in_words(wiring: &WiringResult) -> String {
         "wiring-swapped" => "are swapped",
         "wiring-sign" => "counts the other way",
         "wiring-unit" => "is in another unit",
-        "wiring-offset" => "has another zero",
+        ZERO => "has another zero",
         CLOCK => "are late or early against the commands",
         _ => "are wired otherwise",
     };

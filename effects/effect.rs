@@ -246,6 +246,10 @@ pub trait Effect: Send + Sync {
     fn delays(&self) -> bool {
         false
     }
+    /// Whether it adds constants to readings of its sensor and does nothing else: its first value to a number, those after it to the entries of a vector.
+    fn shifts_readings(&self) -> bool {
+        false
+    }
     /// Whether it depends on [`Site::episode`]: it goes with the order of the logs, or has values of single ones.
     fn counts_episodes(&self) -> bool {
         self.parameters().iter().any(|p| p.episode.is_some())

@@ -7,6 +7,7 @@ mod confused;
 mod due;
 mod exchanged;
 mod finish;
+mod freed;
 mod given_back;
 mod line;
 mod line_fit;

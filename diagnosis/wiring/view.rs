@@ -96,7 +96,7 @@ pub fn mapping(
 const DIGITS: usize = 5;
 
 /// A number with a few significant digits.
-fn rounded(x: f64) -> f64 {
+pub fn rounded(x: f64) -> f64 {
     if x == 0.0 || !x.is_finite() {
         return x;
     }

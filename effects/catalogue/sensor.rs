@@ -93,6 +93,10 @@ impl Effect for Reading {
         false
     }
 
+    fn shifts_readings(&self) -> bool {
+        matches!(self, Self::Bias)
+    }
+
     fn parameters(&self) -> &'static [EffectParameter] {
         const UNIT: &str = "unit of the reading";
         const RATE: &str = "units of the reading per second";

@@ -243,13 +243,51 @@ fn a_clock_that_was_estimated_short_takes_the_delay_of_every_sensor() {
         values: vec![("delay".into(), LATE - first)],
     };
     // One sensor that is late is no clock.
-    assert_eq!(intake.clock_short(&[delay("q_elbow")]), None);
-    let short = intake.clock_short(&[delay("q_elbow"), delay("q_shoulder")]);
+    assert_eq!(intake.estimated_short(&[delay("q_elbow")]), None);
+    let short = intake.estimated_short(&[delay("q_elbow"), delay("q_shoulder")]);
     let layout = &machine.plant.layout;
-    intake.delay_clock(short.unwrap(), layout).unwrap();
-    assert!((told(&intake) - LATE).abs() < 1e-9);
+    intake.mend_further(&short.unwrap(), layout).unwrap();
+    assert!((told(&intake) - LATE).abs() < 1e-6);
     for ((_, a), (_, b)) in intake.study.test.iter().zip(&right.test) {
         let off = distance(a, b);
         assert!(off < 0.02, "off by {off} rad");
+    }
+}
+
+/// The zero of an arm's shoulder was mended 13 mrad off, and a bias of that size was named beside it.
+#[test]
+fn a_zero_that_was_estimated_short_takes_the_bias_of_its_sensor() {
+    const SHIFT: f64 = 0.6;
+    let right = study(true);
+    let shifted = ColumnMapping {
+        offset: SHIFT,
+        ..of("q_shoulder")
+    };
+    let spoilt = spoilt(&right, &[shifted]);
+    let machine = machine(&right);
+    let mut intake = Intake::of(&spoilt, &machine).unwrap();
+    let told = |intake: &Intake| {
+        let mut result = DiagnosisResult::default();
+        intake.tell(&mut result, CheckResult::default());
+        assert_eq!(result.wiring[0].fault, "wiring-offset");
+        let line = result.wiring[0].mend.lines().last().unwrap().to_owned();
+        let offset: f64 = line.strip_prefix("offset = ").unwrap().parse().unwrap();
+        offset
+    };
+    let first = told(&intake);
+    assert!((first + SHIFT).abs() < 0.1, "{first}");
+    let bias = |site: &str| EffectSpec {
+        name: "sensor-bias".into(),
+        site: site.into(),
+        values: vec![("bias".into(), SHIFT + first)],
+    };
+    // The zero of another sensor was right.
+    assert_eq!(intake.estimated_short(&[bias("q_elbow")]), None);
+    let short = intake.estimated_short(&[bias("q_shoulder")]).unwrap();
+    intake.mend_further(&short, &machine.plant.layout).unwrap();
+    assert!((told(&intake) + SHIFT).abs() < 1e-5);
+    for ((_, a), (_, b)) in intake.study.test.iter().zip(&right.test) {
+        let off = distance(a, b);
+        assert!(off < 1e-5, "off by {off} rad");
     }
 }

@@ -8,7 +8,7 @@ use super::measure::Measure;
 use super::open_loop::OpenLoopGap;
 use super::prior::worth;
 use super::round::{Round, Upon};
-use super::set::{Set, free_what_is_given};
+use super::set::Set;
 use super::{
     FURTHER, GIVEN, Search, Untried, fit_from, has_tolerances, is_cut_short, open_upon,
     upon_tolerances,
@@ -96,9 +96,6 @@ impl Search<'_> {
         } = *self;
         let how = (breadth, progress);
         let left = |s: &Set| s.fitted.estimate.missing(context).relative_to(at_first);
-        // The set that stands with what no search tries, such as an offset of its friction: a rival of every further effect, which
-        // needs no further name.
-        let mut freed: Option<Set> = None;
         // What is gone on from though it does not count by itself.
         let mut tentative: Option<Set> = None;
         let mut depth = breadth.depth.saturating_sub(path.best.names);
@@ -134,11 +131,6 @@ impl Search<'_> {
                 cut_short: stopped && best.candidates.is_empty(),
             };
             let next = measure.first(&confirmed, tentative.as_ref())?;
-            let is_ahead = |own: &Set| !own.is_passed(next.as_ref(), threshold);
-            if let Some(own) = freed.take().filter(is_ahead) {
-                path.best = own;
-                continue;
-            }
             let was_tried = tentative.take().is_some();
             let last = path.rounds.last_mut().filter(|_| !was_tried);
             let Some(next) =
@@ -156,7 +148,11 @@ impl Search<'_> {
                 // They are no name.
                 depth += 1;
             }
-            if let Some(smaller) = self.given_back(&next, best)? {
+            let smaller = match self.freed_instead(&next)? {
+                None => self.given_back(&next, best)?,
+                freed => freed,
+            };
+            if let Some(smaller) = smaller {
                 let last = path.rounds.last_mut();
                 last.into_iter()
                     .for_each(|round| round.confirmed.push(smaller.clone()));
@@ -168,11 +164,9 @@ impl Search<'_> {
                 path.untried.push(Untried::upon(&path.best, GIVEN));
                 break;
             }
-            let what = (breadth, threshold);
-            freed = free_what_is_given(context, candidates, &path.best, what, progress)?;
-        }
-        if let Some(freed) = freed {
-            path.best = freed;
+            if let Some(freed) = self.freed(&path.best)? {
+                path.best = freed;
+            }
         }
         Ok(path)
     }

@@ -1,7 +1,6 @@
 //! Sets of effects, fitted: made larger, smaller, and fitted on.
 
 use asid_core::{Progress, Result};
-use asid_effects::Start;
 use asid_results::naming::grouped;
 
 use crate::candidate::Candidate;
@@ -46,11 +45,6 @@ impl Set {
     pub(super) fn is_level_with(&self, ahead: &Self, rise: f64) -> bool {
         let unsure = WANDER * self.fitted.wander.hypot(ahead.fitted.wander);
         ahead.fitted.evidence - self.fitted.evidence <= unsure.max(rise)
-    }
-
-    /// Whether the next set, if there is one, has the evidence of this one and a threshold more.
-    pub(super) fn is_passed(&self, next: Option<&Self>, threshold: f64) -> bool {
-        next.is_some_and(|n| n.fitted.evidence >= self.fitted.evidence + threshold)
     }
 
     /// Fits it on from where it stands, to some extent.
@@ -139,76 +133,6 @@ pub(super) fn shared_values(fitted: &mut Fitted, other: &Fitted) {
 
 /// Deviations from null up to which a value counts as nothing.
 pub(super) const IDLE: f64 = 2.0;
-
-/// Fits what no search tries (an offset of friction between the directions) of the effects that were named, all of it at
-/// once; nothing where it does not earn its place. What is no larger than its uncertainty goes back to where it was.
-pub(super) fn free_what_is_given(
-    context: &Context<'_>,
-    candidates: &[Candidate],
-    best: &Set,
-    (breadth, threshold): (Breadth, f64),
-    progress: &dyn Progress,
-) -> Result<Option<Set>> {
-    let fitted = &best.fitted;
-    let mut hypothesis = fitted.hypothesis.clone();
-    let mut freed = Vec::new();
-    let mut at = fitted.theta.len();
-    for &c in best.candidates.iter().rev() {
-        let parameters = candidates[c].parameters();
-        at -= parameters.len();
-        if candidates[c].is_tolerance {
-            continue;
-        }
-        let own = &fitted.theta[at..at + parameters.len()];
-        for (i, p) in parameters.iter().enumerate() {
-            let unknown = &mut hypothesis.unknowns[at + i];
-            if p.start != Start::Given || unknown.free {
-                continue;
-            }
-            unknown.free = true;
-            freed.push((at + i, p.null));
-            // As uncertain as the effect itself is large.
-            let sizes = own.iter().zip(parameters);
-            let size = sizes
-                .filter(|(_, q)| q.unit == p.unit)
-                .map(|(x, q)| (x - q.null).abs())
-                .fold(0.0, f64::max);
-            if size > 0.0 {
-                unknown.deviation = unknown.deviation.min(size);
-            }
-        }
-    }
-    if freed.is_empty() {
-        return Ok(None);
-    }
-    let rounds = (breadth.rounds[1], progress);
-    let from = (&fitted.estimate, &fitted.slopes);
-    let all = fit(context, &hypothesis, &fitted.theta, from, rounds)?;
-    if all.evidence - fitted.evidence <= threshold {
-        return Ok(None);
-    }
-    let free = hypothesis.free();
-    let (mut theta, mut idle) = (all.theta.clone(), false);
-    for (i, null) in freed {
-        let place = free.iter().position(|&f| f == i);
-        let variance = place.map_or(0.0, |k| all.covariance[(k, k)]);
-        if (theta[i] - null).abs() < IDLE * variance.max(0.0).sqrt() {
-            hypothesis.unknowns[i].free = false;
-            theta[i] = null;
-            idle = true;
-        }
-    }
-    let fitted = if idle {
-        let from = (&all.estimate, &all.slopes);
-        fit(context, &hypothesis, &theta, from, rounds)?
-    } else {
-        all
-    };
-    Ok(Some(Set {
-        fitted,
-        ..best.clone()
-    }))
-}
 
 /// What a person is told who reads of a set that has no name.
 pub(super) const TOLERANCES: &str = "tolerances";

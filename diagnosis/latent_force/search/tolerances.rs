@@ -17,6 +17,7 @@ use crate::latent_force::scales::Scales;
 use crate::latent_force::screen::Screened;
 use crate::latent_force::smoother::Regression;
 
+use super::has_tolerances;
 use super::set::Set;
 
 /// Deviations that a tolerance is taken as.
@@ -97,7 +98,7 @@ impl Tolerances {
         candidates: &[Candidate],
         set: &Set,
     ) -> Option<Self> {
-        if set.candidates.iter().any(|&c| candidates[c].is_tolerance) {
+        if has_tolerances(candidates, set) {
             return None;
         }
         let sharpest = scales.common.last()?;
@@ -168,8 +169,12 @@ impl Tolerances {
         })
     }
 
-    /// A set with all of them but those of what it names, its values moved as the screening says; not fitted yet.
+    /// A set with all of them but those of what it names, its values moved as the screening says; not fitted yet. One that has some
+    /// already gets the others, and its values stay.
     pub(super) fn beside(&self, set: &Set, candidates: &[Candidate]) -> Set {
+        if has_tolerances(candidates, set) {
+            return self.begun_at_null(set, candidates);
+        }
         let mut set = set.clone();
         let fitted = &mut set.fitted;
         let free = fitted.hypothesis.free();
@@ -187,12 +192,16 @@ impl Tolerances {
     }
 
     fn joined(&self, mut set: Set, candidates: &[Candidate], values: fn(&Member) -> &[f64]) -> Set {
-        for member in &self.members {
-            if !set.candidates.contains(&member.named.0) {
-                member.join(&mut set, &candidates[member.candidate], values(member));
-            }
+        for member in self.not_in(&set.candidates.clone()) {
+            member.join(&mut set, &candidates[member.candidate], values(member));
         }
         set
+    }
+
+    /// Those that some candidates neither name nor hold.
+    fn not_in<'m>(&'m self, held: &'m [usize]) -> impl Iterator<Item = &'m Member> {
+        let is_in = |m: &&Member| held.contains(&m.named.0) || held.contains(&m.candidate);
+        self.members.iter().filter(move |m| !is_in(m))
     }
 }
 
@@ -292,6 +301,25 @@ mod tests {
             bounds: vec![[-9.0, 9.0]; 2],
             complete: true,
         }
+    }
+
+    #[test]
+    fn a_pair_fitted_with_tolerances_gets_none_of_them_twice() {
+        // A dry friction and a bias (1, 2) with what an ordinary machine has of a delay (5): the bias has gone out of it.
+        let member = |candidate, named| Member {
+            candidate,
+            begin: Vec::new(),
+            values: Vec::new(),
+            deviations: Vec::new(),
+            named: (named, Vec::new()),
+        };
+        let tolerances = Tolerances {
+            gain: 0.0,
+            base: Vec::new(),
+            members: vec![member(4, 1), member(5, 3), member(6, 2)],
+        };
+        let joining: Vec<usize> = tolerances.not_in(&[1, 5]).map(|m| m.candidate).collect();
+        assert_eq!(joining, [6]);
     }
 
     #[test]

@@ -1,0 +1,131 @@
+//! What the mending of a clock or of a zero was estimated short by: it is estimated over short windows of a model as given, and the fit to whole
+//! logs knows it better. What comes out as an effect then is the rest of the fault, and belongs into the same line of the study's file.
+
+use asid_core::registry::find;
+use asid_core::{Layout, Result};
+use asid_effects::{Effect, EffectEntry, EffectSpec};
+use asid_logs::episode::ColumnMapping;
+
+use super::{CLOCK, Intake, ZERO};
+use crate::result::WiringResult;
+use crate::wiring;
+use crate::wiring::view::rounded;
+
+/// The rest of what was mended.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Short {
+    /// Further seconds by which all readings are late.
+    pub clock: Option<f64>,
+    /// What is further to be added to columns, each with its name, in the unit of the reading.
+    pub zeros: Vec<(String, f64)>,
+}
+
+/// The values of an effect at a sensor, of the kind that is asked for.
+fn values_at<'e>(
+    effects: &'e [EffectSpec],
+    sensor: &str,
+    kind: impl Fn(&dyn Effect) -> bool,
+) -> Option<&'e [(String, f64)]> {
+    let is_kind = |e: &EffectSpec| {
+        find::<EffectEntry>(&e.name).is_ok_and(|entry| kind(&*(entry.make)()))
+    };
+    let own = effects.iter().find(|e| e.site == sensor && is_kind(e))?;
+    Some(&own.values)
+}
+
+/// The place of a column among the values of a shift: that of a number first, then those of a vector's entries.
+fn place_of<'c>(column: &'c str, sensor: &'c str) -> Option<usize> {
+    match column.strip_prefix(sensor)? {
+        "" => Some(0),
+        entry => Some(1 + entry.strip_prefix('.')?.parse::<usize>().ok()?),
+    }
+}
+
+impl Intake {
+    /// What a mended clock or zero was estimated short by, where a verdict has every sensor late after the clock was mended, or shifts a reading whose
+    /// zero was; `None` where it does neither.
+    #[must_use]
+    pub fn estimated_short(&self, effects: &[EffectSpec]) -> Option<Short> {
+        let short = Short {
+            clock: self.clock_short(effects),
+            zeros: self.zeros_short(effects),
+        };
+        (short.clock.is_some() || !short.zeros.is_empty()).then_some(short)
+    }
+
+    /// Mean delay of all sensors, s.
+    fn clock_short(&self, effects: &[EffectSpec]) -> Option<f64> {
+        let clock = self.clock()?;
+        let late = |sensor: &String| {
+            let delay = values_at(effects, sensor, |e| e.delays())?.first()?;
+            Some(delay.1)
+        };
+        let delays: Vec<f64> = clock.columns.iter().map(late).collect::<Option<_>>()?;
+        Some(delays.iter().sum::<f64>() / delays.len().max(1) as f64)
+    }
+
+    /// Of the columns whose zero was mended, what takes a verdict's shift out of the readings.
+    fn zeros_short(&self, effects: &[EffectSpec]) -> Vec<(String, f64)> {
+        let zeros = self.wiring.iter().filter(|w| w.fault == ZERO);
+        let columns = zeros.flat_map(|w| &w.columns);
+        let short = |column: &String| {
+            let sensor = column.split('.').next()?;
+            let shift = values_at(effects, sensor, |e| e.shifts_readings())?;
+            let (_, by) = shift.get(place_of(column, sensor)?)?;
+            (*by != 0.0).then(|| (column.clone(), -by))
+        };
+        columns.filter_map(short).collect()
+    }
+
+    /// Mends further what was estimated short, in the logs and in the lines for the study's file.
+    ///
+    /// # Errors
+    /// When the logs are too short for it.
+    pub fn mend_further(&mut self, short: &Short, layout: &Layout) -> Result<()> {
+        let columns = self.clock().map(|clock| clock.columns.clone());
+        let mut further: Vec<ColumnMapping> = Vec::new();
+        for mapping in &mut self.mappings {
+            let of_clock = (columns.as_ref())
+                .is_some_and(|columns| wiring::mend::concerns_any(mapping, columns));
+            if let Some(seconds) = short.clock.filter(|_| of_clock) {
+                mapping.delay = rounded(mapping.delay + seconds);
+            }
+            if let Some((_, by)) = short.zeros.iter().find(|(name, _)| *name == mapping.name) {
+                let before = mapping.offset;
+                mapping.offset = rounded(before + by);
+                further.push(ColumnMapping {
+                    offset: mapping.offset - before,
+                    ..ColumnMapping::of(&mapping.name)
+                });
+            }
+        }
+        let mappings = if let Some(before) = &self.before {
+            self.study = before.clone();
+            &self.mappings
+        } else {
+            &further
+        };
+        wiring::mend::apply(&mut self.study, layout, mappings)?;
+        for w in &mut self.wiring {
+            w.mend = wiring::mend::lines(&self.study, &self.mappings, &w.columns);
+        }
+        Ok(())
+    }
+
+    /// The mended clock.
+    pub(super) fn clock(&self) -> Option<&WiringResult> {
+        self.wiring.iter().find(|w| w.fault == CLOCK)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_number_has_the_first_value_of_a_shift_and_the_entries_of_a_vector_the_others() {
+        assert_eq!(place_of("q", "q"), Some(0));
+        assert_eq!(place_of("ball.2", "ball"), Some(3));
+        assert_eq!(place_of("ballast", "ball"), None);
+    }
+}
