@@ -269,6 +269,10 @@ fn a_zero_that_was_estimated_short_takes_the_bias_of_its_sensor() {
     let spoilt = spoilt(&right, &[shifted]);
     let machine = machine(&right);
     let mut intake = Intake::of(&spoilt, &machine).unwrap();
+    if distance(&intake.study.test[0].1, &right.test[0].1) > 0.5 * shift {
+        // What else the model lacks leaves the zero in doubt.
+        intake.turn();
+    }
     let told = |intake: &Intake| {
         let mut result = DiagnosisResult::default();
         intake.tell(&mut result, CheckResult::default());
