@@ -10,7 +10,7 @@ use crate::latent_force::fit::rise;
 
 use super::confused::is_confused;
 use super::path::Path;
-use super::prior::worth;
+use super::prior::{log_prior, worth};
 use super::set::{Set, without};
 use super::{Search, is_within};
 
@@ -94,7 +94,10 @@ impl Search<'_> {
             let rest = without(best, self.candidates, *out);
             let mut set = with_that_of(&rest, other, self.candidates, *into);
             set.names = best.names;
-            set.fit(context, (self.breadth.rounds[0], self.progress))?;
+            // In segments only a long fit shows by how much its evidence scatters.
+            let [little, whole] = self.breadth.rounds;
+            let rounds = if context.has_segments() { whole } else { little };
+            set.fit(context, (rounds, self.progress))?;
             again.push(set);
             if again.len() == MOST {
                 break;
@@ -103,12 +106,22 @@ impl Search<'_> {
         Ok(again)
     }
 
-    /// Adds the twins of the best set of a path to what its last round has fitted. One that is worth more, for its name is likelier, stands; twins of it are its rivals
-    /// then.
+    /// Adds the twins of the best set of a path to what its last round has fitted. One that is worth more, for its name is likelier, stands, or one of fewer
+    /// values that evidence does not tell from it; twins of it are its rivals then.
     pub(super) fn with_twins(&self, path: &mut Path) -> Result<()> {
         let worth = |set: &Set| worth(self.context, self.candidates, set);
         for _ in 0..MOST {
-            let twins = self.twins(path)?;
+            let mut twins = self.twins(path)?;
+            let best = &mut path.best;
+            let simpler = twins.iter_mut().find(|twin| self.is_simpler(twin, best));
+            if let Some(twin) = simpler {
+                // Both scatter about the same evidence: the simpler one is worth no less, and the other is its rival.
+                let most = twin.fitted.evidence.max(best.fitted.evidence);
+                twin.fitted.evidence = most;
+                best.fitted.evidence = most;
+                let twin = twin.clone();
+                twins.push(std::mem::replace(best, twin));
+            }
             let likelier = twins.iter().max_by(|a, b| worth(a).total_cmp(&worth(b)));
             let likelier = likelier
                 .filter(|twin| worth(twin) > worth(&path.best))
@@ -120,6 +133,15 @@ impl Search<'_> {
             path.best = twin;
         }
         Ok(())
+    }
+
+    /// Whether a twin is as likely as the set that stands by all that is known, and has fewer values.
+    fn is_simpler(&self, twin: &Set, best: &Set) -> bool {
+        let values = |s: &Set| s.fitted.hypothesis.free().len();
+        let prior = |s: &Set| log_prior(self.context.plant(), self.candidates, &s.candidates);
+        values(twin) < values(best)
+            && prior(twin) >= prior(best)
+            && twin.is_level_with(best, rise(self.context))
     }
 
     /// Twins of the best set of a path, each fitted a little.
