@@ -216,6 +216,10 @@ impl Effect for Across<Box<dyn Effect>> {
         self.run(|effect| effect.delays())
     }
 
+    fn shifts_readings(&self) -> bool {
+        self.run(|effect| effect.shifts_readings())
+    }
+
     fn counts_episodes(&self) -> bool {
         self.run(|effect| effect.counts_episodes())
     }
