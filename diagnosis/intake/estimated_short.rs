@@ -26,9 +26,8 @@ fn values_at<'e>(
     sensor: &str,
     kind: impl Fn(&dyn Effect) -> bool,
 ) -> Option<&'e [(String, f64)]> {
-    let is_kind = |e: &EffectSpec| {
-        find::<EffectEntry>(&e.name).is_ok_and(|entry| kind(&*(entry.make)()))
-    };
+    let is_kind =
+        |e: &EffectSpec| find::<EffectEntry>(&e.name).is_ok_and(|entry| kind(&*(entry.make)()));
     let own = effects.iter().find(|e| e.site == sensor && is_kind(e))?;
     Some(&own.values)
 }

@@ -96,7 +96,11 @@ impl Search<'_> {
             set.names = best.names;
             // In segments only a long fit shows by how much its evidence scatters.
             let [little, whole] = self.breadth.rounds;
-            let rounds = if context.has_segments() { whole } else { little };
+            let rounds = if context.has_segments() {
+                whole
+            } else {
+                little
+            };
             set.fit(context, (rounds, self.progress))?;
             again.push(set);
             if again.len() == MOST {
