@@ -6,6 +6,7 @@ mod by_replays;
 mod confused;
 mod due;
 mod exchanged;
+mod finer;
 mod finish;
 mod freed;
 mod given_back;
@@ -217,6 +218,7 @@ pub fn search(
             path = path.or(other, |set| worth(context, candidates, set));
         }
     }
+    path = search.refine(path)?;
     path = search.exchange(path)?;
     search.with_twins(&mut path)?;
     let missing = [&none, &path.best.fitted].map(|f| f.estimate.missing(context));

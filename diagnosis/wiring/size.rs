@@ -73,6 +73,19 @@ fn step(here: &Misses, there: &[Misses], probes: &[f64]) -> DVector<f64> {
     solved.map_or_else(|| DVector::zeros(n), |x| -x)
 }
 
+/// Slope of a reading in an offset of it below which windows do not tell the offset.
+const TELLS: f64 = 0.05;
+
+/// How much larger a size would have to be for some windows, from their misses at it and at one that is larger by `probe`; `None` where
+/// it does not show in them.
+#[must_use]
+pub fn further(here: &Misses, there: &Misses, probe: f64) -> Option<f64> {
+    let pairs = here.residual.iter().zip(&there.residual);
+    let slopes = pairs.map(|(a, b)| ((b - a) / probe).powi(2)).filter(|s| s.is_finite());
+    let (sum, n) = slopes.fold((0.0, 0.0), |(sum, n), s| (sum + s, n + 1.0));
+    (sum > TELLS * TELLS * n).then(|| step(here, std::slice::from_ref(there), &[probe])[0])
+}
+
 /// The size at which misses are least, with these misses. The windows keep the parameters that go with it.
 ///
 /// # Errors

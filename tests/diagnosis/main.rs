@@ -15,6 +15,7 @@ mod few_rows;
 mod filtered_at_a_stop;
 mod first_row;
 mod held_joint;
+mod homed_servo;
 mod islands;
 mod late_drive;
 mod next;

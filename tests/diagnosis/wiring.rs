@@ -184,6 +184,21 @@ fn wiring_offset() {
     assert!(found.wiring.is_empty(), "{:?}", found.wiring);
 }
 
+/// The mean of a belt slide's sensor that drifts was taken for its zero, and the drift was named nowhere.
+#[test]
+fn a_reading_that_drifts_has_no_other_zero() {
+    let deviation = deviation_of_the_shoulder(&study(false));
+    for rate in [-0.5, 0.5] {
+        let mut study = study(false);
+        for (_, episode) in study.train.iter_mut().chain(&mut study.test) {
+            let rows = episode.time.clone().into_iter().enumerate();
+            rows.for_each(|(row, time)| episode.readings[2 * row] += rate * deviation * time);
+        }
+        let found = mended(&study);
+        assert!(found.wiring.is_empty(), "{rate}: {:?}", found.wiring);
+    }
+}
+
 #[test]
 fn the_mending_lines_are_those_of_the_study_file() {
     let turned = ColumnMapping {

@@ -8,6 +8,8 @@ use super::Estimate;
 const REST_DEVIATIONS: f64 = 3.0;
 /// The same relative to its largest speed.
 const REST_SHARE: f64 = 0.02;
+/// Deviations of the sign test's count from which on more rows than not have a force against their motion, or along it: fewer than nine tell nothing.
+const SURE: f64 = 3.0;
 
 impl Estimate {
     /// Speed of a degree of freedom in a row of a walk.
@@ -34,6 +36,27 @@ impl Estimate {
             .collect()
     }
 
+    /// Dry friction that a joint shows where it moves faster than at rest: the median of the missing force against its motion where that is
+    /// certain, averaged over the directions. What always acts opposes only one of them.
+    fn friction_shown(&self, context: &Context<'_>, dof: usize, rest: f64) -> f64 {
+        let nv = context.plant().layout.nv;
+        let mut against = [Vec::new(), Vec::new()];
+        let walks = self.smoothed.iter().zip(&context.walks).enumerate();
+        for (w, (smoothed, _)) in walks.filter(|(_, (_, walk))| walk.segment.is_none()) {
+            for (row, forces) in smoothed.force.chunks_exact(nv).enumerate() {
+                let speed = self.speed(context, w, row, dof);
+                if speed.abs() > rest {
+                    against[usize::from(speed > 0.0)].push(-forces[dof] * speed.signum());
+                }
+            }
+        }
+        let shown: Vec<f64> = against
+            .iter_mut()
+            .filter_map(|a| certain_median(a))
+            .collect();
+        shown.iter().sum::<f64>().max(0.0) / shown.len().max(1) as f64
+    }
+
     /// Lets joints that stand be held by any force as large as the dry friction that moving rows show, in
     /// every model alike: at rest friction is any force within its cone, and says nothing of its size.
     pub fn free_at_rest(&mut self, context: &Context<'_>) {
@@ -47,16 +70,7 @@ impl Estimate {
             .collect();
         for joint in context.plant().scalar_joints() {
             let d = layout.joints[joint].qvel;
-            let mut against = Vec::new();
-            for (w, smoothed) in self.smoothed.iter().enumerate() {
-                for k in 0..free[w].len() / nv {
-                    let speed = self.speed(context, w, k, d);
-                    if speed.abs() > rest[d] {
-                        against.push(-smoothed.force[k * nv + d] * speed.signum());
-                    }
-                }
-            }
-            let friction = crate::noise::median(&mut against).unwrap_or(0.0).max(0.0);
+            let friction = self.friction_shown(context, d, rest[d]);
             for (w, free) in free.iter_mut().enumerate() {
                 for k in 0..free.len() / nv {
                     if self.speed(context, w, k, d).abs() <= rest[d] {
@@ -66,5 +80,40 @@ impl Estimate {
             }
         }
         self.free = free;
+    }
+}
+
+/// The median of some values, or zero where the sign test leaves its sign open; `None` of so few that it always does.
+fn certain_median(values: &mut [f64]) -> Option<f64> {
+    let positive = values.iter().filter(|x| **x > 0.0).count() as f64;
+    let n = values.len() as f64;
+    let open = SURE * n.sqrt();
+    if n < open.max(1.0) {
+        return None;
+    }
+    if (2.0 * positive - n).abs() < open {
+        return Some(0.0);
+    }
+    crate::noise::median(values)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_median_is_certain_where_few_values_have_the_other_sign() {
+        let values = |n: u32| (1..=n).map(f64::from).collect::<Vec<f64>>();
+        assert_eq!(certain_median(&mut []), None);
+        assert_eq!(certain_median(&mut values(8)), None);
+        assert_eq!(certain_median(&mut values(9)), Some(5.0));
+        // Of a hundred, 65 to 35 are certain and 64 to 36 are not.
+        let signed = |positive: u32| -> Vec<f64> {
+            let sign = |k| if k < positive { 1.0 } else { -1.0 };
+            (0..100).map(sign).collect()
+        };
+        assert_eq!(certain_median(&mut signed(65)), Some(1.0));
+        assert_eq!(certain_median(&mut signed(64)), Some(0.0));
+        assert_eq!(certain_median(&mut signed(35)), Some(-1.0));
     }
 }

@@ -56,6 +56,33 @@ impl Search<'_> {
         Ok(Some(self.judged(hypothesis, given, &misses)))
     }
 
+    /// Whether another zero of a column makes too little sense for one that is another late in the logs than early: it must shrink misses the more,
+    /// the more of itself it changes by. A reading that drifts away has a mean as well.
+    pub(super) fn is_drift(
+        &mut self,
+        (view, hypothesis): (&View, &Hypothesis),
+        (given, misses): (&Misses, &Misses),
+    ) -> Result<bool> {
+        if hypothesis.fault != Fault::Offset {
+            return Ok(false);
+        }
+        let quantity = &self.quantities[hypothesis.quantities[0]];
+        let size = view_of(&hypothesis.view, quantity).offset - view_of(view, quantity).offset;
+        let probe = OFFSET_PROBE * self.spread(view, quantity);
+        let larger = shifted(&hypothesis.view, quantity, probe);
+        let larger = self.all.misses(&larger)?;
+        let further = [false, true].map(|later| {
+            let [here, there] = [misses, &larger].map(|m| self.all.of_half(m, later));
+            size::further(&here, &there, probe)
+        });
+        let [Some(early), Some(late)] = further else {
+            return Ok(false);
+        };
+        let change = (late - early).abs() / size.abs();
+        let shrinkage = self.settings.shrinkage(given, misses);
+        Ok(self.settings.probability(shrinkage, change) < self.settings.named)
+    }
+
     /// The same offset, fitted to all windows.
     pub(super) fn refined_offset(
         &mut self,

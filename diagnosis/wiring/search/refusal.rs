@@ -24,7 +24,8 @@ impl Search<'_> {
             || self.is_of_others(hypothesis, given, misses)
             || self.is_of_undriven(hypothesis, given, misses)
             || self.is_of_some_logs(hypothesis, given, misses)
-            || self.is_silence(view, hypothesis, misses)?)
+            || self.is_silence(view, hypothesis, misses)?
+            || self.is_drift((view, hypothesis), (given, misses))?)
     }
 
     /// Whether a unit makes a column larger that would then be in question again. With a unit that is far too large everything flies

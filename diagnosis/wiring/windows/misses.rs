@@ -101,6 +101,20 @@ impl Windows<'_> {
         self.means(residual, motion, |w| w.episode == log)
     }
 
+    /// The same of the windows that begin in the later half of their log, or in the earlier.
+    pub fn of_half(&self, misses: &Misses, later: bool) -> Misses {
+        let mut out = misses.clone();
+        let window = (self.frames + 1) * self.width;
+        let residuals = out.residual.chunks_exact_mut(window).zip(&self.windows);
+        for (own, w) in residuals {
+            let is_late = w.start + 0.5 * self.duration > 0.5 * self.record[w.episode].seconds();
+            if is_late != later {
+                own.fill(f64::NAN);
+            }
+        }
+        out
+    }
+
     /// Mean magnitudes of residuals over some windows, in motions.
     fn means(
         &self,
