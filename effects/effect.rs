@@ -214,6 +214,11 @@ pub trait Effect: Send + Sync {
     fn refines(&self) -> &'static [&'static str] {
         &[]
     }
+    /// Parameters that do what one of the law does that it [refines](Effect::refines), as pairs of names: its own and the simpler law's. In the place of that
+    /// law it begins with those values.
+    fn takes_over(&self) -> &'static [(&'static str, &'static str)] {
+        &[]
+    }
     /// Effects that it is easily mistaken for. One side of a pair says so.
     fn mistaken_for(&self) -> &'static [Confusion] {
         &[]

@@ -81,7 +81,9 @@ const TELLS: f64 = 0.05;
 #[must_use]
 pub fn further(here: &Misses, there: &Misses, probe: f64) -> Option<f64> {
     let pairs = here.residual.iter().zip(&there.residual);
-    let slopes = pairs.map(|(a, b)| ((b - a) / probe).powi(2)).filter(|s| s.is_finite());
+    let slopes = pairs
+        .map(|(a, b)| ((b - a) / probe).powi(2))
+        .filter(|s| s.is_finite());
     let (sum, n) = slopes.fold((0.0, 0.0), |(sum, n), s| (sum + s, n + 1.0));
     (sum > TELLS * TELLS * n).then(|| step(here, std::slice::from_ref(there), &[probe])[0])
 }

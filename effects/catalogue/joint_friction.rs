@@ -283,6 +283,10 @@ impl Effect for Stribeck {
         &["coulomb-friction"]
     }
 
+    fn takes_over(&self) -> &'static [(&'static str, &'static str)] {
+        &[("coulomb", "force")]
+    }
+
     fn parameters(&self) -> &'static [EffectParameter] {
         const {
             &[

@@ -183,6 +183,10 @@ impl Effect for Across<Box<dyn Effect>> {
         self.run(|effect| effect.refines())
     }
 
+    fn takes_over(&self) -> &'static [(&'static str, &'static str)] {
+        self.run(|effect| effect.takes_over())
+    }
+
     fn mistaken_for(&self) -> &'static [Confusion] {
         self.run(|effect| effect.mistaken_for())
     }

@@ -13,6 +13,7 @@ mod drift;
 mod far;
 mod few_rows;
 mod filtered_at_a_stop;
+mod finer_law;
 mod first_row;
 mod held_joint;
 mod homed_servo;

@@ -3,6 +3,7 @@
 
 use asid::core::registry::all;
 use asid::core::{Backend, BatchConfig, Capabilities, Control, Model as _, Rollout, Target};
+use asid::effects::Effect;
 use asid::effects::EffectEntry;
 use asid::effects::EffectSpec;
 use asid::effects::refined::{Refined, counts_episodes, needs};
@@ -232,6 +233,29 @@ fn what_an_effect_refines_goes_with_or_is_mistaken_for_is_in_the_catalogue() {
                 entry.name
             );
         }
+    }
+}
+
+/// A dry friction of 2 N was refined from a Stribeck friction that began with nothing of it.
+#[test]
+fn what_an_effect_takes_over_is_a_parameter_of_a_law_that_it_refines() {
+    let all = all::<EffectEntry>();
+    let of = |name: &str| all.iter().find(|e| e.name == name).map(|e| (e.make)());
+    let has = |effect: &dyn Effect, name: &str| effect.parameters().iter().any(|p| p.name == name);
+    for entry in &all {
+        let effect = (entry.make)();
+        for simpler in effect.refines().iter().filter_map(|name| of(name)) {
+            for (own, theirs) in effect.takes_over() {
+                let both = has(&*effect, own) && has(&*simpler, theirs);
+                assert!(both, "{}: `{own}` and `{theirs}`", entry.name);
+            }
+        }
+        assert_eq!(
+            effect.refines().is_empty(),
+            effect.takes_over().is_empty(),
+            "{}",
+            entry.name
+        );
     }
 }
 

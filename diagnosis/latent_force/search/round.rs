@@ -14,7 +14,7 @@ use crate::settings::Breadth;
 use super::Untried;
 use super::open_loop::OpenLoop;
 use super::screening::{Look, Screening, Sight};
-use super::set::{Set, TOLERANCES, name_of, refined_by, with, without};
+use super::set::{Set, TOLERANCES, name_of, refined, refined_by, with};
 use super::tolerances::Tolerances;
 
 /// A round: what was screened and what was fitted upon a base.
@@ -190,7 +190,7 @@ impl Upon<'_> {
         };
         for &c in &added {
             if let Some(simpler) = refined_by(self.candidates, self.open[c]) {
-                set = without(&set, self.candidates, simpler);
+                set = refined(&set, self.candidates, [self.open[c], simpler]);
             }
         }
         set

@@ -1,5 +1,7 @@
 //! Sets of effects, fitted: made larger, smaller, and fitted on.
 
+use std::ops::Range;
+
 use asid_core::{Progress, Result};
 use asid_results::naming::grouped;
 
@@ -169,18 +171,47 @@ pub(super) fn is_due(candidates: &[Candidate], set: &Set, candidate: usize) -> b
     refined_by(candidates, candidate).is_none_or(|simpler| set.candidates.contains(&simpler))
 }
 
+/// Places of the values of a set's candidate among all values that it is fitted with.
+fn values_of(set: &Set, candidates: &[Candidate], which: usize) -> Option<Range<usize>> {
+    let place = set.candidates.iter().position(|&c| c == which)?;
+    let lengths =
+        |c: &[usize]| -> usize { c.iter().map(|&c| candidates[c].parameters().len()).sum() };
+    let study = set.fitted.theta.len() - lengths(&set.candidates);
+    let first = study + lengths(&set.candidates[..place]);
+    Some(first..first + candidates[which].parameters().len())
+}
+
+/// A set in which a finer law, that was put beside the simpler one, takes its place and does what that did.
+pub(super) fn refined(set: &Set, candidates: &[Candidate], [finer, simpler]: [usize; 2]) -> Set {
+    let mut set = set.clone();
+    let places = [finer, simpler].map(|c| values_of(&set, candidates, c));
+    if let [Some(own), Some(theirs)] = places {
+        let named = |c: usize, name: &str| {
+            let mut parameters = candidates[c].parameters().iter();
+            parameters.position(|p| p.name == name)
+        };
+        let Fitted {
+            theta, hypothesis, ..
+        } = &mut set.fitted;
+        for (name, of) in candidates[finer].effect.takes_over() {
+            if let (Some(to), Some(from)) = (named(finer, name), named(simpler, of)) {
+                let (to, from) = (own.start + to, theirs.start + from);
+                let [low, high] = hypothesis.unknowns[to].bounds;
+                theta[to] = (theta[to] + theta[from]).clamp(low, high);
+            }
+        }
+    }
+    without(&set, candidates, simpler)
+}
+
 /// A set without one of its candidates, its other values as they are. A law that it then names nowhere is a name less.
 pub(super) fn without(set: &Set, candidates: &[Candidate], out: usize) -> Set {
     let mut set = set.clone();
-    let Some(place) = set.candidates.iter().position(|&c| c == out) else {
+    let place = set.candidates.iter().position(|&c| c == out);
+    let (Some(place), Some(range)) = (place, values_of(&set, candidates, out)) else {
         return set;
     };
-    let lengths =
-        |c: &[usize]| -> usize { c.iter().map(|&c| candidates[c].parameters().len()).sum() };
     let fitted = &mut set.fitted;
-    let study = fitted.theta.len() - lengths(&set.candidates);
-    let first = study + lengths(&set.candidates[..place]);
-    let range = first..first + candidates[out].parameters().len();
     fitted.theta.drain(range.clone());
     fitted.hypothesis.unknowns.drain(range);
     fitted.hypothesis.specs.remove(place);
