@@ -37,8 +37,10 @@ pub struct Context<'a> {
     pub walks: Vec<Walk>,
     /// The starts that logs give, one a walk; `None` where a walk begins within a log.
     pub given: Vec<Option<State>>,
-    /// Where segments begin by their readings, `nq + nv`, one a walk.
+    /// Where segments begin by their readings, `nq + nv`, one a walk, in the model without further effects.
     pub read: Vec<Vec<f64>>,
+    /// What that model reads there, in the order of the logs' channels.
+    pub as_read: Vec<Vec<f64>>,
     /// Coordinates of the starts that logs leave open.
     pub open: Vec<usize>,
     /// Largest magnitude of each tangent coordinate.
@@ -98,6 +100,7 @@ impl Context<'_> {
             walks: which.iter().map(|&w| self.walks[w].clone()).collect(),
             given: which.iter().map(|&w| self.given[w].clone()).collect(),
             read: which.iter().map(|&w| self.read[w].clone()).collect(),
+            as_read: which.iter().map(|&w| self.as_read[w].clone()).collect(),
             open: self.open.clone(),
             scale: self.scale.clone(),
             position_noise: self.position_noise.clone(),
@@ -160,12 +163,12 @@ impl Context<'_> {
         open.map(|d| START_SHARE * d).collect()
     }
 
-    /// Where the walks begin, about a trajectory.
+    /// Where the walks begin, about a trajectory; `read` is where segments begin by their readings.
     #[must_use]
-    pub fn starts(&self, trajectory: &[Vec<f64>]) -> Vec<Start> {
+    pub fn starts(&self, trajectory: &[Vec<f64>], read: &[Vec<f64>]) -> Vec<Start> {
         let width = self.plant().layout.nq + self.plant().layout.nv;
         let scales = (&self.scale[..], &self.position_noise[..]);
-        let each = self.given.iter().zip(&self.walks).zip(&self.read);
+        let each = self.given.iter().zip(&self.walks).zip(read);
         each.zip(trajectory)
             .map(|(((given, walk), read), states)| {
                 let first = &states[..width];
@@ -213,6 +216,37 @@ fn level_blocks(layout: &Layout, forces: &mut [f64]) {
     }
 }
 
+/// Typical inertial force at each degree of freedom along some states, N or N m: its inertia, by the speed that a force makes over a row (`b`) where no
+/// contact takes it up, times the acceleration seen.
+fn inertial(context: &Context<'_>, trajectory: &[Vec<f64>], b: &[Vec<f64>]) -> Vec<f64> {
+    let layout = &context.plant().layout;
+    let (nv, width) = (layout.nv, layout.nq + layout.nv);
+    let mut free = vec![0.0; nv];
+    for (walk, b) in context.walks.iter().zip(b) {
+        raise_free(&mut free, b, walk.len() - 1);
+    }
+    let mut sums = vec![(0.0, 0.0); nv];
+    for ((walk, states), b) in context.walks.iter().zip(trajectory).zip(b) {
+        for k in 0..walk.len() - 1 {
+            for (d, sum) in sums.iter_mut().enumerate() {
+                let own = b[(k * 2 * nv + nv + d) * nv + d];
+                let gained = if walk.segment.is_some() { free[d] } else { own };
+                let speed = |k: usize| states[k * width + layout.nq + d];
+                if gained > 0.0 {
+                    sum.0 += ((speed(k + 1) - speed(k)) / gained).abs();
+                    sum.1 += 1.0;
+                }
+            }
+        }
+    }
+    let mean = |(force, n): &(f64, f64)| (force / f64::max(*n, 1.0)).max(1e-9);
+    let mut forces: Vec<f64> = sums.iter().map(mean).collect();
+    if context.has_segments() {
+        level_blocks(layout, &mut forces);
+    }
+    forces
+}
+
 /// A context for some walks, and a first estimate of the model at `theta`, not yet smoothed.
 ///
 /// # Errors
@@ -227,13 +261,14 @@ pub fn begin<'a>(
     let layout = &plant.layout;
     let (nv, width) = (layout.nv, layout.nq + layout.nv);
     let mut trajectory = from_readings(plant, logs, &taken.walks, &taken.otherwise);
-    let read = trajectory.iter().map(|s| s[..width].to_vec());
+    let read: Vec<Vec<f64>> = trajectory.iter().map(|s| s[..width].to_vec()).collect();
     let (noise, alike) = (logs.entry_noise(), logs.entry_alike());
     let mut context = Context {
         machine,
         logs,
         given: taken.given,
-        read: read.collect(),
+        read,
+        as_read: Vec::new(),
         open: taken.open,
         scale: taken.scale,
         position_noise: position_noise(plant, logs),
@@ -252,6 +287,7 @@ pub fn begin<'a>(
         context.islands = Islands::of(plant, &sensors, &taken.touching, &ways.by_rows);
     }
     let mut map = context.map(&[], parameters, nv + 1)?;
+    let as_read = map.readings_at(theta, &context.read)?;
     let all = vec![Some(f64::INFINITY); trajectory.len()];
     map.roll(theta, (&mut trajectory, &all), &context.reading_variance)?;
     let want = Derivatives {
@@ -261,32 +297,8 @@ pub fn begin<'a>(
     let push = vec![PUSH; nv];
     let linear = map.linearise(theta, &trajectory, want, &push, &[])?;
     let b: Vec<Vec<f64>> = linear.into_iter().map(|l| l.b).collect();
-    // Inertia by the speed that a force makes, where no contact takes it up, times the acceleration seen.
-    let mut free = vec![0.0; nv];
-    for (walk, b) in context.walks.iter().zip(&b) {
-        raise_free(&mut free, b, walk.len() - 1);
-    }
-    let mut sums = vec![(0.0, 0.0); nv];
-    for ((walk, states), b) in context.walks.iter().zip(&trajectory).zip(&b) {
-        for k in 0..walk.len() - 1 {
-            for (d, sum) in sums.iter_mut().enumerate() {
-                let own = b[(k * 2 * nv + nv + d) * nv + d];
-                let gained = if walk.segment.is_some() { free[d] } else { own };
-                let speed = |k: usize| states[k * width + layout.nq + d];
-                if gained > 0.0 {
-                    sum.0 += ((speed(k + 1) - speed(k)) / gained).abs();
-                    sum.1 += 1.0;
-                }
-            }
-        }
-    }
-    context.inertial = sums
-        .iter()
-        .map(|(force, n)| (force / f64::max(*n, 1.0)).max(1e-9))
-        .collect();
-    if context.has_segments() {
-        level_blocks(layout, &mut context.inertial);
-    }
+    context.as_read = as_read;
+    context.inertial = inertial(&context, &trajectory, &b);
     let tau = -row_seconds(&context.walks) / FIRST_CORRELATION.ln();
     let estimate = Estimate {
         noise: NoiseModel {
@@ -308,6 +320,7 @@ pub fn begin<'a>(
         smoothed: Vec::new(),
         log_likelihood: f64::NEG_INFINITY,
         trajectory,
+        read: context.read.clone(),
         b,
     };
     Ok((context, estimate))

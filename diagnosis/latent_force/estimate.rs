@@ -6,6 +6,7 @@
 
 mod before;
 mod missing;
+mod read_as;
 mod replay;
 mod rest;
 mod variances;
@@ -28,6 +29,8 @@ const LENGTHENED: f64 = 1.7;
 pub struct Estimate {
     /// States, `rows x (nq + nv)`, one a walk.
     pub trajectory: Vec<Vec<f64>>,
+    /// Where segments begin by their readings, `nq + nv`, one a walk, in the model at its values.
+    pub read: Vec<Vec<f64>>,
     /// Covariances.
     pub noise: NoiseModel,
     /// Slopes in generalized forces of the model without effects, one a walk.
@@ -109,7 +112,7 @@ impl Estimate {
         context: &Context<'_>,
         linear: &[LinearEpisode],
     ) -> Vec<DMatrix<f64>> {
-        let starts = context.starts(&self.trajectory);
+        let starts = context.starts(&self.trajectory, &self.read);
         let right = Self {
             excess: vec![1.0; self.excess.len()],
             scatter: vec![Vec::new(); self.scatter.len()],
@@ -126,7 +129,7 @@ impl Estimate {
 
     /// Smooths about the present trajectory, fits the noise over some rounds, and moves the trajectory.
     pub fn improve(&mut self, context: &Context<'_>, linear: &[LinearEpisode], rounds: usize) {
-        let starts = context.starts(&self.trajectory);
+        let starts = context.starts(&self.trajectory, &self.read);
         let mut length = LENGTHENED;
         let mut before = (f64::NEG_INFINITY, self.noise.clone());
         for round in 0..rounds.max(1) {

@@ -3,6 +3,7 @@
 //! Everything is linearised anew about the smoothed trajectory until the evidence stands. An effect that is right
 //! makes the missing force small: each round the evidence is compared over common scales of `q`, so that it is seen.
 
+mod course;
 mod extent;
 mod kept_columns;
 mod regression;
@@ -21,6 +22,7 @@ use super::fitted_value::Unknown;
 use super::scales::settled;
 use super::step_map::{Derivatives, LinearEpisode, StepMap};
 
+use course::Course;
 pub use extent::Extent;
 use regression::{Compared, compare, in_units, prior_of, shift, variations};
 pub use regression::{SCALES, regression, regression_at};
@@ -119,13 +121,11 @@ pub fn fit<'p>(
     let steps = context.start_steps();
     let mut theta = theta.to_vec();
     let mut estimate = estimate.clone();
-    // What is best of all, and by slopes that were taken there: by those of a like model, or of another place, it may come out far too well.
-    let (mut best, mut own): (Option<Fitted>, Option<Fitted>) = (None, None);
     let mut slopes = slopes.begun();
     let has_segments = context.has_segments();
     let rise = rise(context);
     let mut watchdog = Watchdog::new(rise, has_segments);
-    let (mut all, mut reached) = (Vec::new(), Vec::new());
+    let mut course = Course::default();
     for round in 0..rounds.max(1) {
         let variations = variations(unknowns, &free, &theta);
         let mut linear = slopes.linearise(
@@ -148,25 +148,16 @@ pub fn fit<'p>(
         let (here, promised) = (compared.here, compared.promised);
         estimate.rescale(compared.scale);
         let is_own = !has_segments && slopes.are_own();
-        if is_own && best.as_ref().is_some_and(|b| b.evidence - here > MISLED) {
-            best.clone_from(&own);
-        }
-        let before = best.as_ref().map(|b| b.evidence);
-        let outcome = watchdog.look((here, promised), before);
-        all.push(here);
-        if before.is_none_or(|b| here > b) {
-            best = Some(fitted_at(hypothesis, (&theta, &estimate), &compared));
-        }
-        if is_own && own.as_ref().is_none_or(|o| here > o.evidence) {
-            own = Some(fitted_at(hypothesis, (&theta, &estimate), &compared));
-        }
-        reached.extend(best.as_ref().map(|b| b.evidence));
+        let outcome = watchdog.look((here, promised), course.before(here, is_own));
+        course.add(here, is_own, || {
+            fitted_at(hypothesis, (&theta, &estimate), &compared)
+        });
         let stands = round > 0 && !outcome.rose && promised < rise;
         if stands && round + 1 < rounds && !progress.is_stopped() && slopes.renew_columns() {
             // Kept columns may say so by mistake.
             continue;
         }
-        let ends = stands || extent.is_out_of_reach(&reached, promised);
+        let ends = stands || extent.is_out_of_reach(course.reached(), promised);
         let is_last = round + 1 == rounds || progress.is_stopped();
         if ends || is_last || watchdog.is_out_of_steps() {
             break;
@@ -177,7 +168,7 @@ pub fn fit<'p>(
             };
             (theta, estimate) = shorter;
             let before = estimate.trajectory.clone();
-            estimate.roll(context, &mut map, &theta, &before)?;
+            estimate.roll(context, &mut map, &theta, (&before, &[]))?;
             continue;
         }
         let from = outcome.rose.then(|| (theta.clone(), estimate.clone()));
@@ -189,11 +180,17 @@ pub fn fit<'p>(
         }
     }
     let none_finite = || asid_core::Error::Failed("no round of the fit was finite".into());
-    let mut best = best.ok_or_else(none_finite)?;
-    best.slopes = slopes;
-    if has_segments {
-        best.wander = wander(&all, rise);
-    }
+    let wander = if has_segments {
+        wander(course.all(), rise)
+    } else {
+        0.0
+    };
+    let best = course.best().ok_or_else(none_finite)?;
+    let best = Fitted {
+        slopes,
+        wander,
+        ..best
+    };
     Ok(best)
 }
 
@@ -253,14 +250,15 @@ fn smooth(
         ..Derivatives::default()
     };
     let before = estimate.trajectory.clone();
+    let followed = estimate.read_as(context, map, theta)?;
     estimate.improve(context, linear, EM_ROUNDS);
-    estimate.roll(context, map, theta, &before)?;
+    estimate.roll(context, map, theta, (&before, &followed))?;
     let again = map.remembers_readings() && !map.is_all_segments();
     for _ in 0..if again { AGAIN } else { 0 } {
         let linear = map.linearise(theta, &estimate.trajectory, want, steps, &[])?;
         let before = estimate.trajectory.clone();
         estimate.improve(context, &linear, 1);
-        estimate.roll(context, map, theta, &before)?;
+        estimate.roll(context, map, theta, (&before, &[]))?;
     }
     Ok(())
 }
@@ -308,7 +306,7 @@ pub fn settle_noise(
         let linear = slopes.linearise((context, &mut map), (theta, hypothesis), estimate, &[])?;
         let before = estimate.trajectory.clone();
         estimate.improve(context, &linear, em_rounds);
-        estimate.roll(context, &mut map, theta, &before)?;
+        estimate.roll(context, &mut map, theta, (&before, &[]))?;
     }
     Ok(slopes)
 }

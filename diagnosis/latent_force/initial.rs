@@ -1,5 +1,7 @@
 //! A first trajectory from the readings, and what is known of where episodes begin.
 
+use std::ops::Range;
+
 use asid_core::layout::JointKind;
 use asid_core::signal::{rotation_difference, unit_quaternion};
 use asid_mjcf::Plant;
@@ -76,102 +78,122 @@ pub fn from_readings(
     walks: &[Walk],
     otherwise: &[Vec<f64>],
 ) -> Vec<Vec<f64>> {
-    let layout = &plant.layout;
-    let (nq, nv) = (layout.nq, layout.nv);
-    let width = nq + nv;
     let mut out = otherwise.to_vec();
     for (walk, states) in walks.iter().zip(&mut out) {
-        let n = walk.len();
-        let mut speed_read = vec![false; nv];
-        let mut place_read = vec![false; nv];
-        let mut at = 0;
+        let mut read = Read::nothing(plant.layout.nv);
+        let mut first = 0;
         for sensor in &logs.sensors {
-            let Some(index) = layout.sensors.iter().position(|s| s.name == sensor.name) else {
+            let sensors = &plant.layout.sensors;
+            let Some(index) = sensors.iter().position(|s| s.name == sensor.name) else {
                 continue;
             };
-            let len = layout.sensors[index].len;
-            let own = at;
-            at += len;
-            let readings = &logs.episodes[walk.episode].readings;
-            let mut series: Vec<Vec<f64>> = (0..len)
-                .map(|c| {
-                    let row = |&k: &usize| readings[k * logs.width() + own + c];
-                    walk.rows.iter().map(row).collect()
-                })
-                .collect();
-            let kind = &*layout.sensors[index].kind;
-            if kind == "framequat" {
+            let channels = first..first + sensors[index].len;
+            first = channels.end;
+            let mut series = series(logs, walk, channels);
+            if sensors[index].kind == "framequat" {
                 align_signs(&mut series);
             }
-            if !series.iter_mut().all(|s| fill(&walk.time, s)) {
-                continue;
-            }
-            match plant.sensors[index] {
-                Reads::Joint(j) => {
-                    let joint = &layout.joints[j];
-                    if !matches!(joint.kind, JointKind::Hinge | JointKind::Slide) {
-                        continue;
-                    }
-                    let place = match kind {
-                        "jointpos" => {
-                            place_read[joint.qvel] = true;
-                            joint.qpos
-                        }
-                        "jointvel" => {
-                            speed_read[joint.qvel] = true;
-                            nq + joint.qvel
-                        }
-                        _ => continue,
-                    };
-                    for k in 0..n {
-                        states[k * width + place] = series[0][k];
-                    }
-                }
-                Reads::Body(b) => {
-                    let Some(joint) = plant.free_joint(b).map(|j| &layout.joints[j]) else {
-                        continue;
-                    };
-                    let (first, dofs) = match kind {
-                        "framepos" => (joint.qpos, joint.qvel..joint.qvel + 3),
-                        "framequat" => (joint.qpos + 3, joint.qvel + 3..joint.qvel + 6),
-                        _ => continue,
-                    };
-                    place_read[dofs].fill(true);
-                    for k in 0..n {
-                        let values: Vec<f64> = series.iter().map(|s| s[k]).collect();
-                        let row = &mut states[k * width + first..];
-                        if kind == "framequat" {
-                            let q = unit_quaternion(&values);
-                            row[..4].copy_from_slice(&[q.w, q.i, q.j, q.k]);
-                        } else {
-                            row[..3].copy_from_slice(&values);
-                        }
-                    }
-                }
-                Reads::Other => {}
+            if series.iter_mut().all(|s| fill(&walk.time, s)) {
+                read.take(plant, index, &series, states);
             }
         }
-        let places = states.clone();
-        let mut change = vec![0.0; 2 * nv];
-        for k in 0..n {
-            let (a, b) = (k.saturating_sub(HALF_WINDOW), (k + HALF_WINDOW).min(n - 1));
-            let dt = walk.time[b] - walk.time[a];
-            if dt <= 0.0 {
-                continue;
-            }
-            let state = |k: usize| &places[k * width..(k + 1) * width];
-            difference(layout, state(b), state(a), &mut change);
-            for d in (0..nv).filter(|&d| place_read[d] && !speed_read[d]) {
-                states[k * width + nq + d] = change[d] / dt;
-            }
-        }
-        spin(plant, walk, &place_read, &mut change, states);
+        speeds(plant, walk, &read, states);
+        spin(plant, walk, &read.places, states);
     }
     out
 }
 
+/// Some channels of the readings along a walk, one after the other.
+fn series(logs: &Logs, walk: &Walk, channels: Range<usize>) -> Vec<Vec<f64>> {
+    let readings = &logs.episodes[walk.episode].readings;
+    let channel = |c: usize| {
+        let row = |k: &usize| readings[k * logs.width() + c];
+        walk.rows.iter().map(row).collect()
+    };
+    channels.map(channel).collect()
+}
+
+/// Degrees of freedom that sensors of joints and of free bodies read.
+struct Read {
+    /// Whether its position is, `nv`.
+    places: Vec<bool>,
+    /// Whether its speed is, `nv`.
+    speeds: Vec<bool>,
+}
+
+impl Read {
+    fn nothing(nv: usize) -> Self {
+        Self {
+            places: vec![false; nv],
+            speeds: vec![false; nv],
+        }
+    }
+
+    /// Writes what a sensor has read into the states of a walk, if it reads a joint or a free body.
+    fn take(&mut self, plant: &Plant, sensor: usize, series: &[Vec<f64>], states: &mut [f64]) {
+        let layout = &plant.layout;
+        let rows = states.chunks_exact_mut(layout.nq + layout.nv).enumerate();
+        let kind = &*layout.sensors[sensor].kind;
+        match plant.sensors[sensor] {
+            Reads::Joint(j) => {
+                let joint = &layout.joints[j];
+                let is_scalar = matches!(joint.kind, JointKind::Hinge | JointKind::Slide);
+                let (read, place) = match kind {
+                    "jointpos" if is_scalar => (&mut self.places, joint.qpos),
+                    "jointvel" if is_scalar => (&mut self.speeds, layout.nq + joint.qvel),
+                    _ => return,
+                };
+                read[joint.qvel] = true;
+                rows.for_each(|(k, row)| row[place] = series[0][k]);
+            }
+            Reads::Body(b) => {
+                let Some(joint) = plant.free_joint(b).map(|j| &layout.joints[j]) else {
+                    return;
+                };
+                let (place, dof) = match kind {
+                    "framepos" => (joint.qpos, joint.qvel),
+                    "framequat" => (joint.qpos + 3, joint.qvel + 3),
+                    _ => return,
+                };
+                self.places[dof..dof + 3].fill(true);
+                for (k, row) in rows {
+                    let values: Vec<f64> = series.iter().map(|s| s[k]).collect();
+                    if kind == "framequat" {
+                        let q = unit_quaternion(&values);
+                        row[place..place + 4].copy_from_slice(&[q.w, q.i, q.j, q.k]);
+                    } else {
+                        row[place..place + 3].copy_from_slice(&values);
+                    }
+                }
+            }
+            Reads::Other => {}
+        }
+    }
+}
+
+/// Speeds from differences of positions, where no sensor reads them.
+fn speeds(plant: &Plant, walk: &Walk, read: &Read, states: &mut [f64]) {
+    let layout = &plant.layout;
+    let (nq, nv, n) = (layout.nq, layout.nv, walk.len());
+    let width = nq + nv;
+    let places = states.to_vec();
+    let mut change = vec![0.0; 2 * nv];
+    for k in 0..n {
+        let (a, b) = (k.saturating_sub(HALF_WINDOW), (k + HALF_WINDOW).min(n - 1));
+        let dt = walk.time[b] - walk.time[a];
+        if dt <= 0.0 {
+            continue;
+        }
+        let state = |k: usize| &places[k * width..(k + 1) * width];
+        difference(layout, state(b), state(a), &mut change);
+        for d in (0..nv).filter(|&d| read.places[d] && !read.speeds[d]) {
+            states[k * width + nq + d] = change[d] / dt;
+        }
+    }
+}
+
 /// Angular speeds of free bodies from their orientations, about the body's own axes.
-fn spin(plant: &Plant, walk: &Walk, read: &[bool], change: &mut [f64], states: &mut [f64]) {
+fn spin(plant: &Plant, walk: &Walk, read: &[bool], states: &mut [f64]) {
     let layout = &plant.layout;
     let width = layout.nq + layout.nv;
     let n = walk.len();
@@ -193,7 +215,6 @@ fn spin(plant: &Plant, walk: &Walk, read: &[bool], change: &mut [f64], states: &
             states[at..at + 3].copy_from_slice(own.as_slice());
         }
     }
-    change.fill(0.0);
 }
 
 /// Largest magnitude of each tangent coordinate along some trajectories: of positions their spread about the first
@@ -221,24 +242,41 @@ pub fn scales(plant: &Plant, trajectory: &[Vec<f64>]) -> Vec<f64> {
 /// Deviation of the reading of each position that a sensor reads directly, else 0; `nv`.
 #[must_use]
 pub fn position_noise(plant: &Plant, logs: &Logs) -> Vec<f64> {
-    let layout = &plant.layout;
-    let mut noise = vec![0.0; layout.nv];
+    let mut noise = vec![0.0; plant.layout.nv];
     for sensor in &logs.sensors {
-        let Some(index) = layout.sensors.iter().position(|s| s.name == sensor.name) else {
-            continue;
-        };
-        let dofs = match (plant.sensors[index], &*layout.sensors[index].kind) {
-            (Reads::Joint(j), "jointpos") => layout.joints[j].qvel..layout.joints[j].qvel + 1,
-            (Reads::Body(b), kind) => match plant.free_joint(b).map(|j| layout.joints[j].qvel) {
-                Some(first) if kind == "framepos" => first..first + 3,
-                Some(first) if kind == "framequat" => first + 3..first + 6,
-                _ => continue,
-            },
-            _ => continue,
-        };
-        noise[dofs].fill(sensor.noise);
+        noise[positions_read(plant, &sensor.name)].fill(sensor.noise);
     }
     noise
+}
+
+/// The entry of a reading that each position is read in directly, where there is one; `nv`.
+#[must_use]
+pub fn position_entries(plant: &Plant, logs: &Logs) -> Vec<Option<usize>> {
+    let mut entries = vec![None; plant.layout.nv];
+    for (s, sensor) in logs.sensors.iter().enumerate() {
+        let first = logs.entries.iter().position(|e| e.sensor == s);
+        for (i, dof) in positions_read(plant, &sensor.name).enumerate() {
+            entries[dof] = first.map(|first| first + i);
+        }
+    }
+    entries
+}
+
+/// Degrees of freedom whose positions a sensor reads directly.
+fn positions_read(plant: &Plant, sensor: &str) -> Range<usize> {
+    let layout = &plant.layout;
+    let Some(index) = layout.sensors.iter().position(|s| s.name == sensor) else {
+        return 0..0;
+    };
+    match (plant.sensors[index], &*layout.sensors[index].kind) {
+        (Reads::Joint(j), "jointpos") => layout.joints[j].qvel..layout.joints[j].qvel + 1,
+        (Reads::Body(b), kind) => match plant.free_joint(b).map(|j| layout.joints[j].qvel) {
+            Some(first) if kind == "framepos" => first..first + 3,
+            Some(first) if kind == "framequat" => first + 3..first + 6,
+            _ => 0..0,
+        },
+        _ => 0..0,
+    }
 }
 
 /// Where a walk begins, as the filter wants it: about the log's own start where `given`, else about the

@@ -60,6 +60,8 @@ struct Common<'a> {
     depends_on_past: bool,
     /// Whether some make readings depend on those before.
     remembers_readings: bool,
+    /// Whether an effect changes what sensors read.
+    alters_readings: bool,
     /// Whether one physics step tells the slopes of a row in the state.
     one_step: bool,
     /// What one push tells of.
@@ -232,6 +234,7 @@ impl<'a> StepMap<'a> {
             capacity,
             depends_on_past,
             remembers_readings,
+            alters_readings: !on_readings.is_empty(),
             one_step: false,
             at_once: parameters.iter().map(acts_at_once).collect(),
             measured: parameters.iter().map(is_measured).collect(),
@@ -254,6 +257,12 @@ impl<'a> StepMap<'a> {
     #[must_use]
     pub fn remembers_readings(&self) -> bool {
         self.common.remembers_readings
+    }
+
+    /// Whether an effect changes what sensors read.
+    #[must_use]
+    pub fn alters_readings(&self) -> bool {
+        self.common.alters_readings
     }
 
     /// Whether some walks are segments.
@@ -341,6 +350,26 @@ impl<'a> StepMap<'a> {
         for (part, episodes) in self.parts.iter().zip(found) {
             for (&w, episode) in part.walks.iter().zip(episodes) {
                 out[w] = episode;
+            }
+        }
+        Ok(out)
+    }
+
+    /// What the logs' sensors read at a state of each walk, `nq + nv`, in the order of the logs' channels.
+    ///
+    /// # Errors
+    /// As [`StepMap::linearise`].
+    pub fn readings_at(&mut self, theta: &[f64], states: &[Vec<f64>]) -> Result<Vec<Vec<f64>>> {
+        let common = &self.common;
+        let mut out = vec![Vec::new(); common.walks.len()];
+        let read: Vec<Vec<Vec<f64>>> = self
+            .parts
+            .par_iter_mut()
+            .map(|part| part.readings_at(common, theta, states))
+            .collect::<Result<_>>()?;
+        for (part, read) in self.parts.iter().zip(read) {
+            for (&w, read) in part.walks.iter().zip(read) {
+                out[w] = read;
             }
         }
         Ok(out)

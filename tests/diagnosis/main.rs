@@ -24,6 +24,7 @@ mod no_wiring;
 mod one_joint;
 mod ordinary;
 mod played;
+mod raised_tracker;
 mod roll;
 mod row_slopes;
 mod rows;

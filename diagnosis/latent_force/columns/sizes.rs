@@ -76,6 +76,7 @@ fn parts<'c>(
         logs: context.logs,
         given: vec![None; walks.len()],
         read: vec![Vec::new(); walks.len()],
+        as_read: vec![Vec::new(); walks.len()],
         open: context.open.clone(),
         scale: context.scale.clone(),
         position_noise: context.position_noise.clone(),

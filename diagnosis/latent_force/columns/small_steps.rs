@@ -52,6 +52,9 @@ pub(super) fn take_smaller_steps(
     (found, walks): (&mut [Along], &[usize]),
 ) -> Result<bool> {
     let m = wanted.len();
+    if m == 0 {
+        return Ok(true);
+    }
     for _ in 0..TIMES {
         let changes = changes(context, found, wanted, walks);
         let mut due = Vec::new();

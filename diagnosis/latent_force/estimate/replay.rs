@@ -45,7 +45,8 @@ impl Estimate {
     }
 
     /// Replays the segments from their starts, which have just been moved from those `before`: each takes the step, of those
-    /// offered and none, that leaves least of its readings; where that is more than was promised, starts about it are drawn.
+    /// offered, none, and the one that [follows its reading](Self::read_as), that leaves least of its readings; where that is more than was promised,
+    /// starts about it are drawn.
     ///
     /// # Errors
     /// When the engine fails.
@@ -54,13 +55,14 @@ impl Estimate {
         context: &Context<'_>,
         map: &mut StepMap<'_>,
         theta: &[f64],
-        before: &[Vec<f64>],
+        (before, followed): (&[Vec<f64>], &[Vec<f64>]),
     ) -> Result<()> {
         if !map.has_segments() {
             return Ok(());
         }
         let all = vec![Some(f64::INFINITY); self.trajectory.len()];
         let mut left = map.roll(theta, (&mut self.trajectory, &all), &self.noise.r)?;
+        self.follow(map, theta, (before, followed), &mut left)?;
         let promised: Vec<f64> = self
             .smoothed
             .iter()
@@ -77,7 +79,7 @@ impl Estimate {
         self.rolls += 1;
         let mut random = Streams::new(self.rolls).stream("starts of segments");
         // A start that the log gives is hardly open.
-        let starts = context.starts(before);
+        let starts = context.starts(before, &self.read);
         let scales = (&context.scale[..], &context.position_noise[..]);
         for _ in 0..DRAWS {
             for (posterior, reading) in BY_POSTERIOR.into_iter().zip(BY_READING) {
@@ -135,9 +137,21 @@ impl Estimate {
         // One that leaves more than the best so far is of no use.
         let each = worse.iter().zip(&*left);
         let most: Vec<Option<f64>> = each.map(|(worse, left)| worse.then_some(*left)).collect();
-        let of_other = map.roll(theta, (&mut other, &most), &self.noise.r)?;
+        self.take_better(map, theta, (other, &most), left)
+    }
+
+    /// Replays segments from other starts, each as far as it leaves no more than the `most` that is asked of it; where that is less than what is
+    /// `left` by now, the segment takes it.
+    pub(super) fn take_better(
+        &mut self,
+        map: &mut StepMap<'_>,
+        theta: &[f64],
+        (mut other, most): (Vec<Vec<f64>>, &[Option<f64>]),
+        left: &mut [f64],
+    ) -> Result<()> {
+        let of_other = map.roll(theta, (&mut other, most), &self.noise.r)?;
         for (w, states) in other.into_iter().enumerate() {
-            if worse[w] && of_other[w] < left[w] {
+            if most[w].is_some() && of_other[w] < left[w] {
                 left[w] = of_other[w];
                 self.trajectory[w] = states;
             }

@@ -23,7 +23,7 @@ pub fn regression(
     scale: f64,
     m: usize,
 ) -> Regression {
-    let starts = context.starts(&estimate.trajectory);
+    let starts = context.starts(&estimate.trajectory, &estimate.read);
     let problems = estimate.problems(context, linear, &starts).enumerate();
     let of_walk = |(w, p)| regress(p, &estimate.noise_along(context, w, scale), m);
     sum(problems.map(of_walk).collect(), m)
@@ -37,7 +37,7 @@ pub fn regression_at(
     (dof, scale): (usize, f64),
     (m, columns): (usize, &[usize]),
 ) -> Regression {
-    let starts = context.starts(&estimate.trajectory);
+    let starts = context.starts(&estimate.trajectory, &estimate.read);
     let noise = estimate.noise.scaled_at(dof, scale, &estimate.least_white);
     let problems = estimate.problems(context, linear, &starts);
     let of_walk = |p| regress_on(p, &noise, (m, columns));

@@ -224,7 +224,7 @@ impl Slopes {
         (linear, due): (&[LinearEpisode], &[bool]),
     ) {
         self.blind.resize(linear.len(), Vec::new());
-        let starts = context.starts(&estimate.trajectory);
+        let starts = context.starts(&estimate.trajectory, &estimate.read);
         for (w, linear) in linear.iter().enumerate() {
             if context.walks[w].segment.is_some() && due[w] && self.blind[w].is_empty() {
                 let open = &starts[w].variance;

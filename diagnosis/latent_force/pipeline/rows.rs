@@ -1,6 +1,7 @@
 //! Which rows of the logs are smoothed, and which are taken in segments.
 
 use asid_core::Result;
+use asid_mjcf::Plant;
 
 use crate::bench::Bench;
 use crate::latent_force::context::Taken;
@@ -36,6 +37,38 @@ pub(super) fn along(
     Trajectory::along(&*model, plant, values, &bench.train.logs, states, &rows)
 }
 
+/// What the model as it is does in the training logs.
+fn replayed(bench: &Bench, nominal: &[f64]) -> Result<Trajectory> {
+    let machine = &bench.machine;
+    let model = machine.with(&[])?;
+    let point = Point {
+        theta: nominal.to_vec(),
+        starts: bench.train.starts.clone(),
+    };
+    let (plant, logs) = (&machine.plant, &bench.train.logs);
+    let (parameters, threads) = (&bench.parameters, machine.threads);
+    Trajectory::of(&*model, plant, parameters, logs, &point, threads)
+}
+
+/// Takes the contacts of a free body from the replays where it never makes them along its readings: these lie beside the places that the model
+/// knows, for a tracker has its zero elsewhere, and what seems to float there rests on something.
+fn support(plant: &Plant, shown: &mut Trajectory, replayed: &Trajectory, walks: &[Walk]) {
+    let along_readings = pairs_touching(shown);
+    let n = shown.pairs.len();
+    for (i, pair) in shown.pairs.iter().enumerate() {
+        let is_free = |body: &usize| plant.free_joint(*body).is_some();
+        if along_readings.contains(pair) || !pair.iter().any(is_free) {
+            continue;
+        }
+        for (path, walk) in shown.episodes.iter_mut().zip(walks) {
+            let forces = path.contact.iter_mut().skip(i).step_by(n);
+            for (force, row) in forces.zip(&walk.rows) {
+                *force = replayed.episodes[walk.episode].contact[row * n + i];
+            }
+        }
+    }
+}
+
 /// Rows of the training logs that are taken, and what touches in them.
 pub(super) struct Rows {
     /// One walk a log.
@@ -58,9 +91,11 @@ impl Rows {
         let logs = &bench.train.logs;
         let whole = |e| Walk::new(logs, e, layout.timestep);
         let walks = within_budget((0..logs.episodes.len()).map(whole).collect(), layout.nv);
-        let unread = Unread::of(bench, nominal)?;
+        let replayed = replayed(bench, nominal)?;
+        let unread = Unread::of(bench, &replayed);
         let first = from_readings(plant, logs, &walks, &unread.along(&walks));
-        let shown = along(bench, &walks, nominal, &first)?;
+        let mut shown = along(bench, &walks, nominal, &first)?;
+        support(plant, &mut shown, &replayed, &walks);
         Ok(Self {
             touches: touching(plant, logs, &shown),
             pairs: pairs_touching(&shown),
@@ -117,7 +152,7 @@ enum Unread {
 }
 
 impl Unread {
-    fn of(bench: &Bench, nominal: &[f64]) -> Result<Self> {
+    fn of(bench: &Bench, replayed: &Trajectory) -> Self {
         let layout = bench.layout();
         let (nq, nv) = (layout.nq, layout.nv);
         let home = asid_core::problem::home(layout);
@@ -127,16 +162,9 @@ impl Unread {
         let noise = position_noise(plant, logs);
         let joints: Vec<_> = plant.scalar_joints().map(|j| &layout.joints[j]).collect();
         if joints.iter().all(|j| noise[j.qvel] > 0.0) {
-            return Ok(Self::Home(still));
+            return Self::Home(still);
         }
-        let point = Point {
-            theta: nominal.to_vec(),
-            starts: bench.train.starts.clone(),
-        };
-        let threads = bench.machine.threads;
-        let model = bench.machine.with(&[])?;
-        let shown = Trajectory::of(&*model, plant, &bench.parameters, logs, &point, threads)?;
-        let states = |path: Path| -> Vec<f64> {
+        let states = |path: &Path| -> Vec<f64> {
             let rows = path.qpos.chunks_exact(nq).zip(path.qvel.chunks_exact(nv));
             let state = |(q, v): (&[f64], &[f64])| {
                 let mut state = still.clone();
@@ -151,10 +179,10 @@ impl Unread {
             };
             rows.flat_map(state).collect()
         };
-        Ok(Self::Replayed {
-            states: shown.episodes.into_iter().map(states).collect(),
+        Self::Replayed {
+            states: replayed.episodes.iter().map(states).collect(),
             width: nq + nv,
-        })
+        }
     }
 
     /// Along some walks, `rows x (nq + nv)` each.

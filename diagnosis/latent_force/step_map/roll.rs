@@ -1,4 +1,4 @@
-//! Replays of short segments from their first rows.
+//! Replays of short segments from their first rows, and readings there.
 
 use asid_core::{Control, Result, Rollout, Simulator as _};
 
@@ -8,6 +8,42 @@ use super::Common;
 use super::pass::Part;
 
 impl Part {
+    /// Puts some of its walks' simulations at states (`nq + nv`), with values.
+    fn begin_at(
+        &mut self,
+        c: &Common<'_>,
+        theta: &[f64],
+        (which, states): (&[usize], &[&[f64]]),
+    ) -> Result<()> {
+        let nq = c.layout.nq;
+        let mut columns = Vec::new();
+        for &e in which {
+            c.columns
+                .push(theta, c.episode(self.walks[e]), &mut columns);
+        }
+        self.simulator.reset(which)?;
+        self.simulator.set_parameters(which, &columns)?;
+        let qpos: Vec<f64> = states.iter().flat_map(|s| s[..nq].to_vec()).collect();
+        let qvel: Vec<f64> = states.iter().flat_map(|s| s[nq..].to_vec()).collect();
+        self.simulator.set_state(which, &qpos, &qvel)
+    }
+
+    /// What the logs' sensors read at a state of each of its walks.
+    pub(super) fn readings_at(
+        &mut self,
+        c: &Common<'_>,
+        theta: &[f64],
+        states: &[Vec<f64>],
+    ) -> Result<Vec<Vec<f64>>> {
+        let which: Vec<usize> = (0..self.walks.len()).collect();
+        let states: Vec<&[f64]> = self.walks.iter().map(|&w| &states[w][..]).collect();
+        self.begin_at(c, theta, (&which, &states))?;
+        let mut read = vec![0.0; which.len() * c.readings.width()];
+        self.simulator.read(&which, &c.readings, &mut read)?;
+        let each = read.chunks_exact(c.readings.width());
+        Ok(each.map(<[f64]>::to_vec).collect())
+    }
+
     /// Replays some of its segments as [`StepMap::roll`](super::StepMap::roll).
     pub(super) fn roll(
         &mut self,
@@ -25,17 +61,8 @@ impl Part {
         if going.is_empty() {
             return Ok(left);
         }
-        let mut columns = Vec::new();
-        for &e in &going {
-            c.columns
-                .push(theta, c.episode(self.walks[e]), &mut columns);
-        }
-        self.simulator.reset(&going)?;
-        self.simulator.set_parameters(&going, &columns)?;
         let first: Vec<&[f64]> = going.iter().map(|&e| &states[e][..width]).collect();
-        let qpos: Vec<f64> = first.iter().flat_map(|s| s[..nq].to_vec()).collect();
-        let qvel: Vec<f64> = first.iter().flat_map(|s| s[nq..].to_vec()).collect();
-        self.simulator.set_state(&going, &qpos, &qvel)?;
+        self.begin_at(c, theta, (&going, &first))?;
         let (entries, readings) = (c.logs.entries.len(), c.readings.width());
         let mut read = Vec::new();
         let mut differ = vec![0.0; entries];
