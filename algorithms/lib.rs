@@ -1,7 +1,7 @@
-//! Algorithms of ASID that need no native library: Fisher information, optimisers,
-//! exploration, identification and solving.
+//! Algorithms of ASID that need no native library: Fisher information, optimisers, exploration,
+//! identification and solving.
 //!
-//! Nothing here names an engine or a task.
+//! The crate names no engine and no task.
 
 pub mod explore;
 pub mod fisher;

@@ -1,17 +1,25 @@
-//! Is what an episode is expected to tell what it then tells? Expected over actual posterior deviation of
-//! every unknown of a task, over truths drawn from the prior, in the engine that identifies.
+//! Compares the posterior standard deviation that an episode is expected to give with the one that
+//! it gives.
+//!
+//! The program draws truths from the prior and prints expected over actual deviation for every
+//! unknown of a task, in the engine that identifies.
 //!
 //! ```sh
 //! cargo run --release --features mujoco --example expected -- \
 //!     sphere-patches mujoco 30 fisher-cem/population=16 reps 0
 //! ```
 //!
-//! Settings follow a name: `reps/sampling.rounds=6`. The last argument is the first seed. Each line is an
-//! episode of an unknown: truth, estimate, actual deviation, and the ratios to it of what is expected in three
-//! ways: as explorers are paid, with the noise model of identification reading by reading, and with the
-//! correlation of roughness. The table has their medians.
+//! Settings follow a name: `reps/sampling.rounds=6`. The last argument is the first seed. Each line
+//! is one unknown in one episode: truth, estimate and actual deviation, then three ratios of
+//! expected to actual deviation. The expectations are:
+//!
+//! 1. the one that explorers are paid by,
+//! 2. the noise model of identification, reading by reading,
+//! 3. the same with the correlation of the roughness.
+//!
+//! The table gives the median of each ratio.
 
-// A table on standard output is what this program is for.
+// This program exists to print a table on standard output.
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
 use std::error::Error;
@@ -130,7 +138,8 @@ fn main() -> Outcome<()> {
     Ok(())
 }
 
-/// Name and settings of `name/key=value…`: the defaults, the task's, then what is given.
+/// Name and settings of `name/key=value…`: the defaults, overridden by the task's, then by the
+/// given ones.
 fn configured<'n, T: ?Sized + 'static>(
     task: &dyn Task,
     section: &str,

@@ -1,11 +1,12 @@
-//! Exploration that tells rival explanations apart: open-loop actions under which their
-//! simulators are expected to predict most differently.
+//! Exploration that discriminates between rival models: open-loop actions for which the rivals'
+//! simulators predict the most different readings.
 //!
-//! Box and Hill (1967) choose the experiment with the largest expected divergence between
-//! rival models, weighted by their probabilities. With Gaussian trackers the divergence of
-//! two predictions is half their squared distance in units of the noise. Where contact
-//! makes a prediction depend on next to nothing, distance tells of nothing: what two copies
-//! of one rival with starts a hair apart differ by counts as noise of its own.
+//! Box and Hill (1967) choose the experiment with the largest expected divergence between rival
+//! models, weighted by their probabilities. With Gaussian trackers the divergence of two
+//! predictions is half their squared distance in units of the noise. Contact can make a prediction
+//! chaotic: a tiny change of the start changes it a lot, and distance then discriminates nothing.
+//! The difference between two copies of one rival with starts `HAIR` apart therefore counts as
+//! additional noise.
 
 use asid_core::explore::{CurvePoint, Explored, Explorer};
 use asid_core::layout::Recording;
@@ -17,14 +18,14 @@ use asid_readings::SignalSet;
 use super::open_loop::{OpenLoop, Planned, Planner};
 use crate::optimise::CemSettings;
 
-/// An explanation: a simulator with the values that were fitted.
+/// A rival model: a simulator with its fitted values.
 #[derive(Clone)]
 pub struct Rival {
-    /// What it is called.
+    /// Its label.
     pub label: String,
     /// Its simulator.
     pub model: std::sync::Arc<dyn Model>,
-    /// What is set in it.
+    /// The parameters that are set in it.
     pub parameters: Vec<Parameter>,
     /// Values of the parameters, in their units.
     pub theta: Vec<f64>,
@@ -32,15 +33,15 @@ pub struct Rival {
     pub weight: f64,
 }
 
-/// Plans what tells rivals apart.
+/// Plans the actions that discriminate best between rivals.
 pub struct Discriminating {
-    /// At least two.
+    /// The rival models, at least two.
     pub rivals: Vec<Rival>,
-    /// Refits of the distribution.
+    /// Refits of the search distribution.
     pub iterations: usize,
-    /// Action sequences a refit.
+    /// Action sequences per refit.
     pub population: usize,
-    /// Actions of a sequence.
+    /// How a sequence of actions is written as numbers to search for.
     pub open_loop: OpenLoop,
 }
 
@@ -48,7 +49,7 @@ pub struct Discriminating {
 const HAIR: f64 = 1e-6;
 
 impl Discriminating {
-    /// Of some rivals, with the effort of `fisher-cem`'s defaults.
+    /// Planner for these rivals, with the search effort of `fisher-cem`'s defaults.
     ///
     /// # Errors
     /// With fewer than two rivals.
@@ -67,8 +68,8 @@ impl Discriminating {
         })
     }
 
-    /// Expected divergence between the rivals, nats, of each sequence of actions
-    /// (`horizon x action`, in the task's units) from a start pose.
+    /// Expected divergence between the rivals, nats, for each sequence of actions (`horizon x
+    /// action`, in the task's units) from a start pose.
     ///
     /// # Errors
     /// When an engine fails.
@@ -96,16 +97,16 @@ impl Discriminating {
     }
 }
 
-/// What a rival predicts for some plans.
+/// What a rival predicts for each of some plans.
 struct Prediction {
     signals: SignalSet,
     /// Readings of each plan, `frames x width`.
     readings: Vec<Vec<f64>>,
-    /// Square of what next to nothing at the start changes, in units of the noise.
+    /// Squared change of each reading by the start shift `HAIR`, in units of the noise.
     scatter: Vec<Vec<f64>>,
 }
 
-/// Whitened differences of two episodes' readings, over all frames.
+/// Whitened differences between two episodes' readings, over all frames.
 fn differences(signals: &SignalSet, a: &[f64], b: &[f64]) -> Vec<f64> {
     let (width, rows) = (signals.width(), signals.whitened_len());
     let mut all = vec![0.0; a.len() / width * rows];
@@ -128,7 +129,7 @@ impl Prediction {
             parameters: &rival.parameters,
             ..*problem
         };
-        // Two copies of each plan, their starts a hair apart.
+        // Two copies of each plan, their starts shifted by HAIR against each other.
         let n = 2 * plans.len();
         let sims: Vec<usize> = (0..n).collect();
         let mut batch: Batch = own.batch(n)?;
@@ -174,7 +175,7 @@ impl Prediction {
         })
     }
 
-    /// Divergence of two predictions of a plan, nats; nothing where one broke off.
+    /// Divergence of two predictions of a plan, nats; 0 where one of the simulations diverged.
     fn apart(&self, other: &Self, plan: usize) -> f64 {
         let apart = differences(&self.signals, &self.readings[plan], &other.readings[plan]);
         let scatter = self.scatter[plan].iter().zip(&other.scatter[plan]);

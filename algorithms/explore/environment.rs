@@ -1,8 +1,8 @@
 //! Fisher exploration as a batch of environments, for learners.
 //!
-//! An observation comes of a reading with the trackers' noise, as in the real world; with the share of the episode that is
-//! over and the information gathered so far in it (see [`Observer`]), the return of
-//! the telescoping objectives is a function of the observation.
+//! An observation holds a reading with the trackers' noise, as in the real world, the elapsed share
+//! of the episode, and the information gathered so far (see [`Observer`]). With the latter two, the
+//! return of the telescoping objectives is a function of the observation.
 
 use crate::fisher::{FisherBatch, FisherSettings};
 use asid_core::environment::{BatchEnvironment, Transition};
@@ -14,7 +14,7 @@ use rand_distr::{Distribution, StandardNormal};
 
 use super::observation::Observer;
 
-/// Name of the stream that unknowns, start poses and the trackers' noise are drawn from.
+/// Name of the random stream for unknowns, start poses and the trackers' noise.
 const STREAM: &str = "fisher environment";
 
 /// A batch of Fisher exploration episodes that step together.
@@ -26,12 +26,12 @@ pub struct FisherEnvironment<'a> {
     rng: Rng,
     step: usize,
     readings: Vec<f64>,
-    /// Episodes that diverged and wait for the horizon, when all begin anew.
+    /// Whether each episode has diverged; it then waits until the horizon, when all restart.
     ended: Vec<bool>,
 }
 
 impl<'a> FisherEnvironment<'a> {
-    /// `episodes` environments; unknowns and start poses are drawn anew for each episode.
+    /// Creates `episodes` environments; unknowns and start poses are drawn anew for each episode.
     ///
     /// # Errors
     /// As [`FisherBatch::new`].
@@ -53,12 +53,12 @@ impl<'a> FisherEnvironment<'a> {
         })
     }
 
-    /// Draws all further chance from these streams, so that what follows repeats.
+    /// Draws all further random numbers from these streams, so that what follows is reproducible.
     pub fn reseed(&mut self, streams: &Streams) {
         self.rng = streams.stream(STREAM);
     }
 
-    /// Starts one episode in each environment at given unknowns and start poses.
+    /// Starts one episode in each environment, at the given unknowns and start poses.
     ///
     /// # Errors
     /// When the engine fails.
@@ -78,13 +78,13 @@ impl<'a> FisherEnvironment<'a> {
         Ok(())
     }
 
-    /// The episodes' information.
+    /// The episodes with their information.
     #[must_use]
     pub fn batch(&self) -> &FisherBatch<'a> {
         &self.batch
     }
 
-    /// What the environments' observations are made of.
+    /// The observer that makes the environments' observations.
     #[must_use]
     pub fn observer(&self) -> &Observer {
         &self.observer
@@ -152,8 +152,9 @@ impl BatchEnvironment for FisherEnvironment<'_> {
         for (ended, alive) in self.ended.iter_mut().zip(self.batch.alive()) {
             *ended |= !alive;
         }
-        // The horizon is part of the task and the time is observed: its end is an end, not a cut. An
-        // episode that diverged ends at once, and is worth nothing until the horizon.
+        // The horizon is part of the task and the time is observed: reaching it terminates the
+        // episode and does not truncate it. An episode that diverged terminates at once and earns 0
+        // until the horizon.
         for (terminated, ended) in transition.terminated.iter_mut().zip(&self.ended) {
             *terminated = over || *ended;
         }

@@ -1,10 +1,10 @@
-//! The Fisher objective with the cross-entropy method over open-loop action
-//! sequences: the planner without a network.
+//! Planner without a network: the cross-entropy method over open-loop action sequences, for the
+//! Fisher objective.
 //!
-//! It plans when the episode begins, for the start pose that the first reading
-//! shows. Every candidate is simulated at several values of the unknowns, drawn
-//! from the prior, and judged by its mean return. Draws differ from iteration to
-//! iteration, so the best of each meet once more at common ones.
+//! It plans when the episode begins, for the start pose that the first reading shows. Each
+//! candidate is simulated at several values of the unknowns, drawn from the prior, and scored by
+//! its mean return. These draws differ between iterations, so the best candidates of all iterations
+//! are compared once more at common draws.
 
 use crate::fisher::{FisherBatch, FisherSettings};
 use asid_core::explore::{CurvePoint, Explored, Explorer};
@@ -21,15 +21,15 @@ use crate::optimise::{CemSettings, require};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct FisherCem {
-    /// Refits of the distribution.
+    /// Refits of the search distribution.
     pub iterations: usize,
-    /// Action sequences a refit.
+    /// Action sequences per refit.
     pub population: usize,
-    /// Values of the unknowns that each sequence is tried at.
+    /// Values of the unknowns at which each sequence is simulated.
     pub prior_samples: usize,
-    /// Control steps that share an action: fewer numbers to search for.
+    /// Control steps that share an action; more of them leave fewer numbers to search for.
     pub hold: usize,
-    /// First deviation of an action, as a fraction of half its range.
+    /// Initial standard deviation of an action, as a fraction of half its range.
     pub std: f64,
     /// Search distribution.
     pub cem: CemSettings,
@@ -104,7 +104,7 @@ impl Planner for FisherCem {
         let mut rng = problem.streams.stream("fisher-cem");
         let mut trials = Trials::new(self, problem, start)?;
         let mut curve = Vec::new();
-        // The best of every iteration, for a fair comparison in the end.
+        // The best of every iteration, compared at common draws at the end.
         let mut finalists: Vec<Vec<f64>> = Vec::new();
         let kept = (self.population / (FINAL * self.iterations)).max(1);
         problem.progress.begin(
@@ -134,10 +134,11 @@ impl Planner for FisherCem {
     }
 }
 
-/// In the final each plan is tried at about this many times the search's prior samples.
+/// The final comparison simulates each plan at about this many times the search's prior samples; it
+/// has correspondingly fewer plans.
 const FINAL: usize = 4;
 
-/// Episodes of candidate plans in the simulator.
+/// Simulates candidate plans.
 struct Trials<'a> {
     explorer: &'a FisherCem,
     problem: &'a Problem<'a>,
@@ -161,7 +162,7 @@ impl<'a> Trials<'a> {
         self.explorer.open_loop().actions(protocol, candidate)
     }
 
-    /// Mean return of each candidate over `samples` draws of the unknowns, the same for all.
+    /// Mean return of each candidate over `samples` draws of the unknowns, the same draws for all.
     fn returns(
         &mut self,
         candidates: &[Vec<f64>],
@@ -172,7 +173,7 @@ impl<'a> Trials<'a> {
         let (a, e) = (protocol.action.len(), self.batch.episodes());
         let plans: Vec<Vec<f64>> = candidates.iter().map(|c| self.actions(c)).collect();
         let prior = Posterior::prior(self.problem.parameters, samples, rng);
-        // Episodes beyond the last candidate repeat it, and do not count.
+        // Surplus episodes repeat the last candidate and do not count.
         let of = |i: usize| (i / samples).min(candidates.len() - 1);
         let theta: Vec<f64> = (0..e)
             .flat_map(|i| prior.samples[i % samples].iter().copied())

@@ -1,4 +1,4 @@
-//! Exploration: policies that make an episode tell the most about the unknowns.
+//! Exploration: policies that make an episode as informative as possible about the unknowns.
 
 pub mod discriminating;
 pub mod environment;

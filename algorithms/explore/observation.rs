@@ -1,41 +1,42 @@
-//! What an exploration policy sees.
+//! Observations of an exploration policy.
 //!
-//! An observation is made of a reading, the share of the episode that is over, and
-//! the information gathered so far. Entries are chosen so that a small network can
-//! use them: an orientation becomes two columns of its rotation matrix, which have
-//! neither the jump of an angle nor the double sign of a quaternion (Zhou et al.
-//! 2019, "On the continuity of rotation representations"), and the place of the
-//! end effector is also given in the frame of the object, where the effect of a
-//! push does not depend on how the object lies.
+//! An observation consists of a reading, the elapsed share of the episode, and the information
+//! gathered so far. Its entries are chosen so that a small network can use them:
 //!
-//! The end effector is the first channel of proprioception that has three entries;
-//! without one the relative entries are left out.
+//! - An orientation becomes two columns of its rotation matrix, which have neither the jump of an
+//!   angle nor the double sign of a quaternion (Zhou et al. 2019, "On the continuity of rotation
+//!   representations").
+//! - The position of the end effector is also given in the frame of the object, where the effect of
+//!   a push does not depend on how the object lies.
+//!
+//! The end effector is the first proprioceptive channel with three entries; without one the
+//! relative entries are left out.
 
 use asid_core::signal::unit_quaternion;
 use asid_core::{Problem, Result};
 use nalgebra::Vector3;
 
-/// Smallest expected standard deviation that is told apart, prior-scaled.
+/// Smallest expected standard deviation that is resolved, prior-scaled.
 const SMALLEST_STD: f64 = 1e-6;
 
-/// Some entries of an observation that belong together.
+/// A group of observation entries that belong together.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Entry {
-    /// What it is, such as `rod_pos` or `ee_pos in the frame of rod_quat`.
+    /// What the group is, such as `rod_pos` or `ee_pos in the frame of rod_quat`.
     pub name: String,
-    /// How many entries.
+    /// Number of entries.
     pub len: usize,
 }
 
-/// How entries come out of a reading's row.
+/// How entries are computed from a reading's row.
 #[derive(Clone, Debug)]
 enum Part {
-    /// As they are: first entry and number.
+    /// Copied: first entry and number of entries.
     Plain(usize, usize),
-    /// First and second column of the rotation of the quaternion at this entry.
+    /// First and second column of the rotation matrix of the quaternion that begins at this entry.
     Rotation(usize),
-    /// The end effector seen from the object: where each begins, and the quaternion
-    /// of the object if it has one.
+    /// The end effector in the frame of the object: the entry where each begins, and that of the
+    /// object's quaternion if it has one.
     Relative {
         effector: usize,
         object: usize,
@@ -43,7 +44,7 @@ enum Part {
     },
 }
 
-/// Makes observations out of readings.
+/// Turns readings into observations.
 #[derive(Clone, Debug)]
 pub struct Observer {
     parts: Vec<Part>,
@@ -69,8 +70,9 @@ impl Observer {
         Ok(observer)
     }
 
-    /// An observer without the information gathered so far: what the readings and the clock
-    /// show, and nothing that must be simulated along.
+    /// Observer without the information gathered so far.
+    ///
+    /// It uses only the readings and the clock, so that no simulation has to run along.
     ///
     /// # Errors
     /// As [`Observer::new`].
@@ -124,21 +126,22 @@ impl Observer {
         })
     }
 
-    /// What the entries of an observation are, in order.
+    /// The entries of an observation, in order.
     #[must_use]
     pub fn entries(&self) -> &[Entry] {
         &self.entries
     }
 
-    /// Entries of an observation.
+    /// Number of entries of an observation.
     #[must_use]
     pub fn observation_len(&self) -> usize {
         self.parts.iter().map(Part::len).sum::<usize>() + 1 + self.unknowns
     }
 
-    /// Writes the observation of a reading's row at `share` of the episode, with the
-    /// expected standard deviation of each unknown (prior-scaled). Entries of readings
-    /// that are missing are 0.
+    /// Writes the observation for a reading's row at `share` of the episode, with the expected
+    /// standard deviation of each unknown (prior-scaled).
+    ///
+    /// Entries of missing readings are 0.
     pub fn observe(&self, reading: &[f64], share: f64, expected_std: &[f64], out: &mut [f64]) {
         debug_assert_eq!(reading.len(), self.width);
         let mut at = 0;

@@ -1,4 +1,4 @@
-//! Plans of open-loop actions, made when the episode begins.
+//! Open-loop plans, made when the episode begins.
 
 use asid_core::explore::{CurvePoint, Explored, Policy};
 use asid_core::task::ExplorationProtocol;
@@ -6,17 +6,17 @@ use asid_core::{Problem, Result};
 
 use crate::optimise::{Cem, CemSettings};
 
-/// How a plan is written as numbers to search for.
+/// How a plan is parameterised by the numbers to search for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OpenLoop {
-    /// Control steps that share an action: fewer numbers to search for.
+    /// Control steps that share an action; more of them leave fewer numbers to search for.
     pub hold: usize,
-    /// First deviation of an action, as a fraction of half its range.
+    /// Initial standard deviation of an action, as a fraction of half its range.
     pub std: f64,
 }
 
 impl OpenLoop {
-    /// The search over plans, each number within -1 and 1.
+    /// The search over plans, each number between -1 and 1.
     #[must_use]
     pub fn search(&self, protocol: &ExplorationProtocol, settings: CemSettings) -> Cem {
         let n = protocol.horizon.div_ceil(self.hold) * protocol.action.len();
@@ -29,7 +29,7 @@ impl OpenLoop {
         )
     }
 
-    /// Actions of all control steps of a candidate, in the task's units: `horizon x action`.
+    /// Actions of all control steps of a candidate, `horizon x action`, in the task's units.
     #[must_use]
     pub fn actions(&self, protocol: &ExplorationProtocol, candidate: &[f64]) -> Vec<f64> {
         let a = protocol.action.len();
@@ -46,15 +46,15 @@ impl OpenLoop {
 
 /// Finds a plan for a start pose.
 pub trait Planner: Sync {
-    /// The actions of an episode (`horizon x action`, in the task's units), and the mean
-    /// objective over the search.
+    /// Returns the actions of an episode (`horizon x action`, in the task's units) and the mean
+    /// objective over the course of the search.
     ///
     /// # Errors
     /// When the engine fails.
     fn plan(&self, problem: &Problem<'_>, start: &[f64]) -> Result<(Vec<f64>, Vec<CurvePoint>)>;
 }
 
-/// A plan made for the start pose of the episode, as its first reading shows it.
+/// A plan for the episode's start pose, as the first reading shows it.
 pub struct Planned<'a, P> {
     planner: &'a P,
     problem: &'a Problem<'a>,
@@ -64,7 +64,7 @@ pub struct Planned<'a, P> {
 }
 
 impl<'a, P: Planner> Planned<'a, P> {
-    /// The policy of a planner; it plans now where the start pose is known.
+    /// The policy of a planner. It plans at once if the start pose is known.
     ///
     /// # Errors
     /// When planning fails.

@@ -1,4 +1,4 @@
-//! Random actions: the explorer that knows nothing.
+//! Random actions: the baseline that uses no information.
 
 use asid_core::explore::{Explored, Explorer, Policy};
 use asid_core::registry;
@@ -9,7 +9,7 @@ use rand::Rng as _;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// It has nothing to set.
+/// The random explorer; it has no settings.
 #[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct RandomExplorer {}

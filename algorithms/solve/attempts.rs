@@ -1,4 +1,4 @@
-//! Attempts at a task in the simulator, over draws from a belief.
+//! Simulated attempts at a task, over draws from a belief.
 
 use asid_core::problem::Batch;
 use asid_core::rng::Rng;
@@ -7,32 +7,32 @@ use asid_readings::SignalSet;
 use rand::Rng as _;
 use rand_distr::{Distribution, StandardNormal};
 
-/// What attempts begin from: unknowns, start poses, and what the trackers show of these.
+/// What attempts start from: unknowns, start poses, and what the trackers show of the latter.
 #[derive(Clone, Debug, Default)]
 pub struct Situations {
-    /// `n x unknowns`.
+    /// Unknowns, `n x unknowns`.
     theta: Vec<f64>,
-    /// `n x coordinates`.
+    /// Start poses, `n x coordinates`.
     starts: Vec<f64>,
-    /// The start pose that a noisy reading shows, one a situation.
+    /// Start pose that a noisy reading shows, one per situation.
     pub believed: Vec<Vec<f64>>,
 }
 
 impl Situations {
-    /// How many they are.
+    /// Number of situations.
     #[must_use]
     pub fn len(&self) -> usize {
         self.believed.len()
     }
 
-    /// Whether there is none.
+    /// Whether there are no situations.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.believed.is_empty()
     }
 }
 
-/// Attempts in batches of a fixed largest size.
+/// Runs attempts in batches of at most a fixed size.
 pub struct Attempts<'a> {
     problem: &'a Problem<'a>,
     belief: Posterior,
@@ -44,7 +44,7 @@ pub struct Attempts<'a> {
 }
 
 impl<'a> Attempts<'a> {
-    /// Up to `size` attempts at once.
+    /// Prepares up to `size` simultaneous attempts.
     ///
     /// # Errors
     /// When the engine lacks a channel of the task or cannot set an unknown.
@@ -63,7 +63,8 @@ impl<'a> Attempts<'a> {
         })
     }
 
-    /// Draws `n` situations: unknowns from the belief, start poses from their range, and noise.
+    /// Draws `n` situations: unknowns from the belief, start poses from their range, and sensor
+    /// noise.
     ///
     /// # Errors
     /// When the engine fails.
@@ -101,10 +102,10 @@ impl<'a> Attempts<'a> {
         })
     }
 
-    /// Cost of attempts in all situations, with `actions[i]` in the `i`-th.
+    /// Cost of an attempt in each situation, with `actions[i]` in the `i`-th.
     ///
     /// # Errors
-    /// When the engine fails or the task cannot make commands of an action.
+    /// When the engine fails or the task cannot turn an action into commands.
     pub fn costs(&mut self, situations: &Situations, actions: &[&[f64]]) -> Result<Vec<f64>> {
         self.repeated(situations, 1, actions)
     }
@@ -130,7 +131,8 @@ impl<'a> Attempts<'a> {
             .collect())
     }
 
-    /// Attempts in the situations, `times` over: `actions` has one a situation each time.
+    /// Runs attempts in all situations `times` times; `actions` has one action per situation each
+    /// time.
     fn repeated(
         &mut self,
         situations: &Situations,

@@ -1,5 +1,7 @@
-//! The task action by the cross-entropy method: minimise the expected cost over
-//! samples of the belief. With the prior as the belief this is domain randomisation.
+//! Finds the task action by the cross-entropy method: it minimises the expected cost over samples
+//! of the belief.
+//!
+//! With the prior as the belief this is domain randomisation.
 
 use asid_core::registry;
 use asid_core::rng::Rng;
@@ -15,11 +17,11 @@ use crate::optimise::{Cem, CemSettings};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct CemSolver {
-    /// Refits of the distribution.
+    /// Refits of the search distribution.
     pub iterations: usize,
-    /// Actions a refit.
+    /// Actions per refit.
     pub population: usize,
-    /// Samples of the belief that each action is tried at.
+    /// Samples of the belief at which each action is tried.
     pub belief_samples: usize,
     /// Search distribution.
     pub cem: CemSettings,
@@ -84,13 +86,13 @@ impl TaskSolver for CemSolver {
         let std: Vec<f64> = protocol.action.iter().map(|c| c.std()).collect();
         let mut cem = Cem::new(self.cem.clone(), &center, &std, &low, &high);
         let mut trials: Vec<Trial> = Vec::new();
-        // The best actions so far stay among those that are refitted to: where most of the
-        // range fails, a lucky few must not be lost to the next refit.
+        // The best actions so far stay in the set that is refitted to: where most of the range
+        // fails, the few successful actions must survive the next refit.
         let mut pool: Vec<(Vec<f64>, f64)> = Vec::new();
         problem.progress.begin("solve", self.iterations as u64);
         for iteration in 0..self.iterations {
             let actions = cem.ask(self.population, &mut rng);
-            // Fresh for each refit, the same for all its actions.
+            // New draws for each refit, the same for all its actions.
             let situations = attempts.draw(samples, &mut rng)?;
             let costs = attempts.mean_costs(&situations, &actions)?;
             pool.extend(actions.iter().cloned().zip(costs.iter().copied()));
@@ -115,14 +117,15 @@ impl TaskSolver for CemSolver {
     }
 }
 
-/// Actions within this share of the spread between best and median cost count as equally good.
+/// Share of the spread between best and median cost within which actions count as equally good.
 const TIE: f64 = 0.02;
 
-/// The middle of the best actions: where a whole stretch of actions does equally well, its
-/// middle is the safest. Should that middle do worse than the best of them, that one it is.
+/// The midpoint of the best actions, or the best of them if the midpoint does worse.
 ///
-/// Each refit has situations of its own, and the best cost over many refits is partly luck. The better half of the finalists
-/// therefore meet once more at common situations, twice as many, and only what they cost there counts.
+/// Where a whole interval of actions does equally well, its middle is the safest. Each refit has
+/// its own situations, so the best cost over many refits is partly luck. The better half of the
+/// finalists is therefore compared again at common situations, twice as many; only these costs
+/// count.
 fn settled(
     mut finalists: Vec<Vec<f64>>,
     attempts: &mut Attempts<'_>,
@@ -148,7 +151,7 @@ fn settled(
     let ties = || order.iter().take_while(|(cost, _)| *cost <= limit);
     let middle: Vec<f64> = (0..best.len())
         .map(|i| {
-            // Half way between the ends, however the draws are spread between them.
+            // Half way between the ends, however the draws are distributed between them.
             let values = ties().map(|(_, action)| action[i]);
             let low = values.clone().fold(f64::INFINITY, f64::min);
             let high = values.fold(f64::NEG_INFINITY, f64::max);

@@ -1,4 +1,4 @@
-//! Solving a task for a belief over its unknowns.
+//! Solves a task for a belief over its unknowns.
 
 pub mod attempts;
 pub mod cem;
