@@ -1,4 +1,5 @@
-//! The bench on which explanations are tried: the machine, the logs, their noise, and the starts of the episodes.
+//! The bench on which explanations are tried: the machine, the logs, their noise, and the initial
+//! states of the episodes.
 
 pub mod held_out;
 
@@ -14,39 +15,40 @@ use crate::machine::Machine;
 use crate::predict::{Point, Predictor, State};
 use crate::record::Record;
 
-/// Points that one batch takes.
+/// Number of points that one batch takes.
 pub const CAPACITY: usize = 8;
 
-/// A set of effects with its parameters fitted.
+/// A set of effects, with all parameters fitted.
 #[derive(Clone, Debug)]
 pub struct Explanation {
     /// Effects at their sites, with the values of all their parameters.
     pub effects: Vec<EffectSpec>,
-    /// Which of them are what an ordinary machine has, and not named.
+    /// Which of the effects are ordinary tolerances, which are never named.
     pub is_tolerance: Vec<bool>,
-    /// The study's parameters, then those of the effects.
+    /// The study's parameters, followed by those of the effects.
     pub unknowns: Vec<Unknown>,
     /// The fit to the training logs.
     pub fit: Fit,
-    /// Sum of squares of the residuals of the logs held out.
+    /// Sum of squared residuals of the held-out logs.
     pub held_out: f64,
-    /// Starts of the held-out episodes under it.
+    /// Initial states of the held-out episodes under this explanation.
     pub held_starts: Vec<State>,
-    /// The unknowns by a fit that allows for a missing force; none where they were not fitted so.
+    /// Each unknown as estimated by a fit that allows for a missing force; `None` where there is
+    /// none.
     pub local: Vec<Option<Local>>,
 }
 
-/// A value by a fit that allows for a missing force.
+/// A value as estimated by a fit that allows for a missing force.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Local {
-    /// Mean of its posterior, in its unit.
+    /// Mean of the posterior, in the value's unit.
     pub mean: f64,
-    /// Variance of its posterior, in the square of its unit.
+    /// Variance of the posterior, in the square of the value's unit.
     pub variance: f64,
 }
 
 impl Explanation {
-    /// Labels of the effects that it names, sorted; empty for none.
+    /// Returns the labels of the effects that the explanation names, sorted; empty for none.
     #[must_use]
     pub fn labels(&self) -> Vec<String> {
         let all = self.effects.iter().zip(&self.is_tolerance);
@@ -56,7 +58,7 @@ impl Explanation {
         labels
     }
 
-    /// Parameters, in the order of the fit's point.
+    /// Returns the parameters, in the order of the fit's point.
     #[must_use]
     pub fn parameters(&self) -> Vec<Parameter> {
         self.unknowns.iter().map(|u| u.parameter.clone()).collect()
@@ -67,24 +69,27 @@ impl Explanation {
 pub struct Bench {
     /// The machine.
     pub machine: Machine,
-    /// Logs to fit to.
+    /// Logs that models are fitted to.
     pub train: Record,
-    /// Logs held out.
+    /// Held-out logs.
     pub test: Record,
     /// The study's parameters.
     pub parameters: Vec<Parameter>,
-    /// Coordinates of the starts that the logs do not give.
+    /// Coordinates of the initial states that the logs do not give.
     pub open: Open,
-    /// How far each of these may lie from where it is first put, m or rad or per second (`starts::reach`).
+    /// How far each of these may lie from its first guess, m or rad or per second
+    /// (`starts::reach`).
     pub reach: Vec<f64>,
-    /// The first tenth of the logs held out, on which open starts are fitted.
+    /// The first tenth of the held-out logs, on which unknown initial states are fitted.
     pub head: Record,
 }
 
 /// An effect to be tried: a candidate, and values to start from.
 pub type Trial<'a> = (&'a Candidate, Vec<f64>);
 
-/// A parameter of an effect whose range has a value in it, and as much beyond: steps of its slopes are shares of the range.
+/// Widens the range of an effect's parameter so that it contains a value, to twice that value.
+///
+/// The steps of its finite differences are shares of the range.
 fn around(mut parameter: Parameter, value: f64) -> Parameter {
     let [low, high] = &mut parameter.range;
     if value < *low {
@@ -96,20 +101,20 @@ fn around(mut parameter: Parameter, value: f64) -> Parameter {
     parameter
 }
 
-/// The effects of trials at their sites.
+/// Returns the effects of trials at their sites.
 #[must_use]
 pub fn specs(trials: &[Trial<'_>]) -> Vec<EffectSpec> {
     trials.iter().map(|(c, _)| c.spec.clone()).collect()
 }
 
 impl Bench {
-    /// Names and places.
+    /// Returns the layout of the machine: names and places.
     #[must_use]
     pub fn layout(&self) -> &Layout {
         &self.machine.plant.layout
     }
 
-    /// The study's parameters, then those of the effects.
+    /// Returns the study's parameters, followed by those of the effects.
     #[must_use]
     pub fn unknowns(&self, trials: &[Trial<'_>]) -> Vec<Unknown> {
         let mut all: Vec<Unknown> = self.parameters.iter().cloned().map(Unknown::free).collect();
@@ -123,14 +128,14 @@ impl Bench {
         all
     }
 
-    /// Parameters in the order of [`Bench::unknowns`].
+    /// Returns the parameters in the order of [`Bench::unknowns`].
     #[must_use]
     pub fn all_parameters(&self, trials: &[Trial<'_>]) -> Vec<Parameter> {
         let unknowns = self.unknowns(trials).into_iter();
         unknowns.map(|u| u.parameter).collect()
     }
 
-    /// A predictor of some logs in the model with some effects.
+    /// Returns a predictor of some logs for the model with some effects.
     ///
     /// # Errors
     /// When the engine refuses an effect or a parameter.
@@ -141,7 +146,8 @@ impl Bench {
         Predictor::new(&*model, &parameters, &record.logs, CAPACITY, threads)
     }
 
-    /// Fits the study's parameters and some effects' to the training logs, and looks at the logs held out.
+    /// Fits the parameters of the study and of some effects to the training logs, and replays the
+    /// held-out logs.
     ///
     /// # Errors
     /// As [`Bench::predictor`], and when a rollout fails.
@@ -188,7 +194,7 @@ impl Bench {
         }
     }
 
-    /// Sets how many readings in a row the noise of each sensor is alike in, in all records.
+    /// Sets over how many successive readings the noise of each sensor is alike, in all records.
     pub fn set_alike(&mut self, alike: &[f64]) {
         for record in [&mut self.train, &mut self.test, &mut self.head] {
             for (sensor, &alike) in record.logs.sensors.iter_mut().zip(alike) {
@@ -197,8 +203,10 @@ impl Bench {
         }
     }
 
-    /// Replays the logs held out at an explanation's parameters and sets what it leaves of them;
-    /// where starts are open they are fitted on the first tenth, which then does not count.
+    /// Replays the held-out logs at an explanation's parameters and stores the sum of squared
+    /// residuals.
+    ///
+    /// Unknown initial states are fitted on the first tenth, which then does not count.
     ///
     /// # Errors
     /// When a rollout fails.
@@ -214,7 +222,10 @@ impl Bench {
         Ok(())
     }
 
-    /// What an explanation leaves of the logs held out, from where they were fitted to begin, by the noise as it is now.
+    /// Recomputes an explanation's sum of squared residuals of the held-out logs with the present
+    /// noise.
+    ///
+    /// The initial states stay as fitted.
     ///
     /// # Errors
     /// When a rollout fails.
@@ -227,7 +238,8 @@ impl Bench {
         Ok(())
     }
 
-    /// Residuals of the logs held out, of which the first tenth is zero where starts were fitted to it.
+    /// Returns the residuals of the held-out logs; the first tenth is zero where initial states
+    /// were fitted to it.
     fn residuals_held_out(&self, trials: &[Trial<'_>], point: &Point) -> Result<Vec<f64>> {
         let mut predictor = self.predictor(trials, &self.test)?;
         let residuals = predictor.residuals(std::slice::from_ref(point))?.pop();
@@ -236,8 +248,10 @@ impl Bench {
         Ok(residuals)
     }
 
-    /// Replays the logs held out at some values: the point with the [own values](Bench::head_point) of these logs, `from` some starts on, and
-    /// the residuals, of which the first tenth is zero where starts were fitted to it.
+    /// Replays the held-out logs at some values, with fits of initial states beginning at `from`.
+    ///
+    /// Returns the point, with the [own values](Bench::head_point) of these logs, and the
+    /// residuals. The first tenth of the residuals is zero where initial states were fitted to it.
     ///
     /// # Errors
     /// When a rollout fails.
@@ -252,8 +266,10 @@ impl Bench {
         Ok((point, residuals))
     }
 
-    /// What is of the held-out episodes alone, fitted on their first tenth: their starts where these are open, and those values of effects that
-    /// are of one of these episodes.
+    /// Fits what belongs to the held-out episodes alone on their first tenth.
+    ///
+    /// These are the initial states, where they are unknown, and the values of effects that hold in
+    /// one of these episodes only.
     ///
     /// # Errors
     /// When a rollout fails.
@@ -280,14 +296,14 @@ impl Bench {
         Ok(fit.point)
     }
 
-    /// Whether each parameter of a candidate is the value of an episode held out.
+    /// Whether each parameter of a candidate is a value of a held-out episode alone.
     fn of_held_out(&self, candidate: &Candidate) -> Vec<bool> {
         let held = |number| self.test.logs.episodes.iter().any(|e| e.number == number);
         let parameters = candidate.parameters().iter();
         parameters.map(|p| p.episode.is_some_and(held)).collect()
     }
 
-    /// Takes the first tenth of the held-out episodes out of their residuals, where starts
+    /// Sets the residuals of the first tenth of the held-out episodes to zero, where initial states
     /// were fitted on it.
     pub fn mask_head(&self, residuals: &mut [f64]) {
         if self.open.is_empty() {
@@ -301,7 +317,7 @@ impl Bench {
         }
     }
 
-    /// Readings of the held-out logs that count.
+    /// Returns the number of readings of the held-out logs that count.
     #[must_use]
     pub fn held_readings(&self) -> f64 {
         if self.open.is_empty() {

@@ -7,11 +7,11 @@ use asid_core::{Episode, Result};
 use asid_readings::SignalSet;
 use asid_readings::replay::ReplayPlan;
 
-/// One compared number of a row: a component of a sensor, or of a rotation.
+/// One compared number of a row: a component of a sensor's reading, or of a rotation vector.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Entry {
-    /// Name, `sensor` or `sensor.i`; for an orientation `i` counts the axes of the rotation
-    /// vector between two readings.
+    /// Name, `sensor` or `sensor.i`. For an orientation `i` is an axis of the rotation vector
+    /// between two readings.
     pub label: String,
     /// Index of its sensor in [`Logs::sensors`].
     pub sensor: usize,
@@ -19,7 +19,7 @@ pub struct Entry {
     pub component: usize,
 }
 
-/// A sensor that is in the logs.
+/// A sensor whose readings the logs contain.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LoggedSensor {
     /// Name in the scene.
@@ -28,40 +28,42 @@ pub struct LoggedSensor {
     pub unit: String,
     /// Standard deviation of its noise, in its unit (rad for an orientation).
     pub noise: f64,
-    /// Readings in a row that its noise is alike in, by which slow changes are told that much less; 1 for white noise.
+    /// Number of successive readings over which the noise is alike; 1 for white noise.
+    ///
+    /// The readings carry that much less information on slow changes.
     pub alike: f64,
-    /// True for an orientation.
+    /// Whether it reads an orientation.
     pub rotation: bool,
 }
 
-/// One log, prepared.
+/// One log, prepared for comparison.
 #[derive(Clone, Debug)]
 pub struct LoggedEpisode {
     /// File name, for messages and tables.
     pub name: String,
-    /// Its number among all logs of the study, those to fit to before those held out, from 0.
+    /// Number among all logs of the study, from 0: training logs first, then held-out logs.
     pub number: usize,
     /// The log.
     pub episode: Episode,
-    /// Readings of the compared sensors, `rows x width`, NaN where missing.
+    /// Readings of the compared sensors, `rows x width`; NaN where missing.
     pub readings: Vec<f64>,
-    /// How it is replayed.
+    /// Plan of its replay.
     pub plan: ReplayPlan,
 }
 
 /// Some logs of one machine.
 #[derive(Clone, Debug)]
 pub struct Logs {
-    /// Sensors that any of the logs has, in the scene's order.
+    /// Sensors that at least one of the logs has, in the scene's order.
     pub sensors: Vec<LoggedSensor>,
-    /// What is compared in a row.
+    /// The numbers that are compared in each row.
     pub entries: Vec<Entry>,
     /// The episodes.
     pub episodes: Vec<LoggedEpisode>,
     differences: SignalSet,
 }
 
-/// Unit of a sensor of this kind on this machine.
+/// Returns the unit of a sensor of this machine.
 fn unit_of(plant: &asid_mjcf::Plant, sensor: usize) -> String {
     use asid_core::layout::JointKind;
     use asid_mjcf::plant::Reads;
@@ -79,7 +81,7 @@ fn unit_of(plant: &asid_mjcf::Plant, sensor: usize) -> String {
 }
 
 impl Logs {
-    /// Prepares logs; `sensors` are those compared, by name.
+    /// Prepares logs for a comparison of the named `sensors`.
     ///
     /// # Errors
     /// When the scene has no such sensor.
@@ -139,7 +141,7 @@ impl Logs {
         })
     }
 
-    /// The same logs, counted from a number on.
+    /// Numbers the logs from `first` on.
     #[must_use]
     pub fn counted_from(mut self, first: usize) -> Self {
         for (i, e) in self.episodes.iter_mut().enumerate() {
@@ -148,46 +150,48 @@ impl Logs {
         self
     }
 
-    /// Duration of the longest, s.
+    /// Returns the duration of the longest log, s.
     #[must_use]
     pub fn longest(&self) -> f64 {
         let last = |e: &LoggedEpisode| e.episode.time[e.plan.rows() - 1] - e.episode.time[0];
         self.episodes.iter().map(last).fold(0.0, f64::max)
     }
 
-    /// Entries of a row of readings.
+    /// Returns the width of a row of readings.
     #[must_use]
     pub fn width(&self) -> usize {
         self.differences.width()
     }
 
-    /// Names of the sensors, as a recording asks for them.
+    /// Returns the names of the sensors, as channels of a recording.
     #[must_use]
     pub fn channels(&self) -> Vec<String> {
         self.sensors.iter().map(|s| s.name.clone()).collect()
     }
 
-    /// Where the residuals of episode `i` begin in a residual vector.
+    /// Returns where the residuals of episode `i` begin in a residual vector.
     #[must_use]
     pub fn offset(&self, i: usize) -> usize {
         let before = self.episodes[..i].iter();
         before.map(|e| e.plan.rows()).sum::<usize>() * self.entries.len()
     }
 
-    /// Length of a residual vector.
+    /// Returns the length of a residual vector.
     #[must_use]
     pub fn len(&self) -> usize {
         self.offset(self.episodes.len())
     }
 
-    /// True where there are no logs.
+    /// Whether there are no logs.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.episodes.is_empty()
     }
 
-    /// Differences `logged - predicted` of one episode in the sensors' units (`rows x
-    /// entries`), NaN where a reading is missing; `predicted` is `rows x width`.
+    /// Computes the differences `logged - predicted` of one episode in the sensors' units (`rows x
+    /// entries`).
+    ///
+    /// They are NaN where a reading is missing; `predicted` is `rows x width`.
     pub fn difference(&self, episode: usize, predicted: &[f64], out: &mut [f64]) {
         let (w, n) = (self.width(), self.entries.len());
         let e = &self.episodes[episode];
@@ -200,14 +204,14 @@ impl Logs {
         }
     }
 
-    /// Difference `a - b` of two rows of readings (`width` each) in the sensors' units, one number an
-    /// entry; NaN where either is missing.
+    /// Computes the difference `a - b` of two rows of readings (`width` each) in the sensors'
+    /// units, one number per entry; NaN where either is missing.
     pub fn reading_difference(&self, a: &[f64], b: &[f64], out: &mut [f64]) {
         self.differences.difference(a, b, out);
     }
 
-    /// Speed of change at each row of predicted readings (`rows x width`) of one episode, in the
-    /// sensors' units per second (`rows x entries`).
+    /// Returns the rate of change of one episode's predicted readings (`rows x width`) at each row,
+    /// in the sensors' units per second (`rows x entries`).
     #[must_use]
     pub fn speeds(&self, episode: usize, predicted: &[f64]) -> Vec<f64> {
         let (w, n) = (self.width(), self.entries.len());
@@ -223,7 +227,7 @@ impl Logs {
         out
     }
 
-    /// Whether each entry of a residual vector has a reading behind it.
+    /// Whether each entry of a residual vector has a reading.
     #[must_use]
     pub fn present(&self) -> Vec<bool> {
         let mut present = vec![false; self.len()];
@@ -246,14 +250,14 @@ impl Logs {
         }
     }
 
-    /// Readings in a row that the noise of each entry is alike in.
+    /// Returns, for each entry, over how many successive readings its noise is alike.
     #[must_use]
     pub fn entry_alike(&self) -> Vec<f64> {
         let alike = |e: &Entry| self.sensors[e.sensor].alike;
         self.entries.iter().map(alike).collect()
     }
 
-    /// Noise of each entry.
+    /// Returns the standard deviation of the noise of each entry.
     #[must_use]
     pub fn entry_noise(&self) -> Vec<f64> {
         let noise = |e: &Entry| self.sensors[e.sensor].noise;
@@ -268,7 +272,7 @@ pub(crate) mod tests {
 
     use super::*;
 
-    /// Readings of a slide at 0, 0.1, … s.
+    /// Makes a log of a slide's positions at 0, 0.1, … s.
     pub(crate) fn log(name: &str, readings: &[f64]) -> (String, Episode) {
         let rows: Vec<String> = readings
             .iter()
@@ -284,7 +288,7 @@ pub(crate) mod tests {
         )
     }
 
-    /// A machine of one slide.
+    /// Makes a machine with one slide.
     pub(crate) fn plant() -> Plant {
         let scene = r#"<mujoco><worldbody><body name="b">
             <joint name="slide" type="slide"/><geom size="0.1" mass="1"/></body></worldbody>
@@ -297,7 +301,7 @@ pub(crate) mod tests {
         let reading = |k: i32| 0.5 * f64::from(k).powi(2);
         let readings: Vec<f64> = (0..5).map(reading).collect();
         let logs = Logs::new(&plant, &["place".to_owned()], vec![log("a", &readings)]).unwrap();
-        // k a row of 0.1 s in the middle, half a row less at the ends.
+        // The change is k per row of 0.1 s in the middle; half a row less at the ends.
         let speeds = logs.speeds(0, &readings);
         for (speed, k) in speeds.iter().zip([0.5, 1.0, 2.0, 3.0, 3.5]) {
             assert!((speed - 10.0 * k).abs() < 1e-9, "{speeds:?}");

@@ -1,7 +1,7 @@
-//! Least squares over open-loop rollouts: Levenberg and Marquardt's method, within bounds,
-//! with the episodes' starts as nuisance parameters of their own.
+//! Bounded least squares over open-loop rollouts (Levenberg-Marquardt); the episodes' initial
+//! states are nuisance parameters.
 //!
-//! Derivatives are differences of rollouts ([`crate::linearise`]), and all trial steps with several
+//! Derivatives are finite differences of rollouts ([`crate::linearise`]). Trial steps with several
 //! dampings are one batch.
 
 mod region;
@@ -20,32 +20,32 @@ use crate::predict::{Point, Predictor};
 pub use region::Region;
 use steps::Steps;
 
-/// How long and how finely to search.
+/// How long and how finely a fit searches.
 #[derive(Clone, Copy, Debug)]
 pub struct Effort {
-    /// Most iterations.
+    /// Maximum number of iterations.
     pub iterations: usize,
-    /// Share of the cost below which a step counts as none.
+    /// Relative change of the cost below which a step counts as no progress.
     pub tolerance: f64,
-    /// Whether derivatives in the starts are taken once and kept to the end: over a short window they hardly
-    /// change.
+    /// Whether derivatives with respect to the initial states are computed once and kept to the
+    /// end: over a short window they hardly change.
     pub chord: bool,
 }
 
 impl Effort {
-    /// Where it stands, with its slopes.
+    /// No iteration: cost and derivatives at the given point.
     pub const LOOK: Self = Self {
         iterations: 0,
         tolerance: 1e-3,
         chord: false,
     };
-    /// Starts on the first part of an episode, where slopes hardly change.
+    /// Fit of initial states on the first part of an episode, where derivatives hardly change.
     pub const START: Self = Self {
         iterations: 6,
         tolerance: 1e-3,
         chord: true,
     };
-    /// A quick look.
+    /// A short fit.
     pub const BRIEF: Self = Self {
         iterations: 6,
         tolerance: 1e-3,
@@ -53,30 +53,34 @@ impl Effort {
     };
 }
 
-/// What a fit found.
+/// Result of a fit.
 #[derive(Clone, Debug)]
 pub struct Fit {
     /// The best point.
     pub point: Point,
-    /// Sum of squared residuals there.
+    /// Sum of squared residuals at the best point.
     pub cost: f64,
-    /// Residuals there.
+    /// Residuals at the best point.
     pub residuals: Vec<f64>,
-    /// Length of the derivatives of the prediction in each free parameter at the last linearisation, per unit of it.
+    /// Norm of the Jacobian column of each free parameter at the last linearisation, per unit of
+    /// the parameter.
     pub shows: Vec<f64>,
-    /// How far each free parameter moves by a unit of each residual, with the starts refitted, `free x residuals`, in its unit.
+    /// Change of each free parameter per unit of each residual with the initial states refitted,
+    /// `free x residuals`, in the parameter's unit.
     pub gains: DMatrix<f64>,
-    /// Covariance of the free parameters for residuals of unit variance, in their units.
+    /// Covariance of the free parameters for residuals of unit variance, in the parameters' units.
     pub covariance: DMatrix<f64>,
     /// Indices of the free parameters.
     pub free: Vec<usize>,
-    /// Derivatives in the starts at the last linearisation.
+    /// Derivatives with respect to the initial states at the last linearisation.
     pub starts: Arc<StartSlopes>,
 }
 
 impl Fit {
-    /// How far a fit to residuals that are changed so moves each free parameter, to first order, in its unit. Residuals that are not
-    /// numbers, as after a replay diverged, do not count.
+    /// Returns how far each free parameter moves, to first order, if the residuals change by
+    /// `change`; in the parameter's unit.
+    ///
+    /// Entries that are not finite, as after a replay diverged, do not count.
     #[must_use]
     pub fn answer(&self, change: &[f64]) -> Vec<f64> {
         let product = |row: usize| {
@@ -88,13 +92,13 @@ impl Fit {
     }
 }
 
-/// Sum of squares.
+/// Returns the sum of squares.
 #[must_use]
 pub fn cost(residuals: &[f64]) -> f64 {
     residuals.iter().map(|r| r * r).sum()
 }
 
-/// Places of the episodes in a residual vector.
+/// Returns the range of each episode in a residual vector.
 #[must_use]
 pub fn bounds(predictor: &Predictor<'_>) -> Vec<std::ops::Range<usize>> {
     let logs = predictor.logs();
@@ -103,31 +107,36 @@ pub fn bounds(predictor: &Predictor<'_>) -> Vec<std::ops::Range<usize>> {
         .collect()
 }
 
-/// Derivatives in the starts, which fits of like models share.
+/// Derivatives with respect to the initial states, which fits of similar models share.
 #[derive(Clone, Debug, Default)]
 pub struct StartSlopes {
-    /// Differences that they were taken over, one an open coordinate, m or rad or per second.
+    /// Steps of their finite differences, one per open coordinate, m or rad or per second.
     pub steps: Vec<f64>,
-    /// One column an open coordinate: of every episode at once. Empty where only the differences are shared.
+    /// One column per open coordinate, for all episodes at once; empty where only the steps are
+    /// shared.
     pub columns: Vec<Vec<f64>>,
 }
 
-/// What a fit begins with.
+/// Where a fit begins, and within which limits.
 pub struct Begin<'b> {
-    /// Values and starts.
+    /// Values and initial states.
     pub point: Point,
-    /// Coordinates of the starts that are fitted with the values.
+    /// Coordinates of the initial states that are fitted together with the values.
     pub open: &'b Open,
-    /// How far each of these may lie from where it begins (`starts::reach`).
+    /// How far each of these may lie from its first guess (`starts::reach`).
     pub reach: &'b [f64],
-    /// Derivatives in the starts of a model that is like this one: they do for a look, and a fit begins with their differences.
+    /// Derivatives with respect to the initial states, from a similar model.
+    ///
+    /// They replace the first linearisation's own if no iteration follows. Otherwise only the steps
+    /// of their differences are used.
     pub like: Option<&'b StartSlopes>,
-    /// Where the values stay.
+    /// Region that the values may not leave.
     pub region: Option<&'b Region>,
 }
 
 impl<'b> Begin<'b> {
-    /// From some values and starts on, of which some coordinates are open as far as they reach.
+    /// Begins at some values and initial states, whose open coordinates are fitted within their
+    /// reach.
     #[must_use]
     pub fn at(point: Point, (open, reach): (&'b Open, &'b [f64])) -> Self {
         Self {
@@ -140,8 +149,11 @@ impl<'b> Begin<'b> {
     }
 }
 
-/// Fits the unknowns and the starts' open coordinates, as far as it comes until work is stopped. Derivatives in the
-/// starts are kept while steps win, for they cost a replay each and change little (a chord method).
+/// Fits the unknowns and the open coordinates of the initial states until they converge or the work
+/// is stopped.
+///
+/// Derivatives with respect to the initial states are kept while steps succeed: each costs a
+/// replay, and they change little (a chord method).
 ///
 /// # Errors
 /// As [`Predictor::residuals`].
@@ -181,7 +193,7 @@ pub fn fit(
     };
     let mut line = work.first(&point, nearby.as_ref(), progress)?;
     let (mut best, mut damping) = (cost(&line.residuals), 1e-3);
-    // Whether derivatives in the starts are those of another point.
+    // Whether the derivatives with respect to the initial states belong to an earlier point.
     let mut stale = false;
     for _ in 0..effort.iterations {
         if progress.is_stopped() || work.free.is_empty() && open.is_empty() {
@@ -217,7 +229,7 @@ fn finish(work: Steps<'_, '_>, point: Point, line: Linearisation) -> Fit {
     let normal = Normal::new(&line, &work.bounds, 0.0, work.reach);
     let p = free.len();
     let inverse = inverse(&normal.information, 1e-14);
-    // From shares of the range to the parameter's unit.
+    // Converts shares of the range to the parameter's unit.
     let scale: Vec<f64> = free
         .iter()
         .map(|&i| slope(&unknowns[i].parameter, point.theta[i]))

@@ -1,7 +1,11 @@
-//! Derivatives of predictions: differences of rollouts, all columns of a Jacobian in one batch. A start acts on
-//! its own episode only, so that one rollout of all episodes moves all of them at once.
+//! Derivatives of predictions: finite differences of rollouts, with all columns of a Jacobian in
+//! one batch.
 //!
-//! A difference aims at a response that is seen and small: it adapts from one linearisation to the next.
+//! An initial state acts on its own episode alone. One rollout of all episodes therefore perturbs
+//! all of them at once.
+//!
+//! The step of a difference adapts from one linearisation to the next, so that the response is
+//! visible and small.
 
 use asid_core::layout::Layout;
 use asid_core::parameter::Scale;
@@ -9,28 +13,30 @@ use asid_core::{Parameter, Result};
 
 use crate::predict::{Point, Predictor};
 
-/// Response of the residuals, root mean square, that a difference aims at.
+/// Root mean square response of the residuals that the step of a difference aims at: visible, and
+/// small against the noise.
 const AIM: f64 = 0.3;
-/// Response to the whole range, root mean square in units of the noise, below which a
-/// parameter does nothing here, and is left where it is.
+/// Root mean square response to the whole range, in units of the noise, below which a parameter has
+/// no effect here and is held.
 pub const NOTHING: f64 = 0.05;
-/// Smallest and largest difference, as a share of the range.
+/// Smallest and largest step of a difference, as a share of the range.
 const STEPS: [f64; 2] = [1e-8, 0.02];
 
-/// Factor to the difference that its response asks for from which on a column is taken anew: within it the response is small and is seen.
+/// Ratio of the step to the one that the response asks for, from which on a column is computed
+/// again: below it the response is small and visible.
 const SETTLED: f64 = 4.0;
 
-/// A value to fit.
+/// A value to be fitted.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Unknown {
     /// The parameter: name, range, scale.
     pub parameter: Parameter,
-    /// Whether it may move; one that may not keeps its start value.
+    /// Whether it may move; otherwise it keeps its initial value.
     pub free: bool,
 }
 
 impl Unknown {
-    /// A parameter that may move.
+    /// Makes a parameter that may move.
     #[must_use]
     pub fn free(parameter: Parameter) -> Self {
         Self {
@@ -40,17 +46,17 @@ impl Unknown {
     }
 }
 
-/// Differences to take derivatives with; they adapt.
+/// Steps of the finite differences, which adapt to the responses.
 #[derive(Clone, Debug)]
 pub struct Differences {
-    /// Of each parameter, as a share of its range.
+    /// Step of each parameter, as a share of its range.
     pub shares: Vec<f64>,
-    /// Of each open coordinate of the starts, m or rad or per second.
+    /// Step of each open coordinate of the initial states, m or rad or per second.
     pub starts: Vec<f64>,
 }
 
 impl Differences {
-    /// A first guess for `n` parameters and `open` coordinates of the starts.
+    /// First guess for `n` parameters and `open` coordinates of the initial states.
     #[must_use]
     pub fn new(n: usize, open: usize) -> Self {
         Self {
@@ -59,8 +65,10 @@ impl Differences {
         }
     }
 
-    /// Which columns were taken over differences other than these by so much that they are to be taken anew: first those of the
-    /// `free` parameters, then those of the starts.
+    /// Returns which columns to compute again because their steps differ too much from the present
+    /// ones.
+    ///
+    /// Columns of the `free` parameters come first, then those of the initial states.
     #[must_use]
     pub fn due_since(&self, before: &Self, free: &[usize]) -> Vec<bool> {
         let is_off = |a: f64, b: f64| (a / b).max(b / a) >= SETTLED;
@@ -74,8 +82,9 @@ impl Differences {
     }
 }
 
-/// Value moved by a share of the range, to whichever side there is room; and the share
-/// that it was really moved by.
+/// Moves a value by a share of its range, to the side where there is room.
+///
+/// Returns the new value and the share by which it actually moved.
 fn nudged(parameter: &Parameter, value: f64, share: f64) -> (f64, f64) {
     let u = parameter.to_unit(value).clamp(0.0, 1.0);
     let to = if (0.0..=1.0).contains(&(u + share)) {
@@ -86,33 +95,35 @@ fn nudged(parameter: &Parameter, value: f64, share: f64) -> (f64, f64) {
     (parameter.from_unit(to), to - u)
 }
 
-/// Derivatives of the prediction at a point, in units of each parameter's range:
-/// residuals there and the columns, first the free parameters, then the coordinates of
-/// the starts.
+/// Residuals and derivatives of the prediction at a point, per unit range of each parameter.
+///
+/// Columns of the free parameters come first, then those of the coordinates of the initial states.
 #[derive(Clone, Debug, Default)]
 pub struct Linearisation {
     /// Residuals at the point.
     pub residuals: Vec<f64>,
-    /// One column a free parameter.
+    /// One column per free parameter.
     pub columns: Vec<Vec<f64>>,
-    /// One column an open coordinate: of every episode at once.
+    /// One column per open coordinate, for all episodes at once.
     pub start_columns: Vec<Vec<f64>>,
 }
 
-/// Coordinates of the starts that are not known: the same for all episodes of a set.
+/// Unknown coordinates of the initial states, the same for all episodes of a set.
 pub type Open = Vec<usize>;
 
-/// First difference of a start's coordinates, m or rad or per second.
+/// First step of an initial state's coordinates, m or rad or per second.
 const START_STEP: f64 = 1e-5;
-/// Smallest and largest difference of a start's coordinates, m or rad or per second.
+/// Smallest and largest step of an initial state's coordinates, m or rad or per second.
 const START_STEPS: [f64; 2] = [1e-6, 1e-2];
 
-/// Columns that are taken anew, free parameters first, then coordinates of the starts; the others are those of a linearisation nearby.
+/// Which columns are computed again; the others are taken from a nearby linearisation.
+///
+/// Free parameters come first, then coordinates of the initial states.
 #[derive(Clone, Copy)]
 pub struct Anew<'l> {
-    /// One flag a column.
+    /// One flag per column.
     pub due: &'l [bool],
-    /// Where the other columns are from.
+    /// Source of the other columns.
     pub nearby: &'l Linearisation,
 }
 
@@ -138,7 +149,8 @@ pub fn linearise(
     )
 }
 
-/// The same, with some columns taken `anew` alone; all where it says none.
+/// Linearises the predictions, computing only the columns that `anew` marks as due; all columns if
+/// it is `None`.
 ///
 /// # Errors
 /// As [`Predictor::residuals`].
@@ -218,7 +230,7 @@ pub fn linearise_anew(
     })
 }
 
-/// Factor by which a difference is changed, by its response.
+/// Returns the factor that brings the step of a difference towards the aimed response.
 fn towards_aim(response: f64) -> f64 {
     if response > 0.0 {
         (AIM / response).clamp(1e-3, 1e3)
@@ -227,7 +239,7 @@ fn towards_aim(response: f64) -> f64 {
     }
 }
 
-/// Change of the value per share of the range.
+/// Returns the change of the value per share of the range.
 #[must_use]
 pub fn slope(parameter: &Parameter, value: f64) -> f64 {
     let [low, high] = parameter.range;
