@@ -1,9 +1,10 @@
-//! Episodes with their Fisher information: a batch in which every episode has
-//! copies with one entry (an unknown, or a coordinate of the start pose) a little
-//! up and a little down.
+//! Episodes with their Fisher information.
 //!
-//! [`Form`] says from which state the copies start a control step. [`Sensitivity`] makes
-//! derivatives of what they read, and [`Information`] adds these up and rewards them.
+//! In a batch every episode has two copies for each entry (an unknown, or a coordinate of the start
+//! pose): one with the entry slightly increased, one with it slightly decreased.
+//!
+//! [`Form`] says from which state the copies start a control step. [`Sensitivity`] computes
+//! derivatives from their readings. [`Information`] sums these up and computes the rewards.
 
 use super::sensitivity::Sensitivity;
 use super::settings::{FisherSettings, Form};
@@ -20,7 +21,7 @@ use asid_readings::SignalSet;
 /// Step of the start pose in finite differences, in standard deviations of its range.
 const START_DELTA: f64 = 0.02;
 
-/// A batch of episodes with their information.
+/// A batch of episodes with their Fisher information.
 pub struct FisherBatch<'a> {
     problem: &'a Problem<'a>,
     settings: FisherSettings,
@@ -35,7 +36,7 @@ pub struct FisherBatch<'a> {
     read: ReadingFrames,
     /// Control steps taken.
     at: usize,
-    /// Step really taken by each copy pair, prior-scaled: `episodes x entries`.
+    /// Step actually taken by each pair of copies, prior-scaled: `episodes x entries`.
     steps: Vec<f64>,
     information: Vec<Information>,
     ctrl: Vec<f64>,
@@ -46,7 +47,7 @@ pub struct FisherBatch<'a> {
 }
 
 impl<'a> FisherBatch<'a> {
-    /// `episodes` episodes at once.
+    /// Prepares `episodes` simultaneous episodes.
     ///
     /// # Errors
     /// When the engine cannot set an unknown or the settings make no sense.
@@ -66,7 +67,8 @@ impl<'a> FisherBatch<'a> {
         let layout = problem.model.layout();
         let recording = layout.recording(&protocol.channels())?;
         let signals = SignalSet::new(layout, problem.signals)?;
-        // A binary unknown's copies are two models, with nothing between them to be straight.
+        // The copies of a binary unknown are two models; a deviation from a straight line means
+        // nothing between them.
         let binary = |entry| {
             problem
                 .parameters
@@ -112,13 +114,13 @@ impl<'a> FisherBatch<'a> {
         self.episodes
     }
 
-    /// Entries of a reading's row.
+    /// Number of entries of a reading's row.
     #[must_use]
     pub fn width(&self) -> usize {
         self.recording.width()
     }
 
-    /// Information gathered so far by each episode.
+    /// Information gathered so far in each episode.
     #[must_use]
     pub fn information(&self) -> &[Information] {
         &self.information
@@ -147,8 +149,8 @@ impl<'a> FisherBatch<'a> {
                     if let Some(parameter) = self.problem.parameters.get(entry) {
                         let bound = Parameter::scaled_bound();
                         let z = parameter.to_scaled(t[entry]);
-                        // A binary unknown's copies are the two models, one prior
-                        // deviation either side of their mean.
+                        // The copies of a binary unknown are its two models, one prior standard
+                        // deviation to either side of their mean.
                         let moved = if parameter.is_binary() {
                             sign
                         } else {
@@ -194,9 +196,10 @@ impl<'a> FisherBatch<'a> {
         Ok(())
     }
 
-    /// One control step: actions `episodes x action`, in the task's units; writes the
-    /// last true reading of each episode (`episodes x width`) and its reward. Returns
-    /// through [`FisherBatch::alive`] which episodes still run.
+    /// Takes one control step with `actions` (`episodes x action`, in the task's units).
+    ///
+    /// Writes the last true reading of each episode (`episodes x width`) and its reward.
+    /// [`FisherBatch::alive`] then says which episodes still run.
     ///
     /// # Errors
     /// When the engine fails.
@@ -234,8 +237,8 @@ impl<'a> FisherBatch<'a> {
         let readings = std::mem::take(&mut self.readings);
         for e in 0..self.episodes {
             let trace = self.information[e].trace();
-            // The one-step derivative is that of the state at the end of the control
-            // step; the trajectory's counts every reading of the log.
+            // The one-step derivative is that of the state at the end of the control step; the
+            // trajectory form counts every reading of the log.
             let first = if self.settings.form == Form::OneStep {
                 frames - 1
             } else {
@@ -258,7 +261,7 @@ impl<'a> FisherBatch<'a> {
         Ok(())
     }
 
-    /// Which episodes have not diverged.
+    /// Whether each episode still runs, that is, has not diverged.
     #[must_use]
     pub fn alive(&self) -> &[bool] {
         &self.alive

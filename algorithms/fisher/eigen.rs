@@ -1,9 +1,10 @@
-//! Eigenvalues of symmetric matrices, refused where an entry is no number.
+//! Eigendecomposition of symmetric matrices that refuses non-finite entries.
 
 use nalgebra::{DMatrix, Dyn, SymmetricEigen};
 
-/// Eigenvalues and eigenvectors of a symmetric matrix; `None` where an entry is not finite, with which the
-/// iteration would never end.
+/// Eigenvalues and eigenvectors of a symmetric matrix.
+///
+/// `None` where an entry is not finite: the iteration would never end.
 #[must_use]
 pub fn symmetric_eigen(matrix: DMatrix<f64>) -> Option<SymmetricEigen<f64, Dyn>> {
     matrix

@@ -1,10 +1,13 @@
-//! What an episode is expected to tell: the posterior's deviations, before there is a posterior.
+//! Expected posterior standard deviations of an episode, computed before there is a posterior.
 //!
-//! The rewards of [`crate::fisher`] take the luck of neighbouring readings for independent and a difference over
-//! two copies for a slope. That ranks episodes and is cheap, but a contact that comes a step early
-//! moves all that follows together, and the deviation that is added up so is several times too small. Here the
-//! noise model is that of identification: slopes and roughness by a [`LocalFit`], over a region that
-//! is narrowed down to that of the posterior, since an identifier learns how rough the simulator is there.
+//! The rewards of [`crate::fisher`] treat the scatter of neighbouring readings as independent and a
+//! difference between two copies as a slope. That ranks episodes and is cheap. But a contact that
+//! comes a step early shifts all later readings together, so the resulting standard deviation is
+//! several times too small.
+//!
+//! This module uses the noise model of identification: slopes and roughness from a [`LocalFit`].
+//! The region of the fit is narrowed down to that of the posterior, because an identifier also
+//! learns how rough the simulator is there.
 
 use nalgebra::DMatrix;
 
@@ -19,15 +22,16 @@ use asid_core::simulator::{Control, Rollout};
 use asid_core::tracker::TrackerPrior;
 use asid_readings::{SignalSet, SystematicErrors};
 
-/// How expected deviations are computed.
+/// Settings of the computation of expected standard deviations.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ExpectedSettings {
-    /// What the identifier assumes of the readings.
+    /// What the identifier assumes about the readings.
     pub assumes: Assumptions,
-    /// Fits, each over the region that the one before found: on the shuffleboard, where it takes longest, the
-    /// deviation stays within a third of itself from the seventh on.
+    /// Number of fits, each over the region that the previous one found. On the shuffleboard, where
+    /// convergence takes longest, the standard deviation stays within a third of its value from the
+    /// seventh fit on.
     pub rounds: usize,
-    /// Deviations of a region in units of the posterior's, as an identifier's.
+    /// Standard deviations of a region in units of the posterior's, as in an identifier.
     pub widen: f64,
 }
 
@@ -41,19 +45,23 @@ impl Default for ExpectedSettings {
     }
 }
 
-/// Half the first step of an unknown, in prior deviations, and of a start coordinate, in deviations of
-/// its range: those of [`crate::fisher`]. Wider than what most episodes leave of the prior, as an
-/// identifier's first region is: in one that is too narrow the simulator may be smooth by chance, and the
-/// regions stay there.
+/// Initial half step of an unknown (in prior standard deviations) and of a start coordinate (in
+/// standard deviations of its range): those of [`crate::fisher`].
+///
+/// They are wider than what most episodes leave of the prior, as an identifier's first region is.
+/// In a region that is too narrow the simulator may be smooth by chance, and the following regions
+/// would stay there.
 const FIRST: [f64; 2] = [0.3, 0.02];
 
-/// Largest half step of a start coordinate, in deviations of its range.
+/// Largest half step of a start coordinate, in standard deviations of its range: a fit over more is
+/// no longer local.
 const START_REACH: f64 = 0.5;
 
-/// Expected posterior deviation of each unknown, in its unit, after each control step of an
-/// episode with these actions (`horizon x action`) at `theta` and `start`, its prior deviation first:
-/// `horizon + 1` rows. NaN for binary unknowns, which have no slope; `None` where nearly every simulation
-/// diverged.
+/// Expected posterior standard deviation of each unknown after each control step of an episode.
+///
+/// The episode plays `actions` (`horizon x action`) at `theta` and `start`. The result has `horizon
+/// + 1` rows, in the unknowns' units; the first holds the prior standard deviations. Binary
+/// unknowns have no slope: their entries are NaN. `None` where nearly every simulation diverged.
 ///
 /// # Errors
 /// When the engine fails.
@@ -89,7 +97,7 @@ pub fn expected_deviation(
         let Some(root) = covariance.cholesky() else {
             break;
         };
-        // n pairs at this length have the covariance of the region.
+        // With this length, n pairs have the covariance of the region.
         factor = root.l() * (settings.widen * (n as f64).sqrt());
         for i in 0..n {
             let most = if i < d {
@@ -120,11 +128,11 @@ pub fn expected_deviation(
     Ok(Some(out))
 }
 
-/// An episode that is simulated around a point: unknowns in prior-scaled coordinates, then the start pose
-/// in deviations of its range.
+/// An episode simulated around a point: unknowns in prior-scaled coordinates, then the start pose
+/// in standard deviations of its range.
 struct Episode<'a> {
     problem: &'a Problem<'a>,
-    /// Unknowns that are not binary.
+    /// Indices of the unknowns that are not binary.
     sought: Vec<usize>,
     theta: Vec<f64>,
     middle: Vec<f64>,
@@ -203,14 +211,16 @@ impl<'a> Episode<'a> {
         (high.iter().map(|x| -x).collect(), high)
     }
 
-    /// Entries of the residuals after some control steps; the first reading is that of the start.
+    /// Number of residual entries after `steps` control steps; the first reading is that of the
+    /// start.
     fn readings_after(&self, steps: usize) -> usize {
         let frames = steps * self.problem.task.exploration().frames_per_step;
         (1 + frames) * self.signals.whitened_len()
     }
 
-    /// Simulates the middle and `points`, and fits what they differ by. The middle's readings say how systematic
-    /// errors of the trackers would show.
+    /// Simulates the middle and `points`, and fits their differences.
+    ///
+    /// The middle's readings determine how systematic errors of the trackers would show.
     fn fit(
         &mut self,
         factor: &DMatrix<f64>,
@@ -255,7 +265,7 @@ impl<'a> Episode<'a> {
         };
         let len = self.signals.whitened_len();
         let mut whitened = vec![0.0; len];
-        // What is tracked comes first in a row.
+        // The tracked signals come first in a row.
         let tracked = self.signals.width();
         let all: Vec<f64> = row(0).flat_map(|r| r[..tracked].to_vec()).collect();
         let time: Vec<f64> = (0..=frames)

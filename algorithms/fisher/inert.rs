@@ -1,8 +1,8 @@
-//! Does a parameter act at all?
+//! Checks whether a parameter has any effect.
 //!
-//! A target may exist and still change nothing: a friction that another geom's
-//! priority overrides, a mass of a body that never moves. Everything that can move
-//! is thrown about at both ends of the range, and the readings must differ.
+//! A target may exist and still change nothing: a friction that another geom's priority overrides,
+//! or the mass of a body that never moves. The check throws everything that can move, at both ends
+//! of the parameter's range; the readings must differ.
 
 use rand::Rng as _;
 
@@ -11,20 +11,20 @@ use asid_core::problem::{Problem, home};
 use asid_core::rng::Rng;
 use asid_core::simulator::{Control, Rollout};
 
-/// Throws that are compared in a round.
+/// Throws per round that are compared.
 const THROWS: usize = 4;
-/// Frames of a throw, in the first round and in those for what it has not shown:
-/// some things are far away.
+/// Frames of a throw: in the first round, and in later rounds for parameters that showed no effect
+/// yet, since some objects are far away.
 const FRAMES: [usize; 2] = [30, 120];
-/// Rounds of throws; each has a new chance to touch what the ones before have missed.
+/// Number of rounds; each gives random throws another chance to touch what earlier ones missed.
 const ROUNDS: usize = 8;
 /// Largest speed of a throw, m/s or rad/s.
 const SPEED: f64 = 1.0;
 
-/// Checks that every unknown of the problem changes what the sensors read.
+/// Checks that every unknown of the problem changes at least one reading.
 ///
 /// # Errors
-/// [`Error::Parameter`] naming the first that does not.
+/// [`Error::Parameter`] naming the first unknown that changes none.
 pub fn check_parameters(problem: &Problem<'_>) -> Result<()> {
     let mut rng = problem.streams.stream("sensitivity");
     let mut silent: Vec<usize> = (0..problem.parameters.len()).collect();
@@ -50,7 +50,8 @@ pub fn check_parameters(problem: &Problem<'_>) -> Result<()> {
     })
 }
 
-/// Throws everything about for some frames, at both ends of some unknowns: which of them act.
+/// Throws everything for some frames at both ends of each of `unknowns`; returns which of them have
+/// an effect.
 fn throw(
     problem: &Problem<'_>,
     unknowns: &[usize],

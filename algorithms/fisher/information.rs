@@ -1,14 +1,12 @@
-//! Fisher information of an episode and the exploration objectives built on it.
+//! Fisher information of an episode, and the exploration objectives built on it.
 //!
-//! For Gaussian noise of the readings the information that an episode carries
-//! about `theta` is `I = sum_h J_h^T S^-1 J_h` (ASID, Memmel et al. 2024, eq. 5),
-//! with `J_h` the derivative of reading `h`. Here `J_h` comes whitened (divided by
-//! the noise) and in prior-scaled parameters, so that `I` is a sum of outer
-//! products and the prior's information `I_0` is the identity.
+//! With Gaussian noise of the readings an episode carries the information `I = sum_h J_h^T S^-1
+//! J_h` about `theta` (ASID, Memmel et al. 2024, eq. 5), where `J_h` is the derivative of reading
+//! `h`. Here `J_h` is whitened (divided by the noise) and in prior-scaled parameters. `I` is then a
+//! sum of outer products, and the prior's information `I_0` is the identity.
 //!
-//! Parameters come first; behind them there may be *nuisance* entries (the start
-//! pose), which are estimated jointly with them but not sought: objectives look at
-//! the parameters' block of the inverse.
+//! Parameters come first. *Nuisance* entries (the start pose) may follow: they are estimated
+//! jointly but are not sought, so objectives use the parameters' block of the inverse.
 
 use std::str::FromStr;
 
@@ -18,7 +16,7 @@ use serde::{Deserialize, Serialize};
 
 use asid_core::error::{Error, Result};
 
-/// What a step is rewarded for.
+/// What a control step is rewarded for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Objective {
@@ -32,7 +30,7 @@ pub enum Objective {
     DOptimal,
 }
 
-/// Largest trace reward of one step, as in the published code.
+/// Largest trace reward of one control step, as in the paper's published code.
 pub const TRACE_CLIP: f64 = 1000.0;
 
 impl Objective {
@@ -46,7 +44,7 @@ impl Objective {
         }
     }
 
-    /// What its rewards are counted in, for unknowns in prior standard deviations.
+    /// Unit of its rewards, for unknowns in prior standard deviations.
     #[must_use]
     pub fn unit(self) -> &'static str {
         match self {
@@ -94,16 +92,17 @@ impl Information {
         information
     }
 
-    /// Puts it back to the prior.
+    /// Resets to the prior.
     pub fn reset(&mut self) {
         self.total.fill_with_identity();
         self.trace = 0.0;
         self.value = self.measure();
     }
 
-    /// Adds one reading's `J^T J`; `jacobian` holds one whitened, prior-scaled
-    /// column of `rows` entries for each entry, one after the other. Missing
-    /// readings (NaN), and slopes whose square is no number, carry nothing.
+    /// Adds `J^T J` of one reading.
+    ///
+    /// `jacobian` holds one whitened, prior-scaled column of `rows` values per entry, one after the
+    /// other. Missing readings (NaN) and slopes whose square is not finite contribute nothing.
     pub fn add(&mut self, jacobian: &[f64], rows: usize) {
         let n = self.total.nrows();
         for k in 0..rows {
@@ -123,7 +122,7 @@ impl Information {
         }
     }
 
-    /// Reward of what was added since the last call or reset.
+    /// Reward for the information that was added since the last call or reset.
     pub fn reward(&mut self, objective: Objective, trace_before: f64) -> f64 {
         let before = self.value;
         self.value = self.measure();
@@ -140,13 +139,14 @@ impl Information {
         self.trace
     }
 
-    /// `tr` of the parameters' block of `(I + I_0)^-1`, prior-scaled: 1 a parameter before any data.
+    /// `tr` of the parameters' block of `(I + I_0)^-1`, prior-scaled: 1 per parameter before any
+    /// data.
     #[must_use]
     pub fn a_optimality(&self) -> f64 {
         self.measure().0
     }
 
-    /// `log det` of the information about the parameters, nuisance projected out.
+    /// `log det` of the information about the parameters, with the nuisance entries projected out.
     #[must_use]
     pub fn log_det(&self) -> f64 {
         self.measure().1
@@ -177,13 +177,13 @@ impl Information {
     }
 }
 
-/// Inverse of a symmetric matrix that is the identity (the prior) plus what data add, so that no
-/// eigenvalue is below 1.
+/// Inverse of a symmetric matrix that is the identity (the prior) plus the information of data, so
+/// that no eigenvalue is below 1.
 ///
-/// Where one direction is known a great deal better than another, rounding swallows what is known of
-/// the other: eigenvalues below the largest one's resolution are noise, of either sign, and a
-/// Cholesky factor fails or holds that noise. What cannot be resolved is left as uncertain as the
-/// prior has it, and a matrix with an entry that is no number tells nothing at all.
+/// Where one direction is known far better than another, rounding loses the information about the
+/// other. Eigenvalues below the resolution of the largest one are then noise of either sign, and a
+/// Cholesky factor fails or contains that noise. Directions that are not resolved keep the prior's
+/// uncertainty. A matrix with a non-finite entry gives no information at all.
 #[must_use]
 pub fn inverse_above_prior(total: &DMatrix<f64>) -> DMatrix<f64> {
     let n = total.nrows();
@@ -193,7 +193,7 @@ pub fn inverse_above_prior(total: &DMatrix<f64>) -> DMatrix<f64> {
     let resolution = n as f64 * f64::EPSILON;
     if let Some(factor) = total.clone().cholesky() {
         let pivots = factor.l_dirty().diagonal().map(|p| p * p);
-        // Safely resolved: half of the digits are left.
+        // Safely resolved: at least half of the digits remain.
         if pivots.min() > resolution.sqrt() * pivots.max() {
             return factor.inverse();
         }
@@ -211,8 +211,10 @@ pub fn inverse_above_prior(total: &DMatrix<f64>) -> DMatrix<f64> {
     eigen.recompose()
 }
 
-/// Log determinant of a covariance; by its eigenvalues, floored at the smallest number, where the
-/// product of them is not one.
+/// Log determinant of a covariance.
+///
+/// Where the determinant itself underflows or is not positive, it is the sum of the eigenvalues'
+/// logarithms, each floored at the smallest positive number.
 fn log_determinant(covariance: DMatrix<f64>) -> f64 {
     let determinant = covariance.determinant();
     if determinant.is_normal() && determinant > 0.0 {
@@ -243,8 +245,8 @@ mod tests {
 
     #[test]
     fn rewards_by_hand_for_two_parameters() {
-        // J = [[1, 2], [0, 1]] (rows readings): I = [[1, 2], [2, 5]],
-        // I + 1 = [[2, 2], [2, 6]], determinant 8, inverse [[6, -2], [-2, 2]] / 8.
+        // J = [[1, 2], [0, 1]] (rows are readings): I = [[1, 2], [2, 5]], I + 1 = [[2, 2], [2, 6]],
+        // determinant 8, inverse [[6, -2], [-2, 2]] / 8.
         let mut information = Information::prior(2, 0);
         information.add(&[1.0, 0.0, 2.0, 1.0], 2);
         assert!((information.trace() - 6.0).abs() < 1e-12);
@@ -276,8 +278,8 @@ mod tests {
 
     #[test]
     fn a_nuisance_that_looks_the_same_hides_the_parameter() {
-        // Parameter and nuisance move the reading alike: only their sum is seen,
-        // so half of the prior variance stays however large the information.
+        // Parameter and nuisance move the reading alike. Only their sum is seen, so half of the
+        // prior variance stays however large the information.
         let mut information = Information::prior(1, 1);
         information.add(&[1e4, 1e4], 1);
         assert!((information.a_optimality() - 0.5).abs() < 1e-6);
@@ -293,17 +295,18 @@ mod tests {
     #[test]
     fn what_rounding_swallows_is_no_knowledge() {
         // Two entries seen only by their sum: the difference keeps the prior's variance, so each
-        // has 1/2, however well the sum is known. From 1e8 on the matrix is singular as rounded.
+        // has variance 1/2, however well the sum is known. From 1e8 on the rounded matrix is
+        // singular.
         for slope in [1e3, 1e7, 1e8, 1e9, 1e12, 1e100, 1e150] {
             let mut information = Information::prior(2, 0);
             information.add(&[slope, slope], 1);
             for std in information.expected_std() {
-                // Short of that its last digits are lost.
+                // Just below 1e8 the last digits of the variance are lost.
                 assert!((std - 0.5_f64.sqrt()).abs() < 0.02, "{slope}: {std}");
             }
             assert!(information.log_det().is_finite() && information.log_det() > 0.0);
         }
-        // Slopes whose square overflows are no slopes.
+        // Slopes whose square overflows are ignored.
         let mut information = Information::prior(2, 0);
         information.add(&[1e200, 1e200], 1);
         assert_eq!(information.expected_std(), [1.0, 1.0]);

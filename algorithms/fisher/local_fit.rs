@@ -1,19 +1,28 @@
-//! A straight line through a rough simulator.
+//! A local linear fit to a rough simulator.
 //!
-//! A central difference over one small step is mostly luck where contact makes trajectories rough. So
-//! several sets of antithetic pairs of points are simulated, each set along axes turned at random. What
-//! the two points of a pair differ by is regressed on the step between them: slopes. What their mean
-//! differs by from the middle is regressed on quadratic terms: the curvature, which is taken out, and what
-//! the middle would be without its own luck. What both regressions leave is the *roughness* of single
-//! simulations, reading by reading, with its correlation along the episode.
+//! Where contact makes trajectories rough, a central difference over one small step is mostly
+//! random scatter. So several sets of antithetic pairs of points are simulated, each set along
+//! randomly rotated axes:
 //!
-//! The information about the point comes by the sandwich formula (White 1982): weights `P` of the readings,
-//! by their noise and roughness, give the curvature `H = J^T P J` and the information `H M^-1 H`, `M = J^T P (1 + R)
-//! P J` with the roughness' whole covariance `R`, direction by direction. What the luck in `J` itself adds
-//! to `H`, `2 tr(P R) (U^T U)^-1` for steps `U`, is taken out; in `M` it stays, since an estimate by
-//! these slopes has it ([`LocalFit::told`]). Identification by emulation does without that: it takes slopes for
-//! what they are fitted to be and divides by the largest inflation of an unknown's variance. What an
-//! episode is expected to tell it comes the same way ([`LocalFit::emulated`]), so that both agree.
+//! - The difference between the two points of a pair is regressed on the step between them. This
+//!   gives the slopes.
+//! - The difference between their mean and the middle is regressed on quadratic terms. This gives
+//!   the curvature, which is removed, and the value of the middle without its own scatter.
+//!
+//! The residuals of both regressions are the *roughness* of single simulations, reading by reading,
+//! with its correlation along the episode.
+//!
+//! The information about the point follows from the sandwich formula (White 1982). The weights `P`
+//! of the readings come from their noise and roughness. They give the curvature `H = J^T P J` and
+//! the information `H M^-1 H`, where `M = J^T P (1 + R) P J` and `R` is the whole covariance of the
+//! roughness.
+//!
+//! The scatter in `J` itself adds `2 tr(P R) (U^T U)^-1` to `H`, for steps `U`. This is subtracted
+//! from `H`; in `M` it stays, since an estimate by these slopes is subject to it
+//! ([`LocalFit::told`]). Identification by emulation omits this correction: it takes the fitted
+//! slopes at face value and divides by the largest inflation of an unknown's variance. The
+//! information that an episode is expected to give it is computed the same way
+//! ([`LocalFit::emulated`]), so that both agree.
 
 use nalgebra::{DMatrix, DVector};
 use rand_distr::{Distribution, StandardNormal};
@@ -22,22 +31,25 @@ use crate::fisher::precision::{Precision, inflation};
 use crate::fisher::symmetric_eigen;
 use asid_core::rng::Rng;
 
-/// Degrees of freedom that the roughness is left at least.
+/// Minimum degrees of freedom of the roughness.
 const FREEDOM: usize = 8;
 
-/// Pairs at least: their slopes have the luck of a regression on 64 draws, an identifier's default.
+/// Minimum number of pairs: their slopes then scatter as those of a regression on 64 draws, an
+/// identifier's default.
 const PAIRS: usize = 32;
 
-/// Sets of pairs for `n` entries: enough for the quadratic terms and `FREEDOM` more.
+/// Number of sets of pairs for `n` entries: enough for the quadratic terms and `FREEDOM` more.
 #[must_use]
 pub fn sets(n: usize) -> usize {
     let features = 1 + n * (n + 1) / 2;
     (features + FREEDOM).max(PAIRS).div_ceil(n.max(1))
 }
 
-/// Points in antithetic pairs around `middle`, `up` then `down` of each pair: `sets` times `n` pairs along the
-/// columns of `factor` (lower triangular, `n x n`), turned at random but for the first set, and kept inside
-/// the box. Lengths vary from set to set with a mean square of one, so that curvature shows.
+/// Points in antithetic pairs around `middle`, `up` then `down` of each pair.
+///
+/// There are `sets` times `n` pairs along the columns of `factor` (lower triangular, `n x n`).
+/// Every set but the first is randomly rotated, and all points are kept inside the box. Lengths
+/// vary from set to set with a mean square of one, so that curvature shows.
 #[must_use]
 pub fn design(
     middle: &[f64],
@@ -71,35 +83,38 @@ pub fn design(
     points
 }
 
-/// Slopes, curvature's share taken out, and roughness of residuals around a point.
+/// Slopes and roughness of residuals around a point, with the curvature removed.
 #[derive(Clone, Debug)]
 pub struct LocalFit {
     factor: DMatrix<f64>,
-    /// Slopes, entries x readings, along the columns of the factor.
+    /// Slopes along the columns of the factor, entries x readings.
     slopes: DMatrix<f64>,
     /// `(U^T U)^-1`.
     scatter: DMatrix<f64>,
-    /// Luck of single simulations, rows x readings.
+    /// Roughness of single simulations (regression residuals), rows x readings.
     luck: DMatrix<f64>,
     freedom: f64,
-    /// Residuals in the middle, freed of its own luck where there are pairs enough.
+    /// Residuals in the middle; corrected for the middle's own roughness where there are enough
+    /// pairs.
     middle: DVector<f64>,
 }
 
-/// What readings tell about the entries of a point.
+/// The information of readings about the entries of a point.
 pub struct Told {
-    /// Information, entries x entries, without any prior.
+    /// Information without any prior, entries x entries.
     pub information: DMatrix<f64>,
-    /// Curvature of half the weighted sum of squares, `H`.
+    /// Curvature `H` of half the weighted sum of squares.
     pub curvature: DMatrix<f64>,
     /// Weights of the readings.
     pub precision: Precision,
 }
 
 impl LocalFit {
-    /// Fits the residuals of a [`design`] with this middle and factor; `middle_row` is the residual in the
-    /// middle. Pairs with a simulation that diverged (`None`) are left out. `None` where the pairs
-    /// that are left do not span the space.
+    /// Fits the residuals of a [`design`] with this middle and factor; `middle_row` is the residual
+    /// in the middle.
+    ///
+    /// Pairs with a diverged simulation (`None`) are left out. `None` where the remaining pairs do
+    /// not span the space.
     #[must_use]
     pub fn new(
         middle: &[f64],
@@ -116,7 +131,7 @@ impl LocalFit {
             if let [Some(up), Some(down)] = row {
                 let step = DVector::from_fn(n, |i, _| pair[0][i] - pair[1][i]);
                 steps.push(factor.solve_lower_triangular(&step)?);
-                // The box may cut one of the two short.
+                // The box may shorten one of the two steps.
                 let shift = DVector::from_fn(n, |i, _| 0.5 * (pair[0][i] + pair[1][i]) - middle[i]);
                 shifts.push(factor.solve_lower_triangular(&shift)?);
                 kept.push((up, down));
@@ -143,8 +158,8 @@ impl LocalFit {
             luck = stacked(&luck, &(left * 2_f64.sqrt()));
             freedom += (pairs - features) as f64;
         } else {
-            // Second differences, whose luck is that of one and a half simulations; they count
-            // curvature for luck.
+            // Second differences, whose scatter is that of one and a half simulations. They count
+            // curvature as roughness.
             luck = stacked(&luck, &(even * 1.5_f64.sqrt().recip()));
             freedom += pairs as f64;
         }
@@ -158,7 +173,7 @@ impl LocalFit {
         })
     }
 
-    /// The same of the first `readings` entries of the residuals.
+    /// The same fit for the first `readings` entries of the residuals.
     #[must_use]
     pub fn first(&self, readings: usize) -> Self {
         Self {
@@ -191,8 +206,10 @@ impl LocalFit {
         (self.luck.norm_squared() / self.freedom / readings.max(1) as f64).sqrt()
     }
 
-    /// What the readings tell. They are weighed by their roughness alone, or also by how it runs along
-    /// the episode (`correlated`).
+    /// The information of the readings.
+    ///
+    /// Readings are weighted by the variance of their roughness alone, or by its whole covariance
+    /// along the episode (`correlated`).
     #[must_use]
     pub fn told(&self, correlated: bool) -> Option<Told> {
         let (precision, curvature, information);
@@ -218,8 +235,9 @@ impl LocalFit {
         })
     }
 
-    /// Information, entries x entries, as an identification by emulation sees it; the first `sought` entries
-    /// are the unknowns.
+    /// Information as identification by emulation computes it, entries x entries.
+    ///
+    /// The first `sought` entries are the unknowns.
     #[must_use]
     pub fn emulated(&self, correlated: bool, sought: usize) -> Option<DMatrix<f64>> {
         let columns = self.slopes.transpose();
@@ -239,15 +257,17 @@ impl LocalFit {
         self.outside(&(precision.weigh(&self.slopes) * columns / inflated))
     }
 
-    /// Variance of the roughness of each reading.
+    /// Variance of the roughness at each reading.
     fn spread(&self) -> DVector<f64> {
         DVector::from_fn(self.luck.ncols(), |k, _| {
             self.luck.column(k).norm_squared() / self.freedom
         })
     }
 
-    /// Every other row of the luck. A covariance says nothing of the luck that it was made of: each
-    /// half is asked of the other.
+    /// The roughness rows in two interleaved halves, for cross-validation.
+    ///
+    /// A sample covariance cannot be tested on the rows that it was computed from, so each half is
+    /// evaluated with the covariance of the other.
     fn halves(&self) -> [DMatrix<f64>; 2] {
         [0, 1].map(|k| {
             let rows: Vec<usize> = (k..self.luck.nrows()).step_by(2).collect();
@@ -255,12 +275,12 @@ impl LocalFit {
         })
     }
 
-    /// Degrees of freedom of some of the luck's rows.
+    /// Degrees of freedom of some of the roughness rows.
     fn freedom_of(&self, rows: &DMatrix<f64>) -> f64 {
         self.freedom * rows.nrows() as f64 / self.luck.nrows() as f64
     }
 
-    /// A form along the columns of the factor in the entries' own coordinates.
+    /// Transforms a quadratic form along the columns of the factor to the entries' own coordinates.
     fn outside(&self, form: &DMatrix<f64>) -> Option<DMatrix<f64>> {
         let lower = self.factor.transpose();
         let half = lower.solve_upper_triangular(form)?;
@@ -268,8 +288,8 @@ impl LocalFit {
         Some((&whole + whole.transpose()) * 0.5)
     }
 
-    /// `J^T P J` along the columns of the factor, less what luck of this spread in the slopes adds, and not below
-    /// zero in any direction.
+    /// `J^T P J` along the columns of the factor, less what the scatter of the slopes adds to it;
+    /// no eigenvalue is below zero.
     fn curvature(&self, by: &Precision, luck: &DMatrix<f64>, freedom: f64) -> Option<DMatrix<f64>> {
         let of_luck = by.weigh(luck).component_mul(luck).sum() / freedom;
         let raw =
@@ -279,7 +299,7 @@ impl LocalFit {
         Some(eigen.recompose())
     }
 
-    /// `H M^-1 H`, where roughness is as it shows in `luck`.
+    /// `H M^-1 H`, with the covariance of the roughness taken from the rows of `luck`.
     fn sandwich(
         &self,
         by: &Precision,
@@ -296,8 +316,8 @@ impl LocalFit {
     }
 }
 
-/// What is left of `even` (pairs x readings) after a regression on a constant and the quadratic terms of the
-/// half steps `u`, and the constant.
+/// Regresses `even` (pairs x readings) on a constant and the quadratic terms of the half steps `u`;
+/// returns the constant and the regression residuals.
 fn without_curvature(
     u: &DMatrix<f64>,
     even: &DMatrix<f64>,
@@ -311,7 +331,7 @@ fn without_curvature(
     }
     let phi = DMatrix::from_columns(&terms);
     let f = phi.ncols();
-    // Clipped points may leave a term without a say: the ridge keeps it small.
+    // Clipped points may leave a term undetermined: the ridge keeps it small.
     let ridge = DMatrix::identity(f, f) * (1e-9 * phi.norm_squared() / f as f64);
     let normal = phi.transpose() * &phi + ridge;
     let fitted = normal.cholesky()?.solve(&(phi.transpose() * even));

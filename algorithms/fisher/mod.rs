@@ -1,9 +1,10 @@
-//! Fisher information: what an episode tells about the unknowns.
+//! Fisher information: how much an episode reveals about the unknowns.
 //!
-//! [`FisherBatch`] plays episodes with their information, as [`FisherSettings`] say; [`Information`]
-//! adds it up and scores it; [`expected`] is the deviation that an identification should reach, from
-//! fits of the readings over a region ([`local_fit`], [`precision`]); [`inert`] tells unknowns that
-//! change no reading.
+//! - [`FisherBatch`] plays episodes with their information, as [`FisherSettings`] say.
+//! - [`Information`] sums it up and scores it.
+//! - [`expected`] computes the standard deviation that an identification should reach, from fits of
+//!   the readings over a region ([`local_fit`], [`precision`]).
+//! - [`inert`] finds unknowns that change no reading.
 
 mod batch;
 mod eigen;

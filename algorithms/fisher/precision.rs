@@ -1,17 +1,18 @@
 //! Weights of readings under noise and roughness: the inverse of a residual's covariance.
 //!
-//! Whitened readings have noise 1. Roughness adds what a regression leaves of points `E` (points x
-//! readings): its size at each reading, or also how it runs along the episode. A contact
-//! that comes a step early moves all that follows together; what does not take part in that, such
-//! as where two parts lie to each other, keeps its weight only if the correlation is known. The
-//! sample covariance knows no more directions than it has points, so a share of the roughness is
-//! left at each reading by itself (shrinkage, Ledoit and Wolf 2004):
+//! Whitened readings have noise 1. Roughness adds the regression residuals `E` (points x readings):
+//! its variance at each reading, or also its covariance along the episode. A contact that comes a
+//! step early shifts all later readings together. Quantities that do not shift with them, such as
+//! the relative pose of two parts, keep their weight only if the correlation is known.
+//!
+//! The sample covariance spans no more directions than it has points. A share of the roughness is
+//! therefore treated as independent at each reading (shrinkage, Ledoit and Wolf 2004):
 //!
 //! `S = 1 + a diag(s^2) + (1 - a) E^T E / freedom`, inverted by Woodbury's identity.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-/// Share of the roughness that is taken for independent from reading to reading.
+/// Share of the roughness that is treated as independent from reading to reading; see the module.
 const ALONE: f64 = 0.2;
 
 /// `S^-1`.
@@ -23,7 +24,7 @@ pub struct Precision {
 }
 
 impl Precision {
-    /// Of roughness with these variances, independent from reading to reading.
+    /// Weights for roughness with these variances, independent from reading to reading.
     #[must_use]
     pub fn diagonal(spread: &DVector<f64>) -> Self {
         Self {
@@ -32,7 +33,8 @@ impl Precision {
         }
     }
 
-    /// Of roughness as it shows in `epsilon`, points x readings, of so many degrees of freedom.
+    /// Weights for the roughness given by the rows of `epsilon` (points x readings), with `freedom`
+    /// degrees of freedom.
     #[must_use]
     pub fn correlated(epsilon: &DMatrix<f64>, freedom: f64) -> Self {
         let m = epsilon.ncols();
@@ -62,8 +64,11 @@ impl Precision {
     }
 }
 
-/// By how much the variance of the unknowns is larger than the weights say: the sandwich formula, at
-/// slopes `b` (readings x entries), for roughness as it shows in `epsilon`.
+/// Factor by which the variance of an unknown exceeds the one that the weights imply; the largest
+/// of all unknowns, and at least 1.
+///
+/// It comes from the sandwich formula at slopes `b` (readings x entries), with the roughness given
+/// by the rows of `epsilon`.
 #[must_use]
 pub fn inflation(
     precision: &Precision,
@@ -74,7 +79,7 @@ pub fn inflation(
 ) -> Option<f64> {
     let n = b.ncols();
     let bw = precision.weigh(&b.transpose());
-    // Standardised coordinates: what the data do not see keeps the region's width.
+    // In standardised coordinates: a direction that the data do not see keeps the region's width.
     let h = &bw * b + DMatrix::identity(n, n) * 1e-9;
     let projected = &bw * epsilon.transpose();
     let middle = &bw * bw.transpose() + &projected * projected.transpose() / freedom;

@@ -1,16 +1,17 @@
-//! The derivative of one reading, from the copies of an episode.
+//! Derivative of one reading, from the copies of an episode.
 //!
-//! Each entry (an unknown, or a coordinate of the start pose) has two copies: one with the entry a little up, one
-//! with it a little down. The difference of their readings over that of the entry is one column of the Jacobian.
-//! It is divided by the noise, that of the trackers plus, of some entries, the square of what the reading deviates
-//! from a straight line over the copies.
+//! Each entry (an unknown, or a coordinate of the start pose) has two copies: one with the entry
+//! slightly increased, one with it slightly decreased. The difference of their readings divided by
+//! the difference of the entry is one Jacobian column. It is divided by the noise: that of the
+//! trackers plus, for some entries, the squared deviation of the reading from a straight line over
+//! the copies.
 
 use asid_readings::SignalSet;
 
-/// Turns the readings of an episode and its copies into whitened Jacobians.
+/// Computes whitened Jacobians from the readings of an episode and its copies.
 pub struct Sensitivity {
     signals: SignalSet,
-    /// Of each entry, whether its deviation from a straight line counts as noise.
+    /// For each entry, whether its deviation from a straight line counts as noise.
     rough: Vec<bool>,
     jacobian: Vec<f64>,
     difference: Vec<f64>,
@@ -19,8 +20,9 @@ pub struct Sensitivity {
 }
 
 impl Sensitivity {
-    /// Sensitivities of these signals to one entry for each of `rough`, which tells of which entries the deviation
-    /// from a straight line counts as noise.
+    /// Sensitivities of these signals to `rough.len()` entries.
+    ///
+    /// `rough` says for which entries the deviation from a straight line counts as noise.
     pub fn new(signals: SignalSet, rough: Vec<bool>) -> Self {
         let rows = signals.whitened_len();
         Self {
@@ -33,15 +35,16 @@ impl Sensitivity {
         }
     }
 
-    /// Numbers of a whitened reading: the rows of a Jacobian.
+    /// Number of values of a whitened reading: the rows of a Jacobian.
     pub fn rows(&self) -> usize {
         self.signals.whitened_len()
     }
 
-    /// The whitened Jacobian of a reading, one column an entry, one after the other.
+    /// The whitened Jacobian of a reading, column by column, one column per entry.
     ///
-    /// `reading` gives the row that was read of a copy: 0 is the episode itself, `1 + 2 i` has entry `i` up and
-    /// `2 + 2 i` has it down. `steps` are the differences of the entries between the two, prior-scaled.
+    /// `reading` returns the row of a copy: 0 is the episode itself, `1 + 2 i` has entry `i`
+    /// increased and `2 + 2 i` has it decreased. `steps` are the differences of the entries between
+    /// the two, prior-scaled.
     pub fn jacobian<'r>(&mut self, reading: impl Fn(usize) -> &'r [f64], steps: &[f64]) -> &[f64] {
         let rows = self.rows();
         self.noise.fill(1.0);
@@ -52,7 +55,7 @@ impl Sensitivity {
                 self.jacobian[entry * rows + k] = self.difference[k] / step;
             }
             if self.rough[entry] {
-                // up + down - 2 middle: nothing on a straight line, luck and curvature otherwise.
+                // up + down - 2 middle: zero on a straight line, otherwise roughness and curvature.
                 let middle = reading(0);
                 self.signals.difference(up, middle, &mut self.difference);
                 self.signals.difference(middle, down, &mut self.below);

@@ -1,12 +1,12 @@
 //! Settings of Fisher information: which derivative of an episode is taken, and what is rewarded.
 //!
-//! Two forms of the sensitivity are offered. *One-step*: before each control step
-//! the copies take the episode's state, so that their difference is
-//! `d f_theta(s_h, a_h) / d theta`, the derivative in the paper. *Trajectory*: the
-//! copies are simulated on from the start of the episode, so that their difference
-//! is `d s_h / d theta` under the same actions, which counts what a tracked
-//! trajectory reveals when it is replayed as a whole. Start-pose entries make sense in
-//! the trajectory form only.
+//! There are two forms of the sensitivity:
+//!
+//! - *One-step*: before each control step the copies take the episode's state. Their difference is
+//!   `d f_theta(s_h, a_h) / d theta`, the derivative in the paper.
+//! - *Trajectory*: the copies run on from the start of the episode. Their difference is `d s_h / d
+//!   theta` under the same actions: what a tracked trajectory reveals when it is replayed as a
+//!   whole. Start-pose entries make sense in this form only.
 
 use std::str::FromStr;
 
@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 use crate::fisher::Objective;
 use asid_core::error::{Error, Result};
 
-/// Which derivative is taken; see the module.
+/// Which derivative is taken; see the module documentation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Form {
@@ -49,21 +49,21 @@ impl FromStr for Form {
     }
 }
 
-/// How the information of an episode is computed, and what of it is rewarded.
+/// How the information of an episode is computed and rewarded.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct FisherSettings {
-    /// What a step is rewarded for.
+    /// What a control step is rewarded for.
     pub objective: Objective,
-    /// Which derivative.
+    /// Which derivative is taken.
     pub form: Form,
     /// Estimate the start pose jointly with the unknowns (trajectory form only).
     pub nuisance: bool,
     /// Half the difference between the copies, in prior standard deviations.
     pub delta: f64,
-    /// Count what the copies deviate from a straight line as noise. With contact the
-    /// trajectory is rough: a difference divided by a small step is then mostly luck, and
-    /// an explorer that is paid for it seeks chaos.
+    /// Count the copies' deviation from a straight line as noise. With contact the trajectory is
+    /// rough: a difference divided by a small step is then mostly random, and an explorer that is
+    /// rewarded for it seeks chaos.
     pub roughness: bool,
 }
 

@@ -3,7 +3,7 @@ use asid_core::rng::Streams;
 
 const FREE: [f64; 2] = [9.0; 2];
 
-/// Fit at `middle` of residuals `f` with luck of this size that lasts `run` readings.
+/// Fit at `middle` of the residuals `f` plus roughness of size `rough` that lasts `run` readings.
 fn fitted(
     middle: [f64; 2],
     factor: &DMatrix<f64>,
@@ -59,7 +59,7 @@ fn a_quadratic_is_fitted_exactly() {
     }
 }
 
-/// Mean over many fits of the information about the first entry.
+/// Mean information about the first entry over many fits.
 fn mean_information(rough: f64, run: usize, slope: f64, correlated: bool) -> f64 {
     let f = |x: &[f64]| {
         (0..240)
@@ -82,17 +82,18 @@ fn roughness_takes_its_share_of_the_information() {
     // 120 readings of slope 1, noise 1 and independent roughness 2: 120 / 5 = 24.
     let found = mean_information(2.0, 1, 1.0, false);
     assert!((found / 24.0 - 1.0).abs() < 0.2, "{found}");
-    // Roughness that lasts 40 readings leaves some six independent pieces, of which every other
-    // reading counts: about 240 / 40 / 4 / (1 + 1 / (20 * 4)) = 1.5 where the slope takes part in it.
+    // Roughness that lasts 40 readings leaves six independent pieces, of which every other reading
+    // counts: about 240 / 40 / 4 / (1 + 1 / (20 * 4)) = 1.5 where the slope has a part in the
+    // roughness.
     let found = mean_information(2.0, 40, 1.0, false);
     assert!(found < 3.0, "{found}");
 }
 
 #[test]
 fn luck_in_the_slopes_is_no_information() {
-    // Nothing depends on the first entry: its slopes are luck alone, of variance 2 * 9 / 24 at each of 240
-    // readings (sum of the squared steps: 24), which would count for 240 * 0.75 / 10 = 18. Less that,
-    // there remains the positive half of what it varies by.
+    // Nothing depends on the first entry. Its slopes are scatter alone, of variance 2 * 9 / 24 at
+    // each of 240 readings (sum of the squared steps: 24), and would count as 240 * 0.75 / 10 = 18.
+    // After the correction the positive half of their variation remains.
     let found = mean_information(3.0, 1, 0.0, false);
     assert!(found < 3.0, "{found}");
 }
