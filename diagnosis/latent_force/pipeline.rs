@@ -1,4 +1,4 @@
-//! From a study to what its result is told from, by the missing force.
+//! The whole diagnosis by the missing force: from a study to the input of the report.
 
 mod begin_values;
 mod replays;
@@ -38,20 +38,22 @@ use without_effects::{Null, Stands};
 /// Most linearisations of the fit without effects.
 const ROUNDS: usize = 15;
 
-/// Share of the excess power without effects from which on what is left of it is most of the gap: half, as in the decision ([`crate::decision`]).
+/// Share of the excess power without effects from which on the excess that is left counts as most
+/// of the gap: half, as in the decision ([`crate::decision`]).
 const MOST: f64 = 0.5;
 
-/// What is kept of a search once the logs are let go of.
+/// What is kept of a search once its logs are released.
 struct Searched {
     outcome: Outcome,
     candidates: Vec<Candidate>,
     left_out: Vec<LeftOut>,
-    /// Candidates that the logs show by themselves.
+    /// Candidates that the logs show directly, without a search.
     members: Vec<usize>,
     /// Walks that begin an episode.
     firsts: Vec<usize>,
     repeats: Option<Repeats>,
-    /// Excess power that replays of what stands leave of the training logs, and whether that is most of a gap that is there without effects.
+    /// Excess power that replays of the set that stands leave of the training logs, and whether
+    /// that is most of a gap that exists without effects.
     excess: f64,
     leaves_most: bool,
     /// The missing force along the logs, and what is left of it.
@@ -59,7 +61,7 @@ struct Searched {
 }
 
 impl Searched {
-    /// This one, or the one before it where that leaves no more.
+    /// This result, or the one before it if that leaves no more.
     fn or(self, before: Option<Self>) -> Self {
         match before {
             Some(before) if before.excess <= self.excess => before,
@@ -68,10 +70,18 @@ impl Searched {
     }
 }
 
-/// Fits the model without effects, and searches for what is missing. Where bodies touch, that is done in the longest segments that can be
-/// repeated, for a small force tells the more the longer it acts: in whole logs, for a ball whose spin no sensor reads keeps over a log what it was
-/// thrown with; in the longest stretches of contact; and in the shortest, whose replays are next to linear in where they begin. Each is asked where replays of
-/// whole logs leave most of the gap by the answer before it, and the answer stands that leaves least. Whole logs whose slopes mislead are asked last.
+/// Fits the model without effects, and searches for effects.
+///
+/// Where bodies touch, a small force shows the more the longer it acts. So the search uses the
+/// longest segments whose replays can be repeated. It tries in this order:
+///
+/// 1. Whole logs: for a ball whose spin no sensor reads, they keep the spin of the throw.
+/// 2. The longest stretches of contact.
+/// 3. The shortest segments, whose replays are nearly linear in the initial state.
+/// 4. Whole logs whose derivatives mislead.
+///
+/// Each is searched only if replays of whole logs still leave most of the gap with the answer
+/// before it. The answer that leaves least stands.
 fn searched(null: Null<'_>, shown_steps: &[Shown], settings: &Settings) -> Result<Searched> {
     let how = (shown_steps, settings);
     let mut short = null.shortest()?;
@@ -110,7 +120,7 @@ fn firsts(stands: &Stands<'_>) -> Vec<usize> {
     first.map(|(w, _)| w).collect()
 }
 
-/// Whether whole replays of the model without effects leave a gap.
+/// Whether replays of whole logs with the model without effects leave a gap.
 fn leaves_a_gap(null: Null<'_>, stands: &Stands<'_>) -> Result<bool> {
     let replays = Replays {
         bench: null.bench,
@@ -122,7 +132,7 @@ fn leaves_a_gap(null: Null<'_>, stands: &Stands<'_>) -> Result<bool> {
     replays.leaves_a_gap(&stands.none)
 }
 
-/// Searches for what is missing beside a model without effects that stands in some segments.
+/// Searches for effects with a fitted model without effects, in the segments that it was fitted in.
 fn searched_in(
     null: Null<'_>,
     stands: &mut Stands<'_>,
@@ -187,7 +197,10 @@ fn searched_in(
     })
 }
 
-/// The model without effects that stands, with the engine's own error beside it, and its missing force shared out among what rests and moves.
+/// Refits the model without effects with the fixed terms of all models that follow.
+///
+/// Along rows these are the engine's own error, the free forces at rest and at the start, and the
+/// resolution of the missing force.
 fn without_steps(null: Null<'_>, stands: &mut Stands<'_>) -> Result<Fitted> {
     let (context, none) = (&mut stands.context, &mut stands.none);
     let (bench, hypothesis) = (null.bench, null.hypothesis);
@@ -211,8 +224,11 @@ fn without_steps(null: Null<'_>, stands: &mut Stands<'_>) -> Result<Fitted> {
     Ok(none.clone())
 }
 
-/// The model without effects, fitted on from the values that replays of whole logs are fitted with, where these leave less than half of what they leave as
-/// it stands: in segments whose slopes mislead a fit may end far from the study's parameters, and whatever is named then would stand in for them.
+/// Continues the fit without effects from values fitted to replays of whole logs, if these leave
+/// less than half of what the model leaves.
+///
+/// In segments whose derivatives mislead, a fit may end far from the study's parameters. A name
+/// would then stand in for them.
 fn led_by_replays(
     null: Null<'_>,
     context: &Context<'_>,
@@ -257,7 +273,7 @@ pub fn diagnose(
     let (mut bench, nominal) = dataset(study, machine)?;
     set_reading_noise(&mut bench, &study.noise);
     let shown_steps = shown(&bench.train.logs);
-    // Until the end, where gaps are told in units of the sensors' own noise.
+    // Until the end, where gaps are reported in units of the sensors' own noise.
     bench.set_noise(&noise_with_steps(&bench.train.logs));
     let logs = bench.train.logs.clone();
     let unknowns = study.parameters.iter().zip(&nominal);

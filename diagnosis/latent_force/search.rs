@@ -1,4 +1,4 @@
-//! Forward selection of effects by evidence, with a look back after each.
+//! Forward selection of effects by evidence, with corrections after each.
 
 mod about_replays;
 mod begun;
@@ -47,12 +47,12 @@ use path::Path;
 use prior::worth;
 use set::{from_fit_of, is_due};
 
-/// The stage that looks for what is missing beside a set.
+/// Stage that looks for further effects besides a set.
 const FURTHER: &str = "further effects beside those named";
-/// The stage that frees what is given of the effects that are named.
+/// Stage that frees the given values of the named effects.
 const GIVEN: &str = "values of the effects named that no search tries, such as an offset";
 
-/// A stage that was cut short, and the sets that it left out.
+/// A stage that was cut short, with the sets that it left out.
 #[derive(Clone, Debug)]
 pub struct Untried {
     /// What was left out.
@@ -62,7 +62,7 @@ pub struct Untried {
 }
 
 impl Untried {
-    /// What was left out of a stage upon a set.
+    /// A stage that was cut short with a set as its base.
     fn upon(set: &Set, stage: &'static str) -> Self {
         Self {
             stage,
@@ -71,26 +71,26 @@ impl Untried {
     }
 }
 
-/// What a search found.
+/// Result of a search.
 pub struct Outcome {
-    /// Without effects.
+    /// The fitted model without effects.
     pub none: Fitted,
     /// The rounds.
     pub rounds: Vec<Round>,
-    /// What is missing without effects, and with those that stand.
+    /// What is missing without effects, and with the set that stands.
     pub missing: [Missing; 2],
-    /// The set that stands; that without effects where nothing earned its place.
+    /// The set that stands: the model without effects if nothing earned its place.
     pub best: Set,
-    /// What was left out because the work was stopped.
+    /// What was left out because the search was stopped.
     pub untried: Vec<Untried>,
 }
 
-/// Whether a set has what an ordinary machine has of everything.
+/// Whether a set includes tolerances.
 fn has_tolerances(candidates: &[Candidate], set: &Set) -> bool {
     set.candidates.iter().any(|&c| candidates[c].is_tolerance)
 }
 
-/// Whether a set has a candidate within its tolerance.
+/// Whether a set holds the effect of a candidate within its tolerance.
 fn is_within(candidates: &[Candidate], set: &Set, candidate: usize) -> bool {
     let like = |&c: &usize| {
         candidates[c].is_tolerance && candidates[c].label() == candidates[candidate].label()
@@ -98,7 +98,10 @@ fn is_within(candidates: &[Candidate], set: &Set, candidate: usize) -> bool {
     set.candidates.iter().any(like)
 }
 
-/// Candidates that are tried upon a set: not those in it, within their tolerances or else, nor those that are `known` to act or not.
+/// Candidates that are open with a set as the base.
+///
+/// These exclude members of the set, effects that it holds within their tolerances, and candidates
+/// that are `known` to act or not. A refinement is open only if the law that it refines is named.
 fn open_upon(candidates: &[Candidate], known: &[usize], set: &Set) -> Vec<usize> {
     (0..candidates.len())
         .filter(|&c| !candidates[c].is_tolerance && !is_within(candidates, set, c))
@@ -107,8 +110,12 @@ fn open_upon(candidates: &[Candidate], known: &[usize], set: &Set) -> Vec<usize>
         .collect()
 }
 
-/// Fits the set that stands from where the `next` one has come to, where there is time and that raises its evidence; what is
-/// without effects is then the better model without effects too. One that does not rise above it by the `threshold` as it is changes nothing.
+/// Refits the set that stands from the result of the `next` set, and keeps the fit if its evidence
+/// is higher.
+///
+/// If the set that stands has no effects, `none` becomes that better fit too. Nothing is refitted
+/// once time is out. Along rows, nothing is refitted either unless `next` exceeds the set that
+/// stands by the `threshold`.
 fn fit_from(
     context: &Context<'_>,
     (next, threshold): (Option<&Set>, f64),
@@ -130,14 +137,20 @@ fn fit_from(
     Ok(())
 }
 
-/// Whether time has ended before the set that stands could be fitted from the starts of segments of the next one: what a further effect
-/// owes to better starts, or to more rounds, is only known then.
+/// Whether time ran out before the set that stands could be refitted from the initial states of the
+/// next set.
+///
+/// Only that refit shows how much of a further effect's evidence is due to better initial states or
+/// to more linearisations.
 fn is_cut_short(context: &Context<'_>, best: &Set, progress: &dyn Progress) -> bool {
     context.has_segments() && !best.candidates.is_empty() && progress.is_stopped()
 }
 
-/// What follows on the set that stands after a round: the `next` one that has earned it, or where none has and the search goes on the set with
-/// tolerances beside it, if these earn it; with the names that it has once tolerances are among it.
+/// The set that follows the one that stands after a round.
+///
+/// This is the `next` set, which has earned its place. If there is none and time is left, it is the
+/// set that stands with tolerances, if these earn their place. Once tolerances are included, the
+/// names of the set are settled again.
 fn upon_tolerances(
     context: &Context<'_>,
     candidates: &[Candidate],
@@ -167,7 +180,7 @@ fn upon_tolerances(
     }
 }
 
-/// A search: what it is in, and what it chooses from.
+/// A search: its data, its candidates and its settings.
 struct Search<'s> {
     context: &'s Context<'s>,
     candidates: &'s [Candidate],
@@ -178,16 +191,20 @@ struct Search<'s> {
     progress: &'s dyn Progress,
     /// What is missing without effects.
     at_first: Missing,
-    /// Evidence by which a name must rise above the set that stands.
+    /// Evidence by which a name must exceed the set that stands.
     threshold: f64,
 }
 
-/// Searches upon the model without effects, among `candidates` without those that are `known` to act or not. Where hardly any force is missing
-/// and `open_loop` replays still leave a gap, as of a stiff drive that was made softer, what a further name closes of that gap counts.
+/// Searches for effects, starting from the model without effects.
 ///
-/// Which of two first names is the right one may only show once the second is there: where one is not far behind the one that was taken, and
-/// something was missing beside that, the search goes on from it too, and what is more likely in the end stands. What no fit has told from a name
-/// that stands is a rival at the end too.
+/// The search uses the `candidates` that are not `known` to act or not. If hardly any force is
+/// missing but `open_loop` replays still leave a gap, a further name counts by how much of that gap
+/// it closes. A stiff drive that became softer is an example.
+///
+/// Which of two first names is correct may show only once the second name is there. If one was not
+/// far behind the one that was taken, and something was still missing, the search also continues
+/// from it. The more likely end stands. At the end, sets that no fit has separated from a name that
+/// stands are added as rivals.
 ///
 /// # Errors
 /// When the engine fails.

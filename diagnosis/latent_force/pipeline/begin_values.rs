@@ -1,8 +1,10 @@
-//! Where values of the study's parameters begin to be fitted.
+//! Values at which the fit of the study's parameters begins.
 //!
-//! Where nothing touches they begin as given. A contact that sticks in the model, or slides too far, has no slope that tells how far its friction
-//! is from the right one, and segments of such a model begin where that has put them. Replays of whole logs tell: so each parameter begins at
-//! that of a few values over its range whose replays leave least.
+//! Without contact they begin as given. With contact, neither derivatives nor segments help. A
+//! contact that sticks in the model, or slides too far, has no derivative that shows how wrong its
+//! friction is. Segments of such a model begin where that friction has put the bodies. Replays of
+//! whole logs do show it. So each parameter begins at the one of a few values over its range whose
+//! replays leave least.
 
 use asid_core::Result;
 
@@ -12,10 +14,11 @@ use crate::predict::Point;
 
 use super::rows::Rows;
 
-/// Values over the range of a parameter that are tried: a fit goes on from the best, and a tenth of a range is as far as its slopes reach.
+/// Values over the range of a parameter that are tried. A fit continues from the best, and its
+/// derivatives reach about a tenth of a range.
 const TRIED: usize = 5;
 
-/// Values to begin with, `nominal` where nothing touches.
+/// Values to begin with: `nominal` if no bodies touch.
 ///
 /// # Errors
 /// When a rollout fails.

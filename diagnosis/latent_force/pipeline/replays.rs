@@ -1,4 +1,4 @@
-//! Replays, open loop, of the model without effects, of the set that stands and of its rivals.
+//! Open-loop replays of the model without effects, of the set that stands and of its rivals.
 
 use std::sync::Arc;
 
@@ -20,16 +20,21 @@ use crate::trajectory::Trajectory;
 
 use super::told::{detection_limits, isolability, missing_forces, p_value, ranking};
 
-/// Physics steps of a replay of all logs times coordinates of the starts that they leave open up to which starts are fitted
-/// once more with the values; beyond it they stay as smoothed.
+/// Limit of the physics steps of a replay of all logs times the open coordinates of the initial
+/// states.
+///
+/// Up to this limit, initial states are fitted once more with the values. Beyond it they stay as
+/// smoothed.
 const REPLAYED: usize = 500_000;
-/// Most sets besides the verdict's that are replayed.
+/// Most rivals that are replayed.
 const RIVALS: usize = 4;
-/// Difference of evidence, natural logarithm, that tells two sets apart in no case.
+/// Difference of evidence, in nats, up to which two sets always count as equal.
 const LEVEL: f64 = 1.0;
 
-/// Starts of the training episodes as a fit smoothed them, where the logs leave them open; `firsts` are the walks that begin
-/// an episode.
+/// Initial states of the training episodes: as smoothed by a fit if the logs leave them open,
+/// otherwise as the logs give them.
+///
+/// `firsts` are the walks that begin an episode.
 fn smoothed_starts(bench: &Bench, fitted: &Fitted, firsts: &[usize]) -> Vec<State> {
     let layout = bench.layout();
     let width = layout.nq + layout.nv;
@@ -44,8 +49,11 @@ fn smoothed_starts(bench: &Bench, fitted: &Fitted, firsts: &[usize]) -> Vec<Stat
     firsts.iter().map(|&w| state(&trajectory[w])).collect()
 }
 
-/// The values that a fit holds possible: as far about the mean of its posterior as that is uncertain, and as its own values lie from it.
-/// `None` for a set that was enlarged and not fitted yet.
+/// Region of the values that a fit considers possible.
+///
+/// Its covariance about the posterior mean is that of the posterior, plus the outer product of the
+/// distance from the present values to that mean. `None` for a set that was enlarged and not fitted
+/// yet.
 fn region(fitted: &Fitted) -> Option<Region> {
     let places = fitted.hypothesis.free();
     if places.len() != fitted.ahead.len() {
@@ -58,7 +66,7 @@ fn region(fitted: &Fitted) -> Option<Region> {
     Region::new(places, mean, covariance)
 }
 
-/// All sets that were fitted, each once by what it names, the most evident first.
+/// All fitted sets, one for each set of names, in descending order of evidence.
 fn all_sets(outcome: &Outcome, candidates: &[Candidate]) -> Vec<Set> {
     let mut sets: Vec<Set> = Vec::new();
     let named = |set: &Set| {
@@ -70,7 +78,7 @@ fn all_sets(outcome: &Outcome, candidates: &[Candidate]) -> Vec<Set> {
     for set in outcome.rounds.iter().flat_map(|r| &r.confirmed) {
         let members = named(set);
         match sets.iter_mut().find(|s| named(s) == members) {
-            // With tolerances and without it is the same answer.
+            // A set with tolerances and the same set without them are the same answer.
             Some(known) if stands(set) && !stands(known) => *known = set.clone(),
             Some(known) if stands(known) && !stands(set) => {}
             Some(known) if known.fitted.evidence < set.fitted.evidence => *known = set.clone(),
@@ -82,30 +90,31 @@ fn all_sets(outcome: &Outcome, candidates: &[Candidate]) -> Vec<Set> {
     sets
 }
 
-/// Replays of fitted sets: from where their starts were smoothed, with the values fitted once more to whole logs.
+/// Replays of fitted sets, from their smoothed initial states.
 pub(super) struct Replays<'a> {
     pub(super) bench: &'a Bench,
     pub(super) candidates: &'a [Candidate],
     /// Walks that begin an episode.
     pub(super) firsts: &'a [usize],
-    /// Coordinates of the starts that are fitted with the values.
+    /// Coordinates of the initial states that are fitted together with the values.
     pub(super) open: Vec<usize>,
     pub(super) progress: &'a dyn Progress,
 }
 
 impl Replays<'_> {
-    /// Physics steps of a replay of all training logs.
+    /// Physics steps of one replay of all training logs.
     pub(super) fn steps(&self) -> usize {
         let episodes = self.bench.train.logs.episodes.iter();
         episodes.map(|e| e.plan.physics_steps()).sum()
     }
 
-    /// Excess power that a fitted set leaves of the training logs, a reading, in units of the noise.
+    /// Excess power per reading that replays of a fitted set leave of the training logs, in units
+    /// of the noise.
     pub(super) fn excess(&self, fitted: &Fitted, members: &[usize]) -> Result<f64> {
         Ok((self.left(fitted, members)? - 1.0).max(0.0))
     }
 
-    /// Whether the model without effects leaves a gap of the training logs, or of those held out.
+    /// Whether the model without effects leaves a gap in the training logs or in the held-out logs.
     pub(super) fn leaves_a_gap(&self, none: &Fitted) -> Result<bool> {
         let (bench, least) = (self.bench, LEAST_GAP * LEAST_GAP);
         if self.left(none, &[])? > least {
@@ -113,22 +122,25 @@ impl Replays<'_> {
         }
         let (_, residuals) = bench.replay_held_out(&[], &none.theta, &bench.test.starts)?;
         let left = cost(&residuals) / bench.held_readings().max(1.0);
-        // A replay that diverged leaves what is not a number.
+        // A replay that diverged leaves NaN.
         Ok(left.is_nan() || left > least)
     }
 
-    /// Mean square that replays of a fitted set leave of the training logs, in units of the noise; infinite where one diverges.
+    /// Mean square that replays of a fitted set leave of the training logs, in units of the noise;
+    /// infinite if a replay diverges.
     fn left(&self, fitted: &Fitted, members: &[usize]) -> Result<f64> {
         let left = cost(&self.residuals(fitted, members)?);
         Ok(if left.is_nan() { f64::INFINITY } else { left })
     }
 
-    /// Residuals of the training logs that replays of a fitted set leave, in units of the noise and of the root of how many readings there are.
+    /// Residuals that replays of a fitted set leave of the training logs.
+    ///
+    /// They are in units of the noise, divided by the square root of the number of readings.
     pub(super) fn residuals(&self, fitted: &Fitted, members: &[usize]) -> Result<Vec<f64>> {
         self.residuals_at(&self.point(fitted), (fitted, members))
     }
 
-    /// The same from where the logs say that they begin.
+    /// The same residuals for replays from the initial states that the logs give.
     pub(super) fn as_logged(&self, fitted: &Fitted, members: &[usize]) -> Result<Vec<f64>> {
         let point = Point {
             theta: fitted.theta.clone(),
@@ -152,8 +164,11 @@ impl Replays<'_> {
         Ok(residuals)
     }
 
-    /// A set with its values fitted to whole replays from the starts that it has smoothed, after the excess power that they then leave. Its
-    /// covariance is how far all that they leave could have moved each value, if it were of one sign with what the value does.
+    /// Fits the values of a set to whole replays from its smoothed initial states, and returns the
+    /// excess power that is left, with the set.
+    ///
+    /// The covariance of the set is that of the fit times the total misfit: how far the misfit
+    /// could have moved each value if all of it pulled in one direction.
     pub(super) fn fitted(&self, set: &Set) -> Result<(f64, Set)> {
         let bench = self.bench;
         let trials = self.trials(&set.fitted, &set.candidates);
@@ -225,7 +240,7 @@ impl Replays<'_> {
         members.iter().map(with_values).collect()
     }
 
-    /// Values of a fitted set, and the starts that it has smoothed.
+    /// Values of a fitted set, with its smoothed initial states.
     fn point(&self, fitted: &Fitted) -> Point {
         Point {
             theta: fitted.theta.clone(),
@@ -233,7 +248,8 @@ impl Replays<'_> {
         }
     }
 
-    /// Replays a fitted set of candidates, with its values by the fit that allows for a missing force.
+    /// Replays a fitted set of candidates, with the posterior of its values from the local fit,
+    /// which allows for a missing force.
     fn of(
         &self,
         fitted: &Fitted,
@@ -250,7 +266,8 @@ impl Replays<'_> {
         Ok(of)
     }
 
-    /// Replays a set of candidates at its values, with the starts' slopes of a set that is `like` it.
+    /// Replays a set of candidates at its values, with the derivatives with respect to the initial
+    /// states of a similar set (`like`).
     fn replayed(
         &self,
         fitted: &Fitted,
@@ -269,8 +286,10 @@ impl Replays<'_> {
     }
 }
 
-/// How much the values are fitted to whole replays, without effects and of the set that stands; and how many rivals are
-/// replayed. What there was no time for goes to `not_tried`.
+/// Efforts of the fits to whole replays without effects and of the set that stands, and the number
+/// of rivals to replay.
+///
+/// Stages that time does not allow are added to `not_tried`.
 fn efforts(
     repeats: Option<Repeats>,
     progress: &dyn Progress,
@@ -282,12 +301,12 @@ fn efforts(
             effects: Vec::new(),
         });
     };
-    // Whole replays that nobody can repeat tell nothing of values.
+    // Whole replays that cannot be repeated carry no information about values.
     let values = match repeats {
         Some(Repeats { scatters: true, .. }) => Effort::LOOK,
         _ => Effort::BRIEF,
     };
-    // A stopped search fits the values of what stands alone.
+    // A stopped search fits only the values of the set that stands.
     let (of_none, rivals) = if progress.is_stopped() {
         cut("replays of rivals");
         (Effort::LOOK, 0)
@@ -303,8 +322,10 @@ fn efforts(
     (of_none, of_best, rivals)
 }
 
-/// The set that stands, where it is one of those fitted, `rivals` by their evidence, and the set of the `known` candidates; and
-/// whether the first is the one that stands.
+/// The sets to replay, and whether the first of them is the set that stands.
+///
+/// They are the set that stands, if it was fitted, `rivals` in descending order of evidence, and
+/// the set of the `known` candidates.
 fn replayed_sets(
     outcome: &Outcome,
     mut sets: Vec<Set>,
@@ -316,7 +337,7 @@ fn replayed_sets(
         sets.remove(place);
         sets.insert(0, outcome.best.clone());
     }
-    // A twin is a rival however little time there is.
+    // A twin is always a rival, even if time is out.
     let is_level = |s: &Set| (s.fitted.evidence - outcome.best.fitted.evidence).abs() < LEVEL;
     let rivals = rivals.max(usize::from(sets.get(1).is_some_and(is_level)));
     let of_known = sets.iter().position(|s| s.candidates == known);
@@ -326,8 +347,10 @@ fn replayed_sets(
     (sets, stands.is_some())
 }
 
-/// Replays the model without effects, the set that stands and its nearest rivals, open loop; with the sets behind the
-/// findings. The set of the `known` candidates is always among them.
+/// Replays the model without effects, the set that stands and its nearest rivals open loop, and
+/// returns the findings with the replayed sets.
+///
+/// The set of the `known` candidates is always among them.
 pub(super) fn replay(
     bench: &Bench,
     (candidates, outcome, known): (&[Candidate], &Outcome, &[usize]),
@@ -355,13 +378,14 @@ pub(super) fn replay(
     let mut sets = all_sets(outcome, candidates);
     let ranking = ranking(candidates, outcome, &sets);
     if progress.is_stopped() {
-        // Slopes in what an ordinary machine has of everything take longer than those of all names.
+        // Derivatives with respect to tolerances take longer than those of all names.
         let best = &outcome.best.candidates;
         let is_tolerance = |&c: &usize| candidates[c].is_tolerance;
         sets.retain(|s| s.candidates == *best || !s.candidates.iter().any(is_tolerance));
     }
     let (sets, stands) = replayed_sets(outcome, sets, (known, rivals));
-    // Without effects replays may lie far from the logs, where slopes are others.
+    // Replays without effects may be far from the logs, where derivatives differ. So only the steps
+    // of the differences are shared.
     let mut like = Arc::new(StartSlopes {
         steps: none.fit.starts.steps.clone(),
         columns: Vec::new(),

@@ -1,4 +1,4 @@
-//! Which rows of the logs are smoothed, and which are taken in segments.
+//! Selects the rows of the logs, and decides which are smoothed and which are cut into segments.
 
 use asid_core::Result;
 use asid_mjcf::Plant;
@@ -14,16 +14,20 @@ use crate::starts::given_start;
 use crate::study::Study;
 use crate::trajectory::{Path, Trajectory};
 
-/// Physics steps of one walk along all logs times degrees of freedom, at most: a walk is taken once a coordinate and once a
-/// candidate, and both grow with the degrees of freedom.
+/// Most physics steps of one walk along all logs, times degrees of freedom.
+///
+/// A walk is simulated once for each coordinate and each candidate, and both numbers grow with the
+/// degrees of freedom.
 const BUDGET: f64 = 72_000.0;
-/// The same times the square of the degrees of freedom, for from some six on the time of a step grows with them too: a screening of
-/// a machine of 22 takes 500 walks at 50 us a step.
+/// Most physics steps times the square of the degrees of freedom.
+///
+/// From about six degrees of freedom on, the time of a step also grows with their number. A
+/// screening of a machine with 22 takes 500 walks at 50 us a step.
 const SQUARE_BUDGET: f64 = 432_000.0;
-/// Rows of a log that are walked in any case.
+/// Fewest rows of a log that are used, whatever the budget.
 const FEWEST: usize = 150;
 
-/// What the model does along some states.
+/// Trajectory quantities of the model along given states.
 pub(super) fn along(
     bench: &Bench,
     walks: &[Walk],
@@ -37,7 +41,7 @@ pub(super) fn along(
     Trajectory::along(&*model, plant, values, &bench.train.logs, states, &rows)
 }
 
-/// What the model as it is does in the training logs.
+/// Replay of the training logs with the model as given.
 fn replayed(bench: &Bench, nominal: &[f64]) -> Result<Trajectory> {
     let machine = &bench.machine;
     let model = machine.with(&[])?;
@@ -50,8 +54,11 @@ fn replayed(bench: &Bench, nominal: &[f64]) -> Result<Trajectory> {
     Trajectory::of(&*model, plant, parameters, logs, &point, threads)
 }
 
-/// Takes the contacts of a free body from the replays where it never makes them along its readings: these lie beside the places that the model
-/// knows, for a tracker has its zero elsewhere, and what seems to float there rests on something.
+/// Takes the contacts of a free body from the replays if the body touches nothing along its
+/// readings.
+///
+/// Such readings are offset from the coordinates of the model, because a tracker has another zero.
+/// The body seems to float, but it rests on something.
 fn support(plant: &Plant, shown: &mut Trajectory, replayed: &Trajectory, walks: &[Walk]) {
     let along_readings = pairs_touching(shown);
     let n = shown.pairs.len();
@@ -69,22 +76,22 @@ fn support(plant: &Plant, shown: &mut Trajectory, replayed: &Trajectory, walks: 
     }
 }
 
-/// Rows of the training logs that are taken, and what touches in them.
+/// Rows of the training logs that are used, and the contacts in them.
 pub(super) struct Rows {
-    /// One walk a log.
+    /// One walk for each log.
     walks: Vec<Walk>,
-    /// Whether something touches, one flag a row.
+    /// Whether bodies touch, one flag for each row.
     touches: Vec<Vec<bool>>,
     /// Pairs of bodies that touch in some row.
     pairs: Vec<[usize; 2]>,
     /// Largest magnitude of each tangent coordinate.
     scale: Vec<f64>,
-    /// States where no sensor reads them.
+    /// States of the coordinates that no sensor reads.
     unread: Unread,
 }
 
 impl Rows {
-    /// Takes rows within the budget.
+    /// Selects rows within the budget.
     pub(super) fn of(bench: &Bench, nominal: &[f64]) -> Result<Self> {
         let layout = bench.layout();
         let plant = &bench.machine.plant;
@@ -105,19 +112,19 @@ impl Rows {
         })
     }
 
-    /// Whether something touches in any of them.
+    /// Whether bodies touch in any row.
     pub(super) fn touches(&self) -> bool {
         self.touches.iter().flatten().any(|t| *t)
     }
 
-    /// Them in segments of a duration, s, where something touches.
+    /// The rows, cut into segments of a duration, s, where bodies touch.
     pub(super) fn cut(&self, study: &Study, bench: &Bench, duration: f64) -> Taken {
         let each = self.walks.iter().zip(&self.touches);
         let walks = each.flat_map(|(walk, t)| cut(walk, t, duration));
         self.taken(study, bench, walks.collect())
     }
 
-    /// Them with each log in which something touches as one segment.
+    /// The rows, with each log in which bodies touch as one segment.
     pub(super) fn whole(&self, study: &Study, bench: &Bench) -> Taken {
         let each = self.walks.iter().zip(&self.touches);
         let walks = each.map(|(walk, t)| whole(walk, t));
@@ -142,12 +149,15 @@ impl Rows {
     }
 }
 
-/// States along the logs where no sensor reads them.
+/// States along the logs of the coordinates that no sensor reads.
 enum Unread {
     /// The first keyframe, at rest: every hinge and slide is read.
     Home(Vec<f64>),
-    /// The same but for hinges and slides, which move as replays of the model as it is have them; `rows x (nq + nv)` a log. At rest a joint
-    /// that no sensor reads would seem never to move, and no smoother would then let it.
+    /// The first keyframe, with hinges and slides as in replays of the model as given.
+    /// `rows x (nq + nv)` for each log.
+    ///
+    /// At rest, a joint that no sensor reads would seem never to move, and no smoother would let it
+    /// move.
     Replayed { states: Vec<Vec<f64>>, width: usize },
 }
 
@@ -170,7 +180,7 @@ impl Unread {
                 let mut state = still.clone();
                 for joint in &joints {
                     let own = [q[joint.qpos], v[joint.qvel]];
-                    // A replay that diverged says nothing.
+                    // A replay that diverged carries no information.
                     if own.iter().all(|x| x.is_finite()) {
                         (state[joint.qpos], state[nq + joint.qvel]) = (own[0], own[1]);
                     }
@@ -185,7 +195,7 @@ impl Unread {
         }
     }
 
-    /// Along some walks, `rows x (nq + nv)` each.
+    /// The states along some walks, `rows x (nq + nv)` each.
     fn along(&self, walks: &[Walk]) -> Vec<Vec<f64>> {
         let along = |walk: &Walk| match self {
             Self::Home(still) => still.repeat(walk.len()),
@@ -200,7 +210,8 @@ impl Unread {
     }
 }
 
-/// The first rows of each walk, as many as the budget of physics steps allows: a screening takes all of them once a column.
+/// The first rows of each walk, as many as the budget of physics steps allows: a screening
+/// simulates them once for each column.
 fn within_budget(walks: Vec<Walk>, nv: usize) -> Vec<Walk> {
     let steps: usize = walks.iter().flat_map(|w| &w.substeps).sum();
     let nv = nv.max(1) as f64;

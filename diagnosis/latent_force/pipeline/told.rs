@@ -1,4 +1,5 @@
-//! What is told of a search besides its replays: missing forces, the ranking, and what the logs cannot tell apart.
+//! What is reported of a search besides its replays: missing forces, the ranking, detection limits,
+//! and what the logs cannot separate.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -13,10 +14,11 @@ use crate::result::{DetectionLimit, Isolability, MissingForce, RankedSet};
 
 /// Most sets that are listed with their evidence.
 const RANKED: usize = 20;
-/// Steps a rad that angles between effects are told in: a picture shows degrees.
+/// Steps per rad to which angles between effects are rounded: the picture shows degrees.
 const ANGLES: f64 = 1e4;
 
-/// What is missing at each degree of freedom, without effects and with those that stand; empty where all is segments.
+/// Missing force at each degree of freedom, without effects and with the set that stands; empty if
+/// all rows are in segments.
 pub(super) fn missing_forces(layout: &Layout, outcome: &Outcome) -> Vec<MissingForce> {
     if outcome.missing[0].share >= 1.0 {
         return Vec::new();
@@ -36,7 +38,8 @@ pub(super) fn missing_forces(layout: &Layout, outcome: &Outcome) -> Vec<MissingF
         .collect()
 }
 
-/// Sets by their evidence over the model without effects: those that were fitted, then what the first screening had.
+/// Sets in order of rank, with their evidence over the model without effects: the fitted sets
+/// first, then those of the first screening.
 pub(super) fn ranking(
     candidates: &[Candidate],
     outcome: &Outcome,
@@ -54,7 +57,7 @@ pub(super) fn ranking(
         fitted: Some(set.fitted.evidence - none),
     };
     let mut all: Vec<RankedSet> = fitted.iter().map(of_fit).collect();
-    // What has no name is no effect.
+    // A set without a name is no effect.
     all.retain(|r| !r.effects.is_empty());
     for seen in outcome.rounds.iter().take(1).flat_map(|r| &r.screened) {
         let (effects, gain) = (labels(&seen.set), seen.gain);
@@ -71,7 +74,8 @@ pub(super) fn ranking(
     all
 }
 
-/// What the logs could have shown beside what stands.
+/// Detection limits of the last screening: the smallest effects that the logs could have shown
+/// besides the set that stands.
 pub(super) fn detection_limits(candidates: &[Candidate], outcome: &Outcome) -> Vec<DetectionLimit> {
     let Some(Sight { limits, rehearsal }) = outcome.rounds.last().map(|r| &r.sight) else {
         return Vec::new();
@@ -91,13 +95,14 @@ pub(super) fn detection_limits(candidates: &[Candidate], outcome: &Outcome) -> V
     limits.iter().zip(&rehearsal.recognised).map(told).collect()
 }
 
-/// Probability of as much evidence for the best candidate where nothing is missing; `None` where that is not known.
+/// Probability of as much evidence for the best candidate if nothing is missing; `None` if it is
+/// not known.
 pub(super) fn p_value(outcome: &Outcome) -> Option<f64> {
     let first = outcome.rounds.first().map(|r| r.sight.rehearsal.p_value);
     first.filter(|p| p.is_finite())
 }
 
-/// Principal angles between what leads in the first screening.
+/// Principal angles between the leading candidates of the first screening.
 pub(super) fn isolability(candidates: &[Candidate], outcome: &Outcome) -> Option<Isolability> {
     let (leading, cosines) = &outcome.rounds.first()?.alike;
     let n = leading.len();

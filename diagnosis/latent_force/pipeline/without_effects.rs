@@ -1,4 +1,5 @@
-//! The model without effects, in the shortest segments, or in the longest whose replays do not scatter.
+//! The model without effects, fitted in the shortest segments, or in the longest whose replays do
+//! not scatter.
 
 use asid_core::{Error, Progress, Result};
 
@@ -15,53 +16,59 @@ use crate::study::Study;
 use super::ROUNDS;
 use super::rows::Rows;
 
-/// Linearisations and rounds of EM of a first smoothing.
+/// Linearisations of a first smoothing, and rounds of EM.
 const FIRST: (usize, usize) = (4, 8);
-/// The same of segments, whose noise is known but for what they leave: the fit goes on from there.
+/// The same for segments, whose noise is known except for what they leave: the fit continues from
+/// there.
 const FIRST_OF_SEGMENTS: (usize, usize) = (2, 8);
-/// Linearisations of a fit in segments that are not the longest: enough to begin the longer ones where these end.
+/// Linearisations of a fit in segments that are not the longest: enough to initialise the longer
+/// ones.
 const SHORT: usize = 4;
-/// Share of the segments' rows that scatter by more than their noise, from which on segments are not made longer: what is gained by
-/// length is lost where nothing can be repeated.
+/// Share of the segments' rows that scatter by more than their noise from which on segments are not
+/// made longer. Replays that cannot be repeated lose what length gains.
 const LOST: f64 = 0.3;
 
-/// Share of the segments whose last replay did not keep what its slopes promised, from which on they are not made longer: their evidence is
-/// that of slopes that mislead. Of pushed pucks that are read rarely it is a quarter and more where names then come out by chance, of
-/// balls that roll and bounce a sixth at most.
+/// Share of the segments whose last replay did not achieve what its derivatives predicted from
+/// which on segments are not made longer.
+///
+/// The evidence of such segments rests on misleading derivatives. For pushed pucks that are read
+/// rarely, whose names then come out by chance, the share is a quarter and more. For balls that
+/// roll and bounce it is a sixth at most.
 const MISLED: f64 = 0.2;
 
-/// The model without effects, as it stands.
+/// The fitted model without effects.
 pub(super) struct Stands<'a> {
-    /// What it explains.
+    /// The data that it explains.
     pub(super) context: Context<'a>,
     /// The fit.
     pub(super) none: Fitted,
-    /// How far replays of the longest segments that were tried can be repeated; `None` where nothing touches.
+    /// How well replays of the longest segments that were tried can be repeated; `None` if no
+    /// bodies touch.
     pub(super) repeats: Option<Repeats>,
 }
 
-/// How long segments are.
+/// Length of segments.
 #[derive(Clone, Copy)]
 enum Length {
-    /// Some duration, s, within a stretch of contact.
+    /// A duration, s, within a stretch of contact.
     Of(f64),
     /// A whole log, from its first row on.
     Log,
 }
 
-/// A fit in segments of some length, or how their replays scatter where they are too long.
+/// A fit in segments of some length, or the scatter of their replays if the segments are too long.
 enum Tried<'a> {
     Stands(Box<Stands<'a>>),
     Scatters(Repeats),
 }
 
-/// What is fitted.
+/// The model to fit and its data.
 #[derive(Clone, Copy)]
 pub(super) struct Null<'a> {
     /// The study and its bench.
     pub(super) study: &'a Study,
     pub(super) bench: &'a Bench,
-    /// Rows that are taken, of which logs.
+    /// Rows that are used, and their logs.
     pub(super) rows: &'a Rows,
     pub(super) logs: &'a Logs,
     /// The model, and the values to begin with.
@@ -71,7 +78,7 @@ pub(super) struct Null<'a> {
 }
 
 impl<'a> Null<'a> {
-    /// Fits it in the shortest segments.
+    /// Fits the model in the shortest segments.
     ///
     /// # Errors
     /// When the engine fails.
@@ -83,8 +90,11 @@ impl<'a> Null<'a> {
         }
     }
 
-    /// Fits it in longer segments from where the shorter begin and end, for as long as their replays do not scatter; `None` where
-    /// the shorter ones are the longest that do not, whose replays are then told by those that do.
+    /// Fits the model in longer segments, from the results of the shorter ones, as long as replays
+    /// do not scatter.
+    ///
+    /// Returns `None` if the shorter segments are the longest that do not scatter. They then carry
+    /// the scatter of the longer segments as their `repeats`.
     ///
     /// # Errors
     /// When the engine fails.
@@ -106,8 +116,10 @@ impl<'a> Null<'a> {
         stands.map(|s| self.fitted_on(s)).transpose()
     }
 
-    /// Fits it in segments that are whole logs, from where shorter ones begin, and tells whether their slopes mislead; `None` where
-    /// their replays scatter.
+    /// Fits the model in segments that are whole logs, from the results of shorter ones, and
+    /// returns whether their derivatives mislead.
+    ///
+    /// Returns `None` if their replays scatter.
     ///
     /// # Errors
     /// When the engine fails.
@@ -122,7 +134,7 @@ impl<'a> Null<'a> {
         }
     }
 
-    /// Fits it to the end in the segments that stand.
+    /// Continues the fit to its end in the same segments.
     fn fitted_on(self, mut stands: Stands<'a>) -> Result<Stands<'a>> {
         if stands.context.has_segments() {
             let (none, progress) = (&stands.none, self.progress);
@@ -136,7 +148,9 @@ impl<'a> Null<'a> {
         Ok(stands)
     }
 
-    /// Fits it in segments of a length, a little, unless their replays scatter and shorter ones stand.
+    /// Fits the model briefly in segments of a length.
+    ///
+    /// Segments whose replays scatter are not fitted if a fit of shorter ones exists.
     fn fit_in(
         self,
         length: Length,
@@ -200,7 +214,7 @@ impl<'a> Null<'a> {
     }
 }
 
-/// Share of the segments whose last replay left more than its slopes had promised.
+/// Share of the segments whose last replay left more than its derivatives had predicted.
 fn misled(context: &Context<'_>, fitted: &Fitted) -> f64 {
     let pairs = context.walks.iter().zip(&fitted.estimate.misled);
     let segments: Vec<f64> = pairs
