@@ -13,7 +13,7 @@ use asid_core::real_world::{Attempt, RealEpisode, RealWorld};
 use asid_core::solve::{TaskSolver, Trial};
 pub use asid_results::trace::StageCost;
 
-/// Samples that stand for the prior where nothing was identified.
+/// Number of samples that represent the prior where nothing was identified.
 const PRIOR_SAMPLES: usize = 256;
 
 /// What an episode tells about the unknowns, computed in the simulator.
@@ -36,8 +36,8 @@ pub struct EpisodeInformation {
     pub trace: f64,
 }
 
-/// Information of an episode with these actions (`horizon x action`) at `theta` and `start`, all of it as
-/// an explorer with these settings is paid.
+/// Information of an episode with these actions (`horizon x action`) at `theta` and `start`. It is
+/// computed as for the reward of an explorer that has these settings.
 ///
 /// # Errors
 /// When the engine fails.
@@ -79,10 +79,12 @@ pub fn episode_information(
     Ok(out)
 }
 
-/// [`episode_information`] whose expected deviations are those of [`expected_deviation`], with the noise
-/// model of an identifier, where the settings ask for what identification sees (trajectory form, start
-/// pose estimated along, roughness counted) and for at least one fit. Of binary unknowns they follow from the
-/// information.
+/// [`episode_information`] with the expected deviations of [`expected_deviation`], which uses an
+/// identifier's noise model.
+///
+/// The replacement takes place where the settings describe what identification sees: trajectory
+/// form, start pose estimated jointly, roughness included. They must also ask for at least one fit.
+/// The deviations of binary unknowns always follow from the information.
 ///
 /// # Errors
 /// When the engine fails.
@@ -112,14 +114,14 @@ pub fn episode_information_as(
     Ok(out)
 }
 
-/// Everything that came of a run.
+/// Everything that a run produced.
 #[derive(Debug)]
 pub struct RunOutcome {
     /// Return over the search for a policy.
     pub curve: Vec<CurvePoint>,
     /// What the curve's `x` counts.
     pub curve_label: &'static str,
-    /// Name of the objective.
+    /// Name of the objective of exploration.
     pub objective: String,
     /// The real episode; `None` without exploration.
     pub real: Option<RealEpisode>,
@@ -129,7 +131,7 @@ pub struct RunOutcome {
     pub information: EpisodeInformation,
     /// What was identified; `None` without identification.
     pub identified: Option<Identified>,
-    /// What the solver was given.
+    /// The belief that the solver was given.
     pub belief: Posterior,
     /// What the solver tried.
     pub trials: Vec<Trial>,
@@ -139,8 +141,10 @@ pub struct RunOutcome {
     pub costs: Vec<StageCost>,
 }
 
-/// The algorithms of a run. Without explorer or identifier the solver gets what is known
-/// otherwise, and the prior where nothing is: domain randomisation.
+/// The algorithms of a run.
+///
+/// Without an explorer or identifier, the solver gets `known`; where that is absent too it gets the
+/// prior (domain randomisation).
 #[derive(Clone, Copy)]
 pub struct Method<'m> {
     /// How to explore.
@@ -149,10 +153,10 @@ pub struct Method<'m> {
     pub identifier: Option<&'m dyn Identifier>,
     /// How to solve.
     pub solver: &'m dyn TaskSolver,
-    /// Values of the unknowns that the solver is told where nothing is identified.
+    /// Values of the unknowns that the solver is given where nothing is identified.
     pub known: Option<&'m [f64]>,
-    /// How the expected deviations are computed; whether readings are weighed together is up to the
-    /// identifier.
+    /// How the expected deviations are computed. The identifier decides whether readings are
+    /// weighted jointly.
     pub expected: ExpectedSettings,
 }
 

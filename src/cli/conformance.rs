@@ -40,7 +40,8 @@ pub struct Arguments {
     /// Run this many checks at a time; results do not depend on it [default: one a core]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = super::options::threads)]
     threads: Option<usize>,
-    /// Take engines and checks from a file, such as the config.toml of an earlier `asid conformance`
+    /// Take engines and checks from a file, such as the config.toml of an earlier `asid
+    /// conformance`
     #[arg(long, value_name = "FILE.toml")]
     pub config: Option<PathBuf>,
     /// Write the results and their report into this folder [default: none is written]
@@ -54,7 +55,7 @@ pub struct Arguments {
     json: bool,
 }
 
-/// An engine that is asked.
+/// An engine that is checked.
 struct Asked {
     entry: &'static BackendEntry,
     backend: Box<dyn Backend>,
@@ -99,7 +100,7 @@ pub fn conformance(arguments: &Arguments) -> Result<()> {
             threads,
             &told(&bars, asked.entry.name),
         );
-        // An engine that is there twice has two names, of which it knows one.
+        // An engine that is registered twice has two names, but itself knows only one.
         own.iter_mut()
             .for_each(|row| row.engine = asked.entry.name.to_owned());
         said.push(Engine {
@@ -132,7 +133,7 @@ fn names(capabilities: asid_core::Capabilities) -> Vec<&'static str> {
     capabilities.iter_names().map(|(name, _)| name).collect()
 }
 
-/// Shows how far an engine is, with the check that has been running for longest.
+/// Shows the progress of an engine, with the check that has run the longest.
 fn told<'a>(bars: &'a Bars, engine: &'a str) -> impl Fn(Event<'_>) + Sync + 'a {
     let running = Mutex::new(Vec::<String>::new());
     move |event| {
@@ -153,7 +154,7 @@ fn told<'a>(bars: &'a Bars, engine: &'a str) -> impl Fn(Event<'_>) + Sync + 'a {
     }
 }
 
-/// Engines and parts of checks' names, from the options, else from the configuration.
+/// Engines and parts of check names: from the options, else from the configuration.
 fn wanted(arguments: &Arguments) -> Result<(Vec<String>, Vec<String>)> {
     let table = match &arguments.config {
         Some(path) => settings::read(path, &["backend", "check", "plugins"])?,
@@ -172,8 +173,8 @@ fn wanted(arguments: &Arguments) -> Result<(Vec<String>, Vec<String>)> {
     ))
 }
 
-/// The engines to ask: those that are named, else those of plugins that are, else all
-/// that work on this machine.
+/// The engines to check: those named, else those of named plugins, else all that work on this
+/// machine.
 fn asked(names: &[String]) -> Result<Vec<Asked>> {
     if !names.is_empty() {
         return names

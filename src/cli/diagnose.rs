@@ -1,4 +1,4 @@
-//! `asid diagnose`: where the sim-to-real gap lies, which effect causes it, how far it shrinks.
+//! `asid diagnose`: where the sim-to-real gap lies, which effect causes it, and how far it shrinks.
 
 mod config;
 mod live;
@@ -46,7 +46,8 @@ pub struct Arguments {
     /// Diagnose a task in place of a study
     #[arg(long, value_name = "TASK")]
     task: Option<String>,
-    /// Fit to these logs of the task [default: logs of runs in its simulated real world, made first: see --runs]
+    /// Fit to these logs of the task [default: logs of runs in its simulated real world, made
+    /// first: see --runs]
     #[arg(long, value_name = "FILE", num_args = 1.., requires = "task")]
     train: Vec<PathBuf>,
     /// Hold out these logs of the task
@@ -58,17 +59,20 @@ pub struct Arguments {
     /// Play this many further episodes that tell the rival explanations apart [default: 0]
     #[arg(long, value_name = "N", conflicts_with = "train")]
     experiments: Option<usize>,
-    /// Run the task this many times with the nominal and with the refined model, to count successes [default: 5]
+    /// Run the task this many times with the nominal and with the refined model, to count successes
+    /// [default: 5]
     #[arg(long, value_name = "N")]
     seeds: Option<u64>,
-    /// Answer after about this time with what is known by then; result.json lists the explanations not tried. Ctrl-C does the same
-    /// [default: 1.5]
+    /// Answer after about this time with what is known by then; result.json lists the explanations
+    /// not tried. Ctrl-C does the same [default: 1.5]
     #[arg(long, value_name = "MINUTES")]
     minutes: Option<f64>,
-    /// Repeat the diagnosis on simulated logs for as long as --minutes allows, and tell how often it was right
+    /// Repeat the diagnosis on simulated logs for as long as --minutes allows, and tell how often
+    /// it was right
     #[arg(long)]
     calibrate: bool,
-    /// Accuse a machine that lacks nothing no more often than this, by chance; 0.05 finds smaller effects [default: 0.01]
+    /// Accuse a machine that lacks nothing no more often than this, by chance; 0.05 finds smaller
+    /// effects [default: 0.01]
     #[arg(long, value_name = "P")]
     false_alarms: Option<f64>,
     /// Leave out an effect of the catalogue (repeatable)
@@ -100,7 +104,7 @@ impl Arguments {
             || [explorer, identifier, solver].iter().any(|a| a.is_some())
     }
 
-    /// Whether the task is to be run: for its logs, or to try the answer.
+    /// Whether the task is run: for its logs, or to try the answer.
     fn runs_task(&self, table: &toml::Table) -> bool {
         let task = self.task.is_some() || (self.study.is_none() && table.contains_key("task"));
         let logs = !self.train.is_empty() || table.contains_key("train");
@@ -140,7 +144,7 @@ pub fn diagnose(arguments: &Arguments) -> Result<()> {
     });
     let stem = format!("{}-diagnose", subject.unwrap_or_else(|| "study".into()));
     let plays = world.is_some() && config.train.is_empty();
-    // What is wrong with a study is told before anything is claimed or run.
+    // Errors of a study are reported before anything is claimed or run.
     let given = if plays {
         None
     } else {
@@ -240,7 +244,8 @@ fn write(
     })
 }
 
-/// What `config.toml` holds: the diagnosis' own settings, which win, and those of the runs of a task.
+/// Content of `config.toml`: the diagnosis' own settings, which take precedence, and those of the
+/// task's runs.
 fn settings(config: &Config, world: Option<&real_world::Machine>) -> Result<toml::Table> {
     let mut settings = toml::Table::try_from(config)?;
     if let Some(world) = world {
@@ -251,7 +256,7 @@ fn settings(config: &Config, world: Option<&real_world::Machine>) -> Result<toml
     Ok(settings)
 }
 
-/// Adds to a trace what it was made with and what lies beside it.
+/// Adds to a trace the engine, seed and command that made it, and the files beside it.
 fn tell_origin(trace: &mut DiagnosisTrace, engine: &str, seed: u64) {
     trace.command = super::run::command_line();
     trace.engine = engine.to_owned();
@@ -272,7 +277,7 @@ fn tell_origin(trace: &mut DiagnosisTrace, engine: &str, seed: u64) {
     ]);
 }
 
-/// The text of the refined model; its document is copied beside it where it needs no other file.
+/// The text of the refined model. Its document is copied beside it if it needs no other file.
 fn refined(study: &Study, diagnosis: &Diagnosis, folder: &Path) -> Result<String> {
     let alone = !study.scene.xml().contains("file=");
     let model = if alone {

@@ -1,5 +1,6 @@
 //! `asid compare --figure NAME`: the figures of the paper as commands. Each plays exploration
-//! episodes, counts what the paper's figure shows, and writes data, numbers and the picture.
+//! episodes, computes the quantities of the paper's figure, and writes data, numbers and the
+//! picture.
 //!
 //! Two figures are not in the paper: `explorers` ranks explorers by what their episodes tell, and
 //! `difficulty` shows how methods fare as a task gets harder.
@@ -35,29 +36,29 @@ use super::result::Program;
 use claim::Claim;
 use drawing::{Data, Drawing, Number, Panel, mean, median, share};
 
-/// Compares methods on a task under one more setting, in a folder of its own that is gone on with.
+/// Compares methods on a task under one more setting, in a folder of its own that can be resumed.
 pub type CompareAt<'a> = Box<dyn Fn(&str, &str, &Path) -> Result<ComparisonResult> + Sync + 'a>;
 
 /// What a figure is drawn with.
 pub struct Request<'a> {
     /// Options of the command.
     pub common: Common,
-    /// Tasks in place of the figure's own.
+    /// Tasks that replace the figure's own.
     pub tasks: Vec<String>,
     /// Episodes of each explorer, or of each square of a map.
     pub episodes: Option<u64>,
-    /// Explorers in place of the figure's own.
+    /// Explorers that replace the figure's own.
     pub explorers: Vec<String>,
-    /// Levels of a difficulty, as `NAME=VALUE,VALUE`, in place of the task's own.
+    /// Levels of a difficulty, as `NAME=VALUE,VALUE`, that replace the task's own.
     pub levels: Option<String>,
     /// Coarser maps, fewer episodes, smaller searches.
     pub quick: bool,
-    /// Compares the methods asked for, under conditions and seeds as asked for.
+    /// Runs the requested comparison, with the requested conditions and seeds.
     pub compare: CompareAt<'a>,
 }
 
 impl Request<'_> {
-    /// The explorers to show, each once: those asked for, else the figure's own.
+    /// The explorers to show, without repetition: the requested ones, else the figure's own.
     fn explorers(&self, own: &[&str]) -> Vec<String> {
         if self.explorers.is_empty() {
             return own.iter().map(|&e| e.to_owned()).collect();
@@ -65,7 +66,7 @@ impl Request<'_> {
         variant::distinct(&self.explorers)
     }
 
-    /// Episodes of each explorer, unless asked otherwise.
+    /// Episodes of each explorer: the requested number, else the figure's own.
     fn episodes(&self, quick: u64, whole: u64) -> u64 {
         self.episodes
             .unwrap_or(if self.quick { quick } else { whole })
@@ -79,7 +80,7 @@ impl Request<'_> {
 
 /// How a figure is drawn.
 enum Draw {
-    /// From episodes that are played here.
+    /// From episodes that this command plays.
     Episodes(fn(&Request<'_>) -> Result<Drawing>),
     /// From comparisons, kept in the figure's folder under [`Draw::KEPT`].
     Comparisons(fn(&Request<'_>, &Path) -> Result<Drawing>),
@@ -94,20 +95,20 @@ impl Draw {
 struct Entry {
     name: &'static str,
     about: &'static str,
-    /// Whether it is of the tasks that are named, rather than of its own.
+    /// Whether the figure shows the named tasks rather than its own.
     tasks: bool,
     draw: Draw,
 }
 
-/// What a figure makes use of.
+/// What a figure uses.
 pub struct Uses {
     /// The tasks that are named.
     pub tasks: bool,
-    /// Comparisons with their options, rather than episodes that are played here.
+    /// Comparisons with their options, rather than episodes that this command plays.
     pub comparisons: bool,
 }
 
-/// What the figure of this name makes use of.
+/// What the figure of this name uses.
 ///
 /// # Errors
 /// When there is no such figure.

@@ -1,11 +1,10 @@
 //! The folder of a result: written whole or not at all.
 //!
-//! Nothing is written before the work is done. Then the files go into a folder of
-//! their own, which takes its final name when all are there. A folder that exists
-//! already (it may be the root of a volume, which nothing can be renamed onto) gets
-//! the files one by one, `result.json` last.
+//! Nothing is written before the work is done. The files then go into a temporary folder, which is
+//! renamed to its final name when it is complete. A folder that already exists may be the root of a
+//! volume, onto which nothing can be renamed. It gets the files one by one, `result.json` last.
 //!
-//! What a call that was killed leaves is taken away by the next one with the same `--out`.
+//! The next call with the same `--out` removes what a killed call left behind.
 
 use std::cell::RefCell;
 use std::io::{ErrorKind, Write as _};
@@ -20,16 +19,16 @@ use staging::Staging;
 
 pub mod staging;
 
-/// Where results go when `--out` is not given.
+/// Parent folder of results when `--out` is not given.
 const RUNS: &str = "runs";
 
-/// The file that says that a folder holds a result.
+/// The file whose presence marks a folder as a result.
 const RESULT: &str = "result.json";
 
 /// A place for a result that was free and writable when it was claimed.
 pub struct OutFolder {
     path: RefCell<PathBuf>,
-    /// Start of the name where the next free one is taken.
+    /// Stem of the folder's name, where the next free name is taken.
     stem: Option<String>,
 }
 
@@ -41,7 +40,7 @@ fn file(path: &Path, message: impl Into<String>) -> anyhow::Error {
     .into()
 }
 
-/// A failure to write after the work: the call was not wrong.
+/// An error of writing after the work: the work failed, the call was not wrong.
 fn failed(path: &Path, error: &std::io::Error) -> anyhow::Error {
     Error::Failed(format!("{}: cannot be written: {error}", path.display())).into()
 }
@@ -60,11 +59,13 @@ impl OutFolder {
         Self::claim_but_for(out, stem, None)
     }
 
-    /// The same for a result with a folder `kept` of its own that is written while the work goes on, and
-    /// gone on with where it is there already.
+    /// As [`OutFolder::claim`], for a result that also keeps a folder `kept` while the work goes
+    /// on.
+    ///
+    /// If `kept` is there already, the work continues from it.
     pub fn claim_with(out: Option<&Path>, stem: &str, kept: &str) -> Result<Self> {
         let mut claimed = Self::claim_but_for(out, stem, Some(kept))?;
-        // The name is taken from the first file on.
+        // The name is fixed when the first file is written.
         claimed.stem = None;
         Ok(claimed)
     }
@@ -92,7 +93,7 @@ impl OutFolder {
         } else if path.exists() || path.file_name().is_none() {
             return Err(file(&path, "is no folder; --out needs one, new or empty"));
         }
-        // The nearest folder that exists must take new entries.
+        // The nearest existing parent folder must allow new entries.
         let base = path
             .ancestors()
             .map(|p| {
@@ -112,7 +113,7 @@ impl OutFolder {
         })
     }
 
-    /// Says on standard output what was written: the result as JSON and nothing else, or lines of text and where it is.
+    /// Prints the result on standard output: as JSON alone, or as `lines` and its path.
     pub fn tell(&self, json: bool, result: &impl Serialize, lines: &[String]) -> Result<()> {
         let mut stdout = std::io::stdout().lock();
         if json {
@@ -125,7 +126,7 @@ impl OutFolder {
         Ok(writeln!(stdout, "results: {}", self.path().display())?)
     }
 
-    /// Writes the result: `fill` gets a fresh folder; it takes its name when all went well.
+    /// Writes the result: `fill` fills a fresh folder, which gets its final name on success.
     pub fn write(&self, fill: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
         let path = self.path();
         let exists = path.is_dir() && self.stem.is_none();
@@ -145,14 +146,14 @@ impl OutFolder {
             }
         });
         *written = done.is_ok();
-        // Whatever went wrong, the work had been done: the call was not at fault.
+        // Any error here comes after the work, so the call was not wrong.
         done.map_err(|e| Error::Failed(format!("{e:#}")).into())
     }
 
-    /// Gives the filled folder its name: the wanted one, or the next that is still free.
+    /// Renames the filled folder to the wanted name, or to the next free one.
     fn name(&self, staging: &Path) -> Result<()> {
         loop {
-            // A rename onto an empty folder replaces it, onto anything else it fails.
+            // A rename replaces an empty folder and fails on anything else.
             let renamed = std::fs::rename(staging, self.path());
             match (renamed, &self.stem) {
                 (Ok(()), _) => return Ok(()),
@@ -164,13 +165,13 @@ impl OutFolder {
         }
     }
 
-    /// Where it will be; where it is, once written.
+    /// Final path of the result, whether written yet or not.
     pub fn path(&self) -> PathBuf {
         self.path.borrow().clone()
     }
 }
 
-/// Moves the files into a folder that was there before, the result last.
+/// Moves the files into a folder that existed before, `result.json` last.
 fn move_into(staging: &Staging, to: &Path) -> Result<()> {
     let entries = std::fs::read_dir(staging.content()).map_err(|e| failed(to, &e))?;
     let names = entries.filter_map(|e| e.ok()?.file_name().into_string().ok());
@@ -202,7 +203,8 @@ fn folder_of(path: &Path) -> &Path {
     folder.unwrap_or(Path::new("."))
 }
 
-/// Writes a file whole or not at all, in the place of one that may be there: `fill` writes it under another name.
+/// Writes a file whole or not at all, and replaces an existing one: `fill` writes it under another
+/// name.
 pub fn replace_file(path: &Path, fill: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
     let folder = folder_of(path);
     staging::clear(folder);
@@ -219,7 +221,7 @@ pub fn create_text(path: &Path, text: &str) -> std::io::Result<()> {
     let staging = Staging::new_in(folder)?;
     let written = staging.content().join("text");
     std::fs::write(&written, text)?;
-    // A link gives a name only where there is none yet, a rename takes any.
+    // A link fails if the name is taken; a rename would overwrite the file.
     match std::fs::hard_link(&written, path) {
         Err(e) if e.kind() != ErrorKind::AlreadyExists && !path.exists() => {
             std::fs::rename(&written, path)
@@ -232,8 +234,8 @@ pub fn create_text(path: &Path, text: &str) -> std::io::Result<()> {
 mod tests {
     use super::*;
 
-    /// Symptom: of two calls of `asid report` for one folder at once one failed, or a page of both was left. Cause: they wrote under the
-    /// same name before they renamed.
+    /// Symptom: two simultaneous calls of `asid report` for one folder. One failed, or the page was
+    /// a mixture of both. Cause: both wrote under the same temporary name before the rename.
     #[test]
     fn several_write_one_file_at_once() {
         let folder = tempfile::tempdir().unwrap();

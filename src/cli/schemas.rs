@@ -1,4 +1,5 @@
-//! The layouts of `result.json`, one a kind of result: types of other languages are generated from them.
+//! The layouts of `result.json`, one for each kind of result. Types of other languages are
+//! generated from them.
 
 use schemars::generate::SchemaSettings;
 use schemars::{JsonSchema, Schema};
@@ -8,8 +9,10 @@ use asid_results::diagnosis::DiagnosisResult;
 
 use super::{explore, identify, machine, result};
 
-/// The layouts as JSON schemas, of `run`, of `explore` and `identify` for a task and for a machine, of `diagnose` and of
-/// `compare`. The title of each is the name of its type, which no other type in any of them has.
+/// The layouts as JSON schemas: of `run`, of `explore` and `identify` for a task and for a machine,
+/// of `diagnose` and of `compare`.
+///
+/// The title of each is the name of its type, which no other type in any of them shares.
 #[must_use]
 pub fn all() -> Vec<Schema> {
     vec![
@@ -23,7 +26,7 @@ pub fn all() -> Vec<Schema> {
     ]
 }
 
-/// What a value looks like once it is written.
+/// The schema of a type in its serialised form.
 fn layout<T: JsonSchema>() -> Schema {
     let settings = SchemaSettings::draft2020_12().for_serialize();
     settings.into_generator().into_root_schema_for::<T>()

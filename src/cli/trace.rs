@@ -94,14 +94,14 @@ pub fn run_report(
     })
 }
 
-/// What the real world has that the simulator lacks: effects that were named, then what was drawn.
+/// Effects that the real world has and the simulator lacks: the named ones, then those drawn.
 fn effects(session: &Session) -> Vec<String> {
     let named = session.config.real.effects.iter().cloned();
     let drawn = session.perturbed().into_iter();
     named.chain(drawn.flat_map(|p| p.drawn.words())).collect()
 }
 
-/// What made the result.
+/// Versions of what made the result.
 pub fn versions(session: &Session) -> Vec<r::NamedText> {
     [
         ("asid", env!("CARGO_PKG_VERSION").to_owned()),
@@ -126,7 +126,7 @@ pub fn files(entries: &[(&str, &str)]) -> Vec<r::FileEntry> {
         .collect()
 }
 
-/// Return over the search for a policy; `None` where it did not search.
+/// Return over the search for a policy; `None` without a search.
 pub fn learning(curve: &[CurvePoint], label: &str) -> Option<r::LearningCurve> {
     (!curve.is_empty()).then(|| r::LearningCurve {
         x_label: label.to_owned(),
@@ -138,7 +138,7 @@ pub fn learning(curve: &[CurvePoint], label: &str) -> Option<r::LearningCurve> {
     })
 }
 
-/// The condition that was chosen, or else whose truth this is; empty where it is none's.
+/// The chosen condition, else the one whose truth this is; empty where there is none.
 fn condition(session: &Session, truth: &[f64]) -> String {
     if let Some(name) = &session.config.condition {
         return name.clone();
@@ -161,7 +161,7 @@ fn condition(session: &Session, truth: &[f64]) -> String {
         .unwrap_or_default()
 }
 
-/// The unknowns and what became known of them.
+/// The unknowns with what became known of them.
 pub fn parameters(
     session: &Session,
     truth: Option<&[f64]>,
@@ -171,7 +171,7 @@ pub fn parameters(
     parameters_of(&session.parameters, truth, belief, iterations)
 }
 
-/// The same for unknowns of any machine.
+/// As [`parameters`], for the unknowns of any machine.
 pub fn parameters_of(
     parameters: &[asid_core::Parameter],
     truth: Option<&[f64]>,

@@ -1,4 +1,4 @@
-//! The 3-D view of a report: the episode of a task, or a motion that was designed.
+//! The 3-D view of a report: the episode of a task, or a designed motion.
 
 use anyhow::Result;
 use asid_core::{Episode, Parameter};
@@ -12,8 +12,9 @@ use super::session::Session;
 use super::trace::replay_of;
 use crate::pipeline::RunOutcome;
 
-/// The real episode of a run, as logged and as replayed at the prior's centre and at the estimate; `None` where
-/// nothing was identified.
+/// The real episode of a run, as logged and as replayed at the prior's centre and at the estimate.
+///
+/// `None` where nothing was identified.
 pub fn of_run(session: &Session, outcome: &RunOutcome) -> Result<Option<View>> {
     let (Some(real), Some(found)) = (&outcome.real, &outcome.identified) else {
         return Ok(None);
@@ -30,7 +31,7 @@ pub fn of_run(session: &Session, outcome: &RunOutcome) -> Result<Option<View>> {
     of_episode(session, &real.episode, &found.starts[0], &replays, true)
 }
 
-/// An episode that the simulator predicts at these values.
+/// The episode that the simulator predicts at these values.
 pub fn of_prediction(
     session: &Session,
     log: &Episode,
@@ -45,7 +46,9 @@ pub fn of_prediction(
     of_episode(session, log, start, &replays, false)
 }
 
-/// Replays of a log, the last of which stands in where no sensor reads, with the log itself where it is real.
+/// Replays of a log, together with the log itself if it is real.
+///
+/// The last replay stands in where no sensor measures a coordinate.
 fn of_episode(
     session: &Session,
     log: &Episode,
@@ -55,7 +58,7 @@ fn of_episode(
 ) -> Result<Option<View>> {
     let scene = session.task.scene();
     let plant = Plant::of(scene)?;
-    // A model of one's own may have other joints than the task's scene, which is what is drawn.
+    // A user's model may have other joints than the task's scene, which is what is drawn.
     let names = |layout: &asid_core::Layout| -> Vec<String> {
         let joints = layout.joints.iter();
         joints.map(|j| format!("qpos.{}", j.name)).collect()
@@ -88,7 +91,7 @@ fn of_episode(
     Ok(Some(view))
 }
 
-/// A motion that was designed: `qpos` at the ends of frames of `period` seconds.
+/// A designed motion: `qpos` at the ends of frames of `period` seconds.
 pub fn of_motion(subject: &Subject, qpos: &[f64], period: f64) -> Result<Option<View>> {
     let nq = subject.plant.layout.nq.max(1);
     let time: Vec<f64> = (0..qpos.len() / nq).map(|k| k as f64 * period).collect();

@@ -1,23 +1,23 @@
-//! What is claimed of a figure beside the paper, and what the numbers say of it.
+//! Claims of the paper about a figure, and whether the numbers agree.
 
 use asid_comparison::rows::FEWEST;
 use asid_report::page::Tone;
 use serde::Serialize;
 
-/// What the numbers say of a claim.
+/// Whether the numbers agree with a claim.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
-    /// They agree with the paper in direction.
+    /// The numbers agree with the paper in direction.
     Agrees,
-    /// They do not.
+    /// The numbers do not agree.
     Differs,
-    /// Fewer than [`FEWEST`] episodes are behind one of the numbers: they say neither.
+    /// One of the numbers rests on fewer than [`FEWEST`] episodes, so they decide nothing.
     TooFewEpisodes,
 }
 
 impl Verdict {
-    /// As the page has it.
+    /// Text on the page.
     pub const fn words(self) -> &'static str {
         match self {
             Self::Agrees => "agrees",
@@ -26,7 +26,7 @@ impl Verdict {
         }
     }
 
-    /// As the terminal has it, where a difference is not to be overlooked.
+    /// Text on the terminal, where a disagreement must stand out.
     pub const fn mark(self) -> &'static str {
         match self {
             Self::Differs => "DIFFERS",
@@ -34,7 +34,7 @@ impl Verdict {
         }
     }
 
-    /// How the page sets it.
+    /// Tone of the text on the page.
     pub const fn tone(self) -> Tone {
         match self {
             Self::Agrees => Tone::Good,
@@ -44,20 +44,21 @@ impl Verdict {
     }
 }
 
-/// What the paper says of the figure, and whether these numbers agree.
+/// A claim of the paper about the figure, and whether these numbers agree.
 #[derive(Clone, Debug, Serialize)]
 pub struct Claim {
     /// The statement, with the numbers found.
     pub statement: String,
-    /// What the paper reports, or what is asked for where it reports nothing.
+    /// What the paper reports; where it reports nothing, what is required.
     pub paper: String,
-    /// What the numbers say of it.
+    /// Whether the numbers agree.
     pub verdict: Verdict,
 }
 
 impl Claim {
-    /// A claim that `holds` or not, if there are enough episodes behind each of its numbers to tell; `episodes`
-    /// counts those of each number.
+    /// A claim that `holds` or not, if each of its numbers rests on enough episodes.
+    ///
+    /// `episodes` counts those of each number.
     pub fn new(
         statement: String,
         paper: impl Into<String>,

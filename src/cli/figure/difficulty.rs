@@ -1,5 +1,5 @@
-//! Success of methods as a task gets harder: a comparison for each level of one difficulty, kept in the
-//! figure's folder, so that a figure that was stopped goes on.
+//! Success of methods as a task gets harder. Each level of one difficulty has a comparison, kept in
+//! the figure's folder, so that a figure that was stopped can be resumed.
 
 mod shown;
 
@@ -18,8 +18,9 @@ use shown::{claims, metric, success, table};
 /// The task that is shown where none is named.
 const TASK: &str = "rod-balancing";
 
-/// Difficulty and levels of a task where none are given, the easiest first: its own value, what is easier
-/// once, and what is harder until the rod's ledge is an eighth as wide, or a goal a fifth as large.
+/// Difficulty and levels of a task where none are given, the easiest first. They hold the task's
+/// own value, one that is easier, and three that are harder. The hardest rod ledge is an eighth as
+/// wide as the task's own, the hardest goal a fifth as large.
 const LEVELS: [(&str, &str, [f64; 5]); 4] = [
     (
         "rod-balancing",
@@ -107,8 +108,10 @@ pub fn draw(request: &Request<'_>, kept: &Path) -> Result<Drawing> {
     Ok(drawing)
 }
 
-/// The difficulty, of `all` that the task has, and its levels: as given, else the task's own, of which a quick
-/// look has the first, the middle and the last.
+/// The chosen difficulty out of `all` that the task has, with its levels.
+///
+/// The levels are those given, else the task's own. With `quick`, only the first, the middle and
+/// the last of the task's own are used.
 fn levels(
     given: Option<&str>,
     quick: bool,
@@ -181,7 +184,8 @@ fn csv(level: f64, row: &Row) -> Vec<String> {
     cells
 }
 
-/// Methods over all conditions; named with world and engine where there are several of these.
+/// Methods pooled over all conditions. Their names include world and engine where there are
+/// several.
 fn pooled(rows: &[Row]) -> Vec<Point> {
     let several = |pick: fn(&Row) -> &String| rows.iter().any(|r| pick(r) != pick(&rows[0]));
     let (worlds, engines) = (several(|r| &r.world), several(|r| &r.backend));

@@ -13,10 +13,10 @@ const TASK: &str = "sphere-striking";
 /// Sensor of the ball's position.
 const BALL: &str = "ball_pos";
 
-/// A ball that moved by less was not hit, m: half its radius.
+/// Smallest displacement that counts as a hit, m: half the ball's radius.
 pub const HIT: f64 = 0.015;
 
-/// Displacement that is drawn darkest, m.
+/// Displacement that gets the darkest colour, m.
 const FULL: f64 = 0.5;
 
 pub fn draw(request: &Request<'_>) -> Result<Drawing> {
@@ -93,7 +93,7 @@ pub fn draw(request: &Request<'_>) -> Result<Drawing> {
     Ok(drawing)
 }
 
-/// Fisher exploration hits the ball more often than random actions, intervals apart.
+/// Claim: Fisher exploration hits the ball more often than random actions, with intervals apart.
 fn claims(drawing: &Drawing) -> Vec<Claim> {
     let hit = |name: &str| {
         let mut numbers = drawing.numbers.iter();

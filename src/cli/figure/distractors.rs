@@ -1,4 +1,5 @@
-//! Which of four balls an explorer pushes: one has an unknown friction, three do not matter.
+//! Which of four balls an explorer pushes: one has an unknown friction, the other three are
+//! irrelevant.
 
 use anyhow::Result;
 use asid_report::plot::{Axis, Colour, Outline, Plan};
@@ -15,13 +16,14 @@ const TASK: &str = "sphere-distractors";
 /// Episodes of an explorer, as in the paper.
 const EPISODES: u64 = 30;
 
-/// Share of all displacement that goes to the ball that matters.
+/// Share of all displacement that belongs to the ball with the unknown friction.
 const FOCUS: &str = "share of all displacement that is of the ball that matters";
 
-/// Share of all displacement that is most of it: half.
+/// Share of all displacement above which it is the larger part: half.
 const MOST: f64 = 0.5;
 
-/// The least displacement that a share is taken of, m: where no ball is pushed the share is 0.
+/// Least total displacement for which a share is computed, m. Below it no ball is pushed and the
+/// share is 0.
 const STILL: f64 = 1e-9;
 
 pub fn draw(request: &Request<'_>) -> Result<Drawing> {
@@ -30,7 +32,7 @@ pub fn draw(request: &Request<'_>) -> Result<Drawing> {
     let episodes = request.episodes(4, EPISODES);
     let wanted = of_each(TASK, &explorers, &[], request.seed(), episodes);
     let played = play(&request.common, wanted)?;
-    // The task's signals: the ball that matters first, then the others.
+    // The task's signals: the relevant ball first, then the others.
     let signals = &task.exploration().signals;
     let balls: Vec<&str> = signals
         .iter()
@@ -108,7 +110,7 @@ pub fn draw(request: &Request<'_>) -> Result<Drawing> {
     Ok(drawing)
 }
 
-/// Share of all displacement that goes to the ball that matters; episodes are resampled as a whole.
+/// Share of all displacement that belongs to the relevant ball; whole episodes are resampled.
 fn focus(explorer: &str, matters: &[f64], others: &[f64]) -> Number {
     let of = |episodes: &[f64]| {
         let sum = |ways: &[f64]| -> f64 { episodes.iter().map(|&e| ways[e as usize]).sum() };
@@ -126,8 +128,8 @@ fn focus(explorer: &str, matters: &[f64], others: &[f64]) -> Number {
     }
 }
 
-/// Most of what Fisher exploration pushes is the ball that matters, and more than of what MAX pushes, intervals
-/// apart.
+/// Claims: most of what Fisher exploration pushes is the relevant ball, and its share exceeds that
+/// of MAX, with intervals apart.
 fn claims(drawing: &Drawing) -> Vec<Claim> {
     let focus = |name: &str| {
         let mut numbers = drawing.numbers.iter();

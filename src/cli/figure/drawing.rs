@@ -1,4 +1,4 @@
-//! What a figure comes to: data, numbers, tables, claims and pictures, and how they are set.
+//! The content of a figure (data, numbers, tables, claims and pictures) and its layout.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -17,9 +17,9 @@ use crate::cli::result::figure as digits;
 /// A number that the figure shows.
 #[derive(Clone, Debug, Serialize)]
 pub struct Number {
-    /// Which explorer, method or model.
+    /// Name of the explorer, method or model.
     pub explorer: String,
-    /// What it is.
+    /// Name of the quantity.
     pub quantity: String,
     /// Unit; empty for a pure number.
     pub unit: String,
@@ -41,7 +41,7 @@ pub struct Data {
     pub rows: Vec<Vec<String>>,
 }
 
-/// A plot with its title and the sentence that helps to read it.
+/// A plot with its title and a caption that explains how to read it.
 #[derive(Clone)]
 pub struct Panel {
     title: String,
@@ -67,13 +67,13 @@ pub struct Drawing {
     pub title: String,
     /// What was played and what is shown.
     pub lead: String,
-    /// What has to be known beside it, such as what was left out.
+    /// Remarks, such as what was left out.
     pub notes: Vec<String>,
     /// Files of data.
     pub data: Vec<Data>,
     /// The numbers.
     pub numbers: Vec<Number>,
-    /// Tables of a figure that has more to say than its numbers.
+    /// Tables, where a figure has more than its numbers.
     pub tables: Vec<Grid>,
     /// What the paper says of it.
     pub claims: Vec<Claim>,
@@ -81,12 +81,12 @@ pub struct Drawing {
     pub panels: Vec<Panel>,
 }
 
-/// The mean of some values as a number of the figure, with its bootstrap interval.
+/// The mean of values as a number of the figure, with its bootstrap interval.
 pub fn mean(explorer: &str, quantity: &str, unit: &str, values: &[f64]) -> Number {
     of_values(explorer, quantity, unit, values, statistics::mean)
 }
 
-/// The median of some values as a number of the figure, with its bootstrap interval.
+/// The median of values as a number of the figure, with its bootstrap interval.
 pub fn median(explorer: &str, quantity: &str, unit: &str, values: &[f64]) -> Number {
     let statistic = |v: &[f64]| statistics::median(v.iter().copied());
     of_values(explorer, quantity, unit, values, statistic)
@@ -164,7 +164,7 @@ impl Data {
 }
 
 impl Drawing {
-    /// A figure with nothing in it yet.
+    /// An empty figure.
     pub fn new(title: &str, lead: String) -> Self {
         Self {
             title: title.to_owned(),
@@ -173,7 +173,7 @@ impl Drawing {
         }
     }
 
-    /// Numbers and claims on the terminal.
+    /// Prints numbers and claims on the terminal.
     pub fn tell(&self, out: &mut impl std::io::Write, folder: &Path) -> Result<()> {
         for note in &self.notes {
             writeln!(out, "{note}")?;
@@ -194,7 +194,7 @@ impl Drawing {
         Ok(())
     }
 
-    /// The tables as Markdown; none where there are none.
+    /// The tables as Markdown; `None` where there are none.
     pub fn markdown(&self) -> Option<String> {
         let tables: Vec<String> = self.tables.iter().map(Grid::markdown).collect();
         let notes: String = self.notes.iter().map(|n| format!("> {n}\n")).collect();

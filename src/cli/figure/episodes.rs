@@ -1,5 +1,5 @@
-//! Exploration episodes of several explorers, played at the same seeds: what every figure is
-//! made of.
+//! Exploration episodes of several explorers, played with the same seeds. Every figure is made of
+//! these.
 
 use std::io::Write as _;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -22,15 +22,15 @@ use crate::cli::session::Session;
 
 /// An episode that was played.
 pub struct Played {
-    /// What was wanted.
+    /// The request that it was played for.
     pub wanted: Wanted,
-    /// Where the object began.
+    /// Start pose of the object.
     pub start: Vec<f64>,
     /// The log, with the trackers' noise.
     pub log: Episode,
     /// True readings, `frames + 1` rows as in the log.
     pub readings: Vec<f64>,
-    /// Actions, `horizon x action`, which only models of the motion repeat.
+    /// Actions, `horizon x action`; only models of the motion replay them.
     #[cfg_attr(not(feature = "torch"), expect(dead_code))]
     pub actions: Vec<f64>,
     /// Share of control steps with contact.
@@ -38,7 +38,7 @@ pub struct Played {
 }
 
 impl Played {
-    /// The true readings of a channel, a row a frame.
+    /// The true readings of a channel, one row a frame.
     pub fn channel(&self, name: &str) -> Result<Vec<&[f64]>> {
         let channels = &self.log.channels;
         let width: usize = channels.iter().map(|c| c.len).sum();
@@ -54,12 +54,12 @@ impl Played {
         Err(Error::unknown("channel", name, known).into())
     }
 
-    /// Places of a body in the plane, m, by the sensor of its position.
+    /// Positions of a body in the plane, m, from the sensor of its position.
     pub fn path(&self, sensor: &str) -> Result<Vec<[f64; 2]>> {
         Ok(self.channel(sensor)?.iter().map(|r| [r[0], r[1]]).collect())
     }
 
-    /// Distance between the first and the last place of a body in the plane, m.
+    /// Distance between the first and the last position of a body in the plane, m.
     pub fn displacement(&self, sensor: &str) -> Result<f64> {
         let path = self.path(sensor)?;
         let [first, last] = [path[0], path[path.len() - 1]];
@@ -67,7 +67,7 @@ impl Played {
     }
 }
 
-/// Plays all episodes on as many threads as are asked for; the order is that of `wanted`.
+/// Plays all episodes on the requested number of threads; the order is that of `wanted`.
 pub fn play(common: &Common, wanted: Vec<Wanted>) -> Result<Vec<Played>> {
     each(common, wanted, |wanted| {
         let session = open(common, wanted, false)?;
@@ -79,12 +79,13 @@ pub fn play(common: &Common, wanted: Vec<Wanted>) -> Result<Vec<Played>> {
     })
 }
 
-/// Does something with each of the episodes, on as many threads as are asked for, and tells how far it is;
-/// the order is that of `wanted`.
+/// Applies `work` to each episode on the requested number of threads, and shows the progress.
+///
+/// The results are in the order of `wanted`.
 ///
 /// # Errors
-/// When a setting is wrong, before any of them is begun; else the first that one of them ends with, and no
-/// other is begun then.
+/// When a setting is wrong, before any episode begins. Otherwise the first error of an episode; no
+/// further episode begins after it.
 pub fn each<T: Send>(
     common: &Common,
     wanted: Vec<Wanted>,
@@ -132,7 +133,8 @@ pub fn each<T: Send>(
     all.into_iter().map(|(_, result)| result).collect()
 }
 
-/// Opens one session of each task, explorer and settings, so that a wrong call ends before any work.
+/// Opens one session for each task, explorer and settings, so that a wrong call ends before any
+/// work.
 fn check(common: &Common, wanted: &[Wanted]) -> Result<()> {
     let mut checked: Vec<&Wanted> = Vec::new();
     for one in wanted {
@@ -148,7 +150,7 @@ fn check(common: &Common, wanted: &[Wanted]) -> Result<()> {
     Ok(())
 }
 
-/// The session of an episode; with `quick`, searches of explorer and identifier are cut as those of a quick
+/// The session of an episode; `quick` cuts the searches of explorer and identifier as in a quick
 /// comparison.
 ///
 /// # Errors
@@ -157,10 +159,10 @@ pub fn open(common: &Common, wanted: &Wanted, quick: bool) -> Result<Session> {
     let variant = Variant::of(&wanted.explorer);
     let mut own = common.clone();
     own.seed = Some(wanted.seed);
-    // Episodes are the parallel axis.
+    // Episodes run in parallel, so each uses one thread.
     own.threads = Some(1);
     own.quiet = true;
-    // A setting reaches the explorers that have it.
+    // A setting applies only to explorers that have it.
     let task = super::task(&wanted.task)?;
     own.set.retain(|assignment| {
         let key = assignment.trim_start().strip_prefix("explorer.");
@@ -205,7 +207,7 @@ pub fn played(session: &Session, wanted: &Wanted, policy: &mut dyn Policy) -> Re
     played_in(world, wanted, policy)
 }
 
-/// Plays a policy in a world, from the start that is wanted.
+/// Plays a policy in a world, from the requested start.
 ///
 /// # Errors
 /// When the policy or the world fails.

@@ -1,7 +1,7 @@
-//! Explorers ranked by what their episodes tell: the deviation of the posterior that identification
-//! arrives at, how far its mean is from the truth, and the deviation that was expected of the episode.
+//! Explorers ranked by what their episodes tell: the posterior deviation after identification, the
+//! error of its mean, and the deviation that was expected of the episode.
 //!
-//! All are of the prior's deviation, so that unknowns of any unit stand side by side.
+//! All are in units of the prior's deviation, so that unknowns of any unit are comparable.
 
 mod shown;
 
@@ -21,7 +21,7 @@ use shown::{against, claims, ranking, table};
 /// Tasks that are shown where none are named: those of the paper's table 1 with one unknown.
 const TASKS: [&str; 2] = ["rod-balancing", "sphere-striking"];
 
-/// Every objective in both forms, and what else explores.
+/// Every objective in both forms, and the other explorers.
 const OWN: [&str; 11] = [
     "random",
     "fisher-cem:fisher.objective=trace+fisher.form=one-step",
@@ -39,11 +39,11 @@ const OWN: [&str; 11] = [
 /// Episodes of an explorer on a task.
 const EPISODES: u64 = 30;
 
-/// What an episode told of one unknown, in deviations of the prior.
+/// What an episode told of one unknown, in prior deviations.
 #[derive(Clone, Debug)]
 struct Told {
     unknown: String,
-    /// Whether it has two values only, of which nothing is expected by slopes.
+    /// Whether it is binary; its expected deviation does not follow from slopes.
     binary: bool,
     truth: f64,
     estimate: f64,
@@ -130,7 +130,7 @@ pub fn draw(request: &Request<'_>) -> Result<Drawing> {
     Ok(drawing)
 }
 
-/// Plays an episode, identifies from it, and asks what was expected of it.
+/// Plays an episode, identifies from it, and computes what was expected of it.
 fn told(request: &Request<'_>, wanted: &Wanted) -> Result<Episode> {
     let session = open(&request.common, wanted, request.quick)?;
     let config = &session.config;
@@ -142,7 +142,7 @@ fn told(request: &Request<'_>, wanted: &Wanted) -> Result<Episode> {
     let mut policy = explorer.explore(&problem, None)?.policy;
     let real = session.world(&truth)?.explore(&mut *policy)?;
     let found = identifier.identify(&problem, std::slice::from_ref(&real.episode))?;
-    // As a run has it.
+    // The same settings as in a run.
     let expected = ExpectedSettings {
         assumes: identifier.assumes(),
         ..config.expected.settings()
@@ -182,7 +182,7 @@ fn told(request: &Request<'_>, wanted: &Wanted) -> Result<Episode> {
     })
 }
 
-/// Rows by task and unknown, the explorer whose posterior is narrowest first.
+/// Rows by task and unknown, the explorer with the narrowest posterior first.
 fn rows(tasks: &[&str], episodes: &[Episode], labels: &Labels) -> Vec<Row> {
     let mut rows = Vec::new();
     for &task in tasks {

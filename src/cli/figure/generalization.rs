@@ -1,4 +1,4 @@
-//! Pushes from start positions and with a mass that no training has seen.
+//! Pushes from start positions, and with a mass, outside the training data.
 
 use anyhow::Result;
 use asid_learned::shipped;
@@ -12,25 +12,26 @@ use super::wanted::{Wanted, playable};
 use super::{Claim, Data, Drawing, Number, Panel, Request, share, task};
 use crate::cli::settings::wrong;
 
-/// Without walls, so that the ball may lie anywhere.
+/// Task without walls, so that the ball may lie anywhere.
 const TASK: &str = "sphere-free";
 
 /// Sensor of the ball's position.
 const BALL: &str = "ball_pos";
 
-/// Truths a square, as many as in the paper; each square has its own, so that no two episodes share one.
+/// Truths a square, as many as in the paper. Each square has its own, so that no two episodes share
+/// one.
 const EPISODES: u64 = 5;
 
-/// Share of pushes that is asked for within the training box.
+/// Required share of pushes within the training box.
 const INSIDE: f64 = 0.8;
 
-/// Share of pushes that is asked for outside of it, where the arm does not reach every start.
+/// Required share of pushes outside the training box, where the arm does not reach every start.
 const OUTSIDE: f64 = 0.2;
 
 /// How far beyond the training box the map reaches, m.
 const BEYOND: f64 = 0.15;
 
-/// Mass of the ball over that of training.
+/// Ratio of the ball's mass to that of training.
 const MASS: f64 = 3.0;
 
 pub fn draw(request: &Request<'_>) -> Result<Drawing> {
@@ -95,7 +96,7 @@ pub fn draw(request: &Request<'_>) -> Result<Drawing> {
     let each = grid.len() * episodes as usize;
     for ((case, _), of) in cases.iter().zip(played.chunks_exact(each)) {
         let mut values = vec![0.0; grid.len()];
-        // Inside and outside of the training box: hits and episodes.
+        // Hits and episodes, inside and outside the training box.
         let mut counts = [[0_usize; 2]; 2];
         for (square, here) in of.chunks_exact(episodes as usize).enumerate() {
             let [x, y] = grid.middle(square);
@@ -132,7 +133,7 @@ fn row(case: &str, episode: &Played, [x, y]: [f64; 2], moved: f64) -> Vec<String
     [&head[..], &cells].concat()
 }
 
-/// What ships for the task, as in the paper; where nothing does, the search that needs no training.
+/// The explorer shipped for the task, as in the paper; else the search that needs no training.
 fn own() -> &'static str {
     match shipped::find(TASK, "fisher-ppo") {
         Some(_) => "fisher-ppo",
@@ -140,7 +141,7 @@ fn own() -> &'static str {
     }
 }
 
-/// The shares of pushes are above what is asked for with their whole intervals.
+/// Claim: the intervals of the shares of pushes lie wholly above the required shares.
 fn claims(numbers: &[Number]) -> Vec<Claim> {
     let [inside, outside, heavy, _] = numbers else {
         return Vec::new();
@@ -178,7 +179,7 @@ mod tests {
             claims(&numbers)[0].verdict
         };
         assert_eq!(verdict([40, 20, 40, 0], 40), Verdict::Agrees);
-        // 90 % is above 80 % by its value alone.
+        // 90 % is above 80 % by its value, but not by its whole interval.
         assert_eq!(verdict([36, 20, 40, 0], 40), Verdict::Differs);
         assert_eq!(verdict([5; 4], 5), Verdict::TooFewEpisodes);
     }

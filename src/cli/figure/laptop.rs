@@ -11,13 +11,14 @@ use super::{Claim, Data, Drawing, Panel, Request, share, task};
 
 const TASK: &str = "laptop-articulation";
 
-/// A lid that turned by more was moved, rad (ASID, appendix: change of the lid's angle above 1e-2).
+/// Smallest turn that counts as a moved lid, rad (ASID, appendix: change of the lid's angle above
+/// 1e-2).
 const MOVED: f64 = 0.01;
 
-/// Share of episodes that Fisher exploration moves the lid in at least, as in the paper.
+/// Least share of episodes in which Fisher exploration moves the lid, as in the paper.
 const FISHER: f64 = 0.8;
 
-/// Share of episodes that random actions move the lid in at most: half of that of Fisher exploration.
+/// Largest share of episodes in which random actions move the lid: half that of Fisher exploration.
 const RANDOM: f64 = 0.4;
 
 /// Episodes of an explorer.
@@ -109,7 +110,7 @@ pub fn draw(request: &Request<'_>) -> Result<Drawing> {
     Ok(drawing)
 }
 
-/// Largest angle by which the lid turned against the base since the start, rad.
+/// Largest angle between lid and base relative to the start, rad.
 fn lid_turned(episode: &Played) -> Result<f64> {
     let (base, lid) = (episode.channel("base_quat")?, episode.channel("lid_quat")?);
     let relative = |k: usize| {
@@ -125,8 +126,8 @@ fn lid_turned(episode: &Played) -> Result<f64> {
     Ok((0..base.len()).map(angle).fold(0.0, f64::max))
 }
 
-/// Fisher exploration moves the lid more often than random actions, intervals apart, and the shares are about
-/// those of the paper.
+/// Claims: Fisher exploration moves the lid more often than random actions, with intervals apart,
+/// and the shares are about those of the paper.
 fn claims(drawing: &Drawing) -> Vec<Claim> {
     let moved = |name: &str| {
         let mut numbers = drawing.numbers.iter();

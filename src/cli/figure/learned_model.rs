@@ -1,10 +1,10 @@
-//! A model of the motion that is learned from explorers' episodes beside the simulator: how far off are they
-//! where nothing was seen?
+//! A learned model of the motion, trained on explorers' episodes, compared with the simulator: how
+//! large are their errors outside the training data?
 //!
-//! One real world with one hidden truth. Ensembles of probabilistic networks learn its motion from an
-//! explorer's episodes; the simulator is fitted to a single one of them. Both predict episodes open loop, from
-//! the start and the actions alone: the ball pushed from starts outside of the training box, and left alone
-//! there.
+//! There is one real world with one hidden truth. Ensembles of probabilistic networks learn its
+//! motion from an explorer's episodes. The simulator is fitted to a single one of these. Both
+//! predict episodes open loop, from the start and the actions alone. In these episodes the ball is
+//! pushed from starts outside the training box, or left alone there.
 
 mod motions;
 mod shown;
@@ -25,14 +25,14 @@ use shown::{claims, data, numbers, panels};
 
 const TASK: &str = "sphere-striking";
 
-/// Sensors of what the models predict: the ball, and the hand that pushes it.
+/// Sensors that the models predict: the ball, and the hand that pushes it.
 const BALL: &str = "ball_pos";
 const HAND: &str = "ee_pos";
 
 /// Episodes that a model learns from: with 20 control steps each, 1200 transitions.
 const EPISODES: u64 = 60;
 
-/// Episodes of a test for each three that are learned from.
+/// Training episodes for each test episode.
 const TESTED: u64 = 3;
 
 /// Passes over the transitions: ten times those of a round of MAX, which has as many rounds.
@@ -41,22 +41,22 @@ const EPOCHS: usize = 200;
 /// How far beyond the training box a start may lie, m.
 const BEYOND: f64 = 0.12;
 
-/// Free space between a start and what bounds the scene, m: a ball and a half.
+/// Free space between a start and the bounds of the scene, m: one and a half balls.
 const MARGIN: f64 = 0.09;
 
-/// What is predicted.
+/// Test cases.
 const CASES: [&str; 3] = [
     "as in training",
     "pushed from outside",
     "left alone outside",
 ];
 
-/// A model with the paths that it predicts, by case and episode.
+/// A model with its predicted paths, by case and episode.
 struct Model {
     label: String,
     learned: bool,
     paths: Vec<Vec<Path>>,
-    /// Root of the mean squared distance over control steps, m, by case and episode.
+    /// Root-mean-square distance over control steps, m, by case and episode.
     errors: Vec<Vec<f64>>,
 }
 
@@ -123,7 +123,7 @@ pub fn draw(request: &Request<'_>) -> Result<Drawing> {
     Ok(drawing)
 }
 
-/// Settings that hold the hidden truth, drawn by the first seed, for all episodes.
+/// Settings that fix the hidden truth, drawn by the first seed, for all episodes.
 fn truth(request: &Request<'_>) -> Result<Vec<String>> {
     let any = Wanted {
         task: TASK.into(),
@@ -138,7 +138,7 @@ fn truth(request: &Request<'_>) -> Result<Vec<String>> {
         .collect())
 }
 
-/// Episodes whose starts lie beyond the box of training, where there is room.
+/// Episodes whose starts lie beyond the training box, where there is room.
 fn outside(
     request: &Request<'_>,
     task: &dyn Task,
@@ -179,7 +179,7 @@ fn outside(
         .collect()
 }
 
-/// The simulator in the middle of the prior, and fitted to an episode.
+/// The simulator at the middle of the prior, and the simulator fitted to an episode.
 fn simulators(
     request: &Request<'_>,
     episode: &Played,
@@ -200,7 +200,7 @@ fn simulators(
         .collect()
 }
 
-/// A model that learned from an explorer's episodes.
+/// A model learned from an explorer's episodes.
 fn learned(
     task: &dyn Task,
     label: &str,
@@ -238,7 +238,7 @@ fn distances(predicted: &Path, truth: &Path) -> Vec<f64> {
 
 fn errors(paths: &[Vec<Path>], truths: &[Vec<Path>]) -> Vec<Vec<f64>> {
     let one = |(predicted, truth): (&Path, &Path)| {
-        // The start is given.
+        // The start is given, so it has no error.
         let squares: Vec<f64> = distances(predicted, truth)[1..]
             .iter()
             .map(|d| d * d)

@@ -1,4 +1,4 @@
-//! A value over the plane as squares, from nothing to the largest.
+//! A value over the plane as coloured squares, from zero to the largest.
 
 use asid_core::Task;
 use asid_report::plot::{Axis, Colour, Outline, Plan};
@@ -6,7 +6,7 @@ use asid_report::plot::{Axis, Colour, Outline, Plan};
 /// Squares of a grid over a rectangle of the plane.
 #[derive(Clone, Debug)]
 pub struct Grid {
-    /// Low corner, m.
+    /// Lower corner, m.
     pub low: [f64; 2],
     /// Side of a square, m.
     pub side: f64,
@@ -25,12 +25,12 @@ impl Grid {
         }
     }
 
-    /// How many squares there are.
+    /// Number of squares.
     pub fn len(&self) -> usize {
         self.size[0] * self.size[1]
     }
 
-    /// The square that a place is in.
+    /// The square that contains a place.
     pub fn square(&self, place: [f64; 2]) -> Option<usize> {
         let at = [0, 1].map(|i| ((place[i] - self.low[i]) / self.side).floor());
         let inside = (0..2).all(|i| at[i] >= 0.0 && at[i] < self.size[i] as f64);
@@ -43,7 +43,7 @@ impl Grid {
         [0, 1].map(|i| self.low[i] + (at[i] as f64 + 0.5) * self.side)
     }
 
-    /// A plan of one value a square, between nothing and `full`.
+    /// A plan with one value a square, on a scale from 0 to `full`.
     pub fn plan(&self, title: &str, values: &[f64], full: f64, colour: Colour) -> Plan {
         let half = 0.5 * self.side;
         let mut plan = Plan::new(title, Axis::new("x", "m"), Axis::new("y", "m"));
@@ -65,7 +65,7 @@ impl Grid {
     }
 }
 
-/// Adds what stands still in a task's scene.
+/// Adds the fixtures of a task's scene.
 pub fn with_fixtures(mut plan: Plan, task: &dyn Task) -> Plan {
     for fixture in &task.spec().top_view.fixtures {
         let outline = Outline::polygon(fixture.corners.clone()).colour(Colour::Muted);

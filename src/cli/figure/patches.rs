@@ -1,5 +1,5 @@
-//! Where the ball goes on three patches of friction: each patch tells of its own friction alone,
-//! so an explorer that knows what it looks for sends the ball over all of them.
+//! Where the ball goes on three patches of friction. Each patch tells of its own friction alone, so
+//! an explorer that targets the unknowns sends the ball over all of them.
 
 use anyhow::Result;
 use asid_core::task::Outline;
@@ -18,7 +18,7 @@ const BALL: &str = "ball_pos";
 /// Side of a square of the map, m: about the ball's diameter (0.06 m).
 const SIDE: f64 = 0.05;
 
-/// Episodes of an explorer; the paper shows its heat maps without a number.
+/// Episodes of an explorer; the paper gives no number for its heat maps.
 const EPISODES: u64 = 20;
 
 pub fn draw(request: &Request<'_>) -> Result<Drawing> {
@@ -84,7 +84,7 @@ pub fn draw(request: &Request<'_>) -> Result<Drawing> {
     Ok(drawing)
 }
 
-/// Whether a place is within the corners of a region.
+/// Whether a place lies between the corners of a region.
 fn inside(region: &Outline, place: [f64; 2]) -> bool {
     (0..2).all(|i| {
         let along = || region.corners.iter().map(|c| c[i]);
@@ -96,7 +96,7 @@ fn inside(region: &Outline, place: [f64; 2]) -> bool {
     })
 }
 
-/// Fisher exploration covers more than MaxMI, intervals apart.
+/// Claim: Fisher exploration covers more than MaxMI, with intervals apart.
 fn claims(drawing: &Drawing) -> Vec<Claim> {
     let covered = |name: &str| {
         let mut numbers = drawing.numbers.iter();

@@ -8,7 +8,7 @@ use asid_core::registry::{ExplorerEntry, find};
 use asid_learned::learning::SHIPPED;
 use asid_learned::shipped;
 
-/// An explorer and settings that differ from its own.
+/// An explorer with settings that differ from its defaults.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Variant<'t> {
     /// Name of the explorer.
@@ -18,7 +18,7 @@ pub struct Variant<'t> {
 }
 
 impl<'t> Variant<'t> {
-    /// Reads what a figure was told.
+    /// Parses the text of a variant.
     pub fn of(text: &'t str) -> Self {
         let (name, settings) = text.split_once(':').unwrap_or((text, ""));
         Self {
@@ -27,7 +27,8 @@ impl<'t> Variant<'t> {
         }
     }
 
-    /// Name for pictures and tables: the explorer and its values, such as `fisher-cem trace one-step`.
+    /// Name for pictures and tables: the explorer and its values, such as `fisher-cem trace
+    /// one-step`.
     pub fn label(&self) -> String {
         let values = self.settings.iter().map(|s| {
             let value = s.split_once('=').map_or(*s, |(_, value)| value);
@@ -37,8 +38,8 @@ impl<'t> Variant<'t> {
         words.join(" ")
     }
 
-    /// The same with the keys, such as `fisher-cem fisher.objective=trace`, where the values alone do not tell
-    /// explorers apart.
+    /// As [`Variant::label`] with the keys, such as `fisher-cem fisher.objective=trace`, where the
+    /// values alone are ambiguous.
     fn full_label(&self) -> String {
         let words: Vec<&str> = std::iter::once(self.name)
             .chain(self.settings.iter().copied())
@@ -46,8 +47,10 @@ impl<'t> Variant<'t> {
         words.join(" ")
     }
 
-    /// The settings as `--set` takes them. An explorer that learns plays what ships, unless it was told
-    /// a file: no episode trains for itself alone.
+    /// The settings as `--set` takes them.
+    ///
+    /// An explorer that learns plays the shipped policy unless a file is given: it is not trained
+    /// for a single episode.
     ///
     /// # Errors
     /// When there is no such explorer.
@@ -63,7 +66,8 @@ impl<'t> Variant<'t> {
         Ok(set)
     }
 
-    /// Why it cannot be played on a task: it learns, nothing ships and it was told no file.
+    /// Why it cannot be played on a task: it learns, nothing is shipped for it, and no file is
+    /// given.
     ///
     /// # Errors
     /// When there is no such explorer.
@@ -79,7 +83,7 @@ impl<'t> Variant<'t> {
         }))
     }
 
-    /// Whether it plays what was trained before.
+    /// Whether it plays a policy that was trained before.
     ///
     /// # Errors
     /// When there is no such explorer.
@@ -93,7 +97,7 @@ impl<'t> Variant<'t> {
     }
 }
 
-/// Labels of explorers that are shown beside each other: no two are equal.
+/// Labels of explorers that are shown side by side: no two are equal.
 pub struct Labels(HashMap<String, String>);
 
 impl Labels {
@@ -111,14 +115,14 @@ impl Labels {
         Self(explorers.iter().map(|e| (e.clone(), label(e))).collect())
     }
 
-    /// The label of one of them; of another explorer the one that it has alone.
+    /// The label of one of them; any other explorer gets the label it has alone.
     pub fn get(&self, explorer: &str) -> String {
         let known = self.0.get(explorer).cloned();
         known.unwrap_or_else(|| Variant::of(explorer).label())
     }
 }
 
-/// The explorers, each once, as [`Variant::of`] reads them.
+/// The explorers without repetition, as [`Variant::of`] reads them.
 pub fn distinct(explorers: &[String]) -> Vec<String> {
     let mut kept: Vec<String> = Vec::new();
     for explorer in explorers {

@@ -1,4 +1,4 @@
-//! Which episodes a figure plays, of which explorers.
+//! Which episodes a figure plays, and with which explorers.
 
 use anyhow::Result;
 use asid_core::Error;
@@ -7,7 +7,7 @@ use super::Request;
 use super::episodes::Played;
 use super::variant::{Labels, Variant};
 
-/// Episodes that are to be played.
+/// Episodes to play.
 #[derive(Clone, Debug, Default)]
 pub struct Wanted {
     /// The task.
@@ -46,7 +46,7 @@ pub fn playable(
     Ok((kept, notes))
 }
 
-/// The same episodes of each explorer: seeds from `first` on, starts drawn by them.
+/// The same episodes for each explorer: seeds from `first` on, each of which draws the start.
 pub fn of_each(
     task: &str,
     explorers: &[String],

@@ -18,13 +18,14 @@ pub fn shape(outline: &Outline, kind: r::ShapeKind) -> r::Shape {
     }
 }
 
-/// The path of an object; none where its position is not tracked in the plane. One whose
-/// orientation is not tracked keeps its heading.
+/// The path of an object; `None` where its position in the plane is not tracked.
+///
+/// An object whose orientation is not tracked keeps its heading.
 fn track(object: &TrackedObject, log: &asid_core::Episode) -> Option<r::ObjectTrack> {
     let position = log.channel(&object.position).filter(|p| p.len() >= 2)?;
     let orientation = object.orientation.as_ref().and_then(|o| log.channel(o));
     let orientation = orientation.filter(|q| q.len() == 4);
-    // Between two readings of a slow tracker there is nothing to draw.
+    // Rows between two readings of a slow tracker have nothing to draw.
     let rows = (0..log.rows()).filter(|&i| log.reading(i)[position.start].is_finite());
     let rows: Vec<usize> = rows.collect();
     let pose = |row: &[f64]| {
@@ -40,7 +41,7 @@ fn track(object: &TrackedObject, log: &asid_core::Episode) -> Option<r::ObjectTr
     })
 }
 
-/// The real episode from above; none where no position of an object is tracked.
+/// The real episode from above; `None` where no object's position is tracked.
 pub fn episode(session: &Session, log: &asid_core::Episode) -> Option<r::Episode> {
     let view = &session.task.spec().top_view;
     let protocol = session.task.exploration();
@@ -101,7 +102,7 @@ pub fn signals(session: &Session, outcome: &RunOutcome) -> Result<Vec<r::Signal>
     Ok(tracked(session, &real.episode, Some((&before, &after))))
 }
 
-/// Readings of the tracked signals, an orientation as its heading, with replays.
+/// Readings of the tracked signals with their replays; an orientation is shown as its heading.
 pub fn tracked(
     session: &Session,
     log: &asid_core::Episode,
@@ -174,7 +175,7 @@ pub fn tracked(
     out
 }
 
-/// Angles without jumps of a turn.
+/// Angles with jumps of a full turn removed.
 pub fn unwrapped(mut values: Vec<f64>, angle: bool) -> Vec<f64> {
     if angle {
         let turn = 2.0 * std::f64::consts::PI;
@@ -199,7 +200,9 @@ pub fn replay(
     replay_of(session, log, (theta, start), &names)
 }
 
-/// The channels named, at the rows of a log (`rows x width`), that the simulator gives at the values and start `at`.
+/// Simulated readings of the named channels at the rows of a log (`rows x width`).
+///
+/// `at` holds the values of the unknowns and the start.
 pub fn replay_of(
     session: &Session,
     log: &asid_core::Episode,

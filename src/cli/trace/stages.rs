@@ -1,4 +1,4 @@
-//! What exploration gathered and what the task came to, in the report.
+//! The sections of the report on what exploration gathered and how the task went.
 
 use crate::pipeline::EpisodeInformation;
 use asid_core::real_world::Attempt;

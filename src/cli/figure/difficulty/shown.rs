@@ -1,4 +1,4 @@
-//! How methods are shown over the levels: pictures, table, and what is claimed.
+//! How methods are shown over the levels: pictures, table and claims.
 
 use asid_comparison::grid::{Entry, Grid};
 use asid_core::Task;
@@ -20,7 +20,7 @@ const COLOURS: [Colour; 7] = [
     Colour::Muted,
 ];
 
-/// How far apart the whiskers of two methods stand, as a share of the axis.
+/// Distance between the whiskers of two methods, as a share of the axis.
 const APART: f64 = 0.006;
 
 /// Names of the methods, in their order.
@@ -34,7 +34,7 @@ fn methods(points: &[(f64, Vec<Point>)]) -> Vec<&str> {
     names
 }
 
-/// A line with whiskers for each method; `value` gives what is drawn with its interval.
+/// A line with whiskers for each method; `value` gives the drawn value with its interval.
 fn lines(chart: Chart, points: &[(f64, Vec<Point>)], value: impl Fn(&Point) -> [f64; 3]) -> Chart {
     let along = points.iter().map(|(level, _)| *level);
     let width =
@@ -107,7 +107,7 @@ pub fn table(setting: &Difficulty, points: &[(f64, Vec<Point>)]) -> Grid {
     grid
 }
 
-/// The method `asid` is behind no other one but the oracle, at any level.
+/// Claim: at every level, no method but the oracle is better than `asid`.
 pub fn claims(points: &[(f64, Vec<Point>)]) -> Vec<Claim> {
     let interval = |p: &Point| statistics::wilson(p.successes, p.n);
     let (mut first, mut apart, mut counted) = (0, 0, 0);

@@ -1,4 +1,4 @@
-//! How explorers are shown beside each other: the table, the pictures, and what is claimed.
+//! How explorers are shown side by side: table, pictures and claims.
 
 use asid_comparison::grid::{Entry, Grid};
 use asid_comparison::rows::FEWEST;
@@ -7,10 +7,10 @@ use asid_report::plot::{Axis, Chart, Colour, Layer, Ranked, Ranking, Spacing};
 use super::super::{Claim, Number, Panel, median};
 use super::Row;
 
-/// Expected over actual deviation that is asked for, in the median over episodes.
+/// Range of the median ratio of expected to actual deviation that counts as calibrated.
 const CALIBRATED: [f64; 2] = [0.7, 1.4];
 
-/// Deviations below this share of the prior's are drawn there.
+/// Deviations below this share of the prior's are drawn at this value.
 const FLOOR: f64 = 1e-4;
 
 /// The table.
@@ -54,7 +54,7 @@ pub fn table(rows: &[Row]) -> Grid {
     grid
 }
 
-/// Two figures of a number about as large as 1 or smaller.
+/// A number with two significant figures, for values of about 1 or less.
 fn short(x: f64) -> String {
     match x.abs() {
         a if a >= 10.0 || a.is_nan() => format!("{x:.0}"),
@@ -79,7 +79,7 @@ fn kind(explorer: &str) -> (&'static str, Colour) {
     }
 }
 
-/// Posterior deviations of the explorers, of one unknown, as bars.
+/// Posterior deviations of one unknown for each explorer, as bars.
 pub fn ranking(of: &[&Row]) -> Panel {
     let [task, unknown] = [&of[0].task, &of[0].unknown];
     let title = format!("{task}: {unknown}");
@@ -105,7 +105,7 @@ pub fn ranking(of: &[&Row]) -> Panel {
     )
 }
 
-/// Expected against actual deviations of all episodes, of one unknown.
+/// Expected against actual deviations of one unknown, over all episodes.
 pub fn against(of: &[&Row]) -> Panel {
     let title = format!("{}: {}, expected against actual", of[0].task, of[0].unknown);
     let axis = |label: &str| {
@@ -142,14 +142,15 @@ pub fn against(of: &[&Row]) -> Panel {
     )
 }
 
-/// Low end of the axes: a little below what was seen.
+/// Lower end of the axes: a little below the smallest value.
 fn lowest(of: &[&Row]) -> f64 {
     let all = of.iter().flat_map(|r| &r.pairs).flatten();
     let seen = all.copied().filter(|x| x.is_finite());
     0.7 * seen.fold(1.0, f64::min).max(FLOOR)
 }
 
-/// That Fisher exploration tells more than random actions, and that what is expected of it is found.
+/// Claims: Fisher exploration tells more than random actions, and the expected deviations match the
+/// actual ones.
 pub fn claims(rows: &[Row]) -> Vec<Claim> {
     let mut claims = Vec::new();
     let mut groups: Vec<(&str, &str)> = Vec::new();
@@ -192,7 +193,7 @@ pub fn claims(rows: &[Row]) -> Vec<Claim> {
                 ratio.n
             ),
             format!("says nothing of it; {low} to {high} is asked for here"),
-            // Explorers meet the same truths: their episodes count once.
+            // All explorers meet the same truths, so episodes are counted once.
             of().map(|r| r.ratio.n),
             (low..=high).contains(&ratio.value),
         ));

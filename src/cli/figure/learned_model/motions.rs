@@ -1,5 +1,5 @@
-//! Motions that are predicted: those that policies make here, as a learned model sees them, and as the
-//! simulator repeats them.
+//! The motions that are predicted: recorded here, in the form a learned model sees, and as replayed
+//! by the simulator.
 
 use anyhow::Result;
 use asid_core::registry::{IdentifierEntry, find};
@@ -16,13 +16,14 @@ use crate::cli::session::Session;
 /// How the hand moves in an episode of the test.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Move {
-    /// Straight at the ball, as fast as it goes, and on.
+    /// Straight at the ball at full speed, and on.
     Push,
     /// Not at all.
     Still,
 }
 
-/// A policy of a test: it needs neither network nor plan, so that no model's own explorer is favoured.
+/// A policy of a test. It needs neither network nor plan, so that no model's own explorer is
+/// favoured.
 struct Moving {
     kind: Move,
     /// First entries of ball and hand in a reading.
@@ -58,7 +59,7 @@ impl Policy for Moving {
         action.fill(0.0);
         let way = [0, 1].map(|i| reading[self.ball + i] - reading[self.hand + i]);
         let length = way[0].hypot(way[1]);
-        // A reading that is missing moves nothing.
+        // A missing reading leads to no motion.
         if self.kind == Move::Push && length > 0.0 {
             for i in 0..2 {
                 action[i] = self.most[i] * way[i] / length;
@@ -89,7 +90,7 @@ impl Policy for Replay<'_> {
     }
 }
 
-/// Episodes in which the hand moves so.
+/// Episodes in which the hand moves in this way.
 pub fn moved(request: &Request<'_>, wanted: Vec<Wanted>, kind: Move) -> Result<Vec<Played>> {
     each(&request.common, wanted, |wanted| {
         let session = open(&request.common, wanted, false)?;
@@ -98,8 +99,8 @@ pub fn moved(request: &Request<'_>, wanted: Vec<Wanted>, kind: Move) -> Result<V
     })
 }
 
-/// The values of the unknowns that a simulator takes: those in the middle of the prior, and those that are
-/// identified from one episode.
+/// The values of the unknowns that a simulator uses: the middle of the prior, and those identified
+/// from one episode.
 pub fn fitted(request: &Request<'_>, episode: &Played) -> Result<[Vec<f64>; 2]> {
     let session = open(&request.common, &episode.wanted, request.quick)?;
     let component = &session.config.identifier;
@@ -109,7 +110,8 @@ pub fn fitted(request: &Request<'_>, episode: &Played) -> Result<[Vec<f64>; 2]> 
     Ok([middle.collect(), found.posterior.mean()])
 }
 
-/// The same actions from the same starts in the method's simulator with these values of the unknowns.
+/// Replays of the same actions from the same starts in the method's simulator, with these values of
+/// the unknowns.
 pub fn simulated(request: &Request<'_>, episodes: &[Played], theta: &[f64]) -> Result<Vec<Path>> {
     let wanted = episodes.iter().map(|e| Wanted {
         start: Some(e.start.clone()),
@@ -139,7 +141,7 @@ pub fn simulated(request: &Request<'_>, episodes: &[Played], theta: &[f64]) -> R
     })
 }
 
-/// Places of the ball in the plane: at the start and after each control step, m.
+/// Positions of the ball in the plane, at the start and after each control step, m.
 pub type Path = Vec<[f64; 2]>;
 
 /// The ball's path in an episode.
@@ -149,7 +151,8 @@ pub fn path(task: &dyn Task, episode: &Played) -> Result<Path> {
     Ok(rows.into_iter().step_by(frames).collect())
 }
 
-/// An episode as a model of the motion sees it: places of ball and hand, actions scaled to their ranges.
+/// An episode in the form a model of the motion sees: positions of ball and hand, actions scaled to
+/// their ranges.
 pub fn motion(task: &dyn Task, episode: &Played) -> Result<Motion> {
     let protocol = task.exploration();
     let (ball, hand) = (episode.channel(BALL)?, episode.channel(HAND)?);

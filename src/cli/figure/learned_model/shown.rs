@@ -1,4 +1,4 @@
-//! How the models are shown beside each other: data, numbers, pictures, and what is claimed.
+//! How the models are shown side by side: data, numbers, pictures and claims.
 
 use asid_core::Task;
 use asid_report::plot::{Axis, Chart, Colour, Layer, Outline, Plan, Spacing};
@@ -9,13 +9,13 @@ use super::super::{Claim, Data, Number, Panel, mean};
 use super::motions::Path;
 use super::{CASES, Model, distances};
 
-/// Errors are drawn from here on, m.
+/// Smallest error on the axis, m.
 const DRAWN: f64 = 1e-4;
 
-/// How many times the simulator's the learned models' error has to be.
+/// How many times larger than the simulator's error the learned models' error must be.
 const WORSE: f64 = 5.0;
 
-/// What learned models are judged by.
+/// The quantity by which learned models are judged.
 const RATIO: &str = "error over that of the fitted simulator";
 
 /// The model whose data no explorer chose.
@@ -65,7 +65,8 @@ fn medians(model: &Model, truths: &[Vec<Path>], case: usize) -> Vec<f64> {
         .collect()
 }
 
-/// Errors, and those of learned models over those of the fitted simulator, which is the first model.
+/// Errors, and the ratio of learned models' errors to those of the fitted simulator, which is the
+/// first model.
 pub fn numbers(models: &[Model], floor: f64) -> Vec<Number> {
     let mut numbers = Vec::new();
     for (c, case) in CASES.iter().enumerate() {
@@ -85,8 +86,8 @@ pub fn numbers(models: &[Model], floor: f64) -> Vec<Number> {
     numbers
 }
 
-/// Ratio of mean errors over the same episodes, which are resampled together; the lower one counts as at
-/// least `floor`.
+/// Ratio of mean errors over the same episodes, which are resampled together. The denominator
+/// counts as at least `floor`.
 fn ratio(label: &str, quantity: &str, [over, under]: [&Vec<f64>; 2], floor: f64) -> Number {
     let of = |episodes: &[f64]| {
         let sum = |errors: &[f64], least: f64| -> f64 {
@@ -129,7 +130,7 @@ pub fn panels(task: &dyn Task, models: &[Model], truths: &[Vec<Path>]) -> Vec<Pa
     panels
 }
 
-/// The pushed episode in which the ball went furthest, as it was and as it was predicted.
+/// The pushed episode in which the ball went furthest, as recorded and as predicted.
 fn example(task: &dyn Task, models: &[Model], truths: &[Vec<Path>]) -> Panel {
     let case = 1;
     let way = |path: &Path| {
@@ -160,8 +161,11 @@ fn example(task: &dyn Task, models: &[Model], truths: &[Vec<Path>]) -> Panel {
     Panel::new(title, plan, "The episode in which the ball went furthest.")
 }
 
-/// Where nothing was seen, learned models err at least [`WORSE`] times as much as the fitted simulator. What
-/// random actions show is there for comparison: a ball that hardly ever moved is rightly left where it is.
+/// Claim: outside the training data, learned models err at least [`WORSE`] times as much as the
+/// fitted simulator.
+///
+/// The model of random actions is there for comparison: it rightly leaves a ball where it is if it
+/// hardly ever saw the ball move.
 pub fn claims(numbers: &[Number]) -> Vec<Claim> {
     let all = || numbers.iter().filter(|n| n.quantity.ends_with(RATIO));
     let aimless = |n: &&Number| n.explorer == AIMLESS;
