@@ -1,7 +1,8 @@
-//! A model with some effects, fitted: its values, the noise and the trajectory, with the evidence.
+//! Fit of a model with given effects: values, noise and trajectory, with the evidence.
 //!
-//! Everything is linearised anew about the smoothed trajectory until the evidence stands. An effect that is right
-//! makes the missing force small: each round the evidence is compared over common scales of `q`, so that it is seen.
+//! Each round linearises anew about the smoothed trajectory, until the evidence stops rising. A
+//! correct effect makes the missing force small. So that the evidence can show this, each round
+//! maximises it over common scales of `q`.
 
 mod course;
 mod extent;
@@ -30,16 +31,19 @@ pub use slopes::Slopes;
 use wander::wander;
 use watchdog::Watchdog;
 
-/// Largest step of a value, in deviations of its prior: a tangent reaches no further.
+/// Largest step of a value, in standard deviations of its prior: beyond it, the linearisation does
+/// not hold.
 const LARGEST_STEP: f64 = 1.0;
 /// Rounds of EM between two linearisations.
 const EM_ROUNDS: usize = 4;
-/// Further smoothings between two steps of the values where readings remember: their slope in the past of the state is
-/// right to first order only.
+/// Additional smoothings between two steps of the values where readings have memory: the derivative
+/// of such a reading with respect to past states is right to first order only.
 const AGAIN: usize = 2;
-/// Evidence that slopes from elsewhere may have shown too much: rivals that lie no farther apart are all fitted to the end.
+/// Evidence by which derivatives taken elsewhere may overstate a model: rivals no farther apart
+/// than this are all fitted to the end.
 const MISLED: f64 = 20.0;
-/// Evidence that no longer counts as a rise; where there are segments, of each, as errors that are independent add up.
+/// Change of evidence below which nothing counts as a rise. With segments it is the change per
+/// segment, and grows with the square root of their number, as independent errors do.
 const RISE: f64 = 0.5;
 
 /// A model: the study's parameters and effects, with priors.
@@ -52,13 +56,13 @@ pub struct Hypothesis {
 }
 
 impl Hypothesis {
-    /// Its parameters, as columns of a batch.
+    /// Returns its parameters, as columns of a batch.
     #[must_use]
     pub fn parameters(&self) -> Vec<Parameter> {
         self.unknowns.iter().map(|u| u.parameter.clone()).collect()
     }
 
-    /// Places of the values that are fitted.
+    /// Returns the indices of the values that are fitted.
     #[must_use]
     pub fn free(&self) -> Vec<usize> {
         (0..self.unknowns.len())
@@ -74,33 +78,38 @@ pub struct Fitted {
     pub hypothesis: Hypothesis,
     /// All its values.
     pub theta: Vec<f64>,
-    /// Logarithm of its marginal likelihood, natural.
+    /// Natural logarithm of its marginal likelihood.
     pub evidence: f64,
-    /// Median of how far that evidence came out from the best in those linearisations that did not raise it by what counts: about each
-    /// start of a segment that leaves as little of the readings, slopes are others. 0 where there are no segments.
+    /// Median difference between the evidence and the best, over the linearisations that did not
+    /// raise it.
+    ///
+    /// The derivatives of a segment differ about each initial state with equally small residuals,
+    /// and so does the evidence. Zero where there are no segments.
     pub wander: f64,
-    /// What a further step of the values promises, to first order.
+    /// Gain of evidence that a further step of the values predicts, to first order.
     pub promised: f64,
     /// Posterior covariance of the fitted values, in their units.
     pub covariance: DMatrix<f64>,
-    /// How far the posterior mean of each fitted value lies from the value, by the last linearisation, in their units: 0 where the fit has
-    /// come to its end.
+    /// Posterior mean of each fitted value by the last linearisation, relative to the value, in its
+    /// units; 0 once the fit has converged.
     pub ahead: Vec<f64>,
     /// Trajectory, force and noise.
     pub estimate: Estimate,
-    /// Slopes in the state, with which fits of like models begin.
+    /// Derivatives with respect to the state, with which fits of similar models begin.
     pub slopes: Slopes,
 }
 
-/// Evidence that no longer counts as a rise, natural logarithm.
+/// Returns the change of evidence (natural logarithm) below which nothing counts as a rise.
 #[must_use]
 pub fn rise(context: &Context<'_>) -> f64 {
     let segments = context.walks.iter().filter(|w| w.segment.is_some()).count();
     RISE * (segments.max(1) as f64).sqrt()
 }
 
-/// Fits a model from some values, an estimate and the slopes of a like model on, to some extent;
-/// over the linearisations so far, but at least one, where the work is stopped.
+/// Fits a model, starting from given values, an estimate and the derivatives of a similar model.
+///
+/// `extent` limits the fit. If the work is stopped, the result rests on the linearisations so far,
+/// at least one.
 ///
 /// # Errors
 /// When a value is not physical or the engine fails.
@@ -154,7 +163,7 @@ pub fn fit<'p>(
         });
         let stands = round > 0 && !outcome.rose && promised < rise;
         if stands && round + 1 < rounds && !progress.is_stopped() && slopes.renew_columns() {
-            // Kept columns may say so by mistake.
+            // Kept columns can make a fit look converged by mistake.
             continue;
         }
         let ends = stands || extent.is_out_of_reach(course.reached(), promised);
@@ -194,7 +203,8 @@ pub fn fit<'p>(
     Ok(best)
 }
 
-/// The model at some values and an estimate, with what a comparison found there.
+/// Assembles the fitted model at given values and an estimate, from the result of a comparison
+/// there.
 fn fitted_at(
     hypothesis: &Hypothesis,
     (theta, estimate): (&[f64], &Estimate),
@@ -214,7 +224,8 @@ fn fitted_at(
     }
 }
 
-/// What coefficients, as far as a tangent reaches, move the free values by, in their units.
+/// Returns the moves of the free values that coefficients stand for, in the values' units, limited
+/// to the largest step.
 fn ahead(coefficients: &[f64], unknowns: &[Unknown], free: &[usize]) -> Vec<f64> {
     let pairs = coefficients.iter().zip(free);
     pairs
@@ -222,8 +233,11 @@ fn ahead(coefficients: &[f64], unknowns: &[Unknown], free: &[usize]) -> Vec<f64>
         .collect()
 }
 
-/// Moves the free values by coefficients in deviations of their priors, within their bounds and the reach of a tangent; returns the moves, and
-/// after them the coefficient of the engine's own error, which no tangent limits.
+/// Moves the free values by coefficients in standard deviations of their priors, within their
+/// bounds and the largest step.
+///
+/// Returns the moves, followed by the coefficient of the engine's own error, which has no largest
+/// step.
 fn step(unknowns: &[Unknown], free: &[usize], coefficients: &[f64], theta: &mut [f64]) -> Vec<f64> {
     let mut moves = coefficients.to_vec();
     for by in moves.iter_mut().take(free.len()) {
@@ -236,8 +250,10 @@ fn step(unknowns: &[Unknown], free: &[usize], coefficients: &[f64], theta: &mut 
     moves
 }
 
-/// Smooths the logs again after a step of the values: once about the moved linearisation, and where readings remember about
-/// further ones.
+/// Smooths the logs again after a step of the values.
+///
+/// It smooths once about the shifted linearisation. Where readings have memory, it then smooths
+/// about new linearisations.
 fn smooth(
     context: &Context<'_>,
     map: &mut StepMap<'_>,
@@ -263,8 +279,10 @@ fn smooth(
     Ok(())
 }
 
-/// An estimate taken along to values of a model that differ by `changes`, one a column of a linearisation about it: the starts of segments move
-/// with the values, as they do in each step of a fit.
+/// Moves an estimate to a model whose values differ by `changes`, one a column of a linearisation
+/// about the estimate.
+///
+/// The initial states of segments move with the values, as they do in each step of a fit.
 ///
 /// # Errors
 /// When a value is not physical or the engine fails.
@@ -284,7 +302,10 @@ pub fn taken_along(
     Ok(estimate)
 }
 
-/// Smooths the logs in a model for the first time: linearises and fits the noise until both stand. Returns the last slopes.
+/// Smooths the logs under a model for the first time: alternates linearisation and EM for up to
+/// `rounds` rounds.
+///
+/// Returns the last derivatives.
 ///
 /// # Errors
 /// When the engine fails.

@@ -1,6 +1,7 @@
 //! Kalman filter and smoother with the missing force as a hidden state.
 //!
-//! About a trajectory `x_k` the true state is `x_k` moved by `d_k` (tangent coordinates), and
+//! Relative to a trajectory `x_k`, the true state is `x_k` changed by `d_k` (tangent coordinates),
+//! and
 //!
 //! ```text
 //! d_{k+1} = A_k d_k + B_k (w_k + e_k) + f(x_k) - x_{k+1}
@@ -9,15 +10,18 @@
 //! y_k     = h(x_k) + H_k d_k + noise,   variance r
 //! ```
 //!
-//! `w_k` is the generalized force that the model lacks, a first-order process at each degree of freedom (a latent force
-//! model, Alvarez, Luengo and Lawrence 2009, in state-space form, Hartikainen and Sarkka 2010). `e_k` is independent from row to
-//! row: `white` covers what changes at once, as friction does where a joint turns round, and `free_k`, known and of some rows only,
-//! the force that may hold a joint at rest, or that a drive makes of what was before the log.
+//! `w_k` is the generalized force that the model lacks: a first-order process at each degree of
+//! freedom. This is a latent force model (Alvarez, Luengo and Lawrence 2009) in state-space form
+//! (Hartikainen and Sarkka 2010). `e_k` is independent from row to row. `white` covers forces that
+//! change at once, such as friction where a joint reverses. `free_k` is known and non-zero in some
+//! rows only. It covers the force that may hold a joint at rest, and the force of a drive whose
+//! state before the log is unknown.
 //!
-//! Readings are taken one by one, so that no matrix is inverted. The forward pass is in `filter.rs`; smoothing is by the adjoint
-//! recursion of Bryson and Frazier (Bierman 1977), which inverts none either, in `adjoint.rs`.
-//! Columns (what a unit of an effect adds to `f` and `h`) go through the same filter: in whitened innovations all
-//! effects are one linear regression.
+//! Readings are processed one at a time, so no matrix is inverted. The forward pass is in
+//! `filter.rs`. Smoothing is the adjoint recursion of Bryson and Frazier (Bierman 1977), which
+//! inverts no matrix either, in `adjoint.rs`. Columns (the change of `f` and `h` per unit of an
+//! effect) pass through the same filter: in whitened innovations, all effects form one linear
+//! regression.
 
 mod adjoint;
 mod blocks;
@@ -43,14 +47,16 @@ pub struct NoiseModel {
     pub q: Vec<f64>,
     /// Its correlation time, s, one a degree of freedom.
     pub tau: Vec<f64>,
-    /// Variance of the part of the missing force that is another one in each row, one a degree of freedom.
+    /// Variance of the white part of the missing force, independent from row to row; one a degree
+    /// of freedom.
     pub white: Vec<f64>,
     /// Variance of each entry of a reading.
     pub r: Vec<f64>,
 }
 
 impl NoiseModel {
-    /// The same with all variances of the missing force scaled, those of the white part not below `least`.
+    /// Returns the model with all variances of the missing force scaled, those of the white part to
+    /// no less than `least`.
     #[must_use]
     pub fn scaled(&self, factor: f64, least: &[f64]) -> Self {
         let white = self.white.iter().zip(least);
@@ -61,7 +67,8 @@ impl NoiseModel {
         }
     }
 
-    /// The same with the variances of one missing force scaled, that of its white part not below `least`.
+    /// Returns the model with the variances of the force at one degree of freedom scaled, that of
+    /// its white part to no less than `least`.
     #[must_use]
     pub fn scaled_at(&self, dof: usize, factor: f64, least: &[f64]) -> Self {
         let mut scaled = self.clone();
@@ -71,7 +78,8 @@ impl NoiseModel {
     }
 }
 
-/// Where an episode begins: mean of the change from the trajectory's first state, and its variances.
+/// Prior of an episode's initial state: mean and variances of its change from the trajectory's
+/// first state.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Start {
     /// Mean, `nx`.
@@ -87,33 +95,35 @@ pub struct Problem<'a> {
     pub walk: &'a Walk,
     /// Its linearisation.
     pub linear: &'a LinearEpisode,
-    /// Slopes in generalized forces, `(rows - 1) x nx x nv`.
+    /// Derivatives of the next state with respect to generalized forces, `(rows - 1) x nx x nv`.
     pub b: &'a [f64],
-    /// Where it begins.
+    /// Prior of its initial state.
     pub start: &'a Start,
-    /// Variance of the force that is free in a row, `rows x nv`; empty where there is none.
+    /// Variance of the free force in each row, `rows x nv`; empty for none.
     pub free: &'a [f64],
-    /// Of a segment: directions in which its replays scatter, `rows x ns x directions`; empty for none.
+    /// For a segment: directions in which its replays scatter, `rows x ns x directions`; empty for
+    /// none.
     pub scatter: &'a [f64],
 }
 
-/// Sums that the noise model is estimated from.
+/// Sums from which the noise model is estimated.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Sums {
-    /// Rows with a row before them, and their times, s.
+    /// Number of steps from a row to the next.
     pub steps: f64,
     /// Sum of the steps' durations, s.
     pub seconds: f64,
-    /// Of each force: squares at the later row, at the earlier, and products.
+    /// For each force: sum of squares at the later row, of squares at the earlier row, and of
+    /// products.
     pub force: Vec<[f64; 3]>,
-    /// Of each force: squares of its white part.
+    /// For each force: sum of squares of its white part.
     pub white: Vec<f64>,
-    /// Of each entry of a reading: squares of what is left, and how many.
+    /// For each entry of a reading: sum of squared residuals, and their number.
     pub reading: Vec<[f64; 2]>,
 }
 
 impl Sums {
-    /// Adds those of another episode.
+    /// Adds the sums of another episode.
     pub fn add(&mut self, other: &Self) {
         self.steps += other.steps;
         self.seconds += other.seconds;
@@ -138,28 +148,32 @@ impl Sums {
 /// A smoothed episode.
 #[derive(Clone, Debug, Default)]
 pub struct Smoothed {
-    /// Logarithm of the likelihood of its readings, natural, up to `ln 2 pi` a reading.
+    /// Natural log-likelihood of its readings, up to a constant of `ln 2 pi` a reading.
     pub log_likelihood: f64,
     /// Change of the trajectory, `rows x nx`.
     pub change: Vec<f64>,
-    /// Of a segment: shorter changes of its start, each `nx`, where the whole goes too far.
+    /// For a segment: damped changes of its initial state, each `nx`, for where the whole step goes
+    /// too far.
     pub damped: Vec<Vec<f64>>,
-    /// Of a segment: sum of squares that a replay from the changed start should leave of each entry, where slopes tell.
+    /// For a segment: predicted sum of squared residuals of each entry in a replay from the changed
+    /// initial state.
     pub promised: Vec<f64>,
-    /// Of a segment: a root of the posterior covariance of its start, `nx` rows; empty for other walks.
+    /// For a segment: a square root of the posterior covariance of its initial state, `nx` rows;
+    /// empty for other walks.
     pub root: DMatrix<f64>,
-    /// Its variances, `rows x nx`.
+    /// Variances of the change, `rows x nx`.
     pub change_variance: Vec<f64>,
     /// Missing force, `rows x nv`.
     pub force: Vec<f64>,
-    /// Its variances, `rows x nv`.
+    /// Variances of the missing force, `rows x nv`.
     pub force_variance: Vec<f64>,
     /// Sums for the noise model.
     pub sums: Sums,
 }
 
 impl Smoothed {
-    /// An episode of some rows along which nothing is changed or missing, with nothing summed.
+    /// Returns an episode of `rows` rows in which the state change, the force and the sums are
+    /// zero.
     fn unmoved(rows: usize, noise: &NoiseModel) -> Self {
         let (nv, ns) = (noise.q.len(), noise.r.len());
         let nx = 2 * nv;
@@ -180,10 +194,11 @@ impl Smoothed {
     }
 }
 
-/// The linear regression that a filter pass with columns makes: `X'X`, `X'y` and the likelihood without them.
+/// Linear regression from a filter pass with columns: `X'X`, `X'y` and the log-likelihood without
+/// the columns.
 #[derive(Clone, Debug)]
 pub struct Regression {
-    /// Logarithm of the likelihood at the trajectory and the present parameters.
+    /// Log-likelihood at the trajectory and the present parameters.
     pub log_likelihood: f64,
     /// `X'X`, `m x m`.
     pub gram: DMatrix<f64>,
@@ -192,7 +207,7 @@ pub struct Regression {
 }
 
 impl Regression {
-    /// Adds that of another episode.
+    /// Adds the regression of another episode.
     pub fn add(&mut self, other: &Self) {
         self.log_likelihood += other.log_likelihood;
         self.gram += &other.gram;
@@ -200,7 +215,7 @@ impl Regression {
     }
 }
 
-/// Logarithm of the likelihood of an episode that is no segment.
+/// Returns the log-likelihood of an episode that is not a segment.
 #[must_use]
 pub fn log_likelihood(problem: Problem<'_>, noise: &NoiseModel) -> f64 {
     match Blocks::of(problem, noise) {
@@ -209,7 +224,7 @@ pub fn log_likelihood(problem: Problem<'_>, noise: &NoiseModel) -> f64 {
     }
 }
 
-/// The same of an episode that is taken as one block.
+/// Returns the log-likelihood of an episode, treated as one block.
 fn log_likelihood_of_one(problem: Problem<'_>, noise: &NoiseModel) -> f64 {
     let mut filter = Filter::new(problem, noise);
     for k in 0..problem.linear.rows {
@@ -223,7 +238,7 @@ fn log_likelihood_of_one(problem: Problem<'_>, noise: &NoiseModel) -> f64 {
     filter.total()
 }
 
-/// The linear regression of an episode with its columns.
+/// Returns the linear regression of an episode on its `m` columns.
 #[must_use]
 pub fn regress(problem: Problem<'_>, noise: &NoiseModel, m: usize) -> Regression {
     if problem.walk.segment.is_some() {
@@ -244,7 +259,9 @@ fn regress_some(
     }
 }
 
-/// The same with some of its columns, of an episode that is no segment; its products are among those alone, in their order.
+/// As [`regress`], on some of the columns only, for an episode that is not a segment.
+///
+/// The products are those of the selected columns, in their order.
 #[must_use]
 pub fn regress_on(
     problem: Problem<'_>,
@@ -266,7 +283,7 @@ pub fn smooth(problem: Problem<'_>, noise: &NoiseModel) -> Smoothed {
     }
 }
 
-/// Smooths an episode that is no segment as one block.
+/// Smooths an episode that is not a segment, as one block.
 fn smooth_one(problem: Problem<'_>, noise: &NoiseModel) -> Smoothed {
     let mut filter = Filter::new(problem, noise);
     let rows = problem.linear.rows;

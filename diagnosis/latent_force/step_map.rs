@@ -1,11 +1,14 @@
-//! The model over one row of a log, and its derivatives, along a trajectory.
+//! The model over one row of a log, and its derivatives along a trajectory.
 //!
-//! `f` carries a state from a row of the log to the next under the row's command; `h` reads the sensors. Both
-//! come from a batch of any engine: a pass walks all episodes side by side, sets every simulation to the
-//! trajectory's state at each row, and steps it to the next. Derivatives are forward differences: one
-//! simulation an episode for the model as it is, one for each coordinate of the state, each force and each value
-//! that is varied. Effects that remember (a delay, a rotor behind its play) walk along with their
-//! own simulation, so that their memory at a row is that of the trajectory before it.
+//! `f` maps the state at one row of the log to the state at the next, under the row's command. `h`
+//! is the sensors' readings of a state. Both come from a batch of any engine. A pass walks all
+//! episodes side by side: at each row it sets every simulation to the trajectory's state and steps
+//! it to the next row.
+//!
+//! Derivatives are forward differences. Each episode has one simulation for the unperturbed model
+//! and one for each perturbed coordinate of the state, force or value. An effect with memory (a
+//! delay, a rotor behind backlash) runs along with its own simulation, so its memory at a row is
+//! that of the trajectory before the row.
 
 mod carried;
 mod late;
@@ -54,46 +57,53 @@ struct Common<'a> {
     columns: BatchColumns,
     states: Recording,
     readings: Recording,
-    /// Most roles in one pass.
+    /// Largest number of roles in one pass.
     capacity: usize,
-    /// Whether effects depend on time or on what was before: some on the drive side, or on readings.
+    /// Whether an effect depends on time or on earlier states: one on the drive side or on
+    /// readings.
     depends_on_past: bool,
-    /// Whether some make readings depend on those before.
+    /// Whether an effect makes readings depend on earlier ones.
     remembers_readings: bool,
     /// Whether an effect changes what sensors read.
     alters_readings: bool,
-    /// Whether one physics step tells the slopes of a row in the state.
+    /// Whether one physics step gives a row's derivatives with respect to the state.
     one_step: bool,
-    /// What one push tells of.
+    /// Uncoupled degrees of freedom, which one simulation perturbs together.
     islands: Islands,
-    /// Whether each parameter acts in each physics step alike, by what the model is then.
+    /// Whether each parameter acts in every physics step alike, as a property of the model does.
     at_once: Vec<bool>,
-    /// Whether each parameter is of an effect on readings.
+    /// Whether each parameter belongs to an effect on readings.
     measured: Vec<bool>,
-    /// What readings depend on.
+    /// What the readings depend on.
     sensors: Sensors,
 }
 
 impl Common<'_> {
-    /// Number of the episode that a walk is of.
+    /// Returns the number of the episode that a walk belongs to.
     fn episode(&self, walk: usize) -> usize {
         self.logs.episodes[self.walks[walk].episode].number
     }
 
-    /// Whether a walk is replayed from its first row, and its derivatives are those of the replay: a segment, but where the
-    /// slopes in forces are wanted, which are those of rows.
+    /// Whether a walk is replayed from its first row, with the derivatives of the whole replay.
+    ///
+    /// True for a segment, unless derivatives with respect to forces are wanted: those are
+    /// derivatives over single rows.
     fn rolls(&self, walk: usize, want: Derivatives) -> bool {
         self.walks[walk].segment.is_some() && !want.force
     }
 
-    /// Whether a variation is of parameters alone that act in each physics step alike. What sensors remember tells of other steps too.
+    /// Whether a variation changes only parameters that act in every physics step alike.
+    ///
+    /// False where sensors have memory, since their readings depend on other steps too.
     fn acts_at_once(&self, theta: &[f64], variation: &Variation) -> bool {
         let values = theta.iter().zip(&variation.theta).zip(&self.at_once);
         let mut varied = values.filter(|((a, b), _)| a != b);
         !self.remembers_readings && varied.all(|(_, at_once)| *at_once)
     }
 
-    /// Whether a variation is of effects on readings alone: it moves as the model as it is does, and only has to be read.
+    /// Whether a variation changes effects on readings alone.
+    ///
+    /// Its motion is that of the unperturbed model, so it is only read.
     fn is_read_alone(&self, theta: &[f64], variation: &Variation) -> bool {
         let values = theta.iter().zip(&variation.theta).zip(&self.measured);
         values
@@ -101,7 +111,7 @@ impl Common<'_> {
             .all(|(_, measured)| *measured)
     }
 
-    /// Whether a variation changes readings in the same state.
+    /// Whether a variation changes the readings of an unchanged state.
     fn is_read(&self, theta: &[f64], variation: &Variation) -> bool {
         let values = theta.iter().zip(&variation.theta);
         let mut of_values = values.zip(&self.sensors.of_readings);
@@ -110,22 +120,23 @@ impl Common<'_> {
     }
 }
 
-/// What of a linearisation is taken anew; all of it by default. What is not is zero.
+/// Which parts of a linearisation are computed anew: all by default. Other parts are zero.
 #[derive(Clone, Copy, Default)]
 pub struct Anew<'r> {
-    /// Walks whose slopes in the state are; empty for all.
+    /// Walks whose derivatives with respect to the state are computed; empty for all.
     pub state: &'r [bool],
-    /// [`LinearEpisode::carried`] of the other walks; empty where there is none.
+    /// [`LinearEpisode::carried`] of the other walks; empty for none.
     pub carried: &'r [Vec<f64>],
-    /// Variations whose columns are kept but along the walks of `columns`; empty for none.
+    /// Variations whose columns are kept, except along the walks of `columns`; empty for none.
     pub kept: &'r [bool],
-    /// Walks along which the columns of all variations are taken anew; empty for none.
+    /// Walks along which the columns of all variations are computed; empty for none.
     pub columns: &'r [bool],
-    /// Of each segment the coordinates of its start that its readings do not depend on, whose slopes are zero; empty for none.
+    /// For each segment: coordinates of its initial state on which its readings do not depend.
+    /// Their derivatives are zero. Empty for none.
     pub blind: &'r [Vec<bool>],
 }
 
-/// The linearisation point and what is wanted of it.
+/// The linearisation point and what is wanted there.
 #[derive(Clone, Copy)]
 struct Request<'r> {
     theta: &'r [f64],
@@ -134,26 +145,26 @@ struct Request<'r> {
     push: &'r [f64],
     variations: &'r [Variation],
     anew: Anew<'r>,
-    /// Whether each variation is of what acts in each physics step alike.
+    /// Whether each variation changes only what acts in every physics step alike.
     at_once: &'r [bool],
-    /// Whether each variation changes readings in the same state.
+    /// Whether each variation changes the readings of an unchanged state.
     read: &'r [bool],
-    /// Whether each variation is of readings alone.
+    /// Whether each variation changes readings alone.
     alone: &'r [bool],
 }
 
 impl<'r> Request<'r> {
-    /// Whether the slopes of a walk in the state are wanted, where any are.
+    /// Whether derivatives with respect to the state are computed for a walk, if any are wanted.
     fn due(&self, walk: usize) -> bool {
         self.anew.state.get(walk).is_none_or(|due| *due)
     }
 
-    /// Coordinates of the start of a walk whose slopes are zero; empty for none.
+    /// Coordinates of a walk's initial state whose derivatives are zero; empty for none.
     fn blind(&self, walk: usize) -> &'r [bool] {
         self.anew.blind.get(walk).map_or(&[], Vec::as_slice)
     }
 
-    /// Whether a role is read at each row, and never stepped.
+    /// Whether a role is read at each row and never stepped.
     fn is_read_alone(&self, role: Role) -> bool {
         match role {
             Role::Varied(i) => self.alone[i],
@@ -161,15 +172,17 @@ impl<'r> Request<'r> {
         }
     }
 
-    /// Whether the column of a variation is wanted along the walks whose columns are `due`, or else along the others.
+    /// Whether the column of a variation is wanted along the walks whose columns are `due`, or else
+    /// along the other walks.
     fn wants(&self, variation: usize, due: bool) -> bool {
         due || !self.anew.kept.get(variation).is_some_and(|kept| *kept)
     }
 }
 
 impl<'a> StepMap<'a> {
-    /// Of a machine with more effects, whose parameters are given; `roles` is how many evaluations a pass
-    /// will want.
+    /// Builds the map of a machine with additional effects, whose parameters are given.
+    ///
+    /// `roles` is the number of evaluations that a pass is expected to need.
     ///
     /// # Errors
     /// When the engine refuses an effect or a target.
@@ -243,17 +256,19 @@ impl<'a> StepMap<'a> {
         Ok(Self { common, parts })
     }
 
-    /// Takes slopes in the state from one physics step of each row; from the whole row otherwise, as a new map does.
+    /// Sets whether one physics step of each row gives the derivatives with respect to the state.
+    ///
+    /// A new map takes them over whole rows.
     pub fn by_one_step(&mut self, one: bool) {
         self.common.one_step = one;
     }
 
-    /// Takes slopes in what nothing couples together, where no walk is a segment.
+    /// Perturbs uncoupled degrees of freedom together; no walk may be a segment.
     pub fn apart(&mut self, islands: &Islands) {
         self.common.islands.clone_from(islands);
     }
 
-    /// Whether an effect makes readings depend on those before.
+    /// Whether an effect makes readings depend on earlier ones.
     #[must_use]
     pub fn remembers_readings(&self) -> bool {
         self.common.remembers_readings
@@ -271,7 +286,7 @@ impl<'a> StepMap<'a> {
         self.common.walks.iter().any(|w| w.segment.is_some())
     }
 
-    /// Whether all walks are.
+    /// Whether all walks are segments.
     #[must_use]
     pub fn is_all_segments(&self) -> bool {
         self.common.walks.iter().all(|w| w.segment.is_some())
@@ -283,14 +298,16 @@ impl<'a> StepMap<'a> {
         &self.common.layout
     }
 
-    /// Physics steps so far.
+    /// Number of physics steps taken so far.
     #[must_use]
     pub fn steps(&self) -> u64 {
         self.parts.iter().map(|p| p.simulator.steps_taken()).sum()
     }
 
-    /// Linearises about a trajectory (`rows x (nq + nv)`, one a walk) at some parameters. `push` is what slopes are taken over:
-    /// in each generalized force, or in each coordinate of the starts of segments.
+    /// Linearises about a trajectory (`rows x (nq + nv)`, one a walk) at given parameters.
+    ///
+    /// `push` holds the steps of the differences: one a generalized force, or one a coordinate of
+    /// the initial states of segments.
     ///
     /// # Errors
     /// When a value is not physical or the engine fails.
@@ -305,7 +322,7 @@ impl<'a> StepMap<'a> {
         self.linearise_anew(theta, trajectory, (want, Anew::default()), push, variations)
     }
 
-    /// The same of what is taken `anew` alone.
+    /// As [`StepMap::linearise`], but computes only the parts that `anew` selects.
     ///
     /// # Errors
     /// As [`StepMap::linearise`].
@@ -355,7 +372,8 @@ impl<'a> StepMap<'a> {
         Ok(out)
     }
 
-    /// What the logs' sensors read at a state of each walk, `nq + nv`, in the order of the logs' channels.
+    /// Returns what the logs' sensors read at a state (`nq + nv`) of each walk, in the order of the
+    /// logs' channels.
     ///
     /// # Errors
     /// As [`StepMap::linearise`].
@@ -375,10 +393,13 @@ impl<'a> StepMap<'a> {
         Ok(out)
     }
 
-    /// Replays some of the segments from the first rows of their trajectories, which become those of the replays. With the sum of
-    /// squares of what is left of the readings that count, each divided by its `variance` (one an entry); 0 for other walks. A replay ends where it
-    /// leaves more than the `most` that is asked of it (one a walk, `None` where it is not replayed), and has left infinitely much then, as where
-    /// the engine fails.
+    /// Replays some of the segments from the first rows of their trajectories, and overwrites the
+    /// trajectories with the replays.
+    ///
+    /// Returns, for each walk, the sum of squared residuals of the readings that count, each
+    /// divided by its `variance` (one an entry); 0 for other walks. `most` holds one limit a walk,
+    /// or `None` if it is not replayed. A replay ends once its sum exceeds the limit; the sum is
+    /// then infinite, as where the engine fails.
     ///
     /// # Errors
     /// As [`StepMap::linearise`].
