@@ -5,10 +5,10 @@
 pub enum Acts {
     /// On the model's parameters.
     Model,
-    /// On the command on its way to the drive.
+    /// On the command, before it reaches the drive.
     Command,
     /// As a force during the step.
     Force,
-    /// On the reading on its way from the sensor.
+    /// On the reading of a sensor.
     Measurement,
 }

@@ -1,4 +1,4 @@
-//! The contract of an effect: where it acts, on what, with which parameters.
+//! The interface of an effect: where it acts, which parameters it has, and what it does.
 
 use asid_core::backend::Capabilities;
 use asid_core::error::Result;
@@ -14,27 +14,28 @@ use crate::reach::Reach;
 /// How a search for a parameter's value begins.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Start {
-    /// At the null value: the parameter acts from there on in proportion.
+    /// At the null value, from which the effect grows in proportion to the parameter.
     Slope,
     /// At each of these values.
     Values(&'static [f64]),
-    /// One of these values and nothing between them, such as a number of teeth.
+    /// At one of these values and nothing between them, such as a number of teeth.
     Choice(&'static [f64]),
-    /// At these multiples of what the logs show of something.
+    /// At these multiples of a quantity that the logs show.
     Multiples(Reference, &'static [f64]),
-    /// At these quantiles (0 to 1) of the places that the body of the site visits; the
-    /// first choice parameter of the effect says along which axis (0, 1, 2).
+    /// At these quantiles (0 to 1) of the positions that the body of the site visits.
+    ///
+    /// The effect's first choice parameter names the axis (0, 1, 2).
     Places(&'static [f64]),
-    /// Not searched for: it stays at its null value unless it is given.
+    /// Not searched for: it keeps its null value unless a value is given.
     Given,
-    /// Not searched for: it is this multiple of what the logs show of something, unless it is given.
+    /// Not searched for: this multiple of a quantity that the logs show, unless a value is given.
     Set(Reference, f64),
 }
 
-/// What a start value is measured by.
+/// Quantity of the logs that scales a start value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Reference {
-    /// The largest command of the actuator, without its mean for a position.
+    /// The largest command of the actuator; for a position command, about its mean.
     Command,
     /// The largest speed of the joint.
     Speed,
@@ -44,7 +45,7 @@ pub enum Reference {
     Force,
     /// How far the joint travels between its ends.
     Travel,
-    /// The compliance by which the largest force of the drive on the joint gives way as far as the joint travels.
+    /// The compliance that yields by the joint's travel under the drive's largest force.
     Give,
 }
 
@@ -61,14 +62,14 @@ pub struct EffectParameter {
     pub null: f64,
     /// How a search for its value begins.
     pub start: Start,
-    /// Large values that are looked at beside its slope: see [`EffectParameter::large_at`].
+    /// Large values to try beside the slope: see [`EffectParameter::large_at`].
     pub large: Option<Start>,
-    /// The episode of the logs whose value it is, by its number; `None` for a value of all.
+    /// Number of the episode that the value is for; `None` where it is for all episodes.
     pub episode: Option<usize>,
 }
 
 impl EffectParameter {
-    /// A parameter that acts in proportion from its null value on.
+    /// A parameter whose effect is proportional to its distance from the null value.
     #[must_use]
     pub const fn new(name: &'static str, unit: &'static str, range: [f64; 2], null: f64) -> Self {
         Self {
@@ -82,15 +83,18 @@ impl EffectParameter {
         }
     }
 
-    /// Whether it is a limit that the machine never reaches at its null value, the upper end of the range: there is nothing between
-    /// that and the values that act.
+    /// Whether the parameter is a limit that the machine never reaches at its null value.
+    ///
+    /// The null is then the upper end of the range. Values between the null and those that act have
+    /// no effect.
     #[must_use]
     pub fn is_limit(&self) -> bool {
         self.null == self.range[1]
     }
 
-    /// Whether its values grow with the machine's mass, or are in a unit that the model chooses: its range is then that of a
-    /// machine on a table.
+    /// Whether values scale with the machine's mass, or have a unit that the model chooses.
+    ///
+    /// The range then suits a machine on a table.
     #[must_use]
     pub fn grows_with_the_machine(&self) -> bool {
         !self.is_limit()
@@ -99,22 +103,25 @@ impl EffectParameter {
                 .any(|part| self.unit.contains(part))
     }
 
-    /// The same as the value of one episode of the logs.
+    /// The same parameter, for the value of one episode of the logs.
     #[must_use]
     pub const fn of_episode(mut self, number: usize) -> Self {
         self.episode = Some(number);
         self
     }
 
-    /// The same of what acts out of proportion where it is large, as friction does that holds its joint: where stretches of a log are replayed, a
-    /// search looks at these values too ([`Start::Values`] or [`Start::Multiples`]). A slope at the null knows of no joint that is held.
+    /// The same parameter with large values to try ([`Start::Values`] or [`Start::Multiples`]).
+    ///
+    /// Some effects are nonlinear where they are large, such as friction that holds its joint: a
+    /// slope at the null value cannot show that. The search tries these values too where it replays
+    /// segments of a log.
     #[must_use]
     pub const fn large_at(mut self, values: Start) -> Self {
         self.large = Some(values);
         self
     }
 
-    /// The same with another start of the search.
+    /// The same parameter with another start of the search.
     #[must_use]
     pub const fn starting(mut self, start: Start) -> Self {
         self.start = start;
@@ -122,17 +129,18 @@ impl EffectParameter {
     }
 }
 
-/// What an effect is attached to.
+/// Where an effect is attached, with its values.
 #[derive(Clone, Copy, Debug)]
 pub struct Site<'a> {
     /// The machine.
     pub plant: &'a Plant,
     /// Name of the site; empty for an effect of the whole scene.
     pub name: &'a str,
-    /// One value a parameter.
+    /// One value for each parameter.
     pub values: &'a [f64],
-    /// Places of the effect's targets among the columns that [`Acting::set`] and
-    /// [`StepView::parameters`] show, in the order of [`Effect::targets`].
+    /// Indices of the effect's targets, in the order of [`Effect::targets`].
+    ///
+    /// They index the columns that [`Acting::set`] gets and [`StepView::parameters`] shows.
     pub columns: &'a [usize],
     /// Number of the episode among all logs, in their order, from 0.
     pub episode: usize,
@@ -140,46 +148,48 @@ pub struct Site<'a> {
 
 /// An effect at work at one site in one simulation.
 ///
-/// It may remember what it likes, as long as [`Acting::save`] and [`Acting::load`] carry
-/// all of it: simulations are snapshotted and restored, and their parameters change while
-/// their memory stays.
+/// It may hold any state, as long as [`Acting::save`] and [`Acting::load`] carry all of it:
+/// simulations are saved and restored, and their parameters change while their state stays.
 pub trait Acting: Send {
-    /// Changes the model's parameters before the simulation runs: a row of all columns.
+    /// Changes the model's parameters before the simulation runs; `columns` is one row of them all.
     fn set(&self, _columns: &mut [f64]) {}
     /// Called before each physics step.
     fn before_step(&mut self, _view: &mut StepView<'_>) {}
-    /// Turns what a sensor would read at a time (s) into what it says; called in the
-    /// order of time, possibly more than once for one time, for the sensor of the site.
+    /// Turns the true reading of the site's sensor at a time (s) into what the sensor reports.
+    ///
+    /// Calls come in the order of time, possibly several for one time.
     fn read(&mut self, _time: f64, _reading: &mut [f64]) {}
-    /// Called where the machine was placed `from` one state `to` another within an episode, not by a step, as on the next reading of a
-    /// log; positions and speeds of all joints each. What is remembered of where a joint was goes with it: a stiff spring would feel all
-    /// of the change else.
+    /// Called where the machine was placed `from` one state `to` another within an episode.
+    ///
+    /// This happens without a step, as when a replay restarts at the next reading of a log. Each
+    /// state is `[qpos, qvel]`. Remembered positions of a joint must move along, or a stiff spring
+    /// would feel the whole change.
     fn displaced(&mut self, _from: [&[f64]; 2], _to: [&[f64]; 2]) {}
-    /// Forgets what was: a new episode begins.
+    /// Clears the state for a new episode.
     fn restart(&mut self) {}
-    /// Appends what it remembers.
+    /// Appends the state to `memory`.
     fn save(&self, _memory: &mut Vec<f64>) {}
-    /// Takes over what another one at the same site, maybe with other values, has saved.
+    /// Takes over a saved state of the same site, possibly saved with other parameter values.
     fn load(&mut self, _memory: &[f64]) {}
 }
 
-/// Effects that leave much the same in many logs as another one, and what tells them from it.
+/// Effects that leave similar traces in many logs, and the experiment that tells them apart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Confusion {
     /// Names of the effects.
     pub with: &'static [&'static str],
-    /// The experiment that tells them apart, as advice to who has the machine.
+    /// The experiment that tells them apart, as advice to the owner of the machine.
     pub told_apart_by: &'static str,
 }
 
-/// How well a plain document says an effect.
+/// How well a plain MJCF document expresses an effect.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Native {
-    /// All of it.
+    /// Completely.
     Whole,
-    /// Not quite: a sentence on what differs.
+    /// Nearly: a sentence on what differs.
     Nearly(String),
-    /// Not at all: a sentence on why, which follows on its name.
+    /// Not at all: the reason, as a sentence that continues the effect's name.
     LeftOut(String),
 }
 
@@ -189,15 +199,18 @@ pub trait Effect: Send + Sync {
     fn acts(&self) -> Acts;
     /// Its parameters.
     fn parameters(&self) -> &'static [EffectParameter];
-    /// Names of the sites of a machine that it can be attached to; one empty name for an
-    /// effect of the whole scene.
+    /// Names of the machine's sites that it can be attached to.
+    ///
+    /// An effect of the whole scene has one empty name.
     fn sites(&self, plant: &Plant) -> Vec<String>;
     /// Parameters of the model that it changes at a site.
     fn targets(&self, _plant: &Plant, _site: &str) -> Vec<Target> {
         Vec::new()
     }
-    /// What it moves by itself at a site. An effect whose forces act elsewhere than on what its targets name, or that moves
-    /// another drive than that of its site, says [`Reach::Everything`].
+    /// What it moves directly at a site.
+    ///
+    /// Override this with [`Reach::Everything`] where its forces act on more than its targets name,
+    /// or on another drive than the site's.
     fn reach(&self, plant: &Plant, site: &str) -> Reach {
         Reach::of(plant, self.acts(), site, &self.targets(plant, site))
     }
@@ -205,36 +218,47 @@ pub trait Effect: Send + Sync {
     fn steps(&self) -> bool {
         matches!(self.acts(), Acts::Command | Acts::Force)
     }
-    /// Whether what it makes of a reading depends on readings before, and not on this one and its time alone.
+    /// Whether the reading that it makes depends on earlier readings.
+    ///
+    /// If not, it depends on the current reading and its time alone.
     fn remembers_readings(&self) -> bool {
         self.acts() == Acts::Measurement
     }
-    /// Names of effects that it is a refinement of: with some of its parameters at their null
-    /// values it is one of them. The simpler one is preferred unless that leaves much more.
+    /// Names of effects that it refines.
+    ///
+    /// It equals one of them where some of its parameters have their null values. A diagnosis
+    /// prefers the simpler one unless that leaves much larger residuals.
     fn refines(&self) -> &'static [&'static str] {
         &[]
     }
-    /// Parameters that do what one of the law does that it [refines](Effect::refines), as pairs of names: its own and the simpler law's. In the place of that
-    /// law it begins with those values.
+    /// Parameters that correspond to one of the law that it [refines](Effect::refines).
+    ///
+    /// Pairs of names: its own and the simpler law's. Where it replaces that law it starts from
+    /// those values.
     fn takes_over(&self) -> &'static [(&'static str, &'static str)] {
         &[]
     }
-    /// Effects that it is easily mistaken for. One side of a pair says so.
+    /// Effects that it is easily mistaken for. Only one side of a pair lists the other.
     fn mistaken_for(&self) -> &'static [Confusion] {
         &[]
     }
-    /// Whether this effect is an unlikely explanation at this site a priori. A force on a body that joints hold
-    /// is one: friction and drives are likelier there.
+    /// Whether this effect is an unlikely explanation at this site a priori.
+    ///
+    /// An example is a force on a body that joints hold: friction and drives are likelier there.
     fn unusual_at(&self, _plant: &Plant, _site: &str) -> bool {
         false
     }
-    /// Effects that come with it at the same site more often than by chance, for they have one origin. One side of a pair says so.
+    /// Effects that share its site more often than by chance, because they have one origin.
+    ///
+    /// Only one side of a pair lists the other.
     fn goes_with(&self) -> &'static [&'static str] {
         &[]
     }
-    /// Values of each parameter, lowest and highest, that an ordinary machine has which is as its model says: makers' tolerances, friction that
-    /// differs from one machine to the next. They are taken as three deviations. `shown` is what the logs show of the site. Empty
-    /// where an ordinary machine has none of it.
+    /// Lowest and highest value of each parameter on an ordinary machine that matches its model.
+    ///
+    /// Makers' tolerances and friction that varies between machines cause them. The bounds count as
+    /// three standard deviations. `shown` returns what the logs show of the site. Empty where an
+    /// ordinary machine has none of this effect.
     fn tolerance(
         &self,
         _plant: &Plant,
@@ -243,32 +267,40 @@ pub trait Effect: Send + Sync {
     ) -> Vec<[f64; 2]> {
         Vec::new()
     }
-    /// Whether it rounds readings to multiples of its one parameter: a log shows that by itself.
+    /// Whether it only rounds readings to multiples of its one parameter, which a log shows
+    /// directly.
     fn rounds(&self) -> bool {
         false
     }
-    /// Whether it hands readings on late by its one parameter, s, and does nothing else.
+    /// Whether it only delays readings, by its one parameter (s).
     fn delays(&self) -> bool {
         false
     }
-    /// Whether it adds constants to readings of its sensor and does nothing else: its first value to a number, those after it to the entries of a vector.
+    /// Whether it only adds constants to its sensor's readings.
+    ///
+    /// The first value goes to a number, the later values to the entries of a vector.
     fn shifts_readings(&self) -> bool {
         false
     }
-    /// Whether it depends on [`Site::episode`]: it goes with the order of the logs, or has values of single ones.
+    /// Whether it depends on [`Site::episode`].
+    ///
+    /// It then follows the order of the logs, or has values of single episodes.
     fn counts_episodes(&self) -> bool {
         self.parameters().iter().any(|p| p.episode.is_some())
     }
-    /// What an engine must be able to do for it, besides setting its targets and, where it
-    /// [steps](Effect::steps), calling hooks.
+    /// Capabilities that an engine needs for it.
+    ///
+    /// Setting its targets, and hooks where it [steps](Effect::steps), are implied.
     fn needs(&self) -> Capabilities {
         Capabilities::empty()
     }
-    /// Writes it at a site with MJCF's own elements, and tells how well they say it. An effect that only changes
-    /// values of its targets has nothing to do here: the values are written.
+    /// Writes it at a site with MJCF's own elements, and returns how well they express it.
+    ///
+    /// An effect that only changes values of its targets needs no code here: the values are
+    /// written.
     ///
     /// # Errors
-    /// When the scene has no such site, or a value makes no sense.
+    /// When the scene has no such site, or a value is invalid.
     fn native(&self, _site: &Site<'_>, _document: &mut NativeModel<'_>) -> Result<Native> {
         if self.acts() == Acts::Model && !self.steps() {
             return Ok(Native::Whole);
@@ -280,7 +312,7 @@ pub trait Effect: Send + Sync {
     /// Attaches it at a site, for one simulation.
     ///
     /// # Errors
-    /// When the scene has no such site, or a value makes no sense.
+    /// When the scene has no such site, or a value is invalid.
     fn attach(&self, site: &Site<'_>) -> Result<Box<dyn Acting>>;
 }
 
@@ -290,7 +322,7 @@ pub struct EffectEntry {
     pub name: &'static str,
     /// One line for `asid list`.
     pub about: &'static str,
-    /// Makes it.
+    /// Constructs it.
     pub make: &'static (dyn Fn() -> Box<dyn Effect> + Sync),
     /// Where it comes from.
     pub origin: Origin,
@@ -298,7 +330,7 @@ pub struct EffectEntry {
 
 asid_core::__entry!(EffectEntry, "effect");
 
-/// Registers an effect under a name, with the package that the statement stands in.
+/// Registers an effect under a name, with the package that contains the statement as origin.
 #[macro_export]
 macro_rules! register {
     (EffectEntry {

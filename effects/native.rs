@@ -1,7 +1,7 @@
-//! A refined model as a plain MJCF document.
+//! Writes a refined model as a plain MJCF document.
 //!
-//! What an effect is in MJCF it says itself ([`native`](crate::Effect::native)). One that only changes values of targets is those values,
-//! so that effects of plugins go along as well.
+//! Each effect writes itself in MJCF ([`native`](crate::Effect::native)). One that only changes
+//! values of its targets is written as those values, so that effects of plugins work as well.
 
 use std::path::Path;
 
@@ -12,17 +12,17 @@ use asid_mjcf::native::NativeModel;
 
 use crate::{Acts, EffectSpec, Native, RefinedModel, Site};
 
-/// How an effect stands in a document.
+/// How the document expresses an effect.
 #[derive(Clone, Debug)]
 pub struct Expressed {
     /// The effect with its values.
     pub effect: EffectSpec,
-    /// How well the document says it.
+    /// How well the document expresses it.
     pub native: Native,
 }
 
 impl Expressed {
-    /// One sentence where the document does not say all of it.
+    /// One sentence on what the document lacks of it, if anything.
     #[must_use]
     pub fn sentence(&self) -> Option<String> {
         let label = self.effect.label();
@@ -34,21 +34,21 @@ impl Expressed {
     }
 }
 
-/// A document, and how it says what the model has.
+/// A document, and how well it expresses the model.
 #[derive(Clone, Debug)]
 pub struct PlainModel {
     /// The document.
     pub xml: String,
-    /// Effects, in the model's order.
+    /// Effects, in the order in which a simulation applies them.
     pub effects: Vec<Expressed>,
-    /// Further things that the document does not say, a sentence each.
+    /// Further things that the document leaves out, a sentence each.
     pub left_out: Vec<String>,
     /// Values that it sets.
     pub values: Vec<(Target, f64)>,
 }
 
 impl PlainModel {
-    /// All that the document does not say as the model does, a sentence each.
+    /// All differences of the document from the model, a sentence each.
     #[must_use]
     pub fn sentences(&self) -> Vec<String> {
         let effects = self.effects.iter().filter_map(Expressed::sentence);
@@ -56,19 +56,19 @@ impl PlainModel {
     }
 }
 
-/// Writes a model for a folder, from which the document finds its assets.
+/// Writes a model as a document that will stand in `folder`, so that it finds its assets.
 ///
 /// # Errors
-/// When the engine refuses the scene, or an effect, site or value is unknown or makes no sense.
+/// When the engine refuses the scene, or an effect, site or value is unknown or invalid.
 pub fn plain(backend: &dyn Backend, model: &RefinedModel, folder: &Path) -> Result<PlainModel> {
     let compiled = backend.load(&model.scene)?;
     let mut plant = Plant::of(&model.scene)?;
-    // Names and ranges as the engine compiled them.
+    // Use the names and ranges that the engine compiled.
     plant.layout = compiled.layout().clone();
     let mut document = NativeModel::new(&plant);
     let mut values: Vec<(Target, f64)> = model.parameters.clone();
     let mut expressed = Vec::with_capacity(model.effects.len());
-    // In the order in which a simulation applies them.
+    // A simulation applies effects in this order.
     let mut order: Vec<&EffectSpec> = model.effects.iter().collect();
     let mut found = Vec::with_capacity(order.len());
     for spec in &order {

@@ -1,7 +1,7 @@
-//! What an effect moves by itself, before the machine passes it on.
+//! What an effect moves directly, before the machine passes the motion on.
 //!
-//! Two effects that reach different joints, or different sensors, can be tried in one simulation and told apart
-//! afterwards, as columns of a sparse Jacobian are (Curtis, Powell, Reid 1974).
+//! Two effects that reach different joints, or different sensors, can be tried in one simulation
+//! and told apart afterwards, like the columns of a sparse Jacobian (Curtis, Powell, Reid 1974).
 
 use std::collections::BTreeSet;
 
@@ -11,19 +11,20 @@ use asid_mjcf::plant::Plant;
 
 use crate::acts::Acts;
 
-/// What an effect moves by itself.
+/// What an effect moves directly.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Reach {
-    /// Anything: nothing is known of it.
+    /// Possibly anything.
     Everything,
-    /// Generalized forces on these degrees of freedom, places in `qvel`, and nothing else.
+    /// Generalised forces on these degrees of freedom (indices in `qvel`), and nothing else.
     Dofs(BTreeSet<usize>),
-    /// What one sensor says, by index in the layout.
+    /// The reading of one sensor, by index in the layout.
     Sensor(usize),
 }
 
 impl Reach {
-    /// Of an effect that acts on nothing but the sensor or the drive of its site, or else on what its targets name.
+    /// Reach of an effect that acts on its site's sensor or drive alone, or on what its targets
+    /// name.
     #[must_use]
     pub fn of(plant: &Plant, acts: Acts, site: &str, targets: &[Target]) -> Self {
         let layout = &plant.layout;
@@ -50,7 +51,7 @@ impl Reach {
         body.map_or(Self::Everything, |b| Self::Dofs(body_dofs(plant, b)))
     }
 
-    /// Whether a third party can tell what this makes from what the other makes.
+    /// Whether the effects of the two can be told apart within one simulation.
     #[must_use]
     pub fn is_apart_from(&self, other: &Self) -> bool {
         match (self, other) {
@@ -72,7 +73,7 @@ fn joint_dofs(plant: &Plant, joint: usize) -> BTreeSet<usize> {
     (joint.qvel..joint.qvel + count).collect()
 }
 
-/// Those that an actuator drives; `None` where it is no plain drive of a joint.
+/// Degrees of freedom that an actuator drives; `None` where it is no plain drive of a joint.
 fn drive_dofs(plant: &Plant, actuator: &str) -> Option<BTreeSet<usize>> {
     let actuators = &plant.layout.actuators;
     let place = actuators.iter().position(|a| a.name == actuator)?;
@@ -92,7 +93,9 @@ fn body_dofs(plant: &Plant, body: usize) -> BTreeSet<usize> {
     dofs
 }
 
-/// Those that a target's value makes forces on: of a body's mass all joints that carry it.
+/// Degrees of freedom on which a target's value causes forces; `None` where unknown.
+///
+/// For a body's mass these are all joints that carry it.
 fn target_dofs(plant: &Plant, target: &Target) -> Option<BTreeSet<usize>> {
     let layout = &plant.layout;
     match &*target.element {

@@ -1,10 +1,9 @@
-//! A compiled scene with effects: a model like any other.
+//! A compiled scene with effects, usable as any other model.
 //!
-//! The effects wrap the engine's model and its batches, so that exploration,
-//! identification, the task's solver and the diagnosis use a refined simulator
-//! without knowing it. Each simulation of a batch has effects of its own, whose
-//! parameters are columns like the scene's: `effect/NAME@SITE/PARAMETER`. A row
-//! whose effect has null values runs without it, at no cost.
+//! The effects wrap the engine's model and its batches. Exploration, identification, the task's
+//! solver and the diagnosis therefore use a refined simulator without knowing it. Each simulation
+//! of a batch has effects of its own, whose parameters are columns like the scene's:
+//! `effect/NAME@SITE/PARAMETER`. A row whose effect has null values runs without it, at no cost.
 
 mod simulator;
 
@@ -21,8 +20,9 @@ use asid_mjcf::plant::Plant;
 use simulator::Column;
 pub use simulator::RefinedSimulator;
 
-/// The column of a batch that says which episode of the logs a simulation is of, by its number, 0 if it is not set. Models have it
-/// whose effects [count episodes](Effect::counts_episodes).
+/// Target of the column that holds the number of a simulation's episode; 0 if it is not set.
+///
+/// Models whose effects [count episodes](Effect::counts_episodes) have this column.
 #[must_use]
 pub fn episode_number() -> Target {
     Target {
@@ -33,21 +33,21 @@ pub fn episode_number() -> Target {
     }
 }
 
-/// That column, where a model has it.
+/// The target [`episode_number`], if the model has it.
 #[must_use]
 pub fn counts_episodes(model: &dyn Model) -> Option<Target> {
     let column = episode_number();
     model.nominal(&column).is_ok().then_some(column)
 }
 
-/// An effect found, with the place where it acts.
+/// An effect with its site and values.
 struct Placed {
     label: String,
     site: String,
     effect: Box<dyn Effect>,
     values: Vec<f64>,
     targets: Vec<Target>,
-    /// Sensor whose readings it changes, by index.
+    /// Index of the sensor whose readings it changes.
     sensor: Option<usize>,
 }
 
@@ -65,7 +65,7 @@ impl Placed {
     }
 }
 
-/// A model with effects and with parameters set to other than the document's values.
+/// A model with effects and with values that override the document's.
 pub struct Refined {
     inner: Arc<dyn Model>,
     plant: Arc<Plant>,
@@ -74,8 +74,9 @@ pub struct Refined {
 }
 
 impl Refined {
-    /// Gives `model`, which `backend` compiled of the scene that `plant` was read from, some
-    /// parameters and effects.
+    /// Gives `model` some parameter values and effects.
+    ///
+    /// `backend` must have compiled `model` from the scene of `plant`.
     ///
     /// # Errors
     /// When an effect, site, parameter or target is unknown, or is not for this engine.
@@ -122,7 +123,7 @@ impl Refined {
                 sensor,
             });
         }
-        // A force may depend on the command that reaches the drive.
+        // Command effects come first: a force may depend on the command that reaches the drive.
         placed.sort_by_key(|p| p.effect.acts() != Acts::Command);
         for (target, _) in fixed {
             model.nominal(target)?;
@@ -133,7 +134,7 @@ impl Refined {
             placed: Arc::new(placed),
             fixed: fixed.to_vec(),
         });
-        // Values are checked where a simulation is made; a batch of one makes it now.
+        // Simulators check values; a batch of one does so now.
         refined.simulator(&BatchConfig {
             size: 1,
             threads: 1,
@@ -173,7 +174,7 @@ impl Refined {
     }
 }
 
-/// What an engine must be able to do for an effect.
+/// Capabilities that an engine needs for an effect, hooks included.
 #[must_use]
 pub fn needs(effect: &dyn Effect) -> Capabilities {
     if effect.steps() {
@@ -209,7 +210,7 @@ impl Model for Refined {
 }
 
 impl Refined {
-    /// A batch, as of [`Model::simulator`].
+    /// A batch, as [`Model::simulator`] makes it.
     ///
     /// # Errors
     /// As [`Model::simulator`].

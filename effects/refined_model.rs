@@ -36,7 +36,7 @@ struct EffectValues {
     parameters: BTreeMap<String, f64>,
 }
 
-/// A model file that is open: an MJCF document, or one refined.
+/// A model file that was read: an MJCF document, or a refined model of one.
 #[derive(Clone, Debug)]
 pub struct RefinedModel {
     /// The document.
@@ -47,7 +47,7 @@ pub struct RefinedModel {
     pub effects: Vec<EffectSpec>,
 }
 
-/// Longest chain of refined models of refined models.
+/// Longest chain of refined models of refined models: a longer one is a circle.
 const MAX_DEPTH: usize = 8;
 
 impl RefinedModel {
@@ -107,7 +107,7 @@ impl RefinedModel {
         Ok(base)
     }
 
-    /// The text of a file that refines `model`, a path as the file will name it.
+    /// The text of a file that refines `model`, a path as the file is to name it.
     ///
     /// # Errors
     /// [`Error::Failed`] where a value cannot be written.

@@ -8,8 +8,9 @@ use asid_core::error::{Error, Result};
 use asid_core::registry::{all, find};
 use asid_mjcf::plant::Plant;
 
-/// An effect with its site and values, written `name@site:parameter=value,…`;
-/// parameters that are left out are at their null value.
+/// An effect with its site and values, written `name@site:parameter=value,…`.
+///
+/// Parameters that are left out have their null values.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EffectSpec {
     /// Name of the effect.
@@ -30,7 +31,7 @@ impl FromStr for EffectSpec {
                 "`{text}`: {message}; an effect is written NAME@SITE:parameter=value,parameter=value"
             ),
         };
-        // A site may hold colons: the last one that values follow begins the values.
+        // A site may contain colons: the last one that values follow begins the values.
         let values_follow = |tail: &str| tail.trim().is_empty() || tail.contains('=');
         let (head, tail) = match text.rsplit_once(':') {
             Some((head, tail)) if values_follow(tail) => (head, tail),
@@ -64,7 +65,9 @@ impl FromStr for EffectSpec {
     }
 }
 
-/// Splits `NAME@SITE`. A loaded effect whose own name was taken has an `@` in its name.
+/// Splits `NAME@SITE`.
+///
+/// A loaded effect whose own name was taken has an `@` in its name.
 fn name_and_site(head: &str) -> (&str, &str) {
     let longest = all::<EffectEntry>()
         .iter()
@@ -120,10 +123,10 @@ impl EffectSpec {
         ))
     }
 
-    /// One value a parameter of `effect`: as given, else null.
+    /// One value for each parameter of `effect`: the given value, else the null value.
     ///
     /// # Errors
-    /// When a parameter is unknown, or a value makes no sense; the message lists near names.
+    /// When a parameter is unknown; the message lists near names.
     pub fn values_of(&self, effect: &dyn Effect) -> Result<Vec<f64>> {
         let parameters = effect.parameters();
         let mut values: Vec<f64> = parameters.iter().map(|p| p.null).collect();

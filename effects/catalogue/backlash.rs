@@ -14,11 +14,13 @@ crate::register!(EffectEntry {
     make: || Box::new(Backlash),
 });
 
-/// The drive acts on a rotor that moves freely by `width` against the joint and pushes it at the ends
-/// of this gap, which are rigid and do not bounce: see [`super::motor_side`]. The rotor has the
-/// joint's `armature` as its inertia and the drive's sensor sits on it; a servo's rotor may have none,
-/// and then follows the servo's law. A torque drive on a joint without `armature` is no site. Under a
-/// load that never changes its sign the joint only stands half a gap off.
+/// The drive acts on a rotor that moves freely against the joint within a gap of `width`.
+///
+/// At the ends of the gap, which are rigid and do not bounce, it pushes the joint: see
+/// [`super::motor_side`]. The rotor has the joint's `armature` as its inertia, and the drive's
+/// sensor sits on it. A servo's rotor may have no inertia, and then follows the servo's law. A
+/// torque drive on a joint without `armature` is no site. Under a load that never changes sign, the
+/// joint is only offset by half a gap.
 struct Backlash;
 
 impl Effect for Backlash {

@@ -1,4 +1,4 @@
-//! Forces on moving bodies: a constant one, and those of the air.
+//! Forces on moving bodies: a constant force, and forces of the air.
 
 use crate::{Acting, Acts, Effect, EffectParameter, Native, Reach, Site};
 use asid_core::Result;
@@ -79,10 +79,10 @@ crate::register!(EffectEntry {
 
 /// A force at the centre of mass, in the world's frame.
 ///
-/// The drags are `-c v` and `-c |v| v`, weakened as `c (1 - e^-x) / x` with `x = c dt / m` and
-/// `c / (1 + x)` with `x = c |v| dt / m`, which makes a step of a free body of mass `m` exact and
-/// stable. Magnus' force is `c ω x v` (R. D. Mehta, "Aerodynamics of sports balls", Annu. Rev. Fluid
-/// Mech. 17, 1985).
+/// The drags are `-c v` and `-c |v| v`. The coefficient is reduced to `c (1 - e^-x) / x` with
+/// `x = c dt / m`, and to `c / (1 + x)` with `x = c |v| dt / m`. A step of a free body of mass `m`
+/// is then exact and stable. The Magnus force is `c ω x v` (R. D. Mehta, "Aerodynamics of sports
+/// balls", Annu. Rev. Fluid Mech. 17, 1985).
 #[derive(Clone, Copy)]
 enum Law {
     Constant(Vector3<f64>),
@@ -92,7 +92,7 @@ enum Law {
 }
 
 impl Law {
-    /// The force; `share` is the time step divided by the mass.
+    /// The force; `share` is the time step over the mass.
     fn force(self, motion: &Motion, share: f64) -> Vector3<f64> {
         let v = motion.velocity;
         match self {
@@ -111,7 +111,9 @@ impl Law {
     }
 }
 
-/// Sine of the angle up to which a force counts as along gravity: rounding of numbers in a file.
+/// Sine of the angle up to which a force counts as parallel to gravity.
+///
+/// It allows for the rounding of numbers in a file.
 const PARALLEL: f64 = 1e-9;
 
 /// One of the laws, at bodies that can move.

@@ -1,4 +1,4 @@
-//! What a drive makes of its command: gain, bias, saturation, dead band.
+//! Errors of a drive's response to its command: gain, bias, saturation, dead band.
 
 use crate::{Acting, Acts, Effect, EffectParameter, Native, Reference, Site, Start};
 use asid_core::simulator::StepView;
@@ -47,8 +47,9 @@ crate::register!(EffectEntry {
     make: || Box::new(Deadband),
 });
 
-/// `gain * command + bias`, with one of the two as its parameter. The command is clamped to its
-/// range before.
+/// `gain * command + bias`, one of the two being its parameter.
+///
+/// The command is clamped to its range first.
 struct Affine {
     parameters: &'static [EffectParameter],
     scaled: bool,
@@ -85,7 +86,7 @@ impl Effect for Affine {
         let [value] = values(site)?;
         let actuator = document.actuator(site.name)?;
         if self.scaled {
-            // What comes later scales what was added before.
+            // A later gain also scales biases that were added before.
             actuator.gain *= value;
             actuator.bias *= value;
         } else {
@@ -108,7 +109,9 @@ impl Effect for Affine {
     }
 }
 
-/// What a limit of a drive's force needs to know and changes: the joint's damping, and the drive's gains.
+/// Parameters that a limit of a drive's force reads and changes.
+///
+/// They are the joint's damping and the drive's gains.
 pub(super) fn limit_targets(plant: &Plant, site: &str) -> Vec<Target> {
     let Ok((actuator, drive)) = plant.drive(site) else {
         return Vec::new();
@@ -119,11 +122,12 @@ pub(super) fn limit_targets(plant: &Plant, site: &str) -> Vec<Target> {
     targets
 }
 
-/// Force (N or N m) beyond which no drive's limit is looked for.
+/// Largest force limit of the search (N or N m); no machine on a table reaches it.
 pub(super) const UNLIMITED: f64 = 1000.0;
 
-/// The force on the joint, gear included, is held within `±limit`, from step to step by what the drive asks
-/// for at its start: see [`DriveAt::hold`].
+/// Holds the force on the joint, gear included, within `±limit`.
+///
+/// The force that the drive asks for at the start of a step decides: see [`DriveAt::hold`].
 struct Saturation;
 
 struct SaturationAt {
@@ -190,9 +194,11 @@ impl Effect for Saturation {
     }
 }
 
-/// What the drive answers to is nearer to zero by `width`, and zero within: for a motor (N or N m)
-/// and a velocity servo (rad/s or m/s) the command, for a position servo the difference of
-/// command and position (rad or m before the gear), since no position is small by itself.
+/// Moves the drive's input nearer to zero by `width`; within `width` it is zero.
+///
+/// The input is the command of a motor (N or N m) or a velocity servo (rad/s or m/s). For a
+/// position servo it is the difference of command and position (rad or m before the gear), since no
+/// position is small by itself.
 struct Deadband;
 
 struct DeadbandAt {
@@ -202,7 +208,7 @@ struct DeadbandAt {
     width: f64,
 }
 
-/// `x` nearer to zero by `width`.
+/// Moves `x` nearer to zero by `width`, but not beyond.
 fn shrink(x: f64, width: f64) -> f64 {
     (x.abs() - width).max(0.0).copysign(x)
 }
@@ -218,7 +224,9 @@ impl Acting for DeadbandAt {
     }
 }
 
-/// Width of what a command may change by without effect.
+/// By how much a command may change without effect.
+///
+/// Its start values are shares of the largest command.
 pub(super) const WIDTH: EffectParameter =
     EffectParameter::new("width", "unit of the command", [0.0, 10.0], 0.0)
         .starting(Start::Multiples(Reference::Command, &[0.03, 0.1, 0.3]));

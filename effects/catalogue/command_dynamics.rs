@@ -1,8 +1,8 @@
 //! Commands that arrive late: a pure delay, and a first-order lag.
 //!
-//! Commands are held between the steps, and a drive answers to their mean over a step, so that
-//! both act continuously in time and not in whole steps. Before the first step the command was
-//! the same as in it.
+//! Commands are constant between the steps, and a drive answers to their mean over a step. Both
+//! effects therefore act continuously in time, not in whole steps. Before the first step the
+//! command is taken as constant.
 
 use std::collections::VecDeque;
 
@@ -26,27 +26,31 @@ crate::register!(EffectEntry {
     make: || Box::new(Lag),
 });
 
-/// Name of the lag of a drive.
+/// Name of the effect of a drive's lag.
 pub const LAG: &str = "actuator-lag";
 
-/// Three deviations of a delay that no model has and every bus and controller: a few cycles of a loop of 1 kHz, s.
+/// Three standard deviations of the delay of an ordinary machine, s.
+///
+/// No model has this delay, but every bus and controller does: a few cycles of a loop of 1 kHz.
 const DELAY_TOLERANCE: f64 = 4.5e-3;
 
-/// Longest delay that is looked for, s.
+/// Longest delay of the search, s: no control loop works with a longer one.
 const LONGEST: f64 = 0.5;
 
-/// `c(t) = u(t - delay)`. With a delay of `n + f` steps the mean over a step is
-/// `(1 - f) u[n] + f u[n + 1]`, counted back from this step.
+/// `c(t) = u(t - delay)`.
+///
+/// With a delay of `n + f` steps the mean over a step is `(1 - f) u[n] + f u[n + 1]`, where `u[n]`
+/// is the command `n` steps ago.
 struct Delay;
 
 struct DelayAt {
     actuator: usize,
-    /// Delay in whole steps, and the rest.
+    /// Delay in whole steps, and the remaining fraction of one.
     whole: usize,
     part: f64,
-    /// Commands, this step's first.
+    /// Commands, the newest first.
     past: VecDeque<f64>,
-    /// Number of commands that are kept, whatever the delay.
+    /// Number of commands to keep, the same for all delays up to the longest.
     kept: usize,
 }
 
@@ -123,13 +127,14 @@ impl Effect for Delay {
     }
 }
 
-/// `T dy/dt = u - y`, solved exactly for a command that is held over the step: with
-/// `x = dt / T`, `y` ends at `u + (y - u) e^-x` and has the mean `u + (y - u) (1 - e^-x) / x`.
+/// `T dy/dt = u - y`, solved exactly for a command that is constant over the step.
+///
+/// With `x = dt / T`, `y` ends at `u + (y - u) e^-x` and has the mean `u + (y - u) (1 - e^-x) / x`.
 struct Lag;
 
 struct LagAt {
     actuator: usize,
-    /// `e^-x`, and the mean of it over a step.
+    /// `e^-x`, and its mean over a step.
     decay: f64,
     mean: f64,
     level: Option<f64>,
@@ -158,8 +163,9 @@ impl Acting for LagAt {
 }
 
 impl Effect for Lag {
-    /// Every bus and every control loop delays, by a step at least; the current loop of a drive settles within one. Where the two cannot be
-    /// told apart, a delay comes to mind first.
+    /// Every bus and control loop delays by a step at least; a current loop settles within one.
+    ///
+    /// Where the two cannot be told apart, a delay is likelier.
     fn unusual_at(&self, _plant: &Plant, _site: &str) -> bool {
         true
     }

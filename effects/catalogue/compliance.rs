@@ -1,4 +1,4 @@
-//! Elasticity in series: a drive that pulls its link through a spring.
+//! Elasticity in series: a drive that moves its link through a spring.
 
 use crate::{Acting, Acts, Effect, EffectParameter, Native, Reference, Site, Start};
 use asid_core::{Capabilities, Result, Target};
@@ -14,14 +14,18 @@ crate::register!(EffectEntry {
     make: || Box::new(Compliance),
 });
 
-/// Damping ratio where nothing else is known: pairs of steel gears have 0.03 to 0.17 (R. Kasuba and J. W. Evans, "An extended model
-/// for determining dynamic loads in spur gearing", J. Mech. Des. 103, 1981).
+/// Default damping ratio: pairs of steel gears have 0.03 to 0.17.
+///
+/// The values are those of R. Kasuba and J. W. Evans, "An extended model for determining dynamic
+/// loads in spur gearing", J. Mech. Des. 103, 1981.
 const LOSS: f64 = 0.03;
 
-/// The drive acts on a rotor, and a spring of `compliance` joins the rotor to the joint: see
-/// [`super::motor_side`]. A damper beside the spring takes from the rotor's swing what `loss` says, the damping ratio against a joint that is held. The rotor has the joint's `armature` as its inertia and the drive's sensor
-/// sits on it. A torque drive on a joint without `armature` is no site, since a spring then changes
-/// nothing. At a joint there can be this or backlash, not both.
+/// A spring of `compliance` between the drive's rotor and the joint: see [`super::motor_side`].
+///
+/// A damper in parallel with the spring damps the rotor's swing by `loss`, the damping ratio
+/// against a fixed joint. The rotor has the joint's `armature` as its inertia, and the drive's
+/// sensor sits on the rotor. A torque drive on a joint without `armature` is no site, since a
+/// spring then changes nothing. A joint can have this effect or backlash, not both.
 struct Compliance;
 
 impl Effect for Compliance {

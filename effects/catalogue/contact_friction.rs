@@ -1,9 +1,9 @@
-//! The coefficients of a contact's friction.
+//! The friction coefficients of a contact.
 //!
-//! A site is one geom of a pair that can touch: the one that is fixed, else the one whose friction
-//! counts. A pair takes the larger coefficient of its two geoms, so the effect scales the site's own,
-//! that of every partner whose coefficient is as large or larger or has the priority, and that of
-//! whatever lies free on a fixed site.
+//! A site is one geom of a pair that can touch: the fixed one, else the one whose friction counts.
+//! A pair takes the larger coefficient of its two geoms. The effect therefore scales three
+//! coefficients: the site's own, that of every partner whose coefficient is at least as large or
+//! has the priority, and that of anything that lies free on a fixed site.
 
 use crate::{Acting, Acts, Effect, EffectParameter, Site, Start};
 use asid_core::{Capabilities, Result, Target};
@@ -29,7 +29,7 @@ crate::register!(EffectEntry {
     make: || Box::new(Friction { entry: 2 }),
 });
 
-/// Dimensions that a contact needs for an entry of friction to count.
+/// Smallest `condim` of a contact for which each entry of friction counts, as MuJoCo defines it.
 const CONDIM: [u32; 3] = [3, 4, 6];
 
 /// The coefficient `entry` (0 sliding, 1 torsional, 2 rolling) times `factor`.
@@ -81,7 +81,7 @@ impl Effect for Friction {
     }
 }
 
-/// What an engine must be able to do for an entry of friction to count.
+/// Capabilities that an engine needs for an entry of friction.
 pub(super) fn needs(entry: usize) -> Capabilities {
     Capabilities::CONTACT
         | [
@@ -91,14 +91,14 @@ pub(super) fn needs(entry: usize) -> Capabilities {
         ][entry]
 }
 
-/// The geom of a pair that names its contact: the fixed one, else the one whose friction counts.
+/// The geom that names the contact of a pair: the fixed one, else the one whose friction counts.
 fn named_by(plant: &Plant, pair: [usize; 2], entry: usize) -> usize {
     let fixed = |g: &usize| !plant.moves(plant.geoms[*g].body);
     let found = pair.into_iter().find(fixed);
     found.unwrap_or_else(|| plant.dominant(pair, entry))
 }
 
-/// Dimensions of a pair's contacts.
+/// The `condim` of a pair's contacts.
 fn condim(plant: &Plant, [a, b]: [usize; 2]) -> u32 {
     let (a, b) = (&plant.geoms[a], &plant.geoms[b]);
     match a.priority.cmp(&b.priority) {
@@ -108,7 +108,7 @@ fn condim(plant: &Plant, [a, b]: [usize; 2]) -> u32 {
     }
 }
 
-/// Pairs whose friction matters: one geom is fixed, or lies free.
+/// Pairs whose friction matters: one geom is fixed or on a free body.
 fn pairs(plant: &Plant, entry: usize) -> impl Iterator<Item = [usize; 2]> {
     let pairs = plant.contacts.iter().copied();
     pairs.filter(move |&pair| {
@@ -119,7 +119,7 @@ fn pairs(plant: &Plant, entry: usize) -> impl Iterator<Item = [usize; 2]> {
     })
 }
 
-/// Names of the geoms that name a contact.
+/// Names of the geoms that are sites.
 pub(super) fn sites(plant: &Plant, entry: usize) -> Vec<String> {
     let mut geoms: Vec<usize> = pairs(plant, entry)
         .map(|pair| named_by(plant, pair, entry))
@@ -132,7 +132,7 @@ pub(super) fn sites(plant: &Plant, entry: usize) -> Vec<String> {
         .collect()
 }
 
-/// Partners of a geom in the contacts that it names; what lies free where anything does.
+/// Partners of a geom in the contacts that it names; only the free ones if any is free.
 pub(super) fn partners(plant: &Plant, geom: usize, entry: usize) -> Vec<usize> {
     let all: Vec<usize> = pairs(plant, entry)
         .filter(|&pair| named_by(plant, pair, entry) == geom)
@@ -150,7 +150,7 @@ fn is_free(plant: &Plant, geom: usize) -> bool {
     plant.free_joint(weld).is_some()
 }
 
-/// The coefficients that make the friction of a geom's contacts.
+/// The coefficients that determine the friction of a geom's contacts.
 pub(super) fn targets(plant: &Plant, site: &str, entry: usize) -> Vec<Target> {
     let Ok(geom) = plant.geom(site) else {
         return Vec::new();

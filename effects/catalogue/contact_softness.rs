@@ -1,4 +1,4 @@
-//! Bounce and softness of a contact, in the terms of MuJoCo's `solref`.
+//! Restitution and stiffness of a contact, in the terms of MuJoCo's `solref`.
 
 use crate::{Acting, Acts, Effect, EffectParameter, Site};
 use asid_core::{Capabilities, Result, Target};
@@ -19,11 +19,14 @@ crate::register!(EffectEntry {
     make: || Box::new(Softness { entry: 0 }),
 });
 
-/// Stiffness (entry 0 of `solref`) or damping (entry 1) times `factor`, for a geom and all that can
-/// touch it, since a contact mixes the numbers of its two geoms.
+/// Stiffness (entry 0 of `solref`) or damping (entry 1) times `factor`.
 ///
-/// `solref` is `(-stiffness, -damping)` where its numbers are negative. Where they are positive it is a
-/// time constant, which goes with the square root of the inverse stiffness, and a damping ratio.
+/// It applies to a geom and all that can touch it, since a contact mixes the numbers of its two
+/// geoms.
+///
+/// `solref` is `(-stiffness, -damping)` where its numbers are negative. Where they are positive it
+/// is a time constant, which scales with the inverse square root of the stiffness, and a damping
+/// ratio.
 struct Softness {
     entry: usize,
 }

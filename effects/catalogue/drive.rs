@@ -1,4 +1,4 @@
-//! A drive at work: its law with the gains that the simulation has, and how its force is held at a value.
+//! A drive in a simulation: its law with the simulation's gains, and how its force is limited.
 
 use std::cell::Cell;
 
@@ -24,7 +24,7 @@ pub fn gains(plant: &Plant, actuator: usize) -> Vec<Target> {
         .collect()
 }
 
-/// A law with other gains, in the order of [`gains`].
+/// The law with other gains, in the order of [`gains`].
 pub fn with_gains(law: DriveLaw, gains: impl IntoIterator<Item = f64>) -> DriveLaw {
     let mut gains = gains.into_iter();
     let mut next = |old: f64| gains.next().unwrap_or(old);
@@ -42,9 +42,9 @@ pub fn with_gains(law: DriveLaw, gains: impl IntoIterator<Item = f64>) -> DriveL
 pub struct DriveAt {
     /// Index of its actuator.
     pub actuator: usize,
-    /// Places of its joint in `qpos` and `qvel`.
+    /// Index of its joint in `qpos`.
     pub qpos: usize,
-    /// The same in `qvel`.
+    /// Index of its joint in `qvel`.
     pub dof: usize,
     /// Columns of its gains.
     columns: Vec<usize>,
@@ -52,7 +52,7 @@ pub struct DriveAt {
 }
 
 impl DriveAt {
-    /// The drive of an actuator, the columns of whose [`gains`] are the next of `columns`.
+    /// The drive of an actuator; the columns of its [`gains`] are the next of `columns`.
     pub fn new(
         plant: &Plant,
         actuator: usize,
@@ -70,15 +70,19 @@ impl DriveAt {
         }
     }
 
-    /// The drive of a site that is an actuator, its gains behind the first `skip` targets of the effect.
+    /// The drive of a site that is an actuator.
+    ///
+    /// Its gains follow the first `skip` targets of the effect.
     pub fn of_site(site: &Site<'_>, skip: usize) -> Result<Self> {
         let (actuator, drive) = site.plant.drive(site.name)?;
         let mut columns = site.columns[skip..].iter().copied();
         Ok(Self::new(site.plant, actuator, drive, &mut columns))
     }
 
-    /// Takes over the gains of the simulation; the document's stay where an effect of the transmission has
-    /// taken the drive from the joint already.
+    /// Takes over the gains of the simulation.
+    ///
+    /// The document's gains stay where an effect of the transmission has already taken the drive
+    /// from the joint and left zeros.
     pub fn set(&self, columns: &[f64]) {
         let gains = self.columns.iter().map(|&c| columns[c]);
         if gains.clone().any(|gain| gain != 0.0) {
@@ -88,16 +92,19 @@ impl DriveAt {
         }
     }
 
-    /// Force on the joint that the command asks for, N or N m, within the drive's own limits.
+    /// Force on the joint that the command asks for (N or N m), within the drive's own limits.
     pub fn force(&self, view: &StepView<'_>) -> f64 {
         let (q, v) = (view.qpos[self.qpos], view.qvel[self.dof]);
         self.drive.get().force(view.ctrl[self.actuator], q, v)
     }
 
-    /// Holds the force on the joint (N or N m), less than the drive asks for, for the coming step: the command
-    /// becomes the one that makes it now, and what a servo's damping takes over the step, which engines
-    /// integrate implicitly, is given back by the joint's damping, a column. (An engine that integrates `kp`
-    /// implicitly too, as rapier does, falls short of the force by `kp v dt`.)
+    /// Holds the force on the joint (N or N m) at less than the drive asks for, for the coming
+    /// step.
+    ///
+    /// The command becomes the one that makes this force now. A servo's damping would change the
+    /// force over the step, since engines integrate it implicitly. The joint's damping, column
+    /// `damping`, compensates that. (An engine that integrates `kp` implicitly too, as rapier does,
+    /// falls short of the force by `kp v dt`.)
     pub fn hold(&self, view: &mut StepView<'_>, force: f64, damping: usize) {
         let drive = self.drive.get();
         let (q, v) = (view.qpos[self.qpos], view.qvel[self.dof]);

@@ -1,11 +1,11 @@
 //! Dry friction of a hinge or slide, the same in every engine.
 //!
-//! A joint that slides feels the force `F` against its speed. One that is about to stop, or stands, feels
-//! damping of `F / max(|v|, v0)`, which engines integrate implicitly: it comes to rest without chatter
-//! and is held but for a creep below `v0`, and is let go in the step after its speed has passed `v0`. It is
-//! about to stop where its speed is less than what the last step changed it by. (MuJoCo's own
-//! `frictionloss` has by default a time constant of 20 ms, over which a joint that should stand
-//! still glides.)
+//! A joint that slides feels the force `F` against its speed. One that stands, or is about to stop,
+//! feels damping of `F / max(|v|, v0)`, which engines integrate implicitly. It comes to rest
+//! without chatter, is held except for a creep below `v0`, and slides again in the step after its
+//! speed has passed `v0`. It is about to stop where its speed is less than the last step's change
+//! of it. (MuJoCo's own `frictionloss` has by default a time constant of 20 ms, over which a joint
+//! that should stand still glides.)
 
 use crate::Site;
 use asid_core::Result;
@@ -13,20 +13,22 @@ use asid_core::simulator::StepView;
 
 use super::at_least;
 
-/// Speed below which a joint counts as standing where nothing else is said, rad/s or m/s.
+/// Default speed below which a joint counts as standing, rad/s or m/s.
+///
+/// Small beside the speeds of a machine in use.
 pub const CREEP: f64 = 0.01;
 
-/// Dry friction at a joint whose damping is the first target of the effect.
+/// Dry friction at a joint. The joint's damping is the first target of the effect.
 pub struct DryFriction {
     damping: usize,
     dof: usize,
     creep: f64,
-    /// Speed before the step before.
+    /// Speed at the start of the previous step.
     pub before: Option<f64>,
 }
 
 impl DryFriction {
-    /// At a site that is a joint, with the speed below which it counts as standing.
+    /// For a site that is a joint; below the speed `creep` it counts as standing.
     pub fn new(site: &Site<'_>, creep: f64) -> Result<Self> {
         Ok(Self {
             damping: site.columns[0],

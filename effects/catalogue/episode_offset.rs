@@ -1,8 +1,8 @@
-//! A zero that is found anew at the start of each episode: an encoder that is homed, a gyroscope whose bias differs each time that it is
-//! switched on.
+//! A sensor zero that is new in each episode.
 //!
-//! The shifts of different episodes have nothing to do with each other, so that each is a value of its own. An episode beyond the last one that
-//! has a value is not shifted.
+//! Examples are an encoder that is homed, and a gyroscope whose bias differs each time that it is
+//! switched on. The shifts of different episodes are independent, so that each is a value of its
+//! own. Episodes beyond the last value are not shifted.
 
 use crate::{Acting, Acts, Confusion, Effect, EffectParameter, Site};
 use asid_core::Result;
@@ -16,7 +16,7 @@ crate::register!(EffectEntry {
     make: || Box::new(EpisodeOffset),
 });
 
-/// Episodes that have a value: each is a column of a fit for each sensor.
+/// Number of episodes that have a value: each adds a column to a fit for each sensor.
 const MOST: usize = 16;
 
 /// Names of the values.

@@ -1,8 +1,8 @@
-//! Sliding friction that differs by place, by time, from episode to episode and by direction.
+//! Sliding friction that varies with place, time, episode or direction.
 //!
 //! The sites and the coefficients that are scaled are those of `sliding-friction`
-//! ([`super::contact_friction`]); the factor is computed anew before each step, for each body that slides
-//! on the site from its own motion.
+//! ([`super::contact_friction`]). The factor is computed before each step, for each body that
+//! slides on the site, from its own motion.
 
 use crate::{Acting, Acts, Confusion, Effect, EffectParameter, Site, Start};
 use asid_core::nalgebra::Vector3;
@@ -41,15 +41,16 @@ crate::register!(EffectEntry {
 /// Half the width of the transition at the edge of a patch, m.
 const EDGE: f64 = 0.002;
 
-/// Speed below which a direction means less and less, m/s.
+/// Speed below which the direction of sliding gradually loses its effect, m/s.
 const SLOW: f64 = 0.001;
 
 /// How the factor is found.
 ///
-/// - `Patch`: `ratio` where the coordinate `axis` (0 is x, 1 is y of the world) of the sliding body's
-///   frame is beyond `place`, 1 before it, with a smooth step of 4 mm between.
+/// - `Patch`: `ratio` where the coordinate `axis` (0 is x, 1 is y of the world) of the sliding
+///   body's frame is beyond `place`, 1 before it, with a smooth step of 4 mm between.
 /// - `Drift`: `1 + per_second t`, at least 0, `t` since the episode began.
-/// - `Trend`: `1 + per_episode n`, at least 0, `n` the number of the episode among all logs: wear, wax, warmth.
+/// - `Trend`: `1 + per_episode n`, at least 0, `n` the number of the episode among all logs: wear,
+///   wax, warmth.
 /// - `Anisotropy`: `1 + cos_2 cos 2φ + sin_2 sin 2φ`, at least 0, `φ` the direction of the body's
 ///   velocity in the plane of x and y.
 #[derive(Clone, Copy)]
@@ -63,9 +64,9 @@ enum Field {
 struct FieldAt {
     field: Field,
     values: [f64; 3],
-    /// What slides on the site, and its factor in this step.
+    /// The bodies that slide on the site, each with its factor in this step.
     bodies: Vec<(BodyPoint, f64)>,
-    /// Each column with the bodies whose least factor scales it.
+    /// Each column with the bodies whose smallest factor scales it.
     columns: Vec<(usize, Vec<usize>)>,
 }
 
@@ -116,9 +117,11 @@ pub fn sliding_bodies(plant: &Plant, site: &str) -> Vec<usize> {
     bodies
 }
 
-/// For each target of a site the sliding bodies that it makes the friction of: the partner's own for a
-/// partner; for the site the first that takes its coefficient, and where none does all, since the least
-/// factor then keeps it out of every contact.
+/// For each target of a site, the sliding bodies whose friction it sets, as indices in `bodies`.
+///
+/// A partner's coefficient belongs to its own body. The site's coefficient belongs to the first
+/// partner that takes it. Where no partner does, it belongs to all: their smallest factor then
+/// keeps it from counting in any contact.
 fn bodies_of_targets(plant: &Plant, site: &str, bodies: &[usize]) -> Vec<Vec<usize>> {
     let place = |geom: usize| {
         let body = plant.bodies[plant.geoms[geom].body].weld;

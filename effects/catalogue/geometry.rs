@@ -13,12 +13,14 @@ crate::register!(EffectEntry {
     make: || Box::new(Geometry),
 });
 
-/// The frame of a body is moved by `x`, `y`, `z` in its parent's frame, and the axes of its hinges and slides are turned by
-/// the small angles `turn_x`, `turn_y`, `turn_z` about the axes of its own frame: `a + turn x a`, of length 1 again.
+/// Moves a body's frame by `x`, `y`, `z` in its parent's frame, and turns its joint axes.
+///
+/// The axes of its hinges and slides turn by the small angles `turn_x`, `turn_y`, `turn_z` about
+/// the axes of its own frame: `a + turn x a`, normalised.
 struct Geometry;
 
 struct GeometryAt {
-    /// Columns of the place, then of one axis after the other.
+    /// Columns of the position, then of each axis.
     columns: Vec<usize>,
     shift: [f64; 3],
     turn: [f64; 3],
@@ -40,12 +42,12 @@ impl Acting for GeometryAt {
     }
 }
 
-/// Three deviations of a length from its drawing, m: parts that are milled or printed, and how they are put together.
+/// Three standard deviations of a length from its drawing, m: milled or printed parts, assembled.
 const LENGTH_TOLERANCE: f64 = 3e-3;
-/// Three deviations of an axis from its drawing, rad: 1.5 degrees.
+/// Three standard deviations of an axis from its drawing, rad: 1.5 degrees, as parts are mounted.
 const AXIS_TOLERANCE: f64 = 0.026;
 
-/// Joints of a body that fix it to its parent in some direction.
+/// Joints of a body that constrain it to its parent.
 fn joints<'p>(plant: &'p Plant, body: &str) -> impl Iterator<Item = &'p Joint> {
     let all = plant.layout.joints.iter();
     let body = body.to_owned();
@@ -60,7 +62,8 @@ impl Effect for Geometry {
         }]
     }
 
-    /// Lengths and axes are the first that a maker measures, and a drawing has them; forces, gains and masses nobody draws.
+    /// Makers measure lengths and axes first, and drawings show them, unlike forces, gains and
+    /// masses.
     fn unusual_at(&self, _plant: &Plant, _site: &str) -> bool {
         true
     }

@@ -1,4 +1,4 @@
-//! The ground is not level.
+//! Gravity in a tilted frame: the ground is not level.
 
 use crate::{Acting, Acts, Confusion, Effect, EffectParameter, Site};
 use asid_core::nalgebra::{Rotation3, Vector3};
@@ -13,10 +13,11 @@ crate::register!(EffectEntry {
     make: || Box::new(Tilt),
 });
 
-/// The machine's base is turned by `pitch` about the y axis of the world and by `roll` about its x
-/// axis, right-handed, so that gravity `(0, 0, -g)` becomes
-/// `g (sin pitch, -cos pitch sin roll, -cos pitch cos roll)`: downhill is +x for a positive pitch and
-/// -y for a positive roll. Whatever gravity the simulation has is turned.
+/// Turns the machine's base by `pitch` about the world's y axis and by `roll` about its x axis.
+///
+/// Both are right-handed, so that gravity `(0, 0, -g)` becomes
+/// `g (sin pitch, -cos pitch sin roll, -cos pitch cos roll)`: downhill is +x for a positive pitch
+/// and -y for a positive roll. The simulation's own gravity is turned, whatever it is.
 struct Tilt;
 
 struct TiltAt {

@@ -1,4 +1,4 @@
-//! Play on the command's side: a lever or an encoder that a command has to take along.
+//! Play on the command's side, as of a lever or an encoder that the command moves.
 
 use crate::{Acting, Acts, Confusion, Effect, EffectParameter, Site};
 use asid_core::Result;
@@ -14,17 +14,19 @@ crate::register!(EffectEntry {
     make: || Box::new(Hysteresis),
 });
 
-/// What arrives stays as it was while the command is within `width / 2` of it, and is taken along beyond: the
-/// play operator (M. Krasnosel'skii, A. Pokrovskii, "Systems with Hysteresis", 1989), and Simulink's Backlash
-/// block. Before the first step the command was the same as in it, and in the middle of the play. The command
-/// is clamped to its range before. Play between a drive and its load is another thing: `backlash`.
+/// The output stays while the command is within `width / 2` of it, and is moved along beyond.
+///
+/// This is the play operator (M. Krasnosel'skii, A. Pokrovskii, "Systems with Hysteresis", 1989),
+/// and Simulink's Backlash block. It begins in the middle of the play, with the first command as
+/// its output. The command is clamped to its range first. Play between a drive and its load is
+/// another effect, `backlash`.
 struct Hysteresis;
 
 struct HysteresisAt {
     actuator: usize,
     range: [f64; 2],
     half: f64,
-    /// What arrived last.
+    /// The last output.
     level: Option<f64>,
 }
 

@@ -1,4 +1,4 @@
-//! Forces that depend on where a joint stands: a spring in parallel, cogging.
+//! Forces that depend on a joint's position: a parallel spring, and cogging.
 
 use crate::{Acting, Acts, Effect, EffectParameter, Native, Site, Start};
 use asid_core::Result;
@@ -21,9 +21,12 @@ crate::register!(EffectEntry {
     make: || Box::new(Ripple),
 });
 
-/// Force `-(stiffness d + cubic d³)`, `d = q - rest`: the first terms of any spring that pulls alike on both
-/// sides, and with `cubic` one that stiffens, as cables, hoses and rubber do (G. Duffing, "Erzwungene Schwingungen
-/// bei veränderlicher Eigenfrequenz", 1918). It is explicit in time: stable while the period is above `pi` time steps.
+/// Force `-(stiffness d + cubic d³)` with `d = q - rest`.
+///
+/// These are the first terms of any spring that is symmetric about its rest. With `cubic` it
+/// stiffens, as cables, hoses and rubber do (G. Duffing, "Erzwungene Schwingungen bei
+/// veränderlicher Eigenfrequenz", 1918). It is explicit in time: stable while the period is above
+/// `pi` time steps.
 struct Stiffness;
 
 struct StiffnessAt {

@@ -17,7 +17,7 @@ use super::drive::{DriveAt, gains};
 use super::dry::{CREEP, DryFriction};
 use super::{at_least, scalar_joints, target, values};
 
-/// Name of dry friction of a joint.
+/// Name of the effect of dry friction at a joint.
 pub const COULOMB: &str = "coulomb-friction";
 
 crate::register!(EffectEntry {
@@ -44,30 +44,38 @@ crate::register!(EffectEntry {
     make: || Box::new(Load),
 });
 
-/// Speed below which a joint counts as standing: small beside its speeds in the logs.
+/// Speed below which a joint counts as standing.
+///
+/// By default a small share of its largest speed in the logs.
 const CREEP_PARAMETER: EffectParameter =
     EffectParameter::new("creep", "rad/s or m/s", [1e-5, 0.1], CREEP)
         .starting(Start::Set(Reference::Speed, CREEP_SHARE));
-/// The same as a share of the largest speed.
+/// Default of `creep`, as a share of the joint's largest speed.
 const CREEP_SHARE: f64 = 3e-3;
 
-/// Shares of the drive's largest force at which dry friction is looked at as a large one: there its joint stands for a good part of the time. A fit goes on
-/// from half or twice its value, so that two of them cover a decade.
+/// Large values of dry friction to try, as shares of the drive's largest force.
+///
+/// At these the joint stands for much of the time. A fit converges from half or twice its value, so
+/// that two values cover a decade.
 const LARGE: &[f64] = &[0.1, 0.3];
-/// The same of friction that grows with the drive's force: of what that leaves for the motion, `1 - coefficient`, two values that cover a decade.
+/// Large values of friction that grows with the drive's force.
+///
+/// The share left for the motion is `1 - coefficient`; two values cover a decade of it.
 const LARGE_BY_LOAD: &[f64] = &[0.3, 0.8];
 
-/// Three deviations of a joint's friction from what its model says, as a share of it: seals, grease and preload differ from one
-/// machine to the next, and with its temperature, by a tenth and more (Bittencourt and Gunnarsson 2012 report far more over temperature).
+/// Three standard deviations of a joint's friction from its model, as a share of it.
+///
+/// Seals, grease and preload differ between machines and with temperature, by a tenth and more
+/// (Bittencourt and Gunnarsson 2012 report far more over temperature).
 const FRICTION_TOLERANCE: f64 = 0.3;
 
-/// A joint of the document by its name.
+/// A joint of the document, by name.
 fn joint_of<'p>(plant: &'p Plant, name: &str) -> Option<&'p PlantJoint> {
     let index = plant.layout.joints.iter().position(|j| j.name == name);
     index.and_then(|i| plant.joints.get(i))
 }
 
-/// Force `-damping v`: adds to the joint's `damping`.
+/// Force `-damping v`: `damping` adds to the joint's own.
 struct Viscous;
 
 struct ViscousAt {
@@ -83,7 +91,8 @@ impl Acting for ViscousAt {
 }
 
 impl Effect for Viscous {
-    /// Bearings and seals rub dry and in their grease at once (Armstrong-Hélouvry and others 1994).
+    /// Bearings and seals have dry and viscous friction at once (Armstrong-Hélouvry and others
+    /// 1994).
     fn goes_with(&self) -> &'static [&'static str] {
         &["coulomb-friction"]
     }
@@ -136,9 +145,10 @@ impl Effect for Viscous {
     }
 }
 
-/// Friction `force + offset` against motion in the positive direction, and `force - offset` against
-/// the other: dry friction `force`, and `-offset` is a force that always acts. Below the speed `creep` the
-/// friction is viscous: machines and simulators differ in how hard they stick.
+/// Friction `force + offset` against motion in the positive direction, `force - offset` otherwise.
+///
+/// This is dry friction `force` with a constant force `-offset`. Below the speed `creep` the
+/// friction is viscous, since machines and simulators differ in how firmly they stick.
 struct Coulomb;
 
 struct CoulombAt {
@@ -242,8 +252,10 @@ impl Effect for Coulomb {
     }
 }
 
-/// Friction `coulomb + breakaway exp(-(v / speed)²)`: `breakaway` is what holds at rest above what
-/// slides, `speed` where most of it is gone.
+/// Friction `coulomb + breakaway exp(-(v / speed)²)`.
+///
+/// `breakaway` is how much the friction at rest exceeds sliding friction; near `speed` most of it
+/// is gone.
 struct Stribeck;
 
 struct StribeckAt {
@@ -332,8 +344,9 @@ impl Effect for Stribeck {
     }
 }
 
-/// Friction `coefficient |F|`, `F` the force of the joint's drives at the start of the step, as gears
-/// have that are pressed together by what they carry.
+/// Friction `coefficient |F|`, `F` the force of the joint's drives at the start of the step.
+///
+/// Gears behave so: the load that they transmit presses them together.
 struct Load;
 
 struct LoadAt {

@@ -1,7 +1,8 @@
-//! Mass properties of bodies that move.
+//! Mass properties of moving bodies.
 //!
-//! Where a body's mass comes from its geoms, `mass` changes the geoms' masses; centre and inertia change
-//! what the geoms make. So all compose with a study that fits the mass of a geom.
+//! Where geoms determine a body's mass, `mass` changes the masses of the geoms; `center-of-mass`
+//! and `inertia` change what results from them. All of them therefore compose with a study that
+//! fits the mass of a geom.
 
 use crate::{Acting, Acts, Confusion, Effect, EffectParameter, Reference, Site};
 use asid_core::{Capabilities, Result, Target};
@@ -27,7 +28,7 @@ crate::register!(EffectEntry {
     make: || Box::new(MassProperty::Inertia),
 });
 
-/// What is changed.
+/// The property that changes.
 ///
 /// - `Mass`: times `factor`, inertia with it; of a geom that has a mass, else of a body.
 /// - `Center`: moved by `x`, `y`, `z` in the body's frame.
@@ -61,14 +62,15 @@ impl Acting for MassPropertyAt {
     }
 }
 
-/// Three deviations of masses and moments of inertia from a drawing, as a share: what drawings leave out (cables, screws, grease), and
-/// densities.
+/// Three standard deviations of masses and moments of inertia from a drawing, as a share.
+///
+/// Drawings leave out cables, screws and grease, and densities vary.
 const TOLERANCE: f64 = 0.09;
 
 /// Name of the effect on a mass.
 pub const MASS: &str = "mass";
 
-/// Names of the geoms that make a body's mass; empty where it has one of its own.
+/// Names of the geoms that determine a body's mass; empty where the body has its own.
 fn geoms_of(plant: &Plant, body: usize) -> Vec<String> {
     let geoms = plant.geoms.iter().zip(&plant.layout.geoms);
     geoms
@@ -77,7 +79,7 @@ fn geoms_of(plant: &Plant, body: usize) -> Vec<String> {
         .collect()
 }
 
-/// The masses that make a body's: those of its geoms, or its own.
+/// The masses that make up a body's mass: those of its geoms, or its own.
 pub(super) fn masses_of(plant: &Plant, body: &str) -> Vec<Target> {
     let index = plant.layout.bodies.iter().position(|b| b == body);
     let geoms = index.map_or_else(Vec::new, |b| geoms_of(plant, b));

@@ -1,16 +1,23 @@
-//! The catalogue of effects, one file a family: what a real machine does and its model may lack.
+//! The catalogue of effects, one file for each family.
 //!
-//! On the command: [`command`], [`command_dynamics`], [`hysteresis`], [`supply`]. Of servos: [`servo`]. Between a drive and
-//! its joint: [`backlash`], [`compliance`]. At a joint: [`joint_friction`], [`joint_force`], [`rotor`]. On bodies:
-//! [`mass`], [`payload`], [`geometry`], [`body_force`], [`gravity`]. In contacts: [`contact_friction`], [`friction_field`], [`contact_softness`]. On
-//! readings: [`sensor`], [`sensor_dynamics`], [`episode_offset`]. A new family is a file here and its `mod` line
-//! (docs/add-an-effect.md has what else it needs); modules that are not public hold what several families share.
+//! Effects are what a real machine does and its model may lack.
 //!
-//! Where the engine has the same physics (damping and rotor inertia of a joint, friction
-//! and softness of contacts, masses, gravity) an effect changes the engine's own parameter, which is
-//! integrated as stably as the engine can; the rest are forces and commands, step by step. A change of
-//! a parameter scales or adds to the value that the simulation has, so that it composes with a study
-//! that fits the same parameter.
+//! - On the command: [`command`], [`command_dynamics`], [`hysteresis`], [`supply`].
+//! - Of servos: [`servo`].
+//! - Between a drive and its joint: [`backlash`], [`compliance`].
+//! - At a joint: [`joint_friction`], [`joint_force`], [`rotor`].
+//! - On bodies: [`mass`], [`payload`], [`geometry`], [`body_force`], [`gravity`].
+//! - In contacts: [`contact_friction`], [`friction_field`], [`contact_softness`].
+//! - On readings: [`sensor`], [`sensor_dynamics`], [`episode_offset`].
+//!
+//! A new family is a file here and its `mod` line; docs/add-an-effect.md lists what else it needs.
+//! Private modules hold code that several families share.
+//!
+//! Where the engine has the same physics (damping and rotor inertia of a joint, friction and
+//! softness of contacts, masses, gravity) an effect changes the engine's own parameter, which the
+//! engine integrates as stably as it can. The rest are forces and commands, computed before each
+//! step. A change of a parameter scales or adds to the value that the simulation has. It therefore
+//! composes with a study that fits the same parameter.
 
 pub mod backlash;
 pub mod body_force;
@@ -42,7 +49,7 @@ use crate::Site;
 use asid_core::{Error, Result, Target};
 use asid_mjcf::Plant;
 
-/// The values of a site, one a parameter.
+/// The values of a site, one for each parameter.
 fn values<const N: usize>(site: &Site<'_>) -> Result<[f64; N]> {
     site.values.try_into().map_err(|_| {
         let given = site.values.len();
@@ -50,7 +57,10 @@ fn values<const N: usize>(site: &Site<'_>) -> Result<[f64; N]> {
     })
 }
 
-/// A value, where it is at least `low`.
+/// Returns `value` if it is at least `low`.
+///
+/// # Errors
+/// When it is below `low`, or not a number.
 fn at_least(site: &Site<'_>, parameter: &str, value: f64, low: f64) -> Result<f64> {
     if value >= low {
         return Ok(value);
@@ -61,7 +71,7 @@ fn at_least(site: &Site<'_>, parameter: &str, value: f64, low: f64) -> Result<f6
     })
 }
 
-/// A target by its parts.
+/// A target from its parts.
 fn target(element: &str, name: &str, attribute: &str, index: usize) -> Target {
     Target {
         element: element.into(),
@@ -79,13 +89,13 @@ fn scalar_joints(plant: &Plant) -> Vec<String> {
         .collect()
 }
 
-/// Names of all actuators: their commands can be late or off whatever they drive.
+/// Names of all actuators: any command can be late or off, whatever it drives.
 fn actuators(plant: &Plant) -> Vec<String> {
     let actuators = plant.layout.actuators.iter();
     actuators.map(|a| a.name.clone()).collect()
 }
 
-/// Names of the plain drives.
+/// Names of the actuators that are plain drives of a joint.
 fn drives(plant: &Plant) -> Vec<String> {
     let actuators = plant.layout.actuators.iter().zip(&plant.drives);
     actuators

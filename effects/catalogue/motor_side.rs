@@ -1,5 +1,6 @@
-//! The motor side of a transmission: a rotor with its drive, which a spring or a gap parts from its joint. How a step takes
-//! them is in [`transmission`].
+//! The motor side of a transmission: a rotor with its drive, behind a spring or a gap.
+//!
+//! [`transmission`] has the equations of a time step.
 
 mod transmission;
 
@@ -16,7 +17,7 @@ use super::target;
 
 use transmission::{Begun, Between, Law, Transmission};
 
-/// Names of the joints that have one drive, whose motor side can be told from the joint.
+/// Names of the joints with a single drive whose rotor can be told from the joint.
 pub fn sites(plant: &Plant) -> Vec<String> {
     let joints = plant.scalar_joints();
     joints
@@ -33,8 +34,9 @@ pub fn sites(plant: &Plant) -> Vec<String> {
         .collect()
 }
 
-/// What is taken from the joint and given to the rotor: damping (which the coupling changes),
-/// rotor inertia, and the gains of a servo.
+/// Parameters that move from the joint to the rotor, and the damping that the coupling changes.
+///
+/// They are the joint's damping, its rotor inertia, and the gains of a servo.
 pub fn targets(plant: &Plant, site: &str) -> Vec<Target> {
     let mut targets = vec![
         target("joint", site, "damping", 0),
@@ -58,16 +60,18 @@ pub struct MotorSide {
     drive: Drive,
     timestep: f64,
     between: Between,
-    /// Rotor inertia and gains, as the simulation's parameters were before they were taken.
+    /// Rotor inertia and gains of the simulation, from before the joint's were set to zero.
     inertia: Cell<f64>,
     kp: Cell<f64>,
     kv: Cell<f64>,
-    /// Angle and speed of the rotor, and the step that leads on from there; none where it has just been taken along.
+    /// Angle and speed of the rotor, and the step that begins there.
+    ///
+    /// There is no step where the rotor was just moved along with its joint.
     state: Option<([f64; 2], Option<Begun>)>,
 }
 
 impl MotorSide {
-    /// Attaches it behind a spring, with its compliance (rad/(N m) or m/N) and its damping ratio.
+    /// Attaches it behind a spring of a compliance (rad/(N m) or m/N) and a damping ratio.
     pub fn with_spring(site: &Site<'_>, compliance: f64, loss: f64) -> Result<Self> {
         Ok(Self {
             between: Between {
@@ -205,7 +209,7 @@ impl Acting for MotorSide {
         self.state = Some((rotor, Some(begun)));
     }
 
-    /// The rotor is taken along as far as its spring and its drive are then in balance.
+    /// Moves the rotor along until its spring and its drive are in balance.
     fn displaced(&mut self, from: [&[f64]; 2], to: [&[f64]; 2]) {
         let place = |[qpos, qvel]: [&[f64]; 2]| [qpos[self.qpos], qvel[self.dof]];
         let (from, to) = (place(from), place(to));

@@ -1,4 +1,4 @@
-//! What a body carries: its mass and where it is.
+//! The load that a body carries: its mass and its position.
 
 use crate::{Acting, Acts, Confusion, Effect, EffectParameter, Site};
 use asid_core::{Capabilities, Result, Target};
@@ -13,18 +13,21 @@ crate::register!(EffectEntry {
     make: || Box::new(Payload),
 });
 
-/// A mass `m` more, with the first moments `p = m r`, `r` its place from the body's centre of mass along the
-/// axes of the body's frame. The body then weighs `M + m`, its centre moves by `p / (M + m)`, and its moments
-/// of inertia about this centre grow in proportion to the mass, as if the payload were spread as the body is.
+/// An added mass `m` with the first moments `p = m r`.
 ///
-/// Mass and first moments, and not mass and place, because forces are linear in them (C. Atkeson, C. An, J.
-/// Hollerbach, "Estimation of inertial parameters of manipulator loads and links", Int. J. Robotics Research
-/// 5, 1986): each of the four has a slope where nothing is carried, and the place is `p / m`. A payload that
-/// is small and far off has a moment of inertia of `m M / (m + M) r^2` more, which is left to `inertia`.
+/// `r` is its position from the body's centre of mass along the axes of the body's frame. The body
+/// then has the mass `M + m`, and its centre moves by `p / (M + m)`. Its moments of inertia about
+/// this centre grow in proportion to the mass, as if the payload were spread as the body is.
+///
+/// The parameters are mass and first moments, not mass and position, because forces are linear in
+/// them (C. Atkeson, C. An, J. Hollerbach, "Estimation of inertial parameters of manipulator loads
+/// and links", Int. J. Robotics Research 5, 1986). Each of the four has a slope at zero load, and
+/// the position is `p / m`. A payload that is small and far off adds a further moment of inertia of
+/// `m M / (m + M) r^2`, which is left to `inertia`.
 struct Payload;
 
 struct PayloadAt {
-    /// Columns of the masses that make the body's, and of its centre.
+    /// Columns of the masses that make up the body's mass, and of its centre of mass.
     masses: Vec<usize>,
     center: Vec<usize>,
     mass: f64,

@@ -1,15 +1,15 @@
-//! A point of a body: where it is, how it moves, and forces on it.
+//! A point of a body: its position, its motion, and forces on it.
 
 use asid_core::nalgebra::{Isometry3, Translation3, Vector3};
 use asid_core::signal::unit_quaternion;
 use asid_core::simulator::StepView;
 use asid_mjcf::Plant;
 
-/// How a body hangs on the world.
+/// How a body is connected to the world.
 enum Reach {
-    /// By a free joint of its own: places in `qpos` and `qvel`.
+    /// By a free joint of its own: indices in `qpos` and `qvel`.
     Free { qpos: usize, dof: usize },
-    /// By a chain of joints; `jacobian` is room for `6 x nv` numbers.
+    /// By a chain of joints; `jacobian` is a buffer of `6 x nv` numbers.
     Chain {
         plant: Box<Plant>,
         body: usize,
@@ -26,7 +26,7 @@ pub struct BodyPoint {
 
 /// Motion of a point and its body in the world's frame.
 pub struct Motion {
-    /// Place, m.
+    /// Position, m.
     pub place: Vector3<f64>,
     /// Velocity, m/s.
     pub velocity: Vector3<f64>,
@@ -63,7 +63,7 @@ impl BodyPoint {
         }
     }
 
-    /// Motion in a state.
+    /// Motion of the point in a state; keeps the Jacobian for [`BodyPoint::push`].
     pub fn motion(&mut self, qpos: &[f64], qvel: &[f64]) -> Motion {
         match &mut self.reach {
             Reach::Free { qpos: at, dof } => {
@@ -96,8 +96,9 @@ impl BodyPoint {
         }
     }
 
-    /// Adds a force (N, world frame) at the point to the generalised forces of the step. In the same
-    /// step [`BodyPoint::motion`] was asked before.
+    /// Adds a force (N, world frame) at the point to the generalised forces of the step.
+    ///
+    /// [`BodyPoint::motion`] must be called first in the same step.
     pub fn push(&self, view: &mut StepView<'_>, force: &Vector3<f64>) {
         match &self.reach {
             Reach::Free { qpos, dof } => {

@@ -1,4 +1,4 @@
-//! Inertia of what turns with a joint but is no link: rotors, seen through their gears.
+//! Rotor inertia at a joint, seen through the gear.
 
 use crate::{Acting, Acts, Confusion, Effect, EffectParameter, Site};
 use asid_core::{Capabilities, Result, Target};
@@ -12,7 +12,7 @@ crate::register!(EffectEntry {
     make: || Box::new(Armature),
 });
 
-/// `inertia` (the rotor's times the square of the gear's ratio) adds to the joint's `armature`.
+/// Adds `inertia` (the rotor's times the square of the gear ratio) to the joint's `armature`.
 struct Armature;
 
 struct ArmatureAt {

@@ -1,7 +1,7 @@
-//! Errors of a reading at one time: shift, factor, slow growth within an episode and from one to the next, steps.
+//! Memoryless errors of a reading: bias, scale, drift, trend over episodes, quantisation.
 //!
-//! Sites are sensors that read numbers and vectors. Orientations and unit vectors are none: a
-//! number added to them means nothing.
+//! Sites are sensors that read numbers or vectors. Orientations and unit vectors are not sites:
+//! adding a number to them means nothing.
 
 use crate::{Acting, Acts, Effect, EffectParameter, Reference, Site, Start};
 use asid_core::Result;
@@ -39,12 +39,15 @@ crate::register!(EffectEntry {
     make: || Box::new(Reading::Quantization),
 });
 
-/// What happens to a reading `r`.
+/// The error of a reading `r`.
 ///
-/// - `Bias`: `r + bias` of a number, `r + (x, y, z)` of a vector; the other parameters do nothing.
+/// - `Bias`: `r + bias` for a number, `r + (x, y, z)` for a vector; the other parameters do
+///   nothing.
 /// - `Scale`: `scale r`, every entry of a vector.
-/// - `Drift`: `r + rate t` of a number, `r + (x, y, z) t` of a vector, `t` since the episode began.
-/// - `Trend`: `r + step n` of a number, `r + (x, y, z) n` of a vector, `n` the number of the episode among all logs.
+/// - `Drift`: `r + rate t` for a number, `r + (x, y, z) t` for a vector, `t` since the episode
+///   began.
+/// - `Trend`: `r + step n` for a number, `r + (x, y, z) n` for a vector, `n` the number of the
+///   episode among all logs.
 /// - `Quantization`: the nearest multiple of `step`, every entry of a vector.
 #[derive(Clone, Copy)]
 enum Reading {
@@ -57,7 +60,7 @@ enum Reading {
 
 struct ReadingAt {
     law: Reading,
-    /// By entry of the reading.
+    /// One value for each entry of the reading.
     values: [f64; 3],
 }
 
@@ -75,7 +78,7 @@ impl Acting for ReadingAt {
     }
 }
 
-/// Names of the sensors whose readings are numbers or vectors of them.
+/// Names of the sensors that read numbers or vectors, unit vectors excepted.
 pub(super) fn sensors(plant: &Plant) -> Vec<String> {
     let sensors = plant.layout.sensors.iter();
     sensors

@@ -1,7 +1,7 @@
 //! Readings that come late: a pure delay, and a first-order low pass.
 //!
-//! Both see the rows that a rollout records and fill in between them, so a row's period may be long
-//! against the delay. Before the first row the reading was the same as in it.
+//! Both see the recorded rows of a rollout and interpolate between them, so that a row's period may
+//! be long compared with the delay. Before the first row the reading is taken as constant.
 
 use std::collections::VecDeque;
 
@@ -25,17 +25,19 @@ crate::register!(EffectEntry {
     make: || Box::new(Filter),
 });
 
-/// Longest delay that is looked for, s.
+/// Longest delay of the search, s: no control loop works with a longer one.
 const LONGEST: f64 = 0.5;
 
-/// Number of rows that a value is interpolated from: a cubic.
+/// Number of rows that a value is interpolated from: four define a cubic.
 const POINTS: usize = 4;
 
 /// A row: time, then the reading, of at most three entries.
 type Row = [f64; 4];
 
-/// `r(t - delay)`, on the cubic through the four rows around it (the last four where fewer are known
-/// after it), which follows a motion of 5 Hz to a thousandth from rows of 10 ms.
+/// `r(t - delay)`, from the cubic through the four rows around that time.
+///
+/// Near the end it uses the last four rows. The cubic follows a motion of 5 Hz to a thousandth from
+/// rows of 10 ms.
 struct Delay;
 
 struct DelayAt {
@@ -45,7 +47,7 @@ struct DelayAt {
 }
 
 impl DelayAt {
-    /// Takes a row in and drops those that no delay reaches back to.
+    /// Appends a row, and drops the rows that are older than any delay needs.
     fn remember(&mut self, time: f64, reading: &[f64]) {
         let mut row = [time, 0.0, 0.0, 0.0];
         for (to, from) in row[1..].iter_mut().zip(reading) {
@@ -61,7 +63,7 @@ impl DelayAt {
         }
     }
 
-    /// Entry `entry` at a time between the first and the last row.
+    /// Entry `entry` of the reading at a time between the first and the last row.
     fn at(&self, time: f64, entry: usize) -> f64 {
         let rows = &self.past;
         let after = rows.partition_point(|row| row[0] < time);
@@ -147,13 +149,14 @@ impl Effect for Delay {
     }
 }
 
-/// `T dy/dt = r - y`, solved exactly for a reading that is linear in time between two rows:
+/// `T dy/dt = r - y`, solved exactly for a reading that is linear in time between two rows.
+///
 /// `y1 = r1 - m T + (y0 - r0 + m T) e^(-h/T)` with the slope `m = (r1 - r0) / h`.
 struct Filter;
 
 struct FilterAt {
     time_constant: f64,
-    /// Time, reading and output of the row before the last, and of the last.
+    /// Time, reading and output of the last two rows, the older one first.
     rows: Option<[[f64; 7]; 2]>,
 }
 
@@ -205,8 +208,9 @@ impl Acting for FilterAt {
 }
 
 impl Effect for Filter {
-    /// Every reading is late by the time that it takes to arrive; which readings are filtered is known as a rule. Where the two cannot be
-    /// told apart, a delay comes to mind first.
+    /// Every reading is delayed by its transport; whether readings are filtered is usually known.
+    ///
+    /// Where the two cannot be told apart, a delay is likelier.
     fn unusual_at(&self, _plant: &Plant, _site: &str) -> bool {
         true
     }

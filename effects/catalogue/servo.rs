@@ -1,9 +1,10 @@
-//! Gains of servos: how stiffly one pursues its position, and how it resists speed.
+//! Gains of servos: stiffness of the position loop and damping.
 //!
-//! A position servo asks for `kp (u - q) - kv v`, a velocity servo for `kv (u - v)`, each within the limits
-//! of its force. The gains of a real servo are rarely those of its model: a hobby servo's firmware has its
-//! own, in units of its own, and a model's often were chosen to be stiff. M. Duclusaud et al., "Extended
-//! friction models for the physics simulation of servo actuators", ICRA 2025, identify both.
+//! A position servo asks for `kp (u - q) - kv v`, a velocity servo for `kv (u - v)`, each within
+//! the limits of its force. The gains of a real servo are rarely those of its model: a hobby
+//! servo's firmware has its own gains, in units of its own, and a model's gains were often chosen
+//! to be stiff. M. Duclusaud et al., "Extended friction models for the physics simulation of servo
+//! actuators", ICRA 2025, identify both.
 
 use crate::{Acting, Acts, Confusion, Effect, EffectParameter, Site, Start};
 use asid_core::{Result, Target};
@@ -26,10 +27,11 @@ crate::register!(EffectEntry {
 
 /// A gain of a servo.
 ///
-/// - `Stiffness`: `kp` of a position servo times `factor`. Stiff and limited in force, a servo sits at its
-///   limit and feels no small change of its gain: the search begins at factors far from 1.
-/// - `Damping`: `damping` is added to `kv`, which does not fall below 0. It is no factor, since many
-///   models have a `kv` of 0. At a velocity servo `kv` is also how firmly it pursues its command.
+/// - `Stiffness`: `kp` of a position servo times `factor`. A stiff servo of limited force sits at
+///   its limit and feels no small change of its gain: the search begins at factors far from 1.
+/// - `Damping`: `damping` is added to `kv`, which does not fall below 0. It is not a factor, since
+///   many models have a `kv` of 0. At a velocity servo `kv` is also how firmly it follows its
+///   command.
 #[derive(Clone, Copy)]
 enum Gain {
     Stiffness,
@@ -53,7 +55,7 @@ impl Acting for GainAt {
 }
 
 impl Gain {
-    /// The engine's name of it.
+    /// The engine's name of the gain.
     fn attribute(self) -> &'static str {
         match self {
             Self::Stiffness => "kp",
@@ -77,7 +79,8 @@ impl Effect for Gain {
     }
 
     fn unusual_at(&self, plant: &Plant, site: &str) -> bool {
-        // Without a limit the damping of a position servo is that of its joint: friction comes to mind first.
+        // Without a force limit a position servo's damping equals its joint's: friction is
+        // likelier.
         let without_limit = |drive: Drive| drive.is_position_servo() && drive.force_range.is_none();
         matches!(self, Self::Damping) && plant.drive(site).is_ok_and(|(_, d)| without_limit(d))
     }

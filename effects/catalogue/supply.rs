@@ -1,4 +1,4 @@
-//! What a drive loses to speed and to its supply.
+//! Losses of a drive at speed and from its supply.
 
 use crate::{Acting, Acts, Confusion, Effect, EffectParameter, Reference, Site, Start};
 use asid_core::simulator::StepView;
@@ -27,13 +27,16 @@ crate::register!(EffectEntry {
     make: || Box::new(Supply::Trend),
 });
 
-/// Speed (rad/s or m/s) up to which no fall of the force is looked for.
+/// Largest speed limit of the search (rad/s or m/s); no joint reaches it.
 const FAST: f64 = 1000.0;
 
-/// The force on the joint, gear included, is held within `±force (1 - |v| / speed)`: `force` at rest, nothing
-/// at `speed`, where a motor's own voltage has reached its supply's (A. Hughes, B. Drury, "Electric Motors
-/// and Drives", ch. 3). As for a saturation, what the drive asks for at the start of a step decides
-/// ([`DriveAt::hold`]); where it drives, the fall is damping, which engines integrate implicitly.
+/// Holds the force on the joint, gear included, within `±force (1 - |v| / speed)`.
+///
+/// The limit is `force` at rest and zero at `speed`, where a motor's own voltage has reached its
+/// supply's (A. Hughes, B. Drury, "Electric Motors and Drives", ch. 3). As for a saturation, the
+/// force that the drive asks for at the start of a step decides ([`DriveAt::hold`]). Where the
+/// drive accelerates the joint, the fall with speed acts as damping, which engines integrate
+/// implicitly.
 struct SpeedLimit;
 
 struct SpeedLimitAt {
@@ -110,8 +113,9 @@ impl Effect for SpeedLimit {
     }
 }
 
-/// How the gain of a command changes, after the command's range and never below zero times. A battery that empties has a negative rate, a
-/// drive that warms up one of either sign.
+/// A gain of the command that changes over time, at least 0, after the command's range.
+///
+/// An emptying battery has a negative rate; a drive that warms up has either sign.
 ///
 /// - `Drift`: `(1 + rate t) u`, `t` restarts with each episode.
 /// - `Trend`: `(1 + rate n) u`, `n` the number of the episode among all logs.

@@ -1,4 +1,4 @@
-//! A batch whose simulations have effects, each with values and a memory of its own.
+//! A batch whose simulations have effects, each with values and a state of its own.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -23,7 +23,7 @@ pub enum Column {
     Episode,
 }
 
-/// Effects at work in one simulation; `None` where one has its null values.
+/// Effects of one simulation; `None` where an effect has its null values.
 type Row = Vec<Option<Box<dyn Acting>>>;
 
 /// A batch whose simulations have effects.
@@ -31,7 +31,7 @@ pub struct RefinedSimulator {
     inner: Box<dyn Simulator>,
     plant: Arc<Plant>,
     placed: Arc<Vec<Placed>>,
-    /// Columns of the engine's batch that each effect's targets are.
+    /// Columns of the engine's batch that hold each effect's targets.
     places: Vec<Vec<usize>>,
     columns: Vec<Column>,
     /// Values of the engine's columns before any effect.
@@ -39,19 +39,20 @@ pub struct RefinedSimulator {
     /// Physics steps of each simulation since its episode began.
     steps: Vec<u64>,
     rows: Vec<Mutex<Row>>,
-    /// Positions and speeds of all joints, and those of simulations before they were placed elsewhere.
+    /// Positions and speeds of all joints, and their values before simulations were placed
+    /// elsewhere.
     state: Recording,
     before: Vec<f64>,
 }
 
-/// Memories of a simulation's effects, and its steps.
+/// Steps of a simulation, and the saved states of its effects.
 #[derive(Clone)]
 struct Memory {
     steps: u64,
     effects: Vec<Vec<f64>>,
 }
 
-/// The engine's snapshot, and a memory for each of its rows.
+/// The engine's snapshot, and a memory for each row of it.
 struct Saved {
     inner: Snapshot,
     memories: Vec<Memory>,
@@ -62,8 +63,10 @@ fn lock(row: &Mutex<Row>) -> std::sync::MutexGuard<'_, Row> {
 }
 
 impl RefinedSimulator {
-    /// Gives the engine's batch `inner` the effects `placed`. `places` are the columns of `inner` that each effect's
-    /// targets are, `base` the values of these columns before any effect, and `columns` what the caller sets.
+    /// Gives the engine's batch `inner` the effects `placed`.
+    ///
+    /// `places` are the columns of `inner` that hold each effect's targets, `base` the values of
+    /// the columns of `inner` before any effect, and `columns` what the caller sets.
     pub(super) fn new(
         inner: Box<dyn Simulator>,
         (plant, placed): (Arc<Plant>, Arc<Vec<Placed>>),
@@ -114,14 +117,18 @@ impl RefinedSimulator {
         }
     }
 
-    /// Lets the time of readings pass for some simulations, by so many physics steps, without a step: of machines that are
-    /// placed where they are read, and that what sensors remember is wanted of.
+    /// Advances the time of readings of some simulations by `steps` physics steps, without a step.
+    ///
+    /// This is for machines that are placed at each reading while effects of sensors keep their
+    /// state.
     pub fn pass_time(&mut self, sims: &[usize], steps: u64) {
         sims.iter().for_each(|&sim| self.steps[sim] += steps);
     }
 
-    /// Brings simulations to where others have come, each with the memory of its own effects kept: of simulations that differ from those
-    /// in their readings alone.
+    /// Copies the states of simulations `from` to simulations `to`, which keep their effects'
+    /// states.
+    ///
+    /// This is for simulations that differ from their source in their readings alone.
     ///
     /// # Errors
     /// As [`Simulator::copy_state`].
@@ -133,8 +140,10 @@ impl RefinedSimulator {
         Ok(())
     }
 
-    /// Lets the sensors' effects change `frames` rows of a simulation's readings, the first
-    /// after `first` physics steps of its episode and each `substeps` later than the one before.
+    /// Applies the effects on sensors to rows of a simulation's readings.
+    ///
+    /// The first row is `first` physics steps after the beginning of its episode, and each further
+    /// row `substeps` later.
     fn measure(
         &self,
         sim: usize,
@@ -165,7 +174,7 @@ impl RefinedSimulator {
     }
 }
 
-/// The hook of a rollout: effects of each row, then what the caller brought.
+/// The hook of a rollout: the effects of each row, then the caller's own hook.
 struct RowHook<'a> {
     rows: &'a [Mutex<Row>],
     sims: &'a [usize],
@@ -226,7 +235,7 @@ impl Simulator for RefinedSimulator {
                 })?;
                 row.push(Some(acting));
             }
-            // What the model is comes first: other effects may depend on it, or take it over.
+            // Effects on the model come first: others may depend on their values or take them over.
             for of_model in [true, false] {
                 for (acting, placed) in row.iter().zip(self.placed.iter()) {
                     if let Some(acting) = acting

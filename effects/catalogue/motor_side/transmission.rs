@@ -1,45 +1,53 @@
-//! A step of a rotor with its drive, coupled to its joint by a spring, a gap, or both.
+//! One time step of a rotor and its drive, coupled to a joint by a spring, a gap, or both.
 //!
-//! With the drive's law `a - b θ - d ω` on the rotor (angle `θ`, speed `ω`, inertia `J`, all seen
-//! from the joint), a spring of compliance `C` between rotor and joint, a damper beside it and a gap of `w`, one step of
-//! `dt` is
+//! The drive's law on the rotor is `a - b θ - d ω` (angle `θ`, speed `ω`, inertia `J`, all seen
+//! from the joint). Between rotor and joint are a spring of compliance `C`, a damper in parallel
+//! with it and a gap of width `w`. One step of `dt` is
 //!
 //! `J (ω1 - ω) / dt = a - b (θ + s dt ω1 - g dt ω) - d ω1 - T`,
 //! `C T = θ - q ∓ w/2 + s' dt (ω1 - v1) - g' dt (ω - v) + τ (ω1 - v1)`,
-//! `θ1 = θ + ω1 dt`, `q1 = q + v1 dt`,
+//! `θ1 = θ + ω1 dt`, `q1 = q + v1 dt`.
 //!
-//! so the transmitted force is linear in the joint's speed at the end of the step: with `σ = s' dt + τ`,
+//! The transmitted force `T` is therefore linear in the joint's speed at the end of the step. With
+//! `σ = s' dt + τ`,
 //!
 //! `T = K (θ - q ∓ w/2 - g' dt (ω - v) + σ X / A) - K σ v1`, with `A = J/dt + s b dt + d`,
 //! `X = (J/dt + g b dt) ω + a - b θ`, `K = 1 / (C + σ / A)`.
 //!
-//! The first part is applied as a force and `K σ` as damping of the joint, which engines
-//! integrate implicitly: it is stable however stiff the spring is, a gap's ends are rigid and do
-//! not bounce, and as `C` and `w` vanish it becomes the drive at the joint with the rotor's inertia
-//! added. What the damping took over the step, however an engine divides it, follows from the way that
-//! the joint went: `v1` is then `(q1 - q) / dt`, so that rotor and joint exchange equal impulses. A
-//! rotor without inertia needs a law with `b` or `d`.
+//! The first part is applied as a force, and `K σ` as damping of the joint, which engines integrate
+//! implicitly. The scheme is stable at any stiffness of the spring, and the ends of a gap are rigid
+//! and do not bounce. As `C` and `w` vanish it becomes the drive at the joint with the rotor's
+//! inertia added. The joint's displacement tells the impulse that the damping took over the step,
+//! however an engine integrates it: with `v1 = (q1 - q) / dt`, rotor and joint exchange equal
+//! impulses. A rotor without inertia needs a law with `b` or `d`.
 //!
-//! The damper is the transmission's own loss: `τ = 2 ζ sqrt(J C)` has the rotor swing against a joint that is held with a damping ratio `ζ`.
-//! A spring of the step's own loss would hide it: with `s = 1` and `g = 0` (backward Euler) that is a damper of `dt`, at 1 ms more than
-//! the steel of a hand-sized servo's gears. With `s = g = 1/4` a spring loses nothing, and its swing has the period of the trapezoidal rule, stable at any
-//! stiffness. But what can hardly swing should not: a spring that hardly gives, and the ends of
-//! a gap, are rigid, with `s = 1`, and a rotor without inertia in its gap goes to where its drive has it, by `s = 1 / (1 - exp(-x)) - 1 / x` with
-//! `x = b dt / d` exactly as fast as without steps (exponential Euler). So each spring is shared between the two, by how much its rotor's inertia or its
-//! compliance counts over a step: [`Share`].
+//! The damper models the transmission's own loss: with `τ = 2 ζ sqrt(J C)` the rotor swings against
+//! a fixed joint at a damping ratio `ζ`. The numerical loss of the step must not hide it. With
+//! `s = 1` and `g = 0` (backward Euler) that loss equals a damper of `dt`, which at 1 ms exceeds
+//! that of the steel gears of a hand-sized servo. With `s = g = 1/4` a spring loses nothing. Its
+//! swing then has the period of the trapezoidal rule and is stable at any stiffness.
+//!
+//! Stiff parts must not swing, however. A spring of very small compliance and the ends of a gap are
+//! rigid, with `s = 1`. A rotor without inertia moves within its gap to where its drive pulls it:
+//! there `s = 1 / (1 - exp(-x)) - 1 / x` with `x = b dt / d` gives the speed of continuous time
+//! (exponential Euler). Each spring is therefore a mix of both cases, weighted by how much its
+//! rotor's inertia or its compliance counts over a step: [`Share`].
 
 /// What lies between a rotor and its joint.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Between {
     /// Compliance, rad/(N m) or m/N.
     pub(super) compliance: f64,
-    /// Damping ratio of the rotor on it.
+    /// Damping ratio of the rotor's swing on the spring.
     pub(super) loss: f64,
     /// Half of the gap, rad or m.
     pub(super) half_gap: f64,
 }
 
-/// How a step takes a spring: at what it gives way by until then, and `late` and `early` steps' worth of the speeds at its end and at its beginning.
+/// Weights of the speeds, in time steps, in the deflection that a step uses for a spring.
+///
+/// `late` weighs the speed at the end of the step, `early` (negatively) that at its beginning: `s`
+/// and `g` above.
 #[derive(Clone, Copy, Debug)]
 struct Share {
     late: f64,
@@ -47,7 +55,7 @@ struct Share {
 }
 
 impl Share {
-    /// The trapezoidal rule for a share that swings (0 to 1), `creeping` for the rest.
+    /// The trapezoidal rule for the share `swings` (0 to 1), `creeping` for the rest.
     fn of(swings: f64, creeping: f64) -> Self {
         Self {
             late: 0.25 * swings + creeping * (1.0 - swings),
@@ -56,8 +64,10 @@ impl Share {
     }
 }
 
-/// When in a step a spring is taken that relaxes against a damper, the step being `x` of their time constants: in its middle where it is a small part
-/// of one, at its end where it is many. The relaxation is then that of a continuous time.
+/// The weight `late` of a spring that relaxes against a damper, for a step of `x` time constants.
+///
+/// It is the middle of a short step and the end of a long one, so that the relaxation is that of
+/// continuous time.
 fn exponential(x: f64) -> f64 {
     if x < 1e-4 {
         return 0.5 + x / 12.0;
@@ -73,22 +83,22 @@ pub(super) struct Law {
     pub(super) d: f64,
 }
 
-/// A step that was begun, to be completed once the joint's speed after it is known.
+/// A step that has begun; [`Transmission::complete`] ends it once the joint has moved.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Begun {
     pub(super) law: Law,
-    /// `A` and `X`.
+    /// `A` and `X`, as above.
     resistance: f64,
     push: f64,
-    /// Transmitted force `force - damping v1`.
+    /// The transmitted force is `force - damping v1`.
     pub(super) force: f64,
     pub(super) damping: f64,
-    /// Where the joint was.
+    /// Position of the joint at the beginning.
     from: f64,
 }
 
 impl Begun {
-    /// All of it, to be remembered.
+    /// All of it as numbers, to be saved.
     pub(super) fn numbers(&self) -> [f64; 8] {
         let Law { a, b, d } = self.law;
         let (resistance, push) = (self.resistance, self.push);
@@ -104,7 +114,7 @@ impl Begun {
         ]
     }
 
-    /// From what was remembered.
+    /// Restores it from saved numbers.
     pub(super) fn of(numbers: &[f64]) -> Option<Self> {
         let [a, b, d, resistance, push, force, damping, from] =
             <[f64; 8]>::try_from(numbers).ok()?;
@@ -119,7 +129,7 @@ impl Begun {
     }
 }
 
-/// A rotor behind what lies between it and its joint. Its state is its angle and its speed.
+/// A rotor coupled to its joint. Its state is its angle and its speed.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Transmission {
     /// What lies between.
@@ -131,7 +141,7 @@ pub(super) struct Transmission {
 }
 
 impl Transmission {
-    /// `A` and `X` of a law, for a rotor that pushes its joint or one that is free of it.
+    /// `A` and `X` of a law, for a rotor that pushes its joint (`pushes`) or one that moves freely.
     fn coefficients(&self, law: Law, [angle, speed]: [f64; 2], pushes: bool) -> (f64, f64) {
         let inertia = self.inertia / self.dt;
         let spring = law.b * self.dt;
@@ -140,7 +150,7 @@ impl Transmission {
             return (0.0, law.a - law.b * angle);
         }
         let share = if pushes {
-            // With the joint's inertia, its damper does not let it creep.
+            // The damper acts on the joint's inertia too, so that the rotor does not creep alone.
             Share::of((inertia + law.d) / whole, 1.0)
         } else if law.d > 0.0 {
             Share::of(inertia / whole, exponential(spring / law.d))
@@ -153,7 +163,7 @@ impl Transmission {
         )
     }
 
-    /// The step that a law begins at a joint's position and speed.
+    /// Begins a step with a law, at a joint's position and speed.
     pub(super) fn begin(&self, law: Law, rotor: [f64; 2], q: f64, v: f64) -> Begun {
         let dt = self.dt;
         let begun = |resistance, push| Begun {
@@ -166,7 +176,7 @@ impl Transmission {
         };
         let (resistance, push) = self.coefficients(law, rotor, false);
         if resistance <= 0.0 {
-            // Nothing holds the rotor back: its drive's force passes.
+            // Nothing resists the rotor: it transmits its drive's force.
             return Begun {
                 force: law.a,
                 ..begun(resistance, push)
@@ -208,7 +218,7 @@ impl Transmission {
         [rotor[0] + speed * self.dt, speed]
     }
 
-    /// Where a rotor at rest with its joint would be.
+    /// Angle and speed of a rotor in balance with its joint.
     pub(super) fn settled(&self, law: Law, q: f64, v: f64) -> [f64; 2] {
         let end = if law.b > 0.0 {
             (law.a / law.b).clamp(q - self.between.half_gap, q + self.between.half_gap)
@@ -222,8 +232,11 @@ impl Transmission {
         [angle, v]
     }
 
-    /// A rotor whose joint was placed elsewhere, `from` and `to` a position and a speed. In balance the spring pulls as much more as the drive
-    /// does, so that the rotor follows by `1 / (1 + C b)`: all of the way behind a stiff spring, and not at all within its gap.
+    /// State of the rotor after its joint was placed elsewhere; `from` and `to` are position and
+    /// speed.
+    ///
+    /// In balance the spring's force changes as the drive's does, so that the rotor follows by the
+    /// share `1 / (1 + C b)`: fully behind a stiff spring, and not at all within its gap.
     pub(super) fn taken_along(
         &self,
         law: Law,
@@ -258,7 +271,7 @@ mod tests {
         }
     }
 
-    /// `θ = θ∞ (1 - exp(-b t / d))`, whatever the step.
+    /// `θ = θ∞ (1 - exp(-b t / d))`, at any time step.
     #[test]
     fn a_rotor_without_inertia_relaxes_in_its_gap_as_in_continuous_time() {
         for d in [1e-3, 0.1, 3.0] {
@@ -282,7 +295,8 @@ mod tests {
         }
     }
 
-    /// Largest angles in the first of some hundred periods and in the last, of a rotor that swings on its spring against a joint that is held.
+    /// Largest angles in the first and the eleventh period of a rotor on its spring, the joint
+    /// fixed.
     fn swings(loss: f64) -> [f64; 2] {
         let (inertia, compliance) = (0.02, 0.05);
         let between = Between {
@@ -324,7 +338,7 @@ mod tests {
         );
     }
 
-    /// By hand: at rest a servo's force, and at a speed what its damper takes of it.
+    /// By hand: the force of a servo at rest, and the damping that it adds.
     #[test]
     fn a_rotor_that_nothing_parts_from_its_joint_is_the_drive() {
         let transmission = rotor(0.0, Between::default());
