@@ -122,7 +122,7 @@ pub(super) fn limit_targets(plant: &Plant, site: &str) -> Vec<Target> {
     targets
 }
 
-/// Largest force limit of the search (N or N m); no machine on a table reaches it.
+/// Largest force limit of the search (N or N m): at this value the limit is off.
 pub(super) const UNLIMITED: f64 = 1000.0;
 
 /// Holds the force on the joint, gear included, within `±limit`.

@@ -34,7 +34,7 @@ pub const LAG: &str = "actuator-lag";
 /// No model has this delay, but every bus and controller does: a few cycles of a loop of 1 kHz.
 const DELAY_TOLERANCE: f64 = 4.5e-3;
 
-/// Longest delay of the search, s: no control loop works with a longer one.
+/// Longest delay of the search, s.
 const LONGEST: f64 = 0.5;
 
 /// `c(t) = u(t - delay)`.

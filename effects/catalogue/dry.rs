@@ -14,8 +14,6 @@ use asid_core::simulator::StepView;
 use super::at_least;
 
 /// Default speed below which a joint counts as standing, rad/s or m/s.
-///
-/// Small beside the speeds of a machine in use.
 pub const CREEP: f64 = 0.01;
 
 /// Dry friction at a joint. The joint's damping is the first target of the effect.

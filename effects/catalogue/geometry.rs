@@ -44,7 +44,7 @@ impl Acting for GeometryAt {
 
 /// Three standard deviations of a length from its drawing, m: milled or printed parts, assembled.
 const LENGTH_TOLERANCE: f64 = 3e-3;
-/// Three standard deviations of an axis from its drawing, rad: 1.5 degrees, as parts are mounted.
+/// Three standard deviations of an axis from its drawing, rad: 1.5 degrees.
 const AXIS_TOLERANCE: f64 = 0.026;
 
 /// Joints of a body that constrain it to its parent.

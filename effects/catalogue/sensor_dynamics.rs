@@ -25,7 +25,7 @@ crate::register!(EffectEntry {
     make: || Box::new(Filter),
 });
 
-/// Longest delay of the search, s: no control loop works with a longer one.
+/// Longest delay of the search, s.
 const LONGEST: f64 = 0.5;
 
 /// Number of rows that a value is interpolated from: four define a cubic.

@@ -27,7 +27,7 @@ crate::register!(EffectEntry {
     make: || Box::new(Supply::Trend),
 });
 
-/// Largest speed limit of the search (rad/s or m/s); no joint reaches it.
+/// Largest speed limit of the search (rad/s or m/s): at this value the limit is off.
 const FAST: f64 = 1000.0;
 
 /// Holds the force on the joint, gear included, within `±force (1 - |v| / speed)`.
