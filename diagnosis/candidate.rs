@@ -18,51 +18,59 @@ use crate::trajectory::Trajectory;
 pub struct Candidate {
     /// The effect.
     pub effect: Arc<dyn Effect>,
-    /// Name and site, all parameters at null.
+    /// Name and site, with no values: all parameters at null.
     pub spec: EffectSpec,
-    /// Points to start from, one value a parameter.
+    /// Starting points, one value per parameter.
     pub starts: Vec<Vec<f64>>,
-    /// Points at which it is large, and does not act in proportion: looked at beside its slopes where stretches of the logs are replayed.
+    /// Points at which the effect is large and not proportional to its value.
+    ///
+    /// They are evaluated in addition to the derivatives where segments of the logs are replayed.
     pub large: Vec<Vec<f64>>,
-    /// Range of each parameter: that of the effect, or where the logs can tell of it.
+    /// Range of each parameter: that of the effect, or the one about which the logs carry
+    /// information.
     pub ranges: Vec<[f64; 2]>,
-    /// How many episodes there are to fit to: values of others are not fitted to them.
+    /// Number of training logs; values that belong to other logs are not fitted.
     pub episodes: usize,
-    /// Whether it stands for what an ordinary machine has, within [`Effect::tolerance`]: it is fitted and never named.
+    /// Whether it stands for an ordinary tolerance, within [`Effect::tolerance`]: it is fitted and
+    /// never named.
     pub is_tolerance: bool,
 }
 
-/// A candidate that was left out, and why.
+/// A candidate that was left out, with the reason.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LeftOut {
     /// `NAME@SITE`.
     pub label: String,
-    /// Why.
+    /// Reason, in words.
     pub why: String,
 }
 
-/// How much larger than on a table a value may be that grows with the machine: mass grows with the third power of length, and a machine
-/// may be ten times as long.
+/// Factor by which a value that grows with the machine may exceed its range on a table.
+///
+/// Mass grows with the third power of length, and a machine may be ten times as long.
 const LARGER: f64 = 1000.0;
 
-/// Most starts of one candidate.
+/// Maximum number of starting points of one candidate.
 const MAX_STARTS: usize = 24;
 
 impl Candidate {
-    /// `NAME@SITE`.
+    /// Returns `NAME@SITE`.
     #[must_use]
     pub fn label(&self) -> String {
         self.spec.label()
     }
 
-    /// Its parameters.
+    /// Returns the parameters of the effect.
     #[must_use]
     pub fn parameters(&self) -> &'static [EffectParameter] {
         self.effect.parameters()
     }
 
-    /// Its parameters as columns of a batch: whether each is searched for continuously. What stands for a tolerance keeps the values that
-    /// the missing force has told: whole replays know nothing of priors.
+    /// Returns the parameters as columns of a batch, each with whether it is searched for
+    /// continuously.
+    ///
+    /// A tolerance keeps the values that the missing force has given: fits to whole replays use no
+    /// priors.
     #[must_use]
     pub fn unknowns(&self) -> Vec<(Parameter, bool)> {
         self.parameters()
@@ -88,7 +96,8 @@ impl Candidate {
             .collect()
     }
 
-    /// How far a fit may take a parameter: over its range, and a thousand times as far where that is the range of a machine on a table.
+    /// Returns how far a fit may move a parameter: over its range, or [`LARGER`] times as far if
+    /// that range is the one of a machine on a table.
     #[must_use]
     pub fn limits(&self, parameter: usize) -> [f64; 2] {
         let range = self.ranges[parameter];
@@ -98,7 +107,7 @@ impl Candidate {
         limits(&self.parameters()[parameter], range)
     }
 
-    /// Parameters that act in proportion from their null value on.
+    /// Returns the parameters whose effect is proportional to their value from the null value on.
     #[must_use]
     pub fn slopes(&self) -> Vec<usize> {
         let parameters = self.parameters().iter().enumerate();
@@ -108,13 +117,13 @@ impl Candidate {
             .collect()
     }
 
-    /// Whether a parameter is of all episodes, or of one that is fitted to.
+    /// Whether a parameter applies to all episodes, or to one that is fitted to.
     fn is_fitted(&self, parameter: &EffectParameter) -> bool {
         parameter.episode.is_none_or(|e| e < self.episodes)
     }
 }
 
-/// The same effect at the same site as what an ordinary machine has of it; `None` where it has none.
+/// Returns the candidate as an ordinary tolerance; `None` if the effect has none at its site.
 fn within_tolerance(candidate: &Candidate, plant: &Plant, shown: &Trajectory) -> Option<Candidate> {
     let site = &candidate.spec.site;
     let measured = |reference: Reference| measure(plant, site, reference, shown);
@@ -128,13 +137,14 @@ fn within_tolerance(candidate: &Candidate, plant: &Plant, shown: &Trajectory) ->
     })
 }
 
-/// How many of some candidates can be named.
+/// Returns how many of the candidates can be named.
 #[must_use]
 pub fn nameable(candidates: &[Candidate]) -> usize {
     candidates.iter().filter(|c| !c.is_tolerance).count()
 }
 
-/// The parameter of a study that fits the mass of a body as a whole, of whose geoms some targets are: a model takes one of the two.
+/// Returns the study's parameter that fits the whole mass of a body, if a target is one of its
+/// geoms; a model takes one of the two.
 fn fitted_as_a_whole<'p>(
     plant: &Plant,
     targets: &[Target],
@@ -153,9 +163,11 @@ fn fitted_as_a_whole<'p>(
     found.map(|p| &*p.name)
 }
 
-/// All effects at all sites that the engine can give the scene, but for those that the
-/// model has already, those named in `without`, and those that set what the study's `parameters` set otherwise; then what an ordinary machine
-/// has of them.
+/// Returns all effects at all sites that the engine can add to the scene, followed by their
+/// tolerances, and those left out.
+///
+/// It skips effects that the model has already, those named in `without`, and those that set in
+/// another way what the study's `parameters` set.
 #[must_use]
 pub fn enumerate(
     machine: &Machine,
@@ -180,11 +192,11 @@ pub fn enumerate(
             if machine.given_effects().iter().any(|e| e.label() == label) {
                 continue;
             }
-            // A sensor that no log has cannot tell of its own effects.
+            // A sensor that is in no log carries no information on its own effects.
             if effect.acts() == Acts::Measurement && !shown.sensors.contains(&site) {
                 continue;
             }
-            // What acts in contacts alone does nothing where there are none.
+            // An effect on contacts alone does nothing where there are none.
             if of_contacts(&*effect, plant, &site) && !shown.touches(plant, &site) {
                 let why = "nothing touches it in these logs".to_owned();
                 left_out.push(LeftOut { label, why });
@@ -235,7 +247,7 @@ pub fn enumerate(
     (found, left_out)
 }
 
-/// Whether an effect changes nothing but how a geom's contacts behave.
+/// Whether an effect changes nothing but the contact behaviour of a geom.
 fn of_contacts(effect: &dyn Effect, plant: &Plant, site: &str) -> bool {
     let targets = effect.targets(plant, site);
     let contact = |t: &Target| {
@@ -244,7 +256,7 @@ fn of_contacts(effect: &dyn Effect, plant: &Plant, site: &str) -> bool {
     !targets.is_empty() && targets.iter().all(contact)
 }
 
-/// How far a fit may take a parameter that has some range.
+/// Returns how far a fit may move a parameter of the given range.
 fn limits(parameter: &EffectParameter, range: [f64; 2]) -> [f64; 2] {
     if parameter.grows_with_the_machine() {
         range.map(|end| LARGER * end)
@@ -253,7 +265,7 @@ fn limits(parameter: &EffectParameter, range: [f64; 2]) -> [f64; 2] {
     }
 }
 
-/// Ranges of the parameters; a place lies where the body goes.
+/// Returns the ranges of the parameters; the range of a place is the one over which the body moves.
 fn ranges(effect: &dyn Effect, plant: &Plant, site: &str, shown: &Trajectory) -> Vec<[f64; 2]> {
     let parameters = effect.parameters().iter();
     parameters
@@ -270,14 +282,14 @@ fn ranges(effect: &dyn Effect, plant: &Plant, site: &str, shown: &Trajectory) ->
         .collect()
 }
 
-/// All combinations of the parameters' start values.
+/// Returns all combinations of the parameters' starting values.
 fn starts(effect: &dyn Effect, plant: &Plant, site: &str, shown: &Trajectory) -> Vec<Vec<f64>> {
     let mut all: Vec<Vec<f64>> = vec![Vec::new()];
     let parameters = effect.parameters();
     let axis = parameters
         .iter()
         .position(|p| matches!(p.start, Start::Choice(_)));
-    // Choices first: places are measured along the axis chosen.
+    // Choices come first: places are measured along the chosen axis.
     let mut order: Vec<usize> = (0..parameters.len()).collect();
     order.sort_by_key(|&i| !matches!(parameters[i].start, Start::Choice(_)));
     for start in &mut all {
@@ -313,7 +325,7 @@ fn starts(effect: &dyn Effect, plant: &Plant, site: &str, shown: &Trajectory) ->
     all
 }
 
-/// The first start with one parameter at each of the values at which it is large.
+/// Returns the first starting point with one parameter at each of the values at which it is large.
 fn large(
     effect: &dyn Effect,
     plant: &Plant,
@@ -341,7 +353,7 @@ fn large(
     all
 }
 
-/// Multiples of what the logs show of something at a site.
+/// Returns multiples of a quantity that the logs show at a site.
 fn multiples(
     plant: &Plant,
     site: &str,
@@ -352,7 +364,7 @@ fn multiples(
     multiples.iter().map(|x| x * unit).collect()
 }
 
-/// What the logs show of a site, in the unit of the reference.
+/// Returns the quantity that the logs show at a site, in the unit of the reference.
 fn measure(plant: &Plant, site: &str, reference: Reference, shown: &Trajectory) -> f64 {
     let layout = &plant.layout;
     let actuator = layout.actuators.iter().position(|a| a.name == site);

@@ -1,8 +1,10 @@
-//! How far a verdict is to be trusted: probabilities that hold on worlds whose cause is known.
+//! How far a verdict can be trusted: probabilities calibrated on worlds whose cause is known.
 //!
-//! Evidence compares explanations under one noise model, and no machine has just that noise: differences of hundreds mean less
-//! than they say. What a verdict's probability is was counted instead, on training worlds: a logistic regression of whether what is named is
-//! among the true causes. It says by how much a verdict is less sure where a search was cut short, and where a gap is left beside what is named.
+//! Evidence compares explanations under one noise model, and no machine has exactly that noise.
+//! Differences of hundreds mean less than they say. The probability of a verdict therefore comes
+//! from a logistic regression on training worlds: whether what was named is among the true causes.
+//! It lowers the probability where a search was cut short, and where a gap is left beside what is
+//! named.
 
 mod refit;
 
@@ -10,31 +12,41 @@ use crate::judgement::{Claim, Hypothesis, Judgement};
 
 pub use refit::{Refitted, refit};
 
-/// What a verdict's probability goes with. The first five are the most probable given the 72 named verdicts of 140 training worlds of all kinds, 50 of them
-/// right (seeds 1129501, 1129701 and 1131001; docs/diagnosis-method.md), upon the numbers that 127 others gave ([`refit`]); left out one by one, they have a
-/// mean log score of -0.36, the numbers before -0.38, a constant -0.62.
+/// Coefficients of the probability of a verdict.
+///
+/// The first five are the posterior mode given the 72 named verdicts of 140 training worlds of all
+/// kinds, 50 of them right (seeds 1129501, 1129701 and 1131001; docs/diagnosis-method.md). The
+/// prior is the fit to 127 earlier verdicts ([`refit`]). Leave-one-out, they have a mean log score
+/// of -0.36; the earlier coefficients have -0.38, a constant has -0.62.
 #[derive(Clone, Debug)]
 pub struct Confidence {
     /// Log odds of a verdict that is as probable as its rivals and closes nothing.
     pub named: f64,
-    /// By how much the log odds of the verdict among the hypotheses count.
+    /// Weight of the log odds of the verdict among the hypotheses.
     pub evidence: f64,
-    /// Log odds that it loses where the search was cut short.
+    /// Log odds lost where the search was cut short.
     pub stopped: f64,
-    /// Log odds that it loses by the logarithm of the share of the gap that it leaves.
+    /// Log odds lost per unit of the logarithm of the share of the gap that is left.
     pub gap_left: f64,
-    /// Log odds that it loses by each law that it names beside the first: all of them have to be true.
+    /// Log odds lost per law named beside the first: all of them have to be true.
     pub more_laws: f64,
-    /// Most that `none` may be where small things of everything make up for a gap: six of eight such answers were right in training worlds of all
-    /// kinds (seeds 9101 and 9808), and a cause that stands out by less than tolerances was behind the others.
+    /// Largest probability of `none` where tolerances make up for a gap.
+    ///
+    /// Six of eight such answers were right in training worlds of all kinds (seeds 9101 and 9808).
+    /// In the others, the cause stood out by less than tolerances do.
     pub ordinary: f64,
-    /// Most that `unknown` may be: of 16 training worlds in which nothing was named although a gap was there, 8 had a cause that
-    /// the catalogue has not.
+    /// Largest probability of `unknown`.
+    ///
+    /// Of 16 training worlds in which nothing was named although there was a gap, 8 had a cause
+    /// that the catalogue lacks.
     pub unknown: f64,
-    /// Share of what the verdict leaves that goes to `unknown`: a cause of no catalogue was behind 3 of 17 wrong names.
+    /// Share of the probability left by the verdict that goes to `unknown`: a cause outside the
+    /// catalogue was behind 3 of 17 wrong names.
     pub beside: f64,
-    /// Deviation of the logarithm of a fitted evidence about the screened one, by which sets that were screened only
-    /// have their share: half as much again, or less, is usual.
+    /// Standard deviation of the logarithm of the ratio of fitted to screened evidence.
+    ///
+    /// It gives sets that were only screened their share. The two usually differ by a factor of 1.5
+    /// or less.
     pub screening: f64,
 }
 
@@ -57,35 +69,39 @@ impl Default for Confidence {
 /// What is known of a verdict beside its evidence.
 #[derive(Clone, Copy, Debug)]
 pub struct Shown {
-    /// Share of the power of the gap, of the logs held out and without the engine's own error, that its replays leave.
+    /// Share of the power of the gap that the verdict's replays leave, on held-out logs and without
+    /// the engine's own error.
     pub left: f64,
     /// Whether the search was cut short.
     pub stopped: bool,
-    /// Laws that it names, each at one site or at several.
+    /// Number of laws that it names, each at one site or at several.
     pub laws: usize,
-    /// Whether it names none because tolerances make up for a gap.
+    /// Whether it names no effect because tolerances make up for a gap.
     pub within_tolerances: bool,
 }
 
-/// Probabilities beyond which evidence says no more.
+/// Probabilities beyond which evidence carries no more information.
 const CLIP: [f64; 2] = [0.02, 0.98];
-/// Most that `unknown` may be beside one law that a search names which came to its end, relative to it: of 15 such names that left a gap, of the
-/// training worlds above, 12 were right.
+/// Largest probability of `unknown` relative to that of the verdict, beside one law named by a
+/// complete search.
+///
+/// Of 15 such names that left a gap, of the training worlds above, 12 were right.
 const LESS: f64 = 0.9;
-/// Share of a gap's power below which what is left tells no more: that of the noise beside a gap of thirty.
+/// Share of a gap's power below which the remainder carries no information: that of the noise
+/// beside a gap of thirty.
 const CLOSED: f64 = 1e-3;
-/// Most sets that were screened only and are listed.
+/// Maximum number of listed sets that were only screened.
 const LISTED: usize = 8;
 
 /// A set that was screened and not fitted.
 pub struct Untried {
-    /// Its effects, sorted.
+    /// Labels of its effects, sorted.
     pub labels: Vec<String>,
-    /// Its weight, relative to the best set.
+    /// Weight relative to the best set.
     pub weight: f64,
 }
 
-/// The logistic function: from log odds to a probability.
+/// Logistic function: converts log odds to a probability.
 pub(crate) fn sigmoid(x: f64) -> f64 {
     1.0 / (1.0 + (-x).exp())
 }
@@ -105,7 +121,8 @@ fn normal(x: f64) -> f64 {
     if x > 0.0 { 1.0 - upper } else { upper }
 }
 
-/// What is claimed by a verdict of which, and of what the logs do not tell from it, evidence says the probability `raw`.
+/// Returns the claim of a verdict whose probability by evidence alone is `raw`, together with the
+/// sets that the logs do not distinguish from it.
 fn claim(raw: f64, shown: Shown) -> Claim {
     let p = raw.clamp(CLIP[0], CLIP[1]);
     Claim {
@@ -117,7 +134,10 @@ fn claim(raw: f64, shown: Shown) -> Claim {
 }
 
 impl Confidence {
-    /// Log odds that a claim holds: that all effects of a verdict, or of a set that the logs do not tell from it, are among the true ones.
+    /// Returns the log odds that a claim holds.
+    ///
+    /// It holds if all effects of the verdict, or of a set that the logs do not distinguish from
+    /// it, are among the true ones.
     #[must_use]
     pub fn log_odds(&self, claim: &Claim) -> f64 {
         self.named + self.evidence * claim.odds
@@ -126,15 +146,20 @@ impl Confidence {
             - self.more_laws * claim.more
     }
 
-    /// Probability that a set would pass the best one if it were fitted, of which a screening has the evidence `relative` to that of the best.
+    /// Returns the probability that a set would exceed the best one if it were fitted; `relative`
+    /// is its screened evidence over that of the best.
     #[must_use]
     pub fn passes(&self, relative: f64) -> f64 {
         normal(relative.max(f64::MIN_POSITIVE).ln() / self.screening)
     }
 
-    /// Probabilities of a verdict with what the logs do not tell from it, of all its rivals, and of `unknown`. `p` is the calibrated probability of
-    /// the first, `rivals` what the likelihoods of the others, relative to its own, come to. What neither takes is `unknown`. It stays `less`
-    /// probable than one law that a whole search names; a search that was cut short names what closes most, and is mostly wrong.
+    /// Returns the probabilities of the verdict with the sets that the logs do not distinguish from
+    /// it, of all its rivals, and of `unknown`.
+    ///
+    /// `p` is the calibrated probability of the first, `rivals` the sum of the likelihoods of the
+    /// others, relative to its own. `unknown` gets what neither takes. If `less` is true (one law,
+    /// named by a complete search), it stays below the verdict's probability. A search that was cut
+    /// short names what closes most, and is mostly wrong.
     fn shares(&self, (p, less): (f64, bool), rivals: f64) -> [f64; 3] {
         let rest = 1.0 - p;
         let most = (1.0 - self.beside) * rest;
@@ -147,7 +172,8 @@ impl Confidence {
         [p / sum, rivals / sum, unknown / sum]
     }
 
-    /// Gives the hypotheses of a judgement the probabilities that hold; the verdict stays what it is.
+    /// Gives the hypotheses of a judgement their calibrated probabilities; the verdict does not
+    /// change.
     pub fn settle(&self, judgement: &mut Judgement, shown: Shown, untried: &[Untried]) {
         let best = judgement.best_explanation().clone();
         let is_none = best.labels.is_empty() && !judgement.is_unknown;
@@ -159,7 +185,9 @@ impl Confidence {
             true => h.labels.is_empty(),
             false => best.labels.iter().all(|l| h.labels.contains(l)),
         };
-        // Of what is given to hypotheses: those that hold the verdict's effects, the others, and those that were not fitted.
+        // Relative weights of three groups of hypotheses: those that contain the verdict's effects,
+        // those that the logs do not distinguish from it, and the others, with those that were not
+        // fitted.
         let weight =
             |h: &Hypothesis| (h.probability / best.probability.max(f64::MIN_POSITIVE)).min(1.0);
         let listed = untried.iter().take(LISTED);
@@ -181,11 +209,12 @@ impl Confidence {
             weights([false, true]),
             weights([false, false]),
         );
-        // Which of sets that the logs do not tell apart is right is another question than whether one of them is.
+        // Whether one of the sets that the logs do not distinguish is right is another question
+        // than which of them is.
         let of_alike = all().filter(|&(h, alike)| *alike && !holds(h));
         let of_alike: f64 = of_alike.map(|(h, _)| h.probability).sum();
         let marginal = judgement.marginal(&best.labels) + of_alike;
-        // What is left of the gap counts by itself.
+        // The remaining gap enters by itself, in `Shown::left`.
         let raw = marginal / (1.0 - judgement.unknown).max(f64::MIN_POSITIVE);
         let first = with + alike;
         let [p, rivals, unknown] = if is_named || is_none {
@@ -280,7 +309,8 @@ mod tests {
         assert!(stated(0.0, false) > 0.8);
         assert!(stated(0.3, false) < stated(0.01, false));
         assert!(stated(0.0, true) < stated(0.0, false));
-        // Where no rival is near, `unknown` takes the rest, and may be more probable than the verdict.
+        // Where no rival is near, `unknown` takes the rest, and may be more probable than the
+        // verdict.
         let mut j = judgement(sets, 1, 0.001);
         Confidence::default().settle(&mut j, shown(0.3, true), &[]);
         assert!(j.unknown > 0.5 && !j.is_unknown, "{}", j.unknown);
@@ -314,7 +344,7 @@ mod tests {
         confidence.settle(&mut j, shown(0.3, true), &untried);
         assert!((sum(&j) - 1.0).abs() < 1e-12);
         let p = |label: &str| j.marginal(&[label.to_owned()]);
-        // Of the verdict's own, as likely as they would pass it.
+        // Their share of the verdict's probability is the probability that they would exceed it.
         let [b, c] = ["b", "c"].map(|label| p(label) / p("a"));
         assert!(b > 0.3 && c < 0.03, "{b} {c}");
     }
@@ -324,7 +354,7 @@ mod tests {
         let mut j = judgement(&[(&[], 0.97), (&["a"], 0.01)], 0, 0.02);
         Confidence::default().settle(&mut j, shown(0.0, false), &[]);
         assert_eq!(j.best_explanation().probability, 0.97);
-        // Small things of everything may hide one that is larger.
+        // Tolerances may hide a cause that is larger.
         let mut j = judgement(&[(&[], 0.97), (&["a"], 0.01)], 0, 0.02);
         let within_tolerances = Shown {
             within_tolerances: true,

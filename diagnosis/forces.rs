@@ -1,9 +1,9 @@
 //! The force that a model lacks at each joint, measured over short windows of the logs.
 //!
-//! Over a long replay an error at one joint moves all others. Over a window, whose start is
-//! fitted, a force that the model lacks shows at its own joint: the constant force on every
-//! joint that explains most of what the window leaves is a linear fit, for which a
-//! replay a joint tells all slopes at once.
+//! Over a long replay an error at one joint moves all others. Over a window with a fitted initial
+//! state, a missing force shows at its own joint. The constant forces on all joints that explain
+//! most of a window's residuals are a linear fit: one replay per joint gives the derivatives for
+//! all windows.
 
 mod linear;
 
@@ -24,36 +24,39 @@ use linear::Linear;
 /// The effect whose parameter is a constant force on a joint.
 const EFFECT: &str = asid_effects::catalogue::joint_friction::COULOMB;
 
-/// What one model lacks at a joint in some of the windows.
+/// What a model lacks at one joint over some of the windows.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Missing {
-    /// Joint.
+    /// Name of the joint.
     pub joint: String,
     /// Unit of the force.
     pub unit: &'static str,
     /// Whether the machine touches something in these windows.
     pub touching: bool,
-    /// How many they are.
+    /// Number of these windows.
     pub windows: usize,
-    /// Root mean square over them, off what the noise alone makes.
+    /// Root mean square force over them, less what the noise alone contributes.
     pub force: f64,
-    /// Median of what acts against the motion, weighted by how well a window tells it, with its
-    /// standard error: a window in which the machine meets something that the model does not is no
-    /// measure of it.
+    /// Median force against the motion, weighted by how precisely a window determines it, and its
+    /// standard error.
+    ///
+    /// The median ignores windows in which the machine meets something that the model does not.
     pub against: [f64; 2],
 }
 
-/// What short replays of one model leave.
+/// What short replays of one model leave unexplained.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Short {
-    /// Root mean square of the residuals of a window in units of the noise, the median of those in
-    /// which the machine touches nothing, and of those in which it does; `None` where there are none.
+    /// Median over the windows of the root mean square residual, in units of the noise.
+    ///
+    /// The first is of windows without contact, the second of windows with contact; `None` where
+    /// there are none.
     pub gaps: [Option<f64>; 2],
-    /// What it lacks at each hinge and slide.
+    /// What the model lacks at each hinge and slide.
     pub joints: Vec<Missing>,
 }
 
-/// The constant force at one joint.
+/// Makes the candidate of a constant force at one joint.
 fn candidate(joint: &str) -> Result<Candidate> {
     let effect = (find::<EffectEntry>(EFFECT)?.make)();
     let spec = EffectSpec {
@@ -73,8 +76,8 @@ fn candidate(joint: &str) -> Result<Candidate> {
     })
 }
 
-/// What a model leaves of windows, and lacks at each hinge and slide; `theta` are the study's
-/// parameters.
+/// Returns the residuals of a model over windows and the forces that it lacks at each hinge and
+/// slide; `theta` are the study's parameters.
 ///
 /// # Errors
 /// When a rollout fails.
@@ -138,12 +141,12 @@ pub fn missing(
     })
 }
 
-/// What windows add up to.
+/// Sums over windows.
 #[derive(Clone, Debug, Default)]
 struct Sum {
-    /// Squared forces, off their variance.
+    /// Sum of the squared forces less their variances.
     excess: f64,
-    /// Forces against the motion, with their deviations.
+    /// Forces against the motion, with their standard deviations.
     against: Vec<(f64, f64)>,
 }
 
@@ -154,8 +157,10 @@ impl Sum {
             .push((-force * motion.signum(), variance.sqrt()));
     }
 
-    /// Weighted median against the motion, with its standard error: a window weighs by how well it
-    /// tells a force, and the deviations are right up to a factor that the windows themselves tell.
+    /// Returns the weighted median against the motion, with its standard error.
+    ///
+    /// The weight of a window is the inverse of its standard deviation. The windows themselves
+    /// determine a common factor of these standard deviations.
     fn against(&self) -> [f64; 2] {
         let least = f64::MIN_POSITIVE;
         let mut sorted: Vec<(f64, f64)> = self.against.clone();
@@ -171,7 +176,7 @@ impl Sum {
             .iter()
             .map(|(x, s)| (x - middle).abs() / s.max(least));
         let factor = NORMAL * median(&mut off.collect::<Vec<f64>>()).unwrap_or(0.0);
-        // A median is this much less certain than a mean.
+        // Ratio of the standard error of a median to that of a mean.
         let loss = std::f64::consts::FRAC_PI_2.sqrt();
         let n = sorted.len().max(1) as f64;
         [middle, loss * factor * n.sqrt() / weight.max(least)]
@@ -184,7 +189,7 @@ mod tests {
 
     #[test]
     fn what_acts_against_the_motion_is_told_from_what_does_not_and_from_a_blow() {
-        // 0.2 against the motion beside a constant 0.01, in as many windows this way as that.
+        // 0.2 against the motion beside a constant 0.01, in as many windows of each direction.
         let mut sum = Sum::default();
         for k in 0..100 {
             let motion = if k % 2 == 0 { 1.0 + f64::from(k) } else { -3.0 };

@@ -1,4 +1,4 @@
-//! A study: a model, logs of the real machine, and what the user fits already.
+//! A study: a model, logs of the real machine, and the parameters that the user already fits.
 
 mod document;
 mod files;
@@ -14,44 +14,48 @@ use asid_effects::refined_model::RefinedModel;
 use asid_logs::episode::{ColumnMapping, LogNotes};
 use asid_mjcf::Plant;
 
-/// What counts as noise of a task's own sensors, rad or m: the repeatability of the arm, 0.1 mm
-/// (Franka Emika's data sheet). Simulated they have none, and a push that differs by the width of an atom
-/// would be a gap.
+/// Standard deviation of the noise of a task's own sensors, rad or m: the arm's repeatability, 0.1
+/// mm (Franka Emika's data sheet).
+///
+/// In simulation they have no noise, and a push that differs by the width of an atom would be a
+/// gap.
 const PROPRIOCEPTION: f64 = 1e-4;
 
 /// A study, read and checked.
 #[derive(Clone, Debug)]
 pub struct Study {
-    /// Name: that of its folder or file.
+    /// Name of the study: that of its folder or file.
     pub name: String,
-    /// Model file as the study names it, made absolute by the study's folder.
+    /// Path of the model file; a relative path in the study file is joined to the study's folder.
     pub model: PathBuf,
-    /// The document.
+    /// The scene of the model.
     pub scene: Scene,
     /// Values that a refined model sets.
     pub fixed: Vec<(Target, f64)>,
-    /// Effects that a refined model has.
+    /// Effects that a refined model contains.
     pub effects: Vec<EffectSpec>,
-    /// What the user fits already.
+    /// Parameters that the user already fits.
     pub parameters: Vec<Parameter>,
-    /// Logs to fit to, by file name.
+    /// Training logs, by file name.
     pub train: Vec<(String, Episode)>,
-    /// Logs held out.
+    /// Held-out logs, by file name.
     pub test: Vec<(String, Episode)>,
-    /// Noise by sensor, where it is given.
+    /// Standard deviation of the noise by sensor, where it is given.
     pub noise: BTreeMap<String, f64>,
-    /// What the columns of the logs mean, where they do not mean what their names say.
+    /// Meaning of the logs' columns where it differs from what their names say.
     pub columns: Vec<ColumnMapping>,
-    /// What was passed over or mended as logs were read: file and notes.
+    /// What was skipped or repaired as the logs were read: file and notes.
     pub notes: Vec<(String, LogNotes)>,
-    /// Whether the columns are known to mean what their names say: logs of a task's own runs.
+    /// Whether the columns are known to mean what their names say, as in logs of a task's own runs.
     pub wired: bool,
 }
 
 impl Study {
-    /// A built-in task as a study: its unknowns and the noise of its trackers, in a model: its
-    /// scene, or one that fits the task. The machine begins where the model's first keyframe has
-    /// it; where the object begins is estimated.
+    /// Makes a study of a built-in task: its unknowns and the noise of its trackers, in the task's
+    /// scene or in a model that fits the task.
+    ///
+    /// The machine begins at the model's first keyframe. The initial pose of the object is
+    /// estimated.
     ///
     /// # Errors
     /// When a log is wrong, or there is none to hold out.
@@ -96,8 +100,10 @@ impl Study {
         .with_test()
     }
 
-    /// A further mapping, of logs as this study reads them, as one of the files themselves: what replaces the study's own of
-    /// that name.
+    /// Composes a further mapping, of logs as this study reads them, with the study's own of that
+    /// name.
+    ///
+    /// The result maps the files themselves and replaces the study's own mapping.
     #[must_use]
     pub fn composed(&self, further: &ColumnMapping) -> ColumnMapping {
         let source = further.from.as_deref().unwrap_or(&further.name);
@@ -114,7 +120,7 @@ impl Study {
                 whole.unit.clone_from(unit);
                 whole.scale = own.scale * further.scale;
             }
-            // Two units make a factor.
+            // Two units combine into a factor.
             _ => {
                 whole.unit = None;
                 whole.scale = (own.factor() * further.factor()).abs();
@@ -123,7 +129,7 @@ impl Study {
         whole.in_one_unit()
     }
 
-    /// Holds out whole episodes where the study names no test logs: a third of them, the last.
+    /// Holds out the last third of the episodes if the study names no test logs.
     ///
     /// # Errors
     /// When there is a single log and none to hold out.
@@ -146,8 +152,10 @@ impl Study {
     }
 }
 
-/// The scene's first keyframe, with what a start pose of the object changes left open: of a
-/// puck on a board the place on it and the turn about its normal, not its height.
+/// Returns the scene's first keyframe with NaN where the object's initial pose is unknown.
+///
+/// For a puck on a board these are its place on the board and its rotation about the normal, not
+/// its height.
 fn task_start(task: &dyn Task, layout: &Layout) -> Result<InitialState> {
     let (home, qvel) = home(layout);
     let coordinates = &task.exploration().start;

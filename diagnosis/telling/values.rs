@@ -1,14 +1,22 @@
 //! Fitted values with their intervals.
 //!
-//! Intervals are those of least squares (Gauss), widened by how much more the fit leaves than the noise and by how alike
-//! neighbouring residuals are: many readings of one and the same error count once. Where the missing force was estimated they
-//! are no narrower than those of the fit that allows for it: what the model lacks leaves values as uncertain as it does there. Nor are
-//! they narrower than the episodes disagree: what the model lacks often pulls one of them up and another one down.
+//! Intervals are those of least squares (Gauss), widened for two reasons: the fit leaves more than
+//! the noise, and neighbouring residuals are correlated, so that many readings of one error count
+//! once. Where the missing force was estimated, intervals are no narrower than those of the fit
+//! that allows for it: the values are as uncertain as what the model lacks makes them there. Nor
+//! are they narrower than the disagreement between episodes: what the model lacks often raises a
+//! value in one episode and lowers it in another.
 //!
-//! Two errors that no spread of residuals shows are added as squares. A model that is wrong makes fits that weigh the logs otherwise
-//! disagree (Hausman 1978): the distance of the value from the mean of the fit that allows for a missing force. And the engine's own
-//! error: what the value would be at a time step of none, by how far half the step moves it (Richardson 1911). A parameter of the study
-//! at an end of its range is as uncertain as the range is wide.
+//! Two errors that no scatter of residuals shows are added as squares:
+//!
+//! - A wrong model makes fits that weight the logs differently disagree (Hausman 1978). This error
+//!   is the distance of the value from the posterior mean of the fit that allows for a missing
+//!   force.
+//! - The engine's own error, extrapolated to a time step of zero from the change at half the step
+//!   (Richardson 1911).
+//!
+//! A parameter of the study at an end of its range has at least the standard deviation of a uniform
+//! distribution over that range.
 
 use std::collections::BTreeMap;
 
@@ -20,14 +28,16 @@ use crate::checks::{RICHARDSON, change_by_step};
 use crate::linearise::NOTHING;
 use crate::result::ParameterResult;
 
-/// Deviations of a normal distribution that hold 95 %, to either side.
+/// Standard deviations of a normal distribution to either side of the mean that contain 95 %.
 const DEVIATIONS: f64 = 1.959_964;
-/// Largest correlation that is believed: beyond it a log is one reading.
+/// Largest correlation that is used: beyond it a log would count as a single reading.
 const MOST_CORRELATED: f64 = 0.98;
-/// Share of its range up to which a value is at the end of it: what a fit stops at.
+/// Share of its range within which a value counts as at the end of it: the precision at which a fit
+/// stops.
 const AT_END: f64 = 1e-6;
 
-/// Correlation of neighbouring residuals, averaged over entries and episodes by their size.
+/// Returns the correlation of neighbouring residuals, averaged over entries and episodes with their
+/// squares as weights.
 fn correlation(bench: &Bench, residuals: &[f64]) -> f64 {
     let logs = &bench.train.logs;
     let n = logs.entries.len();
@@ -46,16 +56,20 @@ fn correlation(bench: &Bench, residuals: &[f64]) -> f64 {
     }
 }
 
-/// What the spread of residuals does not tell of the uncertainty of an explanation's values.
+/// Contributions to the uncertainty of an explanation's values that the scatter of residuals does
+/// not show.
 struct Beyond<'m> {
-    /// How far the engine's own error moves each fitted value, in its unit; empty for nothing.
+    /// Change of each fitted value by the engine's own error, in its unit; empty if unknown.
     moved: &'m [f64],
-    /// Variance of each by how the episodes disagree.
+    /// Variance of each fitted value by the disagreement between episodes.
     by_episodes: Vec<f64>,
 }
 
-/// Variance of sums, of which each episode has given its part, one row an episode: of parts that are independent from one episode to
-/// the next it is their variance times their number (Liang and Zeger 1986, with episodes as clusters). 0 of a single episode.
+/// Returns the variance of sums of per-episode contributions, one row of `parts` per episode; 0 for
+/// a single episode.
+///
+/// For contributions that are independent between episodes it is their sample variance times their
+/// number (Liang and Zeger 1986, with episodes as clusters).
 fn between_episodes(parts: &[Vec<f64>], values: usize) -> Vec<f64> {
     let n = parts.len() as f64;
     let of_value = |k: usize| {
@@ -73,7 +87,7 @@ fn between_episodes(parts: &[Vec<f64>], values: usize) -> Vec<f64> {
 /// A value with its uncertainty.
 struct Fitted {
     value: f64,
-    /// Infinite where it does not show in the readings.
+    /// Standard deviation; infinite where the value does not show in the readings.
     deviation: f64,
     interval95: [f64; 2],
     /// Whether it is at an end of its range.
@@ -81,14 +95,16 @@ struct Fitted {
 }
 
 impl Telling<'_> {
-    /// By how much the variance of fitted values exceeds that of independent residuals of the noise's size.
+    /// Returns the ratio of the variance of fitted values to that for independent residuals of the
+    /// noise's size.
     pub(super) fn inflation(&self, of: &Explanation) -> f64 {
         let readings = self.bench.train.readings.max(1) as f64;
         let rho = correlation(self.bench, &of.fit.residuals);
         (of.fit.cost / readings).max(1.0) * (1.0 + rho) / (1.0 - rho)
     }
 
-    /// How far the engine's own error moves each fitted value of an explanation, in its unit; 0 where that cannot be told.
+    /// Returns how far the engine's own error moves each fitted value of an explanation, in its
+    /// unit; 0 where that cannot be computed.
     pub(super) fn moved_by_step(&self, of: &Explanation) -> Result<Vec<f64>> {
         let none = vec![0.0; of.fit.free.len()];
         let scatters = self.findings.repeats.is_some_and(|r| r.scatters);
@@ -103,7 +119,8 @@ impl Telling<'_> {
         Ok(moved.iter().map(|m| RICHARDSON * m).collect())
     }
 
-    /// What moves the values of an explanation, and how its episodes disagree about them.
+    /// Collects what else makes the values of an explanation uncertain: the engine's own error and
+    /// the disagreement between episodes.
     fn beyond<'m>(&self, of: &Explanation, moved: &'m [f64]) -> Beyond<'m> {
         let (logs, residuals) = (&self.bench.train.logs, &of.fit.residuals);
         let mut own = vec![0.0; residuals.len()];
@@ -121,7 +138,7 @@ impl Telling<'_> {
         }
     }
 
-    /// The value of an unknown of an explanation; `None` where it was not fitted.
+    /// Returns the value of an unknown of an explanation; `None` where it was not fitted.
     fn fitted(&self, (of, beyond): (&Explanation, &Beyond<'_>), unknown: usize) -> Option<Fitted> {
         let fit = &of.fit;
         let k = fit.free.iter().position(|&f| f == unknown)?;
@@ -141,7 +158,8 @@ impl Telling<'_> {
         };
         let end = AT_END * (high - low);
         let at_bound = value - low < end || high - value < end;
-        // The logs ask for a parameter of the study beyond its range: within it nothing tells where it is.
+        // The logs ask for a value of the study's parameter beyond its range. Within the range
+        // nothing determines it.
         let is_of_study = unknown < self.bench.parameters.len();
         let least = if at_bound && is_of_study {
             (high - low) / 12.0_f64.sqrt()
@@ -160,8 +178,10 @@ impl Telling<'_> {
         })
     }
 
-    /// Intervals of the fitted values of each effect of an explanation, and whether one is at an end of its range that does not
-    /// mean that the effect is absent. `moved` is how far the engine's own error moves each fitted value, empty for nothing.
+    /// Returns the intervals of the fitted values of each effect, and whether one is at an end of
+    /// its range other than its null.
+    ///
+    /// `moved` is how far the engine's own error moves each fitted value; empty if unknown.
     pub(super) fn intervals(
         &self,
         of: &Explanation,
@@ -188,7 +208,7 @@ impl Telling<'_> {
         each.collect()
     }
 
-    /// The study's parameters.
+    /// Returns the study's parameters with their estimates and intervals.
     pub(super) fn parameters(&self, of: &Explanation, moved: &[f64]) -> Vec<ParameterResult> {
         let beyond = self.beyond(of, moved);
         let all = self.bench.parameters.iter().enumerate();
@@ -214,7 +234,8 @@ mod tests {
 
     #[test]
     fn a_mean_has_the_variance_of_its_sample_over_the_number_of_episodes() {
-        // Least squares of one value, read once an episode: each episode moves it by a quarter of its residual.
+        // Least squares of one value, read once per episode: each episode moves it by a quarter of
+        // its residual.
         let readings = [1.0, 3.0, 2.0, 6.0];
         let mean = 3.0;
         let parts: Vec<Vec<f64>> = readings.iter().map(|x| vec![(x - mean) / 4.0]).collect();
