@@ -1,4 +1,4 @@
-//! What is being explained: logs as walks, and a first estimate of the model along them.
+//! The data of a diagnosis: logs as walks, and a first estimate of the model along them.
 
 use asid_core::layout::{JointKind, Layout};
 use asid_core::{Parameter, Result};
@@ -18,59 +18,69 @@ use super::step_error::StepError;
 use super::step_map::{Derivatives, StepMap};
 use super::walk::Walk;
 
-/// Change of a segment's start that slopes are taken over, as a share of what its readings leave open.
+/// Finite-difference step of a segment's initial state, as a share of what its readings leave open.
+///
+/// It is small against the prior, yet large enough to average over contact points that come and go.
 const START_SHARE: f64 = 0.02;
-/// Correlation over a row that the search begins with.
+/// Correlation of the missing force from row to row with which the search begins.
 const FIRST_CORRELATION: f64 = 0.9;
-/// Deviation of the white part of a missing force that the search begins with, relative to the whole.
+/// Standard deviation of the white part with which the search begins, relative to the whole force.
 const FIRST_WHITE: f64 = 0.1;
-/// Force that slopes are taken over, N or N m: an inertia of 1e-5 to 1e3 moves by what doubles resolve.
+/// Finite-difference step of a force, N or N m: doubles resolve the motion of inertias from 1e-5 to
+/// 1e3.
 pub(super) const PUSH: f64 = 1e-4;
 
-/// What is being explained: logs of a machine, walked row by row.
+/// The data of a diagnosis: logs of a machine, walked row by row.
 pub struct Context<'a> {
     /// The machine.
     pub machine: &'a Machine,
     /// The logs.
     pub logs: &'a Logs,
-    /// Their rows.
+    /// The rows of the logs.
     pub walks: Vec<Walk>,
-    /// The starts that logs give, one a walk; `None` where a walk begins within a log.
+    /// Initial states that logs give, one a walk; `None` where a walk begins within a log.
     pub given: Vec<Option<State>>,
-    /// Where segments begin by their readings, `nq + nv`, one a walk, in the model without further effects.
+    /// Initial states of the walks by their readings, `nq + nv`, in the model without further
+    /// effects.
     pub read: Vec<Vec<f64>>,
-    /// What that model reads there, in the order of the logs' channels.
+    /// Readings of that model there, in the order of the logs' channels.
     pub as_read: Vec<Vec<f64>>,
-    /// Coordinates of the starts that logs leave open.
+    /// Tangent coordinates of the initial states that logs leave open.
     pub open: Vec<usize>,
     /// Largest magnitude of each tangent coordinate.
     pub scale: Vec<f64>,
-    /// Deviation of the reading of each position that a sensor reads directly, else 0; `nv`.
+    /// Standard deviation of the reading of each position that a sensor reads directly, else 0;
+    /// `nv`.
     pub position_noise: Vec<f64>,
-    /// Variance of each entry of a reading, as given or first estimated, times how many readings in a row its noise is alike in.
+    /// Variance of each entry of a reading, as given or first estimated, times its entry in
+    /// `alike`.
     pub reading_variance: Vec<f64>,
-    /// How many readings in a row the noise of each entry is alike in: noise that is slow tells as little of what is slow as white noise
-    /// of so many times its variance.
+    /// Number of successive readings over which the noise of each entry counts as one error.
+    ///
+    /// For anything slow, correlated noise is as informative as white noise of that many times its
+    /// variance.
     pub alike: Vec<f64>,
     /// Typical inertial force at each degree of freedom, N or N m.
     pub inertial: Vec<f64>,
-    /// Degrees of freedom that nothing couples, in the model without further effects.
+    /// Sets of degrees of freedom that nothing couples, in the model without further effects.
     pub islands: Islands,
-    /// Whether one physics step of a row tells its slopes in the state, of the model without further effects.
+    /// Whether the state derivatives of one physics step represent the row, in the model without
+    /// further effects.
     pub one_step: bool,
-    /// The engine's own error over the rows; none until a first trajectory is there, and where the engine takes no other time step.
+    /// The engine's own error over the rows; empty before the first trajectory, and for an engine
+    /// that takes no other time step.
     pub step_error: StepError,
 }
 
-/// What the logs of a study are taken as.
+/// Rows, initial states and states that a context begins from.
 pub struct Taken {
     /// Rows.
     pub walks: Vec<Walk>,
-    /// The starts that logs give, one a walk; `None` where a walk begins within a log.
+    /// Initial states that logs give, one a walk; `None` where a walk begins within a log.
     pub given: Vec<Option<State>>,
-    /// Coordinates of the starts that logs leave open.
+    /// Tangent coordinates of the initial states that logs leave open.
     pub open: Vec<usize>,
-    /// States where no sensor reads them, `rows x (nq + nv)`, one a walk.
+    /// States for coordinates that no sensor reads, `rows x (nq + nv)`, one a walk.
     pub otherwise: Vec<Vec<f64>>,
     /// Largest magnitude of each tangent coordinate.
     pub scale: Vec<f64>,
@@ -91,7 +101,7 @@ impl Context<'_> {
         self.walks.iter().any(|w| w.segment.is_some())
     }
 
-    /// What is being explained along some of the walks alone.
+    /// Returns the context restricted to some of the walks.
     #[must_use]
     pub fn of_walks(&self, which: &[usize]) -> Context<'_> {
         Context {
@@ -113,7 +123,7 @@ impl Context<'_> {
         }
     }
 
-    /// A step map of the machine with more effects; `roles` as [`StepMap::new`].
+    /// Returns a step map of the machine with more effects; `roles` as in [`StepMap::new`].
     ///
     /// # Errors
     /// As [`StepMap::new`].
@@ -132,7 +142,7 @@ impl Context<'_> {
         Ok(map)
     }
 
-    /// Whether effects leave apart what nothing couples.
+    /// Whether no effect couples separate islands.
     fn within_islands(&self, specs: &[EffectSpec]) -> Result<bool> {
         for spec in specs {
             let reach = spec.find(self.plant())?.reach(self.plant(), &spec.site);
@@ -144,7 +154,8 @@ impl Context<'_> {
         Ok(true)
     }
 
-    /// The sensor of each entry of a reading, by index in the layout; beyond it where the layout lacks it.
+    /// The sensor of each entry of a reading, by index in the layout; the number of sensors if the
+    /// layout lacks it.
     #[must_use]
     pub fn entry_sensors(&self) -> Vec<usize> {
         let layout = &self.plant().layout.sensors;
@@ -154,8 +165,10 @@ impl Context<'_> {
         name.map(|n| place(n).unwrap_or(layout.len())).collect()
     }
 
-    /// Changes of the start of a segment that slopes are taken over: a part of what its first readings leave open, so that
-    /// points of contact that come and go even out.
+    /// Finite-difference steps of the initial state of a segment.
+    ///
+    /// Each is a share of what the first readings leave open, so that points of contact that come
+    /// and go average out.
     #[must_use]
     pub fn start_steps(&self) -> Vec<f64> {
         let scales = (&self.scale[..], &self.position_noise[..]);
@@ -163,7 +176,9 @@ impl Context<'_> {
         open.map(|d| START_SHARE * d).collect()
     }
 
-    /// Where the walks begin, about a trajectory; `read` is where segments begin by their readings.
+    /// Returns the priors of the walks' initial states, relative to a trajectory.
+    ///
+    /// `read` holds the initial states of segments by their readings.
     #[must_use]
     pub fn starts(&self, trajectory: &[Vec<f64>], read: &[Vec<f64>]) -> Vec<Start> {
         let width = self.plant().layout.nq + self.plant().layout.nv;
@@ -182,14 +197,15 @@ impl Context<'_> {
     }
 }
 
-/// Duration of a row, s, as a mean over all walks.
+/// Mean duration of a row over all walks, s.
 fn row_seconds(walks: &[Walk]) -> f64 {
     let seconds: f64 = walks.iter().map(|w| w.time[w.len() - 1]).sum();
     let rows: usize = walks.iter().map(|w| w.len() - 1).sum();
     seconds / rows.max(1) as f64
 }
 
-/// Raises the largest speeds that a unit of each force has made over a row to those of some more rows, `rows x nx x nv`.
+/// Raises the largest speeds per unit of each force over a row, `free`, to those of the rows in `b`
+/// (`rows x nx x nv`).
 pub(super) fn raise_free(free: &mut [f64], b: &[f64], rows: usize) {
     let nv = free.len();
     for k in 0..rows {
@@ -199,8 +215,10 @@ pub(super) fn raise_free(free: &mut [f64], b: &[f64], rows: usize) {
     }
 }
 
-/// Gives all directions of a free body the largest of its forces, and all its turns the largest of its torques: along the one
-/// that a contact blocks it hardly moves, and what acts along it is no smaller.
+/// Gives all directions of a free body its largest force, and all its rotations its largest torque.
+///
+/// A body hardly moves along the direction that a contact blocks, but the forces along it are no
+/// smaller.
 fn level_blocks(layout: &Layout, forces: &mut [f64]) {
     for joint in &layout.joints {
         let first = joint.qvel;
@@ -216,7 +234,10 @@ fn level_blocks(layout: &Layout, forces: &mut [f64]) {
     }
 }
 
-/// Typical inertial force at each degree of freedom along some states, N or N m: its inertia, by the speed that a force makes over a row (`b`) where no
+/// Typical inertial force at each degree of freedom along some states, N or N m.
+///
+/// It is the mean acceleration seen, times the inertia. The inertia follows from the speed that a
+/// force produces over a row (`b`); in segments, from the row where no contact takes the force up.
 /// contact takes it up, times the acceleration seen.
 fn inertial(context: &Context<'_>, trajectory: &[Vec<f64>], b: &[Vec<f64>]) -> Vec<f64> {
     let layout = &context.plant().layout;
@@ -247,7 +268,8 @@ fn inertial(context: &Context<'_>, trajectory: &[Vec<f64>], b: &[Vec<f64>]) -> V
     forces
 }
 
-/// A context for some walks, and a first estimate of the model at `theta`, not yet smoothed.
+/// Creates a context for some walks, and a first estimate of the model at `theta`, not yet
+/// smoothed.
 ///
 /// # Errors
 /// When the engine fails.

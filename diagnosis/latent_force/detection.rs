@@ -1,8 +1,10 @@
-//! The smallest size of each effect that the logs could have shown.
+//! The smallest size of each effect that the logs could have shown (detection limit).
 //!
-//! A column with the information `g` (its power in whitened innovations, what the present model can do projected out) adds
-//! the evidence `c^2 g / 2 - ln(1 + g) / 2` at a coefficient `c`, in deviations of its prior. The least `c` that reaches the evidence
-//! an effect must earn is the limit. It is that of the evidence alone: where replays must show the effect as well, it can be larger.
+//! Let `g` be the information of a column: its power in whitened innovations, the present model
+//! projected out. At a coefficient `c`, in prior standard deviations, it adds the evidence `c^2 g /
+//! 2 - ln(1 + g) / 2`. The limit is the smallest `c` that reaches the evidence that an effect must
+//! earn. It considers the evidence alone: where replays must confirm the effect, the limit can be
+//! larger.
 
 use asid_effects::Start;
 
@@ -12,27 +14,29 @@ use super::columns::{Columns, SECANT};
 use super::screen::project;
 use super::smoother::Regression;
 
-/// The value of a candidate's parameter from which on it is seen.
+/// The smallest detectable value of a candidate's parameter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limit {
     /// The candidate.
     pub candidate: usize,
     /// Its parameter.
     pub parameter: usize,
-    /// The value; NaN where none within its range is seen.
+    /// The value; NaN if no value within the range is detectable.
     pub value: f64,
-    /// Its column.
+    /// Index of its column.
     pub column: usize,
-    /// Coefficient of the column from which on it is seen, in deviations of its prior.
+    /// Smallest detectable coefficient of the column, in prior standard deviations.
     pub coefficient: f64,
 }
 
-/// Coefficient from which on a column of information `g` earns `threshold`.
+/// Smallest coefficient with which a column of information `g` earns `threshold`.
 fn coefficient(g: f64, threshold: f64) -> f64 {
     ((2.0 * threshold + g.ln_1p()) / g).sqrt()
 }
 
-/// Limits of all candidates that have columns, one for each parameter that is a slope, or the first of those that a secant
+/// Returns the detection limits of all candidates that have columns.
+///
+/// There is one for each parameter with a derivative, or for the first parameter that a secant
 /// moves.
 #[must_use]
 pub fn limits(
@@ -87,15 +91,19 @@ pub fn limits(
     all
 }
 
-/// Least part of a secant that tells of smaller values: a law that has no slope at null bends.
+/// Smallest part of a secant that represents smaller values: a law without a derivative at its null
+/// is nonlinear.
 const LEAST_PART: f64 = 0.3;
 
-/// The value from which on an effect is seen whose secant at `begin` is seen from the coefficient `c` on; NaN where that is beyond what the
-/// secant tells of.
+/// Smallest detectable value of an effect with a secant at `begin`, detectable from coefficient `c`
+/// on.
+///
+/// NaN if the value is beyond what the secant represents.
 fn by_secant(null: f64, begin: f64, c: f64) -> f64 {
     match c {
         c if c > SECANT => f64::NAN,
-        // Between a limit and none there is no proportion.
+        // A limit has a null other than zero (no limit), and its values do not scale with the
+        // coefficient.
         c if null != 0.0 => {
             if c <= 1.0 {
                 begin
@@ -107,7 +115,7 @@ fn by_secant(null: f64, begin: f64, c: f64) -> f64 {
     }
 }
 
-/// `null` and a distance from it, up where the range allows that, else down; NaN where neither.
+/// `null` plus a distance if the range allows that, else minus it; NaN if neither is in range.
 fn within([low, high]: [f64; 2], null: f64, distance: f64) -> f64 {
     if null + distance <= high {
         null + distance
@@ -136,7 +144,7 @@ mod tests {
         assert_eq!(by_secant(0.0, 0.02, 0.5), 0.01);
         assert_eq!(by_secant(0.0, 0.02, 1e-6), 0.006);
         assert!(by_secant(0.0, 0.02, 2.0).is_nan());
-        // A limit of 3 in place of 500 that is easily seen.
+        // A limit of 3 instead of 500 that is easily detected.
         assert_eq!(by_secant(500.0, 3.0, 0.1), 3.0);
     }
 

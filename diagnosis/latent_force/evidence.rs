@@ -1,25 +1,28 @@
 //! Laplace evidence of a linear regression with normal priors and bounds.
 //!
-//! With `X'X`, `X'y` of whitened innovations, coefficients in units of their prior deviations and a prior
-//! `N(0, 1)`, the logarithm of the marginal likelihood relative to that without the columns is
-//! `b'c - c'Ac/2 - ln det A / 2` at the best coefficients `c` within their bounds, `A = X'X + I` (MacKay 1992).
+//! `X'X` and `X'y` are those of whitened innovations. Coefficients are in prior standard
+//! deviations, with the prior `N(0, 1)`. The log marginal likelihood relative to the model without
+//! the columns is `b'c - c'Ac/2 - ln det A / 2` at the best coefficients `c` within their bounds,
+//! with `A = X'X + I` (MacKay 1992).
 
 use nalgebra::{DMatrix, DVector};
 
 /// Evidence, and the coefficients behind it.
 #[derive(Clone, Debug)]
 pub struct Evidence {
-    /// Logarithm of the marginal likelihood, natural, relative to none of the columns.
+    /// Log marginal likelihood, natural, relative to the model without the columns.
     pub gain: f64,
-    /// Coefficients in units of their prior deviations.
+    /// Coefficients in prior standard deviations.
     pub coefficients: Vec<f64>,
-    /// Posterior covariance of the coefficients, bounds aside.
+    /// Posterior covariance of the coefficients, without regard to bounds.
     pub covariance: DMatrix<f64>,
 }
 
-/// Evidence of the columns `which` of a regression. `gram` and `moment` are in units of the prior deviations;
-/// `center` is where the prior's mean lies from the present point, and `bounds` where the coefficients may
-/// go from it, all in deviations.
+/// Computes the evidence of the columns `which` of a regression.
+///
+/// `gram` and `moment` are in prior standard deviations. `center` is the prior's mean relative to
+/// the present point. `bounds` limit the coefficients relative to it. Both are in standard
+/// deviations.
 #[must_use]
 pub fn evidence(
     gram: &DMatrix<f64>,
@@ -50,13 +53,16 @@ pub fn evidence(
     }
 }
 
-/// Most sweeps of coordinate descent.
+/// Largest number of sweeps of coordinate descent.
 const SWEEPS: usize = 400;
-/// Largest move of a sweep at which it stands, in deviations of the prior.
+/// Coordinate descent has converged at this largest change of a sweep, in prior standard
+/// deviations.
 const STANDS: f64 = 1e-9;
 
-/// The `c` within bounds that maximises `b'c - c'Ac/2`: without bounds where that lies within them, else by
-/// coordinate descent, which finds the maximum of a concave function over a box.
+/// Returns the `c` within bounds that maximises `b'c - c'Ac/2`.
+///
+/// It is the unbounded maximum if that lies within the bounds. Else coordinate descent finds it, as
+/// it does for any concave function over a box.
 fn bounded(a: &DMatrix<f64>, b: &DVector<f64>, bounds: &[[f64; 2]]) -> DVector<f64> {
     let n = b.len();
     let free = a.clone().cholesky().map(|f| f.solve(b));
@@ -89,7 +95,8 @@ mod tests {
 
     #[test]
     fn of_one_column_is_the_ratio_of_two_normal_densities() {
-        // y = x c + noise of variance 1 with c ~ N(0, 1): y'y - y'(I + xx')^-1 y over 2, less ln(1 + x'x) / 2.
+        // y = x c + noise of variance 1 with c ~ N(0, 1): y'y - y'(I + xx')^-1 y over 2, less ln(1
+        // + x'x) / 2.
         let (x, y) = ([1.0, 2.0, -1.0], [0.9, 2.2, -0.7]);
         let xx: f64 = x.iter().map(|x| x * x).sum();
         let xy: f64 = x.iter().zip(&y).map(|(x, y)| x * y).sum();
@@ -118,7 +125,8 @@ mod tests {
 
     #[test]
     fn of_two_columns_that_are_nearly_one_neither_is_driven_to_a_far_bound() {
-        // Without bounds one wants 30 and the other -20; held at 5, the first is best near 5 and the second near 4.
+        // Without bounds, one goes to 30 and the other to -20. With the first held at 5, the best
+        // second is near 4.
         let gram = DMatrix::from_row_slice(2, 2, &[1000.0, 999.0, 999.0, 1000.0]);
         let moment = DVector::from_row_slice(&[9050.0, 9000.0]);
         let bounds = [[-5.0, 5.0], [-5.0, 5.0]];

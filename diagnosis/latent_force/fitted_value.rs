@@ -2,26 +2,28 @@
 
 use asid_core::Parameter;
 
-/// A value that is fitted, or kept, with its prior: normal about a center, cut off at the bounds.
+/// A value, fitted or fixed, with its prior: normal about a center, truncated at the bounds.
 #[derive(Clone, Debug)]
 pub struct Unknown {
-    /// As a column of a batch.
+    /// The value as a column of a batch.
     pub parameter: Parameter,
     /// Center of its prior: the model's own value, or the effect's null.
     pub center: f64,
-    /// Deviation of its prior.
+    /// Standard deviation of its prior.
     pub deviation: f64,
     /// Lowest and highest value.
     pub bounds: [f64; 2],
     /// Whether it is fitted.
     pub free: bool,
-    /// Whether its prior is the tolerance of an ordinary machine: over that, no slope changes.
+    /// Whether its prior is the tolerance of an ordinary machine: over so narrow a range
+    /// derivatives hardly change.
     pub is_tolerance: bool,
 }
 
 impl Unknown {
-    /// A parameter of the study about the model's own value: as uncertain as its range is wide (the deviation of a
-    /// uniform distribution over it).
+    /// Returns an unknown for a parameter of the study, centered on the model's own value.
+    ///
+    /// Its prior standard deviation is that of a uniform distribution over its range.
     #[must_use]
     pub fn of_study(parameter: &Parameter, nominal: f64) -> Self {
         let [low, high] = parameter.range;
@@ -35,7 +37,7 @@ impl Unknown {
         }
     }
 
-    /// Distance of a value from the center, in deviations.
+    /// Distance of a value from the center, in prior standard deviations.
     #[must_use]
     pub fn distance(&self, value: f64) -> f64 {
         (value - self.center) / self.deviation

@@ -1,4 +1,4 @@
-//! A model at half its time step, along the rows of a trajectory.
+//! The engine's own error, from the model at half its time step along a trajectory.
 
 use asid_core::Result;
 
@@ -10,7 +10,9 @@ use super::step_error::StepError;
 use super::step_map::{Derivatives, StepMap};
 use super::walk::Walk;
 
-/// The engine's own error over the rows, of a model at some values along a trajectory; `finer` is the machine at half its time step.
+/// Computes the engine's own error over the rows, of a model at some values along a trajectory.
+///
+/// `finer` is the machine at half its time step.
 ///
 /// # Errors
 /// When the engine fails.

@@ -1,8 +1,11 @@
-//! Degrees of freedom that nothing couples: two arms on a table, or an arm beside a thing that lies there.
+//! Sets of degrees of freedom that nothing couples: two arms on a table, or an arm beside an
+//! object.
 //!
-//! What moves one of them moves none of the others, so that one simulation tells of a push in each: columns of a Jacobian whose rows do not
-//! overlap (Curtis, Powell and Reid 1974). Engines call such sets islands. A kinematic tree is one by its structure; two trees are one where a
-//! sensor reads both, where their bodies touched in some row of the logs, and where slopes say so, as of a tendon or a connection.
+//! A perturbation of one set moves none of the others, so one simulation perturbs each of them.
+//! They are columns of a Jacobian whose rows do not overlap (Curtis, Powell and Reid 1974). Engines
+//! call such sets islands. A kinematic tree is within one island by its structure. Two trees are
+//! one island if a sensor reads both, if their bodies touched in some row of the logs, or if
+//! derivatives show a coupling, as of a tendon or a connection.
 
 use asid_core::layout::JointKind;
 use asid_effects::Reach;
@@ -11,18 +14,20 @@ use asid_mjcf::plant::Reads;
 
 use super::step_map::LinearEpisode;
 
-/// Share of the largest slope of a row that is none: slopes are differences of doubles over steps of 1e-6, and rounding makes 1e-10 of a
-/// coordinate of order one.
+/// Derivatives below this share of the largest of their row count as zero.
+///
+/// They are differences of doubles over steps of 1e-6, and rounding makes 1e-10 of a coordinate of
+/// order one.
 const NO_COUPLING: f64 = 1e-8;
 
-/// Degrees of freedom, joined one by one into sets.
+/// Degrees of freedom, merged into sets (union-find).
 pub(super) struct Joined {
     parent: Vec<usize>,
     sets: usize,
 }
 
 impl Joined {
-    /// Each by itself.
+    /// Each degree of freedom as a set of its own.
     pub(super) fn new(dofs: usize) -> Self {
         Self {
             parent: (0..dofs).collect(),
@@ -30,12 +35,12 @@ impl Joined {
         }
     }
 
-    /// How many sets there are.
+    /// Number of sets.
     pub(super) fn sets(&self) -> usize {
         self.sets
     }
 
-    /// The first of the set of one.
+    /// Returns the smallest member of the set that contains `of`.
     pub(super) fn root(&self, mut of: usize) -> usize {
         while self.parent[of] != of {
             of = self.parent[of];
@@ -43,7 +48,7 @@ impl Joined {
         of
     }
 
-    /// Joins the sets of two.
+    /// Merges the sets of two degrees of freedom.
     pub(super) fn join(&mut self, a: usize, b: usize) {
         let (a, b) = (self.root(a), self.root(b));
         if a != b {
@@ -52,7 +57,9 @@ impl Joined {
         }
     }
 
-    /// Joins those that a row of slopes depends on, places before speeds, with each other and with the row's `own`.
+    /// Merges the degrees of freedom on which a row of derivatives depends, and the row's `own`.
+    ///
+    /// The row has derivatives with respect to positions, then to speeds.
     pub(super) fn couple(&mut self, slopes: &[f64], own: Option<usize>) {
         let nv = self.parent.len();
         let mut first = own;
@@ -64,7 +71,7 @@ impl Joined {
         }
     }
 
-    /// The set of each, numbered in order.
+    /// Returns the set of each degree of freedom, numbered in order of appearance.
     pub(super) fn numbered(&self) -> Vec<usize> {
         let mut numbers = vec![usize::MAX; self.parent.len()];
         let mut next = 0;
@@ -80,7 +87,7 @@ impl Joined {
     }
 }
 
-/// Places of the slopes of a row that are more than rounding.
+/// Indices of the derivatives of a row that exceed rounding.
 pub(super) fn depends(slopes: &[f64]) -> impl Iterator<Item = usize> + '_ {
     let largest = slopes.iter().fold(0.0, |most: f64, x| x.abs().max(most));
     let places = slopes.iter().enumerate();
@@ -95,12 +102,13 @@ pub struct Islands {
     /// The island of each degree of freedom, and of each entry of a reading.
     of_dof: Vec<usize>,
     of_entry: Vec<usize>,
-    /// Degrees of freedom that are pushed together: the first of each island, the second of each, and so on.
+    /// Degrees of freedom that are perturbed together: the first of each island, the second of
+    /// each, and so on.
     slots: Vec<Vec<usize>>,
 }
 
 impl Islands {
-    /// All as one.
+    /// All degrees of freedom as one island.
     #[must_use]
     pub fn one(dofs: usize, entries: usize) -> Self {
         Self::numbered(vec![0; dofs], vec![0; entries])
@@ -122,8 +130,11 @@ impl Islands {
         }
     }
 
-    /// Of a machine some of whose pairs of bodies touch, by slopes along some rows; `sensors` are those of the entries of a reading, by index in
-    /// the layout.
+    /// Finds the islands of a machine by its structure, its contacts and derivatives along some
+    /// rows.
+    ///
+    /// `sensors` are those of the entries of a reading, by index in the layout. `touching` are
+    /// pairs of bodies in contact.
     #[must_use]
     pub fn of(
         plant: &Plant,
@@ -169,19 +180,20 @@ impl Islands {
         Self::numbered(of_dof, of_entry)
     }
 
-    /// How many pushes tell of all degrees of freedom.
+    /// Number of perturbations that cover all degrees of freedom.
     #[must_use]
     pub fn slots(&self) -> usize {
         self.slots.len()
     }
 
-    /// Degrees of freedom that are pushed together.
+    /// Degrees of freedom that are perturbed together.
     #[must_use]
     pub fn pushed(&self, slot: usize) -> &[usize] {
         &self.slots[slot]
     }
 
-    /// Tangent coordinates that are moved together, places (`slot` below [`Islands::slots`]) before speeds.
+    /// Tangent coordinates that are perturbed together: positions if `slot` is below
+    /// [`Islands::slots`], else speeds.
     pub fn moved(&self, slot: usize) -> impl Iterator<Item = usize> + '_ {
         let (n, nv) = (self.slots.len(), self.of_dof.len());
         self.slots[slot % n]
@@ -189,7 +201,7 @@ impl Islands {
             .map(move |d| nv * (slot / n) + d)
     }
 
-    /// Which of the degrees of freedom that are pushed together a tangent coordinate tells of.
+    /// Which of the degrees of freedom perturbed together moves a tangent coordinate.
     #[must_use]
     pub fn dof_told(&self, slot: usize, coordinate: usize) -> Option<usize> {
         let own = self.of_dof[coordinate % self.of_dof.len()];
@@ -197,7 +209,7 @@ impl Islands {
         dofs.find(|&d| self.of_dof[d] == own)
     }
 
-    /// Which of the coordinates that are moved together a tangent coordinate tells of.
+    /// Which of the coordinates perturbed together moves a tangent coordinate.
     #[must_use]
     pub fn coordinate_told(&self, slot: usize, coordinate: usize) -> Option<usize> {
         let own = self.of_dof[coordinate % self.of_dof.len()];
@@ -205,7 +217,7 @@ impl Islands {
         self.moved(slot).find(|c| self.of_dof[c % nv] == own)
     }
 
-    /// Which of them an entry of a reading tells of.
+    /// Which of the coordinates perturbed together changes an entry of a reading.
     #[must_use]
     pub fn coordinate_read(&self, slot: usize, entry: usize) -> Option<usize> {
         let nv = self.of_dof.len();
@@ -219,7 +231,7 @@ impl Islands {
         self.of_dof[dof]
     }
 
-    /// The island that something reaches; `None` where that is more than one, or not known.
+    /// The one island that an effect reaches; `None` if it reaches several or if that is unknown.
     #[must_use]
     pub fn reached(&self, reach: &Reach) -> Option<usize> {
         let Reach::Dofs(dofs) = reach else {
@@ -231,7 +243,7 @@ impl Islands {
     }
 }
 
-/// The body at the foot of the kinematic tree of a body; the world for what is fixed to it.
+/// The root body of a body's kinematic tree; the world for a body that is fixed to it.
 fn root(plant: &Plant, mut body: usize) -> usize {
     let mut foot = 0;
     while body != 0 {
@@ -243,7 +255,7 @@ fn root(plant: &Plant, mut body: usize) -> usize {
     foot
 }
 
-/// Degrees of freedom of the tree at whose foot each body is.
+/// Degrees of freedom of each kinematic tree, by its root body.
 fn trees(plant: &Plant) -> Vec<Vec<usize>> {
     let mut trees = vec![Vec::new(); plant.bodies.len()];
     for (body, own) in plant.bodies.iter().enumerate() {
@@ -266,7 +278,7 @@ mod tests {
 
     use super::*;
 
-    /// An arm of two hinges, a ball that is free, and a slide.
+    /// An arm of two hinges, a free ball and a slide.
     const SCENE: &str = r#"<mujoco><worldbody>
         <body name="upper"><joint name="a" type="hinge"/><geom size="0.1" mass="1"/>
           <body name="fore"><joint name="b" type="hinge"/><geom size="0.1" mass="1"/></body></body>
@@ -318,7 +330,8 @@ mod tests {
         let plant = plant();
         let touching = [[body(&plant, "fore"), body(&plant, "ball")]];
         let islands = Islands::of(&plant, &[0, 1], &touching, &[]);
-        // Two hinges and six of the ball; the cart is by itself. The floor moves nothing.
+        // Two hinges and six degrees of freedom of the ball; the cart is on its own. The floor
+        // moves nothing.
         assert_eq!(islands.slots(), 8);
         let floor = [[0, body(&plant, "ball")]];
         assert_eq!(Islands::of(&plant, &[0, 1], &floor, &[]).slots(), 6);
@@ -330,7 +343,8 @@ mod tests {
         let nv = plant.layout.nv;
         let nx = 2 * nv;
         let mut a = nalgebra::DMatrix::identity(nx, nx);
-        // The cart's speed follows from the arm's place; what is next to the rounding of a difference is none.
+        // The cart's speed depends on the arm's position; a value at the rounding of a difference
+        // counts as zero.
         a[(2 * nv - 1, 0)] = 0.3;
         a[(nv + 3, 1)] = 1e-10;
         let episode = LinearEpisode {

@@ -1,4 +1,5 @@
-//! What the effects that stand leave of the missing force: how much of it could be learned, and from what.
+//! The missing force that remains with the accepted effects: how much of it could be learned, and
+//! from what.
 
 use crate::ceiling::{Course, Left, Variable, learn};
 use crate::trace::ForceSeries;
@@ -7,10 +8,11 @@ use super::context::Context;
 use super::picture::{dofs, most_missing_of, series};
 use super::search::Outcome;
 
-/// Most rows of a degree of freedom that are learned from: a law shows in some thousand, and neighbours tell the same.
+/// Most rows of a degree of freedom to learn from: some thousand show a law, and neighbouring rows
+/// say the same.
 const ROWS: usize = 6000;
 
-/// Change of a series by its time, one a row: over the rows before and after.
+/// Time derivative of a series, one value a row, from the rows before and after.
 fn rate(values: &[f64], time: &[f64]) -> Vec<f64> {
     let last = values.len().saturating_sub(1);
     (0..values.len())
@@ -21,7 +23,8 @@ fn rate(values: &[f64], time: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-/// A stretch of a degree of freedom as a course: its force goes with what moves it and how it moves.
+/// A stretch of a degree of freedom as a course: its remaining force with the variables that may
+/// explain it.
 fn course(force: ForceSeries) -> Course {
     let mut variables = Vec::new();
     let mut add = |name: &str, kinds: &'static [&'static str], values: Vec<f64>| {
@@ -62,7 +65,8 @@ fn course(force: ForceSeries) -> Course {
     }
 }
 
-/// What is left at the degrees of freedom where most is, and what a flexible model foretells of it.
+/// The remaining force at the degrees of freedom that lack the most, and how much a flexible model
+/// predicts.
 pub(super) fn left(context: &Context<'_>, outcome: &Outcome) -> Vec<Left> {
     let estimate = &outcome.best.fitted.estimate;
     let smoothed: Vec<usize> = (0..context.walks.len())

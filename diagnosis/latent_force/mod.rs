@@ -1,14 +1,19 @@
-//! The force that a model lacks, as a hidden state, and which effects make up for it.
+//! The force that a model lacks, as a hidden state, and the effects that explain it.
 //!
-//! Replays ask whether a model, run open loop from an episode's first row, lands on the log. Here the question is
-//! local: which force is missing *now*? It is a hidden state beside position and speed, estimated by smoothing; effects are
-//! columns of one linear regression on its innovations; the few that lead are put into the model and fitted anew.
+//! A replay asks whether a model, run open loop from an episode's first row, matches the log. Here
+//! the question is local: which force is missing *now*? That force is a hidden state next to
+//! position and speed, estimated by a smoother. Effects are columns of one linear regression on its
+//! innovations. The few leading ones are inserted into the model and fitted.
 //!
-//! From below: [`tangent`] (states), [`walk`] (rows), [`segments`] (where bodies touch) and [`scatter`] (how far their replays can be repeated), [`step_map`] (the model over a row and its derivatives),
-//! [`smoother`], [`initial`], `one_step` (how slopes are taken), [`step_error`] (the engine's own), [`context`] and [`estimate`] (trajectory, force and noise), [`fitted_value`] and [`fit`] (a model with its values),
-//! [`evidence`], [`trace`], [`columns`], [`screen`], [`search`], [`selection`],
-//! [`detection`] (what could have been seen), [`rehearsal`] (what a screening would say of machines like this one), `steps` (encoder steps), `picture` (what the report draws of the force), `left` (what could
-//! be learned of the rest), [`pipeline`].
+//! From the bottom up: [`tangent`] (states), [`walk`] (rows), [`segments`] (where bodies touch) and
+//! [`scatter`] (how far their replays can be repeated), [`step_map`] (the model over a row and its
+//! derivatives), [`smoother`], [`initial`], `one_step` (how derivatives are computed),
+//! [`step_error`] (the engine's own error), [`context`] and [`estimate`] (trajectory, force and
+//! noise), [`fitted_value`] and [`fit`] (a model with its values), [`evidence`], [`trace`],
+//! [`columns`], [`screen`], [`search`], [`selection`], [`detection`] (detection limits),
+//! [`rehearsal`] (what a screening would report for machines like this one), `steps` (encoder
+//! steps), `picture` (what the report draws of the force), `left` (what could be learned of the
+//! rest), [`pipeline`].
 
 pub mod columns;
 pub mod context;

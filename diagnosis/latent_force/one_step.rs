@@ -1,7 +1,8 @@
-//! Whether one physics step of a row tells the slopes of the whole row.
+//! Whether the derivatives of one physics step represent those of a whole row.
 //!
-//! It does where the machine hardly changes over a row, and does not where a stiff drive comes to rest within one. Neither the model nor
-//! the log says which; a few rows that are taken both ways do. A drive that is found to be softer is told by one step from then on.
+//! They do where the machine hardly changes over a row. They do not where a stiff drive comes to
+//! rest within one. Neither the model nor the log shows which is the case, so a few rows are
+//! differentiated both ways. Once a drive turns out to be softer, one step is enough from then on.
 
 use asid_core::{Parameter, Result};
 use asid_effects::EffectSpec;
@@ -10,24 +11,28 @@ use super::context::Context;
 use super::step_map::{Derivatives, LinearEpisode, StepMap};
 use super::walk::Walk;
 
-/// Rows in the middle of each walk that are taken both ways.
+/// Rows in the middle of each walk that are differentiated both ways.
 const ROWS: usize = 16;
-/// Share of the slopes by which the two ways may differ in a row (Frobenius norm, coordinates in units of their largest): a chord
-/// method gains a digit a round with slopes that are right to a tenth.
+/// Relative difference of the derivatives up to which the two ways agree in a row.
+///
+/// It is a Frobenius norm, with coordinates in units of their largest value. A chord method gains a
+/// digit a round with derivatives that are right to a tenth.
 const APART: f64 = 0.1;
-/// Share of the rows that may differ by more, as where a joint comes to a stop within the row.
+/// Share of the rows that may differ by more, for example where a joint reaches a stop within the
+/// row.
 const ODD: f64 = 0.05;
 
-/// Slopes in the state along a few rows, taken both ways, one a walk that is no segment.
+/// State derivatives along a few rows, computed both ways, one a walk that is no segment.
 pub struct BothWays {
-    /// Over whole rows.
+    /// Derivatives over whole rows.
     pub by_rows: Vec<LinearEpisode>,
-    /// By one physics step of each.
+    /// Derivatives of one physics step of each row, extended to the row.
     by_steps: Vec<LinearEpisode>,
 }
 
-/// Whether slopes in the state of one physics step, carried over its row, are those of the row, for a model with some effects along a
-/// trajectory.
+/// Whether the state derivatives of one physics step, extended to its row, are those of the row.
+///
+/// The model has some effects, and the rows are those of a trajectory.
 ///
 /// # Errors
 /// When the engine fails.
@@ -39,7 +44,7 @@ pub fn one_step_tells(
     Ok(both_ways(context, model, along)?.one_step_tells(&context.scale))
 }
 
-/// Takes slopes of a model with some effects along a few rows of a trajectory both ways.
+/// Computes state derivatives of a model along a few rows of a trajectory both ways.
 ///
 /// # Errors
 /// When the engine fails.
@@ -77,7 +82,8 @@ pub fn both_ways(
 }
 
 impl BothWays {
-    /// Whether they agree, coordinates in units of their `scale`; not where there are none.
+    /// Whether the two ways agree, with coordinates in units of their `scale`; false if there are
+    /// no rows.
     #[must_use]
     pub fn one_step_tells(&self, scale: &[f64]) -> bool {
         let nx = scale.len();

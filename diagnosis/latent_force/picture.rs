@@ -1,5 +1,7 @@
-//! The missing force along the logs, as the report draws it: against time, speed, position and load, before and with
-//! the effects that stand, and the force that these add to the model.
+//! The missing force along the logs, as the report draws it.
+//!
+//! The report plots it against time, speed, position and load, before and with the accepted
+//! effects, together with the force that these effects add to the model.
 
 use asid_core::layout::JointKind;
 use asid_core::{Layout, Result};
@@ -13,24 +15,25 @@ use super::estimate::Estimate;
 use super::search::Outcome;
 use super::step_map::{Derivatives, Variation};
 
-/// Degrees of freedom that are shown: as many as an arm has.
+/// Largest number of degrees of freedom that are shown: as many as an arm has.
 const SHOWN: usize = 6;
-/// Share of the most missing, relative to the inertial forces, from which on a degree of freedom is shown.
+/// A degree of freedom is shown from this share of the largest missing force on, both relative to
+/// the inertial forces.
 const LEAST: f64 = 0.02;
-/// Rows of the stretch that is drawn against time, and most rows that are drawn against speed, position and load.
+/// Rows of the stretch drawn against time, and most rows drawn against speed, position and load.
 const ROWS: usize = 400;
-/// Digits that are kept of a number: a picture shows three.
+/// Significant digits that are kept of a number: a picture shows three.
 const DIGITS: i32 = 5;
 
-/// Where a degree of freedom is in the layout, and in what it is counted.
+/// Name, place in the layout and kind of motion of a degree of freedom.
 pub(super) struct Dof {
-    /// Joint; with the axis where it has several.
+    /// Name of the joint, with the axis if the joint has several.
     pub(super) name: String,
-    /// Joint of the layout.
+    /// Index of the joint in the layout.
     joint: usize,
-    /// Place in `qpos`; `None` for a turn about a free axis.
+    /// Index in `qpos`; `None` for a rotation about a free axis.
     position: Option<usize>,
-    /// Whether it turns.
+    /// Whether it is a rotation.
     turns: bool,
 }
 
@@ -70,7 +73,7 @@ pub(super) fn dofs(layout: &Layout) -> Vec<Dof> {
     all
 }
 
-/// A number with the digits that a picture needs.
+/// Rounds a number to the digits that a picture needs.
 fn short(x: f64) -> f64 {
     if x == 0.0 || !x.is_finite() {
         return x;
@@ -79,8 +82,11 @@ fn short(x: f64) -> f64 {
     (x * scale).round() / scale
 }
 
-/// The force that the effects of the set that stands, and the values fitted with them, add to the model without effects:
-/// the change of the speeds after a row through the slopes in forces. `(rows - 1) x nv`, one a walk; empty where no effect stands.
+/// Force that the accepted effects, and the values fitted with them, add to the model without
+/// effects.
+///
+/// It is the change of the speeds after a row, divided by the derivatives with respect to forces.
+/// `(rows - 1) x nv`, one a walk; empty where no effect is accepted.
 fn law(
     context: &Context<'_>,
     outcome: &Outcome,
@@ -125,7 +131,7 @@ fn law(
     Ok(along.collect())
 }
 
-/// The degrees of freedom at which most is missing, relative to the inertial forces, most first.
+/// The degrees of freedom that lack the most force relative to their inertial force, largest first.
 pub(super) fn most_missing_of(context: &Context<'_>, estimate: &Estimate) -> Vec<usize> {
     let noise = &estimate.noise;
     let missing = |d: usize| (noise.q[d] + noise.white[d]).sqrt() / context.inertial[d];
@@ -137,7 +143,7 @@ pub(super) fn most_missing_of(context: &Context<'_>, estimate: &Estimate) -> Vec
     order
 }
 
-/// The missing force at the degrees of freedom where most is missing, relative to the inertial forces.
+/// Traces of the missing force at the degrees of freedom that lack the most.
 ///
 /// # Errors
 /// When the engine fails.
@@ -164,7 +170,8 @@ pub(super) fn forces(
         .step_by(rows.len().div_ceil(ROWS).max(1))
         .copied()
         .collect();
-    // All rows of the episode in which most is missing where most is.
+    // All rows of the episode that lacks the most force, at the degree of freedom that lacks the
+    // most.
     let first = most_missing(context, outcome, &smoothed, order[0]);
     let of_episode = first
         .first()
@@ -196,7 +203,7 @@ pub(super) fn forces(
     Ok(order.iter().map(trace).collect())
 }
 
-/// The rows of one walk, [`ROWS`] at most, along which most is missing at a degree of freedom.
+/// The rows of one walk, [`ROWS`] at most, that lack the most force at a degree of freedom.
 fn most_missing(
     context: &Context<'_>,
     outcome: &Outcome,
@@ -220,7 +227,7 @@ fn most_missing(
     range.map(|k| (w, k)).collect()
 }
 
-/// A degree of freedom along some rows, each a walk and its row.
+/// Series of a degree of freedom along some rows, each given as (walk, row).
 pub(super) fn series(
     context: &Context<'_>,
     outcome: &Outcome,
@@ -263,7 +270,7 @@ pub(super) fn series(
             along(&load)
         },
         before: force(0),
-        // A fit that was stopped at its first linearisation has not smoothed anew.
+        // A fit that was stopped at its first linearisation has no new smoothed force.
         after: if force(1) == force(0) && !law.iter().all(Vec::is_empty) {
             Vec::new()
         } else {

@@ -1,8 +1,10 @@
-//! What the screening would say of machines that are like this one: of those that lack nothing, and of those that lack one effect.
+//! What the screening would report for machines like this one: with nothing missing, and with one
+//! effect missing.
 //!
-//! The screening is a linear problem: whitened innovations are `X c` and normal noise, and all that it sees of them is `X'y`. So logs that
-//! the same commands would have given need no simulation: `X'y = G c + z`, with `z ~ N(0, G)` and `G = X'X`, what the present model can do
-//! projected out. Each draw is screened as the logs were.
+//! The screening is a linear problem: whitened innovations are `X c` plus normal noise, and it uses
+//! only `X'y`. So drawing logs under the same commands needs no simulation: `X'y = G c + z` with `z
+//! ~ N(0, G)` and `G = X'X`, the present model projected out. Each draw is screened as the logs
+//! were.
 
 use asid_core::Streams;
 use nalgebra::{DMatrix, DVector};
@@ -14,32 +16,34 @@ use super::detection::Limit;
 use super::screen::project;
 use super::smoother::Regression;
 
-/// Draws of a machine that lacks nothing: its evidence is known to half a percent of them.
+/// Draws of a machine that lacks nothing: they resolve probabilities to half a percent.
 const NOTHING_MISSING: usize = 199;
-/// Draws of a machine that lacks one effect: shares are known to a fifth.
+/// Draws of a machine that lacks one effect: shares are known to 0.2 (two standard errors).
 const ONE_MISSING: usize = 24;
-/// Multiple of its limit that an effect is given: at the limit itself half of the draws do not show it.
+/// Size of the drawn effect, as a multiple of its limit: at the limit itself half of the draws miss
+/// it.
 const SIZE: f64 = 2.0;
-/// Most columns: the cube of their number is what a rehearsal costs.
+/// Largest number of columns: the cost of a rehearsal grows with its cube.
 const COLUMNS: usize = 600;
 
-/// What screenings of drawn logs say.
+/// Results of screening the drawn logs.
 #[derive(Clone, Debug, Default)]
 pub struct Rehearsal {
-    /// Probability of as much evidence for the best candidate where nothing is missing; NaN where that is not known.
+    /// Probability that chance alone gives the best candidate as much evidence; NaN if unknown.
     pub p_value: f64,
-    /// Of each limit: the share of draws that rank its candidate first, and the candidate that most of the others rank first.
+    /// One entry per limit: the share of draws that rank its candidate first, and the candidate
+    /// that most of the other draws rank first.
     pub recognised: Vec<Option<(f64, Option<usize>)>>,
 }
 
-/// A form with what its evidence needs.
+/// A form with the quantities that its evidence needs.
 struct Ranked<'a> {
     form: &'a Form,
     places: Vec<usize>,
     /// Inverse of `G + 1`, and half the logarithm of its determinant.
     inverse: DMatrix<f64>,
     half_log: f64,
-    /// Bounds of the one coefficient, where there is but one.
+    /// Bounds of the coefficient, if there is only one.
     bounds: Option<[f64; 2]>,
 }
 
@@ -61,7 +65,7 @@ impl<'a> Ranked<'a> {
         })
     }
 
-    /// Evidence for the form where `X'y` is `moment`.
+    /// Evidence for the form if `X'y` is `moment`.
     fn gain(&self, moment: &DVector<f64>) -> f64 {
         let b = DVector::from_fn(self.places.len(), |i, _| moment[self.places[i]]);
         let c = &self.inverse * &b;
@@ -73,14 +77,16 @@ impl<'a> Ranked<'a> {
     }
 }
 
-/// The best of all forms.
+/// Largest evidence of all forms, and its candidate.
 fn best(forms: &[Ranked<'_>], moment: &DVector<f64>) -> (f64, usize) {
     let gains = forms.iter().map(|f| (f.gain(moment), f.form.candidate));
     gains.max_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((0.0, 0))
 }
 
-/// The factor `L` of `G = L L'`, of a matrix that may be singular: of one whose diagonal is a little larger, each entry relative to itself,
-/// for columns differ by many powers of ten.
+/// Factor `L` of `G = L L'` of a matrix that may be singular.
+///
+/// Each diagonal entry is raised by a small share of itself, because columns differ by many powers
+/// of ten.
 fn root(gram: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let sizes = gram.diagonal().map(|g| g.max(0.0).sqrt());
     let unit = |i: usize| if sizes[i] > 0.0 { sizes[i] } else { 1.0 };
@@ -97,7 +103,7 @@ fn root(gram: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     })
 }
 
-/// `X'X` with what the present model can do projected out; its own rows and columns are zero.
+/// `X'X` with the present model projected out; the model's own rows and columns are zero.
 fn projected(sum: &Regression, base: usize) -> DMatrix<f64> {
     let places: Vec<usize> = (0..base).collect();
     let mut gram = project(&sum.gram, &places);
@@ -108,7 +114,7 @@ fn projected(sum: &Regression, base: usize) -> DMatrix<f64> {
     gram
 }
 
-/// Rehearses a screening; `found` is the evidence that it had for its best candidate.
+/// Rehearses a screening; `found` is the evidence of its best candidate.
 #[must_use]
 pub fn rehearse(
     sum: &Regression,
@@ -198,7 +204,8 @@ mod tests {
 
     #[test]
     fn what_chance_reaches_is_as_probable_as_the_chi_square_distribution_says() {
-        // One column of information g, and a moment of some deviations: at 1.645 a tenth of the draws are further from zero.
+        // One column of information g, and a moment of some standard deviations: a tenth of the
+        // draws lie beyond 1.645.
         let g = 1e6_f64;
         let of = |deviations: f64| {
             let sum = regression(DMatrix::from_element(1, 1, g));
@@ -218,8 +225,9 @@ mod tests {
 
     #[test]
     fn what_the_present_model_can_do_is_in_no_draw() {
-        // The candidate does what the model's own column does, and next to nothing besides: of so little information every draw has
-        // an evidence above -0.5, of the whole column next to none.
+        // The candidate acts nearly as the model's own column does. With the little information
+        // that remains, every draw has an evidence above -0.5. With the whole column, next to none
+        // has.
         let x = DMatrix::from_row_slice(2, 2, &[1e3, 600.0, 0.0, 1e-3]);
         let mut columns = columns(1);
         columns.base = 1;

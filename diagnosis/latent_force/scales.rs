@@ -1,9 +1,10 @@
-//! The regressions that candidates are ranked by: at several scales of the missing forces' variances.
+//! The regressions that rank candidates, at several scales of the missing force's variances.
 //!
-//! Where a law is missing, the noise model has taken its force for chance, and the smoother makes up for most of it: a slow force, such as
-//! that of viscous friction, hardly shows. With the law the variance is smaller, so that each set of columns is given the scale that is
-//! likeliest with it. What acts at one joint makes the variance there smaller and leaves those of the others as they are: many things
-//! that every machine has a little of are in these.
+//! Where a law is missing, the noise model counts its force as chance, and the smoother absorbs
+//! most of it. A slow force, such as that of viscous friction, then hardly shows. With the law in
+//! the model the variance is smaller. So each set of columns gets the scale at which it is most
+//! likely. An effect at one joint lowers the variance there and leaves the variances of other
+//! joints as they are: these contain the many small errors of every machine.
 
 use asid_effects::Reach;
 
@@ -17,28 +18,34 @@ use super::fit::{SCALES, regression, regression_at};
 use super::smoother::Regression;
 use super::step_map::LinearEpisode;
 
-/// Factors of one joint's variance: of the force a third, a tenth and a thirtieth is then left to chance.
+/// Factors of one joint's variance: a third, a tenth and a thirtieth of the force is left to
+/// chance.
 const AT_A_JOINT: [f64; 3] = [0.1, 0.01, 0.001];
 
-/// Joints that have scales of their own, at most: each takes as many passes of the filter as there are factors, and two arms have sixteen.
+/// Largest number of joints with scales of their own.
+///
+/// Each joint costs as many passes of the filter as there are factors, and two arms have sixteen
+/// joints.
 const JOINTS: usize = 6;
 
-/// Regressions at scales of one degree of freedom's variance, on the columns of the present model and on those that reach no other.
+/// Regressions at several scales of the variance of one degree of freedom.
+///
+/// Their columns are those of the present model and those that reach no other degree of freedom.
 struct AtJoint {
-    /// Places of the columns among all, in ascending order.
+    /// Indices of the columns among all columns, in ascending order.
     columns: Vec<usize>,
     sums: Vec<Regression>,
 }
 
 /// Regressions at all scales.
 pub struct Scales {
-    /// At common scales of all variances, on all columns; the first at the variances as they are.
+    /// At common scales of all variances, on all columns; the first has the variances as they are.
     pub common: Vec<Regression>,
     joints: Vec<AtJoint>,
 }
 
 impl Scales {
-    /// Of the columns of some candidates along an estimate.
+    /// Computes the regressions on the columns of some candidates along an estimate.
     #[must_use]
     pub fn of(
         context: &Context<'_>,
@@ -67,7 +74,7 @@ impl Scales {
         }
     }
 
-    /// Whether some columns, besides those of the present model, all reach one degree of freedom and nothing else.
+    /// Whether some columns, apart from the present model's, all reach one degree of freedom alone.
     #[must_use]
     pub fn at_one_joint(&self, columns: &[usize]) -> bool {
         let holds = |joint: &AtJoint| {
@@ -77,7 +84,7 @@ impl Scales {
         self.joints.iter().any(holds)
     }
 
-    /// Of regressions at common scales, and of those on some columns at the scales of a joint.
+    /// Regressions at common scales, and those on some columns at the scales of one joint.
     #[cfg(test)]
     pub fn known(common: Vec<Regression>, joints: Vec<(Vec<usize>, Vec<Regression>)>) -> Self {
         let joints = joints.into_iter();
@@ -88,7 +95,9 @@ impl Scales {
         }
     }
 
-    /// Evidence of some columns, those of the present model among them, at the scale where it is largest, with their coefficients.
+    /// Returns the evidence of some columns at the scale where it is largest, with coefficients.
+    ///
+    /// The columns `which` contain those of the present model.
     #[must_use]
     pub fn best(&self, columns: &Columns, which: &[usize]) -> (f64, Vec<f64>) {
         let (center, bounds) = (&columns.center, &columns.bounds);
@@ -117,8 +126,10 @@ impl Scales {
     }
 }
 
-/// An estimate with the variances that the present model's own columns are likeliest with, joint by joint. Else a candidate's scale at one joint
-/// would be credited with what the model without it gains there, and candidates of other joints would not.
+/// An estimate whose variances, joint by joint, make the present model's own columns most likely.
+///
+/// Otherwise a candidate's scale at one joint would be credited with what the model without it also
+/// gains there, and candidates at other joints would not.
 #[must_use]
 pub fn at_own_scales(context: &Context<'_>, estimate: &Estimate, columns: &Columns) -> Estimate {
     let base: Vec<usize> = (0..columns.base).collect();
@@ -126,7 +137,9 @@ pub fn at_own_scales(context: &Context<'_>, estimate: &Estimate, columns: &Colum
     settled(context, estimate, (&columns.linear, &base), prior)
 }
 
-/// An estimate with the variances that some columns of a linearisation are likeliest with, joint by joint; all columns have a center and bounds.
+/// An estimate whose variances, joint by joint, make some columns of a linearisation most likely.
+///
+/// All columns have a center and bounds.
 #[must_use]
 pub fn settled(
     context: &Context<'_>,
@@ -156,8 +169,10 @@ pub fn settled(
     own
 }
 
-/// The degrees of freedom that lack the most force relative to their inertial forces. None of a single one, which has all of it, and none where
-/// there are segments, whose replays lack none.
+/// The degrees of freedom that lack the most force relative to their inertial force.
+///
+/// Returns none if there is only one, since common scales do the same. Returns none if there are
+/// segments, since their replays have no missing force.
 fn lacking(context: &Context<'_>, estimate: &Estimate) -> Vec<usize> {
     let nv = context.plant().layout.nv;
     if context.has_segments() || nv < 2 {
@@ -171,7 +186,8 @@ fn lacking(context: &Context<'_>, estimate: &Estimate) -> Vec<usize> {
     dofs
 }
 
-/// Columns of the present model, and those of candidates that reach one degree of freedom and nothing else; in ascending order.
+/// Columns of the present model, and of candidates that reach one degree of freedom alone;
+/// ascending.
 fn reaching(
     context: &Context<'_>,
     (columns, candidates): (&Columns, &[Candidate]),

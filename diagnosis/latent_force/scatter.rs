@@ -1,11 +1,13 @@
-//! What replays of a segment scatter by, though nothing is missing.
+//! How far replays of a segment scatter although nothing is missing.
 //!
-//! A replay is known only as well as its start and its integrator. Within what the readings leave open of a start, a puck that is
-//! pushed at an edge turns left or right: its replays are far apart, and slopes tell nothing of it. What replays from starts drawn of
-//! the posterior do *beyond* their slopes is the error of the linearisation, and its covariance is added to that of the readings, as
-//! in posterior linearisation (García-Fernández, Svensson, Morelande and Särkkä 2015). The covariance is of low rank: each draw is a
-//! direction with a coefficient of its own, `N(0, 1)`, that is projected out together with the start. What half the time
-//! step changes is one direction more.
+//! A replay is known only as well as its initial state and its integrator. A puck that is pushed at
+//! an edge turns left or right within what the readings leave open of its initial state. Its
+//! replays are then far apart, and derivatives do not describe them. Initial states are therefore
+//! drawn from the posterior. What their replays do *beyond* the derivatives is the error of the
+//! linearisation. Its covariance is added to that of the readings, as in posterior linearisation
+//! (García-Fernández, Svensson, Morelande and Särkkä 2015). The covariance is of low rank: each
+//! draw is a direction with a coefficient of its own, `N(0, 1)`, that is projected out together
+//! with the initial state. The change at half the time step is one more direction.
 
 use asid_core::Result;
 use asid_core::rng::Streams;
@@ -22,23 +24,30 @@ use super::step_map::{Anew, Derivatives, LinearEpisode, StepMap};
 use super::tangent::retract;
 use super::walk::Walk;
 
-/// Starts that are drawn: the least with which the deviation of a reading is known to a quarter of itself.
+/// Initial states that are drawn: the fewest that give the standard deviation of a reading to a
+/// quarter.
 const DRAWS: usize = 8;
-/// Share of what half the time step changes that each segment may have of its own: another integrator errs otherwise, and not in the
-/// same proportion everywhere.
+/// Share of the change at half the time step that each segment may have of its own.
+///
+/// Another integrator errs in another way, and not in the same proportion everywhere.
 const OWN_INTEGRATOR: f64 = 0.3;
 
-/// Directions in which the replays of each walk scatter, `rows x readings x directions` in the sensors' units.
+/// Directions in which the replays of each walk scatter.
+///
+/// `rows x readings x directions`, in the sensors' units.
 #[derive(Clone, Debug, Default)]
 pub struct Scatter {
-    /// Of each walk; empty for one that is no segment.
+    /// Directions of each walk; empty for one that is no segment.
     pub directions: Vec<Vec<f64>>,
     /// Share of the rows in segments whose readings scatter by more than their noise.
     pub lost: f64,
 }
 
 impl Scatter {
-    /// Of the segments about a model at some values and an estimate of it, without slopes in what segments are `seen` to be blind to; `finer` is the machine at half its time step, where the engine takes it.
+    /// Scatter of the segments about a model at some values and its estimate.
+    ///
+    /// Coordinates to which segments are blind, as `seen` records, have no derivatives. `finer` is
+    /// the machine at half its time step, if the engine takes it.
     ///
     /// # Errors
     /// When the engine fails.
@@ -75,7 +84,7 @@ impl Scatter {
             if walk.segment.is_none() {
                 return Vec::new();
             }
-            // Side by side, the columns of one array.
+            // The directions are the columns of one array.
             let readings = 0..here[w].residual.len();
             let row = |at: usize| all.iter().map(move |d| d[w][at]);
             readings.flat_map(row).collect()
@@ -88,10 +97,10 @@ impl Scatter {
     }
 }
 
-/// What the readings of each walk do beyond slopes, along one direction.
+/// Part of the readings of each walk that derivatives do not predict, along one direction.
 type Beyond = Vec<Vec<f64>>;
 
-/// Directions of replays from starts that are drawn of the posterior.
+/// Directions from replays of initial states that are drawn from the posterior.
 fn drawn(
     context: &Context<'_>,
     (map, theta): (&mut StepMap<'_>, &[f64]),
@@ -126,7 +135,8 @@ fn drawn(
     Ok(all)
 }
 
-/// What the readings of replays from starts moved by some changes do beyond what slopes say; zero where one of them is missing.
+/// Readings of replays from changed initial states, beyond what derivatives predict; zero if
+/// missing.
 fn beyond_slopes(
     here: &[LinearEpisode],
     there: &[LinearEpisode],
@@ -151,7 +161,8 @@ fn scaled(by: f64, mut beyond: Beyond) -> Beyond {
     beyond
 }
 
-/// Share of the rows, over all segments, in which readings of the variances `r` scatter by more than their noise.
+/// Share of the rows of all segments whose readings, of variances `r`, scatter by more than their
+/// noise.
 fn lost(directions: &[Vec<f64>], n: usize, r: &[f64]) -> f64 {
     let (mut lost, mut rows) = (0_u32, 0_u32);
     for row in directions.iter().flat_map(|d| d.chunks_exact(n * r.len())) {

@@ -1,4 +1,4 @@
-//! Ranking of all candidates, of groups and of pairs of them, by one linear regression.
+//! Ranks all candidates, groups of them and pairs of them by one linear regression.
 
 use std::collections::BTreeSet;
 
@@ -10,31 +10,36 @@ use super::columns::Columns;
 use super::scales::Scales;
 use super::smoother::Regression;
 
-/// Evidence by which a group must beat the best of its members, and a pair the sum of its two.
+/// Evidence by which a group must beat its best member, and a pair the sum of its two members.
 const MORE: f64 = 3.0;
-/// Candidates that lead by themselves, of each of which and any other a pair is looked at.
+/// Number of leading single candidates that are paired with others.
 const FIRSTS: usize = 40;
-/// Pairs that are kept, at most.
+/// Largest number of pairs that are kept.
 const PAIRS: usize = 3;
 
 /// Which pairs of candidates are offered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pairs {
-    /// Two at one joint that tell more together than the sum of what each tells by itself: two frictions, each of which leaves to the noise what
-    /// the other makes. What is no more than the sum is found one after the other.
+    /// Two candidates at one joint that together earn more evidence than the sum of the two.
+    ///
+    /// Two frictions are an example: fitted alone, each leaves the force of the other to the noise
+    /// model. A pair that is no better than the sum is found one name after the other.
     BeyondTheSum,
-    /// Two at any joints that tell more together than the better of them: where nearly all of the force shows, each tells most by itself.
+    /// Two candidates at any joints that together earn more evidence than the better one.
+    ///
+    /// Where the logs show nearly all of the force, each candidate alone already shows most of its
+    /// evidence.
     BeyondTheBetter,
 }
 
-/// Candidates that may be missing together, with the evidence for them upon the present model.
+/// Candidates that may be missing together, with their evidence relative to the present model.
 #[derive(Clone, Debug)]
 pub struct Screened {
     /// Forms of the candidates; see [`Columns::forms`].
     pub forms: Vec<usize>,
-    /// How many named things they are: a group counts once.
+    /// Number of names: a group counts once.
     pub names: usize,
-    /// Evidence over the present model, natural logarithm; a round adds the prior odds.
+    /// Evidence relative to the present model, natural logarithm; a round adds the prior odds.
     pub gain: f64,
     /// Coefficients of the present model's unknowns.
     pub base: Vec<f64>,
@@ -43,25 +48,25 @@ pub struct Screened {
 }
 
 impl Screened {
-    /// Its evidence, less the `price` of each name but the first.
+    /// The evidence, less the `price` of each name after the first.
     #[must_use]
     pub fn worth(&self, price: f64) -> f64 {
         self.gain - price * self.names.saturating_sub(1) as f64
     }
 }
 
-/// A ranking by regressions.
+/// State of one ranking by regressions.
 struct Ranking<'r> {
     scales: &'r Scales,
     columns: &'r Columns,
     candidates: &'r [Candidate],
-    /// Columns of the present model, and the evidence of these alone.
+    /// Columns of the present model, and the evidence of these columns alone.
     base: Vec<usize>,
     none: f64,
 }
 
 impl Ranking<'_> {
-    /// The evidence of some forms together, which are so many names.
+    /// Returns the evidence of some forms together; they count as `names` names.
     fn screened(&self, forms: &[usize], names: usize) -> Screened {
         let mut which = self.base.clone();
         let own = forms.iter().flat_map(|&f| self.columns.forms[f].columns());
@@ -85,7 +90,7 @@ impl Ranking<'_> {
         }
     }
 
-    /// Each candidate by itself, in its best form.
+    /// Returns each candidate by itself, in its best form.
     fn singles(&self) -> Vec<Screened> {
         let mut best: Vec<Option<Screened>> = vec![None; self.candidates.len()];
         for (f, form) in self.columns.forms.iter().enumerate() {
@@ -100,7 +105,9 @@ impl Ranking<'_> {
         singles
     }
 
-    /// One effect at all its sites, but where that is one of them with idle ones.
+    /// Returns groups of one effect at all its sites, if they beat their best member by [`MORE`].
+    ///
+    /// A group that is one active member with idle others does not pass this test.
     fn groups(&self, singles: &[Screened]) -> Vec<Screened> {
         let name = |s: &Screened| {
             &*self.candidates[self.columns.forms[s.forms[0]].candidate]
@@ -120,7 +127,7 @@ impl Ranking<'_> {
         names.into_iter().filter_map(group).collect()
     }
 
-    /// The best pairs, at the `price` of a further name.
+    /// Returns the best pairs; a further name costs `price`.
     fn pairs(&self, singles: &[Screened], (which, price): (Pairs, f64)) -> Vec<Screened> {
         let mut order: Vec<&Screened> = singles.iter().collect();
         order.sort_by(|a, b| b.gain.total_cmp(&a.gain));
@@ -152,7 +159,9 @@ impl Ranking<'_> {
     }
 }
 
-/// Ranks all candidates, the groups of one effect at all its sites, and pairs, by their evidence less the `price` of a further name, best first.
+/// Ranks candidates, groups of one effect at all its sites, and pairs, best first.
+///
+/// The order is by evidence less the `price` of each further name.
 pub fn rank(
     scales: &Scales,
     columns: &Columns,
@@ -176,15 +185,18 @@ pub fn rank(
     all
 }
 
-/// Cosines of the largest principal angles between candidates' columns, the present model's projected out: 1 where two
-/// cannot be told apart by these logs, 0 where they have nothing in common. One row and column a form.
+/// Cosine of the smallest principal angle between the columns of each two forms.
+///
+/// The present model's columns are projected out. A cosine of 1 means that these logs cannot
+/// separate the two; 0 means that they have nothing in common. The matrix has one row and one
+/// column per form.
 #[must_use]
 pub fn isolability(sum: &Regression, columns: &Columns, forms: &[usize]) -> DMatrix<f64> {
     let base: Vec<usize> = (0..columns.base).collect();
     let gram = project(&sum.gram, &base);
     let block =
         |a: &[usize], b: &[usize]| DMatrix::from_fn(a.len(), b.len(), |i, j| gram[(a[i], b[j])]);
-    // The columns of each form, and what makes them orthonormal.
+    // The columns of each form, and the matrix that makes them orthonormal.
     let basis = |&f: &usize| -> (Vec<usize>, DMatrix<f64>) {
         let own: Vec<usize> = columns.forms[f].columns().collect();
         let eigen = block(&own, &own).symmetric_eigen();
@@ -205,7 +217,7 @@ pub fn isolability(sum: &Regression, columns: &Columns, forms: &[usize]) -> DMat
     })
 }
 
-/// A Gram matrix with some columns projected out of all.
+/// A Gram matrix with the columns `out` projected out of all others.
 pub(super) fn project(gram: &DMatrix<f64>, out: &[usize]) -> DMatrix<f64> {
     if out.is_empty() {
         return gram.clone();
@@ -257,7 +269,7 @@ mod tests {
         isolability(&sum, &columns, &all)
     }
 
-    /// Sums of columns that are orthogonal: each with the information `g` and the moment `b`.
+    /// Sums of `n` orthogonal columns, each with the information `g` and the moment `b`.
     fn orthogonal(log_likelihood: f64, n: usize, (g, b): (f64, f64)) -> Regression {
         Regression {
             log_likelihood,
@@ -268,8 +280,9 @@ mod tests {
 
     #[test]
     fn two_laws_of_one_joint_are_seen_together_where_neither_is_by_itself() {
-        // Forms 0 and 1 act at one joint, form 2 at another. At the noise as it is each column tells next to nothing. With a smaller
-        // variance at the first joint the logs are less likely by 50, and each of its two laws makes up for 0.5 * 100^2 / 101 of that.
+        // Forms 0 and 1 act at one joint, form 2 at another. At the present noise each column alone
+        // earns next to nothing. A smaller variance at the first joint lowers the log-likelihood by
+        // 50, and each of its two laws gains 0.5 * 100^2 / 101.
         let forms = (0..3).map(|c| Form {
             candidate: c,
             begin: Vec::new(),
@@ -312,7 +325,7 @@ mod tests {
             DVector::from_row_slice(&[1.0, 2.0, 0.0, 0.0]),
             DVector::from_row_slice(&[-3.0, -6.0, 0.0, 0.0]),
             DVector::from_row_slice(&[0.0, 0.0, 1.0, 0.0]),
-            // 60 degrees from the last.
+            // 60 degrees from the column before.
             DVector::from_row_slice(&[0.0, 0.0, 0.5, 0.75_f64.sqrt()]),
         ]);
         let found = isolability_of(&x, 0, &[1; 4]);
@@ -331,8 +344,8 @@ mod tests {
 
     #[test]
     fn of_planes_it_is_the_cosine_of_the_smallest_angle_between_them() {
-        // The first plane spans x and y, the second a line at 30 degrees above it and one in y + w: the angle
-        // nearest to zero decides. A column that does nothing spans nothing.
+        // The first plane spans x and y. The second is spanned by a line 30 degrees above the first
+        // and by y + w. The smallest angle decides. A zero column spans nothing.
         let (s, c) = 30.0_f64.to_radians().sin_cos();
         let x = DMatrix::from_columns(&[
             DVector::from_row_slice(&[1.0, 1.0, 0.0, 0.0]),
@@ -350,7 +363,7 @@ mod tests {
 
     #[test]
     fn what_the_present_model_explains_is_projected_out() {
-        // Two candidates share much of what the base can do, and nothing else.
+        // Two candidates share only what the base also explains.
         let x = DMatrix::from_columns(&[
             DVector::from_row_slice(&[1e4, 0.0, 0.0]),
             DVector::from_row_slice(&[5.0, 1.0, 0.0]),
@@ -359,14 +372,14 @@ mod tests {
         let alone = isolability_of(&x.columns(1, 2).into_owned(), 0, &[1; 2]);
         assert!((alone[(0, 1)] - 25.0 / 26.0).abs() < 1e-12);
         let found = isolability_of(&x, 1, &[1; 2]);
-        // A prior deviation of 1 leaves 5^2 / (1 + 1e8) of what is shared.
+        // A prior standard deviation of 1 leaves 5^2 / (1 + 1e8) of the shared part.
         assert!(found[(0, 1)] < 1e-6, "{found}");
         assert!((found[(1, 1)] - 1.0).abs() < 1e-12);
     }
 
     #[test]
     fn projecting_out_is_the_noise_that_uncertain_coefficients_add() {
-        // X' (I + Z Z')^-1 X with Z the columns that are out: their coefficients are N(0, 1).
+        // X' (I + Z Z')^-1 X, where Z are the columns projected out, with coefficients N(0, 1).
         let x = DMatrix::from_fn(5, 4, |i, j| ((3 * i + 7 * j * j + i * j) % 11) as f64 - 5.0);
         let z = x.columns(0, 2);
         let covariance = DMatrix::identity(5, 5) + z * z.transpose();

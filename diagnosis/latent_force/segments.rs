@@ -1,31 +1,40 @@
-//! Where bodies touch, a log is taken in short segments.
+//! Cuts logs into short segments where bodies touch.
 //!
-//! A missing force of any size and direction is no model of a lasting contact: pressed together by it, two bodies rub by any
-//! force. So a stretch with contact is cut into segments, each a replay from a start of its own (multiple shooting, Bock and Plitt
-//! 1984), and what a segment leaves of its readings is a variance of its own. Elsewhere the missing force is smoothed.
+//! A missing force of any size and direction is no model of a lasting contact: if it presses two
+//! bodies together, any friction force can act between them. So a stretch with contact is cut into
+//! segments. Each is a replay from an initial state of its own (multiple shooting, Bock and Plitt
+//! 1984), and its residuals have a variance of their own. Elsewhere the missing force is smoothed.
 //!
-//! A long segment tells more, for a small force moves a body the further the longer it acts, and has fewer starts to find. A short
-//! one is nearer to linear in its start: over a quarter of a second even a model with impacts is. So a segment is [as long
+//! A long segment is more informative: a small force moves a body the further the longer it acts,
+//! and there are fewer initial states to estimate. A short one is closer to linear in its initial
+//! state: over a quarter of a second even a model with impacts is. So a segment is [as long
 //! as](DURATIONS) its replays can be repeated ([`super::scatter`]).
 //!
-//! A segment begins some rows before its readings count. Over these rows the contact settles, and what the start may be off in a
-//! direction that a contact blocks dies away as it does in the machine; and what effects remember is there.
+//! A segment begins some rows before its readings count. Over these rows the contact settles, and
+//! effects build up their memory. An error of the initial state in a direction that a contact
+//! blocks decays as it does in the machine.
 
 use super::walk::Walk;
 
-/// Durations of segments, s, the shortest first: a few times a contact's time constant (0.02 s by default in MuJoCo), over which a
-/// few per cent of a force move a body by about what sensors tell; a few impacts; and a whole stretch of contact.
+/// Durations of segments, s, shortest first.
+///
+/// The first is a few times a contact's time constant (0.02 s by default in MuJoCo): a few per cent
+/// of a force then move a body by about a sensor's resolution. The second covers a few impacts, the
+/// last a whole stretch of contact.
 pub const DURATIONS: [f64; 3] = [0.25, 1.0, f64::INFINITY];
-/// Longest stretch without contact between two with it that is part of them, s: what it lacks is told as well by their readings.
+/// Longest gap between two contacts that joins their stretch, s: its readings show a missing force
+/// as well.
 const BETWEEN: f64 = 0.5;
-/// Time for which a segment runs before its readings count, s: five time constants of a contact.
+/// Time that a segment runs before its readings count, s: five time constants of a contact.
 const LEAD: f64 = 0.1;
-/// Time about a row with contact that counts as with it, s: readings are noisy, and a bounce is shorter than a row.
+/// Time about a row with contact that counts as contact too, s: readings are noisy, and a bounce is
+/// shorter than a row.
 const ABOUT: f64 = 0.1;
-/// Fewest rows of a segment that count.
+/// Fewest counted rows of a segment: fewer say little beyond its initial state.
 const FEWEST: usize = 4;
 
-/// Cuts a walk: where something touches (one flag a row) into segments of a duration, s, the rest as it is.
+/// Cuts a walk into segments of a duration, s, where bodies touch (one flag a row); the rest stays
+/// whole.
 #[must_use]
 pub fn cut(walk: &Walk, touches: &[bool], duration: f64) -> Vec<Walk> {
     let n = walk.len();
@@ -51,7 +60,7 @@ pub fn cut(walk: &Walk, touches: &[bool], duration: f64) -> Vec<Walk> {
     out
 }
 
-/// A walk as one segment from its first row on, where something touches (one flag a row); as it is where nothing does.
+/// Makes a walk one segment from its first row on if bodies touch in any row (one flag a row).
 #[must_use]
 pub fn whole(walk: &Walk, touches: &[bool]) -> Walk {
     let mut walk = walk.clone();
@@ -74,7 +83,7 @@ fn runs_of(flags: &[bool]) -> Vec<Run> {
     runs
 }
 
-/// Short runs without contact become part of those with it.
+/// Joins short runs without contact to their neighbours with contact.
 fn merged(walk: &Walk, runs: Vec<Run>) -> Vec<Run> {
     let mut out: Vec<Run> = Vec::new();
     for (range, touching) in runs {
@@ -88,7 +97,7 @@ fn merged(walk: &Walk, runs: Vec<Run>) -> Vec<Run> {
     out
 }
 
-/// Cuts some rows into segments of about the same duration.
+/// Cuts some rows into segments of about equal duration.
 fn segments(walk: &Walk, range: std::ops::Range<usize>, duration: f64, out: &mut Vec<Walk>) {
     let rows = range.len();
     let seconds = walk.time[range.end - 1] - walk.time[range.start];
@@ -147,7 +156,7 @@ mod tests {
             next = counted(part).end;
         }
         assert_eq!(next, 400);
-        // A tenth of a second about the contact: rows 140 to 239 in four segments.
+        // Contact plus a tenth of a second on either side: rows 140 to 239 in four segments.
         assert_eq!(parts.len(), 6);
         assert_eq!(counted(&parts[1]), 140..165);
         assert_eq!(parts[1].segment, Some(10));

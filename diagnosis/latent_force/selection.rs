@@ -1,4 +1,4 @@
-//! From a search by the missing force to what its decision rests on.
+//! Collects the evidence for the decision from a search by the missing force.
 
 use asid_core::{Progress, Result};
 use asid_mjcf::Plant;
@@ -16,7 +16,8 @@ use crate::skill::about_the_mean;
 use super::estimate::{LEAST_LEFT, NOTHING};
 use super::search::{Outcome, Set, labels_of, log_prior};
 
-/// Sets that were screened and not fitted that are kept: what is further behind has no probability that shows.
+/// Largest number of screened, unfitted sets that are kept: those further behind have a negligible
+/// probability.
 const SCREENED: usize = 40;
 
 /// Labels of a set, sorted.
@@ -26,7 +27,7 @@ fn labels(candidates: &[Candidate], set: &[usize]) -> Vec<String> {
     labels
 }
 
-/// Mean squares that whole replays of an explanation leave.
+/// Mean squared residuals of whole replays of an explanation.
 fn replayed(bench: &Bench, of: &Explanation, held_out: f64) -> Replayed {
     Replayed {
         train: of.fit.cost / bench.train.readings.max(1) as f64,
@@ -34,7 +35,10 @@ fn replayed(bench: &Bench, of: &Explanation, held_out: f64) -> Replayed {
     }
 }
 
-/// What was screened upon a base and never fitted, with evidence over the model without effects to first order and prior odds.
+/// Sets that were screened upon a base and never fitted.
+///
+/// Their evidence is relative to the model without effects, to first order, and includes prior
+/// odds.
 fn screened(
     plant: &Plant,
     outcome: &Outcome,
@@ -44,7 +48,7 @@ fn screened(
     let none = outcome.none.evidence;
     let mut all: Vec<Screened> = Vec::new();
     for round in &outcome.rounds {
-        // The base as it was fitted: the model without effects, or a set of the rounds before.
+        // The fitted base: the model without effects, or a set of an earlier round.
         let sets = outcome.rounds.iter().flat_map(|r| &r.confirmed);
         let of_base = sets.clone().filter(|s| s.candidates == round.base);
         let base = of_base.map(|s| (s.fitted.evidence, s.names)).next();
@@ -73,8 +77,10 @@ fn screened(
     all
 }
 
-/// Gathers what the decision rests on; `sets` are those behind the findings, in their order, and `known` the candidates that the
-/// logs show to act without a search.
+/// Collects what the decision is based on.
+///
+/// `sets` are those behind the findings, in their order. `known` are the candidates that the logs
+/// show without a search.
 ///
 /// # Errors
 /// When a rollout fails.
@@ -101,7 +107,7 @@ pub fn gather(
             }
         })
         .collect();
-    // What the decision compares is what no start makes up for.
+    // The decision compares the residuals that no initial state can absorb.
     let of_found = found.map(|i| &findings.found[i]);
     let of_found = of_found.map(|of| (trials(candidates, &of.candidates, &of.explanation), of));
     let mut compared: Vec<Explained<'_>> = vec![(&[], &findings.none)];
@@ -118,7 +124,8 @@ pub fn gather(
     let [before, after] = outcome.missing;
     let is_missing = before.force.sqrt() > NOTHING || before.readings > LEAST_LEFT;
     let stopped = !outcome.untried.is_empty();
-    // One more replay at half the time step: what is named in a small gap cannot do without, nor can a large one that no missing force makes.
+    // One more replay, at half the time step. A name in a small gap requires it, and so does a
+    // large gap without a missing force.
     let is_asked = if stopped {
         is_small(none) && found.is_some()
     } else {
@@ -126,7 +133,7 @@ pub fn gather(
     };
     let own_error = if is_asked {
         let change = change_by_step(bench, &findings.none, &bench.machine.halved()?)?;
-        // A replay that diverges tells nothing of it.
+        // A replay that diverges gives no estimate.
         let finite = Some(cost(&change)).filter(|c| c.is_finite());
         finite.map_or(f64::NAN, |c| {
             RICHARDSON.powi(2) * c / bench.train.readings.max(1) as f64

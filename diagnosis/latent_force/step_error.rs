@@ -1,30 +1,38 @@
 //! The engine's own error over a row, as a column of every model.
 //!
-//! An engine that takes finite steps errs in the same way in each row: a semi-implicit step damps or drives a joint a little, and logs
-//! show that as friction, a lag or a softer drive that the machine has not got. How the error acts is known: it is what half the
-//! time step changes, and twice that for a method of first order (Richardson 1911). How large it is is known less well, for methods have
-//! other orders. So it is a column with a coefficient of its own in the regression of every model, with effects or without: what the step
-//! does earns no name any evidence. Segments have it as [directions](super::scatter).
+//! An engine with finite steps makes the same error in each row. A semi-implicit step slightly
+//! damps or drives a joint, and logs show that as friction, a lag or a softer drive that the
+//! machine does not have. The form of the error is known: it is the change at half the time step,
+//! times two for a method of first order (Richardson 1911). Its size is less certain, since methods
+//! have other orders. So every model, with effects or without, has this column with a coefficient
+//! of its own: the step's error earns no name any evidence. Segments have it as
+//! [directions](super::scatter).
 
 use crate::checks::RICHARDSON;
 
 use super::step_map::LinearEpisode;
 
-/// Mean of the coefficient, in errors of a method of first order: between that and a method of high order, of which half the step tells
-/// half as much. A log that another simulation made has 0.5 at half the step, 0.75 at a quarter.
+/// Prior mean of the coefficient, in errors of a method of first order.
+///
+/// It lies between 1, a method of first order, and 0.5, a method of high order, for which half the
+/// step shows the whole error. Logs simulated at half the step have 0.5, at a quarter 0.75.
 const MEAN: f64 = 0.75;
-/// Its deviation: both ends are one away.
+/// Prior standard deviation of the coefficient: both ends are one away.
 pub const DEVIATION: f64 = 0.25;
 
-/// The error of each walk, for a coefficient of one deviation, `(rows - 1) x nx` in tangent coordinates of the next state; nothing of segments.
+/// The error of each walk for a coefficient of one standard deviation.
+///
+/// `(rows - 1) x nx` in tangent coordinates of the next state; empty for segments.
 #[derive(Clone, Debug, Default)]
 pub struct StepError {
     walks: Vec<Vec<f64>>,
 }
 
 impl StepError {
-    /// Of the rows of walks that were linearised about one trajectory at a time step and at half of it; of `segments` (one flag a walk)
-    /// there is none.
+    /// Computes the error of walks that were linearised about one trajectory at a time step and at
+    /// half of it.
+    ///
+    /// `segments` has one flag a walk; a segment has no error.
     #[must_use]
     pub fn between(here: &[LinearEpisode], finer: &[LinearEpisode], segments: &[bool]) -> Self {
         let of_walk = |((here, finer), segment): ((&LinearEpisode, &LinearEpisode), &bool)| {
@@ -44,7 +52,7 @@ impl StepError {
         }
     }
 
-    /// That of some of the walks.
+    /// Returns the error of some of the walks.
     #[must_use]
     pub fn of_walks(&self, which: &[usize]) -> Self {
         Self {
@@ -56,19 +64,20 @@ impl StepError {
         }
     }
 
-    /// How many columns it is: one, or none where it is not known.
+    /// Number of its columns: one, or none if the error is unknown.
     #[must_use]
     pub fn columns(&self) -> usize {
         usize::from(!self.walks.is_empty())
     }
 
-    /// Where the prior's center lies from an engine without error, in deviations; one a column.
+    /// Center of the prior relative to an engine without error, in standard deviations; one a
+    /// column.
     #[must_use]
     pub fn center(&self) -> &'static [f64] {
         &[MEAN / DEVIATION][..self.columns()]
     }
 
-    /// Puts its column beside the `m` that a linearisation has.
+    /// Appends its column to the `m` columns of a linearisation.
     pub fn join(&self, linear: &mut [LinearEpisode], m: usize) {
         for (linear, error) in linear.iter_mut().zip(&self.walks) {
             if !error.is_empty() {
@@ -80,7 +89,7 @@ impl StepError {
     }
 }
 
-/// Two row-major matrices of `n` and `m` columns side by side.
+/// Concatenates two row-major matrices of `n` and `m` columns side by side.
 pub(super) fn beside(a: &[f64], n: usize, b: &[f64], m: usize) -> Vec<f64> {
     let rows = a.len().checked_div(n).unwrap_or(b.len() / m.max(1));
     let mut out = Vec::with_capacity(rows * (n + m));

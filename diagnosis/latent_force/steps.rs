@@ -1,8 +1,9 @@
-//! Encoder steps that a log shows by itself.
+//! Encoder steps that a log shows directly.
 //!
-//! Readings on one grid, wider than the sensor's noise, need no search: the log says that they come in steps, and how wide these
-//! are. Rounding has no slope either, by which a regression could find it. So the smoother takes such readings as noisy as
-//! their steps make them (a uniform error has the variance `step² / 12`), and the rounding is named beside whatever else is found.
+//! Readings on a grid that is wider than the sensor's noise need no search: the log itself shows
+//! the steps and their width. Rounding also has no derivative that a regression could use. So the
+//! smoother gives such readings the noise of their steps (a uniform error has the variance `step² /
+//! 12`), and the rounding is named next to whatever else is found.
 
 use nalgebra::DMatrix;
 
@@ -13,16 +14,19 @@ use crate::noise;
 use super::columns::Form;
 use super::search::{Outcome, Round, Set, Sight};
 
-/// Deviation of the rounding, relative to the noise of the sensor, from which on steps are an effect. Smaller: steps that the
-/// noise hides are named too. A study whose noise is that of its encoder (`step / sqrt(12)`) has no such effect.
+/// Steps are an effect if the standard deviation of the rounding is this multiple of the sensor's
+/// noise.
+///
+/// With a smaller factor, steps hidden by the noise would be named too. A study whose stated noise
+/// is that of its encoder (`step / sqrt(12)`) has no such effect.
 const SHOWS: f64 = 1.2;
 
-/// How a sensor rounds.
+/// Rounding of a sensor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Rounding {
     /// Width of a step, in the unit of the reading.
     step: f64,
-    /// Rows that a reading stays the same for, as a mean.
+    /// Mean number of rows over which a reading stays the same.
     run: f64,
 }
 
@@ -33,7 +37,7 @@ impl Rounding {
     }
 }
 
-/// How a sensor rounds, where that is more than its noise.
+/// Rounding of a sensor, if it exceeds the sensor's noise.
 fn rounding(logs: &Logs, sensor: usize) -> Option<Rounding> {
     let step = noise::step(logs, sensor);
     let (mut rows, mut changes) = (0, 0);
@@ -49,8 +53,9 @@ fn rounding(logs: &Logs, sensor: usize) -> Option<Rounding> {
     shows.then_some(found)
 }
 
-/// Deviation of the readings of each sensor: that of its noise, or of its steps. The errors of a run of equal readings are one
-/// error, and tell as little as one.
+/// Standard deviation of the readings of each sensor: that of its noise, or that of its steps.
+///
+/// The errors of a run of equal readings are one error, and carry the information of one reading.
 #[must_use]
 pub fn noise_with_steps(logs: &Logs) -> Vec<f64> {
     let sensors = logs.sensors.iter().enumerate();
@@ -67,11 +72,12 @@ pub struct Shown {
     sensor: String,
     /// Width of a step, in the unit of the reading.
     step: f64,
-    /// Logarithm of the likelihood of the readings with the rounding's variance over that with the noise's alone.
+    /// Log-likelihood of the readings with the rounding's variance, less that with the noise's
+    /// variance.
     gain: f64,
 }
 
-/// The steps that logs show, whose noise is that of the sensors alone.
+/// The steps that logs show; the noise of the logs is that of the sensors alone.
 #[must_use]
 pub fn shown(logs: &Logs) -> Vec<Shown> {
     let sensors = logs.sensors.iter().enumerate();
@@ -92,13 +98,13 @@ pub fn shown(logs: &Logs) -> Vec<Shown> {
 /// Steps that logs show, as a candidate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Known {
-    /// The candidate that rounds so.
+    /// The candidate that rounds in these steps.
     pub candidate: usize,
     step: f64,
     gain: f64,
 }
 
-/// The candidates that stand for the steps shown.
+/// The candidates that correspond to the steps shown.
 #[must_use]
 pub fn known(shown: &[Shown], candidates: &[Candidate]) -> Vec<Known> {
     let of = |shown: &Shown| {
@@ -113,7 +119,7 @@ pub fn known(shown: &[Shown], candidates: &[Candidate]) -> Vec<Known> {
     shown.iter().filter_map(of).collect()
 }
 
-/// Puts the steps that logs show beside every set that a search found, and alone.
+/// Adds the steps that logs show to every set that the search found, and as a set of their own.
 #[must_use]
 pub fn beside(mut outcome: Outcome, known: &[Known], candidates: &[Candidate]) -> Outcome {
     if known.is_empty() {
@@ -130,7 +136,7 @@ pub fn beside(mut outcome: Outcome, known: &[Known], candidates: &[Candidate]) -
                 first: 0,
             };
             let unknowns = form.unknowns(candidate).into_iter();
-            // The log has told it.
+            // The log gives this value, so it is not fitted.
             let given = unknowns.map(|u| super::fitted_value::Unknown { free: false, ..u });
             let fitted = &mut set.fitted;
             fitted.hypothesis.unknowns.extend(given);

@@ -1,13 +1,13 @@
 //! States and their tangent space.
 //!
 //! A state is `qpos` then `qvel` (`nq + nv` numbers). A small change of it has `2 nv` coordinates:
-//! of the positions, then of the speeds. Orientations change about the body's own axes, as
-//! their angular speed is counted.
+//! those of the positions, then those of the speeds. Orientations are rotated about the body's own
+//! axes, as their angular velocity is expressed.
 
 use asid_core::layout::{JointKind, Layout};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
-/// First entry of a joint's quaternion in `qpos` and of its angular speed in `qvel`, where it has one.
+/// Index of a joint's quaternion in `qpos` and of its angular velocity in `qvel`, if it has one.
 fn rotation(joint: &asid_core::layout::Joint) -> Option<(usize, usize)> {
     match joint.kind {
         JointKind::Free => Some((joint.qpos + 3, joint.qvel + 3)),
@@ -16,7 +16,7 @@ fn rotation(joint: &asid_core::layout::Joint) -> Option<(usize, usize)> {
     }
 }
 
-/// Position coordinates that are plain numbers: places in `qpos` and in `qvel`.
+/// Indices in `qpos` and `qvel` of the position coordinates that are plain numbers.
 fn scalars(layout: &Layout) -> impl Iterator<Item = (usize, usize)> {
     layout.joints.iter().flat_map(|j| {
         let n = match j.kind {
@@ -48,7 +48,7 @@ pub fn retract(layout: &Layout, state: &mut [f64], change: &[f64]) {
     }
 }
 
-/// The change (`2 nv`) that moves state `b` to state `a`.
+/// Computes the change (`2 nv`) that moves state `b` to state `a`.
 pub fn difference(layout: &Layout, a: &[f64], b: &[f64], out: &mut [f64]) {
     let (nq, nv) = (layout.nq, layout.nv);
     for (p, d) in scalars(layout) {

@@ -1,7 +1,8 @@
 //! In which rows bodies touch in a way that the motion depends on.
 //!
-//! Many models have bodies that touch all the time and never move against each other: a thing that lies on a table beside the
-//! arm, a base on its stand. Such a contact holds what is at rest anyway. No row needs to be taken otherwise for it.
+//! Many models have bodies that touch all the time and never move relative to each other: an object
+//! that lies on a table beside the arm, a base on its stand. Such a contact only holds what is at
+//! rest anyway. Its rows need no segments.
 
 use asid_core::layout::JointKind;
 use asid_mjcf::Plant;
@@ -12,11 +13,13 @@ use crate::trajectory::Trajectory;
 use super::initial::position_noise;
 use super::tangent::difference;
 
-/// Deviation of a coordinate, in deviations of its reading, up to which a joint counts as at rest: noise makes 1, and a noise
-/// that is estimated may be half as large as it is.
+/// A joint counts as at rest up to this standard deviation, in standard deviations of its reading.
+///
+/// Noise alone makes 1, and an estimated noise may be half of the actual one.
 const AT_REST: f64 = 3.0;
 
-/// For each walk of a trajectory, one flag a row: whether two bodies touch there that move against each other in some log.
+/// For each walk, one flag a row: whether two bodies touch that move relative to each other in some
+/// log.
 #[must_use]
 pub fn touching(plant: &Plant, logs: &Logs, shown: &Trajectory) -> Vec<Vec<bool>> {
     let episodes: Vec<&[f64]> = shown.episodes.iter().map(|e| &e.qpos[..]).collect();
@@ -58,8 +61,10 @@ pub fn pairs_touching(shown: &Trajectory) -> Vec<[usize; 2]> {
     pairs.filter(touch).map(|(_, pair)| *pair).collect()
 }
 
-/// Whether each joint stays where it is along some positions (`rows x nq` an episode), as far as readings with such deviations
-/// (one a degree of freedom, 0 for none) tell; what no sensor reads may move.
+/// Whether each joint is at rest along some positions (`rows x nq` an episode).
+///
+/// `noise` is the standard deviation of the readings, one a degree of freedom, 0 if no sensor reads
+/// it. A joint that no sensor reads may move.
 fn joints_at_rest(plant: &Plant, noise: &[f64], episodes: &[&[f64]]) -> Vec<bool> {
     let layout = &plant.layout;
     let (nq, nv) = (layout.nq, layout.nv);
@@ -91,7 +96,7 @@ fn joints_at_rest(plant: &Plant, noise: &[f64], episodes: &[&[f64]]) -> Vec<bool
         .collect()
 }
 
-/// The joints on the way from one body to another.
+/// The joints between two bodies.
 fn between(plant: &Plant, [a, b]: [usize; 2]) -> impl Iterator<Item = usize> {
     let chain = |mut body: usize| {
         let mut bodies = vec![body];

@@ -1,8 +1,9 @@
-//! Effects that need no engine to become columns: forces along a trajectory.
+//! Effects whose columns need no engine: forces along a trajectory.
 //!
-//! An effect that only adds forces is driven along the smoothed states and the logged commands, physics step by physics step,
-//! so that what it remembers is right; its column follows by the slopes of the model in forces. (Commands are no such case:
-//! a drive at its limit has no slope.)
+//! An effect that only adds forces is evaluated along the smoothed states and the logged commands,
+//! physics step by physics step, so that its memory is right. Its column follows from the model's
+//! derivatives with respect to forces. (Effects on commands are excluded: a drive at its limit has
+//! no derivative.)
 
 use asid_core::Result;
 use asid_core::simulator::StepView;
@@ -20,11 +21,12 @@ pub fn is_traceable(plant: &Plant, candidate: &Candidate) -> bool {
     matches!(effect.acts(), Acts::Force) && effect.targets(plant, &candidate.spec.site).is_empty()
 }
 
-/// Generalized forces that a candidate with some values adds along a walk's states (`rows x (nq + nv)`), mean over each row,
-/// `(rows - 1) x nv`.
+/// Returns the generalized forces that a candidate adds along a walk, as means over its rows.
+///
+/// `values` are its values, `states` are `rows x (nq + nv)`, and the result is `(rows - 1) x nv`.
 ///
 /// # Errors
-/// When a value makes no sense.
+/// When a value is invalid.
 pub fn trace(
     plant: &Plant,
     candidate: &Candidate,

@@ -1,26 +1,26 @@
-//! The rows of a log as a filter walks them.
+//! The rows of a log that the filter processes.
 
 use crate::data::Logs;
 
-/// Shortest row, s: over a shorter one a force moves nothing by what a sensor tells, and machines of this size do little
-/// faster.
+/// Shortest row, s. Over a shorter one no force moves a body by as much as a sensor resolves, and
+/// machines of this size hardly move faster.
 pub const FINEST: f64 = 0.004;
 
-/// Rows of one episode that are at least one physics step apart.
+/// Rows of one episode, at least [`FINEST`] and one physics step apart.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Walk {
-    /// The episode of the logs.
+    /// Index of the episode in the logs.
     pub episode: usize,
-    /// Rows of the log.
+    /// Indices of the rows in the log.
     pub rows: Vec<usize>,
-    /// Their times from the first on, s.
+    /// Times of the rows from the first one on, s.
     pub time: Vec<f64>,
     /// Physics steps from each row to the next, one fewer than rows.
     pub substeps: Vec<usize>,
     /// Commands held from each row to the next, `(rows - 1) x nu`.
     pub ctrl: Vec<f64>,
-    /// Of a short segment that is replayed from its first row: how many rows at its beginning do not count. `None` for rows
-    /// along which a force may be missing.
+    /// For a segment that is replayed from its first row: the number of leading rows that do not
+    /// count. `None` for rows along which a force may be missing.
     pub segment: Option<usize>,
 }
 
@@ -37,9 +37,11 @@ impl Walk {
         self.rows.is_empty()
     }
 
-    /// Walks an episode of some logs at a physics time step (s). Times are rounded to whole steps from
-    /// the first row on, so that no error adds up. A row that falls on the step of the one before, or follows it sooner than
-    /// [`FINEST`], is passed over; the command between two rows is the mean of those sent.
+    /// Selects the rows of an episode at a physics time step (s).
+    ///
+    /// Times are rounded to whole steps from the first row on, so that rounding errors do not add
+    /// up. A row is skipped if it falls on the step of the row before, or follows it sooner than
+    /// [`FINEST`]. The command between two rows is the mean of the commands sent.
     #[must_use]
     pub fn new(logs: &Logs, episode: usize, timestep: f64) -> Self {
         let log = &logs.episodes[episode];
@@ -81,7 +83,7 @@ impl Walk {
         }
     }
 
-    /// Some of its rows, as a walk of their own.
+    /// Some of the rows, as a walk of their own.
     #[must_use]
     pub fn part(&self, range: std::ops::Range<usize>) -> Self {
         let steps = range.start..range.end - 1;
@@ -97,8 +99,10 @@ impl Walk {
     }
 }
 
-/// Groups the walks of those `here` that go on beyond row `k` by the physics steps from it to the next: an engine steps all
-/// simulations of a call alike.
+/// Groups walks by the physics steps from row `k` to the next.
+///
+/// Only walks of `here` that continue beyond row `k` are included. An engine steps all simulations
+/// of a call by the same number of steps.
 #[must_use]
 pub fn by_substeps(walks: &[&Walk], here: Vec<usize>, k: usize) -> Vec<(usize, Vec<usize>)> {
     let mut groups: Vec<(usize, Vec<usize>)> = Vec::new();
@@ -146,7 +150,7 @@ mod tests {
 
     #[test]
     fn rounding_to_steps_does_not_add_up() {
-        // Rows 1.49 steps apart, from some time on: each lies within half a step of where the walk is.
+        // Rows are 1.49 steps apart: each lies within half a step of the walk's time.
         let time: Vec<f64> = (0..200).map(|k| 7.0 + 1.49 * STEP * f64::from(k)).collect();
         let walk = Walk::new(&logs(&time), 0, STEP);
         assert_eq!(walk.len(), 200);
